@@ -1,0 +1,1 @@
+//! Models written in a study as equations (to be filled).

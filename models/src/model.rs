@@ -1,0 +1,64 @@
+//! The forward model: a state, its rate, what it shows, where it starts.
+//!
+//! A model does not know windows, data or observers: [`crate::simulator`] does. Next file to read: [`crate::native`] for the
+//! built-in models, [`crate::equations`] for models written in a study.
+
+use crate::{ParticleError, Spec};
+
+/// Access to input signals at other times than now, for delays.
+pub trait History {
+    /// Value of input `index` at time `t`; before the first sample, the first sample's value.
+    fn at(&self, index: usize, t: f64) -> f64;
+}
+
+/// The inputs of a model at one time.
+#[derive(Clone, Copy)]
+pub struct Drive<'a> {
+    /// Values, in the order of [`Spec::inputs`].
+    pub value: &'a [f64],
+    /// Time derivatives of the inputs on the current segment.
+    pub slope: &'a [f64],
+    /// The inputs at earlier times.
+    pub history: &'a dyn History,
+}
+
+/// A span of time on which every input is linear.
+#[derive(Clone, Copy)]
+pub struct Segment<'a> {
+    /// Start time.
+    pub t0: f64,
+    /// End time, `t1 > t0`.
+    pub t1: f64,
+    /// Input values at `t0`.
+    pub u0: &'a [f64],
+    /// Input slopes on the segment.
+    pub slope: &'a [f64],
+    /// The inputs at earlier times.
+    pub history: &'a dyn History,
+}
+
+/// A dynamical system dx/dt = f(t, x, θ, u), y = h(t, x, θ, u).
+///
+/// Slices: `x` and `dx` have [`Spec::n_state`] entries, `theta` one per [`Spec::parameters`], `y` [`Spec::n_output`].
+pub trait Model: Send + Sync {
+    /// What the model says of itself.
+    fn spec(&self) -> &Spec;
+
+    /// Writes the initial state for these parameters.
+    fn initial(&self, theta: &[f64], x: &mut [f64]);
+
+    /// Writes the rate of the state.
+    fn rhs(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, dx: &mut [f64]);
+
+    /// Writes the outputs.
+    fn output(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, y: &mut [f64]);
+
+    /// Advances `x` over one segment. The default integrates [`Model::rhs`] with an adaptive Dormand–Prince pair; a model
+    /// with a closed-form or structure-preserving step overrides it.
+    ///
+    /// # Errors
+    /// When the integrator cannot reach the segment's end.
+    fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ParticleError> {
+        crate::integrate::dopri5::advance(self, segment, theta, x, crate::integrate::Tolerance::default())
+    }
+}

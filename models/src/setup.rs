@@ -1,0 +1,88 @@
+//! What is sent to a worker once: the model, its constants, its observer and its effects, by name.
+//!
+//! These types are plain data (serde); building checks that they fit together. Next file to read: [`crate::catalogue`].
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::effect::EffectDef;
+use crate::equations::EquationsDef;
+
+/// The model by kind, with the values that are not estimated.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ModelDef {
+    /// A kind in the [`crate::catalogue`], or `equations`.
+    pub kind: String,
+    /// Fixed parameter values by name.
+    pub constants: BTreeMap<String, f64>,
+    /// The equations, when `kind` is `equations`.
+    pub equations: Option<EquationsDef>,
+}
+
+/// The observer by kind.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ObserverDef {
+    /// A kind in the list of [`crate::observer`], or `none`.
+    pub kind: String,
+    /// Gain in 1/time unit.
+    pub gain: f64,
+    /// Output → state that it corrects, where the model does not say so itself.
+    pub corrects: BTreeMap<String, String>,
+}
+
+/// Everything that stays the same over the jobs of one fit.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Setup {
+    /// The model.
+    pub model: ModelDef,
+    /// Names of the values in [`crate::Job::theta`]: model parameters, effect parameters, or `initial:<state>`.
+    pub parameters: Vec<String>,
+    /// Names of the predicted outputs, the rows of [`crate::Prediction::outputs`].
+    pub outputs: Vec<String>,
+    /// The observer.
+    pub observer: ObserverDef,
+    /// Effects added to the model.
+    pub effects: Vec<EffectDef>,
+}
+
+/// Why a setup does not make a model.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SetupError {
+    /// A name that the model, the catalogue or the effect list does not have.
+    #[error("no {what} named `{name}`{}", nearest.as_ref().map(|n| format!("; did you mean `{n}`?")).unwrap_or_default())]
+    Unknown {
+        /// `model`, `parameter`, `output`, `input`, `state`, `observer`, `effect` or `constant`.
+        what: &'static str,
+        /// The name given.
+        name: String,
+        /// The nearest valid name, if one is close.
+        nearest: Option<String>,
+    },
+    /// A model parameter that neither the constants nor the parameters give.
+    #[error("parameter `{name}` of model `{model}` has no value: add it to the model's constants or to the parameters")]
+    Missing {
+        /// The model's kind.
+        model: String,
+        /// The parameter.
+        name: String,
+    },
+    /// A name given twice.
+    #[error("`{0}` is given twice")]
+    Twice(String),
+    /// An expression that does not parse or uses what it may not.
+    #[error("in `{expression}` at column {column}: {message}")]
+    Expression {
+        /// Where the expression stands, such as `rate of v` or `effect overflow`.
+        place: String,
+        /// The expression's text.
+        expression: String,
+        /// Character position of the fault, from 1.
+        column: usize,
+        /// What is wrong and what was expected.
+        message: String,
+    },
+    /// Anything else that does not fit.
+    #[error("{0}")]
+    Invalid(String),
+}

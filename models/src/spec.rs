@@ -1,0 +1,145 @@
+//! What a model says of itself: its states, parameters, outputs and inputs, with units, ranges and physical roles.
+//!
+//! This file holds no behaviour. Next file to read: [`crate::model`].
+
+use serde::{Deserialize, Serialize};
+
+/// The physical meaning of a quantity; observers and effects find their place in a model by it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Role {
+    /// A displacement of a structure.
+    Displacement,
+    /// A velocity of a structure.
+    Velocity,
+    /// A liquid level.
+    Level,
+    /// A pressure.
+    Pressure,
+    /// A volume flow.
+    Flow,
+    /// A temperature.
+    Temperature,
+    /// A force.
+    Force,
+    /// A resistance to flow.
+    Resistance,
+    /// A compliance.
+    Compliance,
+    /// An inertance or a mass.
+    Inertia,
+    /// A stiffness.
+    Stiffness,
+    /// A damping coefficient.
+    Damping,
+    /// Anything else.
+    #[default]
+    Other,
+}
+
+/// One named quantity of a model: a state, a parameter, an output or an input.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Quantity {
+    /// Name, unique among the model's quantities of its kind.
+    pub name: String,
+    /// Unit label; empty when dimensionless or unknown.
+    pub unit: String,
+    /// Number of components: 1 for a scalar, n for a field.
+    pub size: usize,
+    /// Smallest and largest value that physics allows; infinite where it sets no bound.
+    pub range: [f64; 2],
+    /// Physical meaning.
+    pub role: Role,
+    /// Value used when neither the study's constants nor its parameters give one.
+    pub default: Option<f64>,
+    /// One plain sentence.
+    pub says: String,
+}
+
+impl Quantity {
+    /// A scalar quantity without bounds, default or role.
+    pub fn new(name: &str, unit: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+            size: 1,
+            range: [f64::NEG_INFINITY, f64::INFINITY],
+            role: Role::Other,
+            default: None,
+            says: String::new(),
+        }
+    }
+
+    /// The same quantity with a physical meaning.
+    #[must_use]
+    pub fn role(mut self, role: Role) -> Self {
+        self.role = role;
+        self
+    }
+
+    /// The same quantity restricted to `[lo, hi]`.
+    #[must_use]
+    pub fn range(mut self, lo: f64, hi: f64) -> Self {
+        self.range = [lo, hi];
+        self
+    }
+
+    /// The same quantity with a default value.
+    #[must_use]
+    pub fn default(mut self, value: f64) -> Self {
+        self.default = Some(value);
+        self
+    }
+
+    /// The same quantity with one sentence about it.
+    #[must_use]
+    pub fn says(mut self, sentence: &str) -> Self {
+        sentence.clone_into(&mut self.says);
+        self
+    }
+}
+
+/// What a model says of itself. Vectors of states and outputs are the concatenation of the quantities in this order.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Spec {
+    /// The `kind` by which a study names the model.
+    pub kind: String,
+    /// One plain sentence.
+    pub says: String,
+    /// State quantities.
+    pub states: Vec<Quantity>,
+    /// Parameters.
+    pub parameters: Vec<Quantity>,
+    /// Outputs that can be observed.
+    pub outputs: Vec<Quantity>,
+    /// Input signals that the model needs.
+    pub inputs: Vec<Quantity>,
+    /// For each output that measures one state (up to terms without state), the pair (output name, state name).
+    pub measures: Vec<(String, String)>,
+    /// Whether a run can start from a given state.
+    pub restart: bool,
+}
+
+impl Spec {
+    /// Number of state components.
+    pub fn n_state(&self) -> usize {
+        self.states.iter().map(|q| q.size).sum()
+    }
+
+    /// Number of output components.
+    pub fn n_output(&self) -> usize {
+        self.outputs.iter().map(|q| q.size).sum()
+    }
+
+    /// Position of the named quantity's first component in the concatenation of `list`.
+    pub fn offset(list: &[Quantity], name: &str) -> Option<usize> {
+        let mut at = 0;
+        for q in list {
+            if q.name == name {
+                return Some(at);
+            }
+            at += q.size;
+        }
+        None
+    }
+}
