@@ -1,2 +1,76 @@
-//! The command line of Starlings.
-fn main() {}
+//! The command line of Starlings: one file per command, nothing here computes.
+//!
+//! Exit code 0: done; 1: the run failed; 2: the input is wrong. With `--json` standard output holds the machine-readable
+//! result and nothing else; everything for people goes to standard error. Next file to read: [`run`].
+
+#![allow(clippy::print_stdout, clippy::print_stderr)]
+
+mod check;
+mod console;
+mod export;
+mod failure;
+mod models;
+mod progress;
+mod report;
+mod run;
+mod simulate;
+mod worker;
+
+use std::process::ExitCode;
+use std::time::Instant;
+
+use clap::{Parser, Subcommand};
+
+/// Estimates what a simulation does not know, on as many machines as you give it.
+///
+/// A study file names a forward model, a recording and the uncertain parameters. Every sigma point of the reduced-order
+/// unscented Kalman filter is one run of the model on one worker.
+#[derive(Parser)]
+#[command(name = "starlings", version, max_term_width = 100)]
+struct Cli {
+    /// More detail on standard error: -v for what the fleet does, -vv for every job.
+    #[arg(short, long, action = clap::ArgAction::Count, global = true)]
+    verbose: u8,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Estimate the parameters of a study and write a run folder.
+    Run(run::Args),
+    /// Validate a study and make one trial run of its model.
+    Check(check::Args),
+    /// Run the model forward with chosen values and noise: a twin experiment.
+    Simulate(simulate::Args),
+    /// Be a worker: dial a coordinator and run its jobs.
+    Worker(worker::Args),
+    /// List the built-in models, or describe one.
+    Models(models::Args),
+    /// Write the result files of a run folder again.
+    Report(report::Args),
+    /// Write a table of a run folder as CSV.
+    Export(export::Args),
+}
+
+fn main() -> ExitCode {
+    let started = Instant::now();
+    let cli = Cli::parse();
+    console::log_to_stderr(cli.verbose);
+    let outcome = match cli.command {
+        Command::Run(args) => run::run(&args, started),
+        Command::Check(args) => check::run(&args),
+        Command::Simulate(args) => simulate::run(&args),
+        Command::Worker(args) => worker::run(&args),
+        Command::Models(args) => models::run(&args),
+        Command::Report(args) => report::run(&args),
+        Command::Export(args) => export::run(&args),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            failure.print();
+            failure.code()
+        }
+    }
+}

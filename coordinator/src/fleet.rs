@@ -1,1 +1,56 @@
-//! (being written)
+//! The fleet: runs a batch of jobs on whatever workers there are and returns their outcomes in job order.
+//!
+//! [`dispatcher`] decides (pure: events in, commands out); [`GrpcFleet`] is the shell that carries its commands over the
+//! network; [`InProcess`] runs jobs on threads of this process; [`LocalWorkers`] keeps worker processes on this machine
+//! alive. Nothing here knows estimators, studies or stores, and nothing here retries with other parameters: a particle that
+//! no worker can finish is an [`Outcome`] whose result is an error. Next file to read: [`dispatcher`].
+
+pub mod dispatcher;
+mod error;
+mod event;
+mod grpc;
+mod hub;
+mod in_process;
+mod local_workers;
+mod service;
+
+pub use error::FleetError;
+pub use event::FleetEvent;
+pub use grpc::{FleetConfig, FleetHandle, GrpcFleet};
+pub use in_process::InProcess;
+pub use local_workers::{LocalConfig, LocalWorkers};
+pub use starlings_proto::SetupId;
+
+use starlings_models::{Job, ParticleError, Prediction, Setup};
+
+/// How one job of a batch ended.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcome {
+    /// The prediction, or why there is none.
+    pub result: Result<Prediction, ParticleError>,
+    /// How often the job was started; depends on the workers and must not enter an estimate.
+    pub attempts: u32,
+    /// The worker that answered last.
+    pub worker: String,
+}
+
+/// Anything that runs batches of jobs. Same jobs, same results, whatever runs them.
+pub trait Fleet {
+    /// Makes a setup known, to be named in [`Fleet::run`].
+    ///
+    /// # Errors
+    /// [`FleetError::SetupFailed`] when it cannot be built or sent.
+    fn install(&mut self, setup: &Setup) -> Result<SetupId, FleetError>;
+
+    /// Runs all jobs with one setup and returns one outcome per job, in job order.
+    ///
+    /// # Errors
+    /// A failure of the fleet: cancelled, no workers, a setup that no worker can build. A failed job is no error.
+    fn run(&mut self, setup: SetupId, jobs: Vec<Job>) -> Result<Vec<Outcome>, FleetError>;
+
+    /// Number of workers now.
+    fn n_workers(&self) -> usize;
+
+    /// Number of jobs that can run at the same time now.
+    fn slots(&self) -> usize;
+}

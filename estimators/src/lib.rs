@@ -1,1 +1,45 @@
-//! (being written)
+//! Estimation as pure functions: sigma points, the reduced-order unscented Kalman filter, the batch fit, diagnostics.
+//!
+//! What it deliberately does not do: it runs no model, reads no file, keeps no clock and starts no thread. It sees the
+//! predictions of the particles, never their states: the caller applies the transform of an analysis to whatever the
+//! states are (`recombine`). Everything here is in transformed parameters (see [`Transform`]), a particle is a column,
+//! and every reduction runs in a fixed order, so the same input gives the same bits.
+//!
+//! Read next: `sigma_set.rs` (where the particles are), then `roukf.rs` (what an analysis does with them).
+
+mod analysis;
+mod batch;
+mod data;
+mod diagnostics;
+mod drift;
+mod error;
+mod exchange;
+mod gaussian;
+mod information;
+mod linearisation;
+mod particles;
+mod recombine;
+mod roukf;
+mod sigma_set;
+mod smoother;
+mod stored;
+mod transform;
+mod whiten;
+
+pub use analysis::Analysis;
+pub use batch::{Batch, BatchState, BatchStep};
+pub use data::{Data, Noise};
+pub use diagnostics::{
+    autocorrelation, correlation, effective_sample_size, nis_band, noise_from_third_differences,
+};
+pub use drift::Drift;
+pub use error::EstimatorError;
+pub use exchange::exchange_prior;
+pub use gaussian::Gaussian;
+pub use linearisation::Linearisation;
+pub use particles::Particles;
+pub use recombine::recombine;
+pub use roukf::{Root, Roukf};
+pub use sigma_set::{Points, SigmaSet};
+pub use smoother::smooth;
+pub use transform::Transform;

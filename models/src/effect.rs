@@ -1,1 +1,84 @@
-//! (to write)
+//! An effect: a named, removable piece of physics that is added to a running model.
+//!
+//! At amplitude zero it is absent. It may enter several equations, outputs and inputs at once, carry several parameters and
+//! bring states of its own. Nothing here decides which effect a recording needs. Next file to read: [`def`] for what a study
+//! says, [`terms`] for how it is evaluated, [`extended`] for the model with its effects, [`library`] for the built-in list.
+
+pub mod def;
+pub mod extended;
+pub mod library;
+pub mod terms;
+
+use crate::Drive;
+
+pub use def::{Addition, EffectDef, EffectParameter, EffectState};
+pub use extended::Extended;
+pub use terms::TermEffect;
+
+/// One time of an extended model. Slices follow the extended specification; `y` holds the inner model's outputs without any
+/// effect, and is empty unless [`Touches::reads_outputs`].
+#[derive(Clone, Copy)]
+pub struct Moment<'a> {
+    /// Time.
+    pub t: f64,
+    /// The extended state.
+    pub x: &'a [f64],
+    /// The extended parameters.
+    pub theta: &'a [f64],
+    /// The recorded inputs, before any effect.
+    pub u: Drive<'a>,
+    /// The inner model's outputs.
+    pub y: &'a [f64],
+}
+
+/// Which parts of a model an effect enters; the wrapper keeps the inner model's exact step where it can.
+#[allow(clippy::struct_excessive_bools, reason = "a set of independent facts")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Touches {
+    /// It adds to a rate or brings states.
+    pub rates: bool,
+    /// It adds to an output.
+    pub outputs: bool,
+    /// It adds to an input.
+    pub inputs: bool,
+    /// One of its terms reads an output.
+    pub reads_outputs: bool,
+    /// A term that adds to an input reads a state.
+    pub inputs_follow_states: bool,
+}
+
+impl Touches {
+    /// What this effect or the other touches.
+    #[must_use]
+    pub fn or(self, other: Self) -> Self {
+        Self {
+            rates: self.rates || other.rates,
+            outputs: self.outputs || other.outputs,
+            inputs: self.inputs || other.inputs,
+            reads_outputs: self.reads_outputs || other.reads_outputs,
+            inputs_follow_states: self.inputs_follow_states || other.inputs_follow_states,
+        }
+    }
+}
+
+/// Adds physics to a model. Every method adds to what stands in the slice; none overwrites it, except an effect's own states.
+pub trait Effect: Send + Sync {
+    /// The definition.
+    fn def(&self) -> &EffectDef;
+
+    /// Which parts of the model it enters.
+    fn touches(&self) -> Touches;
+
+    /// Writes the initial values of its own states into the extended state `x`.
+    fn initial(&self, theta: &[f64], x: &mut [f64]);
+
+    /// Adds to the inputs' values `value` and to their time derivatives `slope`; `rate` is the rate of the extended state,
+    /// or empty where it does not matter.
+    fn add_to_inputs(&self, at: Moment<'_>, rate: &[f64], value: &mut [f64], slope: &mut [f64]);
+
+    /// Adds to the rates of the extended state.
+    fn add_to_rates(&self, at: Moment<'_>, dx: &mut [f64]);
+
+    /// Adds to the outputs.
+    fn add_to_outputs(&self, at: Moment<'_>, y: &mut [f64]);
+}

@@ -1,1 +1,20 @@
-//! Models written in a study as equations (to be filled).
+//! Models written in a study as equations: an expression language, and a [`crate::Model`] made of its expressions.
+//!
+//! It does not read study files: [`EquationsDef`] is plain data that a study parser fills. It does not integrate:
+//! [`crate::integrate`] does. Next file to read: [`expression`], then [`def`], then [`model`].
+
+mod affine;
+mod build;
+mod calculus;
+mod compile;
+pub mod def;
+pub mod expression;
+mod inline;
+pub mod model;
+mod node;
+mod parse;
+mod program;
+
+pub use def::{EquationsDef, InputDef, Method, OutputDef, SolverDef, StateDef};
+pub use expression::{At, Direction, Expression, ExpressionError, Program, Slot};
+pub use model::EquationsModel;

@@ -1,1 +1,72 @@
-//! (to write)
+//! Numerical integration of a model over one segment of linear inputs.
+//!
+//! One file per method: [`dopri5`] for smooth problems, [`rosenbrock`] for stiff ones, [`fixed`] for a step that never
+//! adapts. The step control, the location of switching points and sliding along them are shared by the adaptive methods.
+//! Nothing here keeps memory between segments, so that a run depends on its job only. Next file to read: [`dopri5`].
+
+mod control;
+pub mod dopri5;
+mod events;
+pub mod fixed;
+pub mod rosenbrock;
+mod sliding;
+mod system;
+
+use crate::model::Segment;
+use crate::{Model, ParticleError};
+
+/// How exact a step must be: its error estimate stays below `absolute + relative · |x|` in the root mean square.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tolerance {
+    /// Relative tolerance.
+    pub relative: f64,
+    /// Absolute tolerance, in each state's unit.
+    pub absolute: f64,
+}
+
+impl Default for Tolerance {
+    fn default() -> Self {
+        Self { relative: 1e-8, absolute: 1e-10 }
+    }
+}
+
+/// Which method integrates a model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Solver {
+    /// Dormand–Prince, going over to Rosenbrock for the rest of a segment that turns out stiff.
+    Auto(Tolerance),
+    /// Dormand–Prince 5(4).
+    Dopri5(Tolerance),
+    /// Rosenbrock 4(3).
+    Rosenbrock(Tolerance),
+    /// Classic Runge–Kutta in equal steps no longer than `step`.
+    Fixed {
+        /// Longest step, in the study's time unit.
+        step: f64,
+    },
+}
+
+impl Default for Solver {
+    fn default() -> Self {
+        Self::Dopri5(Tolerance::default())
+    }
+}
+
+/// Advances `x` over the segment by the chosen method.
+///
+/// # Errors
+/// [`ParticleError::TooManySteps`], [`ParticleError::StepTooSmall`] or [`ParticleError::NotFinite`], with the time reached.
+pub fn advance<M: Model + ?Sized>(
+    model: &M,
+    solver: Solver,
+    segment: Segment<'_>,
+    theta: &[f64],
+    x: &mut [f64],
+) -> Result<(), ParticleError> {
+    match solver {
+        Solver::Auto(tolerance) => control::auto(model, segment, theta, x, tolerance),
+        Solver::Dopri5(tolerance) => dopri5::advance(model, segment, theta, x, tolerance),
+        Solver::Rosenbrock(tolerance) => rosenbrock::advance(model, segment, theta, x, tolerance),
+        Solver::Fixed { step } => fixed::advance(model, segment, theta, x, step),
+    }
+}

@@ -6,21 +6,27 @@
 //!
 //! Next file to read: [`job`], then [`model`], then [`simulator`].
 
+mod binding;
+mod bounds;
 pub mod catalogue;
 pub mod effect;
 pub mod equations;
+mod inputs;
 pub mod integrate;
 pub mod job;
 pub mod model;
 pub mod native;
+mod nearest;
 pub mod observer;
 pub mod setup;
 pub mod simulator;
 pub mod spec;
 
-pub use effect::Effect;
+pub use effect::{Effect, EffectDef};
 pub use job::{Forward, Job, ParticleError, Prediction, Signal, Window};
 pub use model::{Drive, Model};
+pub use nearest::nearest;
 pub use observer::Observer;
 pub use setup::{ModelDef, ObserverDef, Setup, SetupError};
+pub use simulator::Simulator;
 pub use spec::{Quantity, Role, Spec};

@@ -3,6 +3,7 @@
 //! A model does not know windows, data or observers: [`crate::simulator`] does. Next file to read: [`crate::native`] for the
 //! built-in models, [`crate::equations`] for models written in a study.
 
+use crate::integrate::{self, Solver};
 use crate::{ParticleError, Spec};
 
 /// Access to input signals at other times than now, for delays.
@@ -53,12 +54,35 @@ pub trait Model: Send + Sync {
     /// Writes the outputs.
     fn output(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, y: &mut [f64]);
 
-    /// Advances `x` over one segment. The default integrates [`Model::rhs`] with an adaptive Dormand–Prince pair; a model
-    /// with a closed-form or structure-preserving step overrides it.
+    /// Which integrator the default [`Model::advance`] uses.
+    fn solver(&self) -> Solver {
+        Solver::default()
+    }
+
+    /// Number of switching functions; a model that wraps another adds its own to the inner model's.
+    fn n_switch(&self) -> usize {
+        0
+    }
+
+    /// Writes the switching functions: the rate may jump or have a kink where one of them changes sign, and the integrators
+    /// restart there.
+    fn switches(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, g: &mut [f64]) {
+        let _ = (t, x, theta, u, g);
+    }
+
+    /// Writes ∂f/∂x (n × n, column by column) and the rate's time derivative at fixed state, inputs moving by their slopes;
+    /// says whether it did. Without it a stiff integrator takes finite differences.
+    fn jacobian(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, dfdx: &mut [f64], dfdt: &mut [f64]) -> bool {
+        let _ = (t, x, theta, u, dfdx, dfdt);
+        false
+    }
+
+    /// Advances `x` over one segment. The default integrates [`Model::rhs`] as [`Model::solver`] says; a model with a
+    /// closed-form or structure-preserving step overrides it.
     ///
     /// # Errors
     /// When the integrator cannot reach the segment's end.
     fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ParticleError> {
-        crate::integrate::dopri5::advance(self, segment, theta, x, crate::integrate::Tolerance::default())
+        integrate::advance(self, self.solver(), segment, theta, x)
     }
 }

@@ -1,1 +1,82 @@
-//! (to write)
+//! Luenberger observers: after a prediction is recorded, they pull the state towards the same time's observation.
+//!
+//! An observer never sees a datum before its prediction is recorded; [`crate::simulator`] holds that order. Observers that
+//! need a mesh or an operator of the model are not here. Next file to read: [`nudging`].
+
+pub mod none;
+pub mod nudging;
+
+use crate::setup::{ObserverDef, SetupError};
+use crate::{Spec, nearest};
+
+pub use none::None;
+pub use nudging::Nudging;
+
+/// What an observer corrects with: one observation time.
+#[derive(Clone, Copy, Debug)]
+pub struct Correction<'a> {
+    /// Observation time.
+    pub t: f64,
+    /// Time since the previous observation of the window, or since its start; positive.
+    pub dt: f64,
+    /// Observed values, one per row of the predicted outputs; NaN where nothing was measured or it is held out.
+    pub observed: &'a [f64],
+    /// Predicted values, as recorded before this correction.
+    pub predicted: &'a [f64],
+}
+
+/// Corrects a state by what was observed.
+pub trait Observer: Send + Sync {
+    /// Corrects the state `x` in place.
+    fn correct(&self, at: Correction<'_>, x: &mut [f64]);
+}
+
+/// What an observer is built against.
+#[derive(Clone, Copy)]
+pub struct Wiring<'a> {
+    /// The model's specification, effects included.
+    pub spec: &'a Spec,
+    /// Names of the observed outputs, in the order of the rows.
+    pub outputs: &'a [String],
+}
+
+/// Makes an observer from its definition.
+pub type Build = fn(&ObserverDef, Wiring<'_>) -> Result<Box<dyn Observer>, SetupError>;
+
+/// One observer of the list.
+pub struct Kind {
+    /// The `kind` by which a study names it.
+    pub kind: &'static str,
+    /// One plain sentence.
+    pub says: &'static str,
+    /// Makes it.
+    pub build: Build,
+}
+
+/// Every observer.
+pub fn kinds() -> Vec<Kind> {
+    vec![none::KIND, nudging::KIND]
+}
+
+/// Makes the observer that the definition names; an empty kind is `none`.
+///
+/// # Errors
+/// When the kind is unknown, the gain is not a finite number ≥ 0, or the observer finds nothing to correct.
+pub fn build(def: &ObserverDef, wiring: Wiring<'_>) -> Result<Box<dyn Observer>, SetupError> {
+    let wanted = if def.kind.is_empty() { none::KIND.kind } else { def.kind.as_str() };
+    let kinds = kinds();
+    let Some(kind) = kinds.iter().find(|k| k.kind == wanted) else {
+        return Err(SetupError::Unknown {
+            what: "observer",
+            name: def.kind.clone(),
+            nearest: nearest(wanted, kinds.iter().map(|k| k.kind)),
+        });
+    };
+    if !def.gain.is_finite() || def.gain < 0.0 {
+        return Err(SetupError::Invalid(format!(
+            "the observer's gain is {}: give a finite number, zero or above",
+            def.gain
+        )));
+    }
+    (kind.build)(def, wiring)
+}

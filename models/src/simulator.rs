@@ -1,1 +1,172 @@
-//! (to write)
+//! Runs a model over a window: predict, record, then correct.
+//!
+//! For each observation time: advance over the spans on which the inputs are linear, record the outputs, and only then let
+//! the observer see the observed values of that same time. No clock and no randomness: same job, same bits. A run over
+//! consecutive windows equals one run over the whole. Next file to read: [`crate::inputs`], then [`crate::binding`].
+
+use crate::binding::Binding;
+use crate::inputs::Inputs;
+use crate::observer::{self, Correction, Observer, Wiring};
+use crate::setup::{Setup, SetupError};
+use crate::{Forward, Job, Model, ParticleError, Prediction, Quantity, Spec, Window, nearest};
+
+/// A model, its observer, and the way from a job's values to its parameters.
+pub struct Simulator {
+    model: Box<dyn Model>,
+    observer: Box<dyn Observer>,
+    binding: Binding,
+    /// For each predicted row, the output component behind it.
+    rows: Vec<usize>,
+}
+
+impl Simulator {
+    /// Builds the model, the effects and the observer of a setup and resolves every name.
+    ///
+    /// # Errors
+    /// When a name is unknown (with the nearest valid one), given twice or without value, or an expression is wrong.
+    pub fn new(setup: &Setup) -> Result<Self, SetupError> {
+        let model = setup.model()?;
+        let spec = model.spec();
+        let rows = rows(spec, &setup.outputs)?;
+        let binding = Binding::new(setup, spec, &crate::effect::terms::names(&setup.effects)?)?;
+        let observer = observer::build(&setup.observer, Wiring { spec, outputs: &setup.outputs })?;
+        Ok(Self { model, observer, binding, rows })
+    }
+
+    /// The state at the window's start.
+    fn start(&self, job: &Job, theta: &[f64]) -> Result<Vec<f64>, ParticleError> {
+        let n = self.spec().n_state();
+        if let Some(x) = &job.state {
+            if x.len() != n {
+                return Err(bad(format!("{} state values for a model of {n}", x.len())));
+            }
+            return Ok(x.clone());
+        }
+        let mut x = vec![0.0; n];
+        self.model.initial(theta, &mut x);
+        self.binding.initial(&job.theta, &mut x);
+        Ok(x)
+    }
+
+    /// Refuses a job whose lengths or times do not fit.
+    fn check(&self, job: &Job) -> Result<(), ParticleError> {
+        let window = &*job.window;
+        let (given, wanted) = (job.theta.len(), self.binding.len());
+        if given != wanted {
+            return Err(bad(format!("{given} parameter values for {wanted} parameters")));
+        }
+        let (given, wanted) = (window.observed.len(), self.rows.len() * window.times.len());
+        if given != wanted {
+            return Err(bad(format!("{given} observed values where outputs times times make {wanted}")));
+        }
+        let (given, wanted) = (window.inputs.len(), self.spec().inputs.len());
+        if given != wanted {
+            return Err(bad(format!("{given} input signals for a model with {wanted}")));
+        }
+        for (signal, input) in window.inputs.iter().zip(&self.spec().inputs) {
+            if signal.times.len() != signal.values.len() || signal.times.is_empty() {
+                let (times, values) = (signal.times.len(), signal.values.len());
+                return Err(bad(format!("input `{}` has {times} times and {values} values", input.name)));
+            }
+        }
+        check_times(window)
+    }
+
+    /// The first quantity that is not finite, as an error. A wrong input is named before what it spoils.
+    fn check_finite(&self, t: f64, u: &[f64], x: &[f64], y: &[f64]) -> Result<(), ParticleError> {
+        if x.iter().chain(y).all(|value| value.is_finite()) {
+            return Ok(());
+        }
+        let spec = self.spec();
+        let lists =
+            [("input", &spec.inputs, u), ("state", &spec.states, x), ("output", &spec.outputs, y)];
+        let found = lists.iter().find_map(|(what, list, values)| {
+            let at = values.iter().position(|value| !value.is_finite())?;
+            Some(format!("{what} `{}`", component_name(list, at)))
+        });
+        Err(ParticleError::NotFinite { what: found.unwrap_or_default(), time: t })
+    }
+}
+
+impl Forward for Simulator {
+    fn spec(&self) -> &Spec {
+        self.model.spec()
+    }
+
+    fn run(&self, job: &Job) -> Result<Prediction, ParticleError> {
+        self.check(job)?;
+        let window = &*job.window;
+        let theta = self.binding.theta(&job.theta, window.start)?;
+        let mut x = self.start(job, &theta)?;
+        let mut y = vec![0.0; self.spec().n_output()];
+        let mut outputs = Vec::with_capacity(window.observed.len());
+        let mut inputs = Inputs::new(window);
+        let n_obs = self.rows.len();
+        let mut previous = window.start;
+        for (j, &t) in window.times.iter().enumerate() {
+            inputs.walk(previous, t, |segment| self.model.advance(segment, &theta, &mut x))?;
+            let drive = inputs.drive(t);
+            self.model.output(t, &x, &theta, drive, &mut y);
+            self.check_finite(t, drive.value, &x, &y)?;
+            outputs.extend(self.rows.iter().map(|&row| y[row]));
+            let dt = t - previous;
+            if dt > 0.0 {
+                let column = j * n_obs..(j + 1) * n_obs;
+                let (observed, predicted) = (&window.observed[column.clone()], &outputs[column]);
+                self.observer.correct(Correction { t, dt, observed, predicted }, &mut x);
+            }
+            previous = t;
+        }
+        self.check_finite(previous, &[], &x, &[])?;
+        Ok(Prediction { outputs, state: x, cost: 0.0 })
+    }
+}
+
+/// Refuses a window without times, with times out of order or before its start.
+fn check_times(window: &Window) -> Result<(), ParticleError> {
+    let Some(&first) = window.times.first() else {
+        return Err(bad("a window without observation times".to_owned()));
+    };
+    if !window.start.is_finite() || !window.times.iter().all(|t| t.is_finite()) {
+        return Err(bad("a window with a time that is not finite".to_owned()));
+    }
+    if first < window.start || !window.times.is_sorted_by(|a, b| a < b) {
+        return Err(bad("observation times must increase from the window's start".to_owned()));
+    }
+    Ok(())
+}
+
+fn bad(message: String) -> ParticleError {
+    ParticleError::BadJob(message)
+}
+
+/// The output components behind the named outputs, in their order.
+fn rows(spec: &Spec, outputs: &[String]) -> Result<Vec<usize>, SetupError> {
+    let mut rows = Vec::new();
+    for (i, name) in outputs.iter().enumerate() {
+        if outputs[..i].contains(name) {
+            return Err(SetupError::Twice(name.clone()));
+        }
+        let size = spec.outputs.iter().find(|q| q.name == *name).map(|q| q.size);
+        let Some((first, size)) = Spec::offset(&spec.outputs, name).zip(size) else {
+            return Err(SetupError::Unknown {
+                what: "output",
+                name: name.clone(),
+                nearest: nearest(name, spec.outputs.iter().map(|q| &q.name)),
+            });
+        };
+        rows.extend(first..first + size);
+    }
+    Ok(rows)
+}
+
+/// The name of component `at` in the concatenation of `list`, with its index in a field.
+fn component_name(list: &[Quantity], mut at: usize) -> String {
+    for q in list {
+        if at < q.size {
+            return if q.size == 1 { q.name.clone() } else { format!("{}[{at}]", q.name) };
+        }
+        at -= q.size;
+    }
+    String::new()
+}

@@ -47,6 +47,7 @@ pub struct Quantity {
     /// Number of components: 1 for a scalar, n for a field.
     pub size: usize,
     /// Smallest and largest value that physics allows; infinite where it sets no bound.
+    #[serde(with = "crate::bounds")]
     pub range: [f64; 2],
     /// Physical meaning.
     pub role: Role,
@@ -82,6 +83,23 @@ impl Quantity {
     pub fn range(mut self, lo: f64, hi: f64) -> Self {
         self.range = [lo, hi];
         self
+    }
+
+    /// The same quantity restricted to values above zero.
+    #[must_use]
+    pub fn positive(self) -> Self {
+        self.range(f64::MIN_POSITIVE, f64::INFINITY)
+    }
+
+    /// The range in words of a table: `> 0`, `>= 1`, `<= 2`, `1 to 2`, or `any`.
+    pub fn range_text(&self) -> String {
+        match self.range {
+            [lo, hi] if lo.is_infinite() && hi.is_infinite() => "any".to_owned(),
+            [lo, hi] if lo > 0.0 && lo <= f64::MIN_POSITIVE && hi.is_infinite() => "> 0".to_owned(),
+            [lo, hi] if hi.is_infinite() => format!(">= {lo}"),
+            [lo, hi] if lo.is_infinite() => format!("<= {hi}"),
+            [lo, hi] => format!("{lo} to {hi}"),
+        }
     }
 
     /// The same quantity with a default value.
@@ -141,5 +159,26 @@ impl Spec {
             at += q.size;
         }
         None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_quantity_survives_json_with_its_open_range() {
+        let quantity = Quantity::new("R", "mmHg s/mL").positive().role(Role::Resistance).default(1.5);
+        let text = serde_json::to_string(&quantity).unwrap();
+        assert_eq!(serde_json::from_str::<Quantity>(&text).unwrap(), quantity, "{text}");
+    }
+
+    #[test]
+    fn a_range_reads_as_a_table_entry() {
+        let text = |lo, hi| Quantity::new("a", "").range(lo, hi).range_text();
+        assert_eq!(Quantity::new("a", "").positive().range_text(), "> 0");
+        assert_eq!(text(0.0, f64::INFINITY), ">= 0");
+        assert_eq!(text(-1.0, 2.5), "-1 to 2.5");
+        assert_eq!(text(f64::NEG_INFINITY, f64::INFINITY), "any");
     }
 }

@@ -1,1 +1,33 @@
-//! (being written)
+//! The wire between the coordinator and its workers.
+//!
+//! `proto/fleet.proto` says what travels, in which unit and shape. [`wire`] is generated from it and nobody looks inside:
+//! [`convert`] is the only place that checks and translates. No socket and no scheduling here. Next file to read:
+//! [`convert`].
+
+pub mod convert;
+
+pub use convert::{
+    Answer, FromWorker, Hello, JobEncoder, Lease, SetupId, ToWorker, Welcome, WireError, decode_setup, digest,
+    encode_setup,
+};
+
+/// Number of the protocol; coordinator and worker must have the same.
+pub const PROTOCOL: u32 = 1;
+
+/// Largest state that travels inside a job or a prediction, bytes.
+pub const MAX_INLINE_STATE: usize = 256 * 1024;
+
+/// Largest message either side accepts, bytes.
+pub const MAX_MESSAGE: usize = 16 * 1024 * 1024;
+
+/// HTTP/2 frame size either side accepts, bytes; the default of 16 KiB halves the transport rate of large windows.
+pub const FRAME_SIZE: u32 = 256 * 1024;
+
+/// Package version sent in [`Hello`]; unequal versions are refused, since they may not give the same bits.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// Types and service stubs generated from `proto/fleet.proto`.
+#[allow(missing_docs, unreachable_pub, clippy::all, clippy::pedantic, rust_2018_idioms)]
+pub mod wire {
+    tonic::include_proto!("starlings.fleet.v1");
+}

@@ -1,0 +1,362 @@
+//! Decides which worker runs which job: events in, commands out. No socket, clock or lock; time is only what events bring.
+//!
+//! Rules. A job is given under a lease (stream, job, attempt); an answer without a valid lease is ignored. Jobs go to the
+//! least loaded worker, so that few jobs spread over all slots. A worker holds two jobs per slot when they are long, up to
+//! 64 when they are shorter than a message's way. At the end of a batch, jobs that wait behind a busy slot are recalled for
+//! an idle one. A lost worker's leases go back to the queue; the jobs it was running count an attempt. A model's failure is
+//! tried once more on another worker. The order of outcomes is the order of jobs, whatever happened.
+//!
+//! Not here: what a job contains, the wire, other parameters for a failed particle. Next files to read: [`message`] for
+//! events and commands, [`roster`] for workers, [`batch`] for jobs.
+
+pub mod batch;
+pub mod message;
+pub mod roster;
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use starlings_models::ParticleError;
+use starlings_proto::{Answer, Lease, SetupId};
+
+use super::FleetEvent;
+use batch::{Batch, JobName, Lost};
+pub use message::{BatchError, Command, Event, Joining, WorkerId};
+use roster::{SetupState, Worker};
+
+/// First notice of a batch that waits, seconds after it began to wait; each later one after twice as long.
+const FIRST_NOTICE: Duration = Duration::from_secs(2);
+
+/// The numbers that the rules need.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rules {
+    /// Time between heartbeats; a worker silent for twice as long is lost.
+    pub heartbeat: Duration,
+    /// How long a batch may wait without any worker that can take a job.
+    pub patience: Duration,
+    /// How many workers may be lost under one job before it is given up.
+    pub max_attempts: u32,
+}
+
+/// The decisions of a fleet. One batch at a time.
+#[derive(Debug)]
+pub struct Dispatcher {
+    rules: Rules,
+    workers: BTreeMap<WorkerId, Worker>,
+    batch: Option<Batch>,
+    next_job: u64,
+    last_setup: Option<SetupId>,
+    last_tick: Option<Duration>,
+    starved: Option<Starved>,
+    out: Vec<Command>,
+}
+
+/// Since when no worker can take a job, and when to say so next.
+#[derive(Clone, Copy, Debug)]
+struct Starved {
+    since: Duration,
+    next_notice: Duration,
+}
+
+impl Dispatcher {
+    /// A dispatcher without workers or jobs.
+    pub fn new(rules: Rules) -> Self {
+        Self {
+            rules,
+            workers: BTreeMap::new(),
+            batch: None,
+            next_job: 1,
+            last_setup: None,
+            last_tick: None,
+            starved: None,
+            out: Vec::new(),
+        }
+    }
+
+    /// Number of workers.
+    pub fn n_workers(&self) -> usize {
+        self.workers.len()
+    }
+
+    /// Number of slots of all workers.
+    pub fn slots(&self) -> usize {
+        self.workers.values().map(|w| w.slots).sum()
+    }
+
+    /// Number of leases that a worker holds.
+    pub fn in_flight(&self, worker: WorkerId) -> usize {
+        self.workers.get(&worker).map_or(0, Worker::load)
+    }
+
+    /// Takes one event at time `now` (any fixed origin) and returns what has to be done about it.
+    pub fn step(&mut self, now: Duration, event: Event) -> Vec<Command> {
+        match event {
+            Event::Joined(joining) => self.joined(now, joining),
+            Event::Left { worker, reason, clean } => self.lose(worker, &reason, clean),
+            Event::Heard { worker } => self.heard(now, worker),
+            Event::SetupDone { worker, setup } => self.setup_answered(now, worker, setup, SetupState::Ready),
+            Event::SetupFailed { worker, setup, reason } => {
+                self.setup_answered(now, worker, setup, SetupState::Failed(reason));
+            }
+            Event::Submit { setup, jobs } => self.submit(setup, jobs),
+            Event::Answered { worker, lease, answer, cost } => self.answered(now, worker, lease, answer, cost),
+            Event::Tick => self.tick(now),
+            Event::Abort(error) => self.abort(error),
+        }
+        self.proceed();
+        std::mem::take(&mut self.out)
+    }
+
+    fn joined(&mut self, now: Duration, joining: Joining) {
+        let twin = self.workers.values().find(|w| w.nonce == joining.nonce).map(|w| w.id);
+        if let Some(id) = twin {
+            self.out.push(Command::Close { worker: id, reason: "its process connected again".to_owned() });
+            self.lose(id, "its process connected again", true);
+        }
+        let mut worker = Worker::new(&joining, now);
+        self.out.push(Command::Notice(joining.notice()));
+        if let Some(batch) = &self.batch {
+            worker.setups.insert(batch.setup, SetupState::Pending);
+            self.out.push(Command::SendSetup { worker: worker.id, setup: batch.setup });
+        }
+        self.workers.insert(worker.id, worker);
+    }
+
+    fn heard(&mut self, now: Duration, worker: WorkerId) {
+        if let Some(worker) = self.workers.get_mut(&worker) {
+            worker.last_heard = now;
+        }
+    }
+
+    /// Takes a worker out and returns its leases to the queue. A clean leave counts no attempt.
+    fn lose(&mut self, id: WorkerId, reason: &str, clean: bool) {
+        let Some(worker) = self.workers.remove(&id) else { return };
+        let mut requeued = 0;
+        let leases = worker.leases_in_order();
+        for (position, job) in leases.into_iter().enumerate() {
+            let Some(batch) = &mut self.batch else { break };
+            let Some(index) = batch.index_of(job) else { continue };
+            let counted = !clean && position < worker.slots;
+            let why = format!("{} was lost: {reason}", worker.name);
+            match batch.lost(index, counted, self.rules.max_attempts, &worker.name, &why) {
+                Lost::Requeued => {
+                    requeued += 1;
+                    if counted {
+                        self.out.push(Command::Notice(batch.retried(index, &worker.name, &why)));
+                    }
+                }
+                Lost::GivenUp => self.out.push(Command::Notice(batch.failed(index))),
+            }
+        }
+        let notice = FleetEvent::WorkerLeft { worker: worker.name, reason: reason.to_owned(), requeued };
+        self.out.push(Command::Notice(notice));
+    }
+
+    fn setup_answered(&mut self, now: Duration, id: WorkerId, setup: SetupId, state: SetupState) {
+        let Some(worker) = self.workers.get_mut(&id) else { return };
+        worker.last_heard = now;
+        if let SetupState::Failed(reason) = &state {
+            let notice = FleetEvent::SetupFailed { worker: worker.name.clone(), reason: reason.clone() };
+            self.out.push(Command::Notice(notice));
+        }
+        worker.setups.insert(setup, state);
+    }
+
+    fn submit(&mut self, setup: SetupId, jobs: Vec<JobName>) {
+        self.abort(BatchError::Cancelled);
+        if self.last_setup != Some(setup) {
+            self.workers.values_mut().for_each(Worker::forget_cost);
+            self.last_setup = Some(setup);
+        }
+        for worker in self.workers.values_mut() {
+            // A setup that failed is tried again: what was missing on that host may be there now.
+            if !matches!(worker.setups.get(&setup), Some(SetupState::Ready | SetupState::Pending)) {
+                worker.setups.insert(setup, SetupState::Pending);
+                self.out.push(Command::SendSetup { worker: worker.id, setup });
+            }
+        }
+        let n = jobs.len() as u64;
+        self.batch = Some(Batch::new(setup, self.next_job, jobs));
+        self.next_job += n;
+    }
+
+    fn answered(&mut self, now: Duration, id: WorkerId, lease: Lease, answer: Answer, cost: f64) {
+        let Some(worker) = self.workers.get_mut(&id) else { return };
+        worker.last_heard = now;
+        let valid = lease.epoch == id.0 && worker.release(lease.job, lease.attempt);
+        let index = self.batch.as_ref().and_then(|batch| batch.index_of(lease.job));
+        let (true, Some(index), Some(batch)) = (valid, index, &mut self.batch) else {
+            if matches!(answer, Answer::Ran(_)) {
+                let notice = FleetEvent::LateAnswer { worker: worker.name.clone(), job: lease.job };
+                self.out.push(Command::Notice(notice));
+            }
+            return;
+        };
+        match answer {
+            Answer::Withdrawn => batch.withdrawn(index),
+            Answer::Ran(Ok(prediction)) => {
+                worker.learn_cost(cost);
+                batch.finish(index, Ok(prediction), &worker.name);
+            }
+            Answer::Ran(Err(error)) => self.model_failed(id, index, error),
+        }
+    }
+
+    fn model_failed(&mut self, id: WorkerId, index: usize, error: ParticleError) {
+        let Some(batch) = &mut self.batch else { return };
+        let name = self.workers.get(&id).map_or("", |w| w.name.as_str());
+        let setup = batch.setup;
+        let other = self.workers.values().any(|w| w.id != id && w.may_run(&setup));
+        if other && batch.may_retry(index) {
+            self.out.push(Command::Notice(batch.retried(index, name, &error.to_string())));
+            batch.retry_elsewhere(index, id, error, name);
+        } else {
+            batch.finish(index, Err(error), name);
+            self.out.push(Command::Notice(batch.failed(index)));
+        }
+    }
+
+    fn abort(&mut self, error: BatchError) {
+        let Some(batch) = self.batch.take() else { return };
+        for worker in self.workers.values() {
+            let leases = worker.leases().filter(|l| batch.index_of(l.job).is_some()).collect::<Vec<_>>();
+            if !leases.is_empty() {
+                self.out.push(Command::Cancel { worker: worker.id, leases });
+            }
+        }
+        self.starved = None;
+        self.out.push(Command::BatchFailed(error));
+    }
+
+    fn tick(&mut self, now: Duration) {
+        let gap = now.saturating_sub(self.last_tick.unwrap_or(now));
+        self.last_tick = Some(now);
+        if gap > self.rules.heartbeat {
+            // This process stood still (suspended, or starved of processor time): what workers sent meanwhile is unread.
+            self.workers.values_mut().for_each(|w| w.last_heard = (w.last_heard + gap).min(now));
+        }
+        let limit = self.rules.heartbeat * 2;
+        let silent = self.workers.values().filter(|w| now.saturating_sub(w.last_heard) > limit);
+        for id in silent.map(|w| w.id).collect::<Vec<_>>() {
+            let reason = format!("silent for more than {:.0} s", limit.as_secs_f64());
+            self.out.push(Command::Close { worker: id, reason: reason.clone() });
+            self.lose(id, &reason, false);
+        }
+        if let Some(progress) = self.batch.as_mut().and_then(Batch::progress) {
+            self.out.push(Command::Notice(progress));
+        }
+        self.watch_starvation(now);
+    }
+
+    /// Says what is missing while no worker can take a job, and ends the batch when patience does.
+    fn watch_starvation(&mut self, now: Duration) {
+        let Some(batch) = &self.batch else { return };
+        if self.workers.values().any(|w| w.is_ready(&batch.setup)) {
+            self.starved = None;
+            return;
+        }
+        let starved = self.starved.get_or_insert(Starved { since: now, next_notice: FIRST_NOTICE });
+        let waited = now.saturating_sub(starved.since);
+        let names = self.workers.values().map(|w| w.name.as_str()).collect::<Vec<_>>().join(", ");
+        let missing = if names.is_empty() {
+            "no worker is connected".to_owned()
+        } else {
+            format!("the model is still being built by {names}")
+        };
+        if waited >= self.rules.patience {
+            self.abort(BatchError::NoWorkers { waited, missing });
+        } else if waited >= starved.next_notice {
+            starved.next_notice *= 2;
+            let notice = FleetEvent::Waiting { seconds: waited.as_secs_f64(), missing };
+            self.out.push(Command::Notice(notice));
+        }
+    }
+
+    /// Everything that may follow from any event: settle, give out, recall, end.
+    fn proceed(&mut self) {
+        self.fail_without_setup();
+        self.settle_failures();
+        self.give_out();
+        self.recall();
+        if self.batch.as_ref().is_some_and(Batch::is_done) {
+            if let Some(batch) = self.batch.take() {
+                self.starved = None;
+                self.out.push(Command::BatchDone(batch.into_outcomes()));
+            }
+        }
+    }
+
+    fn fail_without_setup(&mut self) {
+        let Some(batch) = &self.batch else { return };
+        if batch.is_done() || self.workers.is_empty() || self.workers.values().any(|w| w.may_run(&batch.setup)) {
+            return;
+        }
+        let mut reasons = Vec::<String>::new();
+        for worker in self.workers.values() {
+            if let Some(SetupState::Failed(reason)) = worker.setups.get(&batch.setup) {
+                if !reasons.contains(reason) {
+                    reasons.push(reason.clone());
+                }
+            }
+        }
+        self.abort(BatchError::SetupFailed { reason: reasons.join("; ") });
+    }
+
+    /// Ends the failed jobs that wait for another worker when there is none.
+    fn settle_failures(&mut self) {
+        let Some(batch) = &mut self.batch else { return };
+        for avoided in batch.avoided() {
+            let other = self.workers.values().any(|w| w.id != avoided && w.may_run(&batch.setup));
+            if !other {
+                for index in batch.settle(avoided) {
+                    self.out.push(Command::Notice(batch.failed(index)));
+                }
+            }
+        }
+    }
+
+    fn give_out(&mut self) {
+        let Some(batch) = &mut self.batch else { return };
+        let setup = batch.setup;
+        for avoided in batch.retry_keys() {
+            while batch.has_retry(avoided) {
+                let Some(worker) = roster::least_loaded(&mut self.workers, &setup, avoided) else { break };
+                let Some(index) = batch.next_retry(avoided) else { break };
+                self.out.push(lease(worker, batch, index));
+            }
+        }
+        while batch.has_fresh() {
+            let Some(worker) = roster::least_loaded(&mut self.workers, &setup, None) else { break };
+            let Some(index) = batch.next_fresh() else { break };
+            self.out.push(lease(worker, batch, index));
+        }
+    }
+
+    /// Calls back jobs that wait behind a busy slot while another slot is idle and the queue is empty.
+    fn recall(&mut self) {
+        let Some(batch) = &mut self.batch else { return };
+        if batch.has_waiting() {
+            return;
+        }
+        let ready = || self.workers.values().filter(|w| w.is_ready(&batch.setup));
+        let idle: usize = ready().map(|w| w.slots.saturating_sub(w.load())).sum();
+        let mut open = idle.saturating_sub(ready().map(Worker::n_recalled).sum());
+        while open > 0 {
+            let Some(victim) = self.workers.values_mut().filter(|w| w.surplus() > 0).max_by_key(|w| w.surplus()) else {
+                break;
+            };
+            let Some(held) = victim.youngest(|job| batch.may_recall(job)) else { break };
+            batch.mark_recalled(held.job);
+            self.out.push(Command::Cancel { worker: victim.id, leases: vec![held] });
+            open -= 1;
+        }
+    }
+}
+
+fn lease(worker: &mut Worker, batch: &mut Batch, index: usize) -> Command {
+    let lease = Lease { epoch: worker.id.0, job: batch.job_number(index), attempt: batch.start(index) };
+    worker.hold(lease);
+    Command::SendJob { worker: worker.id, lease, index }
+}

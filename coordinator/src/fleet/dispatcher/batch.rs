@@ -1,0 +1,217 @@
+//! The jobs of one batch: which are waiting, how often each was tried, how each ended.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use starlings_models::{ParticleError, Prediction};
+use starlings_proto::SetupId;
+
+use super::message::WorkerId;
+use crate::fleet::{FleetEvent, Outcome};
+
+/// What a job is called in events.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct JobName {
+    /// Index of the sigma point.
+    pub particle: u32,
+    /// Index of the record.
+    pub record: u32,
+}
+
+/// What the loss of a worker means for a job.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Lost {
+    /// It waits again.
+    Requeued,
+    /// It was lost too often.
+    GivenUp,
+}
+
+/// One batch.
+#[derive(Debug)]
+pub(super) struct Batch {
+    pub(super) setup: SetupId,
+    first_job: u64,
+    names: Vec<JobName>,
+    jobs: Vec<State>,
+    next: usize,
+    /// Jobs to be given again, by the worker that must not get them.
+    retry: BTreeMap<Option<WorkerId>, VecDeque<usize>>,
+    done: usize,
+    told: usize,
+}
+
+/// One job.
+#[derive(Debug, Default)]
+struct State {
+    starts: u32,
+    losses: u32,
+    recalled: bool,
+    failure: Option<Failure>,
+    outcome: Option<Outcome>,
+}
+
+/// A model's failure, kept while another worker tries.
+#[derive(Debug)]
+struct Failure {
+    error: ParticleError,
+    by: WorkerId,
+    name: String,
+}
+
+impl Batch {
+    pub(super) fn new(setup: SetupId, first_job: u64, names: Vec<JobName>) -> Self {
+        let jobs = names.iter().map(|_| State::default()).collect();
+        Self { setup, first_job, names, jobs, next: 0, retry: BTreeMap::new(), done: 0, told: 0 }
+    }
+
+    pub(super) fn job_number(&self, index: usize) -> u64 {
+        self.first_job + index as u64
+    }
+
+    /// Index of an unfinished or finished job of this batch; `None` for another batch's.
+    pub(super) fn index_of(&self, job: u64) -> Option<usize> {
+        let index = job.checked_sub(self.first_job)? as usize;
+        (index < self.jobs.len()).then_some(index)
+    }
+
+    pub(super) fn is_done(&self) -> bool {
+        self.done == self.jobs.len()
+    }
+
+    pub(super) fn into_outcomes(self) -> Vec<Outcome> {
+        self.jobs.into_iter().filter_map(|job| job.outcome).collect()
+    }
+
+    /// How far the batch is, when that changed.
+    pub(super) fn progress(&mut self) -> Option<FleetEvent> {
+        let changed = self.told != self.done;
+        self.told = self.done;
+        changed.then(|| FleetEvent::Progress { done: self.done, total: self.jobs.len() })
+    }
+
+    pub(super) fn has_fresh(&self) -> bool {
+        self.next < self.jobs.len()
+    }
+
+    pub(super) fn next_fresh(&mut self) -> Option<usize> {
+        let index = self.next;
+        self.has_fresh().then(|| {
+            self.next += 1;
+            index
+        })
+    }
+
+    pub(super) fn has_waiting(&self) -> bool {
+        self.has_fresh() || self.retry.values().any(|queue| !queue.is_empty())
+    }
+
+    pub(super) fn retry_keys(&self) -> Vec<Option<WorkerId>> {
+        self.retry.iter().filter(|(_, queue)| !queue.is_empty()).map(|(&key, _)| key).collect()
+    }
+
+    pub(super) fn avoided(&self) -> Vec<WorkerId> {
+        self.retry_keys().into_iter().flatten().collect()
+    }
+
+    pub(super) fn has_retry(&self, avoided: Option<WorkerId>) -> bool {
+        self.retry.get(&avoided).is_some_and(|queue| !queue.is_empty())
+    }
+
+    pub(super) fn next_retry(&mut self, avoided: Option<WorkerId>) -> Option<usize> {
+        self.retry.get_mut(&avoided)?.pop_front()
+    }
+
+    /// Counts a start and returns its number, from 1.
+    pub(super) fn start(&mut self, index: usize) -> u32 {
+        self.jobs[index].starts += 1;
+        self.jobs[index].starts
+    }
+
+    pub(super) fn withdrawn(&mut self, index: usize) {
+        self.requeue(index);
+    }
+
+    /// Whether a model's failure may be tried on another worker.
+    pub(super) fn may_retry(&self, index: usize) -> bool {
+        self.jobs[index].failure.is_none()
+    }
+
+    pub(super) fn retry_elsewhere(&mut self, index: usize, by: WorkerId, error: ParticleError, name: &str) {
+        self.jobs[index].failure = Some(Failure { error, by, name: name.to_owned() });
+        self.requeue(index);
+    }
+
+    /// Takes back a job whose worker is gone; `counted` when the worker may have died of it.
+    pub(super) fn lost(&mut self, index: usize, counted: bool, limit: u32, name: &str, reason: &str) -> Lost {
+        let job = &mut self.jobs[index];
+        job.losses += u32::from(counted);
+        if counted && job.losses >= limit {
+            let attempts = self.attempts(index);
+            let error = ParticleError::Lost { attempts, reason: reason.to_owned() };
+            self.end(index, Outcome { result: Err(error), attempts, worker: name.to_owned() });
+            return Lost::GivenUp;
+        }
+        self.requeue(index);
+        Lost::Requeued
+    }
+
+    /// Ends the jobs that may not go back to `avoided`, with the failure they had there.
+    pub(super) fn settle(&mut self, avoided: WorkerId) -> Vec<usize> {
+        let indices = Vec::from(self.retry.remove(&Some(avoided)).unwrap_or_default());
+        for &index in &indices {
+            let attempts = self.attempts(index);
+            if let Some(failure) = self.jobs[index].failure.take() {
+                self.end(index, Outcome { result: Err(failure.error), attempts, worker: failure.name });
+            }
+        }
+        indices
+    }
+
+    pub(super) fn finish(&mut self, index: usize, result: Result<Prediction, ParticleError>, name: &str) {
+        let attempts = self.attempts(index) + 1;
+        self.end(index, Outcome { result, attempts, worker: name.to_owned() });
+    }
+
+    /// A job is called back at most once, so that it cannot travel for ever.
+    pub(super) fn may_recall(&self, job: u64) -> bool {
+        self.index_of(job).is_some_and(|index| !self.jobs[index].recalled)
+    }
+
+    pub(super) fn mark_recalled(&mut self, job: u64) {
+        if let Some(index) = self.index_of(job) {
+            self.jobs[index].recalled = true;
+        }
+    }
+
+    pub(super) fn retried(&self, index: usize, worker: &str, reason: &str) -> FleetEvent {
+        let JobName { particle, record } = self.names[index];
+        FleetEvent::JobRetried { particle, record, worker: worker.to_owned(), reason: reason.to_owned() }
+    }
+
+    pub(super) fn failed(&self, index: usize) -> FleetEvent {
+        let JobName { particle, record } = self.names[index];
+        let outcome = self.jobs[index].outcome.as_ref();
+        let attempts = outcome.map_or(0, |o| o.attempts);
+        let reason = outcome.and_then(|o| o.result.as_ref().err()).map(ToString::to_string).unwrap_or_default();
+        FleetEvent::JobFailed { particle, record, attempts, reason }
+    }
+
+    /// Attempts that ended with a lost worker or a model's failure.
+    fn attempts(&self, index: usize) -> u32 {
+        let job = &self.jobs[index];
+        job.losses + u32::from(job.failure.is_some())
+    }
+
+    fn requeue(&mut self, index: usize) {
+        let avoided = self.jobs[index].failure.as_ref().map(|f| f.by);
+        self.retry.entry(avoided).or_default().push_back(index);
+    }
+
+    fn end(&mut self, index: usize, outcome: Outcome) {
+        let job = &mut self.jobs[index];
+        debug_assert!(job.outcome.is_none(), "a job ends once: its only lease is released before");
+        if job.outcome.replace(outcome).is_none() {
+            self.done += 1;
+        }
+    }
+}

@@ -1,0 +1,172 @@
+//! What the dispatcher hears and what it asks for.
+
+use std::fmt::Write as _;
+use std::time::Duration;
+
+use starlings_proto::{Answer, Lease, SetupId};
+
+use super::batch::JobName;
+use crate::fleet::{FleetEvent, Outcome};
+
+/// Number of a worker's stream: the epoch of its leases. A process that connects again gets a new one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct WorkerId(pub u64);
+
+/// A worker at the door.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Joining {
+    /// Number of its stream.
+    pub id: WorkerId,
+    /// Its name in events and outcomes.
+    pub name: String,
+    /// Host name.
+    pub host: String,
+    /// Process number on that host.
+    pub pid: u32,
+    /// Jobs at the same time, at least 1.
+    pub slots: u32,
+    /// Cores that it sees.
+    pub cores: u32,
+    /// Drawn once per process.
+    pub nonce: u64,
+    /// BLAKE3 of its executable.
+    pub build: Option<[u8; 32]>,
+}
+
+impl Joining {
+    pub(super) fn notice(&self) -> FleetEvent {
+        let build = self.build.iter().flatten().fold(String::new(), |mut text, byte| {
+            let _ = write!(text, "{byte:02x}");
+            text
+        });
+        FleetEvent::WorkerJoined {
+            worker: self.name.clone(),
+            host: self.host.clone(),
+            pid: self.pid,
+            slots: self.slots,
+            cores: self.cores,
+            build,
+        }
+    }
+}
+
+/// Something that happened.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Event {
+    /// A worker connected and was taken.
+    Joined(Joining),
+    /// A worker's stream ended. Clean: it said goodbye.
+    Left {
+        /// Which.
+        worker: WorkerId,
+        /// Why.
+        reason: String,
+        /// Whether it left on purpose.
+        clean: bool,
+    },
+    /// A sign of life.
+    Heard {
+        /// From whom.
+        worker: WorkerId,
+    },
+    /// A worker built a setup.
+    SetupDone {
+        /// Which worker.
+        worker: WorkerId,
+        /// Which setup.
+        setup: SetupId,
+    },
+    /// A worker could not build a setup.
+    SetupFailed {
+        /// Which worker.
+        worker: WorkerId,
+        /// Which setup.
+        setup: SetupId,
+        /// Its words.
+        reason: String,
+    },
+    /// A batch to run; one still running is cancelled.
+    Submit {
+        /// The setup of all its jobs.
+        setup: SetupId,
+        /// What each job is called.
+        jobs: Vec<JobName>,
+    },
+    /// A worker answered a lease.
+    Answered {
+        /// Which worker.
+        worker: WorkerId,
+        /// Under which lease.
+        lease: Lease,
+        /// What.
+        answer: Answer,
+        /// Wall time of the run, seconds.
+        cost: f64,
+    },
+    /// Time passed.
+    Tick,
+    /// The batch must end with this error.
+    Abort(BatchError),
+}
+
+/// Why a batch ended without outcomes.
+#[derive(Clone, Debug, PartialEq)]
+pub enum BatchError {
+    /// Nobody wants it any more.
+    Cancelled,
+    /// No worker could take a job for too long.
+    NoWorkers {
+        /// How long.
+        waited: Duration,
+        /// What is missing.
+        missing: String,
+    },
+    /// No worker can build the setup.
+    SetupFailed {
+        /// The workers' words.
+        reason: String,
+    },
+    /// The worker processes on this machine cannot run.
+    LocalWorkers(String),
+}
+
+/// Something to do.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Command {
+    /// Send a setup.
+    SendSetup {
+        /// To whom.
+        worker: WorkerId,
+        /// Which.
+        setup: SetupId,
+    },
+    /// Send a job of the running batch.
+    SendJob {
+        /// To whom.
+        worker: WorkerId,
+        /// Under which lease.
+        lease: Lease,
+        /// Index of the job in the batch.
+        index: usize,
+    },
+    /// Withdraw jobs that have not started.
+    Cancel {
+        /// From whom.
+        worker: WorkerId,
+        /// Which.
+        leases: Vec<Lease>,
+    },
+    /// End a worker's stream.
+    Close {
+        /// Whose.
+        worker: WorkerId,
+        /// Why.
+        reason: String,
+    },
+    /// The batch ended: one outcome per job, in job order.
+    BatchDone(Vec<Outcome>),
+    /// The batch ended without outcomes.
+    BatchFailed(BatchError),
+    /// Something worth telling.
+    Notice(FleetEvent),
+}

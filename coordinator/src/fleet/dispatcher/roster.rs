@@ -1,0 +1,159 @@
+//! What the dispatcher knows of each worker: its slots, its leases, its setups, how long its jobs take.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use starlings_proto::{Lease, SetupId};
+
+use super::message::{Joining, WorkerId};
+
+/// Jobs per slot held by a worker whose jobs are long: one runs, one waits.
+const MIN_CREDIT: usize = 2;
+
+/// Jobs per slot held by a worker whose jobs are shorter than a message's way.
+const MAX_CREDIT: usize = 64;
+
+/// Seconds of work per slot that a worker should hold; between the two limits above.
+const LOOKAHEAD: f64 = 0.01;
+
+/// Weight of the newest run in the moving average of run times.
+const NEWEST: f64 = 0.3;
+
+/// Shortest run, in seconds, for which calling a job back is worth two messages.
+const RECALL_WORTH: f64 = 0.005;
+
+/// Where a setup stands on a worker.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum SetupState {
+    /// Sent, not answered.
+    Pending,
+    /// Built.
+    Ready,
+    /// Not built: why.
+    Failed(String),
+}
+
+/// One worker.
+#[derive(Debug)]
+pub(super) struct Worker {
+    pub(super) id: WorkerId,
+    pub(super) name: String,
+    pub(super) slots: usize,
+    pub(super) nonce: u64,
+    pub(super) last_heard: Duration,
+    pub(super) setups: BTreeMap<SetupId, SetupState>,
+    held: BTreeMap<u64, Held>,
+    sent: u64,
+    cost: Option<f64>,
+}
+
+/// One lease: how often the job was started, when in the worker's order, whether it was called back.
+#[derive(Clone, Copy, Debug)]
+struct Held {
+    attempt: u32,
+    order: u64,
+    recalled: bool,
+}
+
+impl Worker {
+    pub(super) fn new(joining: &Joining, now: Duration) -> Self {
+        Self {
+            id: joining.id,
+            name: joining.name.clone(),
+            slots: joining.slots.max(1) as usize,
+            nonce: joining.nonce,
+            last_heard: now,
+            setups: BTreeMap::new(),
+            held: BTreeMap::new(),
+            sent: 0,
+            cost: None,
+        }
+    }
+
+    /// Number of leases held.
+    pub(super) fn load(&self) -> usize {
+        self.held.len()
+    }
+
+    pub(super) fn n_recalled(&self) -> usize {
+        self.held.values().filter(|h| h.recalled).count()
+    }
+
+    /// Leases that certainly wait behind a busy slot and are worth calling back.
+    pub(super) fn surplus(&self) -> usize {
+        if self.cost.is_some_and(|cost| cost < RECALL_WORTH) {
+            return 0;
+        }
+        self.load().saturating_sub(self.slots + self.n_recalled())
+    }
+
+    pub(super) fn is_ready(&self, setup: &SetupId) -> bool {
+        matches!(self.setups.get(setup), Some(SetupState::Ready))
+    }
+
+    /// Whether the worker runs jobs of this setup, now or once it is built.
+    pub(super) fn may_run(&self, setup: &SetupId) -> bool {
+        !matches!(self.setups.get(setup), Some(SetupState::Failed(_)))
+    }
+
+    fn has_room(&self) -> bool {
+        let credit = match self.cost {
+            Some(cost) => ((LOOKAHEAD / cost.max(1e-9)) as usize).clamp(MIN_CREDIT, MAX_CREDIT),
+            None => MIN_CREDIT,
+        };
+        self.load() < self.slots * credit
+    }
+
+    pub(super) fn hold(&mut self, lease: Lease) {
+        self.sent += 1;
+        self.held.insert(lease.job, Held { attempt: lease.attempt, order: self.sent, recalled: false });
+    }
+
+    /// Ends a lease; false when it is not held.
+    pub(super) fn release(&mut self, job: u64, attempt: u32) -> bool {
+        let held = self.held.get(&job).is_some_and(|h| h.attempt == attempt);
+        if held {
+            self.held.remove(&job);
+        }
+        held
+    }
+
+    pub(super) fn leases(&self) -> impl Iterator<Item = Lease> + '_ {
+        self.held.iter().map(|(&job, held)| Lease { epoch: self.id.0, job, attempt: held.attempt })
+    }
+
+    /// Jobs held, oldest lease first. Workers start jobs in this order, so the first ones were running.
+    pub(super) fn leases_in_order(&self) -> Vec<u64> {
+        let mut jobs = self.held.iter().map(|(&job, held)| (held.order, job)).collect::<Vec<_>>();
+        jobs.sort_unstable();
+        jobs.into_iter().map(|(_, job)| job).collect()
+    }
+
+    /// Marks the youngest lease that `may` be called back.
+    pub(super) fn youngest(&mut self, may: impl Fn(u64) -> bool) -> Option<Lease> {
+        let open = self.held.iter_mut().filter(|(job, held)| !held.recalled && may(**job));
+        let (&job, held) = open.max_by_key(|(_, held)| held.order)?;
+        held.recalled = true;
+        Some(Lease { epoch: self.id.0, job, attempt: held.attempt })
+    }
+
+    pub(super) fn learn_cost(&mut self, seconds: f64) {
+        self.cost = Some(self.cost.map_or(seconds, |mean| mean + NEWEST * (seconds - mean)));
+    }
+
+    pub(super) fn forget_cost(&mut self) {
+        self.cost = None;
+    }
+}
+
+/// The worker with the fewest leases per slot among those that are ready and have room; the earlier one of equals.
+pub(super) fn least_loaded<'a>(
+    workers: &'a mut BTreeMap<WorkerId, Worker>,
+    setup: &SetupId,
+    avoided: Option<WorkerId>,
+) -> Option<&'a mut Worker> {
+    workers
+        .values_mut()
+        .filter(|w| Some(w.id) != avoided && w.has_room() && w.is_ready(setup))
+        .min_by(|a, b| (a.load() * b.slots).cmp(&(b.load() * a.slots)))
+}

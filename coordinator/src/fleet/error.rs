@@ -1,0 +1,71 @@
+//! Why a fleet cannot run a batch.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+use starlings_proto::WireError;
+
+/// A failure of the fleet as a whole; a failed job is an [`super::Outcome`].
+#[derive(Debug, thiserror::Error)]
+pub enum FleetError {
+    /// The address cannot be listened on.
+    #[error("cannot listen on {address}: {source}{}", remedy(source, *address))]
+    Bind {
+        /// The address asked for.
+        address: SocketAddr,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The run was cancelled.
+    #[error("cancelled")]
+    Cancelled,
+    /// No worker could take a job for too long.
+    #[error(
+        "waited {waited:.0} s for a worker at {address}: {missing}; start one with `starlings worker --connect {address}`"
+    )]
+    NoWorkers {
+        /// Where workers can connect.
+        address: SocketAddr,
+        /// How long it was waited, seconds.
+        waited: f64,
+        /// What is missing.
+        missing: String,
+    },
+    /// No worker can build the setup.
+    #[error("the model cannot be built: {reason}")]
+    SetupFailed {
+        /// The workers' words.
+        reason: String,
+    },
+    /// A job or a setup does not fit the wire; for a state, the text says how large it may be.
+    #[error(transparent)]
+    TooLarge(WireError),
+    /// A setup that was never installed.
+    #[error("the setup was not installed in this fleet")]
+    UnknownSetup,
+    /// The worker processes on this machine die again and again, or cannot start.
+    #[error("the local workers cannot run: {0}")]
+    LocalWorkers(String),
+    /// A worker program that cannot be started.
+    #[error("cannot start the worker program {}: {source}", program.display())]
+    Spawn {
+        /// The program.
+        program: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The network thread ended although nobody closed the fleet.
+    #[error("the fleet's network stopped: {0}")]
+    Stopped(String),
+}
+
+fn remedy(source: &std::io::Error, address: SocketAddr) -> String {
+    match source.kind() {
+        std::io::ErrorKind::AddrInUse => {
+            format!("; port {} is taken by another process: stop it or choose another port (0 picks a free one)", address.port())
+        }
+        std::io::ErrorKind::PermissionDenied => "; ports below 1024 need privileges: choose a higher one".to_owned(),
+        std::io::ErrorKind::AddrNotAvailable => "; this machine has no such address: use 127.0.0.1 or 0.0.0.0".to_owned(),
+        _ => String::new(),
+    }
+}

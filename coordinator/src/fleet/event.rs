@@ -1,0 +1,104 @@
+//! What happens in a fleet, for the store and the progress display. Only facts; nobody in the fleet reads them back.
+
+use std::net::SocketAddr;
+
+use serde::Serialize;
+
+/// Something that happened in the fleet.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case", tag = "event")]
+pub enum FleetEvent {
+    /// Workers can connect.
+    Listening {
+        /// Where.
+        address: SocketAddr,
+    },
+    /// A worker is taken.
+    WorkerJoined {
+        /// Its name in this run.
+        worker: String,
+        /// Host name.
+        host: String,
+        /// Process number on that host.
+        pid: u32,
+        /// Jobs at the same time.
+        slots: u32,
+        /// Cores that it sees.
+        cores: u32,
+        /// BLAKE3 of its executable, hexadecimal; empty when unknown.
+        build: String,
+    },
+    /// A worker is refused.
+    WorkerRefused {
+        /// Its host.
+        host: String,
+        /// Why, with the remedy.
+        reason: String,
+    },
+    /// A worker is gone.
+    WorkerLeft {
+        /// Its name.
+        worker: String,
+        /// Why.
+        reason: String,
+        /// Jobs that go back to the queue.
+        requeued: usize,
+    },
+    /// A worker cannot build the setup.
+    SetupFailed {
+        /// Its name.
+        worker: String,
+        /// Why.
+        reason: String,
+    },
+    /// A job goes to a worker again.
+    JobRetried {
+        /// Index of the sigma point.
+        particle: u32,
+        /// Index of the record.
+        record: u32,
+        /// Where the last attempt ended.
+        worker: String,
+        /// How it ended.
+        reason: String,
+    },
+    /// A job is given up.
+    JobFailed {
+        /// Index of the sigma point.
+        particle: u32,
+        /// Index of the record.
+        record: u32,
+        /// Attempts made.
+        attempts: u32,
+        /// How the last one ended.
+        reason: String,
+    },
+    /// An answer that nobody waits for any more; ignored.
+    LateAnswer {
+        /// Who sent it.
+        worker: String,
+        /// Number of the job.
+        job: u64,
+    },
+    /// A batch cannot go on.
+    Waiting {
+        /// For how long, seconds.
+        seconds: f64,
+        /// What is missing.
+        missing: String,
+    },
+    /// How far the running batch is.
+    Progress {
+        /// Jobs with an outcome.
+        done: usize,
+        /// Jobs in the batch.
+        total: usize,
+    },
+    /// A worker process on this machine died and is started again.
+    LocalWorkerRestarted {
+        /// Its process number.
+        pid: u32,
+        /// How it ended.
+        reason: String,
+    },
+}

@@ -1,0 +1,183 @@
+//! What the page's template needs: texts already formatted and figures already drawn.
+//!
+//! The template (`report.html`) only arranges; every number is formatted here or in a figure. Next file to read:
+//! [`super::plot`].
+
+use serde::Serialize;
+
+use super::data::{Autocorrelation, ChannelPlot, ParameterRow, ReportData};
+use super::plot::figure::Figure;
+use super::plot::{autocorrelation, fit, interval, nis, residual, run_times, track};
+use super::{ReportError, headline, number};
+
+/// At most this many events of the fleet are listed.
+const EVENTS: usize = 60;
+
+/// The page, ready to be arranged.
+#[derive(Debug, Serialize)]
+pub(crate) struct Page<'a> {
+    css: &'static str,
+    data: &'a ReportData,
+    headline: String,
+    facts: Vec<(&'static str, String)>,
+    parameters: Vec<ParameterView>,
+    fits: Vec<Figure>,
+    residuals: Vec<Figure>,
+    tracks: Vec<Figure>,
+    nis: Option<Figure>,
+    nis_mean: String,
+    log_likelihood: String,
+    correlation: Vec<Vec<CorrelationCell>>,
+    fleet: FleetView,
+}
+
+#[derive(Debug, Serialize)]
+struct ParameterView {
+    name: String,
+    unit: String,
+    estimate: String,
+    sd: String,
+    interval: String,
+    prior_median: String,
+    strip: String,
+}
+
+/// One cell of the correlation table: its text and the share of colour behind it.
+#[derive(Debug, Serialize)]
+struct CorrelationCell {
+    text: String,
+    class: &'static str,
+    share: String,
+}
+
+#[derive(Debug, Serialize)]
+struct FleetView {
+    counts: Vec<(&'static str, String)>,
+    workers: Vec<Vec<String>>,
+    run_times: Option<Figure>,
+    events: Vec<(String, String)>,
+    events_left_out: usize,
+}
+
+impl<'a> Page<'a> {
+    /// Draws and formats everything that `data` holds.
+    ///
+    /// # Errors
+    ///
+    /// A figure cannot be drawn.
+    pub(crate) fn new(data: &'a ReportData) -> Result<Self, ReportError> {
+        let optional = |value: Option<f64>| {
+            value.map_or(number::ABSENT.to_owned(), |v| {
+                number::with_sd(v, if v.abs() < 100.0 { 0.1 } else { 1.0 })
+            })
+        };
+        let x_label = if data.x_label.is_empty() { "step" } else { &data.x_label };
+        Ok(Self {
+            css: include_str!("report.css"),
+            data,
+            headline: headline::of(data),
+            facts: facts(data),
+            parameters: data.parameters.iter().map(|row| parameter(row, data)).collect::<Result<_, _>>()?,
+            fits: shown(data).map(|c| fit::figure(c, &data.time_unit)).collect::<Result<_, _>>()?,
+            residuals: residuals(data)?,
+            tracks: data.tracks.iter().map(|t| track::figure(t, x_label)).collect::<Result<_, _>>()?,
+            nis: nis::figure(&data.nis, x_label)?,
+            nis_mean: optional(data.nis_per_observation),
+            log_likelihood: optional(data.log_likelihood),
+            correlation: data
+                .correlation
+                .iter()
+                .enumerate()
+                .map(|(k, row)| correlation_row(k, row))
+                .collect(),
+            fleet: fleet(data)?,
+        })
+    }
+}
+
+fn facts(data: &ReportData) -> Vec<(&'static str, String)> {
+    let mut facts = vec![("Model", data.model.clone()), ("Estimator", data.estimator.clone())];
+    if let Some(started) = &data.started {
+        facts.push(("Started", started.clone()));
+    }
+    facts.push(("Wall time", number::duration(data.wall_s)));
+    facts.retain(|(_, text)| !text.is_empty());
+    facts
+}
+
+fn shown(data: &ReportData) -> impl Iterator<Item = &ChannelPlot> {
+    data.channels.iter().filter(|c| !c.time.is_empty())
+}
+
+/// The residuals of every channel, each followed by its autocorrelation.
+fn residuals(data: &ReportData) -> Result<Vec<Figure>, ReportError> {
+    let mut figures = Vec::new();
+    for channel in shown(data) {
+        figures.push(residual::figure(channel, &data.time_unit)?);
+        let same = |a: &&Autocorrelation| a.record == channel.record && a.channel == channel.channel;
+        if let Some(series) = data.autocorrelation.iter().find(same).filter(|a| !a.value.is_empty()) {
+            figures.push(autocorrelation::figure(series, &data.time_unit)?);
+        }
+    }
+    Ok(figures)
+}
+
+fn parameter(row: &ParameterRow, data: &ReportData) -> Result<ParameterView, ReportError> {
+    let digits = |value| number::with_sd(value, row.sd);
+    Ok(ParameterView {
+        name: row.name.clone(),
+        unit: row.unit.clone(),
+        estimate: digits(row.estimate),
+        sd: number::significant(row.sd, 2),
+        interval: format!("{} to {}", digits(row.lo), digits(row.hi)),
+        prior_median: number::significant(row.prior_median, 3),
+        strip: interval::strip(row, data.log_axis(&row.name))?,
+    })
+}
+
+fn correlation_row(diagonal: usize, row: &[f64]) -> Vec<CorrelationCell> {
+    let cell = |(k, &value): (usize, &f64)| CorrelationCell {
+        text: number::with_sd(value, 0.1),
+        class: if k == diagonal {
+            "diagonal"
+        } else if value < 0.0 {
+            "negative"
+        } else {
+            "positive"
+        },
+        share: format!("{:.0}%", if value.is_finite() { 60.0 * value.abs().min(1.0) } else { 0.0 }),
+    };
+    row.iter().enumerate().map(cell).collect()
+}
+
+fn fleet(data: &ReportData) -> Result<FleetView, ReportError> {
+    let fleet = &data.fleet;
+    let mut counts = vec![
+        ("model runs", fleet.runs_total.to_string()),
+        ("failed attempts", fleet.failed.to_string()),
+        ("retried", fleet.retried.to_string()),
+        ("rescued", fleet.rescued.to_string()),
+        ("workers", fleet.workers.len().to_string()),
+    ];
+    if let Some(times) = &fleet.time_per_run {
+        counts.push(("median time per run", number::duration(times.median)));
+    }
+    let worker = |w: &super::data::WorkerRow| {
+        vec![
+            w.name.clone(),
+            w.host.clone(),
+            w.jobs.to_string(),
+            w.failed.to_string(),
+            number::duration(w.mean_s),
+            w.busy_share.map_or(number::ABSENT.to_owned(), number::percent),
+        ]
+    };
+    let listed = fleet.events.iter().take(EVENTS);
+    Ok(FleetView {
+        counts,
+        workers: fleet.workers.iter().map(worker).collect(),
+        run_times: fleet.time_per_run.as_ref().map_or(Ok(None), run_times::figure)?,
+        events: listed.map(|e| (number::duration(e.time_s), e.text.clone())).collect(),
+        events_left_out: fleet.events.len().saturating_sub(EVENTS),
+    })
+}

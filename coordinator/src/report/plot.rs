@@ -1,0 +1,18 @@
+//! The plots of the report, one file per kind of figure.
+//!
+//! A figure is described as a [`scene::Scene`] (two axes and a list of marks) and drawn once, in `scene.rs`; nothing else
+//! touches the drawing library. Text and colours are fixed in `palette.rs`. Next file to read: `scene.rs`.
+
+pub(super) mod autocorrelation;
+pub(super) mod axis;
+pub(super) mod figure;
+pub(super) mod fit;
+pub(super) mod interval;
+pub(super) mod mark;
+pub(super) mod nis;
+pub(super) mod palette;
+pub(super) mod residual;
+pub(super) mod run_times;
+pub(super) mod scene;
+pub(super) mod thin;
+pub(super) mod track;

@@ -1,0 +1,43 @@
+//! How long the model runs took.
+
+use super::super::data::RunTimes;
+use super::super::{ReportError, number};
+use super::axis::Axis;
+use super::figure::Figure;
+use super::mark::Mark;
+use super::palette::BLUE;
+use super::scene::Scene;
+
+/// Draws the histogram of run times; `None` when it has no bins.
+///
+/// # Errors
+///
+/// The figure cannot be drawn.
+pub(crate) fn figure(times: &RunTimes) -> Result<Option<Figure>, ReportError> {
+    let bins: Vec<_> = times.bins.iter().filter(|b| b.from.is_finite() && b.to.is_finite()).collect();
+    let (Some(first), Some(last)) = (bins.first(), bins.last()) else { return Ok(None) };
+    let (unit, factor) = match last.to {
+        to if to < 1e-3 => ("µs", 1e6),
+        to if to < 1.0 => ("ms", 1e3),
+        _ => ("s", 1.0),
+    };
+    let edges = [factor * first.from, factor * last.to];
+    let label = format!("time per run [{unit}]");
+    let wide = first.from > 0.0 && last.to > 30.0 * first.from;
+    let x = if wide { Axis::log_around(&label, edges) } else { Axis::tight(&label, edges) };
+    let highest = bins.iter().map(|b| b.count).max().unwrap_or(0) as f64;
+    let mut y = Axis::tight("runs", [0.0, 1.05 * highest.max(1.0)]);
+    y.label = "model runs".to_owned();
+    let bars = bins.iter().map(|b| (factor * b.from, factor * b.to, b.count as f64)).collect();
+    let caption = format!(
+        "Median {}, 95th percentile {}, shortest {}, longest {}. A long tail on the right is a slow worker or a hard particle.",
+        number::duration(times.median),
+        number::duration(times.p95),
+        number::duration(times.min),
+        number::duration(times.max)
+    );
+    let title = "Time per model run".to_owned();
+    let scene =
+        Scene { title, description: caption.clone(), x, y, marks: vec![Mark::Bars { bars, colour: BLUE }] };
+    Figure::new(&scene, &[("area solid", "runs per bin")], caption).map(Some)
+}

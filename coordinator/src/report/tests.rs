@@ -1,0 +1,151 @@
+//! Tests of the whole page and of the overview picture.
+
+use super::data::{ChannelPlot, NisSeries, ParameterRow, ReportData, Track};
+use super::{overview_svg, render, sample};
+
+/// The order in which a reader meets the sections.
+const SECTIONS: [&str; 11] = [
+    "result",
+    "warnings",
+    "parameters",
+    "fit",
+    "residuals",
+    "tracks",
+    "nis",
+    "correlation",
+    "fleet",
+    "conditional",
+    "reproduce",
+];
+
+fn assert_well_formed(page: &str) {
+    let places: Vec<usize> =
+        SECTIONS.iter().map(|id| page.find(&format!("id=\"{id}\"")).expect(id)).collect();
+    assert!(places.is_sorted(), "sections out of order: {places:?}");
+    let outside = page.replace("xmlns=\"http://www.w3.org/2000/svg\"", "");
+    for forbidden in [
+        "http://",
+        "https://",
+        "<script",
+        "<link",
+        "@import",
+        "url(",
+        "NaN",
+        "inf\"",
+        ">inf",
+        "None",
+        "none stored",
+    ] {
+        assert!(!outside.contains(forbidden), "the page contains {forbidden}");
+    }
+    assert_eq!(page.matches("<svg").count(), page.matches("</svg>").count());
+    assert_eq!(page.matches("<svg").count(), page.matches("role=\"img\" aria-label=").count());
+}
+
+/// Writes what a person may want to look at when `REPORT_SAMPLE_DIR` names a folder.
+fn show(name: &str, text: &str) {
+    if let Some(folder) = std::env::var_os("REPORT_SAMPLE_DIR") {
+        std::fs::write(std::path::Path::new(&folder).join(name), text).expect("the folder can be written");
+    }
+}
+
+#[test]
+fn a_full_report_is_self_contained_and_in_order() {
+    let page = render(&sample::run(840)).unwrap();
+    show("report.html", &page);
+    assert_well_formed(&page);
+    for text in
+        ["3.367", "3.326 to 3.409", "Training RMSE 4.43 mmHg", "held-out RMSE 4.11 mmHg", "Seed 1", "−0.31"]
+    {
+        assert!(page.contains(text), "the page lacks {text}");
+    }
+    // One figure per channel for the fit, two for its residuals, three tracks, NIS and run times.
+    assert_eq!(page.matches("<figure>").count(), 1 + 2 + 3 + 1 + 1);
+    assert!(page.find("NIS is 5.1").unwrap() < page.find("id=\"parameters\"").unwrap());
+}
+
+#[test]
+fn a_report_of_nothing_says_what_is_missing() {
+    let page = render(&ReportData::default()).unwrap();
+    show("empty.html", &page);
+    assert_well_formed(&page);
+    for text in ["no estimate yet", "No prediction was stored", "No innovations were stored", "No warnings."]
+    {
+        assert!(page.contains(text), "the page lacks {text}");
+    }
+    assert!(overview_svg(&ReportData::default()).unwrap().contains("no prediction stored"));
+}
+
+#[test]
+fn values_that_are_not_finite_are_left_out() {
+    let nan = f64::NAN;
+    let data = ReportData {
+        parameters: vec![ParameterRow {
+            name: "R".into(),
+            estimate: nan,
+            sd: nan,
+            lo: nan,
+            hi: f64::INFINITY,
+            ..ParameterRow::default()
+        }],
+        correlation: vec![vec![nan, nan]],
+        tracks: vec![Track { name: "R".into(), prior_median: nan, log_axis: true, ..Track::default() }],
+        channels: vec![ChannelPlot {
+            time: vec![0.0, 1.0],
+            observed: vec![None, None],
+            predicted: vec![nan, f64::INFINITY],
+            noise: nan,
+            held_out_channel: true,
+            ..ChannelPlot::default()
+        }],
+        nis: vec![NisSeries { time: vec![0.0], nis_per_observation: vec![nan], ..NisSeries::default() }],
+        nis_per_observation: Some(nan),
+        ..ReportData::default()
+    };
+    assert_well_formed(&render(&data).unwrap());
+    assert!(!overview_svg(&data).unwrap().contains("NaN"));
+}
+
+#[test]
+fn a_hundred_thousand_samples_stay_a_small_file() {
+    let page = render(&sample::run(100_000)).unwrap();
+    show("long.html", &page);
+    // Each of about 20 curves and bands becomes at most 800 points of about 10 bytes.
+    assert!(page.len() < 350_000, "{} bytes", page.len());
+}
+
+#[test]
+fn names_from_the_study_cannot_become_markup() {
+    let attack = "<script>alert('x')</script>\"&";
+    let mut data = sample::run(50);
+    data.study = attack.into();
+    data.warnings = vec![attack.into()];
+    data.parameters[0].name = attack.into();
+    data.tracks[0].name = attack.into();
+    data.channels[0].record = attack.into();
+    data.channels[0].unit = attack.into();
+    data.fleet.workers[0].name = attack.into();
+    data.command = attack.into();
+    let page = render(&data).unwrap();
+    assert!(!page.contains("<script"));
+    assert!(page.contains("&lt;script&gt;"));
+    assert!(!overview_svg(&data).unwrap().contains("<script"));
+}
+
+#[test]
+fn the_overview_shows_fit_and_intervals_in_one_picture() {
+    let picture = overview_svg(&sample::run(840)).unwrap();
+    show("overview.svg", &picture);
+    assert!(picture.starts_with("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 3600 1680\""));
+    assert!(picture.trim_end().ends_with("</svg>"));
+    for text in ["pressure [mmHg]", "R [mmHg s/mL]", "3.367 ± 0.042", "held out"] {
+        assert!(picture.contains(text), "the picture lacks {text}");
+    }
+}
+
+#[test]
+fn the_data_survive_being_stored_as_json() {
+    let data = sample::run(60);
+    let text = serde_json::to_string(&data).unwrap();
+    assert!(serde_json::from_str::<ReportData>(&text).unwrap() == data);
+}

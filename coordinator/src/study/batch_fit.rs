@@ -1,0 +1,150 @@
+//! The batch fit: iterated sigma-point Gauss–Newton over whole-record runs, one iteration = one ensemble.
+//!
+//! For solvers that cannot restart from a state, and as a reference for the filter: every run starts at its record's start,
+//! so no linear mixture of states is ever used. Next file to read: the `batch` module of `starlings-estimators`.
+
+use std::sync::Arc;
+
+use starlings_estimators::{Batch, BatchState, BatchStep, Data, SigmaSet};
+
+use super::flight::{Flight, Place, StepWindows, stack_outputs};
+use super::snapshot::{Head, Snapshot};
+use super::store::{AnalysisRow, Store};
+use super::{Fit, Progress, RunContext, RunError, filter, posterior};
+
+/// Iterates to the posterior mode, continuing from `resumed` if there is one.
+///
+/// # Errors
+/// When the fleet or the store fails, or no run around the estimate succeeds.
+pub fn fit(
+    flight: &mut Flight<'_>,
+    store: &mut Store,
+    context: &mut RunContext<'_>,
+    resumed: Option<Snapshot>,
+) -> Result<Fit, RunError> {
+    let study = flight.study();
+    let batch = Batch {
+        set: SigmaSet::new(study.estimator.points, study.theta.len())?,
+        max_iterations: study.estimator.max_iterations,
+        tolerance: study.estimator.tolerance,
+        ..Batch::default_for(study.theta.len())?
+    };
+    let windows: StepWindows = (0..study.records.len())
+        .filter(|record| study.records[*record].is_trained())
+        .map(|record| (record, Arc::new(study.whole(record, true))))
+        .collect();
+    let values: Vec<f64> = windows.iter().flat_map(|(_, w)| w.observed.iter().copied()).collect();
+    let noise = filter::noise(study, &windows, 1.0);
+    let (mut state, mut now) = match resumed {
+        Some(snapshot) => (restore(store, &snapshot)?, snapshot),
+        None => begin(&batch, study),
+    };
+    loop {
+        let place = Place { pass: 1, step: now.head.step };
+        let theta = batch.sample(&state);
+        let results = fly(flight, &mut now, place, &theta, &windows)?;
+        let failed: Vec<bool> = results.iter().map(|of| of.iter().any(Result::is_err)).collect();
+        let predictions = stack_outputs(&results);
+        let (next, step) = batch.step(&state, &predictions, &failed, &Data { values: &values, noise: &noise })?;
+        state = next;
+        keep(&mut now, &state, &step)?;
+        let mut row = row(study, place, &step);
+        row.jobs = flight.take_rows();
+        store.analysis(&row, &now)?;
+        context.after_step(store, &progress(&now, &batch, flight))?;
+        if step.converged || now.head.step >= batch.max_iterations {
+            return Ok(finish(now, step));
+        }
+    }
+}
+
+fn begin(batch: &Batch, study: &super::Study) -> (BatchState, Snapshot) {
+    let prior = posterior::prior(study);
+    let state = batch.init(&prior);
+    let head = Head {
+        pass: 0,
+        step: 0,
+        theta: super::snapshot::Matrix::default(),
+        centre: prior.mean.iter().copied().collect(),
+        scale: posterior::standard_deviations(&prior),
+        batch: String::new(),
+        nis: 0.0,
+        n_used: 0,
+        log_likelihood: 0.0,
+        information_lost: 0.0,
+        counts: super::snapshot::Counts::default(),
+    };
+    (state, Snapshot { head, states: vec![None; study.records.len()] })
+}
+
+fn restore(store: &Store, snapshot: &Snapshot) -> Result<BatchState, RunError> {
+    Ok(serde_json::from_str(&snapshot.head.batch).map_err(|e| store.damaged("snapshot", e))?)
+}
+
+/// Runs the whole ensemble; a failed particle is left to the estimator, which can do without it.
+fn fly(
+    flight: &mut Flight<'_>,
+    now: &mut Snapshot,
+    place: Place,
+    theta: &nalgebra::DMatrix<f64>,
+    windows: &StepWindows,
+) -> Result<super::flight::Results, RunError> {
+    let before = (flight.total, flight.failed, flight.retried);
+    let everyone: Vec<usize> = (0..theta.ncols()).collect();
+    let states = vec![None; now.states.len()];
+    let results = flight.run(place, &everyone, theta, &states, windows)?;
+    now.head.counts.total += flight.total - before.0;
+    now.head.counts.failed += flight.failed - before.1;
+    now.head.counts.retried += flight.retried - before.2;
+    Ok(results)
+}
+
+fn keep(now: &mut Snapshot, state: &BatchState, step: &BatchStep) -> Result<(), RunError> {
+    now.head.batch = serde_json::to_string(state).map_err(|e| RunError::Internal(e.to_string()))?;
+    now.head.step += 1;
+    now.head.nis = step.misfit;
+    now.head.n_used = step.n_used;
+    now.head.log_likelihood = step.evidence;
+    Ok(())
+}
+
+fn row(study: &super::Study, place: Place, step: &BatchStep) -> AnalysisRow {
+    AnalysisRow {
+        pass: place.pass,
+        step: place.step,
+        time: (place.step + 1) as f64,
+        n_used: step.n_used,
+        nis: step.misfit,
+        log_likelihood: step.log_likelihood,
+        information_lost: 0.0,
+        transform: None,
+        estimates: posterior::rows(study, &step.posterior),
+        innovations: Vec::new(),
+        jobs: Vec::new(),
+    }
+}
+
+fn finish(now: Snapshot, step: BatchStep) -> Fit {
+    Fit {
+        posterior: step.posterior,
+        log_likelihood: step.evidence,
+        nis: step.misfit,
+        n_used: step.n_used,
+        information_lost: 0.0,
+        counts: now.head.counts,
+        passes: 1,
+        converged: step.converged,
+    }
+}
+
+fn progress(now: &Snapshot, batch: &Batch, flight: &Flight<'_>) -> Progress {
+    Progress {
+        stage: "batch",
+        pass: 1,
+        passes: 1,
+        step: now.head.step,
+        steps: batch.max_iterations,
+        runs: now.head.counts.total,
+        workers: flight.n_workers(),
+    }
+}

@@ -1,0 +1,279 @@
+//! A checked study: plain data that the run can rely on without asking again.
+//!
+//! Nothing here reads files or judges. Next files to read: [`super::expand`] for the way from the estimated vector to a job's
+//! values, [`super::plan`] for the windows.
+
+use std::path::{Path, PathBuf};
+
+use starlings_estimators::{Drift, Points, Root, Transform};
+use starlings_models::{EffectDef, Setup, Signal, Spec};
+
+use super::check;
+use super::problem::{Problem, StudyError};
+
+/// A study whose names exist, whose numbers make sense and whose recordings were read.
+#[derive(Clone, Debug)]
+pub struct Study {
+    /// The study file.
+    pub file: PathBuf,
+    /// Its text, as read.
+    pub text: String,
+    /// Name of the study.
+    pub name: String,
+    /// What it is about, in the author's words.
+    pub says: String,
+    /// Every random choice derives from it.
+    pub seed: u64,
+    /// Unit label of every time.
+    pub time_unit: String,
+    /// What workers receive: its parameters are the values of a job, its outputs those of all channels, first seen first.
+    pub setup: Setup,
+    /// What the model with its effects says of itself.
+    pub spec: Spec,
+    /// Effects that the file describes and that are not part of the model: none of their parameters has a value.
+    pub candidates: Vec<EffectDef>,
+    /// The uncertain parameters, in the order of [`Setup::parameters`].
+    pub parameters: Vec<StudyParameter>,
+    /// The estimated vector: shared parameters once, the others once per trained record.
+    pub theta: Vec<ThetaEntry>,
+    /// The recordings.
+    pub records: Vec<Record>,
+    /// The estimator.
+    pub estimator: EstimatorChoice,
+    /// The fleet.
+    pub fleet: FleetChoice,
+    /// What `explain` may do.
+    pub explain: ExplainChoice,
+    /// An input is used at earlier times: windows then carry it from the record's start.
+    pub delays: bool,
+    /// What is doubtful but no error.
+    pub warnings: Vec<String>,
+}
+
+/// An uncertain parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StudyParameter {
+    /// Name in the model, or `initial:<state>`.
+    pub name: String,
+    /// Unit label.
+    pub unit: String,
+    /// Map to the units in which the prior is Gaussian.
+    pub transform: Transform,
+    /// One value per record instead of one for all.
+    pub per_record: bool,
+    /// Prior mean in transformed units, one per record of the study.
+    pub prior_mean: Vec<f64>,
+    /// Prior standard deviation in transformed units.
+    pub prior_sd: f64,
+    /// How it moves from one analysis to the next.
+    pub drift: Drift,
+}
+
+/// One entry of the estimated vector.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ThetaEntry {
+    /// `R`, or `R[in-vivo-1]` for one record's value.
+    pub name: String,
+    /// Index in [`Study::parameters`].
+    pub parameter: usize,
+    /// Index in [`Study::records`]; `None` when all records share the value.
+    pub record: Option<usize>,
+    /// Prior mean in transformed units.
+    pub prior_mean: f64,
+    /// Prior standard deviation in transformed units.
+    pub prior_sd: f64,
+    /// Map to physical units.
+    pub transform: Transform,
+    /// How it moves from one analysis to the next.
+    pub drift: Drift,
+}
+
+/// A recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Record {
+    /// Name, unique in the study.
+    pub name: String,
+    /// Times at which at least one channel was measured, strictly increasing; the run starts at the first.
+    pub times: Vec<f64>,
+    /// What was measured.
+    pub channels: Vec<Channel>,
+    /// Input signals in the order of the model's inputs, as long as their file.
+    pub inputs: Vec<Signal>,
+    /// Training span, both ends included; `None` when the whole record is held out.
+    pub train: Option<[f64; 2]>,
+    /// Observation times per window.
+    pub every: usize,
+}
+
+/// One measured output of a record.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Channel {
+    /// The model's output.
+    pub output: String,
+    /// Its position in [`Setup::outputs`].
+    pub row: usize,
+    /// Column of the record's file.
+    pub column: String,
+    /// Standard deviation of the noise, in the channel's unit.
+    pub noise: f64,
+    /// How that standard deviation was found.
+    pub noise_how: String,
+    /// Values at the record's times; NaN where missing.
+    pub values: Vec<f64>,
+    /// Never fitted.
+    pub held_out: bool,
+}
+
+/// Which estimator fits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EstimatorKind {
+    /// The reduced-order unscented Kalman filter.
+    Roukf,
+    /// Iterated sigma-point Gauss–Newton over whole records.
+    Batch,
+}
+
+/// The estimator and its settings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EstimatorChoice {
+    /// Which one.
+    pub kind: EstimatorKind,
+    /// Sigma points.
+    pub points: Points,
+    /// Root of the covariance that moves the particles.
+    pub root: Root,
+    /// Passes of the filter over the data.
+    pub passes: usize,
+    /// Factor on the noise sd in the first of several passes.
+    pub anneal: f64,
+    /// Width of the sigma points: of the prior sd from the filter's second pass on, of the posterior sd in the batch fit.
+    pub spread: f64,
+    /// Resample states and parameters before an analysis, for sets of more than p + 1 points.
+    pub resample: bool,
+    /// Ensembles of the batch fit at most.
+    pub max_iterations: usize,
+    /// Step at which the batch fit has converged, in posterior sd.
+    pub tolerance: f64,
+}
+
+/// Workers and how patient to be with them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FleetChoice {
+    /// Local worker processes.
+    pub workers: usize,
+    /// Runs at a time per worker; `None` leaves it to the worker.
+    pub slots: Option<usize>,
+    /// Seconds without a sign of life after which a worker counts as lost; `None` for the fleet's own default.
+    pub patience: Option<f64>,
+    /// Attempts per run before a particle counts as failed; `None` for the fleet's own default.
+    pub max_attempts: Option<u32>,
+}
+
+/// Which effects `explain` may try.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Library {
+    /// Those of the study and the built-in ones.
+    #[default]
+    All,
+    /// Those of the study.
+    Study,
+    /// The built-in ones.
+    BuiltIn,
+}
+
+/// Settings of `explain`.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct ExplainChoice {
+    /// Outputs that are never fitted.
+    pub hold_out_channels: Vec<String>,
+    /// Model runs at most.
+    pub budget: Option<u64>,
+    /// Where candidates come from.
+    pub library: Library,
+}
+
+impl Study {
+    /// Reads and checks a study file and its recordings, which stand relative to it.
+    ///
+    /// # Errors
+    /// Everything that is wrong, each with its place and remedy.
+    pub fn load(path: &Path) -> Result<Self, StudyError> {
+        match std::fs::read_to_string(path) {
+            Ok(text) => Self::from_text(path, &text),
+            Err(error) => {
+                let problem = Problem {
+                    message: format!("cannot read the study: {error}"),
+                    help: Some("give the path of a study file (TOML)".to_owned()),
+                    file: path.to_owned(),
+                    source_text: None,
+                    span: None,
+                };
+                Err(StudyError { problems: vec![problem] })
+            }
+        }
+    }
+
+    /// Checks the text of a study file that stands, or stood, at `file`.
+    ///
+    /// # Errors
+    /// As [`Study::load`].
+    pub fn from_text(file: &Path, text: &str) -> Result<Self, StudyError> {
+        check::check(file, text)
+    }
+
+    /// Whether no observer corrects the state during a run.
+    pub fn observer_is_off(&self) -> bool {
+        matches!(self.setup.observer.kind.as_str(), "" | "none") || self.setup.observer.gain <= 0.0
+    }
+
+    /// Noise sd of each of [`Setup::outputs`] in a record; 1 for an output that the record does not measure, whose rows
+    /// are all missing.
+    pub fn noise(&self, record: usize) -> Vec<f64> {
+        let mut noise = vec![1.0; self.setup.outputs.len()];
+        for channel in &self.records[record].channels {
+            noise[channel.row] = channel.noise;
+        }
+        noise
+    }
+}
+
+impl Record {
+    /// Whether the record takes part in the fit.
+    pub fn is_trained(&self) -> bool {
+        self.train.is_some()
+    }
+
+    /// The training span cut to the record, `None` when the whole record is held out.
+    pub fn train_span(&self) -> Option<[f64; 2]> {
+        let [from, to] = self.train?;
+        Some([from.max(*self.times.first()?), to.min(*self.times.last()?)])
+    }
+
+    /// Whether the time lies in the training span.
+    pub fn trains_at(&self, time: f64) -> bool {
+        self.train.is_some_and(|[from, to]| from <= time && time <= to)
+    }
+
+    /// The value of one of the record's channels at one of its times, if it was measured there.
+    pub fn observed(&self, channel: &Channel, time: f64) -> Option<f64> {
+        let at = self.times.binary_search_by(|t| t.total_cmp(&time)).ok()?;
+        channel.values.get(at).copied().filter(|v| v.is_finite())
+    }
+}
+
+impl EstimatorChoice {
+    /// One line for reports, such as `roukf, simplex points, 2 passes`.
+    pub fn describe(&self) -> String {
+        let points = match self.points {
+            Points::Simplex => "simplex",
+            Points::Canonical => "canonical",
+            Points::Star => "star",
+            Points::JulierUhlmann { .. } => "julier-uhlmann",
+        };
+        match self.kind {
+            EstimatorKind::Batch => format!("batch, {points} points"),
+            EstimatorKind::Roukf if self.passes == 1 => format!("roukf, {points} points, 1 pass"),
+            EstimatorKind::Roukf => format!("roukf, {points} points, {} passes", self.passes),
+        }
+    }
+}

@@ -1,0 +1,60 @@
+//! From parameters and records to the estimated vector, and from that vector to the values of one record's job.
+//!
+//! Next file to read: [`super::plan`].
+
+use super::checked::{Record, Study, StudyParameter, ThetaEntry};
+
+/// The prefix of a parameter that is a state's initial value.
+pub(super) const INITIAL: &str = "initial:";
+
+/// The estimated vector: a shared parameter once, any other once per trained record. In a study of one record the names
+/// need no record.
+pub(super) fn theta(parameters: &[StudyParameter], records: &[Record]) -> Vec<ThetaEntry> {
+    let mut entries = Vec::new();
+    for (index, parameter) in parameters.iter().enumerate() {
+        let entry = |name: String, record: Option<usize>| ThetaEntry {
+            name,
+            parameter: index,
+            record,
+            prior_mean: parameter.prior_mean.get(record.unwrap_or(0)).copied().unwrap_or(f64::NAN),
+            prior_sd: parameter.prior_sd,
+            transform: parameter.transform,
+            drift: parameter.drift,
+        };
+        if parameter.per_record && records.len() > 1 {
+            let trained = records.iter().enumerate().filter(|(_, r)| r.is_trained());
+            entries.extend(trained.map(|(i, r)| entry(format!("{}[{}]", parameter.name, r.name), Some(i))));
+        } else {
+            entries.push(entry(parameter.name.clone(), None));
+        }
+    }
+    entries
+}
+
+impl Study {
+    /// Physical values in the order of [`starlings_models::Setup::parameters`] for one record, from the estimated vector in
+    /// transformed units.
+    ///
+    /// A held-out record has no entries of its own: it takes the mean of the fitted records (in transformed units), and for
+    /// an initial value its own prior median.
+    pub fn theta_for(&self, record: usize, transformed: &[f64]) -> Vec<f64> {
+        let value = |(index, parameter): (usize, &StudyParameter)| {
+            let mut sum = 0.0;
+            let mut count = 0_u32;
+            for (entry, value) in self.theta.iter().zip(transformed).filter(|(e, _)| e.parameter == index) {
+                if entry.record.is_none_or(|r| r == record) {
+                    return parameter.transform.to_physical(*value);
+                }
+                sum += value;
+                count += 1;
+            }
+            let mean = if parameter.name.starts_with(INITIAL) {
+                parameter.prior_mean[record]
+            } else {
+                sum / f64::from(count)
+            };
+            parameter.transform.to_physical(mean)
+        };
+        self.parameters.iter().enumerate().map(value).collect()
+    }
+}

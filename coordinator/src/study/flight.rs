@@ -1,0 +1,148 @@
+//! One ensemble to the fleet and back: windows and particles become jobs, outcomes become predictions and states.
+//!
+//! Outcomes are gathered by particle and record, never by arrival, so the numbers do not know who computed them. What to do
+//! about a particle that failed is not decided here: see [`super::rescue`].
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+use starlings_models::{Job, ParticleError, Prediction, Window};
+
+use super::store::JobRow;
+use super::{RunError, Study};
+use crate::fleet::{Fleet, SetupId};
+
+/// The windows of one step, one per record that still has data: (record, window).
+pub type StepWindows = Vec<(usize, Arc<Window>)>;
+
+/// Where in the run a flight belongs; goes into the rows of the store.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    /// Pass, from 1; 0 for the final forward run.
+    pub pass: usize,
+    /// Analysis within the pass, from 0.
+    pub step: usize,
+}
+
+/// A prediction per particle and window, or why there is none.
+pub type Results = Vec<Vec<Result<Prediction, ParticleError>>>;
+
+/// Sends runs to a fleet and keeps the rows that the store will want.
+pub struct Flight<'a> {
+    study: &'a Study,
+    fleet: &'a mut dyn Fleet,
+    setup: SetupId,
+    /// One row per run since the last [`Flight::take_rows`].
+    rows: Vec<JobRow>,
+    /// Runs asked for.
+    pub total: u64,
+    /// Runs that failed for good.
+    pub failed: u64,
+    /// Extra attempts.
+    pub retried: u64,
+}
+
+impl<'a> Flight<'a> {
+    /// Installs the study's setup on the fleet.
+    ///
+    /// # Errors
+    /// When the fleet refuses the setup.
+    pub fn new(study: &'a Study, fleet: &'a mut dyn Fleet) -> Result<Self, RunError> {
+        let setup = fleet.install(&study.setup)?;
+        Ok(Self { study, fleet, setup, rows: Vec::new(), total: 0, failed: 0, retried: 0 })
+    }
+
+    /// Runs the given particles over the windows. `theta` is p × r in transformed units, `states[record]` is n × r or
+    /// `None` at a record's start. Returns `[particle in the order given][window]`.
+    ///
+    /// # Errors
+    /// When the fleet fails as a whole.
+    pub fn run(
+        &mut self,
+        place: Place,
+        particles: &[usize],
+        theta: &DMatrix<f64>,
+        states: &[Option<DMatrix<f64>>],
+        windows: &StepWindows,
+    ) -> Result<Results, RunError> {
+        let mut jobs = Vec::with_capacity(particles.len() * windows.len());
+        for &particle in particles {
+            let column: DVector<f64> = theta.column(particle).into_owned();
+            for (record, window) in windows {
+                jobs.push(Job {
+                    particle: particle as u32,
+                    record: *record as u32,
+                    window: Arc::clone(window),
+                    theta: self.study.theta_for(*record, column.as_slice()),
+                    state: states[*record].as_ref().map(|x| x.column(particle).iter().copied().collect()),
+                });
+            }
+        }
+        self.total += jobs.len() as u64;
+        let outcomes = self.fleet.run(self.setup, jobs)?;
+        let mut outcomes = outcomes.into_iter();
+        let mut results = Vec::with_capacity(particles.len());
+        for &particle in particles {
+            let mut of_particle = Vec::with_capacity(windows.len());
+            for ((record, _), outcome) in windows.iter().zip(outcomes.by_ref()) {
+                self.rows.push(self.row(place, *record, particle, &outcome));
+                self.retried += u64::from(outcome.attempts.saturating_sub(1));
+                self.failed += u64::from(outcome.result.is_err());
+                of_particle.push(outcome.result);
+            }
+            results.push(of_particle);
+        }
+        Ok(results)
+    }
+
+    fn row(&self, place: Place, record: usize, particle: usize, outcome: &crate::fleet::Outcome) -> JobRow {
+        JobRow {
+            pass: place.pass,
+            step: place.step,
+            record: self.study.records[record].name.clone(),
+            particle: particle as u32,
+            attempts: outcome.attempts,
+            worker: outcome.worker.clone(),
+            error: outcome.result.as_ref().err().map(ToString::to_string),
+            cost_s: outcome.result.as_ref().map_or(0.0, |p| p.cost),
+        }
+    }
+
+    /// The rows gathered since the last call.
+    pub fn take_rows(&mut self) -> Vec<JobRow> {
+        std::mem::take(&mut self.rows)
+    }
+
+    /// Workers at the moment, for progress and the summary.
+    pub fn n_workers(&self) -> usize {
+        self.fleet.n_workers()
+    }
+
+    /// The study that is run.
+    pub fn study(&self) -> &'a Study {
+        self.study
+    }
+}
+
+/// Stacks the predictions of all particles: m × r, rows by window, then time, then output. A failed particle's column is
+/// zero and must be masked by the caller.
+pub fn stack_outputs(results: &Results) -> DMatrix<f64> {
+    let columns: Vec<Vec<f64>> = results
+        .iter()
+        .map(|windows| windows.iter().flatten().flat_map(|p| p.outputs.iter().copied()).collect())
+        .collect();
+    let m = columns.iter().map(Vec::len).max().unwrap_or(0);
+    DMatrix::from_fn(m, columns.len(), |row, column| columns[column].get(row).copied().unwrap_or(0.0))
+}
+
+/// The states of all particles at the end of window `index`: n × r. A failed particle's column is zero.
+pub fn stack_states(results: &Results, index: usize) -> DMatrix<f64> {
+    let n = results.iter().filter_map(|w| w[index].as_ref().ok()).map(|p| p.state.len()).max().unwrap_or(0);
+    let mut x = DMatrix::zeros(n, results.len());
+    for (column, windows) in results.iter().enumerate() {
+        if let Ok(p) = &windows[index] {
+            x.column_mut(column).copy_from_slice(&p.state);
+        }
+    }
+    x
+}

@@ -1,0 +1,224 @@
+//! The run folder: a frozen study, the store, and the files made from it.
+//!
+//! Result files are written beside their place and renamed into it, so a reader never sees half of one. Next file to read:
+//! [`super::store`].
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::store::{Store, StoreError};
+use super::summary::Summary;
+use super::{Fit, RunError, Study, posterior, reader};
+use crate::report;
+
+/// What the store keeps of the study so that a report needs nothing else.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct StudyInfo {
+    /// Study name.
+    pub name: String,
+    /// What the study says of itself.
+    pub says: Option<String>,
+    /// Model kind.
+    pub model: String,
+    /// Estimator in one line.
+    pub estimator: String,
+    /// `filter` or `batch`: what the steps of the store mean.
+    pub batch: bool,
+    /// Seed.
+    pub seed: u64,
+    /// Time unit.
+    pub time_unit: String,
+    /// Output names and units.
+    pub outputs: Vec<(String, String)>,
+    /// Names of parameters that are estimated through a logarithm.
+    pub logarithmic: Vec<String>,
+    /// Record names and training spans; `None` for a record that is held out as a whole.
+    pub records: Vec<(String, Option<[f64; 2]>)>,
+    /// The command line of the run.
+    pub command: String,
+    /// When the run started, as text.
+    pub started: String,
+    /// Version of the program.
+    pub version: String,
+}
+
+/// Why a run folder cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum FolderError {
+    /// It already holds a run.
+    #[error("{0} already holds a run: continue it with --resume, or choose another folder with --out")]
+    Occupied(PathBuf),
+    /// It cannot be made or written.
+    #[error("cannot write to {path}: {source}")]
+    Unwritable {
+        /// The folder or file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// A resumed run was started from another study.
+    #[error("{folder} was started from another study: {what} changed since; start a new run instead of --resume")]
+    OtherStudy {
+        /// The folder.
+        folder: PathBuf,
+        /// `the study file` or `the recordings`.
+        what: &'static str,
+    },
+    /// The database failed.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+}
+
+/// An open run folder.
+pub struct RunFolder {
+    /// The folder.
+    pub path: PathBuf,
+    /// Its database.
+    pub store: Store,
+}
+
+impl RunFolder {
+    /// Makes the folder of a new run and freezes the study into it.
+    ///
+    /// # Errors
+    /// When the folder holds a run already or cannot be written.
+    pub fn create(path: &Path, study: &Study, command: &str, started: &str) -> Result<Self, FolderError> {
+        let database = path.join("run.db");
+        if database.exists() {
+            return Err(FolderError::Occupied(path.to_owned()));
+        }
+        std::fs::create_dir_all(path)
+            .map_err(|source| FolderError::Unwritable { path: path.to_owned(), source })?;
+        write(&path.join("study.toml"), &study.text)
+            .map_err(|source| FolderError::Unwritable { path: path.join("study.toml"), source })?;
+        let store = Store::create(&database)?;
+        store.set_meta("study", &study.text)?;
+        store.set_meta("recordings", &fingerprint(study))?;
+        store.set_meta("info", &json(&info(study, command, started)))?;
+        Ok(Self { path: path.to_owned(), store })
+    }
+
+    /// Opens the folder of a run that was interrupted.
+    ///
+    /// # Errors
+    /// When there is no run, or it was started from another study or other recordings.
+    pub fn resume(path: &Path, study: &Study) -> Result<Self, FolderError> {
+        let store = Store::open(&path.join("run.db"))?;
+        let other = |what| FolderError::OtherStudy { folder: path.to_owned(), what };
+        if store.meta("study")?.as_deref() != Some(study.text.as_str()) {
+            return Err(other("the study file"));
+        }
+        if store.meta("recordings")? != Some(fingerprint(study)) {
+            return Err(other("the recordings"));
+        }
+        Ok(Self { path: path.to_owned(), store })
+    }
+
+    /// Opens the folder of any run for reading.
+    ///
+    /// # Errors
+    /// When there is no run.
+    pub fn open(path: &Path) -> Result<Self, FolderError> {
+        Ok(Self { path: path.to_owned(), store: Store::open(&path.join("run.db"))? })
+    }
+
+    /// The summary, once the run is finished.
+    ///
+    /// # Errors
+    /// When the store fails or its content is damaged.
+    pub fn summary(&self) -> Result<Option<Summary>, StoreError> {
+        let text = self.store.meta("summary")?;
+        text.map(|t| serde_json::from_str(&t).map_err(|e| self.store.damaged("summary", e))).transpose()
+    }
+
+    pub(super) fn finish(&mut self, study: &Study, fit: &Fit, summary: &Summary) -> Result<(), RunError> {
+        self.store.set_meta("summary", &json(summary))?;
+        self.store.set_meta("posterior", &posterior::to_csv(study, &fit.posterior))?;
+        self.write_artefacts()
+    }
+
+    /// Writes `posterior.csv`, `summary.json` and `report.html` from the store.
+    ///
+    /// # Errors
+    /// When the run is not finished or a file cannot be written.
+    pub fn write_artefacts(&self) -> Result<(), RunError> {
+        let Some(summary) = self.summary()? else {
+            return Err(StoreError::Unusable(format!(
+                "the run in {} is not finished: continue it with --resume",
+                self.path.display()
+            ))
+            .into());
+        };
+        let data = reader::report_data(&self.store)?;
+        let page = report::render(&data).map_err(|e| RunError::Internal(e.to_string()))?;
+        let posterior = self.store.meta("posterior")?.unwrap_or_default();
+        let summary =
+            serde_json::to_string_pretty(&summary).map_err(|e| RunError::Internal(e.to_string()))? + "\n";
+        for (name, text) in [("posterior.csv", posterior), ("summary.json", summary), ("report.html", page)] {
+            let path = self.path.join(name);
+            write(&path, &text).map_err(|source| RunError::Artefact { path, source })?;
+        }
+        Ok(())
+    }
+}
+
+/// Writes a file beside its place and renames it into it.
+fn write(path: &Path, text: &str) -> io::Result<()> {
+    let partial = path.with_extension("partial");
+    std::fs::write(&partial, text)?;
+    std::fs::rename(&partial, path)
+}
+
+fn json(value: &impl Serialize) -> String {
+    serde_json::to_string(value).unwrap_or_default()
+}
+
+/// BLAKE3 of every number of every record: a resumed run must see the same data.
+fn fingerprint(study: &Study) -> String {
+    let mut hasher = blake3::Hasher::new();
+    let mut feed = |values: &[f64]| {
+        for v in values {
+            hasher.update(&v.to_le_bytes());
+        }
+    };
+    for record in &study.records {
+        feed(&record.times);
+        for channel in &record.channels {
+            feed(&channel.values);
+        }
+        for input in &record.inputs {
+            feed(&input.times);
+            feed(&input.values);
+        }
+    }
+    hasher.finalize().to_hex().to_string()
+}
+
+fn info(study: &Study, command: &str, started: &str) -> StudyInfo {
+    use starlings_estimators::Transform;
+    let unit = |output: &String| {
+        study.spec.outputs.iter().find(|q| &q.name == output).map(|q| q.unit.clone()).unwrap_or_default()
+    };
+    StudyInfo {
+        name: study.name.clone(),
+        says: study.says.clone(),
+        model: study.setup.model.kind.clone(),
+        estimator: study.estimator.describe(),
+        batch: study.estimator.kind == super::EstimatorKind::Batch,
+        seed: study.seed,
+        time_unit: study.time_unit.clone(),
+        outputs: study.setup.outputs.iter().map(|o| (o.clone(), unit(o))).collect(),
+        logarithmic: study
+            .theta
+            .iter()
+            .filter(|t| matches!(t.transform, Transform::Log | Transform::Log2))
+            .map(|t| t.name.clone())
+            .collect(),
+        records: study.records.iter().map(|r| (r.name.clone(), r.train_span())).collect(),
+        command: command.to_owned(),
+        started: started.to_owned(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+    }
+}

@@ -1,0 +1,133 @@
+//! From a Gaussian in transformed units to what a reader wants: medians and intervals in physical units.
+//!
+//! A median and a central interval are exact under a monotone transform; the standard deviation in physical units is the
+//! first-order one, |dv/dθ|·sd.
+
+use serde::{Deserialize, Serialize};
+use starlings_estimators::{Gaussian, Transform};
+
+use super::store::EstimateRow;
+use super::{Study, ThetaEntry};
+
+/// Half-width of a central 95 % interval of a Gaussian, in standard deviations.
+const Z95: f64 = 1.959_963_984_540_054;
+
+/// One estimated parameter in physical units.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Estimate {
+    /// Name in the estimated vector, such as `R` or `R[in-vivo-1]`.
+    pub name: String,
+    /// Unit label.
+    pub unit: String,
+    /// Posterior median.
+    pub estimate: f64,
+    /// Standard deviation, to first order.
+    pub sd: f64,
+    /// Central 95 % interval.
+    pub interval95: [f64; 2],
+    /// Prior median.
+    pub prior_median: f64,
+    /// Prior central 95 % interval.
+    pub prior_interval95: [f64; 2],
+}
+
+/// The study's prior over the estimated vector, independent entries, transformed units.
+pub fn prior(study: &Study) -> Gaussian {
+    let mean: Vec<f64> = study.theta.iter().map(|t| t.prior_mean).collect();
+    let sd: Vec<f64> = study.theta.iter().map(|t| t.prior_sd).collect();
+    independent(&mean, &sd)
+}
+
+/// A Gaussian with independent entries.
+pub fn independent(mean: &[f64], sd: &[f64]) -> Gaussian {
+    use nalgebra::{DMatrix, DVector};
+    let variance = DVector::from_iterator(sd.len(), sd.iter().map(|s| s * s));
+    Gaussian { mean: DVector::from_column_slice(mean), covariance: DMatrix::from_diagonal(&variance) }
+}
+
+/// Estimates in physical units, in the order of the estimated vector.
+pub fn estimates(study: &Study, posterior: &Gaussian) -> Vec<Estimate> {
+    let sd = standard_deviations(posterior);
+    study
+        .theta
+        .iter()
+        .enumerate()
+        .map(|(j, entry)| {
+            let mean = posterior.mean[j];
+            Estimate {
+                name: entry.name.clone(),
+                unit: entry.unit(study).to_owned(),
+                estimate: entry.transform.to_physical(mean),
+                sd: entry.transform.derivative(mean).abs() * sd[j],
+                interval95: interval(&entry.transform, mean, Z95 * sd[j]),
+                prior_median: entry.transform.to_physical(entry.prior_mean),
+                prior_interval95: interval(&entry.transform, entry.prior_mean, Z95 * entry.prior_sd),
+            }
+        })
+        .collect()
+}
+
+/// Rows for the store: median and the band of two standard deviations.
+pub fn rows(study: &Study, posterior: &Gaussian) -> Vec<EstimateRow> {
+    let sd = standard_deviations(posterior);
+    study
+        .theta
+        .iter()
+        .enumerate()
+        .map(|(j, entry)| {
+            let mean = posterior.mean[j];
+            let [lo, hi] = interval(&entry.transform, mean, 2.0 * sd[j]);
+            let estimate = entry.transform.to_physical(mean);
+            EstimateRow { parameter: entry.name.clone(), estimate, lo, hi, mean, sd: sd[j] }
+        })
+        .collect()
+}
+
+/// Square roots of the variances; a variance rounded below zero counts as zero.
+pub fn standard_deviations(gaussian: &Gaussian) -> Vec<f64> {
+    gaussian.covariance.diagonal().iter().map(|v| v.max(0.0).sqrt()).collect()
+}
+
+fn interval(transform: &Transform, mean: f64, half_width: f64) -> [f64; 2] {
+    [transform.to_physical(mean - half_width), transform.to_physical(mean + half_width)]
+}
+
+impl ThetaEntry {
+    /// Unit label of the parameter this entry belongs to.
+    pub fn unit<'a>(&self, study: &'a Study) -> &'a str {
+        &study.parameters[self.parameter].unit
+    }
+}
+
+/// The posterior as CSV: one row per parameter with its estimate, then its row of the covariance in transformed units.
+/// Every number is written with the digits that identify it exactly.
+pub fn to_csv(study: &Study, posterior: &Gaussian) -> String {
+    let mut text = String::from("parameter,unit,transform,estimate,sd,lo95,hi95,mean_transformed");
+    for entry in &study.theta {
+        text.push_str(&format!(",{}", quoted(&format!("cov:{}", entry.name))));
+    }
+    text.push('\n');
+    for (j, e) in estimates(study, posterior).iter().enumerate() {
+        text.push_str(&format!(
+            "{},{},{},{:?},{:?},{:?},{:?},{:?}",
+            quoted(&e.name),
+            quoted(&e.unit),
+            quoted(&study.theta[j].transform.to_string()),
+            e.estimate,
+            e.sd,
+            e.interval95[0],
+            e.interval95[1],
+            posterior.mean[j]
+        ));
+        for value in posterior.covariance.row(j).iter() {
+            text.push_str(&format!(",{value:?}"));
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// A CSV field, quoted where it must be.
+fn quoted(field: &str) -> String {
+    if field.contains([',', '"', '\n']) { format!("\"{}\"", field.replace('"', "\"\"")) } else { field.to_owned() }
+}

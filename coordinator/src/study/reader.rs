@@ -1,0 +1,288 @@
+//! From the store to what a report shows; the only way from a run to its pictures.
+//!
+//! A running or killed run can be read as well: what is not there yet stays empty. Next file to read: [`crate::report`].
+
+use std::collections::BTreeMap;
+
+use rusqlite::Row;
+use starlings_estimators::{autocorrelation, nis_band};
+
+use super::folder::StudyInfo;
+use super::store::{Store, StoreError};
+use super::summary::Summary;
+use crate::report::{
+    Autocorrelation, ChannelPlot, FleetEvent, FleetTable, NisSeries, ParameterRow, PassTrack, ReportData, RunTimeBin,
+    RunTimes, Track, WorkerRow,
+};
+
+/// Lags shown in an autocorrelation plot.
+const MAX_LAG: usize = 60;
+/// Bins of the histogram of run times.
+const BINS: usize = 24;
+
+impl Store {
+    /// Time of the last event, in s of the run's wall time; zero for a new run.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub fn last_event_s(&self) -> Result<f64, StoreError> {
+        self.guard(self.connection().query_row("SELECT coalesce(max(at_s), 0.0) FROM events", [], |row| row.get(0)))
+    }
+
+    /// All rows of a query, each mapped by `map`.
+    pub(super) fn rows<T>(
+        &self,
+        sql: &str,
+        map: impl FnMut(&Row<'_>) -> rusqlite::Result<T>,
+    ) -> Result<Vec<T>, StoreError> {
+        let mut statement = self.guard(self.connection().prepare(sql))?;
+        let rows = self.guard(statement.query_map([], map))?;
+        self.guard(rows.collect())
+    }
+}
+
+/// Everything a report shows, as far as the run has come.
+///
+/// # Errors
+/// When the database refuses or its content is damaged.
+pub fn report_data(store: &Store) -> Result<ReportData, StoreError> {
+    let info = store.meta("info")?.unwrap_or_default();
+    let info: StudyInfo = serde_json::from_str(&info).map_err(|e| store.damaged("study description", e))?;
+    let summary: Option<Summary> = match store.meta("summary")? {
+        Some(text) => Some(serde_json::from_str(&text).map_err(|e| store.damaged("summary", e))?),
+        None => None,
+    };
+    let mut data = ReportData {
+        tracks: tracks(store, &info, summary.as_ref())?,
+        channels: channels(store, &info)?,
+        nis: nis(store)?,
+        fleet: fleet(store, summary.as_ref())?,
+        x_label: if info.batch { "iteration".to_owned() } else { format!("time [{}]", info.time_unit) },
+        study: info.name,
+        says: info.says,
+        model: info.model,
+        estimator: info.estimator,
+        seed: info.seed,
+        time_unit: info.time_unit,
+        started: Some(info.started).filter(|s| !s.is_empty()),
+        command: info.command,
+        version: info.version,
+        ..ReportData::default()
+    };
+    data.autocorrelation = data.channels.iter().filter_map(residual_autocorrelation).collect();
+    match summary {
+        Some(summary) => finished(&mut data, summary),
+        None => data.warnings.push("the run is not finished: continue it with --resume".to_owned()),
+    }
+    Ok(data)
+}
+
+fn finished(data: &mut ReportData, summary: Summary) {
+    data.warnings = summary.warnings;
+    data.wall_s = summary.wall_s;
+    data.correlation = summary.correlation;
+    data.nis_per_observation = Some(summary.fit.nis_per_observation);
+    data.log_likelihood = Some(summary.fit.log_likelihood);
+    data.conditional_on = summary.conditional_on;
+    data.parameters = summary
+        .parameters
+        .into_iter()
+        .map(|p| ParameterRow {
+            name: p.name,
+            unit: p.unit,
+            estimate: p.estimate,
+            sd: p.sd,
+            lo: p.interval95[0],
+            hi: p.interval95[1],
+            prior_median: p.prior_median,
+            prior_lo: p.prior_interval95[0],
+            prior_hi: p.prior_interval95[1],
+        })
+        .collect();
+}
+
+/// (name, pass, time, estimate, lo, hi) in the order of the run.
+type EstimateAt = (String, usize, f64, f64, f64, f64);
+
+fn tracks(store: &Store, info: &StudyInfo, summary: Option<&Summary>) -> Result<Vec<Track>, StoreError> {
+    let rows: Vec<EstimateAt> = store.rows(
+        "SELECT e.parameter, e.pass, a.time, e.estimate, e.lo, e.hi FROM estimates e
+         JOIN analyses a ON a.pass = e.pass AND a.step = e.step ORDER BY e.pass, e.step",
+        |r| Ok((r.get(0)?, r.get(1)?, r.get(2)?, r.get(3)?, r.get(4)?, r.get(5)?)),
+    )?;
+    let mut tracks: Vec<Track> = Vec::new();
+    for (name, pass, time, estimate, lo, hi) in rows {
+        let index = tracks.iter().position(|t| t.name == name).unwrap_or_else(|| {
+            let of = summary.and_then(|s| s.parameters.iter().find(|p| p.name == name));
+            tracks.push(Track {
+                name: name.clone(),
+                unit: of.map(|p| p.unit.clone()).unwrap_or_default(),
+                prior_median: of.map_or(f64::NAN, |p| p.prior_median),
+                log_axis: info.logarithmic.contains(&name),
+                passes: Vec::new(),
+            });
+            tracks.len() - 1
+        });
+        let passes = &mut tracks[index].passes;
+        if passes.last().is_none_or(|p| p.pass != pass) {
+            passes.push(PassTrack { pass, ..PassTrack::default() });
+        }
+        if let Some(track) = passes.last_mut() {
+            track.time.push(time);
+            track.estimate.push(estimate);
+            track.lo.push(lo);
+            track.hi.push(hi);
+        }
+    }
+    Ok(tracks)
+}
+
+fn channels(store: &Store, info: &StudyInfo) -> Result<Vec<ChannelPlot>, StoreError> {
+    let rows: Vec<(String, String, f64, Option<f64>, f64, String, f64)> = store.rows(
+        "SELECT record, output, time, observed, predicted, use, noise FROM predictions ORDER BY rowid",
+        |r| Ok((r.get(0)?, r.get(1)?, r.get(2)?, r.get(3)?, r.get(4)?, r.get(5)?, r.get(6)?)),
+    )?;
+    let mut channels: Vec<(ChannelPlot, Misfit)> = Vec::new();
+    for (record, output, time, observed, predicted, usage, noise) in rows {
+        if channels.last().is_none_or(|(c, _)| c.record != record || c.channel != output) {
+            let unit = info.outputs.iter().find(|(name, _)| *name == output).map(|(_, u)| u.clone());
+            let train = info.records.iter().find(|(name, _)| *name == record).and_then(|(_, span)| *span);
+            let plot = ChannelPlot {
+                record,
+                channel: output,
+                unit: unit.unwrap_or_default(),
+                noise,
+                train: train.filter(|_| usage != "held-out-channel"),
+                held_out_channel: usage == "held-out-channel",
+                ..ChannelPlot::default()
+            };
+            channels.push((plot, Misfit::default()));
+        }
+        if let Some((plot, misfit)) = channels.last_mut() {
+            plot.time.push(time);
+            plot.observed.push(observed);
+            plot.predicted.push(predicted);
+            misfit.add(usage == "train", observed.map(|o| o - predicted));
+        }
+    }
+    Ok(channels.into_iter().map(|(plot, misfit)| misfit.fill(plot)).collect())
+}
+
+/// Sums of squares over the training and held-out parts of one channel.
+#[derive(Default)]
+struct Misfit {
+    train: (f64, u32),
+    held_out: (f64, u32),
+}
+
+impl Misfit {
+    fn add(&mut self, train: bool, residual: Option<f64>) {
+        let part = if train { &mut self.train } else { &mut self.held_out };
+        if let Some(residual) = residual {
+            part.0 += residual * residual;
+            part.1 += 1;
+        }
+    }
+
+    fn fill(&self, mut plot: ChannelPlot) -> ChannelPlot {
+        let rmse = |(sum, n): (f64, u32)| (n > 0).then(|| (sum / f64::from(n)).sqrt());
+        plot.train_rmse = rmse(self.train);
+        plot.held_out_rmse = rmse(self.held_out);
+        plot
+    }
+}
+
+fn residual_autocorrelation(plot: &ChannelPlot) -> Option<Autocorrelation> {
+    let inside = |t: f64| plot.train.is_none_or(|[from, to]| t >= from && t <= to);
+    let (times, residuals): (Vec<f64>, Vec<f64>) = plot
+        .time
+        .iter()
+        .zip(plot.observed.iter().zip(&plot.predicted))
+        .filter(|(t, _)| inside(**t))
+        .filter_map(|(t, (o, p))| o.map(|o| (*t, o - p)))
+        .unzip();
+    if residuals.len() < 3 {
+        return None;
+    }
+    let value = autocorrelation(&residuals, MAX_LAG.min(residuals.len() - 1));
+    let spacing = (times[times.len() - 1] - times[0]) / (times.len() - 1) as f64;
+    Some(Autocorrelation {
+        record: plot.record.clone(),
+        channel: plot.channel.clone(),
+        lag_time: (0..value.len()).map(|lag| lag as f64 * spacing).collect(),
+        value,
+        band: 1.96 / (residuals.len() as f64).sqrt(),
+    })
+}
+
+fn nis(store: &Store) -> Result<Vec<NisSeries>, StoreError> {
+    let rows: Vec<(usize, f64, f64, usize)> = store.rows(
+        "SELECT pass, time, nis, n_used FROM analyses WHERE n_used > 0 ORDER BY pass, step",
+        |r| Ok((r.get(0)?, r.get(1)?, r.get(2)?, r.get(3)?)),
+    )?;
+    let mut series: Vec<NisSeries> = Vec::new();
+    for (pass, time, nis, n_used) in rows {
+        if series.last().is_none_or(|s| s.pass != pass) {
+            let (lo, hi) = nis_band(n_used, 0.95);
+            series.push(NisSeries { pass, lo, hi, n_used, ..NisSeries::default() });
+        }
+        if let Some(s) = series.last_mut() {
+            s.time.push(time);
+            s.nis_per_observation.push(nis / n_used as f64);
+        }
+    }
+    Ok(series)
+}
+
+fn fleet(store: &Store, summary: Option<&Summary>) -> Result<FleetTable, StoreError> {
+    let mut workers: BTreeMap<String, WorkerRow> = BTreeMap::new();
+    let mut costs = Vec::new();
+    let jobs: Vec<(String, bool, f64)> =
+        store.rows("SELECT worker, status = 'done', coalesce(cost_s, 0) FROM jobs ORDER BY id", |r| {
+            Ok((r.get(0)?, r.get(1)?, r.get(2)?))
+        })?;
+    for (name, done, cost) in &jobs {
+        let host = name.split(':').next().unwrap_or_default().to_owned();
+        let row = workers.entry(name.clone()).or_insert_with(|| WorkerRow { name: name.clone(), host, ..WorkerRow::default() });
+        row.jobs += 1;
+        row.failed += u64::from(!done);
+        row.mean_s += cost;
+        if *done {
+            costs.push(*cost);
+        }
+    }
+    for row in workers.values_mut() {
+        row.mean_s /= row.jobs as f64;
+    }
+    let events = store.rows("SELECT at_s, text FROM events ORDER BY id", |r| {
+        Ok(FleetEvent { time_s: r.get(0)?, text: r.get(1)? })
+    })?;
+    let runs = summary.map(|s| s.runs.clone());
+    Ok(FleetTable {
+        workers: workers.into_values().collect(),
+        runs_total: runs.as_ref().map_or(jobs.len() as u64, |r| r.total),
+        failed: runs.as_ref().map_or(0, |r| r.failed),
+        retried: runs.as_ref().map_or(0, |r| r.retried),
+        rescued: runs.as_ref().map_or(0, |r| r.rescued),
+        time_per_run: run_times(costs),
+        events,
+    })
+}
+
+/// Quantiles and histogram of the run times; `None` when nothing was timed.
+fn run_times(mut costs: Vec<f64>) -> Option<RunTimes> {
+    costs.retain(|c| *c > 0.0);
+    costs.sort_by(f64::total_cmp);
+    let last = costs.len().checked_sub(1)?;
+    let quantile = |q: f64| costs[(q * last as f64).round() as usize];
+    // The longest runs are few and far out: the bins end at the 99th percentile and the last one holds the rest.
+    let (from, to) = (costs[0], quantile(0.99));
+    let width = ((to - from) / BINS as f64).max(f64::MIN_POSITIVE);
+    let mut bins: Vec<RunTimeBin> = (0..BINS)
+        .map(|i| RunTimeBin { from: from + i as f64 * width, to: from + (i + 1) as f64 * width, count: 0 })
+        .collect();
+    for cost in &costs {
+        bins[(((cost - from) / width) as usize).min(BINS - 1)].count += 1;
+    }
+    Some(RunTimes { min: costs[0], median: quantile(0.5), p95: quantile(0.95), max: costs[last], bins })
+}

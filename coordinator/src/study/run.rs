@@ -1,0 +1,182 @@
+//! The whole loop: fit, forward run, summary, artefacts. Everything between a checked study and a finished run folder.
+//!
+//! The same code starts a run and continues a killed one: what is already in the store is not done again. Next files to
+//! read: [`super::filter`] and [`super::batch_fit`].
+
+use std::sync::mpsc::Receiver;
+
+use starlings_estimators::{EstimatorError, Gaussian};
+use starlings_models::ParticleError;
+
+use super::flight::Flight;
+use super::folder::RunFolder;
+use super::snapshot::{Counts, Snapshot};
+use super::store::{Store, StoreError};
+use super::summary::Summary;
+use super::{EstimatorKind, Study, batch_fit, filter, forecast, summary};
+use crate::fleet::{Fleet, FleetError, FleetEvent};
+
+/// Why a run ended without a result.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The fleet failed as a whole.
+    #[error(transparent)]
+    Fleet(#[from] FleetError),
+    /// The store failed.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// The estimator could not go on.
+    #[error(transparent)]
+    Estimator(#[from] EstimatorError),
+    /// A sigma point failed at every distance from the mean and the others do not span the parameters.
+    #[error("sigma point {particle} of pass {pass}, step {step} failed even next to the mean ({values}): {cause}; {source}")]
+    SigmaPointLost {
+        /// Index of the sigma point.
+        particle: usize,
+        /// Pass, from 1.
+        pass: usize,
+        /// Step within the pass.
+        step: usize,
+        /// Its parameters in physical units.
+        values: String,
+        /// Why its run failed.
+        cause: String,
+        /// What the estimator advises.
+        source: EstimatorError,
+    },
+    /// A redrawn sigma point could not be observed.
+    #[error("sigma point {particle} has no prediction after resampling: {source}; set [estimator] resample = \"none\"")]
+    Resampled {
+        /// Index of the sigma point.
+        particle: usize,
+        /// Why.
+        source: ParticleError,
+    },
+    /// The model fails at the estimate itself.
+    #[error("the model fails with the estimated parameters on record `{record}`: {source}")]
+    FinalRun {
+        /// Record name.
+        record: String,
+        /// Why.
+        source: ParticleError,
+    },
+    /// A result file could not be written.
+    #[error("cannot write {path}: {source}; the run itself is complete in run.db, `starlings report` writes the files again")]
+    Artefact {
+        /// The file.
+        path: std::path::PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A value that must serialise did not.
+    #[error("internal: {0}")]
+    Internal(String),
+}
+
+/// What a fit leaves behind.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// Posterior in transformed units, under the study's own prior.
+    pub posterior: Gaussian,
+    /// Evidence: log-likelihood with the parameters integrated out.
+    pub log_likelihood: f64,
+    /// Normalised innovation squared of the last pass, summed.
+    pub nis: f64,
+    /// Observations used in the last pass.
+    pub n_used: usize,
+    /// Largest share of the spread lost at one analysis.
+    pub information_lost: f64,
+    /// Runs.
+    pub counts: Counts,
+    /// Passes done.
+    pub passes: usize,
+    /// False when the iteration limit came first.
+    pub converged: bool,
+}
+
+impl Fit {
+    /// Normalised innovation squared per observation of the last pass.
+    pub fn nis_per_observation(&self) -> f64 {
+        self.nis / (self.n_used.max(1)) as f64
+    }
+}
+
+/// Where a run stands.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// `filter`, `batch` or `forward run`.
+    pub stage: &'static str,
+    /// Pass, from 1.
+    pub pass: usize,
+    /// Passes in all.
+    pub passes: usize,
+    /// Analyses done in this pass.
+    pub step: usize,
+    /// Analyses of a pass, at most.
+    pub steps: usize,
+    /// Runs so far.
+    pub runs: u64,
+    /// Workers now.
+    pub workers: usize,
+}
+
+/// What the run needs from the outside: time, somebody who watches, and the fleet's events.
+pub struct RunContext<'a> {
+    /// Seconds since the program started.
+    pub clock: &'a dyn Fn() -> f64,
+    /// Called after every analysis.
+    pub watch: &'a mut dyn FnMut(&Progress),
+    /// Events of the fleet, kept in the store.
+    pub events: Option<&'a Receiver<FleetEvent>>,
+    /// Wall time of the earlier parts of a resumed run, in s.
+    pub earlier_s: f64,
+}
+
+impl RunContext<'_> {
+    /// Wall time of the run so far, earlier parts included, in s.
+    pub fn elapsed(&self) -> f64 {
+        self.earlier_s + (self.clock)()
+    }
+
+    /// Stores the fleet's events and tells the watcher.
+    pub(super) fn after_step(&mut self, store: &Store, progress: &Progress) -> Result<(), StoreError> {
+        self.keep_events(store)?;
+        (self.watch)(progress);
+        Ok(())
+    }
+
+    fn keep_events(&self, store: &Store) -> Result<(), StoreError> {
+        for event in self.events.iter().flat_map(|events| events.try_iter()) {
+            store.event(self.elapsed(), event.kind(), &event.to_string())?;
+        }
+        Ok(())
+    }
+}
+
+/// Runs or continues a study in its folder and writes the result.
+///
+/// # Errors
+/// When the fleet, the estimator or the store fails; what was done until then stays in the store.
+pub fn run(
+    study: &Study,
+    fleet: &mut dyn Fleet,
+    folder: &mut RunFolder,
+    context: &mut RunContext<'_>,
+) -> Result<Summary, RunError> {
+    let resumed = Snapshot::read(&folder.store, study.records.len())?;
+    context.earlier_s = folder.store.last_event_s()?;
+    folder.store.event(context.elapsed(), "run", if resumed.is_some() { "run resumed" } else { "run started" })?;
+    let mut flight = Flight::new(study, fleet)?;
+    let fit = match study.estimator.kind {
+        EstimatorKind::Roukf => filter::fit(&mut flight, &mut folder.store, context, resumed)?,
+        EstimatorKind::Batch => batch_fit::fit(&mut flight, &mut folder.store, context, resumed)?,
+    };
+    let predictions = forecast::run(&mut flight, &fit.posterior)?;
+    let jobs = flight.take_rows();
+    folder.store.predictions(&predictions, &jobs)?;
+    context.keep_events(&folder.store)?;
+    let result = summary::make(study, &fit, &predictions, flight.n_workers(), context.elapsed());
+    folder.store.event(context.elapsed(), "run", "run finished")?;
+    folder.finish(study, &fit, &result)?;
+    Ok(result)
+}

@@ -1,0 +1,164 @@
+//! What a reader must know before using the numbers; every rule is one function over the finished fit.
+//!
+//! Warnings travel with the result into the summary, the report and the terminal. They never change a number.
+
+use starlings_estimators::{Transform, autocorrelation, nis_band};
+
+use super::posterior::{prior, standard_deviations};
+use super::store::PredictionRow;
+use super::summary::Summary;
+use super::{Fit, Study};
+
+/// Correlation above which two parameters are reported as one combination.
+const CORRELATED: f64 = 0.95;
+/// Share of the prior sd above which the data are said not to inform a parameter.
+const UNINFORMED: f64 = 0.9;
+/// Prior standard deviations beyond which an estimate contradicts its prior.
+const FAR_FROM_PRIOR: f64 = 4.0;
+/// Ratio of free-run to innovation misfit beyond which the filter's states are no trajectory of its estimate.
+const FREE_RUN_RATIO: f64 = 1.15;
+
+/// All warnings of a finished fit, the study's own first.
+pub fn collect(study: &Study, fit: &Fit, summary: &Summary, predictions: &[PredictionRow]) -> Vec<String> {
+    let mut warnings = study.warnings.clone();
+    warnings.extend(nis(fit));
+    warnings.extend(not_converged(fit));
+    warnings.extend(free_run(fit, study, predictions));
+    warnings.extend(autocorrelated(study, predictions));
+    warnings.extend(correlated(summary));
+    warnings.extend(uninformed(study, fit));
+    warnings.extend(far_from_prior(study, fit));
+    warnings.extend(lost(fit));
+    warnings
+}
+
+fn nis(fit: &Fit) -> Option<String> {
+    let ratio = fit.nis_per_observation();
+    let (lo, hi) = nis_band(fit.n_used, 0.999);
+    if ratio > hi.max(1.5) {
+        Some(format!(
+            "NIS is {ratio:.2} per observation, far above 1: the model does not explain the data at the stated noise; \
+             residuals are about {:.1} times the noise and the intervals too narrow. Look for a missing effect, or state \
+             a larger noise.",
+            ratio.sqrt()
+        ))
+    } else if ratio < lo.min(0.6) {
+        Some(format!(
+            "NIS is {ratio:.2} per observation, far below 1: the stated noise is too large for these data and the \
+             intervals are too wide."
+        ))
+    } else {
+        None
+    }
+}
+
+fn not_converged(fit: &Fit) -> Option<String> {
+    (!fit.converged).then(|| {
+        "the batch fit stopped at its iteration limit before it converged: raise [estimator] max_iterations".to_owned()
+    })
+}
+
+/// Particles are linear mixtures of states after an analysis; a free run with the estimate shows what that cost.
+fn free_run(fit: &Fit, study: &Study, predictions: &[PredictionRow]) -> Option<String> {
+    let train: Vec<&PredictionRow> = predictions.iter().filter(|p| p.usage == "train").collect();
+    let whitened = train.iter().filter_map(|p| Some((p.observed? - p.predicted) / p.noise));
+    let (sum, n) = whitened.fold((0.0, 0_u32), |(sum, n), w| (sum + w * w, n + 1));
+    let free = sum / f64::from(n.max(1));
+    let filtered = fit.nis_per_observation();
+    let drifting = study.theta.iter().any(|t| !matches!(t.drift, starlings_estimators::Drift::None));
+    (!drifting && study.observer_is_off() && free > (FREE_RUN_RATIO * FREE_RUN_RATIO * filtered).max(1.5)).then(|| {
+        format!(
+            "a free run with the estimate misses the training data by {:.1} times the noise, the filter by {:.1}: its \
+             states are no trajectory of the estimate. Use more passes, or kind = \"batch\".",
+            free.sqrt(),
+            filtered.sqrt()
+        )
+    })
+}
+
+fn autocorrelated(study: &Study, predictions: &[PredictionRow]) -> Vec<String> {
+    let mut found = Vec::new();
+    for output in &study.setup.outputs {
+        for record in &study.records {
+            let residuals: Vec<f64> = predictions
+                .iter()
+                .filter(|p| &p.output == output && p.record == record.name && p.usage == "train")
+                .filter_map(|p| Some(p.observed? - p.predicted))
+                .collect();
+            if residuals.len() < 20 {
+                continue;
+            }
+            let lag1 = autocorrelation(&residuals, 1).get(1).copied().unwrap_or(0.0);
+            if lag1 > 0.5 {
+                let effective = residuals.len() as f64 * (1.0 - lag1) / (1.0 + lag1);
+                found.push(format!(
+                    "residuals of {output} in {} are autocorrelated ({lag1:.2} at one sample): {} samples carry the \
+                     information of about {effective:.0}, and the intervals are too narrow.",
+                    record.name,
+                    residuals.len()
+                ));
+            }
+        }
+    }
+    found
+}
+
+fn correlated(summary: &Summary) -> Vec<String> {
+    let mut found = Vec::new();
+    for (i, row) in summary.correlation.iter().enumerate() {
+        for (j, value) in row.iter().enumerate().skip(i + 1) {
+            if value.abs() > CORRELATED {
+                found.push(format!(
+                    "{} and {} are correlated ({value:.3}): the data determine their combination, not each of them.",
+                    summary.parameters[i].name, summary.parameters[j].name
+                ));
+            }
+        }
+    }
+    found
+}
+
+fn uninformed(study: &Study, fit: &Fit) -> Vec<String> {
+    let sd = standard_deviations(&fit.posterior);
+    study
+        .theta
+        .iter()
+        .zip(&sd)
+        .filter(|(entry, sd)| **sd > UNINFORMED * entry.prior_sd)
+        .map(|(entry, sd)| {
+            format!(
+                "the data say almost nothing about {}: its uncertainty is still {:.0} % of the prior's.",
+                entry.name,
+                100.0 * sd / entry.prior_sd
+            )
+        })
+        .collect()
+}
+
+fn far_from_prior(study: &Study, fit: &Fit) -> Vec<String> {
+    let prior = prior(study);
+    study
+        .theta
+        .iter()
+        .enumerate()
+        .filter_map(|(j, entry)| {
+            let distance = (fit.posterior.mean[j] - prior.mean[j]).abs() / entry.prior_sd;
+            let bounded = matches!(entry.transform, Transform::Logit { .. });
+            (distance > FAR_FROM_PRIOR).then(|| {
+                let remedy = if bounded { "it sits at a bound" } else { "widen the prior, or bound it with logit" };
+                format!("{} is {distance:.1} prior standard deviations from its prior median: {remedy}.", entry.name)
+            })
+        })
+        .collect()
+}
+
+fn lost(fit: &Fit) -> Option<String> {
+    (fit.counts.rescued > 0).then(|| {
+        format!(
+            "{} sigma points failed and were pulled towards the mean or dropped; at the worst analysis {:.0} % of the \
+             ensemble's spread was lost.",
+            fit.counts.rescued,
+            100.0 * fit.information_lost
+        )
+    })
+}

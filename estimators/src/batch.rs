@@ -1,0 +1,272 @@
+//! Batch fit: iterated sigma-point Gauss-Newton with damping, for solvers that cannot restart from a state.
+//!
+//! One iteration is one ensemble of whole-record runs: the centre, and sigma points around it whose regression replaces
+//! the derivative (Gauss-Newton as in Bell 1994, on the linearisation of Arasaratnam & Haykin's statistical kind; damping of Levenberg 1944
+//! and Marquardt 1963, its control after Nielsen 1999). A centre that lowers the cost is kept; otherwise the step is
+//! shortened and recomputed from the linearisation of the best centre. It deliberately stops nowhere by itself:
+//! the caller looks at `converged` and `max_iterations`. Read next: `linearisation.rs`.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::data::same;
+use crate::linearisation::{Ensemble, Linearisation, Outcome};
+use crate::{Data, EstimatorError, Gaussian, SigmaSet};
+
+/// Damping of the first step, relative to the diagonal of the information.
+const FIRST_DAMPING: f64 = 1e-3;
+/// Least damping after a rejected step.
+const REJECTED_DAMPING: f64 = 0.05;
+/// First factor by which a rejected step raises the damping; it doubles with every further one.
+const FIRST_GROWTH: f64 = 4.0;
+/// No parameter moves further than this in one step, in prior sd.
+const LONGEST: f64 = 2.0;
+/// Steps rejected in a row before the best centre is linearised again with closer points.
+const STUBBORN: usize = 4;
+/// Points come no closer than this, relative to the spread asked for.
+const NARROWEST: f64 = 0.1;
+/// Ensembles around the prior mean before the start counts as failed.
+const STARTS: usize = 4;
+
+/// Settings of a batch fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Batch {
+    /// Sigma points, r of them.
+    pub set: SigmaSet,
+    /// Spread of the points in units of the current posterior sd (of the prior sd at first). As the steps get shorter
+    /// than one sd, the points close in with them, down to a tenth of this.
+    pub spread: f64,
+    /// Ensembles at most; the caller stops there.
+    pub max_iterations: usize,
+    /// Converged when the undamped step is shorter than this, in posterior sd.
+    pub tolerance: f64,
+}
+
+/// All that a batch fit carries from one ensemble to the next. Vectors and matrices are in parameters whitened by the
+/// prior: theta = prior mean + L u, L the lower Cholesky factor of the prior covariance.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BatchState {
+    /// Prior of the transformed parameters.
+    pub prior: Gaussian,
+    /// Centre u of the next ensemble, length p.
+    pub trial: DVector<f64>,
+    /// Factor of the offsets of the next ensemble, p x p: point i is trial + scale I_i.
+    pub scale: DMatrix<f64>,
+    /// Distance of the points relative to [`Batch::spread`].
+    pub width: f64,
+    /// Damping of the next step, relative to the diagonal of the information.
+    pub damping: f64,
+    /// Factor by which the next rejection raises the damping.
+    pub growth: f64,
+    /// Ensembles used so far.
+    pub iteration: usize,
+    /// Ensembles rejected in a row.
+    pub rejected: usize,
+    /// The best centre so far and the slope there; none before the first ensemble.
+    pub best: Option<Linearisation>,
+    /// The undamped step from the best centre is shorter than the tolerance.
+    pub converged: bool,
+}
+
+/// What is known after one ensemble, at the best centre so far.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BatchStep {
+    /// -2 log posterior up to a constant: misfit plus squared distance from the prior mean in prior sd.
+    pub cost: f64,
+    /// Whitened squared residual.
+    pub misfit: f64,
+    /// Rows that were not missing.
+    pub n_used: usize,
+    /// Length of the undamped step to the minimum, in posterior sd.
+    pub step: f64,
+    /// The centre of this ensemble is the new best.
+    pub accepted: bool,
+    /// The step is shorter than the tolerance.
+    pub converged: bool,
+    /// Gaussian posterior (P0^-1 + J^T W^-1 J)^-1 around the best centre; once converged, around the end of the last step.
+    pub posterior: Gaussian,
+    /// Log-likelihood at the best centre, natural logarithm.
+    pub log_likelihood: f64,
+    /// Laplace approximation of the log evidence, exact for a linear model once converged.
+    pub evidence: f64,
+}
+
+impl Batch {
+    /// A batch fit with the usual settings: spread 0.1, tolerance 0.01, at most 60 ensembles.
+    pub fn new(set: SigmaSet) -> Self {
+        Self { set, spread: 0.1, max_iterations: 60, tolerance: 1e-2 }
+    }
+
+    /// The state before any ensemble: centred at the prior mean, points at `spread` prior sd.
+    ///
+    /// # Panics
+    /// When the prior has not the p parameters of the sigma points.
+    pub fn init(&self, prior: &Gaussian) -> BatchState {
+        let p = self.set.n_param();
+        assert_eq!(prior.n_param(), p, "prior and sigma points differ in parameters");
+        BatchState {
+            prior: prior.clone(),
+            trial: DVector::zeros(p),
+            scale: DMatrix::identity(p, p) * self.spread,
+            width: 1.0,
+            damping: FIRST_DAMPING,
+            growth: FIRST_GROWTH,
+            iteration: 0,
+            rejected: 0,
+            best: None,
+            converged: false,
+        }
+    }
+
+    /// Transformed parameters of the next ensemble, p x (r+1): column 0 is the centre, then the sigma points around it.
+    pub fn sample(&self, s: &BatchState) -> DMatrix<f64> {
+        let mut u = (&s.scale * &self.set.points).insert_column(0, 0.0);
+        for mut column in u.column_iter_mut() {
+            column += &s.trial;
+        }
+        let mut theta = s.prior.factor() * u;
+        for mut column in theta.column_iter_mut() {
+            column += &s.prior.mean;
+        }
+        theta
+    }
+
+    /// Takes the predictions of one ensemble (m x (r+1), columns as in [`Batch::sample`]) and chooses the next.
+    ///
+    /// A failed centre, marked or not finite, is a rejected step; failed points are left out of the regression as long
+    /// as the rest spans the parameters.
+    ///
+    /// # Errors
+    /// Wrong lengths, bad data or noise, a spread that is not positive, and `StartFailed` when nothing could be run
+    /// around the prior mean.
+    pub fn step(
+        &self,
+        s: &BatchState,
+        predictions: &DMatrix<f64>,
+        failed: &[bool],
+        data: &Data<'_>,
+    ) -> Result<(BatchState, BatchStep), EstimatorError> {
+        same("parameters of the state", self.set.n_param(), s.trial.len())?;
+        let ensemble = Ensemble { set: &self.set, centre: &s.trial, scale: &s.scale, predictions, failed, data };
+        let mut next = s.clone();
+        next.iteration += 1;
+        let outcome = ensemble.linearise()?;
+        let accepted = match (outcome, &s.best) {
+            (Outcome::Fit(fit), None) => {
+                next.best = Some(fit);
+                true
+            }
+            (Outcome::Fit(fit), Some(best)) if fit.cost <= best.cost => {
+                next.relax(best, &fit);
+                next.best = Some(fit);
+                true
+            }
+            (Outcome::NoCentre, None) => return Err(EstimatorError::StartFailed { attempt: next.iteration }),
+            (Outcome::NotSpanned, None) if next.iteration >= STARTS => {
+                return Err(EstimatorError::StartFailed { attempt: next.iteration });
+            }
+            _ => false,
+        };
+        let Some(best) = next.best.clone() else {
+            next.scale *= 0.25;
+            return Ok((next.clone(), self.unstarted(&next)));
+        };
+        if accepted { next.rejected = 0 } else { next.reject() }
+        self.advance(&mut next, &best, accepted).map(|step| (next, step))
+    }
+
+    /// The next centre and its points, from the best linearisation; and the report.
+    fn advance(
+        &self,
+        next: &mut BatchState,
+        best: &Linearisation,
+        accepted: bool,
+    ) -> Result<BatchStep, EstimatorError> {
+        let hessian = best.hessian();
+        let singular = EstimatorError::NotPositiveDefinite { what: "posterior" };
+        let root = hessian.clone().cholesky().ok_or_else(|| singular.clone())?;
+        let newton = -root.solve(&best.gradient);
+        let step = (-newton.dot(&best.gradient)).max(0.0).sqrt();
+        let again = !accepted && next.rejected.is_multiple_of(STUBBORN);
+        if again {
+            next.trial.clone_from(&best.centre);
+            next.width *= 0.3;
+        } else {
+            next.trial = &best.centre + damped(&hessian, &best.gradient, next.damping).ok_or(singular)?;
+            if accepted {
+                next.width = step.clamp(NARROWEST, 1.0);
+            }
+        }
+        let eigen = hessian.symmetric_eigen();
+        let sd = DMatrix::from_diagonal(&eigen.eigenvalues.map(|v| 1.0 / v.sqrt()));
+        let log_det: f64 = eigen.eigenvalues.iter().map(|v| v.ln()).sum();
+        next.scale = &eigen.eigenvectors * sd * eigen.eigenvectors.transpose() * (self.spread * next.width);
+        next.converged = step < self.tolerance;
+        let (u, gain) = if next.converged { (&best.centre + newton, step * step) } else { (best.centre.clone(), 0.0) };
+        let l = next.prior.factor();
+        let covariance = &l * root.inverse() * l.transpose();
+        Ok(BatchStep {
+            cost: best.cost,
+            misfit: best.misfit,
+            n_used: best.n_used,
+            step,
+            accepted,
+            converged: next.converged,
+            posterior: Gaussian {
+                mean: &next.prior.mean + l * u,
+                covariance: (&covariance + covariance.transpose()) * 0.5,
+            },
+            log_likelihood: best.log_likelihood,
+            evidence: best.log_likelihood + 0.5 * (best.misfit - best.cost + gain - log_det),
+        })
+    }
+
+    /// The report when no ensemble could be linearised yet: nothing is known but the prior.
+    fn unstarted(&self, s: &BatchState) -> BatchStep {
+        BatchStep {
+            cost: f64::INFINITY,
+            misfit: f64::INFINITY,
+            n_used: 0,
+            step: f64::INFINITY,
+            accepted: false,
+            converged: false,
+            posterior: s.prior.clone(),
+            log_likelihood: f64::NEG_INFINITY,
+            evidence: f64::NEG_INFINITY,
+        }
+    }
+}
+
+impl BatchState {
+    /// Lowers the damping by how well the linear model foretold the fall of the cost.
+    fn relax(&mut self, from: &Linearisation, to: &Linearisation) {
+        let s = &to.centre - &from.centre;
+        let foretold = -2.0 * s.dot(&from.gradient) - s.dot(&(from.hessian() * &s));
+        if foretold > 0.0 {
+            let ratio = (from.cost - to.cost) / foretold;
+            self.damping *= (1.0 - (2.0 * ratio - 1.0).powi(3)).clamp(0.1, 2.0);
+        }
+        self.growth = FIRST_GROWTH;
+    }
+
+    fn reject(&mut self) {
+        self.rejected += 1;
+        self.damping = self.damping.max(REJECTED_DAMPING) * self.growth;
+        self.growth *= 2.0;
+    }
+}
+
+impl Linearisation {
+    /// Half the second derivative of the cost (Gauss-Newton), p x p.
+    fn hessian(&self) -> DMatrix<f64> {
+        let p = self.centre.len();
+        DMatrix::identity(p, p) + &self.information
+    }
+}
+
+/// Solves (H + damping diag H) step = -gradient; no component longer than [`LONGEST`].
+fn damped(hessian: &DMatrix<f64>, gradient: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
+    let matrix = hessian + DMatrix::from_diagonal(&(hessian.diagonal() * damping));
+    let step = -matrix.cholesky()?.solve(gradient);
+    let longest = step.amax();
+    Some(if longest > LONGEST { step * (LONGEST / longest) } else { step })
+}

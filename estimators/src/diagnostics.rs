@@ -1,0 +1,82 @@
+//! Diagnostics of residuals and posteriors: noise, autocorrelation, the band of the NIS, correlations.
+//!
+//! Deliberately without judgement: what deserves a warning is the caller's business. Read next: `analysis.rs`.
+
+use nalgebra::DMatrix;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+/// Third quartile of the standard normal distribution: median of |x| for unit sd.
+const MEDIAN_ABSOLUTE: f64 = 0.674_489_750_196_081_7;
+
+/// Noise sd of an evenly sampled smooth series from its third differences: median |d3| / (0.6745 sqrt 20).
+///
+/// Differences that touch a NaN are skipped; NaN when none is left. Third differences remove any parabola, and white
+/// noise has third differences of variance 1 + 9 + 9 + 1 = 20; the median is blind to a few jumps.
+pub fn noise_from_third_differences(series: &[f64]) -> f64 {
+    let mut size: Vec<f64> = series
+        .windows(4)
+        .map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs())
+        .filter(|d| d.is_finite())
+        .collect();
+    if size.is_empty() {
+        return f64::NAN;
+    }
+    size.sort_by(f64::total_cmp);
+    let median = 0.5 * (size[(size.len() - 1) / 2] + size[size.len() / 2]);
+    median / (MEDIAN_ABSOLUTE * 20f64.sqrt())
+}
+
+/// Autocorrelation at lags 0 to `max_lag` (length `max_lag + 1`), the biased estimate (Box & Jenkins 1976, section 2.1).
+///
+/// Products that touch a NaN count as zero, so values stay within [-1, 1]. NaN for a constant or empty series.
+pub fn autocorrelation(series: &[f64], max_lag: usize) -> Vec<f64> {
+    let observed: Vec<f64> = series.iter().copied().filter(|v| v.is_finite()).collect();
+    let mean = observed.iter().sum::<f64>() / observed.len() as f64;
+    let deviation: Vec<f64> = series.iter().map(|v| if v.is_finite() { v - mean } else { 0.0 }).collect();
+    let variance: f64 = deviation.iter().map(|d| d * d).sum();
+    (0..=max_lag)
+        .map(|lag| {
+            let later = deviation.get(lag..).unwrap_or(&[]);
+            if variance > 0.0 {
+                later.iter().zip(&deviation).map(|(a, b)| a * b).sum::<f64>() / variance
+            } else {
+                f64::NAN
+            }
+        })
+        .collect()
+}
+
+/// Number of independent values that would give the mean of this series the same variance: n / (1 + 2 sum rho).
+///
+/// The sum stops at the first pair of lags whose correlations no longer add up to something positive (Geyer 1992).
+/// NaN for a constant or empty series; never more than the number of observed values.
+pub fn effective_sample_size(series: &[f64]) -> f64 {
+    let n = series.iter().filter(|v| v.is_finite()).count();
+    let rho = autocorrelation(series, series.len().saturating_sub(1));
+    let pairs: f64 = rho.chunks_exact(2).map(|p| p[0] + p[1]).take_while(|s| *s > 0.0).sum();
+    let time = (2.0 * pairs - 1.0).max(1.0);
+    if rho.first().is_some_and(|r| r.is_finite()) { n as f64 / time } else { f64::NAN }
+}
+
+/// Band that holds NIS per observation with probability `level` (in (0, 1)) when the model explains `n_used` values:
+/// central chi-square quantiles over `n_used`. (NaN, NaN) without observations.
+pub fn nis_band(n_used: usize, level: f64) -> (f64, f64) {
+    let n = n_used as f64;
+    ChiSquared::new(n).map_or((f64::NAN, f64::NAN), |chi| {
+        let tail = 0.5 * (1.0 - level);
+        (chi.inverse_cdf(tail) / n, chi.inverse_cdf(1.0 - tail) / n)
+    })
+}
+
+/// Correlation matrix of a covariance; a variable without variance correlates with nothing (0, and 1 with itself).
+pub fn correlation(covariance: &DMatrix<f64>) -> DMatrix<f64> {
+    let sd = covariance.diagonal().map(|v| v.max(0.0).sqrt());
+    DMatrix::from_fn(covariance.nrows(), covariance.ncols(), |i, j| {
+        let scale = sd[i] * sd[j];
+        match (i == j, scale > 0.0) {
+            (true, _) => 1.0,
+            (false, true) => (covariance[(i, j)] / scale).clamp(-1.0, 1.0),
+            (false, false) => 0.0,
+        }
+    })
+}

@@ -1,0 +1,43 @@
+//! A Gaussian over the transformed parameters: what a prior is and what an estimator returns.
+//!
+//! Deliberately only a mean and a covariance; the particles carry factors of their own.
+//! Read next: `exchange.rs`, which changes the prior under a posterior.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Mean and covariance of p transformed parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gaussian {
+    /// Mean, length p.
+    pub mean: DVector<f64>,
+    /// Covariance, p x p, symmetric.
+    pub covariance: DMatrix<f64>,
+}
+
+impl Gaussian {
+    /// Independent parameters: mean and standard deviation of each.
+    pub fn independent(mean: &[f64], sd: &[f64]) -> Self {
+        let variance = DVector::from_iterator(sd.len(), sd.iter().map(|s| s * s));
+        Self { mean: DVector::from_column_slice(mean), covariance: DMatrix::from_diagonal(&variance) }
+    }
+
+    /// Number of parameters p.
+    pub fn n_param(&self) -> usize {
+        self.mean.len()
+    }
+
+    /// Standard deviations, length p.
+    pub fn sd(&self) -> DVector<f64> {
+        self.covariance.diagonal().map(|v| v.max(0.0).sqrt())
+    }
+
+    /// A factor L with L L^T = covariance: lower Cholesky, or the symmetric root where the covariance is singular.
+    pub(crate) fn factor(&self) -> DMatrix<f64> {
+        if let Some(cholesky) = self.covariance.clone().cholesky() {
+            return cholesky.l();
+        }
+        let eigen = self.covariance.clone().symmetric_eigen();
+        let root = DMatrix::from_diagonal(&eigen.eigenvalues.map(|v| v.max(0.0).sqrt()));
+        &eigen.eigenvectors * root * eigen.eigenvectors.transpose()
+    }
+}

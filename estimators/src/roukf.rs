@@ -1,0 +1,201 @@
+//! The reduced-order unscented Kalman filter as pure steps on particles (Moireau & Chapelle 2011).
+//!
+//! A study samples particles, runs the model on each up to the next observation, hands in their predictions and gets
+//! new particles and the transform T to apply to the states. It deliberately never sees a state: an uncertain initial
+//! value is one more parameter, whose direction stays in the particles. Read next: `analysis.rs`.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::analysis::analyse;
+use crate::data::same;
+use crate::particles::{Geometry, SPANNED};
+use crate::{Analysis, Data, Drift, EstimatorError, Gaussian, Particles, SigmaSet, drift};
+
+/// Which root C of the posterior covariance U^{-1} moves the particles; mean and covariance do not depend on it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Root {
+    /// Symmetric root: does not depend on the orientation or order of the points, and moves them least.
+    #[default]
+    Symmetric,
+    /// Lower Cholesky factor (Moireau & Chapelle 2011).
+    Cholesky,
+}
+
+/// The reduced-order unscented Kalman filter of p parameters with r particles.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Roukf {
+    /// Sigma points, r of them.
+    pub set: SigmaSet,
+    /// Root of the posterior covariance.
+    pub root: Root,
+    /// Drift of each parameter, length p; empty = none drifts.
+    pub drift: Vec<Drift>,
+}
+
+impl Roukf {
+    /// Particles that represent the prior exactly: mean + L I with L L^T its covariance.
+    ///
+    /// # Panics
+    /// When the prior has not the p parameters of the sigma points.
+    pub fn init(&self, prior: &Gaussian) -> Particles {
+        assert_eq!(prior.n_param(), self.set.n_param(), "prior and sigma points differ in parameters");
+        Particles::whole(around(&prior.mean, &(prior.factor() * &self.set.points)))
+    }
+
+    /// Mean of the parameters, length p.
+    ///
+    /// # Panics
+    /// When the particles do not match the sigma points in number.
+    pub fn mean(&self, p: &Particles) -> DVector<f64> {
+        &p.theta * Geometry::new(&self.set, &p.pull).mean
+    }
+
+    /// Mean and covariance of the parameters.
+    ///
+    /// # Panics
+    /// When the particles do not match the sigma points in number.
+    pub fn gaussian(&self, p: &Particles) -> Gaussian {
+        let geometry = Geometry::new(&self.set, &p.pull);
+        let l = &p.theta * &geometry.slope;
+        Gaussian { mean: &p.theta * &geometry.mean, covariance: &l * l.transpose() }
+    }
+
+    /// Pulls particle `i` to the distance `s` (0 < s <= 1) of its sigma point from the mean: the new particles, and the
+    /// r x r matrix that does the same to the states, X <- X M. The other particles do not move.
+    ///
+    /// # Panics
+    /// When there is no particle `i` or `s` lies outside (0, 1].
+    pub fn pull(&self, p: &Particles, i: usize, s: f64) -> (Particles, DMatrix<f64>) {
+        assert!(s > 0.0 && s <= 1.0, "a particle is pulled to a distance in (0, 1], got {s}");
+        let geometry = Geometry::new(&self.set, &p.pull);
+        let r = self.set.n_particle();
+        let mut m = DMatrix::identity(r, r);
+        if p.pull[i] > 0.0 {
+            let kept = s / p.pull[i];
+            m.set_column(i, &(&geometry.mean * (1.0 - kept)));
+            m[(i, i)] += kept;
+        } else {
+            // A dropped particle comes back on the line that the others define.
+            m.set_column(i, &(&geometry.mean + &geometry.slope * self.set.points.column(i) * s));
+        }
+        let mut pull = p.pull.clone();
+        pull[i] = s;
+        (Particles { theta: &p.theta * &m, pull }, m)
+    }
+
+    /// Drops particle `i`, which could not be run anywhere: the others keep their places, its weight is shared out.
+    ///
+    /// # Errors
+    /// `NotSpanned` when the others no longer span the parameters, always so for the simplex.
+    ///
+    /// # Panics
+    /// When there is no particle `i`.
+    pub fn drop(&self, p: &Particles, i: usize) -> Result<Particles, EstimatorError> {
+        let mut pull = p.pull.clone();
+        pull[i] = 0.0;
+        self.spanned(p, &Geometry::new(&self.set, &pull))?;
+        Ok(Particles { theta: p.theta.clone(), pull })
+    }
+
+    /// Resampling before an analysis of more than p + 1 particles: keeps the p leading directions of the whole spread of
+    /// the augmented particles, its even part included, so that with as many parameters as states the filter is the
+    /// plain unscented one.
+    ///
+    /// `gram` (r x r) holds the products sqrt(a_i a_j) <x_i - x, x_j - x> of deviations from the weighted mean x, in a
+    /// norm that makes state and parameters commensurable. Returns the new particles and the r x r matrix R of
+    /// X <- X R, after which the predictions must be evaluated again. Particles that were pulled or dropped, and the
+    /// simplex, are left as they are (R = 1): a pulled set has no even part that could be trusted.
+    ///
+    /// # Errors
+    /// `Shape`, `NotFinite` for a bad Gram matrix.
+    pub fn resample(
+        &self,
+        p: &Particles,
+        gram: &DMatrix<f64>,
+    ) -> Result<(Particles, DMatrix<f64>), EstimatorError> {
+        let (n_param, r) = (self.set.n_param(), self.set.n_particle());
+        self.check(p)?;
+        same("rows of the Gram matrix", r, gram.nrows())?;
+        same("columns of the Gram matrix", r, gram.ncols())?;
+        if gram.iter().any(|v| !v.is_finite()) {
+            return Err(EstimatorError::NotFinite { what: "the Gram matrix of the particles" });
+        }
+        if r == n_param + 1 || p.pull.iter().any(|s| *s < 1.0) {
+            return Ok((p.clone(), DMatrix::identity(r, r)));
+        }
+        let eigen = ((gram + gram.transpose()) * 0.5).symmetric_eigen();
+        let mut order: Vec<usize> = (0..r).collect();
+        order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
+        let leading = eigen.eigenvectors.select_columns(&order[..n_param]);
+        let alpha = &self.set.weights;
+        let mut directions = DMatrix::from_diagonal(&alpha.map(f64::sqrt)) * leading;
+        for mut column in directions.column_iter_mut() {
+            let sum = column.sum();
+            column.axpy(-sum, alpha, 1.0);
+        }
+        let t = around(alpha, &(directions * &self.set.points));
+        Ok((Particles::whole(&p.theta * &t), t))
+    }
+
+    /// One analysis. `predictions` is m x r, rows as in `data`; the column of a dropped particle is ignored, and so is
+    /// every row that is missing. Afterwards all particles are at their sigma points again.
+    ///
+    /// Without any observation a simplex stays where it is; other sets lose the even part of their spread (they are
+    /// projected on the linear relation, w = 0 and C = 1). Random walks go on, forgetting waits for data.
+    ///
+    /// # Errors
+    /// Wrong lengths, non-finite predictions or data, noise that is not positive, particles that do not span the
+    /// parameters or have no spread for the drift.
+    pub fn analysis(
+        &self,
+        p: &Particles,
+        predictions: &DMatrix<f64>,
+        data: &Data<'_>,
+    ) -> Result<(Particles, Analysis), EstimatorError> {
+        self.check(p)?;
+        drift::check(&self.drift, self.set.n_param())?;
+        same("rows of the predictions", data.values.len(), predictions.nrows())?;
+        same("columns of the predictions", self.set.n_particle(), predictions.ncols())?;
+        let geometry = Geometry::new(&self.set, &p.pull);
+        self.spanned(p, &geometry)?;
+        let mut analysis = analyse(&geometry, &self.set.points, self.root, predictions, data)?;
+        let mut theta = &p.theta * &analysis.transform;
+        if let Some(moved) = drift::transform(&self.drift, &self.set, &theta, analysis.n_used > 0)? {
+            theta *= &moved;
+            analysis.transform *= moved;
+        }
+        Ok((Particles::whole(theta), analysis))
+    }
+
+    fn check(&self, p: &Particles) -> Result<(), EstimatorError> {
+        same("parameters of the particles", self.set.n_param(), p.theta.nrows())?;
+        same("particles", self.set.n_particle(), p.theta.ncols())?;
+        same("pulls of the particles", self.set.n_particle(), p.pull.len())
+    }
+
+    /// Do the particles that count still span the parameters?
+    fn spanned(&self, p: &Particles, geometry: &Geometry) -> Result<(), EstimatorError> {
+        let (direction, variance) = &geometry.weakest;
+        if *variance > SPANNED {
+            return Ok(());
+        }
+        // The lost direction in parameters, each measured in its own sd, from the full set of points.
+        let l = &p.theta * Geometry::new(&self.set, &vec![1.0; p.pull.len()]).slope;
+        let lost = &l * direction;
+        let share: Vec<f64> = (0..lost.len()).map(|j| (lost[j] / l.row(j).norm()).abs()).collect();
+        let most = share.iter().copied().fold(0.0, f64::max);
+        let mut parameters: Vec<usize> = (0..share.len()).filter(|&j| share[j] >= 0.5 * most).collect();
+        parameters.sort_by(|a, b| share[*b].total_cmp(&share[*a]));
+        let n_left = geometry.weights.iter().filter(|w| **w > 0.0).count();
+        Err(EstimatorError::NotSpanned { n_left, n_param: share.len(), parameters })
+    }
+}
+
+/// centre 1^T + offsets.
+fn around(centre: &DVector<f64>, offsets: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut points = offsets.clone();
+    for mut column in points.column_iter_mut() {
+        column += centre;
+    }
+    points
+}

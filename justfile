@@ -1,0 +1,42 @@
+# Every recipe is a plain cargo line; `just` is a convenience, not a need.
+
+# Types only.
+check:
+    cargo check --workspace --all-targets
+
+# Every test.
+test:
+    cargo test --workspace
+
+# Formatting and lints, warnings are errors.
+lint:
+    cargo fmt --all --check
+    cargo clippy --workspace --all-targets -- -D warnings
+
+# Format in place.
+fmt:
+    cargo fmt --all
+
+# API documentation, warnings are errors.
+doc $RUSTDOCFLAGS="-D warnings":
+    cargo doc --workspace --no-deps
+
+# Micro-benchmarks and the fleet benchmark.
+bench:
+    cargo bench --bench analysis
+    cargo bench --bench fleet -- --json
+
+# Licences, advisories, bans and sources (cargo install cargo-deny).
+deny:
+    cargo deny check
+
+# The main example.
+run:
+    cargo run --release -- run examples/pig-aorta/study.toml
+
+# Check every example's study and data without estimating.
+examples:
+    cargo run --release -- check examples/pig-aorta/study.toml
+    cargo run --release -- check examples/pig-aorta-joint/study.toml
+    cargo run --release -- check examples/rcr/study.toml
+    cargo run --release -- check examples/oscillator/study.toml

@@ -1,0 +1,203 @@
+//! A model with effects, which is a model again.
+//!
+//! The effects' states follow the model's states and their parameters follow its parameters. Terms see the recorded inputs;
+//! the model sees them with the effects' additions, except through `delay`, which reads the record. Where effects only add to
+//! outputs the model keeps its own step, so that its states are untouched to the last bit. Next file to read: [`super::library`].
+
+use std::collections::BTreeMap;
+
+use super::terms::Scope;
+use super::{Effect, EffectDef, Moment, TermEffect, Touches};
+use crate::model::{Drive, Segment};
+use crate::setup::SetupError;
+use crate::{Model, ParticleError, Quantity, Spec};
+
+/// A model and the effects added to it.
+pub struct Extended {
+    inner: Box<dyn Model>,
+    effects: Vec<Box<dyn Effect>>,
+    spec: Spec,
+    touches: Touches,
+    /// State components and parameters of the inner model.
+    n_state: usize,
+    n_param: usize,
+}
+
+impl Extended {
+    /// Adds effects, written out, to a model. `constants` are values that terms may use besides the model's parameters.
+    ///
+    /// # Errors
+    /// When a name is given twice or an effect does not fit the model.
+    pub fn new(
+        inner: Box<dyn Model>,
+        defs: &[EffectDef],
+        constants: &BTreeMap<String, f64>,
+    ) -> Result<Self, SetupError> {
+        let spec = extended_spec(inner.spec(), defs)?;
+        let scope = Scope { spec: &spec, constants };
+        let mut effects: Vec<Box<dyn Effect>> = Vec::with_capacity(defs.len());
+        for def in defs {
+            effects.push(Box::new(TermEffect::new(def, scope)?));
+        }
+        let touches = effects.iter().fold(Touches::default(), |all, effect| all.or(effect.touches()));
+        let (n_state, n_param) = (inner.spec().n_state(), inner.spec().parameters.len());
+        Ok(Self { inner, effects, spec, touches, n_state, n_param })
+    }
+
+    /// The inner model's outputs without any effect, where a term reads them.
+    fn plain_outputs(&self, at: Moment<'_>) -> Scratch {
+        let mut y = Scratch::new(if self.touches.reads_outputs { self.spec.n_output() } else { 0 });
+        if self.touches.reads_outputs {
+            let (x, theta) = (&at.x[..self.n_state], &at.theta[..self.n_param]);
+            self.inner.output(at.t, x, theta, at.u, y.as_mut());
+        }
+        y
+    }
+
+    /// Calls `use_inputs` with the inputs as the inner model sees them. `rate` is the extended state's rate, or empty.
+    fn with_inputs(&self, at: Moment<'_>, rate: &[f64], use_inputs: impl FnOnce(Drive<'_>)) {
+        if !self.touches.inputs {
+            return use_inputs(at.u);
+        }
+        let (mut value, mut slope) = (Scratch::of(at.u.value), Scratch::of(at.u.slope));
+        for effect in &self.effects {
+            effect.add_to_inputs(at, rate, value.as_mut(), slope.as_mut());
+        }
+        use_inputs(Drive { value: value.as_ref(), slope: slope.as_ref(), history: at.u.history });
+    }
+
+    /// The rate of the extended state, with the inputs' slopes as far as `rate` tells the state's part of them.
+    fn rate(&self, at: Moment<'_>, rate: &[f64], dx: &mut [f64]) {
+        let (x, theta) = (&at.x[..self.n_state], &at.theta[..self.n_param]);
+        let (inner, own) = dx.split_at_mut(self.n_state);
+        self.with_inputs(at, rate, |u| self.inner.rhs(at.t, x, theta, u, inner));
+        own.fill(0.0);
+        for effect in &self.effects {
+            effect.add_to_rates(at, dx);
+        }
+    }
+
+    /// The rate of the state where an input's slope needs it, else nothing.
+    fn rate_for_slopes(&self, at: Moment<'_>) -> Scratch {
+        let mut rate = Scratch::new(if self.touches.inputs_follow_states { at.x.len() } else { 0 });
+        if self.touches.inputs_follow_states {
+            self.rate(at, &[], rate.as_mut());
+        }
+        rate
+    }
+}
+
+impl Model for Extended {
+    fn spec(&self) -> &Spec {
+        &self.spec
+    }
+
+    fn initial(&self, theta: &[f64], x: &mut [f64]) {
+        let (inner, own) = x.split_at_mut(self.n_state);
+        self.inner.initial(&theta[..self.n_param], inner);
+        own.fill(0.0);
+        for effect in &self.effects {
+            effect.initial(theta, x);
+        }
+    }
+
+    fn rhs(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, dx: &mut [f64]) {
+        let at = Moment { t, x, theta, u, y: &[] };
+        let y = self.plain_outputs(at);
+        let at = Moment { y: y.as_ref(), ..at };
+        let rate = self.rate_for_slopes(at);
+        self.rate(at, rate.as_ref(), dx);
+    }
+
+    fn output(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, y: &mut [f64]) {
+        let at = Moment { t, x, theta, u, y: &[] };
+        let plain = self.plain_outputs(at);
+        let at = Moment { y: plain.as_ref(), ..at };
+        let rate = self.rate_for_slopes(at);
+        let inner = |u: Drive<'_>| self.inner.output(t, &x[..self.n_state], &theta[..self.n_param], u, y);
+        self.with_inputs(at, rate.as_ref(), inner);
+        for effect in &self.effects {
+            effect.add_to_outputs(at, y);
+        }
+    }
+
+    fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ParticleError> {
+        if self.touches.rates || self.touches.inputs {
+            self.inner.advance_whole(self, segment, theta, x)
+        } else {
+            self.inner.advance(segment, &theta[..self.n_param], x)
+        }
+    }
+}
+
+/// The inner model's specification with the effects' states and parameters.
+fn extended_spec(inner: &Spec, defs: &[EffectDef]) -> Result<Spec, SetupError> {
+    let mut spec = inner.clone();
+    for (i, def) in defs.iter().enumerate() {
+        if defs[..i].iter().any(|d| d.name == def.name) {
+            return Err(SetupError::Twice(def.name.clone()));
+        }
+        if def.adds.is_empty() || def.parameters.is_empty() {
+            return Err(SetupError::Invalid(format!(
+                "effect `{}` needs at least one term in `adds` and one parameter, its amplitude",
+                def.name
+            )));
+        }
+        for (j, parameter) in def.parameters.iter().enumerate() {
+            check_new(&spec, &parameter.name)?;
+            let mut quantity = Quantity::new(&parameter.name, &parameter.unit);
+            quantity.range = parameter.range;
+            quantity.default = if j == 0 { Some(0.0) } else { middle(&parameter.grid) };
+            spec.parameters.push(quantity.says(&format!("Parameter of the effect `{}`.", def.name)));
+        }
+        for state in &def.states {
+            check_new(&spec, &state.name)?;
+            let quantity = Quantity::new(&state.name, &state.unit);
+            spec.states.push(quantity.says(&format!("State of the effect `{}`.", def.name)));
+        }
+    }
+    Ok(spec)
+}
+
+/// The middle entry of a grid in the order given.
+fn middle(grid: &[f64]) -> Option<f64> {
+    grid.get(grid.len() / 2).copied()
+}
+
+/// Refuses a name that the model already has.
+fn check_new(spec: &Spec, name: &str) -> Result<(), SetupError> {
+    let lists = [&spec.states, &spec.parameters, &spec.inputs, &spec.outputs];
+    let taken = lists.into_iter().flatten().any(|q| q.name == name);
+    if taken { Err(SetupError::Twice(name.to_owned())) } else { Ok(()) }
+}
+
+/// Room for a few numbers without allocating: rates are evaluated many times per step.
+struct Scratch {
+    small: [f64; SMALL],
+    large: Vec<f64>,
+    n: usize,
+}
+
+/// Longest vector that is kept on the stack.
+const SMALL: usize = 16;
+
+impl Scratch {
+    fn new(n: usize) -> Self {
+        let large = if n > SMALL { vec![0.0; n] } else { Vec::new() };
+        Self { small: [0.0; SMALL], large, n }
+    }
+
+    fn of(values: &[f64]) -> Self {
+        let mut scratch = Self::new(values.len());
+        scratch.as_mut().copy_from_slice(values);
+        scratch
+    }
+
+    fn as_ref(&self) -> &[f64] {
+        if self.n > SMALL { &self.large } else { &self.small[..self.n] }
+    }
+
+    fn as_mut(&mut self) -> &mut [f64] {
+        if self.n > SMALL { &mut self.large } else { &mut self.small[..self.n] }
+    }
+}

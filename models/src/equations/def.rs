@@ -1,0 +1,116 @@
+//! A model written as equations, as plain data.
+//!
+//! Nothing is checked here: [`super::EquationsModel::new`] does. Next file to read: [`super::model`].
+
+use serde::{Deserialize, Serialize};
+
+use crate::Role;
+
+/// The equations of a model, as a study states them.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct EquationsDef {
+    /// States, each with its rate.
+    pub states: Vec<StateDef>,
+    /// Outputs that can be observed.
+    pub outputs: Vec<OutputDef>,
+    /// Input signals.
+    pub inputs: Vec<InputDef>,
+    /// Names of rate terms that may be left out or replaced; a name shared by several states stands for all of them.
+    pub replaceable: Vec<String>,
+    /// How to integrate.
+    pub solver: SolverDef,
+}
+
+/// One state and its rate.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct StateDef {
+    /// Name, unique among all names of the model.
+    pub name: String,
+    /// Unit label.
+    pub unit: String,
+    /// Physical meaning.
+    pub role: Role,
+    /// Smallest and largest value that physics allows; infinite where it sets no bound.
+    #[serde(with = "crate::bounds")]
+    pub range: [f64; 2],
+    /// Initial value: a number, or an expression of parameters.
+    pub initial: String,
+    /// Rate as the sum of named terms, (name, expression); a rate given as one text is one term named as the state.
+    pub rate: Vec<(String, String)>,
+}
+
+impl Default for StateDef {
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            unit: String::new(),
+            role: Role::Other,
+            range: crate::bounds::unbounded(),
+            initial: String::new(),
+            rate: Vec::new(),
+        }
+    }
+}
+
+/// One output.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct OutputDef {
+    /// Name; it may be a state's name when the value is that state.
+    pub name: String,
+    /// Unit label.
+    pub unit: String,
+    /// Physical meaning.
+    pub role: Role,
+    /// Value: an expression.
+    pub value: String,
+}
+
+/// One input signal.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct InputDef {
+    /// Name, unique among all names of the model.
+    pub name: String,
+    /// Unit label.
+    pub unit: String,
+    /// Physical meaning.
+    pub role: Role,
+}
+
+/// Which integrator runs the equations.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// Dormand–Prince that goes over to Rosenbrock where the equations turn out stiff.
+    #[default]
+    Auto,
+    /// Dormand–Prince 5(4).
+    Dopri5,
+    /// Rosenbrock 4(3), for stiff equations.
+    Rosenbrock,
+    /// Classic Runge–Kutta with a fixed step.
+    Fixed,
+}
+
+/// How the equations are integrated.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SolverDef {
+    /// The integrator.
+    pub method: Method,
+    /// Relative tolerance per step.
+    pub rtol: f64,
+    /// Absolute tolerance per step, in each state's unit.
+    pub atol: f64,
+    /// Longest step of [`Method::Fixed`], in the study's time unit.
+    pub step: Option<f64>,
+}
+
+impl Default for SolverDef {
+    fn default() -> Self {
+        Self { method: Method::Auto, rtol: 1e-8, atol: 1e-10, step: None }
+    }
+}

@@ -1,0 +1,292 @@
+//! From text to a syntax tree, by operator precedence (Pratt 1973).
+//!
+//! Precedence, loosest first: comparisons (which do not chain), `+ -`, `* /`, unary `-`, `^` (from the right).
+//! Names are not resolved here. Next file to read: [`super::compile`].
+
+use super::expression::ExpressionError;
+use crate::nearest;
+use super::node::{Function, Name, Node, Operation};
+
+/// Parts nested deeper than this are refused, so that no expression can exhaust the stack.
+const MAX_DEPTH: usize = 200;
+/// Longest text, in characters.
+const MAX_LENGTH: usize = 4000;
+
+/// Every function of the language.
+pub(super) const FUNCTIONS: [&str; 15] = [
+    "sin", "cos", "tan", "exp", "log", "sqrt", "abs", "sign", "min", "max", "tanh", "step", "if", "delay", "ddt",
+];
+
+/// Parses a whole expression.
+pub(super) fn parse(text: &str) -> Result<Node, ExpressionError> {
+    let chars: Vec<char> = text.chars().collect();
+    if chars.len() > MAX_LENGTH {
+        return Err(ExpressionError::new(MAX_LENGTH + 1, format!("longer than {MAX_LENGTH} characters")));
+    }
+    let mut parser = Parser { chars, at: 0, depth: 0 };
+    let node = parser.expression(0)?;
+    match parser.peek() {
+        None => Ok(node),
+        Some(_) => Err(parser.unexpected("an operator or the end")),
+    }
+}
+
+struct Parser {
+    chars: Vec<char>,
+    at: usize,
+    depth: usize,
+}
+
+/// Binding power of unary minus: above `*`, below `^`.
+const UNARY: u8 = 7;
+
+impl Parser {
+    /// Next character that is not white space.
+    fn peek(&mut self) -> Option<char> {
+        while self.chars.get(self.at).is_some_and(|c| c.is_whitespace()) {
+            self.at += 1;
+        }
+        self.chars.get(self.at).copied()
+    }
+
+    /// Takes `c` if it comes next.
+    fn take(&mut self, c: char) -> bool {
+        let found = self.peek() == Some(c);
+        self.at += usize::from(found);
+        found
+    }
+
+    fn column(&self) -> usize {
+        self.at + 1
+    }
+
+    /// The word, number or character that comes next, quoted, for messages.
+    fn found(&mut self) -> String {
+        match self.peek() {
+            None => "the end".to_owned(),
+            Some(c) if c.is_alphanumeric() || c == '_' => {
+                let word: String =
+                    self.chars[self.at..].iter().take_while(|c| c.is_alphanumeric() || **c == '_').collect();
+                format!("`{word}`")
+            }
+            Some(c) => format!("`{c}`"),
+        }
+    }
+
+    fn unexpected(&mut self, expected: &str) -> ExpressionError {
+        let found = self.found();
+        let hint = match self.peek() {
+            Some(c) if expected.starts_with("an operator") && (c.is_alphabetic() || c == '(') => {
+                " (a product needs `*`)"
+            }
+            Some('*') if self.at > 0 && self.chars[self.at - 1] == '*' => " (a power is written `^`)",
+            Some('=') => " (equality is written `==`)",
+            _ => "",
+        };
+        ExpressionError::new(self.column(), format!("expected {expected}, found {found}{hint}"))
+    }
+
+    /// The infix operator that comes next, its length and its left and right binding powers.
+    fn infix(&mut self) -> Option<(Operation, usize, u8, u8)> {
+        let c = self.peek()?;
+        let equals = self.chars.get(self.at + 1) == Some(&'=');
+        Some(match (c, equals) {
+            ('<', true) => (Operation::LessEqual, 2, 1, 2),
+            ('<', false) => (Operation::Less, 1, 1, 2),
+            ('>', true) => (Operation::GreaterEqual, 2, 1, 2),
+            ('>', false) => (Operation::Greater, 1, 1, 2),
+            ('=', true) => (Operation::Equal, 2, 1, 2),
+            ('!', true) => (Operation::NotEqual, 2, 1, 2),
+            ('+', _) => (Operation::Add, 1, 3, 4),
+            ('-', _) => (Operation::Sub, 1, 3, 4),
+            ('*', _) => (Operation::Mul, 1, 5, 6),
+            ('/', _) => (Operation::Div, 1, 5, 6),
+            ('^', _) => (Operation::Pow, 1, 9, 8),
+            _ => return None,
+        })
+    }
+
+    /// An expression whose operators all bind at least as tightly as `floor`.
+    fn expression(&mut self, floor: u8) -> Result<Node, ExpressionError> {
+        self.depth += 1;
+        if self.depth > MAX_DEPTH {
+            return Err(ExpressionError::new(self.column(), format!("nested more than {MAX_DEPTH} deep")));
+        }
+        let mut left = self.prefix()?;
+        let mut compared = false;
+        while let Some((operation, length, l, r)) = self.infix() {
+            if l < floor {
+                break;
+            }
+            if operation.compares() && std::mem::replace(&mut compared, true) {
+                let message = "comparisons do not chain: put one of them in parentheses";
+                return Err(ExpressionError::new(self.column(), message));
+            }
+            self.at += length;
+            let right = self.expression(r)?;
+            left = Node::Pair(operation, Box::new(left), Box::new(right));
+        }
+        self.depth -= 1;
+        Ok(left)
+    }
+
+    /// A number, a name, a call, a parenthesis, or one of these behind a sign.
+    fn prefix(&mut self) -> Result<Node, ExpressionError> {
+        match self.peek() {
+            Some('-') => {
+                self.at += 1;
+                Ok(Node::Call(Function::Neg, Box::new(self.expression(UNARY)?)))
+            }
+            Some('+') => {
+                self.at += 1;
+                self.expression(UNARY)
+            }
+            Some('(') => {
+                self.at += 1;
+                let inside = self.expression(0)?;
+                self.close("an operator or `)`")?;
+                Ok(inside)
+            }
+            Some(c) if c.is_ascii_digit() || c == '.' => self.number(),
+            Some(c) if c.is_alphabetic() || c == '_' => self.word(),
+            _ => Err(self.unexpected("a number, a name, a function or `(`")),
+        }
+    }
+
+    fn close(&mut self, expected: &str) -> Result<(), ExpressionError> {
+        if self.take(')') { Ok(()) } else { Err(self.unexpected(expected)) }
+    }
+
+    fn digits(&mut self) {
+        while self.chars.get(self.at).is_some_and(char::is_ascii_digit) {
+            self.at += 1;
+        }
+    }
+
+    fn number(&mut self) -> Result<Node, ExpressionError> {
+        let start = self.at;
+        self.digits();
+        if self.chars.get(self.at) == Some(&'.') {
+            self.at += 1;
+            self.digits();
+        }
+        if matches!(self.chars.get(self.at), Some('e' | 'E')) {
+            let signed = usize::from(matches!(self.chars.get(self.at + 1), Some('+' | '-')));
+            if self.chars.get(self.at + 1 + signed).is_some_and(char::is_ascii_digit) {
+                self.at += 1 + signed;
+                self.digits();
+            }
+        }
+        let text: String = self.chars[start..self.at].iter().collect();
+        match text.parse::<f64>() {
+            Ok(value) if value.is_finite() => Ok(Node::Number(value)),
+            Ok(_) => Err(ExpressionError::new(start + 1, format!("`{text}` is too large a number"))),
+            Err(_) => Err(ExpressionError::new(start + 1, format!("expected a number, found `{text}`"))),
+        }
+    }
+
+    fn identifier(&mut self) -> Name {
+        let column = self.column();
+        let text: String =
+            self.chars[self.at..].iter().take_while(|c| c.is_alphanumeric() || **c == '_').collect();
+        self.at += text.chars().count();
+        Name { text, column }
+    }
+
+    fn word(&mut self) -> Result<Node, ExpressionError> {
+        let name = self.identifier();
+        if self.take('(') {
+            return self.call(&name);
+        }
+        match name.text.as_str() {
+            "t" => Ok(Node::Time),
+            "pi" => Ok(Node::Number(std::f64::consts::PI)),
+            f if FUNCTIONS.contains(&f) => {
+                Err(ExpressionError::new(name.column, format!("`{f}` is a function: expected `{f}(...)`")))
+            }
+            _ => Ok(Node::Name(name)),
+        }
+    }
+
+    /// A call, from behind its opening parenthesis.
+    fn call(&mut self, name: &Name) -> Result<Node, ExpressionError> {
+        let one = match name.text.as_str() {
+            "sin" => Function::Sin,
+            "cos" => Function::Cos,
+            "tan" => Function::Tan,
+            "exp" => Function::Exp,
+            "log" => Function::Log,
+            "sqrt" => Function::Sqrt,
+            "abs" => Function::Abs,
+            "sign" => Function::Sign,
+            "tanh" => Function::Tanh,
+            "step" => Function::Step,
+            "min" => return self.arguments(name).map(|[a, b]| pair(Operation::Min, a, b)),
+            "max" => return self.arguments(name).map(|[a, b]| pair(Operation::Max, a, b)),
+            "if" => {
+                let [c, a, b] = self.arguments(name)?;
+                return Ok(Node::If(Box::new(c), Box::new(a), Box::new(b)));
+            }
+            "delay" => {
+                let column = self.signal_column();
+                let [u, tau] = self.arguments(name)?;
+                return Ok(Node::Delay(signal(u, name, column)?, Box::new(tau)));
+            }
+            "ddt" => {
+                let column = self.signal_column();
+                let [u] = self.arguments(name)?;
+                return Ok(Node::Ddt(signal(u, name, column)?));
+            }
+            unknown => {
+                let hint = match nearest(unknown, FUNCTIONS) {
+                    Some(near) => format!("; did you mean `{near}`?"),
+                    None => format!("; a product is written `{unknown}*(...)`"),
+                };
+                return Err(ExpressionError::new(name.column, format!("no function named `{unknown}`{hint}")));
+            }
+        };
+        let [a] = self.arguments(name)?;
+        Ok(Node::Call(one, Box::new(a)))
+    }
+
+    fn signal_column(&mut self) -> usize {
+        self.peek();
+        self.column()
+    }
+
+    /// Exactly `N` arguments and the closing parenthesis.
+    fn arguments<const N: usize>(&mut self, name: &Name) -> Result<[Node; N], ExpressionError> {
+        let mut list = Vec::with_capacity(N);
+        loop {
+            list.push(self.expression(0)?);
+            let last = list.len() == N;
+            match self.peek() {
+                Some(',') if !last => self.at += 1,
+                Some(')') if last => {
+                    self.at += 1;
+                    break;
+                }
+                Some(',' | ')') => {
+                    let plural = if N == 1 { "" } else { "s" };
+                    let message = format!("`{}` takes {N} argument{plural}", name.text);
+                    let expected = if last { "`)`" } else { "`,`" };
+                    return Err(ExpressionError::new(self.column(), format!("{message}: expected {expected}")));
+                }
+                _ => return Err(self.unexpected(if last { "an operator or `)`" } else { "an operator or `,`" })),
+            }
+        }
+        list.try_into().map_err(|_| ExpressionError::new(name.column, "wrong number of arguments"))
+    }
+}
+
+fn pair(operation: Operation, a: Node, b: Node) -> Node {
+    Node::Pair(operation, Box::new(a), Box::new(b))
+}
+
+/// The bare name that `delay` and `ddt` need as first argument.
+fn signal(node: Node, of: &Name, column: usize) -> Result<Name, ExpressionError> {
+    match node {
+        Node::Name(name) => Ok(name),
+        _ => Err(ExpressionError::new(column, format!("`{}` needs the name of an input or an output", of.text))),
+    }
+}

@@ -1,0 +1,275 @@
+//! The choice of steps: proportional–integral control (Gustafsson 1991; Hairer, Nørsett & Wanner 1993, §II.4), limits, and
+//! restarts at switching points.
+//!
+//! It knows no formulas of a method. Next file to read: [`super::events`].
+
+use super::Tolerance;
+use super::dopri5::Dopri5;
+use super::events::Events;
+use super::rosenbrock::Rosenbrock;
+use super::system::{OnSegment, System, not_finite};
+use crate::model::Segment;
+use crate::{Model, ParticleError};
+
+/// Most steps, accepted or not, within one segment.
+pub(super) const MAX_STEPS: u64 = 1_000_000;
+const SAFETY: f64 = 0.9;
+/// Weight of the integral part.
+const BETA: f64 = 0.04;
+/// Smallest and largest factor between two steps.
+const FACTOR: [f64; 2] = [0.1, 8.0];
+
+/// A one-step method with an error estimate.
+pub(super) trait Stepper {
+    /// Order at which the error estimate falls with the step.
+    const ORDER: f64;
+
+    /// Prepares for a step from a point that no accepted step led to.
+    fn restart<S: System>(&mut self, system: &mut S, t: f64, x: &[f64]);
+
+    /// The rate at the current point.
+    fn rate(&self) -> &[f64];
+
+    /// Writes the state after a step of length `h` and returns the scaled norm of its error estimate.
+    fn attempt<S: System>(
+        &mut self,
+        system: &mut S,
+        t: f64,
+        x: &[f64],
+        h: f64,
+        new: &mut [f64],
+        tolerance: Tolerance,
+    ) -> f64;
+
+    /// Makes the last attempt, which ended at `(t, new)`, the current point; says whether to give up for stiffness.
+    fn accept<S: System>(&mut self, system: &mut S, t: f64, h: f64, new: &[f64]) -> bool;
+}
+
+/// An error in units of the tolerance.
+#[inline]
+pub(super) fn scaled(error: f64, before: f64, after: f64, tolerance: Tolerance) -> f64 {
+    error / (tolerance.absolute + tolerance.relative * before.abs().max(after.abs()))
+}
+
+/// How an integration ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Reached {
+    /// At the end of the span.
+    End,
+    /// At this time the method gave up for stiffness.
+    Stiff(f64),
+}
+
+/// Dormand–Prince as far as it goes, then Rosenbrock.
+pub(super) fn auto<M: Model + ?Sized>(
+    model: &M,
+    segment: Segment<'_>,
+    theta: &[f64],
+    x: &mut [f64],
+    tolerance: Tolerance,
+) -> Result<(), ParticleError> {
+    let n = x.len();
+    let mut system = OnSegment::new(model, segment, theta, n);
+    let span = [segment.t0, segment.t1];
+    if let Reached::Stiff(t) = integrate(&mut system, &mut Dopri5::new(n, true), span, x, tolerance)? {
+        integrate(&mut system, &mut Rosenbrock::new(n), [t, segment.t1], x, tolerance)?;
+    }
+    Ok(())
+}
+
+/// Integrates over a span, restarting at switching points and sliding along them where both sides lead back.
+pub(super) fn integrate<S: System, P: Stepper>(
+    system: &mut S,
+    stepper: &mut P,
+    span: [f64; 2],
+    x: &mut [f64],
+    tolerance: Tolerance,
+) -> Result<Reached, ParticleError> {
+    let mut run = Run::new(system, stepper, span, x, tolerance);
+    run.start()?;
+    while run.t < run.end {
+        if run.step()? {
+            return Ok(Reached::Stiff(run.t));
+        }
+        if let Some(index) = run.events.sliding() {
+            super::sliding::slide(&mut run, index)?;
+        }
+    }
+    Ok(Reached::End)
+}
+
+/// One integration under way.
+pub(super) struct Run<'a, S, P> {
+    pub(super) system: &'a mut S,
+    pub(super) stepper: &'a mut P,
+    pub(super) t: f64,
+    pub(super) end: f64,
+    pub(super) x: &'a mut [f64],
+    pub(super) tolerance: Tolerance,
+    pub(super) events: Events,
+    new: Vec<f64>,
+    /// Length of the next attempt.
+    h: f64,
+    /// Shortest step that still moves the clock.
+    shortest: f64,
+    /// Error of the last accepted step, for the integral part.
+    last_error: f64,
+    pub(super) steps: u64,
+}
+
+impl<'a, S: System, P: Stepper> Run<'a, S, P> {
+    pub(super) fn new(
+        system: &'a mut S,
+        stepper: &'a mut P,
+        [t, end]: [f64; 2],
+        x: &'a mut [f64],
+        tolerance: Tolerance,
+    ) -> Self {
+        let events = Events::new(system.n_switch());
+        let shortest = 16.0 * f64::EPSILON * t.abs().max(end.abs());
+        let new = vec![0.0; x.len()];
+        Self { system, stepper, t, end, x, tolerance, events, new, h: 0.0, shortest, last_error: 1e-4, steps: 0 }
+    }
+
+    /// Evaluates the starting point and guesses the first step.
+    pub(super) fn start(&mut self) -> Result<(), ParticleError> {
+        self.stepper.restart(self.system, self.t, self.x);
+        let rate = self.stepper.rate();
+        if !rate.iter().all(|v| v.is_finite()) {
+            return Err(not_finite(self.system, self.t, rate));
+        }
+        self.h = self.first_step();
+        self.last_error = 1e-4;
+        self.events.begin(self.system, self.t, self.x);
+        Ok(())
+    }
+
+    /// A tenth of the time in which the state would change by itself at the present rate. It costs no evaluation, since spans
+    /// are often shorter than the step could be; a bad guess costs one refused step.
+    fn first_step(&self) -> f64 {
+        let span = self.end - self.t;
+        let (mut state, mut rate) = (0.0, 0.0);
+        for (x, f) in self.x.iter().zip(self.stepper.rate()) {
+            state += scaled(*x, *x, *x, self.tolerance).powi(2);
+            rate += scaled(*f, *x, *x, self.tolerance).powi(2);
+        }
+        let guess = 0.1 * (state / rate).sqrt();
+        if guess.is_finite() { guess.clamp(1e-4 * span, span) } else { span }
+    }
+
+    /// One accepted step, or several up to and across a switching point; says whether the method gave up for stiffness.
+    pub(super) fn step(&mut self) -> Result<bool, ParticleError> {
+        loop {
+            let left = self.end - self.t;
+            let last = self.h * 1.01 >= left;
+            let h = if last { left } else { self.h };
+            let error = self.attempt(h)?;
+            if error.is_finite() && self.events.changed(self.system, self.t + h, &self.new) {
+                if let Some(stiff) = self.cross(h)? {
+                    return Ok(stiff);
+                }
+                continue;
+            }
+            if error <= 1.0 {
+                let target = if last { self.end } else { self.t + h };
+                let stiff = self.accept(h, target);
+                if !last {
+                    self.h = h * self.factor(error);
+                    self.last_error = error.max(1e-4);
+                }
+                return Ok(stiff);
+            }
+            self.refuse(h, error)?;
+        }
+    }
+
+    fn attempt(&mut self, h: f64) -> Result<f64, ParticleError> {
+        self.steps += 1;
+        if self.steps > MAX_STEPS {
+            return Err(ParticleError::TooManySteps { time: self.t, limit: MAX_STEPS });
+        }
+        Ok(self.stepper.attempt(self.system, self.t, self.x, h, &mut self.new, self.tolerance))
+    }
+
+    fn accept(&mut self, h: f64, target: f64) -> bool {
+        self.t = target;
+        self.x.copy_from_slice(&self.new);
+        self.events.passed(h);
+        self.stepper.accept(self.system, self.t, h, self.x)
+    }
+
+    /// Factor to the next step after an accepted one.
+    fn factor(&self, error: f64) -> f64 {
+        let alpha = 1.0 / P::ORDER - 0.75 * BETA;
+        (SAFETY * error.max(1e-10).powf(-alpha) * self.last_error.powf(BETA)).clamp(FACTOR[0], FACTOR[1])
+    }
+
+    fn refuse(&mut self, h: f64, error: f64) -> Result<(), ParticleError> {
+        let factor = if error.is_finite() { (SAFETY * error.powf(-1.0 / P::ORDER)).clamp(FACTOR[0], 0.9) } else { 0.1 };
+        self.h = h * factor;
+        if self.h >= self.shortest {
+            return Ok(());
+        }
+        if self.new.iter().all(|v| v.is_finite()) {
+            return Err(ParticleError::StepTooSmall { time: self.t, step: self.h });
+        }
+        Err(not_finite(self.system, self.t, &self.new))
+    }
+
+    /// Steps up to the first switching point within `h` and across it; `None` when the step up to it was refused.
+    fn cross(&mut self, h: f64) -> Result<Option<bool>, ParticleError> {
+        let [before, after] = self.locate(h)?;
+        let mut stiff = false;
+        if before > self.shortest {
+            let error = self.attempt(before)?;
+            if !(error <= 1.0) {
+                self.refuse(before, error)?;
+                return Ok(None);
+            }
+            stiff = self.accept(before, self.t + before);
+        }
+        // The switching point lies within this step; it is so short that its error does not count.
+        let gap = (after - before).max(self.shortest).min(self.end - self.t);
+        if gap > 0.0 {
+            self.attempt(gap)?;
+            if !self.new.iter().all(|v| v.is_finite()) {
+                return Err(not_finite(self.system, self.t, &self.new));
+            }
+            let target = if self.end - self.t <= gap { self.end } else { self.t + gap };
+            self.accept(gap, target);
+        }
+        self.events.cross(self.system, self.t, self.x, h);
+        self.stepper.restart(self.system, self.t, self.x);
+        self.h = h;
+        self.last_error = 1e-4;
+        Ok(Some(stiff))
+    }
+
+    /// Narrows the first change of side within `h` down to two step lengths, before and after it, by the Illinois variant of
+    /// regula falsi (Dowell & Jarratt 1971) on repeated steps, safeguarded by bisection.
+    fn locate(&mut self, h: f64) -> Result<[f64; 2], ParticleError> {
+        let narrow = (1e-12 * h).max(self.shortest);
+        let mut bracket = [0.0, h];
+        let mut weights = self.events.ends();
+        let mut halvings = 0;
+        while bracket[1] - bracket[0] > narrow && halvings < 100 {
+            let width = bracket[1] - bracket[0];
+            let share = weights[0] / (weights[0] - weights[1]);
+            let guess = if halvings % 4 == 3 || !(0.0..=1.0).contains(&share) { 0.5 } else { share };
+            // A guess next to an end is moved inwards, so that the bracket closes from both sides.
+            let at = bracket[0] + (guess * width).clamp(0.45 * narrow, width - 0.45 * narrow);
+            let error = self.attempt(at)?;
+            let changed = self.events.changed(self.system, self.t + at, &self.new);
+            let value = self.events.ends()[1];
+            if changed || !error.is_finite() {
+                (bracket[1], weights[1]) = (at, value);
+                weights[0] *= 0.5;
+            } else {
+                (bracket[0], weights[0]) = (at, value);
+                weights[1] *= 0.5;
+            }
+            halvings += 1;
+        }
+        Ok(bracket)
+    }
+}

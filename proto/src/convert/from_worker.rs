@@ -1,0 +1,183 @@
+//! What a worker says to the coordinator, both ways.
+
+use bytes::Bytes;
+use starlings_models::{ParticleError, Prediction};
+
+use super::{Lease, SetupId, WireError, floats, job::check_state, required, setup_id};
+use crate::wire::{self, failure, from_worker::Kind, result::Outcome};
+
+/// Who a worker is. First message of every stream.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Hello {
+    /// Protocol number.
+    pub protocol: u32,
+    /// Package version.
+    pub version: String,
+    /// Cores that the worker sees.
+    pub cores: u32,
+    /// Jobs that it runs at the same time; at least 1.
+    pub slots: u32,
+    /// Host name.
+    pub host: String,
+    /// Process number on that host.
+    pub pid: u32,
+    /// Drawn once per process.
+    pub nonce: u64,
+    /// BLAKE3 of the executable; `None` when it could not be read.
+    pub build: Option<[u8; 32]>,
+    /// What an external solver says of itself, JSON.
+    pub solver: Option<Vec<u8>>,
+}
+
+/// How one lease ended on a worker.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Answer {
+    /// A prediction, or the model's failure.
+    Ran(Result<Prediction, ParticleError>),
+    /// The job was withdrawn before it started.
+    Withdrawn,
+}
+
+/// A checked message from a worker.
+#[derive(Clone, Debug, PartialEq)]
+pub enum FromWorker {
+    /// Who it is.
+    Hello(Hello),
+    /// Whether it could build a setup.
+    Setup {
+        /// The setup's name.
+        id: SetupId,
+        /// Built, or why not.
+        result: Result<(), String>,
+    },
+    /// How a lease ended. [`Prediction::cost`] carries the run's wall time; for a failure `cost` does.
+    Result {
+        /// The lease answered.
+        lease: Lease,
+        /// How it ended.
+        answer: Answer,
+        /// Wall time of the run, seconds, not negative.
+        cost: f64,
+    },
+    /// The worker is alive.
+    Heartbeat {
+        /// Jobs being computed.
+        running: u32,
+        /// Jobs waiting in the worker.
+        queued: u32,
+    },
+    /// The worker leaves on purpose.
+    Goodbye(String),
+}
+
+impl FromWorker {
+    /// The message to send.
+    ///
+    /// # Errors
+    /// [`WireError::StateTooLarge`] for a prediction whose state does not fit in a message.
+    pub fn encode(self) -> Result<wire::FromWorker, WireError> {
+        let kind = match self {
+            Self::Hello(hello) => Kind::Hello(encode_hello(hello)),
+            Self::Setup { id, result } => {
+                Kind::Setup(wire::SetupResult { id: Bytes::copy_from_slice(&id), failure: result.err() })
+            }
+            Self::Result { lease, answer, cost } => {
+                let outcome = Some(encode_answer(answer)?);
+                Kind::Result(wire::Result { lease: Some(lease.into()), outcome, cost_s: cost })
+            }
+            Self::Heartbeat { running, queued } => Kind::Heartbeat(wire::Heartbeat { running, queued }),
+            Self::Goodbye(reason) => Kind::Goodbye(wire::Goodbye { reason }),
+        };
+        Ok(wire::FromWorker { kind: Some(kind) })
+    }
+
+    /// Checks a message that arrived.
+    ///
+    /// # Errors
+    /// What is missing or does not fit.
+    pub fn decode(message: wire::FromWorker) -> Result<Self, WireError> {
+        Ok(match required(message.kind, "kind")? {
+            Kind::Hello(hello) => Self::Hello(decode_hello(hello)?),
+            Kind::Setup(s) => Self::Setup { id: setup_id(&s.id)?, result: s.failure.map_or(Ok(()), Err) },
+            Kind::Result(result) => decode_result(result)?,
+            Kind::Heartbeat(h) => Self::Heartbeat { running: h.running, queued: h.queued },
+            Kind::Goodbye(g) => Self::Goodbye(g.reason),
+        })
+    }
+}
+
+fn encode_hello(hello: Hello) -> wire::Hello {
+    let Hello { protocol, version, cores, slots, host, pid, nonce, build, solver } = hello;
+    let build = build.map_or_else(Bytes::new, |hash| Bytes::copy_from_slice(&hash));
+    wire::Hello { protocol, version, cores, slots, host, pid, nonce, build, solver: solver.map(Into::into) }
+}
+
+fn decode_hello(hello: wire::Hello) -> Result<Hello, WireError> {
+    let wire::Hello { protocol, version, cores, slots, host, pid, nonce, build, solver } = hello;
+    if slots == 0 {
+        return Err(WireError::Shape { field: "slots", message: "a worker needs at least one".to_owned() });
+    }
+    let build = if build.is_empty() { None } else { Some(setup_id(&build)?) };
+    Ok(Hello { protocol, version, cores, slots, host, pid, nonce, build, solver: solver.map(Into::into) })
+}
+
+fn encode_answer(answer: Answer) -> Result<Outcome, WireError> {
+    Ok(match answer {
+        Answer::Ran(Ok(prediction)) => {
+            check_state(&prediction.state)?;
+            Outcome::Prediction(wire::Prediction {
+                outputs: floats::encode(&prediction.outputs),
+                state: floats::encode(&prediction.state),
+            })
+        }
+        Answer::Ran(Err(error)) => Outcome::Failure(wire::Failure { kind: Some(encode_failure(error)) }),
+        Answer::Withdrawn => Outcome::Withdrawn(wire::Withdrawn {}),
+    })
+}
+
+fn decode_result(result: wire::Result) -> Result<FromWorker, WireError> {
+    let lease = required(result.lease, "lease")?.into();
+    let cost = if result.cost_s > 0.0 && result.cost_s.is_finite() { result.cost_s } else { 0.0 };
+    let answer = match required(result.outcome, "outcome")? {
+        Outcome::Prediction(p) => {
+            let state = floats::decode(&p.state, "state")?;
+            check_state(&state)?;
+            Answer::Ran(Ok(Prediction { outputs: floats::decode(&p.outputs, "outputs")?, state, cost }))
+        }
+        Outcome::Failure(failure) => Answer::Ran(Err(decode_failure(required(failure.kind, "failure kind")?)?)),
+        Outcome::Withdrawn(_) => Answer::Withdrawn,
+    };
+    Ok(FromWorker::Result { lease, answer, cost })
+}
+
+fn encode_failure(error: ParticleError) -> failure::Kind {
+    match error {
+        ParticleError::NotFinite { what, time } => {
+            failure::Kind::NotFinite(wire::NotFinite { what, time: Some(time) })
+        }
+        ParticleError::StepTooSmall { time, step } => {
+            failure::Kind::StepTooSmall(wire::StepTooSmall { time: Some(time), step: Some(step) })
+        }
+        ParticleError::TooManySteps { time, limit } => {
+            failure::Kind::TooManySteps(wire::TooManySteps { time: Some(time), limit })
+        }
+        ParticleError::BadJob(text) => failure::Kind::BadJob(text),
+        ParticleError::Solver(text) => failure::Kind::Solver(text),
+        ParticleError::Lost { attempts, reason } => failure::Kind::Lost(wire::Lost { attempts, reason }),
+    }
+}
+
+fn decode_failure(kind: failure::Kind) -> Result<ParticleError, WireError> {
+    Ok(match kind {
+        failure::Kind::NotFinite(f) => ParticleError::NotFinite { what: f.what, time: required(f.time, "time")? },
+        failure::Kind::StepTooSmall(f) => {
+            ParticleError::StepTooSmall { time: required(f.time, "time")?, step: required(f.step, "step")? }
+        }
+        failure::Kind::TooManySteps(f) => {
+            ParticleError::TooManySteps { time: required(f.time, "time")?, limit: f.limit }
+        }
+        failure::Kind::BadJob(text) => ParticleError::BadJob(text),
+        failure::Kind::Solver(text) => ParticleError::Solver(text),
+        failure::Kind::Lost(f) => ParticleError::Lost { attempts: f.attempts, reason: f.reason },
+    })
+}

@@ -1,0 +1,115 @@
+//! Jobs and windows, both ways.
+
+use std::sync::Arc;
+
+use starlings_models::{Job, Signal, Window};
+
+use super::{Lease, SetupId, WireError, floats, required};
+use crate::{MAX_INLINE_STATE, MAX_MESSAGE, wire};
+
+/// Room left in a message for everything that is no array.
+const MESSAGE_MARGIN: usize = 64 * 1024;
+
+/// Encodes jobs and keeps the encoded form of the last window, which all particles of an ensemble share.
+#[derive(Debug, Default)]
+pub struct JobEncoder {
+    last: Option<(Arc<Window>, wire::Window)>,
+}
+
+impl JobEncoder {
+    /// The message that gives one job to a worker.
+    pub fn encode(&mut self, lease: Lease, setup: &SetupId, job: &Job) -> wire::ToWorker {
+        let message = wire::Job {
+            lease: Some(lease.into()),
+            setup: bytes::Bytes::copy_from_slice(setup),
+            particle: job.particle,
+            record: job.record,
+            window: Some(self.window(&job.window)),
+            theta: floats::encode(&job.theta),
+            state: job.state.as_deref().map(floats::encode),
+        };
+        wire::ToWorker { kind: Some(wire::to_worker::Kind::Job(message)) }
+    }
+
+    fn window(&mut self, window: &Arc<Window>) -> wire::Window {
+        match &self.last {
+            Some((known, encoded)) if Arc::ptr_eq(known, window) => encoded.clone(),
+            _ => {
+                let encoded = encode_window(window);
+                self.last = Some((Arc::clone(window), encoded.clone()));
+                encoded
+            }
+        }
+    }
+}
+
+/// Whether a job can travel in one message.
+///
+/// # Errors
+/// [`WireError::StateTooLarge`], or [`WireError::Shape`] when window and parameters exceed a message.
+pub fn check_size(job: &Job) -> Result<(), WireError> {
+    check_state(job.state.as_deref().unwrap_or_default())?;
+    let window = &job.window;
+    let signals: usize = window.inputs.iter().map(|s| s.times.len() + s.values.len()).sum();
+    let bytes = 8 * (window.times.len() + window.observed.len() + signals + job.theta.len());
+    if bytes + MAX_INLINE_STATE + MESSAGE_MARGIN > MAX_MESSAGE {
+        let limit = MAX_MESSAGE - MAX_INLINE_STATE - MESSAGE_MARGIN;
+        let message = format!("{bytes} bytes, at most {limit} fit in a message: use fewer observation times per window");
+        return Err(WireError::Shape { field: "window", message });
+    }
+    Ok(())
+}
+
+pub(super) fn check_state(state: &[f64]) -> Result<(), WireError> {
+    let bytes = state.len() * 8;
+    if bytes > MAX_INLINE_STATE {
+        return Err(WireError::StateTooLarge { bytes, limit: MAX_INLINE_STATE });
+    }
+    Ok(())
+}
+
+fn encode_window(window: &Window) -> wire::Window {
+    wire::Window {
+        start: Some(window.start),
+        times: floats::encode(&window.times),
+        observed: floats::encode(&window.observed),
+        inputs: window
+            .inputs
+            .iter()
+            .map(|s| wire::Signal { times: floats::encode(&s.times), values: floats::encode(&s.values) })
+            .collect(),
+    }
+}
+
+pub(super) fn decode_job(job: &wire::Job) -> Result<Job, WireError> {
+    let state = job.state.as_ref().map(|bytes| floats::decode(bytes, "state")).transpose()?;
+    check_state(state.as_deref().unwrap_or_default())?;
+    Ok(Job {
+        particle: job.particle,
+        record: job.record,
+        window: Arc::new(decode_window(required(job.window.as_ref(), "window")?)?),
+        theta: floats::decode(&job.theta, "theta")?,
+        state,
+    })
+}
+
+fn decode_window(window: &wire::Window) -> Result<Window, WireError> {
+    let times = floats::decode(&window.times, "times")?;
+    let observed = floats::decode(&window.observed, "observed")?;
+    if times.is_empty() || observed.len() % times.len() != 0 {
+        let message = format!("{} values for {} times", observed.len(), times.len());
+        return Err(WireError::Shape { field: "observed", message });
+    }
+    let inputs = window.inputs.iter().map(decode_signal).collect::<Result<_, _>>()?;
+    Ok(Window { start: required(window.start, "start")?, times, observed, inputs })
+}
+
+fn decode_signal(signal: &wire::Signal) -> Result<Signal, WireError> {
+    let times = floats::decode(&signal.times, "input times")?;
+    let values = floats::decode(&signal.values, "input values")?;
+    if times.len() != values.len() {
+        let message = format!("{} values for {} times", values.len(), times.len());
+        return Err(WireError::Shape { field: "input", message });
+    }
+    Ok(Signal { times, values })
+}

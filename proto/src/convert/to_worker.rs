@@ -1,0 +1,124 @@
+//! What the coordinator says to a worker, both ways.
+
+use bytes::Bytes;
+use starlings_models::{Job, Setup};
+
+use super::{Lease, SetupId, WireError, decode_setup, job, required, setup_id};
+use crate::wire::{self, to_worker::Kind};
+
+/// The coordinator takes the worker.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Welcome {
+    /// Protocol number of the coordinator.
+    pub protocol: u32,
+    /// Name of the run.
+    pub run: String,
+    /// Seconds between heartbeats, both ways; positive.
+    pub heartbeat: f64,
+    /// Number of this stream, carried by every lease given on it.
+    pub epoch: u64,
+}
+
+/// A checked message to a worker. Jobs are encoded by [`super::JobEncoder`], everything else by [`ToWorker::encode`].
+#[derive(Clone, Debug, PartialEq)]
+pub enum ToWorker {
+    /// The worker is taken.
+    Welcome(Welcome),
+    /// The worker is not taken: why, with the remedy.
+    Refuse(String),
+    /// A setup to build, or why its text cannot be read.
+    Setup {
+        /// Its name.
+        id: SetupId,
+        /// The setup, or what is wrong with it.
+        setup: Result<Box<Setup>, WireError>,
+    },
+    /// A job to run.
+    Job {
+        /// The right to answer.
+        lease: Lease,
+        /// The setup to run it with.
+        setup: SetupId,
+        /// The job.
+        job: Job,
+    },
+    /// Withdraw these jobs if they have not started.
+    Cancel(Vec<Lease>),
+    /// The coordinator is alive.
+    Heartbeat,
+    /// The run is over: leave.
+    Drain(String),
+}
+
+impl ToWorker {
+    /// The message for [`ToWorker::Welcome`].
+    pub fn welcome(welcome: Welcome) -> wire::ToWorker {
+        let Welcome { protocol, run, heartbeat, epoch } = welcome;
+        message(Kind::Welcome(wire::Welcome { protocol, run, heartbeat, epoch }))
+    }
+
+    /// The message for [`ToWorker::Refuse`].
+    pub fn refuse(reason: &str) -> wire::ToWorker {
+        message(Kind::Refuse(wire::Refuse { reason: reason.to_owned() }))
+    }
+
+    /// The message for [`ToWorker::Setup`], from the text made by [`super::encode_setup`].
+    pub fn setup(id: &SetupId, json: Bytes) -> wire::ToWorker {
+        message(Kind::Setup(wire::SetupMsg { id: Bytes::copy_from_slice(id), json }))
+    }
+
+    /// The message for [`ToWorker::Cancel`].
+    pub fn cancel(leases: &[Lease]) -> wire::ToWorker {
+        message(Kind::Cancel(wire::Cancel { leases: leases.iter().copied().map(Into::into).collect() }))
+    }
+
+    /// The message for [`ToWorker::Heartbeat`].
+    pub fn heartbeat() -> wire::ToWorker {
+        message(Kind::Heartbeat(wire::Heartbeat { running: 0, queued: 0 }))
+    }
+
+    /// The message for [`ToWorker::Drain`].
+    pub fn drain(reason: &str) -> wire::ToWorker {
+        message(Kind::Drain(wire::Drain { reason: reason.to_owned() }))
+    }
+
+    /// Checks a message that arrived.
+    ///
+    /// # Errors
+    /// What is missing or does not fit; [`WireError::Job`] where the lease is good and can be answered.
+    pub fn decode(message: wire::ToWorker) -> Result<Self, WireError> {
+        Ok(match required(message.kind, "kind")? {
+            Kind::Welcome(w) => Self::Welcome(decode_welcome(w)?),
+            Kind::Refuse(r) => Self::Refuse(r.reason),
+            Kind::Setup(s) => {
+                let id = setup_id(&s.id)?;
+                Self::Setup { id, setup: decode_setup(&id, &s.json).map(Box::new) }
+            }
+            Kind::Job(job) => decode_job(&job)?,
+            Kind::Cancel(c) => Self::Cancel(c.leases.into_iter().map(Into::into).collect()),
+            Kind::Heartbeat(_) => Self::Heartbeat,
+            Kind::Drain(d) => Self::Drain(d.reason),
+        })
+    }
+}
+
+fn message(kind: Kind) -> wire::ToWorker {
+    wire::ToWorker { kind: Some(kind) }
+}
+
+fn decode_welcome(welcome: wire::Welcome) -> Result<Welcome, WireError> {
+    let wire::Welcome { protocol, run, heartbeat, epoch } = welcome;
+    if !(heartbeat > 0.0 && heartbeat < 1e6) {
+        return Err(WireError::Shape { field: "heartbeat", message: format!("{heartbeat} s, expected a positive time") });
+    }
+    Ok(Welcome { protocol, run, heartbeat, epoch })
+}
+
+fn decode_job(wire_job: &wire::Job) -> Result<ToWorker, WireError> {
+    let lease: Lease = required(wire_job.lease, "lease")?.into();
+    let decoded = setup_id(&wire_job.setup).and_then(|setup| Ok((setup, job::decode_job(wire_job)?)));
+    match decoded {
+        Ok((setup, job)) => Ok(ToWorker::Job { lease, setup, job }),
+        Err(source) => Err(WireError::Job { lease, source: Box::new(source) }),
+    }
+}

@@ -1,0 +1,268 @@
+//! What is sent is what arrives, bit by bit, and what is malformed is an error and no panic.
+
+use std::sync::Arc;
+
+use proptest::prelude::*;
+use prost::Message;
+use starlings_models::{Job, ModelDef, ParticleError, Prediction, Setup, Signal, Window};
+use starlings_proto::{
+    Answer, FromWorker, Hello, JobEncoder, Lease, MAX_INLINE_STATE, ToWorker, Welcome, WireError, convert::job::check_size,
+    decode_setup, encode_setup, wire,
+};
+
+fn any_float() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        any::<u64>().prop_map(f64::from_bits),
+        Just(f64::NAN),
+        Just(f64::INFINITY),
+        Just(f64::NEG_INFINITY),
+        Just(-0.0),
+        Just(f64::MIN_POSITIVE / 2.0),
+    ]
+}
+
+fn floats(max: usize) -> impl Strategy<Value = Vec<f64>> {
+    prop::collection::vec(any_float(), 0..max)
+}
+
+fn signal() -> impl Strategy<Value = Signal> {
+    prop::collection::vec((any_float(), any_float()), 0..5).prop_map(|pairs| {
+        let (times, values) = pairs.into_iter().unzip();
+        Signal { times, values }
+    })
+}
+
+fn window() -> impl Strategy<Value = Window> {
+    (1_usize..6, 0_usize..4, prop::collection::vec(signal(), 0..3), any_float()).prop_flat_map(
+        |(n_times, n_obs, inputs, start)| {
+            (
+                prop::collection::vec(any_float(), n_times),
+                prop::collection::vec(any_float(), n_times * n_obs),
+                Just(inputs),
+                Just(start),
+            )
+                .prop_map(|(times, observed, inputs, start)| Window { start, times, observed, inputs })
+        },
+    )
+}
+
+fn job() -> impl Strategy<Value = Job> {
+    (any::<u32>(), any::<u32>(), window(), floats(8), prop::option::of(floats(8))).prop_map(
+        |(particle, record, window, theta, state)| Job { particle, record, window: Arc::new(window), theta, state },
+    )
+}
+
+fn lease() -> impl Strategy<Value = Lease> {
+    (any::<u64>(), any::<u64>(), any::<u32>()).prop_map(|(epoch, job, attempt)| Lease { epoch, job, attempt })
+}
+
+fn failure() -> impl Strategy<Value = ParticleError> {
+    prop_oneof![
+        (".*", any_float()).prop_map(|(what, time)| ParticleError::NotFinite { what, time }),
+        (any_float(), any_float()).prop_map(|(time, step)| ParticleError::StepTooSmall { time, step }),
+        (any_float(), any::<u64>()).prop_map(|(time, limit)| ParticleError::TooManySteps { time, limit }),
+        ".*".prop_map(ParticleError::BadJob),
+        ".*".prop_map(ParticleError::Solver),
+        (any::<u32>(), ".*").prop_map(|(attempts, reason)| ParticleError::Lost { attempts, reason }),
+    ]
+}
+
+fn answer() -> impl Strategy<Value = Answer> {
+    prop_oneof![
+        (floats(8), floats(8))
+            .prop_map(|(outputs, state)| Answer::Ran(Ok(Prediction { outputs, state, cost: 0.25 }))),
+        failure().prop_map(|error| Answer::Ran(Err(error))),
+        Just(Answer::Withdrawn),
+    ]
+}
+
+fn from_worker() -> impl Strategy<Value = FromWorker> {
+    let hello = (any::<u32>(), ".*", 1_u32.., any::<u64>(), any::<Option<[u8; 32]>>(), any::<Option<Vec<u8>>>());
+    prop_oneof![
+        hello.prop_map(|(protocol, text, slots, nonce, build, solver)| {
+            FromWorker::Hello(Hello {
+                protocol,
+                version: text.clone(),
+                cores: slots,
+                slots,
+                host: text,
+                pid: protocol,
+                nonce,
+                build,
+                solver,
+            })
+        }),
+        (any::<[u8; 32]>(), prop::option::of(".*"))
+            .prop_map(|(id, failure)| FromWorker::Setup { id, result: failure.map_or(Ok(()), Err) }),
+        (lease(), answer()).prop_map(|(lease, answer)| FromWorker::Result { lease, answer, cost: 0.25 }),
+        (any::<u32>(), any::<u32>()).prop_map(|(running, queued)| FromWorker::Heartbeat { running, queued }),
+        ".*".prop_map(FromWorker::Goodbye),
+    ]
+}
+
+/// Text in which every float shows its bits, so that NaN compares equal to the same NaN only.
+fn bits(values: &[f64]) -> Vec<u64> {
+    values.iter().map(|v| v.to_bits()).collect()
+}
+
+fn through_bytes<M: Message + Default>(message: &M) -> M {
+    M::decode(message.encode_to_vec().as_slice()).unwrap()
+}
+
+fn same_window(a: &Window, b: &Window) -> bool {
+    let signals = |w: &Window| w.inputs.iter().map(|s| (bits(&s.times), bits(&s.values))).collect::<Vec<_>>();
+    a.start.to_bits() == b.start.to_bits()
+        && bits(&a.times) == bits(&b.times)
+        && bits(&a.observed) == bits(&b.observed)
+        && signals(a) == signals(b)
+}
+
+fn failure_bits(error: &ParticleError) -> (String, Vec<u64>) {
+    let numbers = match error {
+        ParticleError::NotFinite { time, .. } => vec![*time],
+        ParticleError::StepTooSmall { time, step } => vec![*time, *step],
+        ParticleError::TooManySteps { time, limit } => vec![*time, *limit as f64],
+        _ => vec![],
+    };
+    (error.to_string(), bits(&numbers))
+}
+
+proptest! {
+    #[test]
+    fn a_job_arrives_bit_by_bit(lease in lease(), setup: [u8; 32], job in job()) {
+        let mut encoder = JobEncoder::default();
+        for _ in 0..2 {
+            let sent = encoder.encode(lease, &setup, &job);
+            let ToWorker::Job { lease: got_lease, setup: got_setup, job: got } =
+                ToWorker::decode(through_bytes(&sent)).unwrap() else { panic!("a job arrives as a job") };
+            prop_assert_eq!((got_lease, got_setup), (lease, setup));
+            prop_assert_eq!((got.particle, got.record), (job.particle, job.record));
+            prop_assert_eq!(bits(&got.theta), bits(&job.theta));
+            prop_assert_eq!(got.state.as_deref().map(bits), job.state.as_deref().map(bits));
+            prop_assert!(same_window(&got.window, &job.window));
+        }
+    }
+
+    #[test]
+    fn a_worker_s_message_arrives_bit_by_bit(message in from_worker()) {
+        let got = FromWorker::decode(through_bytes(&message.clone().encode().unwrap())).unwrap();
+        match (&message, &got) {
+            (
+                FromWorker::Result { lease: a, answer: Answer::Ran(Ok(sent)), .. },
+                FromWorker::Result { lease: b, answer: Answer::Ran(Ok(back)), .. },
+            ) => {
+                prop_assert_eq!(a, b);
+                prop_assert_eq!((bits(&sent.outputs), bits(&sent.state)), (bits(&back.outputs), bits(&back.state)));
+            }
+            (
+                FromWorker::Result { lease: a, answer: Answer::Ran(Err(sent)), .. },
+                FromWorker::Result { lease: b, answer: Answer::Ran(Err(back)), .. },
+            ) => {
+                prop_assert_eq!(a, b);
+                prop_assert_eq!(failure_bits(sent), failure_bits(back));
+            }
+            _ => prop_assert_eq!(&message, &got),
+        }
+    }
+
+    #[test]
+    fn arbitrary_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+        if let Ok(message) = wire::ToWorker::decode(bytes.as_slice()) {
+            let _ = ToWorker::decode(message);
+        }
+        if let Ok(message) = wire::FromWorker::decode(bytes.as_slice()) {
+            let _ = FromWorker::decode(message);
+        }
+    }
+
+    #[test]
+    fn a_damaged_job_is_an_error_or_another_job_and_never_a_panic(job in job(), at: prop::sample::Index, byte: u8) {
+        let sent = JobEncoder::default().encode(Lease { epoch: 1, job: 2, attempt: 3 }, &[7; 32], &job);
+        let mut bytes = sent.encode_to_vec();
+        let at = at.index(bytes.len());
+        bytes[at] = byte;
+        if let Ok(message) = wire::ToWorker::decode(bytes.as_slice()) {
+            let _ = ToWorker::decode(message);
+        }
+    }
+}
+
+fn small_job() -> Job {
+    let window = Window { start: 0.0, times: vec![1.0], observed: vec![2.0], inputs: vec![] };
+    Job { particle: 0, record: 0, window: Arc::new(window), theta: vec![], state: None }
+}
+
+#[test]
+fn the_coordinator_s_messages_arrive_as_sent() {
+    let welcome = Welcome { protocol: 1, run: "pig".to_owned(), heartbeat: 8.0, epoch: 5 };
+    let leases = vec![Lease { epoch: 5, job: 1, attempt: 1 }, Lease { epoch: 5, job: 2, attempt: 3 }];
+    let pairs = [
+        (ToWorker::welcome(welcome.clone()), ToWorker::Welcome(welcome)),
+        (ToWorker::refuse("no"), ToWorker::Refuse("no".to_owned())),
+        (ToWorker::cancel(&leases), ToWorker::Cancel(leases)),
+        (ToWorker::heartbeat(), ToWorker::Heartbeat),
+        (ToWorker::drain("done"), ToWorker::Drain("done".to_owned())),
+    ];
+    for (sent, expected) in pairs {
+        assert_eq!(ToWorker::decode(through_bytes(&sent)), Ok(expected));
+    }
+}
+
+#[test]
+fn a_setup_arrives_as_sent_and_a_damaged_one_says_so() {
+    let mut setup = Setup { model: ModelDef { kind: "windkessel-3".to_owned(), ..ModelDef::default() }, ..Setup::default() };
+    setup.model.constants.insert("R".to_owned(), 0.1 + 0.2);
+    let (id, json) = encode_setup(&setup).unwrap();
+    assert_eq!(decode_setup(&id, &json), Ok(setup));
+    assert!(matches!(decode_setup(&id, &json[1..]), Err(WireError::Setup(_))));
+}
+
+#[test]
+fn a_setup_with_an_infinite_constant_is_refused_before_it_travels() {
+    let mut setup = Setup::default();
+    setup.model.constants.insert("R".to_owned(), f64::INFINITY);
+    assert!(matches!(encode_setup(&setup), Err(WireError::Setup(_))));
+}
+
+#[test]
+fn a_state_beyond_the_limit_is_refused_on_both_sides() {
+    let mut job = small_job();
+    job.state = Some(vec![0.0; MAX_INLINE_STATE / 8]);
+    assert_eq!(check_size(&job), Ok(()));
+    job.state = Some(vec![0.0; MAX_INLINE_STATE / 8 + 1]);
+    let error = check_size(&job).unwrap_err();
+    assert!(error.to_string().contains("chunked transfer of states is not available yet"), "{error}");
+
+    let lease = Lease { epoch: 1, job: 1, attempt: 1 };
+    let sent = JobEncoder::default().encode(lease, &[0; 32], &job);
+    assert!(matches!(ToWorker::decode(sent), Err(WireError::Job { lease: l, .. }) if l == lease));
+    let prediction = Prediction { outputs: vec![], state: job.state.unwrap(), cost: 0.0 };
+    let result = FromWorker::Result { lease, answer: Answer::Ran(Ok(prediction)), cost: 0.0 };
+    assert!(matches!(result.encode(), Err(WireError::StateTooLarge { .. })));
+}
+
+#[test]
+fn a_malformed_job_names_its_lease_so_that_it_can_be_answered() {
+    let lease = Lease { epoch: 1, job: 9, attempt: 1 };
+    let sent = JobEncoder::default().encode(lease, &[0; 32], &small_job());
+    let Some(wire::to_worker::Kind::Job(good)) = sent.kind else { panic!("a job is encoded as a job") };
+    let spoil: [fn(&mut wire::Job); 4] = [
+        |job| job.theta = vec![1, 2, 3].into(),
+        |job| job.setup = vec![0; 31].into(),
+        |job| job.window = None,
+        |job| job.window.as_mut().unwrap().times = bytes::Bytes::new(),
+    ];
+    for damage in spoil {
+        let mut job = good.clone();
+        damage(&mut job);
+        let message = wire::ToWorker { kind: Some(wire::to_worker::Kind::Job(job)) };
+        assert!(matches!(ToWorker::decode(message), Err(WireError::Job { lease: l, .. }) if l == lease));
+    }
+}
+
+#[test]
+fn a_worker_without_slots_is_malformed() {
+    let hello = wire::Hello { slots: 0, ..wire::Hello::default() };
+    let message = wire::FromWorker { kind: Some(wire::from_worker::Kind::Hello(hello)) };
+    assert!(matches!(FromWorker::decode(message), Err(WireError::Shape { field: "slots", .. })));
+}

@@ -1,0 +1,88 @@
+//! `starlings check`: validate everything, make one trial run, say what a run would do.
+
+use std::path::PathBuf;
+
+use clap::Parser;
+use serde_json::json;
+use starlings_coordinator::study::trial::{TrialChannel, trial};
+use starlings_coordinator::study::{Study, posterior};
+
+use crate::console::{number, table};
+use crate::failure::Failure;
+
+/// Validate a study, its recordings and its model, and make one trial run at the prior median.
+#[derive(Parser)]
+pub struct Args {
+    /// The study file.
+    study: PathBuf,
+    /// Print what was found as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Checks the study.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let study = Study::load(&args.study)?;
+    let channels = trial(&study).map_err(Failure::input)?;
+    if args.json {
+        println!("{:#}", as_json(&study, &channels));
+    } else {
+        print(&study, &channels);
+    }
+    Ok(())
+}
+
+fn runs_per_pass(study: &Study) -> usize {
+    study.estimator.points.n_particle(study.theta.len())
+        * (0..study.records.len()).map(|r| study.windows(r).len()).sum::<usize>()
+}
+
+fn as_json(study: &Study, channels: &[TrialChannel]) -> serde_json::Value {
+    let estimates = posterior::estimates(study, &posterior::prior(study));
+    json!({
+        "study": study.name,
+        "model": study.setup.model.kind,
+        "estimator": study.estimator.describe(),
+        "parameters": estimates.iter().map(|e| json!({
+            "name": e.name, "unit": e.unit, "prior_median": e.prior_median, "prior_interval95": e.prior_interval95,
+        })).collect::<Vec<_>>(),
+        "particles": study.estimator.points.n_particle(study.theta.len()),
+        "runs_per_pass": runs_per_pass(study),
+        "trial": channels.iter().map(|c| json!({
+            "record": c.record, "output": c.output, "observations": c.n_obs, "rmse": c.rmse, "noise": c.noise,
+        })).collect::<Vec<_>>(),
+        "warnings": study.warnings,
+    })
+}
+
+fn print(study: &Study, channels: &[TrialChannel]) {
+    println!("{}: model {}, {}", study.name, study.setup.model.kind, study.estimator.describe());
+    println!("\nparameters");
+    let mut rows = vec![["name", "unit", "prior median", "prior 95 %"].map(str::to_owned).to_vec()];
+    for e in posterior::estimates(study, &posterior::prior(study)) {
+        let [lo, hi] = e.prior_interval95.map(|v| number(v, None));
+        rows.push(vec![e.name, e.unit, number(e.prior_median, None), format!("{lo} … {hi}")]);
+    }
+    print!("{}", table(&rows, false));
+    println!("\ntrial run at the prior median");
+    let mut rows = vec![["record", "output", "observations", "rmse", "noise"].map(str::to_owned).to_vec()];
+    for c in channels {
+        rows.push(vec![
+            c.record.clone(),
+            c.output.clone(),
+            c.n_obs.to_string(),
+            number(c.rmse, None),
+            number(c.noise, None),
+        ]);
+    }
+    print!("{}", table(&rows, false));
+    println!(
+        "\n{} particles, {} runs of the model per pass",
+        study.estimator.points.n_particle(study.theta.len()),
+        runs_per_pass(study)
+    );
+    for warning in &study.warnings {
+        println!("warning: {warning}");
+    }
+    println!("the study is sound");
+}

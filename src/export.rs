@@ -1,0 +1,65 @@
+//! `starlings export`: one table of a run folder as CSV.
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use clap::{Parser, ValueEnum};
+use starlings_coordinator::study::{RunFolder, store};
+
+use crate::failure::Failure;
+
+/// Write a table of a run folder as CSV.
+#[derive(Parser)]
+pub struct Args {
+    /// The run folder.
+    dir: PathBuf,
+    /// Which table.
+    #[arg(long, value_enum, default_value_t = Table::Estimates)]
+    table: Table,
+    /// Where to write; standard output without it.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Table {
+    /// Every parameter after every analysis: median, band of two sd, mean and sd in transformed units.
+    Estimates,
+    /// Observed minus predicted before each analysis, with the sd the filter expected.
+    Innovations,
+    /// The free forward run with the estimate, beside what was observed.
+    Predictions,
+    /// Time, observations used, NIS and log-likelihood of every analysis.
+    Analyses,
+    /// Every run of the model: particle, worker, attempts, cost, error.
+    Jobs,
+    /// What happened to the run and its fleet.
+    Events,
+}
+
+/// Writes the table.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let folder = RunFolder::open(&args.dir).map_err(Failure::input)?;
+    let (name, columns) = match args.table {
+        Table::Estimates => ("estimates", "pass, step, parameter, estimate, lo, hi, mean, sd"),
+        Table::Innovations => ("innovations", "pass, step, record, output, time, innovation, sd"),
+        Table::Predictions => ("predictions", "record, output, time, observed, predicted, use, noise"),
+        Table::Analyses => ("analyses", "pass, step, time, n_used, nis, log_likelihood, information_lost"),
+        Table::Jobs => ("jobs", "pass, step, record, particle, attempts, worker, status, error, cost_s"),
+        Table::Events => ("events", "at_s, kind, text"),
+    };
+    let rows = store::table(&folder.store, name, columns).map_err(Failure::run)?;
+    let sink: Box<dyn Write> = match &args.output {
+        Some(path) => Box::new(
+            std::fs::File::create(path)
+                .map_err(|e| Failure::input(format!("cannot write {}: {e}", path.display())))?,
+        ),
+        None => Box::new(std::io::stdout().lock()),
+    };
+    let mut csv = csv::Writer::from_writer(sink);
+    csv.write_record(columns.split(", ")).map_err(Failure::run)?;
+    for row in rows {
+        csv.write_record(&row).map_err(Failure::run)?;
+    }
+    csv.flush().map_err(Failure::run)
+}

@@ -1,0 +1,111 @@
+//! One message with its cause and remedy, and the exit code that belongs to it.
+
+use std::fmt::Display;
+use std::process::ExitCode;
+
+use miette::{Diagnostic, LabeledSpan, NamedSource, Report, Severity, SourceCode};
+use starlings_coordinator::study::{Problem, StudyError};
+
+/// Why a command ended without doing what was asked.
+pub enum Failure {
+    /// The input is wrong: exit code 2.
+    Input(String),
+    /// The study file or a recording is wrong, at known places: exit code 2.
+    Study(StudyError),
+    /// The run failed: exit code 1.
+    Run(String),
+}
+
+impl Failure {
+    /// The input is wrong.
+    pub fn input(message: impl Display) -> Self {
+        Self::Input(message.to_string())
+    }
+
+    /// The run failed.
+    pub fn run(message: impl Display) -> Self {
+        Self::Run(message.to_string())
+    }
+
+    /// Exit code.
+    pub fn code(&self) -> ExitCode {
+        match self {
+            Self::Input(_) | Self::Study(_) => ExitCode::from(2),
+            Self::Run(_) => ExitCode::from(1),
+        }
+    }
+
+    /// Prints the message to standard error.
+    pub fn print(&self) {
+        match self {
+            Self::Input(message) | Self::Run(message) => eprintln!("error: {message}"),
+            Self::Study(error) => {
+                for problem in &error.problems {
+                    eprintln!("{:?}", Report::new(Shown::from(problem)));
+                }
+                let n = error.problems.len();
+                if n > 1 {
+                    eprintln!("{n} problems; nothing was run");
+                }
+            }
+        }
+    }
+}
+
+impl From<StudyError> for Failure {
+    fn from(error: StudyError) -> Self {
+        Self::Study(error)
+    }
+}
+
+/// A problem of the study as a diagnostic with its place in the file.
+#[derive(Debug)]
+struct Shown {
+    message: String,
+    help: Option<String>,
+    source: Option<NamedSource<String>>,
+    span: Option<std::ops::Range<usize>>,
+}
+
+impl From<&Problem> for Shown {
+    fn from(problem: &Problem) -> Self {
+        let source = problem
+            .source_text
+            .as_ref()
+            .map(|text| NamedSource::new(problem.file.display().to_string(), text.to_string()));
+        let message = if source.is_some() && problem.span.is_some() {
+            problem.message.clone()
+        } else {
+            format!("{}: {}", problem.file.display(), problem.message)
+        };
+        Self { message, help: problem.help.clone(), source, span: problem.span.clone() }
+    }
+}
+
+impl Display for Shown {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl std::error::Error for Shown {}
+
+impl Diagnostic for Shown {
+    fn severity(&self) -> Option<Severity> {
+        Some(Severity::Error)
+    }
+
+    fn help<'a>(&'a self) -> Option<Box<dyn Display + 'a>> {
+        self.help.as_ref().map(|h| Box::new(h) as Box<dyn Display>)
+    }
+
+    fn source_code(&self) -> Option<&dyn SourceCode> {
+        self.source.as_ref().map(|s| s as &dyn SourceCode)
+    }
+
+    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
+        let span = self.span.clone()?;
+        self.source.as_ref()?;
+        Some(Box::new(std::iter::once(LabeledSpan::new(Some("here".to_owned()), span.start, span.len().max(1)))))
+    }
+}

@@ -1,0 +1,68 @@
+//! `starlings models`: the catalogue, written by the models themselves.
+
+use clap::Parser;
+use starlings_models::{Quantity, Spec, catalogue, nearest};
+
+use crate::console::table;
+use crate::failure::Failure;
+
+/// List the built-in models, or describe one.
+#[derive(Parser)]
+pub struct Args {
+    /// Model kind to describe; all kinds are listed without it.
+    kind: Option<String>,
+    /// Print the catalogue as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Prints the catalogue or one of its entries.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let mut specs: Vec<Spec> = catalogue::specs();
+    if let Some(kind) = &args.kind {
+        let names: Vec<String> = specs.iter().map(|s| s.kind.clone()).collect();
+        specs.retain(|s| s.kind == *kind);
+        if specs.is_empty() {
+            let hint = nearest(kind, &names).map(|n| format!("; did you mean `{n}`?")).unwrap_or_default();
+            return Err(Failure::input(format!("no model named `{kind}`{hint} (known: {})", names.join(", "))));
+        }
+    }
+    if args.json {
+        let text = serde_json::to_string_pretty(&specs).map_err(Failure::run)?;
+        println!("{text}");
+    } else if args.kind.is_some() {
+        specs.iter().for_each(describe);
+    } else {
+        let mut rows = vec![vec!["kind".to_owned(), "what it is".to_owned()]];
+        rows.extend(specs.iter().map(|s| vec![s.kind.clone(), s.says.clone()]));
+        print!("{}", table(&rows, false));
+        println!("\n`starlings models KIND` lists parameters, states, outputs and inputs.");
+    }
+    Ok(())
+}
+
+fn describe(spec: &Spec) {
+    println!("{}: {}", spec.kind, spec.says);
+    let lists =
+        [("parameters", &spec.parameters), ("states", &spec.states), ("outputs", &spec.outputs), ("inputs", &spec.inputs)];
+    for (title, quantities) in lists {
+        if quantities.is_empty() {
+            continue;
+        }
+        println!("\n{title}");
+        let mut rows = vec![["name", "unit", "range", "default", "meaning"].map(str::to_owned).to_vec()];
+        rows.extend(quantities.iter().map(row));
+        print!("{}", table(&rows, false));
+    }
+    println!("\nestimate an initial value with the parameter name `initial:<state>`");
+}
+
+fn row(q: &Quantity) -> Vec<String> {
+    vec![
+        q.name.clone(),
+        q.unit.clone(),
+        q.range_text(),
+        q.default.map(|v| v.to_string()).unwrap_or_default(),
+        q.says.clone(),
+    ]
+}

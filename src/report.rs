@@ -1,0 +1,49 @@
+//! `starlings report`: the result files of a run folder, written again from its store.
+
+use std::path::PathBuf;
+
+use clap::Parser;
+use starlings_coordinator::report as page;
+use starlings_coordinator::study::{RunFolder, reader};
+
+use crate::failure::Failure;
+
+/// Write report.html, summary.json and posterior.csv of a run folder again from its run.db.
+#[derive(Parser)]
+pub struct Args {
+    /// The run folder.
+    dir: PathBuf,
+    /// Also write the overview picture (SVG) to this file.
+    #[arg(long, value_name = "FILE")]
+    overview: Option<PathBuf>,
+    /// Print the summary as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Writes the files; a run that is not finished gets a report of what there is.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let folder = RunFolder::open(&args.dir).map_err(Failure::input)?;
+    let data = reader::report_data(&folder.store).map_err(Failure::run)?;
+    if let Some(path) = &args.overview {
+        let svg = page::overview_svg(&data).map_err(Failure::run)?;
+        std::fs::write(path, svg).map_err(|e| Failure::input(format!("cannot write {}: {e}", path.display())))?;
+    }
+    let summary = folder.summary().map_err(Failure::run)?;
+    let html = args.dir.join("report.html");
+    if summary.is_some() {
+        folder.write_artefacts().map_err(Failure::run)?;
+    } else {
+        let text = page::render(&data).map_err(Failure::run)?;
+        std::fs::write(&html, text).map_err(|e| Failure::input(format!("cannot write {}: {e}", html.display())))?;
+    }
+    if args.json {
+        println!("{}", serde_json::to_string_pretty(&summary).map_err(Failure::run)?);
+    } else {
+        if summary.is_none() {
+            eprintln!("the run is not finished: the report shows what there is");
+        }
+        println!("{}", html.display());
+    }
+    Ok(())
+}

@@ -1,0 +1,198 @@
+//! `starlings run`: a study, a fleet, a run folder.
+
+use std::path::{Path, PathBuf};
+use std::sync::mpsc;
+use std::time::{Duration, Instant};
+
+use clap::Parser;
+use starlings_coordinator::fleet::{FleetConfig, FleetEvent, GrpcFleet, LocalWorkers};
+use starlings_coordinator::study::trial::trial;
+use starlings_coordinator::study::{RunContext, RunFolder, Study, Summary, run as study_run};
+use tokio_util::sync::CancellationToken;
+
+use crate::console::{cancel_on_signal, number, table};
+use crate::failure::Failure;
+use crate::progress::Display;
+
+/// Estimate the parameters of a study; writes posterior.csv, summary.json and report.html into a run folder.
+#[derive(Parser)]
+pub struct Args {
+    /// The study file.
+    study: PathBuf,
+    /// Run folder; runs/<name>-<time> without it.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Number of local worker processes; the study's [fleet] workers without it.
+    #[arg(long, value_name = "N", conflicts_with = "listen")]
+    workers: Option<usize>,
+    /// Wait for workers to dial this address (HOST:PORT, port 0 picks a free one) instead of starting local ones.
+    #[arg(long, value_name = "ADDR")]
+    listen: Option<String>,
+    /// Allow --listen beyond loopback although the connection is neither encrypted nor authenticated.
+    #[arg(long)]
+    insecure: bool,
+    /// Continue an interrupted run in --out from its last stored analysis.
+    #[arg(long, requires = "out")]
+    resume: bool,
+    /// Print the summary as JSON on standard output and nothing else.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the study.
+pub fn run(args: &Args, started: Instant) -> Result<(), Failure> {
+    let study = Study::load(&args.study)?;
+    let n_worker = args.workers.unwrap_or(study.fleet.workers);
+    if n_worker == 0 {
+        return Err(Failure::input("--workers must be at least 1 (or use --listen ADDR and start workers elsewhere)"));
+    }
+    let address = address(args)?;
+    trial(&study).map_err(Failure::input)?;
+    let mut folder = open_folder(args, &study)?;
+    if let Some(summary) = folder.summary().map_err(Failure::run)? {
+        eprintln!("the run in {} is finished already; writing its files again", folder.path.display());
+        folder.write_artefacts().map_err(Failure::run)?;
+        return print(&summary, &folder.path, args.json);
+    }
+    let summary = estimate(args, &study, &mut folder, address, n_worker, started)?;
+    print(&summary, &folder.path, args.json)
+}
+
+/// Where to listen: a free loopback port for local workers, or what was asked for.
+fn address(args: &Args) -> Result<std::net::SocketAddr, Failure> {
+    use std::net::ToSocketAddrs;
+    let text = args.listen.as_deref().unwrap_or("127.0.0.1:0");
+    let address = text
+        .to_socket_addrs()
+        .ok()
+        .and_then(|mut all| all.next())
+        .ok_or_else(|| Failure::input(format!("--listen {text}: expected HOST:PORT, such as 127.0.0.1:7000")))?;
+    if !address.ip().is_loopback() && !args.insecure {
+        return Err(Failure::input(format!(
+            "{address} is reachable from other machines, and the connection is neither encrypted nor authenticated in \
+             this version: listen on 127.0.0.1, or accept it with --insecure on a network you trust"
+        )));
+    }
+    Ok(address)
+}
+
+fn open_folder(args: &Args, study: &Study) -> Result<RunFolder, Failure> {
+    let stamp = jiff::Timestamp::now().strftime("%Y%m%d-%H%M%S").to_string();
+    let path = args.out.clone().unwrap_or_else(|| Path::new("runs").join(format!("{}-{stamp}", study.name)));
+    if args.resume {
+        return RunFolder::resume(&path, study).map_err(Failure::input);
+    }
+    let command = std::env::args().skip(1).collect::<Vec<_>>().join(" ");
+    RunFolder::create(&path, study, &format!("starlings {command}"), &stamp).map_err(Failure::input)
+}
+
+/// Starts the fleet, runs the study, ends the fleet.
+fn estimate(
+    args: &Args,
+    study: &Study,
+    folder: &mut RunFolder,
+    address: std::net::SocketAddr,
+    n_worker: usize,
+    started: Instant,
+) -> Result<Summary, Failure> {
+    let cancel = CancellationToken::new();
+    cancel_on_signal(&cancel);
+    let (events, heard) = mpsc::channel();
+    let mut config = FleetConfig::new(address, events);
+    config.run_name.clone_from(&study.name);
+    config.cancel = cancel;
+    if let Some(patience) = study.fleet.patience_s {
+        config.patience = Duration::from_secs_f64(patience);
+    }
+    if let Some(attempts) = study.fleet.max_attempts {
+        config.max_attempts = attempts;
+    }
+    let mut fleet = GrpcFleet::listen(config).map_err(Failure::run)?;
+    let local = if args.listen.is_none() {
+        let program = std::env::current_exe().map_err(Failure::run)?;
+        Some(LocalWorkers::spawn(&program, n_worker, fleet.address()).map_err(Failure::run)?)
+    } else {
+        eprintln!("listening on {}; start workers with: starlings worker --connect {}", fleet.address(), fleet.address());
+        None
+    };
+    let display = Display::new(args.json);
+    let (kept, store_events) = mpsc::channel();
+    let watcher = relay(heard, kept, args.json);
+    let mut watch = |p: &starlings_coordinator::study::Progress| display.step(p);
+    let clock = move || started.elapsed().as_secs_f64();
+    let mut context = RunContext { clock: &clock, watch: &mut watch, events: Some(&store_events), earlier_s: 0.0 };
+    let result = study_run::run(study, &mut fleet, folder, &mut context);
+    display.finish();
+    fleet.close();
+    drop(local);
+    drop(fleet);
+    let _ = watcher.join();
+    result.map_err(|error| {
+        Failure::run(format!(
+            "{error}\n  the run so far is in {}: continue it with --out {} --resume",
+            folder.path.display(),
+            folder.path.display()
+        ))
+    })
+}
+
+/// Shows the events that people should see at once and hands all of them on to the store.
+fn relay(
+    heard: mpsc::Receiver<FleetEvent>,
+    kept: mpsc::Sender<FleetEvent>,
+    silent: bool,
+) -> std::thread::JoinHandle<()> {
+    std::thread::spawn(move || {
+        for event in heard {
+            if event.is_notable() && !silent {
+                eprintln!("{event}");
+            }
+            tracing::info!(kind = event.kind(), "{event}");
+            // The store stops listening at the end of the run; later events have no reader.
+            let _ = kept.send(event);
+        }
+    })
+}
+
+fn print(summary: &Summary, folder: &Path, json: bool) -> Result<(), Failure> {
+    if json {
+        println!("{}", serde_json::to_string_pretty(summary).map_err(Failure::run)?);
+        return Ok(());
+    }
+    for warning in &summary.warnings {
+        println!("warning: {warning}");
+    }
+    let mut rows = vec![["parameter", "unit", "estimate", "95 % interval", "prior median"].map(str::to_owned).to_vec()];
+    for p in &summary.parameters {
+        let [lo, hi] = p.interval95.map(|v| number(v, Some(p.sd)));
+        rows.push(vec![
+            p.name.clone(),
+            p.unit.clone(),
+            number(p.estimate, Some(p.sd)),
+            format!("{lo} … {hi}"),
+            number(p.prior_median, None),
+        ]);
+    }
+    println!("\n{}", table(&rows, false));
+    let shown = |rmse: Option<f64>| rmse.map_or_else(|| "–".to_owned(), |v| number(v, None));
+    for c in &summary.fit.channels {
+        println!(
+            "{}: RMSE {} on the training span, {} held out (noise {})",
+            c.name,
+            shown(c.train_rmse),
+            shown(c.held_out_rmse),
+            number(c.noise, None)
+        );
+    }
+    println!(
+        "{} runs ({} failed, {} retried) on {} workers in {:.2} s; NIS {:.2} per observation",
+        summary.runs.total,
+        summary.runs.failed,
+        summary.runs.retried,
+        summary.workers,
+        summary.wall_s,
+        summary.fit.nis_per_observation
+    );
+    println!("report: {}", folder.join("report.html").display());
+    Ok(())
+}

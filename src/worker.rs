@@ -1,0 +1,49 @@
+//! `starlings worker`: dial a coordinator and run its jobs until it says goodbye.
+
+use std::time::Duration;
+
+use clap::Parser;
+use starlings_worker::WorkerConfig;
+use tokio_util::sync::CancellationToken;
+
+use crate::console::cancel_on_signal;
+use crate::failure::Failure;
+
+/// Be a worker: dial the coordinator, run its jobs, hold nothing it needs.
+#[derive(Parser)]
+pub struct Args {
+    /// Address of the coordinator, HOST:PORT.
+    #[arg(long, value_name = "ADDR")]
+    connect: String,
+    /// Runs at the same time; the number of cores without it.
+    #[arg(long, value_name = "N")]
+    slots: Option<usize>,
+    /// Seconds to keep dialling while nobody answers.
+    #[arg(long, default_value_t = 600.0, value_name = "SECONDS")]
+    patience: f64,
+    /// End when the coordinator's connection closes instead of dialling again.
+    #[arg(long)]
+    once: bool,
+}
+
+/// Works until drained, cancelled or out of patience.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    if args.slots == Some(0) {
+        return Err(Failure::input("--slots must be at least 1"));
+    }
+    let patience = Duration::try_from_secs_f64(args.patience)
+        .map_err(|_| Failure::input("--patience must be a number of seconds, zero or more"))?;
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let cancel = CancellationToken::new();
+    cancel_on_signal(&cancel);
+    let config = WorkerConfig {
+        slots: args.slots.unwrap_or(cores),
+        once: args.once,
+        patience,
+        cancel,
+        ..WorkerConfig::new(args.connect.clone())
+    };
+    let report = starlings_worker::run(config).map_err(Failure::run)?;
+    tracing::info!(jobs = report.jobs, "done");
+    Ok(())
+}
