@@ -1,2 +1,184 @@
-//! bench
-fn main() {}
+//! The arithmetic of one analysis and one run, each against its limit measured in the same process.
+//!
+//! `cargo bench --bench analysis` prints a table, with `-- --json` one JSON object. Absolute times depend on the machine;
+//! the ratios are what to watch. Nothing is asserted here.
+
+#![allow(clippy::print_stdout, missing_docs)]
+
+use std::collections::BTreeMap;
+use std::hint::black_box;
+use std::sync::Arc;
+use std::time::Instant;
+
+use nalgebra::DMatrix;
+use serde_json::{Map, Value, json};
+use starlings_estimators::{Data, Drift, Noise, Particles, Points, Root, Roukf, SigmaSet, recombine};
+use starlings_models::equations::{EquationsDef, EquationsModel};
+use starlings_models::integrate::{Tolerance, dopri5};
+use starlings_models::model::{History, Segment};
+use starlings_models::{Drive, Job, Model, ModelDef, Setup, Signal, Spec, Window};
+
+fn main() {
+    let json = std::env::args().any(|a| a == "--json");
+    let mut figures = Map::new();
+    analysis(&mut figures);
+    recombination(&mut figures);
+    windkessel_beat(&mut figures);
+    equations_against_rust(&mut figures);
+    if json {
+        println!("{}", Value::Object(figures));
+    } else {
+        for (name, value) in figures {
+            println!("{name:32} {value}");
+        }
+    }
+}
+
+/// Shortest of `n` timings of `work`, in seconds.
+fn best(n: usize, mut work: impl FnMut()) -> f64 {
+    (0..n)
+        .map(|_| {
+            let start = Instant::now();
+            work();
+            start.elapsed().as_secs_f64()
+        })
+        .fold(f64::INFINITY, f64::min)
+}
+
+fn round(value: f64) -> Value {
+    json!((value * 1e4).round() / 1e4)
+}
+
+/// One analysis of p = 22 parameters, 23 simplex particles, m = 100 000 observations with independent noise.
+fn analysis(figures: &mut Map<String, Value>) {
+    let (p, m) = (22, 100_000);
+    let Ok(set) = SigmaSet::new(Points::Simplex, p) else { return };
+    let r = set.n_particle();
+    let roukf = Roukf { set, root: Root::Symmetric, drift: vec![Drift::None; p] };
+    let theta = roukf.set.points.clone();
+    let z = DMatrix::from_fn(m, r, |i, j| ((i * 31 + j * 17) % 1009) as f64 / 1009.0);
+    let values: Vec<f64> = (0..m).map(|i| ((i * 7) % 101) as f64 / 101.0).collect();
+    let noise = Noise::Diagonal(vec![20.0; m]);
+    let particles = Particles { theta, pull: vec![1.0; r] };
+    let seconds = best(20, || {
+        let done = roukf.analysis(&particles, &z, &Data { values: &values, noise: &noise });
+        black_box(done.map(|(_, a)| a.nis).unwrap_or(f64::NAN));
+    });
+    // The flops of Z D I' and S'S, the two products of an analysis.
+    let flops = 2.0 * (m * r * p + m * p * p) as f64;
+    figures.insert("analysis_p22_m100000_ms".into(), round(1e3 * seconds));
+    figures.insert("analysis_gflop_per_s".into(), round(flops / seconds / 1e9));
+}
+
+/// X+ = X- T at n = 10^6, r = 22, against memcpy of the same matrix.
+fn recombination(figures: &mut Map<String, Value>) {
+    let (n, r) = (1_000_000, 22);
+    let x = DMatrix::from_fn(n, r, |i, j| (i % 97 + j) as f64);
+    let t = DMatrix::from_fn(r, r, |i, j| if i == j { 0.9 } else { 0.1 / 21.0 });
+    let mut out = DMatrix::zeros(n, r);
+    let copy = best(10, || black_box(&mut out).as_mut_slice().copy_from_slice(black_box(&x).as_slice()));
+    let product = best(10, || recombine(black_box(&x), &t, black_box(&mut out)));
+    let bytes = (2 * n * r * 8) as f64;
+    figures.insert("recombine_n1e6_r22_ms".into(), round(1e3 * product));
+    figures.insert("recombine_gb_per_s".into(), round(bytes / product / 1e9));
+    figures.insert("memcpy_gb_per_s".into(), round(bytes / copy / 1e9));
+    figures.insert("recombine_share_of_memcpy".into(), round(copy / product));
+}
+
+/// One beat of the three-element Windkessel: 200 steps of 5 ms, an output at each, as a worker runs it.
+fn windkessel_beat(figures: &mut Map<String, Value>) {
+    let setup = Setup {
+        model: ModelDef { kind: "windkessel-3".into(), ..ModelDef::default() },
+        parameters: ["R", "C", "Zc", "initial:p"].map(String::from).to_vec(),
+        outputs: vec!["pressure".into()],
+        ..Setup::default()
+    };
+    let times: Vec<f64> = (0..=200).map(|k| 0.005 * f64::from(k)).collect();
+    let flow = times.iter().map(|t| if *t < 0.3 { 300.0 * (10.472 * t).sin() } else { 0.0 }).collect();
+    let window = Window {
+        start: 0.0,
+        times: times[1..].to_vec(),
+        observed: vec![f64::NAN; 200],
+        inputs: vec![Signal { times, values: flow }],
+    };
+    let job = Job { particle: 0, record: 0, window: Arc::new(window), theta: vec![3.4, 1.2, 0.1, 100.0], state: None };
+    match setup.build() {
+        Ok(model) => {
+            let beat = || {
+                for _ in 0..100 {
+                    black_box(model.run(black_box(&job)).is_ok());
+                }
+            };
+            figures.insert("windkessel_beat_us".into(), round(1e6 * best(20, beat) / 100.0));
+        }
+        Err(error) => println!("windkessel-3: {error}"),
+    }
+}
+
+/// A Duffing oscillator with a known force, in Rust; its twin below is written as equations.
+struct Duffing {
+    spec: Spec,
+}
+
+impl Model for Duffing {
+    fn spec(&self) -> &Spec {
+        &self.spec
+    }
+
+    fn initial(&self, _theta: &[f64], x: &mut [f64]) {
+        x.copy_from_slice(&[0.1, 0.0]);
+    }
+
+    fn rhs(&self, t: f64, x: &[f64], theta: &[f64], _u: Drive<'_>, dx: &mut [f64]) {
+        let [k, c, b] = [theta[0], theta[1], theta[2]];
+        dx[0] = x[1];
+        dx[1] = -k * x[0] - c * x[1] - b * x[0] * x[0] * x[0] + (1.2 * t).cos();
+    }
+
+    fn output(&self, _t: f64, x: &[f64], _theta: &[f64], _u: Drive<'_>, y: &mut [f64]) {
+        y[0] = x[0];
+    }
+}
+
+const DUFFING: &str = r#"{ "states": [
+    { "name": "x", "initial": "0.1", "rate": [["x", "v"]] },
+    { "name": "v", "initial": "0", "rate": [["spring", "-k*x"], ["viscous", "-c*v"], ["cubic", "-b*x^3"], ["drive", "cos(1.2*t)"]] }
+  ], "outputs": [ { "name": "position", "value": "x" } ], "solver": { "method": "dopri5" } }"#;
+
+struct NoHistory;
+
+impl History for NoHistory {
+    fn at(&self, _index: usize, _t: f64) -> f64 {
+        0.0
+    }
+}
+
+/// The same model, the same integrator, the same tolerance: what the expression language costs.
+fn equations_against_rust(figures: &mut Map<String, Value>) {
+    let def: EquationsDef = match serde_json::from_str(DUFFING) {
+        Ok(def) => def,
+        Err(error) => return println!("equations: {error}"),
+    };
+    let equations = match EquationsModel::new(&def) {
+        Ok(model) => model,
+        Err(error) => return println!("equations: {error}"),
+    };
+    let rust = Duffing { spec: equations.spec().clone() };
+    let order: BTreeMap<&str, f64> = [("k", 1.0), ("c", 0.1), ("b", 0.5)].into();
+    let theta: Vec<f64> = equations.spec().parameters.iter().map(|q| order[q.name.as_str()]).collect();
+    let segment = Segment { t0: 0.0, t1: 50.0, u0: &[], slope: &[], history: &NoHistory };
+    let mut x = [0.0; 2];
+    let native = best(20, || {
+        x = [0.1, 0.0];
+        black_box(dopri5::advance(&rust, segment, &[1.0, 0.1, 0.5], &mut x, Tolerance::default()).is_ok());
+    });
+    let by_rust = x;
+    let written = best(20, || {
+        x = [0.1, 0.0];
+        black_box(equations.advance(segment, &theta, &mut x).is_ok());
+    });
+    figures.insert("duffing_rust_us".into(), round(1e6 * native));
+    figures.insert("duffing_equations_us".into(), round(1e6 * written));
+    figures.insert("equations_over_rust".into(), round(written / native));
+    figures.insert("equations_minus_rust".into(), json!((x[0] - by_rust[0]).abs()));
+}

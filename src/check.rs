@@ -6,6 +6,7 @@ use clap::Parser;
 use serde_json::json;
 use starlings_coordinator::study::trial::{TrialChannel, trial};
 use starlings_coordinator::study::{Study, posterior};
+use starlings_estimators::SigmaSet;
 
 use crate::console::{number, table};
 use crate::failure::Failure;
@@ -24,20 +25,27 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let study = Study::load(&args.study)?;
     let channels = trial(&study).map_err(Failure::input)?;
+    let n_particle = n_particle(&study)?;
     if args.json {
-        println!("{:#}", as_json(&study, &channels));
+        println!("{:#}", as_json(&study, &channels, n_particle));
     } else {
-        print(&study, &channels);
+        print(&study, &channels, n_particle);
     }
     Ok(())
 }
 
-fn runs_per_pass(study: &Study) -> usize {
-    study.estimator.points.n_particle(study.theta.len())
+/// Particles of one ensemble.
+fn n_particle(study: &Study) -> Result<usize, Failure> {
+    let set = SigmaSet::new(study.estimator.points, study.theta.len()).map_err(Failure::input)?;
+    Ok(set.n_particle())
+}
+
+fn runs_per_pass(study: &Study, n_particle: usize) -> usize {
+    n_particle
         * (0..study.records.len()).map(|r| study.windows(r).len()).sum::<usize>()
 }
 
-fn as_json(study: &Study, channels: &[TrialChannel]) -> serde_json::Value {
+fn as_json(study: &Study, channels: &[TrialChannel], n_particle: usize) -> serde_json::Value {
     let estimates = posterior::estimates(study, &posterior::prior(study));
     json!({
         "study": study.name,
@@ -46,8 +54,8 @@ fn as_json(study: &Study, channels: &[TrialChannel]) -> serde_json::Value {
         "parameters": estimates.iter().map(|e| json!({
             "name": e.name, "unit": e.unit, "prior_median": e.prior_median, "prior_interval95": e.prior_interval95,
         })).collect::<Vec<_>>(),
-        "particles": study.estimator.points.n_particle(study.theta.len()),
-        "runs_per_pass": runs_per_pass(study),
+        "particles": n_particle,
+        "runs_per_pass": runs_per_pass(study, n_particle),
         "trial": channels.iter().map(|c| json!({
             "record": c.record, "output": c.output, "observations": c.n_obs, "rmse": c.rmse, "noise": c.noise,
         })).collect::<Vec<_>>(),
@@ -55,7 +63,7 @@ fn as_json(study: &Study, channels: &[TrialChannel]) -> serde_json::Value {
     })
 }
 
-fn print(study: &Study, channels: &[TrialChannel]) {
+fn print(study: &Study, channels: &[TrialChannel], n_particle: usize) {
     println!("{}: model {}, {}", study.name, study.setup.model.kind, study.estimator.describe());
     println!("\nparameters");
     let mut rows = vec![["name", "unit", "prior median", "prior 95 %"].map(str::to_owned).to_vec()];
@@ -77,9 +85,8 @@ fn print(study: &Study, channels: &[TrialChannel]) {
     }
     print!("{}", table(&rows, false));
     println!(
-        "\n{} particles, {} runs of the model per pass",
-        study.estimator.points.n_particle(study.theta.len()),
-        runs_per_pass(study)
+        "\n{n_particle} particles, {} runs of the model per pass",
+        runs_per_pass(study, n_particle)
     );
     for warning in &study.warnings {
         println!("warning: {warning}");

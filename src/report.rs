@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Parser;
 use starlings_coordinator::report as page;
-use starlings_coordinator::study::{RunFolder, reader};
+use starlings_coordinator::study::RunFolder;
 
 use crate::failure::Failure;
 
@@ -24,7 +24,7 @@ pub struct Args {
 /// Writes the files; a run that is not finished gets a report of what there is.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let folder = RunFolder::open(&args.dir).map_err(Failure::input)?;
-    let data = reader::report_data(&folder.store).map_err(Failure::run)?;
+    let data = page::reader::report_data(&folder.store).map_err(Failure::run)?;
     if let Some(path) = &args.overview {
         let svg = page::overview_svg(&data).map_err(Failure::run)?;
         std::fs::write(path, svg).map_err(|e| Failure::input(format!("cannot write {}: {e}", path.display())))?;
@@ -32,7 +32,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let summary = folder.summary().map_err(Failure::run)?;
     let html = args.dir.join("report.html");
     if summary.is_some() {
-        folder.write_artefacts().map_err(Failure::run)?;
+        page::write_files(&folder).map_err(Failure::run)?;
     } else {
         let text = page::render(&data).map_err(Failure::run)?;
         std::fs::write(&html, text).map_err(|e| Failure::input(format!("cannot write {}: {e}", html.display())))?;

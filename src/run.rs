@@ -1,13 +1,15 @@
 //! `starlings run`: a study, a fleet, a run folder.
 
+use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
 use clap::Parser;
-use starlings_coordinator::fleet::{FleetConfig, FleetEvent, GrpcFleet, LocalWorkers};
+use starlings_coordinator::fleet::{FleetConfig, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers};
+use starlings_coordinator::report;
 use starlings_coordinator::study::trial::trial;
-use starlings_coordinator::study::{RunContext, RunFolder, Study, Summary, run as study_run};
+use starlings_coordinator::study::{Progress, RunContext, RunFolder, Study, Summary, run as study_run};
 use tokio_util::sync::CancellationToken;
 
 use crate::console::{cancel_on_signal, number, table};
@@ -48,19 +50,33 @@ pub fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     }
     let address = address(args)?;
     trial(&study).map_err(Failure::input)?;
+    // Listen before the folder is made: a port in use must leave nothing behind.
+    let mut crew = Crew::listen(&study, address, args.json)?;
     let mut folder = open_folder(args, &study)?;
     if let Some(summary) = folder.summary().map_err(Failure::run)? {
         eprintln!("the run in {} is finished already; writing its files again", folder.path.display());
-        folder.write_artefacts().map_err(Failure::run)?;
+        report::write_files(&folder).map_err(Failure::run)?;
         return print(&summary, &folder.path, args.json);
     }
-    let summary = estimate(args, &study, &mut folder, address, n_worker, started)?;
+    crew.gather(args, &study, n_worker)?;
+    let display = Display::new(args.json);
+    let mut watch = |p: &Progress| display.step(p);
+    let clock = move || started.elapsed().as_secs_f64();
+    let mut context =
+        RunContext { clock: &clock, watch: &mut watch, events: Some(&crew.events), earlier_s: 0.0 };
+    let result = study_run::run(&study, &mut crew.fleet, &mut folder, &mut context);
+    display.finish();
+    crew.dismiss();
+    let path = folder.path.display();
+    let summary = result.map_err(|error| {
+        Failure::run(format!("{error}\n  the run so far is in {path}: continue it with --out {path} --resume"))
+    })?;
+    report::write_files(&folder).map_err(Failure::run)?;
     print(&summary, &folder.path, args.json)
 }
 
 /// Where to listen: a free loopback port for local workers, or what was asked for.
-fn address(args: &Args) -> Result<std::net::SocketAddr, Failure> {
-    use std::net::ToSocketAddrs;
+fn address(args: &Args) -> Result<SocketAddr, Failure> {
     let text = args.listen.as_deref().unwrap_or("127.0.0.1:0");
     let address = text
         .to_socket_addrs()
@@ -86,72 +102,72 @@ fn open_folder(args: &Args, study: &Study) -> Result<RunFolder, Failure> {
     RunFolder::create(&path, study, &format!("starlings {command}"), &stamp).map_err(Failure::input)
 }
 
-/// Starts the fleet, runs the study, ends the fleet.
-fn estimate(
-    args: &Args,
-    study: &Study,
-    folder: &mut RunFolder,
-    address: std::net::SocketAddr,
-    n_worker: usize,
-    started: Instant,
-) -> Result<Summary, Failure> {
-    let cancel = CancellationToken::new();
-    cancel_on_signal(&cancel);
-    let (events, heard) = mpsc::channel();
-    let mut config = FleetConfig::new(address, events);
-    config.run_name.clone_from(&study.name);
-    config.cancel = cancel;
-    if let Some(patience) = study.fleet.patience_s {
-        config.patience = Duration::from_secs_f64(patience);
+/// The fleet of one run, its local workers, and the way of its events to the store.
+struct Crew {
+    fleet: GrpcFleet,
+    local: Option<LocalWorkers>,
+    events: mpsc::Receiver<FleetEvent>,
+    watcher: std::thread::JoinHandle<()>,
+}
+
+impl Crew {
+    /// Listens for workers; none is started yet.
+    fn listen(study: &Study, address: SocketAddr, silent: bool) -> Result<Self, Failure> {
+        let cancel = CancellationToken::new();
+        cancel_on_signal(&cancel);
+        let (sender, heard) = mpsc::channel();
+        let (kept, events) = mpsc::channel();
+        let mut config = FleetConfig::new(address, &study.name, cancel, sender);
+        if let Some(patience) = study.fleet.patience {
+            config.patience = Duration::from_secs_f64(patience);
+        }
+        if let Some(attempts) = study.fleet.max_attempts {
+            config.max_attempts = attempts;
+        }
+        let fleet = GrpcFleet::listen(config).map_err(Failure::run)?;
+        let watcher = std::thread::spawn(move || relay(heard, &kept, silent));
+        Ok(Self { fleet, local: None, events, watcher })
     }
-    if let Some(attempts) = study.fleet.max_attempts {
-        config.max_attempts = attempts;
+
+    /// Starts the local workers, or says how to start others.
+    fn gather(&mut self, args: &Args, study: &Study, n: usize) -> Result<(), Failure> {
+        let address = self.fleet.address();
+        if args.listen.is_some() {
+            eprintln!("listening on {address}; start workers with: starlings worker --connect {address}");
+            return Ok(());
+        }
+        let slots = study.fleet.slots.unwrap_or(1).to_string();
+        let config = LocalConfig {
+            program: std::env::current_exe().map_err(Failure::run)?,
+            args: ["worker", "--slots", &slots].map(str::to_owned).to_vec(),
+            n,
+            address,
+            fleet: self.fleet.handle(),
+        };
+        self.local = Some(LocalWorkers::spawn(config).map_err(Failure::run)?);
+        Ok(())
     }
-    let mut fleet = GrpcFleet::listen(config).map_err(Failure::run)?;
-    let local = if args.listen.is_none() {
-        let program = std::env::current_exe().map_err(Failure::run)?;
-        Some(LocalWorkers::spawn(&program, n_worker, fleet.address()).map_err(Failure::run)?)
-    } else {
-        eprintln!("listening on {}; start workers with: starlings worker --connect {}", fleet.address(), fleet.address());
-        None
-    };
-    let display = Display::new(args.json);
-    let (kept, store_events) = mpsc::channel();
-    let watcher = relay(heard, kept, args.json);
-    let mut watch = |p: &starlings_coordinator::study::Progress| display.step(p);
-    let clock = move || started.elapsed().as_secs_f64();
-    let mut context = RunContext { clock: &clock, watch: &mut watch, events: Some(&store_events), earlier_s: 0.0 };
-    let result = study_run::run(study, &mut fleet, folder, &mut context);
-    display.finish();
-    fleet.close();
-    drop(local);
-    drop(fleet);
-    let _ = watcher.join();
-    result.map_err(|error| {
-        Failure::run(format!(
-            "{error}\n  the run so far is in {}: continue it with --out {} --resume",
-            folder.path.display(),
-            folder.path.display()
-        ))
-    })
+
+    /// Ends the fleet and its workers.
+    fn dismiss(self) {
+        let Self { fleet, local, watcher, .. } = self;
+        fleet.close();
+        drop(local);
+        // The relay ends with the last sender of events; a panic in it has been printed already.
+        let _ = watcher.join();
+    }
 }
 
 /// Shows the events that people should see at once and hands all of them on to the store.
-fn relay(
-    heard: mpsc::Receiver<FleetEvent>,
-    kept: mpsc::Sender<FleetEvent>,
-    silent: bool,
-) -> std::thread::JoinHandle<()> {
-    std::thread::spawn(move || {
-        for event in heard {
-            if event.is_notable() && !silent {
-                eprintln!("{event}");
-            }
-            tracing::info!(kind = event.kind(), "{event}");
-            // The store stops listening at the end of the run; later events have no reader.
-            let _ = kept.send(event);
+fn relay(heard: mpsc::Receiver<FleetEvent>, kept: &mpsc::Sender<FleetEvent>, silent: bool) {
+    for event in heard {
+        if event.is_notable() && !silent {
+            eprintln!("{event}");
         }
-    })
+        tracing::info!(kind = event.kind(), "{event}");
+        // The store stops listening at the end of the run; later events have no reader.
+        let _ = kept.send(event);
+    }
 }
 
 fn print(summary: &Summary, folder: &Path, json: bool) -> Result<(), Failure> {

@@ -1,21 +1,24 @@
 //! The report of a run: one self-contained HTML page and one overview picture, made from plain data.
 //!
-//! The store's reader fills [`ReportData`]; [`render`] and [`overview_svg`] turn it into text and know neither the store nor
-//! the study. The page needs no script, no network and no font, works on a phone and in print, and states warnings before
+//! [`reader`] fills [`ReportData`] from the store; [`render`] and [`overview_svg`] turn it into text and know neither the
+//! store nor the study. The page needs no script, no network and no font, works on a phone and in print, and states warnings before
 //! numbers. Deliberately absent: computing anything that was not stored. Next file to read: [`data`].
 
 pub mod data;
+mod files;
 mod headline;
 mod number;
 mod overview;
 mod page;
 mod plot;
+pub mod reader;
 #[cfg(test)]
 mod sample;
 #[cfg(test)]
 mod tests;
 
 pub use data::ReportData;
+pub use files::{FilesError, write_files};
 pub use overview::overview_svg;
 
 /// Why a report could not be made.

@@ -10,7 +10,6 @@ pub mod flight;
 pub mod folder;
 pub mod forecast;
 pub mod posterior;
-pub mod reader;
 pub mod resample;
 pub mod rescue;
 pub mod run;

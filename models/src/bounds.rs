@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::de::{Error, SeqAccess, Visitor};
 use serde::ser::SerializeTuple;
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde::{Deserialize, Deserializer, Serializer};
 
 /// Writes a range of two numbers.
 pub(crate) fn serialize<S: Serializer>(range: &[f64; 2], serializer: S) -> Result<S::Ok, S::Error> {

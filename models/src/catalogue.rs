@@ -1,1 +1,55 @@
-//! (to write)
+//! Every kind of model that a study can name.
+//!
+//! The list is what `Setup::build` looks kinds up in, what the `models` command prints, and what the family tests run over.
+//! Next file to read: [`crate::native`] for the built-in models, [`crate::equations`] for models written in a study.
+
+use crate::equations::EquationsModel;
+use crate::setup::{ModelDef, SetupError};
+use crate::{Model, Spec, native, nearest};
+
+/// The kind of a model written in the study itself.
+pub const EQUATIONS: &str = "equations";
+
+/// What every kind of model says of itself, in the order of the list of built-in ones, `equations` last; the lists of
+/// `equations` are empty, since the study fills them.
+pub fn specs() -> Vec<Spec> {
+    let mut specs: Vec<Spec> = native::all().iter().map(|model| model.spec().clone()).collect();
+    specs.push(Spec {
+        kind: EQUATIONS.to_owned(),
+        says: "States, rates and outputs as the study writes them.".to_owned(),
+        states: Vec::new(),
+        parameters: Vec::new(),
+        outputs: Vec::new(),
+        inputs: Vec::new(),
+        measures: Vec::new(),
+        restart: true,
+    });
+    specs
+}
+
+/// Makes the model that a definition names, without effects.
+///
+/// # Errors
+/// When the kind is unknown, equations are missing or given for another kind, or they are wrong.
+pub fn build(def: &ModelDef) -> Result<Box<dyn Model>, SetupError> {
+    match (&def.equations, def.kind == EQUATIONS) {
+        (Some(equations), true) => return Ok(Box::new(EquationsModel::new(equations)?)),
+        (None, true) => {
+            let message = "model kind `equations` needs its states: give at least one, with a rate";
+            return Err(SetupError::Invalid(message.to_owned()));
+        }
+        (Some(_), false) => {
+            return Err(SetupError::Invalid(format!(
+                "model kind `{}` has its own equations: remove the states, or set kind to `equations`",
+                def.kind
+            )));
+        }
+        (None, false) => {}
+    }
+    let found = native::all().into_iter().find(|model| model.spec().kind == def.kind);
+    found.ok_or_else(|| SetupError::Unknown {
+        what: "model",
+        name: def.kind.clone(),
+        nearest: nearest(&def.kind, specs().iter().map(|spec| &spec.kind)),
+    })
+}

@@ -7,12 +7,15 @@
 pub mod def;
 pub mod extended;
 pub mod library;
+mod scratch;
 pub mod terms;
 
 use crate::Drive;
 
 pub use def::{Addition, EffectDef, EffectParameter, EffectState};
 pub use extended::Extended;
+pub use library::library;
+pub(crate) use terms::names;
 pub use terms::TermEffect;
 
 /// One time of an extended model. Slices follow the extended specification; `y` holds the inner model's outputs without any
@@ -81,4 +84,10 @@ pub trait Effect: Send + Sync {
 
     /// Adds to the outputs.
     fn add_to_outputs(&self, at: Moment<'_>, y: &mut [f64]);
+
+    /// Number of switching functions in what it adds to rates and inputs.
+    fn n_switch(&self) -> usize;
+
+    /// Writes its switching functions, as [`crate::Model::switches`].
+    fn switches(&self, at: Moment<'_>, g: &mut [f64]);
 }

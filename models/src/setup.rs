@@ -6,8 +6,9 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::effect::EffectDef;
+use crate::effect::{EffectDef, Extended, library};
 use crate::equations::EquationsDef;
+use crate::{Forward, Model, Simulator, Spec, catalogue};
 
 /// The model by kind, with the values that are not estimated.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -44,6 +45,45 @@ pub struct Setup {
     pub observer: ObserverDef,
     /// Effects added to the model.
     pub effects: Vec<EffectDef>,
+}
+
+impl Setup {
+    /// Builds what runs jobs, and checks that everything fits together.
+    ///
+    /// # Errors
+    /// When a name is unknown (with the nearest valid one), given twice or without value, or an expression is wrong.
+    pub fn build(&self) -> Result<Box<dyn Forward>, SetupError> {
+        Ok(Box::new(Simulator::new(self)?))
+    }
+
+    /// What the model says of itself, effects included; parameters, outputs and observer are not looked at.
+    ///
+    /// # Errors
+    /// When the model or an effect does not build.
+    pub fn spec(&self) -> Result<Spec, SetupError> {
+        Ok(self.model()?.spec().clone())
+    }
+
+    /// The model with its effects.
+    ///
+    /// # Errors
+    /// When the model or an effect does not build.
+    pub fn model(&self) -> Result<Box<dyn Model>, SetupError> {
+        let inner = catalogue::build(&self.model)?;
+        if self.effects.is_empty() {
+            return Ok(inner);
+        }
+        let effects = self.written_out_effects(inner.spec())?;
+        Ok(Box::new(Extended::new(inner, &effects, &self.model.constants)?))
+    }
+
+    /// The effects with the built-in ones written out for a model of this specification.
+    ///
+    /// # Errors
+    /// When the model has no such built-in effect.
+    pub fn written_out_effects(&self, spec: &Spec) -> Result<Vec<EffectDef>, SetupError> {
+        self.effects.iter().map(|def| library::write_out(def, spec)).collect()
+    }
 }
 
 /// Why a setup does not make a model.

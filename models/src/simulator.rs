@@ -5,6 +5,7 @@
 //! consecutive windows equals one run over the whole. Next file to read: [`crate::inputs`], then [`crate::binding`].
 
 use crate::binding::Binding;
+use crate::effect;
 use crate::inputs::Inputs;
 use crate::observer::{self, Correction, Observer, Wiring};
 use crate::setup::{Setup, SetupError};
@@ -28,7 +29,7 @@ impl Simulator {
         let model = setup.model()?;
         let spec = model.spec();
         let rows = rows(spec, &setup.outputs)?;
-        let binding = Binding::new(setup, spec, &crate::effect::terms::names(&setup.effects)?)?;
+        let binding = Binding::new(setup, spec, &effect::names(&setup.effects)?)?;
         let observer = observer::build(&setup.observer, Wiring { spec, outputs: &setup.outputs })?;
         Ok(Self { model, observer, binding, rows })
     }

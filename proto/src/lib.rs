@@ -6,6 +6,7 @@
 
 pub mod convert;
 
+pub use bytes::Bytes;
 pub use convert::{
     Answer, FromWorker, Hello, JobEncoder, Lease, SetupId, ToWorker, Welcome, WireError, decode_setup, digest,
     encode_setup,

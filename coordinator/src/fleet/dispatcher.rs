@@ -112,7 +112,7 @@ impl Dispatcher {
     fn joined(&mut self, now: Duration, joining: Joining) {
         let twin = self.workers.values().find(|w| w.nonce == joining.nonce).map(|w| w.id);
         if let Some(id) = twin {
-            self.out.push(Command::Close { worker: id, reason: "its process connected again".to_owned() });
+            self.out.push(Command::Close { worker: id });
             self.lose(id, "its process connected again", true);
         }
         let mut worker = Worker::new(&joining, now);
@@ -241,7 +241,7 @@ impl Dispatcher {
         let silent = self.workers.values().filter(|w| now.saturating_sub(w.last_heard) > limit);
         for id in silent.map(|w| w.id).collect::<Vec<_>>() {
             let reason = format!("silent for more than {:.0} s", limit.as_secs_f64());
-            self.out.push(Command::Close { worker: id, reason: reason.clone() });
+            self.out.push(Command::Close { worker: id });
             self.lose(id, &reason, false);
         }
         if let Some(progress) = self.batch.as_mut().and_then(Batch::progress) {

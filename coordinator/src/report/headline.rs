@@ -24,7 +24,13 @@ pub(crate) fn of(data: &ReportData) -> String {
 fn estimate(row: &ParameterRow) -> String {
     let digits = |value| number::with_sd(value, row.sd);
     let unit = if row.unit.is_empty() { String::new() } else { format!("\u{a0}{}", row.unit) };
-    format!("{} = {} [{} to {}]{unit}", row.name, digits(row.estimate), digits(row.lo), digits(row.hi))
+    format!(
+        "{}\u{a0}=\u{a0}{} [{} to {}]{unit}",
+        row.name,
+        digits(row.estimate),
+        digits(row.lo),
+        digits(row.hi)
+    )
 }
 
 /// The held-out error of the only channel that has one.

@@ -10,7 +10,7 @@ use super::plot::figure::with_unit;
 use super::plot::fit;
 use super::plot::interval::{self, Place};
 use super::plot::palette::{BLUE, INK, MUTED, VERMILION};
-use super::plot::scene::{Surface, picture, stroke, units, write, write_title};
+use super::plot::scene::{Surface, picture, stroke, units, whole, write, write_title};
 use super::{ReportError, headline, number};
 
 const WIDTH: i32 = 900;
@@ -21,6 +21,8 @@ const HEAD: i32 = 78;
 const LEFT: i32 = 580;
 /// More parameters than this do not fit.
 const ROWS: usize = 5;
+/// Letters that fit on a line of the right panel.
+const LETTERS: usize = 38;
 
 const MIDDLE_LEFT: Pos = Pos { h_pos: HPos::Left, v_pos: VPos::Center };
 const MIDDLE_RIGHT: Pos = Pos { h_pos: HPos::Right, v_pos: VPos::Center };
@@ -77,20 +79,32 @@ fn legend(surface: &Surface<'_>) -> Result<(), ReportError> {
 fn intervals(surface: &Surface<'_>, data: &ReportData) -> Result<(), ReportError> {
     let right = units(WIDTH - LEFT - 10 - 16);
     let rows = &data.parameters[..data.parameters.len().min(ROWS)];
-    let height = 290 / rows.len().max(3) as i32;
+    let height = 290 / whole(rows.len().max(3));
     for (k, row) in rows.iter().enumerate() {
-        let top = units(12 + height * k as i32);
-        write(surface, (units(8), top), &with_unit(&row.name, &row.unit), INK, MIDDLE_LEFT)?;
-        write(surface, (right, top), &interval_text(row), INK, MIDDLE_RIGHT)?;
+        let top = units(12 + height * whole(k));
+        let value = interval_text(row);
+        write(surface, (units(8), top), &name_beside(row, &value), INK, MIDDLE_LEFT)?;
+        write(surface, (right, top), &value, INK, MIDDLE_RIGHT)?;
         let place = Place { left: units(8), right, middle: top + units(24) };
         interval::draw(surface, row, data.log_axis(&row.name), place)?;
     }
-    let note = "blue: 95\u{a0}% interval after the data, grey: prior";
+    let note = "blue: after the data, grey: before";
     let note = match data.parameters.len() - rows.len() {
         0 => note.to_owned(),
         more => format!("{note}; {more} more"),
     };
     write(surface, (units(8), units(HEIGHT - HEAD - 18)), &note, MUTED, MIDDLE_LEFT)
+}
+
+/// The name with its unit, without it or shortened, as the room beside `value` allows.
+fn name_beside(row: &ParameterRow, value: &str) -> String {
+    let room = LETTERS.saturating_sub(value.chars().count() + 2);
+    let full = with_unit(&row.name, &row.unit);
+    let name = if full.chars().count() <= room { full } else { row.name.clone() };
+    if name.chars().count() <= room {
+        return name;
+    }
+    name.chars().take(room.saturating_sub(1)).chain(['…']).collect()
 }
 
 fn interval_text(row: &ParameterRow) -> String {

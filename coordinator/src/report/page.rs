@@ -1,7 +1,7 @@
 //! What the page's template needs: texts already formatted and figures already drawn.
 //!
 //! The template (`report.html`) only arranges; every number is formatted here or in a figure. Next file to read:
-//! [`super::plot`].
+//! `plot.rs`.
 
 use serde::Serialize;
 

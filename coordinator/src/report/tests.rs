@@ -115,6 +115,42 @@ fn a_hundred_thousand_samples_stay_a_small_file() {
 }
 
 #[test]
+fn a_record_that_was_never_fitted_is_marked_as_held_out() {
+    let mut data = sample::run(60);
+    let held_out =
+        ChannelPlot { record: "in-vivo-2".into(), train: None, train_rmse: None, ..data.channels[0].clone() };
+    data.channels = vec![held_out];
+    data.autocorrelation.clear();
+    data.x_label = "iteration".into();
+    let page = render(&data).unwrap();
+    show("held-out.html", &page);
+    assert_well_formed(&page);
+    assert!(page.contains("predicted, held out") && page.contains("Held-out RMSE 4.11 mmHg"));
+    assert!(!page.contains("predicted, training") && !page.contains("Training RMSE"));
+}
+
+#[test]
+fn many_records_and_parameters_keep_the_page_readable() {
+    let mut data = sample::run(840);
+    let record = |k: usize| format!("in-vivo-{k}");
+    let channel = data.channels[0].clone();
+    data.channels = (1..=4).map(|k| ChannelPlot { record: record(k), ..channel.clone() }).collect();
+    let row = data.parameters[0].clone();
+    data.parameters = (1..=12)
+        .map(|k| ParameterRow { name: format!("initial:pressure@{}", record(k)), ..row.clone() })
+        .collect();
+    data.correlation = (0..12)
+        .map(|i| (0..12).map(|j| if i == j { 1.0 } else { 0.09 * f64::from(i - j) }).collect())
+        .collect();
+    let page = render(&data).unwrap();
+    show("many.html", &page);
+    show("many.svg", &overview_svg(&data).unwrap());
+    assert_well_formed(&page);
+    assert_eq!(page.matches(": predicted against measured</strong>").count(), 4);
+    assert!(overview_svg(&data).unwrap().contains("7 more"));
+}
+
+#[test]
 fn names_from_the_study_cannot_become_markup() {
     let attack = "<script>alert('x')</script>\"&";
     let mut data = sample::run(50);

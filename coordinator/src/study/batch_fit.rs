@@ -27,7 +27,7 @@ pub fn fit(
         set: SigmaSet::new(study.estimator.points, study.theta.len())?,
         max_iterations: study.estimator.max_iterations,
         tolerance: study.estimator.tolerance,
-        ..Batch::default_for(study.theta.len())?
+        spread: study.estimator.spread,
     };
     let windows: StepWindows = (0..study.records.len())
         .filter(|record| study.records[*record].is_trained())

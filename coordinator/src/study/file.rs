@@ -37,7 +37,6 @@ pub(super) struct StudySection {
 /// `[model]`.
 #[derive(Debug)]
 pub(super) struct ModelSection {
-    pub(super) span: Range<usize>,
     pub(super) kind: Spanned<String>,
     pub(super) constants: Named<f64>,
     /// Present when `kind` is `equations`.

@@ -45,7 +45,7 @@ pub(super) fn model(source: &Source, root: &Table<'_>) -> ModelSection {
     }
     let Some(t) = root.table("model", "[model]", &keys) else {
         let kind = Spanned::new(0..0, String::new());
-        return ModelSection { span: 0..0, kind, constants: Vec::new(), equations: None };
+        return ModelSection { kind, constants: Vec::new(), equations: None };
     };
     let kind = t.required_text("kind", "a model's name (`starlings models` lists them) or \"equations\"");
     let of_kind = kind.get_ref().as_str();
@@ -60,7 +60,7 @@ pub(super) fn model(source: &Source, root: &Table<'_>) -> ModelSection {
             }
         }
     }
-    ModelSection { span: t.span.clone(), constants: constants(source, &t), kind, equations }
+    ModelSection { constants: constants(source, &t), kind, equations }
 }
 
 fn constants(source: &Source, model: &Table<'_>) -> Named<f64> {

@@ -10,8 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::store::{Store, StoreError};
 use super::summary::Summary;
-use super::{Fit, RunError, Study, posterior, reader};
-use crate::report;
+use super::{Fit, Study, posterior};
 
 /// What the store keeps of the study so that a report needs nothing else.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -133,39 +132,14 @@ impl RunFolder {
         text.map(|t| serde_json::from_str(&t).map_err(|e| self.store.damaged("summary", e))).transpose()
     }
 
-    pub(super) fn finish(&mut self, study: &Study, fit: &Fit, summary: &Summary) -> Result<(), RunError> {
-        self.store.set_meta("summary", &json(summary))?;
+    pub(super) fn finish(&mut self, study: &Study, fit: &Fit, summary: &Summary) -> Result<(), StoreError> {
         self.store.set_meta("posterior", &posterior::to_csv(study, &fit.posterior))?;
-        self.write_artefacts()
-    }
-
-    /// Writes `posterior.csv`, `summary.json` and `report.html` from the store.
-    ///
-    /// # Errors
-    /// When the run is not finished or a file cannot be written.
-    pub fn write_artefacts(&self) -> Result<(), RunError> {
-        let Some(summary) = self.summary()? else {
-            return Err(StoreError::Unusable(format!(
-                "the run in {} is not finished: continue it with --resume",
-                self.path.display()
-            ))
-            .into());
-        };
-        let data = reader::report_data(&self.store)?;
-        let page = report::render(&data).map_err(|e| RunError::Internal(e.to_string()))?;
-        let posterior = self.store.meta("posterior")?.unwrap_or_default();
-        let summary =
-            serde_json::to_string_pretty(&summary).map_err(|e| RunError::Internal(e.to_string()))? + "\n";
-        for (name, text) in [("posterior.csv", posterior), ("summary.json", summary), ("report.html", page)] {
-            let path = self.path.join(name);
-            write(&path, &text).map_err(|source| RunError::Artefact { path, source })?;
-        }
-        Ok(())
+        self.store.set_meta("summary", &json(summary))
     }
 }
 
 /// Writes a file beside its place and renames it into it.
-fn write(path: &Path, text: &str) -> io::Result<()> {
+pub(crate) fn write(path: &Path, text: &str) -> io::Result<()> {
     let partial = path.with_extension("partial");
     std::fs::write(&partial, text)?;
     std::fs::rename(&partial, path)
@@ -203,7 +177,7 @@ fn info(study: &Study, command: &str, started: &str) -> StudyInfo {
     };
     StudyInfo {
         name: study.name.clone(),
-        says: study.says.clone(),
+        says: Some(study.says.clone()).filter(|s| !s.is_empty()),
         model: study.setup.model.kind.clone(),
         estimator: study.estimator.describe(),
         batch: study.estimator.kind == super::EstimatorKind::Batch,

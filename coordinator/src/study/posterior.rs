@@ -112,7 +112,7 @@ pub fn to_csv(study: &Study, posterior: &Gaussian) -> String {
             "{},{},{},{:?},{:?},{:?},{:?},{:?}",
             quoted(&e.name),
             quoted(&e.unit),
-            quoted(&study.theta[j].transform.to_string()),
+            quoted(study.theta[j].transform.name()),
             e.estimate,
             e.sd,
             e.interval95[0],

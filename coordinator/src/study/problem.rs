@@ -84,12 +84,15 @@ impl Source {
         self.add(span, message.into(), suggestion(&name, valid));
     }
 
-    /// Adds a problem of another file.
+    /// Adds a problem, perhaps of another file, unless it is known: one cause can be met on several ways.
     pub(super) fn adopt(&self, problem: Problem) {
-        self.found.borrow_mut().push(problem);
+        let mut found = self.found.borrow_mut();
+        if !found.contains(&problem) {
+            found.push(problem);
+        }
     }
 
-    /// The study with everything found so far as an error, or nothing when nothing was found.
+    /// Everything found so far as an error, if anything was.
     pub(super) fn verdict(&self) -> Result<(), StudyError> {
         let problems = self.found.borrow().clone();
         if problems.is_empty() { Ok(()) } else { Err(StudyError { problems }) }
@@ -102,12 +105,7 @@ impl Source {
 
     fn add(&self, span: Range<usize>, message: String, help: Option<String>) {
         let text = Some(Arc::clone(&self.text));
-        let problem = Problem { message, help, file: self.file.clone(), source_text: text, span: Some(span) };
-        // One cause can be met on several ways through the checks.
-        let mut found = self.found.borrow_mut();
-        if !found.contains(&problem) {
-            found.push(problem);
-        }
+        self.adopt(Problem { message, help, file: self.file.clone(), source_text: text, span: Some(span) });
     }
 }
 

@@ -60,14 +60,6 @@ pub enum RunError {
         /// Why.
         source: ParticleError,
     },
-    /// A result file could not be written.
-    #[error("cannot write {path}: {source}; the run itself is complete in run.db, `starlings report` writes the files again")]
-    Artefact {
-        /// The file.
-        path: std::path::PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
     /// A value that must serialise did not.
     #[error("internal: {0}")]
     Internal(String),

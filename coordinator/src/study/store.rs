@@ -7,7 +7,7 @@
 use std::path::{Path, PathBuf};
 
 use nalgebra::DMatrix;
-use rusqlite::{Connection, OptionalExtension, params};
+use rusqlite::{Connection, OptionalExtension, Row, params};
 
 use super::snapshot::Snapshot;
 
@@ -230,7 +230,7 @@ impl Store {
         &self.connection
     }
 
-    pub(super) fn damaged(&self, what: &'static str, reason: impl ToString) -> StoreError {
+    pub(crate) fn damaged(&self, what: &'static str, reason: impl ToString) -> StoreError {
         StoreError::Damaged { path: self.path.clone(), what, reason: reason.to_string() }
     }
 
@@ -304,6 +304,25 @@ impl Store {
             transaction.commit()
         };
         write(&mut self.connection).map_err(|source| StoreError::Database { path, source })
+    }
+
+    /// Time of the last event, in s of the run's wall time; zero for a new run.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub fn last_event_s(&self) -> Result<f64, StoreError> {
+        self.guard(self.connection().query_row("SELECT coalesce(max(at_s), 0.0) FROM events", [], |row| row.get(0)))
+    }
+
+    /// All rows of a query, each mapped by `map`.
+    pub(crate) fn rows<T>(
+        &self,
+        sql: &str,
+        map: impl FnMut(&Row<'_>) -> rusqlite::Result<T>,
+    ) -> Result<Vec<T>, StoreError> {
+        let mut statement = self.guard(self.connection().prepare(sql))?;
+        let rows = self.guard(statement.query_map([], map))?;
+        self.guard(rows.collect())
     }
 }
 

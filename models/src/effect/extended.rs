@@ -6,8 +6,10 @@
 
 use std::collections::BTreeMap;
 
+use super::scratch::Scratch;
 use super::terms::Scope;
 use super::{Effect, EffectDef, Moment, TermEffect, Touches};
+use crate::integrate::{self, Solver};
 use crate::model::{Drive, Segment};
 use crate::setup::SetupError;
 use crate::{Model, ParticleError, Quantity, Spec};
@@ -121,9 +123,32 @@ impl Model for Extended {
         }
     }
 
+    fn solver(&self) -> Solver {
+        self.inner.solver()
+    }
+
+    fn n_switch(&self) -> usize {
+        self.inner.n_switch() + self.effects.iter().map(|effect| effect.n_switch()).sum::<usize>()
+    }
+
+    fn switches(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, g: &mut [f64]) {
+        let at = Moment { t, x, theta, u, y: &[] };
+        let y = self.plain_outputs(at);
+        let at = Moment { y: y.as_ref(), ..at };
+        let rate = self.rate_for_slopes(at);
+        let (inner, mut rest) = g.split_at_mut(self.inner.n_switch());
+        let write = |u: Drive<'_>| self.inner.switches(t, &x[..self.n_state], &theta[..self.n_param], u, inner);
+        self.with_inputs(at, rate.as_ref(), write);
+        for effect in &self.effects {
+            let (own, others) = rest.split_at_mut(effect.n_switch());
+            effect.switches(at, own);
+            rest = others;
+        }
+    }
+
     fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ParticleError> {
         if self.touches.rates || self.touches.inputs {
-            self.inner.advance_whole(self, segment, theta, x)
+            integrate::advance(self, self.solver(), segment, theta, x)
         } else {
             self.inner.advance(segment, &theta[..self.n_param], x)
         }
@@ -169,35 +194,4 @@ fn check_new(spec: &Spec, name: &str) -> Result<(), SetupError> {
     let lists = [&spec.states, &spec.parameters, &spec.inputs, &spec.outputs];
     let taken = lists.into_iter().flatten().any(|q| q.name == name);
     if taken { Err(SetupError::Twice(name.to_owned())) } else { Ok(()) }
-}
-
-/// Room for a few numbers without allocating: rates are evaluated many times per step.
-struct Scratch {
-    small: [f64; SMALL],
-    large: Vec<f64>,
-    n: usize,
-}
-
-/// Longest vector that is kept on the stack.
-const SMALL: usize = 16;
-
-impl Scratch {
-    fn new(n: usize) -> Self {
-        let large = if n > SMALL { vec![0.0; n] } else { Vec::new() };
-        Self { small: [0.0; SMALL], large, n }
-    }
-
-    fn of(values: &[f64]) -> Self {
-        let mut scratch = Self::new(values.len());
-        scratch.as_mut().copy_from_slice(values);
-        scratch
-    }
-
-    fn as_ref(&self) -> &[f64] {
-        if self.n > SMALL { &self.large } else { &self.small[..self.n] }
-    }
-
-    fn as_mut(&mut self) -> &mut [f64] {
-        if self.n > SMALL { &mut self.large } else { &mut self.small[..self.n] }
-    }
 }

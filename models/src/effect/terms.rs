@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Effect, EffectDef, Moment, Touches};
+use super::{Addition, Effect, EffectDef, Moment, Touches};
 use crate::equations::expression::{At, Direction, Expression, ExpressionError, Program, Slot};
 use crate::model::{Drive, History};
 use crate::setup::SetupError;
@@ -19,6 +19,7 @@ pub struct TermEffect {
     outputs: Vec<(usize, Program)>,
     inputs: Vec<(usize, Program)>,
     initial: Vec<(usize, Program)>,
+    switches: Vec<Program>,
 }
 
 /// What the expressions of an effect may name.
@@ -71,11 +72,24 @@ impl Scope<'_> {
 
     /// Compiles one expression; `place` says in an error where it stands.
     fn compile(self, text: &str, reach: Reach, place: &str) -> Result<Program, SetupError> {
+        Expression::parse(text)
+            .and_then(|expression| self.program(&expression, reach))
+            .map_err(|error| located(place, text, error))
+    }
+
+    fn program(self, expression: &Expression, reach: Reach) -> Result<Program, ExpressionError> {
         let resolve = |name: &str| self.slot(name, reach);
         let close = |name: &str| nearest(name, self.names(reach));
-        Expression::parse(text)
-            .and_then(|expression| expression.compile(&resolve, &close))
-            .map_err(|error| located(place, text, error))
+        expression.compile(&resolve, &close)
+    }
+
+    /// Compiles the switching functions of one expression.
+    fn switches(self, text: &str, place: &str) -> Result<Vec<Program>, SetupError> {
+        let compiled = || -> Result<Vec<Program>, ExpressionError> {
+            let functions = Expression::parse(text)?.discontinuities();
+            functions.iter().map(|g| self.program(g, Reach::All)).collect()
+        };
+        compiled().map_err(|error| located(place, text, error))
     }
 }
 
@@ -112,7 +126,6 @@ impl TermEffect {
     /// # Errors
     /// When a term adds to something the model does not have, or an expression is wrong.
     pub fn new(def: &EffectDef, scope: Scope<'_>) -> Result<Self, SetupError> {
-        let spec = scope.spec;
         let mut effect = Self {
             def: def.clone(),
             touches: Touches::default(),
@@ -120,36 +133,61 @@ impl TermEffect {
             outputs: Vec::new(),
             inputs: Vec::new(),
             initial: Vec::new(),
+            switches: Vec::new(),
         };
         for add in &def.adds {
-            let place = format!("effect {}, added to {}", def.name, add.to);
-            let compile = |reach| scope.compile(&add.term, reach, &place);
-            if let Some(i) = target(&spec.states, &add.to)? {
-                effect.rates.push((i, compile(Reach::All)?));
-            } else if let Some(i) = target(&spec.outputs, &add.to)? {
-                effect.outputs.push((i, compile(Reach::All)?));
-            } else if let Some(i) = target(&spec.inputs, &add.to)? {
-                effect.inputs.push((i, compile(Reach::NoOutputs)?));
-            } else {
-                let lists = [&spec.states, &spec.outputs, &spec.inputs];
-                return Err(SetupError::Unknown {
-                    what: "state, output or input",
-                    name: add.to.clone(),
-                    nearest: nearest(&add.to, lists.into_iter().flatten().map(|q| &q.name)),
-                });
-            }
+            effect.add(add, scope)?;
         }
         for state in &def.states {
             let place = format!("effect {}, state {}", def.name, state.name);
-            let at = Spec::offset(&spec.states, &state.name).unwrap_or_default();
-            effect.rates.push((at, scope.compile(&state.rate, Reach::All, &format!("{place}, rate"))?));
+            let at = Spec::offset(&scope.spec.states, &state.name).unwrap_or_default();
+            let rate_place = format!("{place}, rate");
+            effect.rates.push((at, scope.compile(&state.rate, Reach::All, &rate_place)?));
+            effect.switches.extend(scope.switches(&state.rate, &rate_place)?);
             if !state.initial.is_empty() {
                 let program = scope.compile(&state.initial, Reach::Fixed, &format!("{place}, initial"))?;
                 effect.initial.push((at, program));
             }
         }
+        effect.check_parameters_used()?;
         effect.touches = effect.find_touches(scope)?;
         Ok(effect)
+    }
+
+    /// Compiles one term into the list of what it is added to: a state's rate, an output or an input.
+    fn add(&mut self, add: &Addition, scope: Scope<'_>) -> Result<(), SetupError> {
+        let spec = scope.spec;
+        let place = format!("effect {}, added to {}", self.def.name, add.to);
+        let compile = |reach| scope.compile(&add.term, reach, &place);
+        if let Some(i) = target(&spec.states, &add.to)? {
+            self.rates.push((i, compile(Reach::All)?));
+            self.switches.extend(scope.switches(&add.term, &place)?);
+        } else if let Some(i) = target(&spec.outputs, &add.to)? {
+            self.outputs.push((i, compile(Reach::All)?));
+        } else if let Some(i) = target(&spec.inputs, &add.to)? {
+            self.inputs.push((i, compile(Reach::NoOutputs)?));
+            self.switches.extend(scope.switches(&add.term, &place)?);
+        } else {
+            let lists = [&spec.states, &spec.outputs, &spec.inputs];
+            return Err(SetupError::Unknown {
+                what: "state, output or input",
+                name: add.to.clone(),
+                nearest: nearest(&add.to, lists.into_iter().flatten().map(|q| &q.name)),
+            });
+        }
+        Ok(())
+    }
+
+    /// Refuses a parameter that no expression uses: it could never be estimated.
+    fn check_parameters_used(&self) -> Result<(), SetupError> {
+        let used = names(std::slice::from_ref(&self.def))?;
+        match self.def.parameters.iter().find(|parameter| !used.contains(&parameter.name)) {
+            Some(parameter) => Err(SetupError::Invalid(format!(
+                "parameter `{}` of effect `{}` stands in none of its terms",
+                parameter.name, self.def.name
+            ))),
+            None => Ok(()),
+        }
     }
 
     fn find_touches(&self, scope: Scope<'_>) -> Result<Touches, SetupError> {
@@ -186,7 +224,7 @@ fn target(list: &[Quantity], name: &str) -> Result<Option<usize>, SetupError> {
     }
 }
 
-fn at<'a>(moment: Moment<'a>) -> At<'a> {
+fn at(moment: Moment<'_>) -> At<'_> {
     At { t: moment.t, x: moment.x, theta: moment.theta, u: moment.u, y: moment.y }
 }
 
@@ -233,6 +271,16 @@ impl Effect for TermEffect {
     fn add_to_outputs(&self, moment: Moment<'_>, y: &mut [f64]) {
         for (i, program) in &self.outputs {
             y[*i] += program.eval(&at(moment));
+        }
+    }
+
+    fn n_switch(&self) -> usize {
+        self.switches.len()
+    }
+
+    fn switches(&self, moment: Moment<'_>, g: &mut [f64]) {
+        for (g, program) in g.iter_mut().zip(&self.switches) {
+            *g = program.eval(&at(moment));
         }
     }
 }

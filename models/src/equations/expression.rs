@@ -142,6 +142,10 @@ impl Expression {
         &self.node
     }
 
+    pub(super) fn new(text: String, node: Node) -> Self {
+        Self { text, node }
+    }
+
     /// An expression made from this one, with its text.
     pub(super) fn derived(&self, node: Node) -> Self {
         Self { text: self.text.clone(), node }

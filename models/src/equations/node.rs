@@ -47,11 +47,18 @@ impl Operation {
 }
 
 /// A name and where it stands.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(super) struct Name {
     pub(super) text: String,
     /// Column of its first character, from 1.
     pub(super) column: usize,
+}
+
+/// The same name at two places is the same name.
+impl PartialEq for Name {
+    fn eq(&self, other: &Self) -> bool {
+        self.text == other.text
+    }
 }
 
 /// A part of an expression.

@@ -31,6 +31,14 @@ pub(super) fn parse(text: &str) -> Result<Node, ExpressionError> {
     }
 }
 
+/// Column of the first `t` that stands for time.
+pub(super) fn column_of_time(text: &str) -> Option<usize> {
+    let chars: Vec<char> = text.chars().collect();
+    let in_word = |i: Option<usize>| i.and_then(|i| chars.get(i)).is_some_and(|c| c.is_alphanumeric() || *c == '_');
+    let alone = |i: &usize| chars[*i] == 't' && !in_word(i.checked_sub(1)) && !in_word(Some(i + 1));
+    (0..chars.len()).find(alone).map(|i| i + 1)
+}
+
 struct Parser {
     chars: Vec<char>,
     at: usize,

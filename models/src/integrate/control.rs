@@ -60,6 +60,19 @@ pub(super) enum Reached {
     Stiff(f64),
 }
 
+/// What one attempt at a step came to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Step {
+    /// Accepted.
+    Passed,
+    /// Accepted up to and across a switching point.
+    Crossed,
+    /// Too inexact; the next attempt is shorter.
+    Refused,
+    /// Accepted, and the method gives up for stiffness.
+    Stiff,
+}
+
 /// Dormand–Prince as far as it goes, then Rosenbrock.
 pub(super) fn auto<M: Model + ?Sized>(
     model: &M,
@@ -85,14 +98,24 @@ pub(super) fn integrate<S: System, P: Stepper>(
     x: &mut [f64],
     tolerance: Tolerance,
 ) -> Result<Reached, ParticleError> {
+    if x.is_empty() {
+        return Ok(Reached::End);
+    }
     let mut run = Run::new(system, stepper, span, x, tolerance);
     run.start()?;
     while run.t < run.end {
-        if run.step()? {
-            return Ok(Reached::Stiff(run.t));
-        }
-        if let Some(index) = run.events.sliding() {
-            super::sliding::slide(&mut run, index)?;
+        match run.step()? {
+            Step::Stiff => return Ok(Reached::Stiff(run.t)),
+            Step::Crossed => {
+                let index = run.events.tracked();
+                super::sliding::slide(&mut run, index..index + 1)?;
+            }
+            // A span may start where the one before it left the state sliding.
+            Step::Refused if run.fresh => {
+                let all = 0..run.system.n_switch();
+                super::sliding::slide(&mut run, all)?;
+            }
+            Step::Passed | Step::Refused => {}
         }
     }
     Ok(Reached::End)
@@ -115,6 +138,8 @@ pub(super) struct Run<'a, S, P> {
     /// Error of the last accepted step, for the integral part.
     last_error: f64,
     pub(super) steps: u64,
+    /// Whether no step was accepted yet.
+    pub(super) fresh: bool,
 }
 
 impl<'a, S: System, P: Stepper> Run<'a, S, P> {
@@ -128,7 +153,7 @@ impl<'a, S: System, P: Stepper> Run<'a, S, P> {
         let events = Events::new(system.n_switch());
         let shortest = 16.0 * f64::EPSILON * t.abs().max(end.abs());
         let new = vec![0.0; x.len()];
-        Self { system, stepper, t, end, x, tolerance, events, new, h: 0.0, shortest, last_error: 1e-4, steps: 0 }
+        Self { system, stepper, t, end, x, tolerance, events, new, h: 0.0, shortest, last_error: 1e-4, steps: 0, fresh: true }
     }
 
     /// Evaluates the starting point and guesses the first step.
@@ -157,30 +182,24 @@ impl<'a, S: System, P: Stepper> Run<'a, S, P> {
         if guess.is_finite() { guess.clamp(1e-4 * span, span) } else { span }
     }
 
-    /// One accepted step, or several up to and across a switching point; says whether the method gave up for stiffness.
-    pub(super) fn step(&mut self) -> Result<bool, ParticleError> {
-        loop {
-            let left = self.end - self.t;
-            let last = self.h * 1.01 >= left;
-            let h = if last { left } else { self.h };
-            let error = self.attempt(h)?;
-            if error.is_finite() && self.events.changed(self.system, self.t + h, &self.new) {
-                if let Some(stiff) = self.cross(h)? {
-                    return Ok(stiff);
-                }
-                continue;
-            }
-            if error <= 1.0 {
-                let target = if last { self.end } else { self.t + h };
-                let stiff = self.accept(h, target);
-                if !last {
-                    self.h = h * self.factor(error);
-                    self.last_error = error.max(1e-4);
-                }
-                return Ok(stiff);
-            }
-            self.refuse(h, error)?;
+    /// One attempt at a step.
+    pub(super) fn step(&mut self) -> Result<Step, ParticleError> {
+        let left = self.end - self.t;
+        let last = self.h * 1.01 >= left;
+        let h = if last { left } else { self.h };
+        let error = self.attempt(h)?;
+        if error.is_finite() && self.events.changed(self.system, self.t + h, &self.new) {
+            return self.cross(h);
         }
+        if error.is_nan() || error > 1.0 {
+            return self.refuse(h, error);
+        }
+        let stiff = self.accept(h, if last { self.end } else { self.t + h });
+        if !last {
+            self.h = h * self.factor(error);
+            self.last_error = error.max(1e-4);
+        }
+        Ok(if stiff { Step::Stiff } else { Step::Passed })
     }
 
     fn attempt(&mut self, h: f64) -> Result<f64, ParticleError> {
@@ -194,7 +213,8 @@ impl<'a, S: System, P: Stepper> Run<'a, S, P> {
     fn accept(&mut self, h: f64, target: f64) -> bool {
         self.t = target;
         self.x.copy_from_slice(&self.new);
-        self.events.passed(h);
+        self.events.passed();
+        self.fresh = false;
         self.stepper.accept(self.system, self.t, h, self.x)
     }
 
@@ -204,45 +224,54 @@ impl<'a, S: System, P: Stepper> Run<'a, S, P> {
         (SAFETY * error.max(1e-10).powf(-alpha) * self.last_error.powf(BETA)).clamp(FACTOR[0], FACTOR[1])
     }
 
-    fn refuse(&mut self, h: f64, error: f64) -> Result<(), ParticleError> {
+    fn refuse(&mut self, h: f64, error: f64) -> Result<Step, ParticleError> {
         let factor = if error.is_finite() { (SAFETY * error.powf(-1.0 / P::ORDER)).clamp(FACTOR[0], 0.9) } else { 0.1 };
         self.h = h * factor;
         if self.h >= self.shortest {
-            return Ok(());
+            return Ok(Step::Refused);
         }
         if self.new.iter().all(|v| v.is_finite()) {
             return Err(ParticleError::StepTooSmall { time: self.t, step: self.h });
         }
-        Err(not_finite(self.system, self.t, &self.new))
+        Err(self.culprit(h))
     }
 
-    /// Steps up to the first switching point within `h` and across it; `None` when the step up to it was refused.
-    fn cross(&mut self, h: f64) -> Result<Option<bool>, ParticleError> {
+    /// The state whose rate stops being finite just ahead; a method's stages spread the fault over all of them.
+    fn culprit(&mut self, h: f64) -> ParticleError {
+        let (mut ahead, mut rate) = (self.x.to_vec(), self.x.to_vec());
+        for (x, f) in ahead.iter_mut().zip(self.stepper.rate()) {
+            *x += h * f;
+        }
+        self.system.rhs(self.t + h, &ahead, &mut rate);
+        let found = if rate.iter().all(|v| v.is_finite()) { &self.new } else { &rate };
+        not_finite(self.system, self.t, found)
+    }
+
+    /// Steps up to the first switching point within `h` and across it, unless the step up to it is refused.
+    fn cross(&mut self, h: f64) -> Result<Step, ParticleError> {
         let [before, after] = self.locate(h)?;
-        let mut stiff = false;
         if before > self.shortest {
             let error = self.attempt(before)?;
-            if !(error <= 1.0) {
-                self.refuse(before, error)?;
-                return Ok(None);
+            if error.is_nan() || error > 1.0 {
+                return self.refuse(before, error);
             }
-            stiff = self.accept(before, self.t + before);
+            self.accept(before, self.t + before);
         }
         // The switching point lies within this step; it is so short that its error does not count.
         let gap = (after - before).max(self.shortest).min(self.end - self.t);
         if gap > 0.0 {
             self.attempt(gap)?;
             if !self.new.iter().all(|v| v.is_finite()) {
-                return Err(not_finite(self.system, self.t, &self.new));
+                return Err(self.culprit(gap));
             }
             let target = if self.end - self.t <= gap { self.end } else { self.t + gap };
             self.accept(gap, target);
         }
-        self.events.cross(self.system, self.t, self.x, h);
+        self.events.begin(self.system, self.t, self.x);
         self.stepper.restart(self.system, self.t, self.x);
         self.h = h;
         self.last_error = 1e-4;
-        Ok(Some(stiff))
+        Ok(Step::Crossed)
     }
 
     /// Narrows the first change of side within `h` down to two step lengths, before and after it, by the Illinois variant of

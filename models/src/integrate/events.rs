@@ -4,11 +4,6 @@
 
 use super::system::System;
 
-/// Crossings in quick succession after which the state is taken to slide along the switching surface.
-const CHATTER: u32 = 3;
-/// Crossings count as quick when less than this share of a step lies between them.
-const QUICK: f64 = 1e-6;
-
 /// The switching functions of one integration.
 pub(super) struct Events {
     /// Whether each function is at or above zero.
@@ -19,23 +14,11 @@ pub(super) struct Events {
     after: Vec<f64>,
     /// The function that changes first.
     tracked: usize,
-    /// Time since the last crossing, and which function that was.
-    since: f64,
-    crossed: usize,
-    quick: u32,
 }
 
 impl Events {
     pub(super) fn new(n: usize) -> Self {
-        Self {
-            sides: vec![true; n],
-            before: vec![0.0; n],
-            after: vec![0.0; n],
-            tracked: 0,
-            since: f64::INFINITY,
-            crossed: 0,
-            quick: 0,
-        }
+        Self { sides: vec![true; n], before: vec![0.0; n], after: vec![0.0; n], tracked: 0 }
     }
 
     /// Takes the sides at a point.
@@ -80,34 +63,14 @@ impl Events {
         self.sides[index]
     }
 
-    /// Values of a function at the current point.
-    pub(super) fn value(&self, index: usize) -> f64 {
-        self.before[index]
+    /// The function that the last change was about.
+    pub(super) fn tracked(&self) -> usize {
+        self.tracked
     }
 
     /// The last attempt was accepted without a change.
     #[inline]
-    pub(super) fn passed(&mut self, h: f64) {
-        self.since += h;
+    pub(super) fn passed(&mut self) {
         std::mem::swap(&mut self.before, &mut self.after);
-    }
-
-    /// The tracked function was crossed; `(t, x)` is beyond it and `h` the step that was intended.
-    pub(super) fn cross<S: System>(&mut self, system: &mut S, t: f64, x: &[f64], h: f64) {
-        let again = self.crossed == self.tracked && self.since < QUICK * h;
-        self.quick = if again { self.quick + 1 } else { 0 };
-        self.crossed = self.tracked;
-        self.since = 0.0;
-        self.begin(system, t, x);
-    }
-
-    /// The function along which the state seems to slide; asking forgets it.
-    #[inline]
-    pub(super) fn sliding(&mut self) -> Option<usize> {
-        if self.quick < CHATTER {
-            return None;
-        }
-        self.quick = 0;
-        Some(self.crossed)
     }
 }

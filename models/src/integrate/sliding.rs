@@ -3,6 +3,8 @@
 //! The rate is the mean of the two sides' rates, weighted so that the state stays on the surface (Filippov 1988, §4).
 //! One surface at a time. Next file to read: [`super::rosenbrock`].
 
+use std::ops::Range;
+
 use super::Tolerance;
 use super::control::{Run, Stepper};
 use super::dopri5::Dopri5;
@@ -12,22 +14,30 @@ use crate::ParticleError;
 /// Distance from the surface at which the two sides' rates are taken, in tolerances: beyond rounding, below notice.
 const OFFSET: f64 = 100.0;
 
-/// Goes on along the surface until one side leads away or the span ends; does nothing where the state does not slide.
-pub(super) fn slide<S: System, P: Stepper>(run: &mut Run<'_, S, P>, index: usize) -> Result<(), ParticleError> {
-    let n = run.x.len();
-    let mut surface = Surface::new(run.system, index, run.tolerance);
-    if run.t >= run.end || !surface.holds(run.t, run.x) {
-        return Ok(());
+/// Goes on along the first of the surfaces on which the state is held, until one side leads away or the span ends; does
+/// nothing where it is held on none.
+pub(super) fn slide<S: System, P: Stepper>(
+    run: &mut Run<'_, S, P>,
+    candidates: Range<usize>,
+) -> Result<(), ParticleError> {
+    run.fresh = false;
+    for index in candidates {
+        let mut surface = Surface::new(run.system, index, run.tolerance);
+        if run.t < run.end && surface.holds(run.t, run.x) {
+            let mut stepper = Dopri5::new(run.x.len(), false);
+            let mut along = Run::new(&mut surface, &mut stepper, [run.t, run.end], run.x, run.tolerance);
+            along.steps = run.steps;
+            along.start()?;
+            while along.t < along.end && along.events.side(0) && along.events.side(1) {
+                along.step()?;
+            }
+            (run.t, run.steps) = (along.t, along.steps);
+            run.start()?;
+            run.fresh = false;
+            return Ok(());
+        }
     }
-    let mut stepper = Dopri5::new(n, false);
-    let mut along = Run::new(&mut surface, &mut stepper, [run.t, run.end], run.x, run.tolerance);
-    along.steps = run.steps;
-    along.start()?;
-    while along.t < along.end && along.events.side(0) && along.events.side(1) {
-        along.step()?;
-    }
-    (run.t, run.steps) = (along.t, along.steps);
-    if run.t < run.end { run.start() } else { Ok(()) }
+    Ok(())
 }
 
 /// The system on a switching surface of another.
@@ -38,6 +48,8 @@ struct Surface<'a, S> {
     g: Vec<f64>,
     normal: Vec<f64>,
     moved: Vec<f64>,
+    /// Distance from the surface at which the rates are taken.
+    width: f64,
     /// Rates on the positive and the negative side.
     rates: [Vec<f64>; 2],
 }
@@ -52,6 +64,7 @@ impl<'a, S: System> Surface<'a, S> {
             g: vec![0.0; m],
             normal: zeros(),
             moved: zeros(),
+            width: 0.0,
             rates: [zeros(), zeros()],
             inner,
         }
@@ -85,6 +98,7 @@ impl<'a, S: System> Surface<'a, S> {
         if !share.is_finite() || square <= 0.0 {
             return None;
         }
+        self.width = share * square.sqrt();
         let mut growth = [passing; 2];
         for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
             // From here to the surface, and from there to the side.
@@ -98,9 +112,11 @@ impl<'a, S: System> Surface<'a, S> {
         Some(growth)
     }
 
-    /// Whether both sides lead to the surface.
+    /// Whether the state is on the surface, as far as the tolerance tells, and both sides lead back to it.
     fn holds(&mut self, t: f64, x: &[f64]) -> bool {
-        self.growth(t, x).is_some_and(|[up, down]| up < 0.0 && down > 0.0)
+        let Some([up, down]) = self.growth(t, x) else { return false };
+        let shift = self.moved.iter().zip(x).map(|(m, x)| (m - x).powi(2)).sum::<f64>().sqrt();
+        up < 0.0 && down > 0.0 && shift <= 2.0 * self.width
     }
 }
 

@@ -160,8 +160,6 @@ pub enum Command {
     Close {
         /// Whose.
         worker: WorkerId,
-        /// Why.
-        reason: String,
     },
     /// The batch ended: one outcome per job, in job order.
     BatchDone(Vec<Outcome>),

@@ -27,7 +27,8 @@ pub(crate) fn figure(channel: &ChannelPlot, time_unit: &str) -> Result<Figure, R
     if trained(channel).is_none_or(|[_, to]| channel.time.iter().any(|t| *t > to)) {
         keys.push(("line vermilion", "predicted, held out"));
     }
-    keys.push(("area blue", "prediction ± 2 noise sd"));
+    let band = if trained(channel).is_some() { "area blue" } else { "area vermilion" };
+    keys.push((band, "prediction ± 2 noise sd"));
     Figure::new(&scene(channel, time_unit), &keys, caption(channel))
 }
 
@@ -72,8 +73,8 @@ pub(crate) fn spans(channel: &ChannelPlot, x: &Axis) -> Vec<Mark> {
 /// Measured values: dots when they are few, otherwise a curve.
 pub(crate) fn measured(time: &[f64], value: &[f64], colour: RGBColor) -> Vec<Mark> {
     let known: Vec<_> = time.iter().copied().zip(value.iter().copied()).filter(|p| p.1.is_finite()).collect();
-    if known.len() <= DOTS {
-        return vec![Mark::Dots { points: known, colour, radius: 1.75 }];
+    if drawn_as_dots(time) {
+        return vec![Mark::Dots { points: known, colour, radius: 2.25 }];
     }
     thin::parts(time, value, value)
         .iter()
@@ -84,9 +85,14 @@ pub(crate) fn measured(time: &[f64], value: &[f64], colour: RGBColor) -> Vec<Mar
         .collect()
 }
 
+/// Whether [`measured`] draws a series at these times as dots.
+pub(crate) fn drawn_as_dots(time: &[f64]) -> bool {
+    time.len() <= DOTS
+}
+
 /// The legend's sample for what [`measured`] draws in ink.
 pub(crate) fn measured_key(time: &[f64]) -> &'static str {
-    if time.len() <= DOTS { "dot ink" } else { "line ink" }
+    if drawn_as_dots(time) { "dot ink" } else { "line ink" }
 }
 
 /// The training span of a channel that was fitted.

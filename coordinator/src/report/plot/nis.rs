@@ -5,7 +5,7 @@ use super::super::data::NisSeries;
 use super::super::number;
 use super::axis::Axis;
 use super::figure::Figure;
-use super::fit::measured;
+use super::fit::{drawn_as_dots, measured};
 use super::mark::Mark;
 use super::palette::{BLUE, GREEN, GREY, MUTED};
 use super::scene::Scene;
@@ -21,7 +21,7 @@ const FLOOR: f64 = 1e-2;
 pub(crate) fn figure(passes: &[NisSeries], x_label: &str) -> Result<Option<Figure>, ReportError> {
     let Some(last) = passes.last() else { return Ok(None) };
     let x = Axis::tight(x_label, passes.iter().flat_map(|p| p.time.iter().copied()));
-    let floored = |v: &f64| v.max(FLOOR);
+    let floored = |v: &f64| if v.is_nan() { f64::NAN } else { v.max(FLOOR) };
     let values = passes.iter().flat_map(|p| &p.nis_per_observation).map(floored);
     let y = Axis::log_around(
         "NIS per observation (1 expected)",
@@ -39,17 +39,23 @@ pub(crate) fn figure(passes: &[NisSeries], x_label: &str) -> Result<Option<Figur
     }
     let known: Vec<f64> = last.nis_per_observation.iter().copied().filter(|v| v.is_finite()).collect();
     let inside = known.iter().filter(|v| (last.lo..=last.hi).contains(*v)).count();
+    let used = if last.n_used == 1 {
+        "1 observed value".to_owned()
+    } else {
+        format!("{} observed values", last.n_used)
+    };
     let caption = format!(
-        "{} of the last pass lies inside the 95\u{a0}% band of chi-square ({} observed values per analysis). Above the band the \
-         model does not explain the data at this noise level, and the intervals are too narrow; below it the noise is stated too large. Values below {FLOOR} stand at {FLOOR}.",
-        number::percent(inside as f64 / known.len() as f64),
-        last.n_used
+        "{} of the last pass lies inside the 95\u{a0}% band of chi-square ({used} per analysis). Above the band the \
+         model does not explain the data at this noise level, and the intervals are too narrow; below it the noise is \
+         stated too large. Values below {FLOOR} stand at {FLOOR}.",
+        number::percent(inside as f64 / known.len() as f64)
     );
-    let mut keys =
-        vec![("line blue", "last pass"), ("area green", "95\u{a0}% band"), ("dash muted", "expected: 1")];
+    let few = drawn_as_dots(&last.time);
+    let mut keys = vec![(if few { "dot blue" } else { "line blue" }, "last pass")];
     if passes.len() > 1 {
-        keys.insert(1, ("line grey", "earlier passes"));
+        keys.push((if few { "dot grey" } else { "line grey" }, "earlier passes"));
     }
+    keys.extend([("area green", "95\u{a0}% band"), ("dash muted", "expected: 1")]);
     let title = "Normalised innovation squared per observation".to_owned();
     let scene = Scene { title, description: caption.clone(), x, y, marks };
     Figure::new(&scene, &keys, caption).map(Some)

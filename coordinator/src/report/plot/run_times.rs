@@ -26,8 +26,7 @@ pub(crate) fn figure(times: &RunTimes) -> Result<Option<Figure>, ReportError> {
     let wide = first.from > 0.0 && last.to > 30.0 * first.from;
     let x = if wide { Axis::log_around(&label, edges) } else { Axis::tight(&label, edges) };
     let highest = bins.iter().map(|b| b.count).max().unwrap_or(0) as f64;
-    let mut y = Axis::tight("runs", [0.0, 1.05 * highest.max(1.0)]);
-    y.label = "model runs".to_owned();
+    let y = Axis::tight("model runs", [0.0, 1.05 * highest.max(1.0)]);
     let bars = bins.iter().map(|b| (factor * b.from, factor * b.to, b.count as f64)).collect();
     let caption = format!(
         "Median {}, 95th percentile {}, shortest {}, longest {}. A long tail on the right is a slow worker or a hard particle.",

@@ -57,12 +57,12 @@ impl Scene {
     /// The drawing library refuses a mark.
     pub(crate) fn draw(&self, surface: &Surface<'_>) -> Result<(), ReportError> {
         let (x_ticks, y_ticks) = (self.x.ticks(6), self.y.ticks(5));
-        let longest = y_ticks.iter().map(|t| t.text.chars().count()).max().unwrap_or(1) as i32;
+        let longest = y_ticks.iter().map(|t| t.text.chars().count()).max().unwrap_or(1);
         let mut chart: Chart<'_, '_> = ChartBuilder::on(surface)
             .margin_top(units(28))
             .margin_right(units(18))
             .x_label_area_size(units(46))
-            .y_label_area_size(units(14 + longest * TEXT * 6 / 10))
+            .y_label_area_size(units(14 + whole(longest) * TEXT * 6 / 10))
             .build_cartesian_2d(Ticked::new(&self.x, x_ticks), Ticked::new(&self.y, y_ticks))
             .map_err(ReportError::drawing)?;
         for mark in self.marks.iter().filter(|mark| matches!(mark, Mark::Span { .. })) {
@@ -74,7 +74,7 @@ impl Scene {
         }
         let (width, height) = surface.dim_in_pixel();
         write(surface, (units(4), units(3)), &self.y.label, INK, Pos::new(HPos::Left, VPos::Top))?;
-        let corner = (width as i32 - units(18), height as i32 - units(5));
+        let corner = (whole(width) - units(18), whole(height) - units(5));
         write(surface, corner, &self.x.label, INK, Pos::new(HPos::Right, VPos::Bottom))
     }
 
@@ -206,6 +206,11 @@ pub(crate) fn write_title(surface: &Surface<'_>, at: (i32, i32), text: &str) -> 
 /// Figure units as drawing units.
 pub(crate) fn units(size: i32) -> i32 {
     size * SUBUNITS
+}
+
+/// A count or a size as the signed number that places are made of.
+pub(crate) fn whole(size: impl TryInto<i32>) -> i32 {
+    size.try_into().unwrap_or(i32::MAX)
 }
 
 /// A stroke of a width in figure units.

@@ -1,45 +1,23 @@
 //! From the store to what a report shows; the only way from a run to its pictures.
 //!
-//! A running or killed run can be read as well: what is not there yet stays empty. Next file to read: [`crate::report`].
+//! A running or killed run can be read as well: what is not there yet stays empty. Next file to read: [`super::data`].
 
 use std::collections::BTreeMap;
 
-use rusqlite::Row;
 use starlings_estimators::{autocorrelation, nis_band};
 
-use super::folder::StudyInfo;
-use super::store::{Store, StoreError};
-use super::summary::Summary;
-use crate::report::{
+use super::data::{
     Autocorrelation, ChannelPlot, FleetEvent, FleetTable, NisSeries, ParameterRow, PassTrack, ReportData, RunTimeBin,
     RunTimes, Track, WorkerRow,
 };
+use crate::study::folder::StudyInfo;
+use crate::study::store::{Store, StoreError};
+use crate::study::summary::Summary;
 
 /// Lags shown in an autocorrelation plot.
 const MAX_LAG: usize = 60;
 /// Bins of the histogram of run times.
 const BINS: usize = 24;
-
-impl Store {
-    /// Time of the last event, in s of the run's wall time; zero for a new run.
-    ///
-    /// # Errors
-    /// When the database refuses.
-    pub fn last_event_s(&self) -> Result<f64, StoreError> {
-        self.guard(self.connection().query_row("SELECT coalesce(max(at_s), 0.0) FROM events", [], |row| row.get(0)))
-    }
-
-    /// All rows of a query, each mapped by `map`.
-    pub(super) fn rows<T>(
-        &self,
-        sql: &str,
-        map: impl FnMut(&Row<'_>) -> rusqlite::Result<T>,
-    ) -> Result<Vec<T>, StoreError> {
-        let mut statement = self.guard(self.connection().prepare(sql))?;
-        let rows = self.guard(statement.query_map([], map))?;
-        self.guard(rows.collect())
-    }
-}
 
 /// Everything a report shows, as far as the run has come.
 ///

@@ -1,0 +1,291 @@
+//! A fleet of worker processes over gRPC: listens, and runs batches for a caller on an ordinary thread.
+//!
+//! The network lives on a thread of its own, so a caller that thinks for minutes between two batches delays no heartbeat.
+
+use std::net::{SocketAddr, TcpListener};
+use std::sync::Arc;
+use std::sync::mpsc::{self, RecvTimeoutError, Sender};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use starlings_models::{Job, Setup};
+use starlings_proto::convert::job::check_size;
+use starlings_proto::wire::fleet_server::FleetServer;
+use starlings_proto::{FRAME_SIZE, MAX_MESSAGE, SetupId, encode_setup};
+use tokio_util::sync::CancellationToken;
+use tonic::transport::Server;
+use tonic::transport::server::TcpIncoming;
+
+use super::dispatcher::{BatchError, Event, Rules};
+use super::hub::Hub;
+use super::service::Service;
+use super::{Fleet, FleetError, FleetEvent, Outcome};
+
+/// How long a closing fleet waits for its workers to leave.
+const GOODBYE_PATIENCE: Duration = Duration::from_secs(2);
+
+/// Longest time between two looks at the clock.
+const TICK: Duration = Duration::from_millis(250);
+
+/// How often a waiting caller checks that the network thread lives.
+const ALIVE_CHECK: Duration = Duration::from_secs(1);
+
+/// HTTP/2 windows per stream and per connection, bytes: enough for a long fat network.
+const WINDOWS: (u32, u32) = (4 * 1024 * 1024, 16 * 1024 * 1024);
+
+/// How a fleet listens and when it loses patience.
+#[derive(Clone, Debug)]
+pub struct FleetConfig {
+    /// Where to listen; port 0 picks a free one.
+    pub address: SocketAddr,
+    /// Name of the run, told to workers.
+    pub run_name: String,
+    /// Time between heartbeats; a worker silent for twice as long is lost.
+    pub heartbeat: Duration,
+    /// How long a batch waits without any usable worker before it is an error.
+    pub patience: Duration,
+    /// How many workers may be lost under one job before it is given up.
+    pub max_attempts: u32,
+    /// Ends [`Fleet::run`] promptly with [`FleetError::Cancelled`].
+    pub cancel: CancellationToken,
+    /// Where events go.
+    pub events: Sender<FleetEvent>,
+}
+
+impl FleetConfig {
+    /// The usual numbers: heartbeat 8 s, patience 5 minutes, five losses per job.
+    pub fn new(address: SocketAddr, run_name: &str, cancel: CancellationToken, events: Sender<FleetEvent>) -> Self {
+        Self {
+            address,
+            run_name: run_name.to_owned(),
+            heartbeat: Duration::from_secs(8),
+            patience: Duration::from_secs(300),
+            max_attempts: 5,
+            cancel,
+            events,
+        }
+    }
+}
+
+/// Workers that dial in.
+pub struct GrpcFleet {
+    hub: Arc<Hub>,
+    address: SocketAddr,
+    cancel: CancellationToken,
+    stop: CancellationToken,
+    network: Option<JoinHandle<Result<(), String>>>,
+}
+
+/// Lets the supervisor of local workers end a fleet's wait.
+#[derive(Clone)]
+pub struct FleetHandle {
+    hub: Arc<Hub>,
+}
+
+impl FleetHandle {
+    /// Says that the local workers are given up: a batch without other workers ends with this reason.
+    pub fn give_up(&self, reason: String) {
+        self.hub.give_up(reason);
+    }
+
+    /// Asks the workers with these process numbers to leave.
+    pub fn dismiss(&self, pids: &[u32]) {
+        self.hub.dismiss(pids);
+    }
+
+    /// Passes an event on.
+    pub fn tell(&self, event: FleetEvent) {
+        self.hub.tell(event);
+    }
+}
+
+impl GrpcFleet {
+    /// Listens and starts the network thread.
+    ///
+    /// # Errors
+    /// [`FleetError::Bind`] when the address is taken or does not exist; [`FleetError::Stopped`] when no thread can start.
+    pub fn listen(config: FleetConfig) -> Result<Self, FleetError> {
+        let bind = |source| FleetError::Bind { address: config.address, source };
+        let listener = TcpListener::bind(config.address).map_err(bind)?;
+        listener.set_nonblocking(true).map_err(bind)?;
+        let address = listener.local_addr().map_err(bind)?;
+        let rules =
+            Rules { heartbeat: config.heartbeat, patience: config.patience, max_attempts: config.max_attempts };
+        let hub = Arc::new(Hub::new(config.run_name, rules, config.events));
+        let stop = CancellationToken::new();
+        let network = {
+            let (hub, cancel, stop) = (Arc::clone(&hub), config.cancel.clone(), stop.clone());
+            let heartbeat = config.heartbeat;
+            std::thread::Builder::new()
+                .name("fleet-network".to_owned())
+                .spawn(move || run_network(listener, hub, heartbeat, cancel, stop))
+                .map_err(|e| FleetError::Stopped(e.to_string()))?
+        };
+        hub.tell(FleetEvent::Listening { address });
+        Ok(Self { hub, address, cancel: config.cancel, stop, network: Some(network) })
+    }
+
+    /// Where workers can connect, with the port that was picked.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// For the supervisor of local workers.
+    pub fn handle(&self) -> FleetHandle {
+        FleetHandle { hub: Arc::clone(&self.hub) }
+    }
+
+    /// Asks all workers to leave, waits shortly for them, and stops the network. Dropping does the same.
+    pub fn close(self) {
+        drop(self);
+    }
+
+    fn wait(&self, replies: &mpsc::Receiver<super::hub::Reply>) -> Result<Vec<Outcome>, FleetError> {
+        loop {
+            match replies.recv_timeout(ALIVE_CHECK) {
+                Ok(reply) => return reply.map_err(|error| self.explain(error)),
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Err(FleetError::Stopped("the batch was replaced by another".to_owned()));
+                }
+                Err(RecvTimeoutError::Timeout) => {
+                    if self.network.as_ref().is_none_or(JoinHandle::is_finished) {
+                        return Err(FleetError::Stopped("its thread ended".to_owned()));
+                    }
+                }
+            }
+        }
+    }
+
+    fn explain(&self, error: BatchError) -> FleetError {
+        match error {
+            BatchError::Cancelled => FleetError::Cancelled,
+            BatchError::NoWorkers { waited, missing } => {
+                FleetError::NoWorkers { address: self.address, waited: waited.as_secs_f64(), missing }
+            }
+            BatchError::SetupFailed { reason } => FleetError::SetupFailed { reason },
+            BatchError::LocalWorkers(reason) => FleetError::LocalWorkers(reason),
+        }
+    }
+}
+
+impl Fleet for GrpcFleet {
+    fn install(&mut self, setup: &Setup) -> Result<SetupId, FleetError> {
+        let (id, json) = encode_setup(setup).map_err(|e| FleetError::SetupFailed { reason: e.to_string() })?;
+        if json.len() + 1024 > MAX_MESSAGE {
+            let reason = format!("its text has {} bytes, a message holds {MAX_MESSAGE}", json.len());
+            return Err(FleetError::SetupFailed { reason });
+        }
+        self.hub.install(id, json);
+        Ok(id)
+    }
+
+    fn run(&mut self, setup: SetupId, jobs: Vec<Job>) -> Result<Vec<Outcome>, FleetError> {
+        for job in &jobs {
+            check_size(job).map_err(FleetError::TooLarge)?;
+        }
+        let (reply, replies) = mpsc::channel();
+        if !self.hub.submit(setup, jobs, reply) {
+            return Err(FleetError::UnknownSetup);
+        }
+        // After the submission, so that a cancellation just before it is not missed.
+        if self.cancel.is_cancelled() {
+            self.hub.handle(Event::Abort(BatchError::Cancelled));
+        }
+        self.wait(&replies)
+    }
+
+    fn n_workers(&self) -> usize {
+        self.hub.counts().0
+    }
+
+    fn slots(&self) -> usize {
+        self.hub.counts().1
+    }
+}
+
+impl Drop for GrpcFleet {
+    fn drop(&mut self) {
+        self.stop.cancel();
+        if let Some(network) = self.network.take() {
+            match network.join() {
+                Ok(Ok(())) => {}
+                Ok(Err(error)) => tracing::warn!(error, "the fleet's network ended with an error"),
+                Err(_) => tracing::error!("the fleet's network thread panicked"),
+            }
+        }
+    }
+}
+
+fn run_network(
+    listener: TcpListener,
+    hub: Arc<Hub>,
+    heartbeat: Duration,
+    cancel: CancellationToken,
+    stop: CancellationToken,
+) -> Result<(), String> {
+    let runtime =
+        tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(|error| error.to_string())?;
+    let outcome = runtime.block_on(async {
+        let listener = tokio::net::TcpListener::from_std(listener).map_err(|error| error.to_string())?;
+        let incoming = TcpIncoming::from(listener).with_nodelay(Some(true));
+        tokio::spawn(tick(Arc::clone(&hub), heartbeat));
+        tokio::spawn(beat(Arc::clone(&hub), heartbeat));
+        tokio::spawn(abort_on_cancel(Arc::clone(&hub), cancel));
+        let service = FleetServer::new(Service { hub: Arc::clone(&hub) })
+            .max_decoding_message_size(MAX_MESSAGE)
+            .max_encoding_message_size(MAX_MESSAGE);
+        let server = Server::builder()
+            .http2_keepalive_interval(Some(heartbeat))
+            .http2_keepalive_timeout(Some(heartbeat))
+            .initial_stream_window_size(WINDOWS.0)
+            .initial_connection_window_size(WINDOWS.1)
+            .max_frame_size(FRAME_SIZE)
+            .add_service(service)
+            .serve_with_incoming(incoming);
+        tokio::select! {
+            ended = server => ended.map_err(|error| error.to_string()),
+            () = drained(&hub, &stop) => Ok(()),
+        }
+    });
+    runtime.shutdown_background();
+    outcome
+}
+
+async fn tick(hub: Arc<Hub>, heartbeat: Duration) {
+    let mut ticks = tokio::time::interval(TICK.min(heartbeat / 4));
+    loop {
+        ticks.tick().await;
+        hub.handle(Event::Tick);
+    }
+}
+
+async fn beat(hub: Arc<Hub>, heartbeat: Duration) {
+    let mut beats = tokio::time::interval(heartbeat);
+    loop {
+        beats.tick().await;
+        hub.beat();
+    }
+}
+
+async fn abort_on_cancel(hub: Arc<Hub>, cancel: CancellationToken) {
+    cancel.cancelled().await;
+    hub.handle(Event::Abort(BatchError::Cancelled));
+}
+
+/// Waits for the stop, asks the workers to leave, and returns when they did or time is up.
+async fn drained(hub: &Hub, stop: &CancellationToken) {
+    stop.cancelled().await;
+    hub.handle(Event::Abort(BatchError::Cancelled));
+    hub.drain("the run is over");
+    let empty = async {
+        loop {
+            let mut ended = std::pin::pin!(hub.link_ended.notified());
+            ended.as_mut().enable();
+            if hub.n_links() == 0 {
+                return;
+            }
+            ended.await;
+        }
+    };
+    let _ = tokio::time::timeout(GOODBYE_PATIENCE, empty).await;
+}

@@ -1,0 +1,93 @@
+//! A fleet without a network: runs the jobs on threads of this process.
+
+use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
+
+use starlings_models::{Forward, Job, ParticleError, Setup};
+use starlings_proto::{SetupId, encode_setup};
+use tokio_util::sync::CancellationToken;
+
+use super::{Fleet, FleetError, Outcome};
+
+/// Threads of this process as a fleet.
+pub struct InProcess {
+    threads: usize,
+    cancel: CancellationToken,
+    forwards: BTreeMap<SetupId, Box<dyn Forward>>,
+}
+
+impl InProcess {
+    /// A fleet of so many threads, at least one.
+    pub fn new(threads: usize) -> Self {
+        Self { threads: threads.max(1), cancel: CancellationToken::new(), forwards: BTreeMap::new() }
+    }
+
+    /// The same fleet, ended by this token: [`Fleet::run`] returns [`FleetError::Cancelled`] after the jobs being computed.
+    #[must_use]
+    pub fn with_cancel(mut self, cancel: CancellationToken) -> Self {
+        self.cancel = cancel;
+        self
+    }
+}
+
+impl Fleet for InProcess {
+    fn install(&mut self, setup: &Setup) -> Result<SetupId, FleetError> {
+        let failed = |reason: String| FleetError::SetupFailed { reason };
+        let (id, _) = encode_setup(setup).map_err(|e| failed(e.to_string()))?;
+        if !self.forwards.contains_key(&id) {
+            self.forwards.insert(id, setup.build().map_err(|e| failed(e.to_string()))?);
+        }
+        Ok(id)
+    }
+
+    fn run(&mut self, setup: SetupId, jobs: Vec<Job>) -> Result<Vec<Outcome>, FleetError> {
+        let forward = self.forwards.get(&setup).ok_or(FleetError::UnknownSetup)?.as_ref();
+        let next = AtomicUsize::new(0);
+        let outcomes = Mutex::new(Vec::with_capacity(jobs.len()));
+        std::thread::scope(|scope| {
+            for thread in 0..self.threads.min(jobs.len()) {
+                let (jobs, next, outcomes, cancel) = (&jobs, &next, &outcomes, &self.cancel);
+                scope.spawn(move || {
+                    while !cancel.is_cancelled() {
+                        let index = next.fetch_add(1, Ordering::Relaxed);
+                        let Some(job) = jobs.get(index) else { break };
+                        let outcome = run_one(forward, job, thread);
+                        outcomes.lock().unwrap_or_else(PoisonError::into_inner).push((index, outcome));
+                    }
+                });
+            }
+        });
+        if self.cancel.is_cancelled() {
+            return Err(FleetError::Cancelled);
+        }
+        let mut outcomes = outcomes.into_inner().unwrap_or_else(PoisonError::into_inner);
+        outcomes.sort_unstable_by_key(|(index, _)| *index);
+        Ok(outcomes.into_iter().map(|(_, outcome)| outcome).collect())
+    }
+
+    fn n_workers(&self) -> usize {
+        1
+    }
+
+    fn slots(&self) -> usize {
+        self.threads
+    }
+}
+
+fn run_one(forward: &dyn Forward, job: &Job, thread: usize) -> Outcome {
+    let started = Instant::now();
+    let mut result = catch_unwind(AssertUnwindSafe(|| forward.run(job)))
+        .unwrap_or_else(|panic| Err(ParticleError::Solver(panic_text(panic.as_ref()))));
+    if let Ok(prediction) = &mut result {
+        prediction.cost = started.elapsed().as_secs_f64();
+    }
+    Outcome { result, attempts: 1, worker: format!("thread {thread}") }
+}
+
+fn panic_text(panic: &(dyn std::any::Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+    format!("the model panicked: {}", text.unwrap_or("without a message"))
+}

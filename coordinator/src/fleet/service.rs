@@ -1,0 +1,82 @@
+//! The gRPC side of a worker's stay: reads its stream and turns each message into an event.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use starlings_proto::wire::{self, fleet_server};
+use starlings_proto::{FromWorker, ToWorker};
+use tokio::sync::mpsc;
+use tokio_stream::wrappers::UnboundedReceiverStream;
+use tonic::{Request, Response, Status, Streaming};
+
+use super::dispatcher::{Event, WorkerId};
+use super::hub::{Hub, Outgoing};
+
+/// How long a connection may stay open without a Hello.
+const HELLO_PATIENCE: Duration = Duration::from_secs(10);
+
+pub(super) struct Service {
+    pub(super) hub: Arc<Hub>,
+}
+
+#[tonic::async_trait]
+impl fleet_server::Fleet for Service {
+    type WorkStream = UnboundedReceiverStream<Outgoing>;
+
+    async fn work(
+        &self,
+        request: Request<Streaming<wire::FromWorker>>,
+    ) -> Result<Response<Self::WorkStream>, Status> {
+        let mut inbound = request.into_inner();
+        let first = tokio::time::timeout(HELLO_PATIENCE, inbound.message())
+            .await
+            .map_err(|_| Status::deadline_exceeded("no Hello arrived"))??
+            .ok_or_else(|| Status::invalid_argument("the stream ended before a Hello"))?;
+        let hello = match FromWorker::decode(first) {
+            Ok(FromWorker::Hello(hello)) => hello,
+            Ok(_) => return Err(Status::invalid_argument("the first message must be a Hello")),
+            Err(error) => return Err(Status::invalid_argument(error.to_string())),
+        };
+        // Credits bound what waits in this channel: at most 64 jobs per slot.
+        let (link, outgoing) = mpsc::unbounded_channel();
+        match self.hub.join(hello, link.clone()) {
+            Ok(worker) => {
+                tokio::spawn(read(Arc::clone(&self.hub), worker, inbound));
+            }
+            Err(reason) => {
+                let _ = link.send(Ok(ToWorker::refuse(&reason)));
+            }
+        }
+        Ok(Response::new(UnboundedReceiverStream::new(outgoing)))
+    }
+}
+
+/// Reads until the stream ends, however it ends, and then returns the worker's leases.
+async fn read(hub: Arc<Hub>, worker: WorkerId, mut inbound: Streaming<wire::FromWorker>) {
+    let (reason, clean) = loop {
+        match inbound.message().await {
+            Ok(Some(message)) => match FromWorker::decode(message) {
+                Ok(FromWorker::Goodbye(reason)) => break (reason, true),
+                Ok(message) => {
+                    if let Some(event) = event(worker, message) {
+                        hub.handle(event);
+                    }
+                }
+                Err(error) => break (format!("it sent a malformed message: {error}"), false),
+            },
+            Ok(None) => break ("it closed the connection".to_owned(), false),
+            Err(status) => break (format!("the connection broke ({})", status.code()), false),
+        }
+    };
+    hub.leave(worker, reason, clean);
+}
+
+fn event(worker: WorkerId, message: FromWorker) -> Option<Event> {
+    Some(match message {
+        FromWorker::Setup { id: setup, result: Ok(()) } => Event::SetupDone { worker, setup },
+        FromWorker::Setup { id: setup, result: Err(reason) } => Event::SetupFailed { worker, setup, reason },
+        FromWorker::Result { lease, answer, cost } => Event::Answered { worker, lease, answer, cost },
+        FromWorker::Heartbeat { .. } => Event::Heard { worker },
+        FromWorker::Hello(_) | FromWorker::Goodbye(_) => return None,
+    })
+}

@@ -1,0 +1,124 @@
+//! From a study as written to a [`Study`]: names against the model, numbers against sense, recordings against both.
+//!
+//! Checks go on after a fault as long as their answer can be trusted, so that one look shows as much as possible. Next file
+//! to read: [`super::check_model`].
+
+use std::path::Path;
+
+use super::check_model::{self, CheckedModel};
+use super::check_parameters::{self, initial_medians};
+use super::check_settings::{estimator, explain, fleet, observer};
+use super::checked::{Record, Study};
+use super::expand;
+use super::file::{RecordSection, StudyFile};
+use super::file_read::read;
+use super::problem::{Source, StudyError};
+use super::record::{Context, Recordings};
+
+/// Checks the text of a study file.
+///
+/// # Errors
+/// Everything that is wrong.
+pub(super) fn check(path: &Path, text: &str) -> Result<Study, StudyError> {
+    let source = Source::new(path, text);
+    let file = read(&source)?;
+    check_name(&source, &file);
+    let estimator = estimator(&source, &file.estimator);
+    let fleet = fleet(&source, &file.fleet);
+    let explain = explain(&source, &file);
+    let observer = observer(&source, &file.observer);
+    let model = check_model::model(&source, &file);
+    // Everything that follows is judged against the model.
+    let Some(mut model) = model else { return Err(source.verdict().err().unwrap_or(StudyError { problems: vec![] })) };
+    model.setup.observer = observer;
+    let mut warnings = Vec::new();
+    check_model::check_values(&source, &file, &model);
+    let priors = check_parameters::priors(&source, &file, &model, &mut warnings);
+    let records = records(&source, &file, &mut model, &explain.hold_out_channels, &mut warnings);
+    source.verdict()?;
+    model.setup.parameters = file.parameters.iter().map(|p| p.name.get_ref().clone()).collect();
+    let parameters = initial_medians(&source, &file, &model.spec, &priors, &records);
+    source.verdict()?;
+    check_model::check_build(&source, &file, &model.setup);
+    source.verdict()?;
+    let theta = expand::theta(&parameters, &records);
+    Ok(Study {
+        file: path.to_owned(),
+        text: text.to_owned(),
+        name: file.study.name.into_inner(),
+        says: file.study.says,
+        seed: file.study.seed,
+        time_unit: file.study.time_unit,
+        setup: model.setup,
+        spec: model.spec,
+        candidates: model.candidates,
+        parameters,
+        theta,
+        records,
+        estimator,
+        fleet,
+        explain,
+        delays: model.delays,
+        warnings,
+    })
+}
+
+/// The name becomes a folder's.
+fn check_name(source: &Source, file: &StudyFile) {
+    let name = file.study.name.get_ref();
+    if name.is_empty() || name.starts_with('.') || name.contains(['/', '\\', ':']) || name.contains(char::is_control) {
+        source.report_with(
+            file.study.name.span(),
+            format!("`{name}` cannot name a study: its run folder takes the name"),
+            "use letters, digits, `-` and `_`",
+        );
+    }
+}
+
+/// Reads all records; their outputs become those of the setup.
+fn records(
+    source: &Source,
+    file: &StudyFile,
+    model: &mut CheckedModel,
+    hold_out: &[String],
+    warnings: &mut Vec<String>,
+) -> Vec<Record> {
+    check_record_list(source, file);
+    let mut files = Recordings::new(source);
+    let mut context = Context { outputs: &mut model.setup.outputs, hold_out, warnings };
+    let read = |section: &RecordSection| files.record(section, &model.spec, &mut context);
+    file.records.iter().filter_map(read).collect()
+}
+
+fn check_record_list(source: &Source, file: &StudyFile) {
+    let end = source.text.len();
+    if file.records.is_empty() {
+        source.report_with(end..end, "the study has no record", "add `[[records]]` with `name`, `file` and `channels`");
+    } else if file.records.iter().all(|r| r.held_out) {
+        let help = "remove `use = \"held-out\"` from at least one";
+        source.report_with(file.records[0].span.clone(), "every record is held out: nothing is left to fit", help);
+    }
+    for (i, record) in file.records.iter().enumerate() {
+        if file.records[..i].iter().any(|r| r.name.get_ref() == record.name.get_ref()) {
+            let message = format!("two records are named `{}`", record.name.get_ref());
+            source.report_with(record.name.span(), message, "names of records are unique in a study");
+        }
+    }
+    // A name that no channel measures is nowhere: a typing error would fit what should stay unseen.
+    let measured: Vec<String> =
+        file.records.iter().flat_map(|r| &r.channels).map(|c| c.output.get_ref().clone()).collect();
+    for name in file.explain.hold_out_channels.iter().filter(|n| !measured.contains(n.get_ref())) {
+        let message = format!("no channel measures `{}`, so it cannot be held out", name.get_ref());
+        source.report_unknown(name.span(), message, &unique(&measured));
+    }
+}
+
+fn unique(names: &[String]) -> Vec<String> {
+    let mut list: Vec<String> = Vec::new();
+    for name in names {
+        if !list.contains(name) {
+            list.push(name.clone());
+        }
+    }
+    list
+}

@@ -1,0 +1,250 @@
+//! The model of a study: definitions from what is written, built to see whether they fit together.
+//!
+//! What the model refuses is told at the place in the file that caused it: see [`super::check_blame`]. Next file to read:
+//! [`super::check_parameters`].
+
+use std::collections::BTreeMap;
+
+use starlings_models::effect::library::write_out;
+use starlings_models::effect::{Addition, EffectParameter, EffectState};
+use starlings_models::equations::{EquationsDef, Expression, InputDef, Method, OutputDef, SolverDef, StateDef};
+use starlings_models::{EffectDef, ModelDef, Setup, Spec};
+use toml::Spanned;
+
+use super::check_blame::{blame, expressions, report_missing};
+use super::check_parameters::{quantity, valid_names};
+use super::expand::INITIAL;
+use super::file::{EffectSection, EquationsSection, SolverSection, StateSection, StudyFile};
+use super::locate::character;
+use super::problem::Source;
+
+/// A model that builds, with the effects that belong to it.
+pub(super) struct CheckedModel {
+    /// Without parameters, outputs and observer.
+    pub(super) setup: Setup,
+    pub(super) spec: Spec,
+    /// Effects that are described but not part of the model.
+    pub(super) candidates: Vec<EffectDef>,
+    /// Names of parameters and initial values, those of the candidates included.
+    pub(super) valid_names: Vec<String>,
+    pub(super) delays: bool,
+}
+
+/// Builds the model of a study; nothing after a complaint.
+pub(super) fn model(source: &Source, file: &StudyFile) -> Option<CheckedModel> {
+    let before = source.count();
+    if file.model.kind.get_ref() == "solver" {
+        let help = "use a built-in model (`starlings models` lists them) or kind = \"equations\"";
+        source.report_with(file.model.kind.span(), "external solvers are not available in this version", help);
+        return None;
+    }
+    check_expressions(source, file);
+    let constants: BTreeMap<String, f64> =
+        file.model.constants.iter().map(|(name, value)| (name.get_ref().clone(), *value.get_ref())).collect();
+    let equations = file.model.equations.as_ref().map(|section| equations(source, section));
+    if source.count() > before {
+        return None;
+    }
+    let model = ModelDef { kind: file.model.kind.get_ref().clone(), constants, equations };
+    let mut setup = Setup { model, ..Setup::default() };
+    let bare = spec(source, file, &setup)?;
+    let candidates = sort_effects(source, file, &mut setup, &bare)?;
+    let spec = spec(source, file, &setup)?;
+    let mut valid_names = valid_names(&spec);
+    valid_names.extend(candidates.iter().flat_map(|e| &e.parameters).map(|p| p.name.clone()));
+    let delays = expressions(file).iter().any(|e| e.get_ref().replace(' ', "").contains("delay("));
+    Some(CheckedModel { setup, spec, candidates, valid_names, delays })
+}
+
+fn spec(source: &Source, file: &StudyFile, setup: &Setup) -> Option<Spec> {
+    setup.model().map(|model| model.spec().clone()).map_err(|error| blame(source, file, &error)).ok()
+}
+
+/// Puts every effect that has a value for one of its parameters into the setup and returns the others.
+fn sort_effects(source: &Source, file: &StudyFile, setup: &mut Setup, bare: &Spec) -> Option<Vec<EffectDef>> {
+    let before = source.count();
+    let given = |name: &String| {
+        file.parameters.iter().any(|p| p.name.get_ref() == name)
+            || file.model.constants.iter().any(|(constant, _)| constant.get_ref() == name)
+    };
+    let mut candidates = Vec::new();
+    for section in &file.effects {
+        let name = section.name.get_ref();
+        if setup.effects.iter().chain(&candidates).any(|e| e.name == *name) {
+            source.report_with(
+                section.name.span(),
+                format!("two effects are named `{name}`"),
+                "names are unique in a study",
+            );
+        }
+        match write_out(&effect(section), bare) {
+            Ok(written) if written.parameters.iter().any(|p| given(&p.name)) => setup.effects.push(written),
+            Ok(written) => {
+                // A candidate must build too, or the search for a missing effect would fail late.
+                let trial = Setup { effects: vec![written.clone()], ..setup.clone() };
+                spec(source, file, &trial);
+                candidates.push(written);
+            }
+            Err(error) => blame(source, file, &error),
+        }
+    }
+    (source.count() == before).then_some(candidates)
+}
+
+/// Parses every expression, so that each fault of spelling is told and not only the first.
+fn check_expressions(source: &Source, file: &StudyFile) {
+    for text in expressions(file) {
+        if let Err(error) = Expression::parse(text.get_ref()) {
+            source.report(character(&source.text, &text.span(), error.column), error.message);
+        }
+    }
+}
+
+fn equations(source: &Source, section: &EquationsSection) -> EquationsDef {
+    EquationsDef {
+        states: section.states.iter().map(state).collect(),
+        outputs: section
+            .outputs
+            .iter()
+            .map(|o| OutputDef {
+                name: o.name.get_ref().clone(),
+                unit: o.unit.clone(),
+                role: o.role,
+                value: o.value.get_ref().clone(),
+            })
+            .collect(),
+        inputs: section
+            .inputs
+            .iter()
+            .map(|i| InputDef { name: i.name.get_ref().clone(), unit: i.unit.clone(), role: i.role })
+            .collect(),
+        replaceable: section.replaceable.iter().map(|r| r.get_ref().clone()).collect(),
+        solver: solver(source, &section.solver),
+    }
+}
+
+fn state(section: &StateSection) -> StateDef {
+    let name = section.name.get_ref();
+    let term = |(term, text): &(Spanned<String>, Spanned<String>)| {
+        let term = if term.get_ref().is_empty() { name } else { term.get_ref() };
+        (term.clone(), text.get_ref().clone())
+    };
+    StateDef {
+        name: name.clone(),
+        unit: section.unit.clone(),
+        role: section.role,
+        initial: section.initial.get_ref().clone(),
+        rate: section.rate.iter().map(term).collect(),
+        ..StateDef::default()
+    }
+}
+
+fn solver(source: &Source, section: &SolverSection) -> SolverDef {
+    let default = SolverDef::default();
+    let methods = [
+        ("auto", Method::Auto),
+        ("dopri5", Method::Dopri5),
+        ("rosenbrock", Method::Rosenbrock),
+        ("fixed", Method::Fixed),
+    ];
+    let mut method = default.method;
+    if let Some(word) = &section.method {
+        if let Some((_, known)) = methods.iter().find(|(name, _)| name == word.get_ref()) {
+            method = *known;
+        } else {
+            let valid: Vec<String> = methods.iter().map(|(name, _)| (*name).to_owned()).collect();
+            source.report_unknown(word.span(), format!("unknown method `{}`", word.get_ref()), &valid);
+        }
+    }
+    if method == Method::Fixed && section.step.is_none() {
+        let help = "give `step = ...` in the study's time unit";
+        source.report_with(section.span.clone(), "the method \"fixed\" needs its `step`", help);
+    }
+    for (key, value) in [("rtol", &section.rtol), ("atol", &section.atol), ("step", &section.step)] {
+        if let Some(value) = value.as_ref().filter(|v| *v.get_ref() <= 0.0) {
+            source.report(value.span(), format!("`{key}` must be above zero, found {}", value.get_ref()));
+        }
+    }
+    let number = |value: &Option<Spanned<f64>>| value.as_ref().map(|v| *v.get_ref());
+    SolverDef {
+        method,
+        rtol: number(&section.rtol).unwrap_or(default.rtol),
+        atol: number(&section.atol).unwrap_or(default.atol),
+        step: number(&section.step),
+    }
+}
+
+fn effect(section: &EffectSection) -> EffectDef {
+    let parameter = |p: &super::file::EffectParameterSection| EffectParameter {
+        name: p.name.get_ref().clone(),
+        unit: p.unit.clone(),
+        range: p.range.unwrap_or(EffectParameter::default().range),
+        grid: p.grid.clone(),
+    };
+    let state = |s: &StateSection| EffectState {
+        name: s.name.get_ref().clone(),
+        unit: s.unit.clone(),
+        initial: s.initial.get_ref().clone(),
+        rate: s.rate.iter().map(|(_, term)| format!("({})", term.get_ref())).collect::<Vec<_>>().join(" + "),
+    };
+    let add = |(to, term): &(Spanned<String>, Spanned<String>)| Addition {
+        to: to.get_ref().clone(),
+        term: term.get_ref().clone(),
+    };
+    EffectDef {
+        name: section.name.get_ref().clone(),
+        says: section.says.clone(),
+        adds: section.adds.iter().map(add).collect(),
+        parameters: section.parameters.iter().map(parameter).collect(),
+        states: section.states.iter().map(state).collect(),
+        confounders: section.confounders.clone(),
+        built_in: section.built_in.as_ref().map(|b| b.get_ref().clone()),
+    }
+}
+
+/// Constants must be known and possible, and every parameter must have a value.
+pub(super) fn check_values(source: &Source, file: &StudyFile, model: &CheckedModel) {
+    let spec = &model.spec;
+    let in_terms: Vec<String> = file
+        .effects
+        .iter()
+        .flat_map(|e| &e.adds)
+        .filter_map(|(_, term)| Expression::parse(term.get_ref()).ok())
+        .flat_map(|e| e.names())
+        .map(|(name, _)| name)
+        .collect();
+    for (name, value) in &file.model.constants {
+        match quantity(spec, name.get_ref()) {
+            Some(q) if *value.get_ref() < q.range[0] || *value.get_ref() > q.range[1] => {
+                let (name, range) = (name.get_ref(), q.range_text());
+                let message = format!("constant `{name}` is {}, outside the model's range ({range})", value.get_ref());
+                source.report(value.span(), message);
+            }
+            None if !in_terms.contains(name.get_ref()) => {
+                let message = format!("model `{}` has no parameter `{}`", spec.kind, name.get_ref());
+                source.report_unknown(name.span(), message, &model.valid_names);
+            }
+            _ => {}
+        }
+    }
+    for q in spec.parameters.iter().filter(|q| q.default.is_none()) {
+        let constant = file.model.constants.iter().any(|(name, _)| *name.get_ref() == q.name);
+        if !constant && !file.parameters.iter().any(|p| *p.name.get_ref() == q.name) {
+            report_missing(source, file, &spec.kind, &q.name);
+        }
+    }
+    let initial = |name: &str| name.strip_prefix(INITIAL).and_then(|s| spec.states.iter().find(|q| q.name == s));
+    for p in &file.parameters {
+        if let Some(q) = initial(p.name.get_ref()).filter(|q| q.size != 1) {
+            let message = format!("state `{}` has {} components: only a scalar has an initial value", q.name, q.size);
+            source.report(p.name.span(), message);
+        }
+    }
+}
+
+/// Builds the setup as workers will.
+pub(super) fn check_build(source: &Source, file: &StudyFile, setup: &Setup) {
+    if let Err(error) = setup.build() {
+        blame(source, file, &error);
+    }
+}

@@ -1,0 +1,127 @@
+//! The uncertain parameters: known to the model, named once, each with a prior that fits it.
+//!
+//! Next file to read: [`super::prior`].
+
+use starlings_models::{Quantity, Spec};
+use toml::Spanned;
+
+use super::check_model::CheckedModel;
+use super::checked::{Record, StudyParameter};
+use super::expand::INITIAL;
+use super::file::{ParameterSection, StudyFile};
+use super::prior::{self, Prior};
+use super::problem::Source;
+
+/// What the model says of a parameter or of the state behind an initial value.
+pub(super) fn quantity<'a>(spec: &'a Spec, name: &str) -> Option<&'a Quantity> {
+    match name.strip_prefix(INITIAL) {
+        Some(state) => spec.states.iter().find(|q| q.name == state),
+        None => spec.parameters.iter().find(|q| q.name == name),
+    }
+}
+
+/// Every name that a parameter or constant may have.
+pub(super) fn valid_names(spec: &Spec) -> Vec<String> {
+    let states = spec.states.iter().map(|q| format!("{INITIAL}{}", q.name));
+    spec.parameters.iter().map(|q| q.name.clone()).chain(states).collect()
+}
+
+/// The priors in the order of the file, nothing in the place of one that was refused.
+pub(super) fn priors(
+    source: &Source,
+    file: &StudyFile,
+    model: &CheckedModel,
+    warnings: &mut Vec<String>,
+) -> Vec<Option<Prior>> {
+    if file.parameters.is_empty() {
+        let end = source.text.len();
+        let help = format!("add `[[parameters]]`; the model has {}", super::problem::quoted_list(&valid_names(&model.spec)));
+        source.report_with(end..end, "the study has no parameter to estimate", help);
+    }
+    let check = |(i, parameter): (usize, &ParameterSection)| {
+        let name = parameter.name.get_ref();
+        if file.parameters[..i].iter().any(|p| p.name.get_ref() == name) {
+            let message = format!("parameter `{name}` is given twice");
+            source.report_with(parameter.name.span(), message, "remove one of the two");
+            return None;
+        }
+        if file.model.constants.iter().any(|(constant, _)| constant.get_ref() == name) {
+            let message = format!("`{name}` is both a constant and an estimated parameter");
+            source.report_with(parameter.name.span(), message, "remove one of the two");
+        }
+        let quantity = quantity(&model.spec, name);
+        if quantity.is_none() {
+            let message = format!("model `{}` has no parameter `{name}`", model.spec.kind);
+            source.report_unknown(parameter.name.span(), message, &model.valid_names);
+        }
+        let prior = prior::prior(source, parameter, quantity)?;
+        warnings.extend(quantity.and_then(|q| prior::reach_warning(name, &prior, q)));
+        warnings.extend(quantity.and_then(|q| unit_warning(parameter, q)));
+        Some(prior)
+    };
+    file.parameters.iter().enumerate().map(check).collect()
+}
+
+/// Units are labels: a mismatch is worth a word, not a refusal.
+fn unit_warning(parameter: &ParameterSection, quantity: &Quantity) -> Option<String> {
+    let given = parameter.unit.as_ref()?.get_ref();
+    let plain = |unit: &str| unit.replace(['*', '·', ' '], "");
+    (!quantity.unit.is_empty() && !given.is_empty() && plain(given) != plain(&quantity.unit)).then(|| {
+        format!(
+            "parameter `{}` is given in {given}, the model has it in {}: its numbers are taken as they stand.",
+            parameter.name.get_ref(),
+            quantity.unit
+        )
+    })
+}
+
+/// The parameters with their prior means per record, medians taken from recordings where the study says so.
+pub(super) fn initial_medians(
+    source: &Source,
+    file: &StudyFile,
+    spec: &Spec,
+    priors: &[Option<Prior>],
+    records: &[Record],
+) -> Vec<StudyParameter> {
+    let mut parameters = Vec::new();
+    for (section, prior) in file.parameters.iter().zip(priors) {
+        let Some(prior) = prior else { continue };
+        let name = section.name.get_ref();
+        let quantity = quantity(spec, name);
+        let per_record = section.per_record.unwrap_or_else(|| name.starts_with(INITIAL));
+        if let Some(from) = section.prior.median_from.as_ref().filter(|_| !per_record && records.len() > 1) {
+            let message = format!("`{name}` is one value for all records, so its median cannot come from each");
+            source.report_with(from.span(), message, "add `per_record = true`, or give `median`");
+            continue;
+        }
+        let mean = |record: &Record| match (&section.prior.median_from, prior.mean) {
+            (Some(from), _) => first_value(source, from, record)
+                .filter(|median| prior::check_median(source, median, name, &prior.transform, quantity))
+                .map_or(f64::NAN, |median| prior.transform.to_transformed(*median.get_ref())),
+            (None, mean) => mean.unwrap_or(f64::NAN),
+        };
+        let unit = section.unit.as_ref().map(|u| u.get_ref().clone()).filter(|u| !u.is_empty());
+        parameters.push(StudyParameter {
+            name: name.clone(),
+            unit: unit.unwrap_or_else(|| quantity.map(|q| q.unit.clone()).unwrap_or_default()),
+            transform: prior.transform,
+            per_record,
+            prior_mean: records.iter().map(mean).collect(),
+            prior_sd: prior.sd,
+            drift: prior::drift(source, &section.process),
+        });
+    }
+    parameters
+}
+
+/// The first observed value of a channel, at the place that asks for it.
+fn first_value(source: &Source, from: &Spanned<String>, record: &Record) -> Option<Spanned<f64>> {
+    let Some(channel) = record.channels.iter().find(|c| c.output == *from.get_ref()) else {
+        let valid: Vec<String> = record.channels.iter().map(|c| c.output.clone()).collect();
+        let message = format!("record `{}` has no channel of output `{}`", record.name, from.get_ref());
+        source.report_unknown(from.span(), message, &valid);
+        return None;
+    };
+    let first = channel.values.iter().copied().find(|v| v.is_finite())?;
+    Some(Spanned::new(from.span(), first))
+}

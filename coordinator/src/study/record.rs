@@ -1,0 +1,179 @@
+//! From `[[records]]` and its CSV files to a [`Record`].
+//!
+//! Next files to read: [`super::record_channel`] for what was measured, [`super::record_input`] for what drives the model.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+
+use starlings_models::Spec;
+use toml::Spanned;
+
+use super::checked::Record;
+use super::file::RecordSection;
+use super::problem::{Source, suggestion};
+use super::record_channel::ChannelReader;
+use super::record_csv::Csv;
+use super::record_input::inputs;
+
+/// Reads the CSV files of a study, each once.
+pub(super) struct Recordings<'a> {
+    pub(super) source: &'a Source,
+    folder: PathBuf,
+    files: BTreeMap<PathBuf, Option<Rc<Csv>>>,
+}
+
+/// A record's file with its times.
+pub(super) struct Table {
+    pub(super) csv: Rc<Csv>,
+    pub(super) times: Vec<f64>,
+    pub(super) time_column: usize,
+}
+
+impl<'a> Recordings<'a> {
+    /// Files are looked for beside the study.
+    pub(super) fn new(source: &'a Source) -> Self {
+        let folder = source.file.parent().unwrap_or(Path::new("")).to_owned();
+        Self { source, folder, files: BTreeMap::new() }
+    }
+
+    /// The file of this name with the times in the named column; nothing after a complaint. `at` is where the study names it.
+    pub(super) fn table(&mut self, name: &str, at: &Spanned<String>, time: &Spanned<String>) -> Option<Table> {
+        let csv = self.open(name, at)?;
+        let time_column = match csv.index(time.get_ref()) {
+            Ok(column) => column,
+            Err((message, help)) => {
+                self.source.report_with(time.span(), message, format!("name the time column by `time = ...`; {help}"));
+                return None;
+            }
+        };
+        match csv.times(time_column) {
+            Ok(times) => Some(Table { csv, times, time_column }),
+            Err(problem) => {
+                self.source.adopt(problem);
+                None
+            }
+        }
+    }
+
+    fn open(&mut self, name: &str, at: &Spanned<String>) -> Option<Rc<Csv>> {
+        let path = self.folder.join(name);
+        if let Some(known) = self.files.get(&path) {
+            return known.clone();
+        }
+        let csv = self.read(&path, name, at).map(Rc::new);
+        self.files.insert(path, csv.clone());
+        csv
+    }
+
+    fn read(&self, path: &Path, name: &str, at: &Spanned<String>) -> Option<Csv> {
+        let bytes = match std::fs::read(path) {
+            Ok(bytes) => bytes,
+            Err(error) => {
+                let message = format!("cannot read `{}`: {}", path.display(), plain(&error));
+                self.source.report_with(at.span(), message, self.near_files(name));
+                return None;
+            }
+        };
+        let Ok(text) = String::from_utf8(bytes) else {
+            self.source.report_with(at.span(), format!("`{name}` is not UTF-8 text"), "save it as CSV in UTF-8");
+            return None;
+        };
+        Csv::new(path, &text).map_err(|error| error.problems.into_iter().for_each(|p| self.source.adopt(p))).ok()
+    }
+
+    /// The nearest file name, or where files are looked for.
+    fn near_files(&self, name: &str) -> String {
+        let folder = if self.folder.as_os_str().is_empty() { Path::new(".") } else { &self.folder };
+        let mut present: Vec<String> = std::fs::read_dir(folder)
+            .into_iter()
+            .flatten()
+            .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+            .filter(|n| n.ends_with(".csv"))
+            .collect();
+        present.sort();
+        match suggestion(name, &present) {
+            Some(help) if help.starts_with("did you mean") => help,
+            _ => "paths are relative to the study file".to_owned(),
+        }
+    }
+
+    /// Reads and checks one record. `outputs` are the study's outputs so far, extended by this record's.
+    pub(super) fn record(
+        &mut self,
+        section: &RecordSection,
+        spec: &Spec,
+        context: &mut Context<'_>,
+    ) -> Option<Record> {
+        if *section.every.get_ref() == 0 {
+            self.source.report_with(section.every.span(), "`every` must be at least 1", "1 makes a window per row");
+        }
+        let table = self.table(section.file.get_ref(), &section.file, &section.time)?;
+        let train = training_span(self.source, section, &table.times);
+        let reader = ChannelReader { source: self.source, section, table: &table, train, spec };
+        let mut channels = reader.channels(context)?;
+        let rows: Vec<usize> = (0..table.times.len())
+            .filter(|row| channels.iter().any(|c| c.values[*row].is_finite()))
+            .collect();
+        for channel in &mut channels {
+            channel.values = rows.iter().map(|row| channel.values[*row]).collect();
+        }
+        let times: Vec<f64> = rows.iter().map(|row| table.times[*row]).collect();
+        let inputs = inputs(self, section, &table, &times, spec)?;
+        Some(Record {
+            name: section.name.get_ref().clone(),
+            times,
+            channels,
+            inputs,
+            train: train?,
+            every: usize::try_from(*section.every.get_ref()).unwrap_or(usize::MAX).max(1),
+        })
+    }
+}
+
+/// What the records of a study share while they are read.
+pub(super) struct Context<'a> {
+    /// Outputs of all channels, first seen first.
+    pub(super) outputs: &'a mut Vec<String>,
+    /// Outputs that are never fitted.
+    pub(super) hold_out: &'a [String],
+    /// What is doubtful but no error.
+    pub(super) warnings: &'a mut Vec<String>,
+}
+
+/// The training span: `Some(None)` when the whole record is held out, nothing after a complaint.
+#[allow(clippy::option_option)]
+fn training_span(source: &Source, section: &RecordSection, times: &[f64]) -> Option<Option<[f64; 2]>> {
+    match &section.train {
+        Some(train) if section.held_out => {
+            let help = "remove `train`, or remove `use = \"held-out\"`";
+            source.report_with(train.span(), "a record that is held out has no training span", help);
+            None
+        }
+        None if section.held_out => Some(None),
+        None => Some(Some([f64::NEG_INFINITY, f64::INFINITY])),
+        Some(train) => {
+            let [from, to] = *train.get_ref();
+            if times.iter().any(|t| from <= *t && *t <= to) {
+                return Some(Some([from, to]));
+            }
+            let (first, last) = (times.first().copied().unwrap_or(0.0), times.last().copied().unwrap_or(0.0));
+            source.report_with(
+                train.span(),
+                format!("no sample of record `{}` lies in the training span [{from}, {to}]", section.name.get_ref()),
+                format!("its times run from {first} to {last}"),
+            );
+            None
+        }
+    }
+}
+
+/// The message of an input/output error without its number.
+fn plain(error: &std::io::Error) -> String {
+    match error.kind() {
+        std::io::ErrorKind::NotFound => "there is no such file".to_owned(),
+        std::io::ErrorKind::PermissionDenied => "permission denied".to_owned(),
+        std::io::ErrorKind::IsADirectory => "it is a folder".to_owned(),
+        _ => error.to_string(),
+    }
+}

@@ -1,0 +1,176 @@
+//! A CSV recording: a header line, one row per time, numbers or empty cells.
+//!
+//! Every complaint names the line and the column. Next file to read: [`super::record`].
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use super::locate::{csv_field, line_column};
+use super::problem::{Problem, Source, StudyError, suggestion};
+
+/// The text of a recording, cut into rows and columns.
+#[derive(Debug)]
+pub(super) struct Csv {
+    pub(super) path: PathBuf,
+    source: Source,
+    pub(super) headers: Vec<String>,
+    /// Byte at which each row starts.
+    starts: Vec<usize>,
+    cells: Vec<csv::StringRecord>,
+}
+
+impl Csv {
+    /// Cuts a text into rows.
+    ///
+    /// # Errors
+    /// When it has no header, no row, or a row of another length than the header.
+    pub(super) fn new(path: &Path, text: &str) -> Result<Self, StudyError> {
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        let mut csv = Self {
+            path: path.to_owned(),
+            source: Source::new(path, text),
+            headers: Vec::new(),
+            starts: Vec::new(),
+            cells: Vec::new(),
+        };
+        let mut reader =
+            csv::ReaderBuilder::new().has_headers(false).flexible(true).trim(csv::Trim::All).from_reader(text.as_bytes());
+        for row in reader.records() {
+            match row {
+                Ok(row) if csv.headers.is_empty() => csv.headers = row.iter().map(ToOwned::to_owned).collect(),
+                Ok(row) => csv.add(row),
+                Err(error) => csv.source.report(0..0, format!("this is not CSV: {error}")),
+            }
+        }
+        csv.check_shape();
+        csv.source.verdict()?;
+        Ok(csv)
+    }
+
+    fn add(&mut self, row: csv::StringRecord) {
+        // The reader's position may stand before blank lines.
+        let from = row.position().map_or(0, |p| p.byte() as usize);
+        let blank = self.source.text.as_bytes()[from..].iter().take_while(|b| matches!(b, b'\n' | b'\r')).count();
+        self.starts.push(from + blank);
+        self.cells.push(row);
+    }
+
+    fn check_shape(&self) {
+        let end = self.source.text.len();
+        if self.headers.is_empty() {
+            self.source.report(end..end, "the file is empty: expected a header line and one row per time");
+        } else if self.cells.is_empty() {
+            self.source.report(end..end, "the file has a header and no row");
+        }
+        let wanted = self.headers.len();
+        if let Some(row) = self.cells.iter().position(|cells| cells.len() != wanted) {
+            let message = format!("this row has {} cells, the header has {wanted}", self.cells[row].len());
+            self.source.report_with(self.cell(row, 0), message, "leave a missing value empty between its commas");
+        }
+    }
+
+    /// Position of a column, or what is wrong with its name and the remedy.
+    pub(super) fn index(&self, column: &str) -> Result<usize, (String, String)> {
+        let found: Vec<usize> =
+            (0..self.headers.len()).filter(|i| self.headers[*i] == column).collect();
+        match found[..] {
+            [one] => Ok(one),
+            [] => {
+                let message = format!("`{}` has no column `{column}`", self.path.display());
+                let only = self.headers.first().filter(|h| self.headers.len() == 1 && h.contains([';', '\t']));
+                let help = match only {
+                    Some(_) => "its header has no comma: separate columns by commas, not by semicolons or tabs".to_owned(),
+                    None => self.columns_help(column),
+                };
+                Err((message, help))
+            }
+            _ => {
+                let message = format!("`{}` has {} columns named `{column}`", self.path.display(), found.len());
+                Err((message, "rename all but one".to_owned()))
+            }
+        }
+    }
+
+    fn columns_help(&self, column: &str) -> String {
+        let list = format!("its columns are {}", super::problem::quoted_list(&self.headers));
+        match suggestion(column, &self.headers) {
+            Some(near) if near.starts_with("did you mean") => format!("{near} {list}"),
+            _ => list,
+        }
+    }
+
+    /// The numbers of a column; an empty cell or `NaN` is NaN.
+    ///
+    /// # Errors
+    /// When a cell is neither; the first such cell, with the count of the others.
+    pub(super) fn numbers(&self, column: usize) -> Result<Vec<f64>, Problem> {
+        let parsed: Vec<Option<f64>> = self.cells.iter().map(|cells| parse(&cells[column])).collect();
+        let wrong: Vec<usize> = (0..parsed.len()).filter(|row| parsed[*row].is_none()).collect();
+        let Some(&row) = wrong.first() else {
+            return Ok(parsed.into_iter().flatten().collect());
+        };
+        let more = match wrong.len() {
+            1 => String::new(),
+            n => format!(", nor are {} other cells of this column", n - 1),
+        };
+        let name = &self.headers[column];
+        let message = format!("`{}` in column `{name}` is not a finite number{more}", &self.cells[row][column]);
+        Err(self.problem(row, column, message, "write a number with a decimal point; leave a missing value empty"))
+    }
+
+    /// The numbers of a time column, strictly increasing.
+    ///
+    /// # Errors
+    /// When a time is missing, no number, repeated, or earlier than the one before it.
+    pub(super) fn times(&self, column: usize) -> Result<Vec<f64>, Problem> {
+        let times = self.numbers(column)?;
+        if let Some(row) = times.iter().position(|t| t.is_nan()) {
+            let message = format!("the time in column `{}` is missing", self.headers[column]);
+            return Err(self.problem(row, column, message, "every row needs its time"));
+        }
+        let Some(before) = times.windows(2).position(|w| w[1] <= w[0]) else { return Ok(times) };
+        let row = before + 1;
+        let (a, b) = (times[before], times[row]);
+        let (line_a, line_b) = (self.line(before), self.line(row));
+        let (message, help) = if b < a {
+            (
+                format!("time goes back from {a} (line {line_a}) to {b} (line {line_b})"),
+                "times must increase from row to row: sort the rows, or split the file into records",
+            )
+        } else {
+            (
+                format!("duplicate time {b} on lines {line_a} and {line_b}"),
+                "times must increase from row to row: keep one of the rows, or average them",
+            )
+        };
+        Err(self.problem(row, column, message, help))
+    }
+
+    /// Line of a row, from 1, the header included.
+    pub(super) fn line(&self, row: usize) -> usize {
+        line_column(&self.source.text, self.starts[row]).0
+    }
+
+    /// A problem at one cell.
+    pub(super) fn problem(&self, row: usize, column: usize, message: String, help: &str) -> Problem {
+        Problem {
+            message,
+            help: Some(help.to_owned()),
+            file: self.path.clone(),
+            source_text: Some(self.source.text.clone()),
+            span: Some(self.cell(row, column)),
+        }
+    }
+
+    fn cell(&self, row: usize, column: usize) -> Range<usize> {
+        csv_field(&self.source.text, self.starts[row], column)
+    }
+}
+
+/// A finite number; NaN for an empty cell; `None` for anything else.
+fn parse(cell: &str) -> Option<f64> {
+    if cell.is_empty() {
+        return Some(f64::NAN);
+    }
+    cell.parse().ok().filter(|v: &f64| !v.is_infinite())
+}

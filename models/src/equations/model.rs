@@ -1,0 +1,125 @@
+//! A model made of expressions.
+//!
+//! It evaluates; [`crate::integrate`] integrates. Next file to read: [`crate::integrate`].
+
+use super::build::{self, Built};
+use super::def::EquationsDef;
+use super::expression::{At, Direction, Program};
+use crate::integrate::Solver;
+use crate::model::Drive;
+use crate::{Model, SetupError, Spec, nearest};
+
+/// A model whose equations a study states.
+#[derive(Clone, Debug)]
+pub struct EquationsModel {
+    def: EquationsDef,
+    built: Built,
+    /// n − 1 zeros and a one: its ends are the unit vectors.
+    unit: Vec<f64>,
+}
+
+impl EquationsModel {
+    /// Checks and compiles the equations.
+    ///
+    /// Names that are neither state, input, output, `t` nor `pi` are parameters, in the order of first use: states first,
+    /// each with its initial value and then its rate, then outputs.
+    ///
+    /// # Errors
+    /// [`SetupError::Expression`] with place and column, [`SetupError::Twice`], or [`SetupError::Invalid`] for a state
+    /// without rate or initial value, an unusable name or an unusable solver.
+    pub fn new(def: &EquationsDef) -> Result<Self, SetupError> {
+        let built = build::build(def)?;
+        let mut unit = vec![0.0; def.states.len()];
+        if let Some(last) = unit.last_mut() {
+            *last = 1.0;
+        }
+        Ok(Self { def: def.clone(), built, unit })
+    }
+
+    /// The same model with the named rate terms left out, wherever they occur; parameters that only they used are gone.
+    ///
+    /// # Errors
+    /// [`SetupError::Unknown`] for a term that is not replaceable.
+    pub fn without(&self, terms: &[&str]) -> Result<Self, SetupError> {
+        let mut def = self.def.clone();
+        for term in terms {
+            if !def.replaceable.iter().any(|name| name == term) {
+                let nearest = nearest(term, &self.def.replaceable);
+                return Err(SetupError::Unknown { what: "replaceable term", name: (*term).to_owned(), nearest });
+            }
+            def.replaceable.retain(|name| name != term);
+            for state in &mut def.states {
+                state.rate.retain(|(name, _)| name != term);
+                if state.rate.is_empty() {
+                    state.rate.push((state.name.clone(), "0".to_owned()));
+                }
+            }
+        }
+        Self::new(&def)
+    }
+
+    /// The equations as stated.
+    pub fn def(&self) -> &EquationsDef {
+        &self.def
+    }
+}
+
+fn write(programs: &[Program], at: &At<'_>, values: &mut [f64]) {
+    for (value, program) in values.iter_mut().zip(programs) {
+        *value = program.eval(at);
+    }
+}
+
+impl Model for EquationsModel {
+    fn spec(&self) -> &Spec {
+        &self.built.spec
+    }
+
+    fn initial(&self, theta: &[f64], x: &mut [f64]) {
+        let u = Drive { value: &[], slope: &[], history: &NoHistory };
+        write(&self.built.initial, &At { t: 0.0, x: &[], theta, u, y: &[] }, x);
+    }
+
+    fn rhs(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, dx: &mut [f64]) {
+        write(&self.built.rates, &At { t, x, theta, u, y: &[] }, dx);
+    }
+
+    fn output(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, y: &mut [f64]) {
+        write(&self.built.outputs, &At { t, x, theta, u, y: &[] }, y);
+    }
+
+    fn solver(&self) -> Solver {
+        self.built.solver
+    }
+
+    fn n_switch(&self) -> usize {
+        self.built.switches.len()
+    }
+
+    fn switches(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, g: &mut [f64]) {
+        write(&self.built.switches, &At { t, x, theta, u, y: &[] }, g);
+    }
+
+    fn jacobian(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, dfdx: &mut [f64], dfdt: &mut [f64]) -> bool {
+        let n = self.unit.len();
+        let at = At { t, x, theta, u, y: &[] };
+        dfdx.fill(0.0);
+        for (i, (rate, depends)) in self.built.rates.iter().zip(&self.built.depends).enumerate() {
+            for &j in depends {
+                let along = Direction { x: &self.unit[n - 1 - j..], ..Direction::default() };
+                dfdx[j * n + i] = rate.eval_dual(&at, &along).1;
+            }
+            dfdt[i] = rate.eval_dual(&at, &Direction { t: 1.0, u: u.slope, ..Direction::default() }).1;
+        }
+        true
+    }
+}
+
+/// Initial values use no input, so nothing asks for one's past.
+struct NoHistory;
+
+impl crate::model::History for NoHistory {
+    fn at(&self, _: usize, _: f64) -> f64 {
+        f64::NAN
+    }
+}

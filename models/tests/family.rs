@@ -1,0 +1,151 @@
+//! What every model of the catalogue must do.
+#![allow(clippy::float_cmp)]
+
+mod common;
+
+use common::{job, kinds, largest_difference, run, run_in_pieces, setup, window};
+use starlings_models::integrate::{self, Solver, Tolerance};
+use starlings_models::model::Segment;
+use starlings_models::{Forward, Model, ParticleError, Simulator, catalogue, native};
+
+#[test]
+fn every_kind_has_a_sentence_and_a_name_of_its_own() {
+    let specs = catalogue::specs();
+    for (i, spec) in specs.iter().enumerate() {
+        assert!(spec.says.ends_with('.'), "{}", spec.kind);
+        assert!(specs[..i].iter().all(|other| other.kind != spec.kind), "{} twice", spec.kind);
+    }
+}
+
+#[test]
+fn every_model_starts_from_a_finite_state_and_predicts_every_output() {
+    for kind in kinds() {
+        let (setup, theta) = setup(&kind);
+        let prediction = run(&*setup.build().unwrap(), &window(&setup, 20), &theta);
+        let spec = setup.spec().unwrap();
+        assert_eq!(prediction.outputs.len(), 20 * spec.n_output(), "{kind}");
+        assert_eq!(prediction.state.len(), spec.n_state(), "{kind}");
+        let model = setup.model().unwrap();
+        let mut x = vec![f64::NAN; spec.n_state()];
+        model.initial(&theta, &mut x);
+        assert!(x.iter().all(|v| v.is_finite()), "{kind}: {x:?}");
+    }
+}
+
+#[test]
+fn every_model_run_in_pieces_gives_the_bits_of_one_run() {
+    for kind in kinds() {
+        let (setup, theta) = setup(&kind);
+        let (model, window) = (setup.build().unwrap(), window(&setup, 24));
+        let whole = run(&*model, &window, &theta);
+        for every in [1, 5, 24] {
+            // Bitwise: pieces end at observation times, where a whole run ends its steps too.
+            assert_eq!(run_in_pieces(&*model, &window, &theta, every), whole, "{kind}, {every} times each");
+        }
+    }
+}
+
+#[test]
+fn every_model_run_in_pieces_with_an_observer_gives_the_bits_of_one_run() {
+    for kind in kinds() {
+        let (mut setup, theta) = setup(&kind);
+        setup.observer.kind = "nudging".to_owned();
+        setup.observer.gain = 7.0;
+        let mut window = window(&setup, 24);
+        for (i, value) in window.observed.iter_mut().enumerate() {
+            *value = if i % 5 == 0 { f64::NAN } else { (i as f64).cos() };
+        }
+        let model = setup.build().unwrap();
+        let whole = run(&*model, &window, &theta);
+        assert_eq!(run_in_pieces(&*model, &window, &theta, 5), whole, "{kind}");
+        setup.observer.gain = 0.0;
+        assert_ne!(run(&*setup.build().unwrap(), &window, &theta), whole, "{kind}: the observer did nothing");
+    }
+}
+
+#[test]
+fn every_model_gives_the_same_bits_twice() {
+    for kind in kinds() {
+        let (setup, theta) = setup(&kind);
+        let window = window(&setup, 20);
+        let (first, second) = (setup.build().unwrap(), setup.build().unwrap());
+        assert_eq!(run(&*first, &window, &theta), run(&*second, &window, &theta), "{kind}");
+    }
+}
+
+#[test]
+fn a_value_that_is_not_finite_is_an_error_that_names_it() {
+    for kind in kinds() {
+        let (setup, theta) = setup(&kind);
+        let (model, window) = (setup.build().unwrap(), window(&setup, 5));
+        for (i, name) in setup.parameters.iter().enumerate() {
+            let mut spoiled = theta.clone();
+            spoiled[i] = f64::NAN;
+            let error = model.run(&job(&window, &spoiled)).unwrap_err();
+            let what = format!("parameter `{name}`");
+            assert_eq!(error, ParticleError::NotFinite { what, time: 0.0 }, "{kind}");
+        }
+    }
+}
+
+#[test]
+fn an_input_that_is_not_finite_is_an_error_and_not_a_panic() {
+    for kind in kinds() {
+        let (setup, theta) = setup(&kind);
+        let mut window = window(&setup, 5);
+        let Some(input) = window.inputs.first_mut() else { continue };
+        input.values[10] = f64::NAN;
+        let error = setup.build().unwrap().run(&job(&window, &theta)).unwrap_err();
+        assert!(matches!(error, ParticleError::NotFinite { .. }), "{kind}: {error}");
+    }
+}
+
+#[test]
+fn every_closed_step_agrees_with_the_integrated_rate() {
+    struct NoHistory;
+    impl starlings_models::model::History for NoHistory {
+        fn at(&self, _: usize, _: f64) -> f64 {
+            f64::NAN
+        }
+    }
+    let tolerance = Tolerance { relative: 1e-12, absolute: 1e-12 };
+    for model in native::all() {
+        let spec = model.spec();
+        let theta: Vec<f64> = (1..=spec.parameters.len()).map(|i| 0.4 + 0.3 * i as f64).collect();
+        let (u0, slope) = (vec![30.0; spec.inputs.len()], vec![-12.0; spec.inputs.len()]);
+        let segment = Segment { t0: 0.2, t1: 0.9, u0: &u0, slope: &slope, history: &NoHistory };
+        let mut exact = vec![0.0; spec.n_state()];
+        model.initial(&theta, &mut exact);
+        let mut integrated = exact.clone();
+        model.advance(segment, &theta, &mut exact).unwrap();
+        integrate::advance::<dyn Model>(&*model, Solver::Dopri5(tolerance), segment, &theta, &mut integrated)
+            .unwrap();
+        // Values reach 80 and a few hundred steps of relative error 1e-12 add up.
+        let difference = largest_difference(&exact, &integrated);
+        assert!(difference < 1e-9, "{}: {difference:e}", spec.kind);
+    }
+}
+
+#[test]
+fn a_job_that_does_not_fit_is_refused() {
+    let (setup, theta) = setup("windkessel-2");
+    let model = Simulator::new(&setup).unwrap();
+    let good = window(&setup, 4);
+    let refused = |window: &starlings_models::Window, theta: &[f64]| {
+        let error = model.run(&job(window, theta)).unwrap_err();
+        assert!(matches!(error, ParticleError::BadJob(_)), "{error}");
+    };
+    refused(&good, &theta[..1]);
+    refused(&starlings_models::Window { observed: vec![], ..good.clone() }, &theta);
+    refused(&starlings_models::Window { inputs: vec![], ..good.clone() }, &theta);
+    refused(&starlings_models::Window { start: 0.3, ..good.clone() }, &theta);
+    refused(&starlings_models::Window { times: vec![], observed: vec![], ..good.clone() }, &theta);
+    let mut backwards = good.clone();
+    backwards.times.swap(0, 1);
+    refused(&backwards, &theta);
+    let mut uneven = good.clone();
+    uneven.inputs[0].values.pop();
+    refused(&uneven, &theta);
+    let short = starlings_models::Job { state: Some(vec![]), ..job(&good, &theta) };
+    assert!(matches!(model.run(&short), Err(ParticleError::BadJob(_))));
+}

@@ -1,0 +1,166 @@
+//! The commands around `run`: what they print, what they write, what they refuse.
+
+mod common;
+
+use std::process::Stdio;
+
+use common::{bytes, output, repository, run, starlings};
+use serde_json::Value;
+
+const STUDY: &str = "examples/pig-aorta/study.toml";
+
+fn json(stdout: &str) -> Value {
+    serde_json::from_str(stdout).unwrap_or_else(|e| panic!("{e}: {stdout}"))
+}
+
+#[test]
+fn check_counts_the_runs_and_shows_the_prior_misfit() {
+    let (code, stdout, stderr) = output(starlings().arg("check").arg(repository(STUDY)).arg("--json"));
+    assert_eq!(code, 0, "{stderr}");
+    let found = json(&stdout);
+    assert_eq!(found["particles"], 5, "four parameters, simplex points");
+    // 463 samples lie in the training span 0–2.31 s at 200 Hz.
+    assert_eq!(found["runs_per_pass"], 5 * 463);
+    assert!(found["trial"][0]["rmse"].as_f64().unwrap() > 2.0);
+}
+
+#[test]
+fn simulate_is_reproducible_and_its_noise_has_the_asked_size() {
+    let twin = |seed: &str, noise: &str| {
+        let (code, stdout, stderr) = output(
+            starlings()
+                .args(["simulate"])
+                .arg(repository(STUDY))
+                .args(["--set", "R=3.4", "--set", "initial:p=100", "--noise", noise, "--seed", seed]),
+        );
+        assert_eq!(code, 0, "{stderr}");
+        stdout
+    };
+    let pressure = |text: &str| -> Vec<f64> {
+        text.lines().skip(1).map(|line| line.split(',').nth(1).unwrap().parse().unwrap()).collect()
+    };
+    let (clean, noisy) = (twin("1", "0"), twin("1", "2.0"));
+    assert_eq!(noisy, twin("1", "2.0"));
+    assert_ne!(noisy, twin("2", "2.0"));
+    assert!(clean.starts_with("time,pressure,flow\n"), "{}", &clean[..40]);
+    let (clean, noisy) = (pressure(&clean), pressure(&noisy));
+    let n = clean.len() as f64;
+    let sd = (clean.iter().zip(&noisy).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / n).sqrt();
+    // 843 samples: the sample sd of noise 2 is within 10 % at more than four standard errors.
+    assert!((sd - 2.0).abs() < 0.2, "{sd}");
+}
+
+#[test]
+fn simulate_adds_a_built_in_effect_to_the_two_element_model() {
+    let run = |study: &str, extra: &[&str]| {
+        let mut command = starlings();
+        command.arg("simulate").arg(repository(study)).args(["--set", "R=3", "--set", "C=1.2", "--set", "initial:p=90"]);
+        let (code, stdout, stderr) = output(command.args(extra));
+        assert_eq!(code, 0, "{stderr}");
+        stdout
+            .lines()
+            .skip(1)
+            .map(|l| l.split(',').nth(1).unwrap().parse::<f64>().unwrap())
+            .collect::<Vec<_>>()
+    };
+    let three = run(STUDY, &["--set", "Zc=0.1"]);
+    let two = run("examples/pig-aorta/two-element.toml", &["--effect", "series-resistance=0.1"]);
+    let worst = three.iter().zip(&two).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    // The same closed-form step and one product: equal to rounding.
+    assert!(worst < 1e-10, "{worst}");
+    let (code, _, stderr) = output(
+        starlings().arg("simulate").arg(repository(STUDY)).args(["--effect", "series-resistence=0.1"]),
+    );
+    assert_eq!(code, 2);
+    assert!(stderr.contains("series-resistance"), "{stderr}");
+}
+
+#[test]
+fn models_lists_every_kind_and_offers_the_nearest() {
+    let (code, stdout, _) = output(starlings().args(["models", "--json"]));
+    assert_eq!(code, 0);
+    let kinds: Vec<String> =
+        json(&stdout).as_array().unwrap().iter().map(|s| s["kind"].as_str().unwrap().to_owned()).collect();
+    for kind in ["windkessel-2", "windkessel-3", "windkessel-4", "oscillator", "equations"] {
+        assert!(kinds.iter().any(|k| k == kind), "{kind} in {kinds:?}");
+    }
+    let (code, stdout, _) = output(starlings().args(["models", "windkessel-3"]));
+    assert_eq!(code, 0);
+    assert!(stdout.contains("Zc") && stdout.contains("flow"), "{stdout}");
+    let (code, _, stderr) = output(starlings().args(["models", "windkesel-3"]));
+    assert_eq!(code, 2);
+    assert!(stderr.contains("did you mean `windkessel-3`"), "{stderr}");
+}
+
+#[test]
+fn report_and_export_read_only_the_run_folder() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("run");
+    run(&repository(STUDY), &out, 1);
+    let before: Vec<Vec<u8>> = ["report.html", "summary.json", "posterior.csv"].map(|f| bytes(&out, f)).into();
+    for file in ["report.html", "summary.json", "posterior.csv"] {
+        std::fs::remove_file(out.join(file)).unwrap();
+    }
+    // Moved elsewhere, away from the study and its recordings.
+    let moved = dir.path().join("moved");
+    std::fs::rename(&out, &moved).unwrap();
+    let picture = dir.path().join("overview.svg");
+    let (code, _, stderr) = output(starlings().arg("report").arg(&moved).arg("--overview").arg(&picture));
+    assert_eq!(code, 0, "{stderr}");
+    let after: Vec<Vec<u8>> = ["report.html", "summary.json", "posterior.csv"].map(|f| bytes(&moved, f)).into();
+    assert_eq!(before, after);
+    assert!(std::fs::read_to_string(picture).unwrap().starts_with("<svg"));
+    for (table, rows) in [("estimates", 2 * 463 * 4), ("innovations", 2 * 463), ("analyses", 2 * 463), ("predictions", 843)] {
+        let (code, stdout, stderr) = output(starlings().arg("export").arg(&moved).args(["--table", table]));
+        assert_eq!(code, 0, "{stderr}");
+        assert_eq!(stdout.lines().count(), rows + 1, "{table}");
+    }
+}
+
+#[test]
+fn a_folder_without_a_run_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    for command in ["report", "export"] {
+        let (code, _, stderr) = output(starlings().arg(command).arg(dir.path()));
+        assert_eq!(code, 2, "{stderr}");
+        assert!(stderr.contains("run.db"), "{stderr}");
+    }
+}
+
+#[test]
+fn a_worker_gives_up_with_the_address_when_nobody_answers() {
+    // A port that was free a moment ago: nobody listens there.
+    let address = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
+    let (code, _, stderr) =
+        output(starlings().args(["worker", "--connect", &address, "--patience", "0.2"]));
+    assert_eq!(code, 1, "{stderr}");
+    assert!(stderr.contains(&address), "{stderr}");
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_ends_its_workers_and_says_how_to_go_on() {
+    use std::io::Read;
+
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("run");
+    let mut child = starlings()
+        .arg("run")
+        .arg(repository(STUDY))
+        .arg("--out")
+        .arg(&out)
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    common::wait_until("some analyses", || common::analyses(&out) > 50);
+    let interrupted = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(interrupted.success());
+    let status = child.wait().unwrap();
+    let mut stderr = String::new();
+    child.stderr.take().unwrap().read_to_string(&mut stderr).unwrap();
+    assert_eq!(status.code(), Some(1), "{stderr}");
+    assert!(stderr.contains("--resume"), "{stderr}");
+    // Standard error is shared with the workers: it closed, so they are gone as well.
+    assert!(!out.join("posterior.csv").exists());
+}

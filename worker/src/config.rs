@@ -1,0 +1,69 @@
+//! What a worker is told when it starts.
+
+use std::hash::{BuildHasher, Hasher};
+use std::sync::Arc;
+use std::time::Duration;
+
+use starlings_models::{Forward, Setup, SetupError};
+use starlings_proto::{Hello, PROTOCOL, VERSION, digest};
+use tokio_util::sync::CancellationToken;
+
+/// Makes what runs the jobs of a setup.
+pub type Factory = Arc<dyn Fn(&Setup) -> Result<Box<dyn Forward>, SetupError> + Send + Sync>;
+
+/// What a worker is told when it starts.
+#[derive(Clone)]
+pub struct WorkerConfig {
+    /// The coordinator, `host:port`.
+    pub connect: String,
+    /// Jobs at the same time, at least 1.
+    pub slots: usize,
+    /// End when the coordinator's connection closes, instead of dialling again.
+    pub once: bool,
+    /// How long to dial without an answer before giving up.
+    pub patience: Duration,
+    /// Ends the worker: it says goodbye and its jobs go elsewhere.
+    pub cancel: CancellationToken,
+    /// Makes what runs jobs; [`Setup::build`] unless replaced.
+    pub factory: Factory,
+    /// Host name told to the coordinator.
+    pub host: String,
+    /// BLAKE3 of the executable told to the coordinator; `None` when unknown.
+    pub build: Option<[u8; 32]>,
+}
+
+impl WorkerConfig {
+    /// One slot, native models, a minute of patience, and what this machine says of itself.
+    pub fn new(connect: impl Into<String>) -> Self {
+        Self {
+            connect: connect.into(),
+            slots: 1,
+            once: false,
+            patience: Duration::from_secs(60),
+            cancel: CancellationToken::new(),
+            factory: Arc::new(Setup::build),
+            host: host_name(),
+            build: std::env::current_exe().and_then(std::fs::read).ok().map(|bytes| digest(&bytes)),
+        }
+    }
+
+    pub(crate) fn hello(&self) -> Hello {
+        Hello {
+            protocol: PROTOCOL,
+            version: VERSION.to_owned(),
+            cores: std::thread::available_parallelism().map_or(1, |n| n.get() as u32),
+            slots: self.slots.max(1) as u32,
+            host: self.host.clone(),
+            pid: std::process::id(),
+            nonce: std::hash::RandomState::new().build_hasher().finish(),
+            build: self.build,
+            solver: None,
+        }
+    }
+}
+
+fn host_name() -> String {
+    let file = std::fs::read_to_string("/proc/sys/kernel/hostname").ok();
+    let name = file.or_else(|| std::env::var("HOSTNAME").ok()).or_else(|| std::env::var("COMPUTERNAME").ok());
+    name.map(|n| n.trim().to_owned()).filter(|n| !n.is_empty()).unwrap_or_else(|| "unknown-host".to_owned())
+}

@@ -1,0 +1,136 @@
+//! One stay with a coordinator: from its Welcome until it drains, vanishes, or the worker is cancelled.
+
+use std::time::Duration;
+
+use starlings_models::ParticleError;
+use starlings_proto::{Answer, FromWorker, ToWorker, WireError, wire};
+use tokio::sync::mpsc::UnboundedSender;
+use tokio_util::sync::CancellationToken;
+use tonic::Streaming;
+
+use crate::dial::Stay;
+use crate::setups::Setups;
+use crate::slots::{Slots, Task, answer};
+
+/// How long a leaving worker waits for the coordinator to close the stream.
+const GOODBYE_PATIENCE: Duration = Duration::from_secs(1);
+
+/// How a stay ended.
+#[derive(Debug)]
+pub(crate) enum Ended {
+    /// The coordinator asked the worker to leave.
+    Drained(String),
+    /// The connection is gone.
+    Lost(String),
+    /// The worker was cancelled.
+    Cancelled,
+}
+
+pub(crate) async fn serve(mut stay: Stay, slots: &Slots, setups: &Setups, cancel: &CancellationToken) -> Ended {
+    let mut beats = tokio::time::interval(Duration::from_secs_f64(stay.welcome.heartbeat));
+    beats.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+    let mut silence = Silence::default();
+    loop {
+        tokio::select! {
+            // Messages first: a flood of jobs must not be mistaken for silence.
+            biased;
+            message = stay.inbound.message() => {
+                silence.broken();
+                match take(message, &stay.outbox, slots, setups) {
+                    Ok(()) => {}
+                    Err(Ended::Drained(reason)) => {
+                        goodbye(&stay.outbox, &mut stay.inbound, &reason).await;
+                        return Ended::Drained(reason);
+                    }
+                    Err(ended) => return ended,
+                }
+            }
+            () = cancel.cancelled() => {
+                goodbye(&stay.outbox, &mut stay.inbound, "it was told to end").await;
+                return Ended::Cancelled;
+            }
+            _ = beats.tick() => {
+                let (running, queued) = slots.load();
+                send(&stay.outbox, FromWorker::Heartbeat { running, queued });
+                if let Some(reason) = silence.after_beat() {
+                    return Ended::Lost(reason);
+                }
+            }
+        }
+    }
+}
+
+/// Heartbeats of this side since the coordinator was last heard, after which it counts as gone.
+const SILENT_BEATS: u32 = 3;
+
+/// Counts heartbeats of this side since the coordinator was last heard. Counting beats instead of reading a clock keeps a
+/// suspended laptop from declaring its coordinator dead.
+#[derive(Default)]
+struct Silence {
+    beats: u32,
+}
+
+impl Silence {
+    fn broken(&mut self) {
+        self.beats = 0;
+    }
+
+    fn after_beat(&mut self) -> Option<String> {
+        self.beats += 1;
+        (self.beats > SILENT_BEATS).then(|| format!("the coordinator was silent for {SILENT_BEATS} heartbeats"))
+    }
+}
+
+fn take(
+    message: Result<Option<wire::ToWorker>, tonic::Status>,
+    outbox: &UnboundedSender<wire::FromWorker>,
+    slots: &Slots,
+    setups: &Setups,
+) -> Result<(), Ended> {
+    let message = match message {
+        Ok(Some(message)) => message,
+        Ok(None) => return Err(Ended::Lost("the coordinator closed the connection".to_owned())),
+        Err(status) => return Err(Ended::Lost(format!("the connection broke: {}", status.message()))),
+    };
+    match ToWorker::decode(message) {
+        Ok(ToWorker::Job { lease, setup, job }) => match setups.get(&setup) {
+            Some(forward) => slots.push(Task { lease, forward, job, outbox: outbox.clone() }),
+            None => refuse(outbox, lease, "its setup was not sent to this worker".to_owned()),
+        },
+        Err(WireError::Job { lease, source }) => refuse(outbox, lease, source.to_string()),
+        Ok(ToWorker::Setup { id, setup }) => {
+            let (setups, outbox) = (setups.clone(), outbox.clone());
+            // A thread of its own: building may take long, and the slots may be busy.
+            std::thread::spawn(move || {
+                let result = if setups.get(&id).is_some() { Ok(()) } else { setups.build(id, setup) };
+                send(&outbox, FromWorker::Setup { id, result });
+            });
+        }
+        Ok(ToWorker::Cancel(leases)) => slots.withdraw(&leases),
+        Ok(ToWorker::Drain(reason)) => return Err(Ended::Drained(reason)),
+        Ok(ToWorker::Heartbeat | ToWorker::Welcome(_) | ToWorker::Refuse(_)) => {}
+        Err(error) => return Err(Ended::Lost(format!("the coordinator sent a malformed message: {error}"))),
+    }
+    Ok(())
+}
+
+fn refuse(outbox: &UnboundedSender<wire::FromWorker>, lease: starlings_proto::Lease, reason: String) {
+    answer(outbox, lease, Answer::Ran(Err(ParticleError::BadJob(reason))), 0.0);
+}
+
+fn send(outbox: &UnboundedSender<wire::FromWorker>, message: FromWorker) {
+    if let Ok(message) = message.encode() {
+        let _ = outbox.send(message);
+    }
+}
+
+/// Says goodbye and waits shortly until the coordinator closes the stream, so that the message is not lost.
+async fn goodbye(
+    outbox: &UnboundedSender<wire::FromWorker>,
+    inbound: &mut Streaming<wire::ToWorker>,
+    reason: &str,
+) {
+    send(outbox, FromWorker::Goodbye(reason.to_owned()));
+    let closed = async { while let Ok(Some(_)) = inbound.message().await {} };
+    let _ = tokio::time::timeout(GOODBYE_PATIENCE, closed).await;
+}

@@ -1,0 +1,144 @@
+//! The threads that compute: one queue, one thread per slot, first in first out.
+//!
+//! A panicking model is a failed job, not a dead worker. The wall time of each run is measured here.
+
+use std::collections::VecDeque;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+use starlings_models::{Forward, Job, ParticleError};
+use starlings_proto::{Answer, FromWorker, Lease, wire};
+use tokio::sync::mpsc::UnboundedSender;
+
+/// One job with everything needed to run and answer it. The outbox belongs to the stream that gave the lease: once that
+/// stream is gone, so is the answer.
+pub(crate) struct Task {
+    pub(crate) lease: Lease,
+    pub(crate) forward: Arc<dyn Forward>,
+    pub(crate) job: Job,
+    pub(crate) outbox: UnboundedSender<wire::FromWorker>,
+}
+
+/// The slots of this process.
+pub(crate) struct Slots {
+    shared: Arc<Shared>,
+}
+
+#[derive(Default)]
+struct Shared {
+    queue: Mutex<Queue>,
+    filled: Condvar,
+    running: AtomicU32,
+    predictions: AtomicU64,
+    failures: AtomicU64,
+}
+
+#[derive(Default)]
+struct Queue {
+    tasks: VecDeque<Task>,
+    closed: bool,
+}
+
+impl Slots {
+    pub(crate) fn start(n: usize) -> std::io::Result<Self> {
+        let shared = Arc::new(Shared::default());
+        for slot in 0..n {
+            let shared = Arc::clone(&shared);
+            std::thread::Builder::new().name(format!("slot-{slot}")).spawn(move || shared.work())?;
+        }
+        Ok(Self { shared })
+    }
+
+    pub(crate) fn push(&self, task: Task) {
+        self.shared.lock().tasks.push_back(task);
+        self.shared.filled.notify_one();
+    }
+
+    /// Answers the given leases as withdrawn where they have not started.
+    pub(crate) fn withdraw(&self, leases: &[Lease]) {
+        let mut queue = self.shared.lock();
+        let (withdrawn, kept) = queue.tasks.drain(..).partition(|task| leases.contains(&task.lease));
+        queue.tasks = kept;
+        drop(queue);
+        let withdrawn: VecDeque<Task> = withdrawn;
+        for task in withdrawn {
+            answer(&task.outbox, task.lease, Answer::Withdrawn, 0.0);
+        }
+    }
+
+    /// Drops what waits, as when its stream is gone.
+    pub(crate) fn forget_queue(&self) {
+        self.shared.lock().tasks.clear();
+    }
+
+    /// Jobs being computed and jobs waiting.
+    pub(crate) fn load(&self) -> (u32, u32) {
+        (self.shared.running.load(Ordering::Relaxed), self.shared.lock().tasks.len() as u32)
+    }
+
+    /// Jobs answered with a prediction and with a failure.
+    pub(crate) fn answered(&self) -> (u64, u64) {
+        (self.shared.predictions.load(Ordering::Relaxed), self.shared.failures.load(Ordering::Relaxed))
+    }
+
+    /// Ends the threads, each after the job it computes.
+    pub(crate) fn close(&self) {
+        let mut queue = self.shared.lock();
+        queue.closed = true;
+        queue.tasks.clear();
+        drop(queue);
+        self.shared.filled.notify_all();
+    }
+}
+
+impl Shared {
+    fn lock(&self) -> MutexGuard<'_, Queue> {
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn next(&self) -> Option<Task> {
+        let mut queue = self.lock();
+        loop {
+            if queue.closed {
+                return None;
+            }
+            if let Some(task) = queue.tasks.pop_front() {
+                return Some(task);
+            }
+            queue = self.filled.wait(queue).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    fn work(&self) {
+        while let Some(Task { lease, forward, job, outbox }) = self.next() {
+            self.running.fetch_add(1, Ordering::Relaxed);
+            let started = Instant::now();
+            let result = catch_unwind(AssertUnwindSafe(|| forward.run(&job)))
+                .unwrap_or_else(|panic| Err(ParticleError::Solver(panic_text(panic.as_ref()))));
+            let cost = started.elapsed().as_secs_f64();
+            self.running.fetch_sub(1, Ordering::Relaxed);
+            let counter = if result.is_ok() { &self.predictions } else { &self.failures };
+            counter.fetch_add(1, Ordering::Relaxed);
+            answer(&outbox, lease, Answer::Ran(result), cost);
+        }
+    }
+}
+
+/// Answers a lease; an answer that does not fit on the wire becomes a failure that says so.
+pub(crate) fn answer(outbox: &UnboundedSender<wire::FromWorker>, lease: Lease, answer: Answer, cost: f64) {
+    let message = FromWorker::Result { lease, answer, cost }.encode().or_else(|error| {
+        let answer = Answer::Ran(Err(ParticleError::BadJob(error.to_string())));
+        FromWorker::Result { lease, answer, cost }.encode()
+    });
+    if let Ok(message) = message {
+        let _ = outbox.send(message);
+    }
+}
+
+/// What a panic said.
+pub(crate) fn panic_text(panic: &(dyn std::any::Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+    format!("the model panicked: {}", text.unwrap_or("without a message"))
+}
