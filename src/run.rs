@@ -165,8 +165,10 @@ fn relay(heard: mpsc::Receiver<FleetEvent>, kept: &mpsc::Sender<FleetEvent>, sil
             eprintln!("{event}");
         }
         tracing::info!(kind = event.kind(), "{event}");
-        // The store stops listening at the end of the run; later events have no reader.
-        let _ = kept.send(event);
+        if event.is_lasting() {
+            // The store stops listening at the end of the run; later events have no reader.
+            let _ = kept.send(event);
+        }
     }
 }
 

@@ -44,6 +44,6 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         ..WorkerConfig::new(args.connect.clone())
     };
     let report = starlings_worker::run(config).map_err(Failure::run)?;
-    tracing::info!(jobs = report.jobs, "done");
+    tracing::info!(predictions = report.predictions, failures = report.failures, reason = ?report.reason, "done");
     Ok(())
 }

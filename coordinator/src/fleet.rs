@@ -8,6 +8,7 @@
 pub mod dispatcher;
 mod error;
 mod event;
+mod event_text;
 mod grpc;
 mod hub;
 mod in_process;

@@ -5,11 +5,30 @@
 //! files to read: [`run`], then [`filter`].
 
 pub mod batch_fit;
+mod check;
+mod check_blame;
+mod check_model;
+mod check_parameters;
+mod check_settings;
+pub mod checked;
+mod expand;
+pub mod file;
+mod file_model;
+mod file_read;
+mod file_table;
 pub mod filter;
 pub mod flight;
 pub mod folder;
 pub mod forecast;
+mod locate;
+mod plan;
 pub mod posterior;
+mod prior;
+pub mod problem;
+mod record;
+mod record_channel;
+mod record_csv;
+mod record_input;
 pub mod resample;
 pub mod rescue;
 pub mod run;
@@ -20,6 +39,8 @@ pub mod trial;
 pub mod twin;
 pub mod warnings;
 
+pub use checked::{EstimatorChoice, EstimatorKind, FleetChoice, Record, Study, ThetaEntry};
 pub use folder::{FolderError, RunFolder};
+pub use problem::{Problem, StudyError};
 pub use run::{Fit, Progress, RunContext, RunError};
 pub use summary::Summary;

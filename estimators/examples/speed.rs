@@ -37,10 +37,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let t = DMatrix::from_fn(r, r, |i, j| if i == j { 0.9 } else { 0.1 / (r - 1) as f64 });
     let mut out = DMatrix::zeros(n, r);
     let gb = 2.0 * (n * r * 8) as f64 / 1e9;
-    let copy = best(10, || out.as_mut_slice().copy_from_slice(x.as_slice()));
-    let whole = best(10, || x.mul_to(&t, &mut out));
-    let blocked = best(10, || recombine(&x, &t, &mut out));
-    println!("copy {:.1} GB/s, mul_to {:.1} GB/s ({:.0} %), recombine {:.1} GB/s ({:.0} %)",
-        gb / copy, gb / whole, 100.0 * copy / whole, gb / blocked, 100.0 * copy / blocked);
+    let copy = best(25, || out.as_mut_slice().copy_from_slice(x.as_slice()));
+    let whole = best(25, || x.mul_to(&t, &mut out));
+    let blocked = best(25, || recombine(&x, &t, &mut out));
+    println!(
+        "copy {:.1} GB/s, mul_to {:.1} GB/s ({:.0} %), recombine {:.1} GB/s ({:.0} %)",
+        gb / copy,
+        gb / whole,
+        100.0 * copy / whole,
+        gb / blocked,
+        100.0 * copy / blocked
+    );
     Ok(())
 }

@@ -1,9 +1,9 @@
 //! Batch fit: iterated sigma-point Gauss-Newton with damping, for solvers that cannot restart from a state.
 //!
 //! One iteration is one ensemble of whole-record runs: the centre, and sigma points around it whose regression replaces
-//! the derivative (Gauss-Newton as in Bell 1994, on the linearisation of Arasaratnam & Haykin's statistical kind; damping of Levenberg 1944
-//! and Marquardt 1963, its control after Nielsen 1999). A centre that lowers the cost is kept; otherwise the step is
-//! shortened and recomputed from the linearisation of the best centre. It deliberately stops nowhere by itself:
+//! the derivative. Gauss-Newton with the prior as a term of its own (Bell 1994), damped after Levenberg (1944) and
+//! Marquardt (1963), the damping controlled after Nielsen (1999). A centre that lowers the cost is kept; otherwise the
+//! step is shortened and recomputed from the linearisation of the best centre. It deliberately stops nowhere by itself:
 //! the caller looks at `converged` and `max_iterations`. Read next: `linearisation.rs`.
 
 use nalgebra::{DMatrix, DVector};
@@ -15,7 +15,7 @@ use crate::{Data, EstimatorError, Gaussian, SigmaSet};
 /// Damping of the first step, relative to the diagonal of the information.
 const FIRST_DAMPING: f64 = 1e-3;
 /// Least damping after a rejected step.
-const REJECTED_DAMPING: f64 = 0.05;
+const REJECTED_DAMPING: f64 = 0.02;
 /// First factor by which a rejected step raises the damping; it doubles with every further one.
 const FIRST_GROWTH: f64 = 4.0;
 /// No parameter moves further than this in one step, in prior sd.
@@ -43,7 +43,7 @@ pub struct Batch {
 
 /// All that a batch fit carries from one ensemble to the next. Vectors and matrices are in parameters whitened by the
 /// prior: theta = prior mean + L u, L the lower Cholesky factor of the prior covariance.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(serde::Serialize, serde::Deserialize, Debug, Clone, PartialEq)]
 pub struct BatchState {
     /// Prior of the transformed parameters.
     pub prior: Gaussian,
@@ -146,7 +146,8 @@ impl Batch {
         data: &Data<'_>,
     ) -> Result<(BatchState, BatchStep), EstimatorError> {
         same("parameters of the state", self.set.n_param(), s.trial.len())?;
-        let ensemble = Ensemble { set: &self.set, centre: &s.trial, scale: &s.scale, predictions, failed, data };
+        let ensemble =
+            Ensemble { set: &self.set, centre: &s.trial, scale: &s.scale, predictions, failed, data };
         let mut next = s.clone();
         next.iteration += 1;
         let outcome = ensemble.linearise()?;
@@ -168,9 +169,13 @@ impl Batch {
         };
         let Some(best) = next.best.clone() else {
             next.scale *= 0.25;
-            return Ok((next.clone(), self.unstarted(&next)));
+            return Ok((next.clone(), Self::unstarted(&next)));
         };
-        if accepted { next.rejected = 0 } else { next.reject() }
+        if accepted {
+            next.rejected = 0;
+        } else {
+            next.reject();
+        }
         self.advance(&mut next, &best, accepted).map(|step| (next, step))
     }
 
@@ -201,7 +206,8 @@ impl Batch {
         let log_det: f64 = eigen.eigenvalues.iter().map(|v| v.ln()).sum();
         next.scale = &eigen.eigenvectors * sd * eigen.eigenvectors.transpose() * (self.spread * next.width);
         next.converged = step < self.tolerance;
-        let (u, gain) = if next.converged { (&best.centre + newton, step * step) } else { (best.centre.clone(), 0.0) };
+        let (u, gain) =
+            if next.converged { (&best.centre + newton, step * step) } else { (best.centre.clone(), 0.0) };
         let l = next.prior.factor();
         let covariance = &l * root.inverse() * l.transpose();
         Ok(BatchStep {
@@ -220,8 +226,8 @@ impl Batch {
         })
     }
 
-    /// The report when no ensemble could be linearised yet: nothing is known but the prior.
-    fn unstarted(&self, s: &BatchState) -> BatchStep {
+    /// The report while no ensemble could be linearised: nothing is known but the prior.
+    fn unstarted(s: &BatchState) -> BatchStep {
         BatchStep {
             cost: f64::INFINITY,
             misfit: f64::INFINITY,
@@ -243,7 +249,7 @@ impl BatchState {
         let foretold = -2.0 * s.dot(&from.gradient) - s.dot(&(from.hessian() * &s));
         if foretold > 0.0 {
             let ratio = (from.cost - to.cost) / foretold;
-            self.damping *= (1.0 - (2.0 * ratio - 1.0).powi(3)).clamp(0.1, 2.0);
+            self.damping *= (1.0 - (2.0 * ratio - 1.0).powi(3)).clamp(0.3, 2.0);
         }
         self.growth = FIRST_GROWTH;
     }

@@ -63,7 +63,8 @@ pub(crate) fn transform(
         let grown = &m * m.transpose() + DMatrix::from_diagonal(&added);
         m = grown.cholesky().ok_or_else(|| no_spread(&l))?.unpack();
     }
-    let b = l.clone().lu().solve(&m).filter(|b| b.iter().all(|v| v.is_finite())).ok_or_else(|| no_spread(&l))?;
+    let b =
+        l.clone().lu().solve(&m).filter(|b| b.iter().all(|v| v.is_finite())).ok_or_else(|| no_spread(&l))?;
     let mut t = dual * b * &set.points;
     for mut column in t.column_iter_mut() {
         column += &set.weights;

@@ -12,7 +12,9 @@ pub enum EstimatorError {
     #[error("no parameter to estimate: at least one is needed")]
     NoParameters,
     /// The free constant of the Julier-Uhlmann set leaves its centre without a positive weight.
-    #[error("kappa = {kappa} is not a positive finite number: the centre of the sigma set needs a positive weight")]
+    #[error(
+        "kappa = {kappa} is not a positive finite number: the centre of the sigma set needs a positive weight"
+    )]
     Kappa {
         /// The value given.
         kappa: f64,
@@ -28,7 +30,9 @@ pub enum EstimatorError {
         got: usize,
     },
     /// A prediction that the analysis needs is not a finite number.
-    #[error("prediction {row} of particle {particle} is {value}: run it again, pull it towards the mean, or drop it")]
+    #[error(
+        "prediction {row} of particle {particle} is {value}: run it again, pull it towards the mean, or drop it"
+    )]
     NonFinitePrediction {
         /// Row of the prediction, from 0.
         row: usize,
@@ -80,13 +84,17 @@ pub enum EstimatorError {
         parameters: Vec<usize>,
     },
     /// The particles no longer spread in some direction, so a factor of their covariance cannot be inverted.
-    #[error("the particles have no spread left in parameter number {parameter}: its drift or prior must not be zero")]
+    #[error(
+        "the particles have no spread left in parameter number {parameter}: its drift or prior must not be zero"
+    )]
     NoSpread {
         /// Parameter, from 0.
         parameter: usize,
     },
     /// A drift lies outside its range.
-    #[error("drift {value} of parameter number {parameter}: forgetting lies in (0, 1], a walk is not negative")]
+    #[error(
+        "drift {value} of parameter number {parameter}: forgetting lies in (0, 1], a walk is not negative"
+    )]
     DriftOutOfRange {
         /// Parameter, from 0.
         parameter: usize,
@@ -94,7 +102,9 @@ pub enum EstimatorError {
         value: f64,
     },
     /// The model could not be run at the first centre of a batch fit, or nowhere close to it.
-    #[error("the model cannot be run at the prior mean (attempt {attempt}): move the prior or bound its parameters")]
+    #[error(
+        "the model cannot be run at the prior mean (attempt {attempt}): move the prior or bound its parameters"
+    )]
     StartFailed {
         /// How many ensembles were tried.
         attempt: usize,

@@ -33,9 +33,8 @@ pub fn exchange_prior(
     let svd = ratio.svd(false, true);
     let v = svd.v_t.ok_or_else(|| singular.clone())?.transpose();
     let information = svd.singular_values.map(|s| (s - 1.0) * (s + 1.0)).map(|e| e.max(0.0));
-    let whiten = |x: &DMatrix<f64>| {
-        l.solve_lower_triangular(x).map(|y| v.tr_mul(&y)).ok_or_else(|| singular.clone())
-    };
+    let whiten =
+        |x: &DMatrix<f64>| l.solve_lower_triangular(x).map(|y| v.tr_mul(&y)).ok_or_else(|| singular.clone());
     let column = |x: DVector<f64>| DMatrix::from_column_slice(x.len(), 1, x.as_slice());
     let at = |g: &Gaussian| whiten(&column(&g.mean - &posterior.mean)).map(|y| y.column(0).clone_owned());
     let (y_used, y_wanted) = (at(used)?, at(wanted)?);

@@ -6,7 +6,7 @@
 use nalgebra::{DMatrix, DVector};
 
 /// Mean and covariance of p transformed parameters.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(serde::Serialize, serde::Deserialize, Debug, Clone, PartialEq)]
 pub struct Gaussian {
     /// Mean, length p.
     pub mean: DVector<f64>,

@@ -11,7 +11,7 @@ use crate::whiten::{Spread, Sweep};
 use crate::{Data, EstimatorError, SigmaSet};
 
 /// The fit at one centre, and the slope around it, in parameters whitened by the prior.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(serde::Serialize, serde::Deserialize, Debug, Clone, PartialEq)]
 pub struct Linearisation {
     /// Centre u, length p.
     pub centre: DVector<f64>,
@@ -78,14 +78,22 @@ impl Ensemble<'_> {
             spread: Spread::Ignored,
         };
         match sweep.run(false) {
-            Ok(whitened) => Ok(Outcome::Fit(self.fit(&whitened.products, whitened.log_det_noise, &slope, rows.len()))),
+            Ok(whitened) => {
+                Ok(Outcome::Fit(self.fit(&whitened.products, whitened.log_det_noise, &slope, rows.len())))
+            }
             // Finite predictions whose square overflows: as far from the data as a failed run.
             Err(EstimatorError::NotFinite { .. }) => Ok(Outcome::NoCentre),
             Err(error) => Err(error),
         }
     }
 
-    fn fit(&self, products: &DMatrix<f64>, log_det_noise: f64, slope: &DMatrix<f64>, n_used: usize) -> Linearisation {
+    fn fit(
+        &self,
+        products: &DMatrix<f64>,
+        log_det_noise: f64,
+        slope: &DMatrix<f64>,
+        n_used: usize,
+    ) -> Linearisation {
         let r = self.set.n_particle();
         let misfit = products[(r + 1, r + 1)];
         let information = slope.tr_mul(&(products.view((1, 1), (r, r)) * slope));
@@ -105,9 +113,13 @@ impl Ensemble<'_> {
     /// D X^T (X D X^T)^{-1}, r x p, over the points that ran, X their offsets from the centre: deviations from the
     /// centre times this is the slope. `None` when the points do not span.
     fn regression(&self, active: &[bool]) -> Option<DMatrix<f64>> {
-        let weights = DVector::from_fn(self.set.n_particle(), |i, _| {
-            if active[i + 1] { self.set.weights[i] } else { 0.0 }
-        });
+        let weights =
+            DVector::from_fn(
+                self.set.n_particle(),
+                |i, _| {
+                    if active[i + 1] { self.set.weights[i] } else { 0.0 }
+                },
+            );
         let dual = weighted_transpose(&self.set.points, &weights);
         let moment = &self.set.points * &dual;
         if moment.clone().symmetric_eigen().eigenvalues.min() < SPANNED {

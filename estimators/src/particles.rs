@@ -76,7 +76,8 @@ impl Geometry {
         let eigen = m.symmetric_eigen();
         let weak = eigen.eigenvalues.imin();
         let weakest = (eigen.eigenvectors.column(weak).clone_owned(), eigen.eigenvalues[weak]);
-        let inverse = DMatrix::from_diagonal(&eigen.eigenvalues.map(|v| if v > SPANNED { 1.0 / v } else { 0.0 }));
+        let inverse =
+            DMatrix::from_diagonal(&eigen.eigenvalues.map(|v| if v > SPANNED { 1.0 / v } else { 0.0 }));
         let slope = dual * &eigen.eigenvectors * inverse * eigen.eigenvectors.transpose();
         let mean = &weights - &slope * &c;
         Self { whole: false, redundant, points, weights, mean, slope, information, weakest }

@@ -46,7 +46,9 @@ impl SigmaSet {
         match kind {
             Points::Simplex => Ok(simplex(p)),
             Points::Canonical => Ok(pairs(p, n.sqrt(), 0.5 / n, None)),
-            Points::Star => Ok(pairs(p, (n + 0.5).sqrt(), 1.0 / (2.0 * n + 1.0), Some(1.0 / (2.0 * n + 1.0)))),
+            Points::Star => {
+                Ok(pairs(p, (n + 0.5).sqrt(), 1.0 / (2.0 * n + 1.0), Some(1.0 / (2.0 * n + 1.0))))
+            }
             Points::JulierUhlmann { kappa } if kappa > 0.0 && kappa.is_finite() => {
                 Ok(pairs(p, (n + kappa).sqrt(), 0.5 / (n + kappa), Some(kappa / (n + kappa))))
             }

@@ -79,11 +79,16 @@ impl Sweep<'_> {
         let mut out = self.empty();
         let mut columns = keep.then(|| DMatrix::zeros(self.rows.len(), self.n_column()));
         let mut block = Block::new(self.n_column());
+        // Rows of one channel share their noise: its logarithm, dear for many rows, is taken once per change.
+        let (mut last, mut reciprocal, mut log) = (f64::NAN, f64::NAN, f64::NAN);
         for (b, rows) in self.rows.chunks(BLOCK).enumerate() {
             let first = b * BLOCK;
             for (inverse, &k) in block.inverse_sd.iter_mut().zip(rows) {
-                *inverse = 1.0 / sd[k];
-                out.log_det_noise += 2.0 * sd[k].ln();
+                if sd[k].to_bits() != last.to_bits() {
+                    (last, reciprocal, log) = (sd[k], 1.0 / sd[k], sd[k].ln());
+                }
+                *inverse = reciprocal;
+                out.log_det_noise += 2.0 * log;
             }
             self.fill(&mut block, rows);
             self.record(&block, first, rows.len(), &mut out);

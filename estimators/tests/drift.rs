@@ -1,4 +1,5 @@
 //! Forgetting and random walks: the covariance of the parameters grows exactly as asked, sensitivities stay.
+#![allow(clippy::unwrap_used)]
 mod common;
 
 use common::{difference, filter, mean_factor, normal, rng};
@@ -53,7 +54,8 @@ fn drift_adds_exactly_its_variance_and_keeps_means_and_sensitivities() {
     for points in common::ALL {
         for drift in DRIFTS {
             let pair = pair(points, drift, &[3.0, -4.0]);
-            let ((m0, l0), (m1, l1)) = (pair.after(&pair.theta, &pair.still), pair.after(&pair.theta, &pair.moved));
+            let ((m0, l0), (m1, l1)) =
+                (pair.after(&pair.theta, &pair.still), pair.after(&pair.theta, &pair.moved));
             let mut expected = &l0 * l0.transpose();
             for (j, d) in drift.into_iter().enumerate() {
                 match d {

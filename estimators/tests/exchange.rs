@@ -1,4 +1,5 @@
 //! Exchanging the prior is exact on a linear Gaussian problem.
+#![allow(clippy::unwrap_used)]
 mod common;
 
 use common::{difference, filter, gauss, normal, rng};

@@ -1,4 +1,5 @@
 //! What must hold for every analysis, each against an exact answer.
+#![allow(clippy::unwrap_used)]
 mod common;
 
 use common::{around, difference, filter, gauss, kalman, linear, mean_factor, normal, rng, uniform};
@@ -19,9 +20,11 @@ struct Run {
 fn reduced(problem: &common::Linear, roukf: &Roukf) -> Run {
     let (n, p) = problem.l0.shape();
     let sd: Vec<f64> = (0..p).map(|j| problem.l0[(n - p + j, j)]).collect();
-    let mut particles = roukf.init(&Gaussian::independent(problem.x0.rows(n - p, p).clone_owned().as_slice(), &sd));
+    let mut particles =
+        roukf.init(&Gaussian::independent(problem.x0.rows(n - p, p).clone_owned().as_slice(), &sd));
     let mut x = around(&problem.x0, &problem.l0, &roukf.set);
-    let mut run = Run { x: x.clone(), theta: x.clone(), log_likelihood: 0.0, ensembles: vec![], transforms: vec![] };
+    let mut run =
+        Run { x: x.clone(), theta: x.clone(), log_likelihood: 0.0, ensembles: vec![], transforms: vec![] };
     for values in &problem.observed {
         x = &problem.a * x;
         let data = Data { values, noise: &problem.noise };
@@ -122,7 +125,8 @@ fn without_observations_the_simplex_does_not_move_and_other_sets_keep_mean_and_f
         let r = roukf.set.n_particle();
         let a = step(&roukf, &normal(&mut g, 2, r), &[f64::NAN; 2], &Noise::Diagonal(vec![1.0; 2]));
         let x = normal(&mut g, 7, r);
-        let ((m0, l0), (m1, l1)) = (mean_factor(&x, &roukf.set), mean_factor(&(&x * &a.transform), &roukf.set));
+        let ((m0, l0), (m1, l1)) =
+            (mean_factor(&x, &roukf.set), mean_factor(&(&x * &a.transform), &roukf.set));
         // Identity and projection to a few roundings.
         assert!((m0 - m1).amax() < 1e-13 && difference(&l0, &l1) < 1e-13);
         assert!(points != Points::Simplex || a.transform == DMatrix::identity(r, r));
@@ -188,7 +192,8 @@ fn one_by_one_or_all_at_once_independent_observations_say_the_same() {
         xs *= &a.transform;
         log_likelihood += a.log_likelihood;
     }
-    let ((m1, l1), (m2, l2)) = (mean_factor(&(x * batch.transform), &roukf.set), mean_factor(&xs, &roukf.set));
+    let ((m1, l1), (m2, l2)) =
+        (mean_factor(&(x * batch.transform), &roukf.set), mean_factor(&xs, &roukf.set));
     // Predictions reach 1e3 noise sd, which costs three digits: 1e-12 measured.
     assert!((m1 - m2).amax() < 1e-9);
     assert!(difference(&(&l1 * l1.transpose()), &(&l2 * l2.transpose())) < 1e-9);
@@ -274,7 +279,8 @@ fn the_product_of_transforms_smooths_like_rauch_tung_and_striebel() {
             let eigen = pm.clone().symmetric_eigen();
             let limit = 1e-11 * eigen.eigenvalues.amax();
             let inverse = eigen.eigenvalues.map(|v| if v > limit { 1.0 / v } else { 0.0 });
-            let inverse = &eigen.eigenvectors * DMatrix::from_diagonal(&inverse) * eigen.eigenvectors.transpose();
+            let inverse =
+                &eigen.eigenvectors * DMatrix::from_diagonal(&inverse) * eigen.eigenvectors.transpose();
             let gain = pp * problem.a.transpose() * inverse;
             mean = xp + &gain * (&mean - xm);
             covariance = pp + &gain * (&covariance - pm) * gain.transpose();

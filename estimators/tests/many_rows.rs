@@ -1,4 +1,5 @@
 //! The routes through an analysis agree: few rows or many, diagonal or dense noise, Gram matrix or stored columns.
+#![allow(clippy::unwrap_used)]
 mod common;
 
 use common::{difference, filter, gauss, normal, rng, uniform};
@@ -27,7 +28,8 @@ fn problem(points: Points, scale: f64) -> (Analysis, Analysis, Analysis) {
     for first in (0..m).step_by(10) {
         let block = zs.rows(first, 10).clone_owned();
         let noise = Noise::Diagonal(sd[first..first + 10].to_vec());
-        let a = roukf.analysis(&particles, &block, &Data { values: &values[first..first + 10], noise: &noise });
+        let a =
+            roukf.analysis(&particles, &block, &Data { values: &values[first..first + 10], noise: &noise });
         let a = a.unwrap().1;
         zs *= &a.transform;
         t *= &a.transform;
@@ -93,7 +95,10 @@ fn very_informative_rows_take_the_stable_route_without_losing_the_likelihood() {
         let sd = found.sd();
         for j in 0..3 {
             // Predictions of 1e8 carry rounding of 1e-8, seen through 200 rows of unit noise.
-            assert!((found.mean[j] - prior.mean[j] - shift[j]).abs() < 1e-6 * sd[j].max(1e-9), "{points:?} {j}");
+            assert!(
+                (found.mean[j] - prior.mean[j] - shift[j]).abs() < 1e-6 * sd[j].max(1e-9),
+                "{points:?} {j}"
+            );
         }
         assert!(a.nis < 1.0 && sd[0] < 1e-8 && sd[2] > 0.99, "{points:?} {} {sd}", a.nis);
     }

@@ -1,11 +1,10 @@
 //! Particles that were pulled towards the mean or dropped: nothing is lost where the model is linear.
+#![allow(clippy::unwrap_used)]
 mod common;
 
 use common::{difference, filter, mean_factor, normal, rng};
 use nalgebra::{DMatrix, DVector};
-use starlings_estimators::{
-    Analysis, Data, EstimatorError, Gaussian, Noise, Particles, Points, Root, Roukf,
-};
+use starlings_estimators::{Analysis, Data, EstimatorError, Gaussian, Noise, Particles, Points, Root, Roukf};
 
 /// A linear model of two parameters more than it has rows, or many more rows.
 struct Linear {
@@ -17,7 +16,11 @@ struct Linear {
 fn linear(m: usize) -> Linear {
     let mut g = rng(40);
     let values = normal(&mut g, m, 1);
-    Linear { h: normal(&mut g, m, 3), values: values.as_slice().to_vec(), noise: Noise::Diagonal(vec![0.7; m]) }
+    Linear {
+        h: normal(&mut g, m, 3),
+        values: values.as_slice().to_vec(),
+        noise: Noise::Diagonal(vec![0.7; m]),
+    }
 }
 
 impl Linear {
@@ -75,7 +78,11 @@ fn a_linear_model_loses_nothing_by_dropped_particles() {
             let dropped = roukf.drop(&particles, lost).unwrap();
             let found = linear(m).analysis(&roukf, &dropped);
             assert_same(&found, &expected);
-            assert_eq!(found.1.transform.row(lost).amax().to_bits(), 0, "nothing of a dropped particle is used");
+            assert_eq!(
+                found.1.transform.row(lost).amax().to_bits(),
+                0,
+                "nothing of a dropped particle is used"
+            );
         }
     }
 }
@@ -87,7 +94,9 @@ fn pulling_states_with_the_matrix_keeps_the_linear_relation_and_the_mean() {
         let states = normal(&mut rng(41), 6, 3) * &particles.theta;
         let (pulled, m) = roukf.pull(&particles, 2, 0.3);
         assert!((roukf.mean(&pulled) - roukf.mean(&particles)).amax() < 1e-12, "a few roundings");
-        assert!(difference(&roukf.gaussian(&pulled).covariance, &roukf.gaussian(&particles).covariance) < 1e-12);
+        assert!(
+            difference(&roukf.gaussian(&pulled).covariance, &roukf.gaussian(&particles).covariance) < 1e-12
+        );
         let expected = roukf.mean(&particles) + (particles.theta.column(2) - roukf.mean(&particles)) * 0.3;
         assert!((pulled.theta.column(2) - expected).amax() < 1e-13);
         let a = linear(4).analysis(&roukf, &pulled).1;
@@ -96,7 +105,10 @@ fn pulling_states_with_the_matrix_keeps_the_linear_relation_and_the_mean() {
             mean_factor(&(&states * m * a.transform), &roukf.set),
             mean_factor(&(states * whole.transform), &roukf.set),
         );
-        assert!((m1 - m2).amax() < 1e-11 && difference(&l1, &l2) < 1e-11, "states move as if nothing was pulled");
+        assert!(
+            (m1 - m2).amax() < 1e-11 && difference(&l1, &l2) < 1e-11,
+            "states move as if nothing was pulled"
+        );
     }
 }
 
@@ -156,7 +168,10 @@ fn bad_input_is_named_by_row_and_particle() {
     assert_eq!(ask(&z, &[value, 1.0], &good), Err(EstimatorError::NonFiniteObservation { row: 0, value }));
     let shape = |what, expected, got| Err(EstimatorError::Shape { what, expected, got });
     assert_eq!(ask(&z, &[0.0], &good), shape("rows of the predictions", 1, 2));
-    assert_eq!(ask(&z.columns(0, 3).clone_owned(), &[0.0; 2], &good), shape("columns of the predictions", 4, 3));
+    assert_eq!(
+        ask(&z.columns(0, 3).clone_owned(), &[0.0; 2], &good),
+        shape("columns of the predictions", 4, 3)
+    );
     assert_eq!(ask(&z, &[0.0; 2], &Noise::Diagonal(vec![1.0])), shape("noise standard deviations", 2, 1));
     let silent = Noise::Diagonal(vec![1.0, 0.0]);
     assert_eq!(ask(&z, &[0.0; 2], &silent), Err(EstimatorError::NoiseNotPositive { row: 1, value: 0.0 }));

@@ -1,12 +1,11 @@
 //! The filter on a Windkessel: reference trajectory, the plain unscented filter, two passes.
+#![allow(clippy::unwrap_used)]
 mod common;
 
 use common::rcr::{MM_HG, TRUTH, forecast, physical, predict, pressure, prior, truth};
 use common::{difference, filter, gauss, rng};
 use nalgebra::{DMatrix, DVector};
-use starlings_estimators::{
-    Data, Gaussian, Noise, Particles, Points, Root, Roukf, SigmaSet, exchange_prior,
-};
+use starlings_estimators::{Data, Gaussian, Noise, Particles, Points, Root, Roukf, SigmaSet, exchange_prior};
 
 /// Filters all pressures; particles after each analysis and the log-likelihood.
 fn run(roukf: &Roukf, prior: &Gaussian, observed: &[f64], sigma: f64) -> (Vec<Particles>, f64) {
@@ -56,7 +55,8 @@ fn star_points_resampled_before_each_analysis_are_the_plain_unscented_filter() {
     let roukf = filter(Points::Star, 4, Root::Symmetric);
     let set = &roukf.set;
     let (noise, r) = (Noise::Diagonal(vec![2.0 * MM_HG]), set.n_particle());
-    let norm = DVector::from_column_slice(&[1.0, 1.0, 1.0, 0.1 / MM_HG]);
+    // Unequal scales: equal prior sd would leave the leading directions undefined.
+    let norm = DVector::from_column_slice(&[1.0, 1.3, 0.8, 0.1 / MM_HG]);
     let mut particles = roukf.init(&prior(0.7));
     let mut pi = particles.theta.rows(3, 1).clone_owned();
     // The plain filter knows the augmented state (log R_p, log R_d, log C, pi) and its sigma points only.
@@ -71,7 +71,8 @@ fn star_points_resampled_before_each_analysis_are_the_plain_unscented_filter() {
         let mut augmented = particles.theta.clone();
         augmented.rows_mut(3, 1).copy_from(&pi);
         let (mean, _) = common::moments(&augmented, set);
-        let weighted = DMatrix::from_fn(4, r, |i, j| norm[i] * set.weights[j].sqrt() * (augmented[(i, j)] - mean[i]));
+        let weighted =
+            DMatrix::from_fn(4, r, |i, j| norm[i] * set.weights[j].sqrt() * (augmented[(i, j)] - mean[i]));
         let (resampled, t) = roukf.resample(&particles, &weighted.tr_mul(&weighted)).unwrap();
         pi *= &t;
         let data = Data { values: &[z], noise: &noise };
@@ -87,7 +88,10 @@ fn star_points_resampled_before_each_analysis_are_the_plain_unscented_filter() {
             // 120 nonlinear steps amplify roundings of the eigenvectors.
             assert!((m[i] - mean[i]).abs() * norm[i] < 1e-8, "mean {i} at {k}");
             for j in 0..4 {
-                assert!((c[(i, j)] - covariance[(i, j)]).abs() * norm[i] * norm[j] < 1e-8, "covariance at {k}");
+                assert!(
+                    (c[(i, j)] - covariance[(i, j)]).abs() * norm[i] * norm[j] < 1e-8,
+                    "covariance at {k}"
+                );
             }
         }
     }
@@ -110,7 +114,9 @@ fn unscented_update(
         eigen.eigenvectors[(i, order[j])] * eigen.eigenvalues[order[j]].sqrt() / norm[i]
     });
     let points = common::around(&mean, &root, set);
-    let h = DMatrix::from_fn(1, points.ncols(), |_, i| points[(3, i)] + points[(0, i)].exp() * common::rcr::flow(10 * k));
+    let h = DMatrix::from_fn(1, points.ncols(), |_, i| {
+        points[(3, i)] + points[(0, i)].exp() * common::rcr::flow(10 * k)
+    });
     let centre = (&h * &set.weights)[0];
     let (mut pzz, mut pxz) = ((2.0 * MM_HG).powi(2), DVector::zeros(4));
     for i in 0..points.ncols() {
@@ -121,7 +127,9 @@ fn unscented_update(
     let covariance = covariance - &pxz * pxz.transpose() / pzz;
     let inverse = root.clone().try_inverse().unwrap();
     let eigen = (&inverse * &covariance * inverse.transpose()).symmetric_eigen();
-    let c = &eigen.eigenvectors * DMatrix::from_diagonal(&eigen.eigenvalues.map(f64::sqrt)) * eigen.eigenvectors.transpose();
+    let c = &eigen.eigenvectors
+        * DMatrix::from_diagonal(&eigen.eigenvalues.map(f64::sqrt))
+        * eigen.eigenvectors.transpose();
     *x = common::around(&after, &(root * c), set);
     (after, covariance)
 }

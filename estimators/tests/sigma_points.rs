@@ -1,4 +1,5 @@
 //! The moments of every sigma set.
+#![allow(clippy::unwrap_used)]
 mod common;
 
 use common::ALL;

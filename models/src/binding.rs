@@ -67,7 +67,12 @@ impl Binding {
         let theta = spec.parameters.iter().zip(theta).map(|(q, value)| {
             value.ok_or_else(|| SetupError::Missing { model: spec.kind.clone(), name: q.name.clone() })
         });
-        Ok(Self { names: setup.parameters.clone(), theta: theta.collect::<Result<_, _>>()?, targets, initial })
+        Ok(Self {
+            names: setup.parameters.clone(),
+            theta: theta.collect::<Result<_, _>>()?,
+            targets,
+            initial,
+        })
     }
 
     /// Number of values in a job.
@@ -136,11 +141,7 @@ fn resolve(spec: &Spec, name: &str, what: &'static str) -> Result<Target, SetupE
     }
     let parameters = spec.parameters.iter().map(|q| q.name.clone());
     let states = spec.states.iter().map(|q| format!("{INITIAL}{}", q.name));
-    Err(SetupError::Unknown {
-        what,
-        name: name.to_owned(),
-        nearest: nearest(name, parameters.chain(states)),
-    })
+    Err(SetupError::Unknown { what, name: name.to_owned(), nearest: nearest(name, parameters.chain(states)) })
 }
 
 /// Refuses a constant that is not finite or that physics forbids.

@@ -6,13 +6,16 @@
 mod affine;
 mod build;
 mod calculus;
+mod check;
 mod compile;
 pub mod def;
+mod dual;
 pub mod expression;
 mod inline;
 pub mod model;
 mod node;
 mod parse;
+mod parsed;
 mod program;
 
 pub use def::{EquationsDef, InputDef, Method, OutputDef, SolverDef, StateDef};

@@ -4,6 +4,7 @@
 //! adapts. The step control, the location of switching points and sliding along them are shared by the adaptive methods.
 //! Nothing here keeps memory between segments, so that a run depends on its job only. Next file to read: [`dopri5`].
 
+pub mod auto;
 mod control;
 pub mod dopri5;
 mod events;
@@ -64,7 +65,7 @@ pub fn advance<M: Model + ?Sized>(
     x: &mut [f64],
 ) -> Result<(), ParticleError> {
     match solver {
-        Solver::Auto(tolerance) => control::auto(model, segment, theta, x, tolerance),
+        Solver::Auto(tolerance) => auto::advance(model, segment, theta, x, tolerance),
         Solver::Dopri5(tolerance) => dopri5::advance(model, segment, theta, x, tolerance),
         Solver::Rosenbrock(tolerance) => rosenbrock::advance(model, segment, theta, x, tolerance),
         Solver::Fixed { step } => fixed::advance(model, segment, theta, x, step),

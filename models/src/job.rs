@@ -70,7 +70,9 @@ pub enum ParticleError {
         time: f64,
     },
     /// The integrator could not go on with a positive step.
-    #[error("the integrator's step fell to {step:e} at t = {time}: the model is too stiff for it or has a singularity there")]
+    #[error(
+        "the integrator's step fell to {step:e} at t = {time}: the model is too stiff for it or has a singularity there"
+    )]
     StepTooSmall {
         /// Time in the study's unit.
         time: f64,

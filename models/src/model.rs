@@ -72,7 +72,15 @@ pub trait Model: Send + Sync {
 
     /// Writes ∂f/∂x (n × n, column by column) and the rate's time derivative at fixed state, inputs moving by their slopes;
     /// says whether it did. Without it a stiff integrator takes finite differences.
-    fn jacobian(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, dfdx: &mut [f64], dfdt: &mut [f64]) -> bool {
+    fn jacobian(
+        &self,
+        t: f64,
+        x: &[f64],
+        theta: &[f64],
+        u: Drive<'_>,
+        dfdx: &mut [f64],
+        dfdt: &mut [f64],
+    ) -> bool {
         let _ = (t, x, theta, u, dfdx, dfdt);
         false
     }

@@ -9,7 +9,7 @@ pub mod nudging;
 use crate::setup::{ObserverDef, SetupError};
 use crate::{Spec, nearest};
 
-pub use none::None;
+pub use none::NoObserver;
 pub use nudging::Nudging;
 
 /// What an observer corrects with: one observation time.

@@ -100,7 +100,9 @@ pub enum SetupError {
         nearest: Option<String>,
     },
     /// A model parameter that neither the constants nor the parameters give.
-    #[error("parameter `{name}` of model `{model}` has no value: add it to the model's constants or to the parameters")]
+    #[error(
+        "parameter `{name}` of model `{model}` has no value: add it to the model's constants or to the parameters"
+    )]
     Missing {
         /// The model's kind.
         model: String,

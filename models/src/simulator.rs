@@ -2,7 +2,7 @@
 //!
 //! For each observation time: advance over the spans on which the inputs are linear, record the outputs, and only then let
 //! the observer see the observed values of that same time. No clock and no randomness: same job, same bits. A run over
-//! consecutive windows equals one run over the whole. Next file to read: [`crate::inputs`], then [`crate::binding`].
+//! consecutive windows equals one run over the whole. Next file to read: `inputs`, then `binding`.
 
 use crate::binding::Binding;
 use crate::effect;
@@ -79,8 +79,7 @@ impl Simulator {
             return Ok(());
         }
         let spec = self.spec();
-        let lists =
-            [("input", &spec.inputs, u), ("state", &spec.states, x), ("output", &spec.outputs, y)];
+        let lists = [("input", &spec.inputs, u), ("state", &spec.states, x), ("output", &spec.outputs, y)];
         let found = lists.iter().find_map(|(what, list, values)| {
             let at = values.iter().position(|value| !value.is_finite())?;
             Some(format!("{what} `{}`", component_name(list, at)))
@@ -170,4 +169,20 @@ fn component_name(list: &[Quantity], mut at: usize) -> String {
         at -= q.size;
     }
     String::new()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_field_takes_one_row_per_component_and_is_named_with_its_index() {
+        let field = Quantity { size: 3, ..Quantity::new("wall", "mm") };
+        let list = vec![Quantity::new("p", ""), field, Quantity::new("q", "")];
+        let spec = Spec { outputs: list.clone(), ..crate::catalogue::specs().remove(0) };
+        let names = ["q", "wall"].map(str::to_owned);
+        assert_eq!(rows(&spec, &names).expect("known outputs"), [4, 1, 2, 3]);
+        assert_eq!(component_name(&list, 3), "wall[2]");
+        assert_eq!(component_name(&list, 4), "q");
+    }
 }

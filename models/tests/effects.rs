@@ -5,7 +5,8 @@ mod common;
 
 use common::{kinds, largest_difference, run, run_in_pieces, setup, window};
 use starlings_models::effect::{Addition, EffectParameter, EffectState};
-use starlings_models::{EffectDef, Setup, SetupError};
+use starlings_models::equations::{EquationsDef, InputDef, OutputDef, StateDef};
+use starlings_models::{EffectDef, ModelDef, Setup, SetupError, Signal};
 
 fn effect(name: &str, adds: &[(&str, &str)], parameters: &[&str]) -> EffectDef {
     let add = |(to, term): &(&str, &str)| Addition { to: (*to).to_owned(), term: (*term).to_owned() };
@@ -111,12 +112,42 @@ fn a_leak_on_the_input_is_the_same_leak() {
 }
 
 #[test]
+fn a_term_on_an_input_also_moves_its_slope() {
+    let clock = StateDef {
+        name: "x".to_owned(),
+        initial: "0".to_owned(),
+        rate: vec![("x".to_owned(), "2".to_owned())],
+        ..StateDef::default()
+    };
+    let slope = OutputDef { name: "slope".to_owned(), value: "ddt(u)".to_owned(), ..OutputDef::default() };
+    let equations = EquationsDef {
+        states: vec![clock],
+        outputs: vec![slope],
+        inputs: vec![InputDef { name: "u".to_owned(), ..InputDef::default() }],
+        ..EquationsDef::default()
+    };
+    let model = ModelDef { kind: "equations".to_owned(), equations: Some(equations), ..ModelDef::default() };
+    let setup = Setup { model, outputs: vec!["slope".to_owned()], ..Setup::default() };
+    let setup = with(&setup, effect("drift", &[("u", "a*x + a*t*t")], &["a"]), &[3.0]);
+    let mut window = window(&setup, 4);
+    window.inputs[0] = Signal { times: vec![0.0, 10.0], values: vec![0.0, 50.0] };
+    let got = run(&*setup.build().unwrap(), &window, &[]).outputs;
+    // du/dt = 5 + 3·2 + 3·2t, exact but for a few roundings.
+    let want: Vec<f64> = window.times.iter().map(|t| 11.0 + 6.0 * t).collect();
+    assert!(largest_difference(&got, &want) < 1e-13, "{got:?}");
+}
+
+#[test]
 fn a_sensor_with_a_lag_brings_its_own_state() {
     let (mut setup, _) = setup("windkessel-2");
     setup.model.constants.insert("initial:p".to_owned(), 100.0);
     let mut lag = effect("sensor lag", &[("pressure", "a*(held - p)")], &["a", "lag", "start"]);
-    lag.states =
-        vec![EffectState { name: "held".into(), initial: "start".into(), rate: "(pressure - held)/lag".into(), ..EffectState::default() }];
+    lag.states = vec![EffectState {
+        name: "held".into(),
+        initial: "start".into(),
+        rate: "(pressure - held)/lag".into(),
+        ..EffectState::default()
+    }];
     let setup = with(&setup, lag, &[1.0, 0.25, 60.0]);
     let mut window = window(&setup, 20);
     window.inputs[0].values.fill(0.0);
@@ -152,7 +183,8 @@ fn a_constant_that_only_a_term_uses_is_allowed() {
     assert!(refused(&offset).to_string().contains("unknown name `height`"), "{}", refused(&offset));
     offset.model.constants.insert("height".to_owned(), 3.0);
     let got = run(&*offset.build().unwrap(), &window, &theta).outputs;
-    let want: Vec<f64> = run(&*setup.build().unwrap(), &window, &theta).outputs.iter().map(|p| p + 6.0).collect();
+    let want: Vec<f64> =
+        run(&*setup.build().unwrap(), &window, &theta).outputs.iter().map(|p| p + 6.0).collect();
     assert_eq!(got, want);
 }
 
@@ -174,10 +206,18 @@ fn an_effect_that_does_not_fit_is_refused_with_its_place() {
     let taken = with(&setup, effect("a", &[("p", "R*p")], &["R"]), &[]);
     assert_eq!(refused(&taken), SetupError::Twice("R".to_owned()));
     let unused = with(&setup, effect("a", &[("p", "a*p")], &["a", "b"]), &[]);
-    assert!(refused(&unused).to_string().contains("`b` of effect `a` stands in none"), "{}", refused(&unused));
+    assert!(
+        refused(&unused).to_string().contains("`b` of effect `a` stands in none"),
+        "{}",
+        refused(&unused)
+    );
     let none = with(&setup, effect("a", &[], &["a"]), &[]);
     assert!(refused(&none).to_string().contains("needs at least one term"));
-    let twice = with(&with(&setup, effect("a", &[("p", "a*p")], &["a"]), &[]), effect("a", &[("p", "b*p")], &["b"]), &[]);
+    let twice = with(
+        &with(&setup, effect("a", &[("p", "a*p")], &["a"]), &[]),
+        effect("a", &[("p", "b*p")], &["b"]),
+        &[],
+    );
     assert_eq!(refused(&twice), SetupError::Twice("a".to_owned()));
 }
 

@@ -36,7 +36,8 @@ fn resolve(name: &str) -> Option<Slot> {
 }
 
 fn compile(text: &str) -> Result<Program, ExpressionError> {
-    let nearest = |name: &str| starlings_models::nearest(name, ["x", "v", "k", "m", "u", "y", "g", "pressure"]);
+    let nearest =
+        |name: &str| starlings_models::nearest(name, ["x", "v", "k", "m", "u", "y", "g", "pressure"]);
     Expression::parse(text)?.compile(&resolve, &nearest)
 }
 

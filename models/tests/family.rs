@@ -127,6 +127,18 @@ fn every_closed_step_agrees_with_the_integrated_rate() {
 }
 
 #[test]
+fn outputs_come_in_the_order_in_which_they_are_asked_for() {
+    let (mut setup, theta) = setup("oscillator");
+    let both = run(&*setup.build().unwrap(), &window(&setup, 3), &theta).outputs;
+    setup.outputs = vec!["velocity".to_owned(), "position".to_owned()];
+    let swapped = run(&*setup.build().unwrap(), &window(&setup, 3), &theta).outputs;
+    assert_eq!(swapped, [both[1], both[0], both[3], both[2], both[5], both[4]]);
+    setup.outputs.pop();
+    let velocity = run(&*setup.build().unwrap(), &window(&setup, 3), &theta).outputs;
+    assert_eq!(velocity, [both[1], both[3], both[5]]);
+}
+
+#[test]
 fn a_job_that_does_not_fit_is_refused() {
     let (setup, theta) = setup("windkessel-2");
     let model = Simulator::new(&setup).unwrap();

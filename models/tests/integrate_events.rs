@@ -28,7 +28,7 @@ fn model(states: &[(&str, &str, &str)], method: Method) -> EquationsModel {
         ..EquationsDef::default()
     };
     def.solver.method = method;
-    EquationsModel::new(&def).unwrap()
+    EquationsModel::new(&def).expect("valid equations")
 }
 
 /// Runs over `[0, end]` in `pieces` equal windows; the input is u = t.
@@ -94,7 +94,8 @@ fn a_spring_that_stiffens_at_a_stop_keeps_its_energy() {
 
 #[test]
 fn two_switches_in_one_step_are_both_met() {
-    let x = run(&model(&[("x", "0", "step(t - 0.3)*step(0.4 - t) + step(t - 0.7)")], Method::Auto), 1.0, 1).unwrap();
+    let x = run(&model(&[("x", "0", "step(t - 0.3)*step(0.4 - t) + step(t - 0.7)")], Method::Auto), 1.0, 1)
+        .unwrap();
     assert_close(x[0], 0.1 + 0.3, "both switches");
 }
 
@@ -119,7 +120,8 @@ fn dry_friction_slows_a_block_down_and_then_holds_it() {
 fn a_held_block_breaks_loose_when_the_force_exceeds_friction() {
     // v' = t - 2 sign(v) from rest: held until t = 2, then v = (t - 2)²/2.
     for pieces in [1, 10, 333] {
-        let x = run(&model(&[("x", "0", "v"), ("v", "0", "u - 2*sign(v)")], Method::Auto), 4.0, pieces).unwrap();
+        let x =
+            run(&model(&[("x", "0", "v"), ("v", "0", "u - 2*sign(v)")], Method::Auto), 4.0, pieces).unwrap();
         assert_close(x[1], 2.0, &format!("velocity, in {pieces}"));
         assert_close(x[0], 8.0 / 6.0, &format!("way, in {pieces}"));
     }

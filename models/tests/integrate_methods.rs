@@ -61,7 +61,7 @@ fn logistic() -> Ode {
 }
 
 fn logistic_error(solver: Solver) -> f64 {
-    let x = run(&logistic(), solver, [0.0, 2.0], &[0.5]).unwrap();
+    let x = run(&logistic(), solver, [0.0, 2.0], &[0.5]).expect("a smooth problem");
     (x[0] - 1.0 / (1.0 + (-2.0_f64).exp())).abs()
 }
 
@@ -98,7 +98,7 @@ fn order_by_work(method: fn(Tolerance) -> Solver) -> f64 {
     use std::sync::atomic::{AtomicU64, Ordering};
     static CALLS: AtomicU64 = AtomicU64::new(0);
     static LOCK: std::sync::Mutex<()> = std::sync::Mutex::new(());
-    let _one_at_a_time = LOCK.lock().unwrap();
+    let _one_at_a_time = LOCK.lock().expect("no run panicked");
     let counted = ode(2, |t, x, _, dx| {
         CALLS.fetch_add(1, Ordering::Relaxed);
         dx[0] = x[1];
@@ -106,7 +106,8 @@ fn order_by_work(method: fn(Tolerance) -> Solver) -> f64 {
     });
     let [coarse, fine] = [1e-6, 1e-9].map(|relative| {
         CALLS.store(0, Ordering::Relaxed);
-        let x = run(&counted, method(tolerance(relative)), [0.0, 20.0], &[1.0, 0.0]).unwrap();
+        let x =
+            run(&counted, method(tolerance(relative)), [0.0, 20.0], &[1.0, 0.0]).expect("a smooth problem");
         // x'' = -9 x + sin t from (1, 0): cos 3t − sin(3t)/24 + sin(t)/8.
         let exact = 60.0_f64.cos() - 60.0_f64.sin() / 24.0 + 20.0_f64.sin() / 8.0;
         ((x[0] - exact).abs(), CALLS.load(Ordering::Relaxed) as f64)
@@ -176,7 +177,12 @@ fn auto_goes_over_to_rosenbrock_where_dormand_prince_gives_up() {
     let y = run(&robertson(), Solver::Auto(tolerance), [0.0, 4e3], &y0).unwrap();
     let strict = Tolerance { relative: 1e-10, absolute: 1e-15 };
     let exact = run(&robertson(), Solver::Rosenbrock(strict), [0.0, 4e3], &y0).unwrap();
-    assert!((y[0] - exact[0]).abs() < 1e-5 * exact[0], "{} against {}: ten times the tolerance", y[0], exact[0]);
+    assert!(
+        (y[0] - exact[0]).abs() < 1e-5 * exact[0],
+        "{} against {}: ten times the tolerance",
+        y[0],
+        exact[0]
+    );
     assert!((y.iter().sum::<f64>() - 1.0).abs() < 1e-10, "mass is conserved by a linear invariant");
 }
 
@@ -208,8 +214,11 @@ fn a_run_cut_at_window_boundaries_equals_the_continuous_run() {
 
 #[test]
 fn the_same_job_gives_the_same_bits() {
-    for solver in [Solver::Auto(tolerance(1e-8)), Solver::Rosenbrock(tolerance(1e-8)), Solver::Fixed { step: 0.01 }] {
-        let bits = || run(&oscillator(), solver, [0.0, 3.0], &[1.0, 0.5]).unwrap().into_iter().map(f64::to_bits);
+    for solver in
+        [Solver::Auto(tolerance(1e-8)), Solver::Rosenbrock(tolerance(1e-8)), Solver::Fixed { step: 0.01 }]
+    {
+        let bits =
+            || run(&oscillator(), solver, [0.0, 3.0], &[1.0, 0.5]).unwrap().into_iter().map(f64::to_bits);
         assert!(bits().eq(bits()));
     }
 }

@@ -4,13 +4,11 @@
 mod common;
 
 use common::{kinds, largest_difference, run, setup, window};
-use starlings_models::{Setup, Window};
+use starlings_models::{ObserverDef, Setup, Window};
 
 fn nudged(setup: &Setup, gain: f64) -> Setup {
-    let mut setup = setup.clone();
-    setup.observer.kind = "nudging".to_owned();
-    setup.observer.gain = gain;
-    setup
+    let observer = ObserverDef { kind: "nudging".to_owned(), gain, ..ObserverDef::default() };
+    Setup { observer, ..setup.clone() }
 }
 
 #[test]
@@ -22,7 +20,11 @@ fn on_noise_free_data_of_the_true_model_the_prediction_does_not_move_with_the_ga
         window.observed.clone_from(&truth.outputs);
         for gain in [0.1, 10.0, 1e6] {
             // Bitwise: every innovation is exactly zero.
-            assert_eq!(run(&*nudged(&setup, gain).build().unwrap(), &window, &theta), truth, "{kind}, gain {gain}");
+            assert_eq!(
+                run(&*nudged(&setup, gain).build().unwrap(), &window, &theta),
+                truth,
+                "{kind}, gain {gain}"
+            );
         }
     }
 }
@@ -58,12 +60,7 @@ fn a_wrong_initial_pressure_is_forgotten_at_the_rate_of_the_gain() {
 #[test]
 fn an_observation_at_the_very_start_is_predicted_but_corrects_nothing() {
     let (setup, theta) = setup("oscillator");
-    let window = Window {
-        start: 0.0,
-        times: vec![0.0],
-        observed: vec![9.0, 9.0],
-        inputs: vec![],
-    };
+    let window = Window { start: 0.0, times: vec![0.0], observed: vec![9.0, 9.0], inputs: vec![] };
     let prediction = run(&*nudged(&setup, 1e9).build().unwrap(), &window, &theta);
     assert_eq!(prediction.outputs, [1.0, 0.0]);
     assert_eq!(prediction.state, [1.0, 0.0]);

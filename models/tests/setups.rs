@@ -37,7 +37,10 @@ fn an_unknown_state_behind_initial_is_named_as_a_state() {
 
 #[test]
 fn an_unknown_output_constant_or_observer_is_refused() {
-    assert_eq!(refused(|s| s.outputs[0] = "presure".to_owned()), unknown("output", "presure", Some("pressure")));
+    assert_eq!(
+        refused(|s| s.outputs[0] = "presure".to_owned()),
+        unknown("output", "presure", Some("pressure"))
+    );
     let error = refused(|s| {
         s.model.constants.insert("L".to_owned(), 1.0);
     });

@@ -8,8 +8,8 @@ pub mod convert;
 
 pub use bytes::Bytes;
 pub use convert::{
-    Answer, FromWorker, Hello, JobEncoder, Lease, SetupId, ToWorker, Welcome, WireError, decode_setup, digest,
-    encode_setup,
+    Answer, FromWorker, Hello, JobEncoder, Lease, SetupId, ToWorker, Welcome, WireError, decode_setup,
+    digest, encode_setup,
 };
 
 /// Number of the protocol; coordinator and worker must have the same.

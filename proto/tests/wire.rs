@@ -1,4 +1,5 @@
 //! What is sent is what arrives, bit by bit, and what is malformed is an error and no panic.
+#![allow(clippy::unwrap_used)]
 
 use std::sync::Arc;
 
@@ -6,8 +7,8 @@ use proptest::prelude::*;
 use prost::Message;
 use starlings_models::{Job, ModelDef, ParticleError, Prediction, Setup, Signal, Window};
 use starlings_proto::{
-    Answer, FromWorker, Hello, JobEncoder, Lease, MAX_INLINE_STATE, ToWorker, Welcome, WireError, convert::job::check_size,
-    decode_setup, encode_setup, wire,
+    Answer, FromWorker, Hello, JobEncoder, Lease, MAX_INLINE_STATE, ToWorker, Welcome, WireError,
+    convert::job::check_size, decode_setup, encode_setup, wire,
 };
 
 fn any_float() -> impl Strategy<Value = f64> {
@@ -41,14 +42,25 @@ fn window() -> impl Strategy<Value = Window> {
                 Just(inputs),
                 Just(start),
             )
-                .prop_map(|(times, observed, inputs, start)| Window { start, times, observed, inputs })
+                .prop_map(|(times, observed, inputs, start)| Window {
+                    start,
+                    times,
+                    observed,
+                    inputs,
+                })
         },
     )
 }
 
 fn job() -> impl Strategy<Value = Job> {
     (any::<u32>(), any::<u32>(), window(), floats(8), prop::option::of(floats(8))).prop_map(
-        |(particle, record, window, theta, state)| Job { particle, record, window: Arc::new(window), theta, state },
+        |(particle, record, window, theta, state)| Job {
+            particle,
+            record,
+            window: Arc::new(window),
+            theta,
+            state,
+        },
     )
 }
 
@@ -69,15 +81,19 @@ fn failure() -> impl Strategy<Value = ParticleError> {
 
 fn answer() -> impl Strategy<Value = Answer> {
     prop_oneof![
-        (floats(8), floats(8))
-            .prop_map(|(outputs, state)| Answer::Ran(Ok(Prediction { outputs, state, cost: 0.25 }))),
+        (floats(8), floats(8)).prop_map(|(outputs, state)| Answer::Ran(Ok(Prediction {
+            outputs,
+            state,
+            cost: 0.25
+        }))),
         failure().prop_map(|error| Answer::Ran(Err(error))),
         Just(Answer::Withdrawn),
     ]
 }
 
 fn from_worker() -> impl Strategy<Value = FromWorker> {
-    let hello = (any::<u32>(), ".*", 1_u32.., any::<u64>(), any::<Option<[u8; 32]>>(), any::<Option<Vec<u8>>>());
+    let hello =
+        (any::<u32>(), ".*", 1_u32.., any::<u64>(), any::<Option<[u8; 32]>>(), any::<Option<Vec<u8>>>());
     prop_oneof![
         hello.prop_map(|(protocol, text, slots, nonce, build, solver)| {
             FromWorker::Hello(Hello {
@@ -210,7 +226,10 @@ fn the_coordinator_s_messages_arrive_as_sent() {
 
 #[test]
 fn a_setup_arrives_as_sent_and_a_damaged_one_says_so() {
-    let mut setup = Setup { model: ModelDef { kind: "windkessel-3".to_owned(), ..ModelDef::default() }, ..Setup::default() };
+    let mut setup = Setup {
+        model: ModelDef { kind: "windkessel-3".to_owned(), ..ModelDef::default() },
+        ..Setup::default()
+    };
     setup.model.constants.insert("R".to_owned(), 0.1 + 0.2);
     let (id, json) = encode_setup(&setup).unwrap();
     assert_eq!(decode_setup(&id, &json), Ok(setup));

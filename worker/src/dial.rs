@@ -35,7 +35,7 @@ pub(crate) struct Stay {
 }
 
 pub(crate) enum Dialled {
-    Connected(Stay),
+    Connected(Box<Stay>),
     Cancelled,
 }
 
@@ -47,7 +47,8 @@ enum Attempt {
 pub(crate) fn endpoint(address: &str) -> Result<Endpoint, WorkerError> {
     let bad = || WorkerError::BadAddress { address: address.to_owned() };
     let bare = address.strip_prefix("http://").unwrap_or(address);
-    let port = bare.rsplit_once(':').and_then(|(host, port)| port.parse::<u16>().ok().filter(|_| !host.is_empty()));
+    let port =
+        bare.rsplit_once(':').and_then(|(host, port)| port.parse::<u16>().ok().filter(|_| !host.is_empty()));
     port.ok_or_else(bad)?;
     let endpoint = Endpoint::from_shared(format!("http://{bare}")).map_err(|_| bad())?;
     Ok(endpoint
@@ -62,7 +63,11 @@ pub(crate) fn endpoint(address: &str) -> Result<Endpoint, WorkerError> {
 }
 
 /// Dials until a coordinator welcomes, refuses, or patience ends.
-pub(crate) async fn dial(config: &WorkerConfig, endpoint: &Endpoint, hello: &Hello) -> Result<Dialled, WorkerError> {
+pub(crate) async fn dial(
+    config: &WorkerConfig,
+    endpoint: &Endpoint,
+    hello: &Hello,
+) -> Result<Dialled, WorkerError> {
     let started = Instant::now();
     let mut wait = FIRST_WAIT;
     loop {
@@ -73,7 +78,7 @@ pub(crate) async fn dial(config: &WorkerConfig, endpoint: &Endpoint, hello: &Hel
         let last = tokio::select! {
             () = config.cancel.cancelled() => return Ok(Dialled::Cancelled),
             attached = attempt => match attached {
-                Ok(stay) => return Ok(Dialled::Connected(stay)),
+                Ok(stay) => return Ok(Dialled::Connected(Box::new(stay))),
                 Err(Attempt::Refused(reason)) => {
                     return Err(WorkerError::Refused { address: config.connect.clone(), reason });
                 }
@@ -98,13 +103,15 @@ pub(crate) async fn dial(config: &WorkerConfig, endpoint: &Endpoint, hello: &Hel
 
 async fn attach(endpoint: &Endpoint, hello: Hello) -> Result<Stay, Attempt> {
     let channel = endpoint.connect().await.map_err(|error| Attempt::Failed(causes(&error)))?;
-    let mut client =
-        FleetClient::new(channel).max_decoding_message_size(MAX_MESSAGE).max_encoding_message_size(MAX_MESSAGE);
+    let mut client = FleetClient::new(channel)
+        .max_decoding_message_size(MAX_MESSAGE)
+        .max_encoding_message_size(MAX_MESSAGE);
     let (outbox, outgoing) = mpsc::unbounded_channel();
     let failed = |text: &str| Attempt::Failed(text.to_owned());
     let hello = FromWorker::Hello(hello).encode().map_err(|error| failed(&error.to_string()))?;
     let _ = outbox.send(hello);
-    let response = client.work(UnboundedReceiverStream::new(outgoing)).await.map_err(|s| failed(s.message()))?;
+    let response =
+        client.work(UnboundedReceiverStream::new(outgoing)).await.map_err(|s| failed(s.message()))?;
     let mut inbound = response.into_inner();
     let first = inbound.message().await.map_err(|status| failed(status.message()))?;
     match first.map(ToWorker::decode) {

@@ -14,8 +14,6 @@ mod slots;
 use std::sync::Arc;
 use std::time::Instant;
 
-use tokio_util::sync::CancellationToken;
-
 pub use config::{Factory, WorkerConfig};
 use dial::Dialled;
 use session::Ended;
@@ -38,7 +36,9 @@ pub struct WorkerReport {
 #[derive(Debug, thiserror::Error)]
 pub enum WorkerError {
     /// No coordinator answered in time.
-    #[error("no coordinator at {address} for {waited:.0} s ({last}): is it running, and is the address right?")]
+    #[error(
+        "no coordinator at {address} for {waited:.0} s ({last}): is it running, and is the address right?"
+    )]
     NoCoordinator {
         /// The address dialled.
         address: String,
@@ -74,7 +74,8 @@ pub enum WorkerError {
 /// [`WorkerError`]; a lost connection is none, unless nobody answers within the patience afterwards.
 pub fn run(config: WorkerConfig) -> Result<WorkerReport, WorkerError> {
     let slots = Slots::start(config.slots.max(1)).map_err(WorkerError::Start)?;
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(WorkerError::Start)?;
+    let runtime =
+        tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(WorkerError::Start)?;
     let config = Arc::new(config);
     let result = runtime.block_on(serve(&config, &slots));
     slots.close();
@@ -95,7 +96,7 @@ async fn serve(config: &Arc<WorkerConfig>, slots: &Slots) -> Result<WorkerReport
         sessions += 1;
         tracing::info!(run = stay.welcome.run, address = config.connect, "joined");
         let stayed_since = Instant::now();
-        let ended = session::serve(stay, slots, &setups, &config.cancel).await;
+        let ended = session::serve(*stay, slots, &setups, &config.cancel).await;
         slots.forget_queue();
         tracing::info!(?ended, seconds = stayed_since.elapsed().as_secs_f64(), "left");
         match ended {
@@ -111,6 +112,3 @@ fn report(slots: &Slots, sessions: u64, reason: &str) -> WorkerReport {
     let (predictions, failures) = slots.answered();
     WorkerReport { predictions, failures, sessions, reason: reason.to_owned() }
 }
-
-/// A token that ends [`run`]; cancel it from a signal handler.
-pub type Cancel = CancellationToken;

@@ -26,7 +26,12 @@ pub(crate) enum Ended {
     Cancelled,
 }
 
-pub(crate) async fn serve(mut stay: Stay, slots: &Slots, setups: &Setups, cancel: &CancellationToken) -> Ended {
+pub(crate) async fn serve(
+    mut stay: Stay,
+    slots: &Slots,
+    setups: &Setups,
+    cancel: &CancellationToken,
+) -> Ended {
     let mut beats = tokio::time::interval(Duration::from_secs_f64(stay.welcome.heartbeat));
     beats.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
     let mut silence = Silence::default();
@@ -77,7 +82,8 @@ impl Silence {
 
     fn after_beat(&mut self) -> Option<String> {
         self.beats += 1;
-        (self.beats > SILENT_BEATS).then(|| format!("the coordinator was silent for {SILENT_BEATS} heartbeats"))
+        (self.beats > SILENT_BEATS)
+            .then(|| format!("the coordinator was silent for {SILENT_BEATS} heartbeats"))
     }
 }
 

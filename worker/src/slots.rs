@@ -139,6 +139,7 @@ pub(crate) fn answer(outbox: &UnboundedSender<wire::FromWorker>, lease: Lease, a
 
 /// What a panic said.
 pub(crate) fn panic_text(panic: &(dyn std::any::Any + Send)) -> String {
-    let text = panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+    let text =
+        panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
     format!("the model panicked: {}", text.unwrap_or("without a message"))
 }

@@ -14,6 +14,7 @@ pub mod message;
 pub mod roster;
 #[cfg(test)]
 mod tests;
+mod watch;
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -25,9 +26,7 @@ use super::FleetEvent;
 use batch::{Batch, JobName, Lost};
 pub use message::{BatchError, Command, Event, Joining, WorkerId};
 use roster::{SetupState, Worker};
-
-/// First notice of a batch that waits, seconds after it began to wait; each later one after twice as long.
-const FIRST_NOTICE: Duration = Duration::from_secs(2);
+use watch::Starved;
 
 /// The numbers that the rules need.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,13 +50,6 @@ pub struct Dispatcher {
     last_tick: Option<Duration>,
     starved: Option<Starved>,
     out: Vec<Command>,
-}
-
-/// Since when no worker can take a job, and when to say so next.
-#[derive(Clone, Copy, Debug)]
-struct Starved {
-    since: Duration,
-    next_notice: Duration,
 }
 
 impl Dispatcher {
@@ -93,7 +85,7 @@ impl Dispatcher {
     /// Takes one event at time `now` (any fixed origin) and returns what has to be done about it.
     pub fn step(&mut self, now: Duration, event: Event) -> Vec<Command> {
         match event {
-            Event::Joined(joining) => self.joined(now, joining),
+            Event::Joined(joining) => self.joined(now, &joining),
             Event::Left { worker, reason, clean } => self.lose(worker, &reason, clean),
             Event::Heard { worker } => self.heard(now, worker),
             Event::SetupDone { worker, setup } => self.setup_answered(now, worker, setup, SetupState::Ready),
@@ -101,7 +93,9 @@ impl Dispatcher {
                 self.setup_answered(now, worker, setup, SetupState::Failed(reason));
             }
             Event::Submit { setup, jobs } => self.submit(setup, jobs),
-            Event::Answered { worker, lease, answer, cost } => self.answered(now, worker, lease, answer, cost),
+            Event::Answered { worker, lease, answer, cost } => {
+                self.answered(now, worker, lease, answer, cost);
+            }
             Event::Tick => self.tick(now),
             Event::Abort(error) => self.abort(error),
         }
@@ -109,13 +103,13 @@ impl Dispatcher {
         std::mem::take(&mut self.out)
     }
 
-    fn joined(&mut self, now: Duration, joining: Joining) {
+    fn joined(&mut self, now: Duration, joining: &Joining) {
         let twin = self.workers.values().find(|w| w.nonce == joining.nonce).map(|w| w.id);
         if let Some(id) = twin {
             self.out.push(Command::Close { worker: id });
             self.lose(id, "its process connected again", true);
         }
-        let mut worker = Worker::new(&joining, now);
+        let mut worker = Worker::new(joining, now);
         self.out.push(Command::Notice(joining.notice()));
         if let Some(batch) = &self.batch {
             worker.setups.insert(batch.setup, SetupState::Pending);
@@ -230,75 +224,32 @@ impl Dispatcher {
         self.out.push(Command::BatchFailed(error));
     }
 
-    fn tick(&mut self, now: Duration) {
-        let gap = now.saturating_sub(self.last_tick.unwrap_or(now));
-        self.last_tick = Some(now);
-        if gap > self.rules.heartbeat {
-            // This process stood still (suspended, or starved of processor time): what workers sent meanwhile is unread.
-            self.workers.values_mut().for_each(|w| w.last_heard = (w.last_heard + gap).min(now));
-        }
-        let limit = self.rules.heartbeat * 2;
-        let silent = self.workers.values().filter(|w| now.saturating_sub(w.last_heard) > limit);
-        for id in silent.map(|w| w.id).collect::<Vec<_>>() {
-            let reason = format!("silent for more than {:.0} s", limit.as_secs_f64());
-            self.out.push(Command::Close { worker: id });
-            self.lose(id, &reason, false);
-        }
-        if let Some(progress) = self.batch.as_mut().and_then(Batch::progress) {
-            self.out.push(Command::Notice(progress));
-        }
-        self.watch_starvation(now);
-    }
-
-    /// Says what is missing while no worker can take a job, and ends the batch when patience does.
-    fn watch_starvation(&mut self, now: Duration) {
-        let Some(batch) = &self.batch else { return };
-        if self.workers.values().any(|w| w.is_ready(&batch.setup)) {
-            self.starved = None;
-            return;
-        }
-        let starved = self.starved.get_or_insert(Starved { since: now, next_notice: FIRST_NOTICE });
-        let waited = now.saturating_sub(starved.since);
-        let names = self.workers.values().map(|w| w.name.as_str()).collect::<Vec<_>>().join(", ");
-        let missing = if names.is_empty() {
-            "no worker is connected".to_owned()
-        } else {
-            format!("the model is still being built by {names}")
-        };
-        if waited >= self.rules.patience {
-            self.abort(BatchError::NoWorkers { waited, missing });
-        } else if waited >= starved.next_notice {
-            starved.next_notice *= 2;
-            let notice = FleetEvent::Waiting { seconds: waited.as_secs_f64(), missing };
-            self.out.push(Command::Notice(notice));
-        }
-    }
-
     /// Everything that may follow from any event: settle, give out, recall, end.
     fn proceed(&mut self) {
         self.fail_without_setup();
         self.settle_failures();
         self.give_out();
         self.recall();
-        if self.batch.as_ref().is_some_and(Batch::is_done) {
-            if let Some(batch) = self.batch.take() {
-                self.starved = None;
-                self.out.push(Command::BatchDone(batch.into_outcomes()));
-            }
+        if let Some(batch) = self.batch.take_if(|batch| batch.is_done()) {
+            self.starved = None;
+            self.out.push(Command::BatchDone(batch.into_outcomes()));
         }
     }
 
     fn fail_without_setup(&mut self) {
         let Some(batch) = &self.batch else { return };
-        if batch.is_done() || self.workers.is_empty() || self.workers.values().any(|w| w.may_run(&batch.setup)) {
+        if batch.is_done()
+            || self.workers.is_empty()
+            || self.workers.values().any(|w| w.may_run(&batch.setup))
+        {
             return;
         }
         let mut reasons = Vec::<String>::new();
         for worker in self.workers.values() {
-            if let Some(SetupState::Failed(reason)) = worker.setups.get(&batch.setup) {
-                if !reasons.contains(reason) {
-                    reasons.push(reason.clone());
-                }
+            if let Some(SetupState::Failed(reason)) = worker.setups.get(&batch.setup)
+                && !reasons.contains(reason)
+            {
+                reasons.push(reason.clone());
             }
         }
         self.abort(BatchError::SetupFailed { reason: reasons.join("; ") });
@@ -334,17 +285,20 @@ impl Dispatcher {
         }
     }
 
-    /// Calls back jobs that wait behind a busy slot while another slot is idle and the queue is empty.
+    /// Calls back jobs that wait behind a busy slot while another slot is idle.
     fn recall(&mut self) {
         let Some(batch) = &mut self.batch else { return };
-        if batch.has_waiting() {
+        // While fresh jobs wait, no slot is idle: spares the counting below.
+        if batch.has_fresh() {
             return;
         }
         let ready = || self.workers.values().filter(|w| w.is_ready(&batch.setup));
         let idle: usize = ready().map(|w| w.slots.saturating_sub(w.load())).sum();
         let mut open = idle.saturating_sub(ready().map(Worker::n_recalled).sum());
         while open > 0 {
-            let Some(victim) = self.workers.values_mut().filter(|w| w.surplus() > 0).max_by_key(|w| w.surplus()) else {
+            let Some(victim) =
+                self.workers.values_mut().filter(|w| w.surplus() > 0).max_by_key(|w| w.surplus())
+            else {
                 break;
             };
             let Some(held) = victim.youngest(|job| batch.may_recall(job)) else { break };

@@ -62,10 +62,17 @@ pub enum FleetError {
 fn remedy(source: &std::io::Error, address: SocketAddr) -> String {
     match source.kind() {
         std::io::ErrorKind::AddrInUse => {
-            format!("; port {} is taken by another process: stop it or choose another port (0 picks a free one)", address.port())
+            format!(
+                "; port {} is taken by another process: stop it or choose another port (0 picks a free one)",
+                address.port()
+            )
         }
-        std::io::ErrorKind::PermissionDenied => "; ports below 1024 need privileges: choose a higher one".to_owned(),
-        std::io::ErrorKind::AddrNotAvailable => "; this machine has no such address: use 127.0.0.1 or 0.0.0.0".to_owned(),
+        std::io::ErrorKind::PermissionDenied => {
+            "; ports below 1024 need privileges: choose a higher one".to_owned()
+        }
+        std::io::ErrorKind::AddrNotAvailable => {
+            "; this machine has no such address: use 127.0.0.1 or 0.0.0.0".to_owned()
+        }
         _ => String::new(),
     }
 }

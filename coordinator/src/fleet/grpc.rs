@@ -54,7 +54,12 @@ pub struct FleetConfig {
 
 impl FleetConfig {
     /// The usual numbers: heartbeat 8 s, patience 5 minutes, five losses per job.
-    pub fn new(address: SocketAddr, run_name: &str, cancel: CancellationToken, events: Sender<FleetEvent>) -> Self {
+    pub fn new(
+        address: SocketAddr,
+        run_name: &str,
+        cancel: CancellationToken,
+        events: Sender<FleetEvent>,
+    ) -> Self {
         Self {
             address,
             run_name: run_name.to_owned(),
@@ -109,8 +114,11 @@ impl GrpcFleet {
         let listener = TcpListener::bind(config.address).map_err(bind)?;
         listener.set_nonblocking(true).map_err(bind)?;
         let address = listener.local_addr().map_err(bind)?;
-        let rules =
-            Rules { heartbeat: config.heartbeat, patience: config.patience, max_attempts: config.max_attempts };
+        let rules = Rules {
+            heartbeat: config.heartbeat,
+            patience: config.patience,
+            max_attempts: config.max_attempts,
+        };
         let hub = Arc::new(Hub::new(config.run_name, rules, config.events));
         let stop = CancellationToken::new();
         let network = {
@@ -118,7 +126,7 @@ impl GrpcFleet {
             let heartbeat = config.heartbeat;
             std::thread::Builder::new()
                 .name("fleet-network".to_owned())
-                .spawn(move || run_network(listener, hub, heartbeat, cancel, stop))
+                .spawn(move || run_network(listener, &hub, heartbeat, cancel, &stop))
                 .map_err(|e| FleetError::Stopped(e.to_string()))?
         };
         hub.tell(FleetEvent::Listening { address });
@@ -170,7 +178,8 @@ impl GrpcFleet {
 
 impl Fleet for GrpcFleet {
     fn install(&mut self, setup: &Setup) -> Result<SetupId, FleetError> {
-        let (id, json) = encode_setup(setup).map_err(|e| FleetError::SetupFailed { reason: e.to_string() })?;
+        let (id, json) =
+            encode_setup(setup).map_err(|e| FleetError::SetupFailed { reason: e.to_string() })?;
         if json.len() + 1024 > MAX_MESSAGE {
             let reason = format!("its text has {} bytes, a message holds {MAX_MESSAGE}", json.len());
             return Err(FleetError::SetupFailed { reason });
@@ -218,20 +227,22 @@ impl Drop for GrpcFleet {
 
 fn run_network(
     listener: TcpListener,
-    hub: Arc<Hub>,
+    hub: &Arc<Hub>,
     heartbeat: Duration,
     cancel: CancellationToken,
-    stop: CancellationToken,
+    stop: &CancellationToken,
 ) -> Result<(), String> {
-    let runtime =
-        tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(|error| error.to_string())?;
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .map_err(|error| error.to_string())?;
     let outcome = runtime.block_on(async {
         let listener = tokio::net::TcpListener::from_std(listener).map_err(|error| error.to_string())?;
         let incoming = TcpIncoming::from(listener).with_nodelay(Some(true));
-        tokio::spawn(tick(Arc::clone(&hub), heartbeat));
-        tokio::spawn(beat(Arc::clone(&hub), heartbeat));
-        tokio::spawn(abort_on_cancel(Arc::clone(&hub), cancel));
-        let service = FleetServer::new(Service { hub: Arc::clone(&hub) })
+        tokio::spawn(tick(Arc::clone(hub), heartbeat));
+        tokio::spawn(beat(Arc::clone(hub), heartbeat));
+        tokio::spawn(abort_on_cancel(Arc::clone(hub), cancel));
+        let service = FleetServer::new(Service { hub: Arc::clone(hub) })
             .max_decoding_message_size(MAX_MESSAGE)
             .max_encoding_message_size(MAX_MESSAGE);
         let server = Server::builder()
@@ -244,7 +255,7 @@ fn run_network(
             .serve_with_incoming(incoming);
         tokio::select! {
             ended = server => ended.map_err(|error| error.to_string()),
-            () = drained(&hub, &stop) => Ok(()),
+            () = drained(hub, stop) => Ok(()),
         }
     });
     runtime.shutdown_background();

@@ -114,6 +114,7 @@ impl Hub {
             return true;
         }
         let names = jobs.iter().map(|j| JobName { particle: j.particle, record: j.record }).collect();
+        state.handle(now, Event::Abort(BatchError::Cancelled));
         state.running = Some(Running { setup, jobs, reply });
         state.handle(now, Event::Submit { setup, jobs: names });
         true

@@ -1,6 +1,7 @@
 //! A fleet without a network: runs the jobs on threads of this process.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -37,8 +38,8 @@ impl Fleet for InProcess {
     fn install(&mut self, setup: &Setup) -> Result<SetupId, FleetError> {
         let failed = |reason: String| FleetError::SetupFailed { reason };
         let (id, _) = encode_setup(setup).map_err(|e| failed(e.to_string()))?;
-        if !self.forwards.contains_key(&id) {
-            self.forwards.insert(id, setup.build().map_err(|e| failed(e.to_string()))?);
+        if let Entry::Vacant(place) = self.forwards.entry(id) {
+            place.insert(setup.build().map_err(|e| failed(e.to_string()))?);
         }
         Ok(id)
     }
@@ -88,6 +89,7 @@ fn run_one(forward: &dyn Forward, job: &Job, thread: usize) -> Outcome {
 }
 
 fn panic_text(panic: &(dyn std::any::Any + Send)) -> String {
-    let text = panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+    let text =
+        panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
     format!("the model panicked: {}", text.unwrap_or("without a message"))
 }

@@ -193,7 +193,12 @@ fn pids(slots: &[Slot]) -> Vec<u32> {
     slots.iter().filter_map(|slot| Some(slot.process.as_ref()?.child.id())).collect()
 }
 
-fn supervise(config: &LocalConfig, mut slots: Vec<Slot>, stopped: &mpsc::Receiver<()>, shared: &Mutex<Vec<u32>>) {
+fn supervise(
+    config: &LocalConfig,
+    mut slots: Vec<Slot>,
+    stopped: &mpsc::Receiver<()>,
+    shared: &Mutex<Vec<u32>>,
+) {
     let mut told = false;
     while stopped.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
         let now = Instant::now();
@@ -206,7 +211,8 @@ fn supervise(config: &LocalConfig, mut slots: Vec<Slot>, stopped: &mpsc::Receive
         }
         if !told && !slots.is_empty() && slots.iter().all(Slot::given_up) {
             told = true;
-            let words = slots.iter().map(|s| s.last_words.as_str()).find(|w| !w.is_empty()).unwrap_or_default();
+            let words =
+                slots.iter().map(|s| s.last_words.as_str()).find(|w| !w.is_empty()).unwrap_or_default();
             config.fleet.give_up(format!("each died {MAX_DEATHS} times in a row, last with {words}"));
         }
     }

@@ -101,10 +101,14 @@ fn name_beside(row: &ParameterRow, value: &str) -> String {
     let room = LETTERS.saturating_sub(value.chars().count() + 2);
     let full = with_unit(&row.name, &row.unit);
     let name = if full.chars().count() <= room { full } else { row.name.clone() };
-    if name.chars().count() <= room {
+    let letters: Vec<char> = name.chars().collect();
+    if letters.len() <= room {
         return name;
     }
-    name.chars().take(room.saturating_sub(1)).chain(['…']).collect()
+    // Names of one family differ at their end: the middle goes.
+    let head = room / 2;
+    let tail = letters.len() - room.saturating_sub(head + 1);
+    letters[..head].iter().chain(&['…']).chain(&letters[tail..]).collect()
 }
 
 fn interval_text(row: &ParameterRow) -> String {

@@ -29,7 +29,9 @@ pub(super) fn check(path: &Path, text: &str) -> Result<Study, StudyError> {
     let observer = observer(&source, &file.observer);
     let model = check_model::model(&source, &file);
     // Everything that follows is judged against the model.
-    let Some(mut model) = model else { return Err(source.verdict().err().unwrap_or(StudyError { problems: vec![] })) };
+    let Some(mut model) = model else {
+        return Err(source.verdict().err().unwrap_or(StudyError { problems: vec![] }));
+    };
     model.setup.observer = observer;
     let mut warnings = Vec::new();
     check_model::check_values(&source, &file, &model);
@@ -66,7 +68,11 @@ pub(super) fn check(path: &Path, text: &str) -> Result<Study, StudyError> {
 /// The name becomes a folder's.
 fn check_name(source: &Source, file: &StudyFile) {
     let name = file.study.name.get_ref();
-    if name.is_empty() || name.starts_with('.') || name.contains(['/', '\\', ':']) || name.contains(char::is_control) {
+    if name.is_empty()
+        || name.starts_with('.')
+        || name.contains(['/', '\\', ':'])
+        || name.contains(char::is_control)
+    {
         source.report_with(
             file.study.name.span(),
             format!("`{name}` cannot name a study: its run folder takes the name"),
@@ -93,10 +99,18 @@ fn records(
 fn check_record_list(source: &Source, file: &StudyFile) {
     let end = source.text.len();
     if file.records.is_empty() {
-        source.report_with(end..end, "the study has no record", "add `[[records]]` with `name`, `file` and `channels`");
+        source.report_with(
+            end..end,
+            "the study has no record",
+            "add `[[records]]` with `name`, `file` and `channels`",
+        );
     } else if file.records.iter().all(|r| r.held_out) {
         let help = "remove `use = \"held-out\"` from at least one";
-        source.report_with(file.records[0].span.clone(), "every record is held out: nothing is left to fit", help);
+        source.report_with(
+            file.records[0].span.clone(),
+            "every record is held out: nothing is left to fit",
+            help,
+        );
     }
     for (i, record) in file.records.iter().enumerate() {
         if file.records[..i].iter().any(|r| r.name.get_ref() == record.name.get_ref()) {

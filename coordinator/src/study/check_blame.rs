@@ -50,15 +50,25 @@ pub(super) fn blame(source: &Source, file: &StudyFile, error: &SetupError) {
             let message = format!("no {what} is named `{name}`");
             match nearest {
                 Some(near) => source.report_with(span, message, format!("did you mean `{near}`?")),
-                None if *what == "model" => source.report_with(span, message, "`starlings models` lists them"),
+                None if *what == "model" => {
+                    source.report_with(span, message, "`starlings models` lists them");
+                }
                 None => source.report(span, message),
             }
         }
         SetupError::Missing { model, name } => report_missing(source, file, model, name),
         SetupError::Twice(name) => {
-            let second = names(file).into_iter().filter(|n| n.get_ref() == name).map(Spanned::span).max_by_key(|s| s.start);
+            let second = names(file)
+                .into_iter()
+                .filter(|n| n.get_ref() == name)
+                .map(Spanned::span)
+                .max_by_key(|s| s.start);
             let span = second.unwrap_or_else(|| file.model.kind.span());
-            source.report_with(span, format!("the name `{name}` is given twice"), "names are unique in a study");
+            source.report_with(
+                span,
+                format!("the name `{name}` is given twice"),
+                "names are unique in a study",
+            );
         }
         SetupError::Expression { place, expression, column, message } => {
             let of_initial = place.starts_with("initial");
@@ -71,8 +81,8 @@ pub(super) fn blame(source: &Source, file: &StudyFile, error: &SetupError) {
             source.report(span, format!("{place}: {message}"));
         }
         SetupError::Invalid(message) => {
-            let quoted = message.split('`').skip(1).step_by(2);
-            let named = quoted.filter_map(|name| place(file, name)).next();
+            let mut quoted = message.split('`').skip(1).step_by(2);
+            let named = quoted.find_map(|name| place(file, name));
             let observer = message.contains("observer").then(|| file.observer.kind.span());
             source.report(observer.or(named).unwrap_or_else(|| file.model.kind.span()), message.clone());
         }
@@ -96,7 +106,9 @@ pub(super) fn report_missing(source: &Source, file: &StudyFile, model: &str, nam
     let known: Vec<String> = names(file).into_iter().skip(1).map(|n| n.get_ref().clone()).collect();
     let near = starlings_models::nearest(name, &known);
     let help = match near.filter(|_| used.is_some()) {
-        Some(near) => format!("did you mean `{near}`? Otherwise give it a value in `constants` or as `[[parameters]]`"),
+        Some(near) => {
+            format!("did you mean `{near}`? Otherwise give it a value in `constants` or as `[[parameters]]`")
+        }
         None => "give it a value in `constants`, or add it as `[[parameters]]`".to_owned(),
     };
     let message = format!("parameter `{name}` of model `{model}` has no value");

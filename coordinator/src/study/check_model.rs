@@ -7,7 +7,9 @@ use std::collections::BTreeMap;
 
 use starlings_models::effect::library::write_out;
 use starlings_models::effect::{Addition, EffectParameter, EffectState};
-use starlings_models::equations::{EquationsDef, Expression, InputDef, Method, OutputDef, SolverDef, StateDef};
+use starlings_models::equations::{
+    EquationsDef, Expression, InputDef, Method, OutputDef, SolverDef, StateDef,
+};
 use starlings_models::{EffectDef, ModelDef, Setup, Spec};
 use toml::Spanned;
 
@@ -35,7 +37,11 @@ pub(super) fn model(source: &Source, file: &StudyFile) -> Option<CheckedModel> {
     let before = source.count();
     if file.model.kind.get_ref() == "solver" {
         let help = "use a built-in model (`starlings models` lists them) or kind = \"equations\"";
-        source.report_with(file.model.kind.span(), "external solvers are not available in this version", help);
+        source.report_with(
+            file.model.kind.span(),
+            "external solvers are not available in this version",
+            help,
+        );
         return None;
     }
     check_expressions(source, file);
@@ -217,7 +223,8 @@ pub(super) fn check_values(source: &Source, file: &StudyFile, model: &CheckedMod
         match quantity(spec, name.get_ref()) {
             Some(q) if *value.get_ref() < q.range[0] || *value.get_ref() > q.range[1] => {
                 let (name, range) = (name.get_ref(), q.range_text());
-                let message = format!("constant `{name}` is {}, outside the model's range ({range})", value.get_ref());
+                let message =
+                    format!("constant `{name}` is {}, outside the model's range ({range})", value.get_ref());
                 source.report(value.span(), message);
             }
             None if !in_terms.contains(name.get_ref()) => {
@@ -233,10 +240,12 @@ pub(super) fn check_values(source: &Source, file: &StudyFile, model: &CheckedMod
             report_missing(source, file, &spec.kind, &q.name);
         }
     }
-    let initial = |name: &str| name.strip_prefix(INITIAL).and_then(|s| spec.states.iter().find(|q| q.name == s));
+    let initial =
+        |name: &str| name.strip_prefix(INITIAL).and_then(|s| spec.states.iter().find(|q| q.name == s));
     for p in &file.parameters {
         if let Some(q) = initial(p.name.get_ref()).filter(|q| q.size != 1) {
-            let message = format!("state `{}` has {} components: only a scalar has an initial value", q.name, q.size);
+            let message =
+                format!("state `{}` has {} components: only a scalar has an initial value", q.name, q.size);
             source.report(p.name.span(), message);
         }
     }

@@ -35,7 +35,10 @@ pub(super) fn priors(
 ) -> Vec<Option<Prior>> {
     if file.parameters.is_empty() {
         let end = source.text.len();
-        let help = format!("add `[[parameters]]`; the model has {}", super::problem::quoted_list(&valid_names(&model.spec)));
+        let help = format!(
+            "add `[[parameters]]`; the model has {}",
+            super::problem::quoted_list(&valid_names(&model.spec))
+        );
         source.report_with(end..end, "the study has no parameter to estimate", help);
     }
     let check = |(i, parameter): (usize, &ParameterSection)| {
@@ -90,7 +93,8 @@ pub(super) fn initial_medians(
         let quantity = quantity(spec, name);
         let per_record = section.per_record.unwrap_or_else(|| name.starts_with(INITIAL));
         if let Some(from) = section.prior.median_from.as_ref().filter(|_| !per_record && records.len() > 1) {
-            let message = format!("`{name}` is one value for all records, so its median cannot come from each");
+            let message =
+                format!("`{name}` is one value for all records, so its median cannot come from each");
             source.report_with(from.span(), message, "add `per_record = true`, or give `median`");
             continue;
         }
@@ -108,7 +112,7 @@ pub(super) fn initial_medians(
             per_record,
             prior_mean: records.iter().map(mean).collect(),
             prior_sd: prior.sd,
-            drift: prior::drift(source, &section.process),
+            drift: prior.drift,
         });
     }
     parameters

@@ -94,7 +94,12 @@ pub(super) fn explain(source: &Source, file: &StudyFile) -> ExplainChoice {
 }
 
 /// The choice behind a word; an unknown word is reported.
-fn choose<T: Copy>(source: &Source, word: Option<&Spanned<String>>, what: &str, choices: &[(&str, T)]) -> Option<T> {
+fn choose<T: Copy>(
+    source: &Source,
+    word: Option<&Spanned<String>>,
+    what: &str,
+    choices: &[(&str, T)],
+) -> Option<T> {
     let word = word?;
     let found = choices.iter().find(|(name, _)| name == word.get_ref()).map(|(_, choice)| *choice);
     if found.is_none() {

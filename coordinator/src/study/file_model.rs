@@ -10,8 +10,8 @@ use starlings_models::Role;
 use toml::Spanned;
 
 use super::file::{
-    EffectParameterSection, EffectSection, EquationsSection, ModelSection, Named, QuantitySection, SolverSection,
-    StateSection,
+    EffectParameterSection, EffectSection, EquationsSection, ModelSection, Named, QuantitySection,
+    SolverSection, StateSection,
 };
 use super::file_read::named_texts;
 use super::file_table::{Node, Table, number, text, wrong_type};
@@ -95,7 +95,8 @@ fn quantities(
     name: &str,
     with_value: bool,
 ) -> Vec<QuantitySection> {
-    let keys: &[&str] = if with_value { &["name", "unit", "role", "value"] } else { &["name", "unit", "role"] };
+    let keys: &[&str] =
+        if with_value { &["name", "unit", "role", "value"] } else { &["name", "unit", "role"] };
     let read = |t: Table<'_>| QuantitySection {
         name: t.required_text("name", "how other parts of the study call it"),
         unit: unit(&t),
@@ -142,7 +143,8 @@ fn initial(source: &Source, node: &Node<'_>) -> Option<Spanned<String>> {
         return text(source, node, "`initial`");
     }
     if node.get_ref().is_float() || node.get_ref().is_integer() {
-        return number(source, node, "`initial`").map(|n| Spanned::new(n.span(), format!("{:?}", n.get_ref())));
+        return number(source, node, "`initial`")
+            .map(|n| Spanned::new(n.span(), format!("{:?}", n.get_ref())));
     }
     wrong_type(source, node, "`initial`", "a number or an expression in quotes");
     None
@@ -167,7 +169,8 @@ fn unit(t: &Table<'_>) -> String {
 
 fn role(source: &Source, t: &Table<'_>) -> Role {
     let Some(name) = t.text("role") else { return Role::Other };
-    let deserializer: StrDeserializer<'_, serde::de::value::Error> = name.get_ref().as_str().into_deserializer();
+    let deserializer: StrDeserializer<'_, serde::de::value::Error> =
+        name.get_ref().as_str().into_deserializer();
     Role::deserialize(deserializer).unwrap_or_else(|_| {
         let valid: Vec<String> = ROLES.iter().map(|r| (*r).to_owned()).collect();
         source.report_unknown(name.span(), format!("unknown role `{}`", name.get_ref()), &valid);
@@ -185,7 +188,10 @@ fn effect(source: &Source, t: &Table<'_>) -> EffectSection {
     let built_in = t.text("built_in");
     if built_in.is_none() {
         if t.get("adds").is_none() {
-            t.missing("adds", "such as `[ { to = \"x\", term = \"-q*x\" } ]`, or `built_in` with an effect's name");
+            t.missing(
+                "adds",
+                "such as `[ { to = \"x\", term = \"-q*x\" } ]`, or `built_in` with an effect's name",
+            );
         }
         if t.get("parameters").is_none() {
             t.missing("parameters", "at least the amplitude, such as `[ { name = \"q\", range = [0, 5] } ]`");

@@ -118,7 +118,10 @@ fn records(source: &Source, root: &Table<'_>) -> Vec<RecordSection> {
     let mut records = Vec::new();
     for t in root.tables("records", "[[records]]", &keys) {
         if t.get("channels").is_none() {
-            t.missing("channels", "such as `[ { column = \"pressure\", output = \"pressure\", noise = 2.0 } ]`");
+            t.missing(
+                "channels",
+                "such as `[ { column = \"pressure\", output = \"pressure\", noise = 2.0 } ]`",
+            );
         }
         records.push(RecordSection {
             span: t.span.clone(),

@@ -106,7 +106,8 @@ impl<'a> Table<'a> {
     /// A whole number from 0.
     pub(super) fn count(&self, key: &str) -> Option<Spanned<u64>> {
         let node = self.get(key)?;
-        let parsed = node.get_ref().as_integer().and_then(|i| u64::from_str_radix(i.as_str(), i.radix()).ok());
+        let parsed =
+            node.get_ref().as_integer().and_then(|i| u64::from_str_radix(i.as_str(), i.radix()).ok());
         if parsed.is_none() {
             wrong_type(self.source, node, &format!("`{key}`"), "a whole number, not negative");
         }

@@ -18,10 +18,16 @@ pub(super) struct Prior {
     pub(super) mean: Option<f64>,
     /// Standard deviation in transformed units.
     pub(super) sd: f64,
+    /// How the parameter moves from one analysis to the next.
+    pub(super) drift: Drift,
 }
 
 /// Checks a prior against itself and against what the model says of the quantity. Nothing after a complaint.
-pub(super) fn prior(source: &Source, parameter: &ParameterSection, quantity: Option<&Quantity>) -> Option<Prior> {
+pub(super) fn prior(
+    source: &Source,
+    parameter: &ParameterSection,
+    quantity: Option<&Quantity>,
+) -> Option<Prior> {
     let written = &parameter.prior;
     let before = source.count();
     let transform = transform(source, written);
@@ -30,12 +36,17 @@ pub(super) fn prior(source: &Source, parameter: &ParameterSection, quantity: Opt
         check_bounds(source, written, &t, q);
     }
     let mean = match (&written.median, &written.median_from) {
-        (Some(median), None) => {
-            transform.and_then(|t| check_median(source, median, parameter.name.get_ref(), &t, quantity).then(|| t.to_transformed(*median.get_ref())))
-        }
+        (Some(median), None) => transform.and_then(|t| {
+            check_median(source, median, parameter.name.get_ref(), &t, quantity)
+                .then(|| t.to_transformed(*median.get_ref()))
+        }),
         (None, Some(_)) => None,
         (Some(_), Some(from)) => {
-            source.report_with(from.span(), "`median` and `median_from` exclude each other", "keep one of them");
+            source.report_with(
+                from.span(),
+                "`median` and `median_from` exclude each other",
+                "keep one of them",
+            );
             None
         }
         (None, None) => {
@@ -47,7 +58,8 @@ pub(super) fn prior(source: &Source, parameter: &ParameterSection, quantity: Opt
             None
         }
     };
-    (source.count() == before).then_some(Prior { transform: transform?, mean, sd: sd? })
+    let drift = drift(source, &parameter.process);
+    (source.count() == before).then_some(Prior { transform: transform?, mean, sd: sd?, drift })
 }
 
 /// Whether a median can be transformed and lies where physics allows; otherwise says so.
@@ -66,7 +78,10 @@ pub(super) fn check_median(
                 "move the median or the bounds of the logit",
             ),
             _ => (
-                format!("the prior median {value} of `{name}` must be above zero for a {} transform", transform.name()),
+                format!(
+                    "the prior median {value} of `{name}` must be above zero for a {} transform",
+                    transform.name()
+                ),
                 "use transform = \"linear\" with `sd` for a value that may be zero or negative",
             ),
         };
@@ -74,7 +89,8 @@ pub(super) fn check_median(
         return false;
     }
     if let Some(q) = quantity.filter(|q| value < q.range[0] || value > q.range[1]) {
-        let message = format!("the prior median {value} of `{name}` is outside the model's range ({})", q.range_text());
+        let message =
+            format!("the prior median {value} of `{name}` is outside the model's range ({})", q.range_text());
         source.report_with(median.span(), message, "give a median that physics allows");
         return false;
     }
@@ -142,7 +158,10 @@ fn logit(source: &Source, written: &Spanned<String>, (lo, hi): (f64, f64)) -> Op
     if lo < hi && (hi - lo).is_finite() {
         return Some(Transform::Logit { lo, hi });
     }
-    source.report(written.span(), format!("the bounds of a logit must be finite and increase, found {lo} and {hi}"));
+    source.report(
+        written.span(),
+        format!("the bounds of a logit must be finite and increase, found {lo} and {hi}"),
+    );
     None
 }
 
@@ -201,7 +220,10 @@ fn check_bounds(source: &Source, prior: &PriorSection, transform: &Transform, qu
         if too_low || *hi > highest {
             source.report_with(
                 written.span(),
-                format!("the bounds {lo} and {hi} reach outside the model's range ({})", quantity.range_text()),
+                format!(
+                    "the bounds {lo} and {hi} reach outside the model's range ({})",
+                    quantity.range_text()
+                ),
                 "narrow the bounds of the logit",
             );
         }
@@ -222,7 +244,7 @@ pub(super) fn reach_warning(name: &str, prior: &Prior, quantity: &Quantity) -> O
 }
 
 /// How the parameter moves from one analysis to the next.
-pub(super) fn drift(source: &Source, process: &ProcessSection) -> Drift {
+fn drift(source: &Source, process: &ProcessSection) -> Drift {
     match (&process.forgetting, &process.walk) {
         (None, None) => Drift::None,
         (Some(_), Some(walk)) => {

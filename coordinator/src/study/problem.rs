@@ -47,7 +47,7 @@ impl fmt::Display for Problem {
     }
 }
 
-/// Everything found wrong with a study, in the order of its checks; never empty.
+/// Everything found wrong with a study, in the order of its file, then of its recordings; never empty.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{}", self.problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
 pub struct StudyError {
@@ -74,7 +74,12 @@ impl Source {
     }
 
     /// Reports a problem with its remedy.
-    pub(super) fn report_with(&self, span: Range<usize>, message: impl Into<String>, help: impl Into<String>) {
+    pub(super) fn report_with(
+        &self,
+        span: Range<usize>,
+        message: impl Into<String>,
+        help: impl Into<String>,
+    ) {
         self.add(span, message.into(), Some(help.into()));
     }
 
@@ -94,7 +99,8 @@ impl Source {
 
     /// Everything found so far as an error, if anything was.
     pub(super) fn verdict(&self) -> Result<(), StudyError> {
-        let problems = self.found.borrow().clone();
+        let mut problems = self.found.borrow().clone();
+        problems.sort_by_key(|p| (p.file != self.file, p.span.as_ref().map(|s| s.start)));
         if problems.is_empty() { Ok(()) } else { Err(StudyError { problems }) }
     }
 

@@ -38,12 +38,21 @@ impl<'a> Recordings<'a> {
     }
 
     /// The file of this name with the times in the named column; nothing after a complaint. `at` is where the study names it.
-    pub(super) fn table(&mut self, name: &str, at: &Spanned<String>, time: &Spanned<String>) -> Option<Table> {
+    pub(super) fn table(
+        &mut self,
+        name: &str,
+        at: &Spanned<String>,
+        time: &Spanned<String>,
+    ) -> Option<Table> {
         let csv = self.open(name, at)?;
         let time_column = match csv.index(time.get_ref()) {
             Ok(column) => column,
             Err((message, help)) => {
-                self.source.report_with(time.span(), message, format!("name the time column by `time = ...`; {help}"));
+                self.source.report_with(
+                    time.span(),
+                    message,
+                    format!("name the time column by `time = ...`; {help}"),
+                );
                 return None;
             }
         };
@@ -76,10 +85,16 @@ impl<'a> Recordings<'a> {
             }
         };
         let Ok(text) = String::from_utf8(bytes) else {
-            self.source.report_with(at.span(), format!("`{name}` is not UTF-8 text"), "save it as CSV in UTF-8");
+            self.source.report_with(
+                at.span(),
+                format!("`{name}` is not UTF-8 text"),
+                "save it as CSV in UTF-8",
+            );
             return None;
         };
-        Csv::new(path, &text).map_err(|error| error.problems.into_iter().for_each(|p| self.source.adopt(p))).ok()
+        Csv::new(path, &text)
+            .map_err(|error| error.problems.into_iter().for_each(|p| self.source.adopt(p)))
+            .ok()
     }
 
     /// The nearest file name, or where files are looked for.
@@ -89,7 +104,7 @@ impl<'a> Recordings<'a> {
             .into_iter()
             .flatten()
             .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
-            .filter(|n| n.ends_with(".csv"))
+            .filter(|n| Path::new(n).extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")))
             .collect();
         present.sort();
         match suggestion(name, &present) {
@@ -106,11 +121,21 @@ impl<'a> Recordings<'a> {
         context: &mut Context<'_>,
     ) -> Option<Record> {
         if *section.every.get_ref() == 0 {
-            self.source.report_with(section.every.span(), "`every` must be at least 1", "1 makes a window per row");
+            self.source.report_with(
+                section.every.span(),
+                "`every` must be at least 1",
+                "1 makes a window per row",
+            );
         }
         let table = self.table(section.file.get_ref(), &section.file, &section.time)?;
         let train = training_span(self.source, section, &table.times);
-        let reader = ChannelReader { source: self.source, section, table: &table, train, spec };
+        let reader = ChannelReader {
+            source: self.source,
+            section,
+            table: &table,
+            train: train.as_ref().ok().copied().flatten(),
+            spec,
+        };
         let mut channels = reader.channels(context)?;
         let rows: Vec<usize> = (0..table.times.len())
             .filter(|row| channels.iter().any(|c| c.values[*row].is_finite()))
@@ -125,7 +150,7 @@ impl<'a> Recordings<'a> {
             times,
             channels,
             inputs,
-            train: train?,
+            train: train.ok()?,
             every: usize::try_from(*section.every.get_ref()).unwrap_or(usize::MAX).max(1),
         })
     }
@@ -141,29 +166,38 @@ pub(super) struct Context<'a> {
     pub(super) warnings: &'a mut Vec<String>,
 }
 
-/// The training span: `Some(None)` when the whole record is held out, nothing after a complaint.
-#[allow(clippy::option_option)]
-fn training_span(source: &Source, section: &RecordSection, times: &[f64]) -> Option<Option<[f64; 2]>> {
+/// A training span that was refused and told.
+struct Refused;
+
+/// The training span, `None` when the whole record is held out.
+fn training_span(
+    source: &Source,
+    section: &RecordSection,
+    times: &[f64],
+) -> Result<Option<[f64; 2]>, Refused> {
     match &section.train {
         Some(train) if section.held_out => {
             let help = "remove `train`, or remove `use = \"held-out\"`";
             source.report_with(train.span(), "a record that is held out has no training span", help);
-            None
+            Err(Refused)
         }
-        None if section.held_out => Some(None),
-        None => Some(Some([f64::NEG_INFINITY, f64::INFINITY])),
+        None if section.held_out => Ok(None),
+        None => Ok(Some([f64::NEG_INFINITY, f64::INFINITY])),
         Some(train) => {
             let [from, to] = *train.get_ref();
             if times.iter().any(|t| from <= *t && *t <= to) {
-                return Some(Some([from, to]));
+                return Ok(Some([from, to]));
             }
             let (first, last) = (times.first().copied().unwrap_or(0.0), times.last().copied().unwrap_or(0.0));
             source.report_with(
                 train.span(),
-                format!("no sample of record `{}` lies in the training span [{from}, {to}]", section.name.get_ref()),
+                format!(
+                    "no sample of record `{}` lies in the training span [{from}, {to}]",
+                    section.name.get_ref()
+                ),
                 format!("its times run from {first} to {last}"),
             );
-            None
+            Err(Refused)
         }
     }
 }

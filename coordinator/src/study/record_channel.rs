@@ -15,8 +15,8 @@ pub(super) struct ChannelReader<'a> {
     pub(super) source: &'a Source,
     pub(super) section: &'a RecordSection,
     pub(super) table: &'a Table,
-    /// The training span; outer `None` when it was refused.
-    pub(super) train: Option<Option<[f64; 2]>>,
+    /// The training span; `None` when the whole record is held out.
+    pub(super) train: Option<[f64; 2]>,
     pub(super) spec: &'a Spec,
 }
 
@@ -29,7 +29,11 @@ impl ChannelReader<'_> {
             let output = section.output.get_ref();
             if channels.iter().any(|c| c.output == *output) {
                 let message = format!("output `{output}` has two channels in record `{}`", self.name());
-                self.source.report_with(section.output.span(), message, "an output is measured once per record");
+                self.source.report_with(
+                    section.output.span(),
+                    message,
+                    "an output is measured once per record",
+                );
             }
             channels.extend(self.channel(section, context));
         }
@@ -58,7 +62,8 @@ impl ChannelReader<'_> {
             return None;
         };
         if quantity.size != 1 {
-            let message = format!("output `{output}` has {} components; a channel measures one", quantity.size);
+            let message =
+                format!("output `{output}` has {} components; a channel measures one", quantity.size);
             self.source.report(section.output.span(), message);
             return None;
         }
@@ -118,7 +123,15 @@ impl ChannelReader<'_> {
 
     /// Whether a row counts for the channel: the training span, or everything for a record that is held out.
     fn is_used(&self, time: f64) -> bool {
-        self.train.flatten().is_none_or(|[from, to]| from <= time && time <= to)
+        self.train.is_none_or(|[from, to]| from <= time && time <= to)
+    }
+
+    /// Whether the rows that count are evenly spaced, to a percent of their mean distance.
+    fn is_even(&self) -> bool {
+        let times: Vec<f64> = self.table.times.iter().copied().filter(|t| self.is_used(*t)).collect();
+        let (Some(first), Some(last)) = (times.first(), times.last()) else { return true };
+        let mean = (last - first) / (times.len() - 1).max(1) as f64;
+        times.windows(2).all(|w| (w[1] - w[0] - mean).abs() <= 0.01 * mean)
     }
 
     /// Noise sd and how it was found. Held-out rows of a trained record take no part.
@@ -128,19 +141,30 @@ impl ChannelReader<'_> {
                 return Some((given, "given in the study".to_owned()));
             }
             let message = format!("`noise` must be above zero, found {given}");
-            let help = "give the standard deviation of the measurement error in the channel's unit, or \"auto\"";
+            let help =
+                "give the standard deviation of the measurement error in the channel's unit, or \"auto\"";
             self.source.report_with(section.noise.span(), message, help);
             return None;
         }
-        let used: Vec<f64> =
-            values.iter().zip(&self.table.times).filter(|(_, t)| self.is_used(**t)).map(|(v, _)| *v).collect();
+        let used: Vec<f64> = values
+            .iter()
+            .zip(&self.table.times)
+            .filter(|(_, t)| self.is_used(**t))
+            .map(|(v, _)| *v)
+            .collect();
         let sd = noise_from_third_differences(&used);
         if sd > 0.0 && sd.is_finite() {
-            return Some((sd, format!("from the third differences of its {} samples", used.len())));
+            let uneven =
+                if self.is_even() { "" } else { " (which are not evenly spaced: it may be too large)" };
+            return Some((sd, format!("from the third differences of its {} samples{uneven}", used.len())));
         }
-        let why = if sd.is_nan() { "there are no four samples in a row" } else { "the samples do not scatter" };
+        let why =
+            if sd.is_nan() { "there are no four samples in a row" } else { "the samples do not scatter" };
         let unit = if unit.is_empty() { String::new() } else { format!(" in {unit}") };
-        let message = format!("the noise of column `{}` cannot be found from the data: {why}", section.column.get_ref());
+        let message = format!(
+            "the noise of column `{}` cannot be found from the data: {why}",
+            section.column.get_ref()
+        );
         self.source.report_with(section.noise.span(), message, format!("give its standard deviation{unit}"));
         None
     }

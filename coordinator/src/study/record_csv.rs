@@ -33,11 +33,16 @@ impl Csv {
             starts: Vec::new(),
             cells: Vec::new(),
         };
-        let mut reader =
-            csv::ReaderBuilder::new().has_headers(false).flexible(true).trim(csv::Trim::All).from_reader(text.as_bytes());
+        let mut reader = csv::ReaderBuilder::new()
+            .has_headers(false)
+            .flexible(true)
+            .trim(csv::Trim::All)
+            .from_reader(text.as_bytes());
         for row in reader.records() {
             match row {
-                Ok(row) if csv.headers.is_empty() => csv.headers = row.iter().map(ToOwned::to_owned).collect(),
+                Ok(row) if csv.headers.is_empty() => {
+                    csv.headers = row.iter().map(ToOwned::to_owned).collect();
+                }
                 Ok(row) => csv.add(row),
                 Err(error) => csv.source.report(0..0, format!("this is not CSV: {error}")),
             }
@@ -50,7 +55,8 @@ impl Csv {
     fn add(&mut self, row: csv::StringRecord) {
         // The reader's position may stand before blank lines.
         let from = row.position().map_or(0, |p| p.byte() as usize);
-        let blank = self.source.text.as_bytes()[from..].iter().take_while(|b| matches!(b, b'\n' | b'\r')).count();
+        let blank =
+            self.source.text.as_bytes()[from..].iter().take_while(|b| matches!(b, b'\n' | b'\r')).count();
         self.starts.push(from + blank);
         self.cells.push(row);
     }
@@ -65,27 +71,35 @@ impl Csv {
         let wanted = self.headers.len();
         if let Some(row) = self.cells.iter().position(|cells| cells.len() != wanted) {
             let message = format!("this row has {} cells, the header has {wanted}", self.cells[row].len());
-            self.source.report_with(self.cell(row, 0), message, "leave a missing value empty between its commas");
+            self.source.report_with(
+                self.cell(row, 0),
+                message,
+                "leave a missing value empty between its commas",
+            );
         }
     }
 
     /// Position of a column, or what is wrong with its name and the remedy.
     pub(super) fn index(&self, column: &str) -> Result<usize, (String, String)> {
-        let found: Vec<usize> =
-            (0..self.headers.len()).filter(|i| self.headers[*i] == column).collect();
+        let found: Vec<usize> = (0..self.headers.len()).filter(|i| self.headers[*i] == column).collect();
         match found[..] {
             [one] => Ok(one),
             [] => {
                 let message = format!("`{}` has no column `{column}`", self.path.display());
-                let only = self.headers.first().filter(|h| self.headers.len() == 1 && h.contains([';', '\t']));
+                let only =
+                    self.headers.first().filter(|h| self.headers.len() == 1 && h.contains([';', '\t']));
                 let help = match only {
-                    Some(_) => "its header has no comma: separate columns by commas, not by semicolons or tabs".to_owned(),
+                    Some(_) => {
+                        "its header has no comma: separate columns by commas, not by semicolons or tabs"
+                            .to_owned()
+                    }
                     None => self.columns_help(column),
                 };
                 Err((message, help))
             }
             _ => {
-                let message = format!("`{}` has {} columns named `{column}`", self.path.display(), found.len());
+                let message =
+                    format!("`{}` has {} columns named `{column}`", self.path.display(), found.len());
                 Err((message, "rename all but one".to_owned()))
             }
         }
@@ -111,11 +125,18 @@ impl Csv {
         };
         let more = match wrong.len() {
             1 => String::new(),
+            2 => ", nor is one other cell of this column".to_owned(),
             n => format!(", nor are {} other cells of this column", n - 1),
         };
         let name = &self.headers[column];
-        let message = format!("`{}` in column `{name}` is not a finite number{more}", &self.cells[row][column]);
-        Err(self.problem(row, column, message, "write a number with a decimal point; leave a missing value empty"))
+        let message =
+            format!("`{}` in column `{name}` is not a finite number{more}", &self.cells[row][column]);
+        Err(self.problem(
+            row,
+            column,
+            message,
+            "write a number with a decimal point; leave a missing value empty",
+        ))
     }
 
     /// The numbers of a time column, strictly increasing.

@@ -19,7 +19,10 @@ pub(super) fn inputs(
 ) -> Option<Vec<Signal>> {
     let before = files.source.count();
     let known: Vec<String> = spec.inputs.iter().map(|q| q.name.clone()).collect();
+    // A misspelt input is told once, not also as a missing one.
+    let mut meant = Vec::new();
     for (name, _) in section.inputs.iter().filter(|(n, _)| !known.contains(n.get_ref())) {
+        meant.extend(starlings_models::nearest(name.get_ref(), &known));
         let message = format!("model `{}` has no input `{}`", spec.kind, name.get_ref());
         if known.is_empty() {
             files.source.report_with(name.span(), message, "it needs none: remove `inputs`");
@@ -30,8 +33,10 @@ pub(super) fn inputs(
     let mut signals = Vec::new();
     for input in &known {
         if let Some((_, column)) = section.inputs.iter().find(|(n, _)| n.get_ref() == input) {
-            signals.extend(signal(files, section, table, column).filter(|s| covers(files, section, s, times, column)));
-        } else {
+            signals.extend(
+                signal(files, section, table, column).filter(|s| covers(files, section, s, times, column)),
+            );
+        } else if !meant.contains(input) {
             let record = section.name.get_ref();
             let message = format!("record `{record}` lacks the input `{input}` of model `{}`", spec.kind);
             let columns = quoted_list(&table.csv.headers);
@@ -111,6 +116,10 @@ fn covers(
         written.get_ref(),
         section.name.get_ref()
     );
-    files.source.report_with(written.span(), message, "an input must cover every observation time of its record");
+    files.source.report_with(
+        written.span(),
+        message,
+        "an input must cover every observation time of its record",
+    );
     false
 }

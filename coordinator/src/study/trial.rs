@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use starlings_models::{Forward, Job, ParticleError, SetupError};
+use starlings_models::{Job, ParticleError, SetupError};
 
 use super::{Study, posterior};
 

@@ -104,13 +104,14 @@ fn place(study: &Study, twin: &Twin) -> Result<(Setup, Vec<f64>), TwinError> {
     Ok((setup, theta))
 }
 
-/// Name of the amplitude of an effect, which is added to the setup if it is a built-in one that the study does not list.
+/// Name of the amplitude of an effect; one that the model does not have yet is added from the study's candidates or the
+/// built-in list.
 fn amplitude_of(study: &Study, setup: &mut Setup, name: &str) -> Result<String, TwinError> {
     let built_in = starlings_models::effect::library(&study.spec);
     if !setup.effects.iter().any(|e| e.name == name) {
-        let Some(effect) = built_in.iter().find(|e| e.name == name) else {
-            let names: Vec<&str> = setup.effects.iter().chain(&built_in).map(|e| e.name.as_str()).collect();
-            let nearest = nearest(name, names.iter().copied()).map(ToOwned::to_owned);
+        let Some(effect) = study.candidates.iter().chain(&built_in).find(|e| e.name == name) else {
+            let names: Vec<&str> = setup.effects.iter().chain(&study.candidates).chain(&built_in).map(|e| e.name.as_str()).collect();
+            let nearest = nearest(name, names.iter().copied());
             return Err(SetupError::Unknown { what: "effect", name: name.to_owned(), nearest }.into());
         };
         setup.effects.push(effect.clone());

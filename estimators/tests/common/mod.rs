@@ -1,5 +1,5 @@
 //! Random matrices and textbook filters that the tests compare with. Every random number is from ChaCha8 with a seed.
-#![allow(dead_code, missing_docs, unreachable_pub)]
+#![allow(clippy::unwrap_used, dead_code, missing_docs, unreachable_pub)]
 
 pub mod rcr;
 

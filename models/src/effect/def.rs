@@ -20,7 +20,7 @@ pub struct EffectDef {
     pub states: Vec<EffectState>,
     /// Names of effects or parameters that can look the same in data.
     pub confounders: Vec<String>,
-    /// Name of the built-in effect that stands for everything above except `name`; see [`super::library`].
+    /// Name of the built-in effect that stands for everything above except `name`; see [`mod@super::library`].
     pub built_in: Option<String>,
 }
 
@@ -51,12 +51,7 @@ pub struct EffectParameter {
 
 impl Default for EffectParameter {
     fn default() -> Self {
-        Self {
-            name: String::new(),
-            unit: String::new(),
-            range: crate::bounds::unbounded(),
-            grid: Vec::new(),
-        }
+        Self { name: String::new(), unit: String::new(), range: crate::bounds::unbounded(), grid: Vec::new() }
     }
 }
 

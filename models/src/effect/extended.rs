@@ -2,7 +2,8 @@
 //!
 //! The effects' states follow the model's states and their parameters follow its parameters. Terms see the recorded inputs;
 //! the model sees them with the effects' additions, except through `delay`, which reads the record. Where effects only add to
-//! outputs the model keeps its own step, so that its states are untouched to the last bit. Next file to read: [`super::library`].
+//! outputs the model keeps its own step, so that its states are untouched to the last bit. An output goes on measuring the
+//! state that it measured, for observers, though a term may bend the relation between the two. Next file to read: [`mod@super::library`].
 
 use std::collections::BTreeMap;
 
@@ -137,7 +138,8 @@ impl Model for Extended {
         let at = Moment { y: y.as_ref(), ..at };
         let rate = self.rate_for_slopes(at);
         let (inner, mut rest) = g.split_at_mut(self.inner.n_switch());
-        let write = |u: Drive<'_>| self.inner.switches(t, &x[..self.n_state], &theta[..self.n_param], u, inner);
+        let write =
+            |u: Drive<'_>| self.inner.switches(t, &x[..self.n_state], &theta[..self.n_param], u, inner);
         self.with_inputs(at, rate.as_ref(), write);
         for effect in &self.effects {
             let (own, others) = rest.split_at_mut(effect.n_switch());

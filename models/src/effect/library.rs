@@ -1,7 +1,7 @@
 //! The built-in effects: they grow from a model's roles, so that one entry serves every model that has its place for it.
 //!
 //! A study names one by `built_in`, or lets a search try them all. Adding an effect is one function and one line in
-//! [`GROWERS`]. Next file to read: [`crate::catalogue`].
+//! `GROWERS`. Next file to read: [`crate::catalogue`].
 
 use super::{Addition, EffectDef, EffectParameter};
 use crate::setup::SetupError;
@@ -57,7 +57,10 @@ fn series_resistance(spec: &Spec) -> Vec<EffectDef> {
                 range: [0.0, f64::INFINITY],
                 grid: Vec::new(),
             }],
-            confounders: vec!["a characteristic impedance".to_owned(), "a flow-dependent sensor error".to_owned()],
+            confounders: vec![
+                "a characteristic impedance".to_owned(),
+                "a flow-dependent sensor error".to_owned(),
+            ],
             ..EffectDef::default()
         })
         .collect()

@@ -56,7 +56,6 @@ pub(super) fn div(a: Node, b: Node) -> Node {
 /// The total derivative of `node` with respect to time, given that of each name.
 pub(super) fn ddt<E>(node: &Node, of: &mut dyn FnMut(&Name) -> Result<Node, E>) -> Result<Node, E> {
     Ok(match node {
-        Node::Number(_) => Node::Number(0.0),
         Node::Time => Node::Number(1.0),
         Node::Name(name) => of(name)?,
         Node::Call(function, a) => mul(slope(*function, a), ddt(a, of)?),
@@ -70,7 +69,7 @@ pub(super) fn ddt<E>(node: &Node, of: &mut dyn FnMut(&Name) -> Result<Node, E>) 
             mul(Node::DelayedSlope(name.clone(), tau.clone()), passing)
         }
         // Inputs are linear between samples.
-        Node::DelayedSlope(..) | Node::Ddt(_) => Node::Number(0.0),
+        Node::Number(_) | Node::DelayedSlope(..) | Node::Ddt(_) => Node::Number(0.0),
     })
 }
 

@@ -13,7 +13,11 @@ type Resolve<'a> = &'a dyn Fn(&str) -> Option<Slot>;
 type Nearest<'a> = &'a dyn Fn(&str) -> Option<String>;
 
 /// Compiles a tree.
-pub(super) fn compile(node: &Node, resolve: Resolve<'_>, nearest: Nearest<'_>) -> Result<Program, ExpressionError> {
+pub(super) fn compile(
+    node: &Node,
+    resolve: Resolve<'_>,
+    nearest: Nearest<'_>,
+) -> Result<Program, ExpressionError> {
     let mut compiler = Compiler { resolve, nearest, code: Vec::new(), height: 0, highest: 0 };
     let tree = compiler.resolved(node)?;
     compiler.emit(&tree)?;
@@ -60,7 +64,8 @@ fn source(slot: Slot) -> Source {
 impl Compiler<'_> {
     fn slot(&self, name: &Name) -> Result<Slot, ExpressionError> {
         (self.resolve)(&name.text).ok_or_else(|| {
-            let hint = (self.nearest)(&name.text).map(|n| format!("; did you mean `{n}`?")).unwrap_or_default();
+            let hint =
+                (self.nearest)(&name.text).map(|n| format!("; did you mean `{n}`?")).unwrap_or_default();
             ExpressionError::new(name.column, format!("unknown name `{}`{hint}", name.text))
         })
     }
@@ -81,7 +86,7 @@ impl Compiler<'_> {
             Node::If(c, a, b) => {
                 let (c, a, b) = (self.resolved(c)?, self.resolved(a)?, self.resolved(b)?);
                 match number(&c) {
-                    Some(value) if value < 0.0 || value > 0.0 => a,
+                    Some(value) if value.abs() > 0.0 => a,
                     Some(_) => b,
                     None => Tree::If(Box::new(c), Box::new(a), Box::new(b)),
                 }
@@ -99,34 +104,35 @@ impl Compiler<'_> {
                 let message = format!("`{}` is constant: `ddt` needs an input or an output", name.text);
                 Err(ExpressionError::new(name.column, message))
             }
-            _ => match (self.resolve)(&format!("ddt:{}", name.text)) {
-                Some(slot) => Ok(Tree::Leaf(source(slot))),
-                None => {
+            _ => (self.resolve)(&format!("ddt:{}", name.text))
+                .map(|slot| Tree::Leaf(source(slot)))
+                .ok_or_else(|| {
                     let message = format!("the time derivative of `{}` is not known here", name.text);
-                    Err(ExpressionError::new(name.column, message))
-                }
-            },
+                    ExpressionError::new(name.column, message)
+                }),
         }
     }
 
-    fn delay(&self, name: &Name, tau: &Node, make: fn(u32, Box<Tree>) -> Tree) -> Result<Tree, ExpressionError> {
+    fn delay(
+        &self,
+        name: &Name,
+        tau: &Node,
+        make: fn(u32, Box<Tree>) -> Tree,
+    ) -> Result<Tree, ExpressionError> {
         match self.slot(name)? {
             Slot::Input(i) => Ok(make(i as u32, Box::new(self.resolved(tau)?))),
             Slot::Constant(_) | Slot::Parameter(_) => {
                 let message = format!("`{}` is constant: `delay` needs an input or an output", name.text);
                 Err(ExpressionError::new(name.column, message))
             }
-            _ => match (self.resolve)(&format!("delay:{}", name.text)) {
-                Some(slot) => Ok(Tree::Leaf(source(slot))),
-                None => Err(ExpressionError::new(
-                    name.column,
-                    format!(
-                        "`delay` of `{0}` is not supported, only of an input: give the model a lag state instead, \
-                         with the rate `({0} - lag)/tau`",
-                        name.text
-                    ),
-                )),
-            },
+            _ => (self.resolve)(&format!("delay:{}", name.text)).map(|slot| Tree::Leaf(source(slot))).ok_or_else(|| {
+                let message = format!(
+                    "`delay` is supported of inputs and of outputs without states, not of `{0}`: use a lag state \
+                     instead, with the rate `({0} - lag)/tau`",
+                    name.text
+                );
+                ExpressionError::new(name.column, message)
+            }),
         }
     }
 

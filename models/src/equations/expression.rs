@@ -169,7 +169,9 @@ fn switching(part: &Node) -> Option<Node> {
     };
     let varies = {
         let mut found = false;
-        g.walk(&mut |n| found |= !matches!(n, Node::Number(_) | Node::Call(..) | Node::Pair(..) | Node::If(..)));
+        g.walk(&mut |n| {
+            found |= !matches!(n, Node::Number(_) | Node::Call(..) | Node::Pair(..) | Node::If(..));
+        });
         found
     };
     varies.then_some(g)

@@ -50,7 +50,9 @@ impl Names<'_> {
     pub(super) fn inline(&self, node: &Node) -> Result<Node, ExpressionError> {
         let done = self.rewrite(node)?;
         if done.size() > MAX_SIZE {
-            let message = format!("more than {MAX_SIZE} operations once outputs are put in: use states for some of them");
+            let message = format!(
+                "more than {MAX_SIZE} operations once outputs are put in: use states for some of them"
+            );
             return Err(ExpressionError::new(1, message));
         }
         Ok(done)
@@ -124,15 +126,18 @@ impl Names<'_> {
         let below = |part: &Node| self.earlier(part, tau).map(Box::new);
         let later = |inner: &Node| Some(Box::new(calculus::add(self.earlier(inner, tau)?, tau.clone())));
         Some(match node {
-            Node::Number(_) => node.clone(),
             Node::Time => calculus::sub(Node::Time, tau.clone()),
             Node::Name(name) if self.state(&name.text).is_some() => return None,
-            Node::Name(name) if self.input(&name.text).is_some() => Node::Delay(name.clone(), Box::new(tau.clone())),
-            Node::Name(_) => node.clone(),
+            Node::Name(name) if self.input(&name.text).is_some() => {
+                Node::Delay(name.clone(), Box::new(tau.clone()))
+            }
+            Node::Number(_) | Node::Name(_) => node.clone(),
             Node::Call(function, a) => Node::Call(*function, below(a)?),
             Node::Pair(operation, a, b) => Node::Pair(*operation, below(a)?, below(b)?),
             Node::If(c, a, b) => Node::If(below(c)?, below(a)?, below(b)?),
-            Node::Delay(name, inner) if self.input(&name.text).is_some() => Node::Delay(name.clone(), later(inner)?),
+            Node::Delay(name, inner) if self.input(&name.text).is_some() => {
+                Node::Delay(name.clone(), later(inner)?)
+            }
             Node::DelayedSlope(name, inner) => Node::DelayedSlope(name.clone(), later(inner)?),
             Node::Ddt(name) => Node::DelayedSlope(name.clone(), Box::new(tau.clone())),
             Node::Delay(..) => return None,

@@ -45,7 +45,11 @@ impl EquationsModel {
         for term in terms {
             if !def.replaceable.iter().any(|name| name == term) {
                 let nearest = nearest(term, &self.def.replaceable);
-                return Err(SetupError::Unknown { what: "replaceable term", name: (*term).to_owned(), nearest });
+                return Err(SetupError::Unknown {
+                    what: "replaceable term",
+                    name: (*term).to_owned(),
+                    nearest,
+                });
             }
             def.replaceable.retain(|name| name != term);
             for state in &mut def.states {
@@ -100,7 +104,15 @@ impl Model for EquationsModel {
         write(&self.built.switches, &At { t, x, theta, u, y: &[] }, g);
     }
 
-    fn jacobian(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, dfdx: &mut [f64], dfdt: &mut [f64]) -> bool {
+    fn jacobian(
+        &self,
+        t: f64,
+        x: &[f64],
+        theta: &[f64],
+        u: Drive<'_>,
+        dfdx: &mut [f64],
+        dfdt: &mut [f64],
+    ) -> bool {
         let n = self.unit.len();
         let at = At { t, x, theta, u, y: &[] };
         dfdx.fill(0.0);

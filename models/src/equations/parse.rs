@@ -3,8 +3,9 @@
 //! Precedence, loosest first: comparisons (which do not chain), `+ -`, `* /`, unary `-`, `^` (from the right).
 //! Names are not resolved here. Next file to read: [`super::compile`].
 
+mod call;
+
 use super::expression::ExpressionError;
-use crate::nearest;
 use super::node::{Function, Name, Node, Operation};
 
 /// Parts nested deeper than this are refused, so that no expression can exhaust the stack.
@@ -14,7 +15,8 @@ const MAX_LENGTH: usize = 4000;
 
 /// Every function of the language.
 pub(super) const FUNCTIONS: [&str; 15] = [
-    "sin", "cos", "tan", "exp", "log", "sqrt", "abs", "sign", "min", "max", "tanh", "step", "if", "delay", "ddt",
+    "sin", "cos", "tan", "exp", "log", "sqrt", "abs", "sign", "min", "max", "tanh", "step", "if", "delay",
+    "ddt",
 ];
 
 /// Parses a whole expression.
@@ -34,7 +36,8 @@ pub(super) fn parse(text: &str) -> Result<Node, ExpressionError> {
 /// Column of the first `t` that stands for time.
 pub(super) fn column_of_time(text: &str) -> Option<usize> {
     let chars: Vec<char> = text.chars().collect();
-    let in_word = |i: Option<usize>| i.and_then(|i| chars.get(i)).is_some_and(|c| c.is_alphanumeric() || *c == '_');
+    let in_word =
+        |i: Option<usize>| i.and_then(|i| chars.get(i)).is_some_and(|c| c.is_alphanumeric() || *c == '_');
     let alone = |i: &usize| chars[*i] == 't' && !in_word(i.checked_sub(1)) && !in_word(Some(i + 1));
     (0..chars.len()).find(alone).map(|i| i + 1)
 }
@@ -214,87 +217,5 @@ impl Parser {
             }
             _ => Ok(Node::Name(name)),
         }
-    }
-
-    /// A call, from behind its opening parenthesis.
-    fn call(&mut self, name: &Name) -> Result<Node, ExpressionError> {
-        let one = match name.text.as_str() {
-            "sin" => Function::Sin,
-            "cos" => Function::Cos,
-            "tan" => Function::Tan,
-            "exp" => Function::Exp,
-            "log" => Function::Log,
-            "sqrt" => Function::Sqrt,
-            "abs" => Function::Abs,
-            "sign" => Function::Sign,
-            "tanh" => Function::Tanh,
-            "step" => Function::Step,
-            "min" => return self.arguments(name).map(|[a, b]| pair(Operation::Min, a, b)),
-            "max" => return self.arguments(name).map(|[a, b]| pair(Operation::Max, a, b)),
-            "if" => {
-                let [c, a, b] = self.arguments(name)?;
-                return Ok(Node::If(Box::new(c), Box::new(a), Box::new(b)));
-            }
-            "delay" => {
-                let column = self.signal_column();
-                let [u, tau] = self.arguments(name)?;
-                return Ok(Node::Delay(signal(u, name, column)?, Box::new(tau)));
-            }
-            "ddt" => {
-                let column = self.signal_column();
-                let [u] = self.arguments(name)?;
-                return Ok(Node::Ddt(signal(u, name, column)?));
-            }
-            unknown => {
-                let hint = match nearest(unknown, FUNCTIONS) {
-                    Some(near) => format!("; did you mean `{near}`?"),
-                    None => format!("; a product is written `{unknown}*(...)`"),
-                };
-                return Err(ExpressionError::new(name.column, format!("no function named `{unknown}`{hint}")));
-            }
-        };
-        let [a] = self.arguments(name)?;
-        Ok(Node::Call(one, Box::new(a)))
-    }
-
-    fn signal_column(&mut self) -> usize {
-        self.peek();
-        self.column()
-    }
-
-    /// Exactly `N` arguments and the closing parenthesis.
-    fn arguments<const N: usize>(&mut self, name: &Name) -> Result<[Node; N], ExpressionError> {
-        let mut list = Vec::with_capacity(N);
-        loop {
-            list.push(self.expression(0)?);
-            let last = list.len() == N;
-            match self.peek() {
-                Some(',') if !last => self.at += 1,
-                Some(')') if last => {
-                    self.at += 1;
-                    break;
-                }
-                Some(',' | ')') => {
-                    let plural = if N == 1 { "" } else { "s" };
-                    let message = format!("`{}` takes {N} argument{plural}", name.text);
-                    let expected = if last { "`)`" } else { "`,`" };
-                    return Err(ExpressionError::new(self.column(), format!("{message}: expected {expected}")));
-                }
-                _ => return Err(self.unexpected(if last { "an operator or `)`" } else { "an operator or `,`" })),
-            }
-        }
-        list.try_into().map_err(|_| ExpressionError::new(name.column, "wrong number of arguments"))
-    }
-}
-
-fn pair(operation: Operation, a: Node, b: Node) -> Node {
-    Node::Pair(operation, Box::new(a), Box::new(b))
-}
-
-/// The bare name that `delay` and `ddt` need as first argument.
-fn signal(node: Node, of: &Name, column: usize) -> Result<Name, ExpressionError> {
-    match node {
-        Node::Name(name) => Ok(name),
-        _ => Err(ExpressionError::new(column, format!("`{}` needs the name of an input or an output", of.text))),
     }
 }

@@ -1,8 +1,8 @@
 //! Flat code for an expression, and its two interpreters: values, and values with a directional derivative.
 //!
-//! A stack machine whose topmost entry stays in a register; nothing is allocated. Forward mode follows Griewank & Walther
-//! (2008, ch. 3). Next file to read: [`super::model`].
+//! A stack machine whose topmost entry stays in a register; nothing is allocated. Next file to read: [`super::dual`].
 
+use super::dual::{Along, Dual};
 use super::expression::{At, Direction};
 use super::node::{Function, Operation};
 
@@ -92,7 +92,7 @@ impl Program {
 }
 
 /// What differs between the two interpreters.
-trait Reader {
+pub(super) trait Reader {
     type Number: Copy + Default;
     fn read(&self, source: Source) -> Self::Number;
     fn call(function: Function, a: Self::Number) -> Self::Number;
@@ -149,8 +149,20 @@ pub(super) fn pair(operation: Operation, a: f64, b: f64) -> f64 {
         Operation::Mul => a * b,
         Operation::Div => a / b,
         Operation::Pow => a.powf(b),
-        Operation::Min => if b < a { b } else { a },
-        Operation::Max => if b > a { b } else { a },
+        Operation::Min => {
+            if b < a {
+                b
+            } else {
+                a
+            }
+        }
+        Operation::Max => {
+            if b > a {
+                b
+            } else {
+                a
+            }
+        }
         Operation::Less => truth(a < b),
         Operation::LessEqual => truth(a <= b),
         Operation::Greater => truth(a > b),
@@ -173,12 +185,20 @@ pub(super) fn call(function: Function, a: f64) -> f64 {
         Function::Abs => a.abs(),
         Function::Sign => sign(a),
         Function::Tanh => a.tanh(),
-        Function::Step => if a >= 0.0 { 1.0 } else if a < 0.0 { 0.0 } else { f64::NAN },
+        Function::Step => {
+            if a >= 0.0 {
+                1.0
+            } else if a < 0.0 {
+                0.0
+            } else {
+                f64::NAN
+            }
+        }
     }
 }
 
 #[inline]
-fn sign(a: f64) -> f64 {
+pub(super) fn sign(a: f64) -> f64 {
     if a > 0.0 {
         1.0
     } else if a < 0.0 {
@@ -204,12 +224,13 @@ pub(super) fn power(a: f64, n: i32) -> f64 {
 }
 
 /// Slope of a delayed input: inputs are linear between samples, so a short difference is exact away from the samples.
-fn delayed_slope(at: &At<'_>, input: usize, tau: f64) -> f64 {
+pub(super) fn delayed_slope(at: &At<'_>, input: usize, tau: f64) -> f64 {
     let (s, h) = (at.t - tau, 1e-7 * at.t.abs().max(tau.abs()).max(1e-3));
     (at.u.history.at(input, s + h) - at.u.history.at(input, s - h)) / (2.0 * h)
 }
 
-struct Values<'a, 'b>(&'a At<'b>);
+/// Plain values.
+pub(super) struct Values<'a, 'b>(pub(super) &'a At<'b>);
 
 impl Reader for Values<'_, '_> {
     type Number = f64;
@@ -251,84 +272,7 @@ impl Reader for Values<'_, '_> {
     }
 
     fn is_zero(a: f64) -> bool {
-        !(a < 0.0 || a > 0.0)
-    }
-}
-
-/// A value and its derivative.
-#[derive(Clone, Copy, Default)]
-struct Dual(f64, f64);
-
-struct Along<'a, 'b, 'c, 'd>(&'a At<'b>, &'c Direction<'d>);
-
-/// `factor * slope`, zero when nothing moves even where the factor is infinite.
-fn chain(factor: f64, slope: f64) -> f64 {
-    if slope < 0.0 || slope > 0.0 || slope.is_nan() { factor * slope } else { 0.0 }
-}
-
-impl Reader for Along<'_, '_, '_, '_> {
-    type Number = Dual;
-
-    fn read(&self, source: Source) -> Dual {
-        let part = |slice: &[f64], i: u32| slice.get(i as usize).copied().unwrap_or(0.0);
-        let slope = match source {
-            // Inputs are linear on a segment: their slopes do not move.
-            Source::Number(_) | Source::Slope(_) => 0.0,
-            Source::Time => self.1.t,
-            Source::State(i) => part(self.1.x, i),
-            Source::Parameter(i) => part(self.1.theta, i),
-            Source::Input(i) => part(self.1.u, i),
-            Source::Output(i) => part(self.1.y, i),
-        };
-        Dual(Values(self.0).read(source), slope)
-    }
-
-    fn call(function: Function, Dual(a, da): Dual) -> Dual {
-        let value = call(function, a);
-        let factor = match function {
-            Function::Neg => -1.0,
-            Function::Sin => a.cos(),
-            Function::Cos => -a.sin(),
-            Function::Tan => 1.0 + value * value,
-            Function::Exp => value,
-            Function::Log => 1.0 / a,
-            Function::Sqrt => 0.5 / value,
-            Function::Abs => sign(a),
-            Function::Sign | Function::Step => 0.0,
-            Function::Tanh => 1.0 - value * value,
-        };
-        Dual(value, chain(factor, da))
-    }
-
-    fn pair(operation: Operation, Dual(a, da): Dual, Dual(b, db): Dual) -> Dual {
-        let value = pair(operation, a, b);
-        let slope = match operation {
-            Operation::Add => da + db,
-            Operation::Sub => da - db,
-            Operation::Mul => da * b + a * db,
-            Operation::Div => (da - value * db) / b,
-            Operation::Pow => chain(b * a.powf(b - 1.0), da) + chain(value * a.ln(), db),
-            Operation::Min => if b < a { db } else { da },
-            Operation::Max => if b > a { db } else { da },
-            _ => 0.0,
-        };
-        Dual(value, slope)
-    }
-
-    fn power(Dual(a, da): Dual, n: i32) -> Dual {
-        Dual(power(a, n), if n == 0 { 0.0 } else { chain(f64::from(n) * power(a, n - 1), da) })
-    }
-
-    fn delay(&self, input: usize, Dual(tau, dtau): Dual) -> Dual {
-        let slope = chain(delayed_slope(self.0, input, tau), self.1.t - dtau);
-        Dual(Values(self.0).delay(input, tau), slope)
-    }
-
-    fn delayed_slope(&self, input: usize, Dual(tau, _): Dual) -> Dual {
-        Dual(delayed_slope(self.0, input, tau), 0.0)
-    }
-
-    fn is_zero(Dual(a, _): Dual) -> bool {
-        Values::is_zero(a)
+        // NaN is no truth: it takes the second branch, as a comparison with NaN does.
+        a.is_nan() || a.abs() <= 0.0
     }
 }

@@ -1,15 +1,14 @@
 //! The choice of steps: proportional–integral control (Gustafsson 1991; Hairer, Nørsett & Wanner 1993, §II.4), limits, and
 //! restarts at switching points.
 //!
-//! It knows no formulas of a method. Next file to read: [`super::events`].
+//! It knows no formulas of a method. Next file to read: `control/crossing.rs`.
+
+mod crossing;
 
 use super::Tolerance;
-use super::dopri5::Dopri5;
 use super::events::Events;
-use super::rosenbrock::Rosenbrock;
-use super::system::{OnSegment, System, not_finite};
-use crate::model::Segment;
-use crate::{Model, ParticleError};
+use super::system::{System, not_finite};
+use crate::ParticleError;
 
 /// Most steps, accepted or not, within one segment.
 pub(super) const MAX_STEPS: u64 = 1_000_000;
@@ -71,23 +70,6 @@ pub(super) enum Step {
     Refused,
     /// Accepted, and the method gives up for stiffness.
     Stiff,
-}
-
-/// Dormand–Prince as far as it goes, then Rosenbrock.
-pub(super) fn auto<M: Model + ?Sized>(
-    model: &M,
-    segment: Segment<'_>,
-    theta: &[f64],
-    x: &mut [f64],
-    tolerance: Tolerance,
-) -> Result<(), ParticleError> {
-    let n = x.len();
-    let mut system = OnSegment::new(model, segment, theta, n);
-    let span = [segment.t0, segment.t1];
-    if let Reached::Stiff(t) = integrate(&mut system, &mut Dopri5::new(n, true), span, x, tolerance)? {
-        integrate(&mut system, &mut Rosenbrock::new(n), [t, segment.t1], x, tolerance)?;
-    }
-    Ok(())
 }
 
 /// Integrates over a span, restarting at switching points and sliding along them where both sides lead back.
@@ -153,7 +135,21 @@ impl<'a, S: System, P: Stepper> Run<'a, S, P> {
         let events = Events::new(system.n_switch());
         let shortest = 16.0 * f64::EPSILON * t.abs().max(end.abs());
         let new = vec![0.0; x.len()];
-        Self { system, stepper, t, end, x, tolerance, events, new, h: 0.0, shortest, last_error: 1e-4, steps: 0, fresh: true }
+        Self {
+            system,
+            stepper,
+            t,
+            end,
+            x,
+            tolerance,
+            events,
+            new,
+            h: 0.0,
+            shortest,
+            last_error: 1e-4,
+            steps: 0,
+            fresh: true,
+        }
     }
 
     /// Evaluates the starting point and guesses the first step.
@@ -225,7 +221,11 @@ impl<'a, S: System, P: Stepper> Run<'a, S, P> {
     }
 
     fn refuse(&mut self, h: f64, error: f64) -> Result<Step, ParticleError> {
-        let factor = if error.is_finite() { (SAFETY * error.powf(-1.0 / P::ORDER)).clamp(FACTOR[0], 0.9) } else { 0.1 };
+        let factor = if error.is_finite() {
+            (SAFETY * error.powf(-1.0 / P::ORDER)).clamp(FACTOR[0], 0.9)
+        } else {
+            0.1
+        };
         self.h = h * factor;
         if self.h >= self.shortest {
             return Ok(Step::Refused);
@@ -245,60 +245,5 @@ impl<'a, S: System, P: Stepper> Run<'a, S, P> {
         self.system.rhs(self.t + h, &ahead, &mut rate);
         let found = if rate.iter().all(|v| v.is_finite()) { &self.new } else { &rate };
         not_finite(self.system, self.t, found)
-    }
-
-    /// Steps up to the first switching point within `h` and across it, unless the step up to it is refused.
-    fn cross(&mut self, h: f64) -> Result<Step, ParticleError> {
-        let [before, after] = self.locate(h)?;
-        if before > self.shortest {
-            let error = self.attempt(before)?;
-            if error.is_nan() || error > 1.0 {
-                return self.refuse(before, error);
-            }
-            self.accept(before, self.t + before);
-        }
-        // The switching point lies within this step; it is so short that its error does not count.
-        let gap = (after - before).max(self.shortest).min(self.end - self.t);
-        if gap > 0.0 {
-            self.attempt(gap)?;
-            if !self.new.iter().all(|v| v.is_finite()) {
-                return Err(self.culprit(gap));
-            }
-            let target = if self.end - self.t <= gap { self.end } else { self.t + gap };
-            self.accept(gap, target);
-        }
-        self.events.begin(self.system, self.t, self.x);
-        self.stepper.restart(self.system, self.t, self.x);
-        self.h = h;
-        self.last_error = 1e-4;
-        Ok(Step::Crossed)
-    }
-
-    /// Narrows the first change of side within `h` down to two step lengths, before and after it, by the Illinois variant of
-    /// regula falsi (Dowell & Jarratt 1971) on repeated steps, safeguarded by bisection.
-    fn locate(&mut self, h: f64) -> Result<[f64; 2], ParticleError> {
-        let narrow = (1e-12 * h).max(self.shortest);
-        let mut bracket = [0.0, h];
-        let mut weights = self.events.ends();
-        let mut halvings = 0;
-        while bracket[1] - bracket[0] > narrow && halvings < 100 {
-            let width = bracket[1] - bracket[0];
-            let share = weights[0] / (weights[0] - weights[1]);
-            let guess = if halvings % 4 == 3 || !(0.0..=1.0).contains(&share) { 0.5 } else { share };
-            // A guess next to an end is moved inwards, so that the bracket closes from both sides.
-            let at = bracket[0] + (guess * width).clamp(0.45 * narrow, width - 0.45 * narrow);
-            let error = self.attempt(at)?;
-            let changed = self.events.changed(self.system, self.t + at, &self.new);
-            let value = self.events.ends()[1];
-            if changed || !error.is_finite() {
-                (bracket[1], weights[1]) = (at, value);
-                weights[0] *= 0.5;
-            } else {
-                (bracket[0], weights[0]) = (at, value);
-                weights[1] *= 0.5;
-            }
-            halvings += 1;
-        }
-        Ok(bracket)
     }
 }

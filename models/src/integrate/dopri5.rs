@@ -1,7 +1,7 @@
 //! The embedded Runge–Kutta pair of order 5(4) by Dormand & Prince (1980), with local extrapolation.
 //!
 //! The last stage is the next step's first. Stiffness is detected as in DOPRI5 (Hairer, Nørsett & Wanner 1993, §IV.2).
-//! Next file to read: [`super::control`], which chooses the steps.
+//! Next file to read: `control.rs`, which chooses the steps.
 
 use super::Tolerance;
 use super::control::{self, Stepper};

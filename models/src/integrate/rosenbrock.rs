@@ -1,7 +1,7 @@
 //! The stiffly accurate Rosenbrock pair of order 4(3) with six stages, RODAS (Hairer & Wanner 1996, §IV.7).
 //!
 //! L-stable: what decays much faster than the step is long is damped at once. The Jacobian is the model's own where it has
-//! one, else finite differences; one factorisation per attempt. Next file to read: [`super::control`].
+//! one, else finite differences; one factorisation per attempt. Next file to read: `control.rs`.
 
 use nalgebra::{DMatrix, DVectorViewMut, Dyn, LU};
 

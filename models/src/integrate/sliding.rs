@@ -84,13 +84,13 @@ impl<'a, S: System> Surface<'a, S> {
         let h = root * t.abs().max(1e-5);
         let passing = (self.value(t + h) - here) / h;
         let mut share = f64::INFINITY;
-        for j in 0..x.len() {
-            let h = root * x[j].abs().max(1e-5);
-            self.moved[j] = x[j] + h;
-            self.normal[j] = (self.value(t) - here) / (self.moved[j] - x[j]);
-            self.moved[j] = x[j];
+        for (j, x) in x.iter().enumerate() {
+            let h = root * x.abs().max(1e-5);
+            self.moved[j] = x + h;
+            self.normal[j] = (self.value(t) - here) / (self.moved[j] - x);
+            self.moved[j] = *x;
             if self.normal[j].abs() > 0.0 {
-                let unit = self.tolerance.absolute + self.tolerance.relative * x[j].abs();
+                let unit = self.tolerance.absolute + self.tolerance.relative * x.abs();
                 share = share.min(OFFSET * unit / self.normal[j].abs());
             }
         }

@@ -13,7 +13,15 @@ pub(super) trait System {
     fn switches(&mut self, t: f64, x: &[f64], g: &mut [f64]);
 
     /// Writes ∂f/∂x column by column and ∂f/∂t; `f` is the rate at (t, x), `scratch` holds 2n numbers.
-    fn jacobian(&mut self, t: f64, x: &[f64], f: &[f64], dfdx: &mut [f64], dfdt: &mut [f64], scratch: &mut [f64]) {
+    fn jacobian(
+        &mut self,
+        t: f64,
+        x: &[f64],
+        f: &[f64],
+        dfdx: &mut [f64],
+        dfdt: &mut [f64],
+        scratch: &mut [f64],
+    ) {
         differences(self, t, x, f, dfdx, dfdt, scratch);
     }
 
@@ -21,7 +29,7 @@ pub(super) trait System {
     fn name(&self, component: usize) -> String;
 }
 
-/// Forward differences with the step of Dennis & Schnabel (1983, §5.4).
+/// One-sided differences with the step of Dennis & Schnabel (1983, §5.4).
 pub(super) fn differences<S: System + ?Sized>(
     system: &mut S,
     t: f64,
@@ -39,6 +47,11 @@ pub(super) fn differences<S: System + ?Sized>(
         let h = root * x[j].abs().max(1e-5);
         moved[j] = x[j] + h;
         system.rhs(t, moved, shifted);
+        if !shifted.iter().all(|v| v.is_finite()) {
+            // The state stands at the edge of where the rate is defined: look back.
+            moved[j] = x[j] - h;
+            system.rhs(t, moved, shifted);
+        }
         for (d, (after, before)) in column.iter_mut().zip(shifted.iter().zip(f)) {
             *d = (after - before) / (moved[j] - x[j]);
         }
@@ -106,7 +119,15 @@ impl<M: Model + ?Sized> System for OnSegment<'_, M> {
         self.model.switches(t, x, self.theta, self.drive(), g);
     }
 
-    fn jacobian(&mut self, t: f64, x: &[f64], f: &[f64], dfdx: &mut [f64], dfdt: &mut [f64], scratch: &mut [f64]) {
+    fn jacobian(
+        &mut self,
+        t: f64,
+        x: &[f64],
+        f: &[f64],
+        dfdx: &mut [f64],
+        dfdt: &mut [f64],
+        scratch: &mut [f64],
+    ) {
         self.set_time(t);
         if !self.model.jacobian(t, x, self.theta, self.drive(), dfdx, dfdt) {
             differences(self, t, x, f, dfdx, dfdt, scratch);

@@ -24,18 +24,22 @@ impl Default for Windkessel4 {
             .role(Role::Inertia)
             .positive()
             .says("Total arterial inertance, parallel to the characteristic impedance.");
-        let branch_flow = Quantity::new("iL", "mL/s")
-            .role(Role::Flow)
-            .default(0.0)
-            .says("Flow through the inertance.");
+        let branch_flow =
+            Quantity::new("iL", "mL/s").role(Role::Flow).default(0.0).says("Flow through the inertance.");
         Self {
             spec: Spec {
                 kind: "windkessel-4".to_owned(),
-                says: "A characteristic impedance with a parallel inertance, before an elastic artery and its \
+                says:
+                    "A characteristic impedance with a parallel inertance, before an elastic artery and its \
                        peripheral resistance."
-                    .to_owned(),
+                        .to_owned(),
                 states: vec![stored_pressure(), branch_flow],
-                parameters: vec![resistance(), compliance(), characteristic_impedance().positive(), inertance],
+                parameters: vec![
+                    resistance(),
+                    compliance(),
+                    characteristic_impedance().positive(),
+                    inertance,
+                ],
                 outputs: vec![pressure()],
                 inputs: vec![flow()],
                 measures: vec![("pressure".to_owned(), "p".to_owned())],

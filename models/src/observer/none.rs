@@ -3,12 +3,12 @@
 use super::{Correction, Kind, Observer};
 
 /// Leaves the state as it is.
-pub struct None;
+pub struct NoObserver;
 
 /// The entry of the observer list.
 pub(super) const KIND: Kind =
-    Kind { kind: "none", says: "The state runs free.", build: |_, _| Ok(Box::new(None)) };
+    Kind { kind: "none", says: "The state runs free.", build: |_, _| Ok(Box::new(NoObserver)) };
 
-impl Observer for None {
+impl Observer for NoObserver {
     fn correct(&self, _at: Correction<'_>, _x: &mut [f64]) {}
 }

@@ -151,7 +151,8 @@ mod tests {
         def.corrects.insert("velocity".to_owned(), "x".to_owned());
         let observer = Nudging::new(&def, Wiring { spec: model.spec(), outputs: &outputs }).expect("nudging");
         let mut x = [0.0, 0.0];
-        observer.correct(Correction { t: 0.5, dt: 0.5, observed: &[1.0, 3.0], predicted: &[0.0, 0.0] }, &mut x);
+        observer
+            .correct(Correction { t: 0.5, dt: 0.5, observed: &[1.0, 3.0], predicted: &[0.0, 0.0] }, &mut x);
         assert!((x[0] - 2.0 * (1.0 - (-1.0_f64).exp())).abs() < 1e-15, "{}", x[0]);
     }
 

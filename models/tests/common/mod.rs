@@ -1,5 +1,5 @@
 //! Setups and windows shared by the tests of this crate.
-#![allow(dead_code, reason = "each test binary uses its part")]
+#![allow(clippy::unwrap_used, dead_code, reason = "test helpers; each test binary uses its part")]
 
 use std::sync::Arc;
 
@@ -39,7 +39,11 @@ fn pendulum() -> EquationsDef {
             state("angle", "0.3", "speed"),
             state("speed", "0", "-g*sin(angle) - c*speed - friction*sign(speed) + torque"),
         ],
-        outputs: vec![OutputDef { name: "angle".to_owned(), value: "angle".to_owned(), ..OutputDef::default() }],
+        outputs: vec![OutputDef {
+            name: "angle".to_owned(),
+            value: "angle".to_owned(),
+            ..OutputDef::default()
+        }],
         inputs: vec![InputDef { name: "torque".to_owned(), ..InputDef::default() }],
         ..EquationsDef::default()
     }

@@ -144,7 +144,9 @@ fn decode_result(result: wire::Result) -> Result<FromWorker, WireError> {
             check_state(&state)?;
             Answer::Ran(Ok(Prediction { outputs: floats::decode(&p.outputs, "outputs")?, state, cost }))
         }
-        Outcome::Failure(failure) => Answer::Ran(Err(decode_failure(required(failure.kind, "failure kind")?)?)),
+        Outcome::Failure(failure) => {
+            Answer::Ran(Err(decode_failure(required(failure.kind, "failure kind")?)?))
+        }
         Outcome::Withdrawn(_) => Answer::Withdrawn,
     };
     Ok(FromWorker::Result { lease, answer, cost })
@@ -169,7 +171,9 @@ fn encode_failure(error: ParticleError) -> failure::Kind {
 
 fn decode_failure(kind: failure::Kind) -> Result<ParticleError, WireError> {
     Ok(match kind {
-        failure::Kind::NotFinite(f) => ParticleError::NotFinite { what: f.what, time: required(f.time, "time")? },
+        failure::Kind::NotFinite(f) => {
+            ParticleError::NotFinite { what: f.what, time: required(f.time, "time")? }
+        }
         failure::Kind::StepTooSmall(f) => {
             ParticleError::StepTooSmall { time: required(f.time, "time")?, step: required(f.step, "step")? }
         }

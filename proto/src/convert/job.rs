@@ -54,7 +54,9 @@ pub fn check_size(job: &Job) -> Result<(), WireError> {
     let bytes = 8 * (window.times.len() + window.observed.len() + signals + job.theta.len());
     if bytes + MAX_INLINE_STATE + MESSAGE_MARGIN > MAX_MESSAGE {
         let limit = MAX_MESSAGE - MAX_INLINE_STATE - MESSAGE_MARGIN;
-        let message = format!("{bytes} bytes, at most {limit} fit in a message: use fewer observation times per window");
+        let message = format!(
+            "{bytes} bytes, at most {limit} fit in a message: use fewer observation times per window"
+        );
         return Err(WireError::Shape { field: "window", message });
     }
     Ok(())

@@ -109,7 +109,10 @@ fn message(kind: Kind) -> wire::ToWorker {
 fn decode_welcome(welcome: wire::Welcome) -> Result<Welcome, WireError> {
     let wire::Welcome { protocol, run, heartbeat, epoch } = welcome;
     if !(heartbeat > 0.0 && heartbeat < 1e6) {
-        return Err(WireError::Shape { field: "heartbeat", message: format!("{heartbeat} s, expected a positive time") });
+        return Err(WireError::Shape {
+            field: "heartbeat",
+            message: format!("{heartbeat} s, expected a positive time"),
+        });
     }
     Ok(Welcome { protocol, run, heartbeat, epoch })
 }

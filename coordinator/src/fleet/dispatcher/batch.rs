@@ -86,7 +86,7 @@ impl Batch {
     pub(super) fn progress(&mut self) -> Option<FleetEvent> {
         let changed = self.told != self.done;
         self.told = self.done;
-        changed.then(|| FleetEvent::Progress { done: self.done, total: self.jobs.len() })
+        changed.then_some(FleetEvent::Progress { done: self.done, total: self.jobs.len() })
     }
 
     pub(super) fn has_fresh(&self) -> bool {
@@ -99,10 +99,6 @@ impl Batch {
             self.next += 1;
             index
         })
-    }
-
-    pub(super) fn has_waiting(&self) -> bool {
-        self.has_fresh() || self.retry.values().any(|queue| !queue.is_empty())
     }
 
     pub(super) fn retry_keys(&self) -> Vec<Option<WorkerId>> {
@@ -192,7 +188,8 @@ impl Batch {
         let JobName { particle, record } = self.names[index];
         let outcome = self.jobs[index].outcome.as_ref();
         let attempts = outcome.map_or(0, |o| o.attempts);
-        let reason = outcome.and_then(|o| o.result.as_ref().err()).map(ToString::to_string).unwrap_or_default();
+        let reason =
+            outcome.and_then(|o| o.result.as_ref().err()).map(ToString::to_string).unwrap_or_default();
         FleetEvent::JobFailed { particle, record, attempts, reason }
     }
 

@@ -129,10 +129,12 @@ impl Worker {
         jobs.into_iter().map(|(_, job)| job).collect()
     }
 
-    /// Marks the youngest lease that `may` be called back.
+    /// Marks the youngest lease that waits behind the running ones and `may` be called back.
     pub(super) fn youngest(&mut self, may: impl Fn(u64) -> bool) -> Option<Lease> {
-        let open = self.held.iter_mut().filter(|(job, held)| !held.recalled && may(**job));
-        let (&job, held) = open.max_by_key(|(_, held)| held.order)?;
+        let waiting = self.leases_in_order().split_off(self.slots.min(self.load()));
+        let open = |job: &u64| may(*job) && self.held.get(job).is_some_and(|held| !held.recalled);
+        let job = waiting.into_iter().rfind(open)?;
+        let held = self.held.get_mut(&job)?;
         held.recalled = true;
         Some(Lease { epoch: self.id.0, job, attempt: held.attempt })
     }

@@ -194,7 +194,9 @@ fn only_the_jobs_that_were_running_count_an_attempt_when_their_worker_dies() {
         assert_eq!(first, Some(0), "the requeued job is first again");
         let died = stage.step(left(id - 1, false));
         if id == 4 {
-            let failed = died.iter().any(|c| matches!(c, Command::Notice(FleetEvent::JobFailed { particle: 0, attempts: 3, .. })));
+            let failed = died.iter().any(|c| {
+                matches!(c, Command::Notice(FleetEvent::JobFailed { particle: 0, attempts: 3, .. }))
+            });
             assert!(failed, "{died:?}");
         }
         stage.step(Event::Joined(joining(id, 1)));
@@ -248,7 +250,9 @@ fn a_failed_job_does_not_wait_for_another_worker_that_left() {
     let jobs = stage.jobs(submit(20));
     let on_first = jobs.iter().find(|(lease, _)| lease.epoch == 1).expect("spread").0;
     // The second worker is full, so the failed job waits for it; then it dies.
-    assert!(stage.jobs(answered(on_first, Answer::Ran(Err(solver("no"))), 1.0)).iter().all(|(l, _)| l.epoch == 1));
+    assert!(
+        stage.jobs(answered(on_first, Answer::Ran(Err(solver("no"))), 1.0)).iter().all(|(l, _)| l.epoch == 1)
+    );
     let commands = stage.step(left(2, false));
     assert!(commands.iter().any(|c| matches!(c, Command::Notice(FleetEvent::JobFailed { attempts: 1, .. }))));
 }
@@ -258,11 +262,12 @@ fn late_duplicate_and_foreign_answers_are_ignored() {
     let mut stage = Stage::with(&[1, 1]);
     let jobs = stage.jobs(submit(2));
     let (lease, _) = jobs[0];
-    let late = |commands: Vec<Command>| {
-        matches!(commands.as_slice(), [Command::Notice(FleetEvent::LateAnswer { job, .. })] if *job == lease.job)
-    };
+    let late = |commands: Vec<Command>| matches!(commands.as_slice(), [Command::Notice(FleetEvent::LateAnswer { job, .. })] if *job == lease.job);
     let ok = || Answer::Ran(Ok(prediction(9)));
     assert!(late(stage.step(answered(Lease { attempt: 2, ..lease }, ok(), 1.0))), "an attempt never started");
+    let past = Lease { epoch: 99, ..lease };
+    let from_past = Event::Answered { worker: WorkerId(lease.epoch), lease: past, answer: ok(), cost: 1.0 };
+    assert!(late(stage.step(from_past)), "a lease of an earlier stream, on this one");
     let foreign = Event::Answered { worker: WorkerId(jobs[1].0.epoch), lease, answer: ok(), cost: 1.0 };
     assert!(late(stage.step(foreign)), "another stream's lease");
     assert!(!late(stage.step(answered(lease, ok(), 1.0))), "the lease itself");
@@ -307,7 +312,8 @@ fn a_setup_that_every_worker_fails_ends_the_batch_with_their_words() {
     stage.step(Event::Joined(joining(1, 1)));
     stage.step(Event::Joined(joining(2, 1)));
     stage.step(submit(3));
-    let failed = |id| Event::SetupFailed { worker: WorkerId(id), setup: SETUP, reason: "no such model".to_owned() };
+    let failed =
+        |id| Event::SetupFailed { worker: WorkerId(id), setup: SETUP, reason: "no such model".to_owned() };
     assert_eq!(stage.step(failed(1)).len(), 1, "the other may still build it");
     let commands = stage.step(failed(2));
     let error = BatchError::SetupFailed { reason: "no such model".to_owned() };
@@ -323,7 +329,9 @@ fn waiting_without_workers_is_told_and_ends_in_an_error() {
     };
     assert_eq!(notices(&stage.seconds(60, &[])), 5, "after 2, 4, 8, 16 and 32 s");
     let commands = stage.seconds(1, &[]);
-    assert!(matches!(&commands[..], [Command::BatchFailed(BatchError::NoWorkers { missing, .. })] if missing.contains("no worker")));
+    assert!(
+        matches!(&commands[..], [Command::BatchFailed(BatchError::NoWorkers { missing, .. })] if missing.contains("no worker"))
+    );
 }
 
 #[test]
@@ -332,7 +340,10 @@ fn an_aborted_batch_calls_its_jobs_back_and_their_answers_only_free_the_slots() 
     let jobs = stage.jobs(submit(5));
     let commands = stage.step(Event::Abort(BatchError::Cancelled));
     let leases = jobs.iter().map(|(lease, _)| *lease).collect();
-    assert_eq!(commands, [Command::Cancel { worker: WorkerId(1), leases }, Command::BatchFailed(BatchError::Cancelled)]);
+    assert_eq!(
+        commands,
+        [Command::Cancel { worker: WorkerId(1), leases }, Command::BatchFailed(BatchError::Cancelled)]
+    );
     assert_eq!(stage.jobs(submit(5)), [], "both places are still held by withdrawn jobs");
     stage.step(answered(jobs[0].0, Answer::Ran(Ok(prediction(0))), 1.0));
     stage.step(answered(jobs[1].0, Answer::Withdrawn, 0.0));
@@ -355,6 +366,33 @@ fn a_job_waiting_behind_a_long_one_is_called_back_for_an_idle_slot() {
     assert!(outcomes(&done).is_none());
     let done = stage.step(answered(jobs[0].0, Answer::Ran(Ok(prediction(0))), 1.0));
     assert_eq!(outcomes(&done).expect("done")[2].attempts, 1, "a move is no attempt");
+}
+
+#[test]
+fn a_job_is_called_back_only_once() {
+    let mut stage = Stage::with(&[1, 1]);
+    let jobs = stage.jobs(submit(2));
+    // The job that failed on one worker waits behind the other's long one, and may not go where it failed.
+    let commands = stage.step(answered(jobs[0].0, Answer::Ran(Err(solver("no"))), 1.0));
+    let waiting = sent(&commands)[0].0;
+    assert!(commands.contains(&Command::Cancel { worker: WorkerId(waiting.epoch), leases: vec![waiting] }));
+    let again = stage.step(answered(waiting, Answer::Withdrawn, 0.0));
+    assert_eq!(sent(&again).len(), 1);
+    assert_eq!(again.len(), 1, "it stays there now");
+}
+
+#[test]
+fn patience_starts_anew_after_a_worker_came_and_went() {
+    let mut stage = Stage::with(&[]);
+    stage.step(submit(1));
+    stage.seconds(50, &[]);
+    stage.step(Event::Joined(joining(1, 1)));
+    stage.step(Event::SetupDone { worker: WorkerId(1), setup: SETUP });
+    stage.seconds(1, &[1]);
+    stage.step(left(1, true));
+    let failed = |commands: Vec<Command>| commands.iter().any(|c| matches!(c, Command::BatchFailed(_)));
+    assert!(!failed(stage.seconds(50, &[])));
+    assert!(failed(stage.seconds(11, &[])));
 }
 
 #[test]

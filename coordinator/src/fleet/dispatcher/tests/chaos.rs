@@ -8,8 +8,8 @@ use starlings_models::ParticleError;
 use starlings_proto::{Answer, Lease};
 
 use super::{RULES, SETUP, answered, joining, left, outcomes, prediction, solver, submit};
+use crate::fleet::Outcome;
 use crate::fleet::dispatcher::{BatchError, Command, Dispatcher, Event, WorkerId};
-use crate::fleet::{FleetEvent, Outcome};
 
 /// One thing that the world does; numbers choose among what is possible then.
 #[derive(Clone, Debug)]
@@ -92,7 +92,7 @@ impl World {
             Command::BatchFailed(error) => {
                 assert!(self.ended.replace(Err(error)).is_none(), "a batch ends once");
             }
-            Command::Notice(FleetEvent::WorkerLeft { .. } | _) => {}
+            Command::Notice(_) => {}
         }
     }
 
@@ -139,7 +139,11 @@ impl World {
                 self.to_build.remove(&worker);
                 let (worker, setup) = (WorkerId(worker), SETUP);
                 let reason = "cannot".to_owned();
-                self.event(if ok { Event::SetupDone { worker, setup } } else { Event::SetupFailed { worker, setup, reason } });
+                self.event(if ok {
+                    Event::SetupDone { worker, setup }
+                } else {
+                    Event::SetupFailed { worker, setup, reason }
+                });
             }
             Act::Answer(which, cost) => match pick(&self.open, which) {
                 // A called-back job may come back unstarted.

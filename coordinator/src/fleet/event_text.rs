@@ -1,0 +1,77 @@
+//! The fleet's events in words: for the store, the terminal and the report.
+
+use std::fmt;
+
+use super::FleetEvent;
+
+impl FleetEvent {
+    /// A short name of the kind of event.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Listening { .. } => "listening",
+            Self::WorkerJoined { .. } => "worker-joined",
+            Self::WorkerRefused { .. } => "worker-refused",
+            Self::WorkerLeft { .. } => "worker-left",
+            Self::SetupFailed { .. } => "setup-failed",
+            Self::JobRetried { .. } => "job-retried",
+            Self::JobFailed { .. } => "job-failed",
+            Self::LateAnswer { .. } => "late-answer",
+            Self::Waiting { .. } => "waiting",
+            Self::Progress { .. } => "progress",
+            Self::LocalWorkerRestarted { .. } => "worker-restarted",
+        }
+    }
+
+    /// Whether somebody who watches the run should see it at once.
+    pub fn is_notable(&self) -> bool {
+        matches!(
+            self,
+            Self::WorkerRefused { .. }
+                | Self::SetupFailed { .. }
+                | Self::JobFailed { .. }
+                | Self::Waiting { .. }
+                | Self::LocalWorkerRestarted { .. }
+        )
+    }
+
+    /// Whether the event belongs into the run's record; progress is only for the moment.
+    pub fn is_lasting(&self) -> bool {
+        !matches!(self, Self::Progress { .. })
+    }
+}
+
+impl fmt::Display for FleetEvent {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Listening { address } => write!(f, "listening on {address}"),
+            Self::WorkerJoined { worker, host, pid, slots, cores, .. } => {
+                write!(f, "worker {worker} joined from {host} (process {pid}, {slots} slots, {cores} cores)")
+            }
+            Self::WorkerRefused { host, reason } => write!(f, "a worker from {host} was refused: {reason}"),
+            Self::WorkerLeft { worker, reason, requeued: 0 } => write!(f, "worker {worker} left: {reason}"),
+            Self::WorkerLeft { worker, reason, requeued } => {
+                write!(f, "worker {worker} left: {reason}; {requeued} of its runs go to others")
+            }
+            Self::SetupFailed { worker, reason } => {
+                write!(f, "worker {worker} cannot build the model: {reason}")
+            }
+            Self::JobRetried { particle, record, worker, reason } => {
+                write!(f, "particle {particle}, record {record}: tried again after worker {worker}: {reason}")
+            }
+            Self::JobFailed { particle, record, attempts, reason } => {
+                write!(
+                    f,
+                    "particle {particle}, record {record}: given up after {attempts} attempts: {reason}"
+                )
+            }
+            Self::LateAnswer { worker, job } => {
+                write!(f, "worker {worker} answered run {job} too late; ignored")
+            }
+            Self::Waiting { seconds, missing } => write!(f, "waiting for {seconds:.0} s: {missing}"),
+            Self::Progress { done, total } => write!(f, "{done} of {total} runs"),
+            Self::LocalWorkerRestarted { pid, reason } => {
+                write!(f, "local worker process {pid} ended ({reason}) and was started again")
+            }
+        }
+    }
+}

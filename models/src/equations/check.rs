@@ -1,0 +1,88 @@
+//! What can be checked of equations before their expressions are looked at.
+//!
+//! Next file to read: [`super::build`].
+
+use std::collections::BTreeSet;
+
+use super::def::{EquationsDef, Method, SolverDef};
+use super::parse;
+use crate::integrate::{Solver, Tolerance};
+use crate::{SetupError, nearest};
+
+/// Names are usable and given once.
+pub(super) fn names(def: &EquationsDef) -> Result<(), SetupError> {
+    if def.states.is_empty() {
+        return Err(SetupError::Invalid(
+            "the equations have no state: add at least one with a rate".to_owned(),
+        ));
+    }
+    let mut seen = BTreeSet::new();
+    let mut outputs = BTreeSet::new();
+    let states = def.states.iter().map(|s| (&s.name, "state"));
+    let inputs = def.inputs.iter().map(|s| (&s.name, "input"));
+    for (name, what) in states.chain(inputs).chain(def.outputs.iter().map(|s| (&s.name, "output"))) {
+        let mut letters = name.chars();
+        let starts = letters.next().is_some_and(|c| c.is_alphabetic() || c == '_');
+        if !starts || !letters.all(|c| c.is_alphanumeric() || c == '_') {
+            let rule = "a letter or `_`, then letters, digits and `_`";
+            return Err(SetupError::Invalid(format!(
+                "`{name}` cannot be the name of an {what}: expected {rule}"
+            )));
+        }
+        if ["t", "pi"].contains(&name.as_str()) || parse::FUNCTIONS.contains(&name.as_str()) {
+            let message =
+                format!("`{name}` cannot be the name of an {what}: it has a meaning in expressions");
+            return Err(SetupError::Invalid(message));
+        }
+        let value = || def.outputs.iter().find(|o| o.name == *name).map(|o| o.value.trim());
+        let is_state =
+            what == "output" && def.states.iter().any(|s| s.name == *name) && value() == Some(name);
+        let list = if is_state { &mut outputs } else { &mut seen };
+        if !list.insert(name) {
+            return Err(SetupError::Twice(name.clone()));
+        }
+    }
+    Ok(())
+}
+
+/// Every state has a rate and an initial value, and replaceable terms exist.
+pub(super) fn terms(def: &EquationsDef) -> Result<(), SetupError> {
+    for state in &def.states {
+        if state.rate.is_empty() {
+            return Err(SetupError::Invalid(format!("state `{}` has no rate", state.name)));
+        }
+        if state.initial.trim().is_empty() {
+            return Err(SetupError::Invalid(format!("state `{}` has no initial value", state.name)));
+        }
+        let mut seen = BTreeSet::new();
+        if let Some((term, _)) = state.rate.iter().find(|(term, _)| !seen.insert(term)) {
+            return Err(SetupError::Twice(format!("{term} in the rate of {}", state.name)));
+        }
+    }
+    let all = || def.states.iter().flat_map(|s| s.rate.iter().map(|(term, _)| term.as_str()));
+    for name in &def.replaceable {
+        if !all().any(|term| term == name) {
+            let nearest = nearest(name, all());
+            return Err(SetupError::Unknown { what: "rate term", name: name.clone(), nearest });
+        }
+    }
+    Ok(())
+}
+
+/// The integrator that the definition asks for.
+pub(super) fn solver(def: &SolverDef) -> Result<Solver, SetupError> {
+    let positive = |value: f64| value.is_finite() && value > 0.0;
+    let tolerance = Tolerance { relative: def.rtol, absolute: def.atol };
+    if !positive(def.rtol) || !positive(def.atol) {
+        return Err(SetupError::Invalid("the solver's rtol and atol must be positive numbers".to_owned()));
+    }
+    match (def.method, def.step) {
+        (Method::Auto, _) => Ok(Solver::Auto(tolerance)),
+        (Method::Dopri5, _) => Ok(Solver::Dopri5(tolerance)),
+        (Method::Rosenbrock, _) => Ok(Solver::Rosenbrock(tolerance)),
+        (Method::Fixed, Some(step)) if positive(step) => Ok(Solver::Fixed { step }),
+        (Method::Fixed, _) => {
+            Err(SetupError::Invalid("the solver's method `fixed` needs a positive `step`".to_owned()))
+        }
+    }
+}

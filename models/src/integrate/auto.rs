@@ -1,0 +1,31 @@
+//! Dormand–Prince as long as accuracy sets the step, Rosenbrock for the rest of a segment once stability does.
+//!
+//! Each segment is judged anew, so that a run depends on its job only. Next file to read: `control.rs`.
+
+use super::Tolerance;
+use super::control::{Reached, integrate};
+use super::dopri5::Dopri5;
+use super::rosenbrock::Rosenbrock;
+use super::system::OnSegment;
+use crate::model::Segment;
+use crate::{Model, ParticleError};
+
+/// Advances `x` over the segment within the tolerance.
+///
+/// # Errors
+/// [`ParticleError::TooManySteps`], [`ParticleError::StepTooSmall`] or [`ParticleError::NotFinite`], with the time reached.
+pub fn advance<M: Model + ?Sized>(
+    model: &M,
+    segment: Segment<'_>,
+    theta: &[f64],
+    x: &mut [f64],
+    tolerance: Tolerance,
+) -> Result<(), ParticleError> {
+    let n = x.len();
+    let mut system = OnSegment::new(model, segment, theta, n);
+    let span = [segment.t0, segment.t1];
+    if let Reached::Stiff(t) = integrate(&mut system, &mut Dopri5::new(n, true), span, x, tolerance)? {
+        integrate(&mut system, &mut Rosenbrock::new(n), [t, segment.t1], x, tolerance)?;
+    }
+    Ok(())
+}
