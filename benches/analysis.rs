@@ -101,7 +101,13 @@ fn windkessel_beat(figures: &mut Map<String, Value>) {
         observed: vec![f64::NAN; 200],
         inputs: vec![Signal { times, values: flow }],
     };
-    let job = Job { particle: 0, record: 0, window: Arc::new(window), theta: vec![3.4, 1.2, 0.1, 100.0], state: None };
+    let job = Job {
+        particle: 0,
+        record: 0,
+        window: Arc::new(window),
+        theta: vec![3.4, 1.2, 0.1, 100.0],
+        state: None,
+    };
     match setup.build() {
         Ok(model) => {
             let beat = || {

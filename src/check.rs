@@ -13,7 +13,7 @@ use crate::failure::Failure;
 
 /// Validate a study, its recordings and its model, and make one trial run at the prior median.
 #[derive(Parser)]
-pub struct Args {
+pub(crate) struct Args {
     /// The study file.
     study: PathBuf,
     /// Print what was found as JSON.
@@ -22,7 +22,7 @@ pub struct Args {
 }
 
 /// Checks the study.
-pub fn run(args: &Args) -> Result<(), Failure> {
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let study = Study::load(&args.study)?;
     let channels = trial(&study).map_err(Failure::input)?;
     let n_particle = n_particle(&study)?;
@@ -41,8 +41,7 @@ fn n_particle(study: &Study) -> Result<usize, Failure> {
 }
 
 fn runs_per_pass(study: &Study, n_particle: usize) -> usize {
-    n_particle
-        * (0..study.records.len()).map(|r| study.windows(r).len()).sum::<usize>()
+    n_particle * (0..study.records.len()).map(|r| study.windows(r).len()).sum::<usize>()
 }
 
 fn as_json(study: &Study, channels: &[TrialChannel], n_particle: usize) -> serde_json::Value {
@@ -84,10 +83,7 @@ fn print(study: &Study, channels: &[TrialChannel], n_particle: usize) {
         ]);
     }
     print!("{}", table(&rows, false));
-    println!(
-        "\n{n_particle} particles, {} runs of the model per pass",
-        runs_per_pass(study, n_particle)
-    );
+    println!("\n{n_particle} particles, {} runs of the model per pass", runs_per_pass(study, n_particle));
     for warning in &study.warnings {
         println!("warning: {warning}");
     }

@@ -5,7 +5,7 @@ use std::io::IsTerminal;
 use tracing_subscriber::filter::LevelFilter;
 
 /// Sends log lines to standard error: warnings, or more with each `-v`.
-pub fn log_to_stderr(verbose: u8) {
+pub(crate) fn log_to_stderr(verbose: u8) {
     let level = match verbose {
         0 => LevelFilter::WARN,
         1 => LevelFilter::INFO,
@@ -21,7 +21,7 @@ pub fn log_to_stderr(verbose: u8) {
 }
 
 /// A table with aligned columns: the first row is the heading, columns after the first are right-aligned when `numeric`.
-pub fn table(rows: &[Vec<String>], numeric: bool) -> String {
+pub(crate) fn table(rows: &[Vec<String>], numeric: bool) -> String {
     let n = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width: Vec<usize> = (0..n)
         .map(|c| rows.iter().filter_map(|r| r.get(c)).map(|cell| cell.chars().count()).max().unwrap_or(0))
@@ -44,7 +44,7 @@ pub fn table(rows: &[Vec<String>], numeric: bool) -> String {
 }
 
 /// A number with as many significant digits as `sd` justifies (two digits of the sd), or five without one.
-pub fn number(value: f64, sd: Option<f64>) -> String {
+pub(crate) fn number(value: f64, sd: Option<f64>) -> String {
     let magnitude = |v: f64| v.abs().log10().floor() as i32;
     let decimals = match sd {
         Some(sd) if sd > 0.0 && sd.is_finite() => 1 - magnitude(sd),
@@ -60,7 +60,7 @@ pub fn number(value: f64, sd: Option<f64>) -> String {
 }
 
 /// Cancels the token on Ctrl-C or a termination signal; a second one ends the process at once.
-pub fn cancel_on_signal(token: &tokio_util::sync::CancellationToken) {
+pub(crate) fn cancel_on_signal(token: &tokio_util::sync::CancellationToken) {
     let token = token.clone();
     std::thread::spawn(move || {
         let Ok(runtime) = tokio::runtime::Builder::new_current_thread().enable_all().build() else { return };
@@ -76,7 +76,8 @@ pub fn cancel_on_signal(token: &tokio_util::sync::CancellationToken) {
 #[cfg(unix)]
 async fn signal() {
     use tokio::signal::unix::{SignalKind, signal};
-    let (Ok(mut terminate), Ok(mut hangup)) = (signal(SignalKind::terminate()), signal(SignalKind::hangup())) else {
+    let (Ok(mut terminate), Ok(mut hangup)) = (signal(SignalKind::terminate()), signal(SignalKind::hangup()))
+    else {
         return std::future::pending().await;
     };
     tokio::select! {

@@ -10,7 +10,7 @@ use crate::failure::Failure;
 
 /// Write a table of a run folder as CSV.
 #[derive(Parser)]
-pub struct Args {
+pub(crate) struct Args {
     /// The run folder.
     dir: PathBuf,
     /// Which table.
@@ -38,7 +38,7 @@ enum Table {
 }
 
 /// Writes the table.
-pub fn run(args: &Args) -> Result<(), Failure> {
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let folder = RunFolder::open(&args.dir).map_err(Failure::input)?;
     let (name, columns) = match args.table {
         Table::Estimates => ("estimates", "pass, step, parameter, estimate, lo, hi, mean, sd"),

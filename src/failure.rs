@@ -7,7 +7,7 @@ use miette::{Diagnostic, LabeledSpan, NamedSource, Report, Severity, SourceCode}
 use starlings_coordinator::study::{Problem, StudyError};
 
 /// Why a command ended without doing what was asked.
-pub enum Failure {
+pub(crate) enum Failure {
     /// The input is wrong: exit code 2.
     Input(String),
     /// The study file or a recording is wrong, at known places: exit code 2.
@@ -18,17 +18,17 @@ pub enum Failure {
 
 impl Failure {
     /// The input is wrong.
-    pub fn input(message: impl Display) -> Self {
+    pub(crate) fn input(message: impl Display) -> Self {
         Self::Input(message.to_string())
     }
 
     /// The run failed.
-    pub fn run(message: impl Display) -> Self {
+    pub(crate) fn run(message: impl Display) -> Self {
         Self::Run(message.to_string())
     }
 
     /// Exit code.
-    pub fn code(&self) -> ExitCode {
+    pub(crate) fn code(&self) -> ExitCode {
         match self {
             Self::Input(_) | Self::Study(_) => ExitCode::from(2),
             Self::Run(_) => ExitCode::from(1),
@@ -36,7 +36,7 @@ impl Failure {
     }
 
     /// Prints the message to standard error.
-    pub fn print(&self) {
+    pub(crate) fn print(&self) {
         match self {
             Self::Input(message) | Self::Run(message) => eprintln!("error: {message}"),
             Self::Study(error) => {
@@ -106,6 +106,10 @@ impl Diagnostic for Shown {
     fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
         let span = self.span.clone()?;
         self.source.as_ref()?;
-        Some(Box::new(std::iter::once(LabeledSpan::new(Some("here".to_owned()), span.start, span.len().max(1)))))
+        Some(Box::new(std::iter::once(LabeledSpan::new(
+            Some("here".to_owned()),
+            span.start,
+            span.len().max(1),
+        ))))
     }
 }

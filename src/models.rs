@@ -8,7 +8,7 @@ use crate::failure::Failure;
 
 /// List the built-in models, or describe one.
 #[derive(Parser)]
-pub struct Args {
+pub(crate) struct Args {
     /// Model kind to describe; all kinds are listed without it.
     kind: Option<String>,
     /// Print the catalogue as JSON.
@@ -17,14 +17,17 @@ pub struct Args {
 }
 
 /// Prints the catalogue or one of its entries.
-pub fn run(args: &Args) -> Result<(), Failure> {
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let mut specs: Vec<Spec> = catalogue::specs();
     if let Some(kind) = &args.kind {
         let names: Vec<String> = specs.iter().map(|s| s.kind.clone()).collect();
         specs.retain(|s| s.kind == *kind);
         if specs.is_empty() {
             let hint = nearest(kind, &names).map(|n| format!("; did you mean `{n}`?")).unwrap_or_default();
-            return Err(Failure::input(format!("no model named `{kind}`{hint} (known: {})", names.join(", "))));
+            return Err(Failure::input(format!(
+                "no model named `{kind}`{hint} (known: {})",
+                names.join(", ")
+            )));
         }
     }
     if args.json {
@@ -43,8 +46,12 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 
 fn describe(spec: &Spec) {
     println!("{}: {}", spec.kind, spec.says);
-    let lists =
-        [("parameters", &spec.parameters), ("states", &spec.states), ("outputs", &spec.outputs), ("inputs", &spec.inputs)];
+    let lists = [
+        ("parameters", &spec.parameters),
+        ("states", &spec.states),
+        ("outputs", &spec.outputs),
+        ("inputs", &spec.inputs),
+    ];
     for (title, quantities) in lists {
         if quantities.is_empty() {
             continue;

@@ -1,7 +1,7 @@
 //! Progress: a bar on a terminal, plain lines elsewhere, nothing with `--json`.
 
-use std::cell::RefCell;
 use std::io::IsTerminal;
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -11,23 +11,23 @@ use starlings_coordinator::study::Progress;
 const LINE_EVERY: Duration = Duration::from_secs(10);
 
 /// Shows where a run stands.
-pub enum Display {
+pub(crate) enum Display {
     /// Nothing is shown.
     Silent,
     /// A line now and then, the first and the last of a pass always.
-    Lines(RefCell<Instant>),
+    Lines(Mutex<Instant>),
     /// A bar.
     Bar(ProgressBar),
 }
 
 impl Display {
     /// A bar if standard error is a terminal, lines otherwise, nothing when `silent`.
-    pub fn new(silent: bool) -> Self {
+    pub(crate) fn new(silent: bool) -> Self {
         if silent {
             return Self::Silent;
         }
         if !std::io::stderr().is_terminal() {
-            return Self::Lines(RefCell::new(Instant::now()));
+            return Self::Lines(Mutex::new(Instant::now()));
         }
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr_with_hz(10));
         let style = ProgressStyle::with_template("{prefix} {wide_bar} {pos}/{len}  {msg}  {eta} left");
@@ -36,16 +36,17 @@ impl Display {
     }
 
     /// One analysis more.
-    pub fn step(&self, p: &Progress) {
+    pub(crate) fn step(&self, p: &Progress) {
         let head = if p.passes > 1 { format!("pass {}/{}", p.pass, p.passes) } else { p.stage.to_owned() };
         let tail = format!("{} runs, {} workers", p.runs, p.workers);
         match self {
             Self::Silent => {}
             Self::Lines(last) => {
                 let edge = p.step == 1 || p.step == p.steps;
-                if edge || last.borrow().elapsed() > LINE_EVERY {
+                let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
+                if edge || last.elapsed() > LINE_EVERY {
                     eprintln!("{head}: {} of {} analyses, {tail}", p.step, p.steps);
-                    *last.borrow_mut() = Instant::now();
+                    *last = Instant::now();
                 }
             }
             Self::Bar(bar) => {
@@ -61,7 +62,7 @@ impl Display {
     }
 
     /// A line from the fleet that people should see.
-    pub fn say(&self, text: &str) {
+    pub(crate) fn say(&self, text: &str) {
         match self {
             Self::Silent => {}
             Self::Lines(_) => eprintln!("{text}"),
@@ -70,7 +71,7 @@ impl Display {
     }
 
     /// Clears the bar.
-    pub fn finish(&self) {
+    pub(crate) fn finish(&self) {
         if let Self::Bar(bar) = self {
             bar.finish_and_clear();
         }

@@ -10,7 +10,7 @@ use crate::failure::Failure;
 
 /// Write report.html, summary.json and posterior.csv of a run folder again from its run.db.
 #[derive(Parser)]
-pub struct Args {
+pub(crate) struct Args {
     /// The run folder.
     dir: PathBuf,
     /// Also write the overview picture (SVG) to this file.
@@ -22,12 +22,13 @@ pub struct Args {
 }
 
 /// Writes the files; a run that is not finished gets a report of what there is.
-pub fn run(args: &Args) -> Result<(), Failure> {
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let folder = RunFolder::open(&args.dir).map_err(Failure::input)?;
     let data = page::reader::report_data(&folder.store).map_err(Failure::run)?;
     if let Some(path) = &args.overview {
         let svg = page::overview_svg(&data).map_err(Failure::run)?;
-        std::fs::write(path, svg).map_err(|e| Failure::input(format!("cannot write {}: {e}", path.display())))?;
+        std::fs::write(path, svg)
+            .map_err(|e| Failure::input(format!("cannot write {}: {e}", path.display())))?;
     }
     let summary = folder.summary().map_err(Failure::run)?;
     let html = args.dir.join("report.html");
@@ -35,7 +36,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         page::write_files(&folder).map_err(Failure::run)?;
     } else {
         let text = page::render(&data).map_err(Failure::run)?;
-        std::fs::write(&html, text).map_err(|e| Failure::input(format!("cannot write {}: {e}", html.display())))?;
+        std::fs::write(&html, text)
+            .map_err(|e| Failure::input(format!("cannot write {}: {e}", html.display())))?;
     }
     if args.json {
         println!("{}", serde_json::to_string_pretty(&summary).map_err(Failure::run)?);

@@ -2,7 +2,7 @@
 
 use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::{Path, PathBuf};
-use std::sync::mpsc;
+use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 
 use clap::Parser;
@@ -18,7 +18,7 @@ use crate::progress::Display;
 
 /// Estimate the parameters of a study; writes posterior.csv, summary.json and report.html into a run folder.
 #[derive(Parser)]
-pub struct Args {
+pub(crate) struct Args {
     /// The study file.
     study: PathBuf,
     /// Run folder; runs/<name>-<time> without it.
@@ -42,16 +42,19 @@ pub struct Args {
 }
 
 /// Runs the study.
-pub fn run(args: &Args, started: Instant) -> Result<(), Failure> {
+pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     let study = Study::load(&args.study)?;
     let n_worker = args.workers.unwrap_or(study.fleet.workers);
     if n_worker == 0 {
-        return Err(Failure::input("--workers must be at least 1 (or use --listen ADDR and start workers elsewhere)"));
+        return Err(Failure::input(
+            "--workers must be at least 1 (or use --listen ADDR and start workers elsewhere)",
+        ));
     }
     let address = address(args)?;
     trial(&study).map_err(Failure::input)?;
     // Listen before the folder is made: a port in use must leave nothing behind.
-    let mut crew = Crew::listen(&study, address, args.json)?;
+    let display = Arc::new(Display::new(args.json));
+    let mut crew = Crew::listen(&study, address, &display)?;
     let mut folder = open_folder(args, &study)?;
     if let Some(summary) = folder.summary().map_err(Failure::run)? {
         eprintln!("the run in {} is finished already; writing its files again", folder.path.display());
@@ -59,7 +62,6 @@ pub fn run(args: &Args, started: Instant) -> Result<(), Failure> {
         return print(&summary, &folder.path, args.json);
     }
     crew.gather(args, &study, n_worker)?;
-    let display = Display::new(args.json);
     let mut watch = |p: &Progress| display.step(p);
     let clock = move || started.elapsed().as_secs_f64();
     let mut context =
@@ -69,7 +71,9 @@ pub fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     crew.dismiss();
     let path = folder.path.display();
     let summary = result.map_err(|error| {
-        Failure::run(format!("{error}\n  the run so far is in {path}: continue it with --out {path} --resume"))
+        Failure::run(format!(
+            "{error}\n  the run so far is in {path}: continue it with --out {path} --resume"
+        ))
     })?;
     report::write_files(&folder).map_err(Failure::run)?;
     print(&summary, &folder.path, args.json)
@@ -78,11 +82,9 @@ pub fn run(args: &Args, started: Instant) -> Result<(), Failure> {
 /// Where to listen: a free loopback port for local workers, or what was asked for.
 fn address(args: &Args) -> Result<SocketAddr, Failure> {
     let text = args.listen.as_deref().unwrap_or("127.0.0.1:0");
-    let address = text
-        .to_socket_addrs()
-        .ok()
-        .and_then(|mut all| all.next())
-        .ok_or_else(|| Failure::input(format!("--listen {text}: expected HOST:PORT, such as 127.0.0.1:7000")))?;
+    let address = text.to_socket_addrs().ok().and_then(|mut all| all.next()).ok_or_else(|| {
+        Failure::input(format!("--listen {text}: expected HOST:PORT, such as 127.0.0.1:7000"))
+    })?;
     if !address.ip().is_loopback() && !args.insecure {
         return Err(Failure::input(format!(
             "{address} is reachable from other machines, and the connection is neither encrypted nor authenticated in \
@@ -112,7 +114,7 @@ struct Crew {
 
 impl Crew {
     /// Listens for workers; none is started yet.
-    fn listen(study: &Study, address: SocketAddr, silent: bool) -> Result<Self, Failure> {
+    fn listen(study: &Study, address: SocketAddr, display: &Arc<Display>) -> Result<Self, Failure> {
         let cancel = CancellationToken::new();
         cancel_on_signal(&cancel);
         let (sender, heard) = mpsc::channel();
@@ -125,7 +127,8 @@ impl Crew {
             config.max_attempts = attempts;
         }
         let fleet = GrpcFleet::listen(config).map_err(Failure::run)?;
-        let watcher = std::thread::spawn(move || relay(heard, &kept, silent));
+        let display = Arc::clone(display);
+        let watcher = std::thread::spawn(move || relay(heard, &kept, &display));
         Ok(Self { fleet, local: None, events, watcher })
     }
 
@@ -159,10 +162,10 @@ impl Crew {
 }
 
 /// Shows the events that people should see at once and hands all of them on to the store.
-fn relay(heard: mpsc::Receiver<FleetEvent>, kept: &mpsc::Sender<FleetEvent>, silent: bool) {
+fn relay(heard: mpsc::Receiver<FleetEvent>, kept: &mpsc::Sender<FleetEvent>, display: &Display) {
     for event in heard {
-        if event.is_notable() && !silent {
-            eprintln!("{event}");
+        if event.is_notable() {
+            display.say(&event.to_string());
         }
         tracing::info!(kind = event.kind(), "{event}");
         if event.is_lasting() {
@@ -180,7 +183,8 @@ fn print(summary: &Summary, folder: &Path, json: bool) -> Result<(), Failure> {
     for warning in &summary.warnings {
         println!("warning: {warning}");
     }
-    let mut rows = vec![["parameter", "unit", "estimate", "95 % interval", "prior median"].map(str::to_owned).to_vec()];
+    let mut rows =
+        vec![["parameter", "unit", "estimate", "95 % interval", "prior median"].map(str::to_owned).to_vec()];
     for p in &summary.parameters {
         let [lo, hi] = p.interval95.map(|v| number(v, Some(p.sd)));
         rows.push(vec![

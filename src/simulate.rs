@@ -10,7 +10,7 @@ use crate::failure::Failure;
 
 /// Run the study's model forward with chosen values and noise, and write the outputs as CSV.
 #[derive(Parser)]
-pub struct Args {
+pub(crate) struct Args {
     /// The study file.
     study: PathBuf,
     /// A parameter, constant or initial:<state> value; may be repeated. The rest stands at its prior median.
@@ -43,11 +43,15 @@ pub struct Args {
 fn assignment(text: &str) -> Result<(String, f64), String> {
     let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE")?;
     let value: f64 = value.trim().parse().map_err(|_| format!("`{value}` is not a number"))?;
-    if value.is_finite() { Ok((name.trim().to_owned(), value)) } else { Err("the value must be finite".to_owned()) }
+    if value.is_finite() {
+        Ok((name.trim().to_owned(), value))
+    } else {
+        Err("the value must be finite".to_owned())
+    }
 }
 
 /// Simulates and writes.
-pub fn run(args: &Args) -> Result<(), Failure> {
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if !(args.noise >= 0.0 && args.noise.is_finite()) {
         return Err(Failure::input("--noise must be zero or a positive number"));
     }
@@ -76,7 +80,9 @@ fn grid(args: &Args, study: &Study, record: usize) -> Result<Vec<f64>, Failure> 
     let (Some(until), Some(step)) = (args.until, args.step) else { return Ok(Vec::new()) };
     let start = study.records[record].times.first().copied().unwrap_or_default();
     if !(step > 0.0 && until > start && (until - start) / step < 1e8) {
-        return Err(Failure::input(format!("--step must be positive and --until after the record's start at {start}")));
+        return Err(Failure::input(format!(
+            "--step must be positive and --until after the record's start at {start}"
+        )));
     }
     let n = ((until - start) / step + 1e-9).floor() as usize;
     Ok((0..=n).map(|k| step.mul_add(k as f64, start)).collect())

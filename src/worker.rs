@@ -11,7 +11,7 @@ use crate::failure::Failure;
 
 /// Be a worker: dial the coordinator, run its jobs, hold nothing it needs.
 #[derive(Parser)]
-pub struct Args {
+pub(crate) struct Args {
     /// Address of the coordinator, HOST:PORT.
     #[arg(long, value_name = "ADDR")]
     connect: String,
@@ -27,7 +27,7 @@ pub struct Args {
 }
 
 /// Works until drained, cancelled or out of patience.
-pub fn run(args: &Args) -> Result<(), Failure> {
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if args.slots == Some(0) {
         return Err(Failure::input("--slots must be at least 1"));
     }

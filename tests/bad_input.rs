@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 
 use common::{output, starlings};
 
-const DATA: &str = "time,pressure,flow\n0.0,100.0,0.0\n0.1,101.0,10.0\n0.2,103.0,30.0\n0.3,102.0,5.0\n0.4,101.0,0.0\n";
+const DATA: &str =
+    "time,pressure,flow\n0.0,100.0,0.0\n0.1,101.0,10.0\n0.2,103.0,30.0\n0.3,102.0,5.0\n0.4,101.0,0.0\n";
 
 const STUDY: &str = r#"[study]
 name = "small"
@@ -38,7 +39,10 @@ workers = 1
 "#;
 
 /// A folder with the small study after `edit`, and its recording after `edit_data`.
-fn study(edit: impl Fn(String) -> String, edit_data: impl Fn(String) -> String) -> (tempfile::TempDir, PathBuf) {
+fn study(
+    edit: impl Fn(String) -> String,
+    edit_data: impl Fn(String) -> String,
+) -> (tempfile::TempDir, PathBuf) {
     let dir = tempfile::tempdir().unwrap();
     let edited = edit(STUDY.to_owned());
     fs::write(dir.path().join("data.csv"), edit_data(DATA.to_owned())).unwrap();
@@ -63,7 +67,8 @@ fn refused(file: &Path, words: &[&str]) {
     let out = file.with_file_name("out");
     let (code, stdout, stderr) = output(starlings().arg("run").arg(file).arg("--out").arg(&out));
     // Line breaks of the display may fall anywhere.
-    let flat = stderr.split_whitespace().filter(|w| !matches!(*w, "│" | "×" | "╰─▶")).collect::<Vec<_>>().join(" ");
+    let flat =
+        stderr.split_whitespace().filter(|w| !matches!(*w, "│" | "×" | "╰─▶")).collect::<Vec<_>>().join(" ");
     assert_eq!(code, 2, "{stderr}");
     assert_eq!(stdout, "");
     for word in words {
@@ -138,8 +143,13 @@ fn a_channel_of_only_nan_is_refused() {
 
 #[test]
 fn a_prior_outside_its_bounds_is_refused() {
-    let (_dir, file) =
-        study(swap("transform = \"log\", median = 3.0, factor = 2.0", "transform = \"logit(0, 2)\", median = 3.0, sd = 1.0"), same);
+    let (_dir, file) = study(
+        swap(
+            "transform = \"log\", median = 3.0, factor = 2.0",
+            "transform = \"logit(0, 2)\", median = 3.0, sd = 1.0",
+        ),
+        same,
+    );
     refused(&file, &["3", "0", "2", "study.toml:9"]);
 }
 
@@ -177,7 +187,8 @@ fn zero_workers_are_refused() {
     refused(&file, &["workers"]);
     let (dir, file) = study(same, same);
     let out = dir.path().join("out");
-    let (code, _, stderr) = output(starlings().arg("run").arg(&file).arg("--out").arg(&out).args(["--workers", "0"]));
+    let (code, _, stderr) =
+        output(starlings().arg("run").arg(&file).arg("--out").arg(&out).args(["--workers", "0"]));
     assert_eq!(code, 2, "{stderr}");
     assert!(stderr.contains("at least 1"), "{stderr}");
 }
@@ -231,7 +242,8 @@ fn a_port_in_use_is_named_with_its_remedy() {
     let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     let address = taken.local_addr().unwrap().to_string();
     let out = dir.path().join("out");
-    let (code, _, stderr) = output(starlings().arg("run").arg(&file).arg("--out").arg(&out).args(["--listen", &address]));
+    let (code, _, stderr) =
+        output(starlings().arg("run").arg(&file).arg("--out").arg(&out).args(["--listen", &address]));
     assert_eq!(code, 1, "{stderr}");
     assert!(stderr.contains(&address) && stderr.contains("taken"), "{stderr}");
 }

@@ -27,12 +27,16 @@ fn check_counts_the_runs_and_shows_the_prior_misfit() {
 #[test]
 fn simulate_is_reproducible_and_its_noise_has_the_asked_size() {
     let twin = |seed: &str, noise: &str| {
-        let (code, stdout, stderr) = output(
-            starlings()
-                .args(["simulate"])
-                .arg(repository(STUDY))
-                .args(["--set", "R=3.4", "--set", "initial:p=100", "--noise", noise, "--seed", seed]),
-        );
+        let (code, stdout, stderr) = output(starlings().args(["simulate"]).arg(repository(STUDY)).args([
+            "--set",
+            "R=3.4",
+            "--set",
+            "initial:p=100",
+            "--noise",
+            noise,
+            "--seed",
+            seed,
+        ]));
         assert_eq!(code, 0, "{stderr}");
         stdout
     };
@@ -54,7 +58,14 @@ fn simulate_is_reproducible_and_its_noise_has_the_asked_size() {
 fn simulate_adds_a_built_in_effect_to_the_two_element_model() {
     let run = |study: &str, extra: &[&str]| {
         let mut command = starlings();
-        command.arg("simulate").arg(repository(study)).args(["--set", "R=3", "--set", "C=1.2", "--set", "initial:p=90"]);
+        command.arg("simulate").arg(repository(study)).args([
+            "--set",
+            "R=3",
+            "--set",
+            "C=1.2",
+            "--set",
+            "initial:p=90",
+        ]);
         let (code, stdout, stderr) = output(command.args(extra));
         assert_eq!(code, 0, "{stderr}");
         stdout
@@ -97,7 +108,8 @@ fn report_and_export_read_only_the_run_folder() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("run");
     run(&repository(STUDY), &out, 1);
-    let before: Vec<Vec<u8>> = ["report.html", "summary.json", "posterior.csv"].map(|f| bytes(&out, f)).into();
+    let before: Vec<Vec<u8>> =
+        ["report.html", "summary.json", "posterior.csv"].map(|f| bytes(&out, f)).into();
     for file in ["report.html", "summary.json", "posterior.csv"] {
         std::fs::remove_file(out.join(file)).unwrap();
     }
@@ -107,10 +119,13 @@ fn report_and_export_read_only_the_run_folder() {
     let picture = dir.path().join("overview.svg");
     let (code, _, stderr) = output(starlings().arg("report").arg(&moved).arg("--overview").arg(&picture));
     assert_eq!(code, 0, "{stderr}");
-    let after: Vec<Vec<u8>> = ["report.html", "summary.json", "posterior.csv"].map(|f| bytes(&moved, f)).into();
+    let after: Vec<Vec<u8>> =
+        ["report.html", "summary.json", "posterior.csv"].map(|f| bytes(&moved, f)).into();
     assert_eq!(before, after);
     assert!(std::fs::read_to_string(picture).unwrap().starts_with("<svg"));
-    for (table, rows) in [("estimates", 2 * 463 * 4), ("innovations", 2 * 463), ("analyses", 2 * 463), ("predictions", 843)] {
+    for (table, rows) in
+        [("estimates", 2 * 463 * 4), ("innovations", 2 * 463), ("analyses", 2 * 463), ("predictions", 843)]
+    {
         let (code, stdout, stderr) = output(starlings().arg("export").arg(&moved).args(["--table", table]));
         assert_eq!(code, 0, "{stderr}");
         assert_eq!(stdout.lines().count(), rows + 1, "{table}");
@@ -131,8 +146,7 @@ fn a_folder_without_a_run_is_refused() {
 fn a_worker_gives_up_with_the_address_when_nobody_answers() {
     // A port that was free a moment ago: nobody listens there.
     let address = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
-    let (code, _, stderr) =
-        output(starlings().args(["worker", "--connect", &address, "--patience", "0.2"]));
+    let (code, _, stderr) = output(starlings().args(["worker", "--connect", &address, "--patience", "0.2"]));
     assert_eq!(code, 1, "{stderr}");
     assert!(stderr.contains(&address), "{stderr}");
 }
@@ -154,7 +168,8 @@ fn an_interrupted_run_ends_its_workers_and_says_how_to_go_on() {
         .spawn()
         .unwrap();
     common::wait_until("some analyses", || common::analyses(&out) > 50);
-    let interrupted = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    let interrupted =
+        std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
     assert!(interrupted.success());
     let status = child.wait().unwrap();
     let mut stderr = String::new();

@@ -103,8 +103,11 @@ fn example(name: &str) {
     for entry in std::fs::read_dir(&folder).unwrap() {
         let path = entry.unwrap().path();
         let file = path.file_name().unwrap().to_string_lossy().into_owned();
-        let Some(stem) = file.strip_prefix("expected").and_then(|f| f.strip_suffix(".toml")) else { continue };
-        let study = folder.join(stem.strip_prefix('-').map_or("study.toml".to_owned(), |s| format!("{s}.toml")));
+        let Some(stem) = file.strip_prefix("expected").and_then(|f| f.strip_suffix(".toml")) else {
+            continue;
+        };
+        let study =
+            folder.join(stem.strip_prefix('-').map_or("study.toml".to_owned(), |s| format!("{s}.toml")));
         compare_study(&study, &path);
         compared += 1;
     }

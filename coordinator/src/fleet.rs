@@ -13,6 +13,7 @@ mod grpc;
 mod hub;
 mod in_process;
 mod local_workers;
+mod network;
 mod service;
 
 pub use error::FleetError;

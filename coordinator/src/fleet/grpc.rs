@@ -1,6 +1,7 @@
 //! A fleet of worker processes over gRPC: listens, and runs batches for a caller on an ordinary thread.
 //!
-//! The network lives on a thread of its own, so a caller that thinks for minutes between two batches delays no heartbeat.
+//! The network lives on a thread of its own, so a caller that thinks for minutes between two batches delays no heartbeat. Next file to
+//! read: [`super::hub`], then [`super::network`].
 
 use std::net::{SocketAddr, TcpListener};
 use std::sync::Arc;
@@ -10,28 +11,16 @@ use std::time::Duration;
 
 use starlings_models::{Job, Setup};
 use starlings_proto::convert::job::check_size;
-use starlings_proto::wire::fleet_server::FleetServer;
-use starlings_proto::{FRAME_SIZE, MAX_MESSAGE, SetupId, encode_setup};
+use starlings_proto::{MAX_MESSAGE, SetupId, encode_setup};
+use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
 use tokio_util::sync::CancellationToken;
-use tonic::transport::Server;
-use tonic::transport::server::TcpIncoming;
 
-use super::dispatcher::{BatchError, Event, Rules};
-use super::hub::Hub;
-use super::service::Service;
-use super::{Fleet, FleetError, FleetEvent, Outcome};
-
-/// How long a closing fleet waits for its workers to leave.
-const GOODBYE_PATIENCE: Duration = Duration::from_secs(2);
-
-/// Longest time between two looks at the clock.
-const TICK: Duration = Duration::from_millis(250);
+use super::dispatcher::{BatchError, Rules};
+use super::hub::{Hub, Reply, Submission};
+use super::{Fleet, FleetError, FleetEvent, Outcome, network};
 
 /// How often a waiting caller checks that the network thread lives.
 const ALIVE_CHECK: Duration = Duration::from_secs(1);
-
-/// HTTP/2 windows per stream and per connection, bytes: enough for a long fat network.
-const WINDOWS: (u32, u32) = (4 * 1024 * 1024, 16 * 1024 * 1024);
 
 /// How a fleet listens and when it loses patience.
 #[derive(Clone, Debug)]
@@ -76,7 +65,7 @@ impl FleetConfig {
 pub struct GrpcFleet {
     hub: Arc<Hub>,
     address: SocketAddr,
-    cancel: CancellationToken,
+    batches: UnboundedSender<Submission>,
     stop: CancellationToken,
     network: Option<JoinHandle<Result<(), String>>>,
 }
@@ -121,16 +110,17 @@ impl GrpcFleet {
         };
         let hub = Arc::new(Hub::new(config.run_name, rules, config.events));
         let stop = CancellationToken::new();
+        let (batches, submitted) = unbounded_channel();
         let network = {
             let (hub, cancel, stop) = (Arc::clone(&hub), config.cancel.clone(), stop.clone());
             let heartbeat = config.heartbeat;
             std::thread::Builder::new()
                 .name("fleet-network".to_owned())
-                .spawn(move || run_network(listener, &hub, heartbeat, cancel, &stop))
+                .spawn(move || network::run(listener, &hub, heartbeat, submitted, &cancel, &stop))
                 .map_err(|e| FleetError::Stopped(e.to_string()))?
         };
         hub.tell(FleetEvent::Listening { address });
-        Ok(Self { hub, address, cancel: config.cancel, stop, network: Some(network) })
+        Ok(Self { hub, address, batches, stop, network: Some(network) })
     }
 
     /// Where workers can connect, with the port that was picked.
@@ -148,7 +138,7 @@ impl GrpcFleet {
         drop(self);
     }
 
-    fn wait(&self, replies: &mpsc::Receiver<super::hub::Reply>) -> Result<Vec<Outcome>, FleetError> {
+    fn wait(&self, replies: &mpsc::Receiver<Reply>) -> Result<Vec<Outcome>, FleetError> {
         loop {
             match replies.recv_timeout(ALIVE_CHECK) {
                 Ok(reply) => return reply.map_err(|error| self.explain(error)),
@@ -192,14 +182,12 @@ impl Fleet for GrpcFleet {
         for job in &jobs {
             check_size(job).map_err(FleetError::TooLarge)?;
         }
-        let (reply, replies) = mpsc::channel();
-        if !self.hub.submit(setup, jobs, reply) {
+        if !self.hub.knows(&setup) {
             return Err(FleetError::UnknownSetup);
         }
-        // After the submission, so that a cancellation just before it is not missed.
-        if self.cancel.is_cancelled() {
-            self.hub.handle(Event::Abort(BatchError::Cancelled));
-        }
+        let (reply, replies) = mpsc::channel();
+        let sent = self.batches.send(Submission { setup, jobs, reply });
+        sent.map_err(|_| FleetError::Stopped("its thread ended".to_owned()))?;
         self.wait(&replies)
     }
 
@@ -223,80 +211,4 @@ impl Drop for GrpcFleet {
             }
         }
     }
-}
-
-fn run_network(
-    listener: TcpListener,
-    hub: &Arc<Hub>,
-    heartbeat: Duration,
-    cancel: CancellationToken,
-    stop: &CancellationToken,
-) -> Result<(), String> {
-    let runtime = tokio::runtime::Builder::new_current_thread()
-        .enable_all()
-        .build()
-        .map_err(|error| error.to_string())?;
-    let outcome = runtime.block_on(async {
-        let listener = tokio::net::TcpListener::from_std(listener).map_err(|error| error.to_string())?;
-        let incoming = TcpIncoming::from(listener).with_nodelay(Some(true));
-        tokio::spawn(tick(Arc::clone(hub), heartbeat));
-        tokio::spawn(beat(Arc::clone(hub), heartbeat));
-        tokio::spawn(abort_on_cancel(Arc::clone(hub), cancel));
-        let service = FleetServer::new(Service { hub: Arc::clone(hub) })
-            .max_decoding_message_size(MAX_MESSAGE)
-            .max_encoding_message_size(MAX_MESSAGE);
-        let server = Server::builder()
-            .http2_keepalive_interval(Some(heartbeat))
-            .http2_keepalive_timeout(Some(heartbeat))
-            .initial_stream_window_size(WINDOWS.0)
-            .initial_connection_window_size(WINDOWS.1)
-            .max_frame_size(FRAME_SIZE)
-            .add_service(service)
-            .serve_with_incoming(incoming);
-        tokio::select! {
-            ended = server => ended.map_err(|error| error.to_string()),
-            () = drained(hub, stop) => Ok(()),
-        }
-    });
-    runtime.shutdown_background();
-    outcome
-}
-
-async fn tick(hub: Arc<Hub>, heartbeat: Duration) {
-    let mut ticks = tokio::time::interval(TICK.min(heartbeat / 4));
-    loop {
-        ticks.tick().await;
-        hub.handle(Event::Tick);
-    }
-}
-
-async fn beat(hub: Arc<Hub>, heartbeat: Duration) {
-    let mut beats = tokio::time::interval(heartbeat);
-    loop {
-        beats.tick().await;
-        hub.beat();
-    }
-}
-
-async fn abort_on_cancel(hub: Arc<Hub>, cancel: CancellationToken) {
-    cancel.cancelled().await;
-    hub.handle(Event::Abort(BatchError::Cancelled));
-}
-
-/// Waits for the stop, asks the workers to leave, and returns when they did or time is up.
-async fn drained(hub: &Hub, stop: &CancellationToken) {
-    stop.cancelled().await;
-    hub.handle(Event::Abort(BatchError::Cancelled));
-    hub.drain("the run is over");
-    let empty = async {
-        loop {
-            let mut ended = std::pin::pin!(hub.link_ended.notified());
-            ended.as_mut().enable();
-            if hub.n_links() == 0 {
-                return;
-            }
-            ended.await;
-        }
-    };
-    let _ = tokio::time::timeout(GOODBYE_PATIENCE, empty).await;
 }

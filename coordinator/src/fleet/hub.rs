@@ -38,7 +38,7 @@ struct State {
     dispatcher: Dispatcher,
     links: BTreeMap<WorkerId, Link>,
     setups: BTreeMap<SetupId, Bytes>,
-    running: Option<Running>,
+    running: Option<Submission>,
     encoder: JobEncoder,
     events: Sender<FleetEvent>,
     first_epoch: u64,
@@ -53,10 +53,11 @@ struct Link {
     pid: u32,
 }
 
-struct Running {
-    setup: SetupId,
-    jobs: Vec<Job>,
-    reply: Sender<Reply>,
+/// A batch and who waits for it.
+pub(super) struct Submission {
+    pub(super) setup: SetupId,
+    pub(super) jobs: Vec<Job>,
+    pub(super) reply: Sender<Reply>,
 }
 
 impl Hub {
@@ -102,22 +103,23 @@ impl Hub {
         self.lock().setups.insert(id, json);
     }
 
-    /// Starts a batch; false when its setup is unknown.
-    pub(super) fn submit(&self, setup: SetupId, jobs: Vec<Job>, reply: Sender<Reply>) -> bool {
+    pub(super) fn knows(&self, setup: &SetupId) -> bool {
+        self.lock().setups.contains_key(setup)
+    }
+
+    /// Starts a batch.
+    pub(super) fn submit(&self, batch: Submission) {
         let now = self.started.elapsed();
         let mut state = self.lock();
-        if !state.setups.contains_key(&setup) {
-            return false;
-        }
         if let Some(reason) = state.given_up.clone().filter(|_| state.links.is_empty()) {
-            let _ = reply.send(Err(BatchError::LocalWorkers(reason)));
-            return true;
+            let _ = batch.reply.send(Err(BatchError::LocalWorkers(reason)));
+            return;
         }
-        let names = jobs.iter().map(|j| JobName { particle: j.particle, record: j.record }).collect();
+        let names = batch.jobs.iter().map(|j| JobName { particle: j.particle, record: j.record }).collect();
+        let setup = batch.setup;
         state.handle(now, Event::Abort(BatchError::Cancelled));
-        state.running = Some(Running { setup, jobs, reply });
+        state.running = Some(batch);
         state.handle(now, Event::Submit { setup, jobs: names });
-        true
     }
 
     /// Takes a worker or says why not. The first message on its link is the welcome.

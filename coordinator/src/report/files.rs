@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use super::{ReportError, reader, render};
 use crate::study::RunFolder;
-use crate::study::folder::write;
 use crate::study::store::StoreError;
+use crate::study::store::folder::write;
 
 /// Why the files could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -18,7 +18,9 @@ pub enum FilesError {
     #[error(transparent)]
     Page(#[from] ReportError),
     /// A file could not be written.
-    #[error("cannot write {path}: {source}; the result is safe in run.db, `starlings report` writes the files again")]
+    #[error(
+        "cannot write {path}: {source}; the result is safe in run.db, `starlings report` writes the files again"
+    )]
     File {
         /// The file.
         path: PathBuf,
@@ -38,7 +40,8 @@ pub fn write_files(folder: &RunFolder) -> Result<(), FilesError> {
     };
     let page = render(&reader::report_data(&folder.store)?)?;
     let posterior = folder.store.meta("posterior")?.unwrap_or_default();
-    let summary = serde_json::to_string_pretty(&summary).map_err(|e| folder.store.damaged("summary", e))? + "\n";
+    let summary =
+        serde_json::to_string_pretty(&summary).map_err(|e| folder.store.damaged("summary", e))? + "\n";
     for (name, text) in [("posterior.csv", posterior), ("summary.json", summary), ("report.html", page)] {
         let path = folder.path.join(name);
         write(&path, &text).map_err(|source| FilesError::File { path, source })?;

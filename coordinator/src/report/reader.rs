@@ -7,10 +7,10 @@ use std::collections::BTreeMap;
 use starlings_estimators::{autocorrelation, nis_band};
 
 use super::data::{
-    Autocorrelation, ChannelPlot, FleetEvent, FleetTable, NisSeries, ParameterRow, PassTrack, ReportData, RunTimeBin,
-    RunTimes, Track, WorkerRow,
+    Autocorrelation, ChannelPlot, FleetEvent, FleetTable, NisSeries, ParameterRow, PassTrack, ReportData,
+    RunTimeBin, RunTimes, Track, WorkerRow,
 };
-use crate::study::folder::StudyInfo;
+use crate::study::store::folder::StudyInfo;
 use crate::study::store::{Store, StoreError};
 use crate::study::summary::Summary;
 
@@ -194,10 +194,10 @@ fn residual_autocorrelation(plot: &ChannelPlot) -> Option<Autocorrelation> {
 }
 
 fn nis(store: &Store) -> Result<Vec<NisSeries>, StoreError> {
-    let rows: Vec<(usize, f64, f64, usize)> = store.rows(
-        "SELECT pass, time, nis, n_used FROM analyses WHERE n_used > 0 ORDER BY pass, step",
-        |r| Ok((r.get(0)?, r.get(1)?, r.get(2)?, r.get(3)?)),
-    )?;
+    let rows: Vec<(usize, f64, f64, usize)> = store
+        .rows("SELECT pass, time, nis, n_used FROM analyses WHERE n_used > 0 ORDER BY pass, step", |r| {
+            Ok((r.get(0)?, r.get(1)?, r.get(2)?, r.get(3)?))
+        })?;
     let mut series: Vec<NisSeries> = Vec::new();
     for (pass, time, nis, n_used) in rows {
         if series.last().is_none_or(|s| s.pass != pass) {
@@ -215,13 +215,17 @@ fn nis(store: &Store) -> Result<Vec<NisSeries>, StoreError> {
 fn fleet(store: &Store, summary: Option<&Summary>) -> Result<FleetTable, StoreError> {
     let mut workers: BTreeMap<String, WorkerRow> = BTreeMap::new();
     let mut costs = Vec::new();
-    let jobs: Vec<(String, bool, f64)> =
-        store.rows("SELECT worker, status = 'done', coalesce(cost_s, 0) FROM jobs ORDER BY id", |r| {
+    let jobs: Vec<(String, bool, f64)> = store
+        .rows("SELECT worker, status = 'done', coalesce(cost_s, 0) FROM jobs ORDER BY id", |r| {
             Ok((r.get(0)?, r.get(1)?, r.get(2)?))
         })?;
     for (name, done, cost) in &jobs {
         let host = name.split(':').next().unwrap_or_default().to_owned();
-        let row = workers.entry(name.clone()).or_insert_with(|| WorkerRow { name: name.clone(), host, ..WorkerRow::default() });
+        let row = workers.entry(name.clone()).or_insert_with(|| WorkerRow {
+            name: name.clone(),
+            host,
+            ..WorkerRow::default()
+        });
         row.jobs += 1;
         row.failed += u64::from(!done);
         row.mean_s += cost;

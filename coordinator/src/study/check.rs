@@ -1,19 +1,25 @@
 //! From a study as written to a [`Study`]: names against the model, numbers against sense, recordings against both.
 //!
 //! Checks go on after a fault as long as their answer can be trusted, so that one look shows as much as possible. Next file
-//! to read: [`super::check_model`].
+//! to read: [`self::model`].
+
+mod blame;
+mod model;
+mod parameters;
+mod prior;
+mod settings;
 
 use std::path::Path;
 
-use super::check_model::{self, CheckedModel};
-use super::check_parameters::{self, initial_medians};
-use super::check_settings::{estimator, explain, fleet, observer};
+use self::model::CheckedModel;
+use self::parameters::initial_medians;
+use self::settings::{estimator, explain, fleet, observer};
 use super::checked::{Record, Study};
 use super::expand;
 use super::file::{RecordSection, StudyFile};
-use super::file_read::read;
 use super::problem::{Source, StudyError};
 use super::record::{Context, Recordings};
+use crate::study::file::read::read;
 
 /// Checks the text of a study file.
 ///
@@ -27,21 +33,21 @@ pub(super) fn check(path: &Path, text: &str) -> Result<Study, StudyError> {
     let fleet = fleet(&source, &file.fleet);
     let explain = explain(&source, &file);
     let observer = observer(&source, &file.observer);
-    let model = check_model::model(&source, &file);
+    let model = model::model(&source, &file);
     // Everything that follows is judged against the model.
     let Some(mut model) = model else {
         return Err(source.verdict().err().unwrap_or(StudyError { problems: vec![] }));
     };
     model.setup.observer = observer;
     let mut warnings = Vec::new();
-    check_model::check_values(&source, &file, &model);
-    let priors = check_parameters::priors(&source, &file, &model, &mut warnings);
+    model::check_values(&source, &file, &model);
+    let priors = parameters::priors(&source, &file, &model, &mut warnings);
     let records = records(&source, &file, &mut model, &explain.hold_out_channels, &mut warnings);
     source.verdict()?;
     model.setup.parameters = file.parameters.iter().map(|p| p.name.get_ref().clone()).collect();
     let parameters = initial_medians(&source, &file, &model.spec, &priors, &records);
     source.verdict()?;
-    check_model::check_build(&source, &file, &model.setup);
+    model::check_build(&source, &file, &model.setup);
     source.verdict()?;
     let theta = expand::theta(&parameters, &records);
     Ok(Study {

@@ -1,7 +1,12 @@
 //! The study file as it is written: every section and key, with its place, before any check of meaning.
 //!
 //! Types, missing and unknown keys are settled here; whether names exist and numbers make sense is [`super::check`]'s
-//! business. Next file to read: [`super::file_read`], which fills these.
+//! business. Next file to read: [`crate::study::file::read`], which fills these.
+
+pub(super) mod locate;
+mod model;
+pub(super) mod read;
+mod table;
 
 use std::ops::Range;
 

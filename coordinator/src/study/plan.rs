@@ -1,7 +1,7 @@
 //! From recordings to windows: what a run sees of a record, and when.
 //!
 //! Held-out values are left out here and nowhere else: a window that reaches the fleet never holds one. Next file to read:
-//! [`super::filter`], which runs the windows.
+//! [`crate::study::fit::filter`], which runs the windows.
 
 use std::sync::Arc;
 

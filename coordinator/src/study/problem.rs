@@ -9,7 +9,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::locate::line_column;
+use crate::study::file::locate::line_column;
 
 /// One thing wrong with a study file or one of its data files.
 #[derive(Clone, Debug, PartialEq, Eq)]

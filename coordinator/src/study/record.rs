@@ -1,6 +1,10 @@
 //! From `[[records]]` and its CSV files to a [`Record`].
 //!
-//! Next files to read: [`super::record_channel`] for what was measured, [`super::record_input`] for what drives the model.
+//! Next files to read: [`crate::study::record::channel`] for what was measured, [`crate::study::record::input`] for what drives the model.
+
+mod channel;
+mod csv;
+mod input;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -12,9 +16,9 @@ use toml::Spanned;
 use super::checked::Record;
 use super::file::RecordSection;
 use super::problem::{Source, suggestion};
-use super::record_channel::ChannelReader;
-use super::record_csv::Csv;
-use super::record_input::inputs;
+use crate::study::record::channel::ChannelReader;
+use crate::study::record::csv::Csv;
+use crate::study::record::input::inputs;
 
 /// Reads the CSV files of a study, each once.
 pub(super) struct Recordings<'a> {

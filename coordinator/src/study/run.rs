@@ -1,20 +1,21 @@
 //! The whole loop: fit, forward run, summary, artefacts. Everything between a checked study and a finished run folder.
 //!
 //! The same code starts a run and continues a killed one: what is already in the store is not done again. Next files to
-//! read: [`super::filter`] and [`super::batch_fit`].
+//! read: [`crate::study::fit::filter`] and [`crate::study::fit::batch`].
 
 use std::sync::mpsc::Receiver;
 
 use starlings_estimators::{EstimatorError, Gaussian};
 use starlings_models::ParticleError;
 
-use super::flight::Flight;
-use super::folder::RunFolder;
-use super::snapshot::{Counts, Snapshot};
+use super::fit::{batch, filter, forecast};
 use super::store::{Store, StoreError};
 use super::summary::Summary;
-use super::{EstimatorKind, Study, batch_fit, filter, forecast, summary};
+use super::{EstimatorKind, Study, summary};
 use crate::fleet::{Fleet, FleetError, FleetEvent};
+use crate::study::fit::flight::Flight;
+use crate::study::store::folder::RunFolder;
+use crate::study::store::snapshot::{Counts, Snapshot};
 
 /// Why a run ended without a result.
 #[derive(Debug, thiserror::Error)]
@@ -29,7 +30,9 @@ pub enum RunError {
     #[error(transparent)]
     Estimator(#[from] EstimatorError),
     /// A sigma point failed at every distance from the mean and the others do not span the parameters.
-    #[error("sigma point {particle} of pass {pass}, step {step} failed even next to the mean ({values}): {cause}; {source}")]
+    #[error(
+        "sigma point {particle} of pass {pass}, step {step} failed even next to the mean ({values}): {cause}; {source}"
+    )]
     SigmaPointLost {
         /// Index of the sigma point.
         particle: usize,
@@ -45,7 +48,9 @@ pub enum RunError {
         source: EstimatorError,
     },
     /// A redrawn sigma point could not be observed.
-    #[error("sigma point {particle} has no prediction after resampling: {source}; set [estimator] resample = \"none\"")]
+    #[error(
+        "sigma point {particle} has no prediction after resampling: {source}; set [estimator] resample = \"none\""
+    )]
     Resampled {
         /// Index of the sigma point.
         particle: usize,
@@ -157,11 +162,15 @@ pub fn run(
 ) -> Result<Summary, RunError> {
     let resumed = Snapshot::read(&folder.store, study.records.len())?;
     context.earlier_s = folder.store.last_event_s()?;
-    folder.store.event(context.elapsed(), "run", if resumed.is_some() { "run resumed" } else { "run started" })?;
+    folder.store.event(
+        context.elapsed(),
+        "run",
+        if resumed.is_some() { "run resumed" } else { "run started" },
+    )?;
     let mut flight = Flight::new(study, fleet)?;
     let fit = match study.estimator.kind {
         EstimatorKind::Roukf => filter::fit(&mut flight, &mut folder.store, context, resumed)?,
-        EstimatorKind::Batch => batch_fit::fit(&mut flight, &mut folder.store, context, resumed)?,
+        EstimatorKind::Batch => batch::fit(&mut flight, &mut folder.store, context, resumed)?,
     };
     let predictions = forecast::run(&mut flight, &fit.posterior)?;
     let jobs = flight.take_rows();

@@ -2,14 +2,17 @@
 //!
 //! Whatever is shown later — summary, report, export, resume — is read from here and from nowhere else. Each analysis and
 //! the snapshot that a resumed run starts from are written in one transaction, so a run killed at any instant continues
-//! from its last whole analysis. Nothing here computes. Next file to read: [`super::snapshot`].
+//! from its last whole analysis. Nothing here computes. Next file to read: [`crate::study::store::snapshot`].
+
+pub mod folder;
+pub mod snapshot;
 
 use std::path::{Path, PathBuf};
 
 use nalgebra::DMatrix;
 use rusqlite::{Connection, OptionalExtension, Row, params};
 
-use super::snapshot::Snapshot;
+use crate::study::store::snapshot::Snapshot;
 
 /// Version of the tables below; a store of another version is refused.
 const SCHEMA_VERSION: i64 = 1;
@@ -198,7 +201,11 @@ impl Store {
     /// When there is none or it was written by another version.
     pub fn open(path: &Path) -> Result<Self, StoreError> {
         if !path.is_file() {
-            return Err(StoreError::Unusable(format!("no run in {}: expected the file {}", folder_of(path), path.display())));
+            return Err(StoreError::Unusable(format!(
+                "no run in {}: expected the file {}",
+                folder_of(path),
+                path.display()
+            )));
         }
         let store = Self::connect(path, rusqlite::OpenFlags::SQLITE_OPEN_READ_WRITE)?;
         let version: i64 =
@@ -296,9 +303,17 @@ impl Store {
             transaction.execute("DELETE FROM predictions", [])?;
             transaction.execute("DELETE FROM jobs WHERE pass = 0", [])?;
             for row in rows {
-                transaction.prepare_cached("INSERT INTO predictions VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)")?.execute(
-                    params![row.record, row.output, row.time, row.observed, row.predicted, row.usage, row.noise],
-                )?;
+                transaction
+                    .prepare_cached("INSERT INTO predictions VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)")?
+                    .execute(params![
+                        row.record,
+                        row.output,
+                        row.time,
+                        row.observed,
+                        row.predicted,
+                        row.usage,
+                        row.noise
+                    ])?;
             }
             insert_jobs(&transaction, jobs)?;
             transaction.commit()
@@ -311,7 +326,9 @@ impl Store {
     /// # Errors
     /// When the database refuses.
     pub fn last_event_s(&self) -> Result<f64, StoreError> {
-        self.guard(self.connection().query_row("SELECT coalesce(max(at_s), 0.0) FROM events", [], |row| row.get(0)))
+        self.guard(
+            self.connection().query_row("SELECT coalesce(max(at_s), 0.0) FROM events", [], |row| row.get(0)),
+        )
     }
 
     /// All rows of a query, each mapped by `map`.
@@ -331,8 +348,9 @@ fn folder_of(path: &Path) -> String {
 }
 
 fn insert_analysis(connection: &Connection, row: &AnalysisRow) -> rusqlite::Result<()> {
-    connection.prepare_cached("INSERT OR REPLACE INTO analyses VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)")?.execute(
-        params![
+    connection
+        .prepare_cached("INSERT OR REPLACE INTO analyses VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)")?
+        .execute(params![
             row.pass,
             row.step,
             row.time,
@@ -340,9 +358,8 @@ fn insert_analysis(connection: &Connection, row: &AnalysisRow) -> rusqlite::Resu
             row.nis,
             row.log_likelihood,
             row.information_lost,
-            row.transform.as_ref().map(|t| super::snapshot::to_bytes(t.as_slice()))
-        ],
-    )?;
+            row.transform.as_ref().map(|t| crate::study::store::snapshot::to_bytes(t.as_slice()))
+        ])?;
     for e in &row.estimates {
         connection
             .prepare_cached("INSERT OR REPLACE INTO estimates VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)")?

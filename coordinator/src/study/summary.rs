@@ -138,8 +138,12 @@ fn channel_fit(
     predictions: &[PredictionRow],
     keep: &dyn Fn(&PredictionRow) -> bool,
 ) -> Option<ChannelFit> {
-    let of_output: Vec<&PredictionRow> = predictions.iter().filter(|p| p.output == output && keep(p)).collect();
-    let noise = of_output.iter().map(|p| p.noise).fold(None, |max: Option<f64>, s| Some(max.map_or(s, |m| m.max(s))))?;
+    let of_output: Vec<&PredictionRow> =
+        predictions.iter().filter(|p| p.output == output && keep(p)).collect();
+    let noise = of_output
+        .iter()
+        .map(|p| p.noise)
+        .fold(None, |max: Option<f64>, s| Some(max.map_or(s, |m| m.max(s))))?;
     Some(ChannelFit {
         name: output.to_owned(),
         noise,

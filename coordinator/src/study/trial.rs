@@ -28,7 +28,9 @@ pub enum TrialError {
     #[error(transparent)]
     Setup(#[from] SetupError),
     /// The model fails at the prior median.
-    #[error("the model fails at the prior median on record `{record}` ({values}): {source}; check constants, priors and inputs")]
+    #[error(
+        "the model fails at the prior median on record `{record}` ({values}): {source}; check constants, priors and inputs"
+    )]
     Model {
         /// Record name.
         record: String,
@@ -68,7 +70,9 @@ pub fn trial(study: &Study) -> Result<Vec<TrialChannel>, TrialError> {
                 .times
                 .iter()
                 .enumerate()
-                .filter_map(|(j, t)| Some(record.observed(channel, *t)? - prediction.outputs[j * n_obs + channel.row]))
+                .filter_map(|(j, t)| {
+                    Some(record.observed(channel, *t)? - prediction.outputs[j * n_obs + channel.row])
+                })
                 .collect();
             let sum: f64 = residuals.iter().map(|r| r * r).sum();
             channels.push(TrialChannel {

@@ -78,7 +78,8 @@ pub fn simulate(study: &Study, twin: &Twin) -> Result<Recording, TwinError> {
         inputs: record.inputs.clone(),
     };
     let window = Arc::new(window);
-    let job = Job { particle: 0, record: twin.record as u32, window: Arc::clone(&window), theta, state: None };
+    let job =
+        Job { particle: 0, record: twin.record as u32, window: Arc::clone(&window), theta, state: None };
     let prediction = model.run(&job)?;
     Ok(recording(&*model, &setup, &window, &prediction.outputs, twin))
 }
@@ -110,7 +111,13 @@ fn amplitude_of(study: &Study, setup: &mut Setup, name: &str) -> Result<String, 
     let built_in = starlings_models::effect::library(&study.spec);
     if !setup.effects.iter().any(|e| e.name == name) {
         let Some(effect) = study.candidates.iter().chain(&built_in).find(|e| e.name == name) else {
-            let names: Vec<&str> = setup.effects.iter().chain(&study.candidates).chain(&built_in).map(|e| e.name.as_str()).collect();
+            let names: Vec<&str> = setup
+                .effects
+                .iter()
+                .chain(&study.candidates)
+                .chain(&built_in)
+                .map(|e| e.name.as_str())
+                .collect();
             let nearest = nearest(name, names.iter().copied());
             return Err(SetupError::Unknown { what: "effect", name: name.to_owned(), nearest }.into());
         };

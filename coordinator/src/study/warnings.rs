@@ -145,8 +145,12 @@ fn far_from_prior(study: &Study, fit: &Fit) -> Vec<String> {
             let distance = (fit.posterior.mean[j] - prior.mean[j]).abs() / entry.prior_sd;
             let bounded = matches!(entry.transform, Transform::Logit { .. });
             (distance > FAR_FROM_PRIOR).then(|| {
-                let remedy = if bounded { "it sits at a bound" } else { "widen the prior, or bound it with logit" };
-                format!("{} is {distance:.1} prior standard deviations from its prior median: {remedy}.", entry.name)
+                let remedy =
+                    if bounded { "it sits at a bound" } else { "widen the prior, or bound it with logit" };
+                format!(
+                    "{} is {distance:.1} prior standard deviations from its prior median: {remedy}.",
+                    entry.name
+                )
             })
         })
         .collect()

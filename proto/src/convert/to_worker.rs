@@ -19,7 +19,7 @@ pub struct Welcome {
     pub epoch: u64,
 }
 
-/// A checked message to a worker. Jobs are encoded by [`super::JobEncoder`], everything else by [`ToWorker::encode`].
+/// A checked message to a worker. Jobs are encoded by [`super::JobEncoder`], everything else by the functions here.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ToWorker {
     /// The worker is taken.

@@ -7,8 +7,8 @@
 use nalgebra::DMatrix;
 use starlings_estimators::{Particles, Roukf};
 
-use super::RunError;
 use super::flight::{Flight, Place, Results, StepWindows};
+use crate::study::RunError;
 
 /// Distances from the mean at which a failed sigma point is tried again, as fractions of its own.
 const DISTANCES: [f64; 5] = [0.5, 0.25, 0.125, 0.0625, 0.03125];
@@ -84,7 +84,9 @@ fn rescue(
     Ok(())
 }
 
-fn failure(of_particle: &[Result<starlings_models::Prediction, starlings_models::ParticleError>]) -> Option<String> {
+fn failure(
+    of_particle: &[Result<starlings_models::Prediction, starlings_models::ParticleError>],
+) -> Option<String> {
     of_particle.iter().find_map(|r| r.as_ref().err().map(ToString::to_string))
 }
 

@@ -1,29 +1,29 @@
 //! From a prior as written to a Gaussian in transformed units.
 //!
 //! A median is in physical units. The spread is a `factor` (a ratio of values, or of odds under a logit) or an `sd` (in
-//! transformed units, which for `linear` are the physical ones). Next file to read: [`super::expand`].
+//! transformed units, which for `linear` are the physical ones). Next file to read: [`crate::study::expand`].
 
 use starlings_estimators::{Drift, Transform};
 use starlings_models::Quantity;
 use toml::Spanned;
 
-use super::file::{ParameterSection, PriorSection, ProcessSection};
-use super::problem::Source;
+use crate::study::file::{ParameterSection, PriorSection, ProcessSection};
+use crate::study::problem::Source;
 
 /// A prior without its place: the median may have to come from a recording.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Prior {
-    pub(super) transform: Transform,
+pub(in crate::study) struct Prior {
+    pub(in crate::study) transform: Transform,
     /// Mean in transformed units, when the study gives the median.
-    pub(super) mean: Option<f64>,
+    pub(in crate::study) mean: Option<f64>,
     /// Standard deviation in transformed units.
-    pub(super) sd: f64,
+    pub(in crate::study) sd: f64,
     /// How the parameter moves from one analysis to the next.
-    pub(super) drift: Drift,
+    pub(in crate::study) drift: Drift,
 }
 
 /// Checks a prior against itself and against what the model says of the quantity. Nothing after a complaint.
-pub(super) fn prior(
+pub(in crate::study) fn prior(
     source: &Source,
     parameter: &ParameterSection,
     quantity: Option<&Quantity>,
@@ -63,7 +63,7 @@ pub(super) fn prior(
 }
 
 /// Whether a median can be transformed and lies where physics allows; otherwise says so.
-pub(super) fn check_median(
+pub(in crate::study) fn check_median(
     source: &Source,
     median: &Spanned<f64>,
     name: &str,
@@ -231,7 +231,7 @@ fn check_bounds(source: &Source, prior: &PriorSection, transform: &Transform, qu
 }
 
 /// A linear prior that reaches values outside the model's range makes sigma points that fail.
-pub(super) fn reach_warning(name: &str, prior: &Prior, quantity: &Quantity) -> Option<String> {
+pub(in crate::study) fn reach_warning(name: &str, prior: &Prior, quantity: &Quantity) -> Option<String> {
     let mean = prior.mean.filter(|_| matches!(prior.transform, Transform::Linear))?;
     let (low, high) = (mean - 2.0 * prior.sd, mean + 2.0 * prior.sd);
     (low < quantity.range[0] || high > quantity.range[1]).then(|| {

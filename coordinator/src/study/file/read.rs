@@ -1,18 +1,18 @@
 //! From TOML text to a [`StudyFile`]: sections, parameters and records.
 //!
 //! Every complaint about form (a missing or unknown key, a wrong type) is reported to the [`Source`]; reading goes on so that
-//! one look shows them all. Next file to read: [`super::file_model`] for the model and the effects.
+//! one look shows them all. Next file to read: [`super::model`] for the model and the effects.
 
 use toml::Spanned;
 use toml::de::DeTable;
 
-use super::file::{
+use super::model::{effects, model};
+use super::table::{Node, Table, number, text, wrong_type};
+use super::{
     ChannelSection, EstimatorSection, ExplainSection, FleetSection, Named, ObserverSection, ParameterSection,
     PriorSection, ProcessSection, RecordSection, StudyFile, StudySection,
 };
-use super::file_model::{effects, model};
-use super::file_table::{Node, Table, number, text, wrong_type};
-use super::problem::{Source, StudyError};
+use crate::study::problem::{Source, StudyError};
 
 const SECTIONS: [&str; 9] =
     ["study", "model", "parameters", "observer", "records", "effects", "explain", "estimator", "fleet"];
@@ -21,7 +21,7 @@ const SECTIONS: [&str; 9] =
 ///
 /// # Errors
 /// Every fault of form.
-pub(super) fn read(source: &Source) -> Result<StudyFile, StudyError> {
+pub(in crate::study) fn read(source: &Source) -> Result<StudyFile, StudyError> {
     let (root, faults) = DeTable::parse_recoverable(&source.text);
     for fault in &faults {
         let end = source.text.len();
@@ -229,7 +229,10 @@ fn fleet(root: &Table<'_>) -> FleetSection {
 }
 
 /// Texts by name; a value that is no text is reported.
-pub(super) fn named_texts(source: &Source, entries: &[(Spanned<String>, &Node<'_>)]) -> Named<String> {
+pub(in crate::study) fn named_texts(
+    source: &Source,
+    entries: &[(Spanned<String>, &Node<'_>)],
+) -> Named<String> {
     let read = |(key, node): &(Spanned<String>, &Node<'_>)| {
         text(source, node, &format!("`{}`", key.get_ref())).map(|value| (key.clone(), value))
     };

@@ -1,7 +1,7 @@
 //! Reading one TOML table field by field, with a place in the file for every value and every complaint.
 //!
 //! The tables are walked by hand and not through a derive: a derive stops at the first fault, and loses the place of a value
-//! that may have several types. Next file to read: [`super::file_read`].
+//! that may have several types. Next file to read: [`super::read`].
 
 use std::cell::RefCell;
 use std::ops::Range;
@@ -9,17 +9,17 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::problem::{Source, suggestion};
+use crate::study::problem::{Source, suggestion};
 
 /// A value of the file with its place.
-pub(super) type Node<'i> = Spanned<DeValue<'i>>;
+pub(in crate::study) type Node<'i> = Spanned<DeValue<'i>>;
 
 /// One table, such as `[model]`, with the keys it may have.
-pub(super) struct Table<'a> {
+pub(in crate::study) struct Table<'a> {
     source: &'a Source,
     map: &'a DeTable<'a>,
     /// Where the table, or its header, stands.
-    pub(super) span: Range<usize>,
+    pub(in crate::study) span: Range<usize>,
     /// What to call it in messages, such as `[model]`.
     name: String,
     /// Valid keys that an unknown key probably meant: their absence is not reported a second time.
@@ -28,7 +28,12 @@ pub(super) struct Table<'a> {
 
 impl<'a> Table<'a> {
     /// Opens a table and reports its unknown keys. Empty when the value is no table, which is reported.
-    pub(super) fn open(source: &'a Source, node: &'a Node<'a>, name: &str, keys: &[&str]) -> Option<Self> {
+    pub(in crate::study) fn open(
+        source: &'a Source,
+        node: &'a Node<'a>,
+        name: &str,
+        keys: &[&str],
+    ) -> Option<Self> {
         let Some(map) = node.get_ref().as_table() else {
             wrong_type(source, node, name, "a table");
             return None;
@@ -37,7 +42,7 @@ impl<'a> Table<'a> {
     }
 
     /// Opens a table whose map is at hand, as the file's root is.
-    pub(super) fn from_map(
+    pub(in crate::study) fn from_map(
         source: &'a Source,
         map: &'a DeTable<'a>,
         span: Range<usize>,
@@ -60,7 +65,7 @@ impl<'a> Table<'a> {
     }
 
     /// Keys and values in the order of the file.
-    pub(super) fn entries(&self) -> Vec<(Spanned<String>, &'a Node<'a>)> {
+    pub(in crate::study) fn entries(&self) -> Vec<(Spanned<String>, &'a Node<'a>)> {
         let mut entries: Vec<_> =
             self.map.iter().map(|(k, v)| (Spanned::new(k.span(), k.get_ref().to_string()), v)).collect();
         entries.sort_by_key(|(key, _)| key.span().start);
@@ -68,17 +73,17 @@ impl<'a> Table<'a> {
     }
 
     /// The value of a key.
-    pub(super) fn get(&self, key: &str) -> Option<&'a Node<'a>> {
+    pub(in crate::study) fn get(&self, key: &str) -> Option<&'a Node<'a>> {
         self.map.get(key)
     }
 
     /// Where a key stands, for complaints about its mere presence.
-    pub(super) fn key_span(&self, key: &str) -> Option<Range<usize>> {
+    pub(in crate::study) fn key_span(&self, key: &str) -> Option<Range<usize>> {
         self.map.get_key_value(key).map(|(k, _)| k.span())
     }
 
     /// Reports that a required key is missing, unless a misspelt one was reported already.
-    pub(super) fn missing(&self, key: &str, expected: &str) {
+    pub(in crate::study) fn missing(&self, key: &str, expected: &str) {
         if !self.meant.borrow().iter().any(|m| m == key) {
             let message = format!("{} needs `{key}`: {expected}", self.name);
             self.source.report(self.span.clone(), message);
@@ -86,12 +91,12 @@ impl<'a> Table<'a> {
     }
 
     /// A text.
-    pub(super) fn text(&self, key: &str) -> Option<Spanned<String>> {
+    pub(in crate::study) fn text(&self, key: &str) -> Option<Spanned<String>> {
         text(self.source, self.get(key)?, &format!("`{key}`"))
     }
 
     /// A text that must be there; empty after the complaint that it is not.
-    pub(super) fn required_text(&self, key: &str, expected: &str) -> Spanned<String> {
+    pub(in crate::study) fn required_text(&self, key: &str, expected: &str) -> Spanned<String> {
         if self.get(key).is_none() {
             self.missing(key, expected);
         }
@@ -99,12 +104,12 @@ impl<'a> Table<'a> {
     }
 
     /// A finite number.
-    pub(super) fn number(&self, key: &str) -> Option<Spanned<f64>> {
+    pub(in crate::study) fn number(&self, key: &str) -> Option<Spanned<f64>> {
         number(self.source, self.get(key)?, &format!("`{key}`"))
     }
 
     /// A whole number from 0.
-    pub(super) fn count(&self, key: &str) -> Option<Spanned<u64>> {
+    pub(in crate::study) fn count(&self, key: &str) -> Option<Spanned<u64>> {
         let node = self.get(key)?;
         let parsed =
             node.get_ref().as_integer().and_then(|i| u64::from_str_radix(i.as_str(), i.radix()).ok());
@@ -115,7 +120,7 @@ impl<'a> Table<'a> {
     }
 
     /// `true` or `false`.
-    pub(super) fn flag(&self, key: &str) -> Option<Spanned<bool>> {
+    pub(in crate::study) fn flag(&self, key: &str) -> Option<Spanned<bool>> {
         let node = self.get(key)?;
         let Some(value) = node.get_ref().as_bool() else {
             wrong_type(self.source, node, &format!("`{key}`"), "`true` or `false`");
@@ -125,7 +130,7 @@ impl<'a> Table<'a> {
     }
 
     /// The entries of a list; a value that is no list is reported.
-    pub(super) fn list(&self, key: &str) -> &'a [Node<'a>] {
+    pub(in crate::study) fn list(&self, key: &str) -> &'a [Node<'a>] {
         let Some(node) = self.get(key) else { return &[] };
         let Some(array) = node.get_ref().as_array() else {
             wrong_type(self.source, node, &format!("`{key}`"), "a list `[ ... ]`");
@@ -135,19 +140,19 @@ impl<'a> Table<'a> {
     }
 
     /// A list of texts.
-    pub(super) fn texts(&self, key: &str) -> Vec<Spanned<String>> {
+    pub(in crate::study) fn texts(&self, key: &str) -> Vec<Spanned<String>> {
         let what = format!("an entry of `{key}`");
         self.list(key).iter().filter_map(|node| text(self.source, node, &what)).collect()
     }
 
     /// A list of numbers.
-    pub(super) fn numbers(&self, key: &str) -> Vec<Spanned<f64>> {
+    pub(in crate::study) fn numbers(&self, key: &str) -> Vec<Spanned<f64>> {
         let what = format!("an entry of `{key}`");
         self.list(key).iter().filter_map(|node| number(self.source, node, &what)).collect()
     }
 
     /// Two numbers `[a, b]` with `a < b`, infinite ones allowed.
-    pub(super) fn interval(&self, key: &str) -> Option<Spanned<[f64; 2]>> {
+    pub(in crate::study) fn interval(&self, key: &str) -> Option<Spanned<[f64; 2]>> {
         let node = self.get(key)?;
         let list = node.get_ref().as_array().map_or(&[][..], |l| l);
         let ends: Option<Vec<f64>> = list.iter().map(|n| any_number(n.get_ref())).collect();
@@ -162,17 +167,17 @@ impl<'a> Table<'a> {
     }
 
     /// The tables of a list, opened one by one.
-    pub(super) fn tables(&self, key: &str, name: &str, keys: &[&str]) -> Vec<Table<'a>> {
+    pub(in crate::study) fn tables(&self, key: &str, name: &str, keys: &[&str]) -> Vec<Table<'a>> {
         self.list(key).iter().filter_map(|node| Table::open(self.source, node, name, keys)).collect()
     }
 
     /// A table inside this one.
-    pub(super) fn table(&self, key: &str, name: &str, keys: &[&str]) -> Option<Table<'a>> {
+    pub(in crate::study) fn table(&self, key: &str, name: &str, keys: &[&str]) -> Option<Table<'a>> {
         Table::open(self.source, self.get(key)?, name, keys)
     }
 
     /// A table with free keys, such as constants by name, in the order of the file.
-    pub(super) fn free_entries(&self, key: &str) -> Vec<(Spanned<String>, &'a Node<'a>)> {
+    pub(in crate::study) fn free_entries(&self, key: &str) -> Vec<(Spanned<String>, &'a Node<'a>)> {
         let Some(node) = self.get(key) else { return Vec::new() };
         let Some(map) = node.get_ref().as_table() else {
             wrong_type(self.source, node, &format!("`{key}`"), "a table `{ name = value }`");
@@ -185,7 +190,7 @@ impl<'a> Table<'a> {
 }
 
 /// A text, or a complaint.
-pub(super) fn text(source: &Source, node: &Node<'_>, what: &str) -> Option<Spanned<String>> {
+pub(in crate::study) fn text(source: &Source, node: &Node<'_>, what: &str) -> Option<Spanned<String>> {
     let Some(value) = node.get_ref().as_str() else {
         wrong_type(source, node, what, "a text in quotes");
         return None;
@@ -194,7 +199,7 @@ pub(super) fn text(source: &Source, node: &Node<'_>, what: &str) -> Option<Spann
 }
 
 /// A finite number, or a complaint.
-pub(super) fn number(source: &Source, node: &Node<'_>, what: &str) -> Option<Spanned<f64>> {
+pub(in crate::study) fn number(source: &Source, node: &Node<'_>, what: &str) -> Option<Spanned<f64>> {
     let Some(value) = any_number(node.get_ref()).filter(|v| v.is_finite()) else {
         wrong_type(source, node, what, "a finite number");
         return None;
@@ -212,7 +217,7 @@ fn any_number(value: &DeValue<'_>) -> Option<f64> {
 }
 
 /// Reports a value of the wrong type, with what it is.
-pub(super) fn wrong_type(source: &Source, node: &Node<'_>, what: &str, expected: &str) {
+pub(in crate::study) fn wrong_type(source: &Source, node: &Node<'_>, what: &str, expected: &str) {
     let found = match node.get_ref() {
         DeValue::String(s) => format!("the text \"{s}\""),
         DeValue::Integer(i) => format!("the number {i}"),

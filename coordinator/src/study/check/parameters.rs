@@ -5,15 +5,15 @@
 use starlings_models::{Quantity, Spec};
 use toml::Spanned;
 
-use super::check_model::CheckedModel;
-use super::checked::{Record, StudyParameter};
-use super::expand::INITIAL;
-use super::file::{ParameterSection, StudyFile};
+use super::model::CheckedModel;
 use super::prior::{self, Prior};
-use super::problem::Source;
+use crate::study::checked::{Record, StudyParameter};
+use crate::study::expand::INITIAL;
+use crate::study::file::{ParameterSection, StudyFile};
+use crate::study::problem::Source;
 
 /// What the model says of a parameter or of the state behind an initial value.
-pub(super) fn quantity<'a>(spec: &'a Spec, name: &str) -> Option<&'a Quantity> {
+pub(in crate::study) fn quantity<'a>(spec: &'a Spec, name: &str) -> Option<&'a Quantity> {
     match name.strip_prefix(INITIAL) {
         Some(state) => spec.states.iter().find(|q| q.name == state),
         None => spec.parameters.iter().find(|q| q.name == name),
@@ -21,13 +21,13 @@ pub(super) fn quantity<'a>(spec: &'a Spec, name: &str) -> Option<&'a Quantity> {
 }
 
 /// Every name that a parameter or constant may have.
-pub(super) fn valid_names(spec: &Spec) -> Vec<String> {
+pub(in crate::study) fn valid_names(spec: &Spec) -> Vec<String> {
     let states = spec.states.iter().map(|q| format!("{INITIAL}{}", q.name));
     spec.parameters.iter().map(|q| q.name.clone()).chain(states).collect()
 }
 
 /// The priors in the order of the file, nothing in the place of one that was refused.
-pub(super) fn priors(
+pub(in crate::study) fn priors(
     source: &Source,
     file: &StudyFile,
     model: &CheckedModel,
@@ -37,7 +37,7 @@ pub(super) fn priors(
         let end = source.text.len();
         let help = format!(
             "add `[[parameters]]`; the model has {}",
-            super::problem::quoted_list(&valid_names(&model.spec))
+            crate::study::problem::quoted_list(&valid_names(&model.spec))
         );
         source.report_with(end..end, "the study has no parameter to estimate", help);
     }
@@ -79,7 +79,7 @@ fn unit_warning(parameter: &ParameterSection, quantity: &Quantity) -> Option<Str
 }
 
 /// The parameters with their prior means per record, medians taken from recordings where the study says so.
-pub(super) fn initial_medians(
+pub(in crate::study) fn initial_medians(
     source: &Source,
     file: &StudyFile,
     spec: &Spec,

@@ -1,13 +1,13 @@
 //! What a killed run continues from: the state of the estimator and of every particle after the last analysis.
 //!
 //! Small values are one JSON text, states are little-endian f64 blobs, so a resumed run sees the same bits. Next file to
-//! read: [`super::run`].
+//! read: [`crate::study::run`].
 
 use nalgebra::DMatrix;
 use rusqlite::{Connection, OptionalExtension, params};
 use serde::{Deserialize, Serialize};
 
-use super::store::{Store, StoreError};
+use crate::study::store::{Store, StoreError};
 
 /// A column-major matrix as plain data.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -83,7 +83,7 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    pub(super) fn write(&self, connection: &Connection) -> rusqlite::Result<()> {
+    pub(in crate::study) fn write(&self, connection: &Connection) -> rusqlite::Result<()> {
         let head = serde_json::to_string(&self.head)
             .map_err(|e| rusqlite::Error::ToSqlConversionFailure(Box::new(e)))?;
         connection
@@ -92,12 +92,9 @@ impl Snapshot {
         connection.prepare_cached("DELETE FROM snapshot_states")?.execute([])?;
         for (record, states) in self.states.iter().enumerate() {
             if let Some(x) = states {
-                connection.prepare_cached("INSERT INTO snapshot_states VALUES (?1, ?2, ?3, ?4)")?.execute(params![
-                    record,
-                    x.nrows(),
-                    x.ncols(),
-                    to_bytes(x.as_slice())
-                ])?;
+                connection
+                    .prepare_cached("INSERT INTO snapshot_states VALUES (?1, ?2, ?3, ?4)")?
+                    .execute(params![record, x.nrows(), x.ncols(), to_bytes(x.as_slice())])?;
             }
         }
         Ok(())
@@ -108,13 +105,14 @@ impl Snapshot {
     /// # Errors
     /// When the database refuses or its content is damaged.
     pub fn read(store: &Store, n_record: usize) -> Result<Option<Self>, StoreError> {
-        let head: Option<String> =
-            store.guard(store.connection().query_row("SELECT head FROM snapshot", [], |row| row.get(0)).optional())?;
+        let head: Option<String> = store.guard(
+            store.connection().query_row("SELECT head FROM snapshot", [], |row| row.get(0)).optional(),
+        )?;
         let Some(head) = head else { return Ok(None) };
         let head: Head = serde_json::from_str(&head).map_err(|e| store.damaged("snapshot", e))?;
         let mut states = vec![None; n_record];
-        let mut select =
-            store.guard(store.connection().prepare("SELECT record, rows, columns, body FROM snapshot_states"))?;
+        let mut select = store
+            .guard(store.connection().prepare("SELECT record, rows, columns, body FROM snapshot_states"))?;
         let rows = store.guard(select.query_map([], |row| {
             Ok((
                 row.get::<_, usize>(0)?,
@@ -126,7 +124,8 @@ impl Snapshot {
         for row in rows {
             let (record, n, r, body) = store.guard(row)?;
             let values = from_bytes(&body);
-            let slot = states.get_mut(record).ok_or_else(|| store.damaged("snapshot", "an unknown record"))?;
+            let slot =
+                states.get_mut(record).ok_or_else(|| store.damaged("snapshot", "an unknown record"))?;
             if values.len() != n * r {
                 return Err(store.damaged("snapshot", "a state of the wrong length"));
             }
@@ -137,12 +136,12 @@ impl Snapshot {
 }
 
 /// Little-endian bytes of a slice.
-pub(super) fn to_bytes(values: &[f64]) -> Vec<u8> {
+pub(in crate::study) fn to_bytes(values: &[f64]) -> Vec<u8> {
     values.iter().flat_map(|v| v.to_le_bytes()).collect()
 }
 
 /// The inverse of [`to_bytes`]; a trailing fragment is ignored.
-pub(super) fn from_bytes(bytes: &[u8]) -> Vec<f64> {
+pub(in crate::study) fn from_bytes(bytes: &[u8]) -> Vec<f64> {
     bytes
         .chunks_exact(8)
         .map(|chunk| {

@@ -1,16 +1,16 @@
 //! The run folder: a frozen study, the store, and the files made from it.
 //!
 //! Result files are written beside their place and renamed into it, so a reader never sees half of one. Next file to read:
-//! [`super::store`].
+//! [`crate::study::store`].
 
 use std::io;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::store::{Store, StoreError};
-use super::summary::Summary;
-use super::{Fit, Study, posterior};
+use crate::study::store::{Store, StoreError};
+use crate::study::summary::Summary;
+use crate::study::{Fit, Study, posterior};
 
 /// What the store keeps of the study so that a report needs nothing else.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -58,7 +58,9 @@ pub enum FolderError {
         source: io::Error,
     },
     /// A resumed run was started from another study.
-    #[error("{folder} was started from another study: {what} changed since; start a new run instead of --resume")]
+    #[error(
+        "{folder} was started from another study: {what} changed since; start a new run instead of --resume"
+    )]
     OtherStudy {
         /// The folder.
         folder: PathBuf,
@@ -132,7 +134,7 @@ impl RunFolder {
         text.map(|t| serde_json::from_str(&t).map_err(|e| self.store.damaged("summary", e))).transpose()
     }
 
-    pub(super) fn finish(&mut self, study: &Study, fit: &Fit, summary: &Summary) -> Result<(), StoreError> {
+    pub(crate) fn finish(&mut self, study: &Study, fit: &Fit, summary: &Summary) -> Result<(), StoreError> {
         self.store.set_meta("posterior", &posterior::to_csv(study, &fit.posterior))?;
         self.store.set_meta("summary", &json(summary))
     }
@@ -180,7 +182,7 @@ fn info(study: &Study, command: &str, started: &str) -> StudyInfo {
         says: Some(study.says.clone()).filter(|s| !s.is_empty()),
         model: study.setup.model.kind.clone(),
         estimator: study.estimator.describe(),
-        batch: study.estimator.kind == super::EstimatorKind::Batch,
+        batch: study.estimator.kind == crate::study::EstimatorKind::Batch,
         seed: study.seed,
         time_unit: study.time_unit.clone(),
         outputs: study.setup.outputs.iter().map(|o| (o.clone(), unit(o))).collect(),

@@ -1,7 +1,7 @@
 //! Reading the model and the effects of a study file.
 //!
 //! A rate is one expression or a table of named terms, an initial value a number or an expression; both end as text with a
-//! place. Next file to read: [`super::check_model`], which asks the model whether they make sense.
+//! place. Next file to read: [`crate::study::check::model`], which asks the model whether they make sense.
 
 use serde::Deserialize;
 use serde::de::IntoDeserializer;
@@ -9,13 +9,13 @@ use serde::de::value::StrDeserializer;
 use starlings_models::Role;
 use toml::Spanned;
 
-use super::file::{
+use super::read::named_texts;
+use super::table::{Node, Table, number, text, wrong_type};
+use super::{
     EffectParameterSection, EffectSection, EquationsSection, ModelSection, Named, QuantitySection,
     SolverSection, StateSection,
 };
-use super::file_read::named_texts;
-use super::file_table::{Node, Table, number, text, wrong_type};
-use super::problem::Source;
+use crate::study::problem::Source;
 
 /// Keys of `[model]` that only a model of equations has.
 const EQUATIONS: [&str; 5] = ["outputs", "inputs", "replaceable", "solver", "states"];
@@ -38,7 +38,7 @@ const ROLES: [&str; 13] = [
 ];
 
 /// Reads `[model]`.
-pub(super) fn model(source: &Source, root: &Table<'_>) -> ModelSection {
+pub(in crate::study) fn model(source: &Source, root: &Table<'_>) -> ModelSection {
     let keys = [&["kind", "constants"], &EQUATIONS[..], &EXTERNAL[..]].concat();
     if root.get("model").is_none() {
         root.missing("model", "a section `[model]` with a `kind`");
@@ -179,7 +179,7 @@ fn role(source: &Source, t: &Table<'_>) -> Role {
 }
 
 /// Reads `[[effects]]`.
-pub(super) fn effects(source: &Source, root: &Table<'_>) -> Vec<EffectSection> {
+pub(in crate::study) fn effects(source: &Source, root: &Table<'_>) -> Vec<EffectSection> {
     let keys = ["name", "says", "built_in", "adds", "parameters", "states", "confounders"];
     root.tables("effects", "[[effects]]", &keys).iter().map(|t| effect(source, t)).collect()
 }

@@ -7,10 +7,11 @@ use std::sync::Arc;
 
 use starlings_estimators::{Batch, BatchState, BatchStep, Data, SigmaSet};
 
+use super::filter;
 use super::flight::{Flight, Place, StepWindows, stack_outputs};
-use super::snapshot::{Head, Snapshot};
-use super::store::{AnalysisRow, Store};
-use super::{Fit, Progress, RunContext, RunError, filter, posterior};
+use crate::study::store::snapshot::{Head, Snapshot};
+use crate::study::store::{AnalysisRow, Store};
+use crate::study::{Fit, Progress, RunContext, RunError, posterior};
 
 /// Iterates to the posterior mode, continuing from `resumed` if there is one.
 ///
@@ -45,7 +46,8 @@ pub fn fit(
         let results = fly(flight, &mut now, place, &theta, &windows)?;
         let failed: Vec<bool> = results.iter().map(|of| of.iter().any(Result::is_err)).collect();
         let predictions = stack_outputs(&results);
-        let (next, step) = batch.step(&state, &predictions, &failed, &Data { values: &values, noise: &noise })?;
+        let (next, step) =
+            batch.step(&state, &predictions, &failed, &Data { values: &values, noise: &noise })?;
         state = next;
         keep(&mut now, &state, &step)?;
         let mut row = row(study, place, &step);
@@ -58,13 +60,13 @@ pub fn fit(
     }
 }
 
-fn begin(batch: &Batch, study: &super::Study) -> (BatchState, Snapshot) {
+fn begin(batch: &Batch, study: &crate::study::Study) -> (BatchState, Snapshot) {
     let prior = posterior::prior(study);
     let state = batch.init(&prior);
     let head = Head {
         pass: 0,
         step: 0,
-        theta: super::snapshot::Matrix::default(),
+        theta: crate::study::store::snapshot::Matrix::default(),
         centre: prior.mean.iter().copied().collect(),
         scale: posterior::standard_deviations(&prior),
         batch: String::new(),
@@ -72,7 +74,7 @@ fn begin(batch: &Batch, study: &super::Study) -> (BatchState, Snapshot) {
         n_used: 0,
         log_likelihood: 0.0,
         information_lost: 0.0,
-        counts: super::snapshot::Counts::default(),
+        counts: crate::study::store::snapshot::Counts::default(),
     };
     (state, Snapshot { head, states: vec![None; study.records.len()] })
 }
@@ -108,7 +110,7 @@ fn keep(now: &mut Snapshot, state: &BatchState, step: &BatchStep) -> Result<(), 
     Ok(())
 }
 
-fn row(study: &super::Study, place: Place, step: &BatchStep) -> AnalysisRow {
+fn row(study: &crate::study::Study, place: Place, step: &BatchStep) -> AnalysisRow {
     AnalysisRow {
         pass: place.pass,
         step: place.step,

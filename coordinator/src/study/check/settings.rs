@@ -1,17 +1,17 @@
 //! Observer, estimator, fleet and explain settings: words to choices, numbers to ranges.
 //!
-//! Next file to read: [`super::check_model`].
+//! Next file to read: [`super::model`].
 
 use starlings_estimators::{Points, Root};
 use starlings_models::ObserverDef;
 use toml::Spanned;
 
-use super::checked::{EstimatorChoice, EstimatorKind, ExplainChoice, FleetChoice, Library};
-use super::file::{EstimatorSection, FleetSection, ObserverSection, StudyFile};
-use super::problem::Source;
+use crate::study::checked::{EstimatorChoice, EstimatorKind, ExplainChoice, FleetChoice, Library};
+use crate::study::file::{EstimatorSection, FleetSection, ObserverSection, StudyFile};
+use crate::study::problem::Source;
 
 /// `[observer]`.
-pub(super) fn observer(source: &Source, section: &ObserverSection) -> ObserverDef {
+pub(in crate::study) fn observer(source: &Source, section: &ObserverSection) -> ObserverDef {
     let kind = section.kind.get_ref();
     let kinds: Vec<String> = starlings_models::observer::kinds().iter().map(|k| k.kind.to_owned()).collect();
     if !kinds.contains(kind) {
@@ -27,7 +27,7 @@ pub(super) fn observer(source: &Source, section: &ObserverSection) -> ObserverDe
 }
 
 /// `[estimator]`.
-pub(super) fn estimator(source: &Source, section: &EstimatorSection) -> EstimatorChoice {
+pub(in crate::study) fn estimator(source: &Source, section: &EstimatorSection) -> EstimatorChoice {
     let kinds = [("roukf", EstimatorKind::Roukf), ("batch", EstimatorKind::Batch)];
     let kind = choose(source, section.kind.as_ref(), "estimator", &kinds).unwrap_or(EstimatorKind::Roukf);
     let roots = [("symmetric", Root::Symmetric), ("cholesky", Root::Cholesky)];
@@ -72,7 +72,7 @@ fn points(source: &Source, section: &EstimatorSection) -> Points {
 }
 
 /// `[fleet]`.
-pub(super) fn fleet(source: &Source, section: &FleetSection) -> FleetChoice {
+pub(in crate::study) fn fleet(source: &Source, section: &FleetSection) -> FleetChoice {
     FleetChoice {
         workers: at_least_one(source, section.workers.as_ref(), "workers").map_or(2, |n| n as usize),
         slots: at_least_one(source, section.slots.as_ref(), "slots").map(|n| n as usize),
@@ -83,7 +83,7 @@ pub(super) fn fleet(source: &Source, section: &FleetSection) -> FleetChoice {
 }
 
 /// `[explain]`.
-pub(super) fn explain(source: &Source, file: &StudyFile) -> ExplainChoice {
+pub(in crate::study) fn explain(source: &Source, file: &StudyFile) -> ExplainChoice {
     let section = &file.explain;
     let libraries = [("all", Library::All), ("study", Library::Study), ("built-in", Library::BuiltIn)];
     ExplainChoice {

@@ -1,7 +1,7 @@
 //! The final forward run: every record from its start, free, with the estimate; what the fit is judged by.
 //!
 //! The runs get no observed value at all, so neither an observer nor the fit can help them, on the held-out spans least of
-//! all. Next file to read: [`super::summary`].
+//! all. Next file to read: [`crate::study::summary`].
 
 use std::sync::Arc;
 
@@ -9,8 +9,8 @@ use nalgebra::DMatrix;
 use starlings_estimators::Gaussian;
 
 use super::flight::{Flight, Place, StepWindows};
-use super::store::PredictionRow;
-use super::{RunError, Study};
+use crate::study::store::PredictionRow;
+use crate::study::{RunError, Study};
 
 /// Runs every record with the posterior mean and pairs predictions with observations.
 ///

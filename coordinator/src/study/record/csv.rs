@@ -1,19 +1,19 @@
 //! A CSV recording: a header line, one row per time, numbers or empty cells.
 //!
-//! Every complaint names the line and the column. Next file to read: [`super::record`].
+//! Every complaint names the line and the column. Next file to read: [`crate::study::record`].
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use super::locate::{csv_field, line_column};
-use super::problem::{Problem, Source, StudyError, suggestion};
+use crate::study::file::locate::{csv_field, line_column};
+use crate::study::problem::{Problem, Source, StudyError, suggestion};
 
 /// The text of a recording, cut into rows and columns.
 #[derive(Debug)]
-pub(super) struct Csv {
-    pub(super) path: PathBuf,
+pub(in crate::study) struct Csv {
+    pub(in crate::study) path: PathBuf,
     source: Source,
-    pub(super) headers: Vec<String>,
+    pub(in crate::study) headers: Vec<String>,
     /// Byte at which each row starts.
     starts: Vec<usize>,
     cells: Vec<csv::StringRecord>,
@@ -24,7 +24,7 @@ impl Csv {
     ///
     /// # Errors
     /// When it has no header, no row, or a row of another length than the header.
-    pub(super) fn new(path: &Path, text: &str) -> Result<Self, StudyError> {
+    pub(in crate::study) fn new(path: &Path, text: &str) -> Result<Self, StudyError> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let mut csv = Self {
             path: path.to_owned(),
@@ -80,7 +80,7 @@ impl Csv {
     }
 
     /// Position of a column, or what is wrong with its name and the remedy.
-    pub(super) fn index(&self, column: &str) -> Result<usize, (String, String)> {
+    pub(in crate::study) fn index(&self, column: &str) -> Result<usize, (String, String)> {
         let found: Vec<usize> = (0..self.headers.len()).filter(|i| self.headers[*i] == column).collect();
         match found[..] {
             [one] => Ok(one),
@@ -106,7 +106,7 @@ impl Csv {
     }
 
     fn columns_help(&self, column: &str) -> String {
-        let list = format!("its columns are {}", super::problem::quoted_list(&self.headers));
+        let list = format!("its columns are {}", crate::study::problem::quoted_list(&self.headers));
         match suggestion(column, &self.headers) {
             Some(near) if near.starts_with("did you mean") => format!("{near} {list}"),
             _ => list,
@@ -117,7 +117,7 @@ impl Csv {
     ///
     /// # Errors
     /// When a cell is neither; the first such cell, with the count of the others.
-    pub(super) fn numbers(&self, column: usize) -> Result<Vec<f64>, Problem> {
+    pub(in crate::study) fn numbers(&self, column: usize) -> Result<Vec<f64>, Problem> {
         let parsed: Vec<Option<f64>> = self.cells.iter().map(|cells| parse(&cells[column])).collect();
         let wrong: Vec<usize> = (0..parsed.len()).filter(|row| parsed[*row].is_none()).collect();
         let Some(&row) = wrong.first() else {
@@ -143,7 +143,7 @@ impl Csv {
     ///
     /// # Errors
     /// When a time is missing, no number, repeated, or earlier than the one before it.
-    pub(super) fn times(&self, column: usize) -> Result<Vec<f64>, Problem> {
+    pub(in crate::study) fn times(&self, column: usize) -> Result<Vec<f64>, Problem> {
         let times = self.numbers(column)?;
         if let Some(row) = times.iter().position(|t| t.is_nan()) {
             let message = format!("the time in column `{}` is missing", self.headers[column]);
@@ -168,12 +168,18 @@ impl Csv {
     }
 
     /// Line of a row, from 1, the header included.
-    pub(super) fn line(&self, row: usize) -> usize {
+    pub(in crate::study) fn line(&self, row: usize) -> usize {
         line_column(&self.source.text, self.starts[row]).0
     }
 
     /// A problem at one cell.
-    pub(super) fn problem(&self, row: usize, column: usize, message: String, help: &str) -> Problem {
+    pub(in crate::study) fn problem(
+        &self,
+        row: usize,
+        column: usize,
+        message: String,
+        help: &str,
+    ) -> Problem {
         Problem {
             message,
             help: Some(help.to_owned()),

@@ -1,28 +1,28 @@
 //! The measured channels of a record: columns to values, and the noise of each.
 //!
-//! Next file to read: [`super::record_input`].
+//! Next file to read: [`super::input`].
 
 use starlings_estimators::noise_from_third_differences;
 use starlings_models::Spec;
 
-use super::checked::Channel;
-use super::file::{ChannelSection, RecordSection};
-use super::problem::Source;
-use super::record::{Context, Table};
+use super::{Context, Table};
+use crate::study::checked::Channel;
+use crate::study::file::{ChannelSection, RecordSection};
+use crate::study::problem::Source;
 
 /// Reads the channels of one record.
-pub(super) struct ChannelReader<'a> {
-    pub(super) source: &'a Source,
-    pub(super) section: &'a RecordSection,
-    pub(super) table: &'a Table,
+pub(in crate::study) struct ChannelReader<'a> {
+    pub(in crate::study) source: &'a Source,
+    pub(in crate::study) section: &'a RecordSection,
+    pub(in crate::study) table: &'a Table,
     /// The training span; `None` when the whole record is held out.
-    pub(super) train: Option<[f64; 2]>,
-    pub(super) spec: &'a Spec,
+    pub(in crate::study) train: Option<[f64; 2]>,
+    pub(in crate::study) spec: &'a Spec,
 }
 
 impl ChannelReader<'_> {
     /// All channels, their values still at every row of the file; nothing after a complaint.
-    pub(super) fn channels(&self, context: &mut Context<'_>) -> Option<Vec<Channel>> {
+    pub(in crate::study) fn channels(&self, context: &mut Context<'_>) -> Option<Vec<Channel>> {
         let before = self.source.count();
         let mut channels: Vec<Channel> = Vec::new();
         for section in &self.section.channels {

@@ -8,9 +8,9 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 use starlings_models::{Job, ParticleError, Prediction, Window};
 
-use super::store::JobRow;
-use super::{RunError, Study};
 use crate::fleet::{Fleet, SetupId};
+use crate::study::store::JobRow;
+use crate::study::{RunError, Study};
 
 /// The windows of one step, one per record that still has data: (record, window).
 pub type StepWindows = Vec<(usize, Arc<Window>)>;

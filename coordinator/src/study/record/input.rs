@@ -1,16 +1,16 @@
 //! The input signals of a record: complete, and as long as the record.
 //!
-//! Next file to read: [`super::plan`].
+//! Next file to read: [`crate::study::plan`].
 
 use starlings_models::{Signal, Spec};
 use toml::Spanned;
 
-use super::file::RecordSection;
-use super::problem::quoted_list;
-use super::record::{Recordings, Table};
+use super::{Recordings, Table};
+use crate::study::file::RecordSection;
+use crate::study::problem::quoted_list;
 
 /// The signals in the order of the model's inputs; nothing after a complaint.
-pub(super) fn inputs(
+pub(in crate::study) fn inputs(
     files: &mut Recordings<'_>,
     section: &RecordSection,
     table: &Table,

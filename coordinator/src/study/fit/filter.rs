@@ -9,14 +9,17 @@
 use std::sync::Arc;
 
 use nalgebra::DMatrix;
-use starlings_estimators::{Analysis, Data, Drift, Gaussian, Noise, Particles, Roukf, SigmaSet, exchange_prior};
+use starlings_estimators::{
+    Analysis, Data, Drift, Gaussian, Noise, Particles, Roukf, SigmaSet, exchange_prior,
+};
 use starlings_models::Window;
 
 use super::flight::{Flight, Place, StepWindows, stack_outputs, stack_states};
+use super::resample;
 use super::rescue::{Flown, fly};
-use super::snapshot::{Head, Snapshot};
-use super::store::{AnalysisRow, InnovationRow, Store};
-use super::{Fit, RunContext, RunError, Study, posterior, resample};
+use crate::study::store::snapshot::{Head, Snapshot};
+use crate::study::store::{AnalysisRow, InnovationRow, Store};
+use crate::study::{Fit, RunContext, RunError, Study, posterior};
 
 /// Runs every pass, continuing from `resumed` if there is one.
 ///
@@ -112,7 +115,7 @@ impl<'a> Schedule<'a> {
                 n_used: 0,
                 log_likelihood: 0.0,
                 information_lost: 0.0,
-                counts: super::snapshot::Counts::default(),
+                counts: crate::study::store::snapshot::Counts::default(),
             },
             states: vec![None; self.study.records.len()],
         }
@@ -148,8 +151,8 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    fn progress(&self, now: &Snapshot, flight: &Flight<'_>) -> super::Progress {
-        super::Progress {
+    fn progress(&self, now: &Snapshot, flight: &Flight<'_>) -> crate::study::Progress {
+        crate::study::Progress {
             stage: "filter",
             pass: now.head.pass + 1,
             passes: self.passes,
@@ -162,7 +165,11 @@ impl<'a> Schedule<'a> {
 }
 
 /// Predict, observe, analyse, recombine: one step of the filter over every record that still has data.
-fn step(flight: &mut Flight<'_>, schedule: &Schedule<'_>, now: &mut Snapshot) -> Result<AnalysisRow, RunError> {
+fn step(
+    flight: &mut Flight<'_>,
+    schedule: &Schedule<'_>,
+    now: &mut Snapshot,
+) -> Result<AnalysisRow, RunError> {
     let windows = schedule.step_windows(now.head.step);
     let place = Place { pass: now.head.pass + 1, step: now.head.step };
     let before = (flight.total, flight.failed, flight.retried);
@@ -215,7 +222,7 @@ fn recombine(states: &mut [Option<DMatrix<f64>>], transform: &DMatrix<f64>) {
 }
 
 /// Noise sd of every row, in the order of the stacked predictions.
-pub(super) fn noise(study: &Study, windows: &StepWindows, factor: f64) -> Noise {
+pub(in crate::study) fn noise(study: &Study, windows: &StepWindows, factor: f64) -> Noise {
     let sd = windows.iter().flat_map(|(record, window)| {
         let of_record = study.noise(*record);
         window.times.iter().flat_map(move |_| of_record.clone())

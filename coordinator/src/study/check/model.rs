@@ -1,7 +1,7 @@
 //! The model of a study: definitions from what is written, built to see whether they fit together.
 //!
-//! What the model refuses is told at the place in the file that caused it: see [`super::check_blame`]. Next file to read:
-//! [`super::check_parameters`].
+//! What the model refuses is told at the place in the file that caused it: see [`super::blame`]. Next file to read:
+//! [`super::parameters`].
 
 use std::collections::BTreeMap;
 
@@ -13,27 +13,27 @@ use starlings_models::equations::{
 use starlings_models::{EffectDef, ModelDef, Setup, Spec};
 use toml::Spanned;
 
-use super::check_blame::{blame, expressions, report_missing};
-use super::check_parameters::{quantity, valid_names};
-use super::expand::INITIAL;
-use super::file::{EffectSection, EquationsSection, SolverSection, StateSection, StudyFile};
-use super::locate::character;
-use super::problem::Source;
+use super::blame::{blame, expressions, report_missing};
+use super::parameters::{quantity, valid_names};
+use crate::study::expand::INITIAL;
+use crate::study::file::locate::character;
+use crate::study::file::{EffectSection, EquationsSection, SolverSection, StateSection, StudyFile};
+use crate::study::problem::Source;
 
 /// A model that builds, with the effects that belong to it.
-pub(super) struct CheckedModel {
+pub(in crate::study) struct CheckedModel {
     /// Without parameters, outputs and observer.
-    pub(super) setup: Setup,
-    pub(super) spec: Spec,
+    pub(in crate::study) setup: Setup,
+    pub(in crate::study) spec: Spec,
     /// Effects that are described but not part of the model.
-    pub(super) candidates: Vec<EffectDef>,
+    pub(in crate::study) candidates: Vec<EffectDef>,
     /// Names of parameters and initial values, those of the candidates included.
-    pub(super) valid_names: Vec<String>,
-    pub(super) delays: bool,
+    pub(in crate::study) valid_names: Vec<String>,
+    pub(in crate::study) delays: bool,
 }
 
 /// Builds the model of a study; nothing after a complaint.
-pub(super) fn model(source: &Source, file: &StudyFile) -> Option<CheckedModel> {
+pub(in crate::study) fn model(source: &Source, file: &StudyFile) -> Option<CheckedModel> {
     let before = source.count();
     if file.model.kind.get_ref() == "solver" {
         let help = "use a built-in model (`starlings models` lists them) or kind = \"equations\"";
@@ -181,7 +181,7 @@ fn solver(source: &Source, section: &SolverSection) -> SolverDef {
 }
 
 fn effect(section: &EffectSection) -> EffectDef {
-    let parameter = |p: &super::file::EffectParameterSection| EffectParameter {
+    let parameter = |p: &crate::study::file::EffectParameterSection| EffectParameter {
         name: p.name.get_ref().clone(),
         unit: p.unit.clone(),
         range: p.range.unwrap_or(EffectParameter::default().range),
@@ -209,7 +209,7 @@ fn effect(section: &EffectSection) -> EffectDef {
 }
 
 /// Constants must be known and possible, and every parameter must have a value.
-pub(super) fn check_values(source: &Source, file: &StudyFile, model: &CheckedModel) {
+pub(in crate::study) fn check_values(source: &Source, file: &StudyFile, model: &CheckedModel) {
     let spec = &model.spec;
     let in_terms: Vec<String> = file
         .effects
@@ -252,7 +252,7 @@ pub(super) fn check_values(source: &Source, file: &StudyFile, model: &CheckedMod
 }
 
 /// Builds the setup as workers will.
-pub(super) fn check_build(source: &Source, file: &StudyFile, setup: &Setup) {
+pub(in crate::study) fn check_build(source: &Source, file: &StudyFile, setup: &Setup) {
     if let Err(error) = setup.build() {
         blame(source, file, &error);
     }

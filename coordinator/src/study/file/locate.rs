@@ -1,11 +1,11 @@
 //! Places in a text: bytes to lines and columns, characters of a TOML string to bytes of the file.
 //!
-//! Next file to read: [`super::problem`].
+//! Next file to read: [`crate::study::problem`].
 
 use std::ops::Range;
 
 /// Line and column (both from 1, the column in characters) of a byte offset.
-pub(super) fn line_column(text: &str, offset: usize) -> (usize, usize) {
+pub(in crate::study) fn line_column(text: &str, offset: usize) -> (usize, usize) {
     let before = &text.as_bytes()[..offset.min(text.len())];
     let line_start = before.iter().rposition(|&b| b == b'\n').map_or(0, |i| i + 1);
     let line = before.split(|b| *b == b'\n').count();
@@ -14,7 +14,7 @@ pub(super) fn line_column(text: &str, offset: usize) -> (usize, usize) {
 
 /// Bytes of the file that hold the character at `column` (from 1) of the TOML string standing at `literal`, quotes and
 /// escapes considered. Past the last character it is the closing quote.
-pub(super) fn character(text: &str, literal: &Range<usize>, column: usize) -> Range<usize> {
+pub(in crate::study) fn character(text: &str, literal: &Range<usize>, column: usize) -> Range<usize> {
     let raw = text.get(literal.clone()).unwrap_or_default();
     let (open, escapes) = opening(raw);
     let mut at = open;
@@ -60,7 +60,7 @@ fn decoded_character(raw: &str, escapes: bool) -> Option<usize> {
 }
 
 /// Bytes of field `index` of the CSV line that starts at byte `start`, quotes included.
-pub(super) fn csv_field(text: &str, start: usize, index: usize) -> Range<usize> {
+pub(in crate::study) fn csv_field(text: &str, start: usize, index: usize) -> Range<usize> {
     let mut field = 0;
     let mut from = start;
     let mut in_quotes = false;

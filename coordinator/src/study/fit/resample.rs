@@ -10,7 +10,7 @@ use starlings_estimators::Particles;
 use starlings_models::Window;
 
 use super::flight::{Flight, Place, StepWindows, stack_outputs};
-use super::{RunError, Study};
+use crate::study::{RunError, Study};
 
 /// Gram matrix (r × r) of the √α-weighted deviations of the augmented particles.
 ///

@@ -1,7 +1,7 @@
 //! From a refusal of the model to the place in the study file that caused it.
 //!
 //! The model knows names and expressions, not files: names are looked up among the names that the file gives, expressions
-//! among its expressions. Next file to read: [`super::problem`].
+//! among its expressions. Next file to read: [`crate::study::problem`].
 
 use std::ops::Range;
 
@@ -9,13 +9,13 @@ use starlings_models::SetupError;
 use starlings_models::equations::Expression;
 use toml::Spanned;
 
-use super::expand::INITIAL;
-use super::file::StudyFile;
-use super::locate::character;
-use super::problem::Source;
+use crate::study::expand::INITIAL;
+use crate::study::file::StudyFile;
+use crate::study::file::locate::character;
+use crate::study::problem::Source;
 
 /// Every expression of the file, in its order.
-pub(super) fn expressions(file: &StudyFile) -> Vec<&Spanned<String>> {
+pub(in crate::study) fn expressions(file: &StudyFile) -> Vec<&Spanned<String>> {
     let model = file.model.equations.iter();
     let outputs = model.clone().flat_map(|e| &e.outputs).map(|o| &o.value);
     let states = model.flat_map(|e| &e.states).chain(file.effects.iter().flat_map(|e| &e.states));
@@ -43,7 +43,7 @@ fn names(file: &StudyFile) -> Vec<&Spanned<String>> {
 }
 
 /// Reports what the model refused.
-pub(super) fn blame(source: &Source, file: &StudyFile, error: &SetupError) {
+pub(in crate::study) fn blame(source: &Source, file: &StudyFile, error: &SetupError) {
     match error {
         SetupError::Unknown { what, name, nearest } => {
             let span = place(file, name).unwrap_or_else(|| file.model.kind.span());
@@ -96,7 +96,7 @@ fn place(file: &StudyFile, name: &str) -> Option<Range<usize>> {
 }
 
 /// Reports a parameter without a value: where an expression first uses it, or else at the model.
-pub(super) fn report_missing(source: &Source, file: &StudyFile, model: &str, name: &str) {
+pub(in crate::study) fn report_missing(source: &Source, file: &StudyFile, model: &str, name: &str) {
     let used = expressions(file).into_iter().find_map(|text| {
         let names = Expression::parse(text.get_ref()).ok()?.names();
         let (_, column) = names.into_iter().find(|(n, _)| n == name)?;

@@ -1,0 +1,114 @@
+//! The network thread: one runtime that serves the workers' streams, keeps time, and starts the caller's batches.
+
+use std::net::TcpListener;
+use std::sync::Arc;
+use std::time::Duration;
+
+use starlings_proto::wire::fleet_server::FleetServer;
+use starlings_proto::{FRAME_SIZE, MAX_MESSAGE};
+use tokio::sync::mpsc::UnboundedReceiver;
+use tokio_util::sync::CancellationToken;
+use tonic::transport::Server;
+use tonic::transport::server::TcpIncoming;
+
+use super::dispatcher::{BatchError, Event};
+use super::hub::{Hub, Submission};
+use super::service::Service;
+
+/// How long a closing fleet waits for its workers to leave.
+const GOODBYE_PATIENCE: Duration = Duration::from_secs(2);
+
+/// Longest time between two looks at the clock.
+const TICK: Duration = Duration::from_millis(250);
+
+/// HTTP/2 windows per stream and per connection, bytes: enough for a long fat network.
+const WINDOWS: (u32, u32) = (4 * 1024 * 1024, 16 * 1024 * 1024);
+
+/// Serves until stopped; then asks the workers to leave and waits shortly for them.
+pub(super) fn run(
+    listener: TcpListener,
+    hub: &Arc<Hub>,
+    heartbeat: Duration,
+    submitted: UnboundedReceiver<Submission>,
+    cancel: &CancellationToken,
+    stop: &CancellationToken,
+) -> Result<(), String> {
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .map_err(|error| error.to_string())?;
+    let outcome = runtime.block_on(async {
+        let listener = tokio::net::TcpListener::from_std(listener).map_err(|error| error.to_string())?;
+        let incoming = TcpIncoming::from(listener).with_nodelay(Some(true));
+        tokio::spawn(tick(Arc::clone(hub), heartbeat));
+        tokio::spawn(beat(Arc::clone(hub), heartbeat));
+        tokio::spawn(submit(Arc::clone(hub), submitted, cancel.clone()));
+        tokio::spawn(abort_on_cancel(Arc::clone(hub), cancel.clone()));
+        let service = FleetServer::new(Service { hub: Arc::clone(hub) })
+            .max_decoding_message_size(MAX_MESSAGE)
+            .max_encoding_message_size(MAX_MESSAGE);
+        let server = Server::builder()
+            .http2_keepalive_interval(Some(heartbeat))
+            .http2_keepalive_timeout(Some(heartbeat))
+            .initial_stream_window_size(WINDOWS.0)
+            .initial_connection_window_size(WINDOWS.1)
+            .max_frame_size(FRAME_SIZE)
+            .add_service(service)
+            .serve_with_incoming(incoming);
+        tokio::select! {
+            ended = server => ended.map_err(|error| error.to_string()),
+            () = drained(hub, stop) => Ok(()),
+        }
+    });
+    runtime.shutdown_background();
+    outcome
+}
+
+async fn tick(hub: Arc<Hub>, heartbeat: Duration) {
+    let mut ticks = tokio::time::interval(TICK.min(heartbeat / 4));
+    loop {
+        ticks.tick().await;
+        hub.handle(Event::Tick);
+    }
+}
+
+async fn beat(hub: Arc<Hub>, heartbeat: Duration) {
+    let mut beats = tokio::time::interval(heartbeat);
+    loop {
+        beats.tick().await;
+        hub.beat();
+    }
+}
+
+/// Starts batches on this thread: all first jobs of a link are queued before it writes, so they leave in one packet.
+async fn submit(hub: Arc<Hub>, mut submitted: UnboundedReceiver<Submission>, cancel: CancellationToken) {
+    while let Some(batch) = submitted.recv().await {
+        hub.submit(batch);
+        if cancel.is_cancelled() {
+            hub.handle(Event::Abort(BatchError::Cancelled));
+        }
+    }
+}
+
+async fn abort_on_cancel(hub: Arc<Hub>, cancel: CancellationToken) {
+    cancel.cancelled().await;
+    hub.handle(Event::Abort(BatchError::Cancelled));
+}
+
+/// Waits for the stop, asks the workers to leave, and returns when they did or time is up.
+async fn drained(hub: &Hub, stop: &CancellationToken) {
+    stop.cancelled().await;
+    hub.handle(Event::Abort(BatchError::Cancelled));
+    hub.drain("the run is over");
+    let empty = async {
+        loop {
+            let mut ended = std::pin::pin!(hub.link_ended.notified());
+            ended.as_mut().enable();
+            if hub.n_links() == 0 {
+                return;
+            }
+            ended.await;
+        }
+    };
+    let _ = tokio::time::timeout(GOODBYE_PATIENCE, empty).await;
+}
