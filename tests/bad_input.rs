@@ -1,5 +1,7 @@
 //! Bad input gets one message with cause and remedy and exit code 2; a failed run exit code 1; nothing half-written is left.
 
+#![allow(clippy::unwrap_used)] // a failed unwrap is a failed test
+
 mod common;
 
 use std::fs;

@@ -1,5 +1,7 @@
 //! The commands around `run`: what they print, what they write, what they refuse.
 
+#![allow(clippy::unwrap_used)] // a failed unwrap is a failed test
+
 mod common;
 
 use std::process::Stdio;

@@ -1,5 +1,7 @@
 //! Every example is run as a user would run it and compared with its `expected.toml`.
 
+#![allow(clippy::unwrap_used)] // a failed unwrap is a failed test
+
 mod common;
 
 use std::collections::BTreeSet;

@@ -1,5 +1,7 @@
 //! The same study gives the same bytes, whatever the number, order or death of workers and of the coordinator.
 
+#![allow(clippy::unwrap_used)] // a failed unwrap is a failed test
+
 mod common;
 
 use std::io::{BufRead, BufReader};

@@ -9,27 +9,27 @@ use std::time::{Duration, Instant};
 use rusqlite::Connection;
 
 /// The longest any single wait of a test may take.
-pub const LIMIT: Duration = Duration::from_secs(120);
+pub(crate) const LIMIT: Duration = Duration::from_secs(120);
 
 /// The binary under test.
-pub fn starlings() -> Command {
+pub(crate) fn starlings() -> Command {
     Command::new(env!("CARGO_BIN_EXE_starlings"))
 }
 
 /// A file of the repository.
-pub fn repository(path: &str) -> PathBuf {
+pub(crate) fn repository(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
 }
 
 /// Runs a command to its end: exit code, standard output, standard error.
-pub fn output(command: &mut Command) -> (i32, String, String) {
+pub(crate) fn output(command: &mut Command) -> (i32, String, String) {
     let out = command.stdin(Stdio::null()).output().expect("the binary starts");
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
     (out.status.code().unwrap_or(-1), text(out.stdout), text(out.stderr))
 }
 
 /// Runs a study into `out` with local workers and returns its summary.
-pub fn run(study: &Path, out: &Path, workers: usize) -> serde_json::Value {
+pub(crate) fn run(study: &Path, out: &Path, workers: usize) -> serde_json::Value {
     let mut command = starlings();
     command.arg("run").arg(study).arg("--out").arg(out).args(["--workers", &workers.to_string(), "--json"]);
     let (code, stdout, stderr) = output(&mut command);
@@ -38,7 +38,7 @@ pub fn run(study: &Path, out: &Path, workers: usize) -> serde_json::Value {
 }
 
 /// Polls until `ready` holds; fails the test after [`LIMIT`].
-pub fn wait_until(what: &str, mut ready: impl FnMut() -> bool) {
+pub(crate) fn wait_until(what: &str, mut ready: impl FnMut() -> bool) {
     let start = Instant::now();
     while !ready() {
         assert!(start.elapsed() < LIMIT, "waited too long for {what}");
@@ -47,7 +47,7 @@ pub fn wait_until(what: &str, mut ready: impl FnMut() -> bool) {
 }
 
 /// Analyses stored so far in a run folder; zero while there is no database.
-pub fn analyses(out: &Path) -> i64 {
+pub(crate) fn analyses(out: &Path) -> i64 {
     let flags = rusqlite::OpenFlags::SQLITE_OPEN_READ_ONLY;
     Connection::open_with_flags(out.join("run.db"), flags)
         .and_then(|db| db.query_row("SELECT count(*) FROM analyses", [], |row| row.get(0)))
@@ -55,12 +55,12 @@ pub fn analyses(out: &Path) -> i64 {
 }
 
 /// Kills a process at once, as `kill -9` does.
-pub fn kill(child: &mut Child) {
+pub(crate) fn kill(child: &mut Child) {
     child.kill().expect("SIGKILL");
     child.wait().expect("reaped");
 }
 
 /// The bytes of a result file.
-pub fn bytes(out: &Path, name: &str) -> Vec<u8> {
+pub(crate) fn bytes(out: &Path, name: &str) -> Vec<u8> {
     std::fs::read(out.join(name)).unwrap_or_else(|e| panic!("{}: {e}", out.join(name).display()))
 }

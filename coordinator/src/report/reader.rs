@@ -115,8 +115,11 @@ fn tracks(store: &Store, info: &StudyInfo, summary: Option<&Summary>) -> Result<
     Ok(tracks)
 }
 
+/// (record, output, time, observed, predicted, use, noise) in the order of the run.
+type PredictedAt = (String, String, f64, Option<f64>, f64, String, f64);
+
 fn channels(store: &Store, info: &StudyInfo) -> Result<Vec<ChannelPlot>, StoreError> {
-    let rows: Vec<(String, String, f64, Option<f64>, f64, String, f64)> = store.rows(
+    let rows: Vec<PredictedAt> = store.rows(
         "SELECT record, output, time, observed, predicted, use, noise FROM predictions ORDER BY rowid",
         |r| Ok((r.get(0)?, r.get(1)?, r.get(2)?, r.get(3)?, r.get(4)?, r.get(5)?, r.get(6)?)),
     )?;

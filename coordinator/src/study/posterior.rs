@@ -101,37 +101,20 @@ impl ThetaEntry {
 
 /// The posterior as CSV: one row per parameter with its estimate, then its row of the covariance in transformed units.
 /// Every number is written with the digits that identify it exactly.
-pub fn to_csv(study: &Study, posterior: &Gaussian) -> String {
-    let mut text = String::from("parameter,unit,transform,estimate,sd,lo95,hi95,mean_transformed");
-    for entry in &study.theta {
-        text.push_str(&format!(",{}", quoted(&format!("cov:{}", entry.name))));
+///
+/// # Errors
+/// Never in practice: the text is written to memory.
+pub fn to_csv(study: &Study, posterior: &Gaussian) -> Result<String, csv::Error> {
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    let fixed = ["parameter", "unit", "transform", "estimate", "sd", "lo95", "hi95", "mean_transformed"];
+    let covariances = study.theta.iter().map(|entry| format!("cov:{}", entry.name));
+    csv.write_record(fixed.map(str::to_owned).into_iter().chain(covariances))?;
+    for (j, e) in estimates(study, posterior).into_iter().enumerate() {
+        let numbers = [e.estimate, e.sd, e.interval95[0], e.interval95[1], posterior.mean[j]];
+        let row = posterior.covariance.row(j);
+        let text = [e.name, e.unit, study.theta[j].transform.name().to_owned()];
+        csv.write_record(text.into_iter().chain(numbers.iter().chain(row.iter()).map(|v| format!("{v:?}"))))?;
     }
-    text.push('\n');
-    for (j, e) in estimates(study, posterior).iter().enumerate() {
-        text.push_str(&format!(
-            "{},{},{},{:?},{:?},{:?},{:?},{:?}",
-            quoted(&e.name),
-            quoted(&e.unit),
-            quoted(study.theta[j].transform.name()),
-            e.estimate,
-            e.sd,
-            e.interval95[0],
-            e.interval95[1],
-            posterior.mean[j]
-        ));
-        for value in posterior.covariance.row(j).iter() {
-            text.push_str(&format!(",{value:?}"));
-        }
-        text.push('\n');
-    }
-    text
-}
-
-/// A CSV field, quoted where it must be.
-fn quoted(field: &str) -> String {
-    if field.contains([',', '"', '\n']) {
-        format!("\"{}\"", field.replace('"', "\"\""))
-    } else {
-        field.to_owned()
-    }
+    let bytes = csv.into_inner().map_err(csv::IntoInnerError::into_error)?;
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
 }

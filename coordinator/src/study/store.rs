@@ -5,34 +5,18 @@
 //! from its last whole analysis. Nothing here computes. Next file to read: [`crate::study::store::snapshot`].
 
 pub mod folder;
+mod rows;
+mod schema;
 pub mod snapshot;
 
 use std::path::{Path, PathBuf};
 
-use nalgebra::DMatrix;
 use rusqlite::{Connection, OptionalExtension, Row, params};
 
-use crate::study::store::snapshot::Snapshot;
+use schema::{SCHEMA, SCHEMA_VERSION, insert_analysis, insert_jobs};
+use snapshot::Snapshot;
 
-/// Version of the tables below; a store of another version is refused.
-const SCHEMA_VERSION: i64 = 1;
-
-const SCHEMA: &str = "
-CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
-CREATE TABLE events (id INTEGER PRIMARY KEY, at_s REAL NOT NULL, kind TEXT NOT NULL, text TEXT NOT NULL);
-CREATE TABLE jobs (id INTEGER PRIMARY KEY, pass INTEGER NOT NULL, step INTEGER NOT NULL, record TEXT NOT NULL,
-  particle INTEGER NOT NULL, attempts INTEGER NOT NULL, worker TEXT NOT NULL, status TEXT NOT NULL, error TEXT, cost_s REAL);
-CREATE TABLE analyses (pass INTEGER NOT NULL, step INTEGER NOT NULL, time REAL NOT NULL, n_used INTEGER NOT NULL,
-  nis REAL NOT NULL, log_likelihood REAL NOT NULL, information_lost REAL NOT NULL, transform BLOB, PRIMARY KEY (pass, step));
-CREATE TABLE estimates (pass INTEGER NOT NULL, step INTEGER NOT NULL, parameter TEXT NOT NULL, estimate REAL NOT NULL,
-  lo REAL NOT NULL, hi REAL NOT NULL, mean REAL NOT NULL, sd REAL NOT NULL, PRIMARY KEY (pass, step, parameter));
-CREATE TABLE innovations (pass INTEGER NOT NULL, step INTEGER NOT NULL, record TEXT NOT NULL, output TEXT NOT NULL,
-  time REAL NOT NULL, innovation REAL NOT NULL, sd REAL NOT NULL);
-CREATE TABLE predictions (record TEXT NOT NULL, output TEXT NOT NULL, time REAL NOT NULL, observed REAL, predicted REAL NOT NULL,
-  use TEXT NOT NULL, noise REAL NOT NULL);
-CREATE TABLE snapshot (id INTEGER PRIMARY KEY CHECK (id = 1), head TEXT NOT NULL);
-CREATE TABLE snapshot_states (record INTEGER PRIMARY KEY, rows INTEGER NOT NULL, columns INTEGER NOT NULL, body BLOB NOT NULL);
-";
+pub use rows::{AnalysisRow, EstimateRow, InnovationRow, JobRow, PredictionRow};
 
 /// Why the store cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -73,105 +57,6 @@ fn remedy(source: &rusqlite::Error) -> &'static str {
         }
         _ => "",
     }
-}
-
-/// One row of the table `jobs`.
-#[derive(Clone, Debug, PartialEq)]
-pub struct JobRow {
-    /// Pass, from 1; 0 for the final forward run.
-    pub pass: usize,
-    /// Analysis within the pass, from 0.
-    pub step: usize,
-    /// Record name.
-    pub record: String,
-    /// Sigma point.
-    pub particle: u32,
-    /// How often it was tried.
-    pub attempts: u32,
-    /// The worker that answered last.
-    pub worker: String,
-    /// The failure, or `None` when it succeeded.
-    pub error: Option<String>,
-    /// Wall time of the run in s.
-    pub cost_s: f64,
-}
-
-/// One parameter's estimate after one analysis.
-#[derive(Clone, Debug, PartialEq)]
-pub struct EstimateRow {
-    /// Name in the estimated vector.
-    pub parameter: String,
-    /// Median, physical units.
-    pub estimate: f64,
-    /// Lower end of the 95 % interval.
-    pub lo: f64,
-    /// Upper end of the 95 % interval.
-    pub hi: f64,
-    /// Mean in transformed units.
-    pub mean: f64,
-    /// Standard deviation in transformed units.
-    pub sd: f64,
-}
-
-/// One innovation: observed minus predicted before the analysis that used it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct InnovationRow {
-    /// Record name.
-    pub record: String,
-    /// Output name.
-    pub output: String,
-    /// Time in the study's unit.
-    pub time: f64,
-    /// Observed minus predicted.
-    pub innovation: f64,
-    /// Its standard deviation as the filter expected it.
-    pub sd: f64,
-}
-
-/// Everything one analysis leaves behind.
-#[derive(Clone, Debug)]
-pub struct AnalysisRow {
-    /// Pass, from 1.
-    pub pass: usize,
-    /// Analysis within the pass, from 0.
-    pub step: usize,
-    /// Largest time of the step's windows since their records' starts.
-    pub time: f64,
-    /// Observations used.
-    pub n_used: usize,
-    /// Normalised innovation squared, summed over the observations.
-    pub nis: f64,
-    /// Innovation log-likelihood.
-    pub log_likelihood: f64,
-    /// Share of the spread lost to pulled or dropped sigma points.
-    pub information_lost: f64,
-    /// The r × r transform; `None` for the batch estimator.
-    pub transform: Option<DMatrix<f64>>,
-    /// One row per estimated parameter.
-    pub estimates: Vec<EstimateRow>,
-    /// One row per used observation.
-    pub innovations: Vec<InnovationRow>,
-    /// One row per run.
-    pub jobs: Vec<JobRow>,
-}
-
-/// One observation time of the final forward run.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PredictionRow {
-    /// Record name.
-    pub record: String,
-    /// Output name.
-    pub output: String,
-    /// Time in the study's unit.
-    pub time: f64,
-    /// Observed value, if there is one.
-    pub observed: Option<f64>,
-    /// Value predicted by a free run with the estimate.
-    pub predicted: f64,
-    /// `train`, `held-out` or `held-out-channel`.
-    pub usage: String,
-    /// Standard deviation of the channel's noise.
-    pub noise: f64,
 }
 
 /// An open run database.
@@ -237,7 +122,7 @@ impl Store {
         &self.connection
     }
 
-    pub(crate) fn damaged(&self, what: &'static str, reason: impl ToString) -> StoreError {
+    pub(crate) fn damaged(&self, what: &'static str, reason: impl std::fmt::Display) -> StoreError {
         StoreError::Damaged { path: self.path.clone(), what, reason: reason.to_string() }
     }
 
@@ -345,54 +230,6 @@ impl Store {
 
 fn folder_of(path: &Path) -> String {
     path.parent().map(|p| p.display().to_string()).unwrap_or_default()
-}
-
-fn insert_analysis(connection: &Connection, row: &AnalysisRow) -> rusqlite::Result<()> {
-    connection
-        .prepare_cached("INSERT OR REPLACE INTO analyses VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)")?
-        .execute(params![
-            row.pass,
-            row.step,
-            row.time,
-            row.n_used,
-            row.nis,
-            row.log_likelihood,
-            row.information_lost,
-            row.transform.as_ref().map(|t| crate::study::store::snapshot::to_bytes(t.as_slice()))
-        ])?;
-    for e in &row.estimates {
-        connection
-            .prepare_cached("INSERT OR REPLACE INTO estimates VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)")?
-            .execute(params![row.pass, row.step, e.parameter, e.estimate, e.lo, e.hi, e.mean, e.sd])?;
-    }
-    for i in &row.innovations {
-        connection
-            .prepare_cached("INSERT INTO innovations VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)")?
-            .execute(params![row.pass, row.step, i.record, i.output, i.time, i.innovation, i.sd])?;
-    }
-    Ok(())
-}
-
-fn insert_jobs(connection: &Connection, jobs: &[JobRow]) -> rusqlite::Result<()> {
-    let mut insert = connection.prepare_cached(
-        "INSERT INTO jobs (pass, step, record, particle, attempts, worker, status, error, cost_s)
-         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
-    )?;
-    for job in jobs {
-        let status = if job.error.is_none() { "done" } else { "failed" };
-        insert.execute(params![
-            job.pass,
-            job.step,
-            job.record,
-            job.particle,
-            job.attempts,
-            job.worker,
-            status,
-            job.error,
-            job.cost_s
-        ])?;
-    }
-    Ok(())
 }
 
 /// The named columns of a table as text, in the order of writing; numbers keep every digit, NULL is empty.

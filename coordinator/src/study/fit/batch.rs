@@ -55,7 +55,7 @@ pub fn fit(
         store.analysis(&row, &now)?;
         context.after_step(store, &progress(&now, &batch, flight))?;
         if step.converged || now.head.step >= batch.max_iterations {
-            return Ok(finish(now, step));
+            return Ok(finish(&now, step));
         }
     }
 }
@@ -126,7 +126,7 @@ fn row(study: &crate::study::Study, place: Place, step: &BatchStep) -> AnalysisR
     }
 }
 
-fn finish(now: Snapshot, step: BatchStep) -> Fit {
+fn finish(now: &Snapshot, step: BatchStep) -> Fit {
     Fit {
         posterior: step.posterior,
         log_likelihood: step.evidence,

@@ -45,7 +45,7 @@ pub fn fit(
         }
         let reported = schedule.reported(&now)?;
         if now.head.pass + 1 == schedule.passes {
-            return Ok(schedule.finish(now, reported));
+            return Ok(schedule.finish(&now, reported));
         }
         let head = now.head;
         now = schedule.start(head.pass + 1, &reported.posterior);
@@ -138,7 +138,7 @@ impl<'a> Schedule<'a> {
         Ok(Reported { posterior, evidence: now.head.log_likelihood + correction })
     }
 
-    fn finish(&self, now: Snapshot, reported: Reported) -> Fit {
+    fn finish(&self, now: &Snapshot, reported: Reported) -> Fit {
         Fit {
             posterior: reported.posterior,
             log_likelihood: reported.evidence,

@@ -135,7 +135,9 @@ impl RunFolder {
     }
 
     pub(crate) fn finish(&mut self, study: &Study, fit: &Fit, summary: &Summary) -> Result<(), StoreError> {
-        self.store.set_meta("posterior", &posterior::to_csv(study, &fit.posterior))?;
+        let posterior =
+            posterior::to_csv(study, &fit.posterior).map_err(|e| self.store.damaged("posterior", e))?;
+        self.store.set_meta("posterior", &posterior)?;
         self.store.set_meta("summary", &json(summary))
     }
 }
