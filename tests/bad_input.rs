@@ -95,7 +95,7 @@ fn an_unknown_key_names_its_line_and_the_nearest_key() {
 #[test]
 fn a_wrong_type_says_what_was_expected() {
     let (_dir, file) = study(swap("name = \"R\"", "name = 3"), same);
-    refused(&file, &["string", "study.toml:8"]);
+    refused(&file, &["text in quotes", "the number 3", "study.toml:8:8"]);
 }
 
 #[test]
@@ -169,7 +169,7 @@ fn an_expression_error_has_its_caret_under_the_place() {
         head
     };
     let (_dir, file) = study(equations, same);
-    refused(&file, &["study.toml:15:19", "sine"]);
+    refused(&file, &["study.toml:14:18", "sine"]);
 }
 
 const EQUATIONS: &str = r#"kind = "equations"

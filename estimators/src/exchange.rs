@@ -9,8 +9,19 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use crate::data::same;
 use crate::{EstimatorError, Gaussian};
 
-/// The posterior that the prior `wanted` would have given instead of `used`, and what to add to the log-likelihood (log
-/// evidence) so that it too refers to `wanted`. Exact for a linear Gaussian problem without drift.
+/// A posterior under another prior, and what that does to the figures of the fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Exchanged {
+    /// The posterior that the wanted prior would have given.
+    pub posterior: Gaussian,
+    /// To be added to the log-likelihood (log evidence).
+    pub log_likelihood: f64,
+    /// To be added to the summed normalised innovation squared.
+    pub nis: f64,
+}
+
+/// The posterior that the prior `wanted` would have given instead of `used`, with the corrections of log-likelihood and NIS
+/// that make them refer to `wanted` too. Exact for a linear Gaussian problem without drift.
 ///
 /// Works in coordinates whitened by `used` around the posterior mean, where the data's information is diagonal.
 /// Directions in which the posterior is no sharper than `used` carry no information and return to `wanted`.
@@ -21,7 +32,7 @@ pub fn exchange_prior(
     posterior: &Gaussian,
     used: &Gaussian,
     wanted: &Gaussian,
-) -> Result<(Gaussian, f64), EstimatorError> {
+) -> Result<Exchanged, EstimatorError> {
     for (what, g) in [("used prior", used), ("wanted prior", wanted)] {
         same(what, posterior.n_param(), g.n_param())?;
     }
@@ -42,12 +53,16 @@ pub fn exchange_prior(
     let slope = y_used.zip_map(&information, |y, e| if e > 0.0 { -y } else { 0.0 });
     let p = slope.len();
     let likelihood = Likelihood { information, slope };
-    let (_, _, before) = likelihood.update(&y_used, &DMatrix::identity(p, p))?;
-    let (y, factor, after) = likelihood.update(&y_wanted, &whiten(&l0)?)?;
+    let before = likelihood.update(&y_used, &DMatrix::identity(p, p))?;
+    let after = likelihood.update(&y_wanted, &whiten(&l0)?)?;
     let back = &l * v;
-    let factor = &back * factor;
-    let mean = &posterior.mean + back * y;
-    Ok((Gaussian { mean, covariance: &factor * factor.transpose() }, after - before))
+    let factor = &back * after.factor;
+    let mean = &posterior.mean + back * after.mean;
+    Ok(Exchanged {
+        posterior: Gaussian { mean, covariance: &factor * factor.transpose() },
+        log_likelihood: after.fit - before.fit - 0.5 * (after.log_det - before.log_det),
+        nis: 2.0 * (before.fit - after.fit),
+    })
 }
 
 fn root(g: &Gaussian, what: &'static str) -> Result<Cholesky<f64, Dyn>, EstimatorError> {
@@ -60,13 +75,17 @@ struct Likelihood {
     slope: DVector<f64>,
 }
 
+/// The posterior under one prior, and the two parts of its log evidence, fit − log_det / 2.
+struct Update {
+    mean: DVector<f64>,
+    factor: DMatrix<f64>,
+    fit: f64,
+    log_det: f64,
+}
+
 impl Likelihood {
-    /// Mean, a factor of the covariance, and log evidence under the prior N(m, F F^T).
-    fn update(
-        &self,
-        m: &DVector<f64>,
-        f: &DMatrix<f64>,
-    ) -> Result<(DVector<f64>, DMatrix<f64>, f64), EstimatorError> {
+    /// Under the prior N(m, F F^T).
+    fn update(&self, m: &DVector<f64>, f: &DMatrix<f64>) -> Result<Update, EstimatorError> {
         let p = m.len();
         let em = self.information.component_mul(m);
         let u = DMatrix::identity(p, p) + f.tr_mul(&(DMatrix::from_diagonal(&self.information) * f));
@@ -74,12 +93,12 @@ impl Likelihood {
         let b = f.tr_mul(&(&self.slope - &em));
         let step = u.solve(&b);
         let log_det = 2.0 * u.l_dirty().diagonal().iter().map(|v| v.ln()).sum::<f64>();
-        let evidence = self.slope.dot(m) - 0.5 * em.dot(m) + 0.5 * (b.dot(&step) - log_det);
+        let fit = self.slope.dot(m) - 0.5 * em.dot(m) + 0.5 * b.dot(&step);
         let factor = u
             .l()
             .solve_lower_triangular(&f.transpose())
             .ok_or(EstimatorError::NotPositiveDefinite { what: "exchanged posterior" })?
             .transpose();
-        Ok((m + f * step, factor, evidence))
+        Ok(Update { mean: m + f * step, factor, fit, log_det })
     }
 }

@@ -34,7 +34,7 @@ pub use diagnostics::{
 };
 pub use drift::Drift;
 pub use error::EstimatorError;
-pub use exchange::exchange_prior;
+pub use exchange::{Exchanged, exchange_prior};
 pub use gaussian::Gaussian;
 pub use linearisation::Linearisation;
 pub use particles::Particles;

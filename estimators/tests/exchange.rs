@@ -4,16 +4,16 @@ mod common;
 
 use common::{difference, filter, gauss, normal, rng};
 use nalgebra::DMatrix;
-use starlings_estimators::{Data, EstimatorError, Gaussian, Noise, Points, Root, exchange_prior};
+use starlings_estimators::{Data, EstimatorError, Exchanged, Gaussian, Noise, Points, Root, exchange_prior};
 
-/// Posterior and log-likelihood of 50 linear observations filtered one by one.
-fn filtered(prior: &Gaussian, n_seen: usize) -> (Gaussian, f64) {
+/// Posterior, log-likelihood and NIS of 50 linear observations filtered one by one.
+fn filtered(prior: &Gaussian, n_seen: usize) -> (Gaussian, f64, f64) {
     let mut g = rng(50);
     let roukf = filter(Points::Simplex, 4, Root::Symmetric);
     let mut particles = roukf.init(prior);
     let truth = normal(&mut g, 4, 1);
     let noise = Noise::Diagonal(vec![0.3]);
-    let mut log_likelihood = 0.0;
+    let (mut log_likelihood, mut nis) = (0.0, 0.0);
     for _ in 0..50 {
         let mut h = normal(&mut g, 1, 4);
         h.columns_mut(n_seen, 4 - n_seen).fill(0.0);
@@ -22,8 +22,9 @@ fn filtered(prior: &Gaussian, n_seen: usize) -> (Gaussian, f64) {
         let (next, a) = roukf.analysis(&particles, &(&h * &particles.theta), &data).unwrap();
         particles = next;
         log_likelihood += a.log_likelihood;
+        nis += a.nis;
     }
-    (roukf.gaussian(&particles), log_likelihood)
+    (roukf.gaussian(&particles), log_likelihood, nis)
 }
 
 fn wanted() -> Gaussian {
@@ -35,28 +36,34 @@ fn wanted() -> Gaussian {
 #[test]
 fn a_filter_from_a_hundred_times_narrower_prior_elsewhere_becomes_the_direct_filter() {
     let wanted = wanted();
-    let (direct, log_likelihood) = filtered(&wanted, 4);
+    let (direct, log_likelihood, nis) = filtered(&wanted, 4);
     let used = Gaussian {
         mean: &wanted.mean + nalgebra::DVector::from_column_slice(&[0.3, -0.2, 0.5, 0.1]),
         covariance: &wanted.covariance / 1e4,
     };
-    let (narrow, other) = filtered(&used, 4);
-    let (exchanged, correction) = exchange_prior(&narrow, &used, &wanted).unwrap();
+    let (narrow, other, other_nis) = filtered(&used, 4);
+    let Exchanged { posterior: exchanged, log_likelihood: correction, nis: nis_correction } =
+        exchange_prior(&narrow, &used, &wanted).unwrap();
     // The narrow prior holds most of the narrow posterior's information, whose removal costs four digits.
     assert!((&exchanged.mean - &direct.mean).amax() < 1e-9, "{} {}", exchanged.mean, direct.mean);
     assert!(difference(&exchanged.covariance, &direct.covariance) < 1e-10);
     // Far from the data the narrow prior is very unlikely, by thousands in the log, all of which is corrected.
     assert!((other - log_likelihood).abs() > 10.0);
     assert!((other + correction - log_likelihood).abs() < 1e-7 * other.abs());
+    assert!(
+        (other_nis + nis_correction - nis).abs() < 1e-7 * other_nis,
+        "{other_nis} {nis_correction} {nis}"
+    );
 }
 
 #[test]
 fn directions_without_information_return_to_the_wanted_prior() {
     let wanted = Gaussian::independent(&[0.0, 1.0, 2.0, 3.0], &[1.0, 2.0, 3.0, 4.0]);
     let used = Gaussian::independent(&[0.5; 4], &[0.1; 4]);
-    let (direct, log_likelihood) = filtered(&wanted, 2);
-    let (narrow, other) = filtered(&used, 2);
-    let (exchanged, correction) = exchange_prior(&narrow, &used, &wanted).unwrap();
+    let (direct, log_likelihood, _) = filtered(&wanted, 2);
+    let (narrow, other, _) = filtered(&used, 2);
+    let Exchanged { posterior: exchanged, log_likelihood: correction, .. } =
+        exchange_prior(&narrow, &used, &wanted).unwrap();
     assert!((&exchanged.mean - &direct.mean).amax() < 1e-9, "{} {}", exchanged.mean, direct.mean);
     assert!(difference(&exchanged.covariance, &direct.covariance) < 1e-9);
     assert!((other + correction - log_likelihood).abs() < 1e-7 * other.abs());
@@ -67,7 +74,8 @@ fn a_posterior_wider_than_its_prior_holds_no_information() {
     let used = Gaussian::independent(&[1.0], &[0.5]);
     let wide = Gaussian::independent(&[4.0], &[0.6]);
     let wanted = Gaussian::independent(&[-1.0], &[2.0]);
-    let (exchanged, correction) = exchange_prior(&wide, &used, &wanted).unwrap();
+    let Exchanged { posterior: exchanged, log_likelihood: correction, .. } =
+        exchange_prior(&wide, &used, &wanted).unwrap();
     assert!((exchanged.mean[0] + 1.0).abs() < 1e-14 && (exchanged.covariance[0] - 4.0).abs() < 1e-14);
     assert!(correction.abs() < 1e-14, "a few roundings");
 }
@@ -75,8 +83,9 @@ fn a_posterior_wider_than_its_prior_holds_no_information() {
 #[test]
 fn the_same_prior_changes_nothing_and_a_singular_one_is_refused() {
     let prior = wanted();
-    let (posterior, _) = filtered(&prior, 4);
-    let (same, correction) = exchange_prior(&posterior, &prior, &prior).unwrap();
+    let (posterior, _, _) = filtered(&prior, 4);
+    let Exchanged { posterior: same, log_likelihood: correction, .. } =
+        exchange_prior(&posterior, &prior, &prior).unwrap();
     assert!((&same.mean - &posterior.mean).amax() < 1e-12 && correction.abs() < 1e-9);
     assert!(difference(&same.covariance, &posterior.covariance) < 1e-12);
     let flat = Gaussian { mean: prior.mean.clone(), covariance: DMatrix::zeros(4, 4) };

@@ -149,7 +149,7 @@ fn two_passes_recover_the_windkessel_from_noisy_pressures() {
         used.mean.rows_mut(0, 3).copy_from(&centre.rows(0, 3));
         let (second, _) = run(&roukf, &used, &noisy, 2.0 * MM_HG);
         let posterior = roukf.gaussian(second.last().unwrap());
-        let (posterior, _) = exchange_prior(&posterior, &used, &prior(0.7)).unwrap();
+        let posterior = exchange_prior(&posterior, &used, &prior(0.7)).unwrap().posterior;
         for (s, (v, t)) in square.iter_mut().zip(physical(&posterior.mean).into_iter().zip(TRUTH)) {
             *s += (v / t - 1.0).powi(2) / seeds as f64;
         }

@@ -44,7 +44,7 @@ impl Binding {
                         Target::Initial(i) => initial.push((i, value)),
                     }
                 }
-                Err(_) if free.contains(name) && value.is_finite() => {}
+                Err(_) if free.contains(name) => check_value(None, name, value)?,
                 Err(error) => return Err(error),
             }
         }

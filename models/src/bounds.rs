@@ -65,6 +65,9 @@ impl Visitor<'_> for BoundVisitor {
     }
 
     fn visit_f64<E: Error>(self, value: f64) -> Result<Bound, E> {
+        if value.is_nan() {
+            return Err(E::invalid_value(serde::de::Unexpected::Float(value), &self));
+        }
         Ok(Bound(value))
     }
 
@@ -77,7 +80,10 @@ impl Visitor<'_> for BoundVisitor {
     }
 
     fn visit_str<E: Error>(self, text: &str) -> Result<Bound, E> {
-        text.parse().map(Bound).map_err(|_| E::invalid_value(serde::de::Unexpected::Str(text), &self))
+        match text.parse::<f64>() {
+            Ok(value) if !value.is_nan() => Ok(Bound(value)),
+            _ => Err(E::invalid_value(serde::de::Unexpected::Str(text), &self)),
+        }
     }
 }
 

@@ -5,10 +5,9 @@
 
 use crate::equations::EquationsModel;
 use crate::setup::{ModelDef, SetupError};
-use crate::{Model, Spec, native, nearest};
+use crate::{Model, Spec, equations, native, nearest};
 
-/// The kind of a model written in the study itself.
-pub const EQUATIONS: &str = "equations";
+pub use crate::equations::KIND as EQUATIONS;
 
 /// What every kind of model says of itself, in the order of the list of built-in ones, `equations` last; the lists of
 /// `equations` are empty, since the study fills them.
@@ -16,7 +15,7 @@ pub fn specs() -> Vec<Spec> {
     let mut specs: Vec<Spec> = native::all().iter().map(|model| model.spec().clone()).collect();
     specs.push(Spec {
         kind: EQUATIONS.to_owned(),
-        says: "States, rates and outputs as the study writes them.".to_owned(),
+        says: equations::SAYS.to_owned(),
         states: Vec::new(),
         parameters: Vec::new(),
         outputs: Vec::new(),

@@ -3,10 +3,16 @@
 //! It does not read study files: [`EquationsDef`] is plain data that a study parser fills. It does not integrate:
 //! [`crate::integrate`] does. Next file to read: [`expression`], then [`def`], then [`model`].
 
+/// The kind of a model written in the study itself.
+pub const KIND: &str = "equations";
+
+/// What the kind says of itself.
+pub(crate) const SAYS: &str = "States, rates and outputs as the study writes them.";
+
 mod affine;
 mod build;
 mod calculus;
-mod check;
+pub(crate) mod check;
 mod compile;
 pub mod def;
 mod dual;

@@ -6,8 +6,11 @@ use crate::model::{Drive, History, Segment};
 use crate::{Signal, Window};
 
 impl Signal {
-    /// Value at time `t`: linear between samples, constant beyond them. NaN for an empty signal.
+    /// Value at time `t`: linear between samples, constant beyond them. NaN for an empty signal or a time that is NaN.
     pub fn at(&self, t: f64) -> f64 {
+        if t.is_nan() {
+            return t;
+        }
         match self.times.partition_point(|&sample| sample <= t) {
             0 => self.values.first().copied().unwrap_or(f64::NAN),
             k if k == self.times.len() => self.values[k - 1],
@@ -144,6 +147,7 @@ mod tests {
     fn a_signal_is_linear_between_samples_and_constant_beyond() {
         let signal = &window().inputs[0];
         assert_eq!([-1.0, 0.25, 1.0, 2.0, 9.0].map(|t| signal.at(t)), [0.0, 2.5, 10.0, 5.0, 0.0]);
+        assert!(signal.at(f64::NAN).is_nan(), "an unknown time has no value");
     }
 
     #[test]

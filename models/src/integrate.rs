@@ -49,7 +49,7 @@ pub enum Solver {
 
 impl Default for Solver {
     fn default() -> Self {
-        Self::Dopri5(Tolerance::default())
+        Self::Auto(Tolerance::default())
     }
 }
 

@@ -23,6 +23,20 @@ pub struct Drive<'a> {
     pub history: &'a dyn History,
 }
 
+impl Drive<'_> {
+    /// No inputs, for what may not use any.
+    pub const NONE: Drive<'static> = Drive { value: &[], slope: &[], history: &NoInputs };
+}
+
+/// The past of no inputs: nothing that may ask for it has any.
+struct NoInputs;
+
+impl History for NoInputs {
+    fn at(&self, _index: usize, _t: f64) -> f64 {
+        f64::NAN
+    }
+}
+
 /// A span of time on which every input is linear.
 #[derive(Clone, Copy)]
 pub struct Segment<'a> {

@@ -92,7 +92,7 @@ pub enum SetupError {
     /// A name that the model, the catalogue or the effect list does not have.
     #[error("no {what} named `{name}`{}", nearest.as_ref().map(|n| format!("; did you mean `{n}`?")).unwrap_or_default())]
     Unknown {
-        /// `model`, `parameter`, `output`, `input`, `state`, `observer`, `effect` or `constant`.
+        /// What was looked for, such as `model`, `parameter` or `rate term`.
         what: &'static str,
         /// The name given.
         name: String,

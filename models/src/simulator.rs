@@ -29,7 +29,7 @@ impl Simulator {
         let model = setup.model()?;
         let spec = model.spec();
         let rows = rows(spec, &setup.outputs)?;
-        let binding = Binding::new(setup, spec, &effect::names(&setup.effects)?)?;
+        let binding = Binding::new(setup, spec, &free_names(setup, spec)?)?;
         let observer = observer::build(&setup.observer, Wiring { spec, outputs: &setup.outputs })?;
         Ok(Self { model, observer, binding, rows })
     }
@@ -69,6 +69,9 @@ impl Simulator {
                 let (times, values) = (signal.times.len(), signal.values.len());
                 return Err(bad(format!("input `{}` has {times} times and {values} values", input.name)));
             }
+            if !signal.times.is_sorted_by(|a, b| a < b) {
+                return Err(bad(format!("the times of input `{}` do not increase", input.name)));
+            }
         }
         check_times(window)
     }
@@ -82,7 +85,7 @@ impl Simulator {
         let lists = [("input", &spec.inputs, u), ("state", &spec.states, x), ("output", &spec.outputs, y)];
         let found = lists.iter().find_map(|(what, list, values)| {
             let at = values.iter().position(|value| !value.is_finite())?;
-            Some(format!("{what} `{}`", component_name(list, at)))
+            Some(format!("{what} `{}`", Spec::component(list, at)))
         });
         Err(ParticleError::NotFinite { what: found.unwrap_or_default(), time: t })
     }
@@ -98,6 +101,7 @@ impl Forward for Simulator {
         let window = &*job.window;
         let theta = self.binding.theta(&job.theta, window.start)?;
         let mut x = self.start(job, &theta)?;
+        self.check_finite(window.start, &[], &x, &[])?;
         let mut y = vec![0.0; self.spec().n_output()];
         let mut outputs = Vec::with_capacity(window.observed.len());
         let mut inputs = Inputs::new(window);
@@ -117,6 +121,7 @@ impl Forward for Simulator {
             }
             previous = t;
         }
+        // An observer moves the state after the last check.
         self.check_finite(previous, &[], &x, &[])?;
         Ok(Prediction { outputs, state: x, cost: 0.0 })
     }
@@ -140,6 +145,13 @@ fn bad(message: String) -> ParticleError {
     ParticleError::BadJob(message)
 }
 
+/// The names that only terms of effects use, so that a constant may have them.
+fn free_names(setup: &Setup, spec: &Spec) -> Result<Vec<String>, SetupError> {
+    let lists = [&spec.states, &spec.inputs, &spec.outputs];
+    let taken = |name: &String| lists.into_iter().flatten().any(|q| q.name == *name);
+    Ok(effect::names(&setup.effects)?.into_iter().filter(|name| !taken(name)).collect())
+}
+
 /// The output components behind the named outputs, in their order.
 fn rows(spec: &Spec, outputs: &[String]) -> Result<Vec<usize>, SetupError> {
     let mut rows = Vec::new();
@@ -160,17 +172,6 @@ fn rows(spec: &Spec, outputs: &[String]) -> Result<Vec<usize>, SetupError> {
     Ok(rows)
 }
 
-/// The name of component `at` in the concatenation of `list`, with its index in a field.
-fn component_name(list: &[Quantity], mut at: usize) -> String {
-    for q in list {
-        if at < q.size {
-            return if q.size == 1 { q.name.clone() } else { format!("{}[{at}]", q.name) };
-        }
-        at -= q.size;
-    }
-    String::new()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -182,7 +183,7 @@ mod tests {
         let spec = Spec { outputs: list.clone(), ..crate::catalogue::specs().remove(0) };
         let names = ["q", "wall"].map(str::to_owned);
         assert_eq!(rows(&spec, &names).expect("known outputs"), [4, 1, 2, 3]);
-        assert_eq!(component_name(&list, 3), "wall[2]");
-        assert_eq!(component_name(&list, 4), "q");
+        assert_eq!(Spec::component(&list, 3), "wall[2]");
+        assert_eq!(Spec::component(&list, 4), "q");
     }
 }

@@ -160,6 +160,17 @@ impl Spec {
         }
         None
     }
+
+    /// Name of component `at` of the concatenation of `list`, with its index in a field; empty beyond the end.
+    pub fn component(list: &[Quantity], mut at: usize) -> String {
+        for q in list {
+            if at < q.size {
+                return if q.size == 1 { q.name.clone() } else { format!("{}[{at}]", q.name) };
+            }
+            at -= q.size;
+        }
+        String::new()
+    }
 }
 
 #[cfg(test)]

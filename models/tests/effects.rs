@@ -163,6 +163,22 @@ fn a_sensor_with_a_lag_brings_its_own_state() {
 }
 
 #[test]
+fn a_lag_far_shorter_than_the_run_is_followed() {
+    let (mut setup, theta) = setup("windkessel-2");
+    setup.model.constants.insert("initial:p".to_owned(), 100.0);
+    let mut lag = effect("sensor lag", &[("pressure", "a*(held - p)")], &["a", "lag"]);
+    lag.states =
+        vec![EffectState { name: "held".into(), rate: "(p - held)/lag".into(), ..EffectState::default() }];
+    let window = window(&setup, 5);
+    let plain = run(&*setup.build().unwrap(), &window, &theta).outputs;
+    // An explicit method alone would need a billion steps.
+    let setup = with(&setup, lag, &[1.0, 1e-9]);
+    let got = run(&*setup.build().unwrap(), &window, &theta).outputs;
+    // The lag itself, 1e-9 of a slope near 100, and the tolerance of 1e-8 per step of values near 100.
+    assert!(largest_difference(&got, &plain) < 2e-5, "{:e}", largest_difference(&got, &plain));
+}
+
+#[test]
 fn a_threshold_inside_a_term_switches_where_it_should() {
     let (mut setup, _) = setup("windkessel-2");
     setup.model.constants.insert("initial:p".to_owned(), 100.0);
@@ -211,6 +227,17 @@ fn an_effect_that_does_not_fit_is_refused_with_its_place() {
         "{}",
         refused(&unused)
     );
+    let time = with(&setup, effect("a", &[("p", "t*p")], &["t"]), &[]);
+    assert!(
+        refused(&time).to_string().contains("`t` cannot be the name of a parameter"),
+        "{}",
+        refused(&time)
+    );
+    let mut backwards = effect("a", &[("p", "a*p")], &["a"]);
+    backwards.parameters[0].range = [1.0, 0.0];
+    assert!(refused(&with(&setup, backwards, &[])).to_string().contains("give the smallest value first"));
+    let unnamed = with(&setup, effect("", &[("p", "a*p")], &["a"]), &[]);
+    assert_eq!(refused(&unnamed).to_string(), "an effect needs a name");
     let none = with(&setup, effect("a", &[], &["a"]), &[]);
     assert!(refused(&none).to_string().contains("needs at least one term"));
     let twice = with(

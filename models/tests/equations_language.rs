@@ -218,6 +218,7 @@ fn derivatives_pass_through_branches() {
     assert_eq!(slope("abs(v)"), -10.0);
     assert_eq!(slope("sqrt(k - 2)"), 0.0, "nothing moves under the root, although its slope is infinite");
     assert_eq!(slope("x^0"), 0.0);
+    assert_eq!(slope("(k - 2)^x"), 0.0, "0^x stays 0 although log 0 is infinite");
 }
 
 #[test]

@@ -230,8 +230,22 @@ fn what_does_not_fit_together_is_refused() {
     says(|def| def.replaceable.push(text("sprin")), "no rate term named `sprin`; did you mean `spring`?");
     says(|def| def.inputs[0].name = text("sin"), "has a meaning in expressions");
     says(|def| def.inputs[0].name = text("2F"), "cannot be the name of an input");
+    says(|def| def.states[0].name = text("t"), "`t` cannot be the name of a state: it has a meaning");
+    says(|def| def.states[0].range = [1.0, -1.0], "the range of state `x` is [1, -1]");
+    says(|def| def.states[0].range = [f64::NAN, 1.0], "the range of state `x` is [NaN, 1]");
     says(|def| def.solver.rtol = 0.0, "must be positive");
     says(|def| def.solver.method = Method::Fixed, "needs a positive `step`");
+}
+
+#[test]
+fn a_long_chain_of_outputs_is_refused_and_not_fatal() {
+    let mut def = oscillator();
+    def.outputs = vec![output("y0", "x")];
+    for i in 1..10 {
+        def.outputs.push(output(&format!("y{i}"), &format!("y{}{}", i - 1, "+x".repeat(1900))));
+    }
+    let error = EquationsModel::new(&def).unwrap_err().to_string();
+    assert!(error.contains("use states for some of them"), "{error}");
 }
 
 #[test]

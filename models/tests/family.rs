@@ -89,6 +89,48 @@ fn a_value_that_is_not_finite_is_an_error_that_names_it() {
 }
 
 #[test]
+fn a_state_that_is_not_finite_is_named_before_anything_runs() {
+    for kind in kinds() {
+        let (setup, theta) = setup(&kind);
+        let spec = setup.spec().unwrap();
+        let mut state = vec![1.0; spec.n_state()];
+        state[spec.n_state() - 1] = f64::NAN;
+        let job = starlings_models::Job { state: Some(state), ..job(&window(&setup, 5), &theta) };
+        let what = format!("state `{}`", spec.states.last().unwrap().name);
+        assert_eq!(
+            setup.build().unwrap().run(&job),
+            Err(ParticleError::NotFinite { what, time: 0.0 }),
+            "{kind}"
+        );
+    }
+}
+
+#[test]
+fn every_model_run_in_pieces_that_end_on_input_samples_gives_the_bits_of_one_run() {
+    for kind in kinds() {
+        let (setup, theta) = setup(&kind);
+        let (model, mut window) = (setup.build().unwrap(), window(&setup, 24));
+        // Before zero and on a clock far from zero, samples on the observation times but for rounding.
+        for offset in [-0.5, 1e6 / 3.0] {
+            window.start = offset;
+            window.times = (1..=24).map(|i| offset + f64::from(i) * 0.1).collect();
+            for input in &mut window.inputs {
+                input.times =
+                    (0..input.values.len()).map(|i| offset + 0.05 + (i as f64 - 2.0) * 0.05).collect();
+            }
+            let whole = run(&*model, &window, &theta);
+            for every in [1, 5] {
+                assert_eq!(
+                    run_in_pieces(&*model, &window, &theta, every),
+                    whole,
+                    "{kind}, {every} from {offset}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
 fn an_input_that_is_not_finite_is_an_error_and_not_a_panic() {
     for kind in kinds() {
         let (setup, theta) = setup(&kind);
@@ -158,6 +200,9 @@ fn a_job_that_does_not_fit_is_refused() {
     let mut uneven = good.clone();
     uneven.inputs[0].values.pop();
     refused(&uneven, &theta);
+    let mut unsorted = good.clone();
+    unsorted.inputs[0].times.swap(3, 4);
+    refused(&unsorted, &theta);
     let short = starlings_models::Job { state: Some(vec![]), ..job(&good, &theta) };
     assert!(matches!(model.run(&short), Err(ParticleError::BadJob(_))));
 }

@@ -241,7 +241,7 @@ fn failures_are_named() {
     for solver in [solver, Solver::Rosenbrock(Tolerance::default()), Solver::Fixed { step: 0.01 }] {
         match run(&nan, solver, [0.0, 1.0], &[0.0, 0.0]) {
             Err(ParticleError::NotFinite { what, time }) => {
-                assert_eq!(what, "x1");
+                assert_eq!(what, "state `x1`");
                 assert!((time - 0.5).abs() < 0.02, "{time}");
             }
             other => panic!("{solver:?} {other:?}"),

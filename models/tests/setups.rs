@@ -87,6 +87,27 @@ fn a_constant_outside_physics_is_refused() {
 }
 
 #[test]
+fn a_constant_of_a_term_is_checked_like_any_other_and_hides_no_state() {
+    use starlings_models::EffectDef;
+    use starlings_models::effect::{Addition, EffectParameter};
+    let with = |name: &str, value: f64| {
+        refused(|s| {
+            s.model.constants.insert("a".to_owned(), 0.0);
+            s.effects.push(EffectDef {
+                name: "offset".to_owned(),
+                adds: vec![Addition { to: "pressure".to_owned(), term: "a*p*height".to_owned() }],
+                parameters: vec![EffectParameter { name: "a".to_owned(), ..EffectParameter::default() }],
+                ..EffectDef::default()
+            });
+            s.model.constants.insert("height".to_owned(), 1.0);
+            s.model.constants.insert(name.to_owned(), value);
+        })
+    };
+    assert!(with("height", f64::NAN).to_string().contains("give a finite number"));
+    assert_eq!(with("p", 3.0), unknown("constant", "p", None));
+}
+
+#[test]
 fn a_negative_gain_is_refused() {
     let error = refused(|s| s.observer.gain = -1.0);
     assert!(error.to_string().contains("gain is -1"), "{error}");

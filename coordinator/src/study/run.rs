@@ -89,6 +89,8 @@ pub struct Fit {
     pub passes: usize,
     /// False when the iteration limit came first.
     pub converged: bool,
+    /// How far the last pass moved the estimate, the largest entry in posterior standard deviations; zero for one pass.
+    pub last_move: f64,
 }
 
 impl Fit {

@@ -15,6 +15,9 @@ const CORRELATED: f64 = 0.95;
 const UNINFORMED: f64 = 0.9;
 /// Prior standard deviations beyond which an estimate contradicts its prior.
 const FAR_FROM_PRIOR: f64 = 4.0;
+/// Posterior standard deviations that a last pass may move the estimate: its linearisation error is of second order in
+/// them.
+const LAST_MOVE: f64 = 15.0;
 /// Ratio of free-run to innovation misfit beyond which the filter's states are no trajectory of its estimate.
 const FREE_RUN_RATIO: f64 = 1.15;
 
@@ -23,6 +26,7 @@ pub fn collect(study: &Study, fit: &Fit, summary: &Summary, predictions: &[Predi
     let mut warnings = study.warnings.clone();
     warnings.extend(nis(fit));
     warnings.extend(not_converged(fit));
+    warnings.extend(still_moving(fit));
     warnings.extend(free_run(fit, study, predictions));
     warnings.extend(autocorrelated(study, predictions));
     warnings.extend(correlated(summary));
@@ -55,6 +59,17 @@ fn nis(fit: &Fit) -> Option<String> {
 fn not_converged(fit: &Fit) -> Option<String> {
     (!fit.converged).then(|| {
         "the batch fit stopped at its iteration limit before it converged: raise [estimator] max_iterations".to_owned()
+    })
+}
+
+fn still_moving(fit: &Fit) -> Option<String> {
+    (fit.last_move > LAST_MOVE).then(|| {
+        format!(
+            "the last pass still moved an estimate by {:.0} posterior standard deviations: raise [estimator] passes to {} \
+             and see whether it has settled.",
+            fit.last_move,
+            fit.passes + 1
+        )
     })
 }
 

@@ -27,7 +27,8 @@ pub struct EffectDef {
 /// One term of an effect.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Addition {
-    /// A state (the term adds to its rate), an output or an input (the term adds to its value).
+    /// A state (the term adds to its rate), an output or an input (the term adds to its value); a name that is both a
+    /// state's and an output's is the state.
     pub to: String,
     /// Expression in states, parameters, constants, inputs, outputs and `t`, in the unit of what it is added to (per time
     /// unit for a state).

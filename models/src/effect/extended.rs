@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 use super::scratch::Scratch;
 use super::terms::Scope;
 use super::{Effect, EffectDef, Moment, TermEffect, Touches};
+use crate::equations::check;
 use crate::integrate::{self, Solver};
 use crate::model::{Drive, Segment};
 use crate::setup::SetupError;
@@ -161,6 +162,9 @@ impl Model for Extended {
 fn extended_spec(inner: &Spec, defs: &[EffectDef]) -> Result<Spec, SetupError> {
     let mut spec = inner.clone();
     for (i, def) in defs.iter().enumerate() {
+        if def.name.is_empty() {
+            return Err(SetupError::Invalid("an effect needs a name".to_owned()));
+        }
         if defs[..i].iter().any(|d| d.name == def.name) {
             return Err(SetupError::Twice(def.name.clone()));
         }
@@ -171,6 +175,8 @@ fn extended_spec(inner: &Spec, defs: &[EffectDef]) -> Result<Spec, SetupError> {
             )));
         }
         for (j, parameter) in def.parameters.iter().enumerate() {
+            check::usable(&parameter.name, &format!("a parameter of the effect `{}`", def.name))?;
+            check::range(parameter.range, &format!("parameter `{}`", parameter.name))?;
             check_new(&spec, &parameter.name)?;
             let mut quantity = Quantity::new(&parameter.name, &parameter.unit);
             quantity.range = parameter.range;
@@ -178,6 +184,7 @@ fn extended_spec(inner: &Spec, defs: &[EffectDef]) -> Result<Spec, SetupError> {
             spec.parameters.push(quantity.says(&format!("Parameter of the effect `{}`.", def.name)));
         }
         for state in &def.states {
+            check::usable(&state.name, &format!("a state of the effect `{}`", def.name))?;
             check_new(&spec, &state.name)?;
             let quantity = Quantity::new(&state.name, &state.unit);
             spec.states.push(quantity.says(&format!("State of the effect `{}`.", def.name)));

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use super::{Addition, Effect, EffectDef, Moment, Touches};
 use crate::equations::expression::{At, Direction, Expression, ExpressionError, Program, Slot};
-use crate::model::{Drive, History};
+use crate::model::Drive;
 use crate::setup::SetupError;
 use crate::{Quantity, Spec, nearest};
 
@@ -228,15 +228,6 @@ fn at(moment: Moment<'_>) -> At<'_> {
     At { t: moment.t, x: moment.x, theta: moment.theta, u: moment.u, y: moment.y }
 }
 
-/// The inputs of an expression that may not use any.
-struct NoInputs;
-
-impl History for NoInputs {
-    fn at(&self, _index: usize, _t: f64) -> f64 {
-        f64::NAN
-    }
-}
-
 impl Effect for TermEffect {
     fn def(&self) -> &EffectDef {
         &self.def
@@ -247,9 +238,8 @@ impl Effect for TermEffect {
     }
 
     fn initial(&self, theta: &[f64], x: &mut [f64]) {
-        let u = Drive { value: &[], slope: &[], history: &NoInputs };
         for (i, program) in &self.initial {
-            x[*i] = program.eval(&At { t: 0.0, x: &[], theta, u, y: &[] });
+            x[*i] = program.eval(&At { t: 0.0, x: &[], theta, u: Drive::NONE, y: &[] });
         }
     }
 

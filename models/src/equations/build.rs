@@ -135,8 +135,8 @@ fn spec(
         quantity
     });
     Spec {
-        kind: "equations".to_owned(),
-        says: "ordinary differential equations written in the study".to_owned(),
+        kind: super::KIND.to_owned(),
+        says: super::SAYS.to_owned(),
         states: def
             .states
             .iter()

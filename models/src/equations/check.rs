@@ -18,25 +18,13 @@ pub(super) fn names(def: &EquationsDef) -> Result<(), SetupError> {
     }
     let mut seen = BTreeSet::new();
     let mut outputs = BTreeSet::new();
-    let states = def.states.iter().map(|s| (&s.name, "state"));
-    let inputs = def.inputs.iter().map(|s| (&s.name, "input"));
-    for (name, what) in states.chain(inputs).chain(def.outputs.iter().map(|s| (&s.name, "output"))) {
-        let mut letters = name.chars();
-        let starts = letters.next().is_some_and(|c| c.is_alphabetic() || c == '_');
-        if !starts || !letters.all(|c| c.is_alphanumeric() || c == '_') {
-            let rule = "a letter or `_`, then letters, digits and `_`";
-            return Err(SetupError::Invalid(format!(
-                "`{name}` cannot be the name of an {what}: expected {rule}"
-            )));
-        }
-        if ["t", "pi"].contains(&name.as_str()) || parse::FUNCTIONS.contains(&name.as_str()) {
-            let message =
-                format!("`{name}` cannot be the name of an {what}: it has a meaning in expressions");
-            return Err(SetupError::Invalid(message));
-        }
+    let states = def.states.iter().map(|s| (&s.name, "a state"));
+    let inputs = def.inputs.iter().map(|s| (&s.name, "an input"));
+    for (name, what) in states.chain(inputs).chain(def.outputs.iter().map(|s| (&s.name, "an output"))) {
+        usable(name, what)?;
         let value = || def.outputs.iter().find(|o| o.name == *name).map(|o| o.value.trim());
         let is_state =
-            what == "output" && def.states.iter().any(|s| s.name == *name) && value() == Some(name);
+            what == "an output" && def.states.iter().any(|s| s.name == *name) && value() == Some(name);
         let list = if is_state { &mut outputs } else { &mut seen };
         if !list.insert(name) {
             return Err(SetupError::Twice(name.clone()));
@@ -45,7 +33,29 @@ pub(super) fn names(def: &EquationsDef) -> Result<(), SetupError> {
     Ok(())
 }
 
-/// Every state has a rate and an initial value, and replaceable terms exist.
+/// The name can stand in an expression; `what` says with its article what it names.
+pub(crate) fn usable(name: &str, what: &str) -> Result<(), SetupError> {
+    let mut letters = name.chars();
+    let starts = letters.next().is_some_and(|c| c.is_alphabetic() || c == '_');
+    let why = if !starts || !letters.all(|c| c.is_alphanumeric() || c == '_') {
+        "expected a letter or `_`, then letters, digits and `_`"
+    } else if ["t", "pi"].contains(&name) || parse::FUNCTIONS.contains(&name) {
+        "it has a meaning in expressions"
+    } else {
+        return Ok(());
+    };
+    Err(SetupError::Invalid(format!("`{name}` cannot be the name of {what}: {why}")))
+}
+
+/// The range of `what` has its smallest value first.
+pub(crate) fn range([lo, hi]: [f64; 2], what: &str) -> Result<(), SetupError> {
+    if lo <= hi {
+        return Ok(());
+    }
+    Err(SetupError::Invalid(format!("the range of {what} is [{lo}, {hi}]: give the smallest value first")))
+}
+
+/// Every state has a rate, an initial value and a range, and replaceable terms exist.
 pub(super) fn terms(def: &EquationsDef) -> Result<(), SetupError> {
     for state in &def.states {
         if state.rate.is_empty() {
@@ -54,6 +64,7 @@ pub(super) fn terms(def: &EquationsDef) -> Result<(), SetupError> {
         if state.initial.trim().is_empty() {
             return Err(SetupError::Invalid(format!("state `{}` has no initial value", state.name)));
         }
+        range(state.range, &format!("state `{}`", state.name))?;
         let mut seen = BTreeSet::new();
         if let Some((term, _)) = state.rate.iter().find(|(term, _)| !seen.insert(term)) {
             return Err(SetupError::Twice(format!("{term} in the rate of {}", state.name)));

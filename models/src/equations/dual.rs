@@ -59,7 +59,11 @@ impl Reader for Along<'_, '_, '_, '_> {
             Operation::Sub => da - db,
             Operation::Mul => da * b + a * db,
             Operation::Div => (da - value * db) / b,
-            Operation::Pow => chain(b * a.powf(b - 1.0), da) + chain(value * a.ln(), db),
+            // 0^b stays 0 when a positive b moves, although log 0 is infinite.
+            Operation::Pow => {
+                let along_b = if value.abs() <= 0.0 { 0.0 } else { value * a.ln() };
+                chain(b * a.powf(b - 1.0), da) + chain(along_b, db)
+            }
             Operation::Min => {
                 if b < a {
                     db

@@ -72,7 +72,7 @@ pub struct Direction<'a> {
 /// A parsed expression and its text.
 ///
 /// `+ - * / ^` with `-x^2 = -(x^2)` and `2^3^2 = 512`; comparisons, giving 1 or 0; `if(cond, a, b)`; `sin cos tan exp log
-/// sqrt abs sign min max tanh step`; `pi`, `t`; `delay(u, tau)` and `ddt(u)`.
+/// sqrt abs sign min max tanh step`; `pi`, `t`; `delay(u, tau)` and `ddt(u)`. A negative `tau` reads ahead in an input.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Expression {
     text: String,

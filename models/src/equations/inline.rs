@@ -11,6 +11,8 @@ use super::node::{Name, Node};
 
 /// Largest expression after rewriting.
 const MAX_SIZE: usize = 20_000;
+/// Deepest one, so that no chain of outputs can exhaust the stack.
+const MAX_DEPTH: usize = 2500;
 
 /// The names of a model and what they stand for.
 pub(super) struct Names<'a> {
@@ -49,9 +51,11 @@ impl Names<'_> {
     /// Rewrites a tree.
     pub(super) fn inline(&self, node: &Node) -> Result<Node, ExpressionError> {
         let done = self.rewrite(node)?;
-        if done.size() > MAX_SIZE {
+        let (size, depth) = (done.size(), done.depth());
+        if size > MAX_SIZE || depth > MAX_DEPTH {
             let message = format!(
-                "more than {MAX_SIZE} operations once outputs are put in: use states for some of them"
+                "{size} operations, nested {depth} deep, once outputs are put in, where {MAX_SIZE} and {MAX_DEPTH} are \
+                 allowed: use states for some of them"
             );
             return Err(ExpressionError::new(1, message));
         }

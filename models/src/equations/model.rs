@@ -43,7 +43,7 @@ impl EquationsModel {
     pub fn without(&self, terms: &[&str]) -> Result<Self, SetupError> {
         let mut def = self.def.clone();
         for term in terms {
-            if !def.replaceable.iter().any(|name| name == term) {
+            if !self.def.replaceable.iter().any(|name| name == term) {
                 let nearest = nearest(term, &self.def.replaceable);
                 return Err(SetupError::Unknown {
                     what: "replaceable term",
@@ -80,8 +80,7 @@ impl Model for EquationsModel {
     }
 
     fn initial(&self, theta: &[f64], x: &mut [f64]) {
-        let u = Drive { value: &[], slope: &[], history: &NoHistory };
-        write(&self.built.initial, &At { t: 0.0, x: &[], theta, u, y: &[] }, x);
+        write(&self.built.initial, &At { t: 0.0, x: &[], theta, u: Drive::NONE, y: &[] }, x);
     }
 
     fn rhs(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, dx: &mut [f64]) {
@@ -124,14 +123,5 @@ impl Model for EquationsModel {
             dfdt[i] = rate.eval_dual(&at, &Direction { t: 1.0, u: u.slope, ..Direction::default() }).1;
         }
         true
-    }
-}
-
-/// Initial values use no input, so nothing asks for one's past.
-struct NoHistory;
-
-impl crate::model::History for NoHistory {
-    fn at(&self, _: usize, _: f64) -> f64 {
-        f64::NAN
     }
 }

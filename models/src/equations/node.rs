@@ -111,4 +111,9 @@ impl Node {
         self.walk(&mut |_| count += 1);
         count
     }
+
+    /// Number of parts on the longest way down.
+    pub(super) fn depth(&self) -> usize {
+        1 + self.children().into_iter().map(Node::depth).max().unwrap_or(0)
+    }
 }

@@ -3,7 +3,7 @@
 //! Parameters and inputs are bound here and appear no further. Next file to read: [`super::control`].
 
 use crate::model::{Drive, Segment};
-use crate::{Model, ParticleError};
+use crate::{Model, ParticleError, Spec};
 
 /// A system of ordinary differential equations.
 pub(super) trait System {
@@ -25,7 +25,7 @@ pub(super) trait System {
         differences(self, t, x, f, dfdx, dfdt, scratch);
     }
 
-    /// The name of one state component.
+    /// What one state component is called in an error.
     fn name(&self, component: usize) -> String;
 }
 
@@ -135,14 +135,6 @@ impl<M: Model + ?Sized> System for OnSegment<'_, M> {
     }
 
     fn name(&self, component: usize) -> String {
-        let mut first = 0;
-        for q in &self.model.spec().states {
-            if component < first + q.size {
-                let name = &q.name;
-                return if q.size == 1 { name.clone() } else { format!("{name}[{}]", component - first) };
-            }
-            first += q.size;
-        }
-        format!("state {component}")
+        format!("state `{}`", Spec::component(&self.model.spec().states, component))
     }
 }

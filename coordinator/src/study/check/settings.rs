@@ -33,7 +33,7 @@ pub(in crate::study) fn estimator(source: &Source, section: &EstimatorSection) -
     let roots = [("symmetric", Root::Symmetric), ("cholesky", Root::Cholesky)];
     let resample = [("svd", true), ("none", false)];
     let default_spread = match kind {
-        EstimatorKind::Roukf => 0.01,
+        EstimatorKind::Roukf => 0.001,
         EstimatorKind::Batch => 0.1,
     };
     EstimatorChoice {

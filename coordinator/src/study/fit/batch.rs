@@ -136,6 +136,7 @@ fn finish(now: &Snapshot, step: BatchStep) -> Fit {
         counts: now.head.counts,
         passes: 1,
         converged: step.converged,
+        last_move: 0.0,
     }
 }
 

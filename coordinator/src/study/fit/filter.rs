@@ -37,13 +37,14 @@ pub fn fit(
         Some(snapshot) => snapshot,
         None => schedule.start(0, &posterior::prior(study)),
     };
+    let mut reported = schedule.reported(&now)?;
     loop {
         while now.head.step < schedule.n_step() {
-            let row = step(flight, &schedule, &mut now)?;
+            let (row, next) = step(flight, &schedule, &mut now, &reported)?;
+            reported = next;
             store.analysis(&row, &now)?;
             context.after_step(store, &schedule.progress(&now, flight))?;
         }
-        let reported = schedule.reported(&now)?;
         if now.head.pass + 1 == schedule.passes {
             return Ok(schedule.finish(&now, reported));
         }
@@ -51,6 +52,7 @@ pub fn fit(
         now = schedule.start(head.pass + 1, &reported.posterior);
         now.head.counts = head.counts;
         now.head.information_lost = head.information_lost;
+        reported = schedule.reported(&now)?;
     }
 }
 
@@ -65,10 +67,11 @@ struct Schedule<'a> {
     windows: Vec<Vec<Arc<Window>>>,
 }
 
-/// A posterior under the study's own prior, with the evidence that belongs to it.
+/// What is known under the study's own prior, and the figures of the pass so far that belong to it.
 struct Reported {
     posterior: Gaussian,
-    evidence: f64,
+    log_likelihood: f64,
+    nis: f64,
 }
 
 impl<'a> Schedule<'a> {
@@ -131,23 +134,37 @@ impl<'a> Schedule<'a> {
         let particles = particles(now);
         let posterior = self.roukf.gaussian(&particles);
         if now.head.pass == 0 {
-            return Ok(Reported { posterior, evidence: now.head.log_likelihood });
+            return Ok(Reported { posterior, log_likelihood: now.head.log_likelihood, nis: now.head.nis });
         }
         let used = posterior::independent(&now.head.centre, &now.head.scale);
-        let (posterior, correction) = exchange_prior(&posterior, &used, &self.prior)?;
-        Ok(Reported { posterior, evidence: now.head.log_likelihood + correction })
+        let exchanged = exchange_prior(&posterior, &used, &self.prior)?;
+        Ok(Reported {
+            posterior: exchanged.posterior,
+            log_likelihood: now.head.log_likelihood + exchanged.log_likelihood,
+            nis: now.head.nis + exchanged.nis,
+        })
     }
 
     fn finish(&self, now: &Snapshot, reported: Reported) -> Fit {
+        let sd = posterior::standard_deviations(&reported.posterior);
+        let moves = reported
+            .posterior
+            .mean
+            .iter()
+            .zip(&now.head.centre)
+            .zip(sd)
+            .map(|((m, c), sd)| (m - c).abs() / sd);
+        let last_move = if now.head.pass == 0 { 0.0 } else { moves.fold(0.0, f64::max) };
         Fit {
             posterior: reported.posterior,
-            log_likelihood: reported.evidence,
-            nis: now.head.nis,
+            log_likelihood: reported.log_likelihood,
+            nis: reported.nis,
             n_used: now.head.n_used,
             information_lost: now.head.information_lost,
             counts: now.head.counts,
             passes: self.passes,
             converged: true,
+            last_move,
         }
     }
 
@@ -164,15 +181,17 @@ impl<'a> Schedule<'a> {
     }
 }
 
-/// Predict, observe, analyse, recombine: one step of the filter over every record that still has data.
+/// Predict, observe, analyse, recombine: one step of the filter over every record that still has data. Returns what the
+/// store keeps of it and what is known after it; `before` is what was known before.
 fn step(
     flight: &mut Flight<'_>,
     schedule: &Schedule<'_>,
     now: &mut Snapshot,
-) -> Result<AnalysisRow, RunError> {
+    before: &Reported,
+) -> Result<(AnalysisRow, Reported), RunError> {
     let windows = schedule.step_windows(now.head.step);
     let place = Place { pass: now.head.pass + 1, step: now.head.step };
-    let before = (flight.total, flight.failed, flight.retried);
+    let counted = (flight.total, flight.failed, flight.retried);
     let Flown { mut particles, results, rescued } =
         fly(flight, &schedule.roukf, particles(now), &mut now.states, &windows, place)?;
     for (index, (record, _)) in windows.iter().enumerate() {
@@ -197,13 +216,14 @@ fn step(
         }
     }
     advance(now, &particles, &analysis);
-    now.head.counts.total += flight.total - before.0;
-    now.head.counts.failed += flight.failed - before.1;
-    now.head.counts.retried += flight.retried - before.2;
+    now.head.counts.total += flight.total - counted.0;
+    now.head.counts.failed += flight.failed - counted.1;
+    now.head.counts.retried += flight.retried - counted.2;
     now.head.counts.rescued += rescued;
-    let mut row = row(schedule, now, place, &windows, &analysis)?;
+    let after = schedule.reported(now)?;
+    let mut row = row(schedule.study, place, &windows, &analysis, before, &after);
     row.jobs = flight.take_rows();
-    Ok(row)
+    Ok((row, after))
 }
 
 fn particles(now: &Snapshot) -> Particles {
@@ -240,27 +260,26 @@ fn advance(now: &mut Snapshot, particles: &Particles, analysis: &Analysis) {
 }
 
 fn row(
-    schedule: &Schedule<'_>,
-    now: &Snapshot,
+    study: &Study,
     place: Place,
     windows: &StepWindows,
     analysis: &Analysis,
-) -> Result<AnalysisRow, RunError> {
-    let study = schedule.study;
-    let posterior = schedule.reported(now)?.posterior;
-    Ok(AnalysisRow {
+    before: &Reported,
+    after: &Reported,
+) -> AnalysisRow {
+    AnalysisRow {
         pass: place.pass,
         step: place.step,
         time: elapsed(study, windows),
         n_used: analysis.n_used,
-        nis: analysis.nis,
-        log_likelihood: analysis.log_likelihood,
+        nis: after.nis - before.nis,
+        log_likelihood: after.log_likelihood - before.log_likelihood,
         information_lost: analysis.information_lost,
         transform: Some(analysis.transform.clone()),
-        estimates: posterior::rows(study, &posterior),
+        estimates: posterior::rows(study, &after.posterior),
         innovations: innovations(study, windows, analysis),
         jobs: Vec::new(),
-    })
+    }
 }
 
 /// Longest time since a record's start among the step's windows.
