@@ -35,17 +35,17 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if summary.is_some() {
         page::write_files(&folder).map_err(Failure::run)?;
     } else {
-        let text = page::render(&data).map_err(Failure::run)?;
-        std::fs::write(&html, text)
-            .map_err(|e| Failure::input(format!("cannot write {}: {e}", html.display())))?;
+        page::write_page(&folder).map_err(Failure::run)?;
+        eprintln!("the run is not finished: the report shows what there is, and the other files are not written");
     }
-    if args.json {
-        println!("{}", serde_json::to_string_pretty(&summary).map_err(Failure::run)?);
-    } else {
-        if summary.is_none() {
-            eprintln!("the run is not finished: the report shows what there is");
-        }
+    if !args.json {
         println!("{}", html.display());
+        return Ok(());
     }
+    let shown = match &summary {
+        Some(summary) => serde_json::to_value(summary).map_err(Failure::run)?,
+        None => serde_json::json!({ "study": data.study, "finished": false, "warnings": data.warnings }),
+    };
+    println!("{shown:#}");
     Ok(())
 }

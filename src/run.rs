@@ -21,10 +21,10 @@ use crate::progress::Display;
 pub(crate) struct Args {
     /// The study file.
     study: PathBuf,
-    /// Run folder; runs/<name>-<time> without it.
+    /// Run folder; runs/NAME-TIME without it.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Number of local worker processes; the study's [fleet] workers without it.
+    /// Number of local worker processes; what the study says (fleet.workers) without it.
     #[arg(long, value_name = "N", conflicts_with = "listen")]
     workers: Option<usize>,
     /// Wait for workers to dial this address (HOST:PORT, port 0 picks a free one) instead of starting local ones.

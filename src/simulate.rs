@@ -13,7 +13,7 @@ use crate::failure::Failure;
 pub(crate) struct Args {
     /// The study file.
     study: PathBuf,
-    /// A parameter, constant or initial:<state> value; may be repeated. The rest stands at its prior median.
+    /// A parameter, constant or initial:STATE value; may be repeated. The rest stands at its prior median.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = assignment)]
     set: Vec<(String, f64)>,
     /// Amplitude of an effect of the study or of the built-in list; may be repeated.

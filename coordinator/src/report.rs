@@ -18,7 +18,7 @@ mod sample;
 mod tests;
 
 pub use data::ReportData;
-pub use files::{FilesError, write_files};
+pub use files::{FilesError, write_files, write_page};
 pub use overview::overview_svg;
 
 /// Why a report could not be made.

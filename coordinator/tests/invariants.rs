@@ -2,19 +2,19 @@
 #![allow(clippy::unwrap_used)]
 mod study_kit;
 
-use std::path::PathBuf;
+use std::fmt::Write as _;
 
 use starlings_coordinator::fleet::InProcess;
 use study_kit::fleets::{Mortal, Shuffled};
 use study_kit::{Case, Done, csv, grid, linear, normals};
 
-/// An arterial pressure over 16 samples, from a two-parameter Windkessel whose start is not known.
+/// An arterial pressure over 11 samples, from a two-parameter Windkessel whose start is not known.
 fn aorta(seed: u64, offset: f64) -> String {
-    let times = grid(16, 0.05);
+    let times = grid(11, 0.08);
     let flow: Vec<f64> = times.iter().map(|t| 60.0 * (8.0 * t).sin().max(0.0)).collect();
-    let noise = normals(16, seed);
+    let noise = normals(11, seed);
     let pressure: Vec<f64> =
-        (0..16).map(|i| 80.0 + offset + 0.3 * flow[i] - 10.0 * times[i] + noise[i]).collect();
+        (0..11).map(|i| 80.0 + offset + 0.3 * flow[i] - 10.0 * times[i] + noise[i]).collect();
     csv("time,pressure,flow", &[&times, &pressure, &flow])
 }
 
@@ -44,14 +44,16 @@ prior = { transform = "linear", median_from = "pressure", sd = 10.0 }
     let mut files = Vec::new();
     let file_names = ["one.csv", "two.csv", "three.csv"];
     for i in 0..records {
-        let train = [0.8, 0.55, 0.4][i];
-        text.push_str(&format!(
+        let train = [0.8, 0.6, 0.4][i];
+        write!(
+            text,
             "[[records]]\nname = \"{}\"\nfile = \"{}\"\ninputs = {{ flow = \"flow\" }}\nevery = {}\n\
              channels = [ {{ column = \"pressure\", output = \"pressure\", noise = 2.0 }} ]\ntrain = [0.0, {train}]\n",
             names[i],
             file_names[i],
             1 + i
-        ));
+        )
+        .unwrap();
         files.push((file_names[i], aorta(i as u64, 5.0 * i as f64)));
     }
     text.push_str("[estimator]\n");
@@ -94,7 +96,7 @@ fn essence(done: &Done) -> String {
 #[test]
 fn the_number_of_threads_and_the_order_of_computing_do_not_change_a_byte() {
     for (name, case) in cases() {
-        let reference = case.run_on(&mut InProcess::new(1)).unwrap();
+        let reference = case.run_on(&mut InProcess::new(1)).unwrap_or_else(|e| panic!("{name}: {e}"));
         let runs = &reference.summary.runs;
         for threads in [2, 5] {
             let again = case.run_on(&mut InProcess::new(threads)).unwrap();
@@ -109,29 +111,32 @@ fn the_number_of_threads_and_the_order_of_computing_do_not_change_a_byte() {
 }
 
 /// Runs until the fleet dies after so many calls, then to the end on another fleet.
-fn interrupted(case: &Case, calls: usize) -> (PathBuf, Done) {
+fn interrupted(case: &Case, calls: usize) -> Done {
     let path = case.fresh();
     let error = case.go(&path, &mut Mortal::new(calls)).err().unwrap();
     assert!(error.to_string().contains("cancelled"), "{error}");
-    let done = case.go(&path, &mut InProcess::new(2)).unwrap_or_else(|e| panic!("{calls} calls: {e}"));
-    (path, done)
+    case.go(&path, &mut InProcess::new(2)).unwrap_or_else(|e| panic!("{calls} calls: {e}"))
 }
 
 #[test]
 fn a_run_interrupted_at_any_call_and_continued_ends_with_the_same_bytes() {
-    for (name, case) in cases() {
-        let mut whole = Mortal::new(usize::MAX);
-        let reference = case.run_on(&mut whole).unwrap();
-        for calls in 0..whole.answered {
-            let (_, done) = interrupted(&case, calls);
-            assert!(
-                essence(&done) == essence(&reference),
-                "{name}, interrupted after {calls} calls\n{}\n{}",
-                done.csv,
-                reference.csv
-            );
-            assert_eq!(done.summary.runs, reference.summary.runs, "{name}, interrupted after {calls} calls");
+    // Hundreds of databases are made and closed, which is waiting for the disk: the cases wait together.
+    std::thread::scope(|scope| {
+        for (name, case) in cases() {
+            scope.spawn(move || interrupt_everywhere(name, &case));
         }
+    });
+}
+
+fn interrupt_everywhere(name: &str, case: &Case) {
+    let mut whole = Mortal::new(usize::MAX);
+    let reference = case.run_on(&mut whole).unwrap_or_else(|e| panic!("{name}: {e}"));
+    assert!(whole.answered > 3, "{name}: {} calls", whole.answered);
+    for calls in 0..whole.answered {
+        let done = interrupted(case, calls);
+        let (again, before) = (essence(&done), essence(&reference));
+        assert!(again == before, "{name}, interrupted after {calls} calls: {} {}", done.csv, reference.csv);
+        assert_eq!(done.summary.runs, reference.summary.runs, "{name}, interrupted after {calls} calls");
     }
 }
 
@@ -143,16 +148,17 @@ fn a_run_that_is_killed_at_every_analysis_still_ends_with_the_same_bytes() {
     // Two calls are one analysis: the ensemble, and its second observation after resampling.
     let lives = (1..200).find_map(|life| case.go(&path, &mut Mortal::new(2)).ok().map(|done| (life, done)));
     let (lives, done) = lives.unwrap();
-    assert!(lives > 20, "{lives}");
+    assert!(lives > 15, "{lives}");
     assert!(essence(&done) == essence(&reference));
 }
 
 /// A study with a held-out span, record and channel; the numbers are those of the held-out values.
 fn with_secrets(estimator: &str, span: f64, record: f64, channel: f64) -> Done {
     let (times, z) = linear::data(40, 3);
-    let one: Vec<f64> = (0..40).map(|i| if i < 5 || i > 24 { span + z[i] } else { z[i] }).collect();
+    let one: Vec<f64> = (0..40).map(|i| if (5..=24).contains(&i) { z[i] } else { span + z[i] }).collect();
     let side: Vec<f64> = z.iter().map(|z| channel + 2.0 * z).collect();
-    let two: Vec<f64> = z.iter().map(|z| record + z).collect();
+    // The first value stays: a held-out record starts from it.
+    let two: Vec<f64> = times.iter().zip(&z).map(|(t, z)| record * t + z).collect();
     let study = linear::study_of(
         estimator,
         r#"
@@ -192,8 +198,11 @@ fn held_out_values_change_the_held_out_error_and_nothing_else() {
         for (span, record, channel) in [(50.0, 0.0, 0.0), (0.0, 70.0, 0.0), (0.0, 0.0, 90.0)] {
             let loud = with_secrets(estimator, span, record, channel);
             assert_eq!(loud.csv, calm.csv, "{estimator}: the posterior saw {span} {record} {channel}");
-            assert_eq!(loud.summary.fit.nis_per_observation, calm.summary.fit.nis_per_observation);
-            assert_eq!(loud.summary.fit.log_likelihood, calm.summary.fit.log_likelihood);
+            let figures = |done: &Done| {
+                let fit = &done.summary.fit;
+                [fit.nis_per_observation, fit.log_likelihood].map(f64::to_bits)
+            };
+            assert_eq!(figures(&loud), figures(&calm));
             assert_eq!(fit(&loud, 0).train_rmse, fit(&calm, 0).train_rmse);
             let touched = usize::from(channel > 0.0);
             let rmse = fit(&loud, touched).held_out_rmse.unwrap();

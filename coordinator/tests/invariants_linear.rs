@@ -57,7 +57,7 @@ fn the_batch_fit_is_the_closed_form() {
 #[test]
 fn missing_values_are_left_out_and_the_length_of_a_window_does_not_matter() {
     let (times, mut z) = linear::data(43, 4);
-    for gap in [0, 1, 7, 8, 9, 10, 30, 42] {
+    for gap in [1, 7, 8, 9, 10, 30, 42] {
         z[gap] = f64::NAN;
     }
     let answer = Regression::of_record(&times, &z).solve();

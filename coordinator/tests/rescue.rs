@@ -84,21 +84,21 @@ fn line(estimator: &str) -> Case {
     Case::new(&linear::study(estimator), &[("line.csv", linear::file(&times, &z))])
 }
 
-fn assert_same(a: &Done, b: &Done, what: &str) {
+fn assert_same(a: &Done, b: &Done, passes: usize, what: &str) {
     let worst = a.summary.parameters.iter().zip(&b.summary.parameters).fold(0.0_f64, |worst, (a, b)| {
         worst.max((a.estimate - b.estimate).abs() / b.sd).max((a.sd / b.sd - 1.0).abs())
     });
-    // The regression is exact for a linear model at any distance: roundings and the integrator remain.
-    assert!(worst < 1e-8, "{what}: {worst:e}");
+    // The regression is exact for a linear model at any distance: roundings remain. A second pass takes its tight prior
+    // out again, which costs the digits by which that prior outweighs the data.
+    assert!(worst < if passes == 1 { 1e-8 } else { 1e-6 }, "{what}: {worst:e}");
     let (a, b) = (a.summary.fit.log_likelihood, b.summary.fit.log_likelihood);
     assert!((a - b).abs() < 1e-7 * b.abs(), "{what}: {a} {b}");
 }
 
 #[test]
 fn a_linear_model_gives_the_same_posterior_with_and_without_a_pulled_point() {
-    for estimator in
-        ["passes = 1", "passes = 2", "passes = 1\npoints = \"star\"", "passes = 2\npoints = \"canonical\""]
-    {
+    for (passes, points) in [(1, "simplex"), (2, "simplex"), (1, "star"), (2, "canonical")] {
+        let estimator = &format!("passes = {passes}\npoints = \"{points}\"");
         let case = line(estimator);
         let whole = case.run_on(&mut InProcess::new(1)).unwrap();
         for (particle, step) in [(0, 0), (1, 4), (3, 12)] {
@@ -110,7 +110,7 @@ fn a_linear_model_gives_the_same_posterior_with_and_without_a_pulled_point() {
                 here
             });
             let pulled = case.run_on(&mut fleet).unwrap();
-            assert_same(&pulled, &whole, &format!("{estimator}, particle {particle} at {step}"));
+            assert_same(&pulled, &whole, passes, &format!("{estimator}, particle {particle} at {step}"));
             assert_eq!((pulled.summary.runs.rescued, pulled.summary.runs.failed), (1, 2));
             assert!(pulled.warns("1 sigma point"), "{:?}", pulled.summary.warnings);
             let lost: f64 = pulled
@@ -128,7 +128,7 @@ fn several_failing_points_of_one_ensemble_are_pulled_one_by_one() {
     let whole = case.run_on(&mut InProcess::new(1)).unwrap();
     let mut fleet = Failing::new(|at: &At<'_>| at.ensemble == 3 && at.job.particle != 2 && !at.again);
     let pulled = case.run_on(&mut fleet).unwrap();
-    assert_same(&pulled, &whole, "three of four points");
+    assert_same(&pulled, &whole, 1, "three of four points");
     assert_eq!(pulled.summary.runs.rescued, 3);
 }
 
@@ -138,7 +138,7 @@ fn a_star_drops_a_centre_that_never_runs_and_goes_on() {
     let whole = case.run_on(&mut InProcess::new(1)).unwrap();
     let mut fleet = Failing::new(|at: &At<'_>| at.job.particle == 6);
     let dropped = case.run_on(&mut fleet).unwrap();
-    assert_same(&dropped, &whole, "no centre");
+    assert_same(&dropped, &whole, 2, "no centre");
     assert_eq!(dropped.summary.runs.rescued, 40, "twenty analyses in two passes");
     assert!(dropped.warns("pulled towards the mean or dropped"));
 }
@@ -149,7 +149,7 @@ fn a_star_goes_on_without_one_arm() {
     let whole = case.run_on(&mut InProcess::new(1)).unwrap();
     let mut fleet = Failing::new(|at: &At<'_>| at.job.particle == 1 && at.ensemble % 3 == 1);
     let dropped = case.run_on(&mut fleet).unwrap();
-    assert_same(&dropped, &whole, "one arm less");
+    assert_same(&dropped, &whole, 1, "one arm less");
     assert!(dropped.summary.runs.rescued > 3);
 }
 
@@ -174,6 +174,8 @@ fn a_model_that_always_fails_ends_the_run_and_says_why() {
     for estimator in ["passes = 1", "points = \"star\"", "kind = \"batch\""] {
         let error = line(estimator).run_on(&mut Failing::new(|_: &At<'_>| true)).err().unwrap();
         let text = error.to_string();
-        assert!(text.contains("made to fail") || text.contains("prior mean"), "{estimator}: {text}");
+        let words =
+            if estimator.contains("batch") { "cannot be run at the prior mean" } else { "made to fail" };
+        assert!(text.contains(words), "{estimator}: {text}");
     }
 }

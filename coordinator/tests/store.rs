@@ -62,7 +62,8 @@ fn the_batch_fit_has_a_row_per_ensemble() {
 #[test]
 fn the_summary_that_is_read_back_is_the_summary_that_was_made() {
     for estimator in ["passes = 2", "kind = \"batch\"", "points = \"star\""] {
-        let done = line(estimator).run();
+        let case = line(estimator);
+        let done = case.run();
         let text = done.folder.store.meta("summary").unwrap().unwrap();
         assert_eq!(serde_json::from_str::<Summary>(&text).unwrap(), done.summary);
         let again = RunFolder::open(&done.folder.path).unwrap();

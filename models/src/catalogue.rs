@@ -32,7 +32,9 @@ pub fn specs() -> Vec<Spec> {
 /// When the kind is unknown, equations are missing or given for another kind, or they are wrong.
 pub fn build(def: &ModelDef) -> Result<Box<dyn Model>, SetupError> {
     match (&def.equations, def.kind == EQUATIONS) {
-        (Some(equations), true) => return Ok(Box::new(EquationsModel::new(equations)?)),
+        (Some(equations), true) => {
+            return Ok(Box::new(EquationsModel::with_constants(equations, &def.constants)?));
+        }
         (None, true) => {
             let message = "model kind `equations` needs its states: give at least one, with a rate";
             return Err(SetupError::Invalid(message.to_owned()));

@@ -2,11 +2,13 @@
 //!
 //! At amplitude zero it is absent. It may enter several equations, outputs and inputs at once, carry several parameters and
 //! bring states of its own. Nothing here decides which effect a recording needs. Next file to read: [`def`] for what a study
-//! says, [`terms`] for how it is evaluated, [`extended`] for the model with its effects, [`mod@library`] for the built-in list.
+//! says, [`scope`] for what its terms may name, [`terms`] for how it is evaluated, [`extended`] for the model with its
+//! effects, [`mod@library`] for the built-in list.
 
 pub mod def;
 pub mod extended;
 pub mod library;
+pub mod scope;
 mod scratch;
 pub mod terms;
 
@@ -15,8 +17,8 @@ use crate::Drive;
 pub use def::{Addition, EffectDef, EffectParameter, EffectState};
 pub use extended::Extended;
 pub use library::library;
+pub(crate) use scope::names;
 pub use terms::TermEffect;
-pub(crate) use terms::names;
 
 /// One time of an extended model. Slices follow the extended specification; `y` holds the inner model's outputs without any
 /// effect, and is empty unless [`Touches::reads_outputs`].

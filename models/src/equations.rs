@@ -15,6 +15,7 @@ mod calculus;
 pub(crate) mod check;
 mod compile;
 pub mod def;
+pub(crate) mod dimension;
 mod dual;
 pub mod expression;
 mod inline;
@@ -23,6 +24,7 @@ mod node;
 mod parse;
 mod parsed;
 mod program;
+mod reach;
 
 pub use def::{EquationsDef, InputDef, Method, OutputDef, SolverDef, StateDef};
 pub use expression::{At, Direction, Expression, ExpressionError, Program, Slot};

@@ -4,11 +4,13 @@
 //! built-in models, [`crate::equations`] for models written in a study.
 
 use crate::integrate::{self, Solver};
+use crate::memory::Memory;
 use crate::{ParticleError, Spec};
 
-/// Access to input signals at other times than now, for delays.
+/// Access to input signals, and to what the model remembers of itself, at other times than now.
 pub trait History {
-    /// Value of input `index` at time `t`; before the first sample, the first sample's value.
+    /// Value of input `index` at time `t`; before the first sample, the first sample's value. Indices beyond the inputs are
+    /// the model's memories; NaN for a time that they do not reach.
     fn at(&self, index: usize, t: f64) -> f64;
 }
 
@@ -97,6 +99,17 @@ pub trait Model: Send + Sync {
     ) -> bool {
         let _ = (t, x, theta, u, dfdx, dfdt);
         false
+    }
+
+    /// What the model remembers of itself. The past of memory i is input `n_input + i` of [`Drive::history`]; whoever runs
+    /// the model keeps it.
+    fn memories(&self) -> &[Memory] {
+        &[]
+    }
+
+    /// Writes the present value of each of [`Model::memories`].
+    fn remembered(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, values: &mut [f64]) {
+        let _ = (t, x, theta, u, values);
     }
 
     /// Advances `x` over one segment. The default integrates [`Model::rhs`] as [`Model::solver`] says; a model with a

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectDef, Extended, library};
 use crate::equations::EquationsDef;
+use crate::memory::with_memories;
 use crate::{Forward, Model, Simulator, Spec, catalogue};
 
 /// The model by kind, with the values that are not estimated.
@@ -56,12 +57,13 @@ impl Setup {
         Ok(Box::new(Simulator::new(self)?))
     }
 
-    /// What the model says of itself, effects included; parameters, outputs and observer are not looked at.
+    /// What the model says of itself, effects and memories included; parameters, outputs and observer are not looked at.
     ///
     /// # Errors
     /// When the model or an effect does not build.
     pub fn spec(&self) -> Result<Spec, SetupError> {
-        Ok(self.model()?.spec().clone())
+        let model = self.model()?;
+        Ok(with_memories(model.spec(), model.memories()))
     }
 
     /// The model with its effects.

@@ -7,13 +7,18 @@
 use crate::binding::Binding;
 use crate::effect;
 use crate::inputs::Inputs;
+use crate::memory::with_memories;
+use crate::model::Segment;
 use crate::observer::{self, Correction, Observer, Wiring};
+use crate::past::Past;
 use crate::setup::{Setup, SetupError};
-use crate::{Forward, Job, Model, ParticleError, Prediction, Quantity, Spec, Window, nearest};
+use crate::{Drive, Forward, Job, Model, ParticleError, Prediction, Spec, Window, nearest};
 
 /// A model, its observer, and the way from a job's values to its parameters.
 pub struct Simulator {
     model: Box<dyn Model>,
+    /// The model's specification, with its memories as states.
+    spec: Spec,
     observer: Box<dyn Observer>,
     binding: Binding,
     /// For each predicted row, the output component behind it.
@@ -27,26 +32,51 @@ impl Simulator {
     /// When a name is unknown (with the nearest valid one), given twice or without value, or an expression is wrong.
     pub fn new(setup: &Setup) -> Result<Self, SetupError> {
         let model = setup.model()?;
-        let spec = model.spec();
-        let rows = rows(spec, &setup.outputs)?;
-        let binding = Binding::new(setup, spec, &free_names(setup, spec)?)?;
-        let observer = observer::build(&setup.observer, Wiring { spec, outputs: &setup.outputs })?;
-        Ok(Self { model, observer, binding, rows })
+        let spec = with_memories(model.spec(), model.memories());
+        let rows = rows(&spec, &setup.outputs)?;
+        let binding = Binding::new(setup, &spec, &free_names(setup, &spec)?)?;
+        let observer = observer::build(&setup.observer, Wiring { spec: &spec, outputs: &setup.outputs })?;
+        Ok(Self { model, spec, observer, binding, rows })
     }
 
-    /// The state at the window's start.
-    fn start(&self, job: &Job, theta: &[f64]) -> Result<Vec<f64>, ParticleError> {
-        let n = self.spec().n_state();
+    /// The model's state at the window's start, and the past that led to it.
+    fn start<'a>(
+        &self,
+        job: &'a Job,
+        theta: &[f64],
+        u: Drive<'_>,
+    ) -> Result<(Vec<f64>, Past<'a>), ParticleError> {
+        let (window, model) = (&*job.window, &*self.model);
         if let Some(x) = &job.state {
+            let n = self.spec.n_state();
             if x.len() != n {
                 return Err(bad(format!("{} state values for a model of {n}", x.len())));
             }
-            return Ok(x.clone());
+            self.check_finite(window.start, &[], x, &[])?;
+            let mut x = x.clone();
+            let past = Past::resumed(model, window, &mut x);
+            return Ok((x, past));
         }
-        let mut x = vec![0.0; n];
-        self.model.initial(theta, &mut x);
+        let mut x = vec![0.0; model.spec().n_state()];
+        model.initial(theta, &mut x);
         self.binding.initial(&job.theta, &mut x);
-        Ok(x)
+        self.check_finite(window.start, &[], &x, &[])?;
+        let past = Past::constant(model, window, u, theta, &x);
+        Ok((x, past))
+    }
+
+    /// Advances the model over one segment, and what it remembers with it.
+    fn advance(
+        &self,
+        past: &mut Past<'_>,
+        segment: Segment<'_>,
+        theta: &[f64],
+        x: &mut [f64],
+    ) -> Result<(), ParticleError> {
+        if self.model.memories().is_empty() {
+            return self.model.advance(segment, theta, x);
+        }
+        past.advance(&*self.model, segment, theta, x)
     }
 
     /// Refuses a job whose lengths or times do not fit.
@@ -93,23 +123,22 @@ impl Simulator {
 
 impl Forward for Simulator {
     fn spec(&self) -> &Spec {
-        self.model.spec()
+        &self.spec
     }
 
     fn run(&self, job: &Job) -> Result<Prediction, ParticleError> {
         self.check(job)?;
         let window = &*job.window;
         let theta = self.binding.theta(&job.theta, window.start)?;
-        let mut x = self.start(job, &theta)?;
-        self.check_finite(window.start, &[], &x, &[])?;
-        let mut y = vec![0.0; self.spec().n_output()];
-        let mut outputs = Vec::with_capacity(window.observed.len());
         let mut inputs = Inputs::new(window);
+        let (mut x, mut past) = self.start(job, &theta, inputs.drive(window.start))?;
+        let mut y = vec![0.0; self.spec.n_output()];
+        let mut outputs = Vec::with_capacity(window.observed.len());
         let n_obs = self.rows.len();
         let mut previous = window.start;
         for (j, &t) in window.times.iter().enumerate() {
-            inputs.walk(previous, t, |segment| self.model.advance(segment, &theta, &mut x))?;
-            let drive = inputs.drive(t);
+            inputs.walk(previous, t, |segment| self.advance(&mut past, segment, &theta, &mut x))?;
+            let drive = Drive { history: &past, ..inputs.drive(t) };
             self.model.output(t, &x, &theta, drive, &mut y);
             self.check_finite(t, drive.value, &x, &y)?;
             outputs.extend(self.rows.iter().map(|&row| y[row]));
@@ -121,6 +150,7 @@ impl Forward for Simulator {
             }
             previous = t;
         }
+        past.store(previous, &mut x);
         // An observer moves the state after the last check.
         self.check_finite(previous, &[], &x, &[])?;
         Ok(Prediction { outputs, state: x, cost: 0.0 })
@@ -175,6 +205,7 @@ fn rows(spec: &Spec, outputs: &[String]) -> Result<Vec<usize>, SetupError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Quantity;
 
     #[test]
     fn a_field_takes_one_row_per_component_and_is_named_with_its_index() {

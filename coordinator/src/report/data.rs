@@ -38,7 +38,7 @@ pub struct ReportData {
     pub correlation: Vec<Vec<f64>>,
     /// One per parameter: how its estimate moved during the run.
     pub tracks: Vec<Track>,
-    /// What the horizontal axis of the tracks is, with its unit: "time [s]" or "iteration".
+    /// What the horizontal axis of the tracks is, with its unit: `time [s]` or `iteration`.
     pub x_label: String,
     /// One per record and observed output.
     pub channels: Vec<ChannelPlot>,

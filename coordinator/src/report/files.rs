@@ -38,13 +38,26 @@ pub fn write_files(folder: &RunFolder) -> Result<(), FilesError> {
         let text = format!("the run in {} is not finished: continue it with --resume", folder.path.display());
         return Err(StoreError::Unusable(text).into());
     };
-    let page = render(&reader::report_data(&folder.store)?)?;
+    write_page(folder)?;
     let posterior = folder.store.meta("posterior")?.unwrap_or_default();
     let summary =
         serde_json::to_string_pretty(&summary).map_err(|e| folder.store.damaged("summary", e))? + "\n";
-    for (name, text) in [("posterior.csv", posterior), ("summary.json", summary), ("report.html", page)] {
-        let path = folder.path.join(name);
-        write(&path, &text).map_err(|source| FilesError::File { path, source })?;
+    for (name, text) in [("posterior.csv", posterior), ("summary.json", summary)] {
+        place(folder, name, &text)?;
     }
     Ok(())
+}
+
+/// Writes `report.html`, of a run that is not finished with what there is.
+///
+/// # Errors
+/// When the store is damaged or the file cannot be written.
+pub fn write_page(folder: &RunFolder) -> Result<(), FilesError> {
+    let page = render(&reader::report_data(&folder.store)?)?;
+    place(folder, "report.html", &page)
+}
+
+fn place(folder: &RunFolder, name: &str, text: &str) -> Result<(), FilesError> {
+    let path = folder.path.join(name);
+    write(&path, text).map_err(|source| FilesError::File { path, source })
 }

@@ -59,9 +59,11 @@ fn at_place(value: f64, place: i32) -> String {
     }
     let exponent = if value.abs() > 0.0 { value.abs().log10().floor() as i32 } else { place.max(0) };
     if exponent >= 5 && (place > 0 || exponent >= 7) || exponent < -4 {
-        let mantissa = value / 10f64.powi(exponent);
         let decimals = (exponent - place).clamp(0, 12) as usize;
-        return format!("{}×10{}", minus(&format!("{mantissa:.decimals$}")), superscript(exponent));
+        // Rounding may carry into the exponent (9.99 to 10), and 10^exponent may underflow: the formatter knows both.
+        let text = format!("{value:.decimals$e}");
+        let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+        return format!("{}×10{}", minus(mantissa), superscript(exponent));
     }
     if place > 0 {
         let unit = 10f64.powi(place);
@@ -79,7 +81,7 @@ fn minus(text: &str) -> String {
     }
 }
 
-fn superscript(exponent: i32) -> String {
+fn superscript(exponent: &str) -> String {
     let digit = |c| match c {
         '-' => '⁻',
         '0' => '⁰',
@@ -93,7 +95,7 @@ fn superscript(exponent: i32) -> String {
         '8' => '⁸',
         _ => '⁹',
     };
-    exponent.to_string().chars().map(digit).collect()
+    exponent.chars().map(digit).collect()
 }
 
 #[cfg(test)]
@@ -116,6 +118,13 @@ mod tests {
         assert_eq!(with_sd(f64::INFINITY, f64::NAN), ABSENT);
         assert_eq!(duration(f64::NAN), ABSENT);
         assert_eq!(with_sd(-0.001, 1.0), "0.0");
+    }
+
+    #[test]
+    fn the_smallest_and_the_largest_numbers_are_written_as_they_are() {
+        assert_eq!(significant(f64::from_bits(1), 2), "4.9×10⁻³²⁴");
+        assert_eq!(significant(f64::MAX, 3), "1.80×10³⁰⁸");
+        assert_eq!(significant(-9.999e-7, 2), "−1.0×10⁻⁶");
     }
 
     #[test]

@@ -85,7 +85,7 @@ type EstimateAt = (String, usize, f64, f64, f64, f64);
 fn tracks(store: &Store, info: &StudyInfo, summary: Option<&Summary>) -> Result<Vec<Track>, StoreError> {
     let rows: Vec<EstimateAt> = store.rows(
         "SELECT e.parameter, e.pass, a.time, e.estimate, e.lo, e.hi FROM estimates e
-         JOIN analyses a ON a.pass = e.pass AND a.step = e.step ORDER BY e.pass, e.step",
+         JOIN analyses a ON a.pass = e.pass AND a.step = e.step ORDER BY e.pass, e.step, e.rowid",
         |r| Ok((r.get(0)?, r.get(1)?, r.get(2)?, r.get(3)?, r.get(4)?, r.get(5)?)),
     )?;
     let mut tracks: Vec<Track> = Vec::new();
@@ -223,10 +223,9 @@ fn fleet(store: &Store, summary: Option<&Summary>) -> Result<FleetTable, StoreEr
             Ok((r.get(0)?, r.get(1)?, r.get(2)?))
         })?;
     for (name, done, cost) in &jobs {
-        let host = name.split(':').next().unwrap_or_default().to_owned();
         let row = workers.entry(name.clone()).or_insert_with(|| WorkerRow {
             name: name.clone(),
-            host,
+            host: host_of(name).to_owned(),
             ..WorkerRow::default()
         });
         row.jobs += 1;
@@ -237,6 +236,7 @@ fn fleet(store: &Store, summary: Option<&Summary>) -> Result<FleetTable, StoreEr
         }
     }
     for row in workers.values_mut() {
+        row.busy_share = summary.map(|s| row.mean_s / s.wall_s);
         row.mean_s /= row.jobs as f64;
     }
     let events = store.rows("SELECT at_s, text FROM events ORDER BY id", |r| {
@@ -252,6 +252,12 @@ fn fleet(store: &Store, summary: Option<&Summary>) -> Result<FleetTable, StoreEr
         time_per_run: run_times(costs),
         events,
     })
+}
+
+/// The host in a worker's name, `number@host/process`.
+fn host_of(worker: &str) -> &str {
+    let after = worker.split_once('@').map_or(worker, |(_, rest)| rest);
+    after.rsplit_once('/').map_or(after, |(host, _)| host)
 }
 
 /// Quantiles and histogram of the run times; `None` when nothing was timed.

@@ -8,6 +8,7 @@ mod model;
 mod parameters;
 mod prior;
 mod settings;
+mod units;
 
 use std::path::Path;
 
@@ -49,6 +50,7 @@ pub(super) fn check(path: &Path, text: &str) -> Result<Study, StudyError> {
     source.verdict()?;
     model::check_build(&source, &file, &model.setup);
     source.verdict()?;
+    warnings.extend(units::warnings(&file, &model, &records));
     let theta = expand::theta(&parameters, &records);
     Ok(Study {
         file: path.to_owned(),

@@ -114,6 +114,8 @@ pub struct Channel {
     pub row: usize,
     /// Column of the record's file.
     pub column: String,
+    /// Unit label of its values where the study gives one; else the output's stands for it.
+    pub unit: Option<String>,
     /// Standard deviation of the noise, in the channel's unit.
     pub noise: f64,
     /// How that standard deviation was found.
@@ -161,11 +163,11 @@ pub struct EstimatorChoice {
 pub struct FleetChoice {
     /// Local worker processes.
     pub workers: usize,
-    /// Runs at a time per worker; `None` leaves it to the worker.
+    /// Runs at a time per local worker; `None` is one.
     pub slots: Option<usize>,
-    /// Seconds without a sign of life after which a worker counts as lost; `None` for the fleet's own default.
+    /// Seconds to wait while no worker can take a run; `None` for the fleet's own default.
     pub patience: Option<f64>,
-    /// Attempts per run before a particle counts as failed; `None` for the fleet's own default.
+    /// Workers that may be lost under one run before the study ends; `None` for the fleet's own default.
     pub max_attempts: Option<u32>,
 }
 

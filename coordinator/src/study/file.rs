@@ -149,6 +149,8 @@ pub(super) struct RecordSection {
 pub(super) struct ChannelSection {
     pub(super) column: Spanned<String>,
     pub(super) output: Spanned<String>,
+    /// Label of the column's values; the model's where it is not given.
+    pub(super) unit: Option<Spanned<String>>,
     /// Standard deviation in the channel's unit; `None` for `"auto"`.
     pub(super) noise: Spanned<Option<f64>>,
 }

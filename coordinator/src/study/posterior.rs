@@ -89,7 +89,8 @@ pub fn standard_deviations(gaussian: &Gaussian) -> Vec<f64> {
 }
 
 fn interval(transform: &Transform, mean: f64, half_width: f64) -> [f64; 2] {
-    [transform.to_physical(mean - half_width), transform.to_physical(mean + half_width)]
+    // An interval beyond the largest number ends there: infinity does not survive JSON.
+    [-half_width, half_width].map(|w| transform.to_physical(mean + w).clamp(f64::MIN, f64::MAX))
 }
 
 impl ThetaEntry {

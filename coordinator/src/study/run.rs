@@ -47,16 +47,6 @@ pub enum RunError {
         /// What the estimator advises.
         source: EstimatorError,
     },
-    /// A redrawn sigma point could not be observed.
-    #[error(
-        "sigma point {particle} has no prediction after resampling: {source}; set [estimator] resample = \"none\""
-    )]
-    Resampled {
-        /// Index of the sigma point.
-        particle: usize,
-        /// Why.
-        source: ParticleError,
-    },
     /// The model fails at the estimate itself.
     #[error("the model fails with the estimated parameters on record `{record}`: {source}")]
     FinalRun {

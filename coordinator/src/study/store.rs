@@ -8,6 +8,8 @@ pub mod folder;
 mod rows;
 mod schema;
 pub mod snapshot;
+#[cfg(test)]
+mod tests;
 
 use std::path::{Path, PathBuf};
 
@@ -52,6 +54,9 @@ fn remedy(source: &rusqlite::Error) -> &'static str {
         Some(rusqlite::ErrorCode::DatabaseBusy | rusqlite::ErrorCode::DatabaseLocked) => {
             "; another process is using this run folder"
         }
+        Some(rusqlite::ErrorCode::SystemIoFailure) => {
+            "; the disk failed or is full: see that it has space and continue with --resume, every finished analysis is kept"
+        }
         Some(rusqlite::ErrorCode::ReadOnly | rusqlite::ErrorCode::CannotOpen) => {
             "; check that the folder exists and may be written"
         }
@@ -66,25 +71,59 @@ pub struct Store {
 }
 
 impl Store {
-    /// Makes the database of a new run.
+    /// Makes the database of a new run with its first named values, all or nothing.
     ///
     /// # Errors
-    /// When the file exists or cannot be written.
-    pub fn create(path: &Path) -> Result<Self, StoreError> {
+    /// When the file exists or cannot be written; a file begun is removed.
+    pub fn create(path: &Path, meta: &[(&str, &str)]) -> Result<Self, StoreError> {
         if path.exists() {
             return Err(StoreError::Unusable(format!("{} already holds a run", path.display())));
         }
-        let store = Self::connect(path, rusqlite::OpenFlags::default())?;
-        store.guard(store.connection.execute_batch(SCHEMA))?;
-        store.guard(store.connection.pragma_update(None, "user_version", SCHEMA_VERSION))?;
+        let made = Self::make(path, meta);
+        if made.is_err() {
+            for ending in ["", "-wal", "-shm", "-journal"] {
+                // Already failing: what cannot be removed either stays.
+                let _ = std::fs::remove_file(format!("{}{ending}", path.display()));
+            }
+        }
+        made
+    }
+
+    fn make(path: &Path, meta: &[(&str, &str)]) -> Result<Self, StoreError> {
+        let mut store = Self::connect(path, rusqlite::OpenFlags::default())?;
+        store.keep_a_log()?;
+        let mut fill = || {
+            let transaction = store.connection.transaction()?;
+            transaction.execute_batch(SCHEMA)?;
+            transaction.pragma_update(None, "user_version", SCHEMA_VERSION)?;
+            for (key, value) in meta {
+                transaction.execute("INSERT INTO meta (key, value) VALUES (?1, ?2)", [key, value])?;
+            }
+            transaction.commit()
+        };
+        fill().map_err(|source| StoreError::Database { path: path.to_owned(), source })?;
         Ok(store)
     }
 
-    /// Opens the database of an existing run.
+    /// Opens the database of an existing run to continue it.
     ///
     /// # Errors
     /// When there is none or it was written by another version.
     pub fn open(path: &Path) -> Result<Self, StoreError> {
+        let store = Self::existing(path, rusqlite::OpenFlags::SQLITE_OPEN_READ_WRITE)?;
+        store.keep_a_log()?;
+        Ok(store)
+    }
+
+    /// Opens the database of an existing run to read it; the folder may be read-only.
+    ///
+    /// # Errors
+    /// When there is none or it was written by another version.
+    pub fn open_to_read(path: &Path) -> Result<Self, StoreError> {
+        Self::existing(path, rusqlite::OpenFlags::SQLITE_OPEN_READ_ONLY)
+    }
+
+    fn existing(path: &Path, flags: rusqlite::OpenFlags) -> Result<Self, StoreError> {
         if !path.is_file() {
             return Err(StoreError::Unusable(format!(
                 "no run in {}: expected the file {}",
@@ -92,7 +131,7 @@ impl Store {
                 path.display()
             )));
         }
-        let store = Self::connect(path, rusqlite::OpenFlags::SQLITE_OPEN_READ_WRITE)?;
+        let store = Self::connect(path, flags)?;
         let version: i64 =
             store.guard(store.connection.pragma_query_value(None, "user_version", |row| row.get(0)))?;
         if version != SCHEMA_VERSION {
@@ -107,11 +146,21 @@ impl Store {
     fn connect(path: &Path, flags: rusqlite::OpenFlags) -> Result<Self, StoreError> {
         let connection = Connection::open_with_flags(path, flags)
             .map_err(|source| StoreError::Database { path: path.to_owned(), source })?;
-        let store = Self { path: path.to_owned(), connection };
-        // WAL with NORMAL keeps every committed transaction through a killed process at the price of one write each.
-        store.guard(store.connection.pragma_update(None, "journal_mode", "WAL"))?;
-        store.guard(store.connection.pragma_update(None, "synchronous", "NORMAL"))?;
-        Ok(store)
+        Ok(Self { path: path.to_owned(), connection })
+    }
+
+    /// WAL with NORMAL keeps every committed transaction through a killed process at the price of one write each.
+    fn keep_a_log(&self) -> Result<(), StoreError> {
+        self.guard(self.connection.pragma_update(None, "journal_mode", "WAL"))?;
+        self.guard(self.connection.pragma_update(None, "synchronous", "NORMAL"))
+    }
+
+    /// Folds the log into the one file, so that a finished run can be read from a read-only folder.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub fn close_log(&self) -> Result<(), StoreError> {
+        self.guard(self.connection.pragma_update(None, "journal_mode", "DELETE"))
     }
 
     pub(super) fn guard<T>(&self, result: rusqlite::Result<T>) -> Result<T, StoreError> {

@@ -2,12 +2,12 @@
 //!
 //! Warnings travel with the result into the summary, the report and the terminal. They never change a number.
 
-use starlings_estimators::{Transform, autocorrelation, nis_band};
+use starlings_estimators::{Drift, Transform, autocorrelation, nis_band};
 
 use super::posterior::{prior, standard_deviations};
 use super::store::PredictionRow;
 use super::summary::Summary;
-use super::{Fit, Study};
+use super::{EstimatorKind, Fit, Study};
 
 /// Correlation above which two parameters are reported as one combination.
 const CORRELATED: f64 = 0.95;
@@ -26,6 +26,7 @@ pub fn collect(study: &Study, fit: &Fit, summary: &Summary, predictions: &[Predi
     let mut warnings = study.warnings.clone();
     warnings.extend(nis(fit));
     warnings.extend(not_converged(fit));
+    warnings.extend(drift_ignored(study));
     warnings.extend(still_moving(fit));
     warnings.extend(free_run(fit, study, predictions));
     warnings.extend(autocorrelated(study, predictions));
@@ -73,6 +74,20 @@ fn still_moving(fit: &Fit) -> Option<String> {
     })
 }
 
+/// A whole-record run has one value of each parameter, however much it may drift.
+fn drift_ignored(study: &Study) -> Vec<String> {
+    let batch = study.estimator.kind == EstimatorKind::Batch;
+    let drifting = study.theta.iter().filter(|t| batch && !matches!(t.drift, Drift::None));
+    drifting
+        .map(|t| {
+            format!(
+                "the batch fit holds {} at one value for all times although the study lets it drift: use kind = \"roukf\".",
+                t.name
+            )
+        })
+        .collect()
+}
+
 /// Particles are linear mixtures of states after an analysis; a free run with the estimate shows what that cost.
 fn free_run(fit: &Fit, study: &Study, predictions: &[PredictionRow]) -> Option<String> {
     let train: Vec<&PredictionRow> = predictions.iter().filter(|p| p.usage == "train").collect();
@@ -80,7 +95,7 @@ fn free_run(fit: &Fit, study: &Study, predictions: &[PredictionRow]) -> Option<S
     let (sum, n) = whitened.fold((0.0, 0_u32), |(sum, n), w| (sum + w * w, n + 1));
     let free = sum / f64::from(n.max(1));
     let filtered = fit.nis_per_observation();
-    let drifting = study.theta.iter().any(|t| !matches!(t.drift, starlings_estimators::Drift::None));
+    let drifting = study.theta.iter().any(|t| !matches!(t.drift, Drift::None));
     (!drifting && study.observer_is_off() && free > (FREE_RUN_RATIO * FREE_RUN_RATIO * filtered).max(1.5)).then(|| {
         format!(
             "a free run with the estimate misses the training data by {:.1} times the noise, the filter by {:.1}: its \

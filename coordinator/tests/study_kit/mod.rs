@@ -7,7 +7,7 @@ pub mod rcr;
 
 use std::cell::Cell;
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -52,7 +52,7 @@ impl Case {
     }
 
     /// Starts a run, or continues one, and keeps whatever came of it.
-    pub fn go(&self, path: &PathBuf, fleet: &mut dyn Fleet) -> Result<Done, RunError> {
+    pub fn go(&self, path: &Path, fleet: &mut dyn Fleet) -> Result<Done, RunError> {
         let study = self.study();
         let mut folder = if path.exists() {
             RunFolder::resume(path, &study).unwrap()
@@ -71,7 +71,7 @@ impl Case {
 
     /// A run that must succeed, on two threads.
     pub fn run(&self) -> Done {
-        self.run_on(&mut InProcess::new(2)).unwrap_or_else(|error| panic!("{error}"))
+        self.run_on(&mut InProcess::new(2)).unwrap_or_else(|error| panic!("{error}\n{}", self.study().text))
     }
 }
 

@@ -7,14 +7,14 @@
 
 use std::collections::BTreeMap;
 
+use super::scope::{Reach, Scope, note_memories};
 use super::scratch::Scratch;
-use super::terms::Scope;
 use super::{Effect, EffectDef, Moment, TermEffect, Touches};
-use crate::equations::check;
+use crate::equations::{Slot, check};
 use crate::integrate::{self, Solver};
 use crate::model::{Drive, Segment};
 use crate::setup::SetupError;
-use crate::{Model, ParticleError, Quantity, Spec};
+use crate::{Memory, Model, ParticleError, Quantity, Spec};
 
 /// A model and the effects added to it.
 pub struct Extended {
@@ -25,6 +25,10 @@ pub struct Extended {
     /// State components and parameters of the inner model.
     n_state: usize,
     n_param: usize,
+    /// The inner model's memories, then those that only effects read.
+    memories: Vec<Memory>,
+    /// For each of the latter, the state or output that it remembers.
+    sources: Vec<Slot>,
 }
 
 impl Extended {
@@ -38,14 +42,21 @@ impl Extended {
         constants: &BTreeMap<String, f64>,
     ) -> Result<Self, SetupError> {
         let spec = extended_spec(inner.spec(), defs)?;
-        let scope = Scope { spec: &spec, constants };
+        let mut memories = inner.memories().to_vec();
+        let n_inner = memories.len();
+        for def in defs {
+            note_memories(def, Scope { spec: &spec, constants, memories: &[] }, &mut memories)?;
+        }
+        let scope = Scope { spec: &spec, constants, memories: &memories };
+        let sources =
+            memories[n_inner..].iter().filter_map(|memory| scope.slot(&memory.of, Reach::All)).collect();
         let mut effects: Vec<Box<dyn Effect>> = Vec::with_capacity(defs.len());
         for def in defs {
             effects.push(Box::new(TermEffect::new(def, scope)?));
         }
         let touches = effects.iter().fold(Touches::default(), |all, effect| all.or(effect.touches()));
         let (n_state, n_param) = (inner.spec().n_state(), inner.spec().parameters.len());
-        Ok(Self { inner, effects, spec, touches, n_state, n_param })
+        Ok(Self { inner, effects, spec, touches, n_state, n_param, memories, sources })
     }
 
     /// The inner model's outputs without any effect, where a term reads them.
@@ -146,6 +157,27 @@ impl Model for Extended {
             let (own, others) = rest.split_at_mut(effect.n_switch());
             effect.switches(at, own);
             rest = others;
+        }
+    }
+
+    fn memories(&self) -> &[Memory] {
+        &self.memories
+    }
+
+    fn remembered(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, values: &mut [f64]) {
+        let at = Moment { t, x, theta, u, y: &[] };
+        let plain = self.plain_outputs(at);
+        let at = Moment { y: plain.as_ref(), ..at };
+        let rate = self.rate_for_slopes(at);
+        let (inner, own) = values.split_at_mut(values.len() - self.sources.len());
+        let (inner_x, inner_theta) = (&x[..self.n_state], &theta[..self.n_param]);
+        self.with_inputs(at, rate.as_ref(), |u| self.inner.remembered(t, inner_x, inner_theta, u, inner));
+        for (value, source) in own.iter_mut().zip(&self.sources) {
+            *value = match *source {
+                Slot::State(i) => x[i],
+                Slot::Output(i) => at.y[i],
+                _ => f64::NAN,
+            };
         }
     }
 

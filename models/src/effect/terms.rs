@@ -1,12 +1,10 @@
 //! An effect evaluated by its compiled terms.
 //!
-//! Names are resolved against the extended model: its states, parameters, inputs and outputs, then the study's constants.
-//! Next file to read: [`super::extended`].
+//! Next file to read: [`super::scope`] for what its terms may name, then [`super::extended`].
 
-use std::collections::BTreeMap;
-
+use super::scope::{Reach, Scope, names};
 use super::{Addition, Effect, EffectDef, Moment, Touches};
-use crate::equations::expression::{At, Direction, Expression, ExpressionError, Program, Slot};
+use crate::equations::expression::{At, Direction, Program, Slot};
 use crate::model::Drive;
 use crate::setup::SetupError;
 use crate::{Quantity, Spec, nearest};
@@ -20,104 +18,6 @@ pub struct TermEffect {
     inputs: Vec<(usize, Program)>,
     initial: Vec<(usize, Program)>,
     switches: Vec<Program>,
-}
-
-/// What the expressions of an effect may name.
-#[derive(Clone, Copy)]
-pub struct Scope<'a> {
-    /// The model with the states and parameters of all effects.
-    pub spec: &'a Spec,
-    /// Fixed values that are no parameter of the model.
-    pub constants: &'a BTreeMap<String, f64>,
-}
-
-/// Which names an expression may use.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Reach {
-    /// Everything.
-    All,
-    /// Everything but outputs, which depend on the input that the term changes.
-    NoOutputs,
-    /// Parameters and constants.
-    Fixed,
-}
-
-impl Scope<'_> {
-    fn slot(self, name: &str, reach: Reach) -> Option<Slot> {
-        let scalar = |list: &[Quantity]| {
-            let q = list.iter().find(|q| q.name == name)?;
-            (q.size == 1).then(|| Spec::offset(list, name))?
-        };
-        let spec = self.spec;
-        let parameter = || spec.parameters.iter().position(|q| q.name == name).map(Slot::Parameter);
-        let constant = || self.constants.get(name).map(|&value| Slot::Constant(value));
-        if reach == Reach::Fixed {
-            return parameter().or_else(constant);
-        }
-        let output = || if reach == Reach::All { scalar(&spec.outputs).map(Slot::Output) } else { None };
-        scalar(&spec.states)
-            .map(Slot::State)
-            .or_else(parameter)
-            .or_else(|| scalar(&spec.inputs).map(Slot::Input))
-            .or_else(output)
-            .or_else(constant)
-    }
-
-    fn names(self, reach: Reach) -> Vec<String> {
-        let spec = self.spec;
-        let lists = [&spec.states, &spec.parameters, &spec.inputs, &spec.outputs];
-        let all = lists.into_iter().flatten().map(|q| q.name.clone());
-        all.chain(self.constants.keys().cloned()).filter(|name| self.slot(name, reach).is_some()).collect()
-    }
-
-    /// Compiles one expression; `place` says in an error where it stands.
-    fn compile(self, text: &str, reach: Reach, place: &str) -> Result<Program, SetupError> {
-        Expression::parse(text)
-            .and_then(|expression| self.program(&expression, reach))
-            .map_err(|error| located(place, text, error))
-    }
-
-    fn program(self, expression: &Expression, reach: Reach) -> Result<Program, ExpressionError> {
-        let resolve = |name: &str| self.slot(name, reach);
-        let close = |name: &str| nearest(name, self.names(reach));
-        expression.compile(&resolve, &close)
-    }
-
-    /// Compiles the switching functions of one expression.
-    fn switches(self, text: &str, place: &str) -> Result<Vec<Program>, SetupError> {
-        let compiled = || -> Result<Vec<Program>, ExpressionError> {
-            let functions = Expression::parse(text)?.discontinuities();
-            functions.iter().map(|g| self.program(g, Reach::All)).collect()
-        };
-        compiled().map_err(|error| located(place, text, error))
-    }
-}
-
-fn located(place: &str, text: &str, error: ExpressionError) -> SetupError {
-    SetupError::Expression {
-        place: place.to_owned(),
-        expression: text.to_owned(),
-        column: error.column,
-        message: error.message,
-    }
-}
-
-/// Every name that the expressions of these effects use.
-///
-/// # Errors
-/// When an expression does not parse.
-pub(crate) fn names(defs: &[EffectDef]) -> Result<Vec<String>, SetupError> {
-    let mut names = Vec::new();
-    for def in defs {
-        let place = format!("effect {}", def.name);
-        let terms = def.adds.iter().map(|a| &a.term);
-        let states = def.states.iter().flat_map(|s| [&s.rate, &s.initial]);
-        for text in terms.chain(states).filter(|text| !text.is_empty()) {
-            let expression = Expression::parse(text).map_err(|error| located(&place, text, error))?;
-            names.extend(expression.names().into_iter().map(|(name, _)| name));
-        }
-    }
-    Ok(names)
 }
 
 impl TermEffect {

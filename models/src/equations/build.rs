@@ -2,7 +2,8 @@
 //!
 //! Every fault names its place, column and remedy. Next file to read: [`super::model`], which runs the programs.
 
-use std::collections::BTreeSet;
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::affine;
 use super::check;
@@ -11,7 +12,9 @@ use super::expression::{Expression, Program, Slot};
 use super::inline::Names;
 use super::node::Node;
 use super::parsed::{Parsed, Placed, fault};
+use crate::bounds::unbounded;
 use crate::integrate::Solver;
+use crate::memory::{self, Memory};
 use crate::{Quantity, SetupError, Spec, nearest};
 
 /// Everything that a model of equations evaluates.
@@ -24,28 +27,41 @@ pub(super) struct Built {
     pub(super) depends: Vec<Vec<usize>>,
     pub(super) outputs: Vec<Program>,
     pub(super) switches: Vec<Program>,
+    pub(super) memories: Vec<Memory>,
+    /// For each memory, the state or output that it remembers.
+    pub(super) sources: Vec<Slot>,
     pub(super) solver: Solver,
 }
 
 /// Checks and compiles the equations.
-pub(super) fn build(def: &EquationsDef) -> Result<Built, SetupError> {
+pub(super) fn build(def: &EquationsDef, constants: &BTreeMap<String, f64>) -> Result<Built, SetupError> {
     check::names(def)?;
     check::terms(def)?;
     let solver = check::solver(&def.solver)?;
     let parsed = Parsed::new(def)?;
     let names = parsed.names(def);
     let parameters = parsed.parameters(&names);
+    let memories = RefCell::new(Vec::<Memory>::new());
     let resolve = |name: &str| {
         let parameter = || parameters.iter().position(|p| p == name).map(Slot::Parameter);
         let signal = || names.input(name).map(Slot::Input);
         // Outputs are rewritten into their values; one that is left stands under a `delay`.
         let output = || names.is_taken(name).then_some(Slot::Output(0));
+        if let Some(delayed) = name.strip_prefix("delay:") {
+            let i = memories.borrow().iter().position(|memory| memory.of == delayed)?;
+            return Some(Slot::Input(def.inputs.len() + i));
+        }
         names.state(name).map(Slot::State).or_else(signal).or_else(output).or_else(parameter)
     };
     let known = |name: &str| nearest(name, parameters.iter().map(String::as_str));
+    let kept = |name: &str| names.is_taken(name) && names.input(name).is_none();
+    let range = |name: &str| constants.get(name).map_or_else(unbounded, |value| [*value, *value]);
     let compile = |placed: &Placed| -> Result<(Expression, Program), SetupError> {
         let node = names.inline(placed.expression.node()).map_err(|e| placed.fault(e))?;
         let expression = placed.expression.derived(node);
+        for (name, longest) in expression.delays(&kept, &range).map_err(|e| placed.fault(e))? {
+            memory::note(&mut memories.borrow_mut(), &name, longest);
+        }
         let program = expression.compile(&resolve, &known).map_err(|e| placed.fault(e))?;
         Ok((expression, program))
     };
@@ -69,6 +85,7 @@ pub(super) fn build(def: &EquationsDef) -> Result<Built, SetupError> {
     let depends = rates.iter().map(|(e, _)| dependencies(e.node(), &names)).collect();
     let switches = switches(&rates, &names, &resolve)?;
     let spec = spec(def, &names, &parameters, &values);
+    let memories = memories.take();
     Ok(Built {
         spec,
         initial,
@@ -76,8 +93,16 @@ pub(super) fn build(def: &EquationsDef) -> Result<Built, SetupError> {
         depends,
         outputs: values.into_iter().map(|(_, p)| p).collect(),
         switches,
+        sources: memories.iter().map(|memory| source(&memory.of, def, &names)).collect(),
+        memories,
         solver,
     })
+}
+
+/// Where the value of a remembered name is found.
+fn source(name: &str, def: &EquationsDef, names: &Names<'_>) -> Slot {
+    let output = || def.outputs.iter().position(|o| o.name == name).unwrap_or_default();
+    names.state(name).map_or_else(|| Slot::Output(output()), Slot::State)
 }
 
 /// The states that a tree depends on.

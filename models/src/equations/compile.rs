@@ -125,14 +125,13 @@ impl Compiler<'_> {
                 let message = format!("`{}` is constant: `delay` needs an input or an output", name.text);
                 Err(ExpressionError::new(name.column, message))
             }
-            _ => (self.resolve)(&format!("delay:{}", name.text)).map(|slot| Tree::Leaf(source(slot))).ok_or_else(|| {
-                let message = format!(
-                    "`delay` is supported of inputs and of outputs without states, not of `{0}`: use a lag state \
-                     instead, with the rate `({0} - lag)/tau`",
-                    name.text
-                );
-                ExpressionError::new(name.column, message)
-            }),
+            _ => {
+                if let Some(Slot::Input(i)) = (self.resolve)(&format!("delay:{}", name.text)) {
+                    return Ok(make(i as u32, Box::new(self.resolved(tau)?)));
+                }
+                let message = format!("the past of `{}` is not known here", name.text);
+                Err(ExpressionError::new(name.column, message))
+            }
         }
     }
 

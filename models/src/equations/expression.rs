@@ -72,7 +72,8 @@ pub struct Direction<'a> {
 /// A parsed expression and its text.
 ///
 /// `+ - * / ^` with `-x^2 = -(x^2)` and `2^3^2 = 512`; comparisons, giving 1 or 0; `if(cond, a, b)`; `sin cos tan exp log
-/// sqrt abs sign min max tanh step`; `pi`, `t`; `delay(u, tau)` and `ddt(u)`. A negative `tau` reads ahead in an input.
+/// sqrt abs sign min max tanh step`; `pi`, `t`; `delay(u, tau)` and `ddt(u)`. A negative `tau` reads ahead in an input;
+/// of a state or output `tau` needs a bound, as in `delay(y, min(tau, 0.5))`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Expression {
     text: String,
@@ -110,7 +111,7 @@ impl Expression {
     ///
     /// `resolve` says where a name's value is, `nearest` offers a valid name for an unknown one. `ddt` of a name that is not
     /// an input asks `resolve` for `ddt:<name>`, and `delay` of one for `delay:<name>`, so that a model which keeps those
-    /// values can offer them.
+    /// values can offer them: the past as an input of [`At::u`]'s history, behind those that have a value.
     ///
     /// # Errors
     /// At the column of an unknown name, of a `ddt` or `delay` without value, and for expressions that nest too deep.

@@ -2,17 +2,20 @@
 //!
 //! It evaluates; [`crate::integrate`] integrates. Next file to read: [`crate::integrate`].
 
+use std::collections::BTreeMap;
+
 use super::build::{self, Built};
 use super::def::EquationsDef;
-use super::expression::{At, Direction, Program};
+use super::expression::{At, Direction, Program, Slot};
 use crate::integrate::Solver;
 use crate::model::Drive;
-use crate::{Model, SetupError, Spec, nearest};
+use crate::{Memory, Model, SetupError, Spec, nearest};
 
 /// A model whose equations a study states.
 #[derive(Clone, Debug)]
 pub struct EquationsModel {
     def: EquationsDef,
+    constants: BTreeMap<String, f64>,
     built: Built,
     /// n − 1 zeros and a one: its ends are the unit vectors.
     unit: Vec<f64>,
@@ -28,12 +31,21 @@ impl EquationsModel {
     /// [`SetupError::Expression`] with place and column, [`SetupError::Twice`], or [`SetupError::Invalid`] for a state
     /// without rate or initial value, an unusable name or an unusable solver.
     pub fn new(def: &EquationsDef) -> Result<Self, SetupError> {
-        let built = build::build(def)?;
+        Self::with_constants(def, &BTreeMap::new())
+    }
+
+    /// As [`EquationsModel::new`], for a study that fixes some parameters: a delay of a state or output by a constant needs
+    /// no other bound.
+    ///
+    /// # Errors
+    /// As [`EquationsModel::new`].
+    pub fn with_constants(def: &EquationsDef, constants: &BTreeMap<String, f64>) -> Result<Self, SetupError> {
+        let built = build::build(def, constants)?;
         let mut unit = vec![0.0; def.states.len()];
         if let Some(last) = unit.last_mut() {
             *last = 1.0;
         }
-        Ok(Self { def: def.clone(), built, unit })
+        Ok(Self { def: def.clone(), constants: constants.clone(), built, unit })
     }
 
     /// The same model with the named rate terms left out, wherever they occur; parameters that only they used are gone.
@@ -59,7 +71,7 @@ impl EquationsModel {
                 }
             }
         }
-        Self::new(&def)
+        Self::with_constants(&def, &self.constants)
     }
 
     /// The equations as stated.
@@ -101,6 +113,21 @@ impl Model for EquationsModel {
 
     fn switches(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, g: &mut [f64]) {
         write(&self.built.switches, &At { t, x, theta, u, y: &[] }, g);
+    }
+
+    fn memories(&self) -> &[Memory] {
+        &self.built.memories
+    }
+
+    fn remembered(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, values: &mut [f64]) {
+        let at = At { t, x, theta, u, y: &[] };
+        for (value, source) in values.iter_mut().zip(&self.built.sources) {
+            *value = match *source {
+                Slot::State(i) => x[i],
+                Slot::Output(i) => self.built.outputs[i].eval(&at),
+                _ => f64::NAN,
+            };
+        }
     }
 
     fn jacobian(

@@ -264,6 +264,10 @@ impl Reader for Values<'_, '_> {
     }
 
     fn delay(&self, input: usize, tau: f64) -> f64 {
+        // A record can be read ahead; what the run itself makes cannot.
+        if tau < 0.0 && input >= self.0.u.value.len() {
+            return f64::NAN;
+        }
         self.0.u.history.at(input, self.0.t - tau)
     }
 

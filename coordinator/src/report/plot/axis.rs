@@ -1,6 +1,15 @@
 //! One axis: its label, its range and its ticks.
+//!
+//! Whatever the values are, the ends are finite, the range has a width and the ticks are few.
 
 use super::super::number;
+
+/// Values beyond ± this stand at the edge of an axis, so that no range and no margin overflows.
+const LARGEST: f64 = 1e300;
+/// Positive values below this stand at the edge of a logarithmic axis.
+const SMALLEST: f64 = 1e-300;
+/// No axis has more ticks than this, whatever is asked.
+const MOST: usize = 50;
 
 /// A tick: where it stands (already on the axis' own scale) and what it says.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,29 +26,48 @@ pub(crate) struct Axis {
     pub(crate) lo: f64,
     /// Upper end, in the quantity's unit.
     pub(crate) hi: f64,
-    log: bool,
+    scale: Scale,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Scale {
+    Linear,
+    /// Linear, with ticks at whole numbers only.
+    Whole,
+    Logarithmic,
 }
 
 impl Axis {
     /// An axis that just holds the finite `values`: for time.
     pub(crate) fn tight(label: &str, values: impl IntoIterator<Item = f64>) -> Self {
         let (lo, hi) = finite_range(values).map_or((0.0, 1.0), widen);
-        Self { label: label.to_owned(), lo, hi, log: false }
+        Self { label: label.to_owned(), lo, hi, scale: Scale::Linear }
+    }
+
+    /// As [`Axis::tight`], for what happened step by step: where every value is whole, as iterations are, so is every tick.
+    pub(crate) fn over_run(label: &str, values: impl IntoIterator<Item = f64>) -> Self {
+        let values: Vec<f64> = values.into_iter().filter(|v| v.is_finite()).collect();
+        let whole = !values.is_empty() && values.iter().all(|v| v.fract().abs() <= 0.0);
+        let scale = if whole { Scale::Whole } else { Scale::Linear };
+        Self { scale, ..Self::tight(label, values) }
     }
 
     /// An axis that holds the finite `values` with a margin.
     pub(crate) fn around(label: &str, values: impl IntoIterator<Item = f64>) -> Self {
         let (lo, hi) = finite_range(values).map_or((0.0, 1.0), widen);
         let margin = 0.06 * (hi - lo);
-        Self { label: label.to_owned(), lo: lo - margin, hi: hi + margin, log: false }
+        Self { label: label.to_owned(), lo: lo - margin, hi: hi + margin, scale: Scale::Linear }
     }
 
     /// A logarithmic axis with a margin; linear when a value is not positive.
     pub(crate) fn log_around(label: &str, values: impl IntoIterator<Item = f64>) -> Self {
         match finite_range(values) {
             Some((lo, hi)) if lo > 0.0 => {
-                let margin = (hi / lo).powf(0.06).max(1.02);
-                Self { label: label.to_owned(), lo: lo / margin, hi: hi * margin, log: true }
+                let (lo, hi) = (lo.clamp(SMALLEST, LARGEST), hi.clamp(SMALLEST, LARGEST));
+                // As a difference of logarithms: the ratio itself may overflow.
+                let margin = (0.06 * (hi.ln() - lo.ln())).exp().max(1.02);
+                let (lo, hi) = ((lo / margin).max(SMALLEST), (hi * margin).min(LARGEST));
+                Self { label: label.to_owned(), lo, hi, scale: Scale::Logarithmic }
             }
             range => Self::around(label, range.map_or(Vec::new(), |(lo, hi)| vec![lo, hi])),
         }
@@ -47,7 +75,7 @@ impl Axis {
 
     /// The same axis with free space above the values, for words.
     pub(crate) fn with_headroom(mut self) -> Self {
-        if !self.log {
+        if self.scale != Scale::Logarithmic {
             self.hi += 0.1 * (self.hi - self.lo);
         }
         self
@@ -55,7 +83,7 @@ impl Axis {
 
     /// Where a value stands on the axis.
     pub(crate) fn at(&self, value: f64) -> f64 {
-        if self.log { value.max(f64::MIN_POSITIVE).log10() } else { value }
+        if self.scale == Scale::Logarithmic { value.max(f64::MIN_POSITIVE).log10() } else { value }
     }
 
     /// Both ends, on the axis' own scale.
@@ -65,18 +93,22 @@ impl Axis {
 
     /// About `count` ticks at round values.
     pub(crate) fn ticks(&self, count: usize) -> Vec<Tick> {
+        let count = count.clamp(1, MOST);
         let tick = |value: f64, step: f64| Tick { at: self.at(value), text: number::tick(value, step) };
-        if let Some(values) = self.log.then(|| log_values(self.lo, self.hi, count)).flatten() {
+        if self.scale == Scale::Logarithmic
+            && let Some(values) = log_values(self.lo, self.hi, count)
+        {
             return values.into_iter().map(|value| tick(value, value)).collect();
         }
-        let values = linear_values(self.lo, self.hi, count);
-        let step = values.windows(2).map(|w| w[1] - w[0]).fold(f64::INFINITY, f64::min);
+        let least = if self.scale == Scale::Whole { 1.0 } else { 0.0 };
+        let (step, values) = linear_values(self.lo, self.hi, count, least);
         values.into_iter().map(|value| tick(value, step)).collect()
     }
 }
 
 fn finite_range(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
-    values.into_iter().filter(|v| v.is_finite()).fold(None, |range, v| match range {
+    let finite = values.into_iter().filter(|v| v.is_finite()).map(|v| v.clamp(-LARGEST, LARGEST));
+    finite.fold(None, |range, v| match range {
         None => Some((v, v)),
         Some((lo, hi)) => Some((lo.min(v), hi.max(v))),
     })
@@ -92,25 +124,29 @@ fn widen((lo, hi): (f64, f64)) -> (f64, f64) {
     (lo - half, hi + half)
 }
 
-/// Multiples of 1, 2 or 5 times a power of ten.
-fn linear_values(lo: f64, hi: f64, count: usize) -> Vec<f64> {
-    let raw = (hi - lo) / count.max(1) as f64;
-    let power = 10f64.powf(raw.log10().floor());
+/// Multiples of a step of 1, 2 or 5 times a power of ten, and that step; it is at least `least`.
+fn linear_values(lo: f64, hi: f64, count: usize, least: f64) -> (f64, Vec<f64>) {
+    let raw = ((hi - lo) / count as f64).max(least);
+    let power = 10f64.powf((raw.log10() + 1e-12).floor());
     let step = [1.0, 2.0, 5.0, 10.0].iter().map(|m| m * power).find(|step| *step >= raw).unwrap_or(raw);
-    let first = (lo / step - 1e-9).ceil() as i64;
-    let last = (hi / step + 1e-9).floor() as i64;
-    (first..=last).map(|k| k as f64 * step).collect()
+    let first = (lo / step - 1e-9).ceil();
+    let last = (hi / step + 1e-9).floor();
+    // Counted from the first one: its multiple of the step may be beyond every integer type.
+    let n = if last >= first { (last - first) as usize + 1 } else { 0 };
+    (step, (0..n.min(MOST)).map(|k| (first + k as f64) * step).collect())
 }
 
 /// 1, 2, 5 of every decade, or whole decades when those are too many; `None` when fewer than three fall inside.
 fn log_values(lo: f64, hi: f64, count: usize) -> Option<Vec<f64>> {
-    let decades = (lo.log10().floor() as i32)..=(hi.log10().ceil() as i32);
+    let (first, last) = (lo.log10().floor() as i32, hi.log10().ceil() as i32);
     let inside = |v: &f64| *v >= lo * (1.0 - 1e-9) && *v <= hi * (1.0 + 1e-9);
     let every = |digits: &[f64], stride: usize| -> Vec<f64> {
-        let powers = decades.clone().step_by(stride);
+        let powers = (first..=last).filter(|e| e.rem_euclid(stride as i32) == 0);
         powers.flat_map(|e| digits.iter().map(move |d| d * 10f64.powi(e))).filter(inside).collect()
     };
-    let stride = decades.clone().count().div_ceil(count.max(1)).max(1);
+    let decades = (last - first).unsigned_abs() as usize + 1;
+    let round = [1, 2, 3, 5, 10, 20, 30, 50, 100, 200];
+    let stride = round.into_iter().find(|stride| decades.div_ceil(*stride) <= count + 1).unwrap_or(200);
     let candidates = [every(&[1.0, 2.0, 5.0], 1), every(&[1.0], 1), every(&[1.0], stride)];
     candidates.into_iter().find(|values| values.len() >= 3 && values.len() <= count + 2)
 }
@@ -142,5 +178,67 @@ mod tests {
             assert!(axis.hi > axis.lo, "{axis:?}");
         }
         assert_eq!(Axis::around("t", [0.0]).at(0.5), 0.5);
+    }
+
+    /// Every way to make an axis, over the same values.
+    fn every_kind(values: &[f64]) -> [Axis; 4] {
+        let values = || values.iter().copied();
+        [
+            Axis::tight("x", values()),
+            Axis::over_run("x", values()),
+            Axis::around("x", values()).with_headroom(),
+            Axis::log_around("x", values()).with_headroom(),
+        ]
+    }
+
+    #[test]
+    fn no_values_make_an_axis_endless_empty_or_crowded() {
+        let (inf, nan, tiny) = (f64::INFINITY, f64::NAN, f64::from_bits(1));
+        for values in [
+            vec![],
+            vec![1e-200, 1e200],
+            vec![tiny, f64::MAX],
+            vec![f64::MIN_POSITIVE, 1.0],
+            vec![tiny, 2.0 * tiny],
+            vec![tiny],
+            vec![-f64::MAX, f64::MAX],
+            vec![f64::MAX, f64::MAX],
+            vec![nan, inf, -inf],
+            vec![inf, 3.0, nan],
+            vec![7.0; 3],
+            vec![0.0; 2],
+            vec![-0.0],
+            vec![1e18, 1e18 + 1e3],
+            vec![1.0, 1.0 + f64::EPSILON],
+        ] {
+            for axis in every_kind(&values) {
+                let (lo, hi) = axis.ends();
+                assert!(axis.lo.is_finite() && axis.hi.is_finite() && axis.lo < axis.hi, "{axis:?}");
+                assert!((hi - lo).is_finite() && hi > lo, "{axis:?}");
+                for count in [0, 1, 5, 7, usize::MAX] {
+                    let ticks = axis.ticks(count);
+                    // A step rounded up to 1, 2 or 5 leaves at most one tick more than asked, and one at each end.
+                    assert!(ticks.len() <= count.clamp(1, MOST) + 2, "{axis:?}: {ticks:?}");
+                    assert!(ticks.iter().all(|t| t.at.is_finite() && t.text != number::ABSENT), "{ticks:?}");
+                    assert!(ticks.windows(2).all(|pair| pair[0].at < pair[1].at), "{axis:?}: {ticks:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn hundreds_of_decades_have_round_ticks() {
+        let axis = Axis::log_around("R", [1e-200, 1e200]);
+        let expected = ["1×10⁻²⁰⁰", "1×10⁻¹⁰⁰", "1", "1×10¹⁰⁰", "1×10²⁰⁰"];
+        assert_eq!(texts(&axis, 5), expected);
+    }
+
+    #[test]
+    fn an_axis_of_a_few_iterations_shows_whole_numbers_only() {
+        assert_eq!(texts(&Axis::over_run("iteration", [1.0, 2.0, 3.0]), 6), ["1", "2", "3"]);
+        assert_eq!(texts(&Axis::over_run("iteration", [1.0, 2.0]), 6), ["1", "2"]);
+        assert_eq!(texts(&Axis::over_run("iteration", [1.0]), 6), ["1"]);
+        assert_eq!(texts(&Axis::over_run("iteration", (1..=11).map(f64::from)), 6), ["2", "4", "6", "8", "10"]);
+        assert_eq!(texts(&Axis::over_run("time [s]", [0.0, 0.5, 1.0]), 5), ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]);
     }
 }

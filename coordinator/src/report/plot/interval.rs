@@ -43,11 +43,11 @@ pub(crate) fn draw(
     log: bool,
     place: Place,
 ) -> Result<(), ReportError> {
-    let ends = [row.prior_lo, row.prior_hi, row.lo, row.hi, row.estimate];
+    let ends = [row.prior_lo, row.prior_hi, row.prior_median, row.lo, row.hi, row.estimate];
     let axis = if log { Axis::log_around("", ends) } else { Axis::around("", ends) };
     let (lo, hi) = axis.ends();
     let pixel = |value: f64| {
-        let share = (axis.at(value) - lo) / (hi - lo);
+        let share = (axis.at(value.clamp(axis.lo, axis.hi)) - lo) / (hi - lo);
         place.left + (share * f64::from(place.right - place.left)).round() as i32
     };
     let bar = |from: f64, to: f64, half: i32, colour: RGBColor, least: i32| {

@@ -15,7 +15,7 @@ use super::thin;
 ///
 /// The figure cannot be drawn.
 pub(crate) fn figure(track: &Track, x_label: &str) -> Result<Figure, ReportError> {
-    let x = Axis::tight(x_label, track.passes.iter().flat_map(|p| p.time.iter().copied()));
+    let x = Axis::over_run(x_label, track.passes.iter().flat_map(|p| p.time.iter().copied()));
     // The band of an earlier pass begins as wide as the prior and would flatten the result: it may leave the figure.
     let estimates = track.passes.iter().flat_map(|p| &p.estimate);
     let band = track.passes.last().into_iter().flat_map(|p| p.lo.iter().chain(&p.hi));

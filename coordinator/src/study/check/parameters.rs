@@ -59,23 +59,9 @@ pub(in crate::study) fn priors(
         }
         let prior = prior::prior(source, parameter, quantity)?;
         warnings.extend(quantity.and_then(|q| prior::reach_warning(name, &prior, q)));
-        warnings.extend(quantity.and_then(|q| unit_warning(parameter, q)));
         Some(prior)
     };
     file.parameters.iter().enumerate().map(check).collect()
-}
-
-/// Units are labels: a mismatch is worth a word, not a refusal.
-fn unit_warning(parameter: &ParameterSection, quantity: &Quantity) -> Option<String> {
-    let given = parameter.unit.as_ref()?.get_ref();
-    let plain = |unit: &str| unit.replace(['*', '·', ' '], "");
-    (!quantity.unit.is_empty() && !given.is_empty() && plain(given) != plain(&quantity.unit)).then(|| {
-        format!(
-            "parameter `{}` is given in {given}, the model has it in {}: its numbers are taken as they stand.",
-            parameter.name.get_ref(),
-            quantity.unit
-        )
-    })
 }
 
 /// The parameters with their prior means per record, medians taken from recordings where the study says so.
@@ -118,7 +104,8 @@ pub(in crate::study) fn initial_medians(
     parameters
 }
 
-/// The first observed value of a channel, at the place that asks for it.
+/// The first observed value of a channel, at the place that asks for it. In a trained record it is the first one that
+/// trains: a held-out value must not reach the fit by way of its prior.
 fn first_value(source: &Source, from: &Spanned<String>, record: &Record) -> Option<Spanned<f64>> {
     let Some(channel) = record.channels.iter().find(|c| c.output == *from.get_ref()) else {
         let valid: Vec<String> = record.channels.iter().map(|c| c.output.clone()).collect();
@@ -126,6 +113,16 @@ fn first_value(source: &Source, from: &Spanned<String>, record: &Record) -> Opti
         source.report_unknown(from.span(), message, &valid);
         return None;
     };
-    let first = channel.values.iter().copied().find(|v| v.is_finite())?;
-    Some(Spanned::new(from.span(), first))
+    if record.is_trained() && channel.held_out {
+        let message = format!("channel `{}` of record `{}` is held out", from.get_ref(), record.name);
+        source.report_with(from.span(), message, "give `median`, or take it from a channel that is fitted");
+        return None;
+    }
+    let mut known = record.times.iter().zip(&channel.values).filter(|(_, v)| v.is_finite());
+    let first = known.find(|(t, _)| !record.is_trained() || record.trains_at(**t));
+    if first.is_none() {
+        let message = format!("`{}` has no value in the training span of `{}`", from.get_ref(), record.name);
+        source.report_with(from.span(), message, "give `median`");
+    }
+    Some(Spanned::new(from.span(), *first?.1))
 }

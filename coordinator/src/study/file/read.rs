@@ -160,10 +160,11 @@ fn channels(source: &Source, record: &Table<'_>) -> Vec<ChannelSection> {
         ChannelSection {
             column: t.required_text("column", "a column of the record's file"),
             output: t.required_text("output", "the output of the model that was measured"),
+            unit: t.text("unit"),
             noise: noise.unwrap_or_else(|| Spanned::new(t.span.clone(), None)),
         }
     };
-    record.tables("channels", "a channel", &["column", "output", "noise"]).into_iter().map(read).collect()
+    record.tables("channels", "a channel", &["column", "output", "unit", "noise"]).into_iter().map(read).collect()
 }
 
 fn noise(source: &Source, node: &Node<'_>) -> Option<Spanned<Option<f64>>> {

@@ -5,7 +5,8 @@
 
 use std::sync::Arc;
 
-use starlings_estimators::{Batch, BatchState, BatchStep, Data, SigmaSet};
+use serde::{Deserialize, Serialize};
+use starlings_estimators::{Batch, BatchState, BatchStep, Data, EstimatorError, Gaussian, SigmaSet};
 
 use super::filter;
 use super::flight::{Flight, Place, StepWindows, stack_outputs};
@@ -36,31 +37,39 @@ pub fn fit(
         .collect();
     let values: Vec<f64> = windows.iter().flat_map(|(_, w)| w.observed.iter().copied()).collect();
     let noise = filter::noise(study, &windows, 1.0);
-    let (mut state, mut now) = match resumed {
+    let (mut known, mut now) = match resumed {
         Some(snapshot) => (restore(store, &snapshot)?, snapshot),
         None => begin(&batch, study),
     };
-    loop {
+    while !known.state.converged && now.head.step < batch.max_iterations {
         let place = Place { pass: 1, step: now.head.step };
-        let theta = batch.sample(&state);
+        let theta = batch.sample(&known.state);
         let results = fly(flight, &mut now, place, &theta, &windows)?;
         let failed: Vec<bool> = results.iter().map(|of| of.iter().any(Result::is_err)).collect();
-        let predictions = stack_outputs(&results);
+        let predictions = stack_outputs(&results, &windows);
         let (next, step) =
-            batch.step(&state, &predictions, &failed, &Data { values: &values, noise: &noise })?;
-        state = next;
-        keep(&mut now, &state, &step)?;
+            batch.step(&known.state, &predictions, &failed, &Data { values: &values, noise: &noise })?;
+        known = Known { state: next, posterior: step.posterior.clone() };
+        keep(&mut now, &known, &step)?;
         let mut row = row(study, place, &step);
         row.jobs = flight.take_rows();
         store.analysis(&row, &now)?;
         context.after_step(store, &progress(&now, &batch, flight))?;
-        if step.converged || now.head.step >= batch.max_iterations {
-            return Ok(finish(&now, step));
-        }
     }
+    if now.head.n_used == 0 {
+        return Err(EstimatorError::StartFailed { attempt: now.head.step }.into());
+    }
+    Ok(finish(&now, known))
 }
 
-fn begin(batch: &Batch, study: &crate::study::Study) -> (BatchState, Snapshot) {
+/// All that is known after an ensemble; what a killed run continues from, or ends with if it was the last one.
+#[derive(Serialize, Deserialize)]
+struct Known {
+    state: BatchState,
+    posterior: Gaussian,
+}
+
+fn begin(batch: &Batch, study: &crate::study::Study) -> (Known, Snapshot) {
     let prior = posterior::prior(study);
     let state = batch.init(&prior);
     let head = Head {
@@ -76,10 +85,10 @@ fn begin(batch: &Batch, study: &crate::study::Study) -> (BatchState, Snapshot) {
         information_lost: 0.0,
         counts: crate::study::store::snapshot::Counts::default(),
     };
-    (state, Snapshot { head, states: vec![None; study.records.len()] })
+    (Known { state, posterior: prior }, Snapshot { head, states: vec![None; study.records.len()] })
 }
 
-fn restore(store: &Store, snapshot: &Snapshot) -> Result<BatchState, RunError> {
+fn restore(store: &Store, snapshot: &Snapshot) -> Result<Known, RunError> {
     Ok(serde_json::from_str(&snapshot.head.batch).map_err(|e| store.damaged("snapshot", e))?)
 }
 
@@ -101,12 +110,15 @@ fn fly(
     Ok(results)
 }
 
-fn keep(now: &mut Snapshot, state: &BatchState, step: &BatchStep) -> Result<(), RunError> {
-    now.head.batch = serde_json::to_string(state).map_err(|e| RunError::Internal(e.to_string()))?;
+fn keep(now: &mut Snapshot, known: &Known, step: &BatchStep) -> Result<(), RunError> {
+    now.head.batch = serde_json::to_string(known).map_err(|e| RunError::Internal(e.to_string()))?;
     now.head.step += 1;
-    now.head.nis = step.misfit;
-    now.head.n_used = step.n_used;
-    now.head.log_likelihood = step.evidence;
+    // Before the first ensemble that could be linearised the figures are infinite, which a snapshot cannot hold.
+    if step.n_used > 0 {
+        now.head.nis = step.misfit;
+        now.head.n_used = step.n_used;
+        now.head.log_likelihood = step.evidence;
+    }
     Ok(())
 }
 
@@ -126,16 +138,16 @@ fn row(study: &crate::study::Study, place: Place, step: &BatchStep) -> AnalysisR
     }
 }
 
-fn finish(now: &Snapshot, step: BatchStep) -> Fit {
+fn finish(now: &Snapshot, known: Known) -> Fit {
     Fit {
-        posterior: step.posterior,
-        log_likelihood: step.evidence,
-        nis: step.misfit,
-        n_used: step.n_used,
+        posterior: known.posterior,
+        log_likelihood: now.head.log_likelihood,
+        nis: now.head.nis,
+        n_used: now.head.n_used,
         information_lost: 0.0,
         counts: now.head.counts,
         passes: 1,
-        converged: step.converged,
+        converged: known.state.converged,
         last_move: 0.0,
     }
 }

@@ -197,13 +197,14 @@ fn step(
     for (index, (record, _)) in windows.iter().enumerate() {
         now.states[*record] = Some(stack_states(&results, index));
     }
-    let mut predictions = stack_outputs(&results);
+    let mut predictions = stack_outputs(&results, &windows);
     if schedule.resample && rescued == 0 {
-        let gram = resample::gram(schedule.study, &schedule.roukf.set.weights, &particles, &now.states);
-        let (resampled, transform) = schedule.roukf.resample(&particles, &gram)?;
-        recombine(&mut now.states, &transform);
-        particles = resampled;
-        predictions = resample::observe_again(flight, place, &particles, &now.states, &windows)?;
+        let states = &mut now.states;
+        let drawn =
+            resample::redraw(flight, &schedule.roukf, place, &windows, &particles, &predictions, states)?;
+        if let Some((redrawn, observed)) = drawn {
+            (particles, predictions) = (redrawn, observed);
+        }
     }
     let values: Vec<f64> = windows.iter().flat_map(|(_, w)| w.observed.iter().copied()).collect();
     let noise = noise(schedule.study, &windows, schedule.anneal(now.head.pass));
@@ -233,7 +234,7 @@ fn particles(now: &Snapshot) -> Particles {
 }
 
 /// X⁺ = X⁻T for the states of every record.
-fn recombine(states: &mut [Option<DMatrix<f64>>], transform: &DMatrix<f64>) {
+pub(super) fn recombine(states: &mut [Option<DMatrix<f64>>], transform: &DMatrix<f64>) {
     for x in states.iter_mut().flatten() {
         let mut out = DMatrix::zeros(x.nrows(), x.ncols());
         starlings_estimators::recombine(x, transform, &mut out);

@@ -126,12 +126,12 @@ impl<'a> Flight<'a> {
 
 /// Stacks the predictions of all particles: m × r, rows by window, then time, then output. A failed particle's column is
 /// zero and must be masked by the caller.
-pub fn stack_outputs(results: &Results) -> DMatrix<f64> {
+pub fn stack_outputs(results: &Results, windows: &StepWindows) -> DMatrix<f64> {
     let columns: Vec<Vec<f64>> = results
         .iter()
         .map(|windows| windows.iter().flatten().flat_map(|p| p.outputs.iter().copied()).collect())
         .collect();
-    let m = columns.iter().map(Vec::len).max().unwrap_or(0);
+    let m = windows.iter().map(|(_, window)| window.observed.len()).sum();
     DMatrix::from_fn(m, columns.len(), |row, column| columns[column].get(row).copied().unwrap_or(0.0))
 }
 

@@ -1,22 +1,30 @@
 //! Resampling for sigma sets with more points than an affine map needs: keep the leading directions of the whole spread.
 //!
-//! Only the r × r Gram matrix of the particles reaches the estimator. Predictions are taken again at the redrawn points by
-//! runs of zero length. Source: Moireau & Chapelle (2011), Verdandi's treatment of the canonical and star sets.
+//! Only the r × r Gram matrix of the particles reaches the estimator. Predictions at a window's end are taken again at the
+//! redrawn points by runs of zero length; the earlier ones of its times, and all of them where an observer has already
+//! brought the datum into the state, are mixed as the states are. Source: Moireau & Chapelle (2011), Verdandi's treatment of
+//! the canonical and star sets.
 
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
-use starlings_estimators::Particles;
+use starlings_estimators::{Particles, Roukf};
 use starlings_models::Window;
 
+use super::filter::recombine;
 use super::flight::{Flight, Place, StepWindows, stack_outputs};
+use crate::study::expand::INITIAL;
 use crate::study::{RunError, Study};
+
+/// Weight of an initial value beside the states that carry it on.
+const FORGOTTEN: f64 = 1e-3;
 
 /// Gram matrix (r × r) of the √α-weighted deviations of the augmented particles.
 ///
 /// Rows are made commensurable: each state quantity by its size in the ensemble mean, each parameter by its prior sd.
-/// Initial values have done their work through the states and do not count again.
-pub fn gram(
+/// Initial values have done their work through the states and hardly count again while their record runs; without any
+/// weight, one that its state has forgotten would be mixed at random.
+fn gram(
     study: &Study,
     weights: &DVector<f64>,
     particles: &Particles,
@@ -34,9 +42,10 @@ pub fn gram(
         }
     }
     for (j, entry) in study.theta.iter().enumerate() {
-        if !study.parameters[entry.parameter].name.starts_with("initial:") {
-            add(&mut gram, &particles.theta.rows(j, 1).into_owned(), weights, entry.prior_sd);
-        }
+        let initial = study.parameters[entry.parameter].name.starts_with(INITIAL);
+        let running = entry.record.map_or(states.iter().any(Option::is_some), |r| states[r].is_some());
+        let share = if initial && running { FORGOTTEN } else { 1.0 };
+        add(&mut gram, &particles.theta.rows(j, 1).into_owned(), weights, entry.prior_sd / share);
     }
     gram
 }
@@ -51,26 +60,59 @@ fn add(gram: &mut DMatrix<f64>, rows: &DMatrix<f64>, weights: &DVector<f64>, sca
     gram.gemm_tr(1.0, &deviation, &deviation, 1.0);
 }
 
-/// Predictions of the redrawn particles at the windows' ends, by runs of zero length.
+/// Redraws particles and states around the leading directions and observes them again: the new particles and their
+/// predictions. `None`, and nothing changed, when a redrawn particle cannot be observed.
 ///
 /// # Errors
-/// When the fleet fails or a redrawn particle has no prediction.
-pub fn observe_again(
+/// When the fleet or the estimator fails.
+pub fn redraw(
+    flight: &mut Flight<'_>,
+    roukf: &Roukf,
+    place: Place,
+    windows: &StepWindows,
+    particles: &Particles,
+    predictions: &DMatrix<f64>,
+    states: &mut Vec<Option<DMatrix<f64>>>,
+) -> Result<Option<(Particles, DMatrix<f64>)>, RunError> {
+    let study = flight.study();
+    let (redrawn, transform) =
+        roukf.resample(particles, &gram(study, &roukf.set.weights, particles, states))?;
+    let mut mixed = states.clone();
+    recombine(&mut mixed, &transform);
+    let mut observed = predictions * transform;
+    // Where an observer has brought the datum into the state, an output of that state is no prediction of it.
+    if study.observer_is_off()
+        && !observe_again(flight, place, &redrawn.theta, &mixed, windows, &mut observed)?
+    {
+        return Ok(None);
+    }
+    *states = mixed;
+    Ok(Some((redrawn, observed)))
+}
+
+/// Puts the outputs at the windows' ends, by runs of zero length, into the predictions; `false` when a run fails.
+fn observe_again(
     flight: &mut Flight<'_>,
     place: Place,
-    particles: &Particles,
+    theta: &DMatrix<f64>,
     states: &[Option<DMatrix<f64>>],
     windows: &StepWindows,
-) -> Result<DMatrix<f64>, RunError> {
+    predictions: &mut DMatrix<f64>,
+) -> Result<bool, RunError> {
     let instants: StepWindows = windows.iter().map(|(record, w)| (*record, Arc::new(instant(w)))).collect();
-    let everyone: Vec<usize> = (0..particles.theta.ncols()).collect();
-    let results = flight.run(place, &everyone, &particles.theta, states, &instants)?;
-    for (particle, of_particle) in results.iter().enumerate() {
-        if let Some(Err(source)) = of_particle.iter().find(|r| r.is_err()) {
-            return Err(RunError::Resampled { particle, source: source.clone() });
-        }
+    let everyone: Vec<usize> = (0..theta.ncols()).collect();
+    let results = flight.run(place, &everyone, theta, states, &instants)?;
+    if results.iter().flatten().any(Result::is_err) {
+        return Ok(false);
     }
-    Ok(stack_outputs(&results))
+    let ends = stack_outputs(&results, &instants);
+    let n_obs = flight.study().setup.outputs.len();
+    let mut after = 0;
+    for (index, (_, window)) in windows.iter().enumerate() {
+        after += window.observed.len();
+        predictions.rows_mut(after - n_obs, n_obs).copy_from(&ends.rows(index * n_obs, n_obs));
+    }
+    Ok(true)
 }
 
 /// The last instant of a window, as a window of its own.

@@ -68,13 +68,15 @@ impl ChannelReader<'_> {
             return None;
         }
         let values = self.values(section)?;
-        let (noise, noise_how) = self.noise(section, &values, &quantity.unit)?;
+        let unit = section.unit.as_ref().map(|u| u.get_ref().clone()).filter(|u| !u.is_empty());
+        let label = unit.as_deref().unwrap_or(&quantity.unit);
+        let (noise, noise_how) = self.noise(section, &values, label)?;
         if noise_how.starts_with("from") {
             context.warnings.push(format!(
                 "the noise of `{output}` in record `{}` was not given: {} was found {noise_how}. Give the sensor's \
                  standard deviation if it is known.",
                 self.name(),
-                with_unit(noise, &quantity.unit)
+                with_unit(noise, label)
             ));
         }
         let row = context.outputs.iter().position(|o| o == output).unwrap_or_else(|| {
@@ -85,6 +87,7 @@ impl ChannelReader<'_> {
             output: output.clone(),
             row,
             column: section.column.get_ref().clone(),
+            unit,
             noise,
             noise_how,
             values,

@@ -3,6 +3,7 @@
 //! Result files are written beside their place and renamed into it, so a reader never sees half of one. Next file to read:
 //! [`crate::study::store`].
 
+use std::fs::{File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -49,6 +50,15 @@ pub enum FolderError {
     /// It already holds a run.
     #[error("{0} already holds a run: continue it with --resume, or choose another folder with --out")]
     Occupied(PathBuf),
+    /// It holds a file that a run would overwrite.
+    #[error("{0} exists already, and a run would overwrite it: choose another folder with --out")]
+    InTheWay(PathBuf),
+    /// Another process runs in it.
+    #[error("another process is running in {0}: wait for its end, or stop it")]
+    Locked(PathBuf),
+    /// Its run never got as far as its first step.
+    #[error("{0} holds no run that could be continued: remove the folder and start again without --resume")]
+    NeverStarted(PathBuf),
     /// It cannot be made or written.
     #[error("cannot write to {path}: {source}")]
     Unwritable {
@@ -78,43 +88,60 @@ pub struct RunFolder {
     pub path: PathBuf,
     /// Its database.
     pub store: Store,
+    /// Held for as long as this process runs in the folder.
+    _lock: Option<File>,
 }
+
+/// The files that a run writes beside its database.
+const FILES: [&str; 4] = ["study.toml", "posterior.csv", "summary.json", "report.html"];
 
 impl RunFolder {
     /// Makes the folder of a new run and freezes the study into it.
     ///
     /// # Errors
-    /// When the folder holds a run already or cannot be written.
+    /// When the folder holds a run or one of its files already, or cannot be written; nothing is left then.
     pub fn create(path: &Path, study: &Study, command: &str, started: &str) -> Result<Self, FolderError> {
         let database = path.join("run.db");
         if database.exists() {
             return Err(FolderError::Occupied(path.to_owned()));
         }
-        std::fs::create_dir_all(path)
-            .map_err(|source| FolderError::Unwritable { path: path.to_owned(), source })?;
-        write(&path.join("study.toml"), &study.text)
-            .map_err(|source| FolderError::Unwritable { path: path.join("study.toml"), source })?;
-        let store = Store::create(&database)?;
-        store.set_meta("study", &study.text)?;
-        store.set_meta("recordings", &fingerprint(study))?;
-        store.set_meta("info", &json(&info(study, command, started)))?;
-        Ok(Self { path: path.to_owned(), store })
+        if let Some(taken) = FILES.map(|name| path.join(name)).into_iter().find(|file| file.exists()) {
+            return Err(FolderError::InTheWay(taken));
+        }
+        let unwritable = |path: &Path| {
+            let path = path.to_owned();
+            move |source| FolderError::Unwritable { path, source }
+        };
+        std::fs::create_dir_all(path).map_err(unwritable(path))?;
+        let frozen = path.join("study.toml");
+        write(&frozen, &study.text).map_err(unwritable(&frozen))?;
+        let lock = lock(path)?;
+        let (recordings, info) = (fingerprint(study), json(&info(study, command, started)));
+        let meta = [("study", study.text.as_str()), ("recordings", &recordings), ("info", &info)];
+        let store = Store::create(&database, &meta).inspect_err(|_| {
+            // Already failing: a frozen study that cannot be removed either stays.
+            let _ = std::fs::remove_file(&frozen);
+        })?;
+        Ok(Self { path: path.to_owned(), store, _lock: Some(lock) })
     }
 
     /// Opens the folder of a run that was interrupted.
     ///
     /// # Errors
-    /// When there is no run, or it was started from another study or other recordings.
+    /// When there is no run, another process runs in it, or it was started from another study or other recordings.
     pub fn resume(path: &Path, study: &Study) -> Result<Self, FolderError> {
         let store = Store::open(&path.join("run.db"))?;
+        let lock = lock(path)?;
         let other = |what| FolderError::OtherStudy { folder: path.to_owned(), what };
-        if store.meta("study")?.as_deref() != Some(study.text.as_str()) {
-            return Err(other("the study file"));
+        match store.meta("study")? {
+            None => return Err(FolderError::NeverStarted(path.to_owned())),
+            Some(text) if text != study.text => return Err(other("the study file")),
+            Some(_) => {}
         }
         if store.meta("recordings")? != Some(fingerprint(study)) {
             return Err(other("the recordings"));
         }
-        Ok(Self { path: path.to_owned(), store })
+        Ok(Self { path: path.to_owned(), store, _lock: Some(lock) })
     }
 
     /// Opens the folder of any run for reading.
@@ -122,7 +149,7 @@ impl RunFolder {
     /// # Errors
     /// When there is no run.
     pub fn open(path: &Path) -> Result<Self, FolderError> {
-        Ok(Self { path: path.to_owned(), store: Store::open(&path.join("run.db"))? })
+        Ok(Self { path: path.to_owned(), store: Store::open_to_read(&path.join("run.db"))?, _lock: None })
     }
 
     /// The summary, once the run is finished.
@@ -138,7 +165,22 @@ impl RunFolder {
         let posterior =
             posterior::to_csv(study, &fit.posterior).map_err(|e| self.store.damaged("posterior", e))?;
         self.store.set_meta("posterior", &posterior)?;
-        self.store.set_meta("summary", &json(summary))
+        self.store.set_meta("summary", &json(summary))?;
+        // Somebody who reads the database right now keeps its log open; the run is finished all the same.
+        let _ = self.store.close_log();
+        Ok(())
+    }
+}
+
+/// Locks the folder through its frozen study until the file is dropped.
+fn lock(path: &Path) -> Result<File, FolderError> {
+    let frozen = path.join("study.toml");
+    let file = File::open(&frozen).map_err(|source| FolderError::Unwritable { path: frozen, source })?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => Err(FolderError::Locked(path.to_owned())),
+        // Some network file systems know no locks; a run there is better than none.
+        Err(TryLockError::Error(_)) => Ok(file),
     }
 }
 
@@ -177,7 +219,9 @@ fn fingerprint(study: &Study) -> String {
 fn info(study: &Study, command: &str, started: &str) -> StudyInfo {
     use starlings_estimators::Transform;
     let unit = |output: &String| {
-        study.spec.outputs.iter().find(|q| &q.name == output).map(|q| q.unit.clone()).unwrap_or_default()
+        let mut channels = study.records.iter().flat_map(|r| &r.channels).filter(|c| &c.output == output);
+        let of_model = || study.spec.outputs.iter().find(|q| &q.name == output).map(|q| q.unit.clone());
+        channels.find_map(|c| c.unit.clone()).or_else(of_model).unwrap_or_default()
     };
     StudyInfo {
         name: study.name.clone(),

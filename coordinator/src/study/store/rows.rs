@@ -30,9 +30,9 @@ pub struct EstimateRow {
     pub parameter: String,
     /// Median, physical units.
     pub estimate: f64,
-    /// Lower end of the 95 % interval.
+    /// Estimate − 2 sd, taken in transformed units.
     pub lo: f64,
-    /// Upper end of the 95 % interval.
+    /// Estimate + 2 sd, taken in transformed units.
     pub hi: f64,
     /// Mean in transformed units.
     pub mean: f64,
