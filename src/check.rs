@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use clap::Parser;
 use serde_json::json;
 use starlings_coordinator::study::trial::{TrialChannel, trial};
-use starlings_coordinator::study::{Study, posterior};
+use starlings_coordinator::study::{EstimatorKind, Study, posterior};
 use starlings_estimators::SigmaSet;
 
-use crate::console::{number, table};
+use crate::console::{line, number, table, text};
 use crate::failure::Failure;
 
 /// Validate a study, its recordings and its model, and make one trial run at the prior median.
@@ -27,11 +27,10 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let channels = trial(&study).map_err(Failure::input)?;
     let n_particle = n_particle(&study)?;
     if args.json {
-        println!("{:#}", as_json(&study, &channels, n_particle));
+        line(format_args!("{:#}", as_json(&study, &channels, n_particle)))
     } else {
-        print(&study, &channels, n_particle);
+        print(&study, &channels, n_particle)
     }
-    Ok(())
 }
 
 /// Particles of one ensemble.
@@ -40,8 +39,16 @@ fn n_particle(study: &Study) -> Result<usize, Failure> {
     Ok(set.n_particle())
 }
 
+/// Runs of one pass of the filter, or of one ensemble of the batch fit.
 fn runs_per_pass(study: &Study, n_particle: usize) -> usize {
-    n_particle * (0..study.records.len()).map(|r| study.windows(r).len()).sum::<usize>()
+    let windows: Vec<usize> = (0..study.records.len()).map(|r| study.windows(r).len()).collect();
+    if study.estimator.kind == EstimatorKind::Batch {
+        // The centre is run beside the sigma points.
+        return (n_particle + 1) * windows.iter().filter(|n| **n > 0).count();
+    }
+    // Redrawn points are observed by runs of their own.
+    let redrawn = study.estimator.resample && n_particle > study.theta.len() + 1 && study.observer_is_off();
+    n_particle * windows.iter().sum::<usize>() * if redrawn { 2 } else { 1 }
 }
 
 fn as_json(study: &Study, channels: &[TrialChannel], n_particle: usize) -> serde_json::Value {
@@ -49,7 +56,7 @@ fn as_json(study: &Study, channels: &[TrialChannel], n_particle: usize) -> serde
     json!({
         "study": study.name,
         "model": study.setup.model.kind,
-        "estimator": study.estimator.describe(),
+        "estimator": study.describe_estimator(),
         "parameters": estimates.iter().map(|e| json!({
             "name": e.name, "unit": e.unit, "prior_median": e.prior_median, "prior_interval95": e.prior_interval95,
         })).collect::<Vec<_>>(),
@@ -62,16 +69,16 @@ fn as_json(study: &Study, channels: &[TrialChannel], n_particle: usize) -> serde
     })
 }
 
-fn print(study: &Study, channels: &[TrialChannel], n_particle: usize) {
-    println!("{}: model {}, {}", study.name, study.setup.model.kind, study.estimator.describe());
-    println!("\nparameters");
+fn print(study: &Study, channels: &[TrialChannel], n_particle: usize) -> Result<(), Failure> {
+    line(format_args!("{}: model {}, {}", study.name, study.setup.model.kind, study.describe_estimator()))?;
+    line("\nparameters")?;
     let mut rows = vec![["name", "unit", "prior median", "prior 95 %"].map(str::to_owned).to_vec()];
     for e in posterior::estimates(study, &posterior::prior(study)) {
         let [lo, hi] = e.prior_interval95.map(|v| number(v, None));
         rows.push(vec![e.name, e.unit, number(e.prior_median, None), format!("{lo} … {hi}")]);
     }
-    print!("{}", table(&rows, false));
-    println!("\ntrial run at the prior median");
+    text(table(&rows, false))?;
+    line("\ntrial run at the prior median")?;
     let mut rows = vec![["record", "output", "observations", "rmse", "noise"].map(str::to_owned).to_vec()];
     for c in channels {
         rows.push(vec![
@@ -82,10 +89,12 @@ fn print(study: &Study, channels: &[TrialChannel], n_particle: usize) {
             number(c.noise, None),
         ]);
     }
-    print!("{}", table(&rows, false));
-    println!("\n{n_particle} particles, {} runs of the model per pass", runs_per_pass(study, n_particle));
+    text(table(&rows, false))?;
+    let runs = runs_per_pass(study, n_particle);
+    let per = if study.estimator.kind == EstimatorKind::Batch { "iteration" } else { "pass" };
+    line(format_args!("\n{n_particle} particles, {runs} runs of the model per {per}"))?;
     for warning in &study.warnings {
-        println!("warning: {warning}");
+        line(format_args!("warning: {warning}"))?;
     }
-    println!("the study is sound");
+    line("the study is sound")
 }

@@ -1,8 +1,14 @@
-//! What people read on a terminal: log lines, aligned tables, numbers of the digits they deserve.
+//! What people read on a terminal: log lines, text on standard output, aligned tables, numbers of the digits they deserve.
+//!
+//! Every command writes to standard output through [`line`], [`text`] or [`lost`]: a reader that stops early, as `head`
+//! does, ends the command quietly.
 
-use std::io::IsTerminal;
+use std::fmt::Display;
+use std::io::{self, ErrorKind, IsTerminal, Write};
 
 use tracing_subscriber::filter::LevelFilter;
+
+use crate::failure::Failure;
 
 /// Sends log lines to standard error: warnings, or more with each `-v`.
 pub(crate) fn log_to_stderr(verbose: u8) {
@@ -18,6 +24,25 @@ pub(crate) fn log_to_stderr(verbose: u8) {
         .with_ansi(std::io::stderr().is_terminal())
         .with_target(false)
         .init();
+}
+
+/// Writes a line to standard output.
+pub(crate) fn line(content: impl Display) -> Result<(), Failure> {
+    text(format_args!("{content}\n"))
+}
+
+/// Writes to standard output, without an end of line of its own.
+pub(crate) fn text(content: impl Display) -> Result<(), Failure> {
+    let mut out = io::stdout().lock();
+    write!(out, "{content}").and_then(|()| out.flush()).map_err(|e| lost(&e))
+}
+
+/// What a failed write to standard output means.
+pub(crate) fn lost(error: &io::Error) -> Failure {
+    match error.kind() {
+        ErrorKind::BrokenPipe => Failure::Unread,
+        _ => Failure::run(format!("cannot write to standard output: {error}")),
+    }
 }
 
 /// A table with aligned columns: the first row is the heading, columns after the first are right-aligned when `numeric`.

@@ -1,11 +1,11 @@
 //! `starlings export`: one table of a run folder as CSV.
 
-use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Parser, ValueEnum};
 use starlings_coordinator::study::{RunFolder, store};
 
+use crate::csv_file::{self, Place};
 use crate::failure::Failure;
 
 /// Write a table of a run folder as CSV.
@@ -40,6 +40,7 @@ enum Table {
 /// Writes the table.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let folder = RunFolder::open(&args.dir).map_err(Failure::input)?;
+    spare(args, &folder)?;
     let (name, columns) = match args.table {
         Table::Estimates => ("estimates", "pass, step, parameter, estimate, lo, hi, mean, sd"),
         Table::Innovations => ("innovations", "pass, step, record, output, time, innovation, sd"),
@@ -49,17 +50,21 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         Table::Events => ("events", "at_s, kind, text"),
     };
     let rows = store::table(&folder.store, name, columns).map_err(Failure::run)?;
-    let sink: Box<dyn Write> = match &args.output {
-        Some(path) => Box::new(
-            std::fs::File::create(path)
-                .map_err(|e| Failure::input(format!("cannot write {}: {e}", path.display())))?,
-        ),
-        None => Box::new(std::io::stdout().lock()),
+    let heading = columns.split(", ").map(str::to_owned).collect();
+    csv_file::write(args.output.as_deref(), std::iter::once(heading).chain(rows))
+}
+
+/// Refuses to write over the run itself, its study or the study's data.
+fn spare(args: &Args, folder: &RunFolder) -> Result<(), Failure> {
+    let output = args.output.as_deref();
+    let inside = |path: &Path| {
+        let (path, dir) = (path.canonicalize().ok()?, args.dir.canonicalize().ok()?);
+        Some(path.parent()? == dir)
     };
-    let mut csv = csv::Writer::from_writer(sink);
-    csv.write_record(columns.split(", ")).map_err(Failure::run)?;
-    for row in rows {
-        csv.write_record(&row).map_err(Failure::run)?;
+    if let Some(path) = output.filter(|path| inside(path).unwrap_or(false)) {
+        let path = path.display();
+        return Err(Failure::input(format!("{path} is a file of the run: choose another file with -o")));
     }
-    csv.flush().map_err(Failure::run)
+    let study = folder.store.meta("study").map_err(Failure::run)?.unwrap_or_default();
+    csv_file::spare_study(output, &study, &Place::Unknown)
 }

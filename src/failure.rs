@@ -14,6 +14,8 @@ pub(crate) enum Failure {
     Study(StudyError),
     /// The run failed: exit code 1.
     Run(String),
+    /// Whoever read standard output has seen enough, as `head` does: nothing is wrong, exit code 0.
+    Unread,
 }
 
 impl Failure {
@@ -32,12 +34,14 @@ impl Failure {
         match self {
             Self::Input(_) | Self::Study(_) => ExitCode::from(2),
             Self::Run(_) => ExitCode::from(1),
+            Self::Unread => ExitCode::SUCCESS,
         }
     }
 
     /// Prints the message to standard error.
     pub(crate) fn print(&self) {
         match self {
+            Self::Unread => {}
             Self::Input(message) | Self::Run(message) => eprintln!("error: {message}"),
             Self::Study(error) => {
                 for problem in &error.problems {

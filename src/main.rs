@@ -7,6 +7,7 @@
 
 mod check;
 mod console;
+mod csv_file;
 mod export;
 mod failure;
 mod models;

@@ -3,7 +3,7 @@
 use clap::Parser;
 use starlings_models::{Quantity, Spec, catalogue, nearest};
 
-use crate::console::table;
+use crate::console::{line, table, text};
 use crate::failure::Failure;
 
 /// List the built-in models, or describe one.
@@ -31,21 +31,19 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         }
     }
     if args.json {
-        let text = serde_json::to_string_pretty(&specs).map_err(Failure::run)?;
-        println!("{text}");
+        line(serde_json::to_string_pretty(&specs).map_err(Failure::run)?)
     } else if args.kind.is_some() {
-        specs.iter().for_each(describe);
+        specs.iter().try_for_each(describe)
     } else {
         let mut rows = vec![vec!["kind".to_owned(), "what it is".to_owned()]];
         rows.extend(specs.iter().map(|s| vec![s.kind.clone(), s.says.clone()]));
-        print!("{}", table(&rows, false));
-        println!("\n`starlings models KIND` lists parameters, states, outputs and inputs.");
+        text(table(&rows, false))?;
+        line("\n`starlings models KIND` lists parameters, states, outputs and inputs.")
     }
-    Ok(())
 }
 
-fn describe(spec: &Spec) {
-    println!("{}: {}", spec.kind, spec.says);
+fn describe(spec: &Spec) -> Result<(), Failure> {
+    line(format_args!("{}: {}", spec.kind, spec.says))?;
     let lists = [
         ("parameters", &spec.parameters),
         ("states", &spec.states),
@@ -56,12 +54,12 @@ fn describe(spec: &Spec) {
         if quantities.is_empty() {
             continue;
         }
-        println!("\n{title}");
+        line(format_args!("\n{title}"))?;
         let mut rows = vec![["name", "unit", "range", "default", "meaning"].map(str::to_owned).to_vec()];
         rows.extend(quantities.iter().map(row));
-        print!("{}", table(&rows, false));
+        text(table(&rows, false))?;
     }
-    println!("\nestimate an initial value with the parameter name `initial:<state>`");
+    line("\nestimate an initial value with the parameter name `initial:<state>`")
 }
 
 fn row(q: &Quantity) -> Vec<String> {

@@ -6,6 +6,7 @@ use clap::Parser;
 use starlings_coordinator::report as page;
 use starlings_coordinator::study::RunFolder;
 
+use crate::console::line;
 use crate::failure::Failure;
 
 /// Write report.html, summary.json and posterior.csv of a run folder again from its run.db.
@@ -36,16 +37,16 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         page::write_files(&folder).map_err(Failure::run)?;
     } else {
         page::write_page(&folder).map_err(Failure::run)?;
-        eprintln!("the run is not finished: the report shows what there is, and the other files are not written");
+        eprintln!(
+            "the run is not finished: the report shows what there is, and the other files are not written"
+        );
     }
     if !args.json {
-        println!("{}", html.display());
-        return Ok(());
+        return line(html.display());
     }
     let shown = match &summary {
         Some(summary) => serde_json::to_value(summary).map_err(Failure::run)?,
         None => serde_json::json!({ "study": data.study, "finished": false, "warnings": data.warnings }),
     };
-    println!("{shown:#}");
-    Ok(())
+    line(format_args!("{shown:#}"))
 }

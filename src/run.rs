@@ -12,7 +12,7 @@ use starlings_coordinator::study::trial::trial;
 use starlings_coordinator::study::{Progress, RunContext, RunFolder, Study, Summary, run as study_run};
 use tokio_util::sync::CancellationToken;
 
-use crate::console::{cancel_on_signal, number, table};
+use crate::console::{cancel_on_signal, line, number, table};
 use crate::failure::Failure;
 use crate::progress::Display;
 
@@ -121,7 +121,7 @@ impl Crew {
         let (kept, events) = mpsc::channel();
         let mut config = FleetConfig::new(address, &study.name, cancel, sender);
         if let Some(patience) = study.fleet.patience {
-            config.patience = Duration::from_secs_f64(patience);
+            config.patience = Duration::try_from_secs_f64(patience).map_err(Failure::input)?;
         }
         if let Some(attempts) = study.fleet.max_attempts {
             config.max_attempts = attempts;
@@ -177,11 +177,10 @@ fn relay(heard: mpsc::Receiver<FleetEvent>, kept: &mpsc::Sender<FleetEvent>, dis
 
 fn print(summary: &Summary, folder: &Path, json: bool) -> Result<(), Failure> {
     if json {
-        println!("{}", serde_json::to_string_pretty(summary).map_err(Failure::run)?);
-        return Ok(());
+        return line(serde_json::to_string_pretty(summary).map_err(Failure::run)?);
     }
     for warning in &summary.warnings {
-        println!("warning: {warning}");
+        line(format_args!("warning: {warning}"))?;
     }
     let mut rows =
         vec![["parameter", "unit", "estimate", "95 % interval", "prior median"].map(str::to_owned).to_vec()];
@@ -195,26 +194,26 @@ fn print(summary: &Summary, folder: &Path, json: bool) -> Result<(), Failure> {
             number(p.prior_median, None),
         ]);
     }
-    println!("\n{}", table(&rows, false));
+    line(format_args!("\n{}", table(&rows, false)))?;
     let shown = |rmse: Option<f64>| rmse.map_or_else(|| "–".to_owned(), |v| number(v, None));
     for c in &summary.fit.channels {
-        println!(
+        line(format_args!(
             "{}: RMSE {} on the training span, {} held out (noise {})",
             c.name,
             shown(c.train_rmse),
             shown(c.held_out_rmse),
             number(c.noise, None)
-        );
+        ))?;
     }
-    println!(
-        "{} runs ({} failed, {} retried) on {} workers in {:.2} s; NIS {:.2} per observation",
+    line(format_args!(
+        "{} runs ({} failed, {} retried) on {} worker{} in {:.2} s; NIS {:.2} per observation",
         summary.runs.total,
         summary.runs.failed,
         summary.runs.retried,
         summary.workers,
+        if summary.workers == 1 { "" } else { "s" },
         summary.wall_s,
         summary.fit.nis_per_observation
-    );
-    println!("report: {}", folder.join("report.html").display());
-    Ok(())
+    ))?;
+    line(format_args!("report: {}", folder.join("report.html").display()))
 }

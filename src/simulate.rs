@@ -1,11 +1,15 @@
 //! `starlings simulate`: a twin experiment, data whose truth is known.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use clap::Parser;
 use starlings_coordinator::study::Study;
 use starlings_coordinator::study::twin::{Recording, Twin, simulate};
+use starlings_models::effect::{EffectDef, library};
+use starlings_models::{Spec, catalogue, nearest};
 
+use crate::csv_file::{self, Place};
 use crate::failure::Failure;
 
 /// Run the study's model forward with chosen values and noise, and write the outputs as CSV.
@@ -20,7 +24,7 @@ pub(crate) struct Args {
     #[arg(long = "effect", value_name = "NAME=VALUE", value_parser = assignment)]
     effect: Vec<(String, f64)>,
     /// Standard deviation of Gaussian noise added to every output, in the output's unit.
-    #[arg(long, default_value_t = 0.0, value_name = "SD")]
+    #[arg(long, default_value_t = 0.0, value_name = "SD", allow_negative_numbers = true)]
     noise: f64,
     /// Seed of the noise; the study's own without it.
     #[arg(long)]
@@ -29,10 +33,10 @@ pub(crate) struct Args {
     #[arg(long)]
     record: Option<String>,
     /// End of a regular time grid from the record's start, together with --step.
-    #[arg(long, requires = "step")]
+    #[arg(long, requires = "step", allow_negative_numbers = true)]
     until: Option<f64>,
     /// Spacing of that grid.
-    #[arg(long, requires = "until")]
+    #[arg(long, requires = "until", allow_negative_numbers = true)]
     step: Option<f64>,
     /// Where to write the CSV; standard output without it.
     #[arg(short, long, value_name = "FILE")]
@@ -56,6 +60,8 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         return Err(Failure::input("--noise must be zero or a positive number"));
     }
     let study = Study::load(&args.study)?;
+    csv_file::spare_study(args.output.as_deref(), &study.text, &Place::Known(&study.file))?;
+    check_names(args, &study)?;
     let record = match &args.record {
         None => 0,
         Some(name) => study.records.iter().position(|r| r.name == *name).ok_or_else(|| {
@@ -88,20 +94,53 @@ fn grid(args: &Args, study: &Study, record: usize) -> Result<Vec<f64>, Failure> 
     Ok((0..=n).map(|k| step.mul_add(k as f64, start)).collect())
 }
 
-fn write(recording: &Recording, args: &Args) -> Result<(), Failure> {
-    let sink: Box<dyn std::io::Write> = match &args.output {
-        Some(path) => Box::new(
-            std::fs::File::create(path)
-                .map_err(|e| Failure::input(format!("cannot write {}: {e}", path.display())))?,
-        ),
-        None => Box::new(std::io::stdout().lock()),
-    };
-    let mut csv = csv::Writer::from_writer(sink);
-    let heading = std::iter::once("time").chain(recording.columns.iter().map(String::as_str));
-    csv.write_record(heading).map_err(Failure::run)?;
-    for (k, time) in recording.times.iter().enumerate() {
-        let row = std::iter::once(*time).chain(recording.values.iter().map(|column| column[k]));
-        csv.write_record(row.map(|v| format!("{v:?}"))).map_err(Failure::run)?;
+/// Refuses a name that neither the model nor an effect of the twin has.
+fn check_names(args: &Args, study: &Study) -> Result<(), Failure> {
+    let built_in = library(&study.spec);
+    let asked = |e: &&EffectDef| args.effect.iter().any(|(name, _)| *name == e.name);
+    let effects = study.candidates.iter().chain(&built_in).filter(asked);
+    let mut names: Vec<String> = study.setup.parameters.clone();
+    names.extend(study.spec.parameters.iter().map(|q| q.name.clone()));
+    names.extend(study.setup.model.constants.keys().cloned());
+    names.extend(effects.flat_map(|e| e.parameters.iter().map(|p| p.name.clone())));
+    names.extend(study.spec.states.iter().map(|q| format!("initial:{}", q.name)));
+    let mut seen = BTreeSet::new();
+    names.retain(|name| seen.insert(name.clone()));
+    for (name, _) in &args.set {
+        if !names.contains(name) {
+            let hint = nearest(name, &names).map(|n| format!("; did you mean `{n}`?")).unwrap_or_default();
+            let names = names.join(", ");
+            return Err(Failure::input(format!(
+                "--set {name}: the study has no parameter, constant or initial value of that name{hint} (it has: {names})"
+            )));
+        }
     }
-    csv.flush().map_err(Failure::run)
+    args.effect.iter().try_for_each(|(name, _)| check_host(name, study, &built_in))
+}
+
+/// Refuses an effect that exists, but not for this model.
+fn check_host(name: &str, study: &Study, built_in: &[EffectDef]) -> Result<(), Failure> {
+    let mut known = study.setup.effects.iter().chain(&study.candidates).chain(built_in);
+    if known.any(|e| e.name == name) {
+        return Ok(());
+    }
+    let hosts = |spec: &Spec| library(spec).iter().any(|e| e.name == name);
+    let kinds: Vec<String> = catalogue::specs().into_iter().filter(hosts).map(|spec| spec.kind).collect();
+    if kinds.is_empty() {
+        return Ok(());
+    }
+    let (model, kinds) = (&study.setup.model.kind, kinds.join(", "));
+    Err(Failure::input(format!(
+        "--effect {name}: the model `{model}` cannot host this effect, it lacks the quantities that the effect joins (models \
+         that can: {kinds})"
+    )))
+}
+
+fn write(recording: &Recording, args: &Args) -> Result<(), Failure> {
+    let heading = std::iter::once("time".to_owned()).chain(recording.columns.iter().cloned()).collect();
+    let rows = recording.times.iter().enumerate().map(|(k, time)| {
+        let row = std::iter::once(*time).chain(recording.values.iter().map(|column| column[k]));
+        row.map(|v| format!("{v:?}")).collect::<Vec<_>>()
+    });
+    csv_file::write(args.output.as_deref(), std::iter::once(heading).chain(rows))
 }

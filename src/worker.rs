@@ -19,7 +19,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "N")]
     slots: Option<usize>,
     /// Seconds to keep dialling while nobody answers.
-    #[arg(long, default_value_t = 600.0, value_name = "SECONDS")]
+    #[arg(long, default_value_t = 600.0, value_name = "SECONDS", allow_negative_numbers = true)]
     patience: f64,
     /// End when the coordinator's connection closes instead of dialling again.
     #[arg(long)]

@@ -155,6 +155,122 @@ fn a_worker_gives_up_with_the_address_when_nobody_answers() {
 
 #[cfg(unix)]
 #[test]
+fn a_reader_that_stops_early_ends_a_command_quietly() {
+    use std::io::Read;
+
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("run");
+    run(&repository(STUDY), &out, 1);
+    let commands = [
+        vec!["check".into(), repository(STUDY)],
+        vec!["check".into(), repository(STUDY), "--json".into()],
+        vec!["models".into()],
+        vec!["models".into(), "windkessel-3".into()],
+        vec!["models".into(), "--json".into()],
+        vec!["simulate".into(), repository(STUDY)],
+        vec!["export".into(), out.clone(), "--table".into(), "jobs".into()],
+        vec!["report".into(), out.clone()],
+        vec!["report".into(), out.clone(), "--json".into()],
+        vec!["run".into(), repository(STUDY), "--out".into(), dir.path().join("again")],
+    ];
+    for arguments in commands {
+        let mut child = starlings()
+            .args(&arguments)
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        // Nobody reads: the first write finds a broken pipe.
+        drop(child.stdout.take());
+        let mut stderr = String::new();
+        child.stderr.take().unwrap().read_to_string(&mut stderr).unwrap();
+        let status = child.wait().unwrap();
+        assert_eq!(status.code(), Some(0), "{arguments:?}: {stderr}");
+        assert!(!stderr.contains("panicked") && !stderr.contains("error"), "{arguments:?}: {stderr}");
+    }
+    assert!(dir.path().join("again/report.html").exists(), "the run went on without a reader");
+}
+
+#[test]
+fn simulate_names_what_is_wrong_with_its_arguments() {
+    let refused = |study: &str, arguments: &[&str]| {
+        let (code, stdout, stderr) =
+            output(starlings().arg("simulate").arg(repository(study)).args(arguments));
+        assert_eq!((code, stdout.as_str()), (2, ""), "{arguments:?}: {stderr}");
+        stderr
+    };
+    assert!(refused(STUDY, &["--noise", "-1"]).contains("--noise must be zero or a positive number"));
+    let until = refused(STUDY, &["--until", "-1", "--step", "0.1"]);
+    assert!(until.contains("--until after the record's start"), "{until}");
+    let step = refused(STUDY, &["--until", "1", "--step", "-0.1"]);
+    assert!(step.contains("--step must be positive"), "{step}");
+    let unknown = refused(STUDY, &["--set", "zz=3"]);
+    assert!(unknown.contains("no parameter, constant or initial value of that name"), "{unknown}");
+    assert!(unknown.contains("Zc") && unknown.contains("initial:p"), "{unknown}");
+    let near = refused(STUDY, &["--set", "initial:P=90"]);
+    assert!(near.contains("did you mean `initial:p`"), "{near}");
+    let host = refused("examples/oscillator/study.toml", &["--effect", "series-resistance=1"]);
+    assert!(host.contains("cannot host") && host.contains("windkessel-2"), "{host}");
+}
+
+#[test]
+fn no_output_replaces_a_study_or_its_data() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("pig.toml");
+    std::fs::create_dir(dir.path().join("data")).unwrap();
+    std::fs::copy(repository(STUDY), &file).unwrap();
+    let recording = dir.path().join("data/in-vivo-1.csv");
+    std::fs::copy(repository("examples/pig-aorta/data/in-vivo-1.csv"), &recording).unwrap();
+    let out = dir.path().join("run");
+    run(&file, &out, 1);
+    let kept = [&file, &recording, &out.join("run.db"), &out.join("study.toml")]
+        .map(|path| (path.clone(), std::fs::read(path).unwrap()));
+    for (path, _) in &kept {
+        let (code, _, stderr) = output(starlings().arg("export").arg(&out).arg("-o").arg(path));
+        assert_eq!(code, 2, "{stderr}");
+        assert!(stderr.contains("choose another file"), "{stderr}");
+    }
+    for (path, _) in &kept[..2] {
+        // However the file is reached.
+        let around = path.parent().unwrap().join(".").join(path.file_name().unwrap());
+        let (code, _, stderr) = output(starlings().arg("simulate").arg(&file).arg("-o").arg(around));
+        assert_eq!(code, 2, "{stderr}");
+        assert!(stderr.contains("choose another file"), "{stderr}");
+    }
+    for (path, bytes) in &kept {
+        assert_eq!(&std::fs::read(path).unwrap(), bytes, "{}", path.display());
+    }
+    // Any other file is written, and written again.
+    let twin = dir.path().join("twin.csv");
+    for _ in 0..2 {
+        let (code, _, stderr) = output(starlings().arg("simulate").arg(&file).arg("-o").arg(&twin));
+        assert_eq!(code, 0, "{stderr}");
+    }
+    let (code, _, stderr) = output(starlings().arg("export").arg(&out).arg("-o").arg(&twin));
+    assert_eq!(code, 0, "{stderr}");
+}
+
+/// Process numbers of the workers that joined a run, as its events tell: `… (process P, S slots, C cores)`.
+#[cfg(target_os = "linux")]
+fn worker_processes(out: &std::path::Path) -> Vec<String> {
+    let flags = rusqlite::OpenFlags::SQLITE_OPEN_READ_ONLY;
+    let db = rusqlite::Connection::open_with_flags(out.join("run.db"), flags).unwrap();
+    let mut events = db.prepare("SELECT text FROM events WHERE kind = 'worker-joined'").unwrap();
+    let texts = events.query_map([], |row| row.get::<_, String>(0)).unwrap();
+    let process = |text: &str| text.split("(process ").nth(1)?.split(',').next().map(str::to_owned);
+    texts.map(|text| process(&text.unwrap()).unwrap()).collect()
+}
+
+/// Whether a process of this number runs; one that only waits to be reaped does not.
+#[cfg(target_os = "linux")]
+fn is_alive(pid: &String) -> bool {
+    let status = std::fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default();
+    status.lines().any(|line| line.starts_with("State:") && !line.contains("zombie"))
+}
+
+#[cfg(target_os = "linux")]
+#[test]
 fn an_interrupted_run_ends_its_workers_and_says_how_to_go_on() {
     use std::io::Read;
 
@@ -178,6 +294,8 @@ fn an_interrupted_run_ends_its_workers_and_says_how_to_go_on() {
     child.stderr.take().unwrap().read_to_string(&mut stderr).unwrap();
     assert_eq!(status.code(), Some(1), "{stderr}");
     assert!(stderr.contains("--resume"), "{stderr}");
-    // Standard error is shared with the workers: it closed, so they are gone as well.
     assert!(!out.join("posterior.csv").exists());
+    let workers = worker_processes(&out);
+    assert!(!workers.is_empty(), "the events name the workers that joined");
+    common::wait_until("the end of the workers", || !workers.iter().any(|pid| is_alive(pid)));
 }

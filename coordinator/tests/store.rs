@@ -113,17 +113,33 @@ fn a_folder_with_a_run_and_a_changed_study_are_refused() {
     let occupied = RunFolder::create(&done.folder.path, &study, "", "").err().unwrap();
     assert!(matches!(occupied, FolderError::Occupied(_)), "{occupied}");
     assert!(occupied.to_string().contains("--resume"), "{occupied}");
+    let path = done.folder.path.clone();
+    let locked = RunFolder::resume(&path, &study).err().unwrap();
+    assert!(matches!(locked, FolderError::Locked(_)), "the folder is still open: {locked}");
+    drop(done);
     let mut changed = study.clone();
     changed.text.push_str("# another thought\n");
-    let error = RunFolder::resume(&done.folder.path, &changed).err().unwrap().to_string();
+    let error = RunFolder::resume(&path, &changed).err().unwrap().to_string();
     assert!(error.contains("the study file changed"), "{error}");
     let mut changed = study.clone();
     changed.records[0].channels[0].values[3] += 1e-9;
-    let error = RunFolder::resume(&done.folder.path, &changed).err().unwrap().to_string();
+    let error = RunFolder::resume(&path, &changed).err().unwrap().to_string();
     assert!(error.contains("the recordings changed"), "{error}");
     let nowhere = case.fresh();
     let error = RunFolder::resume(&nowhere, &study).err().unwrap().to_string();
     assert!(error.contains("no run in") && error.contains("run.db"), "{error}");
+}
+
+#[test]
+fn a_folder_that_holds_a_file_of_the_user_is_left_alone() {
+    let case = line("passes = 1");
+    let folder = case.fresh();
+    std::fs::create_dir_all(&folder).unwrap();
+    let mine = folder.join("study.toml");
+    std::fs::write(&mine, "mine").unwrap();
+    let error = RunFolder::create(&folder, &case.study(), "", "").err().unwrap();
+    assert!(matches!(error, FolderError::InTheWay(_)), "{error}");
+    assert_eq!(std::fs::read_to_string(&mine).unwrap(), "mine");
 }
 
 #[test]

@@ -93,7 +93,7 @@ fn inform(
     }
     let whitened = if whitened.columns.is_some() { whitened } else { sweep.run(true)? };
     let columns = whitened.columns.as_ref().ok_or(EstimatorError::NotFinite { what: "the whitened rows" })?;
-    let information = Information::from_columns(columns, geometry);
+    let information = Information::from_columns(columns, geometry)?;
     Ok((whitened, information))
 }
 

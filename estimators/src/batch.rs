@@ -91,9 +91,12 @@ pub struct BatchStep {
 }
 
 impl Batch {
-    /// A batch fit with the usual settings: spread 0.1, tolerance 0.01, at most 60 ensembles.
+    /// Ensembles at most, unless something else is asked for.
+    pub const MAX_ITERATIONS: usize = 30;
+
+    /// A batch fit with the usual settings: spread 0.1, tolerance 0.01, at most [`Batch::MAX_ITERATIONS`] ensembles.
     pub fn new(set: SigmaSet) -> Self {
-        Self { set, spread: 0.1, max_iterations: 60, tolerance: 1e-2 }
+        Self { set, spread: 0.1, max_iterations: Self::MAX_ITERATIONS, tolerance: 1e-2 }
     }
 
     /// The state before any ensemble: centred at the prior mean, points at `spread` prior sd.
@@ -136,8 +139,8 @@ impl Batch {
     /// as the rest spans the parameters.
     ///
     /// # Errors
-    /// Wrong lengths, bad data or noise, a spread that is not positive, and `StartFailed` when nothing could be run
-    /// around the prior mean.
+    /// Wrong lengths, bad data or noise, `Spread` when it is not positive and finite, and `StartFailed` when nothing
+    /// could be run around the prior mean.
     pub fn step(
         &self,
         s: &BatchState,
@@ -146,6 +149,9 @@ impl Batch {
         data: &Data<'_>,
     ) -> Result<(BatchState, BatchStep), EstimatorError> {
         same("parameters of the state", self.set.n_param(), s.trial.len())?;
+        if !(self.spread > 0.0 && self.spread.is_finite()) {
+            return Err(EstimatorError::Spread { value: self.spread });
+        }
         let ensemble =
             Ensemble { set: &self.set, centre: &s.trial, scale: &s.scale, predictions, failed, data };
         let mut next = s.clone();
@@ -195,6 +201,7 @@ impl Batch {
         if again {
             next.trial.clone_from(&best.centre);
             next.width *= 0.3;
+            next.refresh();
         } else {
             next.trial = &best.centre + damped(&hessian, &best.gradient, next.damping).ok_or(singular)?;
             if accepted {
@@ -258,6 +265,13 @@ impl BatchState {
         self.rejected += 1;
         self.damping = self.damping.max(REJECTED_DAMPING) * self.growth;
         self.growth *= 2.0;
+    }
+
+    /// The slope is about to be measured again: what the old one did to the damping is half forgotten, in the logarithm.
+    /// Forgotten altogether, steps that are too long for the model's curvature would be tried again for ever.
+    fn refresh(&mut self) {
+        self.damping = (self.damping * REJECTED_DAMPING).sqrt();
+        self.growth = FIRST_GROWTH;
     }
 }
 

@@ -7,6 +7,9 @@ use nalgebra::DMatrix;
 
 use crate::EstimatorError;
 
+/// Largest difference of two mirrored entries of a covariance, relative to the sd of their rows, that passes for rounding.
+const ASYMMETRY: f64 = 1e-10;
+
 /// Observation noise of m rows, Gaussian with zero mean.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Noise {
@@ -44,10 +47,25 @@ impl Data<'_> {
             Noise::Dense(covariance) => {
                 same("rows of the noise covariance", m, covariance.nrows())?;
                 same("columns of the noise covariance", m, covariance.ncols())?;
+                symmetric(covariance, &rows)?;
                 Ok(rows)
             }
         }
     }
+}
+
+/// Is the block of these rows symmetric? What is not a number is left to the factorisation.
+fn symmetric(covariance: &DMatrix<f64>, rows: &[usize]) -> Result<(), EstimatorError> {
+    for (k, &column) in rows.iter().enumerate() {
+        for &row in &rows[..k] {
+            let (above, below) = (covariance[(row, column)], covariance[(column, row)]);
+            let scale = (covariance[(row, row)] * covariance[(column, column)]).abs().sqrt();
+            if (above - below).abs() > ASYMMETRY * scale {
+                return Err(EstimatorError::NoiseNotSymmetric { row, column, above, below });
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Two lengths that must agree.

@@ -30,20 +30,37 @@ pub fn noise_from_third_differences(series: &[f64]) -> f64 {
 ///
 /// Products that touch a NaN count as zero, so values stay within [-1, 1]. NaN for a constant or empty series.
 pub fn autocorrelation(series: &[f64], max_lag: usize) -> Vec<f64> {
-    let observed: Vec<f64> = series.iter().copied().filter(|v| v.is_finite()).collect();
-    let mean = observed.iter().sum::<f64>() / observed.len() as f64;
-    let deviation: Vec<f64> = series.iter().map(|v| if v.is_finite() { v - mean } else { 0.0 }).collect();
-    let variance: f64 = deviation.iter().map(|d| d * d).sum();
-    (0..=max_lag)
-        .map(|lag| {
-            let later = deviation.get(lag..).unwrap_or(&[]);
-            if variance > 0.0 {
-                later.iter().zip(&deviation).map(|(a, b)| a * b).sum::<f64>() / variance
-            } else {
-                f64::NAN
-            }
-        })
-        .collect()
+    let deviation = Deviation::new(series);
+    (0..=max_lag).map(|lag| deviation.correlation(lag)).collect()
+}
+
+/// Deviations of a series from its mean, zero where a value is missing.
+struct Deviation {
+    values: Vec<f64>,
+    /// Number of values that are not missing.
+    n: usize,
+    /// Sum of squares.
+    variance: f64,
+}
+
+impl Deviation {
+    fn new(series: &[f64]) -> Self {
+        let n = series.iter().filter(|v| v.is_finite()).count();
+        let mean = series.iter().filter(|v| v.is_finite()).sum::<f64>() / n as f64;
+        let values: Vec<f64> = series.iter().map(|v| if v.is_finite() { v - mean } else { 0.0 }).collect();
+        let variance = values.iter().map(|d| d * d).sum();
+        Self { values, n, variance }
+    }
+
+    /// Autocorrelation at one lag; NaN without variance.
+    fn correlation(&self, lag: usize) -> f64 {
+        let later = self.values.get(lag..).unwrap_or(&[]);
+        if self.variance > 0.0 {
+            later.iter().zip(&self.values).map(|(a, b)| a * b).sum::<f64>() / self.variance
+        } else {
+            f64::NAN
+        }
+    }
 }
 
 /// Number of independent values that would give the mean of this series the same variance: n / (1 + 2 sum rho).
@@ -51,11 +68,17 @@ pub fn autocorrelation(series: &[f64], max_lag: usize) -> Vec<f64> {
 /// The sum stops at the first pair of lags whose correlations no longer add up to something positive (Geyer 1992).
 /// NaN for a constant or empty series; never more than the number of observed values.
 pub fn effective_sample_size(series: &[f64]) -> f64 {
-    let n = series.iter().filter(|v| v.is_finite()).count();
-    let rho = autocorrelation(series, series.len().saturating_sub(1));
-    let pairs: f64 = rho.chunks_exact(2).map(|p| p[0] + p[1]).take_while(|s| *s > 0.0).sum();
-    let time = (2.0 * pairs - 1.0).max(1.0);
-    if rho.first().is_some_and(|r| r.is_finite()) { n as f64 / time } else { f64::NAN }
+    let deviation = Deviation::new(series);
+    if deviation.variance > 0.0 {
+        // Every lag costs a pass over the series, so none is taken beyond the last that counts.
+        let pairs: f64 = (0..series.len() / 2)
+            .map(|k| deviation.correlation(2 * k) + deviation.correlation(2 * k + 1))
+            .take_while(|s| *s > 0.0)
+            .sum();
+        deviation.n as f64 / (2.0 * pairs - 1.0).max(1.0)
+    } else {
+        f64::NAN
+    }
 }
 
 /// Band that holds NIS per observation with probability `level` (in (0, 1)) when the model explains `n_used` values:

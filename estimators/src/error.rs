@@ -57,6 +57,20 @@ pub enum EstimatorError {
         /// Standard deviation given.
         value: f64,
     },
+    /// The noise covariance is not symmetric.
+    #[error(
+        "the noise covariance of observations {row} and {column} is {above} one way and {below} the other: it must be symmetric"
+    )]
+    NoiseNotSymmetric {
+        /// Row of the covariance, from 0.
+        row: usize,
+        /// Column of the covariance, from 0.
+        column: usize,
+        /// Entry (row, column).
+        above: f64,
+        /// Entry (column, row).
+        below: f64,
+    },
     /// The noise covariance of the observed rows has no Cholesky factor.
     #[error("the covariance of the {n_used} observed rows is not positive definite")]
     NoiseNotDefinite {
@@ -98,6 +112,12 @@ pub enum EstimatorError {
     DriftOutOfRange {
         /// Parameter, from 0.
         parameter: usize,
+        /// Value given.
+        value: f64,
+    },
+    /// The spread of the points of a batch fit is not positive and finite.
+    #[error("spread {value} of the sigma points: it must be positive and finite")]
+    Spread {
         /// Value given.
         value: f64,
     },

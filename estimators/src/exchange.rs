@@ -9,6 +9,12 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use crate::data::same;
 use crate::{EstimatorError, Gaussian};
 
+/// Information of a direction, in units of that of the used prior, up to which it counts as none; the next decade fades in.
+///
+/// Rounding of a covariance that went through thousands of analyses stays below 1e-11. A direction of which the data
+/// know a hundredth of what the wanted prior does still has 1e-8 under a used prior of a thousandth of its sd.
+const NO_INFORMATION: f64 = 1e-9;
+
 /// A posterior under another prior, and what that does to the figures of the fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Exchanged {
@@ -16,15 +22,26 @@ pub struct Exchanged {
     pub posterior: Gaussian,
     /// To be added to the log-likelihood (log evidence).
     pub log_likelihood: f64,
-    /// To be added to the summed normalised innovation squared.
+    /// To be added to the summed normalised innovation squared: see [`Exchanged::corrected_nis`].
     pub nis: f64,
+}
+
+impl Exchanged {
+    /// The summed normalised innovation squared `nis` of the used prior, corrected to the wanted one.
+    ///
+    /// It is a sum of squares. Where the used prior was so narrow that nearly all of `nis` came from it, the difference
+    /// of two large numbers may round to less than nothing; then it is zero.
+    pub fn corrected_nis(&self, nis: f64) -> f64 {
+        (nis + self.nis).max(0.0)
+    }
 }
 
 /// The posterior that the prior `wanted` would have given instead of `used`, with the corrections of log-likelihood and NIS
 /// that make them refer to `wanted` too. Exact for a linear Gaussian problem without drift.
 ///
 /// Works in coordinates whitened by `used` around the posterior mean, where the data's information is diagonal.
-/// Directions in which the posterior is no sharper than `used` carry no information and return to `wanted`.
+/// Directions in which the posterior is no sharper than `used`, up to rounding, carry no information and return to
+/// `wanted`, wherever their mean went: a slope of the likelihood without curvature would move it without bound.
 ///
 /// # Errors
 /// `Shape`, and `NotPositiveDefinite` for a singular covariance.
@@ -43,14 +60,18 @@ pub fn exchange_prior(
     let ratio = l2.solve_lower_triangular(&l).ok_or_else(|| singular.clone())?;
     let svd = ratio.svd(false, true);
     let v = svd.v_t.ok_or_else(|| singular.clone())?.transpose();
-    let information = svd.singular_values.map(|s| (s - 1.0) * (s + 1.0)).map(|e| e.max(0.0));
+    // Singular values have the rounding of the largest.
+    let none = NO_INFORMATION.max(100.0 * f64::EPSILON * svd.singular_values.max());
+    let sharpening = svd.singular_values.map(|s| (s - 1.0) * (s + 1.0));
+    let share = sharpening.map(|e| ((e - none) / (9.0 * none)).clamp(0.0, 1.0));
+    let information = sharpening.component_mul(&share);
     let whiten =
         |x: &DMatrix<f64>| l.solve_lower_triangular(x).map(|y| v.tr_mul(&y)).ok_or_else(|| singular.clone());
     let column = |x: DVector<f64>| DMatrix::from_column_slice(x.len(), 1, x.as_slice());
     let at = |g: &Gaussian| whiten(&column(&g.mean - &posterior.mean)).map(|y| y.column(0).clone_owned());
     let (y_used, y_wanted) = (at(used)?, at(wanted)?);
     // The posterior mean is the origin: there the slope of the log-likelihood balances that of the used prior.
-    let slope = y_used.zip_map(&information, |y, e| if e > 0.0 { -y } else { 0.0 });
+    let slope = -y_used.component_mul(&share);
     let p = slope.len();
     let likelihood = Likelihood { information, slope };
     let before = likelihood.update(&y_used, &DMatrix::identity(p, p))?;

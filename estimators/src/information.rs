@@ -11,6 +11,10 @@ use crate::particles::Geometry;
 /// Above this squared size of S the unit matrix in 1 + S^T S drowns in rounding.
 const LARGEST: f64 = 1e12;
 
+fn drowns(size: f64) -> bool {
+    !size.is_finite() || size > LARGEST
+}
+
 /// Result of step 4: U = V (1 + s^2) V^T and what follows from it.
 pub(crate) struct Information {
     /// Eigenvectors V, p x p.
@@ -46,12 +50,12 @@ impl Information {
         let mut sd = geometry.slope.tr_mul(&zd);
         let mut dd = products[(r, r)];
         let mut log_det = 0.0;
-        if ss.trace() > LARGEST {
+        if drowns(ss.trace()) {
             return None;
         }
         if let Some(even) = geometry.even_part() {
             let spread = DMatrix::identity(r, r) + even.tr_mul(&(zz * &even));
-            if spread.trace() > LARGEST {
+            if drowns(spread.trace()) {
                 return None;
             }
             // Woodbury: W_eff^{-1} = 1 - Y (1 + Y^T Y)^{-1} Y^T in whitened rows.

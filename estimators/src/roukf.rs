@@ -21,6 +21,18 @@ pub enum Root {
     Cholesky,
 }
 
+/// Particles drawn again by [`Roukf::resample`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Resampled {
+    /// The new particles.
+    pub particles: Particles,
+    /// The r x r matrix R of X <- X R.
+    pub transform: DMatrix<f64>,
+    /// Share of the whole spread that lay outside the directions that were kept, in [0, 1]: 0 when p directions hold
+    /// everything, or when nothing was drawn again.
+    pub dropped: f64,
+}
+
 /// The reduced-order unscented Kalman filter of p parameters with r particles.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Roukf {
@@ -102,17 +114,13 @@ impl Roukf {
     /// plain unscented one.
     ///
     /// `gram` (r x r) holds the products sqrt(a_i a_j) <x_i - x, x_j - x> of deviations from the weighted mean x, in a
-    /// norm that makes state and parameters commensurable. Returns the new particles and the r x r matrix R of
-    /// X <- X R, after which the predictions must be evaluated again. Particles that were pulled or dropped, and the
+    /// norm that makes state and parameters commensurable. After X <- X R the predictions must be evaluated
+    /// again. Up to 2 p directions spread, of which p are kept; what the others held is reported. Particles that were pulled or dropped, and the
     /// simplex, are left as they are (R = 1): a pulled set has no even part that could be trusted.
     ///
     /// # Errors
     /// `Shape`, `NotFinite` for a bad Gram matrix.
-    pub fn resample(
-        &self,
-        p: &Particles,
-        gram: &DMatrix<f64>,
-    ) -> Result<(Particles, DMatrix<f64>), EstimatorError> {
+    pub fn resample(&self, p: &Particles, gram: &DMatrix<f64>) -> Result<Resampled, EstimatorError> {
         let (n_param, r) = (self.set.n_param(), self.set.n_particle());
         self.check(p)?;
         same("rows of the Gram matrix", r, gram.nrows())?;
@@ -121,11 +129,14 @@ impl Roukf {
             return Err(EstimatorError::NotFinite { what: "the Gram matrix of the particles" });
         }
         if r == n_param + 1 || p.pull.iter().any(|s| *s < 1.0) {
-            return Ok((p.clone(), DMatrix::identity(r, r)));
+            return Ok(Resampled { particles: p.clone(), transform: DMatrix::identity(r, r), dropped: 0.0 });
         }
         let eigen = ((gram + gram.transpose()) * 0.5).symmetric_eigen();
         let mut order: Vec<usize> = (0..r).collect();
         order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
+        let whole: f64 = eigen.eigenvalues.iter().map(|v| v.max(0.0)).sum();
+        let kept: f64 = order[..n_param].iter().map(|&i| eigen.eigenvalues[i].max(0.0)).sum();
+        let dropped = if whole > 0.0 { (1.0 - kept / whole).max(0.0) } else { 0.0 };
         let leading = eigen.eigenvectors.select_columns(&order[..n_param]);
         let alpha = &self.set.weights;
         let mut directions = DMatrix::from_diagonal(&alpha.map(f64::sqrt)) * leading;
@@ -134,7 +145,7 @@ impl Roukf {
             column.axpy(-sum, alpha, 1.0);
         }
         let t = around(alpha, &(directions * &self.set.points));
-        Ok((Particles::whole(&p.theta * &t), t))
+        Ok(Resampled { particles: Particles::whole(&p.theta * &t), transform: t, dropped })
     }
 
     /// One analysis. `predictions` is m x r, rows as in `data`; the column of a dropped particle is ignored, and so is

@@ -45,10 +45,18 @@ impl Transform {
             Self::Linear => theta,
             Self::Logit { lo, hi } => {
                 // Each bound is approached from its own side, so that no digit is lost close to either.
-                if theta > 0.0 {
+                let v = if theta > 0.0 {
                     hi - (hi - lo) / (1.0 + theta.exp())
                 } else {
                     lo + (hi - lo) / (1.0 + (-theta).exp())
+                };
+                // Beyond about 37 the distance to the bound is lost in rounding.
+                if v <= lo {
+                    lo.next_up()
+                } else if v >= hi {
+                    hi.next_down()
+                } else {
+                    v
                 }
             }
         }

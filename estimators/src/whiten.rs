@@ -3,10 +3,17 @@
 //! With q the weights of the reference (sum one), column j is W^{-1/2} (z_j - Z q) and the last column is
 //! W^{-1/2} (z - Z q): sensitivities, innovation and residual spread are all combinations of these columns, so one
 //! (r+1) x (r+1) Gram matrix holds everything an analysis needs. It is accumulated in blocks of 512 rows that stay in
-//! cache. Deliberately ignorant of sigma points. Read next: `information.rs`.
+//! cache. Deliberately ignorant of sigma points. Read next: `gram.rs`, then `information.rs`.
 
-use nalgebra::{DMatrix, DVector};
+#![allow(
+    clippy::inline_always,
+    reason = "the vector instructions reach a function only when it is inlined into the dispatched one"
+)]
 
+use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, DVector};
+use pulp::Arch;
+
+use crate::gram::{Gram, TILE};
 use crate::{Data, EstimatorError, Noise};
 
 /// Rows per block: 24 columns of 512 doubles fit into a second-level cache.
@@ -53,10 +60,11 @@ pub(crate) struct Whitened {
 impl Sweep<'_> {
     /// Whitens; keeps the columns when asked to (dense noise keeps them anyway).
     pub(crate) fn run(&self, keep: bool) -> Result<Whitened, EstimatorError> {
-        let whitened = match self.data.noise {
+        let mut whitened = match self.data.noise {
             Noise::Diagonal(sd) => self.diagonal(sd, keep),
             Noise::Dense(covariance) => self.dense(covariance)?,
         };
+        whitened.products.fill_lower_triangle_with_upper_triangle();
         if whitened.products.iter().all(|v| v.is_finite()) { Ok(whitened) } else { Err(self.culprit()) }
     }
 
@@ -90,11 +98,13 @@ impl Sweep<'_> {
                 *inverse = reciprocal;
                 out.log_det_noise += 2.0 * log;
             }
-            self.fill(&mut block, rows);
-            self.record(&block, first, rows.len(), &mut out);
+            block.arch.dispatch(|| {
+                self.fill(&mut block, rows);
+                self.record(&block, first, rows.len(), &mut out);
+            });
             block.accumulate(rows.len(), &mut out.products);
             if let Some(columns) = columns.as_mut() {
-                columns.rows_mut(first, rows.len()).copy_from(&block.columns.rows(0, rows.len()));
+                columns.rows_mut(first, rows.len()).copy_from(&block.view(rows.len()));
             }
         }
         out.columns = columns;
@@ -110,7 +120,7 @@ impl Sweep<'_> {
             block.inverse_sd.fill(1.0);
             self.fill(&mut block, rows);
             self.record(&block, b * BLOCK, rows.len(), &mut out);
-            columns.rows_mut(b * BLOCK, rows.len()).copy_from(&block.columns.rows(0, rows.len()));
+            columns.rows_mut(b * BLOCK, rows.len()).copy_from(&block.view(rows.len()));
         }
         for (s, &k) in out.innovation_sd.iter_mut().zip(self.rows) {
             *s = (*s * *s - 1.0 + covariance[(k, k)]).max(0.0).sqrt();
@@ -121,7 +131,7 @@ impl Sweep<'_> {
         out.log_det_noise = 2.0 * root.diagonal().iter().map(|v| v.ln()).sum::<f64>();
         for first in (0..n).step_by(BLOCK) {
             let rows = BLOCK.min(n - first);
-            block.columns.rows_mut(0, rows).copy_from(&columns.rows(first, rows));
+            block.view_mut(rows).copy_from(&columns.rows(first, rows));
             block.accumulate(rows, &mut out.products);
         }
         out.columns = Some(columns);
@@ -129,6 +139,7 @@ impl Sweep<'_> {
     }
 
     /// Scaled deviations of one block of rows.
+    #[inline(always)]
     fn fill(&self, block: &mut Block, rows: &[usize]) {
         let n = rows.len();
         let r = self.predictions.ncols();
@@ -166,6 +177,7 @@ impl Sweep<'_> {
     }
 
     /// Innovation and its standard deviation, back in the unit of each row.
+    #[inline(always)]
     fn record(&self, block: &Block, first: usize, n: usize, out: &mut Whitened) {
         let r = self.predictions.ncols();
         let variance = &mut out.innovation_sd[first..first + n];
@@ -208,6 +220,7 @@ impl Sweep<'_> {
 }
 
 /// e = (z - a) / sd, one column of a block.
+#[inline(always)]
 fn deviation(e: &mut [f64], z: &[f64], reference: &[f64], inverse_sd: &[f64]) {
     for (((e, z), a), i) in e.iter_mut().zip(z).zip(reference).zip(inverse_sd) {
         *e = (z - a) * i;
@@ -216,10 +229,10 @@ fn deviation(e: &mut [f64], z: &[f64], reference: &[f64], inverse_sd: &[f64]) {
 
 /// Buffers of one block, allocated once.
 struct Block {
-    /// Columns, BLOCK x (r+1).
+    arch: Arch,
+    n_column: usize,
+    /// Columns, BLOCK x (r+1), and zeros up to a whole number of tiles.
     columns: DMatrix<f64>,
-    /// The same, transposed: the product of two tall matrices is several times faster as rows times columns.
-    transposed: DMatrix<f64>,
     reference: Vec<f64>,
     inverse_sd: Vec<f64>,
 }
@@ -227,17 +240,23 @@ struct Block {
 impl Block {
     fn new(n_column: usize) -> Self {
         Self {
-            columns: DMatrix::zeros(BLOCK, n_column),
-            transposed: DMatrix::zeros(n_column, BLOCK),
+            arch: Arch::new(),
+            n_column,
+            columns: DMatrix::zeros(BLOCK, n_column.next_multiple_of(TILE)),
             reference: vec![0.0; BLOCK],
             inverse_sd: vec![1.0; BLOCK],
         }
     }
 
+    fn view(&self, n: usize) -> DMatrixView<'_, f64> {
+        self.columns.view((0, 0), (n, self.n_column))
+    }
+
+    fn view_mut(&mut self, n: usize) -> DMatrixViewMut<'_, f64> {
+        self.columns.view_mut((0, 0), (n, self.n_column))
+    }
+
     fn accumulate(&mut self, n: usize, products: &mut DMatrix<f64>) {
-        let columns = self.columns.rows(0, n);
-        let mut transposed = self.transposed.columns_mut(0, n);
-        columns.transpose_to(&mut transposed);
-        products.gemm(1.0, &transposed, &columns, 1.0);
+        self.arch.dispatch(Gram { columns: &mut self.columns, rows: n, products });
     }
 }

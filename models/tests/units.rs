@@ -2,6 +2,7 @@
 // Factors are compared exactly where they are powers of ten or defined numbers.
 #![allow(clippy::float_cmp, clippy::unwrap_used)]
 
+use proptest::prelude::*;
 use starlings_models::effect::{Addition, EffectParameter, EffectState};
 use starlings_models::equations::{EquationsDef, InputDef, OutputDef, StateDef};
 use starlings_models::units::{Labels, Mismatch, Unit, consistent};
@@ -93,9 +94,18 @@ fn what_cannot_be_read_or_is_ambiguous_is_only_a_label() {
         "((((((((((m))))))))))",
         "m^(1/",
         "a.u.",
+        "10^400 m",
     ];
     for label in labels {
         assert_eq!(Unit::parse(label), None, "`{label}`");
+    }
+}
+
+proptest! {
+    #[test]
+    fn no_text_breaks_the_reader(text in "[a-zA-Z0-9 */^().·²⁻µ%°-]{0,12}") {
+        // What is read has a factor that can be compared.
+        prop_assert!(Unit::parse(&text).is_none_or(|unit| unit.factor.is_normal()));
     }
 }
 

@@ -160,7 +160,7 @@ pub struct Autocorrelation {
     pub band: f64,
 }
 
-/// Normalised innovation squared over one pass; the two vectors have equal length.
+/// Normalised innovation squared over one pass; the vectors have equal length.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct NisSeries {
@@ -170,12 +170,12 @@ pub struct NisSeries {
     pub time: Vec<f64>,
     /// Normalised innovation squared divided by the number of values used; 1 is expected.
     pub nis_per_observation: Vec<f64>,
-    /// Lower end of the 95 % band of chi-square per observation.
-    pub lo: f64,
-    /// Upper end of the 95 % band of chi-square per observation.
-    pub hi: f64,
+    /// Lower end of the 95 % band of chi-square per observation, for the values used in each analysis.
+    pub lo: Vec<f64>,
+    /// Upper end of that band.
+    pub hi: Vec<f64>,
     /// Observed values used in each analysis.
-    pub n_used: usize,
+    pub n_used: Vec<usize>,
 }
 
 /// What the fleet did during the run.
@@ -186,9 +186,9 @@ pub struct FleetTable {
     pub workers: Vec<WorkerRow>,
     /// Model runs that were asked for.
     pub runs_total: u64,
-    /// Attempts that failed.
+    /// Runs that failed for good.
     pub failed: u64,
-    /// Runs that succeeded on a later attempt.
+    /// Attempts beyond the first of a run.
     pub retried: u64,
     /// Sigma points that were pulled towards the mean and run again.
     pub rescued: u64,
@@ -208,11 +208,11 @@ pub struct WorkerRow {
     pub host: String,
     /// Jobs it answered.
     pub jobs: u64,
-    /// Attempts that failed on it.
+    /// Runs that failed on it for good.
     pub failed: u64,
     /// Mean duration of one job, s.
     pub mean_s: f64,
-    /// Share of its connected time that it computed, 0 to 1; `None` when not known.
+    /// Share of the run's wall time that its slots computed, 0 to 1; `None` when wall time or slots are not known.
     pub busy_share: Option<f64>,
 }
 

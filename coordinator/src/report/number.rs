@@ -57,7 +57,7 @@ fn at_place(value: f64, place: i32) -> String {
     if !value.is_finite() {
         return ABSENT.to_owned();
     }
-    let exponent = if value.abs() > 0.0 { value.abs().log10().floor() as i32 } else { place.max(0) };
+    let exponent = if value.abs() > 0.0 { value.abs().log10().floor() as i32 } else { 0 };
     if exponent >= 5 && (place > 0 || exponent >= 7) || exponent < -4 {
         let decimals = (exponent - place).clamp(0, 12) as usize;
         // Rounding may carry into the exponent (9.99 to 10), and 10^exponent may underflow: the formatter knows both.

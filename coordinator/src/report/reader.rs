@@ -1,23 +1,23 @@
 //! From the store to what a report shows; the only way from a run to its pictures.
 //!
-//! A running or killed run can be read as well: what is not there yet stays empty. Next file to read: [`super::data`].
+//! A running or killed run can be read as well: what is not there yet stays empty. Next files to read: [`super::data`],
+//! `reader/fleet.rs` for what the fleet did.
+
+mod fleet;
+#[cfg(test)]
+mod tests;
 
 use std::collections::BTreeMap;
 
 use starlings_estimators::{autocorrelation, nis_band};
 
-use super::data::{
-    Autocorrelation, ChannelPlot, FleetEvent, FleetTable, NisSeries, ParameterRow, PassTrack, ReportData,
-    RunTimeBin, RunTimes, Track, WorkerRow,
-};
+use super::data::{Autocorrelation, ChannelPlot, NisSeries, ParameterRow, PassTrack, ReportData, Track};
 use crate::study::store::folder::StudyInfo;
 use crate::study::store::{Store, StoreError};
 use crate::study::summary::Summary;
 
 /// Lags shown in an autocorrelation plot.
 const MAX_LAG: usize = 60;
-/// Bins of the histogram of run times.
-const BINS: usize = 24;
 
 /// Everything a report shows, as far as the run has come.
 ///
@@ -34,7 +34,7 @@ pub fn report_data(store: &Store) -> Result<ReportData, StoreError> {
         tracks: tracks(store, &info, summary.as_ref())?,
         channels: channels(store, &info)?,
         nis: nis(store)?,
-        fleet: fleet(store, summary.as_ref())?,
+        fleet: fleet::table(store, summary.as_ref())?,
         x_label: if info.batch { "iteration".to_owned() } else { format!("time [{}]", info.time_unit) },
         study: info.name,
         says: info.says,
@@ -202,78 +202,20 @@ fn nis(store: &Store) -> Result<Vec<NisSeries>, StoreError> {
             Ok((r.get(0)?, r.get(1)?, r.get(2)?, r.get(3)?))
         })?;
     let mut series: Vec<NisSeries> = Vec::new();
+    // A quantile of chi-square is a search; only a few numbers of values occur.
+    let mut bands = BTreeMap::new();
     for (pass, time, nis, n_used) in rows {
         if series.last().is_none_or(|s| s.pass != pass) {
-            let (lo, hi) = nis_band(n_used, 0.95);
-            series.push(NisSeries { pass, lo, hi, n_used, ..NisSeries::default() });
+            series.push(NisSeries { pass, ..NisSeries::default() });
         }
         if let Some(s) = series.last_mut() {
+            let (lo, hi) = *bands.entry(n_used).or_insert_with(|| nis_band(n_used, 0.95));
             s.time.push(time);
             s.nis_per_observation.push(nis / n_used as f64);
+            s.lo.push(lo);
+            s.hi.push(hi);
+            s.n_used.push(n_used);
         }
     }
     Ok(series)
-}
-
-fn fleet(store: &Store, summary: Option<&Summary>) -> Result<FleetTable, StoreError> {
-    let mut workers: BTreeMap<String, WorkerRow> = BTreeMap::new();
-    let mut costs = Vec::new();
-    let jobs: Vec<(String, bool, f64)> = store
-        .rows("SELECT worker, status = 'done', coalesce(cost_s, 0) FROM jobs ORDER BY id", |r| {
-            Ok((r.get(0)?, r.get(1)?, r.get(2)?))
-        })?;
-    for (name, done, cost) in &jobs {
-        let row = workers.entry(name.clone()).or_insert_with(|| WorkerRow {
-            name: name.clone(),
-            host: host_of(name).to_owned(),
-            ..WorkerRow::default()
-        });
-        row.jobs += 1;
-        row.failed += u64::from(!done);
-        row.mean_s += cost;
-        if *done {
-            costs.push(*cost);
-        }
-    }
-    for row in workers.values_mut() {
-        row.busy_share = summary.map(|s| row.mean_s / s.wall_s);
-        row.mean_s /= row.jobs as f64;
-    }
-    let events = store.rows("SELECT at_s, text FROM events ORDER BY id", |r| {
-        Ok(FleetEvent { time_s: r.get(0)?, text: r.get(1)? })
-    })?;
-    let runs = summary.map(|s| s.runs.clone());
-    Ok(FleetTable {
-        workers: workers.into_values().collect(),
-        runs_total: runs.as_ref().map_or(jobs.len() as u64, |r| r.total),
-        failed: runs.as_ref().map_or(0, |r| r.failed),
-        retried: runs.as_ref().map_or(0, |r| r.retried),
-        rescued: runs.as_ref().map_or(0, |r| r.rescued),
-        time_per_run: run_times(costs),
-        events,
-    })
-}
-
-/// The host in a worker's name, `number@host/process`.
-fn host_of(worker: &str) -> &str {
-    let after = worker.split_once('@').map_or(worker, |(_, rest)| rest);
-    after.rsplit_once('/').map_or(after, |(host, _)| host)
-}
-
-/// Quantiles and histogram of the run times; `None` when nothing was timed.
-fn run_times(mut costs: Vec<f64>) -> Option<RunTimes> {
-    costs.retain(|c| *c > 0.0);
-    costs.sort_by(f64::total_cmp);
-    let last = costs.len().checked_sub(1)?;
-    let quantile = |q: f64| costs[(q * last as f64).round() as usize];
-    // The longest runs are few and far out: the bins end at the 99th percentile and the last one holds the rest.
-    let (from, to) = (costs[0], quantile(0.99));
-    let width = ((to - from) / BINS as f64).max(f64::MIN_POSITIVE);
-    let mut bins: Vec<RunTimeBin> = (0..BINS)
-        .map(|i| RunTimeBin { from: from + i as f64 * width, to: from + (i + 1) as f64 * width, count: 0 })
-        .collect();
-    for cost in &costs {
-        bins[(((cost - from) / width) as usize).min(BINS - 1)].count += 1;
-    }
-    Some(RunTimes { min: costs[0], median: quantile(0.5), p95: quantile(0.95), max: costs[last], bins })
 }

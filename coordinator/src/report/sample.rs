@@ -127,10 +127,10 @@ fn nis(pass: usize, n: usize) -> NisSeries {
     NisSeries {
         pass,
         nis_per_observation: time.iter().map(|&t| value(t)).collect(),
+        lo: vec![0.001; time.len()],
+        hi: vec![5.02; time.len()],
+        n_used: vec![1; time.len()],
         time,
-        lo: 0.001,
-        hi: 5.02,
-        n_used: 1,
     }
 }
 

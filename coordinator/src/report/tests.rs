@@ -106,6 +106,60 @@ fn values_that_are_not_finite_are_left_out() {
     assert!(!overview_svg(&data).unwrap().contains("NaN"));
 }
 
+/// Every number of every figure is one of `values` in turn.
+fn of_values(values: &[f64]) -> ReportData {
+    let mut data = sample::run(60);
+    let mut next = values.iter().copied().cycle();
+    let mut fill =
+        |series: &mut Vec<f64>| series.iter_mut().for_each(|v| *v = next.next().unwrap_or_default());
+    for channel in &mut data.channels {
+        fill(&mut channel.predicted);
+        channel.observed = channel.predicted.iter().rev().map(|v| Some(*v)).collect();
+        channel.noise = values[0];
+    }
+    for pass in data.tracks.iter_mut().flat_map(|t| &mut t.passes) {
+        [&mut pass.estimate, &mut pass.lo, &mut pass.hi].into_iter().for_each(&mut fill);
+    }
+    for series in &mut data.nis {
+        [&mut series.nis_per_observation, &mut series.lo, &mut series.hi].into_iter().for_each(&mut fill);
+    }
+    for series in &mut data.autocorrelation {
+        [&mut series.value, &mut series.lag_time].into_iter().for_each(&mut fill);
+    }
+    let value = |k: usize| values[k % values.len()];
+    for (k, row) in data.parameters.iter_mut().enumerate() {
+        (row.estimate, row.sd, row.lo, row.hi) = (value(k), value(k + 1), value(k), value(k + 1));
+        (row.prior_lo, row.prior_median, row.prior_hi) = (value(k + 1), value(k), value(k + 2));
+    }
+    if let Some(times) = &mut data.fleet.time_per_run {
+        let bins = times.bins.iter_mut().enumerate();
+        bins.for_each(|(k, bin)| (bin.from, bin.to) = (value(k), value(k + 1)));
+    }
+    data
+}
+
+#[test]
+fn the_most_extreme_numbers_make_a_page_of_the_usual_size() {
+    let (inf, nan, tiny) = (f64::INFINITY, f64::NAN, f64::from_bits(1));
+    let cases = [
+        vec![1e-200, 1e200],
+        vec![tiny, f64::MAX],
+        vec![-f64::MAX, f64::MAX, 0.0],
+        vec![nan, inf, -inf, 1.0],
+        vec![tiny, f64::MIN_POSITIVE],
+        vec![5.0],
+        vec![0.0],
+    ];
+    for values in cases {
+        let data = of_values(&values);
+        let page = render(&data).unwrap();
+        assert_well_formed(&page);
+        // The page of ordinary numbers has about 90 000 bytes.
+        assert!(page.len() < 200_000, "{values:?}: {} bytes", page.len());
+        assert!(overview_svg(&data).unwrap().len() < 200_000);
+    }
+}
+
 #[test]
 fn a_hundred_thousand_samples_stay_a_small_file() {
     let page = render(&sample::run(100_000)).unwrap();

@@ -228,6 +228,31 @@ impl Study {
         matches!(self.setup.observer.kind.as_str(), "" | "none") || self.setup.observer.gain <= 0.0
     }
 
+    /// Whether a parameter moves from one analysis to the next.
+    pub fn drifts(&self) -> bool {
+        self.theta.iter().any(|t| !matches!(t.drift, Drift::None))
+    }
+
+    /// Passes of the filter; a study with a drifting parameter has two at most.
+    pub fn passes(&self) -> usize {
+        if self.drifts() { self.estimator.passes.min(2) } else { self.estimator.passes }
+    }
+
+    /// The estimator in one line, such as `roukf, simplex points, 2 passes`.
+    pub fn describe_estimator(&self) -> String {
+        let points = match self.estimator.points {
+            Points::Simplex => "simplex",
+            Points::Canonical => "canonical",
+            Points::Star => "star",
+            Points::JulierUhlmann { .. } => "julier-uhlmann",
+        };
+        match (self.estimator.kind, self.passes()) {
+            (EstimatorKind::Batch, _) => format!("batch, {points} points"),
+            (EstimatorKind::Roukf, 1) => format!("roukf, {points} points, 1 pass"),
+            (EstimatorKind::Roukf, n) => format!("roukf, {points} points, {n} passes"),
+        }
+    }
+
     /// Noise sd of each of [`Setup::outputs`] in a record; 1 for an output that the record does not measure, whose rows
     /// are all missing.
     pub fn noise(&self, record: usize) -> Vec<f64> {
@@ -260,22 +285,5 @@ impl Record {
     pub fn observed(&self, channel: &Channel, time: f64) -> Option<f64> {
         let at = self.times.binary_search_by(|t| t.total_cmp(&time)).ok()?;
         channel.values.get(at).copied().filter(|v| v.is_finite())
-    }
-}
-
-impl EstimatorChoice {
-    /// One line for reports, such as `roukf, simplex points, 2 passes`.
-    pub fn describe(&self) -> String {
-        let points = match self.points {
-            Points::Simplex => "simplex",
-            Points::Canonical => "canonical",
-            Points::Star => "star",
-            Points::JulierUhlmann { .. } => "julier-uhlmann",
-        };
-        match self.kind {
-            EstimatorKind::Batch => format!("batch, {points} points"),
-            EstimatorKind::Roukf if self.passes == 1 => format!("roukf, {points} points, 1 pass"),
-            EstimatorKind::Roukf => format!("roukf, {points} points, {} passes", self.passes),
-        }
     }
 }

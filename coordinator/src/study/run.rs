@@ -47,6 +47,21 @@ pub enum RunError {
         /// What the estimator advises.
         source: EstimatorError,
     },
+    /// A run has no answer, and that is not the model's doing.
+    #[error("the run of particle {particle} over record `{record}` has no usable answer: {reason}")]
+    NoAnswer {
+        /// Index of the sigma point.
+        particle: usize,
+        /// Record name.
+        record: String,
+        /// What came instead.
+        reason: String,
+    },
+    /// A figure of the result is no finite number.
+    #[error(
+        "the {0} of the result is not a finite number: the priors or the noise are out of all proportion to the data"
+    )]
+    NotFinite(String),
     /// The model fails at the estimate itself.
     #[error("the model fails with the estimated parameters on record `{record}`: {source}")]
     FinalRun {
@@ -168,7 +183,8 @@ pub fn run(
     let jobs = flight.take_rows();
     folder.store.predictions(&predictions, &jobs)?;
     context.keep_events(&folder.store)?;
-    let result = summary::make(study, &fit, &predictions, flight.n_workers(), context.elapsed());
+    let result = summary::make(study, &fit, &predictions, flight.n_answered(), context.elapsed());
+    result.check_finite().map_err(RunError::NotFinite)?;
     folder.store.event(context.elapsed(), "run", "run finished")?;
     folder.finish(study, &fit, &result)?;
     Ok(result)

@@ -77,7 +77,7 @@ pub struct Summary {
     pub fit: FitSummary,
     /// Runs.
     pub runs: Runs,
-    /// Workers connected at the end.
+    /// Workers that answered at least one run.
     pub workers: usize,
     /// Wall time in s.
     pub wall_s: f64,
@@ -87,12 +87,29 @@ pub struct Summary {
     pub conditional_on: String,
 }
 
+impl Summary {
+    /// Names the first figure that is no finite number: such a summary could be written but not read again.
+    ///
+    /// # Errors
+    /// The figure's name.
+    pub fn check_finite(&self) -> Result<(), String> {
+        let of_parameters = self.parameters.iter().flat_map(|p| {
+            let values = [p.estimate, p.sd, p.interval95[0], p.interval95[1], p.prior_median];
+            values.map(|v| (format!("estimate of {}", p.name), v))
+        });
+        let of_correlation = self.correlation.iter().flatten().map(|v| ("correlation".to_owned(), *v));
+        let of_fit = [("log-likelihood", self.fit.log_likelihood), ("NIS", self.fit.nis_per_observation)];
+        let mut all = of_parameters.chain(of_correlation).chain(of_fit.map(|(name, v)| (name.to_owned(), v)));
+        all.find(|(_, v)| !v.is_finite()).map_or(Ok(()), |(name, _)| Err(name))
+    }
+}
+
 /// Gathers the summary; `wall_s` and `workers` are measured by the caller.
 pub fn make(study: &Study, fit: &Fit, predictions: &[PredictionRow], workers: usize, wall_s: f64) -> Summary {
     let mut summary = Summary {
         study: study.name.clone(),
         model: study.setup.model.kind.clone(),
-        estimator: study.estimator.describe(),
+        estimator: study.describe_estimator(),
         seed: study.seed,
         parameters: estimates(study, &fit.posterior),
         correlation: rows_of(&starlings_estimators::correlation(&fit.posterior.covariance)),

@@ -39,6 +39,16 @@ pub enum TrialError {
         /// Why it failed.
         source: ParticleError,
     },
+    /// Model and data are so far apart that the square of their difference is no number.
+    #[error(
+        "`{output}` of record `{record}` and its prediction at the prior median are out of all proportion: check units, and values that are codes for missing ones"
+    )]
+    Misfit {
+        /// Record name.
+        record: String,
+        /// Output name.
+        output: String,
+    },
 }
 
 /// Runs every record once, free, at the prior median.
@@ -75,6 +85,10 @@ pub fn trial(study: &Study) -> Result<Vec<TrialChannel>, TrialError> {
                 })
                 .collect();
             let sum: f64 = residuals.iter().map(|r| r * r).sum();
+            if !sum.is_finite() {
+                let (record, output) = (record.name.clone(), channel.output.clone());
+                return Err(TrialError::Misfit { record, output });
+            }
             channels.push(TrialChannel {
                 record: record.name.clone(),
                 output: channel.output.clone(),

@@ -14,7 +14,7 @@ pub(super) fn parse(label: &str) -> Option<Unit> {
     let chars: Vec<char> = label.trim().chars().collect();
     let mut parser = Parser { chars, at: 0, depth: 0 };
     let value = parser.product()?;
-    (parser.at == parser.chars.len()).then(|| value.unit())
+    (parser.at == parser.chars.len()).then(|| value.unit()).filter(|u| u.factor.is_normal())
 }
 
 /// A unit in the making: `mantissa` · 10^`decade`.

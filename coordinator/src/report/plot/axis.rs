@@ -238,7 +238,13 @@ mod tests {
         assert_eq!(texts(&Axis::over_run("iteration", [1.0, 2.0, 3.0]), 6), ["1", "2", "3"]);
         assert_eq!(texts(&Axis::over_run("iteration", [1.0, 2.0]), 6), ["1", "2"]);
         assert_eq!(texts(&Axis::over_run("iteration", [1.0]), 6), ["1"]);
-        assert_eq!(texts(&Axis::over_run("iteration", (1..=11).map(f64::from)), 6), ["2", "4", "6", "8", "10"]);
-        assert_eq!(texts(&Axis::over_run("time [s]", [0.0, 0.5, 1.0]), 5), ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]);
+        assert_eq!(
+            texts(&Axis::over_run("iteration", (1..=11).map(f64::from)), 6),
+            ["2", "4", "6", "8", "10"]
+        );
+        assert_eq!(
+            texts(&Axis::over_run("time [s]", [0.0, 0.5, 1.0]), 5),
+            ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]
+        );
     }
 }

@@ -36,16 +36,17 @@ pub(in crate::study) fn estimator(source: &Source, section: &EstimatorSection) -
         EstimatorKind::Roukf => 0.001,
         EstimatorKind::Batch => 0.1,
     };
+    foreign_keys(source, section, kind);
     EstimatorChoice {
         kind,
         points: points(source, section),
         root: choose(source, section.root.as_ref(), "root", &roots).unwrap_or(Root::Symmetric),
-        passes: at_least_one(source, section.passes.as_ref(), "passes").map_or(2, |n| n as usize),
-        anneal: positive(source, section.anneal.as_ref(), "anneal", 10.0),
+        passes: counted(source, section.passes.as_ref(), "passes", 1000).unwrap_or(2),
+        anneal: anneal(source, section.anneal.as_ref()),
         spread: positive(source, section.spread.as_ref(), "spread", default_spread),
         resample: choose(source, section.resample.as_ref(), "resampling", &resample).unwrap_or(true),
-        max_iterations: at_least_one(source, section.max_iterations.as_ref(), "max_iterations")
-            .map_or(30, |n| n as usize),
+        max_iterations: counted(source, section.max_iterations.as_ref(), "max_iterations", 100_000)
+            .unwrap_or(30),
         tolerance: positive(source, section.tolerance.as_ref(), "tolerance", 0.01),
     }
 }
@@ -74,11 +75,10 @@ fn points(source: &Source, section: &EstimatorSection) -> Points {
 /// `[fleet]`.
 pub(in crate::study) fn fleet(source: &Source, section: &FleetSection) -> FleetChoice {
     FleetChoice {
-        workers: at_least_one(source, section.workers.as_ref(), "workers").map_or(2, |n| n as usize),
-        slots: at_least_one(source, section.slots.as_ref(), "slots").map(|n| n as usize),
-        patience: section.patience.as_ref().map(|p| positive(source, Some(p), "patience", 0.0)),
-        max_attempts: at_least_one(source, section.max_attempts.as_ref(), "max_attempts")
-            .map(|n| u32::try_from(n).unwrap_or(u32::MAX)),
+        workers: counted(source, section.workers.as_ref(), "workers", 1024).unwrap_or(2),
+        slots: counted(source, section.slots.as_ref(), "slots", 4096),
+        patience: section.patience.as_ref().map(|p| patience(source, p)),
+        max_attempts: counted(source, section.max_attempts.as_ref(), "max_attempts", 1000).map(|n| n as u32),
     }
 }
 
@@ -109,12 +109,62 @@ fn choose<T: Copy>(
     found
 }
 
-fn at_least_one(source: &Source, value: Option<&Spanned<u64>>, key: &str) -> Option<u64> {
+/// A count from 1 to `most`.
+fn counted(source: &Source, value: Option<&Spanned<u64>>, key: &str, most: u64) -> Option<usize> {
     let value = value?;
-    if *value.get_ref() == 0 {
-        source.report(value.span(), format!("`{key}` must be at least 1, found 0"));
+    let n = *value.get_ref();
+    if n == 0 || n > most {
+        let expected = if n == 0 { "at least 1".to_owned() } else { format!("at most {most}") };
+        source.report(value.span(), format!("`{key}` must be {expected}, found {n}"));
     }
-    Some(*value.get_ref())
+    Some(n.clamp(1, most) as usize)
+}
+
+/// A factor on the noise of the first pass; below 1 it would sharpen it.
+fn anneal(source: &Source, value: Option<&Spanned<f64>>) -> f64 {
+    let Some(value) = value else { return 10.0 };
+    let factor = *value.get_ref();
+    if !(1.0..=1e9).contains(&factor) {
+        source.report(value.span(), format!("`anneal` must be from 1 to 1e9, found {factor}"));
+    }
+    factor
+}
+
+/// Seconds, at most a hundred years.
+fn patience(source: &Source, value: &Spanned<f64>) -> f64 {
+    let seconds = *value.get_ref();
+    if !(seconds > 0.0 && seconds <= 3.2e9) {
+        source.report(
+            value.span(),
+            format!("`patience` must be above zero and at most 3.2e9 s, found {seconds}"),
+        );
+        return 1.0;
+    }
+    seconds
+}
+
+/// Keys of the estimator that was not chosen: they would be ignored, which nobody expects.
+fn foreign_keys(source: &Source, section: &EstimatorSection, kind: EstimatorKind) {
+    let of_roukf = [
+        ("passes", section.passes.as_ref().map(Spanned::span)),
+        ("anneal", section.anneal.as_ref().map(Spanned::span)),
+        ("root", section.root.as_ref().map(Spanned::span)),
+        ("resample", section.resample.as_ref().map(Spanned::span)),
+    ];
+    let of_batch = [
+        ("max_iterations", section.max_iterations.as_ref().map(Spanned::span)),
+        ("tolerance", section.tolerance.as_ref().map(Spanned::span)),
+    ];
+    let (foreign, owner): (&[_], _) = match kind {
+        EstimatorKind::Roukf => (&of_batch, "batch"),
+        EstimatorKind::Batch => (&of_roukf, "roukf"),
+    };
+    for (key, span) in foreign {
+        if let Some(span) = span {
+            let help = format!("remove it, or use kind = \"{owner}\"");
+            source.report_with(span.clone(), format!("`{key}` belongs to kind = \"{owner}\""), help);
+        }
+    }
 }
 
 fn positive(source: &Source, value: Option<&Spanned<f64>>, key: &str, default: f64) -> f64 {

@@ -164,7 +164,11 @@ fn channels(source: &Source, record: &Table<'_>) -> Vec<ChannelSection> {
             noise: noise.unwrap_or_else(|| Spanned::new(t.span.clone(), None)),
         }
     };
-    record.tables("channels", "a channel", &["column", "output", "unit", "noise"]).into_iter().map(read).collect()
+    record
+        .tables("channels", "a channel", &["column", "output", "unit", "noise"])
+        .into_iter()
+        .map(read)
+        .collect()
 }
 
 fn noise(source: &Source, node: &Node<'_>) -> Option<Spanned<Option<f64>>> {

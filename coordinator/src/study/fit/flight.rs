@@ -3,6 +3,7 @@
 //! Outcomes are gathered by particle and record, never by arrival, so the numbers do not know who computed them. What to do
 //! about a particle that failed is not decided here: see [`super::rescue`].
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
@@ -40,6 +41,8 @@ pub struct Flight<'a> {
     pub failed: u64,
     /// Extra attempts.
     pub retried: u64,
+    /// Workers that answered.
+    workers: BTreeSet<String>,
 }
 
 impl<'a> Flight<'a> {
@@ -49,7 +52,16 @@ impl<'a> Flight<'a> {
     /// When the fleet refuses the setup.
     pub fn new(study: &'a Study, fleet: &'a mut dyn Fleet) -> Result<Self, RunError> {
         let setup = fleet.install(&study.setup)?;
-        Ok(Self { study, fleet, setup, rows: Vec::new(), total: 0, failed: 0, retried: 0 })
+        Ok(Self {
+            study,
+            fleet,
+            setup,
+            rows: Vec::new(),
+            total: 0,
+            failed: 0,
+            retried: 0,
+            workers: BTreeSet::new(),
+        })
     }
 
     /// Runs the given particles over the windows. `theta` is p × r in transformed units, `states[record]` is n × r or
@@ -84,15 +96,37 @@ impl<'a> Flight<'a> {
         let mut results = Vec::with_capacity(particles.len());
         for &particle in particles {
             let mut of_particle = Vec::with_capacity(windows.len());
-            for ((record, _), outcome) in windows.iter().zip(outcomes.by_ref()) {
+            for ((record, window), outcome) in windows.iter().zip(outcomes.by_ref()) {
                 self.rows.push(self.row(place, *record, particle, &outcome));
+                if !self.workers.contains(&outcome.worker) {
+                    self.workers.insert(outcome.worker.clone());
+                }
                 self.retried += u64::from(outcome.attempts.saturating_sub(1));
                 self.failed += u64::from(outcome.result.is_err());
-                of_particle.push(outcome.result);
+                of_particle.push(self.sound(outcome.result, *record, particle, window)?);
             }
             results.push(of_particle);
         }
         Ok(results)
+    }
+
+    /// A failure of the model is data. A run that was lost with its workers, or that does not fit the study, is none: it
+    /// says nothing of this particle, and treating it as a failure would let the fleet change the posterior.
+    fn sound(
+        &self,
+        result: Result<Prediction, ParticleError>,
+        record: usize,
+        particle: usize,
+        window: &Window,
+    ) -> Result<Result<Prediction, ParticleError>, RunError> {
+        let reason = match &result {
+            Err(error @ (ParticleError::Lost { .. } | ParticleError::BadJob(_))) => error.to_string(),
+            Ok(p) if p.outputs.len() != window.observed.len() => {
+                format!("{} predicted values where {} were asked for", p.outputs.len(), window.observed.len())
+            }
+            _ => return Ok(result),
+        };
+        Err(RunError::NoAnswer { particle, record: self.study.records[record].name.clone(), reason })
     }
 
     fn row(&self, place: Place, record: usize, particle: usize, outcome: &crate::fleet::Outcome) -> JobRow {
@@ -113,7 +147,12 @@ impl<'a> Flight<'a> {
         std::mem::take(&mut self.rows)
     }
 
-    /// Workers at the moment, for progress and the summary.
+    /// Workers that answered a run so far.
+    pub fn n_answered(&self) -> usize {
+        self.workers.len()
+    }
+
+    /// Workers at the moment.
     pub fn n_workers(&self) -> usize {
         self.fleet.n_workers()
     }

@@ -8,7 +8,7 @@
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
-use starlings_estimators::{Particles, Roukf};
+use starlings_estimators::{Particles, Resampled, Roukf};
 use starlings_models::Window;
 
 use super::filter::recombine;
@@ -75,7 +75,7 @@ pub fn redraw(
     states: &mut Vec<Option<DMatrix<f64>>>,
 ) -> Result<Option<(Particles, DMatrix<f64>)>, RunError> {
     let study = flight.study();
-    let (redrawn, transform) =
+    let Resampled { particles: redrawn, transform, .. } =
         roukf.resample(particles, &gram(study, &roukf.set.weights, particles, states))?;
     let mut mixed = states.clone();
     recombine(&mut mixed, &transform);

@@ -177,10 +177,9 @@ fn lock(path: &Path) -> Result<File, FolderError> {
     let frozen = path.join("study.toml");
     let file = File::open(&frozen).map_err(|source| FolderError::Unwritable { path: frozen, source })?;
     match file.try_lock() {
-        Ok(()) => Ok(file),
         Err(TryLockError::WouldBlock) => Err(FolderError::Locked(path.to_owned())),
         // Some network file systems know no locks; a run there is better than none.
-        Err(TryLockError::Error(_)) => Ok(file),
+        Ok(()) | Err(TryLockError::Error(_)) => Ok(file),
     }
 }
 
@@ -227,7 +226,7 @@ fn info(study: &Study, command: &str, started: &str) -> StudyInfo {
         name: study.name.clone(),
         says: Some(study.says.clone()).filter(|s| !s.is_empty()),
         model: study.setup.model.kind.clone(),
-        estimator: study.estimator.describe(),
+        estimator: study.describe_estimator(),
         batch: study.estimator.kind == crate::study::EstimatorKind::Batch,
         seed: study.seed,
         time_unit: study.time_unit.clone(),
