@@ -1,7 +1,7 @@
 //! What people read on a terminal: log lines, text on standard output, aligned tables, numbers of the digits they deserve.
 //!
 //! Every command writes to standard output through [`line`], [`text`] or [`lost`]: a reader that stops early, as `head`
-//! does, ends the command quietly.
+//! does, ends the command quietly. What is for people only goes to standard error through [`note`].
 
 use std::fmt::Display;
 use std::io::{self, ErrorKind, IsTerminal, Write};
@@ -35,6 +35,11 @@ pub(crate) fn line(content: impl Display) -> Result<(), Failure> {
 pub(crate) fn text(content: impl Display) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
     write!(out, "{content}").and_then(|()| out.flush()).map_err(|e| lost(&e))
+}
+
+/// Writes a line to standard error; when nobody reads it, the work goes on.
+pub(crate) fn note(content: impl Display) {
+    let _ = writeln!(io::stderr().lock(), "{content}");
 }
 
 /// What a failed write to standard output means.

@@ -6,6 +6,8 @@ use std::process::ExitCode;
 use miette::{Diagnostic, LabeledSpan, NamedSource, Report, Severity, SourceCode};
 use starlings_coordinator::study::{Problem, StudyError};
 
+use crate::console::note;
+
 /// Why a command ended without doing what was asked.
 pub(crate) enum Failure {
     /// The input is wrong: exit code 2.
@@ -42,14 +44,14 @@ impl Failure {
     pub(crate) fn print(&self) {
         match self {
             Self::Unread => {}
-            Self::Input(message) | Self::Run(message) => eprintln!("error: {message}"),
+            Self::Input(message) | Self::Run(message) => note(format_args!("error: {message}")),
             Self::Study(error) => {
                 for problem in &error.problems {
-                    eprintln!("{:?}", Report::new(Shown::from(problem)));
+                    note(format_args!("{:?}", Report::new(Shown::from(problem))));
                 }
                 let n = error.problems.len();
                 if n > 1 {
-                    eprintln!("{n} problems; nothing was run");
+                    note(format_args!("{n} problems; nothing was run"));
                 }
             }
         }

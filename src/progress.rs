@@ -7,6 +7,8 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use starlings_coordinator::study::Progress;
 
+use crate::console::note;
+
 /// Spacing of plain lines.
 const LINE_EVERY: Duration = Duration::from_secs(10);
 
@@ -45,7 +47,7 @@ impl Display {
                 let edge = p.step == 1 || p.step == p.steps;
                 let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
                 if edge || last.elapsed() > LINE_EVERY {
-                    eprintln!("{head}: {} of {} analyses, {tail}", p.step, p.steps);
+                    note(format_args!("{head}: {} of {} analyses, {tail}", p.step, p.steps));
                     *last = Instant::now();
                 }
             }
@@ -65,8 +67,8 @@ impl Display {
     pub(crate) fn say(&self, text: &str) {
         match self {
             Self::Silent => {}
-            Self::Lines(_) => eprintln!("{text}"),
-            Self::Bar(bar) => bar.suspend(|| eprintln!("{text}")),
+            Self::Lines(_) => note(format_args!("{text}")),
+            Self::Bar(bar) => bar.suspend(|| note(format_args!("{text}"))),
         }
     }
 

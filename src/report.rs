@@ -6,7 +6,7 @@ use clap::Parser;
 use starlings_coordinator::report as page;
 use starlings_coordinator::study::RunFolder;
 
-use crate::console::line;
+use crate::console::{line, note};
 use crate::failure::Failure;
 
 /// Write report.html, summary.json and posterior.csv of a run folder again from its run.db.
@@ -37,9 +37,9 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         page::write_files(&folder).map_err(Failure::run)?;
     } else {
         page::write_page(&folder).map_err(Failure::run)?;
-        eprintln!(
+        note(format_args!(
             "the run is not finished: the report shows what there is, and the other files are not written"
-        );
+        ));
     }
     if !args.json {
         return line(html.display());

@@ -12,7 +12,7 @@ use starlings_coordinator::study::trial::trial;
 use starlings_coordinator::study::{Progress, RunContext, RunFolder, Study, Summary, run as study_run};
 use tokio_util::sync::CancellationToken;
 
-use crate::console::{cancel_on_signal, line, number, table};
+use crate::console::{cancel_on_signal, line, note, number, table};
 use crate::failure::Failure;
 use crate::progress::Display;
 
@@ -57,7 +57,10 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     let mut crew = Crew::listen(&study, address, &display)?;
     let mut folder = open_folder(args, &study)?;
     if let Some(summary) = folder.summary().map_err(Failure::run)? {
-        eprintln!("the run in {} is finished already; writing its files again", folder.path.display());
+        note(format_args!(
+            "the run in {} is finished already; writing its files again",
+            folder.path.display()
+        ));
         report::write_files(&folder).map_err(Failure::run)?;
         return print(&summary, &folder.path, args.json);
     }
@@ -136,7 +139,9 @@ impl Crew {
     fn gather(&mut self, args: &Args, study: &Study, n: usize) -> Result<(), Failure> {
         let address = self.fleet.address();
         if args.listen.is_some() {
-            eprintln!("listening on {address}; start workers with: starlings worker --connect {address}");
+            note(format_args!(
+                "listening on {address}; start workers with: starlings worker --connect {address}"
+            ));
             return Ok(());
         }
         let slots = study.fleet.slots.unwrap_or(1).to_string();

@@ -192,6 +192,17 @@ fn a_reader_that_stops_early_ends_a_command_quietly() {
     assert!(dir.path().join("again/report.html").exists(), "the run went on without a reader");
 }
 
+#[cfg(unix)]
+#[test]
+fn a_message_that_nobody_reads_changes_no_exit_code() {
+    for (arguments, expected) in [(["check", "no-such.toml"], 2), (["report", "no-such-folder"], 2)] {
+        let mut child =
+            starlings().args(arguments).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+        drop(child.stderr.take());
+        assert_eq!(child.wait().unwrap().code(), Some(expected), "{arguments:?}");
+    }
+}
+
 #[test]
 fn simulate_names_what_is_wrong_with_its_arguments() {
     let refused = |study: &str, arguments: &[&str]| {
@@ -297,5 +308,5 @@ fn an_interrupted_run_ends_its_workers_and_says_how_to_go_on() {
     assert!(!out.join("posterior.csv").exists());
     let workers = worker_processes(&out);
     assert!(!workers.is_empty(), "the events name the workers that joined");
-    common::wait_until("the end of the workers", || !workers.iter().any(|pid| is_alive(pid)));
+    common::wait_until("the end of the workers", || !workers.iter().any(is_alive));
 }

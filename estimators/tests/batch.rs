@@ -254,6 +254,48 @@ fn a_start_that_cannot_be_run_is_an_error_and_bad_shapes_are_refused() {
 }
 
 #[test]
+fn a_new_slope_at_the_same_centre_half_forgets_the_damping() {
+    let prior = Gaussian::independent(&[0.0, 0.0], &[1.0, 1.0]);
+    let batch = Batch::new(SigmaSet::new(Points::Simplex, 2).unwrap());
+    let noise = Noise::Diagonal(vec![1.0; 2]);
+    let data = Data { values: &[2.0, 1.0], noise: &noise };
+    let model = |theta: &[f64]| theta.to_vec();
+    let go = |state: &BatchState, lost: bool| {
+        let (z, mut failed) = ensemble(&model, &batch.sample(state), 2);
+        failed[0] = lost;
+        batch.step(state, &z, &failed, &data).unwrap().0
+    };
+    let first = go(&batch.init(&prior), false);
+    let mut state = first.clone();
+    let mut steps = vec![];
+    for _ in 0..4 {
+        state = go(&state, true);
+        steps.push(state.damping);
+    }
+    assert_eq!(state.trial, first.best.as_ref().unwrap().centre, "the best centre is linearised again");
+    // 0.02 x 4 x 8 x 16 x 32 after four rejections, of which half the decades above 0.02 remain: nearer than after three.
+    assert!(state.damping < steps[2] && state.damping > 0.02, "{} {steps:?}", state.damping);
+    // Five more accepted ensembles of a linear model, each 0.3 of the last, are back below 0.02.
+    for _ in 0..6 {
+        state = go(&state, false);
+    }
+    assert!(state.damping < 0.02, "{}", state.damping);
+}
+
+#[test]
+fn a_spread_that_is_not_positive_and_finite_is_refused() {
+    let set = SigmaSet::new(Points::Simplex, 2).unwrap();
+    let state = Batch::new(set.clone()).init(&Gaussian::independent(&[0.0, 0.0], &[1.0, 1.0]));
+    let noise = Noise::Diagonal(vec![1.0; 2]);
+    let data = Data { values: &[0.0, 1.0], noise: &noise };
+    for spread in [0.0, -0.1, f64::INFINITY] {
+        let batch = Batch { spread, ..Batch::new(set.clone()) };
+        let refused = batch.step(&state, &DMatrix::zeros(2, 4), &[false; 4], &data).unwrap_err();
+        assert_eq!(refused, EstimatorError::Spread { value: spread });
+    }
+}
+
+#[test]
 fn a_state_that_was_stored_goes_on_to_the_same_bits() {
     let values = pressure(&truth());
     let noise = Noise::Diagonal(vec![2.0 * MM_HG; values.len()]);

@@ -59,6 +59,15 @@ fn effective_sample_size_of_white_and_of_autoregressive_noise() {
 }
 
 #[test]
+fn the_effective_sample_size_of_a_million_values_takes_few_passes() {
+    let e = white(82, 1_000_000);
+    // White noise decides at the first pairs; all lags would be 5e11 products.
+    assert!(effective_sample_size(&e) > 0.99e6);
+    // The last lag of an odd series has no partner and does not count.
+    assert!((effective_sample_size(&[1.0, 2.0, 3.0]) - 3.0).abs() < 1e-14);
+}
+
+#[test]
 fn the_nis_band_has_tabulated_chi_square_quantiles() {
     // Chi-square tables, 2.5 and 97.5 %: 3.247 and 20.483 for ten degrees of freedom.
     let (lo, hi) = nis_band(10, 0.95);
@@ -104,5 +113,13 @@ fn transforms_know_their_domain() {
     assert!(!bounded.contains(-1.0) && !bounded.contains(5.0) && bounded.contains(4.9));
     assert!((Transform::Log2.to_physical(3.0) - 8.0).abs() < 1e-14);
     assert!((bounded.to_physical(0.0) - 2.0).abs() < 1e-14);
-    assert!(bounded.to_physical(-800.0) >= -1.0 && bounded.to_physical(800.0) <= 5.0);
+    for bounded in
+        [bounded, Transform::Logit { lo: 0.0, hi: 1.0 }, Transform::Logit { lo: 1e6, hi: 1e6 + 1.0 }]
+    {
+        for theta in [-800.0, -37.0, 37.0, 800.0, f64::NEG_INFINITY, f64::INFINITY] {
+            let v = bounded.to_physical(theta);
+            assert!(bounded.contains(v) && bounded.to_transformed(v).is_finite(), "{bounded:?} {theta}: {v}");
+        }
+        assert!(bounded.to_physical(f64::NAN).is_nan());
+    }
 }

@@ -81,6 +81,46 @@ fn a_posterior_wider_than_its_prior_holds_no_information() {
 }
 
 #[test]
+fn information_of_rounding_size_does_not_carry_a_moved_mean_away() {
+    // A strongly and an unseen direction; the unseen one is sharper by rounding, and its mean moved by a tenth of a sd.
+    let used = Gaussian::independent(&[0.0, 0.0], &[1e-3, 1e-3]);
+    let wanted = Gaussian::independent(&[0.0, 0.0], &[1.0, 1.0]);
+    for rounding in [0.0, 1e-15, 1e-12, 2e-10] {
+        let posterior = Gaussian::independent(&[0.0, 1e-4], &[5e-4, 1e-3 * (1.0 - rounding)]);
+        let exchanged = exchange_prior(&posterior, &used, &wanted).unwrap().posterior;
+        assert!(exchanged.mean[1].abs() < 1e-12, "{rounding}: {}", exchanged.mean[1]);
+        assert!((exchanged.covariance[(1, 1)] - 1.0).abs() < 1e-12, "{rounding}");
+    }
+}
+
+#[test]
+fn a_direction_that_the_data_know_a_hundredth_of_still_counts_under_a_narrow_prior() {
+    // Information 0.01 under the wanted prior, 1e-8 under the used one; the datum says 3.
+    let (e, datum) = (0.01, 3.0);
+    let used = Gaussian::independent(&[0.0], &[1e-3]);
+    let wanted = Gaussian::independent(&[0.0], &[1.0]);
+    let precision = 1e6 + e;
+    let posterior = Gaussian::independent(&[e * datum / precision], &[precision.sqrt().recip()]);
+    let exchanged = exchange_prior(&posterior, &used, &wanted).unwrap().posterior;
+    // One part in 1e8 of a number with 16 digits is left: 8 digits at best, fewer after the square roots.
+    assert!((exchanged.mean[0] - e * datum / (1.0 + e)).abs() < 1e-6, "{}", exchanged.mean[0]);
+    assert!((exchanged.covariance[0] - 1.0 / (1.0 + e)).abs() < 1e-6);
+}
+
+#[test]
+fn a_corrected_nis_is_never_negative() {
+    let used = Gaussian::independent(&[0.0], &[1e-3]);
+    let wanted = Gaussian::independent(&[0.0], &[1.0]);
+    let (narrow, datum) = (1e6, 5.0);
+    // One datum of unit noise: all of its 25 under the used prior, half under the wanted one.
+    let posterior = Gaussian::independent(&[datum / (narrow + 1.0)], &[(narrow + 1.0f64).sqrt().recip()]);
+    let exchanged = exchange_prior(&posterior, &used, &wanted).unwrap();
+    let nis = datum * datum / (1.0 + 1.0 / narrow);
+    assert!((exchanged.corrected_nis(nis) - 12.5).abs() < 1e-6, "{}", exchanged.corrected_nis(nis));
+    assert!(exchanged.corrected_nis(1.0) >= 0.0 && exchanged.nis < -1.0);
+}
+
+#[test]
 fn the_same_prior_changes_nothing_and_a_singular_one_is_refused() {
     let prior = wanted();
     let (posterior, _, _) = filtered(&prior, 4);

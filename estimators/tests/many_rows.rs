@@ -4,7 +4,7 @@ mod common;
 
 use common::{difference, filter, gauss, normal, rng, uniform};
 use nalgebra::{DMatrix, DVector};
-use starlings_estimators::{Analysis, Data, Gaussian, Noise, Points, Root, recombine};
+use starlings_estimators::{Analysis, Data, EstimatorError, Gaussian, Noise, Points, Root, recombine};
 
 /// 700 rows in two blocks, a quarter missing, the first rows complete.
 fn problem(points: Points, scale: f64) -> (Analysis, Analysis, Analysis) {
@@ -117,6 +117,47 @@ fn recombination_equals_the_matrix_product_and_ignores_a_dropped_column() {
     lost.column_mut(3).fill(f64::NAN);
     recombine(&lost, &t, &mut out);
     assert!(difference(&out, &expected) < 1e-13, "sums of seven products");
+}
+
+#[test]
+fn recombination_is_the_matrix_product_for_any_number_of_particles_and_rows() {
+    let mut g = rng(23);
+    for r in [1, 2, 6, 10, 11, 13, 22, 23, 45] {
+        for n in [1, 15, 16, 4097, 9000] {
+            let (x, t) = (normal(&mut g, n, r), normal(&mut g, r, r));
+            let mut out = DMatrix::from_element(n, r, f64::NAN);
+            recombine(&x, &t, &mut out);
+            assert!(difference(&out, &(&x * &t)) < 1e-12, "sums of {r} products, {n} rows");
+        }
+    }
+}
+
+#[test]
+fn a_noise_covariance_that_is_not_symmetric_is_refused_and_a_missing_row_is_not_looked_at() {
+    let roukf = filter(Points::Simplex, 1, Root::Symmetric);
+    let particles = roukf.init(&Gaussian::independent(&[0.0], &[1.0]));
+    let z = DMatrix::from_fn(3, 2, |i, j| (i + j) as f64);
+    let noise = Noise::Dense(DMatrix::from_row_slice(3, 3, &[2.0, 0.0, 0.5, 0.0, 2.0, 0.0, 0.4, 0.0, 2.0]));
+    let run = |values: &[f64]| roukf.analysis(&particles, &z, &Data { values, noise: &noise });
+    let refused = run(&[0.0; 3]).unwrap_err();
+    assert_eq!(refused, EstimatorError::NoiseNotSymmetric { row: 0, column: 2, above: 0.5, below: 0.4 });
+    assert_eq!(run(&[0.0, 1.0, f64::NAN]).unwrap().1.n_used, 2);
+}
+
+#[test]
+fn predictions_whose_sensitivity_overflows_are_an_error() {
+    for points in common::ALL {
+        let roukf = filter(points, 2, Root::Symmetric);
+        let particles = roukf.init(&Gaussian::independent(&[0.0; 2], &[1.0; 2]));
+        let z = DMatrix::from_fn(
+            2,
+            particles.theta.ncols(),
+            |i, j| if (i + j) % 2 == 0 { 1e308 } else { -1e308 },
+        );
+        let noise = Noise::Diagonal(vec![1e-3; 2]);
+        let done = roukf.analysis(&particles, &z, &Data { values: &[0.0, 1.0], noise: &noise });
+        assert!(matches!(done, Err(EstimatorError::NotFinite { .. })), "{points:?}");
+    }
 }
 
 #[test]

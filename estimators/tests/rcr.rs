@@ -3,9 +3,11 @@
 mod common;
 
 use common::rcr::{MM_HG, TRUTH, forecast, physical, predict, pressure, prior, truth};
-use common::{difference, filter, gauss, rng};
+use common::{filter, gauss, rng};
 use nalgebra::{DMatrix, DVector};
-use starlings_estimators::{Data, Gaussian, Noise, Particles, Points, Root, Roukf, SigmaSet, exchange_prior};
+use starlings_estimators::{
+    Data, Gaussian, Noise, Particles, Points, Resampled, Root, Roukf, SigmaSet, exchange_prior,
+};
 
 /// Filters all pressures; particles after each analysis and the log-likelihood.
 fn run(roukf: &Roukf, prior: &Gaussian, observed: &[f64], sigma: f64) -> (Vec<Particles>, f64) {
@@ -73,7 +75,10 @@ fn star_points_resampled_before_each_analysis_are_the_plain_unscented_filter() {
         let (mean, _) = common::moments(&augmented, set);
         let weighted =
             DMatrix::from_fn(4, r, |i, j| norm[i] * set.weights[j].sqrt() * (augmented[(i, j)] - mean[i]));
-        let (resampled, t) = roukf.resample(&particles, &weighted.tr_mul(&weighted)).unwrap();
+        let Resampled { particles: resampled, transform: t, dropped } =
+            roukf.resample(&particles, &weighted.tr_mul(&weighted)).unwrap();
+        // As many parameters as states: four directions hold everything, up to rounding.
+        assert!(dropped < 1e-12, "{dropped}");
         pi *= &t;
         let data = Data { values: &[z], noise: &noise };
         let (next, a) = roukf.analysis(&resampled, &predict(&pi, &resampled.theta, k), &data).unwrap();
@@ -164,10 +169,21 @@ fn two_passes_recover_the_windkessel_from_noisy_pressures() {
 fn resampling_leaves_the_simplex_and_pulled_particles_alone() {
     let simplex = filter(Points::Simplex, 4, Root::Symmetric);
     let particles = simplex.init(&prior(0.7));
-    let (same, t) = simplex.resample(&particles, &DMatrix::identity(5, 5)).unwrap();
-    assert_eq!((same, t), (particles, DMatrix::identity(5, 5)));
+    let same = simplex.resample(&particles, &DMatrix::identity(5, 5)).unwrap();
+    assert_eq!(same, Resampled { particles, transform: DMatrix::identity(5, 5), dropped: 0.0 });
     let star = filter(Points::Star, 4, Root::Symmetric);
     let (pulled, _) = star.pull(&star.init(&prior(0.7)), 2, 0.5);
-    let (same, t) = star.resample(&pulled, &DMatrix::identity(9, 9)).unwrap();
-    assert_eq!((same, difference(&t, &DMatrix::identity(9, 9)) < 1e-300), (pulled, true));
+    let same = star.resample(&pulled, &DMatrix::identity(9, 9)).unwrap();
+    assert_eq!(same, Resampled { particles: pulled, transform: DMatrix::identity(9, 9), dropped: 0.0 });
+}
+
+#[test]
+fn resampling_says_which_share_of_the_spread_it_dropped() {
+    let star = filter(Points::Star, 4, Root::Symmetric);
+    let particles = star.init(&prior(0.7));
+    let gram =
+        DMatrix::from_diagonal(&DVector::from_column_slice(&[8.0, 1.0, 0.0, 4.0, 2.0, 0.0, 4.0, 1.0, 0.0]));
+    // 8 + 4 + 4 + 2 of 20 are kept.
+    let dropped = star.resample(&particles, &gram).unwrap().dropped;
+    assert!((dropped - 0.1).abs() < 1e-14, "{dropped}: a few roundings");
 }

@@ -18,15 +18,41 @@ use self::settings::{estimator, explain, fleet, observer};
 use super::checked::{Record, Study};
 use super::expand;
 use super::file::{RecordSection, StudyFile};
-use super::problem::{Source, StudyError};
+use super::problem::{Problem, Source, StudyError};
 use super::record::{Context, Recordings};
 use crate::study::file::read::read;
 
-/// Checks the text of a study file.
-///
-/// # Errors
-/// Everything that is wrong.
-pub(super) fn check(path: &Path, text: &str) -> Result<Study, StudyError> {
+impl Study {
+    /// Reads and checks a study file and its recordings, which stand relative to it.
+    ///
+    /// # Errors
+    /// Everything that is wrong, each with its place and remedy.
+    pub fn load(path: &Path) -> Result<Self, StudyError> {
+        match std::fs::read_to_string(path) {
+            Ok(text) => Self::from_text(path, &text),
+            Err(error) => {
+                let problem = Problem {
+                    message: format!("cannot read the study: {error}"),
+                    help: Some("give the path of a study file (TOML)".to_owned()),
+                    file: path.to_owned(),
+                    source_text: None,
+                    span: None,
+                };
+                Err(StudyError { problems: vec![problem] })
+            }
+        }
+    }
+
+    /// Checks the text of a study file that stands, or stood, at `file`.
+    ///
+    /// # Errors
+    /// As [`Study::load`].
+    pub fn from_text(file: &Path, text: &str) -> Result<Self, StudyError> {
+        check(file, text)
+    }
+}
+
+fn check(path: &Path, text: &str) -> Result<Study, StudyError> {
     let source = Source::new(path, text);
     let file = read(&source)?;
     check_name(&source, &file);

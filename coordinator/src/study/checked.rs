@@ -1,15 +1,12 @@
 //! A checked study: plain data that the run can rely on without asking again.
 //!
-//! Nothing here reads files or judges. Next files to read: [`super::expand`] for the way from the estimated vector to a job's
-//! values, [`super::plan`] for the windows.
+//! Nothing here reads files or judges: [`super::check`] does. Next files to read: [`super::expand`] for the way from the
+//! estimated vector to a job's values, [`super::plan`] for the windows.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use starlings_estimators::{Drift, Points, Root, Transform};
 use starlings_models::{EffectDef, Setup, Signal, Spec};
-
-use super::check;
-use super::problem::{Problem, StudyError};
 
 /// A study whose names exist, whose numbers make sense and whose recordings were read.
 #[derive(Clone, Debug)]
@@ -195,34 +192,6 @@ pub struct ExplainChoice {
 }
 
 impl Study {
-    /// Reads and checks a study file and its recordings, which stand relative to it.
-    ///
-    /// # Errors
-    /// Everything that is wrong, each with its place and remedy.
-    pub fn load(path: &Path) -> Result<Self, StudyError> {
-        match std::fs::read_to_string(path) {
-            Ok(text) => Self::from_text(path, &text),
-            Err(error) => {
-                let problem = Problem {
-                    message: format!("cannot read the study: {error}"),
-                    help: Some("give the path of a study file (TOML)".to_owned()),
-                    file: path.to_owned(),
-                    source_text: None,
-                    span: None,
-                };
-                Err(StudyError { problems: vec![problem] })
-            }
-        }
-    }
-
-    /// Checks the text of a study file that stands, or stood, at `file`.
-    ///
-    /// # Errors
-    /// As [`Study::load`].
-    pub fn from_text(file: &Path, text: &str) -> Result<Self, StudyError> {
-        check::check(file, text)
-    }
-
     /// Whether no observer corrects the state during a run.
     pub fn observer_is_off(&self) -> bool {
         matches!(self.setup.observer.kind.as_str(), "" | "none") || self.setup.observer.gain <= 0.0

@@ -6,6 +6,7 @@
 //! [`filter`].
 
 pub mod batch;
+mod ensemble;
 pub mod filter;
 pub mod flight;
 pub mod forecast;

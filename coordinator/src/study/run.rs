@@ -11,7 +11,7 @@ use starlings_models::ParticleError;
 use super::fit::{batch, filter, forecast};
 use super::store::{Store, StoreError};
 use super::summary::Summary;
-use super::{EstimatorKind, Study, summary};
+use super::{EstimatorKind, Study, summary, warnings};
 use crate::fleet::{Fleet, FleetError, FleetEvent};
 use crate::study::fit::flight::Flight;
 use crate::study::store::folder::RunFolder;
@@ -183,7 +183,8 @@ pub fn run(
     let jobs = flight.take_rows();
     folder.store.predictions(&predictions, &jobs)?;
     context.keep_events(&folder.store)?;
-    let result = summary::make(study, &fit, &predictions, flight.n_answered(), context.elapsed());
+    let mut result = summary::make(study, &fit, &predictions, flight.n_answered(), context.elapsed());
+    result.warnings = warnings::collect(study, &fit, &result, &predictions);
     result.check_finite().map_err(RunError::NotFinite)?;
     folder.store.event(context.elapsed(), "run", "run finished")?;
     folder.finish(study, &fit, &result)?;

@@ -104,9 +104,9 @@ impl Summary {
     }
 }
 
-/// Gathers the summary; `wall_s` and `workers` are measured by the caller.
+/// Gathers the summary but for its warnings; `wall_s` and `workers` are measured by the caller.
 pub fn make(study: &Study, fit: &Fit, predictions: &[PredictionRow], workers: usize, wall_s: f64) -> Summary {
-    let mut summary = Summary {
+    Summary {
         study: study.name.clone(),
         model: study.setup.model.kind.clone(),
         estimator: study.describe_estimator(),
@@ -124,9 +124,7 @@ pub fn make(study: &Study, fit: &Fit, predictions: &[PredictionRow], workers: us
         wall_s,
         warnings: Vec::new(),
         conditional_on: conditional_on(study),
-    };
-    summary.warnings = super::warnings::collect(study, fit, &summary, predictions);
-    summary
+    }
 }
 
 fn rows_of(m: &DMatrix<f64>) -> Vec<Vec<f64>> {

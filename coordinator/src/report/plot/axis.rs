@@ -140,13 +140,12 @@ fn linear_values(lo: f64, hi: f64, count: usize, least: f64) -> (f64, Vec<f64>) 
 fn log_values(lo: f64, hi: f64, count: usize) -> Option<Vec<f64>> {
     let (first, last) = (lo.log10().floor() as i32, hi.log10().ceil() as i32);
     let inside = |v: &f64| *v >= lo * (1.0 - 1e-9) && *v <= hi * (1.0 + 1e-9);
-    let every = |digits: &[f64], stride: usize| -> Vec<f64> {
-        let powers = (first..=last).filter(|e| e.rem_euclid(stride as i32) == 0);
+    let every = |digits: &[f64], stride: i32| -> Vec<f64> {
+        let powers = (first..=last).filter(|e| e.rem_euclid(stride) == 0);
         powers.flat_map(|e| digits.iter().map(move |d| d * 10f64.powi(e))).filter(inside).collect()
     };
-    let decades = (last - first).unsigned_abs() as usize + 1;
-    let round = [1, 2, 3, 5, 10, 20, 30, 50, 100, 200];
-    let stride = round.into_iter().find(|stride| decades.div_ceil(*stride) <= count + 1).unwrap_or(200);
+    let few = |stride: &i32| ((last - first) / stride).unsigned_abs() as usize <= count;
+    let stride = [1, 2, 3, 5, 10, 20, 30, 50, 100].into_iter().find(few).unwrap_or(200);
     let candidates = [every(&[1.0, 2.0, 5.0], 1), every(&[1.0], 1), every(&[1.0], stride)];
     candidates.into_iter().find(|values| values.len() >= 3 && values.len() <= count + 2)
 }

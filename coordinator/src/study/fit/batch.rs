@@ -8,7 +8,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use starlings_estimators::{Batch, BatchState, BatchStep, Data, EstimatorError, Gaussian, SigmaSet};
 
-use super::filter;
+use super::ensemble::noise;
 use super::flight::{Flight, Place, StepWindows, stack_outputs};
 use crate::study::store::snapshot::{Head, Snapshot};
 use crate::study::store::{AnalysisRow, Store};
@@ -36,7 +36,7 @@ pub fn fit(
         .map(|record| (record, Arc::new(study.whole(record, true))))
         .collect();
     let values: Vec<f64> = windows.iter().flat_map(|(_, w)| w.observed.iter().copied()).collect();
-    let noise = filter::noise(study, &windows, 1.0);
+    let noise = noise(study, &windows, 1.0);
     let (mut known, mut now) = match resumed {
         Some(snapshot) => (restore(store, &snapshot)?, snapshot),
         None => begin(&batch, study),

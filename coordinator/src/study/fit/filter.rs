@@ -3,9 +3,9 @@
 //! What differs from pass to pass is in [`super::schedule`]; the sigma-point arithmetic lives in `starlings-estimators`; model
 //! states are only recombined here. Next file to read: [`super::schedule`], then [`super::rescue`].
 
-use nalgebra::DMatrix;
-use starlings_estimators::{Analysis, Data, Noise, Particles};
+use starlings_estimators::{Analysis, Data, Particles};
 
+use super::ensemble::{noise, recombine};
 use super::flight::{Flight, Place, StepWindows, stack_outputs, stack_states};
 use super::resample;
 use super::rescue::{Flown, fly};
@@ -93,24 +93,6 @@ fn step(
     let mut row = row(schedule.study, place, &windows, &analysis, before, &after);
     row.jobs = flight.take_rows();
     Ok((row, after))
-}
-
-/// X⁺ = X⁻T for the states of every record.
-pub(super) fn recombine(states: &mut [Option<DMatrix<f64>>], transform: &DMatrix<f64>) {
-    for x in states.iter_mut().flatten() {
-        let mut out = DMatrix::zeros(x.nrows(), x.ncols());
-        starlings_estimators::recombine(x, transform, &mut out);
-        *x = out;
-    }
-}
-
-/// Noise sd of every row, in the order of the stacked predictions.
-pub(in crate::study) fn noise(study: &Study, windows: &StepWindows, factor: f64) -> Noise {
-    let sd = windows.iter().flat_map(|(record, window)| {
-        let of_record = study.noise(*record);
-        window.times.iter().flat_map(move |_| of_record.clone())
-    });
-    Noise::Diagonal(sd.map(|s| s * factor).collect())
 }
 
 fn advance(now: &mut Snapshot, particles: &Particles, analysis: &Analysis) {

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 use starlings_estimators::{Particles, Resampled, Roukf};
 use starlings_models::Window;
 
-use super::filter::recombine;
+use super::ensemble::recombine;
 use super::flight::{Flight, Place, StepWindows, stack_outputs};
 use crate::study::expand::INITIAL;
 use crate::study::{RunError, Study};
