@@ -12,8 +12,8 @@ use fleet_kit::{
     ThreadWorker, Wire, any_port, assert_exact, await_event, await_workers, factory, jobs, listen, square,
 };
 use starlings_coordinator::fleet::{Fleet, FleetConfig, FleetError, FleetEvent, GrpcFleet, InProcess};
-use starlings_models::{Job, ModelDef, ParticleError, Setup, SetupError, Window};
-use starlings_worker::{WorkerConfig, WorkerError};
+use starlings_models::{Job, ModelDef, Setup, Window};
+use starlings_worker::WorkerConfig;
 use tokio_util::sync::CancellationToken;
 
 #[test]
@@ -190,29 +190,6 @@ fn a_cancelled_worker_says_goodbye_and_its_jobs_go_elsewhere() {
 }
 
 #[test]
-fn a_model_failure_is_an_outcome_after_two_workers_tried() {
-    let (mut fleet, events, _) = listen(any_port());
-    let failing = || {
-        factory(|job| match job.particle {
-            3 => Err(ParticleError::NotFinite { what: "p".to_owned(), time: f64::INFINITY }),
-            4 => panic!("what a model"),
-            _ => Ok(square(job)),
-        })
-    };
-    let _workers = [0; 2].map(|_| ThreadWorker::start(fleet.address(), failing()));
-    await_workers(&events, 2);
-    let setup = fleet.install(&Setup::default()).unwrap();
-    let outcomes = fleet.run(setup, jobs(6)).unwrap();
-    assert_eq!(
-        outcomes[3].result,
-        Err(ParticleError::NotFinite { what: "p".to_owned(), time: f64::INFINITY })
-    );
-    assert!(matches!(&outcomes[4].result, Err(ParticleError::Solver(text)) if text.contains("what a model")));
-    assert_eq!(outcomes.iter().map(|o| o.attempts).collect::<Vec<_>>(), [1, 1, 1, 2, 2, 1]);
-    assert_eq!(outcomes.iter().filter(|o| o.result.is_ok()).count(), 4);
-}
-
-#[test]
 fn a_cancelled_run_returns_although_its_job_never_ends() {
     let (mut fleet, events, cancel) = listen(any_port());
     let stop = cancel.clone();
@@ -232,64 +209,6 @@ fn a_cancelled_run_returns_although_its_job_never_ends() {
     );
     fleet.close();
     worker.end().unwrap();
-}
-
-#[test]
-fn a_port_in_use_is_named_with_a_remedy() {
-    let (fleet, _events, _) = listen(any_port());
-    let (sender, _receiver) = mpsc::channel();
-    let config = FleetConfig::new(fleet.address(), "second", CancellationToken::new(), sender);
-    let error = GrpcFleet::listen(config).err().expect("the port is taken");
-    let text = error.to_string();
-    assert!(matches!(error, FleetError::Bind { .. }));
-    assert!(text.contains(&fleet.address().port().to_string()) && text.contains("another port"), "{text}");
-}
-
-#[test]
-fn a_fleet_without_workers_says_so_when_its_patience_ends() {
-    let (sender, _events) = mpsc::channel();
-    let mut config = FleetConfig::new(any_port(), "lonely", CancellationToken::new(), sender);
-    config.patience = Duration::from_millis(100);
-    let mut fleet = GrpcFleet::listen(config).unwrap();
-    let setup = fleet.install(&Setup::default()).unwrap();
-    let text = fleet.run(setup, jobs(1)).unwrap_err().to_string();
-    assert!(text.contains("starlings worker --connect") && text.contains("no worker is connected"), "{text}");
-}
-
-#[test]
-fn a_worker_without_a_coordinator_gives_up_and_names_the_address() {
-    let address = TcpListener::bind(any_port()).unwrap().local_addr().unwrap();
-    let lonely = |config: &mut WorkerConfig| config.patience = Duration::from_millis(50);
-    let error = ThreadWorker::start_with(address, factory(|job| Ok(square(job))), lonely).end().unwrap_err();
-    assert!(matches!(&error, WorkerError::NoCoordinator { .. }));
-    let text = error.to_string();
-    assert!(text.contains(&address.to_string()) && text.contains("refused"), "{text}");
-}
-
-#[test]
-fn a_setup_that_no_worker_can_build_ends_the_run_with_its_text() {
-    let (mut fleet, events, _) = listen(any_port());
-    let broken = || -> starlings_worker::Factory {
-        Arc::new(|_| Err(SetupError::Invalid("the model has no legs".to_owned())))
-    };
-    let _workers = [0; 2].map(|_| ThreadWorker::start(fleet.address(), broken()));
-    await_workers(&events, 2);
-    let setup = fleet.install(&Setup::default()).unwrap();
-    let error = fleet.run(setup, jobs(1)).unwrap_err();
-    assert!(
-        matches!(&error, FleetError::SetupFailed { reason } if reason == "the model has no legs"),
-        "{error}"
-    );
-}
-
-#[test]
-fn a_state_too_large_for_a_job_is_refused_before_anything_is_sent() {
-    let (mut fleet, _events, _) = listen(any_port());
-    let setup = fleet.install(&Setup::default()).unwrap();
-    let mut jobs = jobs(1);
-    jobs[0].state = Some(vec![0.0; 40_000]);
-    let text = fleet.run(setup, jobs).unwrap_err().to_string();
-    assert!(text.contains("320000 bytes") && text.contains("not available yet"), "{text}");
 }
 
 #[test]
@@ -318,4 +237,29 @@ fn a_model_that_computes_for_several_heartbeats_is_not_declared_dead() {
     clock.join().unwrap();
     assert_eq!(outcomes[0].attempts, 1);
     assert!(!events.try_iter().any(|e| matches!(e, FleetEvent::WorkerLeft { .. })));
+}
+
+#[test]
+fn a_coordinator_that_stands_still_loses_no_worker_that_serves_once() {
+    let (sender, events) = mpsc::channel();
+    let mut config = FleetConfig::new(any_port(), "still", CancellationToken::new(), sender);
+    config.heartbeat = Duration::from_millis(500);
+    config.patience = Duration::from_secs(10);
+    let mut fleet = GrpcFleet::listen(config).unwrap();
+    let wire = Wire::to(fleet.address());
+    let local = factory(|job| Ok(square(job)));
+    let worker = ThreadWorker::start_with(wire.address, local, |config| config.once = true);
+    await_workers(&events, 1);
+    // An answered batch: the worker has had its welcome.
+    let setup = fleet.install(&Setup::default()).unwrap();
+    let jobs = jobs(20);
+    assert_exact(&fleet.run(setup, jobs.clone()).unwrap(), &jobs);
+    // Time itself is what is tested here: the worker hears nothing for five heartbeats, three are its patience otherwise.
+    wire.silence(true);
+    std::thread::park_timeout(Duration::from_millis(2500));
+    wire.silence(false);
+    assert_exact(&fleet.run(setup, jobs.clone()).unwrap(), &jobs);
+    fleet.close();
+    let report = worker.end().unwrap();
+    assert_eq!((report.sessions, report.reason.as_str()), (1, "the run is over"));
 }

@@ -4,14 +4,18 @@
 
 mod fleet_kit;
 
-use std::process::Command;
+use std::net::TcpListener;
+use std::process::{Command, Stdio};
 use std::sync::mpsc;
 use std::time::Duration;
 
 use fleet_kit::{any_port, assert_exact, await_event, factory, jobs, listen, square};
-use starlings_coordinator::fleet::{Fleet, FleetError, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers};
+use starlings_coordinator::fleet::{
+    Fleet, FleetConfig, FleetError, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers,
+};
 use starlings_models::Setup;
-use starlings_worker::WorkerConfig;
+use starlings_worker::{LIFELINE, WorkerConfig};
+use tokio_util::sync::CancellationToken;
 
 fn local(fleet: &GrpcFleet, n: usize, program: &str, args: &[&str]) -> LocalConfig {
     LocalConfig {
@@ -39,6 +43,7 @@ fn worker_process() {
     let Ok(address) = std::env::var("TEST_WORKER_CONNECT") else { return };
     let mut config = WorkerConfig::new(address);
     config.once = true;
+    config.lifeline = std::env::var_os(LIFELINE).is_some();
     config.factory = factory(|job| {
         // Long enough that a kill hits a running batch.
         let (_open, never) = mpsc::channel::<()>();
@@ -75,7 +80,10 @@ fn a_killed_worker_process_is_started_again_and_nothing_is_lost() {
 
 #[test]
 fn workers_that_die_at_once_end_the_run_with_their_last_words() {
-    let (mut fleet, _events, _) = listen(any_port());
+    let (sender, events) = mpsc::channel();
+    let mut config = FleetConfig::new(any_port(), "broken", CancellationToken::new(), sender);
+    config.max_attempts = 1;
+    let mut fleet = GrpcFleet::listen(config).unwrap();
     let script = "echo 'no such library: libphysics' >&2; exit 3";
     let _workers = LocalWorkers::spawn(local(&fleet, 2, "/bin/sh", &["-c", script])).unwrap();
     let setup = fleet.install(&Setup::default()).unwrap();
@@ -85,6 +93,21 @@ fn workers_that_die_at_once_end_the_run_with_their_last_words() {
         matches!(fleet.run(setup, jobs(1)), Err(FleetError::LocalWorkers(_))),
         "and so does the next one"
     );
+    let (mut given_up, mut restarted) = (0, 0);
+    for event in events.try_iter() {
+        match event {
+            FleetEvent::LocalWorkerGivenUp { deaths, reason, .. } => {
+                given_up += 1;
+                assert!(
+                    deaths > 1 && reason.contains("libphysics"),
+                    "more deaths than a job has attempts: {deaths}"
+                );
+            }
+            FleetEvent::LocalWorkerRestarted { .. } => restarted += 1,
+            _ => {}
+        }
+    }
+    assert_eq!((given_up, restarted), (2, 6), "each of two was started three times again");
 }
 
 #[test]
@@ -92,4 +115,25 @@ fn a_program_that_does_not_exist_is_named() {
     let (fleet, _events, _) = listen(any_port());
     let error = LocalWorkers::spawn(local(&fleet, 1, "/no/such/program", &[])).err().expect("cannot start");
     assert!(error.to_string().contains("/no/such/program"), "{error}");
+}
+
+#[test]
+fn a_worker_that_never_found_its_coordinator_ends_with_its_lifeline() {
+    let nobody = TcpListener::bind(any_port()).unwrap().local_addr().unwrap();
+    let mut worker = Command::new(std::env::current_exe().unwrap())
+        .args(["--exact", "worker_process", "--ignored"])
+        .env("TEST_WORKER_CONNECT", nobody.to_string())
+        .env(LIFELINE, "stdin")
+        .stdin(Stdio::piped())
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
+    assert!(worker.try_wait().unwrap().is_none(), "it dials");
+    let cut = std::time::Instant::now();
+    drop(worker.stdin.take());
+    assert!(
+        worker.wait().unwrap().success(),
+        "without its lifeline it is cancelled, and does not dial in vain"
+    );
+    assert!(cut.elapsed() < Duration::from_secs(30), "its patience is a minute");
 }

@@ -5,7 +5,9 @@ mod fleet_kit;
 
 use std::net::SocketAddr;
 
-use fleet_kit::{any_port, assert_exact, await_event, await_workers, jobs, listen, square};
+use fleet_kit::{
+    ThreadWorker, any_port, assert_exact, await_event, await_workers, factory, jobs, listen, square,
+};
 use starlings_coordinator::fleet::{Fleet, FleetEvent};
 use starlings_models::Setup;
 use starlings_proto::wire::{self, fleet_client::FleetClient};
@@ -173,4 +175,35 @@ fn a_malformed_message_ends_the_stream_and_nothing_else() {
         |e| matches!(e, FleetEvent::WorkerLeft { reason, .. } if reason.contains("malformed")),
     );
     assert_eq!(fleet.n_workers(), 0);
+}
+
+#[test]
+fn a_worker_that_dials_when_the_run_is_over_ends_well() {
+    let (fleet, _events, _) = listen(any_port());
+    let address = fleet.address();
+    block_on(async {
+        let mut hand = Hand::dial(address, hello()).await;
+        assert!(matches!(hand.hear().await, Some(ToWorker::Welcome(_))));
+        // Waits for the hand, which hears of the end and stays.
+        let closing = std::thread::spawn(move || fleet.close());
+        hand.stay_until_drained().await;
+        let report = ThreadWorker::start(address, factory(|job| Ok(square(job)))).end().unwrap();
+        assert_eq!((report.reason.as_str(), report.sessions), ("the run is over", 0));
+        drop(hand);
+        closing.join().unwrap();
+    });
+}
+
+#[test]
+fn a_broken_connection_says_what_broke() {
+    let (fleet, events, _) = listen(any_port());
+    block_on(async {
+        let mut hand = Hand::dial(fleet.address(), hello()).await;
+        assert!(matches!(hand.hear().await, Some(ToWorker::Welcome(_))));
+    });
+    // The runtime is gone in the middle of the stream.
+    let event = await_event(&events, |e| matches!(e, FleetEvent::WorkerLeft { .. }));
+    let FleetEvent::WorkerLeft { reason, .. } = &event else { unreachable!("awaited") };
+    assert!(reason.starts_with("the connection broke: ") && !reason.contains("code:"), "{reason}");
+    assert!(!reason.contains("Unknown error"), "{reason}");
 }

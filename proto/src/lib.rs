@@ -5,6 +5,7 @@
 //! [`convert`].
 
 pub mod convert;
+pub mod words;
 
 pub use bytes::Bytes;
 pub use convert::{
@@ -24,8 +25,20 @@ pub const MAX_MESSAGE: usize = 16 * 1024 * 1024;
 /// HTTP/2 frame size either side accepts, bytes; the default of 16 KiB halves the transport rate of large windows.
 pub const FRAME_SIZE: u32 = 256 * 1024;
 
+/// Largest number of slots of one worker: each is a thread.
+pub const MAX_SLOTS: usize = 4096;
+
+/// Environment variable by which a supervisor tells a worker that its standard input is a lifeline: a pipe that closes when the
+/// supervisor ends, however it ends.
+pub const LIFELINE: &str = "STARLINGS_LIFELINE";
+
 /// Package version sent in [`Hello`]; unequal versions are refused, since they may not give the same bits.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// BLAKE3 of the running program; `None` when it cannot be read.
+pub fn own_build() -> Option<[u8; 32]> {
+    std::env::current_exe().and_then(std::fs::read).ok().map(|bytes| digest(&bytes))
+}
 
 /// Types and service stubs generated from `proto/fleet.proto`.
 #[allow(missing_docs, unreachable_pub, clippy::all, clippy::pedantic, rust_2018_idioms)]

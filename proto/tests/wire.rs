@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use prost::Message;
 use starlings_models::{Job, ModelDef, ParticleError, Prediction, Setup, Signal, Window};
 use starlings_proto::{
-    Answer, FromWorker, Hello, JobEncoder, Lease, MAX_INLINE_STATE, ToWorker, Welcome, WireError,
+    Answer, FromWorker, Hello, JobEncoder, Lease, MAX_INLINE_STATE, MAX_SLOTS, ToWorker, Welcome, WireError,
     convert::job::check_size, decode_setup, encode_setup, wire,
 };
 
@@ -92,8 +92,14 @@ fn answer() -> impl Strategy<Value = Answer> {
 }
 
 fn from_worker() -> impl Strategy<Value = FromWorker> {
-    let hello =
-        (any::<u32>(), ".*", 1_u32.., any::<u64>(), any::<Option<[u8; 32]>>(), any::<Option<Vec<u8>>>());
+    let hello = (
+        any::<u32>(),
+        ".*",
+        1..=MAX_SLOTS as u32,
+        any::<u64>(),
+        any::<Option<[u8; 32]>>(),
+        any::<Option<Vec<u8>>>(),
+    );
     prop_oneof![
         hello.prop_map(|(protocol, text, slots, nonce, build, solver)| {
             FromWorker::Hello(Hello {
@@ -280,8 +286,24 @@ fn a_malformed_job_names_its_lease_so_that_it_can_be_answered() {
 }
 
 #[test]
-fn a_worker_without_slots_is_malformed() {
-    let hello = wire::Hello { slots: 0, ..wire::Hello::default() };
-    let message = wire::FromWorker { kind: Some(wire::from_worker::Kind::Hello(hello)) };
-    assert!(matches!(FromWorker::decode(message), Err(WireError::Shape { field: "slots", .. })));
+fn a_worker_without_slots_or_with_too_many_is_malformed() {
+    for slots in [0, MAX_SLOTS as u32 + 1, u32::MAX] {
+        let hello = wire::Hello { slots, ..wire::Hello::default() };
+        let message = wire::FromWorker { kind: Some(wire::from_worker::Kind::Hello(hello)) };
+        assert!(matches!(FromWorker::decode(message), Err(WireError::Shape { field: "slots", .. })));
+    }
+}
+
+#[test]
+fn a_window_that_no_worker_would_take_is_refused_before_it_travels() {
+    let spoil: [fn(&mut Window); 3] = [
+        |window| window.times.clear(),
+        |window| window.times = vec![1.0, 2.0],
+        |window| window.inputs = vec![Signal { times: vec![0.0], values: vec![] }],
+    ];
+    for damage in spoil {
+        let mut job = small_job();
+        damage(Arc::make_mut(&mut job.window));
+        assert!(matches!(check_size(&job), Err(WireError::Shape { .. })), "{job:?}");
+    }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use starlings_models::{Forward, Setup, SetupError};
-use starlings_proto::{Hello, PROTOCOL, VERSION, digest};
+use starlings_proto::{Hello, PROTOCOL, VERSION, own_build};
 use tokio_util::sync::CancellationToken;
 
 /// Makes what runs the jobs of a setup.
@@ -16,10 +16,14 @@ pub type Factory = Arc<dyn Fn(&Setup) -> Result<Box<dyn Forward>, SetupError> + 
 pub struct WorkerConfig {
     /// The coordinator, `host:port`.
     pub connect: String,
-    /// Jobs at the same time, at least 1.
+    /// Jobs at the same time, at least 1, at most [`starlings_proto::MAX_SLOTS`].
     pub slots: usize,
-    /// End when the coordinator's connection closes, instead of dialling again.
+    /// End when the coordinator's connection closes, instead of dialling again. A coordinator that is silent while the connection
+    /// stands, as when it is stopped, is waited for.
     pub once: bool,
+    /// End when the standard input of this process closes, as under a supervisor that holds its other end. Otherwise the standard
+    /// input is never read.
+    pub lifeline: bool,
     /// How long to dial without an answer before giving up.
     pub patience: Duration,
     /// Ends the worker: it says goodbye and its jobs go elsewhere.
@@ -39,11 +43,12 @@ impl WorkerConfig {
             connect: connect.into(),
             slots: 1,
             once: false,
+            lifeline: false,
             patience: Duration::from_secs(60),
             cancel: CancellationToken::new(),
             factory: Arc::new(Setup::build),
             host: host_name(),
-            build: std::env::current_exe().and_then(std::fs::read).ok().map(|bytes| digest(&bytes)),
+            build: own_build(),
         }
     }
 

@@ -4,6 +4,7 @@
 use std::time::{Duration, Instant};
 
 use starlings_proto::wire::{self, fleet_client::FleetClient};
+use starlings_proto::words::{causes, status_text};
 use starlings_proto::{FRAME_SIZE, FromWorker, Hello, MAX_MESSAGE, ToWorker, Welcome};
 use tokio::sync::mpsc::{self, UnboundedSender};
 use tokio_stream::wrappers::UnboundedReceiverStream;
@@ -21,8 +22,12 @@ const FIRST_WAIT: Duration = Duration::from_millis(50);
 /// Longest wait between two attempts.
 const LONGEST_WAIT: Duration = Duration::from_secs(2);
 
-/// Time between HTTP/2 keep-alive pings; an unanswered one ends the connection after as long again.
-const KEEP_ALIVE: Duration = Duration::from_secs(8);
+/// Time between HTTP/2 keep-alive pings: far above the silence at which either side acts, since it is only for connections that
+/// neither side would otherwise notice to be dead.
+const KEEP_ALIVE: Duration = Duration::from_secs(60);
+
+/// How long such a ping may stay unanswered.
+const KEEP_ALIVE_PATIENCE: Duration = Duration::from_secs(30);
 
 /// HTTP/2 windows per stream and per connection, bytes.
 const WINDOWS: (u32, u32) = (4 * 1024 * 1024, 16 * 1024 * 1024);
@@ -36,30 +41,40 @@ pub(crate) struct Stay {
 
 pub(crate) enum Dialled {
     Connected(Box<Stay>),
+    /// The coordinator is there, but its run is over.
+    Over(String),
     Cancelled,
 }
 
 enum Attempt {
     Failed(String),
     Refused(String),
+    Over(String),
 }
 
-pub(crate) fn endpoint(address: &str) -> Result<Endpoint, WorkerError> {
-    let bad = || WorkerError::BadAddress { address: address.to_owned() };
+pub(crate) fn endpoint(config: &WorkerConfig) -> Result<Endpoint, WorkerError> {
+    let address = &config.connect;
+    let bad = || WorkerError::BadAddress { address: address.clone() };
     let bare = address.strip_prefix("http://").unwrap_or(address);
     let port =
         bare.rsplit_once(':').and_then(|(host, port)| port.parse::<u16>().ok().filter(|_| !host.is_empty()));
     port.ok_or_else(bad)?;
     let endpoint = Endpoint::from_shared(format!("http://{bare}")).map_err(|_| bad())?;
-    Ok(endpoint
+    let endpoint = endpoint
         .connect_timeout(ATTEMPT)
         .tcp_nodelay(true)
-        .http2_keep_alive_interval(KEEP_ALIVE)
-        .keep_alive_timeout(KEEP_ALIVE)
-        .keep_alive_while_idle(true)
+        .tcp_keepalive(Some(KEEP_ALIVE))
         .initial_stream_window_size(WINDOWS.0)
         .initial_connection_window_size(WINDOWS.1)
-        .max_frame_size(FRAME_SIZE))
+        .max_frame_size(FRAME_SIZE);
+    if config.once {
+        // TCP's keep-alive alone: the system answers it even for a coordinator that is stopped, and not for a host that is gone.
+        return Ok(endpoint);
+    }
+    Ok(endpoint
+        .http2_keep_alive_interval(KEEP_ALIVE)
+        .keep_alive_timeout(KEEP_ALIVE_PATIENCE)
+        .keep_alive_while_idle(true))
 }
 
 /// Dials until a coordinator welcomes, refuses, or patience ends.
@@ -82,6 +97,7 @@ pub(crate) async fn dial(
                 Err(Attempt::Refused(reason)) => {
                     return Err(WorkerError::Refused { address: config.connect.clone(), reason });
                 }
+                Err(Attempt::Over(reason)) => return Ok(Dialled::Over(reason)),
                 Err(Attempt::Failed(last)) => last,
             },
         };
@@ -111,25 +127,15 @@ async fn attach(endpoint: &Endpoint, hello: Hello) -> Result<Stay, Attempt> {
     let hello = FromWorker::Hello(hello).encode().map_err(|error| failed(&error.to_string()))?;
     let _ = outbox.send(hello);
     let response =
-        client.work(UnboundedReceiverStream::new(outgoing)).await.map_err(|s| failed(s.message()))?;
+        client.work(UnboundedReceiverStream::new(outgoing)).await.map_err(|s| failed(&status_text(&s)))?;
     let mut inbound = response.into_inner();
-    let first = inbound.message().await.map_err(|status| failed(status.message()))?;
+    let first = inbound.message().await.map_err(|s| failed(&status_text(&s)))?;
     match first.map(ToWorker::decode) {
         Some(Ok(ToWorker::Welcome(welcome))) => Ok(Stay { welcome, outbox, inbound }),
         Some(Ok(ToWorker::Refuse(reason))) => Err(Attempt::Refused(reason)),
+        Some(Ok(ToWorker::Drain(reason))) => Err(Attempt::Over(reason)),
         Some(Ok(_)) => Err(failed("it did not answer with a Welcome")),
         Some(Err(error)) => Err(failed(&error.to_string())),
         None => Err(failed("it closed the connection")),
     }
-}
-
-/// The error and its causes; the outermost alone only says that there was a transport error.
-fn causes(error: &dyn std::error::Error) -> String {
-    let mut text = error.to_string();
-    let mut source = error.source();
-    while let Some(cause) = source {
-        text = format!("{text}: {cause}");
-        source = cause.source();
-    }
-    text
 }

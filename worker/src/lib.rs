@@ -7,6 +7,7 @@
 
 pub mod config;
 mod dial;
+mod lifeline;
 mod session;
 mod setups;
 mod slots;
@@ -18,6 +19,7 @@ pub use config::{Factory, WorkerConfig};
 use dial::Dialled;
 use session::Ended;
 use slots::Slots;
+pub use starlings_proto::{LIFELINE, MAX_SLOTS};
 
 /// What a worker did until it ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -61,6 +63,12 @@ pub enum WorkerError {
         /// The address given.
         address: String,
     },
+    /// More slots than a worker may have.
+    #[error("{slots} slots: a worker has at most {MAX_SLOTS}; start several workers instead")]
+    TooManySlots {
+        /// The number asked for.
+        slots: usize,
+    },
     /// The system gives no thread or no network.
     #[error("the worker cannot start: {0}")]
     Start(std::io::Error),
@@ -72,31 +80,38 @@ pub enum WorkerError {
 ///
 /// # Errors
 /// [`WorkerError`]; a lost connection is none, unless nobody answers within the patience afterwards.
+#[expect(clippy::needless_pass_by_value, reason = "a worker owns what it was told")]
 pub fn run(config: WorkerConfig) -> Result<WorkerReport, WorkerError> {
+    if config.slots > MAX_SLOTS {
+        return Err(WorkerError::TooManySlots { slots: config.slots });
+    }
     let slots = Slots::start(config.slots.max(1)).map_err(WorkerError::Start)?;
     let runtime =
         tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(WorkerError::Start)?;
-    let config = Arc::new(config);
+    if config.lifeline {
+        lifeline::watch(config.cancel.clone()).map_err(WorkerError::Start)?;
+    }
     let result = runtime.block_on(serve(&config, &slots));
     slots.close();
     runtime.shutdown_background();
     result
 }
 
-async fn serve(config: &Arc<WorkerConfig>, slots: &Slots) -> Result<WorkerReport, WorkerError> {
-    let endpoint = dial::endpoint(&config.connect)?;
+async fn serve(config: &WorkerConfig, slots: &Slots) -> Result<WorkerReport, WorkerError> {
+    let endpoint = dial::endpoint(config)?;
     let setups = setups::Setups::new(Arc::clone(&config.factory));
     let hello = config.hello();
     let mut sessions = 0;
     loop {
         let stay = match dial::dial(config, &endpoint, &hello).await? {
             Dialled::Cancelled => return Ok(report(slots, sessions, "cancelled before it was connected")),
+            Dialled::Over(reason) => return Ok(report(slots, sessions, &reason)),
             Dialled::Connected(stay) => stay,
         };
         sessions += 1;
         tracing::info!(run = stay.welcome.run, address = config.connect, "joined");
         let stayed_since = Instant::now();
-        let ended = session::serve(*stay, slots, &setups, &config.cancel).await;
+        let ended = session::serve(*stay, slots, &setups, config).await;
         slots.forget_queue();
         tracing::info!(?ended, seconds = stayed_since.elapsed().as_secs_f64(), "left");
         match ended {

@@ -3,11 +3,12 @@
 use std::time::Duration;
 
 use starlings_models::ParticleError;
+use starlings_proto::words::status_text;
 use starlings_proto::{Answer, FromWorker, ToWorker, WireError, wire};
 use tokio::sync::mpsc::UnboundedSender;
-use tokio_util::sync::CancellationToken;
 use tonic::Streaming;
 
+use crate::WorkerConfig;
 use crate::dial::Stay;
 use crate::setups::Setups;
 use crate::slots::{Slots, Task, answer};
@@ -26,12 +27,7 @@ pub(crate) enum Ended {
     Cancelled,
 }
 
-pub(crate) async fn serve(
-    mut stay: Stay,
-    slots: &Slots,
-    setups: &Setups,
-    cancel: &CancellationToken,
-) -> Ended {
+pub(crate) async fn serve(mut stay: Stay, slots: &Slots, setups: &Setups, config: &WorkerConfig) -> Ended {
     let mut beats = tokio::time::interval(Duration::from_secs_f64(stay.welcome.heartbeat));
     beats.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
     let mut silence = Silence::default();
@@ -50,14 +46,15 @@ pub(crate) async fn serve(
                     Err(ended) => return ended,
                 }
             }
-            () = cancel.cancelled() => {
+            () = config.cancel.cancelled() => {
                 goodbye(&stay.outbox, &mut stay.inbound, "it was told to end").await;
                 return Ended::Cancelled;
             }
             _ = beats.tick() => {
                 let (running, queued) = slots.load();
                 send(&stay.outbox, FromWorker::Heartbeat { running, queued });
-                if let Some(reason) = silence.after_beat() {
+                // A worker that serves once has nowhere else to go: only the end of its connection ends its stay.
+                if let Some(reason) = silence.after_beat().filter(|_| !config.once) {
                     return Ended::Lost(reason);
                 }
             }
@@ -96,7 +93,7 @@ fn take(
     let message = match message {
         Ok(Some(message)) => message,
         Ok(None) => return Err(Ended::Lost("the coordinator closed the connection".to_owned())),
-        Err(status) => return Err(Ended::Lost(format!("the connection broke: {}", status.message()))),
+        Err(status) => return Err(Ended::Lost(format!("the connection broke: {}", status_text(&status)))),
     };
     match ToWorker::decode(message) {
         Ok(ToWorker::Job { lease, setup, job }) => match setups.get(&setup) {
@@ -106,11 +103,18 @@ fn take(
         Err(WireError::Job { lease, source }) => refuse(outbox, lease, source.to_string()),
         Ok(ToWorker::Setup { id, setup }) => {
             let (setups, outbox) = (setups.clone(), outbox.clone());
+            let failed = outbox.clone();
             // A thread of its own: building may take long, and the slots may be busy.
-            std::thread::spawn(move || {
+            let build = move || {
                 let result = if setups.get(&id).is_some() { Ok(()) } else { setups.build(id, setup) };
                 send(&outbox, FromWorker::Setup { id, result });
-            });
+            };
+            if let Err(error) = std::thread::Builder::new().name("setup".to_owned()).spawn(build) {
+                send(
+                    &failed,
+                    FromWorker::Setup { id, result: Err(format!("no thread to build it: {error}")) },
+                );
+            }
         }
         Ok(ToWorker::Cancel(leases)) => slots.withdraw(&leases),
         Ok(ToWorker::Drain(reason)) => return Err(Ended::Drained(reason)),

@@ -5,10 +5,10 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use starlings_models::{Forward, Setup};
+use starlings_proto::words::panic_text;
 use starlings_proto::{SetupId, WireError};
 
 use crate::config::Factory;
-use crate::slots::panic_text;
 
 /// Shared between the network and the thread that builds.
 #[derive(Clone)]

@@ -6,9 +6,11 @@ use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
 use std::time::Instant;
 
 use starlings_models::{Forward, Job, ParticleError};
+use starlings_proto::words::panic_text;
 use starlings_proto::{Answer, FromWorker, Lease, wire};
 use tokio::sync::mpsc::UnboundedSender;
 
@@ -42,13 +44,32 @@ struct Queue {
 }
 
 impl Slots {
+    /// Starts the threads, or none: those that started end again when the system gives no more.
     pub(crate) fn start(n: usize) -> std::io::Result<Self> {
-        let shared = Arc::new(Shared::default());
+        Self::start_with(n, |slot, work| std::thread::Builder::new().name(format!("slot-{slot}")).spawn(work))
+    }
+
+    fn start_with(
+        n: usize,
+        spawn: impl Fn(usize, Box<dyn FnOnce() + Send>) -> std::io::Result<JoinHandle<()>>,
+    ) -> std::io::Result<Self> {
+        let slots = Self { shared: Arc::default() };
+        let mut started = Vec::with_capacity(n);
         for slot in 0..n {
-            let shared = Arc::clone(&shared);
-            std::thread::Builder::new().name(format!("slot-{slot}")).spawn(move || shared.work())?;
+            let shared = Arc::clone(&slots.shared);
+            match spawn(slot, Box::new(move || shared.work())) {
+                Ok(thread) => started.push(thread),
+                Err(error) => {
+                    slots.close();
+                    // They are idle: none has been given a job.
+                    for thread in started {
+                        let _ = thread.join();
+                    }
+                    return Err(error);
+                }
+            }
         }
-        Ok(Self { shared })
+        Ok(slots)
     }
 
     pub(crate) fn push(&self, task: Task) {
@@ -137,9 +158,24 @@ pub(crate) fn answer(outbox: &UnboundedSender<wire::FromWorker>, lease: Lease, a
     }
 }
 
-/// What a panic said.
-pub(crate) fn panic_text(panic: &(dyn std::any::Any + Send)) -> String {
-    let text =
-        panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
-    format!("the model panicked: {}", text.unwrap_or("without a message"))
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn threads_that_started_end_again_when_the_system_gives_no_more() {
+        let ended = Arc::new(AtomicU32::new(0));
+        let spawn = |slot, work: Box<dyn FnOnce() + Send>| {
+            if slot == 3 {
+                return Err(std::io::Error::other("no more threads"));
+            }
+            let ended = Arc::clone(&ended);
+            Ok(std::thread::spawn(move || {
+                work();
+                ended.fetch_add(1, Ordering::Relaxed);
+            }))
+        };
+        assert!(Slots::start_with(5, spawn).is_err());
+        assert_eq!(ended.load(Ordering::Relaxed), 3);
+    }
 }

@@ -4,14 +4,16 @@
 //! least loaded worker, so that few jobs spread over all slots. A worker holds two jobs per slot when they are long, up to
 //! 64 when they are shorter than a message's way. At the end of a batch, jobs that wait behind a busy slot are recalled for
 //! an idle one. A lost worker's leases go back to the queue; the jobs it was running count an attempt. A model's failure is
-//! tried once more on another worker. The order of outcomes is the order of jobs, whatever happened.
+//! tried once more on another worker, unless it could only fail again. The order of outcomes is the order of jobs, whatever happened.
 //!
 //! Not here: what a job contains, the wire, other parameters for a failed particle. Next files to read: [`message`] for
-//! events and commands, [`roster`] for workers, [`batch`] for jobs.
+//! events and commands, [`roster`] for workers, [`batch`] for jobs, `hand_out` for what follows from any event.
 
 pub mod batch;
+mod hand_out;
 pub mod message;
 pub mod roster;
+mod run_times;
 #[cfg(test)]
 mod tests;
 mod watch;
@@ -26,7 +28,8 @@ use super::FleetEvent;
 use batch::{Batch, JobName, Lost};
 pub use message::{BatchError, Command, Event, Joining, WorkerId};
 use roster::{SetupState, Worker};
-use watch::Starved;
+use run_times::RunTimes;
+use watch::{Overdue, Starved};
 
 /// The numbers that the rules need.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,6 +52,9 @@ pub struct Dispatcher {
     last_setup: Option<SetupId>,
     last_tick: Option<Duration>,
     starved: Option<Starved>,
+    overdue: Option<Overdue>,
+    run_times: RunTimes,
+    local_only: bool,
     out: Vec<Command>,
 }
 
@@ -63,6 +69,9 @@ impl Dispatcher {
             last_setup: None,
             last_tick: None,
             starved: None,
+            overdue: None,
+            run_times: RunTimes::default(),
+            local_only: false,
             out: Vec::new(),
         }
     }
@@ -92,10 +101,11 @@ impl Dispatcher {
             Event::SetupFailed { worker, setup, reason } => {
                 self.setup_answered(now, worker, setup, SetupState::Failed(reason));
             }
-            Event::Submit { setup, jobs } => self.submit(setup, jobs),
+            Event::Submit { setup, jobs } => self.submit(now, setup, jobs),
             Event::Answered { worker, lease, answer, cost } => {
                 self.answered(now, worker, lease, answer, cost);
             }
+            Event::LocalOnly => self.local_only = true,
             Event::Tick => self.tick(now),
             Event::Abort(error) => self.abort(error),
         }
@@ -112,7 +122,7 @@ impl Dispatcher {
         let mut worker = Worker::new(joining, now);
         self.out.push(Command::Notice(joining.notice()));
         if let Some(batch) = &self.batch {
-            worker.setups.insert(batch.setup, SetupState::Pending);
+            worker.setups.insert(batch.setup, SetupState::Pending { since: now });
             self.out.push(Command::SendSetup { worker: worker.id, setup: batch.setup });
         }
         self.workers.insert(worker.id, worker);
@@ -158,16 +168,17 @@ impl Dispatcher {
         worker.setups.insert(setup, state);
     }
 
-    fn submit(&mut self, setup: SetupId, jobs: Vec<JobName>) {
+    fn submit(&mut self, now: Duration, setup: SetupId, jobs: Vec<JobName>) {
         self.abort(BatchError::Cancelled);
         if self.last_setup != Some(setup) {
             self.workers.values_mut().for_each(Worker::forget_cost);
+            self.run_times = RunTimes::default();
             self.last_setup = Some(setup);
         }
         for worker in self.workers.values_mut() {
             // A setup that failed is tried again: what was missing on that host may be there now.
-            if !matches!(worker.setups.get(&setup), Some(SetupState::Ready | SetupState::Pending)) {
-                worker.setups.insert(setup, SetupState::Pending);
+            if !matches!(worker.setups.get(&setup), Some(SetupState::Ready | SetupState::Pending { .. })) {
+                worker.setups.insert(setup, SetupState::Pending { since: now });
                 self.out.push(Command::SendSetup { worker: worker.id, setup });
             }
         }
@@ -192,6 +203,7 @@ impl Dispatcher {
             Answer::Withdrawn => batch.withdrawn(index),
             Answer::Ran(Ok(prediction)) => {
                 worker.learn_cost(cost);
+                self.run_times.learn(cost);
                 batch.finish(index, Ok(prediction), &worker.name);
             }
             Answer::Ran(Err(error)) => self.model_failed(id, index, error),
@@ -203,7 +215,9 @@ impl Dispatcher {
         let name = self.workers.get(&id).map_or("", |w| w.name.as_str());
         let setup = batch.setup;
         let other = self.workers.values().any(|w| w.id != id && w.may_run(&setup));
-        if other && batch.may_retry(index) {
+        // A job that does not fit the model fits it nowhere.
+        let repeatable = matches!(error, ParticleError::BadJob(_));
+        if other && !repeatable && batch.may_retry(index) {
             self.out.push(Command::Notice(batch.retried(index, name, &error.to_string())));
             batch.retry_elsewhere(index, id, error, name);
         } else {
@@ -221,96 +235,7 @@ impl Dispatcher {
             }
         }
         self.starved = None;
+        self.overdue = None;
         self.out.push(Command::BatchFailed(error));
     }
-
-    /// Everything that may follow from any event: settle, give out, recall, end.
-    fn proceed(&mut self) {
-        self.fail_without_setup();
-        self.settle_failures();
-        self.give_out();
-        self.recall();
-        if let Some(batch) = self.batch.take_if(|batch| batch.is_done()) {
-            self.starved = None;
-            self.out.push(Command::BatchDone(batch.into_outcomes()));
-        }
-    }
-
-    fn fail_without_setup(&mut self) {
-        let Some(batch) = &self.batch else { return };
-        if batch.is_done()
-            || self.workers.is_empty()
-            || self.workers.values().any(|w| w.may_run(&batch.setup))
-        {
-            return;
-        }
-        let mut reasons = Vec::<String>::new();
-        for worker in self.workers.values() {
-            if let Some(SetupState::Failed(reason)) = worker.setups.get(&batch.setup)
-                && !reasons.contains(reason)
-            {
-                reasons.push(reason.clone());
-            }
-        }
-        self.abort(BatchError::SetupFailed { reason: reasons.join("; ") });
-    }
-
-    /// Ends the failed jobs that wait for another worker when there is none.
-    fn settle_failures(&mut self) {
-        let Some(batch) = &mut self.batch else { return };
-        for avoided in batch.avoided() {
-            let other = self.workers.values().any(|w| w.id != avoided && w.may_run(&batch.setup));
-            if !other {
-                for index in batch.settle(avoided) {
-                    self.out.push(Command::Notice(batch.failed(index)));
-                }
-            }
-        }
-    }
-
-    fn give_out(&mut self) {
-        let Some(batch) = &mut self.batch else { return };
-        let setup = batch.setup;
-        for avoided in batch.retry_keys() {
-            while batch.has_retry(avoided) {
-                let Some(worker) = roster::least_loaded(&mut self.workers, &setup, avoided) else { break };
-                let Some(index) = batch.next_retry(avoided) else { break };
-                self.out.push(lease(worker, batch, index));
-            }
-        }
-        while batch.has_fresh() {
-            let Some(worker) = roster::least_loaded(&mut self.workers, &setup, None) else { break };
-            let Some(index) = batch.next_fresh() else { break };
-            self.out.push(lease(worker, batch, index));
-        }
-    }
-
-    /// Calls back jobs that wait behind a busy slot while another slot is idle.
-    fn recall(&mut self) {
-        let Some(batch) = &mut self.batch else { return };
-        // While fresh jobs wait, no slot is idle: spares the counting below.
-        if batch.has_fresh() {
-            return;
-        }
-        let ready = || self.workers.values().filter(|w| w.is_ready(&batch.setup));
-        let idle: usize = ready().map(|w| w.slots.saturating_sub(w.load())).sum();
-        let mut open = idle.saturating_sub(ready().map(Worker::n_recalled).sum());
-        while open > 0 {
-            let Some(victim) =
-                self.workers.values_mut().filter(|w| w.surplus() > 0).max_by_key(|w| w.surplus())
-            else {
-                break;
-            };
-            let Some(held) = victim.youngest(|job| batch.may_recall(job)) else { break };
-            batch.mark_recalled(held.job);
-            self.out.push(Command::Cancel { worker: victim.id, leases: vec![held] });
-            open -= 1;
-        }
-    }
-}
-
-fn lease(worker: &mut Worker, batch: &mut Batch, index: usize) -> Command {
-    let lease = Lease { epoch: worker.id.0, job: batch.job_number(index), attempt: batch.start(index) };
-    worker.hold(lease);
-    Command::SendJob { worker: worker.id, lease, index }
 }

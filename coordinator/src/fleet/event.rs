@@ -28,6 +28,17 @@ pub enum FleetEvent {
         /// BLAKE3 of its executable, hexadecimal; empty when unknown.
         build: String,
     },
+    /// A worker of the same version runs another executable than the coordinator; told once per executable.
+    OtherBuild {
+        /// Its name.
+        worker: String,
+        /// Its host.
+        host: String,
+        /// BLAKE3 of its executable, hexadecimal.
+        build: String,
+        /// BLAKE3 of the coordinator's.
+        own: String,
+    },
     /// A worker is refused.
     WorkerRefused {
         /// Its host.
@@ -96,9 +107,18 @@ pub enum FleetEvent {
     },
     /// A worker process on this machine died and is started again.
     LocalWorkerRestarted {
-        /// Its process number.
+        /// Process number of the dead one.
         pid: u32,
         /// How it ended.
+        reason: String,
+    },
+    /// A worker process on this machine died too often and is not started again.
+    LocalWorkerGivenUp {
+        /// Process number of the last one.
+        pid: u32,
+        /// Deaths in a row.
+        deaths: u32,
+        /// How the last one ended.
         reason: String,
     },
 }

@@ -10,6 +10,7 @@ impl FleetEvent {
         match self {
             Self::Listening { .. } => "listening",
             Self::WorkerJoined { .. } => "worker-joined",
+            Self::OtherBuild { .. } => "other-build",
             Self::WorkerRefused { .. } => "worker-refused",
             Self::WorkerLeft { .. } => "worker-left",
             Self::SetupFailed { .. } => "setup-failed",
@@ -19,6 +20,7 @@ impl FleetEvent {
             Self::Waiting { .. } => "waiting",
             Self::Progress { .. } => "progress",
             Self::LocalWorkerRestarted { .. } => "worker-restarted",
+            Self::LocalWorkerGivenUp { .. } => "worker-given-up",
         }
     }
 
@@ -27,10 +29,12 @@ impl FleetEvent {
         matches!(
             self,
             Self::WorkerRefused { .. }
+                | Self::OtherBuild { .. }
                 | Self::SetupFailed { .. }
                 | Self::JobFailed { .. }
                 | Self::Waiting { .. }
                 | Self::LocalWorkerRestarted { .. }
+                | Self::LocalWorkerGivenUp { .. }
         )
     }
 
@@ -47,6 +51,15 @@ impl fmt::Display for FleetEvent {
             Self::WorkerJoined { worker, host, pid, slots, cores, .. } => {
                 write!(f, "worker {worker} joined from {host} (process {pid}, {slots} slots, {cores} cores)")
             }
+            Self::OtherBuild { worker, host, build, own } => {
+                write!(
+                    f,
+                    "worker {worker} on {host} runs another build of this version ({} instead of {}): its results may differ in the \
+                     last digits",
+                    short(build),
+                    short(own)
+                )
+            }
             Self::WorkerRefused { host, reason } => write!(f, "a worker from {host} was refused: {reason}"),
             Self::WorkerLeft { worker, reason, requeued: 0 } => write!(f, "worker {worker} left: {reason}"),
             Self::WorkerLeft { worker, reason, requeued } => {
@@ -59,9 +72,10 @@ impl fmt::Display for FleetEvent {
                 write!(f, "particle {particle}, record {record}: tried again after worker {worker}: {reason}")
             }
             Self::JobFailed { particle, record, attempts, reason } => {
+                let s = if *attempts == 1 { "" } else { "s" };
                 write!(
                     f,
-                    "particle {particle}, record {record}: given up after {attempts} attempts: {reason}"
+                    "particle {particle}, record {record}: given up after {attempts} attempt{s}: {reason}"
                 )
             }
             Self::LateAnswer { worker, job } => {
@@ -72,6 +86,31 @@ impl fmt::Display for FleetEvent {
             Self::LocalWorkerRestarted { pid, reason } => {
                 write!(f, "local worker process {pid} ended ({reason}) and was started again")
             }
+            Self::LocalWorkerGivenUp { pid, deaths, reason } => {
+                write!(
+                    f,
+                    "local worker process {pid} ended ({reason}) and is not started again after {deaths} deaths in a row"
+                )
+            }
         }
+    }
+}
+
+/// The first digits of a hash: enough to tell two builds apart.
+fn short(hash: &str) -> &str {
+    hash.get(..12).unwrap_or(hash)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failed_job_says_its_attempts_once_and_in_the_right_number() {
+        let text = |attempts| {
+            FleetEvent::JobFailed { particle: 1, record: 0, attempts, reason: "no".to_owned() }.to_string()
+        };
+        assert_eq!(text(1), "particle 1, record 0: given up after 1 attempt: no");
+        assert_eq!(text(2), "particle 1, record 0: given up after 2 attempts: no");
     }
 }

@@ -7,15 +7,15 @@ use std::net::{SocketAddr, TcpListener};
 use std::sync::Arc;
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use starlings_models::{Job, Setup};
 use starlings_proto::convert::job::check_size;
-use starlings_proto::{MAX_MESSAGE, SetupId, encode_setup};
+use starlings_proto::{MAX_MESSAGE, SetupId, encode_setup, own_build};
 use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
 use tokio_util::sync::CancellationToken;
 
-use super::dispatcher::{BatchError, Rules};
+use super::dispatcher::{BatchError, Event, Rules};
 use super::hub::{Hub, Reply, Submission};
 use super::{Fleet, FleetError, FleetEvent, Outcome, network};
 
@@ -35,6 +35,8 @@ pub struct FleetConfig {
     pub patience: Duration,
     /// How many workers may be lost under one job before it is given up.
     pub max_attempts: u32,
+    /// BLAKE3 of this executable: a worker of another one is told of. `None`: none is.
+    pub build: Option<[u8; 32]>,
     /// Ends [`Fleet::run`] promptly with [`FleetError::Cancelled`].
     pub cancel: CancellationToken,
     /// Where events go.
@@ -55,6 +57,7 @@ impl FleetConfig {
             heartbeat: Duration::from_secs(8),
             patience: Duration::from_secs(300),
             max_attempts: 5,
+            build: own_build(),
             cancel,
             events,
         }
@@ -80,6 +83,16 @@ impl FleetHandle {
     /// Says that the local workers are given up: a batch without other workers ends with this reason.
     pub fn give_up(&self, reason: String) {
         self.hub.give_up(reason);
+    }
+
+    /// Says that all workers are processes of this machine: a setup that they cannot build ends a batch at once.
+    pub fn local_only(&self) {
+        self.hub.handle(Event::LocalOnly);
+    }
+
+    /// How many workers may be lost under one job.
+    pub fn max_attempts(&self) -> u32 {
+        self.hub.max_attempts()
     }
 
     /// Asks the workers with these process numbers to leave.
@@ -108,7 +121,7 @@ impl GrpcFleet {
             patience: config.patience,
             max_attempts: config.max_attempts,
         };
-        let hub = Arc::new(Hub::new(config.run_name, rules, config.events));
+        let hub = Arc::new(Hub::new(config.run_name, config.build, rules, config.events));
         let stop = CancellationToken::new();
         let (batches, submitted) = unbounded_channel();
         let network = {
@@ -143,15 +156,24 @@ impl GrpcFleet {
             match replies.recv_timeout(ALIVE_CHECK) {
                 Ok(reply) => return reply.map_err(|error| self.explain(error)),
                 Err(RecvTimeoutError::Disconnected) => {
-                    return Err(FleetError::Stopped("the batch was replaced by another".to_owned()));
+                    // The batch was dropped by a network that is about to end: what it says then is the reason.
+                    let deadline = Instant::now() + ALIVE_CHECK;
+                    while !self.has_ended() && Instant::now() < deadline {
+                        std::thread::sleep(ALIVE_CHECK / 1000);
+                    }
+                    return Err(FleetError::Stopped(self.hub.why_stopped()));
                 }
                 Err(RecvTimeoutError::Timeout) => {
-                    if self.network.as_ref().is_none_or(JoinHandle::is_finished) {
-                        return Err(FleetError::Stopped("its thread ended".to_owned()));
+                    if self.has_ended() {
+                        return Err(FleetError::Stopped(self.hub.why_stopped()));
                     }
                 }
             }
         }
+    }
+
+    fn has_ended(&self) -> bool {
+        self.network.as_ref().is_none_or(JoinHandle::is_finished)
     }
 
     fn explain(&self, error: BatchError) -> FleetError {
@@ -162,6 +184,7 @@ impl GrpcFleet {
             }
             BatchError::SetupFailed { reason } => FleetError::SetupFailed { reason },
             BatchError::LocalWorkers(reason) => FleetError::LocalWorkers(reason),
+            BatchError::Stopped(reason) => FleetError::Stopped(reason),
         }
     }
 }
@@ -187,7 +210,7 @@ impl Fleet for GrpcFleet {
         }
         let (reply, replies) = mpsc::channel();
         let sent = self.batches.send(Submission { setup, jobs, reply });
-        sent.map_err(|_| FleetError::Stopped("its thread ended".to_owned()))?;
+        sent.map_err(|_| FleetError::Stopped(self.hub.why_stopped()))?;
         self.wait(&replies)
     }
 
@@ -210,5 +233,28 @@ impl Drop for GrpcFleet {
                 Err(_) => tracing::error!("the fleet's network thread panicked"),
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::Ipv4Addr;
+
+    use starlings_models::Window;
+
+    use super::*;
+
+    #[test]
+    fn a_panic_in_the_middle_of_a_decision_ends_the_run_with_an_error() {
+        let (sender, _events) = mpsc::channel();
+        let address = (Ipv4Addr::LOCALHOST, 0).into();
+        let config = FleetConfig::new(address, "test", CancellationToken::new(), sender);
+        let mut fleet = GrpcFleet::listen(config).expect("a free port");
+        let setup = fleet.install(&Setup::default()).expect("it travels");
+        fleet.hub.panic_inside();
+        let window = Window { start: 0.0, times: vec![1.0], observed: vec![0.0], inputs: vec![] };
+        let job = Job { particle: 0, record: 0, window: window.into(), theta: vec![], state: None };
+        let error = fleet.run(setup, vec![job]).expect_err("nothing can be decided any more");
+        assert!(matches!(&error, FleetError::Stopped(why) if why.contains("panic")), "{error}");
     }
 }

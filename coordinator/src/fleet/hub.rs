@@ -1,22 +1,28 @@
 //! Carries the dispatcher's commands out: the one place where events meet the clock, the links and the waiting caller.
 //!
-//! Every event is handled to its end under one lock, on the thread that brings it. Nothing is decided here. Next file to
-//! read: [`super::service`], which brings the workers' events.
+//! Every event is handled to its end under one lock, on the thread that brings it. A panic under that lock is a broken invariant:
+//! the next event panics too, and the network thread turns that into the end of the fleet. Nothing is decided here. Next file to
+//! read: `state`, then [`super::service`], which brings the workers' events.
 
-use std::collections::BTreeMap;
+mod state;
+#[cfg(test)]
+mod tests;
+
 use std::hash::{BuildHasher, Hasher};
 use std::sync::mpsc::Sender;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use starlings_models::Job;
-use starlings_proto::{Bytes, Hello, JobEncoder, PROTOCOL, SetupId, ToWorker, VERSION, Welcome, wire};
+use starlings_proto::{Bytes, Hello, PROTOCOL, SetupId, ToWorker, Welcome, wire};
 use tokio::sync::{Notify, mpsc::UnboundedSender};
 use tonic::Status;
 
 use super::dispatcher::batch::JobName;
-use super::dispatcher::{BatchError, Command, Dispatcher, Event, Joining, Rules, WorkerId};
+use super::dispatcher::message::hex;
+use super::dispatcher::{BatchError, Event, Joining, Rules, WorkerId};
 use super::{FleetEvent, Outcome};
+pub(super) use state::{Closed, Submission};
+use state::{Link, State};
 
 /// What a link carries to its worker.
 pub(super) type Outgoing = Result<wire::ToWorker, Status>;
@@ -30,57 +36,29 @@ pub(super) struct Hub {
     started: Instant,
     run_name: String,
     heartbeat: Duration,
+    build: Option<[u8; 32]>,
+    max_attempts: u32,
     /// Woken whenever a link ends.
     pub(super) link_ended: Notify,
 }
 
-struct State {
-    dispatcher: Dispatcher,
-    links: BTreeMap<WorkerId, Link>,
-    setups: BTreeMap<SetupId, Bytes>,
-    running: Option<Submission>,
-    encoder: JobEncoder,
-    events: Sender<FleetEvent>,
-    first_epoch: u64,
-    joined: u64,
-    draining: bool,
-    given_up: Option<String>,
-}
-
-/// The way to one worker.
-struct Link {
-    sender: UnboundedSender<Outgoing>,
-    pid: u32,
-}
-
-/// A batch and who waits for it.
-pub(super) struct Submission {
-    pub(super) setup: SetupId,
-    pub(super) jobs: Vec<Job>,
-    pub(super) reply: Sender<Reply>,
-}
-
 impl Hub {
-    pub(super) fn new(run_name: String, rules: Rules, events: Sender<FleetEvent>) -> Self {
+    pub(super) fn new(
+        run_name: String,
+        build: Option<[u8; 32]>,
+        rules: Rules,
+        events: Sender<FleetEvent>,
+    ) -> Self {
         // Epochs start anywhere, so that answers to an earlier coordinator on the same port carry none of this one's.
         let first_epoch = std::hash::RandomState::new().build_hasher().finish() >> 1;
-        let state = State {
-            dispatcher: Dispatcher::new(rules),
-            links: BTreeMap::new(),
-            setups: BTreeMap::new(),
-            running: None,
-            encoder: JobEncoder::default(),
-            events,
-            first_epoch,
-            joined: 0,
-            draining: false,
-            given_up: None,
-        };
+        let state = State::new(first_epoch, rules, events);
         Self {
             state: Mutex::new(state),
             started: Instant::now(),
             run_name,
             heartbeat: rules.heartbeat,
+            build,
+            max_attempts: rules.max_attempts,
             link_ended: Notify::new(),
         }
     }
@@ -91,7 +69,23 @@ impl Hub {
 
     pub(super) fn handle(&self, event: Event) {
         let now = self.started.elapsed();
-        self.lock().handle(now, event);
+        self.decide().handle(now, event);
+    }
+
+    pub(super) fn max_attempts(&self) -> u32 {
+        self.max_attempts
+    }
+
+    /// The network ended: nobody else will answer the caller.
+    pub(super) fn stopped(&self, reason: &str) {
+        let mut state = self.lock();
+        state.stopped = Some(reason.to_owned());
+        state.reply(Err(BatchError::Stopped(reason.to_owned())));
+    }
+
+    /// Why the network ended by itself.
+    pub(super) fn why_stopped(&self) -> String {
+        self.lock().stopped.clone().unwrap_or_else(|| "its thread ended".to_owned())
     }
 
     pub(super) fn counts(&self) -> (usize, usize) {
@@ -110,7 +104,7 @@ impl Hub {
     /// Starts a batch.
     pub(super) fn submit(&self, batch: Submission) {
         let now = self.started.elapsed();
-        let mut state = self.lock();
+        let mut state = self.decide();
         if let Some(reason) = state.given_up.clone().filter(|_| state.links.is_empty()) {
             let _ = batch.reply.send(Err(BatchError::LocalWorkers(reason)));
             return;
@@ -123,12 +117,14 @@ impl Hub {
     }
 
     /// Takes a worker or says why not. The first message on its link is the welcome.
-    pub(super) fn join(&self, hello: Hello, link: UnboundedSender<Outgoing>) -> Result<WorkerId, String> {
+    pub(super) fn join(&self, hello: Hello, link: UnboundedSender<Outgoing>) -> Result<WorkerId, Closed> {
         let now = self.started.elapsed();
-        let mut state = self.lock();
-        if let Err(reason) = state.admit(&hello) {
-            let _ = state.events.send(FleetEvent::WorkerRefused { host: hello.host, reason: reason.clone() });
-            return Err(reason);
+        let mut state = self.decide();
+        if let Err(closed) = state.admit(&hello) {
+            if let Closed::Refused(reason) = closed.clone() {
+                let _ = state.events.send(FleetEvent::WorkerRefused { host: hello.host, reason });
+            }
+            return Err(closed);
         }
         state.joined += 1;
         let id = WorkerId(state.first_epoch + state.joined);
@@ -142,12 +138,25 @@ impl Hub {
         state.links.insert(id, Link { sender: link, pid: hello.pid });
         let name = format!("{}@{}/{}", state.joined, hello.host, hello.pid);
         let Hello { cores, slots, host, pid, nonce, build, .. } = hello;
+        let other = state.other_build(self.build, build).map(|(own, build)| FleetEvent::OtherBuild {
+            worker: name.clone(),
+            host: host.clone(),
+            build: hex(&build),
+            own: hex(&own),
+        });
         state.handle(now, Event::Joined(Joining { id, name, host, pid, slots, cores, nonce, build }));
+        if let Some(event) = other {
+            let _ = state.events.send(event);
+        }
         Ok(id)
     }
 
     pub(super) fn leave(&self, worker: WorkerId, reason: String, clean: bool) {
         let now = self.started.elapsed();
+        // After a panic under the lock there is nothing left to decide: the next tick ends the fleet.
+        if self.state.is_poisoned() {
+            return;
+        }
         let mut state = self.lock();
         state.links.remove(&worker);
         state.handle(now, Event::Left { worker, reason, clean });
@@ -159,10 +168,8 @@ impl Hub {
     pub(super) fn give_up(&self, reason: String) {
         let now = self.started.elapsed();
         let mut state = self.lock();
-        state.given_up = Some(reason.clone());
-        if state.links.is_empty() {
-            state.handle(now, Event::Abort(BatchError::LocalWorkers(reason)));
-        }
+        state.given_up = Some(reason);
+        state.end_if_abandoned(now);
     }
 
     pub(super) fn beat(&self) {
@@ -191,69 +198,13 @@ impl Hub {
         self.lock().links.len()
     }
 
+    /// The state, for a decision.
+    fn decide(&self) -> MutexGuard<'_, State> {
+        let state = self.state.lock();
+        state.expect("an earlier decision ended in a panic, so the fleet's state is broken")
+    }
+
     fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl State {
-    fn admit(&self, hello: &Hello) -> Result<(), String> {
-        if hello.protocol != PROTOCOL || hello.version != VERSION {
-            return Err(format!(
-                "the worker on {} is starlings {} (protocol {}), the coordinator {VERSION} (protocol {PROTOCOL}): start the \
-                 worker from the coordinator's release",
-                hello.host, hello.version, hello.protocol
-            ));
-        }
-        if self.draining {
-            return Err("the run is over".to_owned());
-        }
-        Ok(())
-    }
-
-    fn handle(&mut self, now: Duration, event: Event) {
-        for command in self.dispatcher.step(now, event) {
-            self.carry_out(command);
-        }
-    }
-
-    fn carry_out(&mut self, command: Command) {
-        match command {
-            Command::SendSetup { worker, setup } => {
-                if let Some(json) = self.setups.get(&setup) {
-                    self.send(worker, ToWorker::setup(&setup, json.clone()));
-                }
-            }
-            Command::SendJob { worker, lease, index } => {
-                let Some(running) = &self.running else { return };
-                let Some(job) = running.jobs.get(index) else { return };
-                let message = self.encoder.encode(lease, &running.setup, job);
-                self.send(worker, message);
-            }
-            Command::Cancel { worker, leases } => self.send(worker, ToWorker::cancel(&leases)),
-            // Its stream ends without a word: a worker that still lives dials again.
-            Command::Close { worker } => {
-                self.links.remove(&worker);
-            }
-            Command::BatchDone(outcomes) => self.reply(Ok(outcomes)),
-            Command::BatchFailed(error) => self.reply(Err(error)),
-            Command::Notice(event) => {
-                tracing::debug!(?event, "fleet");
-                let _ = self.events.send(event);
-            }
-        }
-    }
-
-    fn send(&self, worker: WorkerId, message: wire::ToWorker) {
-        // A link that is closing ends in `leave`, which returns its leases.
-        if let Some(link) = self.links.get(&worker) {
-            let _ = link.sender.send(Ok(message));
-        }
-    }
-
-    fn reply(&mut self, reply: Reply) {
-        if let Some(running) = self.running.take() {
-            let _ = running.reply.send(reply);
-        }
     }
 }

@@ -8,6 +8,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use starlings_models::{Forward, Job, ParticleError, Setup};
+use starlings_proto::words::panic_text;
 use starlings_proto::{SetupId, encode_setup};
 use tokio_util::sync::CancellationToken;
 
@@ -86,10 +87,4 @@ fn run_one(forward: &dyn Forward, job: &Job, thread: usize) -> Outcome {
         prediction.cost = started.elapsed().as_secs_f64();
     }
     Outcome { result, attempts: 1, worker: format!("thread {thread}") }
-}
-
-fn panic_text(panic: &(dyn std::any::Any + Send)) -> String {
-    let text =
-        panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
-    format!("the model panicked: {}", text.unwrap_or("without a message"))
 }

@@ -5,8 +5,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use starlings_proto::wire::fleet_server::FleetServer;
+use starlings_proto::words::{causes, panic_words};
 use starlings_proto::{FRAME_SIZE, MAX_MESSAGE};
 use tokio::sync::mpsc::UnboundedReceiver;
+use tokio::task::{JoinError, JoinSet};
 use tokio_util::sync::CancellationToken;
 use tonic::transport::Server;
 use tonic::transport::server::TcpIncoming;
@@ -20,6 +22,10 @@ const GOODBYE_PATIENCE: Duration = Duration::from_secs(2);
 
 /// Longest time between two looks at the clock.
 const TICK: Duration = Duration::from_millis(250);
+
+/// Time between HTTP/2 keep-alive pings, and how long one may stay unanswered: far above the silence at which the dispatcher gives
+/// a worker up, and above the time that this process may stand still. They only end connections that nobody uses any more.
+const KEEP_ALIVE: (Duration, Duration) = (Duration::from_secs(60), Duration::from_secs(30));
 
 /// HTTP/2 windows per stream and per connection, bytes: enough for a long fat network.
 const WINDOWS: (u32, u32) = (4 * 1024 * 1024, 16 * 1024 * 1024);
@@ -40,28 +46,41 @@ pub(super) fn run(
     let outcome = runtime.block_on(async {
         let listener = tokio::net::TcpListener::from_std(listener).map_err(|error| error.to_string())?;
         let incoming = TcpIncoming::from(listener).with_nodelay(Some(true));
-        tokio::spawn(tick(Arc::clone(hub), heartbeat));
-        tokio::spawn(beat(Arc::clone(hub), heartbeat));
-        tokio::spawn(submit(Arc::clone(hub), submitted, cancel.clone()));
-        tokio::spawn(abort_on_cancel(Arc::clone(hub), cancel.clone()));
+        let mut tasks = JoinSet::new();
+        tasks.spawn(tick(Arc::clone(hub), heartbeat));
+        tasks.spawn(beat(Arc::clone(hub), heartbeat));
+        tasks.spawn(submit(Arc::clone(hub), submitted, cancel.clone()));
+        tasks.spawn(abort_on_cancel(Arc::clone(hub), cancel.clone()));
         let service = FleetServer::new(Service { hub: Arc::clone(hub) })
             .max_decoding_message_size(MAX_MESSAGE)
             .max_encoding_message_size(MAX_MESSAGE);
         let server = Server::builder()
-            .http2_keepalive_interval(Some(heartbeat))
-            .http2_keepalive_timeout(Some(heartbeat))
+            .http2_keepalive_interval(Some(KEEP_ALIVE.0))
+            .http2_keepalive_timeout(Some(KEEP_ALIVE.1))
             .initial_stream_window_size(WINDOWS.0)
             .initial_connection_window_size(WINDOWS.1)
             .max_frame_size(FRAME_SIZE)
             .add_service(service)
             .serve_with_incoming(incoming);
         tokio::select! {
-            ended = server => ended.map_err(|error| error.to_string()),
+            ended = server => Err(ended.err().map_or_else(|| "its server ended".to_owned(), |error| causes(&error))),
+            Some(ended) = tasks.join_next() => Err(task_ended(ended)),
             () = drained(hub, stop) => Ok(()),
         }
     });
+    if let Err(reason) = &outcome {
+        hub.stopped(reason);
+    }
     runtime.shutdown_background();
     outcome
+}
+
+/// Why the fleet cannot go on without one of its tasks.
+fn task_ended(ended: Result<(), JoinError>) -> String {
+    match ended.map_err(JoinError::try_into_panic) {
+        Err(Ok(panic)) => format!("a part of it panicked: {}", panic_words(panic.as_ref())),
+        _ => "a part of it ended".to_owned(),
+    }
 }
 
 async fn tick(hub: Arc<Hub>, heartbeat: Duration) {
@@ -88,11 +107,15 @@ async fn submit(hub: Arc<Hub>, mut submitted: UnboundedReceiver<Submission>, can
             hub.handle(Event::Abort(BatchError::Cancelled));
         }
     }
+    // The caller is gone; the drain follows.
+    std::future::pending::<()>().await;
 }
 
 async fn abort_on_cancel(hub: Arc<Hub>, cancel: CancellationToken) {
     cancel.cancelled().await;
     hub.handle(Event::Abort(BatchError::Cancelled));
+    // Done, but not ended: the end of a task ends the fleet.
+    std::future::pending::<()>().await;
 }
 
 /// Waits for the stop, asks the workers to leave, and returns when they did or time is up.

@@ -4,13 +4,14 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use starlings_proto::wire::{self, fleet_server};
+use starlings_proto::words::status_text;
 use starlings_proto::{FromWorker, ToWorker};
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::UnboundedReceiverStream;
 use tonic::{Request, Response, Status, Streaming};
 
 use super::dispatcher::{Event, WorkerId};
-use super::hub::{Hub, Outgoing};
+use super::hub::{Closed, Hub, Outgoing};
 
 /// How long a connection may stay open without a Hello.
 const HELLO_PATIENCE: Duration = Duration::from_secs(10);
@@ -43,17 +44,36 @@ impl fleet_server::Fleet for Service {
             Ok(worker) => {
                 tokio::spawn(read(Arc::clone(&self.hub), worker, inbound));
             }
-            Err(reason) => {
+            Err(Closed::Refused(reason)) => {
                 let _ = link.send(Ok(ToWorker::refuse(&reason)));
+            }
+            Err(Closed::Over(reason)) => {
+                let _ = link.send(Ok(ToWorker::drain(&reason)));
             }
         }
         Ok(Response::new(UnboundedReceiverStream::new(outgoing)))
     }
 }
 
-/// Reads until the stream ends, however it ends, and then returns the worker's leases.
+/// Tells the hub that a worker left, however its reader ended.
+struct Leaving {
+    hub: Arc<Hub>,
+    worker: WorkerId,
+    reason: String,
+    clean: bool,
+}
+
+impl Drop for Leaving {
+    fn drop(&mut self) {
+        self.hub.leave(self.worker, std::mem::take(&mut self.reason), self.clean);
+    }
+}
+
+/// Reads until the stream ends; its worker leaves with it.
 async fn read(hub: Arc<Hub>, worker: WorkerId, mut inbound: Streaming<wire::FromWorker>) {
-    let (reason, clean) = loop {
+    let reason = "its messages are no longer read".to_owned();
+    let mut leaving = Leaving { hub: Arc::clone(&hub), worker, reason, clean: false };
+    (leaving.reason, leaving.clean) = loop {
         match inbound.message().await {
             Ok(Some(message)) => match FromWorker::decode(message) {
                 Ok(FromWorker::Goodbye(reason)) => break (reason, true),
@@ -65,10 +85,9 @@ async fn read(hub: Arc<Hub>, worker: WorkerId, mut inbound: Streaming<wire::From
                 Err(error) => break (format!("it sent a malformed message: {error}"), false),
             },
             Ok(None) => break ("it closed the connection".to_owned(), false),
-            Err(status) => break (format!("the connection broke ({})", status.code()), false),
+            Err(status) => break (format!("the connection broke: {}", status_text(&status)), false),
         }
     };
-    hub.leave(worker, reason, clean);
 }
 
 fn event(worker: WorkerId, message: FromWorker) -> Option<Event> {

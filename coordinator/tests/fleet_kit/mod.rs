@@ -4,7 +4,7 @@
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::mpsc::{self, Receiver};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Condvar, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -133,6 +133,21 @@ impl ThreadWorker {
 pub struct Wire {
     pub address: SocketAddr,
     ends: Arc<Mutex<Vec<TcpStream>>>,
+    silent: Arc<Silent>,
+}
+
+/// Whether what the server says is held back.
+#[derive(Default)]
+struct Silent {
+    held: Mutex<bool>,
+    changed: Condvar,
+}
+
+impl Silent {
+    fn wait(&self) {
+        let held = self.held.lock().unwrap();
+        drop(self.changed.wait_while(held, |held| *held).unwrap());
+    }
 }
 
 impl Wire {
@@ -141,16 +156,25 @@ impl Wire {
         let address = listener.local_addr().expect("bound");
         let ends = Arc::new(Mutex::new(vec![]));
         let shared = Arc::clone(&ends);
+        let silent = Arc::<Silent>::default();
+        let quiet = Arc::clone(&silent);
         std::thread::spawn(move || {
             for near in listener.incoming().map_while(Result::ok) {
                 let Ok(far) = TcpStream::connect(server) else { continue };
                 shared.lock().unwrap().extend([near.try_clone().unwrap(), far.try_clone().unwrap()]);
                 let (near2, far2) = (near.try_clone().unwrap(), far.try_clone().unwrap());
-                std::thread::spawn(move || pump(near, far));
-                std::thread::spawn(move || pump(far2, near2));
+                let quiet = Arc::clone(&quiet);
+                std::thread::spawn(move || pump(near, far, || {}));
+                std::thread::spawn(move || pump(far2, near2, || quiet.wait()));
             }
         });
-        Self { address, ends }
+        Self { address, ends, silent }
+    }
+
+    /// Holds back what the server says, or lets it go; the other direction passes.
+    pub fn silence(&self, held: bool) {
+        *self.silent.held.lock().unwrap() = held;
+        self.silent.changed.notify_all();
     }
 
     pub fn cut(&self) {
@@ -160,9 +184,10 @@ impl Wire {
     }
 }
 
-fn pump(mut from: TcpStream, mut to: TcpStream) {
+fn pump(mut from: TcpStream, mut to: TcpStream, gate: impl Fn()) {
     let mut buffer = [0; 16 * 1024];
     while let Ok(n @ 1..) = from.read(&mut buffer) {
+        gate();
         if to.write_all(&buffer[..n]).is_err() {
             break;
         }

@@ -4,6 +4,7 @@ use bytes::Bytes;
 use starlings_models::{ParticleError, Prediction};
 
 use super::{Lease, SetupId, WireError, floats, job::check_state, required, setup_id};
+use crate::MAX_SLOTS;
 use crate::wire::{self, failure, from_worker::Kind, result::Outcome};
 
 /// Who a worker is. First message of every stream.
@@ -15,7 +16,7 @@ pub struct Hello {
     pub version: String,
     /// Cores that the worker sees.
     pub cores: u32,
-    /// Jobs that it runs at the same time; at least 1.
+    /// Jobs that it runs at the same time; at least 1, at most [`MAX_SLOTS`].
     pub slots: u32,
     /// Host name.
     pub host: String,
@@ -114,8 +115,9 @@ fn encode_hello(hello: Hello) -> wire::Hello {
 
 fn decode_hello(hello: wire::Hello) -> Result<Hello, WireError> {
     let wire::Hello { protocol, version, cores, slots, host, pid, nonce, build, solver } = hello;
-    if slots == 0 {
-        return Err(WireError::Shape { field: "slots", message: "a worker needs at least one".to_owned() });
+    if slots == 0 || slots as usize > MAX_SLOTS {
+        let message = format!("{slots}, expected 1 to {MAX_SLOTS}");
+        return Err(WireError::Shape { field: "slots", message });
     }
     let build = if build.is_empty() { None } else { Some(setup_id(&build)?) };
     Ok(Hello { protocol, version, cores, slots, host, pid, nonce, build, solver: solver.map(Into::into) })

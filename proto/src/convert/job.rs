@@ -43,13 +43,15 @@ impl JobEncoder {
     }
 }
 
-/// Whether a job can travel in one message.
+/// Whether a job can travel in one message and will be taken at the other end.
 ///
 /// # Errors
-/// [`WireError::StateTooLarge`], or [`WireError::Shape`] when window and parameters exceed a message.
+/// [`WireError::StateTooLarge`], or [`WireError::Shape`] when the window has no times, its arrays do not fit together, or window
+/// and parameters exceed a message.
 pub fn check_size(job: &Job) -> Result<(), WireError> {
     check_state(job.state.as_deref().unwrap_or_default())?;
     let window = &job.window;
+    check_window(window)?;
     let signals: usize = window.inputs.iter().map(|s| s.times.len() + s.values.len()).sum();
     let bytes = 8 * (window.times.len() + window.observed.len() + signals + job.theta.len());
     if bytes + MAX_INLINE_STATE + MESSAGE_MARGIN > MAX_MESSAGE {
@@ -98,20 +100,30 @@ pub(super) fn decode_job(job: &wire::Job) -> Result<Job, WireError> {
 fn decode_window(window: &wire::Window) -> Result<Window, WireError> {
     let times = floats::decode(&window.times, "times")?;
     let observed = floats::decode(&window.observed, "observed")?;
-    if times.is_empty() || observed.len() % times.len() != 0 {
+    let inputs = window.inputs.iter().map(decode_signal).collect::<Result<_, _>>()?;
+    let window = Window { start: required(window.start, "start")?, times, observed, inputs };
+    check_window(&window)?;
+    Ok(window)
+}
+
+fn check_window(window: &Window) -> Result<(), WireError> {
+    let Window { times, observed, inputs, .. } = window;
+    if times.is_empty() {
+        return Err(WireError::Shape { field: "times", message: "a window needs at least one".to_owned() });
+    }
+    if observed.len() % times.len() != 0 {
         let message = format!("{} values for {} times", observed.len(), times.len());
         return Err(WireError::Shape { field: "observed", message });
     }
-    let inputs = window.inputs.iter().map(decode_signal).collect::<Result<_, _>>()?;
-    Ok(Window { start: required(window.start, "start")?, times, observed, inputs })
+    if let Some(signal) = inputs.iter().find(|signal| signal.times.len() != signal.values.len()) {
+        let message = format!("{} values for {} times", signal.values.len(), signal.times.len());
+        return Err(WireError::Shape { field: "input", message });
+    }
+    Ok(())
 }
 
 fn decode_signal(signal: &wire::Signal) -> Result<Signal, WireError> {
     let times = floats::decode(&signal.times, "input times")?;
     let values = floats::decode(&signal.values, "input values")?;
-    if times.len() != values.len() {
-        let message = format!("{} values for {} times", values.len(), times.len());
-        return Err(WireError::Shape { field: "input", message });
-    }
     Ok(Signal { times, values })
 }

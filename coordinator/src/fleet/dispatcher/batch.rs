@@ -89,6 +89,12 @@ impl Batch {
         changed.then_some(FleetEvent::Progress { done: self.done, total: self.jobs.len() })
     }
 
+    /// What a job is called in a sentence.
+    pub(super) fn describe(&self, job: u64) -> String {
+        let name = self.index_of(job).and_then(|index| self.names.get(index));
+        name.map_or_else(|| format!("run {job}"), |n| format!("particle {}, record {}", n.particle, n.record))
+    }
+
     pub(super) fn has_fresh(&self) -> bool {
         self.next < self.jobs.len()
     }
@@ -188,8 +194,12 @@ impl Batch {
         let JobName { particle, record } = self.names[index];
         let outcome = self.jobs[index].outcome.as_ref();
         let attempts = outcome.map_or(0, |o| o.attempts);
-        let reason =
-            outcome.and_then(|o| o.result.as_ref().err()).map(ToString::to_string).unwrap_or_default();
+        let reason = match outcome.and_then(|o| o.result.as_ref().err()) {
+            // The event counts the attempts itself.
+            Some(ParticleError::Lost { reason, .. }) => reason.clone(),
+            Some(error) => error.to_string(),
+            None => String::new(),
+        };
         FleetEvent::JobFailed { particle, record, attempts, reason }
     }
 

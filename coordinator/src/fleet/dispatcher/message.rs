@@ -35,10 +35,7 @@ pub struct Joining {
 
 impl Joining {
     pub(super) fn notice(&self) -> FleetEvent {
-        let build = self.build.iter().flatten().fold(String::new(), |mut text, byte| {
-            let _ = write!(text, "{byte:02x}");
-            text
-        });
+        let build = self.build.map_or_else(String::new, |hash| hex(&hash));
         FleetEvent::WorkerJoined {
             worker: self.name.clone(),
             host: self.host.clone(),
@@ -48,6 +45,14 @@ impl Joining {
             build,
         }
     }
+}
+
+/// A hash in hexadecimal.
+pub(in crate::fleet) fn hex(hash: &[u8; 32]) -> String {
+    hash.iter().fold(String::new(), |mut text, byte| {
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
 }
 
 /// Something that happened.
@@ -103,6 +108,8 @@ pub enum Event {
         /// Wall time of the run, seconds.
         cost: f64,
     },
+    /// All workers are processes of this machine, started from one program: what one of them cannot build, none can.
+    LocalOnly,
     /// Time passed.
     Tick,
     /// The batch must end with this error.
@@ -128,6 +135,8 @@ pub enum BatchError {
     },
     /// The worker processes on this machine cannot run.
     LocalWorkers(String),
+    /// The network ended although nobody closed the fleet.
+    Stopped(String),
 }
 
 /// Something to do.

@@ -26,7 +26,10 @@ const RECALL_WORTH: f64 = 0.005;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum SetupState {
     /// Sent, not answered.
-    Pending,
+    Pending {
+        /// When it was sent.
+        since: Duration,
+    },
     /// Built.
     Ready,
     /// Not built: why.
@@ -47,12 +50,14 @@ pub(super) struct Worker {
     cost: Option<f64>,
 }
 
-/// One lease: how often the job was started, when in the worker's order, whether it was called back.
+/// One lease: how often the job was started, when in the worker's order, whether it was called back, since when it has certainly
+/// been computed.
 #[derive(Clone, Copy, Debug)]
 struct Held {
     attempt: u32,
     order: u64,
     recalled: bool,
+    running_since: Option<Duration>,
 }
 
 impl Worker {
@@ -75,8 +80,30 @@ impl Worker {
         self.held.len()
     }
 
-    pub(super) fn n_recalled(&self) -> usize {
-        self.held.values().filter(|h| h.recalled).count()
+    /// Leases called back that have not started: they are on their way back. One that had started meanwhile runs to its end.
+    pub(super) fn n_returning(&self) -> usize {
+        if self.held.values().all(|held| !held.recalled) {
+            return 0;
+        }
+        let waiting = self.leases_in_order().split_off(self.slots.min(self.load()));
+        waiting.iter().filter(|job| self.held.get(job).is_some_and(|held| held.recalled)).count()
+    }
+
+    /// Notes since when the jobs in its slots have been computed.
+    pub(super) fn mark_running(&mut self, now: Duration) {
+        if self.held.is_empty() {
+            return;
+        }
+        for job in self.leases_in_order().into_iter().take(self.slots) {
+            if let Some(held) = self.held.get_mut(&job) {
+                held.running_since.get_or_insert(now);
+            }
+        }
+    }
+
+    /// Jobs in its slots, each with the time since when.
+    pub(super) fn running(&self) -> impl Iterator<Item = (u64, Duration)> + '_ {
+        self.held.iter().filter_map(|(&job, held)| Some((job, held.running_since?)))
     }
 
     /// Leases that certainly wait behind a busy slot and are worth calling back.
@@ -84,7 +111,7 @@ impl Worker {
         if self.cost.is_some_and(|cost| cost < RECALL_WORTH) {
             return 0;
         }
-        self.load().saturating_sub(self.slots + self.n_recalled())
+        self.load().saturating_sub(self.slots + self.n_returning())
     }
 
     pub(super) fn is_ready(&self, setup: &SetupId) -> bool {
@@ -106,7 +133,10 @@ impl Worker {
 
     pub(super) fn hold(&mut self, lease: Lease) {
         self.sent += 1;
-        self.held.insert(lease.job, Held { attempt: lease.attempt, order: self.sent, recalled: false });
+        self.held.insert(
+            lease.job,
+            Held { attempt: lease.attempt, order: self.sent, recalled: false, running_since: None },
+        );
     }
 
     /// Ends a lease; false when it is not held.

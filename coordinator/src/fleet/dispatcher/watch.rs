@@ -1,17 +1,33 @@
-//! The passing of time: silent workers, batches that wait, progress. Nothing else in the dispatcher looks at the clock.
+//! The passing of time: silent workers, slow setups, batches that wait, jobs that do not come back, progress. Nothing else in the
+//! dispatcher looks at the clock.
 
 use std::time::Duration;
 
 use super::batch::Batch;
+use super::roster::SetupState;
 use super::{BatchError, Command, Dispatcher};
 use crate::fleet::FleetEvent;
 
 /// First notice of a batch that waits, seconds after it began to wait; each later one after twice as long.
 const FIRST_NOTICE: Duration = Duration::from_secs(2);
 
+/// A job is overdue after this time at the earliest.
+const SHORTEST_OVERDUE: Duration = Duration::from_secs(30);
+
+/// A job is overdue after so many times the usual one.
+const OVERDUE_FACTOR: f64 = 10.0;
+
 /// Since when no worker can take a job, and when to say so next.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Starved {
+    since: Duration,
+    next_notice: Duration,
+}
+
+/// The job that has been computing for longest, and when to say so next.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Overdue {
+    job: u64,
     since: Duration,
     next_notice: Duration,
 }
@@ -34,30 +50,101 @@ impl Dispatcher {
         if let Some(progress) = self.batch.as_mut().and_then(Batch::progress) {
             self.out.push(Command::Notice(progress));
         }
+        self.watch_setups(now);
         self.watch_starvation(now);
+        self.watch_overdue(now);
+    }
+
+    /// A worker that builds a setup for longer than patience counts as one that cannot build it.
+    fn watch_setups(&mut self, now: Duration) {
+        let Some(batch) = &self.batch else { return };
+        let patience = self.rules.patience;
+        for worker in self.workers.values_mut() {
+            let Some(state) = worker.setups.get_mut(&batch.setup) else { continue };
+            if matches!(state, SetupState::Pending { since } if now.saturating_sub(*since) >= patience) {
+                let reason = format!("it was not built within {:.0} s", patience.as_secs_f64());
+                *state = SetupState::Failed(reason.clone());
+                self.out
+                    .push(Command::Notice(FleetEvent::SetupFailed { worker: worker.name.clone(), reason }));
+            }
+        }
     }
 
     /// Says what is missing while no worker can take a job, and ends the batch when patience does.
     fn watch_starvation(&mut self, now: Duration) {
         let Some(batch) = &self.batch else { return };
-        if self.workers.values().any(|w| w.is_ready(&batch.setup)) {
+        let setup = batch.setup;
+        if self.workers.values().any(|w| w.is_ready(&setup)) {
             self.starved = None;
             return;
         }
         let starved = self.starved.get_or_insert(Starved { since: now, next_notice: FIRST_NOTICE });
         let waited = now.saturating_sub(starved.since);
-        let names = self.workers.values().map(|w| w.name.as_str()).collect::<Vec<_>>().join(", ");
-        let missing = if names.is_empty() {
-            "no worker is connected".to_owned()
-        } else {
-            format!("the model is still being built by {names}")
-        };
-        if waited >= self.rules.patience {
-            self.abort(BatchError::NoWorkers { waited, missing });
-        } else if waited >= starved.next_notice {
+        let told = waited >= starved.next_notice;
+        if told {
             starved.next_notice *= 2;
-            let notice = FleetEvent::Waiting { seconds: waited.as_secs_f64(), missing };
+        }
+        if waited >= self.rules.patience {
+            let error = match self.failed_everywhere(&setup) {
+                Some(reason) => BatchError::SetupFailed { reason },
+                None => BatchError::NoWorkers { waited, missing: self.missing(&setup) },
+            };
+            self.abort(error);
+        } else if told {
+            let notice = FleetEvent::Waiting { seconds: waited.as_secs_f64(), missing: self.missing(&setup) };
             self.out.push(Command::Notice(notice));
+        }
+    }
+
+    /// What a batch without a ready worker lacks.
+    fn missing(&self, setup: &starlings_proto::SetupId) -> String {
+        let mut building = Vec::new();
+        let mut failed = Vec::new();
+        for worker in self.workers.values() {
+            match worker.setups.get(setup) {
+                Some(SetupState::Failed(reason)) => failed.push(format!("{} ({reason})", worker.name)),
+                _ => building.push(worker.name.as_str()),
+            }
+        }
+        let mut parts = Vec::new();
+        if !building.is_empty() {
+            parts.push(format!("the model is still being built by {}", building.join(", ")));
+        }
+        if !failed.is_empty() {
+            parts.push(format!("the model cannot be built by {}", failed.join(", ")));
+        }
+        if parts.is_empty() { "no worker is connected".to_owned() } else { parts.join("; ") }
+    }
+
+    /// Names the job that has been computing for longest when it takes much longer than the others did, and again after twice as
+    /// long. It is not ended: how long a run may take is not known here.
+    fn watch_overdue(&mut self, now: Duration) {
+        self.workers.values_mut().for_each(|worker| worker.mark_running(now));
+        let Some(batch) = &self.batch else { return };
+        let running =
+            self.workers.values().flat_map(|w| w.running().map(move |(job, since)| (since, job, w)));
+        let oldest = running.filter(|(_, job, _)| batch.index_of(*job).is_some());
+        let Some((since, job, worker)) = oldest.min_by_key(|&(since, job, _)| (since, job)) else {
+            self.overdue = None;
+            return;
+        };
+        let out = now.saturating_sub(since);
+        if out < SHORTEST_OVERDUE {
+            self.overdue = None;
+            return;
+        }
+        let usual = self.run_times.median();
+        let limit = SHORTEST_OVERDUE
+            .max(Duration::try_from_secs_f64(OVERDUE_FACTOR * usual.unwrap_or(0.0)).unwrap_or_default());
+        let known = self.overdue.filter(|overdue| (overdue.job, overdue.since) == (job, since));
+        let next_notice = known.map_or(limit, |overdue| overdue.next_notice);
+        let told = out >= next_notice;
+        self.overdue = Some(Overdue { job, since, next_notice: if told { out * 2 } else { next_notice } });
+        if told {
+            let name = batch.describe(job);
+            let usual = usual.map_or_else(String::new, |s| format!(", runs usually take {s:.3} s"));
+            let missing = format!("{name} has not come back from worker {}{usual}", worker.name);
+            self.out.push(Command::Notice(FleetEvent::Waiting { seconds: out.as_secs_f64(), missing }));
         }
     }
 }

@@ -51,7 +51,7 @@ struct World {
 }
 
 impl World {
-    fn new(jobs: u32) -> Self {
+    fn new(jobs: u32, local: bool) -> Self {
         let mut world = Self {
             dispatcher: Dispatcher::new(RULES),
             now: Duration::ZERO,
@@ -63,6 +63,9 @@ impl World {
             past: vec![],
             ended: None,
         };
+        if local {
+            world.event(Event::LocalOnly);
+        }
         world.event(submit(jobs));
         world
     }
@@ -196,8 +199,12 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(512))]
 
     #[test]
-    fn every_job_ends_exactly_once_whatever_happens(jobs in 1_u32..40, acts in prop::collection::vec(act(), 0..300)) {
-        let mut world = World::new(jobs);
+    fn every_job_ends_exactly_once_whatever_happens(
+        jobs in 1_u32..40,
+        local in any::<bool>(),
+        acts in prop::collection::vec(act(), 0..300),
+    ) {
+        let mut world = World::new(jobs, local);
         for act in &acts {
             if world.ended.is_some() {
                 break;

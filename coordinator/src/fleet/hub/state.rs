@@ -1,0 +1,154 @@
+//! What the fleet is at one moment: the dispatcher, the links, the batch that somebody waits for.
+//!
+//! Commands become messages here. The lock around it is [`super::Hub`]'s.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::mpsc::Sender;
+use std::time::Duration;
+
+use starlings_models::Job;
+use starlings_proto::{Bytes, Hello, JobEncoder, PROTOCOL, SetupId, ToWorker, VERSION, wire};
+use tokio::sync::mpsc::UnboundedSender;
+
+use super::{Outgoing, Reply};
+use crate::fleet::FleetEvent;
+use crate::fleet::dispatcher::{BatchError, Command, Dispatcher, Event, Rules, WorkerId};
+
+/// Guarded by the hub's lock.
+pub(super) struct State {
+    pub(super) dispatcher: Dispatcher,
+    pub(super) links: BTreeMap<WorkerId, Link>,
+    pub(super) setups: BTreeMap<SetupId, Bytes>,
+    pub(super) running: Option<Submission>,
+    pub(super) encoder: JobEncoder,
+    pub(super) events: Sender<FleetEvent>,
+    pub(super) first_epoch: u64,
+    pub(super) joined: u64,
+    pub(super) draining: bool,
+    pub(super) given_up: Option<String>,
+    pub(super) stopped: Option<String>,
+    pub(super) other_builds: BTreeSet<[u8; 32]>,
+}
+
+/// The way to one worker.
+pub(super) struct Link {
+    pub(super) sender: UnboundedSender<Outgoing>,
+    pub(super) pid: u32,
+}
+
+/// Why a worker is not taken.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(in crate::fleet) enum Closed {
+    /// It does not fit: dialling again would not help.
+    Refused(String),
+    /// There is no more work: it may leave.
+    Over(String),
+}
+
+/// A batch and who waits for it.
+pub(in crate::fleet) struct Submission {
+    pub(in crate::fleet) setup: SetupId,
+    pub(in crate::fleet) jobs: Vec<Job>,
+    pub(in crate::fleet) reply: Sender<Reply>,
+}
+
+impl State {
+    pub(super) fn new(first_epoch: u64, rules: Rules, events: Sender<FleetEvent>) -> Self {
+        Self {
+            dispatcher: Dispatcher::new(rules),
+            links: BTreeMap::new(),
+            setups: BTreeMap::new(),
+            running: None,
+            encoder: JobEncoder::default(),
+            events,
+            first_epoch,
+            joined: 0,
+            draining: false,
+            given_up: None,
+            stopped: None,
+            other_builds: BTreeSet::new(),
+        }
+    }
+
+    pub(super) fn admit(&self, hello: &Hello) -> Result<(), Closed> {
+        if hello.protocol != PROTOCOL || hello.version != VERSION {
+            return Err(Closed::Refused(format!(
+                "the worker on {} is starlings {} (protocol {}), the coordinator {VERSION} (protocol {PROTOCOL}): start the \
+                 worker from the coordinator's release",
+                hello.host, hello.version, hello.protocol
+            )));
+        }
+        if self.draining {
+            return Err(Closed::Over("the run is over".to_owned()));
+        }
+        Ok(())
+    }
+
+    pub(super) fn handle(&mut self, now: Duration, event: Event) {
+        for command in self.dispatcher.step(now, event) {
+            self.carry_out(command);
+        }
+        self.end_if_abandoned(now);
+    }
+
+    /// Ends the batch when the local workers are given up and the last link is gone, whichever came first.
+    pub(super) fn end_if_abandoned(&mut self, now: Duration) {
+        if !self.links.is_empty() || self.running.is_none() {
+            return;
+        }
+        let Some(reason) = self.given_up.clone() else { return };
+        for command in self.dispatcher.step(now, Event::Abort(BatchError::LocalWorkers(reason))) {
+            self.carry_out(command);
+        }
+    }
+
+    /// The coordinator's build and a worker's, when they differ and this one was not seen before.
+    pub(super) fn other_build(
+        &mut self,
+        own: Option<[u8; 32]>,
+        build: Option<[u8; 32]>,
+    ) -> Option<([u8; 32], [u8; 32])> {
+        let pair = own.zip(build).filter(|(own, build)| own != build)?;
+        self.other_builds.insert(pair.1).then_some(pair)
+    }
+
+    fn carry_out(&mut self, command: Command) {
+        match command {
+            Command::SendSetup { worker, setup } => {
+                if let Some(json) = self.setups.get(&setup) {
+                    self.send(worker, ToWorker::setup(&setup, json.clone()));
+                }
+            }
+            Command::SendJob { worker, lease, index } => {
+                let Some(running) = &self.running else { return };
+                let Some(job) = running.jobs.get(index) else { return };
+                let message = self.encoder.encode(lease, &running.setup, job);
+                self.send(worker, message);
+            }
+            Command::Cancel { worker, leases } => self.send(worker, ToWorker::cancel(&leases)),
+            // Its stream ends without a word: a worker that still lives dials again.
+            Command::Close { worker } => {
+                self.links.remove(&worker);
+            }
+            Command::BatchDone(outcomes) => self.reply(Ok(outcomes)),
+            Command::BatchFailed(error) => self.reply(Err(error)),
+            Command::Notice(event) => {
+                tracing::debug!(?event, "fleet");
+                let _ = self.events.send(event);
+            }
+        }
+    }
+
+    fn send(&self, worker: WorkerId, message: wire::ToWorker) {
+        // A link that is closing ends in `leave`, which returns its leases.
+        if let Some(link) = self.links.get(&worker) {
+            let _ = link.sender.send(Ok(message));
+        }
+    }
+
+    pub(super) fn reply(&mut self, reply: Reply) {
+        if let Some(running) = self.running.take() {
+            let _ = running.reply.send(reply);
+        }
+    }
+}
