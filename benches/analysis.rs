@@ -105,6 +105,10 @@ fn recombination(figures: &mut Map<String, Value>) -> Result<(), Failure> {
     let mut out = DMatrix::zeros(n, r);
     let copy = best(10, || black_box(&mut out).as_mut_slice().copy_from_slice(black_box(&x).as_slice()));
     let product = best(10, || recombine(black_box(&x), &t, black_box(&mut out)));
+    let expected = (x.row(n - 1) * t.column(r - 1))[0];
+    if (out[(n - 1, r - 1)] - expected).abs() > 1e-9 {
+        return Err(format!("the recombination gives {} instead of {expected}", out[(n - 1, r - 1)]).into());
+    }
     let bytes = (2 * n * r * 8) as f64;
     figures.insert("recombine_n1e6_r22_ms".into(), round(1e3 * product));
     figures.insert("recombine_gb_per_s".into(), round(bytes / product / 1e9));

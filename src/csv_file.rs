@@ -44,8 +44,9 @@ pub(crate) enum Place<'a> {
 
 /// Refuses an output that would overwrite the study or a file that it names.
 pub(crate) fn spare_study(output: Option<&Path>, study: &str, place: &Place<'_>) -> Result<(), Failure> {
-    // What does not exist cannot be overwritten.
-    let Some((given, target)) = output.and_then(|path| Some((path, path.canonicalize().ok()?))) else {
+    // What does not exist cannot be overwritten, and a device is no file of a study.
+    let existing = output.and_then(|path| Some((path, path.canonicalize().ok()?)));
+    let Some((given, target)) = existing.filter(|(_, target)| target.is_file()) else {
         return Ok(());
     };
     let refuse = |what: &str| {

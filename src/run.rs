@@ -171,8 +171,9 @@ fn relay(heard: mpsc::Receiver<FleetEvent>, kept: &mpsc::Sender<FleetEvent>, dis
     for event in heard {
         if event.is_notable() {
             display.say(&event.to_string());
+        } else {
+            tracing::info!(kind = event.kind(), "{event}");
         }
-        tracing::info!(kind = event.kind(), "{event}");
         if event.is_lasting() {
             // The store stops listening at the end of the run; later events have no reader.
             let _ = kept.send(event);

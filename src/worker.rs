@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use clap::Parser;
-use starlings_worker::WorkerConfig;
+use starlings_worker::{LIFELINE, MAX_SLOTS, WorkerConfig};
 use tokio_util::sync::CancellationToken;
 
 use crate::console::cancel_on_signal;
@@ -28,8 +28,8 @@ pub(crate) struct Args {
 
 /// Works until drained, cancelled or out of patience.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    if args.slots == Some(0) {
-        return Err(Failure::input("--slots must be at least 1"));
+    if args.slots.is_some_and(|n| n == 0 || n > MAX_SLOTS) {
+        return Err(Failure::input(format!("--slots must be from 1 to {MAX_SLOTS}")));
     }
     let patience = Duration::try_from_secs_f64(args.patience)
         .map_err(|_| Failure::input("--patience must be a number of seconds, zero or more"))?;
@@ -41,6 +41,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         once: args.once,
         patience,
         cancel,
+        lifeline: std::env::var_os(LIFELINE).is_some(),
         ..WorkerConfig::new(args.connect.clone())
     };
     let report = starlings_worker::run(config).map_err(Failure::run)?;

@@ -94,7 +94,7 @@ pub enum ParticleError {
     #[error("the solver failed: {0}")]
     Solver(String),
     /// No worker could finish the run; the text lists what happened at each attempt.
-    #[error("given up after {attempts} attempts: {reason}")]
+    #[error("given up after {attempts} attempt{}: {reason}", if *attempts == 1 { "" } else { "s" })]
     Lost {
         /// How often it was tried.
         attempts: u32,

@@ -88,6 +88,8 @@ pub struct Fit {
     pub n_used: usize,
     /// Largest share of the spread lost at one analysis.
     pub information_lost: f64,
+    /// Largest share of the spread that a resampling left out.
+    pub dropped: f64,
     /// Runs.
     pub counts: Counts,
     /// Passes done.

@@ -13,6 +13,8 @@ use super::{EstimatorKind, Fit, Study};
 const CORRELATED: f64 = 0.95;
 /// Share of the prior sd above which the data are said not to inform a parameter.
 const UNINFORMED: f64 = 0.9;
+/// Share of the spread that resampling may leave out in silence.
+const DROPPED: f64 = 0.05;
 /// Prior standard deviations beyond which an estimate contradicts its prior.
 const FAR_FROM_PRIOR: f64 = 4.0;
 /// Posterior standard deviations that a last pass may move the estimate: its linearisation error is of second order in
@@ -34,6 +36,7 @@ pub fn collect(study: &Study, fit: &Fit, summary: &Summary, predictions: &[Predi
     warnings.extend(uninformed(study, fit));
     warnings.extend(far_from_prior(study, fit));
     warnings.extend(lost(fit));
+    warnings.extend(dropped(fit));
     warnings
 }
 
@@ -184,6 +187,16 @@ fn far_from_prior(study: &Study, fit: &Fit) -> Vec<String> {
             })
         })
         .collect()
+}
+
+fn dropped(fit: &Fit) -> Option<String> {
+    (fit.dropped > DROPPED).then(|| {
+        format!(
+            "resampling left out up to {:.0} % of the ensemble's spread: the model bends within it. Use tighter priors, or \
+             more passes.",
+            100.0 * fit.dropped
+        )
+    })
 }
 
 fn lost(fit: &Fit) -> Option<String> {

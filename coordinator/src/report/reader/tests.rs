@@ -50,6 +50,7 @@ fn snapshot(rescued: u64) -> Snapshot {
         n_used: 1,
         log_likelihood: 0.0,
         information_lost: 0.0,
+        dropped: 0.0,
         counts: Counts { rescued, ..Counts::default() },
     };
     Snapshot { head, states: Vec::new() }

@@ -2,7 +2,7 @@
 //!
 //! Next file to read: [`super::model`].
 
-use starlings_estimators::{Points, Root};
+use starlings_estimators::{Batch, Points, Root};
 use starlings_models::ObserverDef;
 use toml::Spanned;
 
@@ -46,7 +46,7 @@ pub(in crate::study) fn estimator(source: &Source, section: &EstimatorSection) -
         spread: positive(source, section.spread.as_ref(), "spread", default_spread),
         resample: choose(source, section.resample.as_ref(), "resampling", &resample).unwrap_or(true),
         max_iterations: counted(source, section.max_iterations.as_ref(), "max_iterations", 100_000)
-            .unwrap_or(30),
+            .unwrap_or(Batch::MAX_ITERATIONS),
         tolerance: positive(source, section.tolerance.as_ref(), "tolerance", 0.01),
     }
 }

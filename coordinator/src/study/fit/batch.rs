@@ -83,6 +83,7 @@ fn begin(batch: &Batch, study: &crate::study::Study) -> (Known, Snapshot) {
         n_used: 0,
         log_likelihood: 0.0,
         information_lost: 0.0,
+        dropped: 0.0,
         counts: crate::study::store::snapshot::Counts::default(),
     };
     (Known { state, posterior: prior }, Snapshot { head, states: vec![None; study.records.len()] })
@@ -145,6 +146,7 @@ fn finish(now: &Snapshot, known: Known) -> Fit {
         nis: now.head.nis,
         n_used: now.head.n_used,
         information_lost: 0.0,
+        dropped: 0.0,
         counts: now.head.counts,
         passes: 1,
         converged: known.state.converged,

@@ -45,6 +45,7 @@ pub fn fit(
         now = schedule.start(head.pass + 1, &reported.posterior);
         now.head.counts = head.counts;
         now.head.information_lost = head.information_lost;
+        now.head.dropped = head.dropped;
         reported = schedule.reported(&now)?;
     }
 }
@@ -70,8 +71,9 @@ fn step(
     if schedule.resample && rescued == 0 {
         let states = &mut now.states;
         let drawn = resample::redraw(flight, roukf, place, &windows, &particles, &predictions, states)?;
-        if let Some((redrawn, observed)) = drawn {
-            (particles, predictions) = (redrawn, observed);
+        if let Some(redrawn) = drawn {
+            (particles, predictions) = (redrawn.particles, redrawn.predictions);
+            now.head.dropped = now.head.dropped.max(redrawn.dropped);
         }
     }
     let values: Vec<f64> = windows.iter().flat_map(|(_, w)| w.observed.iter().copied()).collect();

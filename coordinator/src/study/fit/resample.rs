@@ -60,8 +60,18 @@ fn add(gram: &mut DMatrix<f64>, rows: &DMatrix<f64>, weights: &DVector<f64>, sca
     gram.gemm_tr(1.0, &deviation, &deviation, 1.0);
 }
 
-/// Redraws particles and states around the leading directions and observes them again: the new particles and their
-/// predictions. `None`, and nothing changed, when a redrawn particle cannot be observed.
+/// An ensemble after resampling.
+pub struct Redrawn {
+    /// The redrawn particles.
+    pub particles: Particles,
+    /// Their predictions, m × r.
+    pub predictions: DMatrix<f64>,
+    /// Share of the spread, in the norm of the Gram matrix, that they leave out.
+    pub dropped: f64,
+}
+
+/// Redraws particles and states around the leading directions and observes them again: the new
+/// ensemble. `None`, and nothing changed, when a redrawn particle cannot be observed.
 ///
 /// # Errors
 /// When the fleet or the estimator fails.
@@ -73,9 +83,9 @@ pub fn redraw(
     particles: &Particles,
     predictions: &DMatrix<f64>,
     states: &mut Vec<Option<DMatrix<f64>>>,
-) -> Result<Option<(Particles, DMatrix<f64>)>, RunError> {
+) -> Result<Option<Redrawn>, RunError> {
     let study = flight.study();
-    let Resampled { particles: redrawn, transform, .. } =
+    let Resampled { particles: redrawn, transform, dropped } =
         roukf.resample(particles, &gram(study, &roukf.set.weights, particles, states))?;
     let mut mixed = states.clone();
     recombine(&mut mixed, &transform);
@@ -87,7 +97,7 @@ pub fn redraw(
         return Ok(None);
     }
     *states = mixed;
-    Ok(Some((redrawn, observed)))
+    Ok(Some(Redrawn { particles: redrawn, predictions: observed, dropped }))
 }
 
 /// Puts the outputs at the windows' ends, by runs of zero length, into the predictions; `false` when a run fails.

@@ -95,6 +95,7 @@ impl<'a> Schedule<'a> {
                 n_used: 0,
                 log_likelihood: 0.0,
                 information_lost: 0.0,
+                dropped: 0.0,
                 counts: Counts::default(),
             },
             states: vec![None; self.study.records.len()],
@@ -115,9 +116,9 @@ impl<'a> Schedule<'a> {
         let used = posterior::independent(&now.head.centre, &now.head.scale);
         let exchanged = exchange_prior(&posterior, &used, &self.prior)?;
         Ok(Reported {
-            posterior: exchanged.posterior,
+            nis: exchanged.corrected_nis(now.head.nis),
             log_likelihood: now.head.log_likelihood + exchanged.log_likelihood,
-            nis: now.head.nis + exchanged.nis,
+            posterior: exchanged.posterior,
         })
     }
 
@@ -129,10 +130,10 @@ impl<'a> Schedule<'a> {
             last_move: if one_value { moved.zip(sd).map(|(m, sd)| m / sd).fold(0.0, f64::max) } else { 0.0 },
             posterior: reported.posterior,
             log_likelihood: reported.log_likelihood,
-            // Exchanging priors subtracts large sums: what rounding leaves below zero is zero.
-            nis: reported.nis.max(0.0),
+            nis: reported.nis,
             n_used: now.head.n_used,
             information_lost: now.head.information_lost,
+            dropped: now.head.dropped,
             counts: now.head.counts,
             passes: self.passes,
             converged: true,

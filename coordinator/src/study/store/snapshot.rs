@@ -69,6 +69,8 @@ pub struct Head {
     pub log_likelihood: f64,
     /// Largest share of the spread lost at one analysis, over all passes.
     pub information_lost: f64,
+    /// Largest share of the spread that a resampling left out, over all passes.
+    pub dropped: f64,
     /// Runs so far.
     pub counts: Counts,
 }

@@ -33,6 +33,7 @@ fn snapshot(step: usize) -> Snapshot {
         n_used: step,
         log_likelihood: 0.0,
         information_lost: 0.0,
+        dropped: 0.0,
         counts: Counts::default(),
     };
     Snapshot { head, states: vec![Some(DMatrix::from_element(8, 3, step as f64))] }
