@@ -114,7 +114,21 @@ fn recombination(figures: &mut Map<String, Value>) -> Result<(), Failure> {
     figures.insert("recombine_gb_per_s".into(), round(bytes / product / 1e9));
     figures.insert("memcpy_gb_per_s".into(), round(bytes / copy / 1e9));
     figures.insert("recombine_share_of_memcpy".into(), round(copy / product));
+    let halves = best(10, || copy_in_halves(&x, &mut out));
+    figures.insert("memcpy_two_threads_gb_per_s".into(), round(bytes / halves / 1e9));
+    figures.insert("recombine_share_of_memcpy_two_threads".into(), round(halves / product));
     Ok(())
+}
+
+/// memcpy shared by two threads: the limit of a recombination that uses two cores.
+fn copy_in_halves(x: &DMatrix<f64>, out: &mut DMatrix<f64>) {
+    let half = x.len() / 2;
+    let (from, to) = (black_box(x).as_slice(), black_box(out).as_mut_slice());
+    let (first, second) = to.split_at_mut(half);
+    std::thread::scope(|scope| {
+        scope.spawn(|| first.copy_from_slice(&from[..half]));
+        second.copy_from_slice(&from[half..]);
+    });
 }
 
 /// One beat of the three-element Windkessel: 200 steps of 5 ms, an output at each, as a worker runs it.

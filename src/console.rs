@@ -1,6 +1,6 @@
 //! What people read on a terminal: log lines, text on standard output, aligned tables, numbers of the digits they deserve.
 //!
-//! Every command writes to standard output through [`line`], [`text`] or [`lost`]: a reader that stops early, as `head`
+//! Every command writes to standard output through `line`, `text` or `lost`: a reader that stops early, as `head`
 //! does, ends the command quietly. What is for people only goes to standard error through [`note`].
 
 use std::fmt::Display;

@@ -2,13 +2,16 @@
 //!
 //! Bound by memory when done well: the result goes to a buffer of the caller (a fresh one would pay page faults), a
 //! few rows of all particles are packed together, and every register holds a piece of the result until it is complete.
-//! The vector instructions are chosen when the program runs. Deliberately one thread: the memory bus is the limit.
+//! The vector instructions are chosen when the program runs. Matrices far beyond the caches are shared out by rows over a
+//! few threads; every row is made the same way whoever makes it, so the bits do not know how many there were.
 //! Read next: `roukf.rs`, which makes T.
 
 #![allow(
     clippy::inline_always,
     reason = "the vector instructions reach a function only when it is inlined into the dispatched one"
 )]
+
+use std::ops::Range;
 
 use nalgebra::DMatrix;
 use pulp::{Arch, Simd, WithSimd};
@@ -17,6 +20,11 @@ use pulp::{Arch, Simd, WithSimd};
 const GROUP: usize = 6;
 /// Bytes of X packed at a time: long runs of every column, which the memory likes, and still a second-level cache.
 const PACKED: usize = 384 * 1024;
+
+/// Numbers in X from which threads pay for themselves: 32 MiB.
+const SHARED: usize = 4 * 1024 * 1024;
+/// Threads at most: more do not move the memory bus.
+const THREADS: usize = 4;
 
 /// Writes X T into `out`: `x` is n x r, a particle per column, `t` is r x r, `out` is n x r.
 ///
@@ -31,15 +39,40 @@ pub fn recombine(x: &DMatrix<f64>, t: &DMatrix<f64>, out: &mut DMatrix<f64>) {
     if out.is_empty() {
         return;
     }
-    Arch::new().dispatch(Recombination { x, t, used, out });
+    let n = x.nrows();
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let threads = if x.len() < SHARED { 1 } else { cores.min(THREADS) };
+    let mut rest: Vec<&mut [f64]> = out.as_mut_slice().chunks_exact_mut(n).collect();
+    std::thread::scope(|scope| {
+        for k in 0..threads {
+            let rows = n * k / threads..n * (k + 1) / threads;
+            let out = rest.iter_mut().map(|column| take(column, rows.len())).collect();
+            let part = Recombination { x, t, used: &used, rows, out };
+            if k + 1 == threads {
+                Arch::new().dispatch(part);
+            } else {
+                scope.spawn(move || Arch::new().dispatch(part));
+            }
+        }
+    });
+}
+
+/// Splits the first `n` numbers off a slice.
+fn take<'a>(slice: &mut &'a mut [f64], n: usize) -> &'a mut [f64] {
+    let (first, rest) = std::mem::take(slice).split_at_mut(n);
+    *slice = rest;
+    first
 }
 
 struct Recombination<'a> {
     x: &'a DMatrix<f64>,
     t: &'a DMatrix<f64>,
     /// Particles that take part.
-    used: Vec<usize>,
-    out: &'a mut DMatrix<f64>,
+    used: &'a [usize],
+    /// Rows to make.
+    rows: Range<usize>,
+    /// The columns of the result, these rows of them.
+    out: Vec<&'a mut [f64]>,
 }
 
 impl Recombination<'_> {
@@ -47,7 +80,7 @@ impl Recombination<'_> {
     fn packed_transform(&self) -> Vec<f64> {
         let mut packed = Vec::with_capacity(self.used.len() * (self.t.ncols() + GROUP));
         for first in (0..self.t.ncols()).step_by(GROUP) {
-            for &i in &self.used {
+            for &i in self.used {
                 packed.extend(
                     (first..first + GROUP).map(|j| if j < self.t.ncols() { self.t[(i, j)] } else { 0.0 }),
                 );
@@ -61,7 +94,7 @@ impl WithSimd for Recombination<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
+    fn with_simd<S: Simd>(mut self, simd: S) {
         let n = self.x.nrows();
         let coefficients = self.packed_transform();
         let tile = 2 * S::F64_LANES;
@@ -70,11 +103,10 @@ impl WithSimd for Recombination<'_> {
         let mut packed = vec![simd.splat_f64s(0.0); 2 * n_tile * self.used.len()];
         let group = self.used.len() * GROUP;
         if group == 0 {
-            return self.out.fill(0.0);
+            return self.out.iter_mut().for_each(|column| column.fill(0.0));
         }
-        let result = self.out.as_mut_slice();
-        for first in (0..n).step_by(block) {
-            let rows = block.min(n - first);
+        for first in self.rows.clone().step_by(block) {
+            let rows = block.min(self.rows.end - first);
             let tiles = rows.div_ceil(tile);
             for (k, &i) in self.used.iter().enumerate() {
                 let column = &self.x.as_slice()[i * n + first..i * n + first + rows];
@@ -86,11 +118,10 @@ impl WithSimd for Recombination<'_> {
                 let columns = GROUP.min(self.t.ncols() - g * GROUP);
                 for (s, x) in packed.chunks_exact(2 * self.used.len()).take(tiles).enumerate() {
                     let sums = product(simd, x, coefficients);
-                    let start = first + s * tile;
-                    let height = tile.min(n - start);
-                    for (j, (lo, hi)) in sums.into_iter().enumerate().take(columns) {
-                        let place = (g * GROUP + j) * n + start;
-                        store(simd, &mut result[place..place + height], lo, hi);
+                    let start = first + s * tile - self.rows.start;
+                    let height = tile.min(self.rows.len() - start);
+                    for (column, (lo, hi)) in self.out[g * GROUP..g * GROUP + columns].iter_mut().zip(sums) {
+                        store(simd, &mut column[start..start + height], lo, hi);
                     }
                 }
             }

@@ -167,3 +167,19 @@ fn the_same_input_gives_the_same_bits() {
     assert_eq!(a.transform, b.transform);
     assert_eq!(a.log_likelihood.to_bits(), b.log_likelihood.to_bits());
 }
+
+#[test]
+fn rows_shared_out_over_threads_have_the_bits_of_rows_made_alone() {
+    // Just past the size from which threads share the work, and no multiple of any block.
+    let (n, r) = (200_003, 22);
+    let x = DMatrix::from_fn(n, r, |i, j| ((i * 31 + j * 17) % 1009) as f64 / 7.0);
+    let t = DMatrix::from_fn(r, r, |i, j| 1.0 / (1 + i + 2 * j) as f64);
+    let mut whole = DMatrix::zeros(n, r);
+    recombine(&x, &t, &mut whole);
+    for first in (0..n).step_by(50_021) {
+        let rows = 50_021.min(n - first);
+        let mut part = DMatrix::zeros(rows, r);
+        recombine(&x.rows(first, rows).into_owned(), &t, &mut part);
+        assert!(part == whole.rows(first, rows), "rows from {first}");
+    }
+}
