@@ -46,7 +46,7 @@ pub fn recombine(x: &DMatrix<f64>, t: &DMatrix<f64>, out: &mut DMatrix<f64>) {
     std::thread::scope(|scope| {
         for k in 0..threads {
             let rows = n * k / threads..n * (k + 1) / threads;
-            let out = rest.iter_mut().map(|column| take(column, rows.len())).collect();
+            let out = rest.iter_mut().filter_map(|column| column.split_off_mut(..rows.len())).collect();
             let part = Recombination { x, t, used: &used, rows, out };
             if k + 1 == threads {
                 Arch::new().dispatch(part);
@@ -55,13 +55,6 @@ pub fn recombine(x: &DMatrix<f64>, t: &DMatrix<f64>, out: &mut DMatrix<f64>) {
             }
         }
     });
-}
-
-/// Splits the first `n` numbers off a slice.
-fn take<'a>(slice: &mut &'a mut [f64], n: usize) -> &'a mut [f64] {
-    let (first, rest) = std::mem::take(slice).split_at_mut(n);
-    *slice = rest;
-    first
 }
 
 struct Recombination<'a> {

@@ -1,0 +1,47 @@
+//! Why a store refuses, with the remedy.
+
+use std::path::PathBuf;
+
+/// Why the store cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// The database refused; the text names the file and the remedy.
+    #[error("cannot write to {path}: {source}{}", remedy(source))]
+    Database {
+        /// The database file.
+        path: PathBuf,
+        /// What SQLite said.
+        source: rusqlite::Error,
+    },
+    /// The folder or its database is missing or of another version.
+    #[error("{0}")]
+    Unusable(String),
+    /// A stored value cannot be read back.
+    #[error("{path} holds a damaged {what}: {reason}")]
+    Damaged {
+        /// The database file.
+        path: PathBuf,
+        /// Which value.
+        what: &'static str,
+        /// What is wrong with it.
+        reason: String,
+    },
+}
+
+fn remedy(source: &rusqlite::Error) -> &'static str {
+    match source.sqlite_error_code() {
+        Some(rusqlite::ErrorCode::DiskFull) => {
+            "; the disk is full: free some space and continue with --resume, every finished analysis is kept"
+        }
+        Some(rusqlite::ErrorCode::DatabaseBusy | rusqlite::ErrorCode::DatabaseLocked) => {
+            "; another process is using this run folder"
+        }
+        Some(rusqlite::ErrorCode::SystemIoFailure) => {
+            "; the disk failed or is full: see that it has space and continue with --resume, every finished analysis is kept"
+        }
+        Some(rusqlite::ErrorCode::ReadOnly | rusqlite::ErrorCode::CannotOpen) => {
+            "; check that the folder exists and may be written"
+        }
+        _ => "",
+    }
+}
