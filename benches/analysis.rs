@@ -97,27 +97,26 @@ fn products_alone(z: &DMatrix<f64>, dual: &DMatrix<f64>, block: usize) {
     black_box(information);
 }
 
-/// X+ = X- T at n = 10^6, r = 22, against memcpy of the same matrix.
+/// X+ = X- T at n = 10^6, r = 22, in place, against memcpy of the same matrix by as many threads.
 fn recombination(figures: &mut Map<String, Value>) -> Result<(), Failure> {
     let (n, r) = (1_000_000, 22);
-    let x = DMatrix::from_fn(n, r, |i, j| (i % 97 + j) as f64);
+    let mut x = DMatrix::from_fn(n, r, |i, j| (i % 97 + j) as f64);
     let t = DMatrix::from_fn(r, r, |i, j| if i == j { 0.9 } else { 0.1 / 21.0 });
-    let mut out = DMatrix::zeros(n, r);
-    let copy = best(10, || black_box(&mut out).as_mut_slice().copy_from_slice(black_box(&x).as_slice()));
-    let product = best(10, || recombine(black_box(&x), &t, black_box(&mut out)));
+    let mut out = x.clone();
     let expected = (x.row(n - 1) * t.column(r - 1))[0];
+    recombine(&mut out, &t, 2);
     if (out[(n - 1, r - 1)] - expected).abs() > 1e-9 {
         return Err(format!("the recombination gives {} instead of {expected}", out[(n - 1, r - 1)]).into());
     }
     let bytes = (2 * n * r * 8) as f64;
-    figures.insert("recombine_n1e6_r22_ms".into(), round(1e3 * product));
-    figures.insert("recombine_gb_per_s".into(), round(bytes / product / 1e9));
-    // The product uses more than one thread at this size, so its limit is a memcpy that does so too.
+    let copy = best(10, || black_box(&mut out).as_mut_slice().copy_from_slice(black_box(&x).as_slice()));
     let halves = best(10, || copy_in_halves(&x, &mut out));
-    figures.insert("memcpy_two_threads_gb_per_s".into(), round(bytes / halves / 1e9));
-    figures.insert("recombine_share_of_memcpy".into(), round(halves / product));
-    figures.insert("memcpy_one_thread_gb_per_s".into(), round(bytes / copy / 1e9));
-    figures.insert("recombine_over_one_thread_memcpy".into(), round(copy / product));
+    for (threads, name, copy) in [(1, "one_thread", copy), (2, "two_threads", halves)] {
+        let product = best(10, || recombine(black_box(&mut x), &t, threads));
+        figures.insert(format!("memcpy_{name}_gb_per_s"), round(bytes / copy / 1e9));
+        figures.insert(format!("recombine_n1e6_r22_{name}_ms"), round(1e3 * product));
+        figures.insert(format!("recombine_{name}_share_of_memcpy"), round(copy / product));
+    }
     Ok(())
 }
 

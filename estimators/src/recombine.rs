@@ -1,9 +1,11 @@
 //! X+ = X- T: the states after an analysis, the one place where estimation touches large arrays.
 //!
-//! Bound by memory when done well: the result goes to a buffer of the caller (a fresh one would pay page faults), a
-//! few rows of all particles are packed together, and every register holds a piece of the result until it is complete.
-//! The vector instructions are chosen when the program runs. Matrices far beyond the caches are shared out by rows over a
-//! few threads; every row is made the same way whoever makes it, so the bits do not know how many there were.
+//! The product is made in place: a few rows of all particles are packed together, and their result goes into the lines
+//! they came from, which are still in the first cache. A second matrix would cost half as much traffic again, since memory
+//! reads a line before it writes one. While a block is multiplied, the one after the next is fetched. Every register
+//! holds a piece of the result until it is complete; the vector instructions are chosen when the program runs. Matrices
+//! far beyond the caches are shared out by rows over the caller's threads; every row is made the same way whoever makes
+//! it, so the bits do not know how many there were.
 //! Read next: `roukf.rs`, which makes T.
 
 #![allow(
@@ -11,43 +13,42 @@
     reason = "the vector instructions reach a function only when it is inlined into the dispatched one"
 )]
 
-use std::ops::Range;
-
 use nalgebra::DMatrix;
+use prefetch_index::prefetch_index;
 use pulp::{Arch, Simd, WithSimd};
 
 /// Columns of the result made at a time, two registers each.
 const GROUP: usize = 6;
-/// Bytes of X packed at a time: long runs of every column, which the memory likes, and still a second-level cache.
-const PACKED: usize = 384 * 1024;
+/// Tiles of two registers' rows packed at a time: with their result they stay in the first-level cache.
+const TILES: usize = 4;
+/// Blocks between the one that is multiplied and the one that is fetched.
+const AHEAD: usize = 2;
 
 /// Numbers in X from which threads pay for themselves: 32 MiB.
 const SHARED: usize = 4 * 1024 * 1024;
 /// Threads at most: more do not move the memory bus.
 const THREADS: usize = 4;
 
-/// Writes X T into `out`: `x` is n x r, a particle per column, `t` is r x r, `out` is n x r.
+/// Replaces X by X T: `x` is n x r, a particle per column, `t` is r x r; over up to `threads` threads when X is large.
 ///
 /// A column of X whose row in T is zero (a dropped particle) is not read as a number: it may hold NaN.
 ///
 /// # Panics
 /// When the shapes do not match.
-pub fn recombine(x: &DMatrix<f64>, t: &DMatrix<f64>, out: &mut DMatrix<f64>) {
-    assert_eq!(x.ncols(), t.nrows(), "one row of the transform per particle");
-    assert_eq!((x.nrows(), t.ncols()), out.shape(), "the result has the rows of X and the columns of T");
-    let used: Vec<usize> = (0..t.nrows()).filter(|&i| t.row(i).iter().any(|v| v.abs() > 0.0)).collect();
-    if out.is_empty() {
+pub fn recombine(x: &mut DMatrix<f64>, t: &DMatrix<f64>, threads: usize) {
+    assert_eq!((x.ncols(), x.ncols()), t.shape(), "one row and one column of the transform per particle");
+    if x.is_empty() {
         return;
     }
+    let used: Vec<usize> = (0..t.nrows()).filter(|&i| t.row(i).iter().any(|v| v.abs() > 0.0)).collect();
     let n = x.nrows();
-    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-    let threads = if x.len() < SHARED { 1 } else { cores.min(THREADS) };
-    let mut rest: Vec<&mut [f64]> = out.as_mut_slice().chunks_exact_mut(n).collect();
+    let threads = if x.len() < SHARED { 1 } else { threads.clamp(1, THREADS) };
+    let mut rest: Vec<&mut [f64]> = x.as_mut_slice().chunks_exact_mut(n).collect();
     std::thread::scope(|scope| {
         for k in 0..threads {
-            let rows = n * k / threads..n * (k + 1) / threads;
-            let out = rest.iter_mut().filter_map(|column| column.split_off_mut(..rows.len())).collect();
-            let part = Recombination { x, t, used: &used, rows, out };
+            let rows = n * (k + 1) / threads - n * k / threads;
+            let x = rest.iter_mut().filter_map(|column| column.split_off_mut(..rows)).collect();
+            let part = Recombination { x, t, used: &used };
             if k + 1 == threads {
                 Arch::new().dispatch(part);
             } else {
@@ -58,14 +59,11 @@ pub fn recombine(x: &DMatrix<f64>, t: &DMatrix<f64>, out: &mut DMatrix<f64>) {
 }
 
 struct Recombination<'a> {
-    x: &'a DMatrix<f64>,
+    /// Some rows of X, a column per particle.
+    x: Vec<&'a mut [f64]>,
     t: &'a DMatrix<f64>,
     /// Particles that take part.
     used: &'a [usize],
-    /// Rows to make.
-    rows: Range<usize>,
-    /// The columns of the result, these rows of them.
-    out: Vec<&'a mut [f64]>,
 }
 
 impl Recombination<'_> {
@@ -81,6 +79,14 @@ impl Recombination<'_> {
         }
         packed
     }
+
+    /// One place (column, row) in each register's length of the block of rows that starts at `first`.
+    #[inline(always)]
+    fn lines<S: Simd>(&self, first: usize) -> impl Iterator<Item = (usize, usize)> + use<S> {
+        let last = self.x[0].len().min(first + TILES * 2 * S::F64_LANES);
+        (0..self.x.len())
+            .flat_map(move |column| (first..last).step_by(S::F64_LANES).map(move |row| (column, row)))
+    }
 }
 
 impl WithSimd for Recombination<'_> {
@@ -88,33 +94,34 @@ impl WithSimd for Recombination<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) {
-        let n = self.x.nrows();
-        let coefficients = self.packed_transform();
-        let tile = 2 * S::F64_LANES;
-        let n_tile = (PACKED / (size_of::<f64>() * tile * self.used.len().max(1))).clamp(4, 256);
-        let block = n_tile * tile;
-        let mut packed = vec![simd.splat_f64s(0.0); 2 * n_tile * self.used.len()];
+        let n = self.x[0].len();
         let group = self.used.len() * GROUP;
         if group == 0 {
-            return self.out.iter_mut().for_each(|column| column.fill(0.0));
+            return self.x.iter_mut().for_each(|column| column.fill(0.0));
         }
-        for first in self.rows.clone().step_by(block) {
-            let rows = block.min(self.rows.end - first);
+        let coefficients = self.packed_transform();
+        let tile = 2 * S::F64_LANES;
+        let mut packed = vec![simd.splat_f64s(0.0); 2 * TILES * self.used.len()];
+        for first in (0..n).step_by(TILES * tile) {
+            let rows = (TILES * tile).min(n - first);
             let tiles = rows.div_ceil(tile);
             for (k, &i) in self.used.iter().enumerate() {
-                let column = &self.x.as_slice()[i * n + first..i * n + first + rows];
+                let column = &self.x[i][first..first + rows];
                 for (piece, place) in column.chunks(tile).zip(packed.chunks_exact_mut(2 * self.used.len())) {
                     (place[2 * k], place[2 * k + 1]) = load(simd, piece);
                 }
             }
+            let mut ahead = self.lines::<S>(first + AHEAD * TILES * tile);
             for (g, coefficients) in coefficients.chunks_exact(group).enumerate() {
-                let columns = GROUP.min(self.t.ncols() - g * GROUP);
-                for (s, x) in packed.chunks_exact(2 * self.used.len()).take(tiles).enumerate() {
-                    let sums = product(simd, x, coefficients);
-                    let start = first + s * tile - self.rows.start;
-                    let height = tile.min(self.rows.len() - start);
-                    for (column, (lo, hi)) in self.out[g * GROUP..g * GROUP + columns].iter_mut().zip(sums) {
-                        store(simd, &mut column[start..start + height], lo, hi);
+                let columns = GROUP.min(self.x.len() - g * GROUP);
+                for (s, packed) in packed.chunks_exact(2 * self.used.len()).take(tiles).enumerate() {
+                    for (column, row) in ahead.by_ref().take(2 * GROUP) {
+                        prefetch_index(&*self.x[column], row);
+                    }
+                    let sums = product(simd, packed, coefficients);
+                    let rows = first + s * tile..(first + (s + 1) * tile).min(n);
+                    for (column, (lo, hi)) in self.x[g * GROUP..g * GROUP + columns].iter_mut().zip(sums) {
+                        store(simd, &mut column[rows.clone()], lo, hi);
                     }
                 }
             }

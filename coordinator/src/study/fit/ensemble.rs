@@ -6,12 +6,11 @@ use starlings_estimators::Noise;
 use super::flight::StepWindows;
 use crate::study::Study;
 
-/// X⁺ = X⁻T for the states of every record.
+/// X⁺ = X⁻T for the states of every record, by as many threads as there are cores; the bits do not depend on them.
 pub(super) fn recombine(states: &mut [Option<DMatrix<f64>>], transform: &DMatrix<f64>) {
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     for x in states.iter_mut().flatten() {
-        let mut out = DMatrix::zeros(x.nrows(), x.ncols());
-        starlings_estimators::recombine(x, transform, &mut out);
-        *x = out;
+        starlings_estimators::recombine(x, transform, cores);
     }
 }
 
