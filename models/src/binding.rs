@@ -75,6 +75,11 @@ impl Binding {
         })
     }
 
+    /// The model's parameters: constants and defaults, zero for what a job gives.
+    pub(crate) fn constants(&self) -> &[f64] {
+        &self.theta
+    }
+
     /// Number of values in a job.
     pub(crate) fn len(&self) -> usize {
         self.targets.len()
@@ -124,13 +129,11 @@ fn resolve(spec: &Spec, name: &str, what: &'static str) -> Result<Target, SetupE
         return Ok(Target::Parameter(i));
     }
     if let Some(state) = name.strip_prefix(INITIAL) {
-        return match spec.states.iter().find(|q| q.name == state) {
-            Some(q) if q.size == 1 => {
-                Ok(Target::Initial(Spec::offset(&spec.states, state).unwrap_or_default()))
-            }
-            Some(q) => Err(SetupError::Invalid(format!(
-                "`{name}`: state `{state}` has {} components; only a scalar state takes an initial value by name",
-                q.size
+        return match Spec::range_of(&spec.states, state) {
+            Some(range) if range.len() == 1 => Ok(Target::Initial(range.start)),
+            Some(range) => Err(SetupError::Invalid(format!(
+                "`{name}`: state `{state}` has {} components; name one, such as `{name}[0]`",
+                range.len()
             ))),
             None => Err(SetupError::Unknown {
                 what: "state",

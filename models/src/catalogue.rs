@@ -12,7 +12,8 @@ pub use crate::equations::KIND as EQUATIONS;
 /// What every kind of model says of itself, in the order of the list of built-in ones, `equations` last; the lists of
 /// `equations` are empty, since the study fills them.
 pub fn specs() -> Vec<Spec> {
-    let mut specs: Vec<Spec> = native::all().iter().map(|model| model.spec().clone()).collect();
+    let built = native::all().into_iter().flatten();
+    let mut specs: Vec<Spec> = built.map(|model| model.spec().clone()).collect();
     specs.push(Spec {
         kind: EQUATIONS.to_owned(),
         says: equations::SAYS.to_owned(),
@@ -47,10 +48,14 @@ pub fn build(def: &ModelDef) -> Result<Box<dyn Model>, SetupError> {
         }
         (None, false) => {}
     }
-    let found = native::all().into_iter().find(|model| model.spec().kind == def.kind);
-    found.ok_or_else(|| SetupError::Unknown {
-        what: "model",
-        name: def.kind.clone(),
-        nearest: nearest(&def.kind, specs().iter().map(|spec| &spec.kind)),
-    })
+    let kinds = native::kinds();
+    let Some(kind) = kinds.iter().find(|kind| kind.kind == def.kind) else {
+        let known = kinds.iter().map(|kind| kind.kind).chain([EQUATIONS]);
+        return Err(SetupError::Unknown {
+            what: "model",
+            name: def.kind.clone(),
+            nearest: nearest(&def.kind, known),
+        });
+    };
+    (kind.build)(def)
 }

@@ -7,6 +7,7 @@
 //! Next file to read: [`job`], then [`model`], then [`simulator`].
 
 mod binding;
+pub mod blocks;
 mod bounds;
 pub mod catalogue;
 pub mod effect;
@@ -14,6 +15,7 @@ pub mod equations;
 mod inputs;
 pub mod integrate;
 pub mod job;
+pub mod layout;
 pub mod memory;
 pub mod model;
 pub mod native;
@@ -25,6 +27,7 @@ pub mod simulator;
 pub mod spec;
 pub mod units;
 
+pub use blocks::Blocks;
 pub use effect::{Effect, EffectDef};
 pub use job::{Forward, Job, ParticleError, Prediction, Signal, Window};
 pub use memory::Memory;

@@ -5,7 +5,7 @@
 
 use crate::integrate::{self, Solver};
 use crate::memory::Memory;
-use crate::{ParticleError, Spec};
+use crate::{Blocks, ParticleError, Spec};
 
 /// Access to input signals, and to what the model remembers of itself, at other times than now.
 pub trait History {
@@ -99,6 +99,13 @@ pub trait Model: Send + Sync {
     ) -> bool {
         let _ = (t, x, theta, u, dfdx, dfdt);
         false
+    }
+
+    /// The blocks of a linear fluid–structure system at these parameters; `None` for a model that is none. Whether there are
+    /// any does not depend on the parameters' values, which may be placeholders.
+    fn blocks(&self, theta: &[f64]) -> Option<Blocks> {
+        let _ = theta;
+        None
     }
 
     /// What the model remembers of itself. The past of memory i is input `n_input + i` of [`Drive::history`]; whoever runs

@@ -10,7 +10,8 @@ pub mod windkessel2;
 pub mod windkessel3;
 pub mod windkessel4;
 
-use crate::Model;
+use crate::setup::{ModelDef, SetupError};
+use crate::{Model, layout};
 
 pub use driven_oscillator::DrivenOscillator;
 pub use oscillator::Oscillator;
@@ -18,13 +19,38 @@ pub use windkessel2::Windkessel2;
 pub use windkessel3::Windkessel3;
 pub use windkessel4::Windkessel4;
 
+/// One built-in model of the list.
+pub struct Kind {
+    /// The `kind` by which a study names it.
+    pub kind: &'static str,
+    /// Makes it; without a layout, in its default one.
+    pub build: fn(&ModelDef) -> Result<Box<dyn Model>, SetupError>,
+}
+
 /// Every built-in model.
-pub fn all() -> Vec<Box<dyn Model>> {
+pub fn kinds() -> Vec<Kind> {
     vec![
-        Box::new(Windkessel2::default()),
-        Box::new(Windkessel3::default()),
-        Box::new(Windkessel4::default()),
-        Box::new(Oscillator::default()),
-        Box::new(DrivenOscillator::default()),
+        Kind { kind: "windkessel-2", build: fixed::<Windkessel2> },
+        Kind { kind: "windkessel-3", build: fixed::<Windkessel3> },
+        Kind { kind: "windkessel-4", build: fixed::<Windkessel4> },
+        Kind { kind: "oscillator", build: fixed::<Oscillator> },
+        Kind { kind: "driven-oscillator", build: fixed::<DrivenOscillator> },
     ]
+}
+
+/// Every built-in model in its default layout.
+///
+/// # Errors
+/// When a model refuses its own default, which is a defect.
+pub fn all() -> Result<Vec<Box<dyn Model>>, SetupError> {
+    kinds()
+        .into_iter()
+        .map(|kind| (kind.build)(&ModelDef { kind: kind.kind.to_owned(), ..ModelDef::default() }))
+        .collect()
+}
+
+/// Builds a model that has no layout.
+fn fixed<M: Model + Default + 'static>(def: &ModelDef) -> Result<Box<dyn Model>, SetupError> {
+    layout::none(def)?;
+    Ok(Box::new(M::default()))
 }

@@ -3,17 +3,20 @@
 //! An observer never sees a datum before its prediction is recorded; [`crate::simulator`] holds that order. Observers that
 //! need a mesh or an operator of the model are not here. Next file to read: [`nudging`].
 
+pub mod measured;
 pub mod none;
 pub mod nudging;
 
+use nalgebra::DMatrix;
+
 use crate::setup::{ObserverDef, SetupError};
-use crate::{Spec, nearest};
+use crate::{Model, Spec, nearest};
 
 pub use none::NoObserver;
 pub use nudging::Nudging;
 
 /// What an observer corrects with: one observation time.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct Correction<'a> {
     /// Observation time.
     pub t: f64,
@@ -23,12 +26,27 @@ pub struct Correction<'a> {
     pub observed: &'a [f64],
     /// Predicted values, as recorded before this correction.
     pub predicted: &'a [f64],
+    /// The model, effects included.
+    pub model: &'a dyn Model,
+    /// The model's parameters in this run.
+    pub theta: &'a [f64],
 }
 
 /// Corrects a state by what was observed.
 pub trait Observer: Send + Sync {
     /// Corrects the state `x` in place.
     fn correct(&self, at: Correction<'_>, x: &mut [f64]);
+
+    /// Γ, n_state × n_state: with correct parameters and data without noise, the state error e obeys de/dt = (A − Γ) e
+    /// under this observer at its gain in continuous time, A being the model's own linearisation; zero where nothing is
+    /// observed. [`Correction`]s are its steps.
+    fn feedback(&self, model: &dyn Model, theta: &[f64]) -> DMatrix<f64>;
+
+    /// The largest stable product of gain and time between observations; `None` for a correction that any gain leaves
+    /// stable.
+    fn stable_up_to(&self) -> Option<f64> {
+        None
+    }
 }
 
 /// What an observer is built against.
@@ -36,8 +54,12 @@ pub trait Observer: Send + Sync {
 pub struct Wiring<'a> {
     /// The model's specification, effects included.
     pub spec: &'a Spec,
-    /// Names of the observed outputs, in the order of the rows.
+    /// Names of the observed outputs, in the order of the rows; a field stands for all its components, `field[i]` for one.
     pub outputs: &'a [String],
+    /// The model, effects included.
+    pub model: &'a dyn Model,
+    /// The model's parameters: constants and defaults, zero for what is estimated.
+    pub theta: &'a [f64],
 }
 
 /// Makes an observer from its definition.

@@ -20,6 +20,9 @@ pub struct ModelDef {
     pub constants: BTreeMap<String, f64>,
     /// The equations, when `kind` is `equations`.
     pub equations: Option<EquationsDef>,
+    /// How the model is put together, where its kind leaves that to the study; see [`crate::layout`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub layout: Option<serde_json::Value>,
 }
 
 /// The observer by kind.
@@ -123,6 +126,14 @@ pub enum SetupError {
         expression: String,
         /// Character position of the fault, from 1.
         column: usize,
+        /// What is wrong and what was expected.
+        message: String,
+    },
+    /// A fault in the layout of a model.
+    #[error("in the model's layout{}: {message}", if path.is_empty() || path == "." { String::new() } else { format!(" at `{path}`") })]
+    Layout {
+        /// The place, such as `regions[2].to`; empty for the layout as a whole.
+        path: String,
         /// What is wrong and what was expected.
         message: String,
     },

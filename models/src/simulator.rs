@@ -35,7 +35,9 @@ impl Simulator {
         let spec = with_memories(model.spec(), model.memories());
         let rows = rows(&spec, &setup.outputs)?;
         let binding = Binding::new(setup, &spec, &free_names(setup, &spec)?)?;
-        let observer = observer::build(&setup.observer, Wiring { spec: &spec, outputs: &setup.outputs })?;
+        let wiring =
+            Wiring { spec: &spec, outputs: &setup.outputs, model: &*model, theta: binding.constants() };
+        let observer = observer::build(&setup.observer, wiring)?;
         Ok(Self { model, spec, observer, binding, rows })
     }
 
@@ -146,7 +148,8 @@ impl Forward for Simulator {
             if dt > 0.0 {
                 let column = j * n_obs..(j + 1) * n_obs;
                 let (observed, predicted) = (&window.observed[column.clone()], &outputs[column]);
-                self.observer.correct(Correction { t, dt, observed, predicted }, &mut x);
+                let (model, theta) = (&*self.model, theta.as_slice());
+                self.observer.correct(Correction { t, dt, observed, predicted, model, theta }, &mut x);
             }
             previous = t;
         }
@@ -189,15 +192,14 @@ fn rows(spec: &Spec, outputs: &[String]) -> Result<Vec<usize>, SetupError> {
         if outputs[..i].contains(name) {
             return Err(SetupError::Twice(name.clone()));
         }
-        let size = spec.outputs.iter().find(|q| q.name == *name).map(|q| q.size);
-        let Some((first, size)) = Spec::offset(&spec.outputs, name).zip(size) else {
+        let Some(range) = Spec::range_of(&spec.outputs, name) else {
             return Err(SetupError::Unknown {
                 what: "output",
                 name: name.clone(),
                 nearest: nearest(name, spec.outputs.iter().map(|q| &q.name)),
             });
         };
-        rows.extend(first..first + size);
+        rows.extend(range);
     }
     Ok(rows)
 }
@@ -212,8 +214,10 @@ mod tests {
         let field = Quantity { size: 3, ..Quantity::new("wall", "mm") };
         let list = vec![Quantity::new("p", ""), field, Quantity::new("q", "")];
         let spec = Spec { outputs: list.clone(), ..crate::catalogue::specs().remove(0) };
-        let names = ["q", "wall"].map(str::to_owned);
-        assert_eq!(rows(&spec, &names).expect("known outputs"), [4, 1, 2, 3]);
+        let names = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
+        assert_eq!(rows(&spec, &names(&["q", "wall"])).expect("known outputs"), [4, 1, 2, 3]);
+        assert_eq!(rows(&spec, &names(&["wall[2]", "p"])).expect("known outputs"), [3, 0]);
+        assert!(rows(&spec, &names(&["wall[3]"])).is_err(), "beyond the field");
         assert_eq!(Spec::component(&list, 3), "wall[2]");
         assert_eq!(Spec::component(&list, 4), "q");
     }

@@ -2,6 +2,8 @@
 //!
 //! This file holds no behaviour. Next file to read: [`crate::model`].
 
+use std::ops::Range;
+
 use serde::{Deserialize, Serialize};
 
 /// The physical meaning of a quantity; observers and effects find their place in a model by it.
@@ -69,6 +71,13 @@ impl Quantity {
             default: None,
             says: String::new(),
         }
+    }
+
+    /// The same quantity as a field of `n` components.
+    #[must_use]
+    pub fn size(mut self, n: usize) -> Self {
+        self.size = n;
+        self
     }
 
     /// The same quantity with a physical meaning.
@@ -159,6 +168,20 @@ impl Spec {
             at += q.size;
         }
         None
+    }
+
+    /// Positions in the concatenation of `list` that a name stands for: all components of `wall`, or one, `wall[2]`.
+    pub fn range_of(list: &[Quantity], name: &str) -> Option<Range<usize>> {
+        let whole = |name: &str| {
+            let size = list.iter().find(|q| q.name == name).map(|q| q.size);
+            Self::offset(list, name).zip(size).map(|(first, size)| first..first + size)
+        };
+        whole(name).or_else(|| {
+            let (field, index) = name.strip_suffix(']')?.rsplit_once('[')?;
+            let field = whole(field)?;
+            let at = field.start + index.parse::<usize>().ok()?;
+            (at < field.end).then_some(at..at + 1)
+        })
     }
 
     /// Name of component `at` of the concatenation of `list`, with its index in a field; empty beyond the end.

@@ -28,7 +28,8 @@ fn equations(states: &[(&str, &str, &str)], outputs: &[(&str, &str)], constants:
         ..EquationsDef::default()
     };
     let constants = constants.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
-    let model = ModelDef { kind: "equations".to_owned(), equations: Some(equations), constants };
+    let model =
+        ModelDef { kind: "equations".to_owned(), equations: Some(equations), constants, layout: None };
     Setup { model, outputs: outputs.iter().map(|(name, _)| (*name).to_owned()).collect(), ..Setup::default() }
 }
 

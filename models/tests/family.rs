@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{job, kinds, largest_difference, run, run_in_pieces, setup, window};
+use common::{job, kinds, largest_difference, plausible, run, run_in_pieces, setup, window};
 use starlings_models::integrate::{self, Solver, Tolerance};
 use starlings_models::model::Segment;
 use starlings_models::{Forward, Model, ParticleError, Simulator, catalogue, native};
@@ -151,9 +151,9 @@ fn every_closed_step_agrees_with_the_integrated_rate() {
         }
     }
     let tolerance = Tolerance { relative: 1e-12, absolute: 1e-12 };
-    for model in native::all() {
+    for model in native::all().unwrap() {
         let spec = model.spec();
-        let theta: Vec<f64> = (1..=spec.parameters.len()).map(|i| 0.4 + 0.3 * i as f64).collect();
+        let theta = plausible(spec);
         let (u0, slope) = (vec![30.0; spec.inputs.len()], vec![-12.0; spec.inputs.len()]);
         let segment = Segment { t0: 0.2, t1: 0.9, u0: &u0, slope: &slope, history: &NoHistory };
         let mut exact = vec![0.0; spec.n_state()];

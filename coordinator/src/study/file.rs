@@ -3,6 +3,7 @@
 //! Types, missing and unknown keys are settled here; whether names exist and numbers make sense is [`super::check`]'s
 //! business. Next file to read: [`crate::study::file::read`], which fills these.
 
+pub(super) mod layout;
 pub(super) mod locate;
 mod model;
 pub(super) mod read;
@@ -44,6 +45,8 @@ pub(super) struct StudySection {
 pub(super) struct ModelSection {
     pub(super) kind: Spanned<String>,
     pub(super) constants: Named<f64>,
+    /// How the model is put together, with the places of its parts.
+    pub(super) layout: Option<layout::Layout>,
     /// Present when `kind` is `equations`.
     pub(super) equations: Option<EquationsSection>,
 }

@@ -1,6 +1,9 @@
 //! No observer: the state runs free. Next file to read: [`super::nudging`].
 
+use nalgebra::DMatrix;
+
 use super::{Correction, Kind, Observer};
+use crate::Model;
 
 /// Leaves the state as it is.
 pub struct NoObserver;
@@ -11,4 +14,9 @@ pub(super) const KIND: Kind =
 
 impl Observer for NoObserver {
     fn correct(&self, _at: Correction<'_>, _x: &mut [f64]) {}
+
+    fn feedback(&self, model: &dyn Model, _theta: &[f64]) -> DMatrix<f64> {
+        let n = model.spec().n_state();
+        DMatrix::zeros(n, n)
+    }
 }

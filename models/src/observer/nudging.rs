@@ -6,9 +6,12 @@
 //! is stable; the explicit form would need γ Δt < 2. On noise-free data of the true model the innovation is zero and neither
 //! the state nor an estimate moves with the gain. Next file to read: [`crate::simulator`].
 
+use nalgebra::DMatrix;
+
+use super::measured::{Measured, measured};
 use super::{Correction, Kind, Observer, Wiring};
+use crate::Model;
 use crate::setup::{ObserverDef, SetupError};
-use crate::{Quantity, Spec, nearest};
 
 /// Pulls measured states towards the data.
 #[derive(Debug)]
@@ -31,57 +34,22 @@ impl Nudging {
     /// # Errors
     /// When a name in `corrects` is unknown, the sizes of output and state differ, or no channel corrects a state.
     pub fn new(def: &ObserverDef, wiring: Wiring<'_>) -> Result<Self, SetupError> {
-        let spec = wiring.spec;
-        for (output, state) in &def.corrects {
-            find(&spec.outputs, output, "output")?;
-            find(&spec.states, state, "state")?;
-        }
         let mut channels: Vec<(usize, Vec<usize>)> = Vec::new();
-        let mut row = 0;
-        for output in wiring.outputs {
-            let (_, n) = find(&spec.outputs, output, "output")?;
-            if let Some(state) = measured(def, spec, output) {
-                let (first, size) = find(&spec.states, state, "state")?;
-                if size != n {
-                    return Err(SetupError::Invalid(format!(
-                        "output `{output}` has {n} components and state `{state}` has {size}: one cannot correct the other"
-                    )));
-                }
-                for i in 0..n {
-                    match channels.iter_mut().find(|(at, _)| *at == first + i) {
-                        Some((_, rows)) => rows.push(row + i),
-                        None => channels.push((first + i, vec![row + i])),
-                    }
-                }
+        for Measured { row, state } in measured(def, &wiring)? {
+            match channels.iter_mut().find(|(at, _)| *at == state) {
+                Some((_, rows)) => rows.push(row),
+                None => channels.push((state, vec![row])),
             }
-            row += n;
         }
         if channels.is_empty() {
             return Err(SetupError::Invalid(format!(
                 "the observer `nudging` corrects nothing: no observed output of `{}` measures a state; \
                  say which in `corrects`, as output = state",
-                spec.kind
+                wiring.spec.kind
             )));
         }
         Ok(Self { gain: def.gain, channels })
     }
-}
-
-/// The state that an output corrects.
-fn measured<'a>(def: &'a ObserverDef, spec: &'a Spec, output: &str) -> Option<&'a str> {
-    let own = || spec.measures.iter().find(|(name, _)| name == output).map(|(_, state)| state.as_str());
-    def.corrects.get(output).map(String::as_str).or_else(own)
-}
-
-/// First component and size of a named quantity.
-fn find(list: &[Quantity], name: &str, what: &'static str) -> Result<(usize, usize), SetupError> {
-    let unknown = || SetupError::Unknown {
-        what,
-        name: name.to_owned(),
-        nearest: nearest(name, list.iter().map(|q| &q.name)),
-    };
-    let size = list.iter().find(|q| q.name == name).map(|q| q.size);
-    Spec::offset(list, name).zip(size).ok_or_else(unknown)
 }
 
 impl Observer for Nudging {
@@ -102,17 +70,29 @@ impl Observer for Nudging {
             }
         }
     }
+
+    fn feedback(&self, model: &dyn Model, _theta: &[f64]) -> DMatrix<f64> {
+        let n = model.spec().n_state();
+        let mut feedback = DMatrix::zeros(n, n);
+        for (state, rows) in &self.channels {
+            feedback[(*state, *state)] = rows.len() as f64 * self.gain;
+        }
+        feedback
+    }
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::float_cmp)]
     use super::*;
-    use crate::Model;
     use crate::native::{Oscillator, Windkessel3};
 
     fn def(gain: f64) -> ObserverDef {
         ObserverDef { kind: "nudging".to_owned(), gain, ..ObserverDef::default() }
+    }
+
+    fn wiring<'a>(model: &'a dyn Model, outputs: &'a [String]) -> Wiring<'a> {
+        Wiring { spec: model.spec(), outputs, model, theta: &[] }
     }
 
     fn names(list: &[&str]) -> Vec<String> {
@@ -123,10 +103,12 @@ mod tests {
     fn the_pull_is_one_minus_exp_of_gain_times_time() {
         let model = Windkessel3::default();
         let outputs = names(&["pressure"]);
-        let observer =
-            Nudging::new(&def(2.0), Wiring { spec: model.spec(), outputs: &outputs }).expect("nudging");
+        let observer = Nudging::new(&def(2.0), wiring(&model, &outputs)).expect("nudging");
         let mut x = [80.0];
-        observer.correct(Correction { t: 1.0, dt: 0.3, observed: &[100.0], predicted: &[90.0] }, &mut x);
+        observer.correct(
+            Correction { t: 1.0, dt: 0.3, observed: &[100.0], predicted: &[90.0], model: &model, theta: &[] },
+            &mut x,
+        );
         // The same arithmetic written out; one rounding apart.
         assert!((x[0] - (80.0 + (1.0 - (-0.6_f64).exp()) * 10.0)).abs() < 1e-13, "{}", x[0]);
     }
@@ -135,10 +117,16 @@ mod tests {
     fn a_missing_value_corrects_nothing_and_a_huge_gain_is_stable() {
         let model = Oscillator::default();
         let outputs = names(&["velocity", "position"]);
-        let observer =
-            Nudging::new(&def(1e9), Wiring { spec: model.spec(), outputs: &outputs }).expect("nudging");
+        let observer = Nudging::new(&def(1e9), wiring(&model, &outputs)).expect("nudging");
         let mut x = [1.0, 2.0];
-        let at = Correction { t: 1.0, dt: 0.1, observed: &[f64::NAN, 5.0], predicted: &[2.0, 1.0] };
+        let at = Correction {
+            t: 1.0,
+            dt: 0.1,
+            observed: &[f64::NAN, 5.0],
+            predicted: &[2.0, 1.0],
+            model: &model,
+            theta: &[],
+        };
         observer.correct(at, &mut x);
         assert_eq!(x, [5.0, 2.0]);
     }
@@ -149,10 +137,19 @@ mod tests {
         let outputs = names(&["position", "velocity"]);
         let mut def = def(1.0);
         def.corrects.insert("velocity".to_owned(), "x".to_owned());
-        let observer = Nudging::new(&def, Wiring { spec: model.spec(), outputs: &outputs }).expect("nudging");
+        let observer = Nudging::new(&def, wiring(&model, &outputs)).expect("nudging");
         let mut x = [0.0, 0.0];
-        observer
-            .correct(Correction { t: 0.5, dt: 0.5, observed: &[1.0, 3.0], predicted: &[0.0, 0.0] }, &mut x);
+        observer.correct(
+            Correction {
+                t: 0.5,
+                dt: 0.5,
+                observed: &[1.0, 3.0],
+                predicted: &[0.0, 0.0],
+                model: &model,
+                theta: &[],
+            },
+            &mut x,
+        );
         assert!((x[0] - 2.0 * (1.0 - (-1.0_f64).exp())).abs() < 1e-15, "{}", x[0]);
     }
 
@@ -162,7 +159,7 @@ mod tests {
         let outputs = names(&["position"]);
         let mut def = def(1.0);
         def.corrects.insert("positon".to_owned(), "x".to_owned());
-        let error = Nudging::new(&def, Wiring { spec: model.spec(), outputs: &outputs }).expect_err("typo");
+        let error = Nudging::new(&def, wiring(&model, &outputs)).expect_err("typo");
         assert!(error.to_string().contains("did you mean `position`"), "{error}");
     }
 
@@ -171,7 +168,9 @@ mod tests {
         let mut spec = Oscillator::default().spec().clone();
         spec.measures.clear();
         let outputs = names(&["position"]);
-        let error = Nudging::new(&def(1.0), Wiring { spec: &spec, outputs: &outputs }).expect_err("no state");
+        let error =
+            Nudging::new(&def(1.0), Wiring { spec: &spec, ..wiring(&Oscillator::default(), &outputs) })
+                .expect_err("no state");
         assert!(error.to_string().contains("corrects nothing"), "{error}");
     }
 }

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use starlings_models::equations::{EquationsDef, InputDef, OutputDef, StateDef};
-use starlings_models::{Forward, Job, ModelDef, Prediction, Setup, Signal, Window, catalogue};
+use starlings_models::{Forward, Job, ModelDef, Prediction, Setup, Signal, Spec, Window, catalogue};
 
 /// A setup of one kind that predicts every output, with its parameters estimated; and plausible values for them.
 pub(crate) fn setup(kind: &str) -> (Setup, Vec<f64>) {
@@ -17,8 +17,12 @@ pub(crate) fn setup(kind: &str) -> (Setup, Vec<f64>) {
     let spec = setup.spec().unwrap();
     setup.parameters = spec.parameters.iter().map(|q| q.name.clone()).collect();
     setup.outputs = spec.outputs.iter().map(|q| q.name.clone()).collect();
-    let theta = (1..=setup.parameters.len()).map(|i| 0.4 + 0.3 * i as f64).collect();
-    (setup, theta)
+    (setup, plausible(&spec))
+}
+
+/// The defaults of a model's parameters, and plausible values for those without one.
+pub(crate) fn plausible(spec: &Spec) -> Vec<f64> {
+    spec.parameters.iter().enumerate().map(|(i, q)| q.default.unwrap_or(0.7 + 0.3 * i as f64)).collect()
 }
 
 /// Every kind of the catalogue.

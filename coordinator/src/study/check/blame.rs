@@ -80,6 +80,10 @@ pub(in crate::study) fn blame(source: &Source, file: &StudyFile, error: &SetupEr
             let span = text.map_or(file.model.kind.span(), |e| character(&source.text, &e.span(), *column));
             source.report(span, format!("{place}: {message}"));
         }
+        SetupError::Layout { path, message } => {
+            let place = file.model.layout.as_ref().and_then(|layout| layout.place(path));
+            source.report(place.unwrap_or_else(|| file.model.kind.span()), format!("layout: {message}"));
+        }
         SetupError::Invalid(message) => {
             let mut quoted = message.split('`').skip(1).step_by(2);
             let named = quoted.find_map(|name| place(file, name));

@@ -51,7 +51,8 @@ pub(in crate::study) fn model(source: &Source, file: &StudyFile) -> Option<Check
     if source.count() > before {
         return None;
     }
-    let model = ModelDef { kind: file.model.kind.get_ref().clone(), constants, equations };
+    let layout = file.model.layout.as_ref().map(|layout| layout.value.clone());
+    let model = ModelDef { kind: file.model.kind.get_ref().clone(), constants, equations, layout };
     let mut setup = Setup { model, ..Setup::default() };
     let bare = spec(source, file, &setup)?;
     let candidates = sort_effects(source, file, &mut setup, &bare)?;

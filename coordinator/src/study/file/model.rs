@@ -9,6 +9,7 @@ use serde::de::value::StrDeserializer;
 use starlings_models::Role;
 use toml::Spanned;
 
+use super::layout::Layout;
 use super::read::named_texts;
 use super::table::{Node, Table, number, text, wrong_type};
 use super::{
@@ -39,13 +40,13 @@ const ROLES: [&str; 13] = [
 
 /// Reads `[model]`.
 pub(in crate::study) fn model(source: &Source, root: &Table<'_>) -> ModelSection {
-    let keys = [&["kind", "constants"], &EQUATIONS[..], &EXTERNAL[..]].concat();
+    let keys = [&["kind", "constants", "layout"], &EQUATIONS[..], &EXTERNAL[..]].concat();
     if root.get("model").is_none() {
         root.missing("model", "a section `[model]` with a `kind`");
     }
     let Some(t) = root.table("model", "[model]", &keys) else {
         let kind = Spanned::new(0..0, String::new());
-        return ModelSection { kind, constants: Vec::new(), equations: None };
+        return ModelSection { kind, constants: Vec::new(), layout: None, equations: None };
     };
     let kind = t.required_text("kind", "a model's name (`starlings models` lists them) or \"equations\"");
     let of_kind = kind.get_ref().as_str();
@@ -60,7 +61,8 @@ pub(in crate::study) fn model(source: &Source, root: &Table<'_>) -> ModelSection
             }
         }
     }
-    ModelSection { constants: constants(source, &t), kind, equations }
+    let layout = t.get("layout").map(Layout::read);
+    ModelSection { constants: constants(source, &t), kind, layout, equations }
 }
 
 fn constants(source: &Source, model: &Table<'_>) -> Named<f64> {

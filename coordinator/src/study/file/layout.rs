@@ -1,0 +1,68 @@
+//! The layout of a model: any table of the file as one value, and the way back from a path in it to a place in the file.
+//!
+//! What a layout may hold is the model's business; it answers with a path such as `regions[2].to`. Next file to read:
+//! [`crate::study::check::model`].
+
+use std::ops::Range;
+
+use serde_json::Value;
+use toml::de::DeValue;
+
+use super::table::Node;
+
+/// A layout as it is written.
+#[derive(Debug)]
+pub(in crate::study) struct Layout {
+    /// What the model receives.
+    pub(in crate::study) value: Value,
+    /// Paths of all parts with their places, outermost first.
+    places: Vec<(String, Range<usize>)>,
+}
+
+impl Layout {
+    /// Reads any value of the file.
+    pub(in crate::study) fn read(node: &Node<'_>) -> Self {
+        let mut places = Vec::new();
+        let value = convert(node, "", &mut places);
+        Self { value, places }
+    }
+
+    /// The place of a path, or of the nearest part around it.
+    pub(in crate::study) fn place(&self, path: &str) -> Option<Range<usize>> {
+        let inside = |part: &str| {
+            path.strip_prefix(part)
+                .is_some_and(|rest| part.is_empty() || rest.is_empty() || rest.starts_with(['.', '[']))
+        };
+        let around = self.places.iter().filter(|(part, _)| inside(part));
+        around.max_by_key(|(part, _)| part.len()).map(|(_, span)| span.clone())
+    }
+}
+
+fn convert(node: &Node<'_>, path: &str, places: &mut Vec<(String, Range<usize>)>) -> Value {
+    places.push((path.to_owned(), node.span()));
+    match node.get_ref() {
+        DeValue::String(text) => Value::from(text.as_ref()),
+        DeValue::Boolean(value) => Value::from(*value),
+        DeValue::Array(items) => {
+            let item = |(i, item): (usize, &Node<'_>)| convert(item, &format!("{path}[{i}]"), places);
+            Value::Array(items.iter().enumerate().map(item).collect())
+        }
+        DeValue::Table(table) => {
+            let entry = |(key, value): (&toml::Spanned<std::borrow::Cow<'_, str>>, &Node<'_>)| {
+                let key = key.get_ref().to_string();
+                let inner = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+                let value = convert(value, &inner, places);
+                (key, value)
+            };
+            Value::Object(table.iter().map(entry).collect())
+        }
+        DeValue::Integer(number) => {
+            let text = number.as_str().replace('_', "");
+            i64::from_str_radix(&text, number.radix()).map_or(Value::Null, Value::from)
+        }
+        DeValue::Float(number) => {
+            number.as_str().replace('_', "").parse::<f64>().map_or(Value::Null, Value::from)
+        }
+        DeValue::Datetime(time) => Value::from(time.to_string()),
+    }
+}
