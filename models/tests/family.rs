@@ -142,6 +142,16 @@ fn an_input_that_is_not_finite_is_an_error_and_not_a_panic() {
     }
 }
 
+/// How closely a model's own step follows its rate over a long segment; `None` for a scheme of an order of its own, whose
+/// convergence the model's own tests hold.
+fn closed_step_tolerance(kind: &str) -> Option<f64> {
+    match kind {
+        "fsi-tube" | "artery-1d" => None,
+        // Values reach 80 and a few hundred steps of relative error 1e-12 add up.
+        _ => Some(1e-9),
+    }
+}
+
 #[test]
 fn every_closed_step_agrees_with_the_integrated_rate() {
     struct NoHistory;
@@ -153,6 +163,7 @@ fn every_closed_step_agrees_with_the_integrated_rate() {
     let tolerance = Tolerance { relative: 1e-12, absolute: 1e-12 };
     for model in native::all().unwrap() {
         let spec = model.spec();
+        let Some(allowed) = closed_step_tolerance(&spec.kind) else { continue };
         let theta = plausible(spec);
         let (u0, slope) = (vec![30.0; spec.inputs.len()], vec![-12.0; spec.inputs.len()]);
         let segment = Segment { t0: 0.2, t1: 0.9, u0: &u0, slope: &slope, history: &NoHistory };
@@ -162,9 +173,8 @@ fn every_closed_step_agrees_with_the_integrated_rate() {
         model.advance(segment, &theta, &mut exact).unwrap();
         integrate::advance::<dyn Model>(&*model, Solver::Dopri5(tolerance), segment, &theta, &mut integrated)
             .unwrap();
-        // Values reach 80 and a few hundred steps of relative error 1e-12 add up.
         let difference = largest_difference(&exact, &integrated);
-        assert!(difference < 1e-9, "{}: {difference:e}", spec.kind);
+        assert!(difference < allowed, "{}: {difference:e}", spec.kind);
     }
 }
 
