@@ -7,9 +7,11 @@
 
 mod check;
 mod console;
+mod crew;
 mod csv_file;
 mod export;
 mod failure;
+mod identify;
 mod models;
 mod progress;
 mod report;
@@ -44,6 +46,8 @@ enum Command {
     Check(check::Args),
     /// Run the model forward with chosen values and noise: a twin experiment.
     Simulate(simulate::Args),
+    /// Say whether the estimation is reasonable, before it is made: what these data could determine.
+    Identify(identify::Args),
     /// Be a worker: dial a coordinator and run its jobs.
     Worker(worker::Args),
     /// List the built-in models, or describe one.
@@ -62,6 +66,7 @@ fn main() -> ExitCode {
         Command::Run(args) => run::run(&args, started),
         Command::Check(args) => check::run(&args),
         Command::Simulate(args) => simulate::run(&args),
+        Command::Identify(args) => identify::run(&args),
         Command::Worker(args) => worker::run(&args),
         Command::Models(args) => models::run(&args),
         Command::Report(args) => report::run(&args),

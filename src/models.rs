@@ -1,7 +1,7 @@
 //! `starlings models`: the catalogue, written by the models themselves.
 
 use clap::Parser;
-use starlings_models::{Quantity, Spec, catalogue, nearest};
+use starlings_models::{ModelDef, Quantity, Spec, catalogue, nearest};
 
 use crate::console::{line, table, text};
 use crate::failure::Failure;
@@ -59,12 +59,29 @@ fn describe(spec: &Spec) -> Result<(), Failure> {
         rows.extend(quantities.iter().map(row));
         text(table(&rows, false))?;
     }
+    let fields: Vec<&Quantity> = spec.states.iter().chain(&spec.outputs).filter(|q| q.size > 1).collect();
+    if let Some(field) = fields.first() {
+        line(format_args!(
+            "\n`name[0..n]` is a field of n components, `{0}[0]` to `{0}[{1}]`",
+            field.name,
+            field.size - 1
+        ))?;
+    }
+    if has_layout(&spec.kind) {
+        line("\nsizes are those of the default layout; `[model.layout]` of the study changes it")?;
+    }
     line("\nestimate an initial value with the parameter name `initial:<state>`")
+}
+
+/// Whether the model is put together by the study: a model without a layout refuses the empty one.
+fn has_layout(kind: &str) -> bool {
+    let layout = Some(serde_json::json!({}));
+    catalogue::build(&ModelDef { kind: kind.to_owned(), layout, ..ModelDef::default() }).is_ok()
 }
 
 fn row(q: &Quantity) -> Vec<String> {
     vec![
-        q.name.clone(),
+        if q.size == 1 { q.name.clone() } else { format!("{}[0..{}]", q.name, q.size) },
         q.unit.clone(),
         q.range_text(),
         q.default.map(|v| v.to_string()).unwrap_or_default(),

@@ -5,10 +5,12 @@ use std::path::PathBuf;
 
 use clap::Parser;
 use starlings_coordinator::study::Study;
+use starlings_coordinator::study::field::{components, quantity_of};
 use starlings_coordinator::study::twin::{Recording, Twin, simulate};
 use starlings_models::effect::{EffectDef, library};
 use starlings_models::{Spec, catalogue, nearest};
 
+use crate::console::note;
 use crate::csv_file::{self, Place};
 use crate::failure::Failure;
 
@@ -23,9 +25,10 @@ pub(crate) struct Args {
     /// Amplitude of an effect of the study or of the built-in list; may be repeated.
     #[arg(long = "effect", value_name = "NAME=VALUE", value_parser = assignment)]
     effect: Vec<(String, f64)>,
-    /// Standard deviation of Gaussian noise added to every output, in the output's unit.
-    #[arg(long, default_value_t = 0.0, value_name = "SD", allow_negative_numbers = true)]
-    noise: f64,
+    /// Standard deviation of Gaussian noise: added to every output, in the output's unit; or as `10%` of the largest
+    /// amplitude, to the outputs that the study observes.
+    #[arg(long, default_value = "0", value_name = "SD", value_parser = noise, allow_negative_numbers = true)]
+    noise: Noise,
     /// Seed of the noise; the study's own without it.
     #[arg(long)]
     seed: Option<u64>,
@@ -38,9 +41,35 @@ pub(crate) struct Args {
     /// Spacing of that grid.
     #[arg(long, requires = "until", allow_negative_numbers = true)]
     step: Option<f64>,
+    /// Start from the periodic state of the record's first period of this length; inputs that end earlier than --until go
+    /// on periodically.
+    #[arg(long, value_name = "PERIOD", allow_negative_numbers = true)]
+    periodic: Option<f64>,
+    /// Where to write the state at the record's start, for `[model] initial` of another study.
+    #[arg(long, value_name = "FILE")]
+    state_out: Option<PathBuf>,
     /// Where to write the CSV; standard output without it.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
+}
+
+/// How much noise is added.
+#[derive(Clone, Copy)]
+enum Noise {
+    /// In the unit of every output.
+    Absolute(f64),
+    /// As a share of the largest amplitude of an observed output.
+    Share(f64),
+}
+
+/// `0.5` or `10%`.
+fn noise(text: &str) -> Result<Noise, String> {
+    let (number, share) = text.strip_suffix('%').map_or((text, false), |number| (number, true));
+    let value: f64 = number.trim().parse().map_err(|_| format!("`{text}` is neither a number nor a percentage"))?;
+    if !(value >= 0.0 && value.is_finite()) {
+        return Err("the noise must be zero or a positive number".to_owned());
+    }
+    Ok(if share { Noise::Share(value / 100.0) } else { Noise::Absolute(value) })
 }
 
 /// `NAME=VALUE` with a finite value.
@@ -56,11 +85,13 @@ fn assignment(text: &str) -> Result<(String, f64), String> {
 
 /// Simulates and writes.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    if !(args.noise >= 0.0 && args.noise.is_finite()) {
-        return Err(Failure::input("--noise must be zero or a positive number"));
+    if args.periodic.is_some_and(|period| !(period > 0.0 && period.is_finite())) {
+        return Err(Failure::input("--periodic must be a positive number"));
     }
     let study = Study::load(&args.study)?;
-    csv_file::spare_study(args.output.as_deref(), &study.text, &Place::Known(&study.file))?;
+    for output in [&args.output, &args.state_out] {
+        csv_file::spare_study(output.as_deref(), &study.text, &Place::Known(&study.file))?;
+    }
     check_names(args, &study)?;
     let record = match &args.record {
         None => 0,
@@ -73,12 +104,33 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         record,
         values: args.set.clone(),
         effects: args.effect.clone(),
-        noise: args.noise,
+        noise: if let Noise::Absolute(sd) = args.noise { sd } else { 0.0 },
+        noise_share: if let Noise::Share(share) = args.noise { share } else { 0.0 },
         seed: args.seed.unwrap_or(study.seed),
         times: grid(args, &study, record)?,
+        period: args.periodic,
     };
     let recording = simulate(&study, &twin).map_err(Failure::input)?;
+    if matches!(args.noise, Noise::Share(_)) {
+        tell_noise(&recording, &study);
+    }
+    if let Some(n) = recording.n_period {
+        note(format_args!("the periodic state was found in {n} periods"));
+    }
+    if let Some(file) = &args.state_out {
+        let heading = ["state", "value"].map(str::to_owned);
+        let rows = recording.start.iter().map(|(state, value)| [state.clone(), format!("{value:?}")]);
+        csv_file::write(Some(file), std::iter::once(heading).chain(rows))?;
+    }
     write(&recording, args)
+}
+
+/// Says on standard error what a percentage came to: a study of these data states it.
+fn tell_noise(recording: &Recording, study: &Study) {
+    for (output, sd) in recording.noise.iter().filter(|(_, sd)| *sd > 0.0) {
+        let unit = quantity_of(&study.spec.outputs, output).map_or("", |q| q.unit.as_str());
+        note(format_args!("noise of {output}: standard deviation {sd:?} {unit}"));
+    }
 }
 
 /// The regular grid that was asked for; empty takes the record's own times.
@@ -103,7 +155,7 @@ fn check_names(args: &Args, study: &Study) -> Result<(), Failure> {
     names.extend(study.spec.parameters.iter().map(|q| q.name.clone()));
     names.extend(study.setup.model.constants.keys().cloned());
     names.extend(effects.flat_map(|e| e.parameters.iter().map(|p| p.name.clone())));
-    names.extend(study.spec.states.iter().map(|q| format!("initial:{}", q.name)));
+    names.extend(components(&study.spec.states).iter().map(|state| format!("initial:{state}")));
     let mut seen = BTreeSet::new();
     names.retain(|name| seen.insert(name.clone()));
     for (name, _) in &args.set {

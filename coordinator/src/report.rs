@@ -7,6 +7,7 @@
 pub mod data;
 mod files;
 mod headline;
+mod identify;
 mod number;
 mod overview;
 mod page;
@@ -19,6 +20,7 @@ mod tests;
 
 pub use data::ReportData;
 pub use files::{FilesError, write_files, write_page};
+pub use identify::identify_page;
 pub use overview::overview_svg;
 
 /// Why a report could not be made.

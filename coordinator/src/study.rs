@@ -7,8 +7,10 @@
 mod check;
 pub mod checked;
 mod expand;
+pub mod field;
 mod file;
 pub mod fit;
+pub mod identify;
 mod plan;
 pub mod posterior;
 pub mod problem;

@@ -16,6 +16,7 @@ mod error;
 mod exchange;
 mod gaussian;
 mod gram;
+mod identifiability;
 mod information;
 mod linearisation;
 mod particles;
@@ -37,6 +38,9 @@ pub use drift::Drift;
 pub use error::EstimatorError;
 pub use exchange::{Exchanged, exchange_prior};
 pub use gaussian::Gaussian;
+pub use identifiability::{
+    Collinearity, Direction, Fisher, Sensitivities, Subset, sigma_point_sensitivities, weak_directions,
+};
 pub use linearisation::Linearisation;
 pub use particles::Particles;
 pub use recombine::recombine;

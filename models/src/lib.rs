@@ -22,9 +22,12 @@ pub mod native;
 mod nearest;
 pub mod observer;
 mod past;
+pub mod prestress;
 pub mod setup;
 pub mod simulator;
 pub mod spec;
+pub mod surface;
+pub mod spectrum;
 pub mod units;
 
 pub use blocks::Blocks;

@@ -3,9 +3,15 @@
 //! Being listed here is being in the catalogue and in every family test. Next file to read: [`windkessel2`] for the
 //! smallest model, then [`crate::catalogue`].
 
+pub mod artery_1d;
 pub mod driven_oscillator;
+pub mod fsi_tube;
 pub mod oscillator;
+pub mod rcr_network;
 pub mod relaxation;
+pub mod toy_fsi;
+pub mod toy_fsi_stokes;
+pub mod toy_fsi_windkessel;
 pub mod windkessel2;
 pub mod windkessel3;
 pub mod windkessel4;
@@ -13,8 +19,14 @@ pub mod windkessel4;
 use crate::setup::{ModelDef, SetupError};
 use crate::{Model, layout};
 
+pub use artery_1d::Artery1d;
 pub use driven_oscillator::DrivenOscillator;
+pub use fsi_tube::FsiTube;
 pub use oscillator::Oscillator;
+pub use rcr_network::RcrNetwork;
+pub use toy_fsi::ToyFsi;
+pub use toy_fsi_stokes::ToyFsiStokes;
+pub use toy_fsi_windkessel::ToyFsiWindkessel;
 pub use windkessel2::Windkessel2;
 pub use windkessel3::Windkessel3;
 pub use windkessel4::Windkessel4;
@@ -35,6 +47,12 @@ pub fn kinds() -> Vec<Kind> {
         Kind { kind: "windkessel-4", build: fixed::<Windkessel4> },
         Kind { kind: "oscillator", build: fixed::<Oscillator> },
         Kind { kind: "driven-oscillator", build: fixed::<DrivenOscillator> },
+        Kind { kind: "fsi-tube", build: FsiTube::build },
+        Kind { kind: "artery-1d", build: Artery1d::build },
+        Kind { kind: "toy-fsi", build: ToyFsi::build },
+        Kind { kind: "toy-fsi-windkessel", build: ToyFsiWindkessel::build },
+        Kind { kind: "toy-fsi-stokes", build: ToyFsiStokes::build },
+        Kind { kind: "rcr-network", build: rcr_network::build },
     ]
 }
 

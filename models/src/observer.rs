@@ -1,19 +1,33 @@
 //! Luenberger observers: after a prediction is recorded, they pull the state towards the same time's observation.
 //!
-//! An observer never sees a datum before its prediction is recorded; [`crate::simulator`] holds that order. Observers that
-//! need a mesh or an operator of the model are not here. Next file to read: [`nudging`].
+//! An observer never sees a datum before its prediction is recorded; [`crate::simulator`] holds that order. Those of a wall
+//! stand on the model's [`crate::blocks`], the others on the states that outputs measure. Next file to read: [`nudging`],
+//! then [`dvf`].
 
+pub mod dvf;
+pub mod dvf_am;
+mod extension;
+pub mod image_force;
 pub mod measured;
 pub mod none;
 pub mod nudging;
+pub mod sdf;
+pub mod sdf_displacement;
+mod wall;
+pub mod windkessel;
 
 use nalgebra::DMatrix;
 
 use crate::setup::{ObserverDef, SetupError};
 use crate::{Model, Spec, nearest};
 
+pub use dvf::VelocityFeedback;
+pub use image_force::ImageForce;
 pub use none::NoObserver;
 pub use nudging::Nudging;
+pub use sdf::DisplacementFeedback;
+pub use sdf_displacement::SolidFeedback;
+pub use windkessel::WindkesselObserver;
 
 /// What an observer corrects with: one observation time.
 #[derive(Clone, Copy)]
@@ -77,7 +91,16 @@ pub struct Kind {
 
 /// Every observer.
 pub fn kinds() -> Vec<Kind> {
-    vec![none::KIND, nudging::KIND]
+    vec![
+        none::KIND,
+        nudging::KIND,
+        sdf::KIND,
+        dvf::KIND,
+        dvf_am::KIND,
+        sdf_displacement::KIND,
+        image_force::KIND,
+        windkessel::KIND,
+    ]
 }
 
 /// Makes the observer that the definition names; an empty kind is `none`.

@@ -179,7 +179,7 @@ fn bad(message: String) -> ParticleError {
 }
 
 /// The names that only terms of effects use, so that a constant may have them.
-fn free_names(setup: &Setup, spec: &Spec) -> Result<Vec<String>, SetupError> {
+pub(crate) fn free_names(setup: &Setup, spec: &Spec) -> Result<Vec<String>, SetupError> {
     let lists = [&spec.states, &spec.inputs, &spec.outputs];
     let taken = |name: &String| lists.into_iter().flatten().any(|q| q.name == *name);
     Ok(effect::names(&setup.effects)?.into_iter().filter(|name| !taken(name)).collect())

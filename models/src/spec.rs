@@ -34,6 +34,8 @@ pub enum Role {
     Stiffness,
     /// A damping coefficient.
     Damping,
+    /// A shift in time by which an input is read earlier or later than now.
+    Shift,
     /// Anything else.
     #[default]
     Other,

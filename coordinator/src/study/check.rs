@@ -4,19 +4,23 @@
 //! to read: [`self::model`].
 
 mod blame;
+mod initial;
 mod model;
+mod observer;
 mod parameters;
 mod prior;
 mod settings;
+mod spectrum;
 mod units;
 
 use std::path::Path;
 
 use self::model::CheckedModel;
 use self::parameters::initial_medians;
-use self::settings::{estimator, explain, fleet, observer};
+use self::settings::{estimator, explain, fleet};
 use super::checked::{Record, Study};
 use super::expand;
+use super::field::field_of;
 use super::file::{RecordSection, StudyFile};
 use super::problem::{Problem, Source, StudyError};
 use super::record::{Context, Recordings};
@@ -59,7 +63,8 @@ fn check(path: &Path, text: &str) -> Result<Study, StudyError> {
     let estimator = estimator(&source, &file.estimator);
     let fleet = fleet(&source, &file.fleet);
     let explain = explain(&source, &file);
-    let observer = observer(&source, &file.observer);
+    let spectrum = spectrum::spectrum(&source, &file.spectrum);
+    let observer = settings::observer(&source, &file.observer);
     let model = model::model(&source, &file);
     // Everything that follows is judged against the model.
     let Some(mut model) = model else {
@@ -68,6 +73,8 @@ fn check(path: &Path, text: &str) -> Result<Study, StudyError> {
     model.setup.observer = observer;
     let mut warnings = Vec::new();
     model::check_values(&source, &file, &model);
+    let initial = initial::constants(&source, &file, &model.spec, &mut warnings);
+    model.setup.model.constants.extend(initial);
     let priors = parameters::priors(&source, &file, &model, &mut warnings);
     let records = records(&source, &file, &mut model, &explain.hold_out_channels, &mut warnings);
     source.verdict()?;
@@ -75,6 +82,8 @@ fn check(path: &Path, text: &str) -> Result<Study, StudyError> {
     let parameters = initial_medians(&source, &file, &model.spec, &priors, &records);
     source.verdict()?;
     model::check_build(&source, &file, &model.setup);
+    source.verdict()?;
+    observer::check(&source, &file, &model.setup, &records);
     source.verdict()?;
     warnings.extend(units::warnings(&file, &model, &records));
     let theta = expand::theta(&parameters, &records);
@@ -94,6 +103,7 @@ fn check(path: &Path, text: &str) -> Result<Study, StudyError> {
         estimator,
         fleet,
         explain,
+        spectrum,
         delays: model.delays,
         warnings,
     })
@@ -127,7 +137,9 @@ fn records(
     let mut files = Recordings::new(source);
     let mut context = Context { outputs: &mut model.setup.outputs, hold_out, warnings };
     let read = |section: &RecordSection| files.record(section, &model.spec, &mut context);
-    file.records.iter().filter_map(read).collect()
+    let records: Vec<Record> = file.records.iter().filter_map(read).collect();
+    check_held_out_components(source, file, &records);
+    records
 }
 
 fn check_record_list(source: &Source, file: &StudyFile) {
@@ -155,9 +167,24 @@ fn check_record_list(source: &Source, file: &StudyFile) {
     // A name that no channel measures is nowhere: a typing error would fit what should stay unseen.
     let measured: Vec<String> =
         file.records.iter().flat_map(|r| &r.channels).map(|c| c.output.get_ref().clone()).collect();
-    for name in file.explain.hold_out_channels.iter().filter(|n| !measured.contains(n.get_ref())) {
+    let found = |name: &str| measured.iter().any(|m| field_of(m) == field_of(name));
+    report_unmeasured(source, file, &measured, &found);
+}
+
+/// A component that its field's channel has no column for is told only once the files are read.
+fn check_held_out_components(source: &Source, file: &StudyFile, records: &[Record]) {
+    let measured: Vec<String> =
+        records.iter().flat_map(|r| &r.channels).map(|c| c.output.clone()).collect();
+    let found = |name: &str| measured.iter().any(|m| m == name || field_of(m) == name);
+    if records.len() == file.records.len() {
+        report_unmeasured(source, file, &measured, &found);
+    }
+}
+
+fn report_unmeasured(source: &Source, file: &StudyFile, measured: &[String], found: &dyn Fn(&str) -> bool) {
+    for name in file.explain.hold_out_channels.iter().filter(|n| !found(n.get_ref())) {
         let message = format!("no channel measures `{}`, so it cannot be held out", name.get_ref());
-        source.report_unknown(name.span(), message, &unique(&measured));
+        source.report_unknown(name.span(), message, &unique(measured));
     }
 }
 

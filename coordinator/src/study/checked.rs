@@ -6,6 +6,7 @@
 use std::path::PathBuf;
 
 use starlings_estimators::{Drift, Points, Root, Transform};
+use starlings_models::spectrum::Decay;
 use starlings_models::{EffectDef, Setup, Signal, Spec};
 
 /// A study whose names exist, whose numbers make sense and whose recordings were read.
@@ -41,6 +42,8 @@ pub struct Study {
     pub fleet: FleetChoice,
     /// What `explain` may do.
     pub explain: ExplainChoice,
+    /// What `spectrum` compares.
+    pub spectrum: SpectrumChoice,
     /// An input is used at earlier times: windows then carry it from the record's start.
     pub delays: bool,
     /// What is doubtful but no error.
@@ -189,6 +192,17 @@ pub struct ExplainChoice {
     pub budget: Option<u64>,
     /// Where candidates come from.
     pub library: Library,
+}
+
+/// Settings of `spectrum`.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct SpectrumChoice {
+    /// Kinds of observers; empty for all that the model can host.
+    pub observers: Vec<String>,
+    /// Gains in 1/time; empty for a range around the poles.
+    pub gains: Vec<f64>,
+    /// The decay that is wanted.
+    pub decay: Option<Decay>,
 }
 
 impl Study {

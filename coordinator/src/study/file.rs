@@ -7,6 +7,7 @@ pub(super) mod layout;
 pub(super) mod locate;
 mod model;
 pub(super) mod read;
+pub(super) mod spectrum;
 mod table;
 
 use std::ops::Range;
@@ -27,6 +28,7 @@ pub(super) struct StudyFile {
     pub(super) records: Vec<RecordSection>,
     pub(super) effects: Vec<EffectSection>,
     pub(super) explain: ExplainSection,
+    pub(super) spectrum: spectrum::SpectrumSection,
     pub(super) estimator: EstimatorSection,
     pub(super) fleet: FleetSection,
 }
@@ -45,6 +47,8 @@ pub(super) struct StudySection {
 pub(super) struct ModelSection {
     pub(super) kind: Spanned<String>,
     pub(super) constants: Named<f64>,
+    /// File of initial values.
+    pub(super) initial: Option<Spanned<String>>,
     /// How the model is put together, with the places of its parts.
     pub(super) layout: Option<layout::Layout>,
     /// Present when `kind` is `equations`.

@@ -67,7 +67,7 @@ impl Study {
 }
 
 /// Rows within the training span where a channel that is fitted was measured.
-fn training_rows(record: &Record) -> Vec<usize> {
+pub(super) fn training_rows(record: &Record) -> Vec<usize> {
     let measured = |row: usize| record.channels.iter().any(|c| !c.held_out && c.values[row].is_finite());
     (0..record.times.len()).filter(|row| record.trains_at(record.times[*row]) && measured(*row)).collect()
 }

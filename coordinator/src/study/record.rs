@@ -5,6 +5,8 @@
 mod channel;
 mod csv;
 mod input;
+mod noise;
+mod part;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,10 +16,11 @@ use starlings_models::Spec;
 use toml::Spanned;
 
 use super::checked::Record;
+use super::field::field_of;
 use super::file::RecordSection;
 use super::problem::{Source, suggestion};
 use crate::study::record::channel::ChannelReader;
-use crate::study::record::csv::Csv;
+pub(super) use crate::study::record::csv::Csv;
 use crate::study::record::input::inputs;
 
 /// Reads the CSV files of a study, each once.
@@ -69,7 +72,8 @@ impl<'a> Recordings<'a> {
         }
     }
 
-    fn open(&mut self, name: &str, at: &Spanned<String>) -> Option<Rc<Csv>> {
+    /// The file of this name cut into cells; nothing after a complaint. `at` is where the study names it.
+    pub(super) fn open(&mut self, name: &str, at: &Spanned<String>) -> Option<Rc<Csv>> {
         let path = self.folder.join(name);
         if let Some(known) = self.files.get(&path) {
             return known.clone();
@@ -168,6 +172,21 @@ pub(super) struct Context<'a> {
     pub(super) hold_out: &'a [String],
     /// What is doubtful but no error.
     pub(super) warnings: &'a mut Vec<String>,
+}
+
+impl Context<'_> {
+    /// Position of an output among the study's, at the end if it is new.
+    fn row(&mut self, output: &str) -> usize {
+        self.outputs.iter().position(|o| o == output).unwrap_or_else(|| {
+            self.outputs.push(output.to_owned());
+            self.outputs.len() - 1
+        })
+    }
+
+    /// Whether an output, or the field that it belongs to, is never fitted.
+    fn is_held_out(&self, output: &str) -> bool {
+        self.hold_out.iter().any(|name| name == output || name == field_of(output))
+    }
 }
 
 /// A training span that was refused and told.

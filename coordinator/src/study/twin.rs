@@ -1,16 +1,22 @@
 //! A twin experiment: the study's model run forward with chosen values and noise, to make data whose truth is known.
 //!
 //! Nothing is estimated and no fleet is needed. The noise of every output is a ChaCha8 stream of its own, so adding an
-//! output changes no other's data.
+//! output changes no other's data. Next files to read: [`periodic`] for a start in the periodic state, [`run`].
+
+mod noise;
+mod periodic;
+mod run;
 
 use std::sync::Arc;
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use starlings_models::{Forward, Job, ParticleError, Setup, SetupError, Window, nearest};
+use starlings_models::{ObserverDef, ParticleError, Setup, SetupError, Window, nearest};
 
+use super::field::components;
 use super::{Study, posterior};
+use crate::study::twin::run::Run;
 
 /// What to simulate.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -24,10 +30,16 @@ pub struct Twin {
     pub effects: Vec<(String, f64)>,
     /// Standard deviation of the noise added to every output, in the output's unit.
     pub noise: f64,
+    /// Noise added on top to every output that the study observes: its standard deviation as a share of the output's
+    /// largest amplitude, the difference of highest and lowest value over time, over all components of a field.
+    pub noise_share: f64,
     /// Seed of the noise.
     pub seed: u64,
     /// Times at which the outputs are wanted; empty takes the record's.
     pub times: Vec<f64>,
+    /// Starts from the periodic state of the record's first period of this length instead of the initial state. Inputs that
+    /// end before `times` do go on periodically.
+    pub period: Option<f64>,
 }
 
 /// A simulated recording.
@@ -39,6 +51,12 @@ pub struct Recording {
     pub columns: Vec<String>,
     /// Values, one vector per column.
     pub values: Vec<Vec<f64>>,
+    /// Standard deviation of the noise that was added, by output; a field counts as one.
+    pub noise: Vec<(String, f64)>,
+    /// The state at the record's start, by component.
+    pub start: Vec<(String, f64)>,
+    /// Periods that were run to find a periodic start.
+    pub n_period: Option<usize>,
 }
 
 /// Why nothing was simulated.
@@ -58,7 +76,7 @@ pub enum TwinError {
 /// Runs the twin.
 ///
 /// # Errors
-/// When a name is unknown, a time lies before the record, or the model fails.
+/// When a name is unknown, a time lies before the record, the model fails, or there is no periodic start.
 pub fn simulate(study: &Study, twin: &Twin) -> Result<Recording, TwinError> {
     let record = study
         .records
@@ -71,17 +89,20 @@ pub fn simulate(study: &Study, twin: &Twin) -> Result<Recording, TwinError> {
     if times.first().is_some_and(|t| *t < start) || times.windows(2).any(|w| w[1] <= w[0]) {
         return Err(TwinError::Request(format!("times must increase and start at {start} or later")));
     }
-    let window = Window {
-        start,
-        observed: vec![f64::NAN; times.len() * setup.outputs.len()],
-        times,
-        inputs: record.inputs.clone(),
+    let mut run = Run { model: &*model, record: twin.record, theta, n_obs: setup.outputs.len(), n_period: None };
+    let mut window =
+        Window { start, observed: vec![f64::NAN; times.len() * run.n_obs], times, inputs: record.inputs.clone() };
+    let state = match twin.period {
+        None => run.initial(&window)?,
+        Some(period) => run.periodic(&mut window, period)?,
     };
-    let window = Arc::new(window);
-    let job =
-        Job { particle: 0, record: twin.record as u32, window: Arc::clone(&window), theta, state: None };
-    let prediction = model.run(&job)?;
-    Ok(recording(&*model, &setup, &window, &prediction.outputs, twin))
+    // Given as a state, a start without delays is the same to the last bit; with delays it lacks its past.
+    let given = twin.period.map(|_| state.clone());
+    let outputs = run.predict(&Arc::new(window.clone()), given)?.outputs;
+    let mut recording = recording(study, &run, &setup, &window, &outputs, twin);
+    let names = components(&study.spec.states);
+    recording.start = names.into_iter().zip(state).collect();
+    Ok(recording)
 }
 
 /// The setup and parameter vector of the twin: prior medians, overridden by name.
@@ -89,7 +110,9 @@ fn place(study: &Study, twin: &Twin) -> Result<(Setup, Vec<f64>), TwinError> {
     let mut setup = study.setup.clone();
     let prior = posterior::prior(study);
     let mut theta = study.theta_for(twin.record, prior.mean.as_slice());
-    setup.outputs = study.spec.outputs.iter().map(|q| q.name.clone()).collect();
+    setup.outputs = components(&study.spec.outputs);
+    // The truth runs free.
+    setup.observer = ObserverDef::default();
     let mut values = twin.values.clone();
     for (name, amplitude) in &twin.effects {
         values.push((amplitude_of(study, &mut setup, name)?, *amplitude));
@@ -130,20 +153,31 @@ fn amplitude_of(study: &Study, setup: &mut Setup, name: &str) -> Result<String, 
         .ok_or_else(|| TwinError::Request(format!("effect `{name}` has no amplitude")))
 }
 
-fn recording(model: &dyn Forward, setup: &Setup, window: &Window, outputs: &[f64], twin: &Twin) -> Recording {
+fn recording(
+    study: &Study,
+    run: &Run<'_>,
+    setup: &Setup,
+    window: &Window,
+    outputs: &[f64],
+    twin: &Twin,
+) -> Recording {
     let n_obs = setup.outputs.len();
     let mut columns = setup.outputs.clone();
-    let mut values: Vec<Vec<f64>> = (0..n_obs)
-        .map(|i| {
-            let mut rng = ChaCha8Rng::seed_from_u64(twin.seed);
-            rng.set_stream(i as u64);
-            let mut noise = move || -> f64 { StandardNormal.sample(&mut rng) };
-            outputs.iter().skip(i).step_by(n_obs).map(|y| y + twin.noise * noise()).collect()
-        })
-        .collect();
-    for (quantity, signal) in model.spec().inputs.iter().zip(&window.inputs) {
+    let mut values: Vec<Vec<f64>> =
+        (0..n_obs).map(|i| outputs.iter().skip(i).step_by(n_obs).copied().collect()).collect();
+    let noise = noise::standard_deviations(study, &setup.outputs, &values, twin);
+    for (i, (column, sd)) in values.iter_mut().zip(&noise).enumerate() {
+        let mut rng = ChaCha8Rng::seed_from_u64(twin.seed);
+        rng.set_stream(i as u64);
+        for y in column {
+            let noise: f64 = StandardNormal.sample(&mut rng);
+            *y += sd * noise;
+        }
+    }
+    for (quantity, signal) in run.model.spec().inputs.iter().zip(&window.inputs) {
         columns.push(quantity.name.clone());
         values.push(window.times.iter().map(|t| signal.at(*t)).collect());
     }
-    Recording { times: window.times.clone(), columns, values }
+    let noise = noise::of_outputs(&setup.outputs, &noise);
+    Recording { times: window.times.clone(), columns, values, noise, start: Vec::new(), n_period: run.n_period }
 }

@@ -2,17 +2,18 @@
 //!
 //! Warnings travel with the result into the summary, the report and the terminal. They never change a number.
 
-use starlings_estimators::{Drift, Transform, autocorrelation, nis_band};
+use starlings_estimators::{Drift, Transform, autocorrelation, nis_band, weak_directions};
 
+use super::identify::words::{combination, members};
 use super::posterior::{prior, standard_deviations};
 use super::store::PredictionRow;
 use super::summary::Summary;
 use super::{EstimatorKind, Fit, Study};
 
 /// Correlation above which two parameters are reported as one combination.
-const CORRELATED: f64 = 0.95;
-/// Share of the prior sd above which the data are said not to inform a parameter.
-const UNINFORMED: f64 = 0.9;
+pub(super) const CORRELATED: f64 = 0.95;
+/// Share of the prior sd above which the data are said not to inform a parameter, or a combination of parameters.
+pub(super) const UNINFORMED: f64 = 0.9;
 /// Share of the spread that resampling may leave out in silence.
 const DROPPED: f64 = 0.05;
 /// Prior standard deviations beyond which an estimate contradicts its prior.
@@ -32,8 +33,9 @@ pub fn collect(study: &Study, fit: &Fit, summary: &Summary, predictions: &[Predi
     warnings.extend(still_moving(fit));
     warnings.extend(free_run(fit, study, predictions));
     warnings.extend(autocorrelated(study, predictions));
-    warnings.extend(correlated(summary));
+    warnings.extend(correlated_pairs(summary));
     warnings.extend(uninformed(study, fit));
+    warnings.extend(uninformed_directions(study, fit));
     warnings.extend(far_from_prior(study, fit));
     warnings.extend(lost(fit));
     warnings.extend(dropped(fit));
@@ -136,19 +138,23 @@ fn autocorrelated(study: &Study, predictions: &[PredictionRow]) -> Vec<String> {
     found
 }
 
-fn correlated(summary: &Summary) -> Vec<String> {
+fn correlated_pairs(summary: &Summary) -> Vec<String> {
     let mut found = Vec::new();
     for (i, row) in summary.correlation.iter().enumerate() {
         for (j, value) in row.iter().enumerate().skip(i + 1) {
             if value.abs() > CORRELATED {
-                found.push(format!(
-                    "{} and {} are correlated ({value:.3}): the data determine their combination, not each of them.",
-                    summary.parameters[i].name, summary.parameters[j].name
-                ));
+                found.push(correlated(&summary.parameters[i].name, &summary.parameters[j].name, *value));
             }
         }
     }
     found
+}
+
+/// Two parameters that are known as one.
+pub(super) fn correlated(first: &str, second: &str, value: f64) -> String {
+    format!(
+        "{first} and {second} are correlated ({value:.3}): the data determine their combination, not each of them."
+    )
 }
 
 fn uninformed(study: &Study, fit: &Fit) -> Vec<String> {
@@ -166,6 +172,28 @@ fn uninformed(study: &Study, fit: &Fit) -> Vec<String> {
             )
         })
         .collect()
+}
+
+/// Combinations that keep their prior although not each of their parameters does.
+fn uninformed_directions(study: &Study, fit: &Fit) -> Vec<String> {
+    let names: Vec<&str> = study.theta.iter().map(|t| t.name.as_str()).collect();
+    let prior_sd: Vec<f64> = study.theta.iter().map(|t| t.prior_sd).collect();
+    let sd = standard_deviations(&fit.posterior);
+    let keeps = |j: &usize| sd[*j] > UNINFORMED * prior_sd[*j];
+    weak_directions(&fit.posterior.covariance, &prior_sd, UNINFORMED)
+        .iter()
+        .filter(|direction| !members(direction).iter().all(keeps))
+        .map(|direction| uninformed_combination(&combination(&names, direction), direction.share))
+        .collect()
+}
+
+/// A combination about which the data say almost nothing.
+pub(super) fn uninformed_combination(combination: &str, share: f64) -> String {
+    format!(
+        "the data say almost nothing about the combination {combination} (each in units of its prior sd): its uncertainty \
+         is still {:.0} % of the prior's.",
+        100.0 * share
+    )
 }
 
 fn far_from_prior(study: &Study, fit: &Fit) -> Vec<String> {

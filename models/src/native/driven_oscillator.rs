@@ -2,9 +2,9 @@
 //!
 //! Next file to read: [`crate::catalogue`].
 
-use super::oscillator::{INITIAL_POSITION, free_motion, measures, outputs, parameters, states};
+use super::oscillator::{INITIAL_POSITION, blocks, free_motion, measures, outputs, parameters, states};
 use crate::model::Segment;
-use crate::{Drive, Model, ParticleError, Quantity, Role, Spec};
+use crate::{Blocks, Drive, Model, ParticleError, Quantity, Role, Spec};
 
 /// m d²x/dt² + c dx/dt + k x = F(t), with position x and velocity v as states and outputs.
 pub struct DrivenOscillator {
@@ -46,6 +46,10 @@ impl Model for DrivenOscillator {
 
     fn output(&self, _t: f64, x: &[f64], _theta: &[f64], _u: Drive<'_>, y: &mut [f64]) {
         y.copy_from_slice(x);
+    }
+
+    fn blocks(&self, theta: &[f64]) -> Option<Blocks> {
+        Some(blocks(theta))
     }
 
     /// Exact for a force linear in time: the free motion about the particular solution x = (F − c Ḟ/k)/k, v = Ḟ/k.

@@ -2,8 +2,11 @@
 //!
 //! It has no input; [`super::driven_oscillator`] has a force. Next file to read: [`super::driven_oscillator`].
 
+use nalgebra::DMatrix;
+
+use crate::blocks::WallOutputs;
 use crate::model::Segment;
-use crate::{Drive, Model, ParticleError, Quantity, Role, Spec};
+use crate::{Blocks, Drive, Model, ParticleError, Quantity, Role, Spec};
 
 /// m d²x/dt² + c dx/dt + k x = 0, with position x and velocity v as states and outputs.
 pub struct Oscillator {
@@ -44,6 +47,23 @@ pub(super) fn outputs() -> Vec<Quantity> {
 /// The states that the outputs of both oscillators measure.
 pub(super) fn measures() -> Vec<(String, String)> {
     vec![("position".to_owned(), "x".to_owned()), ("velocity".to_owned(), "v".to_owned())]
+}
+
+/// Both oscillators as a wall of one node in a vacuum.
+pub(super) fn blocks(theta: &[f64]) -> Blocks {
+    let one = |value: f64| DMatrix::from_element(1, 1, value);
+    let (mass, stiffness) = (one(theta[0]), one(theta[2]));
+    Blocks {
+        displacement: 0,
+        velocity: 1,
+        mass: mass.clone(),
+        trace: None,
+        solid_mass: mass,
+        added_mass: one(0.0),
+        stiffness,
+        windkessel: None,
+        outputs: WallOutputs { displacement: "position", velocity: "velocity", pressure: None },
+    }
 }
 
 /// Initial displacement when the study gives none: released from one unit.
@@ -109,6 +129,10 @@ impl Model for Oscillator {
 
     fn output(&self, _t: f64, x: &[f64], _theta: &[f64], _u: Drive<'_>, y: &mut [f64]) {
         y.copy_from_slice(x);
+    }
+
+    fn blocks(&self, theta: &[f64]) -> Option<Blocks> {
+        Some(blocks(theta))
     }
 
     fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ParticleError> {

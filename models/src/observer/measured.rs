@@ -70,7 +70,7 @@ fn behind(
 }
 
 /// Components of a named quantity or of one component of it.
-fn find(list: &[Quantity], name: &str, what: &'static str) -> Result<Range<usize>, SetupError> {
+pub(super) fn find(list: &[Quantity], name: &str, what: &'static str) -> Result<Range<usize>, SetupError> {
     Spec::range_of(list, name).ok_or_else(|| SetupError::Unknown {
         what,
         name: name.to_owned(),

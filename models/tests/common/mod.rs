@@ -55,7 +55,9 @@ fn pendulum() -> EquationsDef {
 
 /// A window over `[0, 1]` with `n` equal observation steps, every value missing, and a rough signal for every input.
 pub(crate) fn window(setup: &Setup, n: usize) -> Window {
-    let n_input = setup.spec().unwrap().inputs.len();
+    let spec = setup.spec().unwrap();
+    let n_input = spec.inputs.len();
+    let n_obs: usize = setup.outputs.iter().map(|name| Spec::range_of(&spec.outputs, name).unwrap().len()).sum();
     let times: Vec<f64> = (1..=n).map(|i| i as f64 / n as f64).collect();
     // Samples that do not fall on observation times, so that steps are split.
     let sampled: Vec<f64> = (0..=37).map(|i| f64::from(i) / 36.0 - 0.004).collect();
@@ -63,7 +65,7 @@ pub(crate) fn window(setup: &Setup, n: usize) -> Window {
         let values = sampled.iter().map(|t| 40.0 * (9.0 * t + k as f64).sin().max(0.0)).collect();
         Signal { times: sampled.clone(), values }
     };
-    let observed = vec![f64::NAN; n * setup.outputs.len()];
+    let observed = vec![f64::NAN; n * n_obs];
     Window { start: 0.0, times, observed, inputs: (0..n_input).map(signal).collect() }
 }
 

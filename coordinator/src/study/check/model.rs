@@ -10,7 +10,7 @@ use starlings_models::effect::{Addition, EffectParameter, EffectState};
 use starlings_models::equations::{
     EquationsDef, Expression, InputDef, Method, OutputDef, SolverDef, StateDef,
 };
-use starlings_models::{EffectDef, ModelDef, Setup, Spec};
+use starlings_models::{EffectDef, ModelDef, Role, Setup, Spec};
 use toml::Spanned;
 
 use super::blame::{blame, expressions, report_missing};
@@ -59,7 +59,8 @@ pub(in crate::study) fn model(source: &Source, file: &StudyFile) -> Option<Check
     let spec = spec(source, file, &setup)?;
     let mut valid_names = valid_names(&spec);
     valid_names.extend(candidates.iter().flat_map(|e| &e.parameters).map(|p| p.name.clone()));
-    let delays = expressions(file).iter().any(|e| e.get_ref().replace(' ', "").contains("delay("));
+    let delays = expressions(file).iter().any(|e| e.get_ref().replace(' ', "").contains("delay("))
+        || spec.parameters.iter().any(|q| q.role == Role::Shift);
     Some(CheckedModel { setup, spec, candidates, valid_names, delays })
 }
 
@@ -76,6 +77,11 @@ fn sort_effects(source: &Source, file: &StudyFile, setup: &mut Setup, bare: &Spe
     };
     let mut candidates = Vec::new();
     for section in &file.effects {
+        let told = source.count();
+        refuse_fields(source, section, bare);
+        if source.count() > told {
+            continue;
+        }
         let name = section.name.get_ref();
         if setup.effects.iter().chain(&candidates).any(|e| e.name == *name) {
             source.report_with(
@@ -96,6 +102,22 @@ fn sort_effects(source: &Source, file: &StudyFile, setup: &mut Setup, bare: &Spe
         }
     }
     (source.count() == before).then_some(candidates)
+}
+
+/// Terms are scalar: a field in one is told before its name is not found.
+fn refuse_fields(source: &Source, section: &EffectSection, bare: &Spec) {
+    let fields: Vec<_> = bare.states.iter().chain(&bare.outputs).filter(|q| q.size > 1).collect();
+    for (_, term) in &section.adds {
+        let names = Expression::parse(term.get_ref()).map(|e| e.names()).unwrap_or_default();
+        for (name, column) in names {
+            let own = section.parameters.iter().any(|p| *p.name.get_ref() == name);
+            if let Some(field) = fields.iter().find(|q| q.name == name && !own) {
+                let message = format!("`{name}` has {} components, and a term is one number", field.size);
+                let help = format!("effects of model `{}` can use its scalar quantities and parameters", bare.kind);
+                source.report_with(character(&source.text, &term.span(), column), message, help);
+            }
+        }
+    }
 }
 
 /// Parses every expression, so that each fault of spelling is told and not only the first.
@@ -245,9 +267,9 @@ pub(in crate::study) fn check_values(source: &Source, file: &StudyFile, model: &
         |name: &str| name.strip_prefix(INITIAL).and_then(|s| spec.states.iter().find(|q| q.name == s));
     for p in &file.parameters {
         if let Some(q) = initial(p.name.get_ref()).filter(|q| q.size != 1) {
-            let message =
-                format!("state `{}` has {} components: only a scalar has an initial value", q.name, q.size);
-            source.report(p.name.span(), message);
+            let message = format!("state `{}` has {} components: a parameter is one value", q.name, q.size);
+            let help = format!("name one, such as `{INITIAL}{}[0]`", q.name);
+            source.report_with(p.name.span(), message, help);
         }
     }
 }

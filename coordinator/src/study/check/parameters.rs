@@ -9,20 +9,22 @@ use super::model::CheckedModel;
 use super::prior::{self, Prior};
 use crate::study::checked::{Record, StudyParameter};
 use crate::study::expand::INITIAL;
+use crate::study::field::quantity_of;
 use crate::study::file::{ParameterSection, StudyFile};
 use crate::study::problem::Source;
 
 /// What the model says of a parameter or of the state behind an initial value.
 pub(in crate::study) fn quantity<'a>(spec: &'a Spec, name: &str) -> Option<&'a Quantity> {
     match name.strip_prefix(INITIAL) {
-        Some(state) => spec.states.iter().find(|q| q.name == state),
+        Some(state) => quantity_of(&spec.states, state),
         None => spec.parameters.iter().find(|q| q.name == name),
     }
 }
 
 /// Every name that a parameter or constant may have.
 pub(in crate::study) fn valid_names(spec: &Spec) -> Vec<String> {
-    let states = spec.states.iter().map(|q| format!("{INITIAL}{}", q.name));
+    let first = |q: &Quantity| if q.size == 1 { q.name.clone() } else { format!("{}[0]", q.name) };
+    let states = spec.states.iter().map(|q| format!("{INITIAL}{}", first(q)));
     spec.parameters.iter().map(|q| q.name.clone()).chain(states).collect()
 }
 

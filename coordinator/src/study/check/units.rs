@@ -9,6 +9,7 @@ use starlings_models::units::{Labels, Unit, consistent};
 use super::model::CheckedModel;
 use super::parameters::quantity;
 use crate::study::checked::Record;
+use crate::study::field::quantity_of;
 use crate::study::file::StudyFile;
 
 /// Time unit of the built-in models.
@@ -82,8 +83,8 @@ fn pairs(file: &StudyFile, model: &CheckedModel, records: &[Record]) -> Vec<Pair
     };
     let mut pairs: Vec<Pair> = file.parameters.iter().filter_map(parameter).collect();
     for channel in records.iter().flat_map(|record| &record.channels) {
-        let output = model.spec.outputs.iter().find(|q| q.name == channel.output);
-        let what = format!("output `{}`", channel.output);
+        let output = quantity_of(&model.spec.outputs, &channel.output);
+        let what = format!("output `{}`", output.map_or(&channel.output, |q| &q.name));
         let pair = Pair::new(what, channel.unit.as_deref().unwrap_or(""), output.map_or("", |q| &q.unit));
         if !pairs.iter().any(|p| p.what == pair.what && p.label == pair.label) {
             pairs.push(pair);

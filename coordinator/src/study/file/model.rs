@@ -40,13 +40,13 @@ const ROLES: [&str; 13] = [
 
 /// Reads `[model]`.
 pub(in crate::study) fn model(source: &Source, root: &Table<'_>) -> ModelSection {
-    let keys = [&["kind", "constants", "layout"], &EQUATIONS[..], &EXTERNAL[..]].concat();
+    let keys = [&["kind", "constants", "initial", "layout"], &EQUATIONS[..], &EXTERNAL[..]].concat();
     if root.get("model").is_none() {
         root.missing("model", "a section `[model]` with a `kind`");
     }
     let Some(t) = root.table("model", "[model]", &keys) else {
         let kind = Spanned::new(0..0, String::new());
-        return ModelSection { kind, constants: Vec::new(), layout: None, equations: None };
+        return ModelSection { kind, constants: Vec::new(), initial: None, layout: None, equations: None };
     };
     let kind = t.required_text("kind", "a model's name (`starlings models` lists them) or \"equations\"");
     let of_kind = kind.get_ref().as_str();
@@ -62,7 +62,7 @@ pub(in crate::study) fn model(source: &Source, root: &Table<'_>) -> ModelSection
         }
     }
     let layout = t.get("layout").map(Layout::read);
-    ModelSection { constants: constants(source, &t), kind, layout, equations }
+    ModelSection { constants: constants(source, &t), initial: t.text("initial"), kind, layout, equations }
 }
 
 fn constants(source: &Source, model: &Table<'_>) -> Named<f64> {

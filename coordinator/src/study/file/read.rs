@@ -14,8 +14,18 @@ use super::{
 };
 use crate::study::problem::{Source, StudyError};
 
-const SECTIONS: [&str; 9] =
-    ["study", "model", "parameters", "observer", "records", "effects", "explain", "estimator", "fleet"];
+const SECTIONS: [&str; 10] = [
+    "study",
+    "model",
+    "parameters",
+    "observer",
+    "records",
+    "effects",
+    "explain",
+    "spectrum",
+    "estimator",
+    "fleet",
+];
 
 /// Reads the text of a study file.
 ///
@@ -37,6 +47,7 @@ pub(in crate::study) fn read(source: &Source) -> Result<StudyFile, StudyError> {
         records: records(source, &root),
         effects: effects(source, &root),
         explain: explain(&root),
+        spectrum: super::spectrum::read(&root),
         estimator: estimator(&root),
         fleet: fleet(&root),
     };

@@ -1,10 +1,10 @@
-//! The measured channels of a record: columns to values, and the noise of each.
+//! The measured channels of a record: columns to values, a field's components one by one.
 //!
-//! Next file to read: [`super::input`].
+//! Next files to read: [`super::part`] for fields, [`super::noise`], [`super::input`].
 
-use starlings_estimators::noise_from_third_differences;
 use starlings_models::Spec;
 
+use super::part::Part;
 use super::{Context, Table};
 use crate::study::checked::Channel;
 use crate::study::file::{ChannelSection, RecordSection};
@@ -26,16 +26,17 @@ impl ChannelReader<'_> {
         let before = self.source.count();
         let mut channels: Vec<Channel> = Vec::new();
         for section in &self.section.channels {
-            let output = section.output.get_ref();
-            if channels.iter().any(|c| c.output == *output) {
-                let message = format!("output `{output}` has two channels in record `{}`", self.name());
+            let found = self.channel(section, context).unwrap_or_default();
+            if let Some(twice) = found.iter().find(|new| channels.iter().any(|c| c.output == new.output)) {
+                let message =
+                    format!("output `{}` has two channels in record `{}`", twice.output, self.name());
                 self.source.report_with(
                     section.output.span(),
                     message,
                     "an output is measured once per record",
                 );
             }
-            channels.extend(self.channel(section, context));
+            channels.extend(found);
         }
         if self.section.channels.is_empty() {
             self.source.report(self.section.span.clone(), format!("record `{}` has no channel", self.name()));
@@ -53,124 +54,88 @@ impl ChannelReader<'_> {
         self.section.name.get_ref()
     }
 
-    fn channel(&self, section: &ChannelSection, context: &mut Context<'_>) -> Option<Channel> {
-        let output = section.output.get_ref();
-        let Some(quantity) = self.spec.outputs.iter().find(|q| q.name == *output) else {
-            let valid: Vec<String> = self.spec.outputs.iter().map(|q| q.name.clone()).collect();
-            let message = format!("model `{}` has no output `{output}`", self.spec.kind);
-            self.source.report_unknown(section.output.span(), message, &valid);
-            return None;
-        };
-        if quantity.size != 1 {
-            let message =
-                format!("output `{output}` has {} components; a channel measures one", quantity.size);
-            self.source.report(section.output.span(), message);
+    /// The scalar channels of one that is written: one, or those of a field's components that the file has.
+    fn channel(&self, section: &ChannelSection, context: &mut Context<'_>) -> Option<Vec<Channel>> {
+        let quantity = self.quantity(section)?;
+        let parts = self.parts(section, quantity)?;
+        let read = |part: Part| Some((self.values(section, &part)?, part));
+        let mut measured: Vec<(Vec<f64>, Part)> = parts.into_iter().map(read).collect::<Option<_>>()?;
+        // A component without any value is one that the file lacks.
+        measured.retain(|(values, _)| measured_somewhere(values));
+        if !measured.iter().any(|(values, _)| self.has_value(values)) {
+            self.no_value(section, measured.is_empty());
             return None;
         }
-        let values = self.values(section)?;
         let unit = section.unit.as_ref().map(|u| u.get_ref().clone()).filter(|u| !u.is_empty());
         let label = unit.as_deref().unwrap_or(&quantity.unit);
-        let (noise, noise_how) = self.noise(section, &values, label)?;
-        if noise_how.starts_with("from") {
+        let values: Vec<&[f64]> = measured.iter().map(|(values, _)| values.as_slice()).collect();
+        let noise = self.noise(section, &values, label)?;
+        if noise.how.starts_with("from") {
             context.warnings.push(format!(
-                "the noise of `{output}` in record `{}` was not given: {} was found {noise_how}. Give the sensor's \
-                 standard deviation if it is known.",
+                "the noise of `{}` in record `{}` was not given: {} was found {}. Give the sensor's standard \
+                 deviation if it is known.",
+                section.output.get_ref(),
                 self.name(),
-                with_unit(noise, label)
+                with_unit(noise.sd, label),
+                noise.how
             ));
         }
-        let row = context.outputs.iter().position(|o| o == output).unwrap_or_else(|| {
-            context.outputs.push(output.clone());
-            context.outputs.len() - 1
-        });
-        Some(Channel {
-            output: output.clone(),
-            row,
-            column: section.column.get_ref().clone(),
-            unit,
-            noise,
-            noise_how,
+        let channel = |(values, part): (Vec<f64>, Part)| Channel {
+            row: context.row(&part.output),
+            held_out: context.is_held_out(&part.output),
+            output: part.output,
+            column: part.column,
+            unit: unit.clone(),
+            noise: noise.sd,
+            noise_how: noise.how.clone(),
             values,
-            held_out: context.hold_out.contains(output),
-        })
+        };
+        Some(measured.into_iter().map(channel).collect())
     }
 
-    /// The column's values, at least one of them measured where the record is used.
-    fn values(&self, section: &ChannelSection) -> Option<Vec<f64>> {
-        let column = match self.table.csv.index(section.column.get_ref()) {
+    /// The column's values at every row.
+    fn values(&self, section: &ChannelSection, part: &Part) -> Option<Vec<f64>> {
+        let column = match self.table.csv.index(&part.column) {
             Ok(column) => column,
             Err((message, help)) => {
                 self.source.report_with(section.column.span(), message, help);
                 return None;
             }
         };
-        let values = match self.table.csv.numbers(column) {
-            Ok(values) => values,
-            Err(problem) => {
-                self.source.adopt(problem);
-                return None;
-            }
-        };
-        if values.iter().zip(&self.table.times).any(|(v, t)| v.is_finite() && self.is_used(*t)) {
-            return Some(values);
-        }
-        let whole = values.iter().all(|v| v.is_nan());
-        let place = if whole { "no value" } else { "no value in the training span" };
+        self.table.csv.numbers(column).map_err(|problem| self.source.adopt(problem)).ok()
+    }
+
+    /// Whether one of the values was measured where the record is used.
+    fn has_value(&self, values: &[f64]) -> bool {
+        values.iter().zip(&self.table.times).any(|(v, t)| v.is_finite() && self.is_used(*t))
+    }
+
+    /// Says that a channel has no value, at all or where it is fitted.
+    fn no_value(&self, section: &ChannelSection, at_all: bool) {
+        let place = if at_all { "no value" } else { "no value in the training span" };
         self.source.report_with(
             section.column.span(),
             format!("column `{}` of record `{}` has {place}", section.column.get_ref(), self.name()),
-            if whole { "remove the channel" } else { "remove the channel, or move `train`" },
+            if at_all { "remove the channel" } else { "remove the channel, or move `train`" },
         );
-        None
     }
 
     /// Whether a row counts for the channel: the training span, or everything for a record that is held out.
-    fn is_used(&self, time: f64) -> bool {
+    pub(super) fn is_used(&self, time: f64) -> bool {
         self.train.is_none_or(|[from, to]| from <= time && time <= to)
     }
 
     /// Whether the rows that count are evenly spaced, to a percent of their mean distance.
-    fn is_even(&self) -> bool {
+    pub(super) fn is_even(&self) -> bool {
         let times: Vec<f64> = self.table.times.iter().copied().filter(|t| self.is_used(*t)).collect();
         let (Some(first), Some(last)) = (times.first(), times.last()) else { return true };
         let mean = (last - first) / (times.len() - 1).max(1) as f64;
         times.windows(2).all(|w| (w[1] - w[0] - mean).abs() <= 0.01 * mean)
     }
+}
 
-    /// Noise sd and how it was found. Held-out rows of a trained record take no part.
-    fn noise(&self, section: &ChannelSection, values: &[f64], unit: &str) -> Option<(f64, String)> {
-        if let Some(given) = *section.noise.get_ref() {
-            if given > 0.0 {
-                return Some((given, "given in the study".to_owned()));
-            }
-            let message = format!("`noise` must be above zero, found {given}");
-            let help =
-                "give the standard deviation of the measurement error in the channel's unit, or \"auto\"";
-            self.source.report_with(section.noise.span(), message, help);
-            return None;
-        }
-        let used: Vec<f64> = values
-            .iter()
-            .zip(&self.table.times)
-            .filter(|(_, t)| self.is_used(**t))
-            .map(|(v, _)| *v)
-            .collect();
-        let sd = noise_from_third_differences(&used);
-        if sd > 0.0 && sd.is_finite() {
-            let uneven =
-                if self.is_even() { "" } else { " (which are not evenly spaced: it may be too large)" };
-            return Some((sd, format!("from the third differences of its {} samples{uneven}", used.len())));
-        }
-        let why =
-            if sd.is_nan() { "there are no four samples in a row" } else { "the samples do not scatter" };
-        let unit = if unit.is_empty() { String::new() } else { format!(" in {unit}") };
-        let message = format!(
-            "the noise of column `{}` cannot be found from the data: {why}",
-            section.column.get_ref()
-        );
-        self.source.report_with(section.noise.span(), message, format!("give its standard deviation{unit}"));
-        None
-    }
+fn measured_somewhere(values: &[f64]) -> bool {
+    values.iter().any(|v| v.is_finite())
 }
 
 fn with_unit(value: f64, unit: &str) -> String {

@@ -139,6 +139,11 @@ impl Csv {
         ))
     }
 
+    /// The texts of a column.
+    pub(in crate::study) fn texts(&self, column: usize) -> impl Iterator<Item = &str> {
+        self.cells.iter().map(move |cells| &cells[column])
+    }
+
     /// The numbers of a time column, strictly increasing.
     ///
     /// # Errors

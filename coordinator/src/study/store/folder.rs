@@ -9,6 +9,8 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use crate::study::expand::INITIAL;
+use crate::study::field::quantity_of;
 use crate::study::store::{Store, StoreError};
 use crate::study::summary::Summary;
 use crate::study::{Fit, Study, posterior};
@@ -212,6 +214,13 @@ fn fingerprint(study: &Study) -> String {
             feed(&input.values);
         }
     }
+    // Initial values may come from a file as well.
+    for (name, value) in study.setup.model.constants.range(INITIAL.to_owned()..) {
+        if let Some(state) = name.strip_prefix(INITIAL) {
+            hasher.update(state.as_bytes());
+            hasher.update(&value.to_le_bytes());
+        }
+    }
     hasher.finalize().to_hex().to_string()
 }
 
@@ -219,7 +228,7 @@ fn info(study: &Study, command: &str, started: &str) -> StudyInfo {
     use starlings_estimators::Transform;
     let unit = |output: &String| {
         let mut channels = study.records.iter().flat_map(|r| &r.channels).filter(|c| &c.output == output);
-        let of_model = || study.spec.outputs.iter().find(|q| &q.name == output).map(|q| q.unit.clone());
+        let of_model = || quantity_of(&study.spec.outputs, output).map(|q| q.unit.clone());
         channels.find_map(|c| c.unit.clone()).or_else(of_model).unwrap_or_default()
     };
     StudyInfo {

@@ -1,0 +1,100 @@
+//! Whether the observer fits the recordings: what it needs is fitted, and its gain is stable at their spacing.
+//!
+//! Whether it fits the model, the model says when it is built: see [`super::model::check_build`]. Next file to read:
+//! [`super::blame`].
+
+use starlings_models::observer::{self, Observer, Wiring};
+use starlings_models::{Setup, Spec};
+
+use super::blame::blame;
+use crate::study::checked::Record;
+use crate::study::file::StudyFile;
+use crate::study::plan::training_rows;
+use crate::study::problem::Source;
+
+/// Reports an observer that lacks what it needs, or whose gain makes its correction unstable.
+pub(in crate::study) fn check(source: &Source, file: &StudyFile, setup: &Setup, records: &[Record]) {
+    if matches!(setup.observer.kind.as_str(), "" | "none") {
+        return;
+    }
+    if let Some(observer) = built(source, file, setup, records)
+        && let Some(most) = observer.stable_up_to()
+    {
+        check_gain(source, file, records, most);
+    }
+}
+
+/// The observer as it works in the fit, where held-out channels are never seen; nothing after a complaint.
+fn built(
+    source: &Source,
+    file: &StudyFile,
+    setup: &Setup,
+    records: &[Record],
+) -> Option<Box<dyn Observer>> {
+    let seen = |output: &String| {
+        let channels = records.iter().filter(|r| r.is_trained()).flat_map(|r| &r.channels);
+        channels.into_iter().any(|c| c.output == *output && !c.held_out)
+    };
+    let fitted: Vec<String> = setup.outputs.iter().filter(|o| seen(o)).cloned().collect();
+    let build = |outputs: &[String]| {
+        let (model, spec) = (setup.model()?, setup.spec()?);
+        let theta = constants(setup, &spec);
+        let wiring = Wiring { spec: &spec, outputs, model: &*model, theta: &theta };
+        observer::build(&setup.observer, wiring)
+    };
+    match (build(&fitted), build(&setup.outputs)) {
+        (Ok(observer), _) => Some(observer),
+        (Err(error), Err(_)) => {
+            blame(source, file, &error);
+            None
+        }
+        (Err(error), Ok(_)) => {
+            let message = format!("without the channels that are held out, the observer has not what it needs: {error}");
+            source.report_with(
+                file.observer.kind.span(),
+                message,
+                "remove the channels that it needs from `hold_out_channels`, or choose another observer",
+            );
+            None
+        }
+    }
+}
+
+/// Constants and defaults in the order of the model's parameters, zero for what is estimated.
+fn constants(setup: &Setup, spec: &Spec) -> Vec<f64> {
+    let value = |q: &starlings_models::Quantity| {
+        let constant = setup.model.constants.get(&q.name).copied();
+        let estimated = setup.parameters.contains(&q.name);
+        constant.or(q.default.filter(|_| !estimated)).unwrap_or(0.0)
+    };
+    spec.parameters.iter().map(value).collect()
+}
+
+/// A correction in steps is stable while the product of gain and time between observations stays below `most`.
+fn check_gain(source: &Source, file: &StudyFile, records: &[Record], most: f64) {
+    let gain = *file.observer.gain.get_ref();
+    let spacings = records.iter().filter(|r| r.is_trained()).filter_map(|r| Some((r, spacing(r)?)));
+    let Some((record, dt)) = spacings.max_by(|a, b| a.1.total_cmp(&b.1)) else { return };
+    if gain * dt <= most {
+        return;
+    }
+    let (unit, largest) = (&file.study.time_unit, most / dt);
+    source.report_with(
+        file.observer.gain.span(),
+        format!(
+            "a gain of {gain} is unstable: the observer `{}` corrects in steps, and record `{}` is observed every {dt:.4} \
+             {unit}",
+            file.observer.kind.get_ref(),
+            record.name
+        ),
+        format!("the largest stable gain is {largest:.4} 1/{unit}: lower the gain, or use data observed more often"),
+    );
+}
+
+/// Median time between the observations that a record fits.
+fn spacing(record: &Record) -> Option<f64> {
+    let rows = training_rows(record);
+    let mut spacings: Vec<f64> = rows.windows(2).map(|w| record.times[w[1]] - record.times[w[0]]).collect();
+    spacings.sort_by(f64::total_cmp);
+    spacings.get(spacings.len() / 2).copied()
+}

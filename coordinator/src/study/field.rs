@@ -1,0 +1,51 @@
+//! Fields and their components: `wall` has n components, `wall[2]` is one of them, counted from 0.
+//!
+//! Next file to read: [`crate::study::record::channel`], which takes a field apart into channels.
+
+use starlings_models::{Quantity, Spec};
+
+/// The field and the index of a component's name; nothing for any other name.
+pub fn component_of(name: &str) -> Option<(&str, usize)> {
+    let (field, index) = name.strip_suffix(']')?.rsplit_once('[')?;
+    Some((field, index.parse().ok()?))
+}
+
+/// The name of the field that a component belongs to, or else the name itself.
+pub fn field_of(name: &str) -> &str {
+    component_of(name).map_or(name, |(field, _)| field)
+}
+
+/// The quantity that a name stands for, as a whole or as one of its components.
+pub fn quantity_of<'a>(list: &'a [Quantity], name: &str) -> Option<&'a Quantity> {
+    let exact = list.iter().find(|q| q.name == name);
+    exact.or_else(|| {
+        Spec::range_of(list, name)?;
+        list.iter().find(|q| q.name == field_of(name))
+    })
+}
+
+/// The names of all components of these quantities, in the order of their concatenation.
+pub fn components(list: &[Quantity]) -> Vec<String> {
+    let n = list.iter().map(|q| q.size).sum();
+    (0..n).map(|at| Spec::component(list, at)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_component_is_known_by_its_field_and_index() {
+        let list = [Quantity::new("p", "mmHg"), Quantity::new("wall", "cm").size(3)];
+        let unit = |name: &str| quantity_of(&list, name).map(|q| q.unit.as_str());
+        assert_eq!(["p", "wall", "wall[2]", "wall[3]", "p[1]"].map(unit), [
+            Some("mmHg"),
+            Some("cm"),
+            Some("cm"),
+            None,
+            None
+        ]);
+        assert_eq!(components(&list), ["p", "wall[0]", "wall[1]", "wall[2]"]);
+        assert_eq!((field_of("wall[2]"), field_of("R[in-vivo-1]")), ("wall", "R[in-vivo-1]"));
+    }
+}

@@ -1,0 +1,124 @@
+//! What deserves a warning before an estimation, and what to do about it.
+//!
+//! The limits are those of the warnings of a finished run, so that `identify` foretells them. Next file to read:
+//! [`crate::study::warnings`].
+
+use super::result::{DirectionInfo, Identification, ParameterInfo};
+use crate::study::Study;
+use crate::study::warnings::{CORRELATED, UNINFORMED, correlated, uninformed_combination};
+
+/// Collinearity index from which a set of parameters is hard to estimate together (Brun, Reichert & Künsch 2001).
+const CRITICAL: f64 = 10.0;
+
+/// All warnings: those of the study, silent parameters, uninformed parameters and combinations, correlated pairs.
+pub fn warnings(study: &Study, found: &Identification) -> Vec<String> {
+    let mut warnings = study.warnings.clone();
+    let silent =
+        |name: &String| format!("{name} changes no observed prediction: these data cannot determine it.");
+    warnings.extend(found.silent.iter().map(silent));
+    warnings.extend(uninformed(found).map(|p| {
+        format!(
+            "these data say almost nothing about {}: its expected uncertainty is still {:.0} % of the prior's.",
+            p.name,
+            100.0 * p.expected_sd / p.prior_sd
+        )
+    }));
+    warnings.extend(weak(found).map(|d| uninformed_combination(&d.combination, d.share)));
+    for (i, row) in found.correlation.iter().enumerate() {
+        for (j, value) in row.iter().enumerate().skip(i + 1) {
+            if let Some(value) = value.filter(|c| c.abs() > CORRELATED) {
+                warnings.push(correlated(&found.parameters[i].name, &found.parameters[j].name, value));
+            }
+        }
+    }
+    warnings
+}
+
+/// Parameters that change a prediction and yet keep their prior.
+fn uninformed(found: &Identification) -> impl Iterator<Item = &ParameterInfo> {
+    let keeps = |p: &&ParameterInfo| p.expected_sd > UNINFORMED * p.prior_sd;
+    found.parameters.iter().filter(keeps).filter(|p| !found.silent.contains(&p.name))
+}
+
+/// Combinations that keep their prior although not each of their parameters does.
+fn weak(found: &Identification) -> impl Iterator<Item = &DirectionInfo> {
+    let keeps = |name: &String| {
+        found.parameters.iter().any(|p| p.name == *name && p.expected_sd > UNINFORMED * p.prior_sd)
+    };
+    found.directions.iter().filter(move |d| d.share > UNINFORMED && !d.parameters.iter().all(keeps))
+}
+
+/// What to do, in a sentence or two.
+pub fn advice(found: &Identification) -> String {
+    let mut said = Vec::new();
+    if !found.silent.is_empty() {
+        said.push(format!("Fix {} as a constant, or observe what depends on it.", listed(&found.silent)));
+    }
+    let quiet: Vec<String> = uninformed(found).map(|p| p.name.clone()).collect();
+    if !quiet.is_empty() {
+        said.push(format!(
+            "Fix {}, or measure longer, more often or with less noise: its posterior will be its prior.",
+            listed(&quiet)
+        ));
+    }
+    said.extend(weak(found).map(|d| {
+        format!(
+            "Of {} fix one, give one a tighter prior, or measure what tells them apart: nothing here determines {}.",
+            listed(&d.parameters),
+            d.combination
+        )
+    }));
+    if said.is_empty() {
+        said.push(sound(found));
+    }
+    said.extend(together(found));
+    said.join(" ")
+}
+
+/// Nothing keeps its prior.
+fn sound(found: &Identification) -> String {
+    let least = found.parameters.iter().min_by(|a, b| a.informed.total_cmp(&b.informed));
+    let width = least.map_or(String::new(), |p| {
+        format!(" (least of all {}, to {:.2} % of its prior sd)", p.name, 100.0 * p.expected_sd / p.prior_sd)
+    });
+    let locked = found
+        .correlation
+        .iter()
+        .enumerate()
+        .any(|(i, row)| row.iter().skip(i + 1).flatten().any(|c| c.abs() > CORRELATED));
+    if locked {
+        format!(
+            "These data inform every parameter{width}, but some of them only together: read the correlated pairs as one \
+             combination each, or fix one of the two."
+        )
+    } else {
+        format!(
+            "The estimation is reasonable: these data inform every parameter{width} and no pair is locked."
+        )
+    }
+}
+
+/// The largest set that can be estimated together, where the whole set cannot.
+fn together(found: &Identification) -> Option<String> {
+    let whole = &found.collinearity;
+    if whole.index.is_some_and(|index| index < CRITICAL) {
+        return None;
+    }
+    let fits = |subset: &&super::result::SubsetInfo| subset.index.is_some_and(|index| index < CRITICAL);
+    let best = whole.growing.iter().filter(fits).max_by_key(|subset| subset.parameters.len())?;
+    Some(format!(
+        "The collinearity index of the whole set is {}; without the others, {} have {:.1}, below the critical {CRITICAL}.",
+        whole.index.map_or_else(|| "beyond measure".to_owned(), |index| format!("{index:.1}")),
+        listed(&best.parameters),
+        best.index.unwrap_or(1.0)
+    ))
+}
+
+/// `a`, `a and b`, `a, b and c`.
+fn listed(names: &[String]) -> String {
+    match names {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}

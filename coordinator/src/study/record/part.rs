@@ -1,0 +1,96 @@
+//! What a written channel stands for: one output, or every component of a field that the file has a column for.
+//!
+//! The columns of a field `wall` are `<column>[0]`, `<column>[1]`, …; those that the file lacks are not observed. Next file
+//! to read: [`super::channel`].
+
+use starlings_models::{Quantity, Spec};
+
+use super::channel::ChannelReader;
+use crate::study::field::{component_of, quantity_of};
+use crate::study::file::ChannelSection;
+
+/// A scalar output and its column.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Part {
+    pub(super) output: String,
+    pub(super) column: String,
+}
+
+impl ChannelReader<'_> {
+    /// The quantity that a channel measures; nothing after a complaint.
+    pub(super) fn quantity(&self, section: &ChannelSection) -> Option<&Quantity> {
+        let output = section.output.get_ref();
+        let found = quantity_of(&self.spec.outputs, output);
+        if found.is_none() {
+            let (message, valid) = self.unknown(output);
+            self.source.report_unknown(section.output.span(), message, &valid);
+        }
+        found
+    }
+
+    fn unknown(&self, output: &str) -> (String, Vec<String>) {
+        let valid: Vec<String> = self.spec.outputs.iter().map(|q| q.name.clone()).collect();
+        let kind = &self.spec.kind;
+        let field = component_of(output)
+            .and_then(|(field, _)| self.spec.outputs.iter().find(|q| q.name == field))
+            .filter(|q| q.size > 1);
+        let message = match field {
+            Some(q) => format!(
+                "model `{kind}` has no output `{output}`: `{0}` has the components `{0}[0]` to `{0}[{1}]`",
+                q.name,
+                q.size - 1
+            ),
+            None => format!("model `{kind}` has no output `{output}`"),
+        };
+        (message, valid)
+    }
+
+    /// The scalar channels behind a written one; nothing after a complaint.
+    pub(super) fn parts(&self, section: &ChannelSection, quantity: &Quantity) -> Option<Vec<Part>> {
+        let (output, column) = (section.output.get_ref(), section.column.get_ref());
+        let n = Spec::range_of(&self.spec.outputs, output).map_or(1, |range| range.len());
+        if n == 1 {
+            return Some(vec![Part { output: output.clone(), column: column.clone() }]);
+        }
+        let headers = &self.table.csv.headers;
+        let beyond = headers.iter().find(|header| {
+            component_of(header).is_some_and(|(field, index)| field == column && index >= n)
+        });
+        if let Some(beyond) = beyond {
+            let file = self.table.csv.path.display();
+            self.source.report_with(
+                section.column.span(),
+                format!("`{file}` has a column `{beyond}`, but output `{output}` has {n} components"),
+                "give the model as many components as were measured, or rename the columns by the components that they measure",
+            );
+            return None;
+        }
+        let part = |i: usize| Part { output: format!("{output}[{i}]"), column: format!("{column}[{i}]") };
+        let parts: Vec<Part> =
+            (0..n).map(part).filter(|part| headers.contains(&part.column)).collect();
+        if parts.is_empty() {
+            self.no_component(section, quantity);
+            return None;
+        }
+        Some(parts)
+    }
+
+    /// Says what was looked for in vain.
+    fn no_component(&self, section: &ChannelSection, quantity: &Quantity) {
+        let (column, name, last) = (section.column.get_ref(), &quantity.name, quantity.size - 1);
+        let message = format!(
+            "`{}` has none of the columns `{column}[0]` to `{column}[{last}]` of the {} components of output `{name}`",
+            self.table.csv.path.display(),
+            quantity.size
+        );
+        let help = if self.table.csv.headers.contains(column) {
+            format!("column `{column}` can measure one component: say which, as output = \"{name}[0]\"")
+        } else {
+            format!(
+                "its columns are {}",
+                crate::study::problem::quoted_list(&self.table.csv.headers)
+            )
+        };
+        self.source.report_with(section.column.span(), message, help);
+    }
+}

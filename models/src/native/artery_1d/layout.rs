@@ -1,0 +1,94 @@
+//! The layout of an arterial network as a study writes it: vessels between named nodes.
+//!
+//! Only the text is here; whether the vessels make a network is checked in [`super::network`], the next file to read.
+
+use serde::Deserialize;
+
+/// Vessels and their ends; without one, a straight tube of five regions between an inlet and an RCR outlet.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Layout {
+    /// The vessels, in the order in which their cells stand in states and outputs.
+    pub segments: Vec<Segment>,
+    /// The inlet and the outlets; a node where vessels join need not be listed.
+    pub nodes: Vec<NodeEntry>,
+}
+
+/// One vessel.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Segment {
+    /// Name: letters, digits and `_`.
+    pub name: String,
+    /// Node at which x = 0; flow is counted positive from here on.
+    pub from: String,
+    /// Node at which x is the length.
+    pub to: String,
+    /// Length in cm.
+    pub length: f64,
+    /// Inner radius without load, R0, in cm.
+    pub radius: f64,
+    /// R0 at `to` in cm, for a vessel that tapers; by default as at `from`.
+    pub radius_to: Option<f64>,
+    /// Wall thickness h in cm.
+    pub thickness: f64,
+    /// Number of cells.
+    #[serde(default = "twenty")]
+    pub cells: usize,
+    /// Number of equally long regions, each with a stiffness of its own.
+    #[serde(default = "one")]
+    pub regions: usize,
+}
+
+/// A node at which something other than joining happens.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NodeEntry {
+    /// Name, as vessels use it.
+    pub name: String,
+    /// What happens there.
+    pub kind: NodeKind,
+}
+
+/// What happens at a node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum NodeKind {
+    /// The input flow enters.
+    Inlet,
+    /// Vessels join: mass is conserved, total pressure continuous.
+    Junction,
+    /// Blood leaves through a three-element Windkessel.
+    Rcr,
+    /// Blood leaves through a resistance.
+    Resistance,
+}
+
+fn twenty() -> usize {
+    20
+}
+
+fn one() -> usize {
+    1
+}
+
+impl Default for Layout {
+    fn default() -> Self {
+        let tube = Segment {
+            name: "tube".to_owned(),
+            from: "inlet".to_owned(),
+            to: "outlet".to_owned(),
+            length: 25.0,
+            radius: 1.0,
+            radius_to: None,
+            thickness: 0.15,
+            cells: 20,
+            regions: 5,
+        };
+        let node = |name: &str, kind| NodeEntry { name: name.to_owned(), kind };
+        Self {
+            segments: vec![tube],
+            nodes: vec![node("inlet", NodeKind::Inlet), node("outlet", NodeKind::Rcr)],
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! One time step: convection and pressure explicit, the wall's viscosity implicit.
+//!
+//! The second-order, strong-stability-preserving pair SSP2(2,2,2) of Pareschi & Russo (2005): Heun's method for the
+//! hyperbolic part, an L-stable diagonally implicit method for the viscous one. Areas have no implicit part, so each stage is
+//! a linear system. Next file to read: [`super::node`].
+
+use super::Fault;
+use super::transport::Faces;
+use super::vessels::Vessels;
+use super::viscous::Viscous;
+
+/// γ = 1 − 1/√2.
+const GAMMA: f64 = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
+
+/// The inflow at the stages of a step, linear in time.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Inflow {
+    /// At the start of the step.
+    pub(super) start: f64,
+    /// Its slope.
+    pub(super) slope: f64,
+}
+
+/// Volumes in cm³ that entered at the inlet and left at the outlets during an advance.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Volumes {
+    /// Entered.
+    pub inflow: f64,
+    /// Left.
+    pub outflow: f64,
+}
+
+/// What a run needs to keep between steps for speed alone.
+pub(super) struct Work {
+    pub(super) faces: Faces,
+    pub(super) viscous: Viscous,
+    stage: Vec<f64>,
+    /// Hyperbolic and viscous rates of the two stages.
+    transport: [Vec<f64>; 2],
+    diffusion: [Vec<f64>; 2],
+}
+
+impl Work {
+    pub(super) fn new(vessels: &Vessels<'_>) -> Self {
+        let zeros = || vec![0.0; vessels.n_state()];
+        Self {
+            faces: Faces::new(vessels),
+            viscous: Viscous::new(vessels),
+            stage: zeros(),
+            transport: [zeros(), zeros()],
+            diffusion: [zeros(), zeros()],
+        }
+    }
+}
+
+impl Vessels<'_> {
+    /// Advances the state by a step and counts what passes the ends.
+    ///
+    /// # Errors
+    /// When a vessel has collapsed or a node allows no subcritical flow.
+    pub(super) fn step(
+        &self,
+        dt: f64,
+        inflow: Inflow,
+        x: &mut [f64],
+        work: &mut Work,
+        volumes: &mut Volumes,
+    ) -> Result<(), Fault> {
+        let Work { faces, viscous, stage, transport, diffusion } = work;
+        let flow = |part: f64| inflow.start + inflow.slope * (part * dt);
+        let mut count = |faces: &Faces, flow: f64| {
+            volumes.inflow += 0.5 * dt * flow;
+            let out: f64 = self.network.outlets.iter().map(|&node| self.outflow(node, faces)).sum();
+            volumes.outflow += 0.5 * dt * out;
+        };
+
+        stage.copy_from_slice(x);
+        self.diffuse(GAMMA * dt, flow(GAMMA), stage, viscous, &mut diffusion[0])?;
+        self.transport(stage, &viscous.end, flow(0.0), faces, &mut transport[0])?;
+        count(faces, flow(0.0));
+
+        for (i, stage) in stage.iter_mut().enumerate() {
+            *stage = x[i] + dt * (transport[0][i] + (1.0 - 2.0 * GAMMA) * diffusion[0][i]);
+        }
+        self.diffuse(GAMMA * dt, flow(1.0 - GAMMA), stage, viscous, &mut diffusion[1])?;
+        self.transport(stage, &viscous.end, flow(1.0), faces, &mut transport[1])?;
+        count(faces, flow(1.0));
+
+        for (i, x) in x.iter_mut().enumerate() {
+            *x += 0.5 * dt * (transport[0][i] + transport[1][i] + diffusion[0][i] + diffusion[1][i]);
+        }
+        Ok(())
+    }
+
+    /// Writes the rate of the state at one time.
+    ///
+    /// # Errors
+    /// As [`Vessels::step`].
+    pub(super) fn rate(&self, inflow: f64, x: &[f64], work: &mut Work, rate: &mut [f64]) -> Result<(), Fault> {
+        let Work { faces, viscous, stage, diffusion, .. } = work;
+        stage.copy_from_slice(x);
+        self.diffuse(0.0, inflow, stage, viscous, &mut diffusion[0])?;
+        self.transport(x, &viscous.end, inflow, faces, rate)?;
+        for (rate, diffusion) in rate.iter_mut().zip(&diffusion[0]) {
+            *rate += diffusion;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,102 @@
+//! The network with the values of its parameters: walls, blood and outlets.
+//!
+//! Next file to read: [`super::step`], which advances it.
+
+use std::f64::consts::PI;
+
+use super::layout::NodeKind;
+use super::network::{Network, Tube};
+use super::wall::Ring;
+
+/// Number of parameters that all vessels share.
+const N_SHARED: usize = 10;
+
+/// What is beyond an outlet.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Outlet {
+    /// Resistance between the vessel and the pressure behind it, dyn s/cm⁵.
+    pub(super) proximal: f64,
+    /// The Windkessel: its state's number among the Windkessels, distal resistance, compliance.
+    pub(super) chamber: Option<(usize, f64, f64)>,
+}
+
+/// All that the equations need to know.
+pub(super) struct Vessels<'a> {
+    pub(super) network: &'a Network,
+    /// Wall in each cell.
+    pub(super) cells: Vec<Ring>,
+    /// Wall at each face; those of tube i start at its first cell plus i.
+    pub(super) faces: Vec<Ring>,
+    /// Density ρ of the blood.
+    pub(super) rho: f64,
+    /// Momentum coefficient α.
+    pub(super) alpha: f64,
+    /// K_r = 8πμ/ρ in cm²/s: the friction of a parabolic profile per flow and area.
+    pub(super) friction: f64,
+    /// Γ = c_w + c_s: pressure per radial velocity of wall and tissue.
+    pub(super) damping: f64,
+    pub(super) p_ext: f64,
+    pub(super) p_venous: f64,
+    /// Pressure of the initial state.
+    pub(super) p_start: f64,
+    pub(super) outlets: Vec<Outlet>,
+}
+
+impl<'a> Vessels<'a> {
+    /// The network at these parameters, in the order of [`super::quantities`].
+    pub(super) fn new(network: &'a Network, theta: &[f64]) -> Self {
+        let n = network.tubes.len();
+        let [rho, mu, nu, alpha, c_w, k_s, c_s, p_ext, p_venous, p_start] = std::array::from_fn(|i| theta[n + i]);
+        let mut vessels = Self {
+            network,
+            cells: Vec::with_capacity(network.n_cell),
+            faces: Vec::with_capacity(network.n_cell + n),
+            rho,
+            alpha,
+            friction: 8.0 * PI * mu / rho,
+            damping: c_w + c_s,
+            p_ext,
+            p_venous,
+            p_start,
+            outlets: outlets(network, &theta[n + N_SHARED..]),
+        };
+        for (tube, young) in network.tubes.iter().zip(theta) {
+            let plate = young * tube.thickness / (1.0 - nu * nu);
+            let ring = |radius: f64| Ring { stiffness: plate / (radius * radius) + k_s, radius };
+            vessels.faces.extend(tube.radius.iter().map(|&radius| ring(radius)));
+            vessels.cells.extend(tube.radius.windows(2).map(|pair| ring(0.5 * (pair[0] + pair[1]))));
+        }
+        vessels
+    }
+
+    /// Number of state components.
+    pub(super) fn n_state(&self) -> usize {
+        2 * self.network.n_cell + self.outlets.iter().filter(|o| o.chamber.is_some()).count()
+    }
+
+    /// The face before the first cell of a tube; its other faces follow.
+    pub(super) fn first_face(tube: usize, of: &Tube) -> usize {
+        of.first + tube
+    }
+
+    /// Pressure behind the proximal resistance of an outlet.
+    pub(super) fn behind(&self, outlet: Outlet, x: &[f64]) -> f64 {
+        outlet.chamber.map_or(self.p_venous, |(i, ..)| x[2 * self.network.n_cell + i])
+    }
+}
+
+fn outlets(network: &Network, theta: &[f64]) -> Vec<Outlet> {
+    let (mut theta, mut n_chamber) = (theta, 0);
+    let mut all = Vec::with_capacity(network.outlets.len());
+    for &node in &network.outlets {
+        let own = if network.nodes[node].kind == NodeKind::Rcr { 3 } else { 1 };
+        let (values, rest) = theta.split_at(own);
+        theta = rest;
+        let chamber = (own == 3).then(|| {
+            n_chamber += 1;
+            (n_chamber - 1, values[1], values[2])
+        });
+        all.push(Outlet { proximal: values[0], chamber });
+    }
+    all
+}

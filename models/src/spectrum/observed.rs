@@ -1,0 +1,114 @@
+//! The error of the state under one observer, for any gain: de/dt = (A − Γ(γ)) e.
+//!
+//! Feedback is a polynomial in the gain, so that one observer is built thrice and then looked at for hundreds of gains. The
+//! system is split into independent blocks once; blocks that the observer does not reach keep their poles. Next file to read:
+//! [`super::gain`].
+
+use nalgebra::{Complex, DMatrix};
+
+use super::component::{block, components};
+use super::pole::{of_block, rightmost, sort};
+use super::{SpectrumError, poles};
+
+/// Γ(γ) = γ Γ₁ + γ² Γ₂, in the same coordinates as A.
+#[derive(Clone, Debug)]
+pub struct Feedback {
+    /// Γ₁ = ∂Γ/∂γ without observer.
+    pub linear: DMatrix<f64>,
+    /// Γ₂; zero but for the image force.
+    pub quadratic: DMatrix<f64>,
+}
+
+impl Feedback {
+    /// From the matrix at any gain; `None` when that is no such polynomial.
+    ///
+    /// # Errors
+    /// Whatever `at` returns.
+    pub fn of<E>(at: impl Fn(f64) -> Result<DMatrix<f64>, E>) -> Result<Option<Self>, E> {
+        let (one, two, five) = (at(1.0)?, at(2.0)?, at(5.0)?);
+        let quadratic = (&two - &one * 2.0) * 0.5;
+        let feedback = Self { linear: &one - &quadratic, quadratic };
+        // Rounding of a handful of sums.
+        let close = (feedback.at(5.0) - &five).norm() <= 1e-12 * five.norm();
+        Ok(close.then_some(feedback))
+    }
+
+    /// Γ at a gain.
+    pub fn at(&self, gain: f64) -> DMatrix<f64> {
+        &self.linear * gain + &self.quadratic * (gain * gain)
+    }
+}
+
+/// A model's error under one observer.
+#[derive(Clone, Debug)]
+pub struct ObservedSystem {
+    /// What the observer reaches.
+    pub(super) blocks: Vec<Block>,
+    /// Poles of what it does not reach.
+    pub(super) untouched: Vec<Complex<f64>>,
+}
+
+/// An independent block of A and of its feedback.
+#[derive(Clone, Debug)]
+pub(super) struct Block {
+    pub(super) a: DMatrix<f64>,
+    pub(super) feedback: Feedback,
+}
+
+impl ObservedSystem {
+    /// A model's linearisation under a feedback, both n_state × n_state in the same coordinates.
+    ///
+    /// # Errors
+    /// As [`poles`].
+    pub fn new(a: &DMatrix<f64>, feedback: &Feedback) -> Result<Self, SpectrumError> {
+        let mut system = Self { blocks: Vec::new(), untouched: Vec::new() };
+        for rows in components(&[a, &feedback.linear, &feedback.quadratic]) {
+            let own = block(a, &rows);
+            let linear = block(&feedback.linear, &rows);
+            let quadratic = block(&feedback.quadratic, &rows);
+            if linear.iter().chain(quadratic.iter()).all(|v| v.abs() <= 0.0) {
+                system.untouched.extend(poles(&own)?);
+            } else {
+                system.blocks.push(Block { a: own, feedback: Feedback { linear, quadratic } });
+            }
+        }
+        Ok(system)
+    }
+
+    /// All poles at a gain, sorted by modulus, then by imaginary part.
+    ///
+    /// # Errors
+    /// As [`poles`].
+    pub fn poles(&self, gain: f64) -> Result<Vec<Complex<f64>>, SpectrumError> {
+        let mut poles = self.untouched.clone();
+        for block in &self.blocks {
+            poles.extend(block.poles(gain)?);
+        }
+        sort(&mut poles);
+        Ok(poles)
+    }
+
+    /// The largest real part of the poles at a gain, in 1/time: minus the rate at which the slowest error decays.
+    ///
+    /// # Errors
+    /// As [`poles`].
+    pub fn max_re(&self, gain: f64) -> Result<f64, SpectrumError> {
+        let mut most = rightmost(&self.untouched);
+        for block in &self.blocks {
+            most = most.max(rightmost(&block.poles(gain)?));
+        }
+        Ok(most)
+    }
+}
+
+impl Block {
+    /// A − Γ at a gain, which may be negative for a difference.
+    pub(super) fn at(&self, gain: f64) -> DMatrix<f64> {
+        &self.a - self.feedback.at(gain)
+    }
+
+    /// The poles of the block, in no particular order.
+    pub(super) fn poles(&self, gain: f64) -> Result<Vec<Complex<f64>>, SpectrumError> {
+        of_block(self.at(gain))
+    }
+}

@@ -1,0 +1,12 @@
+//! The toy fluid–structure systems against closed forms and tables that were computed independently, in another language.
+//!
+//! Units are cgs. Tables are printed with a fixed number of digits; half a unit of the last one is their tolerance.
+#![allow(clippy::float_cmp)]
+
+mod elements;
+mod kit;
+mod layouts;
+mod modes;
+mod motion;
+mod stokes;
+mod windkessel;

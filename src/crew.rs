@@ -1,0 +1,141 @@
+//! The fleet of a command: where to listen, how many workers to start, and the way of its events.
+//!
+//! Shared by every command that runs the model on the fleet. Next file to read: [`crate::run`].
+
+use std::net::{SocketAddr, ToSocketAddrs};
+use std::sync::{Arc, mpsc};
+use std::time::Duration;
+
+use clap::Args;
+use starlings_coordinator::fleet::{FleetConfig, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers};
+use starlings_coordinator::study::Study;
+use tokio_util::sync::CancellationToken;
+
+use crate::console::{cancel_on_signal, note};
+use crate::failure::Failure;
+use crate::progress::Display;
+
+/// Which workers run the model.
+#[derive(Args)]
+pub(crate) struct FleetArgs {
+    /// Number of local worker processes; what the study says (fleet.workers) without it.
+    #[arg(long, value_name = "N", conflicts_with = "listen")]
+    workers: Option<usize>,
+    /// Wait for workers to dial this address (HOST:PORT, port 0 picks a free one) instead of starting local ones.
+    #[arg(long, value_name = "ADDR")]
+    listen: Option<String>,
+    /// Allow --listen beyond loopback although the connection is neither encrypted nor authenticated.
+    #[arg(long)]
+    insecure: bool,
+}
+
+/// What was asked for, checked.
+pub(crate) struct Plan {
+    address: SocketAddr,
+    /// Workers are started here, so many.
+    local: bool,
+    n_worker: usize,
+}
+
+impl FleetArgs {
+    /// Checks the arguments; nothing is started yet.
+    pub(crate) fn plan(&self, study: &Study) -> Result<Plan, Failure> {
+        let n_worker = self.workers.unwrap_or(study.fleet.workers);
+        if n_worker == 0 {
+            return Err(Failure::input(
+                "--workers must be at least 1 (or use --listen ADDR and start workers elsewhere)",
+            ));
+        }
+        Ok(Plan { address: self.address()?, local: self.listen.is_none(), n_worker })
+    }
+
+    /// Where to listen: a free loopback port for local workers, or what was asked for.
+    fn address(&self) -> Result<SocketAddr, Failure> {
+        let text = self.listen.as_deref().unwrap_or("127.0.0.1:0");
+        let address = text.to_socket_addrs().ok().and_then(|mut all| all.next()).ok_or_else(|| {
+            Failure::input(format!("--listen {text}: expected HOST:PORT, such as 127.0.0.1:7000"))
+        })?;
+        if !address.ip().is_loopback() && !self.insecure {
+            return Err(Failure::input(format!(
+                "{address} is reachable from other machines, and the connection is neither encrypted nor authenticated in \
+                 this version: listen on 127.0.0.1, or accept it with --insecure on a network you trust"
+            )));
+        }
+        Ok(address)
+    }
+}
+
+/// The fleet of one run, its local workers, and the way of its events to the store.
+pub(crate) struct Crew {
+    pub(crate) fleet: GrpcFleet,
+    local: Option<LocalWorkers>,
+    /// What happened, for the store.
+    pub(crate) events: mpsc::Receiver<FleetEvent>,
+    watcher: std::thread::JoinHandle<()>,
+}
+
+impl Crew {
+    /// Listens for workers; none is started yet.
+    pub(crate) fn listen(study: &Study, plan: &Plan, display: &Arc<Display>) -> Result<Self, Failure> {
+        let cancel = CancellationToken::new();
+        cancel_on_signal(&cancel);
+        let (sender, heard) = mpsc::channel();
+        let (kept, events) = mpsc::channel();
+        let mut config = FleetConfig::new(plan.address, &study.name, cancel, sender);
+        if let Some(patience) = study.fleet.patience {
+            config.patience = Duration::try_from_secs_f64(patience).map_err(Failure::input)?;
+        }
+        if let Some(attempts) = study.fleet.max_attempts {
+            config.max_attempts = attempts;
+        }
+        let fleet = GrpcFleet::listen(config).map_err(Failure::run)?;
+        let display = Arc::clone(display);
+        let watcher = std::thread::spawn(move || relay(heard, &kept, &display));
+        Ok(Self { fleet, local: None, events, watcher })
+    }
+
+    /// Starts the local workers, or says how to start others.
+    pub(crate) fn gather(&mut self, study: &Study, plan: &Plan) -> Result<(), Failure> {
+        let address = self.fleet.address();
+        if !plan.local {
+            note(format_args!(
+                "listening on {address}; start workers with: starlings worker --connect {address}"
+            ));
+            return Ok(());
+        }
+        let slots = study.fleet.slots.unwrap_or(1).to_string();
+        let config = LocalConfig {
+            program: std::env::current_exe().map_err(Failure::run)?,
+            args: ["worker", "--slots", &slots].map(str::to_owned).to_vec(),
+            n: plan.n_worker,
+            address,
+            fleet: self.fleet.handle(),
+        };
+        self.local = Some(LocalWorkers::spawn(config).map_err(Failure::run)?);
+        Ok(())
+    }
+
+    /// Ends the fleet and its workers.
+    pub(crate) fn dismiss(self) {
+        let Self { fleet, local, watcher, .. } = self;
+        fleet.close();
+        drop(local);
+        // The relay ends with the last sender of events; a panic in it has been printed already.
+        let _ = watcher.join();
+    }
+}
+
+/// Shows the events that people should see at once and hands all of them on to the store.
+fn relay(heard: mpsc::Receiver<FleetEvent>, kept: &mpsc::Sender<FleetEvent>, display: &Display) {
+    for event in heard {
+        if event.is_notable() {
+            display.say(&event.to_string());
+        } else {
+            tracing::info!(kind = event.kind(), "{event}");
+        }
+        if event.is_lasting() {
+            // The store stops listening at the end of the run; later events have no reader.
+            let _ = kept.send(event);
+        }
+    }
+}
