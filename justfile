@@ -8,6 +8,10 @@ check:
 test:
     cargo test --workspace
 
+# Coverage over many draws of the noise: minutes, not part of `just test`.
+battery:
+    cargo test --release -p starlings-coordinator --test tube_twin -- --ignored --nocapture
+
 # Formatting and lints, warnings are errors.
 lint:
     cargo fmt --all --check
@@ -24,6 +28,7 @@ doc $RUSTDOCFLAGS="-D warnings":
 # Micro-benchmarks and the fleet benchmark.
 bench:
     cargo bench --bench analysis
+    cargo bench --bench tube
     cargo bench --bench fleet -- --json
 
 # Licences, advisories, bans and sources (cargo install cargo-deny).
@@ -40,3 +45,4 @@ examples:
     cargo run --release -- check examples/pig-aorta-joint/study.toml
     cargo run --release -- check examples/rcr/study.toml
     cargo run --release -- check examples/oscillator/study.toml
+    cargo run --release -- check examples/fsi-tube/study.toml

@@ -90,7 +90,8 @@ impl History for NoHistory {
 /// The defaults of the parameters, and the state that they start from.
 fn start(model: &dyn Model) -> Result<(Vec<f64>, Vec<f64>), Failure> {
     let list = &model.spec().parameters;
-    let theta = list.iter().map(|q| q.default.ok_or("a parameter without default")).collect::<Result<Vec<_>, _>>()?;
+    let theta =
+        list.iter().map(|q| q.default.ok_or("a parameter without default")).collect::<Result<Vec<_>, _>>()?;
     let mut x = vec![0.0; model.spec().n_state()];
     model.initial(&theta, &mut x);
     Ok((theta, x))

@@ -17,6 +17,7 @@ mod progress;
 mod report;
 mod run;
 mod simulate;
+mod spectrum;
 mod worker;
 
 use std::process::ExitCode;
@@ -48,6 +49,8 @@ enum Command {
     Simulate(simulate::Args),
     /// Say whether the estimation is reasonable, before it is made: what these data could determine.
     Identify(identify::Args),
+    /// Show how the poles of the model's error move with the gain of each observer.
+    Spectrum(spectrum::Args),
     /// Be a worker: dial a coordinator and run its jobs.
     Worker(worker::Args),
     /// List the built-in models, or describe one.
@@ -67,6 +70,7 @@ fn main() -> ExitCode {
         Command::Check(args) => check::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Identify(args) => identify::run(&args),
+        Command::Spectrum(args) => spectrum::run(&args),
         Command::Worker(args) => worker::run(&args),
         Command::Models(args) => models::run(&args),
         Command::Report(args) => report::run(&args),

@@ -150,4 +150,5 @@ examples! {
     pig_aorta_joint => "pig-aorta-joint",
     rcr => "rcr",
     oscillator => "oscillator",
+    fsi_tube => "fsi-tube",
 }

@@ -7,8 +7,10 @@
 pub mod data;
 mod files;
 mod headline;
+pub mod locus;
 mod identify;
 mod number;
+mod outputs;
 mod overview;
 mod page;
 mod plot;

@@ -11,6 +11,7 @@ pub mod field;
 mod file;
 pub mod fit;
 pub mod identify;
+pub mod observer_gain;
 mod plan;
 pub mod posterior;
 pub mod problem;

@@ -26,8 +26,8 @@ pub mod prestress;
 pub mod setup;
 pub mod simulator;
 pub mod spec;
-pub mod surface;
 pub mod spectrum;
+pub mod surface;
 pub mod units;
 
 pub use blocks::Blocks;

@@ -77,7 +77,9 @@ fn at_amplitude_zero_an_effect_on_rates_and_inputs_is_absent() {
         let window = window(&setup, 30);
         let spec = setup.spec().unwrap();
         // With an effect the rate is integrated: a scheme of an order of its own is another solution.
-        let Some(state) = scalar(&spec.states).filter(|_| !["fsi-tube", "artery-1d"].contains(&kind.as_str())) else {
+        let Some(state) =
+            scalar(&spec.states).filter(|_| !["fsi-tube", "artery-1d"].contains(&kind.as_str()))
+        else {
             continue;
         };
         let term = format!("a*{state}*abs({state})");

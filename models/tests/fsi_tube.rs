@@ -166,3 +166,31 @@ fn a_run_starts_at_rest_in_equilibrium_with_its_pressure() {
     assert!(rate[..2 * n].iter().all(|v| v.abs() < 1e-9), "{rate:?}");
     assert!((rate[2 * n] + 90.0 * MM_HG / 1.85).abs() < 1e-9 * rate[2 * n].abs());
 }
+
+#[test]
+fn the_pressure_falls_along_the_tube_by_inertia_and_friction() {
+    let n = 25;
+    let model = tube(n, 1e-3);
+    let theta = values(&model, &[("k_s", 1e5)]);
+    let (x, q, slope) = (rough(n), 100.0, 2e3);
+    let mut rate = vec![0.0; 2 * n + 1];
+    model.rhs(0.0, &x, &theta, Drive { value: &[q], slope: &[slope], history: &NoHistory }, &mut rate);
+    let y = outputs(&model, &theta, q, slope, &x);
+    let (inertia, friction) = (1.06 / std::f64::consts::PI, 8.0 * 0.035 / std::f64::consts::PI);
+    let area = 2.0 * std::f64::consts::PI;
+    // Half a cell at the inlet, whole ones, half a cell at the outlet.
+    let (mut flow, mut change) = (q, slope);
+    let mut drop = 0.5 * (inertia * change + friction * flow);
+    for k in 0..n {
+        flow -= area * x[n + k];
+        change -= area * rate[n + k];
+        let weight = if k + 1 == n { 0.5 } else { 1.0 };
+        drop += weight * (inertia * change + friction * flow);
+    }
+    // Rounding of pressures of 1e5.
+    assert!(
+        (y[2 * n + 2] - y[2 * n] - drop).abs() < 1e-9 * 1e5,
+        "{} against {drop}",
+        y[2 * n + 2] - y[2 * n]
+    );
+}

@@ -15,7 +15,8 @@ fn built(layout: Value) -> Result<Box<dyn Model>, String> {
 fn displacement(model: &dyn Model) -> Vec<f64> {
     let list = &model.spec().parameters;
     let mut theta: Vec<f64> = list.iter().map(|q| q.default.unwrap()).collect();
-    for (i, value) in theta.iter_mut().enumerate().take_while(|(i, _)| list[*i].name == format!("E{}", i + 1)) {
+    for (i, value) in theta.iter_mut().enumerate().take_while(|(i, _)| list[*i].name == format!("E{}", i + 1))
+    {
         *value *= i as f64 + 1.0;
     }
     let mut x = vec![0.0; model.spec().n_state()];
@@ -45,14 +46,17 @@ fn equal_regions_share_the_cells_by_their_centres() {
 fn listed_regions_are_parameters_in_their_order_and_named_in_words() {
     let model = built(strap((5.0, 25.0))).unwrap();
     let eta = displacement(&*model);
-    assert!(eta[..2].iter().all(|v| *v == eta[0]) && eta[2..].iter().all(|v| (v - 0.5 * eta[0]).abs() < 1e-15));
+    assert!(
+        eta[..2].iter().all(|v| *v == eta[0]) && eta[2..].iter().all(|v| (v - 0.5 * eta[0]).abs() < 1e-15)
+    );
     assert_eq!(model.spec().parameters[0].says, "Young's modulus of region `strap`, 0 to 5 cm.");
     assert_eq!(model.spec().parameters[1].name, "E2");
 }
 
 #[test]
 fn a_listed_tube_of_another_length_is_covered_by_that_length() {
-    let mut def = ModelDef { kind: "fsi-tube".to_owned(), layout: Some(strap((5.0, 10.0))), ..ModelDef::default() };
+    let mut def =
+        ModelDef { kind: "fsi-tube".to_owned(), layout: Some(strap((5.0, 10.0))), ..ModelDef::default() };
     def.constants.insert("L".to_owned(), 10.0);
     let model = Setup { model: def, ..Setup::default() }.model().unwrap();
     let eta = displacement(&*model);
@@ -75,7 +79,10 @@ fn what_cannot_be_is_refused_with_its_place_and_a_remedy() {
     let cases = [
         (strap((6.0, 25.0)), "`regions[1].from`: no region covers 5 to 6 cm: start `free` at 5"),
         (strap((4.0, 25.0)), "`regions[1].from`: two regions cover 4 to 5 cm: start `free` at 5"),
-        (strap((5.0, 24.0)), "`regions[1].to`: the last region, `free`, ends at 24 cm and the tube at L = 25 cm"),
+        (
+            strap((5.0, 24.0)),
+            "`regions[1].to`: the last region, `free`, ends at 24 cm and the tube at L = 25 cm",
+        ),
         (strap((5.0, 26.0)), "ends at 26 cm and the tube at L = 25 cm"),
         (strap((5.0, 5.0)), "`regions[1].to`: `free` ends at 5 cm and starts at 5 cm"),
         (json!({ "cells": 0 }), "`cells`: 0 cells"),

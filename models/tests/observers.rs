@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{kinds, largest_difference, run, setup, window};
+use common::{kinds, largest_difference, run, run_in_pieces, setup, window};
 use starlings_models::{ObserverDef, Setup, Window};
 
 fn nudged(setup: &Setup, gain: f64) -> Setup {
@@ -77,4 +77,44 @@ fn a_gain_beyond_the_explicit_limit_stays_stable() {
     let state = run(&*setup.build().unwrap(), &window, &theta).state;
     // The first correction takes the state to the data; what is left is rounding of 580 mmHg.
     assert!(largest_difference(&state, &truth.state) < 1e-12, "{state:?}");
+}
+
+/// Every model with a wall, with every observer of a wall that it can host.
+fn walls() -> Vec<(Setup, Vec<f64>)> {
+    let mut walls = Vec::new();
+    for kind in kinds() {
+        let (setup, theta) = setup(&kind);
+        let Some(blocks) = setup.model().unwrap().blocks(&theta) else { continue };
+        let mut observers = vec!["dvf", "dvf-am", "sdf", "sdf-displacement", "image-force"];
+        if blocks.windkessel.is_some() && blocks.outputs.pressure.is_some() {
+            observers.push("windkessel");
+        }
+        for observer in observers {
+            let observer = ObserverDef { kind: observer.to_owned(), gain: 3.0, ..ObserverDef::default() };
+            walls.push((Setup { observer, ..setup.clone() }, theta.clone()));
+        }
+    }
+    assert!(walls.len() >= 10, "both oscillators have a wall");
+    walls
+}
+
+#[test]
+fn every_model_with_a_wall_hosts_every_observer_of_a_wall_and_true_data_move_none() {
+    for (setup, theta) in walls() {
+        let what = format!("{} with {}", setup.model.kind, setup.observer.kind);
+        let mut window = window(&setup, 6);
+        let n_obs = setup.spec().unwrap().n_output();
+        window.observed = vec![f64::NAN; 6 * n_obs];
+        let model = setup.build().unwrap();
+        let truth = run(&*model, &window, &theta);
+        window.observed.clone_from(&truth.outputs);
+        // Bitwise: every innovation is exactly zero.
+        assert_eq!(run(&*model, &window, &theta), truth, "{what}");
+        for (i, value) in window.observed.iter_mut().enumerate() {
+            *value = if i % 7 == 3 { f64::NAN } else { *value + 0.01 * (i as f64).cos() };
+        }
+        let moved = run(&*model, &window, &theta);
+        assert_ne!(moved.state, truth.state, "{what}");
+        assert_eq!(run_in_pieces(&*model, &window, &theta, 2), moved, "{what}");
+    }
 }

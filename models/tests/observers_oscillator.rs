@@ -1,5 +1,5 @@
 //! Observers of a wall on the oscillator: closed-form poles, and the decay of errors in whole runs.
-#![allow(clippy::float_cmp)]
+#![allow(clippy::float_cmp, clippy::unwrap_used, reason = "exact comparisons and helpers of tests")]
 
 mod common;
 mod dense_wall;

@@ -1,4 +1,5 @@
 //! Observers of a wall against their formulas, on dense matrices and with a part of the wall observed.
+#![allow(clippy::float_cmp, clippy::unwrap_used, reason = "exact comparisons and helpers of tests")]
 
 mod dense_wall;
 
@@ -75,8 +76,8 @@ fn the_extension_has_less_elastic_energy_than_any_other_with_the_same_observed_v
     // From rest, one step of an infinite gain moves the wall to the extension of the data.
     let (channels, observed) =
         (channels(&["displacement[0]", "displacement[2]", "displacement[5]"]), [0.4, -1.0, 2.0]);
-    let sdf = wall.observer("sdf", f64::INFINITY.min(1e9), &channels);
-    let x = wall.corrected(&*sdf, 1.0, &channels, &observed, &vec![0.0; 1 + 2 * N]);
+    let sdf = wall.observer("sdf", 1e9, &channels);
+    let x = wall.corrected(&*sdf, 1.0, &channels, &observed, &[0.0; 1 + 2 * N]);
     let d = DVector::from_column_slice(&x[1..=N]);
     assert_eq!([d[0], d[2], d[5]], observed);
     for seed in 0..20 {

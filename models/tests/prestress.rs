@@ -1,4 +1,5 @@
 //! The unloaded shape behind an image, and what it does to an estimated stiffness.
+#![allow(clippy::float_cmp, clippy::unwrap_used, reason = "exact comparisons and helpers of tests")]
 
 use nalgebra::{DMatrix, DVector};
 use starlings_models::prestress::{Rings, unloaded};
@@ -33,7 +34,7 @@ fn loading_the_reference_gives_the_image_back() {
         // The stated tolerance of the search is 1e-12 of the largest radius, the smallest is 0.65 of it.
         assert!(relative(&loaded(&rings, &found.shape, pressure * MMHG), &image) < 2e-12);
         assert!(relative(&found.shape, &radii) < 2e-12, "{pressure} mmHg: {:?}", found.shape);
-        assert!(found.steps < 40, "{pressure} mmHg: {} steps", found.steps);
+        assert!(found.steps < 10, "{pressure} mmHg: {} steps", found.steps);
     }
 }
 

@@ -35,19 +35,30 @@ fn l(name: &str, from: &str, to: &str) -> Value {
 
 #[test]
 fn a_floating_node_is_refused_with_the_remedy() {
-    let elements = json!([c("wall", "a", "0"), r("out", "a", "0"), r("island", "b", "x"), c("sea", "x", "b")]);
-    refused(elements, "elements[2].from", &["`b`", "`x`", "no path to the ground", "resistance or a capacitor"]);
-    let (path, message) = refusal(json!({ "nodes": [{ "name": "a" }, { "name": "spare" }], "elements": [r("out", "a", "0")] }));
+    let elements =
+        json!([c("wall", "a", "0"), r("out", "a", "0"), r("island", "b", "x"), c("sea", "x", "b")]);
+    refused(
+        elements,
+        "elements[2].from",
+        &["`b`", "`x`", "no path to the ground", "resistance or a capacitor"],
+    );
+    let (path, message) =
+        refusal(json!({ "nodes": [{ "name": "a" }, { "name": "spare" }], "elements": [r("out", "a", "0")] }));
     assert_eq!(path, "nodes[1]");
     assert!(message.contains("`spare`") && message.contains("remove"), "{message}");
 }
 
 #[test]
 fn a_node_between_inertances_alone_is_refused_with_their_names() {
-    let elements = json!([c("wall", "a", "0"), l("first", "a", "b"), l("second", "b", "d"), r("out", "d", "0")]);
+    let elements =
+        json!([c("wall", "a", "0"), l("first", "a", "b"), l("second", "b", "d"), r("out", "d", "0")]);
     refused(elements, "elements[1].to", &["`first`, `second`", "node `b`", "add a capacitor"]);
     let inflow = json!({ "name": "inflow", "kind": "flow", "to": "a" });
-    refused(json!([inflow, l("blood", "a", "b"), r("out", "b", "0")]), "elements[0].to", &["`blood`, `inflow`"]);
+    refused(
+        json!([inflow, l("blood", "a", "b"), r("out", "b", "0")]),
+        "elements[0].to",
+        &["`blood`, `inflow`"],
+    );
 }
 
 #[test]
@@ -55,8 +66,14 @@ fn a_loop_of_capacitors_and_pressure_sources_is_refused_with_their_names() {
     let source = json!({ "name": "heart", "kind": "pressure", "to": "a" });
     let elements = json!([source, c("wall", "a", "0"), c("far", "b", "0"), r("link", "a", "b")]);
     refused(elements, "elements[1]", &["`heart`, `wall`", "twice", "put a resistance into the loop"]);
-    let elements = json!([c("one", "a", "0"), c("two", "a", "b"), c("three", "b", "0"), c("tail", "b", "d"), r("x", "d", "0")]);
-    refused(elements, "elements[2]", &["`one`, `two`, `three`"]);
+    let elements = json!([
+        c("one", "a", "0"),
+        c("two", "a", "b"),
+        c("three", "b", "0"),
+        c("tail", "b", "d"),
+        r("x", "d", "0")
+    ]);
+    refused(elements, "elements[1]", &["`one`, `two`, `three`"]);
 }
 
 #[test]
@@ -66,14 +83,23 @@ fn unknown_and_misspelt_nodes_are_refused() {
     assert_eq!(path, "elements[1].from");
     assert!(message.contains("did you mean `aorta`"), "{message}");
     let elements = json!([r("out", "aorta", "0"), c("wall", "aorta", "0"), r("side", "aorta", "aorat")]);
-    refused(elements, "elements[2].to", &["only one element ends at node `aorat`", "`aorta`", "declare all nodes"]);
+    refused(
+        elements,
+        "elements[2].to",
+        &["only one element ends at node `aorat`", "`aorta`", "declare all nodes"],
+    );
 }
 
 #[test]
 fn names_that_are_given_twice_or_are_no_names_are_refused() {
-    refused(json!([r("a", "x", "0"), c("a", "x", "0")]), "elements[1].name", &["another element is named `a`"]);
+    refused(
+        json!([r("a", "x", "0"), c("a", "x", "0")]),
+        "elements[1].name",
+        &["another element is named `a`"],
+    );
     refused(json!([r("a b", "x", "0")]), "elements[0].name", &["letters, digits"]);
-    let (path, _) = refusal(json!({ "nodes": [{ "name": "x" }, { "name": "x" }], "elements": [r("a", "x", "0")] }));
+    let (path, _) =
+        refusal(json!({ "nodes": [{ "name": "x" }, { "name": "x" }], "elements": [r("a", "x", "0")] }));
     assert_eq!(path, "nodes[1].name");
     let rcr = json!({ "name": "x", "kind": "rcr", "from": "x" });
     refused(json!([r("a", "x", "0"), rcr]), "elements[1]", &["chamber of `x`", "rename"]);

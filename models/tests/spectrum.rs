@@ -248,7 +248,7 @@ fn a_locus_starts_at_the_poles_and_moves_without_jumps() {
     let model = chain(8);
     let (_, system) = under(&model, "sdf", &names(&["displacement[0]", "displacement[3]"]));
     let gains: Vec<f64> = std::iter::once(0.0).chain((0..200).map(|k| 10f64.powf(0.02 * f64::from(k)))).collect();
-    let ways = follow(&system, &gains).expect("poles");
+    let ways = follow(&system, &gains, 16).expect("poles");
     assert_eq!(ways.len(), 16);
     for (k, gain) in gains.iter().enumerate() {
         let mut at: Vec<f64> = ways.iter().map(|way| way[k].norm()).collect();

@@ -36,6 +36,10 @@ pub struct ReportData {
     pub parameters: Vec<ParameterRow>,
     /// Posterior correlation of the parameters, n_param rows of n_param values, in the order of `parameters`.
     pub correlation: Vec<Vec<f64>>,
+    /// Families of numbered parameters of one unit, such as E1 to E5, in the order of their numbers.
+    pub families: Vec<Family>,
+    /// What the observer does for the state; `None` without one.
+    pub observer: Option<ObserverRow>,
     /// One per parameter: how its estimate moved during the run.
     pub tracks: Vec<Track>,
     /// What the horizontal axis of the tracks is, with its unit: `time [s]` or `iteration`.
@@ -82,6 +86,48 @@ pub struct ParameterRow {
     pub prior_lo: f64,
     /// Upper end of the prior 95 % interval.
     pub prior_hi: f64,
+}
+
+/// Parameters that differ by a number alone.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Family {
+    /// What their names begin with.
+    pub stem: String,
+    /// Number of each and its row of [`ReportData::parameters`].
+    pub members: Vec<(u32, usize)>,
+    /// They are stiffnesses of the regions of a vessel.
+    pub stiffness: bool,
+}
+
+/// Innovations with the observer and without it, in noise standard deviations.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ObserverRow {
+    /// Kind of the observer.
+    pub kind: String,
+    /// Its gain, in 1/time unit.
+    pub gain: f64,
+    /// Root mean square over the training spans with the observer.
+    pub with: f64,
+    /// The same without it.
+    pub without: f64,
+    /// Their course, one per record.
+    pub courses: Vec<ObserverPlot>,
+}
+
+/// Root mean square innovation over the channels at every time of one record; the three vectors have equal length.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ObserverPlot {
+    /// Name of the record.
+    pub record: String,
+    /// Observation times.
+    pub time: Vec<f64>,
+    /// With the observer, in noise standard deviations.
+    pub with: Vec<f64>,
+    /// Without it.
+    pub without: Vec<f64>,
 }
 
 /// How one parameter's estimate moved.

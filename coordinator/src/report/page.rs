@@ -5,10 +5,10 @@
 
 use serde::Serialize;
 
-use super::data::{Autocorrelation, ChannelPlot, ParameterRow, ReportData};
+use super::data::{ObserverRow, ParameterRow, ReportData};
 use super::plot::figure::Figure;
-use super::plot::{autocorrelation, fit, interval, nis, residual, run_times, track};
-use super::{ReportError, headline, number};
+use super::plot::{along, interval, nis, observer as observer_plot, run_times, track};
+use super::{ReportError, headline, number, outputs};
 
 /// At most this many events of the fleet are listed.
 const EVENTS: usize = 60;
@@ -21,10 +21,12 @@ pub(crate) struct Page<'a> {
     headline: String,
     facts: Vec<(&'static str, String)>,
     parameters: Vec<ParameterView>,
+    families: Vec<Figure>,
     fits: Vec<Figure>,
     residuals: Vec<Figure>,
     tracks: Vec<Figure>,
     nis: Option<Figure>,
+    observer: Option<ObserverView>,
     nis_mean: String,
     log_likelihood: String,
     correlation: Vec<Vec<CorrelationCell>>,
@@ -40,6 +42,13 @@ struct ParameterView {
     interval: String,
     prior_median: String,
     strip: String,
+}
+
+/// What the observer does, in a sentence and in figures.
+#[derive(Debug, Serialize)]
+struct ObserverView {
+    says: String,
+    figures: Vec<Figure>,
 }
 
 /// One cell of the correlation table: its text and the share of colour behind it.
@@ -78,10 +87,12 @@ impl<'a> Page<'a> {
             headline: headline::of(data),
             facts: facts(data),
             parameters: data.parameters.iter().map(|row| parameter(row, data)).collect::<Result<_, _>>()?,
-            fits: shown(data).map(|c| fit::figure(c, &data.time_unit)).collect::<Result<_, _>>()?,
-            residuals: residuals(data)?,
+            families: data.families.iter().map(|f| along::figure(f, data)).collect::<Result<_, _>>()?,
+            fits: outputs::fits(data)?,
+            residuals: outputs::residuals(data)?,
             tracks: data.tracks.iter().map(|t| track::figure(t, x_label)).collect::<Result<_, _>>()?,
             nis: nis::figure(&data.nis, x_label)?,
+            observer: data.observer.as_ref().map(|row| observer(row, data)).transpose()?,
             nis_mean: optional(data.nis_per_observation),
             log_likelihood: optional(data.log_likelihood),
             correlation: data
@@ -105,21 +116,20 @@ fn facts(data: &ReportData) -> Vec<(&'static str, String)> {
     facts
 }
 
-fn shown(data: &ReportData) -> impl Iterator<Item = &ChannelPlot> {
-    data.channels.iter().filter(|c| !c.time.is_empty())
-}
-
-/// The residuals of every channel, each followed by its autocorrelation.
-fn residuals(data: &ReportData) -> Result<Vec<Figure>, ReportError> {
-    let mut figures = Vec::new();
-    for channel in shown(data) {
-        figures.push(residual::figure(channel, &data.time_unit)?);
-        let same = |a: &&Autocorrelation| a.record == channel.record && a.channel == channel.channel;
-        if let Some(series) = data.autocorrelation.iter().find(same).filter(|a| !a.value.is_empty()) {
-            figures.push(autocorrelation::figure(series, &data.time_unit)?);
-        }
-    }
-    Ok(figures)
+fn observer(row: &ObserverRow, data: &ReportData) -> Result<ObserverView, ReportError> {
+    let digits = |value: f64| number::significant(value, 3);
+    let per = if data.time_unit.is_empty() { String::new() } else { format!("\u{a0}1/{}", data.time_unit) };
+    let says = format!(
+        "With the observer {} at a gain of {}{per} the model, at the estimate, misses the next observation by {} noise sd; a \
+         run without it misses the same data by {}.",
+        row.kind,
+        digits(row.gain),
+        digits(row.with),
+        digits(row.without)
+    );
+    let shown = row.courses.iter().filter(|c| !c.time.is_empty());
+    let figures = shown.map(|c| observer_plot::figure(c, row, &data.time_unit)).collect::<Result<_, _>>()?;
+    Ok(ObserverView { says, figures })
 }
 
 fn parameter(row: &ParameterRow, data: &ReportData) -> Result<ParameterView, ReportError> {

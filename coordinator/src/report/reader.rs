@@ -11,8 +11,12 @@ use std::collections::BTreeMap;
 
 use starlings_estimators::{autocorrelation, nis_band};
 
-use super::data::{Autocorrelation, ChannelPlot, NisSeries, ParameterRow, PassTrack, ReportData, Track};
-use crate::study::store::folder::StudyInfo;
+use super::data::{
+    Autocorrelation, ChannelPlot, Family, NisSeries, ObserverPlot, ObserverRow, ParameterRow, PassTrack, ReportData,
+    Track,
+};
+use crate::study::observer_gain::ObserverCourse;
+use crate::study::store::folder::{OBSERVER, StudyInfo};
 use crate::study::store::{Store, StoreError};
 use crate::study::summary::Summary;
 
@@ -36,7 +40,7 @@ pub fn report_data(store: &Store) -> Result<ReportData, StoreError> {
         nis: nis(store)?,
         fleet: fleet::table(store, summary.as_ref())?,
         x_label: if info.batch { "iteration".to_owned() } else { format!("time [{}]", info.time_unit) },
-        study: info.name,
+        study: info.name.clone(),
         says: info.says,
         model: info.model,
         estimator: info.estimator,
@@ -49,10 +53,54 @@ pub fn report_data(store: &Store) -> Result<ReportData, StoreError> {
     };
     data.autocorrelation = data.channels.iter().filter_map(residual_autocorrelation).collect();
     match summary {
-        Some(summary) => finished(&mut data, summary),
+        Some(summary) => {
+            data.observer = observer(store, &summary)?;
+            finished(&mut data, summary);
+            data.families = families(&data.parameters, &info.stiffness);
+        }
         None => data.warnings.push("the run is not finished: continue it with --resume".to_owned()),
     }
     Ok(data)
+}
+
+/// What the run with the observer showed, if there was one.
+fn observer(store: &Store, summary: &Summary) -> Result<Option<ObserverRow>, StoreError> {
+    let Some(fit) = &summary.observer else { return Ok(None) };
+    let courses: Vec<ObserverCourse> = match store.meta(OBSERVER)? {
+        Some(text) => serde_json::from_str(&text).map_err(|e| store.damaged("observer", e))?,
+        None => Vec::new(),
+    };
+    let plot = |c: ObserverCourse| ObserverPlot { record: c.record, time: c.time, with: c.with, without: c.without };
+    Ok(Some(ObserverRow {
+        kind: fit.kind.clone(),
+        gain: fit.gain,
+        with: fit.innovation_rms_with,
+        without: fit.innovation_rms_without,
+        courses: courses.into_iter().map(plot).collect(),
+    }))
+}
+
+/// Families of at least three parameters of one unit whose names are a stem and a number.
+fn families(parameters: &[ParameterRow], stiffness: &[String]) -> Vec<Family> {
+    let mut families: Vec<(Family, &str)> = Vec::new();
+    for (index, row) in parameters.iter().enumerate() {
+        let stem = row.name.trim_end_matches(|c: char| c.is_ascii_digit());
+        let Ok(number) = row.name[stem.len()..].parse() else { continue };
+        let known = families.iter().position(|(f, unit)| f.stem == stem && *unit == row.unit);
+        let at = known.unwrap_or_else(|| {
+            families.push((Family { stem: stem.to_owned(), ..Family::default() }, &row.unit));
+            families.len() - 1
+        });
+        families[at].0.members.push((number, index));
+    }
+    let all_stiff = |f: &Family| f.members.iter().all(|(_, row)| stiffness.contains(&parameters[*row].name));
+    let large = families.into_iter().map(|(f, _)| f).filter(|f| f.members.len() >= 3 && !f.stem.is_empty());
+    large
+        .map(|mut family| {
+            family.members.sort_unstable();
+            Family { stiffness: all_stiff(&family), ..family }
+        })
+        .collect()
 }
 
 fn finished(data: &mut ReportData, summary: Summary) {

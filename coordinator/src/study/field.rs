@@ -30,6 +30,20 @@ pub fn components(list: &[Quantity]) -> Vec<String> {
     (0..n).map(|at| Spec::component(list, at)).collect()
 }
 
+/// Outputs as a reader names them: components of a field as one, with their number.
+pub fn observed_fields(outputs: &[String]) -> Vec<String> {
+    let mut fields: Vec<(&str, usize)> = Vec::new();
+    for output in outputs {
+        let (field, n) = component_of(output).map_or((output.as_str(), 0), |(field, _)| (field, 1));
+        match fields.iter_mut().find(|(known, _)| *known == field) {
+            Some((_, count)) => *count += n,
+            None => fields.push((field, n)),
+        }
+    }
+    let text = |(field, n): (&str, usize)| if n == 0 { field.to_owned() } else { format!("{field} ({n} components)") };
+    fields.into_iter().map(text).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -46,6 +60,8 @@ mod tests {
             None
         ]);
         assert_eq!(components(&list), ["p", "wall[0]", "wall[1]", "wall[2]"]);
+        let observed = ["p", "wall[0]", "wall[2]"].map(str::to_owned);
+        assert_eq!(observed_fields(&observed), ["p", "wall (2 components)"]);
         assert_eq!((field_of("wall[2]"), field_of("R[in-vivo-1]")), ("wall", "R[in-vivo-1]"));
     }
 }

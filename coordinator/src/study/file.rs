@@ -158,6 +158,10 @@ pub(super) struct ChannelSection {
     pub(super) output: Spanned<String>,
     /// Label of the column's values; the model's where it is not given.
     pub(super) unit: Option<Spanned<String>>,
+    /// What the column holds of the output, where not the output itself.
+    pub(super) from: Option<Spanned<String>>,
+    /// Value at which the integral of a rate begins.
+    pub(super) start: Option<Spanned<f64>>,
     /// Standard deviation in the channel's unit; `None` for `"auto"`.
     pub(super) noise: Spanned<Option<f64>>,
 }

@@ -4,6 +4,7 @@
 
 mod channel;
 mod csv;
+mod derived;
 mod input;
 mod noise;
 mod part;

@@ -11,10 +11,10 @@ use starlings_models::ParticleError;
 use super::fit::{batch, filter, forecast};
 use super::store::{Store, StoreError};
 use super::summary::Summary;
-use super::{EstimatorKind, Study, summary, warnings};
+use super::{EstimatorKind, Study, observer_gain, summary, warnings};
 use crate::fleet::{Fleet, FleetError, FleetEvent};
 use crate::study::fit::flight::Flight;
-use crate::study::store::folder::RunFolder;
+use crate::study::store::folder::{self, OBSERVER, RunFolder};
 use crate::study::store::snapshot::{Counts, Snapshot};
 
 /// Why a run ended without a result.
@@ -182,10 +182,15 @@ pub fn run(
         EstimatorKind::Batch => batch::fit(&mut flight, &mut folder.store, context, resumed)?,
     };
     let predictions = forecast::run(&mut flight, &fit.posterior)?;
+    let observer = observer_gain::compare(&mut flight, &fit.posterior, &predictions)?;
     let jobs = flight.take_rows();
     folder.store.predictions(&predictions, &jobs)?;
     context.keep_events(&folder.store)?;
     let mut result = summary::make(study, &fit, &predictions, flight.n_answered(), context.elapsed());
+    if let Some(observer) = observer {
+        folder.store.set_meta(OBSERVER, &folder::json(&observer.courses))?;
+        result.observer = Some(observer.fit);
+    }
     result.warnings = warnings::collect(study, &fit, &result, &predictions);
     result.check_finite().map_err(RunError::NotFinite)?;
     folder.store.event(context.elapsed(), "run", "run finished")?;

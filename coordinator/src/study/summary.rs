@@ -6,6 +6,8 @@
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
+use super::field::field_of;
+use super::observer_gain::ObserverFit;
 use super::posterior::{Estimate, estimates};
 use super::store::PredictionRow;
 use super::{Fit, Study};
@@ -13,7 +15,7 @@ use super::{Fit, Study};
 /// How well the estimate reproduces one output.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ChannelFit {
-    /// Output name.
+    /// Output name; a field counts as one, whatever the number of its observed components.
     pub name: String,
     /// Standard deviation of its noise; the largest where records differ.
     pub noise: f64,
@@ -75,6 +77,9 @@ pub struct Summary {
     pub correlation: Vec<Vec<f64>>,
     /// Fit figures.
     pub fit: FitSummary,
+    /// What the observer does for the state; absent without one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub observer: Option<ObserverFit>,
     /// Runs.
     pub runs: Runs,
     /// Workers that answered at least one run.
@@ -114,6 +119,7 @@ pub fn make(study: &Study, fit: &Fit, predictions: &[PredictionRow], workers: us
         parameters: estimates(study, &fit.posterior),
         correlation: rows_of(&starlings_estimators::correlation(&fit.posterior.covariance)),
         fit: fit_figures(study, fit, predictions),
+        observer: None,
         runs: Runs {
             total: fit.counts.total,
             failed: fit.counts.failed,
@@ -132,47 +138,69 @@ fn rows_of(m: &DMatrix<f64>) -> Vec<Vec<f64>> {
 }
 
 fn fit_figures(study: &Study, fit: &Fit, predictions: &[PredictionRow]) -> FitSummary {
-    let pooled = |keep: &dyn Fn(&PredictionRow) -> bool| -> Vec<ChannelFit> {
-        study.setup.outputs.iter().filter_map(|output| channel_fit(output, predictions, keep)).collect()
-    };
-    let records = study
-        .records
-        .iter()
-        .map(|r| RecordFit { record: r.name.clone(), channels: pooled(&|p| p.record == r.name) })
-        .collect();
+    let mut all: Vec<Tally> = Vec::new();
+    for output in &study.setup.outputs {
+        if all.last().is_none_or(|tally| tally.name != field_of(output)) && tally_of(&all, output).is_none() {
+            all.push(Tally::new(field_of(output)));
+        }
+    }
+    let mut records: Vec<(&str, Vec<Tally>)> =
+        study.records.iter().map(|r| (r.name.as_str(), all.clone())).collect();
+    for row in predictions {
+        let Some(at) = tally_of(&all, &row.output) else { continue };
+        all[at].add(row);
+        if let Some((_, of_record)) = records.iter_mut().find(|(name, _)| *name == row.record) {
+            of_record[at].add(row);
+        }
+    }
+    let fits = |tallies: &[Tally]| tallies.iter().filter_map(Tally::fit).collect::<Vec<ChannelFit>>();
+    let of_record =
+        |(record, tallies): &(&str, Vec<Tally>)| RecordFit { record: (*record).to_owned(), channels: fits(tallies) };
     FitSummary {
-        channels: pooled(&|_| true),
-        records,
+        channels: fits(&all),
+        records: records.iter().map(of_record).collect(),
         nis_per_observation: fit.nis_per_observation(),
         log_likelihood: fit.log_likelihood,
     }
 }
 
-fn channel_fit(
-    output: &str,
-    predictions: &[PredictionRow],
-    keep: &dyn Fn(&PredictionRow) -> bool,
-) -> Option<ChannelFit> {
-    let of_output: Vec<&PredictionRow> =
-        predictions.iter().filter(|p| p.output == output && keep(p)).collect();
-    let noise = of_output
-        .iter()
-        .map(|p| p.noise)
-        .fold(None, |max: Option<f64>, s| Some(max.map_or(s, |m| m.max(s))))?;
-    Some(ChannelFit {
-        name: output.to_owned(),
-        noise,
-        train_rmse: rmse(of_output.iter().filter(|p| p.usage == "train")),
-        held_out_rmse: rmse(of_output.iter().filter(|p| p.usage != "train")),
-    })
+fn tally_of(tallies: &[Tally], output: &str) -> Option<usize> {
+    tallies.iter().position(|tally| tally.name == field_of(output))
 }
 
-/// Root mean square of observed − predicted over the rows that were observed.
-pub fn rmse<'a>(rows: impl Iterator<Item = &'a &'a PredictionRow>) -> Option<f64> {
-    let (sum, n) = rows
-        .filter_map(|p| Some(p.observed? - p.predicted))
-        .fold((0.0, 0_u32), |(sum, n), residual| (residual.mul_add(residual, sum), n + 1));
-    (n > 0).then(|| (sum / f64::from(n)).sqrt())
+/// Squared residuals of one output or field, summed.
+#[derive(Clone)]
+struct Tally {
+    name: String,
+    noise: Option<f64>,
+    train: (f64, u32),
+    held_out: (f64, u32),
+}
+
+impl Tally {
+    fn new(name: &str) -> Self {
+        Self { name: name.to_owned(), noise: None, train: (0.0, 0), held_out: (0.0, 0) }
+    }
+
+    fn add(&mut self, row: &PredictionRow) {
+        self.noise = Some(self.noise.map_or(row.noise, |noise| noise.max(row.noise)));
+        let part = if row.usage == "train" { &mut self.train } else { &mut self.held_out };
+        if let Some(residual) = row.observed.map(|observed| observed - row.predicted) {
+            part.0 = residual.mul_add(residual, part.0);
+            part.1 += 1;
+        }
+    }
+
+    /// The figures; none where nothing was predicted.
+    fn fit(&self) -> Option<ChannelFit> {
+        let rmse = |(sum, n): (f64, u32)| (n > 0).then(|| (sum / f64::from(n)).sqrt());
+        Some(ChannelFit {
+            name: self.name.clone(),
+            noise: self.noise?,
+            train_rmse: rmse(self.train),
+            held_out_rmse: rmse(self.held_out),
+        })
+    }
 }
 
 fn conditional_on(study: &Study) -> String {

@@ -4,6 +4,7 @@
 
 use starlings_estimators::{Drift, Transform, autocorrelation, nis_band, weak_directions};
 
+use super::field::field_of;
 use super::identify::words::{combination, members};
 use super::posterior::{prior, standard_deviations};
 use super::store::PredictionRow;
@@ -111,31 +112,55 @@ fn free_run(fit: &Fit, study: &Study, predictions: &[PredictionRow]) -> Option<S
     })
 }
 
+/// Autocorrelation of the residuals, a field's components together.
 fn autocorrelated(study: &Study, predictions: &[PredictionRow]) -> Vec<String> {
-    let mut found = Vec::new();
-    for output in &study.setup.outputs {
-        for record in &study.records {
-            let residuals: Vec<f64> = predictions
-                .iter()
-                .filter(|p| &p.output == output && p.record == record.name && p.usage == "train")
-                .filter_map(|p| Some(p.observed? - p.predicted))
-                .collect();
-            if residuals.len() < 20 {
-                continue;
-            }
-            let lag1 = autocorrelation(&residuals, 1).get(1).copied().unwrap_or(0.0);
-            if lag1 > 0.5 {
-                let effective = residuals.len() as f64 * (1.0 - lag1) / (1.0 + lag1);
-                found.push(format!(
-                    "residuals of {output} in {} are autocorrelated ({lag1:.2} at one sample): {} samples carry the \
-                     information of about {effective:.0}, and the intervals are too narrow.",
-                    record.name,
-                    residuals.len()
-                ));
-            }
-        }
+    let mut series: Vec<Residuals> = Vec::new();
+    for rows in predictions.chunk_by(|a, b| a.record == b.record && a.output == b.output) {
+        let trained = rows.iter().filter(|p| p.usage == "train");
+        let residuals: Vec<f64> = trained.filter_map(|p| Some(p.observed? - p.predicted)).collect();
+        let Some(row) = rows.first().filter(|_| residuals.len() >= 20) else { continue };
+        let lag1 = autocorrelation(&residuals, 1).get(1).copied().unwrap_or(0.0);
+        let (record, output) = (row.record.as_str(), field_of(&row.output));
+        let known = series.iter().position(|s| s.record == record && s.output == output);
+        let at = known.unwrap_or_else(|| {
+            series.push(Residuals { record, output, lag1: 0.0, n: 0, n_component: 0 });
+            series.len() - 1
+        });
+        series[at].lag1 += lag1;
+        series[at].n += residuals.len();
+        series[at].n_component += 1;
     }
-    found
+    // In the order of the outputs, then of the records.
+    let place = |s: &Residuals| {
+        let output = study.setup.outputs.iter().position(|o| field_of(o) == s.output);
+        (output, study.records.iter().position(|r| r.name == s.record))
+    };
+    series.sort_by_key(place);
+    series.iter().filter_map(Residuals::warning).collect()
+}
+
+/// The residuals of one output in one record.
+struct Residuals<'a> {
+    record: &'a str,
+    output: &'a str,
+    /// Sum over the components of the autocorrelation at one sample.
+    lag1: f64,
+    n: usize,
+    n_component: usize,
+}
+
+impl Residuals<'_> {
+    fn warning(&self) -> Option<String> {
+        let lag1 = self.lag1 / self.n_component as f64;
+        let effective = self.n as f64 * (1.0 - lag1) / (1.0 + lag1);
+        (lag1 > 0.5).then(|| {
+            format!(
+                "residuals of {} in {} are autocorrelated ({lag1:.2} at one sample): {} samples carry the information \
+                 of about {effective:.0}, and the intervals are too narrow.",
+                self.output, self.record, self.n
+            )
+        })
+    }
 }
 
 fn correlated_pairs(summary: &Summary) -> Vec<String> {

@@ -84,7 +84,8 @@ impl Truth {
         let times = grid(n, STEP * EVERY as f64);
         let noise = normals(n * self.cells, seed);
         let column = |cell: usize| -> Vec<f64> {
-            let noisy = |(i, row): (usize, &Vec<f64>)| row[cell] + share * self.noise * noise[i * self.cells + cell];
+            let noisy =
+                |(i, row): (usize, &Vec<f64>)| row[cell] + share * self.noise * noise[i * self.cells + cell];
             self.displacement.iter().enumerate().map(noisy).collect()
         };
         let columns: Vec<Vec<f64>> = std::iter::once(times).chain((0..self.cells).map(column)).collect();
@@ -209,9 +210,8 @@ pub fn after(done: &Done, step: usize) -> Vec<(f64, f64)> {
     let rows = done.table("estimates", "pass, step, parameter, mean, sd");
     let last: usize = rows.iter().map(|row| row[0].parse().unwrap()).max().unwrap();
     let find = |name: &str| {
-        let same = |row: &&Vec<String>| {
-            row[0].parse() == Ok(last) && row[1].parse() == Ok(step) && row[2] == name
-        };
+        let same =
+            |row: &&Vec<String>| row[0].parse() == Ok(last) && row[1].parse() == Ok(step) && row[2] == name;
         let row = rows.iter().find(same).unwrap_or_else(|| panic!("no estimate of {name} at step {step}"));
         (row[3].parse().unwrap(), row[4].parse().unwrap())
     };

@@ -23,10 +23,10 @@ use crate::model::Segment;
 use crate::{Drive, Model, ModelDef, ParticleError, Quantity, SetupError, Spec, layout};
 
 use assembly::Assembly;
-use circuit::{FlowOf, Law};
+use circuit::{Ends, FlowOf, Law};
 use netlist::Netlist;
 use shift::Source;
-use solve::{Given, Network, Solution};
+use solve::{Given, Network};
 use step::Span;
 use units::Measure;
 
@@ -37,10 +37,10 @@ pub struct RcrNetwork {
     sources: Vec<Source>,
     initial: Vec<f64>,
     flows: Vec<FlowOf>,
-    /// Resistive branches whose pressure drop is an output.
-    drops: Vec<usize>,
-    /// Resistive branches that switch.
-    valves: Vec<usize>,
+    /// Pressure differences that are outputs.
+    drops: Vec<Ends>,
+    /// Ends of the branches that switch, at zero pressure drop.
+    valves: Vec<Ends>,
 }
 
 /// Builds the network of a layout.
@@ -56,16 +56,16 @@ impl RcrNetwork {
         let assembly = Assembly::new(netlist)?;
         let outputs = outputs(&assembly);
         let network = Network::new(assembly.circuit)?;
-        let resistive = network.circuit.resistive.iter().enumerate();
-        let valves = resistive.filter_map(|(i, branch)| match branch.law {
-            Law::Diode { smooth, .. } if smooth <= 0.0 => Some(i),
+        let valves = network.circuit.resistive.iter().filter_map(|branch| match branch.law {
+            Law::Diode { smooth, .. } if smooth <= 0.0 => Some(branch.ends),
             _ => None,
         });
         Ok(Self {
             spec: Spec {
                 kind: "rcr-network".to_owned(),
-                says: "A network of resistances, capacitors, inertances, valves and Windkessels from a netlist."
-                    .to_owned(),
+                says:
+                    "A network of resistances, capacitors, inertances, valves and Windkessels from a netlist."
+                        .to_owned(),
                 states: assembly.states,
                 parameters: assembly.parameters.into_quantities(),
                 outputs,
@@ -78,7 +78,7 @@ impl RcrNetwork {
             sources: assembly.sources,
             initial: assembly.initial,
             flows: assembly.flows.into_iter().map(|(_, flow)| flow).collect(),
-            drops: assembly.drops.into_iter().map(|(_, at)| at).collect(),
+            drops: assembly.drops.into_iter().map(|(_, ends)| ends).collect(),
         })
     }
 
@@ -95,11 +95,6 @@ impl RcrNetwork {
         let (values, slopes) = both.split_at_mut(n);
         shift::read(&self.sources, t, theta, u, values, slopes);
         call(values, slopes)
-    }
-
-    /// Pressure drop that drives the flow of a resistive branch.
-    fn drop(&self, at: usize, solution: &Solution) -> f64 {
-        solution.drop(self.network.circuit.resistive[at].ends)
     }
 
     /// Advances over a span on which every signal is linear.
@@ -126,19 +121,19 @@ impl RcrNetwork {
     }
 }
 
-/// Pressure of every node, flow of every element, pressure drop of every loss and valve.
+/// Pressure of every node, flow of every element, pressure drop of every loss, valve and gauge.
 fn outputs(assembly: &Assembly) -> Vec<Quantity> {
     let quantity = |name: String, measure: Measure, says: String| {
         Quantity::new(&name, measure.label(assembly.units)).role(measure.role()).says(&says)
     };
-    let nodes = assembly.circuit.nodes[1..].iter().map(|node| {
-        quantity(format!("p_{node}"), Measure::Pressure, format!("Pressure at node `{node}`."))
-    });
+    let nodes = assembly.circuit.nodes[1..]
+        .iter()
+        .map(|node| quantity(format!("p_{node}"), Measure::Pressure, format!("Pressure at node `{node}`.")));
     let flows = assembly.flows.iter().map(|(name, _)| {
         quantity(format!("q_{name}"), Measure::Flow, format!("Flow through `{name}` in its own direction."))
     });
     let drops = assembly.drops.iter().map(|(name, _)| {
-        quantity(format!("dp_{name}"), Measure::Pressure, format!("Pressure drop across `{name}`."))
+        quantity(format!("dp_{name}"), Measure::Pressure, format!("Pressure drop `{name}`."))
     });
     nodes.chain(flows).chain(drops).collect()
 }
@@ -166,7 +161,7 @@ impl Model for RcrNetwork {
             self.network.rate_of(&solution, given, &mut dx);
             let pressures = solution.pressure[1..].iter().copied();
             let flows = self.flows.iter().map(|of| self.network.flow(*of, &solution, given, &dx));
-            let drops = self.drops.iter().map(|at| self.drop(*at, &solution));
+            let drops = self.drops.iter().map(|ends| solution.drop(*ends));
             for (y, value) in y.iter_mut().zip(pressures.chain(flows).chain(drops)) {
                 *y = value;
             }
@@ -187,8 +182,8 @@ impl Model for RcrNetwork {
         }
         self.with_signals(t, theta, u, |signals, slopes| {
             let solution = self.network.solve(Given { x, theta, signals, slopes });
-            for (g, at) in g.iter_mut().zip(&self.valves) {
-                *g = self.drop(*at, &solution);
+            for (g, ends) in g.iter_mut().zip(&self.valves) {
+                *g = solution.drop(*ends);
             }
         });
     }

@@ -3,6 +3,8 @@
 //! The model stands where its runs start, with the observed outputs of the setup: a setup that observes half a wall shows
 //! partial observation. Next file to read: [`super::observed`].
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Complex, DMatrix};
 
 use super::coordinates::Energy;
@@ -138,7 +140,7 @@ impl Laboratory {
 
     fn build(&self, kind: &str, gain: f64) -> Result<Box<dyn observer::Observer>, SetupError> {
         let own = self.observer.kind == kind || kind == "nudging";
-        let corrects = if own { self.observer.corrects.clone() } else { Default::default() };
+        let corrects = if own { self.observer.corrects.clone() } else { BTreeMap::default() };
         let def = ObserverDef { kind: kind.to_owned(), gain, corrects };
         let (spec, outputs, model, theta) = (&self.spec, &self.outputs[..], &*self.model, &self.theta[..]);
         observer::build(&def, Wiring { spec, outputs, model, theta })
@@ -159,9 +161,11 @@ fn start(setup: &Setup, model: &dyn Model, values: &[f64]) -> Result<(Vec<f64>, 
         return Err(SetupError::Invalid(format!("{given} parameter values for {wanted} parameters")));
     }
     let theta = binding.theta(values, 0.0).map_err(|error| SetupError::Invalid(error.to_string()))?;
-    let mut x = vec![0.0; model.spec().n_state()];
-    model.initial(&theta, &mut x);
+    let n_state = model.spec().n_state();
+    let mut x = vec![0.0; spec.n_state()];
+    model.initial(&theta, &mut x[..n_state]);
     binding.initial(values, &mut x);
+    x.truncate(n_state);
     Ok((theta, x))
 }
 
@@ -171,8 +175,6 @@ impl ObserverSpectrum {
     /// # Errors
     /// When the poles are not found.
     pub fn locus(&self, gains: &[f64], listed: usize) -> Result<Vec<Vec<Complex<f64>>>, SpectrumError> {
-        let mut ways = follow(&self.system, gains)?;
-        ways.truncate(listed);
-        Ok(ways)
+        follow(&self.system, gains, listed)
     }
 }

@@ -12,16 +12,26 @@ use super::observed::{Block, ObservedSystem};
 /// Halvings of a step of the gain before the nearest poles are matched as they are.
 const HALVINGS: usize = 5;
 
-/// The poles at every gain: `[pole][gain]`, the poles in the order of [`ObservedSystem::poles`] at the first gain.
+/// The first `listed` poles at every gain: `[pole][gain]`, in the order of [`ObservedSystem::poles`] at the first gain.
 ///
 /// # Errors
 /// As [`super::poles`].
-pub fn follow(system: &ObservedSystem, gains: &[f64]) -> Result<Vec<Vec<Complex<f64>>>, SpectrumError> {
+pub fn follow(
+    system: &ObservedSystem,
+    gains: &[f64],
+    listed: usize,
+) -> Result<Vec<Vec<Complex<f64>>>, SpectrumError> {
     let Some(&first) = gains.first() else { return Ok(Vec::new()) };
+    let start = system.poles(first)?;
+    let Some(largest) = start[..listed.min(start.len())].last().map(|pole| pole.norm()) else { return Ok(Vec::new()) };
     let mut ways: Vec<Vec<Complex<f64>>> =
         system.untouched.iter().map(|&pole| vec![pole; gains.len()]).collect();
     for block in &system.blocks {
         let mut at = block.poles(first)?;
+        // Rounding may differ from that of `start` in the last place only.
+        if at.iter().all(|pole| pole.norm() > (1.0 + 1e-9) * largest) {
+            continue;
+        }
         let mut own: Vec<Vec<Complex<f64>>> = at.iter().map(|&pole| vec![pole]).collect();
         for pair in gains.windows(2) {
             at = advance(block, &at, pair[0], pair[1], HALVINGS)?;
@@ -32,6 +42,7 @@ pub fn follow(system: &ObservedSystem, gains: &[f64]) -> Result<Vec<Vec<Complex<
         ways.extend(own);
     }
     ways.sort_by(|p, q| p[0].norm().total_cmp(&q[0].norm()).then(p[0].im.total_cmp(&q[0].im)));
+    ways.truncate(listed);
     Ok(ways)
 }
 

@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 
 use super::Foot;
-use super::search::Search;
+use super::search::{Nearest, Search};
 use super::topology::{Edge, Edges, checked, edge, sides};
 use super::triangle::{Part, closest};
 use super::vector::{cross, dot, minus, norm, plus, times, unit};
@@ -50,7 +50,8 @@ impl Mesh {
     /// The place nearest to a point; `None` when the point is not finite.
     pub fn foot(&self, x: [f64; 3]) -> Option<Foot<3>> {
         let corners = |triangle: usize| self.triangles[triangle].map(|v| self.vertices[v]);
-        let (triangle, point, part) = self.search.nearest(&x, |triangle| closest(&corners(triangle), &x))?;
+        let Nearest { facet: triangle, point, place: part, .. } =
+            self.search.nearest(&x, |triangle| closest(&corners(triangle), &x))?;
         let of = self.triangles[triangle];
         let face = (self.faces[triangle], false);
         let (outward, open) = match part {

@@ -3,8 +3,8 @@
 //! Both ends are open. Whether the line crosses itself is not looked at. Next file to read: [`super::mesh`].
 
 use super::Foot;
-use super::search::Search;
-use super::vector::{dot, minus, plus, times, unit};
+use super::search::{Nearest, Search};
+use super::vector::{dot, minus, norm, plus, times, unit};
 use crate::SetupError;
 
 /// Segments between neighbouring points, the axis on their right as z increases.
@@ -34,7 +34,7 @@ impl Profile {
                 ));
             }
         }
-        if let Some(i) = points.windows(2).position(|pair| pair[0] == pair[1]) {
+        if let Some(i) = points.windows(2).position(|pair| norm(&minus(&pair[1], &pair[0])) == 0.0) {
             return refuse(format!("points {i} and {} of the profile are the same: remove one", i + 1));
         }
         // ∫ r² dz, up to π the volume inside.
@@ -59,7 +59,8 @@ impl Profile {
 
     /// The place nearest to a point (z, r); `None` when the point is not finite.
     pub fn foot(&self, x: [f64; 2]) -> Option<Foot<2>> {
-        let (segment, point, share) = self.search.nearest(&x, |segment| self.closest(segment, &x))?;
+        let Nearest { facet: segment, point, place: share, .. } =
+            self.search.nearest(&x, |segment| self.closest(segment, &x))?;
         let own = self.normals[segment];
         // Between two segments both normals count; the sum sees every point on its right side.
         let (outward, open) = match share {

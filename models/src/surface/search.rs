@@ -17,6 +17,16 @@ pub(super) struct Search<const D: usize> {
     reach: f64,
 }
 
+/// The nearest place of all facets.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Nearest<const D: usize, T> {
+    distance: f64,
+    pub(super) facet: usize,
+    pub(super) point: [f64; D],
+    /// Where on the facet.
+    pub(super) place: T,
+}
+
 impl<const D: usize> Search<D> {
     /// Centres of facets, each given by its corners.
     ///
@@ -35,24 +45,24 @@ impl<const D: usize> Search<D> {
         Ok(Self { centres, reach })
     }
 
-    /// The facet whose place nearest to `x`, as `closest` finds it, is nearest of all, and that place; `None` when `x` is not
-    /// finite.
+    /// The facet that comes nearest to `x`, where `closest` finds a facet's nearest point and its place; `None` when `x` is
+    /// not finite.
     pub(super) fn nearest<T: Copy>(
         &self,
         x: &[f64; D],
         closest: impl Fn(usize) -> ([f64; D], T),
-    ) -> Option<(usize, [f64; D], T)> {
-        let mut best: Option<(f64, (usize, [f64; D], T))> = None;
+    ) -> Option<Nearest<D, T>> {
+        let mut best: Option<Nearest<D, T>> = None;
         for (square, &facet) in self.centres.iter_nearest(x, &squared_euclidean).ok()? {
-            if best.is_some_and(|(nearest, _)| square.sqrt() - self.reach > nearest) {
+            if best.is_some_and(|best| square.sqrt() - self.reach > best.distance) {
                 break;
             }
             let (point, place) = closest(facet);
             let distance = norm(&minus(x, &point));
-            if best.is_none_or(|(nearest, _)| distance < nearest) {
-                best = Some((distance, (facet, point, place)));
+            if best.is_none_or(|best| distance < best.distance) {
+                best = Some(Nearest { distance, facet, point, place });
             }
         }
-        best.map(|(_, found)| found)
+        best
     }
 }

@@ -57,7 +57,8 @@ fn pendulum() -> EquationsDef {
 pub(crate) fn window(setup: &Setup, n: usize) -> Window {
     let spec = setup.spec().unwrap();
     let n_input = spec.inputs.len();
-    let n_obs: usize = setup.outputs.iter().map(|name| Spec::range_of(&spec.outputs, name).unwrap().len()).sum();
+    let n_obs: usize =
+        setup.outputs.iter().map(|name| Spec::range_of(&spec.outputs, name).unwrap().len()).sum();
     let times: Vec<f64> = (1..=n).map(|i| i as f64 / n as f64).collect();
     // Samples that do not fall on observation times, so that steps are split.
     let sampled: Vec<f64> = (0..=37).map(|i| f64::from(i) / 36.0 - 0.004).collect();

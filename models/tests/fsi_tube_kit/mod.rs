@@ -117,9 +117,8 @@ impl Dense {
         let added = c.transpose() * &face * &c;
         let (l, friction) = (1.06 / section, 8.0 * PI * 0.035 / (section * section));
         let young = |j: usize| 5e6 * f64::exp2(OCTAVES[j * 5 / n]);
-        let stiffness = DMatrix::from_fn(n, n, |i, j| {
-            if i == j { s * (young(i) * 0.15 / (1.0 - 0.25) + k_s) } else { 0.0 }
-        });
+        let ring = |i: usize, _| s * (young(i) * 0.15 / (1.0 - 0.25) + k_s);
+        let stiffness = DMatrix::from_diagonal(&DVector::from_fn(n, ring));
         let (r_p, r_d, compliance) = (150.0, 1850.0, 1e-3);
         let wall = DVector::from_element(n, s);
         let added_mass = l * &added;

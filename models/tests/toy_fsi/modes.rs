@@ -98,7 +98,7 @@ fn the_largest_real_parts_are_those_of_the_tables() {
 
 #[test]
 fn the_best_gain_is_the_critical_damping_of_the_slowest_mode() {
-    // Printed to two digits, and to three for the gain of direct velocity feedback.
+    // Printed to two digits behind the point; the gain of velocity feedback to three digits in all.
     for (toy, sdf, dvf) in [
         (artery(), [602.22, -301.11], [3.23e4, -236.67]),
         (soft(), [552.89, -276.45], [2.11e4, -217.56]),
@@ -108,7 +108,8 @@ fn the_best_gain_is_the_critical_damping_of_the_slowest_mode() {
             close(&[best.gain, best.max_re], &sdf, 5e-3, kind);
         }
         let best = toy.best("dvf");
-        close(&[best.max_re], &dvf[1..], 5e-3, "dvf");
+        // A corner of two modes, which the table found on a grid of gains: the bottom is a little lower, the gain near.
+        assert!(best.max_re < dvf[1] + 5e-3 && best.max_re > 1.001 * dvf[1], "{best:?}");
         close_relative(&[best.gain], &dvf[..1], 2e-3, "dvf");
     }
 }

@@ -103,9 +103,9 @@ fn viscosity_only_takes_energy_and_a_retarded_wall_takes_more() {
         }
         before / energy(&toy, &start)
     };
-    let (inviscid, viscous, retarded) = (left(&[("mu", 0.0)]), left(&[]), left(&[("tau", 2e-5)]));
+    let (inviscid, viscous, retarded) = (left(&[("mu", 0.0)]), left(&[]), left(&[("tau", 1e-4)]));
     assert!((inviscid - 1.0).abs() < 1e-12, "{inviscid}");
-    assert!(viscous < 0.99 && retarded < 0.9 * viscous, "{viscous} {retarded}");
+    assert!(viscous < 0.99 && retarded < 0.8 * viscous, "{viscous} {retarded}");
 }
 
 #[test]

@@ -52,6 +52,13 @@ impl Axis {
         Self { scale, ..Self::tight(label, values) }
     }
 
+    /// An axis over whole numbers, each with half of the room to its neighbours.
+    pub(crate) fn counted(label: &str, values: impl IntoIterator<Item = f64>) -> Self {
+        let (lo, hi) = finite_range(values).unwrap_or((0.0, 1.0));
+        let (lo, hi) = widen((lo - 0.5, hi + 0.5));
+        Self { label: label.to_owned(), lo, hi, scale: Scale::Whole }
+    }
+
     /// An axis that holds the finite `values` with a margin.
     pub(crate) fn around(label: &str, values: impl IntoIterator<Item = f64>) -> Self {
         let (lo, hi) = finite_range(values).map_or((0.0, 1.0), widen);
@@ -180,11 +187,12 @@ mod tests {
     }
 
     /// Every way to make an axis, over the same values.
-    fn every_kind(values: &[f64]) -> [Axis; 4] {
+    fn every_kind(values: &[f64]) -> [Axis; 5] {
         let values = || values.iter().copied();
         [
             Axis::tight("x", values()),
             Axis::over_run("x", values()),
+            Axis::counted("x", values()),
             Axis::around("x", values()).with_headroom(),
             Axis::log_around("x", values()).with_headroom(),
         ]

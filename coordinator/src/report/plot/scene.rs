@@ -56,15 +56,7 @@ impl Scene {
     ///
     /// The drawing library refuses a mark.
     pub(crate) fn draw(&self, surface: &Surface<'_>) -> Result<(), ReportError> {
-        let (x_ticks, y_ticks) = (self.x.ticks(6), self.y.ticks(5));
-        let longest = y_ticks.iter().map(|t| t.text.chars().count()).max().unwrap_or(1);
-        let mut chart: Chart<'_, '_> = ChartBuilder::on(surface)
-            .margin_top(units(28))
-            .margin_right(units(18))
-            .x_label_area_size(units(46))
-            .y_label_area_size(units(14 + whole(longest) * TEXT * 6 / 10))
-            .build_cartesian_2d(Ticked::new(&self.x, x_ticks), Ticked::new(&self.y, y_ticks))
-            .map_err(ReportError::drawing)?;
+        let mut chart = self.chart(surface)?;
         for mark in self.marks.iter().filter(|mark| matches!(mark, Mark::Span { .. })) {
             self.draw_mark(&mut chart, mark)?;
         }
@@ -76,6 +68,37 @@ impl Scene {
         write(surface, (units(4), units(3)), &self.y.label, INK, Pos::new(HPos::Left, VPos::Top))?;
         let corner = (whole(width) - units(18), whole(height) - units(5));
         write(surface, corner, &self.x.label, INK, Pos::new(HPos::Right, VPos::Bottom))
+    }
+
+    /// Where points stand in a drawing of the given size in figure units, in drawing units; points that are not finite have
+    /// no place.
+    ///
+    /// # Errors
+    ///
+    /// The drawing library refuses the axes.
+    pub(crate) fn positions(
+        &self,
+        (width, height): (i32, i32),
+        points: &[Point],
+    ) -> Result<Vec<Option<(i32, i32)>>, ReportError> {
+        let mut unused = String::new();
+        let surface = SVGBackend::with_string(&mut unused, (units(width) as u32, units(height) as u32));
+        let surface = surface.into_drawing_area();
+        let chart = self.chart(&surface)?;
+        let place = |p: &Point| self.place(&[*p]).first().map(|at| chart.backend_coord(at));
+        Ok(points.iter().map(place).collect())
+    }
+
+    fn chart<'a, 'b>(&self, surface: &'a Surface<'b>) -> Result<Chart<'a, 'b>, ReportError> {
+        let (x_ticks, y_ticks) = (self.x.ticks(6), self.y.ticks(5));
+        let longest = y_ticks.iter().map(|t| t.text.chars().count()).max().unwrap_or(1);
+        ChartBuilder::on(surface)
+            .margin_top(units(28))
+            .margin_right(units(18))
+            .x_label_area_size(units(46))
+            .y_label_area_size(units(14 + whole(longest) * TEXT * 6 / 10))
+            .build_cartesian_2d(Ticked::new(&self.x, x_ticks), Ticked::new(&self.y, y_ticks))
+            .map_err(ReportError::drawing)
     }
 
     fn draw_mark(&self, chart: &mut Chart<'_, '_>, mark: &Mark) -> Result<(), ReportError> {

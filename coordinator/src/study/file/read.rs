@@ -172,11 +172,13 @@ fn channels(source: &Source, record: &Table<'_>) -> Vec<ChannelSection> {
             column: t.required_text("column", "a column of the record's file"),
             output: t.required_text("output", "the output of the model that was measured"),
             unit: t.text("unit"),
+            from: t.text("from"),
+            start: t.number("start"),
             noise: noise.unwrap_or_else(|| Spanned::new(t.span.clone(), None)),
         }
     };
     record
-        .tables("channels", "a channel", &["column", "output", "unit", "noise"])
+        .tables("channels", "a channel", &["column", "output", "unit", "noise", "from", "start"])
         .into_iter()
         .map(read)
         .collect()

@@ -4,6 +4,8 @@
 
 use starlings_models::Spec;
 
+use super::derived::Derived;
+use super::noise::Noise;
 use super::part::Part;
 use super::{Context, Table};
 use crate::study::checked::Channel;
@@ -58,28 +60,24 @@ impl ChannelReader<'_> {
     fn channel(&self, section: &ChannelSection, context: &mut Context<'_>) -> Option<Vec<Channel>> {
         let quantity = self.quantity(section)?;
         let parts = self.parts(section, quantity)?;
+        let derived = self.derived(section)?;
         let read = |part: Part| Some((self.values(section, &part)?, part));
         let mut measured: Vec<(Vec<f64>, Part)> = parts.into_iter().map(read).collect::<Option<_>>()?;
         // A component without any value is one that the file lacks.
         measured.retain(|(values, _)| measured_somewhere(values));
-        if !measured.iter().any(|(values, _)| self.has_value(values)) {
+        if !measured.iter().any(|(values, _)| self.has_value(&derived.values(&self.table.times, values))) {
             self.no_value(section, measured.is_empty());
             return None;
         }
-        let unit = section.unit.as_ref().map(|u| u.get_ref().clone()).filter(|u| !u.is_empty());
-        let label = unit.as_deref().unwrap_or(&quantity.unit);
-        let values: Vec<&[f64]> = measured.iter().map(|(values, _)| values.as_slice()).collect();
-        let noise = self.noise(section, &values, label)?;
-        if noise.how.starts_with("from") {
-            context.warnings.push(format!(
-                "the noise of `{}` in record `{}` was not given: {} was found {}. Give the sensor's standard \
-                 deviation if it is known.",
-                section.output.get_ref(),
-                self.name(),
-                with_unit(noise.sd, label),
-                noise.how
-            ));
-        }
+        let written = section.unit.as_ref().map(|u| u.get_ref().clone()).filter(|u| !u.is_empty());
+        let columns: Vec<&[f64]> = measured.iter().map(|(values, _)| values.as_slice()).collect();
+        let label = written.as_deref().unwrap_or(&quantity.unit);
+        let found = self.noise(section, &columns, label)?;
+        context.warnings.extend(self.noise_warning(section, &found, label));
+        let noise = self.derived_noise(derived, &columns, found);
+        context.warnings.extend(self.derived_warning(section, derived, &noise, &quantity.unit));
+        // A unit belongs to the column; what is derived from it is in the output's.
+        let unit = written.filter(|_| derived == Derived::Itself);
         let channel = |(values, part): (Vec<f64>, Part)| Channel {
             row: context.row(&part.output),
             held_out: context.is_held_out(&part.output),
@@ -88,9 +86,61 @@ impl ChannelReader<'_> {
             unit: unit.clone(),
             noise: noise.sd,
             noise_how: noise.how.clone(),
-            values,
+            values: derived.values(&self.table.times, &values),
         };
         Some(measured.into_iter().map(channel).collect())
+    }
+
+    /// A noise that the study does not give is worth a word.
+    fn noise_warning(&self, section: &ChannelSection, noise: &Noise, label: &str) -> Option<String> {
+        noise.how.starts_with("from").then(|| {
+            format!(
+                "the noise of `{}` in record `{}` was not given: {} was found {}. Give the sensor's standard \
+                 deviation if it is known.",
+                section.output.get_ref(),
+                self.name(),
+                with_unit(noise.sd, label),
+                noise.how
+            )
+        })
+    }
+
+    /// The noise of what is derived from columns of this noise.
+    fn derived_noise(&self, derived: Derived, columns: &[&[f64]], column: Noise) -> Noise {
+        let Some(first) = columns.first().filter(|_| derived != Derived::Itself) else { return column };
+        let (spread, last) = self.spread(derived, first);
+        let how = match derived {
+            Derived::Integral => format!("a centred difference of values with {:.3e} each", column.sd),
+            _ => format!(
+                "{:.3e} at the end, where the errors of {:.3e} of all rates have added up; the root mean square over the \
+                 record",
+                column.sd * last,
+                column.sd
+            ),
+        };
+        Noise { sd: column.sd * spread, how }
+    }
+
+    fn derived_warning(
+        &self,
+        section: &ChannelSection,
+        derived: Derived,
+        noise: &Noise,
+        unit: &str,
+    ) -> Option<String> {
+        let (output, column, sd) =
+            (section.output.get_ref(), section.column.get_ref(), with_unit(noise.sd, unit));
+        let made = match derived {
+            Derived::Itself => return None,
+            Derived::Rate { .. } => "integrated",
+            Derived::Integral => "differentiated",
+        };
+        Some(format!(
+            "`{output}` in record `{}` is column `{column}` {made}: its noise is taken as {sd} ({}), and its errors are \
+             not independent in time: intervals are approximate.",
+            self.name(),
+            noise.how
+        ))
     }
 
     /// The column's values at every row.

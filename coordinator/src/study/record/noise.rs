@@ -59,7 +59,7 @@ impl ChannelReader<'_> {
     }
 
     /// The values at the rows that count.
-    fn used(&self, values: &[f64]) -> Vec<f64> {
+    pub(super) fn used(&self, values: &[f64]) -> Vec<f64> {
         let rows = values.iter().zip(&self.table.times);
         rows.filter(|(_, t)| self.is_used(**t)).map(|(v, _)| *v).collect()
     }

@@ -8,12 +8,13 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
+use starlings_models::Role;
 
 use crate::study::expand::INITIAL;
 use crate::study::field::quantity_of;
 use crate::study::store::{Store, StoreError};
 use crate::study::summary::Summary;
-use crate::study::{Fit, Study, posterior};
+use crate::study::{Fit, Study, ThetaEntry, posterior};
 
 /// What the store keeps of the study so that a report needs nothing else.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -36,6 +37,9 @@ pub struct StudyInfo {
     pub outputs: Vec<(String, String)>,
     /// Names of parameters that are estimated through a logarithm.
     pub logarithmic: Vec<String>,
+    /// Names of parameters that are a stiffness.
+    #[serde(default)]
+    pub stiffness: Vec<String>,
     /// Record names and training spans; `None` for a record that is held out as a whole.
     pub records: Vec<(String, Option<[f64; 2]>)>,
     /// The command line of the run.
@@ -93,6 +97,9 @@ pub struct RunFolder {
     /// Held for as long as this process runs in the folder.
     _lock: Option<File>,
 }
+
+/// Name under which the store keeps the course of the innovations with and without the observer.
+pub(crate) const OBSERVER: &str = "observer";
 
 /// The files that a run writes beside its database.
 const FILES: [&str; 4] = ["study.toml", "posterior.csv", "summary.json", "report.html"];
@@ -192,7 +199,7 @@ pub(crate) fn write(path: &Path, text: &str) -> io::Result<()> {
     std::fs::rename(&partial, path)
 }
 
-fn json(value: &impl Serialize) -> String {
+pub(crate) fn json(value: &impl Serialize) -> String {
     serde_json::to_string(value).unwrap_or_default()
 }
 
@@ -224,6 +231,15 @@ fn fingerprint(study: &Study) -> String {
     hasher.finalize().to_hex().to_string()
 }
 
+/// Names in the estimated vector of parameters that the model calls a stiffness.
+fn stiffness(study: &Study) -> Vec<String> {
+    let is_one = |entry: &&ThetaEntry| {
+        let name = &study.parameters[entry.parameter].name;
+        quantity_of(&study.spec.parameters, name).is_some_and(|q| q.role == Role::Stiffness)
+    };
+    study.theta.iter().filter(is_one).map(|entry| entry.name.clone()).collect()
+}
+
 fn info(study: &Study, command: &str, started: &str) -> StudyInfo {
     use starlings_estimators::Transform;
     let unit = |output: &String| {
@@ -246,6 +262,7 @@ fn info(study: &Study, command: &str, started: &str) -> StudyInfo {
             .filter(|t| matches!(t.transform, Transform::Log | Transform::Log2))
             .map(|t| t.name.clone())
             .collect(),
+        stiffness: stiffness(study),
         records: study.records.iter().map(|r| (r.name.clone(), r.train_span())).collect(),
         command: command.to_owned(),
         started: started.to_owned(),

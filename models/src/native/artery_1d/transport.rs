@@ -1,7 +1,7 @@
 //! Convection, pressure and friction: the hyperbolic part of the equations by finite volumes.
 //!
-//! Second order in space: elastic pressure and flow are linear in each cell, with slopes limited as by van Leer (1977), and
-//! faces have one wall each, so that the areas on the two sides of a face are equal where the pressures are: a state at rest
+//! Second order in space: elastic pressure and flow are linear in each cell, with slopes limited at
+//! fronts (van Leer 1979), and faces have one wall each, so that the areas on the two sides of a face are equal where the pressures are: a state at rest
 //! stays at rest for any radius and stiffness along the vessel (hydrostatic reconstruction, Audusse et al. 2004; Delestre &
 //! Lagrée 2013). Faces inside a tube take the flux of Harten, Lax & van Leer (1983), written as differences from its two
 //! sides; the force of the pressure inside a cell is that of its own reconstruction. Next file to read: [`super::viscous`].
@@ -113,8 +113,9 @@ impl Vessels<'_> {
         let pressure = &faces.pressure[cells.clone()];
         let n = self.network.n_cell;
         let flow = &x[n + of.first..n + of.first + of.n];
+        let [smooth_pressure, smooth_flow] = self.smooth(tube);
         for j in 0..of.n {
-            let (dp, dq) = (0.5 * slope(pressure, j), 0.5 * slope(flow, j));
+            let (dp, dq) = (0.5 * slope(pressure, j, smooth_pressure), 0.5 * slope(flow, j, smooth_flow));
             let side = |face: usize, sign: f64| {
                 let (pressure, flow) = (pressure[j] + sign * dp, flow[j] + sign * dq);
                 Side { area: self.faces[face].area(pressure), flow, pressure }
@@ -127,6 +128,16 @@ impl Vessels<'_> {
             faces.before[first + j + 1] = before;
         }
         Ok(())
+    }
+
+    /// Squared differences of pressure and flow that count as smooth in a tube.
+    fn smooth(&self, tube: usize) -> [f64; 2] {
+        let of = &self.network.tubes[tube];
+        let ring = self.cells[of.first];
+        let area = ring.area(0.0);
+        let [pressure, flow] = [ring.stiffness * ring.radius, area * ring.speed(area, self.rho)];
+        let part = SMOOTH * (of.dx / ring.radius).powi(3);
+        [part * pressure * pressure, part * flow * flow]
     }
 
     /// Harten, Lax & van Leer's flux at the faces between the cells of a tube.
@@ -221,8 +232,12 @@ impl Vessels<'_> {
 /// Part of a cell that the fastest wave may cross in a step: half keeps areas positive with linear reconstruction.
 const COURANT: f64 = 0.5;
 
-/// Limited difference across cell j; plain at the ends, which have one neighbour.
-fn slope(values: &[f64], j: usize) -> f64 {
+/// Squared differences below which a slope is not limited, per squared scale of the values and (dx/R0)³: small enough to
+/// vanish beside those of a front, large enough to leave a smooth crest its slope (Venkatakrishnan 1995).
+const SMOOTH: f64 = 0.01;
+
+/// Limited difference across cell j (van Albada, van Leer & Roberts 1982); plain at the ends, which have one neighbour.
+fn slope(values: &[f64], j: usize, smooth: f64) -> f64 {
     let last = values.len() - 1;
     if j == 0 {
         return values[1] - values[0];
@@ -231,9 +246,6 @@ fn slope(values: &[f64], j: usize) -> f64 {
         return values[last] - values[last - 1];
     }
     let (back, ahead) = (values[j] - values[j - 1], values[j + 1] - values[j]);
-    if back * ahead <= 0.0 {
-        return 0.0;
-    }
-    let least = 2.0 * back.abs().min(ahead.abs());
-    (0.5 * (back + ahead)).clamp(-least, least)
+    let (wb, wa) = (ahead * ahead + smooth, back * back + smooth);
+    (wb * back + wa * ahead) / (wb + wa)
 }

@@ -38,7 +38,8 @@ pub(super) struct Coefficients {
 impl Coefficients {
     /// Reads the parameters that follow those of the regions; `n` cells.
     pub(super) fn new(shared: &[f64], n: usize) -> Self {
-        let &[young_ref, length, radius, h, nu, rho_s, rho_f, mu, c_w, k_s, c_s, r_p, r_d, c, p0] = shared else {
+        let &[young_ref, length, radius, h, nu, rho_s, rho_f, mu, c_w, k_s, c_s, r_p, r_d, c, p0] = shared
+        else {
             unreachable!("a tube shares 15 parameters between its regions, not {}", shared.len());
         };
         let dx = length / n as f64;

@@ -125,7 +125,10 @@ impl Layout {
         }
         let region = |i: usize| {
             let (from, to) = (length * i as f64 / n as f64, length * (i + 1) as f64 / n as f64);
-            Part { says: format!("{from} to {to} cm"), n_cell: self.cells_up_to(i + 1, n) - self.cells_up_to(i, n) }
+            Part {
+                says: format!("{from} to {to} cm"),
+                n_cell: self.cells_up_to(i + 1, n) - self.cells_up_to(i, n),
+            }
         };
         Ok((0..n).map(region).collect())
     }

@@ -88,9 +88,8 @@ fn wall() -> [Quantity; 11] {
 }
 
 fn outlet() -> [Quantity; 4] {
-    let resistance = |name: &str, value: f64| {
-        Quantity::new(name, "dyn s/cm^5").role(Role::Resistance).default(value)
-    };
+    let resistance =
+        |name: &str, value: f64| Quantity::new(name, "dyn s/cm^5").role(Role::Resistance).default(value);
     [
         resistance("R_p", 150.0).range(0.0, f64::INFINITY).says("Proximal resistance of the Windkessel."),
         resistance("R_d", 1850.0).positive().says("Distal resistance of the Windkessel."),

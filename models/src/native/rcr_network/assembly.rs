@@ -2,8 +2,8 @@
 //!
 //! Next file to read: [`super::elements`], which adds one element; then [`super::circuit`].
 
-use super::circuit::{Circuit, FlowOf, Resistive};
-use super::netlist::{Element, GROUND, Kind, Netlist};
+use super::circuit::{Circuit, Ends, FlowOf, Resistive};
+use super::netlist::{Element, GROUND, Gauge, Kind, Netlist};
 use super::parameters::{Parameters, identifier};
 use super::shift::Source;
 use super::units::{Measure, System};
@@ -21,8 +21,8 @@ pub(super) struct Assembly {
     pub(super) sources: Vec<Source>,
     /// Flow of every element, in the order of the netlist.
     pub(super) flows: Vec<(String, FlowOf)>,
-    /// Resistive branches with an output of their own for the pressure drop.
-    pub(super) drops: Vec<(String, usize)>,
+    /// Pressure differences that are outputs.
+    pub(super) drops: Vec<(String, Ends)>,
     /// Pairs of an output and the state that it measures.
     pub(super) measures: Vec<(String, String)>,
     pub(super) units: System,
@@ -58,7 +58,29 @@ impl Assembly {
             return Err(fault(place, message));
         }
         assembly.check_ends(netlist)?;
+        for (i, gauge) in netlist.gauges.iter().enumerate() {
+            assembly.gauge(gauge, &format!("gauges[{i}]"))?;
+        }
         Ok(assembly)
+    }
+
+    /// Adds a pressure difference between nodes that elements end at.
+    fn gauge(&mut self, gauge: &Gauge, path: &str) -> Result<(), SetupError> {
+        check_name(&gauge.name, "a gauge", path)?;
+        if self.drops.iter().any(|(name, _)| *name == gauge.name) {
+            let message = format!("there is a pressure drop `dp_{}` already: names are unique", gauge.name);
+            return Err(fault(&format!("{path}.name"), message));
+        }
+        let find = |name: &String, end: &str| {
+            self.circuit.nodes.iter().position(|node| node == name).ok_or_else(|| {
+                let near = nearest(name, &self.circuit.nodes).map(|n| format!("; did you mean `{n}`?"));
+                let message = format!("no node named `{name}`{}", near.unwrap_or_default());
+                fault(&format!("{path}.{end}"), message)
+            })
+        };
+        let ends = Ends { from: find(&gauge.from, "from")?, to: find(&gauge.to, "to")? };
+        self.drops.push((gauge.name.clone(), ends));
+        Ok(())
     }
 
     /// The ground and the declared nodes.

@@ -91,17 +91,18 @@ impl Assembly {
         let value = element.quadratic.as_ref();
         let quadratic = self.value(element, path, Measure::QuadraticLoss, ("quadratic", "Kq", value))?;
         let at = self.branch(ends, Law::Loss { linear, quadratic }, None);
-        self.drops.push((element.name.clone(), at));
+        self.drops.push((element.name.clone(), ends));
         Ok(FlowOf::Resistive(at))
     }
 
     fn diode(&mut self, element: &Element, ends: Ends, path: &str) -> Result<FlowOf, SetupError> {
-        let open = self.value(element, path, Measure::Resistance, ("open", "Ropen", element.open.as_ref()))?;
+        let open =
+            self.value(element, path, Measure::Resistance, ("open", "Ropen", element.open.as_ref()))?;
         let value = element.closed.as_ref();
         let closed = self.value(element, path, Measure::Resistance, ("closed", "Rclosed", value))?;
         let smooth = element.smooth.unwrap_or(0.0);
         let at = self.branch(ends, Law::Diode { open, closed, smooth }, None);
-        self.drops.push((element.name.clone(), at));
+        self.drops.push((element.name.clone(), ends));
         Ok(FlowOf::Resistive(at))
     }
 
@@ -147,7 +148,8 @@ impl Assembly {
                 Level::Parameter(self.value(element, path, Measure::Pressure, slot)?)
             }
             (Some(_), _, _) => {
-                let message = "a pressure source has a constant `value`, or an `input`: remove one of the two";
+                let message =
+                    "a pressure source has a constant `value`, or an `input`: remove one of the two";
                 return Err(fault(path, message));
             }
             (None, _, _) => Level::Signal(self.source(element, Measure::Pressure, path)?),
@@ -171,8 +173,7 @@ impl Assembly {
     fn capacitor(&mut self, storage: Storage<'_>) -> Result<FlowOf, SetupError> {
         let Ends { from, to } = storage.ends;
         // The ground comes last, so that the state is a node's pressure.
-        let (ends, sign) =
-            if from == 0 { (Ends { from: to, to: from }, -1.0) } else { (storage.ends, 1.0) };
+        let (ends, sign) = if from == 0 { (Ends { from: to, to: from }, -1.0) } else { (storage.ends, 1.0) };
         let beside = self.circuit.ties.iter().position(|tie| {
             let same = tie.ends == ends || (tie.ends.from == ends.to && tie.ends.to == ends.from);
             same && matches!(tie.kind, TieKind::Capacitors { .. })
@@ -202,12 +203,7 @@ impl Assembly {
     }
 
     /// The state of a new capacitor: the pressure of its node, or the drop across it where it is not grounded.
-    fn stored_pressure(
-        &mut self,
-        storage: &Storage<'_>,
-        ends: Ends,
-        sign: f64,
-    ) -> Result<usize, SetupError> {
+    fn stored_pressure(&mut self, storage: &Storage<'_>, ends: Ends, sign: f64) -> Result<usize, SetupError> {
         let pressure = Measure::Pressure;
         let quantity = |name: &str| Quantity::new(name, pressure.label(self.units)).role(pressure.role());
         if ends.to != 0 {
@@ -222,7 +218,8 @@ impl Assembly {
         let listed = listed.map(|at| self.node_initial.remove(at));
         let initial = match (listed, storage.initial) {
             (Some((_, _, place)), Some(_)) => {
-                let message = format!("`{}` gives this node's pressure at the start too: remove one", storage.name);
+                let message =
+                    format!("`{}` gives this node's pressure at the start too: remove one", storage.name);
                 return Err(fault(&place, message));
             }
             (Some((_, value, _)), None) => value,
@@ -236,5 +233,8 @@ impl Assembly {
 
 fn capital(text: &str) -> String {
     let mut letters = text.chars();
-    letters.next().map(|first| first.to_uppercase().collect::<String>() + letters.as_str()).unwrap_or_default()
+    letters
+        .next()
+        .map(|first| first.to_uppercase().collect::<String>() + letters.as_str())
+        .unwrap_or_default()
 }

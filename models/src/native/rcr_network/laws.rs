@@ -1,6 +1,6 @@
-//! The laws of resistive branches: flow, conductance and co-content for a pressure drop.
+//! The laws of resistive branches: flow and conductance for a pressure drop.
 //!
-//! Each flow is an increasing, once continuously differentiable (a sharp diode: continuous) function of the drop, and its
+//! Each flow is an increasing, once continuously differentiable (a sharp diode: continuous) function of the drop, so its
 //! integral over the drop, the co-content (Millar 1951), is convex: what makes the nodal equations uniquely solvable.
 //! Next file to read: [`super::solve`].
 
@@ -23,8 +23,6 @@ pub(super) struct At {
     pub(super) flow: f64,
     /// dq/dΔp.
     pub(super) conductance: f64,
-    /// ∫ q dΔp from 0.
-    pub(super) co_content: f64,
 }
 
 impl Law {
@@ -47,10 +45,7 @@ impl Valued {
             Self::Linear { conductance } => linear(conductance, drop),
             Self::Loss { linear, quadratic } => {
                 let root = (linear * linear + 4.0 * quadratic * drop.abs()).sqrt();
-                let flow = 2.0 * drop / (linear + root);
-                let size = flow.abs();
-                let co_content = size * size * (0.5 * linear + 2.0 / 3.0 * quadratic * size);
-                At { flow, conductance: 1.0 / root, co_content }
+                At { flow: 2.0 * drop / (linear + root), conductance: 1.0 / root }
             }
             Self::Diode { closed, .. } if drop <= 0.0 => linear(closed, drop),
             Self::Diode { open, closed, smooth } => {
@@ -59,7 +54,6 @@ impl Valued {
                 At {
                     flow: base.flow + more * opening.flow,
                     conductance: base.conductance + more * opening.conductance,
-                    co_content: base.co_content + more * opening.co_content,
                 }
             }
         }
@@ -67,22 +61,16 @@ impl Valued {
 }
 
 fn linear(conductance: f64, drop: f64) -> At {
-    At { flow: conductance * drop, conductance, co_content: 0.5 * conductance * drop * drop }
+    At { flow: conductance * drop, conductance }
 }
 
 /// A diode of unit conductance above zero drop.
 fn opening(drop: f64, smooth: f64) -> At {
     if drop < smooth {
-        return At {
-            flow: drop * drop / (2.0 * smooth),
-            conductance: drop / smooth,
-            co_content: drop.powi(3) / (6.0 * smooth),
-        };
+        At { flow: drop * drop / (2.0 * smooth), conductance: drop / smooth }
+    } else {
+        At { flow: drop - 0.5 * smooth, conductance: 1.0 }
     }
-    let beyond = drop - smooth;
-    let flow = drop - 0.5 * smooth;
-    let co_content = smooth * smooth / 6.0 + beyond * 0.5 * (0.5 * smooth + flow);
-    At { flow, conductance: 1.0, co_content }
 }
 
 #[cfg(test)]
@@ -90,7 +78,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn flow_is_the_slope_of_the_co_content_and_conductance_the_slope_of_the_flow() {
+    fn the_conductance_is_the_slope_of_the_flow_and_never_zero() {
         let laws = [
             Valued::Linear { conductance: 0.3 },
             Valued::Loss { linear: 0.05, quadratic: 0.002 },
@@ -102,9 +90,7 @@ mod tests {
             for drop in [-30.0, -0.4, 0.2, 0.6, 0.9, 25.0] {
                 let h = 1e-5;
                 let [low, mid, high] = [drop - h, drop, drop + h].map(|d| law.at(d));
-                // Central differences: rounding 1e-16 · 1e4 / 1e-5 of the largest co-content, and h² beyond.
-                let slope = (high.co_content - low.co_content) / (2.0 * h);
-                assert!((slope - mid.flow).abs() < 1e-6 * (1.0 + mid.flow.abs()), "{law:?} at {drop}");
+                // Central differences: rounding 1e-16 · 500 / 1e-5, and h² beyond.
                 let slope = (high.flow - low.flow) / (2.0 * h);
                 assert!((slope - mid.conductance).abs() < 1e-6 * (1.0 + slope), "{law:?} at {drop}");
                 assert!(mid.conductance > 0.0);

@@ -21,6 +21,18 @@ pub(super) struct Netlist {
     #[serde(default)]
     pub(super) nodes: Vec<Node>,
     pub(super) elements: Vec<Element>,
+    /// Pressure differences that are outputs.
+    #[serde(default)]
+    pub(super) gauges: Vec<Gauge>,
+}
+
+/// An output p(from) − p(to).
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Gauge {
+    pub(super) name: String,
+    pub(super) from: String,
+    pub(super) to: String,
 }
 
 /// A point of the network with one pressure.
@@ -207,6 +219,7 @@ impl Default for Netlist {
             units: System::default(),
             nodes: Vec::new(),
             elements: vec![inflow, wall, outlet("upper", 0.2, 0.3, 3.0), outlet("lower", 0.1, 0.7, 1.5)],
+            gauges: Vec::new(),
         }
     }
 }

@@ -1,8 +1,8 @@
 //! The nodal equations: node pressures and branch flows at one time, from the state and the signals.
 //!
 //! Unknown are the base pressures of the trees without the ground. They minimise the network's co-content (Millar 1951),
-//! which is strictly convex, so there is exactly one solution; Newton's method with a line search on the co-content finds
-//! it from anywhere. The conductance matrix is symmetric positive definite. Next file to read: [`super::step`].
+//! which is strictly convex, so there is exactly one solution; Newton's method with a search along each step finds it from
+//! anywhere. The conductance matrix is symmetric positive definite. Next file to read: [`super::step`].
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -11,10 +11,14 @@ use super::laws::Valued;
 use super::topology::Forest;
 use crate::SetupError;
 
-/// Most Newton steps; quadratic convergence takes about five.
+/// Most Newton steps; about ten are taken.
 const MAX_STEPS: usize = 200;
-/// Most halvings of one Newton step.
-const MAX_HALVINGS: usize = 60;
+/// Most trials along one Newton step.
+const MAX_TRIALS: usize = 60;
+/// Part of the first slope that may be left at the end of a search.
+const LEFT: f64 = 0.1;
+/// Step, in parts of the pressures' size, below which only rounding keeps steps from getting shorter.
+const SMALL: f64 = 1e-9;
 
 /// A circuit that determines all its pressures and flows.
 #[derive(Clone, Debug)]
@@ -178,10 +182,9 @@ struct Nodal {
     size: f64,
 }
 
-/// Co-content with its magnitude, and its first two derivatives in the unknown base pressures.
+/// First and second derivatives of the co-content in the unknown base pressures.
 struct Expansion {
-    co_content: f64,
-    magnitude: f64,
+    /// Flow that leaves each tree.
     residual: DVector<f64>,
     matrix: DMatrix<f64>,
 }
@@ -194,46 +197,61 @@ impl Nodal {
         if n == 0 {
             return base;
         }
+        let mut last = f64::INFINITY;
         for _ in 0..MAX_STEPS {
             let here = self.expand(&base);
-            let Some(matrix) = Cholesky::new(here.matrix.clone()) else { break };
+            let Some(matrix) = Cholesky::new(here.matrix) else { break };
             let step = -matrix.solve(&here.residual);
+            let length = step.amax();
             let size = base.iter().fold(self.size, |size, p| size.max(p.abs()));
-            let done = step.amax() <= 4.0 * f64::EPSILON * size;
-            if !self.search(&here, &step, &mut base) {
-                break;
+            let stalled = length <= SMALL * size && length >= 0.5 * last;
+            if stalled || length <= 4.0 * f64::EPSILON * size {
+                return go(&base, &step, 1.0);
             }
-            if done {
-                return base;
-            }
+            base = self.search(here.residual.dot(&step), &step, &base);
+            last = length;
         }
         vec![f64::NAN; n + 1]
     }
 
-    /// Goes along a Newton step as far as the co-content falls (Armijo 1966), but for rounding; says whether it could.
-    fn search(&self, here: &Expansion, step: &DVector<f64>, base: &mut [f64]) -> bool {
-        let slope = here.residual.dot(step);
-        let slack = 1e-14 * here.magnitude;
-        let start = base.to_vec();
-        let mut share = 1.0;
-        for _ in 0..MAX_HALVINGS {
-            for (b, (start, step)) in base[1..].iter_mut().zip(start[1..].iter().zip(step.iter())) {
-                *b = start + share * step;
-            }
-            if self.co_content(base).0 <= here.co_content + 1e-4 * share * slope + slack {
-                return true;
-            }
-            share *= 0.5;
+    /// Goes along a Newton step towards the least co-content. Its slope along the step grows from `first` < 0; a point is
+    /// good when the slope is below a tenth of that. Illinois variant of regula falsi (Dowell & Jarratt 1971), safeguarded.
+    ///
+    /// Where losses dominate a full Newton step may lead just as far beyond the solution, to and fro for ever.
+    fn search(&self, first: f64, step: &DVector<f64>, base: &[f64]) -> Vec<f64> {
+        let enough = LEFT * first.abs();
+        let mut at = go(base, step, 1.0);
+        let mut slope = self.slope(step, &at);
+        if slope <= enough {
+            return at;
         }
-        false
+        let (mut ends, mut slopes) = ([0.0, 1.0], [first, slope]);
+        let mut last_side = None;
+        for trial in 0..MAX_TRIALS {
+            let guess = if trial % 4 == 3 { 0.5 } else { slopes[0] / (slopes[0] - slopes[1]) };
+            let share = ends[0] + (ends[1] - ends[0]) * guess.clamp(1e-3, 1.0 - 1e-3);
+            at = go(base, step, share);
+            slope = self.slope(step, &at);
+            if slope.abs() <= enough {
+                break;
+            }
+            let side = usize::from(slope > 0.0);
+            (ends[side], slopes[side]) = (share, slope);
+            if last_side.replace(side) == Some(side) {
+                slopes[1 - side] *= 0.5;
+            }
+        }
+        at
     }
 
-    /// Co-content and the sum of its parts' magnitudes.
-    fn co_content(&self, base: &[f64]) -> (f64, f64) {
-        let prescribed = self.prescribed.iter().zip(base).map(|(flow, base)| flow * base);
-        let branches =
-            self.branches.iter().map(|(ends, at, law)| law.at(at + base[ends.from] - base[ends.to]).co_content);
-        prescribed.chain(branches).fold((0.0, 0.0), |(sum, size), part| (sum + part, size + part.abs()))
+    /// Slope of the co-content along a step.
+    fn slope(&self, step: &DVector<f64>, base: &[f64]) -> f64 {
+        let along = |tree: usize| if tree == 0 { 0.0 } else { step[tree - 1] };
+        let prescribed: f64 = self.prescribed.iter().enumerate().map(|(tree, flow)| flow * along(tree)).sum();
+        let branches = self.branches.iter().map(|(ends, offset, law)| {
+            law.at(offset + base[ends.from] - base[ends.to]).flow * (along(ends.from) - along(ends.to))
+        });
+        prescribed + branches.sum::<f64>()
     }
 
     fn expand(&self, base: &[f64]) -> Expansion {
@@ -256,7 +274,12 @@ impl Nodal {
                 matrix[(j, i)] -= at.conductance;
             }
         }
-        let (co_content, magnitude) = self.co_content(base);
-        Expansion { co_content, magnitude, residual, matrix }
+        Expansion { residual, matrix }
     }
+}
+
+/// Base pressures after part of a step; the ground's stay.
+fn go(base: &[f64], step: &DVector<f64>, share: f64) -> Vec<f64> {
+    let moved = base[1..].iter().zip(step.iter()).map(|(base, step)| base + share * step);
+    base[..1].iter().copied().chain(moved).collect()
 }
