@@ -55,6 +55,13 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let display = Arc::new(Display::new(args.json));
     let mut crew = Crew::listen(&study, &plan, &display)?;
     crew.gather(&study, &plan)?;
+    if !args.json {
+        let records = study.records.iter().filter(|record| record.is_trained()).count();
+        let runs = (2 * study.parameters.len() + 1) * records;
+        display.say(&format!(
+            "{runs} runs of the model: a centre and a pair per parameter, over {records} record{}"
+        ));
+    }
     let result = identify(&study, &mut crew.fleet, &at);
     display.finish();
     crew.dismiss();
@@ -150,12 +157,7 @@ fn parameters(found: &Identification) -> String {
 
 /// Correlated pairs, the strongest first.
 fn pairs(found: &Identification) -> Result<(), Failure> {
-    let mut pairs: Vec<(usize, usize, f64)> = Vec::new();
-    for (i, row) in found.correlation.iter().enumerate() {
-        pairs.extend(row.iter().enumerate().skip(i + 1).filter_map(|(j, c)| Some((i, j, (*c)?))));
-    }
-    pairs.retain(|(_, _, c)| c.abs() > 0.95);
-    pairs.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
+    let pairs = found.correlated_pairs();
     if pairs.is_empty() {
         return line("\nno pair of parameters is correlated beyond 0.95");
     }

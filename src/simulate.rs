@@ -65,9 +65,10 @@ enum Noise {
 /// `0.5` or `10%`.
 fn noise(text: &str) -> Result<Noise, String> {
     let (number, share) = text.strip_suffix('%').map_or((text, false), |number| (number, true));
-    let value: f64 = number.trim().parse().map_err(|_| format!("`{text}` is neither a number nor a percentage"))?;
+    let value: f64 =
+        number.trim().parse().map_err(|_| format!("`{text}` is neither a number nor a percentage"))?;
     if !(value >= 0.0 && value.is_finite()) {
-        return Err("the noise must be zero or a positive number".to_owned());
+        return Err("--noise must be zero or a positive number".to_owned());
     }
     Ok(if share { Noise::Share(value / 100.0) } else { Noise::Absolute(value) })
 }

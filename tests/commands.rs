@@ -226,6 +226,45 @@ fn simulate_names_what_is_wrong_with_its_arguments() {
 }
 
 #[test]
+fn a_twin_of_a_model_with_fields_is_a_recording_of_the_next_study() {
+    const TUBE: &str = "examples/fsi-tube/study.toml";
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    let mut command = starlings();
+    command.arg("simulate").arg(repository(TUBE)).args([
+        "--periodic",
+        "0.8",
+        "--noise",
+        "10%",
+        "--set",
+        "E2=4e6",
+    ]);
+    let (code, _, stderr) =
+        output(command.arg("--state-out").arg(at("initial.csv")).arg("-o").arg(at("wall.csv")));
+    assert_eq!(code, 0, "{stderr}");
+    assert!(stderr.contains("the periodic state was found in"), "{stderr}");
+    assert!(
+        stderr.contains("noise of displacement: standard deviation") && !stderr.contains("noise of pressure"),
+        "{stderr}"
+    );
+    let study = std::fs::read_to_string(repository(TUBE)).unwrap();
+    let study = study.replace("\"flow.csv:flow\"", "\"flow\"");
+    std::fs::write(at("study.toml"), study).unwrap();
+    let (code, stdout, stderr) = output(starlings().arg("check").arg(at("study.toml")));
+    assert_eq!(code, 0, "{stderr}");
+    assert!(stdout.contains("displacement[24]") && stdout.contains("the study is sound"), "{stdout}");
+}
+
+#[test]
+fn a_model_with_fields_is_listed_with_their_sizes() {
+    let (code, stdout, stderr) = output(starlings().args(["models", "fsi-tube"]));
+    assert_eq!(code, 0, "{stderr}");
+    assert!(stdout.contains("displacement[0..25]") && stdout.contains("[model.layout]"), "{stdout}");
+    let (_, stdout, _) = output(starlings().args(["models", "windkessel-3"]));
+    assert!(!stdout.contains("[model.layout]") && !stdout.contains("components"), "{stdout}");
+}
+
+#[test]
 fn no_output_replaces_a_study_or_its_data() {
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("pig.toml");

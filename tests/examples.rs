@@ -150,5 +150,11 @@ examples! {
     pig_aorta_joint => "pig-aorta-joint",
     rcr => "rcr",
     oscillator => "oscillator",
+    rcr_network => "rcr-network",
+    coarctation => "coarctation",
     fsi_tube => "fsi-tube",
+    artery_1d => "artery-1d",
+    toy_fsi => "toy-fsi",
+    toy_fsi_windkessel => "toy-fsi-windkessel",
+    toy_fsi_stokes => "toy-fsi-stokes",
 }

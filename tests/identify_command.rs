@@ -207,12 +207,59 @@ fn parameters_that_enter_only_as_a_sum_are_named_as_one_combination() {
 }
 
 #[test]
+fn stiffness_of_a_tube_and_of_the_tissue_around_it_are_known_as_one() {
+    let example = repository("examples/fsi-tube");
+    let study = std::fs::read_to_string(example.join("study.toml")).unwrap();
+    let tissue = "[[parameters]]\nname = \"k_s\"\nprior = { transform = \"log2\", median = 2e5, sd = 1.0 }\n[[records]]";
+    let mut study = study.replace("[[records]]", tissue);
+    for file in ["initial.csv", "wall.csv", "flow.csv"] {
+        study = study.replace(&format!("\"{file}"), &format!("\"{}", example.join(file).display()));
+    }
+    let found = Case::new(&study).json(&[]);
+    let names: Vec<&str> =
+        found["parameters"].as_array().unwrap().iter().map(|p| p["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["E1", "E2", "E3", "E4", "E5", "k_s"]);
+    for ring in 0..5 {
+        // The posterior of a run has about -0.99: the prior loosens a lock that is perfect in a wall of rings.
+        assert!(found["correlation"][ring][5].as_f64().unwrap() < -0.99, "{}", found["correlation"]);
+        assert!(found["posterior_correlation"][ring][5].as_f64().unwrap() < -0.99);
+        assert!(warns(&found, &[names[ring], "and k_s are correlated (-1.000)"]), "{}", found["warnings"]);
+    }
+    assert!(found["advice"].as_str().unwrap().contains("; without "), "{}", found["advice"]);
+    let weakest = &found["directions"][0];
+    assert!(weakest["combination"].as_str().unwrap().starts_with("k_s − 0.2 E1 − 0.2 E2"), "{weakest}");
+    assert!(weakest["share"].as_f64().unwrap() > 0.99 && weakest["standard_error"].is_null());
+    assert!(warns(&found, &["combination k_s"]), "{}", found["warnings"]);
+    assert!(found["advice"].as_str().unwrap().contains("tells them apart"), "{}", found["advice"]);
+}
+
+#[test]
+fn the_weak_combinations_of_the_coarctation_are_named() {
+    let study = repository("examples/coarctation/study.toml");
+    let (code, stdout, stderr) = output(starlings().arg("identify").arg(study).arg("--json"));
+    assert_eq!(code, 0, "{stderr}");
+    let found = parse(&stdout);
+    let parameters = found["parameters"].as_array().unwrap();
+    let directions = found["directions"].as_array().unwrap();
+    assert_eq!(directions.len(), parameters.len());
+    let share = |d: &Value| d["share"].as_f64().unwrap();
+    assert!(directions.windows(2).all(|pair| share(&pair[0]) >= share(&pair[1])), "the weakest first");
+    let combined = directions.iter().filter(|d| d["parameters"].as_array().unwrap().len() > 1);
+    let words: Vec<&str> = combined.map(|d| d["combination"].as_str().unwrap()).collect();
+    assert!(words.len() > 10, "{words:?}");
+    assert!(found["advice"].as_str().unwrap().contains(words[0]), "{}", found["advice"]);
+    for p in parameters {
+        assert!(p["standard_error"].as_f64().unwrap() > 0.0, "the data determine every parameter: {p}");
+    }
+}
+
+#[test]
 fn a_parameter_that_changes_nothing_is_said_in_words_and_null_in_json() {
     let case = decay("constants = { b = 0.5 }", &[("a", HALF), ("idle", HALF)]);
     let found = case.json(&[]);
     let idle = parameter(&found, "idle");
     assert!(idle["standard_error"].is_null());
-    assert_eq!(idle["informed"].as_f64().unwrap(), 0.0);
+    assert!(idle["informed"].as_f64().unwrap().abs() < 1e-12);
     assert!(idle["sensitivity_norm"].as_f64().unwrap() < 1e-9);
     assert!(found["correlation"][0][1].is_null() && found["correlation"][1][0].is_null());
     assert!(warns(&found, &["idle changes no observed prediction"]), "{}", found["warnings"]);
@@ -266,13 +313,6 @@ fn two_records_share_a_parameter_and_keep_their_own_initial_values() {
     assert!(records.len() > 1, "{records:?}");
     let steps: u64 = records.iter().map(|r| r["n"].as_u64().unwrap()).sum();
     assert_eq!(steps as usize, found["gsf"]["time"].as_array().unwrap().len());
-    let own: Vec<&Value> = found["parameters"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .filter(|p| p["name"].as_str().unwrap().contains('['))
-        .collect();
-    assert_eq!(own.len(), records.len());
     for (k, record) in records.iter().enumerate() {
         let name = format!("initial:p[{}]", record["record"].as_str().unwrap());
         let curve = numbers(&found["sensitivity"][&name]);
@@ -281,9 +321,8 @@ fn two_records_share_a_parameter_and_keep_their_own_initial_values() {
         let elsewhere = curve[..first].iter().chain(&curve[first + n..]);
         assert!(elsewhere.copied().all(|v| v.abs() < 1e-12), "{k}: and to no other");
     }
-    // Both records' runs for the centre and a pair of each parameter of the study, not of each entry.
-    let of_study = found["parameters"].as_array().unwrap().len() - own.len() + 1;
-    assert_eq!(found["runs"].as_u64().unwrap() as usize, (2 * of_study + 1) * records.len());
+    // A centre and a pair for each parameter of the study (R, C, Zc, initial:p), whatever the number of its entries.
+    assert_eq!(found["runs"].as_u64().unwrap() as usize, 9 * records.len());
 }
 
 #[test]

@@ -7,8 +7,8 @@
 pub mod data;
 mod files;
 mod headline;
-pub mod locus;
 mod identify;
+pub mod locus;
 mod number;
 mod outputs;
 mod overview;

@@ -19,6 +19,7 @@ mod record;
 pub mod run;
 pub mod store;
 pub mod summary;
+pub mod surfaces;
 pub mod trial;
 pub mod twin;
 pub mod warnings;

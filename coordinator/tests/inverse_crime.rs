@@ -18,8 +18,8 @@ const FINER: usize = 5;
 /// Time between observations in s, observations in a beat, beats before the first observation and observed.
 const EVERY: f64 = 0.01;
 const BEAT: usize = 80;
-const BEFORE: usize = 10;
-const BEATS: usize = 5;
+const BEFORE: usize = 6;
+const BEATS: usize = 3;
 
 struct NoHistory;
 
@@ -149,7 +149,7 @@ file = "wall.csv"
 inputs = {{ flow = "flow.csv:flow" }}
 channels = [ {{ column = "wall", output = "displacement", noise = {sd:?} }} ]
 [estimator]
-passes = 2
+passes = 3
 "#,
             (1..=5).map(young).collect::<String>(),
             80.0 * MM_HG,
@@ -157,34 +157,46 @@ passes = 2
         )
     }
 
-    /// The estimates, and the largest relative error of a ratio between two regions.
-    fn compare(self) -> (Done, f64) {
-        let wall = self.wall();
-        let done = self.fit(&wall);
-        let found: Vec<f64> = (1..=5).map(|i| done.estimate(&format!("E{i}")).estimate / self.young).collect();
-        let off: Vec<f64> = found.iter().zip(OCTAVES).map(|(f, o)| f / o.exp2()).collect();
-        let (lowest, highest) = off.iter().fold((f64::INFINITY, 0.0_f64), |(l, h), v| (l.min(*v), h.max(*v)));
-        eprintln!(
-            "E {:e} peak {} noise {}: R/R0 {:?}, E found/true {off:.4?}, ratios off by {:.4}, NIS {:.3}",
-            self.young,
-            self.peak,
-            self.noise,
-            wall.radius,
-            highest / lowest - 1.0,
-            done.summary.fit.nis_per_observation
-        );
-        for warning in &done.summary.warnings {
-            eprintln!("    {warning}");
-        }
-        (done, highest / lowest - 1.0)
+    /// Estimates over truth, region by region.
+    fn found(self, done: &Done) -> Vec<f64> {
+        let estimate = |i: usize| done.estimate(&format!("E{}", i + 1)).estimate;
+        OCTAVES.iter().enumerate().map(|(i, o)| estimate(i) / (self.young * o.exp2())).collect()
     }
 }
 
+/// By how much the ratio of two regions is off at most, for estimates over truth.
+fn ratios_off(found: &[f64]) -> f64 {
+    let lowest = found.iter().copied().fold(f64::INFINITY, f64::min);
+    found.iter().copied().fold(0.0, f64::max) / lowest - 1.0
+}
+
 #[test]
-fn the_linear_tube_finds_the_stiffness_ratios_of_the_nonlinear_artery() {
-    for young in [5e6, 1e7, 2e7] {
-        for noise in [0.1, 0.02] {
-            Twin { young, peak: 300.0, noise }.compare();
-        }
+fn the_linear_tube_finds_the_stiffness_ratios_of_the_nonlinear_artery_and_says_what_it_misses() {
+    let noisy = Twin { young: 5e6, peak: 300.0, noise: 0.1 };
+    let wall = noisy.wall();
+    // Not small: the radius is up to a third above that of the unloaded vessel, and the linear tube knows only the latter.
+    assert!(wall.radius[0] > 1.0 && wall.radius[1] > 1.3, "{:?}", wall.radius);
+
+    let done = noisy.fit(&wall);
+    let found = noisy.found(&done);
+    // Both walls are rings that are linear in their displacement, and the mean pressure is that of the known outlet: what is
+    // nonlinear moves the ratios by less than noise of a tenth of the pulse, which is all that NIS shows.
+    assert!(ratios_off(&found) < 0.1, "{found:?}");
+    assert!(found.iter().all(|f| (f - 1.0).abs() < 0.02), "{found:?}");
+
+    for noise in [0.1, 0.02, 0.01] {
+        let twin = Twin { noise, ..noisy };
+        let done = twin.fit(&wall);
+        eprintln!("TAB {noise} {:?} {:.4} {:.3} {:?}", twin.found(&done), ratios_off(&twin.found(&done)), done.summary.fit.nis_per_observation, done.summary.warnings.iter().filter_map(|w| w.split("autocorrelated (").nth(1).map(|r| r[..4].to_owned())).collect::<Vec<_>>());
+    }
+    let exact = Twin { noise: 0.01, ..noisy };
+    let done = exact.fit(&wall);
+    let found = exact.found(&done);
+    assert!(ratios_off(&found) < 0.1, "{found:?}");
+    // A hundredth of the pulse shows that the model is another one, and the run says so.
+    let nis = done.summary.fit.nis_per_observation;
+    assert!(nis > 3.0, "{nis}");
+    for warning in ["far above 1: the model does not explain the data", "are autocorrelated"] {
+        assert!(done.warns(warning), "no `{warning}` in {:?}", done.summary.warnings);
     }
 }

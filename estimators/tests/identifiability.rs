@@ -126,6 +126,21 @@ fn only_the_sum_of_two_parameters_is_known_and_no_figure_pretends_otherwise() {
 }
 
 #[test]
+fn columns_that_agree_to_their_accuracy_are_one_and_leave_the_third_parameter_alone() {
+    let exactly = [[3.0, 3.0, 1.0], [1.0, 1.0, -2.0], [-2.0, -2.0, 0.5], [0.0, 0.0, 1.0]];
+    let error = [2e-3, 1e-3, 3e-3, -2e-3];
+    let s = DMatrix::from_fn(4, 3, |i, j| 1e4 * (exactly[i][j] + if j == 1 { error[i] } else { 0.0 }));
+    let coarse = Sensitivities::new(&s, &[1.0; 3], 1e-2).unwrap().fisher().unwrap();
+    assert_eq!(coarse.rank(), 2);
+    let errors = coarse.standard_errors();
+    assert!(errors[0].is_none() && errors[1].is_none() && errors[2].is_some(), "{errors:?}");
+    // Were the columns exact, the small difference between them would be information: 40 noise sd per prior sd.
+    let fine = Sensitivities::new(&s, &[1.0; 3], 1e-6).unwrap().fisher().unwrap();
+    assert_eq!(fine.rank(), 3);
+    assert!(fine.standard_errors()[0].unwrap() < 0.1);
+}
+
+#[test]
 fn a_parameter_that_changes_nothing_keeps_its_prior_and_disturbs_no_other() {
     let s = DMatrix::from_row_slice(3, 3, &[1.0, 0.0, 0.5, 2.0, 0.0, -1.0, 0.0, 0.0, 1.0]);
     let s = exact(&s, &[1.0, 3.0, 1.0]);

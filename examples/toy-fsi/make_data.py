@@ -5,7 +5,7 @@ wall starts from 0.12 cm times sin(pi x/L) + 1/2 sin(2 pi x/L) + 1/4 sin(3 pi x/
 
 uniform.csv: three cosines in time, at x = j L/41. varying.csv: a wall of the thickness h (1 + 0.5 sin(pi x/L)) by finite
 elements, 40 along and 8 across, at x = j L/40; the classical Runge-Kutta method with 40 steps per reading. half.csv: its
-readings at x <= L/2. Displacements are measured every millisecond with Gaussian noise of 0.005 cm, velocities with 1.5 cm/s.
+readings at x <= L/2. Displacements are measured every millisecond with Gaussian noise of 0.0005 cm, velocities with 1.5 cm/s.
 
 Standard library only; the seed is fixed, so the script always writes the same files:
 
@@ -24,7 +24,7 @@ RING = YOUNG * THICKNESS / ((1.0 - POISSON**2) * RADIUS**2)
 SHEAR = SHEAR_CORRECTION * YOUNG / (2.0 * (1.0 + POISSON)) * THICKNESS
 BUMP = (0.12, 0.06, 0.03)
 STEP, READINGS, SUBSTEPS = 1e-3, 61, 40
-NOISE = (0.005, 1.5)
+NOISE = (0.0005, 1.5)
 SEED = 1
 
 Matrix = list[list[float]]
@@ -142,7 +142,7 @@ def read_off(rows: list[list[float]], generator: random.Random) -> list[list[str
     readings = []
     for row in rows:
         noisy = [value + generator.gauss(0.0, NOISE[i >= n]) for i, value in enumerate(row)]
-        readings.append([f"{value:.4f}" if i < n else f"{value:.2f}" for i, value in enumerate(noisy)])
+        readings.append([f"{value:.5f}" if i < n else f"{value:.2f}" for i, value in enumerate(noisy)])
     return readings
 
 

@@ -12,6 +12,7 @@ fn refusal(layout: Value) -> (String, String) {
     }
 }
 
+#[allow(clippy::needless_pass_by_value, reason = "netlists are written where they are used")]
 #[track_caller]
 fn refused(elements: Value, at: &str, says: &[&str]) {
     let (path, message) = refusal(json!({ "elements": elements }));
@@ -145,4 +146,13 @@ fn a_start_of_what_stores_nothing_or_starts_elsewhere_is_refused() {
     assert!(message.contains("no capacitor"), "{message}");
     let second = json!({ "name": "two", "kind": "C", "from": "a", "value": 1.0, "initial": 3.0 });
     refused(json!([c("one", "a", "0"), second]), "elements[1].initial", &["`one`"]);
+}
+
+#[test]
+fn a_gauge_at_an_unknown_node_is_refused() {
+    let gauge = json!([{ "name": "drop", "from": "asc", "to": "dsec" }]);
+    let elements = json!([c("wall", "asc", "0"), r("narrow", "asc", "desc"), r("out", "desc", "0")]);
+    let (path, message) = refusal(json!({ "elements": elements, "gauges": gauge }));
+    assert_eq!(path, "gauges[0].to");
+    assert!(message.contains("did you mean `desc`"), "{message}");
 }

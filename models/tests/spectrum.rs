@@ -8,10 +8,10 @@ mod structure;
 use nalgebra::{Complex, DMatrix, DVector};
 use starlings_models::observer::{self, Wiring};
 use starlings_models::spectrum::{
-    Beyond, Decay, Energy, Feedback, GainCurve, ObservedSystem, SpectrumError, follow, linearisation, observed,
+    Beyond, Decay, Energy, Feedback, GainCurve, Laboratory, ObservedSystem, SpectrumError, follow, linearisation, observed,
     poles, slopes,
 };
-use starlings_models::{Model, ModelDef, ObserverDef, catalogue};
+use starlings_models::{Model, ModelDef, ObserverDef, Setup, catalogue};
 use structure::{Structure, artery_modes, artery_windkessel, chain};
 
 /// An observer of a model whose outputs are observed as named.
@@ -31,7 +31,7 @@ fn under(model: &Structure, kind: &str, outputs: &[String]) -> (DMatrix<f64>, Ob
     let a = energy.of(&linearisation(model, &[]).expect("linear"));
     let at = |gain| Ok::<_, SpectrumError>(energy.of(&build(model, outputs, kind, gain).feedback(model, &[])));
     let feedback = Feedback::of(at).expect("feedback").expect("a polynomial in the gain");
-    let system = ObservedSystem::new(&a, &feedback).expect("poles");
+    let system = ObservedSystem::new(&a, &feedback, 0.0).expect("poles");
     (a, system)
 }
 
@@ -234,7 +234,7 @@ fn nudging_a_scalar_never_saturates() {
     };
     let feedback = Feedback::of(at).expect("built").expect("linear");
     let a = linearisation(&*model, &theta).expect("smooth");
-    let system = ObservedSystem::new(&a, &feedback).expect("poles");
+    let system = ObservedSystem::new(&a, &feedback, 0.0).expect("poles");
     let curve = GainCurve::scan(&system).expect("scan");
     let best = curve.best(&system).expect("best");
     assert_eq!(best.beyond, Beyond::Faster);
@@ -302,4 +302,60 @@ fn the_matrix_of_the_error_is_a_minus_feedback() {
     let a = linearisation(&model, &[]).expect("linear");
     let difference: DVector<f64> = (a - found).diagonal();
     assert_eq!(difference.as_slice(), [7.0, 7.0, 7.0, 0.0, 0.0, 0.0]);
+}
+
+#[test]
+fn six_hundred_poles_of_a_viscous_fluid_come_mode_by_mode_and_the_slow_ones_are_real() {
+    let layout = Some(serde_json::json!({ "modes": 40, "polynomials": 14 }));
+    let model = ModelDef { kind: "toy-fsi-stokes".to_owned(), layout, ..ModelDef::default() };
+    let setup = Setup { model, outputs: names(&["displacement", "velocity"]), ..Setup::default() };
+    let laboratory = Laboratory::new(&setup, &[]).expect("linear");
+    let listed = &laboratory.poles()[..100];
+    let expected = [-0.667_777_56, -0.671_269_96, -0.677_672_62, -0.687_737_60, -0.702_319_35];
+    for (pole, expected) in listed.iter().zip(expected) {
+        // Printed to eight decimals.
+        close(pole.re, expected, 1e-8, "slow pole");
+    }
+    assert!(listed.iter().all(|pole| pole.im == 0.0), "the hundred slowest are real");
+    for (kind, gain, most) in [("dvf", 1e3, 2e-8), ("sdf-displacement", 200.0, 9e-9), ("sdf", 200.0, 1.6e-4)] {
+        let moved = laboratory.observed(kind).expect("hosted").poles(gain).expect("poles");
+        let change = listed.iter().zip(&moved).map(|(p, q)| (p - q).norm() / p.norm()).fold(0.0, f64::max);
+        // A wall observer hardly moves what the viscous fluid alone decides. 1e-9 for rounding.
+        assert!(change < 1.2 * most + 1e-9, "{kind}: {change}");
+    }
+}
+
+#[test]
+fn what_cannot_be_linearised_says_so() {
+    let equations = |rate: &str, initial: &str| {
+        let def = serde_json::json!({
+            "states": [{ "name": "x", "unit": "", "role": "other", "initial": initial, "rate": [["x", rate]] }],
+            "outputs": [{ "name": "y", "unit": "", "role": "other", "value": "x" }],
+            "inputs": [], "replaceable": [], "solver": {},
+        });
+        let equations = Some(serde_json::from_value(def).expect("equations"));
+        let model = ModelDef { kind: "equations".to_owned(), equations, ..ModelDef::default() };
+        Laboratory::new(&Setup { model, outputs: names(&["y"]), ..Setup::default() }, &[]).map(|l| l.poles().to_vec())
+    };
+    assert_eq!(equations("-2*x", "1").expect("linear")[0].re, -2.0);
+    assert!(matches!(equations("-abs(x)", "0"), Err(SpectrumError::Switching { .. })));
+    assert_eq!(equations("-abs(x)", "1").expect("smooth there")[0].re, -1.0);
+    assert!(matches!(equations("-delay(y, 1)", "1"), Err(SpectrumError::Delayed { .. })));
+    assert!(matches!(equations("-log(x)", "0"), Err(SpectrumError::NotFinite { .. })));
+}
+
+#[test]
+fn the_laboratory_lists_why_an_observer_cannot_be() {
+    let constants = [("R", 3.0), ("C", 0.1)].map(|(name, value)| (name.to_owned(), value));
+    let model = ModelDef { kind: "windkessel-2".to_owned(), constants: constants.into(), ..ModelDef::default() };
+    let setup = Setup { model, outputs: names(&["pressure"]), ..Setup::default() };
+    let laboratory = Laboratory::new(&setup, &[]).expect("linear");
+    let observers = laboratory.observers();
+    assert!(observers.contains(&("nudging", None)));
+    let why = observers.iter().find(|(kind, _)| *kind == "sdf").and_then(|(_, why)| why.as_ref()).expect("refused");
+    assert!(why.to_string().contains("models that can host it"), "{why}");
+    let found = laboratory.examine("nudging", &[0.0, 1.0], 5, Some(Decay::new(10.0, 0.1).expect("a decay")));
+    let found = found.expect("hosted");
+    close(found.gain_for_decay.expect("reached"), 10_f64.ln() / 0.1 - 1.0 / 0.3, 1e-7, "gain for the decay");
+    close(found.slopes[0].analytic.expect("simple").re, -1.0, 1e-15, "slope");
 }

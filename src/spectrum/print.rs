@@ -60,7 +60,20 @@ pub(super) fn text(found: &Found<'_>) -> Result<(), Failure> {
     if !found.refused.is_empty() {
         line("\nnot possible here")?;
     }
-    found.refused.iter().try_for_each(|(name, why)| line(format_args!("  {name}: {why}")))
+    refusals(&found.refused).iter().try_for_each(|(names, why)| line(format_args!("  {}: {why}", names.join(", "))))
+}
+
+/// Observers with the same reason together.
+fn refusals(refused: &[(String, String)]) -> Vec<(Vec<&str>, String)> {
+    let mut together: Vec<(Vec<&str>, String)> = Vec::new();
+    for (name, why) in refused {
+        let why = why.replace(&format!("the observer `{name}` "), "");
+        match together.iter_mut().find(|(_, known)| *known == why) {
+            Some((names, _)) => names.push(name),
+            None => together.push((vec![name], why)),
+        }
+    }
+    together
 }
 
 /// A pole and its slope under every observer; of a conjugate pair the upper one.

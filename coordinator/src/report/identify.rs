@@ -24,7 +24,7 @@ struct Page<'a> {
     found: &'a Identification,
     facts: Vec<(&'static str, String)>,
     parameters: Vec<ParameterView>,
-    directions: Vec<[String; 4]>,
+    directions: Vec<[String; 3]>,
     correlation: Vec<Vec<Cell>>,
     sensitivity: Vec<Figure>,
     gsf: Vec<Figure>,
@@ -119,14 +119,14 @@ fn parameter(p: &ParameterInfo) -> Result<ParameterView, ReportError> {
     })
 }
 
-fn directions(found: &Identification) -> Vec<[String; 4]> {
+fn directions(found: &Identification) -> Vec<[String; 3]> {
     let row = |d: &crate::study::identify::result::DirectionInfo| {
         let alone = d.standard_error.map_or_else(
             || "no information".to_owned(),
             |sd| format!("{} {}", number::significant(sd, 2), d.unit),
         );
         let left = format!("{} %", number::significant(100.0 * d.share, 2));
-        [d.combination.clone(), left, alone, d.parameters.len().to_string()]
+        [d.combination.clone(), left, alone]
     };
     found.directions.iter().map(row).collect()
 }

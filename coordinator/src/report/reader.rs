@@ -12,8 +12,8 @@ use std::collections::BTreeMap;
 use starlings_estimators::{autocorrelation, nis_band};
 
 use super::data::{
-    Autocorrelation, ChannelPlot, Family, NisSeries, ObserverPlot, ObserverRow, ParameterRow, PassTrack, ReportData,
-    Track,
+    Autocorrelation, ChannelPlot, Family, NisSeries, ObserverPlot, ObserverRow, ParameterRow, PassTrack,
+    ReportData, Track,
 };
 use crate::study::observer_gain::ObserverCourse;
 use crate::study::store::folder::{OBSERVER, StudyInfo};
@@ -70,7 +70,8 @@ fn observer(store: &Store, summary: &Summary) -> Result<Option<ObserverRow>, Sto
         Some(text) => serde_json::from_str(&text).map_err(|e| store.damaged("observer", e))?,
         None => Vec::new(),
     };
-    let plot = |c: ObserverCourse| ObserverPlot { record: c.record, time: c.time, with: c.with, without: c.without };
+    let plot =
+        |c: ObserverCourse| ObserverPlot { record: c.record, time: c.time, with: c.with, without: c.without };
     Ok(Some(ObserverRow {
         kind: fit.kind.clone(),
         gain: fit.gain,

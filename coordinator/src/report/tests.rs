@@ -1,6 +1,8 @@
 //! Tests of the whole page and of the overview picture.
 
-use super::data::{ChannelPlot, NisSeries, ParameterRow, ReportData, Track};
+use super::data::{
+    ChannelPlot, Family, NisSeries, ObserverPlot, ObserverRow, ParameterRow, ReportData, Track,
+};
 use super::{overview_svg, render, sample};
 
 /// The order in which a reader meets the sections.
@@ -117,6 +119,15 @@ fn of_values(values: &[f64]) -> ReportData {
         channel.observed = channel.predicted.iter().rev().map(|v| Some(*v)).collect();
         channel.noise = values[0];
     }
+    let components =
+        (0..5).map(|i| ChannelPlot { channel: format!("wall[{i}]"), ..data.channels[0].clone() });
+    data.channels = components.chain(data.channels.clone()).collect();
+    let mut course = ObserverPlot { time: data.channels[0].time.clone(), ..ObserverPlot::default() };
+    course.with.clone_from(&course.time);
+    course.without.clone_from(&course.time);
+    [&mut course.with, &mut course.without].into_iter().for_each(&mut fill);
+    data.observer = Some(ObserverRow { with: values[0], courses: vec![course], ..ObserverRow::default() });
+    data.families = vec![Family { stem: "E".into(), members: vec![(1, 0), (2, 1), (3, 2)], stiffness: true }];
     for pass in data.tracks.iter_mut().flat_map(|t| &mut t.passes) {
         [&mut pass.estimate, &mut pass.lo, &mut pass.hi].into_iter().for_each(&mut fill);
     }
@@ -154,8 +165,8 @@ fn the_most_extreme_numbers_make_a_page_of_the_usual_size() {
         let data = of_values(&values);
         let page = render(&data).unwrap();
         assert_well_formed(&page);
-        // The page of ordinary numbers has about 90 000 bytes.
-        assert!(page.len() < 200_000, "{values:?}: {} bytes", page.len());
+        // The page of ordinary numbers has about 90 000 bytes; the field adds three figures, a map and two more.
+        assert!(page.len() < 400_000, "{values:?}: {} bytes", page.len());
         assert!(overview_svg(&data).unwrap().len() < 200_000);
     }
 }
@@ -202,6 +213,77 @@ fn many_records_and_parameters_keep_the_page_readable() {
     assert_well_formed(&page);
     assert_eq!(page.matches(": predicted against measured</strong>").count(), 4);
     assert!(overview_svg(&data).unwrap().contains("7 more"));
+}
+
+/// Twenty-five components with a residual that grows along the field and changes its sign halfway through time.
+fn field(n: usize) -> ReportData {
+    let mut data = sample::run(n);
+    let one = data.channels[0].clone();
+    let component = |i: usize| {
+        let residual = |t: f64| 0.2 * i as f64 * if t < 2.0 { 1.0 } else { -1.0 };
+        let observed = one.time.iter().zip(&one.predicted).map(|(t, p)| Some(p + residual(*t))).collect();
+        ChannelPlot { channel: format!("wall[{i}]"), observed, ..one.clone() }
+    };
+    data.channels.splice(0..0, (0..25).map(component));
+    data
+}
+
+#[test]
+fn a_field_is_shown_by_three_components_and_one_map() {
+    let page = render(&field(840)).unwrap();
+    show("field.html", &page);
+    assert_well_formed(&page);
+    let fits: Vec<usize> = (0..25)
+        .filter(|i| page.contains(&format!("<strong>wall[{i}], record in-vivo-1: predicted")))
+        .collect();
+    assert_eq!(fits, [0, 12, 24]);
+    assert_eq!(page.matches("<strong>wall, record in-vivo-1: residuals by component").count(), 1);
+    assert!(!page.contains("wall[0], record in-vivo-1: residuals"));
+    // The largest mean is 0.2 · 24 over a noise of 2.
+    assert!(page.contains("the fullest colour is ± 2.4"), "the scale of the map");
+    // Four figures more, of which the map is one of 25 rows with two runs of one shade each.
+    assert!(page.len() < 350_000, "{} bytes", page.len());
+}
+
+#[test]
+fn numbered_stiffnesses_are_drawn_along_the_vessel() {
+    let mut data = sample::run(60);
+    let row = data.parameters[0].clone();
+    let region = |k: u32| ParameterRow {
+        name: format!("E{k}"),
+        estimate: f64::from(k),
+        unit: "kPa".into(),
+        ..row.clone()
+    };
+    data.parameters = (1..=4).map(region).collect();
+    let members = (1..=4).zip(0..).collect();
+    data.families = vec![Family { stem: "E".into(), members, stiffness: true }];
+    let page = render(&data).unwrap();
+    show("along.html", &page);
+    assert_well_formed(&page);
+    assert!(page.contains("<strong>E1 to E4 along the vessel</strong>"));
+    assert!(
+        page.contains("Lowest: E1") && page.contains("Highest: E4") && page.contains("4.00 times as much")
+    );
+    data.families[0].stiffness = false;
+    assert!(render(&data).unwrap().contains("<strong>E1 to E4</strong>"));
+}
+
+#[test]
+fn the_observer_is_told_in_a_sentence_and_a_figure() {
+    let mut data = sample::run(60);
+    assert!(!render(&data).unwrap().contains("id=\"observer\""));
+    let time: Vec<f64> = (0..40).map(f64::from).collect();
+    let course =
+        ObserverPlot { record: "in-vivo-1".into(), with: vec![1.0; 40], without: time.clone(), time };
+    let (kind, courses) = ("dvf".to_owned(), vec![course]);
+    data.observer = Some(ObserverRow { kind, gain: 20.0, with: 1.04, without: 5.5, courses });
+    let page = render(&data).unwrap();
+    show("observer.html", &page);
+    assert_well_formed(&page);
+    assert!(page.contains("With the observer dvf at a gain of 20.0\u{a0}1/s"));
+    assert!(page.contains("by 1.04 noise sd") && page.contains("by 5.50"));
+    assert!(page.contains("Record in-vivo-1: innovations with and without the observer dvf"));
 }
 
 #[test]

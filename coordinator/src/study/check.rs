@@ -173,8 +173,7 @@ fn check_record_list(source: &Source, file: &StudyFile) {
 
 /// A component that its field's channel has no column for is told only once the files are read.
 fn check_held_out_components(source: &Source, file: &StudyFile, records: &[Record]) {
-    let measured: Vec<String> =
-        records.iter().flat_map(|r| &r.channels).map(|c| c.output.clone()).collect();
+    let measured: Vec<String> = records.iter().flat_map(|r| &r.channels).map(|c| c.output.clone()).collect();
     let found = |name: &str| measured.iter().any(|m| m == name || field_of(m) == name);
     if records.len() == file.records.len() {
         report_unmeasured(source, file, &measured, &found);

@@ -9,6 +9,8 @@ use starlings_estimators::{Drift, Points, Root, Transform};
 use starlings_models::spectrum::Decay;
 use starlings_models::{EffectDef, Setup, Signal, Spec};
 
+use super::surfaces::Node;
+
 /// A study whose names exist, whose numbers make sense and whose recordings were read.
 #[derive(Clone, Debug)]
 pub struct Study {
@@ -124,6 +126,8 @@ pub struct Channel {
     pub values: Vec<f64>,
     /// Never fitted.
     pub held_out: bool,
+    /// Where the output is compared with a surface per time, the node that it displaces.
+    pub node: Option<Node>,
 }
 
 /// Which estimator fits.

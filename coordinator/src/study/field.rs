@@ -40,7 +40,9 @@ pub fn observed_fields(outputs: &[String]) -> Vec<String> {
             None => fields.push((field, n)),
         }
     }
-    let text = |(field, n): (&str, usize)| if n == 0 { field.to_owned() } else { format!("{field} ({n} components)") };
+    let text = |(field, n): (&str, usize)| {
+        if n == 0 { field.to_owned() } else { format!("{field} ({n} components)") }
+    };
     fields.into_iter().map(text).collect()
 }
 
@@ -52,13 +54,10 @@ mod tests {
     fn a_component_is_known_by_its_field_and_index() {
         let list = [Quantity::new("p", "mmHg"), Quantity::new("wall", "cm").size(3)];
         let unit = |name: &str| quantity_of(&list, name).map(|q| q.unit.as_str());
-        assert_eq!(["p", "wall", "wall[2]", "wall[3]", "p[1]"].map(unit), [
-            Some("mmHg"),
-            Some("cm"),
-            Some("cm"),
-            None,
-            None
-        ]);
+        assert_eq!(
+            ["p", "wall", "wall[2]", "wall[3]", "p[1]"].map(unit),
+            [Some("mmHg"), Some("cm"), Some("cm"), None, None]
+        );
         assert_eq!(components(&list), ["p", "wall[0]", "wall[1]", "wall[2]"]);
         let observed = ["p", "wall[0]", "wall[2]"].map(str::to_owned);
         assert_eq!(observed_fields(&observed), ["p", "wall (2 components)"]);

@@ -164,6 +164,19 @@ pub(super) struct ChannelSection {
     pub(super) start: Option<Spanned<f64>>,
     /// Standard deviation in the channel's unit; `None` for `"auto"`.
     pub(super) noise: Spanned<Option<f64>>,
+    /// The surfaces that were measured, in the place of a column.
+    pub(super) surface: Option<SurfaceSection>,
+}
+
+/// The surface part of a channel.
+#[derive(Debug)]
+pub(super) struct SurfaceSection {
+    /// Profiles `time,z,r`, or meshes by `time,file`.
+    pub(super) file: Spanned<String>,
+    /// The nodes without displacement.
+    pub(super) rest: Spanned<String>,
+    /// Open ends of every mesh.
+    pub(super) open_ends: usize,
 }
 
 /// `[[effects]]`.

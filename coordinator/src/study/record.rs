@@ -7,7 +7,10 @@ mod csv;
 mod derived;
 mod input;
 mod noise;
+mod off;
 mod part;
+mod shapes;
+mod surface;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -138,12 +141,14 @@ impl<'a> Recordings<'a> {
         }
         let table = self.table(section.file.get_ref(), &section.file, &section.time)?;
         let train = training_span(self.source, section, &table.times);
+        let surfaces = self.surfaces(section)?;
         let reader = ChannelReader {
             source: self.source,
             section,
             table: &table,
             train: train.as_ref().ok().copied().flatten(),
             spec,
+            surfaces: &surfaces,
         };
         let mut channels = reader.channels(context)?;
         let rows: Vec<usize> = (0..table.times.len())

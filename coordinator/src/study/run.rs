@@ -147,6 +147,7 @@ impl RunContext<'_> {
     /// Stores the fleet's events and tells the watcher.
     pub(super) fn after_step(&mut self, store: &Store, progress: &Progress) -> Result<(), StoreError> {
         self.keep_events(store)?;
+        store.commit_if_due(self.elapsed())?;
         (self.watch)(progress);
         Ok(())
     }

@@ -1,8 +1,8 @@
 //! The run's one file: a SQLite database with one row per event, job and analysis.
 //!
-//! Whatever is shown later — summary, report, export, resume — is read from here and from nowhere else. Each analysis and
-//! the snapshot that a resumed run starts from are written in one transaction, so a run killed at any instant continues
-//! from its last whole analysis. Nothing here computes. Next file to read: [`crate::study::store::snapshot`].
+//! Whatever is shown later — summary, report, export, resume — is read from here and from nowhere else. Each analysis is
+//! written in one piece with the snapshot that a resumed run starts from, and a few quick ones are committed together, so a
+//! run killed at any instant continues from a whole analysis at most [`HOLD_S`] before. Nothing here computes. Next file to read: [`crate::study::store::snapshot`].
 
 mod error;
 pub mod folder;
@@ -12,20 +12,33 @@ pub mod snapshot;
 #[cfg(test)]
 mod tests;
 
+use std::cell::Cell;
 use std::path::{Path, PathBuf};
 
 use rusqlite::{Connection, OptionalExtension, Row, params};
 
-use schema::{SCHEMA, SCHEMA_VERSION, insert_analysis, insert_jobs};
+use schema::{SCHEMA, SCHEMA_VERSION, insert_analysis, insert_jobs, insert_predictions};
 use snapshot::Snapshot;
 
 pub use error::StoreError;
 pub use rows::{AnalysisRow, EstimateRow, InnovationRow, JobRow, PredictionRow};
 
+/// Analyses are committed together for at most so long, in s: a commit costs about as much as the rows of an analysis.
+pub const HOLD_S: f64 = 0.05;
+
 /// An open run database.
 pub struct Store {
     path: PathBuf,
     connection: Connection,
+    /// Time of the last commit, in s of the run's wall time.
+    committed_s: Cell<f64>,
+}
+
+impl Drop for Store {
+    fn drop(&mut self) {
+        // Nobody is left to be told; what was committed before stays.
+        let _ = self.commit();
+    }
 }
 
 impl Store {
@@ -104,7 +117,7 @@ impl Store {
     fn connect(path: &Path, flags: rusqlite::OpenFlags) -> Result<Self, StoreError> {
         let connection = Connection::open_with_flags(path, flags)
             .map_err(|source| StoreError::Database { path: path.to_owned(), source })?;
-        Ok(Self { path: path.to_owned(), connection })
+        Ok(Self { path: path.to_owned(), connection, committed_s: Cell::new(f64::NEG_INFINITY) })
     }
 
     /// WAL with NORMAL keeps every committed transaction through a killed process at the price of one write each.
@@ -118,6 +131,7 @@ impl Store {
     /// # Errors
     /// When the database refuses.
     pub fn close_log(&self) -> Result<(), StoreError> {
+        self.commit()?;
         self.guard(self.connection.pragma_update(None, "journal_mode", "DELETE"))
     }
 
@@ -168,20 +182,50 @@ impl Store {
         Ok(())
     }
 
-    /// Writes one analysis and the snapshot after it, in one transaction.
+    /// Writes one analysis and the snapshot after it, in one piece; [`Store::commit`] or the end of the store makes it last.
     ///
     /// # Errors
-    /// When the database refuses; nothing of the analysis is then kept.
+    /// When the database refuses; nothing of the analysis is then kept, and those before are committed.
     pub fn analysis(&mut self, row: &AnalysisRow, snapshot: &Snapshot) -> Result<(), StoreError> {
-        let path = self.path.clone();
         let write = |connection: &mut Connection| -> rusqlite::Result<()> {
-            let transaction = connection.transaction()?;
-            insert_analysis(&transaction, row)?;
-            insert_jobs(&transaction, &row.jobs)?;
-            snapshot.write(&transaction)?;
-            transaction.commit()
+            if connection.is_autocommit() {
+                connection.execute_batch("BEGIN IMMEDIATE")?;
+            }
+            let savepoint = connection.savepoint()?;
+            insert_analysis(&savepoint, row)?;
+            insert_jobs(&savepoint, &row.jobs)?;
+            snapshot.write(&savepoint)?;
+            savepoint.commit()
         };
-        write(&mut self.connection).map_err(|source| StoreError::Database { path, source })
+        let written = write(&mut self.connection);
+        if written.is_err() {
+            // The first failure is the one to tell.
+            let _ = self.commit();
+        }
+        self.guard(written)
+    }
+
+    /// Makes everything written so far last.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub fn commit(&self) -> Result<(), StoreError> {
+        if self.connection.is_autocommit() {
+            return Ok(());
+        }
+        self.guard(self.connection.execute_batch("COMMIT"))
+    }
+
+    /// [`Store::commit`], if the last one was [`HOLD_S`] or longer ago; `now_s` is the run's wall time.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub fn commit_if_due(&self, now_s: f64) -> Result<(), StoreError> {
+        if now_s - self.committed_s.get() >= HOLD_S {
+            self.commit()?;
+            self.committed_s.set(now_s);
+        }
+        Ok(())
     }
 
     /// Writes the final forward run, replacing an earlier one.
@@ -189,24 +233,13 @@ impl Store {
     /// # Errors
     /// When the database refuses.
     pub fn predictions(&mut self, rows: &[PredictionRow], jobs: &[JobRow]) -> Result<(), StoreError> {
+        self.commit()?;
         let path = self.path.clone();
         let write = |connection: &mut Connection| -> rusqlite::Result<()> {
             let transaction = connection.transaction()?;
             transaction.execute("DELETE FROM predictions", [])?;
             transaction.execute("DELETE FROM jobs WHERE pass = 0", [])?;
-            for row in rows {
-                transaction
-                    .prepare_cached("INSERT INTO predictions VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)")?
-                    .execute(params![
-                        row.record,
-                        row.output,
-                        row.time,
-                        row.observed,
-                        row.predicted,
-                        row.usage,
-                        row.noise
-                    ])?;
-            }
+            insert_predictions(&transaction, rows)?;
             insert_jobs(&transaction, jobs)?;
             transaction.commit()
         };

@@ -154,8 +154,10 @@ fn fit_figures(study: &Study, fit: &Fit, predictions: &[PredictionRow]) -> FitSu
         }
     }
     let fits = |tallies: &[Tally]| tallies.iter().filter_map(Tally::fit).collect::<Vec<ChannelFit>>();
-    let of_record =
-        |(record, tallies): &(&str, Vec<Tally>)| RecordFit { record: (*record).to_owned(), channels: fits(tallies) };
+    let of_record = |(record, tallies): &(&str, Vec<Tally>)| RecordFit {
+        record: (*record).to_owned(),
+        channels: fits(tallies),
+    };
     FitSummary {
         channels: fits(&all),
         records: records.iter().map(of_record).collect(),

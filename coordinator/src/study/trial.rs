@@ -69,11 +69,12 @@ pub fn trial(study: &Study) -> Result<Vec<TrialChannel>, TrialError> {
             theta: theta.clone(),
             state: None,
         };
-        let prediction = model.run(&job).map_err(|source| TrialError::Model {
+        let mut prediction = model.run(&job).map_err(|source| TrialError::Model {
             record: record.name.clone(),
             values: named(study, &theta),
             source,
         })?;
+        study.measure(index, &window.times, &mut prediction.outputs);
         let n_obs = study.setup.outputs.len();
         for channel in &record.channels {
             let residuals: Vec<f64> = window

@@ -89,9 +89,14 @@ pub fn simulate(study: &Study, twin: &Twin) -> Result<Recording, TwinError> {
     if times.first().is_some_and(|t| *t < start) || times.windows(2).any(|w| w[1] <= w[0]) {
         return Err(TwinError::Request(format!("times must increase and start at {start} or later")));
     }
-    let mut run = Run { model: &*model, record: twin.record, theta, n_obs: setup.outputs.len(), n_period: None };
-    let mut window =
-        Window { start, observed: vec![f64::NAN; times.len() * run.n_obs], times, inputs: record.inputs.clone() };
+    let mut run =
+        Run { model: &*model, record: twin.record, theta, n_obs: setup.outputs.len(), n_period: None };
+    let mut window = Window {
+        start,
+        observed: vec![f64::NAN; times.len() * run.n_obs],
+        times,
+        inputs: record.inputs.clone(),
+    };
     let state = match twin.period {
         None => run.initial(&window)?,
         Some(period) => run.periodic(&mut window, period)?,
@@ -179,5 +184,12 @@ fn recording(
         values.push(window.times.iter().map(|t| signal.at(*t)).collect());
     }
     let noise = noise::of_outputs(&setup.outputs, &noise);
-    Recording { times: window.times.clone(), columns, values, noise, start: Vec::new(), n_period: run.n_period }
+    Recording {
+        times: window.times.clone(),
+        columns,
+        values,
+        noise,
+        start: Vec::new(),
+        n_period: run.n_period,
+    }
 }

@@ -114,7 +114,7 @@ fn free_run(fit: &Fit, study: &Study, predictions: &[PredictionRow]) -> Option<S
 
 /// Autocorrelation of the residuals, a field's components together.
 fn autocorrelated(study: &Study, predictions: &[PredictionRow]) -> Vec<String> {
-    let mut series: Vec<Residuals> = Vec::new();
+    let mut series: Vec<Residuals<'_>> = Vec::new();
     for rows in predictions.chunk_by(|a, b| a.record == b.record && a.output == b.output) {
         let trained = rows.iter().filter(|p| p.usage == "train");
         let residuals: Vec<f64> = trained.filter_map(|p| Some(p.observed? - p.predicted)).collect();
@@ -131,7 +131,7 @@ fn autocorrelated(study: &Study, predictions: &[PredictionRow]) -> Vec<String> {
         series[at].n_component += 1;
     }
     // In the order of the outputs, then of the records.
-    let place = |s: &Residuals| {
+    let place = |s: &Residuals<'_>| {
         let output = study.setup.outputs.iter().position(|o| field_of(o) == s.output);
         (output, study.records.iter().position(|r| r.name == s.record))
     };

@@ -7,8 +7,10 @@
 
 use nalgebra::DMatrix;
 
-/// Up to so many parameters all triples are looked at, and the growing subsets are grown to the end.
+/// Up to so many parameters all triples are looked at.
 const FEW: usize = 15;
+/// No growing subset gets larger.
+const LARGEST: usize = 40;
 
 /// Parameters (from 0, ascending) and their index.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,7 +28,7 @@ pub struct Collinearity {
     pub all: Subset,
     /// Every pair, and for up to 15 parameters every triple; the worst first, pairs before triples.
     pub subsets: Vec<Subset>,
-    /// A well conditioned subset of every size from two: the best pair, then one parameter more at a time, each the one
+    /// A well conditioned subset of every size from 2 to 40 at most: the best pair, then one parameter more at a time, each the one
     /// that keeps the index lowest.
     pub growing: Vec<Subset>,
 }
@@ -90,7 +92,7 @@ fn grown(gram: &DMatrix<f64>, accuracy: f64) -> Vec<Vec<usize>> {
             larger
         };
         best = (0..n)
-            .filter(|i| subset.len() < FEW && !subset.contains(i))
+            .filter(|i| subset.len() < LARGEST && !subset.contains(i))
             .map(with)
             .min_by(|a, b| size(a).total_cmp(&size(b)));
         found.push(subset);

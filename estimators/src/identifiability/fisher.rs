@@ -11,8 +11,8 @@ use crate::EstimatorError;
 
 /// Below this many noise sd per prior sd the data alone leave more than a thousand prior sd: no information.
 const LEAST: f64 = 1e-3;
-/// Squared share of a parameter in a direction that passes for rounding.
-const ABSENT: f64 = 1e-8;
+/// Share of a parameter in a direction that passes for rounding.
+const ABSENT: f64 = 1e-4;
 
 /// What the data say of the parameters, by direction.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,6 +22,8 @@ pub struct Fisher {
     vectors: DMatrix<f64>,
     /// s_k, length p; zero for a direction without information.
     singular: DVector<f64>,
+    /// Share of a parameter in a direction without information that passes for zero.
+    absent: f64,
 }
 
 impl Fisher {
@@ -43,7 +45,8 @@ impl Fisher {
             let s = svd.singular_values[k];
             if s > LEAST.max(accuracy * error) { s } else { 0.0 }
         });
-        Ok(Self { prior_sd: prior_sd.to_vec(), vectors, singular })
+        // The directions are known no better than the columns.
+        Ok(Self { prior_sd: prior_sd.to_vec(), vectors, singular, absent: ABSENT.max(3.0 * accuracy) })
     }
 
     /// Number of parameters p.
@@ -129,7 +132,7 @@ impl Fisher {
             to.copy_from(&from);
         }
         for mut row in hidden.row_iter_mut() {
-            if row.norm_squared() < ABSENT {
+            if row.norm() < self.absent {
                 row.fill(0.0);
             }
         }

@@ -14,7 +14,7 @@ use crate::equations::{Slot, check};
 use crate::integrate::{self, Solver};
 use crate::model::{Drive, Segment};
 use crate::setup::SetupError;
-use crate::{Memory, Model, ParticleError, Quantity, Spec};
+use crate::{Blocks, Memory, Model, ParticleError, Quantity, Spec};
 
 /// A model and the effects added to it.
 pub struct Extended {
@@ -134,6 +134,11 @@ impl Model for Extended {
         for effect in &self.effects {
             effect.add_to_outputs(at, y);
         }
+    }
+
+    /// Those of the inner model: its states come first, and what effects add is a load.
+    fn blocks(&self, theta: &[f64]) -> Option<Blocks> {
+        self.inner.blocks(&theta[..self.n_param])
     }
 
     fn solver(&self) -> Solver {

@@ -90,6 +90,10 @@ impl Artery1d {
         theta: &[f64],
         x: &mut [f64],
     ) -> Result<Volumes, ParticleError> {
+        let finite = |value: &f64| value.is_finite();
+        if !(segment.u0.iter().all(finite) && segment.slope.iter().all(finite)) {
+            return Err(ParticleError::NotFinite { what: "input `flow`".to_owned(), time: segment.t0 });
+        }
         let vessels = Vessels::new(&self.network, theta);
         let (mut work, mut volumes) = (Work::new(&vessels), Volumes::default());
         let (mut t, mut n_step) = (segment.t0, 0);

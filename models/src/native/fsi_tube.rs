@@ -13,6 +13,7 @@ mod quantities;
 mod state;
 
 use crate::model::Segment;
+use crate::prestress::Rings;
 use crate::setup::{ModelDef, SetupError};
 use crate::{Blocks, Drive, Model, ParticleError, Spec};
 use chain::Chain;
@@ -31,6 +32,10 @@ use state::State;
 /// p = π + R_p Q at the outlet,  C dπ/dt = Q − π/R_d.
 ///
 /// Units are cm, g, s and dyn/cm². E is `E1`, `E2`, ... in the regions of the [`Layout`].
+///
+/// With an image pressure p_i in the layout, R is the radius seen in an image under p_i and η counts from the image: the
+/// wall's R in E h/((1 − ν²)R²) becomes the unloaded radius R_u of each region, (E h/((1 − ν²)R_u²) + k_s)(R − R_u) = p_i,
+/// and the wall carries p − p_i. The blood moves as in a tube of the image's radius.
 pub struct FsiTube {
     spec: Spec,
     /// Region of each cell.
@@ -38,6 +43,8 @@ pub struct FsiTube {
     n_region: usize,
     step: f64,
     start: Start,
+    /// Pressure under which the radius is R; zero for the radius without load.
+    image_pressure: f64,
 }
 
 impl FsiTube {
@@ -55,6 +62,7 @@ impl FsiTube {
             n_region: parts.len(),
             step: layout.step,
             start: layout.start,
+            image_pressure: layout.image_pressure,
         })
     }
 
@@ -64,8 +72,7 @@ impl FsiTube {
     /// When its layout cannot be read, or cannot be.
     pub(super) fn build(def: &ModelDef) -> Result<Box<dyn Model>, SetupError> {
         let layout: Layout = crate::layout::read(def)?;
-        let default = || quantities::spec(1, &[]).parameters.iter().find(|q| q.name == "L")?.default;
-        let length = def.constants.get("L").copied().or_else(default).unwrap_or_default();
+        let length = def.constants.get("L").copied().unwrap_or(quantities::LENGTH);
         Ok(Box::new(Self::new(&layout, length)?))
     }
 
@@ -79,9 +86,26 @@ impl FsiTube {
 
     /// Writes the stiffness of wall and tissue in every cell.
     fn stiffness(&self, theta: &[f64], c: &Coefficients, stiffness: &mut [f64]) {
+        let mut known = None;
         for (k, &region) in stiffness.iter_mut().zip(&self.region) {
-            *k = c.stiffness(theta[region]);
+            // Cells of a region follow each other.
+            let of_region = match known {
+                Some((of, value)) if of == region => value,
+                _ => self.of_young(c, theta[region]),
+            };
+            known = Some((region, of_region));
+            *k = of_region;
         }
+    }
+
+    /// The stiffness of wall and tissue for a Young's modulus; NaN where the image has no unloaded radius.
+    fn of_young(&self, c: &Coefficients, young: f64) -> f64 {
+        if self.image_pressure > 0.0 {
+            let ring = Rings { membrane: vec![c.membrane(young)], support: c.tissue };
+            let unloaded = ring.unloaded(&[c.radius], self.image_pressure);
+            return unloaded.map_or(f64::NAN, |found| c.stiffness_at(young, found.shape[0]));
+        }
+        c.stiffness(young)
     }
 
     /// Flow out of the tube: what flows in and does not widen the wall.
@@ -97,8 +121,10 @@ impl FsiTube {
         let wall = vec![c.mass * c.per_area; n];
         let (mut inverse, mut ratio) = (vec![0.0; n], vec![0.0; n]);
         let chain = Chain::factor(c.inertance, &wall, 0.0, &mut inverse, &mut ratio);
+        let mut stiffness = vec![0.0; n];
+        self.stiffness(theta, &c, &mut stiffness);
         // The pressure in a cell but for the wall's inertia.
-        let pressure = |k: usize| c.stiffness(theta[self.region[k]]) * eta[k] + c.damping * w[k];
+        let pressure = |k: usize| self.image_pressure + stiffness[k] * eta[k] + c.damping * w[k];
         let mut flow = u.value[0];
         let mut behind = pressure(0);
         for k in 0..n {
@@ -125,7 +151,7 @@ impl Model for FsiTube {
         &self.spec
     }
 
-    /// At rest under the pressure p0: η = p0/(k + k_s).
+    /// At rest under the pressure p0: η = (p0 − p_i)/(k + k_s).
     fn initial(&self, theta: &[f64], x: &mut [f64]) {
         let c = self.coefficients(theta);
         let State { eta, w, pi } = State::of(x);
@@ -134,7 +160,7 @@ impl Model for FsiTube {
                 Start::Equilibrium => theta[region],
                 Start::Reference => c.young_ref,
             };
-            *eta = c.p0 / c.stiffness(young);
+            *eta = (c.p0 - self.image_pressure) / self.of_young(&c, young);
         }
         w.fill(0.0);
         *pi = c.p0;

@@ -85,7 +85,9 @@ impl Mode {
         let wall = inverse.column(0) * (root * lever);
         energetic.view_mut((0, 1), (1, n - 1)).copy_from(&wall.transpose());
         energetic.view_mut((1, 0), (n - 1, 1)).copy_from(&-wall);
-        energetic.view_mut((1, 1), (n - 1, n - 1)).copy_from(&-(&inverse * dissipation * inverse.transpose()));
+        energetic
+            .view_mut((1, 1), (n - 1, n - 1))
+            .copy_from(&-(&inverse * dissipation * inverse.transpose()));
         let (mut to, mut from) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n));
         to[(0, 0)] = root;
         from[(0, 0)] = 1.0 / root;
@@ -106,14 +108,13 @@ impl ToyFsiStokes {
         let n_b = count("polynomials", layout.polynomials, 1)?;
         count("modes", n * n_b, 1)?;
         let mut states = wall_fields(n);
-        states[1] = Quantity::new("fluid", "cm/s").size(n * n_b).says(
-            "Coefficients of the axial velocity profiles, all of the first sine mode first.",
-        );
+        states[1] = Quantity::new("fluid", "cm/s")
+            .size(n * n_b)
+            .says("Coefficients of the axial velocity profiles, all of the first sine mode first.");
         let viscosity = Quantity::new("mu", "g/cm/s").range(0.0, f64::INFINITY).default(0.035);
-        let parameters = Vessel::parameters().into_iter().chain([
-            viscosity.role(Role::Damping).says("Viscosity of the fluid."),
-            vessel::bump_parameter(),
-        ]);
+        let parameters = Vessel::parameters()
+            .into_iter()
+            .chain([viscosity.role(Role::Damping).says("Viscosity of the fluid."), vessel::bump_parameter()]);
         let spec = Spec {
             kind: "toy-fsi-stokes".to_owned(),
             says: "A viscous flow in a channel under an elastic wall that vibrates freely.".to_owned(),
@@ -184,7 +185,8 @@ impl Model for ToyFsiStokes {
 
     fn output(&self, _t: f64, x: &[f64], theta: &[f64], _u: Drive<'_>, y: &mut [f64]) {
         let (n, n_b, modes) = (self.spectral.len(), self.profiles.len(), self.modes(theta));
-        let speeds: Vec<f64> = modes.iter().enumerate().map(|(i, mode)| mode.lever * x[n + i * n_b]).collect();
+        let speeds: Vec<f64> =
+            modes.iter().enumerate().map(|(i, mode)| mode.lever * x[n + i * n_b]).collect();
         y[..n].copy_from_slice(&x[..n]);
         y[n..].copy_from_slice((self.spectral.apply(&speeds) * self.peak()).as_slice());
     }

@@ -78,8 +78,11 @@ fn depth(vessel: &Vessel) -> f64 {
 impl System {
     fn new(spectral: &Spectral, theta: &[f64]) -> Self {
         let vessel = Vessel::read(theta);
-        let outlet =
-            Outlet { proximal: theta[Vessel::N], distal: theta[Vessel::N + 1], compliance: theta[Vessel::N + 2] };
+        let outlet = Outlet {
+            proximal: theta[Vessel::N],
+            distal: theta[Vessel::N + 1],
+            compliance: theta[Vessel::N + 2],
+        };
         let (n, depth, spacing) = (spectral.len(), depth(&vessel), spectral.spacing(vessel.length));
         let kappa = spectral.wave_numbers(vessel.length);
         let diagonal = |of: &dyn Fn(f64) -> f64| DVector::from_fn(n, |i, _| of(kappa[i]));
@@ -153,7 +156,8 @@ impl ToyFsiWindkessel {
         let same = |name: &str| (name.to_owned(), name.to_owned());
         let spec = Spec {
             kind: "toy-fsi-windkessel".to_owned(),
-            says: "A potential flow in a channel under an elastic wall, from a known inflow to a Windkessel.".to_owned(),
+            says: "A potential flow in a channel under an elastic wall, from a known inflow to a Windkessel."
+                .to_owned(),
             states,
             parameters: Vessel::parameters().into_iter().chain(outlet_parameters()).collect(),
             outputs,
@@ -180,8 +184,12 @@ impl ToyFsiWindkessel {
 fn outlet_parameters() -> [Quantity; 4] {
     let positive = |name, unit, value| Quantity::new(name, unit).positive().default(value);
     [
-        positive("R_p", "dyn s/cm^5", 150.0).role(Role::Resistance).says("Proximal resistance of the Windkessel."),
-        positive("R_d", "dyn s/cm^5", 1850.0).role(Role::Resistance).says("Distal resistance of the Windkessel."),
+        positive("R_p", "dyn s/cm^5", 150.0)
+            .role(Role::Resistance)
+            .says("Proximal resistance of the Windkessel."),
+        positive("R_d", "dyn s/cm^5", 1850.0)
+            .role(Role::Resistance)
+            .says("Distal resistance of the Windkessel."),
         positive("C", "cm^5/dyn", 1e-3).role(Role::Compliance).says("Compliance of the Windkessel."),
         // 80 mmHg.
         Quantity::new("p_0", "dyn/cm^2")
@@ -211,8 +219,8 @@ impl Model for ToyFsiWindkessel {
         let Outlet { proximal, distal, compliance } = system.outlet;
         let pressure = x[2 * n] + proximal * flow;
         let strain = position + speed * system.vessel.retardation;
-        let force =
-            &system.coupling * pressure + &system.entry * u.slope[0] - system.stiffness.component_mul(&strain);
+        let force = &system.coupling * pressure + &system.entry * u.slope[0]
+            - system.stiffness.component_mul(&strain);
         let acceleration = force.component_div(&system.mass);
         dx[..n].copy_from_slice(&x[n..2 * n]);
         dx[n..2 * n].copy_from_slice(self.spectral.apply(acceleration.as_slice()).as_slice());

@@ -7,12 +7,13 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Complex, DMatrix};
 
+use super::component::ROUNDING;
 use super::coordinates::Energy;
 use super::gain::{Best, GainCurve};
 use super::linearise::linearisation_at;
 use super::observed::{Feedback, ObservedSystem};
 use super::sensitivity::{Slope, slopes};
-use super::{Decay, SpectrumError, follow, poles};
+use super::{Decay, SpectrumError, follow};
 use crate::binding::Binding;
 use crate::memory::with_memories;
 use crate::observer::{self, Wiring};
@@ -64,8 +65,9 @@ impl Laboratory {
         let a = linearisation_at(&*model, &theta, &x)?;
         let energy = model.blocks(&theta).and_then(|blocks| Energy::new(&blocks));
         let a = energy.as_ref().map_or_else(|| a.clone(), |energy| energy.of(&a));
+        let none = Feedback::none(a.nrows());
         Ok(Self {
-            poles: poles(&a)?,
+            poles: ObservedSystem::new(&a, &none, if energy.is_some() { ROUNDING } else { 0.0 })?.poles(0.0)?,
             spec: model.spec().clone(),
             model,
             theta,
@@ -88,7 +90,7 @@ impl Laboratory {
     pub fn observed(&self, kind: &str) -> Result<ObservedSystem, SpectrumError> {
         let at = |gain| Ok::<_, SetupError>(self.feedback(&*self.build(kind, gain)?));
         let feedback = Feedback::of(at)?.ok_or_else(|| SpectrumError::NotPolynomial { observer: kind.to_owned() })?;
-        ObservedSystem::new(&self.a, &feedback)
+        ObservedSystem::new(&self.a, &feedback, self.negligible())
     }
 
     /// What an observer does: at the given gains, to the first `listed` poles, and at best.
@@ -136,6 +138,11 @@ impl Laboratory {
         let decades = lo.log10().floor() as i32..=hi.log10().ceil() as i32;
         let nice = decades.flat_map(|d| [1.0, 2.0, 5.0].map(|digit| digit * 10f64.powi(d)));
         std::iter::once(0.0).chain(nice.filter(|gain| (lo..=hi).contains(gain))).collect()
+    }
+
+    /// The coupling that is rounding.
+    fn negligible(&self) -> f64 {
+        if self.energy.is_some() { ROUNDING } else { 0.0 }
     }
 
     fn build(&self, kind: &str, gain: f64) -> Result<Box<dyn observer::Observer>, SetupError> {

@@ -7,8 +7,8 @@
 use nalgebra::{Complex, DMatrix};
 
 use super::component::{block, components};
+use super::SpectrumError;
 use super::pole::{of_block, rightmost, sort};
-use super::{SpectrumError, poles};
 
 /// Γ(γ) = γ Γ₁ + γ² Γ₂, in the same coordinates as A.
 #[derive(Clone, Debug)]
@@ -31,6 +31,11 @@ impl Feedback {
         // Rounding of a handful of sums.
         let close = (feedback.at(5.0) - &five).norm() <= 1e-12 * five.norm();
         Ok(close.then_some(feedback))
+    }
+
+    /// No feedback at all of n states.
+    pub fn none(n: usize) -> Self {
+        Self { linear: DMatrix::zeros(n, n), quadratic: DMatrix::zeros(n, n) }
     }
 
     /// Γ at a gain.
@@ -56,18 +61,20 @@ pub(super) struct Block {
 }
 
 impl ObservedSystem {
-    /// A model's linearisation under a feedback, both n_state × n_state in the same coordinates.
+    /// A model's linearisation under a feedback, both n_state × n_state in the same coordinates. Blocks are independent
+    /// whose coupling is below `negligible` times the largest entry; zero unless the coordinates are orthogonal.
     ///
     /// # Errors
-    /// As [`poles`].
-    pub fn new(a: &DMatrix<f64>, feedback: &Feedback) -> Result<Self, SpectrumError> {
+    /// As [`super::poles`].
+    pub fn new(a: &DMatrix<f64>, feedback: &Feedback, negligible: f64) -> Result<Self, SpectrumError> {
+        let scale = (feedback.linear.amax(), feedback.quadratic.amax());
         let mut system = Self { blocks: Vec::new(), untouched: Vec::new() };
-        for rows in components(&[a, &feedback.linear, &feedback.quadratic]) {
+        for rows in components(&[a, &feedback.linear, &feedback.quadratic], negligible) {
             let own = block(a, &rows);
             let linear = block(&feedback.linear, &rows);
             let quadratic = block(&feedback.quadratic, &rows);
-            if linear.iter().chain(quadratic.iter()).all(|v| v.abs() <= 0.0) {
-                system.untouched.extend(poles(&own)?);
+            if linear.amax() <= negligible * scale.0 && quadratic.amax() <= negligible * scale.1 {
+                system.untouched.extend(of_block(own)?);
             } else {
                 system.blocks.push(Block { a: own, feedback: Feedback { linear, quadratic } });
             }
@@ -78,7 +85,7 @@ impl ObservedSystem {
     /// All poles at a gain, sorted by modulus, then by imaginary part.
     ///
     /// # Errors
-    /// As [`poles`].
+    /// As [`super::poles`].
     pub fn poles(&self, gain: f64) -> Result<Vec<Complex<f64>>, SpectrumError> {
         let mut poles = self.untouched.clone();
         for block in &self.blocks {
@@ -91,7 +98,7 @@ impl ObservedSystem {
     /// The largest real part of the poles at a gain, in 1/time: minus the rate at which the slowest error decays.
     ///
     /// # Errors
-    /// As [`poles`].
+    /// As [`super::poles`].
     pub fn max_re(&self, gain: f64) -> Result<f64, SpectrumError> {
         let mut most = rightmost(&self.untouched);
         for block in &self.blocks {

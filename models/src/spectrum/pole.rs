@@ -21,7 +21,7 @@ pub fn poles(a: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, SpectrumError> {
         return Err(SpectrumError::NotAMatrix { n: a.nrows() });
     }
     let mut poles = Vec::with_capacity(a.nrows());
-    for rows in components(&[a]) {
+    for rows in components(&[a], 0.0) {
         poles.extend(of_block(block(a, &rows))?);
     }
     sort(&mut poles);

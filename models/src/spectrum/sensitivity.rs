@@ -23,6 +23,9 @@ pub struct Slope {
 /// yᴴ x of unit vectors below which a pole is taken as defective: rounding makes no eigenvector pair more orthogonal.
 const DEFECTIVE: f64 = 1e-7;
 
+/// Part of the way to the next pole by which a pole may move in a difference.
+const NEAR: f64 = 0.01;
+
 /// The slopes of the given poles, which are poles of the system at gain zero.
 ///
 /// # Errors
@@ -98,9 +101,9 @@ impl Differences<'_> {
         let apart = others.map(|(_, p)| (p - pole).norm()).fold(f64::INFINITY, f64::min);
         // The pole must move by far more than its rounding and by far less than the way to the next one.
         let own = if pole.norm() > 0.0 { 5e-3 * pole.norm() } else { f64::INFINITY };
-        let step = own.min(0.05 * apart) / self.block.feedback.linear.amax();
+        let step = own.min(NEAR * apart) / self.block.feedback.linear.amax();
         let rounding = 1e3 * f64::EPSILON * self.block.a.amax();
-        if !step.is_finite() || 0.05 * apart <= rounding {
+        if !step.is_finite() || NEAR * apart <= rounding {
             return Ok(None);
         }
         let exponent = step.log2().floor() as i32;

@@ -24,8 +24,7 @@ fn frequencies_and_shares_of_added_mass_are_those_of_the_table() {
     let toy = varying();
     let blocks = toy.blocks();
     let (omega, shapes) = vibration(&blocks.mass, &blocks.stiffness);
-    let expected =
-        [357.016_464_94, 665.366_298_34, 946.366_589_20, 1_204.154_193_11, 1_450.649_745_34];
+    let expected = [357.016_464_94, 665.366_298_34, 946.366_589_20, 1_204.154_193_11, 1_450.649_745_34];
     close(&omega, &expected, 5e-9, "omega");
     close(&first(&toy, 5).iter().map(|p| p.im).collect::<Vec<_>>(), &expected, 5e-9, "poles");
     let share: Vec<f64> =
@@ -88,7 +87,10 @@ fn the_largest_real_parts_with_half_of_the_wall_observed_are_those_of_the_table(
     let toy = half();
     for (kind, table) in [
         ("dvf", [-0.26641, -0.53283, -1.06566, -2.13137, -3.19716, -5.32919, -26.74549, -12.69533]),
-        ("sdf-displacement", [-0.30246, -0.60491, -1.20984, -2.41981, -3.63001, -6.05158, -29.86813, -12.43215]),
+        (
+            "sdf-displacement",
+            [-0.30246, -0.60491, -1.20984, -2.41981, -3.63001, -6.05158, -29.86813, -12.43215],
+        ),
         ("sdf", [-12.47934, -24.83339, -48.62432, -87.73729, -84.92500, -60.15167, -24.67923, -8.43638]),
         ("dvf-am", [-8.33739, -16.70164, -33.59165, -66.81655, -72.62265, -46.13345, -15.25185, -4.68606]),
     ] {

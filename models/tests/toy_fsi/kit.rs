@@ -4,6 +4,7 @@ use nalgebra::{Complex, DMatrix, SymmetricEigen};
 use serde_json::Value;
 use starlings_models::observer::{self, Wiring};
 use starlings_models::setup::{ModelDef, ObserverDef, SetupError};
+use starlings_models::spectrum::component::ROUNDING;
 use starlings_models::spectrum::{
     Best, Feedback, GainCurve, ObservedSystem, linearisation, natural, poles, slopes,
 };
@@ -60,7 +61,8 @@ impl Toy {
             model: &*self.model,
             theta: &self.theta,
         };
-        observer::build(&ObserverDef { kind: kind.to_owned(), gain, ..ObserverDef::default() }, wiring).unwrap()
+        observer::build(&ObserverDef { kind: kind.to_owned(), gain, ..ObserverDef::default() }, wiring)
+            .unwrap()
     }
 
     /// Γ in the state's coordinates.
@@ -81,7 +83,7 @@ impl Toy {
     pub(crate) fn system(&self, kind: &str) -> ObservedSystem {
         let at = |gain: f64| Ok::<_, SetupError>(self.natural(&self.feedback(kind, gain)));
         let feedback = Feedback::of(at).unwrap().unwrap();
-        ObservedSystem::new(&self.natural(&self.linearisation()), &feedback).unwrap()
+        ObservedSystem::new(&self.natural(&self.linearisation()), &feedback, ROUNDING).unwrap()
     }
 
     /// Compares the largest real parts at several gains with a row of a table.

@@ -44,7 +44,8 @@ fn frequencies_and_shares_of_added_mass_are_those_of_the_tables() {
         let spacing = toy.theta[0] / 41.0;
         let density = toy.theta[6];
         let identity = DMatrix::from_diagonal_element(40, 40, spacing * density);
-        let mut mu: Vec<f64> = vibration(&identity, &blocks.added_mass).0.iter().map(|root| root * root).collect();
+        let mut mu: Vec<f64> =
+            vibration(&identity, &blocks.added_mass).0.iter().map(|root| root * root).collect();
         mu.reverse();
         close(&mu, &table.mu, 5e-10, "mu");
     }
@@ -64,8 +65,16 @@ fn without_observer_all_poles_are_on_the_imaginary_axis_at_the_frequencies() {
 #[test]
 fn slopes_of_the_poles_are_those_of_the_closed_forms() {
     let expected = [
-        (artery(), ARTERY, [-7.329_375_081e-3, -2.582_659_418e-2, -4.874_809_185e-2, -7.129_147_689e-2, -9.158_788_820e-2]),
-        (soft(), SOFT_TABLE, [-1.029_646_435e-2, -3.573_856_855e-2, -6.622_840_298e-2, -9.515_096_627e-2, -1.203_334_504e-1]),
+        (
+            artery(),
+            ARTERY,
+            [-7.329_375_081e-3, -2.582_659_418e-2, -4.874_809_185e-2, -7.129_147_689e-2, -9.158_788_820e-2],
+        ),
+        (
+            soft(),
+            SOFT_TABLE,
+            [-1.029_646_435e-2, -3.573_856_855e-2, -6.622_840_298e-2, -9.515_096_627e-2, -1.203_334_504e-1],
+        ),
     ];
     for (toy, table, dvf) in expected {
         let poles: Vec<Complex<f64>> = toy.poles().into_iter().filter(|p| p.im > 0.0).take(5).collect();
@@ -99,10 +108,9 @@ fn the_largest_real_parts_are_those_of_the_tables() {
 #[test]
 fn the_best_gain_is_the_critical_damping_of_the_slowest_mode() {
     // Printed to two digits behind the point; the gain of velocity feedback to three digits in all.
-    for (toy, sdf, dvf) in [
-        (artery(), [602.22, -301.11], [3.23e4, -236.67]),
-        (soft(), [552.89, -276.45], [2.11e4, -217.56]),
-    ] {
+    for (toy, sdf, dvf) in
+        [(artery(), [602.22, -301.11], [3.23e4, -236.67]), (soft(), [552.89, -276.45], [2.11e4, -217.56])]
+    {
         for kind in ["sdf", "dvf-am"] {
             let best = toy.best(kind);
             close(&[best.gain, best.max_re], &sdf, 5e-3, kind);

@@ -58,7 +58,10 @@ fn the_bump_moves_as_three_cosines_in_time() {
 
 #[test]
 fn without_damping_the_energy_of_a_potential_flow_is_conserved() {
-    for layout in [json!({ "modes": 15 }), json!({ "discretisation": "elements", "cells": [16, 4], "thickness_wave": 0.5 })] {
+    for layout in [
+        json!({ "modes": 15 }),
+        json!({ "discretisation": "elements", "cells": [16, 4], "thickness_wave": 0.5 }),
+    ] {
         let toy = Toy::new("toy-fsi", layout, &[]);
         let start = initial(&toy);
         let mut x = start.clone();
@@ -76,8 +79,7 @@ fn a_retarded_wall_damps_each_mode_by_half_its_stiffness_rate() {
         ("toy-fsi", json!({ "modes": 8 })),
         ("toy-fsi", json!({ "discretisation": "elements", "cells": [9, 3], "thickness_wave": 0.5 })),
     ] {
-        let (free, damped) =
-            (Toy::new(kind, layout.clone(), &[]), Toy::new(kind, layout, &[("tau", tau)]));
+        let (free, damped) = (Toy::new(kind, layout.clone(), &[]), Toy::new(kind, layout, &[("tau", tau)]));
         let upper = |toy: &Toy| toy.poles().into_iter().filter(|p| p.im > 0.0).collect::<Vec<_>>();
         for (free, damped) in upper(&free).iter().zip(upper(&damped)) {
             // λ² + τ ω² λ + ω² = 0.

@@ -42,7 +42,8 @@ pub(super) fn sensitivity(found: &Identification) -> Result<Vec<Figure>, ReportE
         );
         let title = format!("{name}: sensitivity");
         let scene = Scene { title, description: caption.clone(), x, y, marks };
-        Figure::new(&scene, &[("line blue", "sensitivity of the first record")], caption)
+        let key = if found.records.len() < 2 { "sensitivity" } else { "first record" };
+        Figure::new(&scene, &[("line blue", key)], caption)
     };
     series.curves.iter().filter_map(|(name, curve)| Some((name, curve.as_ref()?))).map(figure).collect()
 }

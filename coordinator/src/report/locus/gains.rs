@@ -7,6 +7,10 @@ use starlings_models::spectrum::{ObserverSpectrum, SpectrumError};
 
 /// Positions of the slider; the first is gain zero.
 const FRAMES: usize = 121;
+/// Rounds of halving the steps of the drawn loci.
+const ROUNDS: usize = 6;
+/// Gains of a drawn locus at most.
+const MOST: usize = 1500;
 /// Poles shown, those of conjugate pairs in the upper half plane only.
 const SHOWN: usize = 12;
 
@@ -36,6 +40,36 @@ pub(super) fn frames(shown: &[Complex<f64>], observers: &[ObserverSpectrum]) -> 
     std::iter::once(0.0).chain((0..FRAMES - 1).map(at)).collect()
 }
 
+/// The loci as they are drawn: where a shown pole moves by more than `step` from one gain to the next, gains are put between,
+/// so that curves are smooth where poles meet. Poles beyond `far` do not count.
+///
+/// # Errors
+///
+/// The poles are not found.
+pub(super) fn smooth(
+    observer: &ObserverSpectrum,
+    shown: &[Complex<f64>],
+    frames: &[f64],
+    (step, far): (f64, f64),
+) -> Result<Vec<Vec<Complex<f64>>>, SpectrumError> {
+    let mut gains = frames.to_vec();
+    let mut poles = upper(observer, shown, &gains)?;
+    for _ in 0..ROUNDS {
+        let long = |k: usize| {
+            poles.iter().any(|way| (way[k + 1] - way[k]).norm() > step && way[k].norm().min(way[k + 1].norm()) < far)
+        };
+        let between = (0..gains.len() - 1).filter(|&k| long(k)).map(|k| 0.5 * (gains[k] + gains[k + 1]));
+        let between: Vec<f64> = between.collect();
+        if between.is_empty() || gains.len() + between.len() > MOST {
+            break;
+        }
+        gains.extend(between);
+        gains.sort_by(f64::total_cmp);
+        poles = upper(observer, shown, &gains)?;
+    }
+    Ok(poles)
+}
+
 /// The shown poles of an observer at every gain.
 ///
 /// # Errors
@@ -46,10 +80,18 @@ pub(super) fn ways(
     shown: &[Complex<f64>],
     gains: &[f64],
 ) -> Result<Ways, SpectrumError> {
-    let all = observer.locus(gains, observer.slopes.len())?;
-    let upper = all.into_iter().filter(|way| way[0].im >= 0.0).take(shown.len());
     Ok(Ways {
-        poles: upper.collect(),
+        poles: upper(observer, shown, gains)?,
         max_re: gains.iter().map(|&gain| observer.system.max_re(gain)).collect::<Result<_, _>>()?,
     })
+}
+
+/// Of every conjugate pair the pole that starts in the upper half plane.
+fn upper(
+    observer: &ObserverSpectrum,
+    shown: &[Complex<f64>],
+    gains: &[f64],
+) -> Result<Vec<Vec<Complex<f64>>>, SpectrumError> {
+    let all = observer.locus(gains, observer.slopes.len())?;
+    Ok(all.into_iter().filter(|way| way[0].im >= 0.0).take(shown.len()).collect())
 }

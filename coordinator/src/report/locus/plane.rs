@@ -5,7 +5,9 @@
 use nalgebra::Complex;
 use plotters::style::RGBColor;
 
-use super::gains::Ways;
+use starlings_models::spectrum::ObserverSpectrum;
+
+use super::gains::{Ways, smooth};
 use crate::report::ReportError;
 use crate::report::plot::axis::Axis;
 use crate::report::plot::mark::{Mark, Point};
@@ -26,14 +28,14 @@ pub(super) struct Plane {
 /// Per gain, a place in drawing units; nothing outside the plane's edges.
 pub(super) type Places = Vec<Option<(i32, i32)>>;
 
-/// Draws the loci, one colour per observer.
+/// Draws the loci of the shown poles, one colour per observer, and places the poles at the frames.
 ///
 /// # Errors
 ///
 /// The drawing library refuses a mark.
 pub(super) fn draw(
-    shown: &[Complex<f64>],
-    ways: &[Ways],
+    (shown, frames): (&[Complex<f64>], &[f64]),
+    (observers, ways): (&[ObserverSpectrum], &[Ways]),
     colours: &[RGBColor],
     unit: &str,
 ) -> Result<Plane, ReportError> {
@@ -45,11 +47,12 @@ pub(super) fn draw(
     let y = Axis::tight(&format!("Im λ [{unit}]"), [0.0, 1.06 * top]);
     let inside = |pole: &Complex<f64>| (x.lo..=x.hi).contains(&pole.re) && (-1e-9 * scale..=y.hi).contains(&pole.im);
     let mut marks = vec![Mark::Line { points: vec![(0.0, y.lo), (0.0, y.hi)], colour: MUTED, width: 1.0 }];
-    let n = ways.len();
-    for (k, (observer, colour)) in ways.iter().zip(colours).enumerate() {
+    let n = observers.len();
+    for (k, (observer, colour)) in observers.iter().zip(colours).enumerate() {
         // Observers with the same locus lie on top of each other: the first stays visible as a rim.
         let width = 2.0 + 1.8 * (n - 1 - k) as f64;
-        for part in observer.poles.iter().flat_map(|way| parts(way, inside)) {
+        let loci = smooth(observer, shown, frames, (0.02 * scale, 2.0 * scale)).map_err(ReportError::drawing)?;
+        for part in loci.iter().flat_map(|way| parts(way, inside)) {
             marks.push(Mark::Line { points: part, colour: *colour, width });
         }
     }

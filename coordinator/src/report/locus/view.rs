@@ -73,7 +73,7 @@ impl View {
         let follow = |observer| ways(observer, &shown, &gains);
         let ways: Vec<Ways> =
             locus.observers.iter().map(follow).collect::<Result<_, SpectrumError>>().map_err(ReportError::drawing)?;
-        let plane = plane::draw(&shown, &ways, &colours, &unit)?;
+        let plane = plane::draw((&shown, &gains), (locus.observers, &ways), &colours, &unit)?;
         let figure = decay::draw(locus.observers, &ways, &gains, &colours, (locus.decay, &unit))?;
         let colour = |c: &RGBColor| format!("#{:02X}{:02X}{:02X}", c.0, c.1, c.2);
         let hex: Vec<String> = colours.iter().map(colour).collect();
@@ -112,7 +112,7 @@ fn facts(locus: &Locus<'_>, unit: &str) -> Vec<(&'static str, String)> {
     let slowest = locus.poles.iter().map(|pole| pole.re).fold(f64::NEG_INFINITY, f64::max);
     facts.push(("max Re λ without observer", format!("{} {unit}", rate_text(slowest))));
     if let Some(decay) = locus.decay {
-        let (factor, time) = (significant(decay.factor(), 3), significant(decay.time(), 3));
+        let (factor, time) = (decay.factor(), decay.time());
         facts.push(("Wanted decay", format!("by {factor} in {time} {}", locus.time_unit)));
     }
     facts
@@ -174,7 +174,7 @@ fn rates(ways: &Ways) -> Vec<String> {
 }
 
 fn gain_text(gain: f64) -> String {
-    if gain.abs() > 0.0 { significant(gain, 4) } else { "0".to_owned() }
+    if gain.abs() > 0.0 { significant(gain, 5) } else { "0".to_owned() }
 }
 
 /// A real part; what only rounding keeps from zero is zero.

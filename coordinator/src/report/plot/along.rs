@@ -41,7 +41,12 @@ pub(crate) fn figure(family: &Family, data: &ReportData) -> Result<Figure, Repor
     marks.push(Mark::Line { points: curve, colour: BLUE, width: 1.25 });
     let (caption, title) = (caption(&rows), title(family));
     let scene = Scene { title, description: caption.clone(), x, y, marks };
-    let keys = [("dot blue", "estimate"), ("area blue", "± 2 sd"), ("area grey", "prior 95\u{a0}% interval"), ("line muted", "prior median")];
+    let keys = [
+        ("dot blue", "estimate"),
+        ("area blue", "± 2 sd"),
+        ("area grey", "prior 95\u{a0}% interval"),
+        ("line muted", "prior median"),
+    ];
     Figure::new(&scene, &keys, caption)
 }
 

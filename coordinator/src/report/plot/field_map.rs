@@ -86,7 +86,8 @@ impl Cells {
         let n = self.edges.len() - 1;
         let mut marks = Vec::new();
         for (row, (lo, hi)) in self.rows.iter().enumerate() {
-            let shades: Vec<i32> = self.mean[row * n..(row + 1) * n].iter().map(|v| shade(*v, scale)).collect();
+            let shades: Vec<i32> =
+                self.mean[row * n..(row + 1) * n].iter().map(|v| shade(*v, scale)).collect();
             let mut at = 0;
             for run in shades.chunk_by(|a, b| a == b) {
                 let (left, right) = (self.edges[at], self.edges[at + run.len()]);

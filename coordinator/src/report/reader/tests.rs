@@ -56,6 +56,22 @@ fn snapshot(rescued: u64) -> Snapshot {
     Snapshot { head, states: Vec::new() }
 }
 
+#[test]
+fn parameters_that_differ_by_a_number_are_a_family() {
+    let row = |name: &str, unit: &str| ParameterRow {
+        name: name.into(),
+        unit: unit.into(),
+        ..ParameterRow::default()
+    };
+    let rows =
+        [row("E10", "kPa"), row("k_s", ""), row("E2", "kPa"), row("E1", "kPa"), row("R1", ""), row("R2", "")];
+    let found = families(&rows, &["E10", "E2", "E1"].map(str::to_owned));
+    assert_eq!(found.len(), 1, "two are no family: {found:?}");
+    assert_eq!((found[0].stem.as_str(), found[0].stiffness), ("E", true));
+    assert_eq!(found[0].members, [(1, 3), (2, 2), (10, 0)]);
+    assert!(!families(&rows, &["E1".to_owned()])[0].stiffness);
+}
+
 /// Two analyses of a run that was killed: one value used, then two; one run retried, one failed and rescued.
 fn killed() -> (tempfile::TempDir, Store) {
     let folder = tempfile::tempdir().unwrap();

@@ -113,7 +113,8 @@ fn refuse_fields(source: &Source, section: &EffectSection, bare: &Spec) {
             let own = section.parameters.iter().any(|p| *p.name.get_ref() == name);
             if let Some(field) = fields.iter().find(|q| q.name == name && !own) {
                 let message = format!("`{name}` has {} components, and a term is one number", field.size);
-                let help = format!("effects of model `{}` can use its scalar quantities and parameters", bare.kind);
+                let help =
+                    format!("effects of model `{}` can use its scalar quantities and parameters", bare.kind);
                 source.report_with(character(&source.text, &term.span(), column), message, help);
             }
         }

@@ -25,15 +25,10 @@ pub(in crate::study) fn check(source: &Source, file: &StudyFile, setup: &Setup, 
 }
 
 /// The observer as it works in the fit, where held-out channels are never seen; nothing after a complaint.
-fn built(
-    source: &Source,
-    file: &StudyFile,
-    setup: &Setup,
-    records: &[Record],
-) -> Option<Box<dyn Observer>> {
+fn built(source: &Source, file: &StudyFile, setup: &Setup, records: &[Record]) -> Option<Box<dyn Observer>> {
     let seen = |output: &String| {
         let channels = records.iter().filter(|r| r.is_trained()).flat_map(|r| &r.channels);
-        channels.into_iter().any(|c| c.output == *output && !c.held_out)
+        channels.into_iter().any(|c| c.output == *output && !c.held_out && c.node.is_none())
     };
     let fitted: Vec<String> = setup.outputs.iter().filter(|o| seen(o)).cloned().collect();
     let build = |outputs: &[String]| {
@@ -48,8 +43,19 @@ fn built(
             blame(source, file, &error);
             None
         }
+        (Err(error), Ok(_)) if records.iter().flat_map(|r| &r.channels).any(|c| c.node.is_some()) => {
+            let message = format!("a surface shows no displacement that an observer could correct by: {error}");
+            source.report_with(
+                file.observer.kind.span(),
+                message,
+                "measure what it needs by a `column`, or use an observer of another output, or none",
+            );
+            None
+        }
         (Err(error), Ok(_)) => {
-            let message = format!("without the channels that are held out, the observer has not what it needs: {error}");
+            let message = format!(
+                "without the channels that are held out, the observer has not what it needs: {error}"
+            );
             source.report_with(
                 file.observer.kind.span(),
                 message,

@@ -10,7 +10,7 @@ use super::model::{effects, model};
 use super::table::{Node, Table, number, text, wrong_type};
 use super::{
     ChannelSection, EstimatorSection, ExplainSection, FleetSection, Named, ObserverSection, ParameterSection,
-    PriorSection, ProcessSection, RecordSection, StudyFile, StudySection,
+    PriorSection, ProcessSection, RecordSection, StudyFile, StudySection, SurfaceSection,
 };
 use crate::study::problem::{Source, StudyError};
 
@@ -168,20 +168,49 @@ fn channels(source: &Source, record: &Table<'_>) -> Vec<ChannelSection> {
         if t.get("noise").is_none() {
             t.missing("noise", "the standard deviation in the channel's unit, or \"auto\"");
         }
+        let surface = surface(source, &t);
         ChannelSection {
-            column: t.required_text("column", "a column of the record's file"),
+            column: match &surface {
+                Some(surface) => surface.file.clone(),
+                None => t.required_text("column", "a column of the record's file, or a `surface`"),
+            },
             output: t.required_text("output", "the output of the model that was measured"),
             unit: t.text("unit"),
             from: t.text("from"),
             start: t.number("start"),
             noise: noise.unwrap_or_else(|| Spanned::new(t.span.clone(), None)),
+            surface,
         }
     };
-    record
-        .tables("channels", "a channel", &["column", "output", "unit", "noise", "from", "start"])
-        .into_iter()
-        .map(read)
-        .collect()
+    let keys = ["column", "output", "unit", "noise", "from", "start", "surface", "rest", "open_ends"];
+    record.tables("channels", "a channel", &keys).into_iter().map(read).collect()
+}
+
+/// Open ends of a mesh where the study does not say: a tube's.
+const TUBE_ENDS: usize = 2;
+
+/// The surface part of a channel; nothing where it has a column.
+fn surface(source: &Source, t: &Table<'_>) -> Option<SurfaceSection> {
+    if t.get("surface").is_none() {
+        for key in ["rest", "open_ends"] {
+            if let Some(span) = t.key_span(key) {
+                source.report_with(span, format!("`{key}` belongs to a `surface`"), "remove it, or give `surface`");
+            }
+        }
+        return None;
+    }
+    for key in ["column", "from", "start"] {
+        if let Some(span) = t.key_span(key) {
+            let message = format!("a channel with a `surface` has no `{key}`");
+            source.report_with(span, message, "remove it: the observed value is a distance of zero to the surface");
+        }
+    }
+    let ends = t.count("open_ends").map_or(TUBE_ENDS, |n| usize::try_from(*n.get_ref()).unwrap_or(usize::MAX));
+    Some(SurfaceSection {
+        file: t.required_text("surface", "a CSV file of profiles or meshes"),
+        rest: t.required_text("rest", "a CSV file with the place of every node of the output without displacement"),
+        open_ends: ends,
+    })
 }
 
 fn noise(source: &Source, node: &Node<'_>) -> Option<Spanned<Option<f64>>> {

@@ -64,7 +64,7 @@ impl<'a> Flight<'a> {
         })
     }
 
-    /// Runs the given particles over the windows. `theta` is p × r in transformed units, `states[record]` is n × r or
+    /// Runs the given particles over the windows and gives back what the study's channels measure of them. `theta` is p × r in transformed units, `states[record]` is n × r or
     /// `None` at a record's start. Returns `[particle in the order given][window]`.
     ///
     /// # Errors
@@ -78,9 +78,11 @@ impl<'a> Flight<'a> {
         windows: &StepWindows,
     ) -> Result<Results, RunError> {
         let mut jobs = Vec::with_capacity(particles.len() * windows.len());
+        let sent: StepWindows =
+            windows.iter().map(|(record, window)| (*record, self.study.sendable(*record, window))).collect();
         for &particle in particles {
             let column: DVector<f64> = theta.column(particle).into_owned();
-            for (record, window) in windows {
+            for (record, window) in &sent {
                 jobs.push(Job {
                     particle: particle as u32,
                     record: *record as u32,
@@ -103,7 +105,11 @@ impl<'a> Flight<'a> {
                 }
                 self.retried += u64::from(outcome.attempts.saturating_sub(1));
                 self.failed += u64::from(outcome.result.is_err());
-                of_particle.push(self.sound(outcome.result, *record, particle, window)?);
+                let mut sound = self.sound(outcome.result, *record, particle, window)?;
+                if let Ok(prediction) = &mut sound {
+                    self.study.measure(*record, &window.times, &mut prediction.outputs);
+                }
+                of_particle.push(sound);
             }
             results.push(of_particle);
         }

@@ -39,6 +39,10 @@ fn pair(study: &Study, record: usize, times: &[f64], outputs: &[f64]) -> Vec<Pre
     for channel in &of_record.channels {
         for (j, time) in times.iter().enumerate() {
             let observed = of_record.observed(channel, *time);
+            // Without a surface there is nothing that a distance could be to.
+            if channel.node.is_some() && observed.is_none() {
+                continue;
+            }
             let usage = if channel.held_out {
                 "held-out-channel"
             } else if of_record.trains_at(*time) {

@@ -9,6 +9,8 @@ use crate::study::warnings::{CORRELATED, UNINFORMED, correlated, uninformed_comb
 
 /// Collinearity index from which a set of parameters is hard to estimate together (Brun, Reichert & Künsch 2001).
 const CRITICAL: f64 = 10.0;
+/// At most this many pairs have a warning of their own.
+const PAIRS: usize = 20;
 
 /// All warnings: those of the study, silent parameters, uninformed parameters and combinations, correlated pairs.
 pub fn warnings(study: &Study, found: &Identification) -> Vec<String> {
@@ -24,14 +26,27 @@ pub fn warnings(study: &Study, found: &Identification) -> Vec<String> {
         )
     }));
     warnings.extend(weak(found).map(|d| uninformed_combination(&d.combination, d.share)));
-    for (i, row) in found.correlation.iter().enumerate() {
-        for (j, value) in row.iter().enumerate().skip(i + 1) {
-            if let Some(value) = value.filter(|c| c.abs() > CORRELATED) {
-                warnings.push(correlated(&found.parameters[i].name, &found.parameters[j].name, value));
-            }
-        }
+    let pairs = found.correlated_pairs();
+    let name = |j: usize| &found.parameters[j].name;
+    warnings.extend(pairs.iter().take(PAIRS).map(|(i, j, c)| correlated(name(*i), name(*j), *c)));
+    if pairs.len() > PAIRS {
+        warnings.push(format!("{} pairs more are correlated beyond {CORRELATED}.", pairs.len() - PAIRS));
     }
     warnings
+}
+
+impl Identification {
+    /// Pairs of parameters (positions) that are correlated beyond 0.95 by the data alone, the strongest first.
+    pub fn correlated_pairs(&self) -> Vec<(usize, usize, f64)> {
+        let mut pairs = Vec::new();
+        for (i, row) in self.correlation.iter().enumerate() {
+            let later = row.iter().enumerate().skip(i + 1);
+            pairs.extend(later.filter_map(|(j, c)| Some((i, j, c.filter(|c| c.abs() > CORRELATED)?))));
+        }
+        // As they are written: what differs by rounding only stays in the order of the parameters.
+        pairs.sort_by_key(|(_, _, c)| std::cmp::Reverse((1000.0 * c.abs()).round() as i64));
+        pairs
+    }
 }
 
 /// Parameters that change a prediction and yet keep their prior.
@@ -54,7 +69,9 @@ pub fn advice(found: &Identification) -> String {
     if !found.silent.is_empty() {
         said.push(format!("Fix {} as a constant, or observe what depends on it.", listed(&found.silent)));
     }
-    let quiet: Vec<String> = uninformed(found).map(|p| p.name.clone()).collect();
+    let in_weak = |name: &String| weak(found).any(|d| d.parameters.contains(name));
+    let quiet: Vec<String> =
+        uninformed(found).map(|p| p.name.clone()).filter(|name| !in_weak(name)).collect();
     if !quiet.is_empty() {
         said.push(format!(
             "Fix {}, or measure longer, more often or with less noise: its posterior will be its prior.",
@@ -70,6 +87,7 @@ pub fn advice(found: &Identification) -> String {
     }));
     if said.is_empty() {
         said.push(sound(found));
+        said.extend(weakest(found));
     }
     said.extend(together(found));
     said.join(" ")
@@ -81,21 +99,25 @@ fn sound(found: &Identification) -> String {
     let width = least.map_or(String::new(), |p| {
         format!(" (least of all {}, to {:.2} % of its prior sd)", p.name, 100.0 * p.expected_sd / p.prior_sd)
     });
-    let locked = found
-        .correlation
-        .iter()
-        .enumerate()
-        .any(|(i, row)| row.iter().skip(i + 1).flatten().any(|c| c.abs() > CORRELATED));
-    if locked {
-        format!(
-            "These data inform every parameter{width}, but some of them only together: read the correlated pairs as one \
-             combination each, or fix one of the two."
-        )
-    } else {
-        format!(
+    if found.correlated_pairs().is_empty() {
+        return format!(
             "The estimation is reasonable: these data inform every parameter{width} and no pair is locked."
-        )
+        );
     }
+    format!(
+        "These data inform every parameter{width}, but some of them only together: read the correlated pairs as one \
+         combination each, or fix one of the two."
+    )
+}
+
+/// The combination of several parameters that is known worst.
+fn weakest(found: &Identification) -> Option<String> {
+    let d = found.directions.iter().find(|d| d.parameters.len() > 1)?;
+    Some(format!(
+        "The weakest combination is {}, left with {:.2} % of its prior sd.",
+        d.combination,
+        100.0 * d.share
+    ))
 }
 
 /// The largest set that can be estimated together, where the whole set cannot.
@@ -106,10 +128,16 @@ fn together(found: &Identification) -> Option<String> {
     }
     let fits = |subset: &&super::result::SubsetInfo| subset.index.is_some_and(|index| index < CRITICAL);
     let best = whole.growing.iter().filter(fits).max_by_key(|subset| subset.parameters.len())?;
+    let left: Vec<String> =
+        whole.parameters.iter().filter(|name| !best.parameters.contains(name)).cloned().collect();
+    let rest = if left.len() < best.parameters.len() {
+        format!("without {} it is", listed(&left))
+    } else {
+        format!("that of {} alone is", listed(&best.parameters))
+    };
     Some(format!(
-        "The collinearity index of the whole set is {}; without the others, {} have {:.1}, below the critical {CRITICAL}.",
+        "The collinearity index of the whole set is {}; {rest} {:.1}, below the critical {CRITICAL}.",
         whole.index.map_or_else(|| "beyond measure".to_owned(), |index| format!("{index:.1}")),
-        listed(&best.parameters),
         best.index.unwrap_or(1.0)
     ))
 }

@@ -173,8 +173,9 @@ fn record_steps(study: &Study, rows: &[Row]) -> Vec<RecordSteps> {
 
 fn conditional_on(study: &Study, at: &At) -> String {
     let observer = if study.observer_is_off() { "" } else { "; the study's observer is off in these runs" };
+    let drift = if study.drifts() { " Parameters that drift are held at one value." } else { "" };
     format!(
         "A local analysis at {at}: it holds for a model that is close to linear within the expected intervals, and for \
-         independent Gaussian noise of the stated standard deviations. Every record runs freely from its start{observer}."
+         independent Gaussian noise of the stated standard deviations. Every record runs freely from its start{observer}.{drift}"
     )
 }

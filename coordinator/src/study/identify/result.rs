@@ -62,7 +62,7 @@ pub struct CollinearityInfo {
     pub parameters: Vec<String>,
     /// Every pair, and of few parameters every triple; the worst first, pairs before triples.
     pub subsets: Vec<SubsetInfo>,
-    /// A well conditioned subset of every size, found by adding one parameter at a time.
+    /// A well conditioned subset of every size up to 40, found by adding one parameter at a time.
     pub growing: Vec<SubsetInfo>,
 }
 

@@ -7,11 +7,11 @@ const NAMED: f64 = 0.1;
 /// So many terms are written; a longer combination ends in `…`.
 const TERMS: usize = 6;
 
-/// The parameters (positions) that take part in a direction, the largest first.
+/// The parameters (positions) that take part in a direction, the largest first; those that are written alike in order.
 pub fn members(direction: &Direction) -> Vec<usize> {
     let size = |j: &usize| direction.coefficients[*j].abs();
     let mut members: Vec<usize> = (0..direction.coefficients.len()).filter(|j| size(j) >= NAMED).collect();
-    members.sort_by(|a, b| size(b).total_cmp(&size(a)));
+    members.sort_by_key(|j| std::cmp::Reverse((100.0 * size(j)).round() as i64));
     members
 }
 
@@ -54,7 +54,8 @@ mod tests {
     fn a_combination_names_its_largest_terms_first_and_leaves_out_the_smallest() {
         let names = ["E1", "E3", "k_s"];
         assert_eq!(combination(&names, &direction(&[0.02, 1.0, -0.9])), "E3 − 0.9 k_s");
-        assert_eq!(combination(&names, &direction(&[-0.996, 1.0, 0.25])), "E3 − E1 + 0.25 k_s");
+        assert_eq!(combination(&names, &direction(&[-0.994, 1.0, 0.25])), "E3 − 0.99 E1 + 0.25 k_s");
+        assert_eq!(combination(&names, &direction(&[0.3004, -0.3, 1.0])), "k_s + 0.3 E1 − 0.3 E3");
         assert_eq!(combination(&names, &direction(&[0.0, 0.0, 1.0])), "k_s");
     }
 

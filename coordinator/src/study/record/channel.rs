@@ -7,6 +7,7 @@ use starlings_models::Spec;
 use super::derived::Derived;
 use super::noise::Noise;
 use super::part::Part;
+use super::surface::SurfaceFiles;
 use super::{Context, Table};
 use crate::study::checked::Channel;
 use crate::study::file::{ChannelSection, RecordSection};
@@ -20,6 +21,8 @@ pub(in crate::study) struct ChannelReader<'a> {
     /// The training span; `None` when the whole record is held out.
     pub(in crate::study) train: Option<[f64; 2]>,
     pub(in crate::study) spec: &'a Spec,
+    /// The files of every channel that was measured as a surface.
+    pub(super) surfaces: &'a [Option<SurfaceFiles>],
 }
 
 impl ChannelReader<'_> {
@@ -27,8 +30,12 @@ impl ChannelReader<'_> {
     pub(in crate::study) fn channels(&self, context: &mut Context<'_>) -> Option<Vec<Channel>> {
         let before = self.source.count();
         let mut channels: Vec<Channel> = Vec::new();
-        for section in &self.section.channels {
-            let found = self.channel(section, context).unwrap_or_default();
+        for (section, files) in self.section.channels.iter().zip(self.surfaces) {
+            let found = match (&section.surface, files) {
+                (Some(surface), Some(files)) => self.surface(section, surface, files, context),
+                _ => self.channel(section, context),
+            };
+            let found = found.unwrap_or_default();
             if let Some(twice) = found.iter().find(|new| channels.iter().any(|c| c.output == new.output)) {
                 let message =
                     format!("output `{}` has two channels in record `{}`", twice.output, self.name());
@@ -87,6 +94,7 @@ impl ChannelReader<'_> {
             noise: noise.sd,
             noise_how: noise.how.clone(),
             values: derived.values(&self.table.times, &values),
+            node: None,
         };
         Some(measured.into_iter().map(channel).collect())
     }
@@ -156,7 +164,7 @@ impl ChannelReader<'_> {
     }
 
     /// Whether one of the values was measured where the record is used.
-    fn has_value(&self, values: &[f64]) -> bool {
+    pub(super) fn has_value(&self, values: &[f64]) -> bool {
         values.iter().zip(&self.table.times).any(|(v, t)| v.is_finite() && self.is_used(*t))
     }
 

@@ -35,8 +35,11 @@ impl ChannelReader<'_> {
         if sd > 0.0 && sd.is_finite() {
             return Some(Noise { sd, how: self.found(parts) });
         }
-        let why =
-            if known.is_empty() { "there are no four samples in a row" } else { "the samples do not scatter" };
+        let why = if known.is_empty() {
+            "there are no four samples in a row"
+        } else {
+            "the samples do not scatter"
+        };
         let unit = if unit.is_empty() { String::new() } else { format!(" in {unit}") };
         let message = format!(
             "the noise of column `{}` cannot be found from the data: {why}",
@@ -48,12 +51,13 @@ impl ChannelReader<'_> {
 
     fn found(&self, parts: &[&[f64]]) -> String {
         let n = parts.first().map_or(0, |values| self.used(values).len());
-        let uneven =
-            if self.is_even() { "" } else { " (which are not evenly spaced: it may be too large)" };
+        let uneven = if self.is_even() { "" } else { " (which are not evenly spaced: it may be too large)" };
         match parts.len() {
             1 => format!("from the third differences of its {n} samples{uneven}"),
             of => {
-                format!("from the third differences of the {n} samples of its {of} components, pooled{uneven}")
+                format!(
+                    "from the third differences of the {n} samples of its {of} components, pooled{uneven}"
+                )
             }
         }
     }

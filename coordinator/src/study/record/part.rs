@@ -53,9 +53,9 @@ impl ChannelReader<'_> {
             return Some(vec![Part { output: output.clone(), column: column.clone() }]);
         }
         let headers = &self.table.csv.headers;
-        let beyond = headers.iter().find(|header| {
-            component_of(header).is_some_and(|(field, index)| field == column && index >= n)
-        });
+        let beyond = headers
+            .iter()
+            .find(|header| component_of(header).is_some_and(|(field, index)| field == column && index >= n));
         if let Some(beyond) = beyond {
             let file = self.table.csv.path.display();
             self.source.report_with(
@@ -66,8 +66,7 @@ impl ChannelReader<'_> {
             return None;
         }
         let part = |i: usize| Part { output: format!("{output}[{i}]"), column: format!("{column}[{i}]") };
-        let parts: Vec<Part> =
-            (0..n).map(part).filter(|part| headers.contains(&part.column)).collect();
+        let parts: Vec<Part> = (0..n).map(part).filter(|part| headers.contains(&part.column)).collect();
         if parts.is_empty() {
             self.no_component(section, quantity);
             return None;
@@ -86,10 +85,7 @@ impl ChannelReader<'_> {
         let help = if self.table.csv.headers.contains(column) {
             format!("column `{column}` can measure one component: say which, as output = \"{name}[0]\"")
         } else {
-            format!(
-                "its columns are {}",
-                crate::study::problem::quoted_list(&self.table.csv.headers)
-            )
+            format!("its columns are {}", crate::study::problem::quoted_list(&self.table.csv.headers))
         };
         self.source.report_with(section.column.span(), message, help);
     }

@@ -215,6 +215,10 @@ fn fingerprint(study: &Study) -> String {
         feed(&record.times);
         for channel in &record.channels {
             feed(&channel.values);
+            if let Some(node) = &channel.node {
+                feed(&[node.rest, node.normal].concat());
+                feed(&node.seen.numbers);
+            }
         }
         for input in &record.inputs {
             feed(&input.times);

@@ -2,7 +2,7 @@
 
 use rusqlite::{Connection, params};
 
-use super::{AnalysisRow, JobRow};
+use super::{AnalysisRow, JobRow, PredictionRow};
 
 /// Version of the tables below; a store of another version is refused.
 pub(super) const SCHEMA_VERSION: i64 = 1;
@@ -37,15 +37,15 @@ pub(super) fn insert_analysis(connection: &Connection, row: &AnalysisRow) -> rus
             row.information_lost,
             row.transform.as_ref().map(|t| super::snapshot::to_bytes(t.as_slice()))
         ])?;
+    let mut insert = connection
+        .prepare_cached("INSERT OR REPLACE INTO estimates VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)")?;
     for e in &row.estimates {
-        connection
-            .prepare_cached("INSERT OR REPLACE INTO estimates VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)")?
-            .execute(params![row.pass, row.step, e.parameter, e.estimate, e.lo, e.hi, e.mean, e.sd])?;
+        insert.execute(params![row.pass, row.step, e.parameter, e.estimate, e.lo, e.hi, e.mean, e.sd])?;
     }
+    let mut insert =
+        connection.prepare_cached("INSERT INTO innovations VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)")?;
     for i in &row.innovations {
-        connection
-            .prepare_cached("INSERT INTO innovations VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)")?
-            .execute(params![row.pass, row.step, i.record, i.output, i.time, i.innovation, i.sd])?;
+        insert.execute(params![row.pass, row.step, i.record, i.output, i.time, i.innovation, i.sd])?;
     }
     Ok(())
 }
@@ -67,6 +67,23 @@ pub(super) fn insert_jobs(connection: &Connection, jobs: &[JobRow]) -> rusqlite:
             status,
             job.error,
             job.cost_s
+        ])?;
+    }
+    Ok(())
+}
+
+pub(super) fn insert_predictions(connection: &Connection, rows: &[PredictionRow]) -> rusqlite::Result<()> {
+    let mut insert =
+        connection.prepare_cached("INSERT INTO predictions VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)")?;
+    for row in rows {
+        insert.execute(params![
+            row.record,
+            row.output,
+            row.time,
+            row.observed,
+            row.predicted,
+            row.usage,
+            row.noise
         ])?;
     }
     Ok(())

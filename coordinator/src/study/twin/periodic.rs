@@ -113,10 +113,17 @@ mod tests {
     /// Modes that decay by e^−rate per period towards a state of very unequal entries.
     fn modes(rates: &[f64]) -> impl FnMut(&[f64]) -> Result<Vec<f64>, ParticleError> {
         let rates = rates.to_vec();
-        move |x| Ok(rates.iter().zip(x).zip(1..).map(|((r, x), k)| {
-            let fixed = 10_f64.powi(k);
-            fixed + (-r).exp() * (x - fixed)
-        }).collect())
+        move |x| {
+            Ok(rates
+                .iter()
+                .zip(x)
+                .zip(1..)
+                .map(|((r, x), k)| {
+                    let fixed = 10_f64.powi(k);
+                    fixed + (-r).exp() * (x - fixed)
+                })
+                .collect())
+        }
     }
 
     #[test]

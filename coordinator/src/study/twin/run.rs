@@ -164,7 +164,8 @@ mod tests {
 
     #[test]
     fn a_signal_of_one_period_goes_on_with_the_same_samples() {
-        let mut signal = Signal { times: vec![1.0, 1.25, 1.5, 2.0, 2.1], values: vec![0.0, 1.0, 3.0, 0.0, 7.0] };
+        let mut signal =
+            Signal { times: vec![1.0, 1.25, 1.5, 2.0, 2.1], values: vec![0.0, 1.0, 3.0, 0.0, 7.0] };
         repeat(&mut signal, 2.0, 1.0, 4.0);
         // Sums of numbers with few binary digits are exact, also as text.
         assert_eq!(format!("{:?}", signal.times), "[1.0, 1.25, 1.5, 2.0, 2.25, 2.5, 3.0, 3.25, 3.5, 4.0]");

@@ -103,8 +103,10 @@ impl Network {
             nodes.push(Node { name: entry.name.clone(), kind: entry.kind, ends: Vec::new(), outlet });
         }
         let [inlet] = inlets[..] else {
-            let message =
-                format!("{} inlets: list exactly one node of kind \"inlet\", where the flow enters", inlets.len());
+            let message = format!(
+                "{} inlets: list exactly one node of kind \"inlet\", where the flow enters",
+                inlets.len()
+            );
             return Err(fault("nodes", message));
         };
         if outlets.is_empty() {
@@ -199,8 +201,10 @@ impl Network {
         match layout.segments.iter().position(lost) {
             None => Ok(()),
             Some(i) => {
-                let message =
-                    format!("no way leads from the inlet to `{}`: join it to the network", layout.segments[i].name);
+                let message = format!(
+                    "no way leads from the inlet to `{}`: join it to the network",
+                    layout.segments[i].name
+                );
                 Err(fault(&format!("segments[{i}]"), message))
             }
         }

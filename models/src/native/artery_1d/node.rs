@@ -70,7 +70,8 @@ impl Condition {
         for (met, end) in met.iter_mut().zip(ends) {
             met.area = end.area;
         }
-        let mut pressure = ends.iter().map(|end| self.local(rho, end, end.area).pressure).sum::<f64>() / ends.len() as f64;
+        let mut pressure =
+            ends.iter().map(|end| self.local(rho, end, end.area).pressure).sum::<f64>() / ends.len() as f64;
         for _ in 0..MOST {
             let step = self.newton(rho, ends, met, &mut pressure)?;
             if step <= CONVERGED {
@@ -166,7 +167,8 @@ mod tests {
             arriving(-1.0, 3e6, 0.6, 1.3, -20.0),
         ];
         let mut met = [Met::default(); 3];
-        let pressure = Condition::Joint { inflow: 0.0, total: true }.meet(rho, &ends, &mut met).expect("a solution");
+        let pressure =
+            Condition::Joint { inflow: 0.0, total: true }.meet(rho, &ends, &mut met).expect("a solution");
         assert!((met[0].flow - met[1].flow - met[2].flow).abs() < 1e-10, "{met:?}");
         for (met, end) in met.iter().zip(&ends) {
             let u = met.flow / met.area;

@@ -17,7 +17,9 @@ const FLOW: &str = "cm^3/s";
 pub(super) fn spec(network: &Network) -> Spec {
     Spec {
         kind: "artery-1d".to_owned(),
-        says: "Nonlinear waves of area and flow in a network of tapering viscoelastic vessels with RCR outlets.".to_owned(),
+        says:
+            "Nonlinear waves of area and flow in a network of tapering viscoelastic vessels with RCR outlets."
+                .to_owned(),
         states: states(network),
         parameters: parameters(network),
         outputs: outputs(network),
@@ -79,8 +81,12 @@ fn shared() -> [Quantity; 10] {
             .default(1.0)
             .says("Momentum coefficient: 1 for a flat velocity profile, 4/3 for a parabola."),
         not_negative("c_w", "dyn s/cm^3", 2e3).role(Role::Damping).says("Viscosity of the wall."),
-        not_negative("k_s", "dyn/cm^3", 0.0).role(Role::Stiffness).says("Stiffness of the tissue around the vessels."),
-        not_negative("c_s", "dyn s/cm^3", 0.0).role(Role::Damping).says("Viscosity of the tissue around the vessels."),
+        not_negative("k_s", "dyn/cm^3", 0.0)
+            .role(Role::Stiffness)
+            .says("Stiffness of the tissue around the vessels."),
+        not_negative("c_s", "dyn s/cm^3", 0.0)
+            .role(Role::Damping)
+            .says("Viscosity of the tissue around the vessels."),
         pressure("p_ext", 0.0).says("Pressure around the vessels."),
         pressure("p_venous", 0.0).says("Pressure beyond the outlets."),
         pressure("p0", DIASTOLIC).says("Pressure at which the network rests initially."),
@@ -93,7 +99,9 @@ fn outlet(network: &Network, node: usize) -> Vec<Quantity> {
         Quantity::new(&named(network, stem, node), "dyn s/cm^5").role(Role::Resistance).default(default)
     };
     if kind == NodeKind::Resistance {
-        return vec![resistance("R_out", 2000.0).range(0.0, f64::INFINITY).says(&format!("Resistance of `{name}`."))];
+        return vec![
+            resistance("R_out", 2000.0).range(0.0, f64::INFINITY).says(&format!("Resistance of `{name}`.")),
+        ];
     }
     let compliance = Quantity::new(&named(network, "C", node), "cm^5/dyn").role(Role::Compliance).positive();
     vec![

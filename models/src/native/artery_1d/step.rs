@@ -96,7 +96,13 @@ impl Vessels<'_> {
     ///
     /// # Errors
     /// As [`Vessels::step`].
-    pub(super) fn rate(&self, inflow: f64, x: &[f64], work: &mut Work, rate: &mut [f64]) -> Result<(), Fault> {
+    pub(super) fn rate(
+        &self,
+        inflow: f64,
+        x: &[f64],
+        work: &mut Work,
+        rate: &mut [f64],
+    ) -> Result<(), Fault> {
         let Work { faces, viscous, stage, diffusion, .. } = work;
         stage.copy_from_slice(x);
         self.diffuse(0.0, inflow, stage, viscous, &mut diffusion[0])?;

@@ -1,7 +1,7 @@
 //! Convection, pressure and friction: the hyperbolic part of the equations by finite volumes.
 //!
-//! Second order in space: elastic pressure and flow are linear in each cell, with slopes limited at
-//! fronts (van Leer 1979), and faces have one wall each, so that the areas on the two sides of a face are equal where the pressures are: a state at rest
+//! Second order in space: elastic pressure and flow are linear in each cell, with slopes limited at fronts (van Leer 1979).
+//! Faces have one wall each, so that the areas on the two sides of a face are equal where the pressures are: a state at rest
 //! stays at rest for any radius and stiffness along the vessel (hydrostatic reconstruction, Audusse et al. 2004; Delestre &
 //! Lagrée 2013). Faces inside a tube take the flux of Harten, Lax & van Leer (1983), written as differences from its two
 //! sides; the force of the pressure inside a cell is that of its own reconstruction. Next file to read: [`super::viscous`].
@@ -86,7 +86,8 @@ impl Vessels<'_> {
         for (outlet, &node) in self.outlets.iter().zip(&self.network.outlets) {
             if let Some((i, distal, compliance)) = outlet.chamber {
                 let behind = x[2 * n + i];
-                rate[2 * n + i] = (self.outflow(node, faces) - (behind - self.p_venous) / distal) / compliance;
+                rate[2 * n + i] =
+                    (self.outflow(node, faces) - (behind - self.p_venous) / distal) / compliance;
             }
         }
         Ok(())

@@ -46,7 +46,8 @@ impl<'a> Vessels<'a> {
     /// The network at these parameters, in the order of [`super::quantities`].
     pub(super) fn new(network: &'a Network, theta: &[f64]) -> Self {
         let n = network.tubes.len();
-        let [rho, mu, nu, alpha, c_w, k_s, c_s, p_ext, p_venous, p_start] = std::array::from_fn(|i| theta[n + i]);
+        let [rho, mu, nu, alpha, c_w, k_s, c_s, p_ext, p_venous, p_start] =
+            std::array::from_fn(|i| theta[n + i]);
         let mut vessels = Self {
             network,
             cells: Vec::with_capacity(network.n_cell),

@@ -34,9 +34,10 @@ pub(super) struct Viscous {
     /// Γ/(2πR dx) at each face; zero at the ends.
     weight: Vec<f64>,
     couplings: Vec<Coupling>,
-    /// Diagonal and part above it of the factored matrices.
-    diagonal: Vec<f64>,
+    /// What the factored matrices have above their diagonal of ones.
     above: Vec<f64>,
+    /// Flows in the cells if the nodes had no pressure.
+    free: Vec<f64>,
     /// Response of the flows to the pressure at the start and at the end of their tube.
     response: [Vec<f64>; 2],
     /// p_v at each face.
@@ -52,8 +53,8 @@ impl Viscous {
         Self {
             weight: vec![0.0; n_face],
             couplings: vec![Coupling::default(); n_end],
-            diagonal: vec![0.0; n],
             above: vec![0.0; n],
+            free: vec![0.0; n],
             response: [vec![0.0; n], vec![0.0; n]],
             face: vec![0.0; n_face],
             end: vec![0.0; n_end],
@@ -92,7 +93,7 @@ impl Vessels<'_> {
             let given = [x[n + tube.first], x[n + tube.first + tube.n - 1]];
             for j in tube.first..tube.first + tube.n {
                 // The responses replace r only here, after the nodes have used it.
-                x[n + j] = work.diagonal[j] + work.response[0][j] * from + work.response[1][j] * to;
+                x[n + j] = work.free[j] + work.response[0][j] * from + work.response[1][j] * to;
             }
             for j in 1..tube.n {
                 let face = first + j;
@@ -134,11 +135,8 @@ impl Vessels<'_> {
             let brought = |own: f64, next: f64| 1.5 * own - 0.5 * next;
             let elastic = brought(self.cells[cell].pressure(x[cell]), self.cells[next].pressure(x[next]));
             let area = self.faces[face].area(elastic);
-            let mut coupling = Coupling {
-                pressure: self.p_ext + elastic,
-                slope: 0.0,
-                mobility: 0.5 / weight(radius(area)),
-            };
+            let mut coupling =
+                Coupling { pressure: self.p_ext + elastic, slope: 0.0, mobility: 0.5 / weight(radius(area)) };
             if self.network.nodes[node].kind == NodeKind::Junction {
                 let velocity = brought(x[n + cell], x[n + next]) / area;
                 coupling.pressure += 0.5 * self.rho * velocity * velocity;
@@ -148,53 +146,51 @@ impl Vessels<'_> {
         }
     }
 
-    /// Solves one tube's system without its nodes, into the place of the diagonal, and for a pressure of one at each node.
+    /// Solves one tube's system without its nodes, and for a pressure of one at each of them.
     fn respond(&self, tube: usize, tau: f64, x: &[f64], work: &mut Viscous) {
         let of = &self.network.tubes[tube];
-        let (n, first) = (self.network.n_cell, Self::first_face(tube, of));
+        let first = Self::first_face(tube, of);
         let cells = of.first..of.first + of.n;
-        for side in 0..2 {
-            work.response[side][cells.clone()].fill(0.0);
-        }
-        let scale = |cell: usize| tau * x[cell] / (self.rho * of.dx);
-        // Forward elimination; the right-hand side is x's, then the solution takes the place of the pivots.
-        let mut free: Vec<f64> = x[n + of.first..n + of.first + of.n].to_vec();
-        for (side, sign) in [(0, -1.0), (1, 1.0)] {
-            let j = side * (of.n - 1);
-            let (coupling, a) = (work.couplings[2 * tube + side], scale(of.first + j));
-            free[j] += sign * a * (coupling.pressure - coupling.slope * free[j]);
-            work.response[side][of.first + j] = -sign * a;
-        }
+        let (area, flow) = (&x[cells.clone()], &x[self.network.n_cell..][cells.clone()]);
+        let weight = &work.weight[first..=first + of.n];
+        let couplings = &work.couplings[2 * tube..2 * tube + 2];
+        let [start, end] = &mut work.response;
+        let (start, end) = (&mut start[cells.clone()], &mut end[cells.clone()]);
+        let (free, above) = (&mut work.free[cells.clone()], &mut work.above[cells]);
+        let scale = |j: usize| tau * area[j] / (self.rho * of.dx);
+        let last = of.n - 1;
+        free.copy_from_slice(flow);
+        start.fill(0.0);
+        end.fill(0.0);
+        free[0] -= scale(0) * (couplings[0].pressure - couplings[0].slope * flow[0]);
+        free[last] += scale(last) * (couplings[1].pressure - couplings[1].slope * flow[last]);
+        start[0] = scale(0);
+        end[last] = -scale(last);
         for j in 0..of.n {
-            let (cell, a) = (of.first + j, scale(of.first + j));
-            let (left, right) = (work.weight[first + j], work.weight[first + j + 1]);
-            let mut pivot = 1.0 + a * (left + right);
+            let a = scale(j);
+            let mut pivot = 1.0 + a * (weight[j] + weight[j + 1]);
             if j == 0 {
-                pivot += a * work.couplings[2 * tube].slope;
+                pivot += a * couplings[0].slope;
+            } else {
+                let below = -a * weight[j];
+                pivot -= below * above[j - 1];
+                for values in [&mut *free, &mut *start, &mut *end] {
+                    values[j] -= below * values[j - 1];
+                }
             }
-            if j + 1 == of.n {
-                pivot -= a * work.couplings[2 * tube + 1].slope;
+            if j == last {
+                pivot -= a * couplings[1].slope;
             }
-            if j > 0 {
-                let below = -a * left;
-                pivot -= below * work.above[cell - 1];
-                free[j] -= below * free[j - 1];
-                work.response[0][cell] -= below * work.response[0][cell - 1];
-                work.response[1][cell] -= below * work.response[1][cell - 1];
+            above[j] = -a * weight[j + 1] / pivot;
+            for values in [&mut *free, &mut *start, &mut *end] {
+                values[j] /= pivot;
             }
-            work.above[cell] = -a * right / pivot;
-            free[j] /= pivot;
-            work.response[0][cell] /= pivot;
-            work.response[1][cell] /= pivot;
         }
-        for j in (0..of.n - 1).rev() {
-            let cell = of.first + j;
-            let above = work.above[cell];
-            free[j] -= above * free[j + 1];
-            work.response[0][cell] -= above * work.response[0][cell + 1];
-            work.response[1][cell] -= above * work.response[1][cell + 1];
+        for j in (0..last).rev() {
+            for values in [&mut *free, &mut *start, &mut *end] {
+                values[j] -= above[j] * values[j + 1];
+            }
         }
-        work.diagonal[cells].copy_from_slice(&free);
     }
 
     /// The pressures of the nodes: what the ends send there, as [`super::node::Condition`] asks.
@@ -221,7 +217,7 @@ impl Vessels<'_> {
                     matrix[(row, other)] += weight * work.response[side][cell];
                 }
                 matrix[(row, row)] -= m * mobility;
-                right[row] -= weight * work.diagonal[cell] + m * mobility * (pressure - slope * x[n + cell]);
+                right[row] -= weight * work.free[cell] + m * mobility * (pressure - slope * x[n + cell]);
             }
         }
         let solved = matrix.lu().solve(&right).filter(|p: &DVector<f64>| p.iter().all(|p| p.is_finite()));

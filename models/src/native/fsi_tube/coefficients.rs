@@ -7,6 +7,10 @@ use std::f64::consts::PI;
 /// What the equations need of the parameters, per cell of length dx.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Coefficients {
+    /// Membrane stiffness per Young's modulus, h/(1 − ν²) in cm.
+    plane: f64,
+    /// Radius R in cm.
+    pub(super) radius: f64,
     /// Wall stiffness per Young's modulus, h/((1 − ν²) R²) in 1/cm.
     pub(super) ring: f64,
     /// Tissue stiffness k_s in dyn/cm³.
@@ -46,6 +50,8 @@ impl Coefficients {
         let section = PI * radius * radius;
         let area = 2.0 * PI * radius * dx;
         Self {
+            plane: h / (1.0 - nu * nu),
+            radius,
             ring: h / ((1.0 - nu * nu) * radius * radius),
             tissue: k_s,
             mass: rho_s * h,
@@ -60,6 +66,16 @@ impl Coefficients {
             young_ref,
             p0,
         }
+    }
+
+    /// β = E h/(1 − ν²) in dyn/cm, for a wall of this Young's modulus.
+    pub(super) fn membrane(&self, young: f64) -> f64 {
+        self.plane * young
+    }
+
+    /// Stiffness of wall and tissue together in dyn/cm³, for a wall of this Young's modulus and unloaded radius.
+    pub(super) fn stiffness_at(&self, young: f64, unloaded: f64) -> f64 {
+        self.membrane(young) / (unloaded * unloaded) + self.tissue
     }
 
     /// Stiffness of wall and tissue together k in dyn/cm³, for a wall of this Young's modulus.

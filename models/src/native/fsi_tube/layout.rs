@@ -29,11 +29,19 @@ pub struct Layout {
     pub step: f64,
     /// Where a run starts.
     pub start: Start,
+    /// Pressure of the image in which the radius is R, in dyn/cm²; zero where R is the radius without load.
+    pub image_pressure: f64,
 }
 
 impl Default for Layout {
     fn default() -> Self {
-        Self { cells: 25, regions: Regions::Equal(5), step: 1e-3, start: Start::Equilibrium }
+        Self {
+            cells: 25,
+            regions: Regions::Equal(5),
+            step: 1e-3,
+            start: Start::Equilibrium,
+            image_pressure: 0.0,
+        }
     }
 }
 
@@ -112,6 +120,10 @@ impl Layout {
         if !self.step.is_finite() || self.step <= 0.0 {
             return Err(fault("step", format!("a step of {} s: give a time above zero", self.step)));
         }
+        if !self.image_pressure.is_finite() || self.image_pressure < 0.0 {
+            let message = format!("an image under {} dyn/cm^2: give zero or above", self.image_pressure);
+            return Err(fault("image_pressure", message));
+        }
         match &self.regions {
             Regions::Equal(n) => self.equal(*n, length),
             Regions::Listed(regions) => self.listed(regions, length),
@@ -140,7 +152,7 @@ impl Layout {
     }
 
     fn listed(&self, regions: &[Region], length: f64) -> Result<Vec<Part>, SetupError> {
-        self.check(regions, length)?;
+        check(regions, length)?;
         let before = |x: f64| {
             let centre = |j: usize| (j as f64 + 0.5) * length / self.cells as f64;
             (0..self.cells).take_while(|&j| centre(j) < x - SAME * length).count()
@@ -162,38 +174,38 @@ impl Layout {
         }
         Ok(parts)
     }
+}
 
-    /// Refuses regions that do not cover the tube once, from the inlet to the outlet.
-    fn check(&self, regions: &[Region], length: f64) -> Result<(), SetupError> {
-        let Some(last) = regions.last() else {
-            return Err(fault("regions", "no regions: give at least one, or a number of equal ones"));
-        };
-        let same = |a: f64, b: f64| (a - b).abs() <= SAME * length;
-        let mut end = 0.0;
-        for (i, region) in regions.iter().enumerate() {
-            let Region { name, from, to } = region;
-            let at = |key: &str| format!("regions[{i}].{key}");
-            if regions[..i].iter().any(|other| other.name == *name) {
-                return Err(fault(&at("name"), format!("two regions are named `{name}`")));
-            }
-            if !(from.is_finite() && to.is_finite() && from < to) {
-                return Err(fault(&at("to"), format!("`{name}` ends at {to} cm and starts at {from} cm")));
-            }
-            if !same(*from, end) {
-                let what = if *from > end { "no region covers" } else { "two regions cover" };
-                let (a, b) = (end.min(*from), end.max(*from));
-                let remedy = format!("start `{name}` at {end}, or put the regions in order along the tube");
-                return Err(fault(&at("from"), format!("{what} {a} to {b} cm: {remedy}")));
-            }
-            end = *to;
+/// Refuses regions that do not cover the tube once, from the inlet to the outlet.
+fn check(regions: &[Region], length: f64) -> Result<(), SetupError> {
+    let Some(last) = regions.last() else {
+        return Err(fault("regions", "no regions: give at least one, or a number of equal ones"));
+    };
+    let same = |a: f64, b: f64| (a - b).abs() <= SAME * length;
+    let mut end = 0.0;
+    for (i, region) in regions.iter().enumerate() {
+        let Region { name, from, to } = region;
+        let at = |key: &str| format!("regions[{i}].{key}");
+        if regions[..i].iter().any(|other| other.name == *name) {
+            return Err(fault(&at("name"), format!("two regions are named `{name}`")));
         }
-        if !same(end, length) {
-            let message = format!(
-                "the last region, `{}`, ends at {end} cm and the tube at L = {length} cm: both must be the same",
-                last.name
-            );
-            return Err(fault(&format!("regions[{}].to", regions.len() - 1), message));
+        if !(from.is_finite() && to.is_finite() && from < to) {
+            return Err(fault(&at("to"), format!("`{name}` ends at {to} cm and starts at {from} cm")));
         }
-        Ok(())
+        if !same(*from, end) {
+            let what = if *from > end { "no region covers" } else { "two regions cover" };
+            let (a, b) = (end.min(*from), end.max(*from));
+            let remedy = format!("start `{name}` at {end}, or put the regions in order along the tube");
+            return Err(fault(&at("from"), format!("{what} {a} to {b} cm: {remedy}")));
+        }
+        end = *to;
     }
+    if !same(end, length) {
+        let message = format!(
+            "the last region, `{}`, ends at {end} cm and the tube at L = {length} cm: both must be the same",
+            last.name
+        );
+        return Err(fault(&format!("regions[{}].to", regions.len() - 1), message));
+    }
+    Ok(())
 }

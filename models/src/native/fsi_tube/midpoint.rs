@@ -30,6 +30,8 @@ struct Step {
     relaxed: f64,
     /// Pressure of the Windkessel per mean flow into it.
     filling: f64,
+    /// Pressure in a wall of the image's radius.
+    image_pressure: f64,
 }
 
 impl FsiTube {
@@ -42,7 +44,7 @@ impl FsiTube {
         let (wall, rest) = rest.split_at_mut(cells);
         let (flow, rest) = rest.split_at_mut(cells);
         let (inverse, ratio) = rest.split_at_mut(cells);
-        let step = Step::new(&c, h / n as f64);
+        let step = Step::new(&c, h / n as f64, self.image_pressure);
         self.stiffness(theta, &c, stiffness);
         let viscous = step.inertia + c.damping;
         for (z, k) in wall.iter_mut().zip(&*stiffness) {
@@ -61,7 +63,7 @@ impl FsiTube {
 }
 
 impl Step {
-    fn new(c: &Coefficients, dt: f64) -> Self {
+    fn new(c: &Coefficients, dt: f64, image_pressure: f64) -> Self {
         let relaxed = 1.0 / (1.0 + 0.5 * dt / (c.distal * c.compliance));
         Self {
             dt,
@@ -69,6 +71,7 @@ impl Step {
             inertance: 2.0 * c.inertance / dt,
             relaxed,
             filling: 0.5 * dt / c.compliance * relaxed,
+            image_pressure,
         }
     }
 
@@ -80,7 +83,8 @@ impl Step {
         let last = by.flow.len() - 1;
         // The last face is half as long: half the inertia of the others, and no cell behind it.
         by.flow[0] += by.wall[0] * inflow;
-        by.flow[last] -= *pi * self.relaxed;
+        // Between cells the image's pressure cancels; the Windkessel counts from zero.
+        by.flow[last] += self.image_pressure - *pi * self.relaxed;
         chain.solve(by.flow);
         let mut above = inflow;
         for ((eta, w), &below) in eta.iter_mut().zip(w).zip(&*by.flow) {
@@ -99,8 +103,8 @@ impl Step {
         let last = eta.len() - 1;
         let mut flow = inflow;
         let mut behind = pressure(0);
-        for k in 0..last {
-            flow -= c.area * w[k];
+        for (k, w) in w[..last].iter().enumerate() {
+            flow -= c.area * w;
             let ahead = pressure(k + 1);
             by.flow[k] = self.inertance * flow + behind - ahead;
             behind = ahead;

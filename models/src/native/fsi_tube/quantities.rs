@@ -8,6 +8,9 @@ use crate::{Quantity, Role, Spec};
 /// Diastolic initial pressure of the Windkessel: 80 mmHg in dyn/cm².
 const INITIAL_PRESSURE: f64 = 80.0 * 1333.22;
 
+/// Length of the tube in cm, unless a study says otherwise.
+pub(super) const LENGTH: f64 = 25.0;
+
 /// Young's modulus of an artery in dyn/cm².
 const YOUNG: f64 = 5e6;
 
@@ -43,7 +46,7 @@ fn outputs(n: usize) -> Vec<Quantity> {
         Quantity::new("displacement", "cm")
             .size(n)
             .role(Role::Displacement)
-            .says("Radial displacement of the wall, from the inlet on."),
+            .says("Displacement of the wall from the radius R, from the inlet on."),
         Quantity::new("velocity", "cm/s")
             .size(n)
             .role(Role::Velocity)
@@ -72,8 +75,11 @@ fn wall() -> [Quantity; 11] {
         stiff("E_ref", "dyn/cm^2", YOUNG)
             .positive()
             .says("Young's modulus by which a start of kind `reference` is displaced."),
-        Quantity::new("L", "cm").positive().default(25.0).says("Length of the tube."),
-        Quantity::new("R", "cm").positive().default(1.0).says("Radius of the tube."),
+        Quantity::new("L", "cm").positive().default(LENGTH).says("Length of the tube."),
+        Quantity::new("R", "cm")
+            .positive()
+            .default(1.0)
+            .says("Radius of the tube: without load, or under the image pressure of the layout."),
         Quantity::new("h", "cm").positive().default(0.15).says("Thickness of the wall."),
         Quantity::new("nu", "").range(0.0, 0.5).default(0.5).says("Poisson's ratio of the wall."),
         Quantity::new("rho_s", "g/cm^3").positive().default(1.1).says("Density of the wall."),

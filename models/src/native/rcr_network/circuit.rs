@@ -82,7 +82,7 @@ pub(super) enum Law {
 pub(super) struct Inertance {
     pub(super) ends: Ends,
     /// Position of L in θ.
-    pub(super) inertance: usize,
+    pub(super) value: usize,
     /// Position of the flow in the state.
     pub(super) state: usize,
     pub(super) says: String,

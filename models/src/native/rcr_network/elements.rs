@@ -11,6 +11,7 @@ use crate::layout::fault;
 use crate::{Quantity, SetupError};
 
 /// A capacitor on its way into the circuit.
+#[derive(Clone, Copy)]
 struct Storage<'a> {
     name: &'a str,
     path: &'a str,
@@ -108,14 +109,14 @@ impl Assembly {
 
     fn inertance(&mut self, element: &Element, ends: Ends, path: &str) -> Result<FlowOf, SetupError> {
         let value = element.value.as_ref();
-        let inertance = self.value(element, path, Measure::Inertance, ("value", "L", value))?;
+        let value = self.value(element, path, Measure::Inertance, ("value", "L", value))?;
         let name = format!("q_{}", element.name);
         let quantity = Quantity::new(&name, Measure::Flow.label(self.units))
             .role(Measure::Flow.role())
             .says(&format!("Flow through `{}`.", element.name));
         let state = self.state(quantity, element.initial.unwrap_or(0.0));
         self.measures.push((name.clone(), name));
-        self.circuit.inertances.push(Inertance { ends, inertance, state, says: element.name.clone() });
+        self.circuit.inertances.push(Inertance { ends, value, state, says: element.name.clone() });
         Ok(FlowOf::Inertance(self.circuit.inertances.len() - 1))
     }
 

@@ -138,7 +138,7 @@ impl Network {
     /// The rate of the state for a solution at hand.
     pub(super) fn rate_of(&self, solution: &Solution, given: Given<'_>, dx: &mut [f64]) {
         for branch in &self.circuit.inertances {
-            dx[branch.state] = solution.drop(branch.ends) / given.theta[branch.inertance];
+            dx[branch.state] = solution.drop(branch.ends) / given.theta[branch.value];
         }
         for (tie, flow) in self.circuit.ties.iter().zip(&solution.ties) {
             if let TieKind::Capacitors { state, parts } = &tie.kind {

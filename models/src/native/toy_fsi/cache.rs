@@ -45,6 +45,8 @@ impl<T> Cache<T> {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::float_cmp)]
+
     use super::*;
 
     #[test]

@@ -66,7 +66,8 @@ impl Elements {
                 let (i, j) = ((element + p).wrapping_sub(1), (element + q).wrapping_sub(1));
                 if i < n && j < n {
                     solid_mass[(i, j)] += vessel.mass() * thickness * PRODUCTS[p][q] * dx;
-                    let (ring, shear) = (vessel.ring() * PRODUCTS[p][q] * dx, vessel.shear() * SLOPES[p][q] / dx);
+                    let (ring, shear) =
+                        (vessel.ring() * PRODUCTS[p][q] * dx, vessel.shear() * SLOPES[p][q] / dx);
                     stiffness[(i, j)] += thickness * (ring + shear);
                 }
             }
@@ -115,10 +116,9 @@ mod tests {
             for (a, b) in corners.into_iter().flat_map(|a| corners.into_iter().map(move |b| (a, b))) {
                 if [i + a.0, i + b.0].iter().all(|&end| end > 0 && end < along) {
                     let (x, y) = ((a.0, b.0), (a.1, b.1));
-                    kp[(index(i + a.0, j + a.1), index(i + b.0, j + b.1))] += SLOPES[x.0][x.1] / dx
-                        * PRODUCTS[y.0][y.1]
-                        * dy
-                        + PRODUCTS[x.0][x.1] * dx * SLOPES[y.0][y.1] / dy;
+                    kp[(index(i + a.0, j + a.1), index(i + b.0, j + b.1))] +=
+                        SLOPES[x.0][x.1] / dx * PRODUCTS[y.0][y.1] * dy
+                            + PRODUCTS[x.0][x.1] * dx * SLOPES[y.0][y.1] / dy;
                 }
             }
         }

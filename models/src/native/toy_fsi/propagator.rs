@@ -47,6 +47,8 @@ impl Propagator {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::float_cmp)]
+
     use super::*;
 
     #[test]
@@ -54,7 +56,7 @@ mod tests {
         // dx = v, dv = −ω² x: energy coordinates (ω x, v) rotate by ω.
         let omega = 300.0;
         let rotation = DMatrix::from_row_slice(2, 2, &[0.0, omega, -omega, 0.0]);
-        let scale = |s: f64| DMatrix::from_diagonal(&nalgebra::dvector![s, 1.0]);
+        let scale = |s: f64| DMatrix::from_diagonal(&nalgebra::DVector::from_vec(vec![s, 1.0]));
         let propagator = Propagator::new(rotation, scale(omega), scale(1.0 / omega));
         assert_eq!(propagator.rate()[(1, 0)], -omega * omega);
         let step = propagator.step(0.3);
