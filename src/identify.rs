@@ -59,7 +59,8 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         let records = study.records.iter().filter(|record| record.is_trained()).count();
         let runs = (2 * study.parameters.len() + 1) * records;
         display.say(&format!(
-            "{runs} runs of the model: a centre and a pair per parameter, over {records} record{}"
+            "{runs} runs of the model: a centre and a pair per parameter, over {records} record{}",
+            if records == 1 { "" } else { "s" }
         ));
     }
     let result = identify(&study, &mut crew.fleet, &at);

@@ -154,6 +154,7 @@ examples! {
     coarctation => "coarctation",
     fsi_tube => "fsi-tube",
     artery_1d => "artery-1d",
+    wall_images => "wall-images",
     toy_fsi => "toy-fsi",
     toy_fsi_windkessel => "toy-fsi-windkessel",
     toy_fsi_stokes => "toy-fsi-stokes",

@@ -38,6 +38,8 @@ struct Twin {
     peak: f64,
     /// Standard deviation of the noise, as a part of the largest pulse of the wall.
     noise: f64,
+    /// Radius in cm from which displacements are measured, and that the estimator takes for the unloaded one of 1 cm.
+    radius: f64,
 }
 
 /// Wall displacements at the estimator's cell centres, one row per observation, and the extremes of R/R0.
@@ -112,7 +114,7 @@ impl Twin {
         let (n, sd) = (wall.rows.len(), self.noise * wall.pulse);
         let errors = normals(n * CELLS, 3);
         let column = |cell: usize| -> Vec<f64> {
-            (0..n).map(|i| wall.rows[i][cell] + sd * errors[i * CELLS + cell]).collect()
+            (0..n).map(|i| wall.rows[i][cell] + (1.0 - self.radius) + sd * errors[i * CELLS + cell]).collect()
         };
         let columns: Vec<Vec<f64>> = std::iter::once(grid(n, EVERY)).chain((0..CELLS).map(column)).collect();
         let names: Vec<String> = (0..CELLS).map(|cell| format!("wall[{cell}]")).collect();
@@ -139,6 +141,7 @@ impl Twin {
 name = "no-inverse-crime"
 [model]
 kind = "fsi-tube"
+constants = {{ R = {:?} }}
 {}
 [[parameters]]
 name = "p0"
@@ -151,6 +154,7 @@ channels = [ {{ column = "wall", output = "displacement", noise = {sd:?} }} ]
 [estimator]
 passes = 3
 "#,
+            self.radius,
             (1..=5).map(young).collect::<String>(),
             80.0 * MM_HG,
             40.0 * MM_HG,
@@ -172,7 +176,7 @@ fn ratios_off(found: &[f64]) -> f64 {
 
 #[test]
 fn the_linear_tube_finds_the_stiffness_ratios_of_the_nonlinear_artery_and_says_what_it_misses() {
-    let noisy = Twin { young: 5e6, peak: 300.0, noise: 0.1 };
+    let noisy = Twin { young: 5e6, peak: 300.0, noise: 0.1, radius: 1.0 };
     let wall = noisy.wall();
     // Not small: the radius is up to a third above that of the unloaded vessel, and the linear tube knows only the latter.
     assert!(wall.radius[0] > 1.0 && wall.radius[1] > 1.3, "{:?}", wall.radius);
@@ -184,11 +188,6 @@ fn the_linear_tube_finds_the_stiffness_ratios_of_the_nonlinear_artery_and_says_w
     assert!(ratios_off(&found) < 0.1, "{found:?}");
     assert!(found.iter().all(|f| (f - 1.0).abs() < 0.02), "{found:?}");
 
-    for noise in [0.1, 0.02, 0.01] {
-        let twin = Twin { noise, ..noisy };
-        let done = twin.fit(&wall);
-        eprintln!("TAB {noise} {:?} {:.4} {:.3} {:?}", twin.found(&done), ratios_off(&twin.found(&done)), done.summary.fit.nis_per_observation, done.summary.warnings.iter().filter_map(|w| w.split("autocorrelated (").nth(1).map(|r| r[..4].to_owned())).collect::<Vec<_>>());
-    }
     let exact = Twin { noise: 0.01, ..noisy };
     let done = exact.fit(&wall);
     let found = exact.found(&done);
@@ -199,4 +198,14 @@ fn the_linear_tube_finds_the_stiffness_ratios_of_the_nonlinear_artery_and_says_w
     for warning in ["far above 1: the model does not explain the data", "are autocorrelated"] {
         assert!(done.warns(warning), "no `{warning}` in {:?}", done.summary.warnings);
     }
+}
+
+#[test]
+fn a_radius_two_percent_off_spoils_the_ratios_and_no_residual_shows_it() {
+    let twin = Twin { young: 5e6, peak: 300.0, noise: 0.1, radius: 1.02 };
+    let done = twin.fit(&twin.wall());
+    let found = twin.found(&done);
+    // The stiffest region is displaced by 0.05 cm on average: two fifths of it are missing.
+    assert!(ratios_off(&found) > 0.3 && found[1] > 1.5, "{found:?}");
+    assert!(done.summary.fit.nis_per_observation < 1.2, "{}", done.summary.fit.nis_per_observation);
 }

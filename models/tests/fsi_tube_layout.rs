@@ -1,5 +1,5 @@
 //! The tube's layout: regions, where a run starts, and what is refused.
-#![allow(clippy::float_cmp)]
+#![allow(clippy::float_cmp, clippy::unwrap_used)]
 
 mod fsi_tube_kit;
 

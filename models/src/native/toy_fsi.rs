@@ -90,7 +90,8 @@ impl ToyFsi {
         let vessel = Vessel::read(theta);
         self.vibrations.get(&theta[..Vessel::N], || match &self.discretisation {
             Discretisation::Modes(spectral) => {
-                let square = |kappa: f64| vessel.stiffness(kappa) / (vessel.mass() + vessel.added_mass(kappa));
+                let square =
+                    |kappa: f64| vessel.stiffness(kappa) / (vessel.mass() + vessel.added_mass(kappa));
                 let squares = spectral.wave_numbers(vessel.length).into_iter().map(square).collect();
                 Vibration::orthonormal(spectral.transform(), squares, vessel.retardation)
             }

@@ -1,0 +1,278 @@
+//! Studies whose wall was measured as registered surfaces: what is compared, what is refused, and that nothing else changes.
+// Values that are copied are compared exactly; the helpers of a test file are tests too.
+#![allow(clippy::float_cmp, clippy::unwrap_used)]
+mod study_kit;
+
+use std::fmt::Write as _;
+
+use starlings_coordinator::fleet::InProcess;
+use starlings_coordinator::study::identify::{At, identify};
+use starlings_coordinator::study::trial::trial;
+use starlings_coordinator::study::twin::{Recording, Twin, simulate};
+use starlings_coordinator::study::{Problem, Study};
+use study_kit::fleets::Mortal;
+use study_kit::{Case, Done, csv, grid, normals};
+
+/// A tube of five cells of 5 cm in one region.
+const STUDY: &str = r#"
+[study]
+name = "wall"
+[model]
+kind = "fsi-tube"
+[model.layout]
+cells = 5
+regions = 1
+[[parameters]]
+name = "E1"
+prior = { transform = "log2", median = 5e6, sd = 1.0 }
+[[records]]
+name = "beats"
+file = "flow.csv"
+inputs = { flow = "flow" }
+channels = [ { CHANNEL } ]
+"#;
+const SURFACE: &str =
+    r#"surface = "profiles.csv", rest = "rest.csv", output = "displacement", noise = 0.01"#;
+const COLUMN: &str = r#"column = "displacement", output = "displacement", noise = 0.01"#;
+const TRUTH: f64 = 3.5e6;
+const SD: f64 = 0.01;
+const NODES: [f64; 5] = [2.5, 7.5, 12.5, 17.5, 22.5];
+
+fn study(channel: &str) -> String {
+    STUDY.replace("CHANNEL", channel)
+}
+
+/// The record's file: times and flow, and a column that nobody reads.
+fn flow() -> String {
+    let times = grid(41, 0.02);
+    let values: Vec<f64> =
+        times.iter().map(|t| if *t < 0.4 { 300.0 * (7.854 * t).sin().powi(2) } else { 0.0 }).collect();
+    csv("time,flow,zero", &[&times, &values, &[0.0; 41]])
+}
+
+/// The true tube at the times of the record.
+fn truth() -> Recording {
+    let blank = study(r#"column = "zero", output = "pressure", noise = 1.0"#);
+    let study = Case::new(&blank, &[("flow.csv", flow())]).study();
+    simulate(&study, &Twin { values: vec![("E1".to_owned(), TRUTH)], ..Twin::default() }).unwrap()
+}
+
+/// Displacement of each node at every time, with noise.
+fn displacements(noise: f64) -> (Vec<f64>, Vec<Vec<f64>>) {
+    let of = truth();
+    let column = |i: usize| {
+        let at = of.columns.iter().position(|c| *c == format!("displacement[{i}]")).unwrap();
+        let errors = normals(of.times.len(), i as u64);
+        of.values[at].iter().zip(errors).map(|(v, e)| v + noise * e).collect()
+    };
+    (of.times.clone(), (0..5).map(column).collect())
+}
+
+/// Profiles over the nodes and one point further at either end, shifted along the axis.
+fn profiles(noise: f64, slide: f64) -> String {
+    let (times, columns) = displacements(noise);
+    let mut text = "time,z,r\n".to_owned();
+    for (k, t) in times.iter().enumerate() {
+        writeln!(text, "{t},{},{:?}", -1.0 + slide, 1.0 + columns[0][k]).unwrap();
+        for (z, column) in NODES.iter().zip(&columns) {
+            writeln!(text, "{t},{},{:?}", z + slide, 1.0 + column[k]).unwrap();
+        }
+        writeln!(text, "{t},{},{:?}", 26.0 + slide, 1.0 + columns[4][k]).unwrap();
+    }
+    text
+}
+
+fn rest() -> String {
+    csv("z,r", &[&NODES, &[1.0; 5]])
+}
+
+/// The same displacements as plain columns.
+fn columns(noise: f64) -> String {
+    let (times, columns) = displacements(noise);
+    let flow = truth();
+    let flow = &flow.values[flow.columns.iter().position(|c| c == "flow").unwrap()];
+    let names: Vec<String> = (0..5).map(|i| format!("displacement[{i}]")).collect();
+    let all: Vec<&[f64]> =
+        [times.as_slice(), flow.as_slice()].into_iter().chain(columns.iter().map(Vec::as_slice)).collect();
+    csv(&format!("time,flow,{}", names.join(",")), &all)
+}
+
+fn surface_case(channel: &str, extra: &str, profiles: String) -> Case {
+    let files = [("flow.csv", flow()), ("rest.csv", rest()), ("profiles.csv", profiles)];
+    Case::new(&format!("{}{extra}", study(channel)), &files)
+}
+
+fn bits(done: &Done) -> (u64, u64) {
+    let e = done.estimate("E1");
+    (e.estimate.to_bits(), e.sd.to_bits())
+}
+
+#[test]
+fn on_a_straight_tube_a_surface_tells_what_a_displacement_does() {
+    for extra in ["", "[estimator]\nkind = \"batch\"\n", "[estimator]\npoints = \"star\"\npasses = 2\n"] {
+        let surface = surface_case(SURFACE, extra, profiles(SD, 0.0)).run();
+        let column = Case::new(&format!("{}{extra}", study(COLUMN)), &[("flow.csv", columns(SD))]).run();
+        let (s, c) = (surface.estimate("E1"), column.estimate("E1"));
+        // Chords between nodes 5 cm apart lean by a few thousandths of displacements of millimetres.
+        assert!((s.estimate - c.estimate).abs() < 0.05 * c.sd, "{} {} sd {}", s.estimate, c.estimate, c.sd);
+        assert!((s.sd / c.sd - 1.0).abs() < 1e-3 && (c.estimate - TRUTH).abs() < 3.0 * c.sd);
+        let fit = &surface.summary.fit.channels;
+        assert!(fit.len() == 1 && fit[0].name == "displacement", "{fit:?}");
+        // The root mean square distance is the scatter of the surface: 205 values of it.
+        assert!((fit[0].train_rmse.unwrap() / SD - 1.0).abs() < 0.15, "{fit:?}");
+    }
+}
+
+#[test]
+fn identify_and_trial_see_distances_and_not_displacements() {
+    let case = surface_case(SURFACE, "", profiles(0.0, 0.0));
+    let study = case.study();
+    let shown = trial(&study).unwrap();
+    let rms = shown.iter().map(|c| c.rmse).fold(0.0, f64::max);
+    // At the prior median of 5 instead of 3.5 million the wall is displaced by less, not by nothing.
+    assert!((0.01..0.1).contains(&rms) && shown.iter().all(|c| c.n_obs == 41), "{rms}");
+    let of = |study: &Study| identify(study, &mut InProcess::new(2), &At::Prior).unwrap();
+    let plain = Case::new(&self::study(COLUMN), &[("flow.csv", columns(0.0))]).study();
+    let (surface, column) = (of(&study), of(&plain));
+    let norm = |i: &starlings_coordinator::study::Identification| i.parameters[0].sensitivity_norm;
+    // As above.
+    assert!((norm(&surface) / norm(&column) - 1.0).abs() < 1e-3, "{} {}", norm(&surface), norm(&column));
+}
+
+#[test]
+fn a_node_past_the_end_of_a_surface_is_not_observed() {
+    // Slid by 5 cm, the surface begins at 4 cm: the first node is off it.
+    let done = surface_case(SURFACE, "", profiles(0.0, 5.0)).run();
+    let rows = done.table("predictions", "output, observed");
+    assert!(rows.len() == 4 * 41 && rows.iter().all(|row| row[0] != "displacement[0]"), "{}", rows.len());
+    // What is left is compared with the wall 5 cm upstream, which the pulse reaches a hundredth of a second earlier.
+    assert!((done.estimate("E1").estimate / TRUTH - 1.0).abs() < 0.05, "{}", done.estimate("E1").estimate);
+}
+
+#[test]
+fn times_without_a_surface_are_run_over_and_not_observed() {
+    let all = profiles(SD, 0.0);
+    let every_tenth = |line: &&str| line.split(',').next().unwrap().parse::<f64>().map_or(true, |t| (t * 5.0).fract() < 1e-9);
+    let some: Vec<&str> = all.lines().filter(every_tenth).collect();
+    let done = surface_case(SURFACE, "", some.join("\n")).run();
+    assert_eq!(done.table("predictions", "output").len(), 5 * 5);
+    assert!((done.estimate("E1").estimate - TRUTH).abs() < 3.0 * done.estimate("E1").sd);
+}
+
+#[test]
+fn the_bytes_do_not_depend_on_workers_or_on_a_resumed_run() {
+    let case = surface_case(SURFACE, "[estimator]\npasses = 2\n", profiles(SD, 0.0));
+    let one = case.run_on(&mut InProcess::new(1)).unwrap();
+    let four = case.run_on(&mut InProcess::new(4)).unwrap();
+    assert_eq!((bits(&one), &one.csv), (bits(&four), &four.csv));
+    for successes in [0, 7, 40] {
+        let path = case.fresh();
+        let mut fleet = Mortal::new(successes);
+        assert!(case.go(&path, &mut fleet).is_err());
+        let resumed = case.go(&path, &mut InProcess::new(2)).unwrap();
+        assert_eq!(one.csv, resumed.csv);
+    }
+}
+
+#[test]
+fn meshes_of_a_tube_are_read_and_compared_along_the_given_normals() {
+    let (times, columns) = displacements(0.0);
+    let mut list = "time,file\n".to_owned();
+    let mut files = vec![("flow.csv".to_owned(), flow())];
+    let m = 48;
+    for (k, t) in times.iter().enumerate().step_by(8) {
+        writeln!(list, "{t},mesh{k}.off").unwrap();
+        let ends = [(-1.0, 0), (2.5, 0), (7.5, 1), (12.5, 2), (17.5, 3), (22.5, 4), (26.0, 4)];
+        let mut off = format!("OFF\n{} {} 0\n", ends.len() * m, (ends.len() - 1) * m * 2);
+        for (z, node) in ends {
+            // Chords are inside the wall by r (1 − cos(π/m)): the corners stand so far out that the middle of an edge is on it.
+            let r = (1.0 + columns[node][k]) / (std::f64::consts::PI / m as f64).cos();
+            for j in 0..m {
+                let angle = std::f64::consts::TAU * (j as f64 + 0.5) / m as f64;
+                writeln!(off, "{z} {:?} {:?}", r * angle.cos(), r * angle.sin()).unwrap();
+            }
+        }
+        for i in 0..ends.len() - 1 {
+            for j in 0..m {
+                let (a, b) = (i * m + j, i * m + (j + 1) % m);
+                writeln!(off, "3 {a} {b} {}\n3 {a} {} {}", b + m, b + m, a + m).unwrap();
+            }
+        }
+        files.push((format!("mesh{k}.off"), off));
+    }
+    files.push(("meshes.csv".to_owned(), list));
+    let (one, zero) = ([1.0; 5], [0.0; 5]);
+    files.push(("nodes.csv".to_owned(), csv("x,y,z,nx,ny,nz", &[&NODES, &one, &zero, &zero, &one, &zero])));
+    let channel = r#"surface = "meshes.csv", rest = "nodes.csv", output = "displacement", noise = 0.01"#;
+    let files: Vec<(&str, String)> = files.iter().map(|(name, text)| (name.as_str(), text.clone())).collect();
+    let done = Case::new(&study(channel), &files).run();
+    // As on a profile; the triangles of a band are not quite in the cone of their corners.
+    assert!((done.estimate("E1").estimate / TRUTH - 1.0).abs() < 0.01, "{:?}", done.estimate("E1"));
+    let two_ends = format!("{channel}, open_ends = 0");
+    let said = problem(&study(&two_ends), &files);
+    assert!(said.starts_with("mesh0.off:1:") && said.contains("open_ends"), "{said}");
+}
+
+fn problem(study: &str, files: &[(&str, String)]) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in files {
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    let file = folder.path().join("study.toml");
+    std::fs::write(&file, study).unwrap();
+    let found: Vec<Problem> = Study::load(&file).err().map_or_else(Vec::new, |error| error.problems);
+    assert_eq!(found.len(), 1, "{found:?}");
+    let p = &found[0];
+    let folder = format!("{}/", p.file.parent().unwrap().display());
+    let name = p.file.file_name().unwrap().to_string_lossy().into_owned();
+    let line = p.line_column().unwrap_or_default().0;
+    format!("{name}:{line}: {}; {}", p.message.replace(&folder, ""), p.help.clone().unwrap_or_default())
+}
+
+#[test]
+fn what_is_no_surface_is_refused_with_its_place_and_remedy() {
+    let good = "time,z,r\n0,0,1\n0,25,1\n0.02,0,1\n0.02,25,1\n";
+    let with = |channel: &str, profiles: &str, rest: String| {
+        let files = [("flow.csv", flow()), ("rest.csv", rest), ("profiles.csv", profiles.to_owned())];
+        problem(&study(channel), &files)
+    };
+    let cases = [
+        (SURFACE.to_owned(), good.replace("0.02,0,1\n0.02,25,1", "0.02,25,1\n0.02,0,1"), rest(), "profiles.csv:4:", "reverse the order"),
+        (SURFACE.to_owned(), good.replace("0.02,25,1\n", ""), rest(), "profiles.csv:4:", "1 points: give two or more"),
+        (SURFACE.to_owned(), good.replace("0.02,25,1", "0.02,25,"), rest(), "profiles.csv:5:", "has no value here"),
+        (SURFACE.to_owned(), good.replace("0.02,", "0.03,"), rest(), "profiles.csv:4:", "no row at time 0.03"),
+        (SURFACE.to_owned(), format!("{good}0,0,1\n"), rest(), "profiles.csv:6:", "time goes back"),
+        (SURFACE.to_owned(), good.replace("time,z,r", "time,x,r"), rest(), "profiles.csv:2:", "has not the columns"),
+        (SURFACE.to_owned(), good.to_owned(), csv("z,r", &[&NODES[..4], &[1.0; 4]]), "rest.csv:2:", "4 nodes at rest for the 5 components"),
+        (SURFACE.to_owned(), good.to_owned(), csv("z,r", &[&[9.0, 7.0, 5.0, 3.0, 1.0], &[1.0; 5]]), "rest.csv:2:", "order the nodes"),
+        (SURFACE.to_owned(), good.to_owned(), csv("z,r,nz,nr", &[&NODES, &[1.0; 5], &[0.0; 5], &[0.0; 5]]), "rest.csv:2:", "without a direction"),
+        (SURFACE.to_owned(), good.to_owned(), csv("z,r", &[&NODES.map(|z| z + 90.0), &[1.0; 5]]), "study.toml:16:", "no node of `rest.csv` is shown"),
+        (SURFACE.replace("0.01", "\"auto\""), good.to_owned(), rest(), "study.toml:16:", "along its normal"),
+        (SURFACE.replace("0.01", "-1"), good.to_owned(), rest(), "study.toml:16:", "above zero"),
+        (SURFACE.replace(", rest = \"rest.csv\"", ""), good.to_owned(), rest(), "study.toml:16:", "needs `rest`"),
+        (format!("{SURFACE}, from = \"rate\""), good.to_owned(), rest(), "study.toml:16:", "no `from`"),
+        (r#"column = "zero", output = "pressure", noise = 1, rest = "rest.csv""#.to_owned(), good.to_owned(), rest(), "study.toml:16:", "belongs to a `surface`"),
+        (SURFACE.replace("\"displacement\"", "\"displacment\""), good.to_owned(), rest(), "study.toml:16:", "did you mean `displacement`"),
+    ];
+    for (channel, profiles, rest, place, words) in cases {
+        let said = with(&channel, &profiles, rest);
+        assert!(said.starts_with(place) && said.contains(words), "{words}: {said}");
+    }
+}
+
+#[test]
+fn an_observer_cannot_correct_by_a_surface() {
+    let files = [("flow.csv", flow()), ("rest.csv", rest()), ("profiles.csv", profiles(0.0, 0.0))];
+    let said = problem(&format!("{}[observer]\nkind = \"sdf\"\ngain = 5.0\n", study(SURFACE)), &files);
+    assert!(said.starts_with("study.toml:18:") && said.contains("a surface shows no displacement"), "{said}");
+    // One that takes another output is built, and the surfaces do not move its state.
+    let both = format!("{SURFACE} }}, {{ column = \"pressure\", output = \"pressure\", noise = 2000.0");
+    let of = truth();
+    let at = |name: &str| &of.values[of.columns.iter().position(|c| c == name).unwrap()];
+    let record = csv("time,flow,pressure", &[&of.times, at("flow"), at("pressure")]);
+    let files = [("flow.csv", record), ("rest.csv", rest()), ("profiles.csv", profiles(0.0, 0.0))];
+    let done = |observer: &str| Case::new(&format!("{}{observer}", study(&both)), &files).run();
+    let observed = done("[observer]\nkind = \"windkessel\"\ngain = 5.0\n");
+    // On noise-free data the estimate does not move with the observer's gain.
+    assert!((observed.estimate("E1").estimate / TRUTH - 1.0).abs() < 1e-3, "{:?}", observed.estimate("E1"));
+}
