@@ -28,12 +28,12 @@ const TRUTH: [(&str, f64); 20] = [
     ("Rd_dao", 1.55),
     ("C_wall", 0.35),
     ("shift_inflow", -0.03),
-    ("initial:p_asc", 69.8),
-    ("initial:p_bca", 68.0),
-    ("initial:p_lcca", 68.0),
-    ("initial:p_lsa", 68.2),
-    ("initial:p_dao", 69.0),
-    ("initial:q_isthmus", 8.0),
+    ("initial:stored_p_asc", 69.8),
+    ("initial:stored_p_bca", 68.0),
+    ("initial:stored_p_lcca", 68.0),
+    ("initial:stored_p_lsa", 68.2),
+    ("initial:stored_p_dao", 69.0),
+    ("initial:stored_q_isthmus", 8.0),
 ];
 
 /// Parameters that are counted: all but the state at the start.

@@ -19,7 +19,7 @@ kind = "artery-1d"
 segments = [ { name = "v", from = "in", to = "out", length = 25.0, radius = 1.0, thickness = 0.15, cells = 10 } ]
 nodes = [ { name = "in", kind = "inlet" }, { name = "out", kind = "rcr" } ]
 [[parameters]]
-name = "E_v"
+name = "E1"
 prior = { transform = "log2", median = 5e6, sd = 1.0 }
 [[records]]
 name = "beats"
@@ -60,7 +60,7 @@ fn truth() -> Recording {
     let flow: Vec<f64> = times.iter().map(sine).collect();
     let blank = csv("time,flow,zero", &[&times, &flow, &[0.0; 81]]);
     let study = Case::new(TRUTH, &[("wall.csv", blank)]).study();
-    simulate(&study, &Twin { values: vec![("E_v".to_owned(), YOUNG)], ..Twin::default() }).unwrap()
+    simulate(&study, &Twin { values: vec![("E1".to_owned(), YOUNG)], ..Twin::default() }).unwrap()
 }
 
 /// The radius in the image, and the recording: displacement from the image at every cell.

@@ -134,7 +134,7 @@ fn identify_and_trial_see_distances_and_not_displacements() {
     let of = |study: &Study| identify(study, &mut InProcess::new(2), &At::Prior).unwrap();
     let plain = Case::new(&self::study(COLUMN), &[("flow.csv", columns(0.0))]).study();
     let (surface, column) = (of(&study), of(&plain));
-    let norm = |i: &starlings_coordinator::study::Identification| i.parameters[0].sensitivity_norm;
+    let norm = |i: &starlings_coordinator::study::identify::Identification| i.parameters[0].sensitivity_norm;
     // As above.
     assert!((norm(&surface) / norm(&column) - 1.0).abs() < 1e-3, "{} {}", norm(&surface), norm(&column));
 }

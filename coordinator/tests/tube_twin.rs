@@ -1,5 +1,5 @@
 //! Twins of the elastic tube: stiffness of regions and tissue from noisy wall displacements over heart beats.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::print_stdout)] // the figures, with --nocapture
 mod study_kit;
 mod tube_kit;
 

@@ -141,7 +141,17 @@ fn elements_share_a_parameter_by_its_name_and_a_number_is_a_default() {
     );
     assert!(find("Pv_legs").is_empty() && find("Pv_head")[0].default == Some(0.0));
     let states: Vec<&str> = spec.states.iter().map(|q| q.name.as_str()).collect();
-    assert_eq!(states, ["p_lv", "p_asc", "q_blood", "p_head", "p_legs", "v_coupling"]);
+    assert_eq!(
+        states,
+        [
+            "stored_p_lv",
+            "stored_p_asc",
+            "stored_q_blood",
+            "stored_p_head",
+            "stored_p_legs",
+            "stored_v_coupling"
+        ]
+    );
     let x0: Vec<f64> = spec.states.iter().map(|q| q.default.unwrap()).collect();
     assert_eq!(x0, [10.0, 70.0, 0.0, 80.0, 80.0, 0.0]);
 }

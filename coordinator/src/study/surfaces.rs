@@ -64,7 +64,8 @@ pub struct Node {
 
 impl PartialEq for Node {
     fn eq(&self, other: &Self) -> bool {
-        self.rest == other.rest && self.normal == other.normal && Arc::ptr_eq(&self.seen, &other.seen)
+        let bits = |node: &Self| [node.rest, node.normal].map(|x| x.map(f64::to_bits));
+        bits(self) == bits(other) && Arc::ptr_eq(&self.seen, &other.seen)
     }
 }
 

@@ -192,7 +192,7 @@ impl ChannelReader<'_> {
     }
 }
 
-fn measured_somewhere(values: &[f64]) -> bool {
+pub(super) fn measured_somewhere(values: &[f64]) -> bool {
     values.iter().any(|v| v.is_finite())
 }
 

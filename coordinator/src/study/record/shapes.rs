@@ -37,7 +37,8 @@ impl Surfaces<'_> {
             (Some([time, file]), _) => self.listed(time, file),
             (None, Some([time, z, r])) => self.profiles(time, z, r),
             (None, None) => {
-                let (message, help) = lacks(self.csv, "`time`, `z`, `r` of profiles, or `time`, `file` of meshes");
+                let (message, help) =
+                    lacks(self.csv, "`time`, `z`, `r` of profiles, or `time`, `file` of meshes");
                 Err(self.csv.problem(0, 0, message, &help))
             }
         };
@@ -54,7 +55,12 @@ impl Surfaces<'_> {
             let at = self.row_time(first, time, group[0])?;
             let profile = Profile::new(points[first..first + group.len()].to_vec()).map_err(|error| {
                 let message = format!("the surface at time {}: {error}", group[0]);
-                self.csv.problem(first, z, message, "every time needs the points of one wall, inlet to outlet")
+                self.csv.problem(
+                    first,
+                    z,
+                    message,
+                    "every time needs the points of one wall, inlet to outlet",
+                )
             })?;
             shapes.times.push(at);
             shapes.shapes.push(Shape::Profile(profile));
@@ -87,8 +93,9 @@ impl Surfaces<'_> {
             source_text: Some(Arc::from(text.as_str())),
             span: Some(span),
         };
-        let off::Off { vertices, triangles } = off::read(text)
-            .map_err(|fault| problem(fault.message, fault.span, "write triangles in the Object File Format (OFF)"))?;
+        let off::Off { vertices, triangles } = off::read(text).map_err(|fault| {
+            problem(fault.message, fault.span, "write triangles in the Object File Format (OFF)")
+        })?;
         numbers.extend(vertices.as_flattened());
         numbers.extend(triangles.as_flattened().iter().map(|v| *v as f64));
         Mesh::new(vertices, triangles, self.open_ends).map_err(|error| {
@@ -140,7 +147,8 @@ impl Surfaces<'_> {
             if places.len() == n {
                 return Ok(places);
             }
-            let message = format!("{} nodes at rest for the {n} components of output `{output}`", places.len());
+            let message =
+                format!("{} nodes at rest for the {n} components of output `{output}`", places.len());
             Err(csv.problem(0, 0, message, "give one row per component of the output, in their order"))
         });
         counted.map_err(|problem| self.source.adopt(problem)).ok()
@@ -172,8 +180,7 @@ fn vectors<const N: usize>(csv: &Csv, names: [&str; N]) -> Result<Option<Vec<[f6
 
 /// Nodes (x, y, z) that move along (nx, ny, nz).
 fn mesh_places(csv: &Csv) -> Result<Vec<Place>, Problem> {
-    let (Some(rest), Some(normals)) =
-        (vectors(csv, ["x", "y", "z"])?, vectors(csv, ["nx", "ny", "nz"])?)
+    let (Some(rest), Some(normals)) = (vectors(csv, ["x", "y", "z"])?, vectors(csv, ["nx", "ny", "nz"])?)
     else {
         let (message, help) = lacks(csv, "`x`, `y`, `z` and `nx`, `ny`, `nz`, needed beside meshes");
         return Err(csv.problem(0, 0, message, &help));
@@ -222,5 +229,10 @@ fn unit(csv: &Csv, row: usize, n: [f64; 3]) -> Result<[f64; 3], Problem> {
     if length > 0.0 {
         return Ok(n.map(|v| v / length));
     }
-    Err(csv.problem(row, 0, "a node without a direction".to_owned(), "give the outward normal of the wall there"))
+    Err(csv.problem(
+        row,
+        0,
+        "a node without a direction".to_owned(),
+        "give the outward normal of the wall there",
+    ))
 }

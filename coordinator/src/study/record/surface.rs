@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use starlings_models::Spec;
 
-use super::channel::ChannelReader;
+use super::channel::{ChannelReader, measured_somewhere};
 use super::shapes::Surfaces;
 use super::{Context, Csv, Recordings};
 use crate::study::checked::Channel;
@@ -88,6 +88,10 @@ impl ChannelReader<'_> {
             let node = Node { rest, normal, seen: Arc::clone(&shapes) };
             let at = |time: &f64| if node.is_shown(*time) { 0.0 } else { f64::NAN };
             let values: Vec<f64> = self.table.times.iter().map(at).collect();
+            // A node that no surface shows is one that was not measured.
+            if !measured_somewhere(&values) {
+                continue;
+            }
             let output = if n == 1 { output.clone() } else { format!("{output}[{i}]") };
             channels.push(Channel {
                 row: context.row(&output),
@@ -107,7 +111,8 @@ impl ChannelReader<'_> {
                 surface.rest.get_ref(),
                 self.section.name.get_ref()
             );
-            let help = "surfaces and nodes at rest must lie in the same place, in the same unit; or move `train`";
+            let help =
+                "surfaces and nodes at rest must lie in the same place, in the same unit; or move `train`";
             self.source.report_with(surface.file.span(), message, help);
             return None;
         }
@@ -120,7 +125,8 @@ impl ChannelReader<'_> {
             Some(sd) if sd > 0.0 => return Some(sd),
             Some(sd) => {
                 let message = format!("`noise` must be above zero, found {sd}");
-                let help = "give the standard deviation of the surface along its normal, in the unit of its points";
+                let help =
+                    "give the standard deviation of the surface along its normal, in the unit of its points";
                 self.source.report_with(section.noise.span(), message, help);
             }
             None => self.source.report_with(

@@ -110,12 +110,13 @@ impl Assembly {
     fn inertance(&mut self, element: &Element, ends: Ends, path: &str) -> Result<FlowOf, SetupError> {
         let value = element.value.as_ref();
         let value = self.value(element, path, Measure::Inertance, ("value", "L", value))?;
-        let name = format!("q_{}", element.name);
+        let output = format!("q_{}", element.name);
+        let name = format!("stored_{output}");
         let quantity = Quantity::new(&name, Measure::Flow.label(self.units))
             .role(Measure::Flow.role())
             .says(&format!("Flow through `{}`.", element.name));
         let state = self.state(quantity, element.initial.unwrap_or(0.0));
-        self.measures.push((name.clone(), name));
+        self.measures.push((output, name));
         self.circuit.inertances.push(Inertance { ends, value, state, says: element.name.clone() });
         Ok(FlowOf::Inertance(self.circuit.inertances.len() - 1))
     }
@@ -208,12 +209,13 @@ impl Assembly {
         let pressure = Measure::Pressure;
         let quantity = |name: &str| Quantity::new(name, pressure.label(self.units)).role(pressure.role());
         if ends.to != 0 {
-            let name = format!("v_{}", storage.name);
+            let name = format!("stored_v_{}", storage.name);
             let quantity = quantity(&name).says(&format!("Pressure drop across `{}`.", storage.name));
             return Ok(self.state(quantity, storage.initial.unwrap_or(0.0)));
         }
         let node = &self.circuit.nodes[ends.from];
-        let name = format!("p_{node}");
+        let output = format!("p_{node}");
+        let name = format!("stored_{output}");
         let quantity = quantity(&name).says(&format!("Pressure at node `{node}`."));
         let listed = self.node_initial.iter().position(|(node, _, _)| *node == ends.from);
         let listed = listed.map(|at| self.node_initial.remove(at));
@@ -227,7 +229,7 @@ impl Assembly {
             (None, Some(value)) => sign * value,
             (None, None) => self.units.initial_pressure(),
         };
-        self.measures.push((name.clone(), name));
+        self.measures.push((output, name));
         Ok(self.state(quantity, initial))
     }
 }
