@@ -1,77 +1,12 @@
-//! Studies of models with fields: which columns become channels, where runs start, what is refused, what the summary pools.
+//! Studies of models with fields: which columns become channels, where runs start, what is refused.
 // Values that are copied are compared exactly; the helpers of a test file are tests too.
 #![allow(clippy::float_cmp, clippy::unwrap_used)]
 mod study_kit;
 
-use starlings_coordinator::report;
-use starlings_coordinator::study::twin::{Recording, Twin, simulate};
+use starlings_coordinator::study::twin::{Twin, simulate};
 use starlings_coordinator::study::{Problem, Study};
-use study_kit::{Case, Done, csv, grid, normals};
-
-/// A tube of six cells in two regions over two beats.
-const TUBE: &str = r#"
-[study]
-name = "tube"
-[model]
-kind = "fsi-tube"
-[model.layout]
-cells = 6
-regions = 2
-[[parameters]]
-name = "E1"
-prior = { transform = "log2", median = 5e6, sd = 1.0 }
-[[parameters]]
-name = "E2"
-prior = { transform = "log2", median = 5e6, sd = 1.0 }
-[[records]]
-name = "beats"
-file = "wall.csv"
-inputs = { flow = "flow" }
-channels = [ { column = "displacement", output = "displacement", noise = 0.01 } ]
-"#;
-
-const BEAT: f64 = 0.8;
-const TRUTH: [(&str, f64); 2] = [("E1", 3e6), ("E2", 7e6)];
-
-/// A squared sine as long as the ejection, so that the input is smooth enough for coarse times.
-fn flow(t: f64) -> f64 {
-    let phase = (t / BEAT).fract();
-    if phase < 0.4 { 300.0 * (std::f64::consts::PI * phase / 0.4).sin().powi(2) } else { 0.0 }
-}
-
-/// Times, flow and a column of zeros for every component: what a truth is simulated on.
-fn blank(n: usize, step: f64, components: usize) -> String {
-    let times = grid(n, step);
-    let flow: Vec<f64> = times.iter().map(|t| flow(*t)).collect();
-    let zeros = vec![0.0; n];
-    let names: Vec<String> = (0..components).map(|i| format!("displacement[{i}]")).collect();
-    let columns: Vec<&[f64]> = [times.as_slice(), flow.as_slice()]
-        .into_iter()
-        .chain(names.iter().map(|_| zeros.as_slice()))
-        .collect();
-    csv(&format!("time,flow,{}", names.join(",")), &columns)
-}
-
-/// The true tube, from its periodic state on.
-fn truth(twin: Twin) -> Recording {
-    let values = TRUTH.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
-    let study = Case::new(TUBE, &[("wall.csv", blank(161, 0.01, 6))]).study();
-    simulate(&study, &Twin { values, period: Some(BEAT), ..twin }).unwrap()
-}
-
-/// A recording as `starlings simulate` writes it, only with these columns.
-fn columns(of: &Recording, keep: impl Fn(&str) -> bool) -> String {
-    let kept: Vec<usize> = (0..of.columns.len()).filter(|i| keep(&of.columns[*i])).collect();
-    let names: Vec<&str> = kept.iter().map(|i| of.columns[*i].as_str()).collect();
-    let columns: Vec<&[f64]> =
-        std::iter::once(of.times.as_slice()).chain(kept.iter().map(|i| of.values[*i].as_slice())).collect();
-    csv(&format!("time,{}", names.join(",")), &columns)
-}
-
-fn start(of: &Recording) -> String {
-    let rows: Vec<String> = of.start.iter().map(|(state, value)| format!("{state},{value:?}")).collect();
-    format!("state,value\n{}\n", rows.join("\n"))
-}
+use study_kit::tube::{STARTED, TRUTH, TUBE, blank, columns, flow, start, started, truth};
+use study_kit::{Case, csv, grid, normals};
 
 fn problems(study: &str, files: &[(&str, String)]) -> Vec<Problem> {
     let folder = tempfile::tempdir().unwrap();
@@ -174,12 +109,6 @@ fn columns_that_do_not_fit_a_field_are_refused_with_what_was_looked_for() {
     assert!(problem(&twice, &file("displacement[0]")).contains("output `displacement[0]` has two channels"));
 }
 
-const STARTED: &str = "kind = \"fsi-tube\"\ninitial = \"start.csv\"";
-
-fn started() -> String {
-    TUBE.replace("kind = \"fsi-tube\"", STARTED)
-}
-
 #[test]
 fn a_run_starts_from_the_file_of_initial_values_but_where_one_is_estimated() {
     let of = truth(Twin::default());
@@ -229,108 +158,6 @@ fn initial_values_that_do_not_fit_are_told_at_their_line() {
         "{:?}",
         study.warnings
     );
-}
-
-#[test]
-fn the_periodic_start_of_a_twin_returns_after_every_period() {
-    let times = grid(321, 0.01);
-    // The recording's flow lasts two beats; the twin goes on for four.
-    let of = truth(Twin { times, ..Twin::default() });
-    assert!(of.n_period.is_some_and(|n| n < 30), "{:?}", of.n_period);
-    for (name, values) in of.columns.iter().zip(&of.values) {
-        let size = values.iter().fold(0.0, |max: f64, v| max.max(v.abs()));
-        // 1e-10 of its size per period, over three periods; the samples of the periods differ by rounding of their times.
-        // At a sample of the input its slope is the one before it, but at the very first, where there is none.
-        for (a, b) in values[1..80].iter().zip(&values[241..320]) {
-            assert!((a - b).abs() <= 1e-8 * size, "{name}: {a} and {b}");
-        }
-    }
-}
-
-#[test]
-fn a_period_that_is_not_the_inputs_is_refused() {
-    let study = Case::new(TUBE, &[("wall.csv", blank(161, 0.01, 6))]).study();
-    let refused =
-        |period| simulate(&study, &Twin { period: Some(period), ..Twin::default() }).unwrap_err().to_string();
-    assert!(refused(1.0).contains("it has another period"), "{}", refused(1.0));
-    assert!(refused(2.0).contains("before the first period does at 2"), "{}", refused(2.0));
-}
-
-#[test]
-fn relative_noise_is_that_share_of_the_largest_amplitude_of_the_observed_outputs() {
-    let (clean, noisy) = (truth(Twin::default()), truth(Twin { noise_share: 0.1, ..Twin::default() }));
-    let sd = |of: &Recording, name: &str| of.noise.iter().find(|(n, _)| n == name).unwrap().1;
-    let amplitude = |values: &Vec<f64>| {
-        values.iter().fold(f64::MIN, |a, v| a.max(*v)) - values.iter().fold(f64::MAX, |a, v| a.min(*v))
-    };
-    let largest = clean.values[..6].iter().map(amplitude).fold(0.0, f64::max);
-    assert_eq!(sd(&noisy, "displacement"), 0.1 * largest);
-    assert_eq!(sd(&noisy, "pressure"), 0.0);
-    assert_eq!(sd(&clean, "displacement"), 0.0);
-    let spread: f64 = noisy.values[2].iter().zip(&clean.values[2]).map(|(a, b)| (a - b).powi(2)).sum();
-    // 161 draws determine a variance to about a ninth.
-    assert!(((spread / 161.0).sqrt() / (0.1 * largest) - 1.0).abs() < 0.2, "{spread}");
-}
-
-/// A fit of two noisy beats, told the initial state or left with the model's own.
-fn fit(study: &str, share: f64, told: bool) -> Done {
-    let of = truth(Twin { noise_share: share, seed: 5, ..Twin::default() });
-    let wall = columns(&of, |c| c.starts_with("displacement") || c == "flow");
-    let study = if told { study.replace("kind = \"fsi-tube\"", STARTED) } else { study.to_owned() };
-    let sd = of.noise.iter().find(|(name, _)| name == "displacement").map_or(0.01, |(_, sd)| sd.max(1e-4));
-    let study = study.replace("noise = 0.01", &format!("noise = {sd:?}"));
-    Case::new(&study, &[("wall.csv", wall), ("start.csv", start(&of))]).run()
-}
-
-#[test]
-fn a_field_is_one_entry_of_the_summary_and_data_ten_steps_apart_determine_the_stiffness() {
-    // The tube steps by 1 ms, the recording by 10 ms.
-    let done = fit(TUBE, 0.1, true);
-    let names: Vec<&str> = done.summary.fit.channels.iter().map(|c| c.name.as_str()).collect();
-    assert_eq!(names, ["displacement"]);
-    assert_eq!(done.summary.fit.records[0].channels.len(), 1);
-    let rows = done.table("predictions", "observed, predicted");
-    let value = |row: &Vec<String>, i: usize| row[i].parse::<f64>().unwrap();
-    let squares: f64 = rows.iter().map(|r| (value(r, 0) - value(r, 1)).powi(2)).sum();
-    let rmse = (squares / rows.len() as f64).sqrt();
-    let told = done.summary.fit.channels[0].train_rmse.unwrap();
-    // The same sum in another order.
-    assert!((told / rmse - 1.0).abs() < 1e-12, "{told} {rmse}");
-    for (name, truth) in TRUTH {
-        let p = done.estimate(name);
-        // Four standard deviations: an interval that misses the truth by more is wrong, not unlucky.
-        assert!(
-            (p.estimate - truth).abs() < 4.0 * p.sd && p.sd < 0.1 * truth,
-            "{name}: {} ± {}",
-            p.estimate,
-            p.sd
-        );
-    }
-    assert!(done.summary.observer.is_none());
-}
-
-#[test]
-fn the_summary_says_what_the_observer_does_for_a_state_that_starts_wrong() {
-    let observer = "[observer]\nkind = \"nudging\"\ngain = 50.0\n";
-    let tube =
-        TUBE.replace("kind = \"fsi-tube\"", "kind = \"fsi-tube\"\nconstants = { \"initial:pi\" = 5e4 }");
-    let wrong = fit(&format!("{tube}{observer}"), 0.02, false);
-    let found = wrong.summary.observer.clone().unwrap();
-    assert_eq!((found.kind.as_str(), found.gain), ("nudging", 50.0));
-    assert!(
-        found.innovation_rms_with < 0.8 * found.innovation_rms_without,
-        "the observer holds the state: {found:?}"
-    );
-    let runs = wrong.table("jobs", "pass, step").into_iter().filter(|row| row[0] == "0").count();
-    assert_eq!(runs, 2, "the free run and the one with the observer");
-    report::write_page(&wrong.folder).unwrap();
-    let page = std::fs::read_to_string(wrong.folder.path.join("report.html")).unwrap();
-    assert!(page.contains("id=\"observer\"") && page.contains("With the observer nudging"));
-    assert!(page.contains("displacement, record beats: residuals by component"));
-    // First, middle and last component, and no other.
-    let shown =
-        |i: usize| page.contains(&format!("displacement[{i}], record beats: predicted against measured"));
-    assert_eq!([0, 1, 2, 3, 4, 5].map(shown), [true, false, false, true, false, true]);
 }
 
 #[test]

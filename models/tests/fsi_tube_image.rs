@@ -10,7 +10,7 @@ use starlings_models::native::fsi_tube::Layout;
 use starlings_models::prestress::Rings;
 
 const DIASTOLE: f64 = 80.0 * MM_HG;
-/// Softer and stiffer than the default by octaves, so that regions have different unloaded radii.
+/// A radius and a tissue that are not the default.
 const TISSUE: [(&str, f64); 2] = [("R", 1.1), ("k_s", 4e4)];
 
 fn imaged(pressure: f64) -> FsiTube {
@@ -109,4 +109,11 @@ fn displacements_differ_from_those_of_the_unloaded_tube_by_the_images_alone() {
             assert!((1.1 + eta - radius).abs() < 1e-11, "{pressure}: {eta} {radius}");
         }
     }
+}
+
+#[test]
+fn an_image_under_suction_is_refused() {
+    let layout = Layout { image_pressure: -1.0, ..Layout::default() };
+    let error = FsiTube::new(&layout, 25.0).err().unwrap().to_string();
+    assert!(error.contains("image_pressure") && error.contains("zero or above"), "{error}");
 }

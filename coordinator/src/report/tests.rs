@@ -281,7 +281,7 @@ fn the_observer_is_told_in_a_sentence_and_a_figure() {
     let page = render(&data).unwrap();
     show("observer.html", &page);
     assert_well_formed(&page);
-    assert!(page.contains("With the observer dvf at a gain of 20.0\u{a0}1/s"));
+    assert!(page.contains("With the observer dvf at a gain of 20.0"));
     assert!(page.contains("by 1.04 noise sd") && page.contains("by 5.50"));
     assert!(page.contains("Record in-vivo-1: innovations with and without the observer dvf"));
 }

@@ -3,16 +3,22 @@
 //! A channel of this kind has a node of the model's wall and one surface per time. Its observed value is zero, its predicted
 //! one the signed distance of the displaced node to the surface of the time, positive outside (Moireau et al. 2013). Models,
 //! workers and estimators know displacements and numbers only: predictions are turned into distances where they come back
-//! from the fleet, by [`Study::measure`], and a job carries no observed value of such a channel, by [`Study::sendable`]. How
-//! surfaces are read is in [`crate::study::record`].
+//! from the fleet, by [`Study::measure`], and a job carries for an observer the displacement with which the node would be on
+//! the surface, by [`Study::sendable`]. How surfaces are read is in [`crate::study::record`].
 
 use std::sync::Arc;
 
 use starlings_models::Window;
-use starlings_models::surface::{Mesh, Profile};
+use starlings_models::surface::{Foot, Mesh, Profile};
 
 use super::Study;
 use super::checked::{Channel, Record};
+
+/// Distance at which a node is on a surface, relative to one unit of length and to its displacement.
+const CLOSE: f64 = 1e-12;
+
+/// Steps after which the search along a node's line gives up.
+const MOST_STEPS: usize = 50;
 
 /// The surface of one time.
 #[derive(Clone, Debug)]
@@ -24,12 +30,15 @@ pub enum Shape {
 }
 
 impl Shape {
-    /// Signed distance of a point, positive outside, and how far it lies past an open end. The third coordinate of a profile is
-    /// not looked at.
-    fn distance(&self, [a, b, c]: [f64; 3]) -> Option<[f64; 2]> {
+    /// The nearest place. The third coordinate of a profile is zero.
+    fn foot(&self, [a, b, c]: [f64; 3]) -> Option<Foot<3>> {
         match self {
-            Self::Profile(profile) => profile.foot([a, b]).map(|foot| [foot.distance, foot.past_end]),
-            Self::Mesh(mesh) => mesh.foot([a, b, c]).map(|foot| [foot.distance, foot.past_end]),
+            Self::Profile(profile) => profile.foot([a, b]).map(|foot| {
+                let ([z, r], [nz, nr]) = (foot.point, foot.normal);
+                let Foot { distance, facet, past_end, .. } = foot;
+                Foot { distance, point: [z, r, 0.0], normal: [nz, nr, 0.0], facet, past_end }
+            }),
+            Self::Mesh(mesh) => mesh.foot([a, b, c]),
         }
     }
 }
@@ -74,14 +83,32 @@ impl Node {
     ///
     /// The place at rest decides and not that of a particle, so that all particles are compared with the same data.
     pub fn is_shown(&self, time: f64) -> bool {
-        let past_end = self.seen.at(time).and_then(|shape| shape.distance(self.rest)).map(|[_, past]| past);
-        past_end.is_some_and(|past| past <= 0.0)
+        self.foot(time, 0.0).is_some_and(|foot| foot.past_end <= 0.0)
     }
 
     /// Signed distance of the node, displaced, to the surface of this time; `None` without one.
     pub fn distance(&self, time: f64, displacement: f64) -> Option<f64> {
+        self.foot(time, displacement).map(|foot| foot.distance)
+    }
+
+    /// The displacement with which the node is on the surface of this time, by Newton's method; `None` without one, and where
+    /// its line does not meet the surface.
+    pub fn crossing(&self, time: f64) -> Option<f64> {
+        let mut displacement = 0.0;
+        for _ in 0..MOST_STEPS {
+            let foot = self.foot(time, displacement)?;
+            if foot.distance.abs() <= CLOSE * (1.0 + f64::abs(displacement)) {
+                return Some(displacement);
+            }
+            let slope: f64 = foot.normal.iter().zip(&self.normal).map(|(a, b)| a * b).sum();
+            displacement -= foot.distance / slope;
+        }
+        None
+    }
+
+    fn foot(&self, time: f64, displacement: f64) -> Option<Foot<3>> {
         let displaced = std::array::from_fn(|i| displacement.mul_add(self.normal[i], self.rest[i]));
-        self.seen.at(time)?.distance(displaced).map(|[distance, _]| distance)
+        self.seen.at(time)?.foot(displaced)
     }
 }
 
@@ -106,15 +133,20 @@ impl Study {
         }
     }
 
-    /// The window as a job carries it: a distance is no displacement that an observer could correct by.
+    /// The window as a job carries it, for an observer that knows displacements only: in the place of an observed distance, the
+    /// displacement that has none.
     pub fn sendable(&self, record: usize, window: &Arc<Window>) -> Arc<Window> {
-        let rows: Vec<usize> = self.records[record].surfaces().map(|(channel, _)| channel.row).collect();
-        if rows.is_empty() {
+        if self.observer_is_off() || self.records[record].surfaces().next().is_none() {
             return Arc::clone(window);
         }
         let mut sent = Window::clone(window);
-        for values in sent.observed.chunks_mut(self.setup.outputs.len().max(1)) {
-            rows.iter().for_each(|row| values[*row] = f64::NAN);
+        let n_obs = self.setup.outputs.len();
+        for (channel, node) in self.records[record].surfaces() {
+            for (values, &time) in sent.observed.chunks_mut(n_obs.max(1)).zip(&window.times) {
+                if values[channel.row].is_finite() {
+                    values[channel.row] = node.crossing(time).unwrap_or(f64::NAN);
+                }
+            }
         }
         Arc::new(sent)
     }

@@ -4,6 +4,7 @@
 pub mod fleets;
 pub mod linear;
 pub mod rcr;
+pub mod tube;
 
 use std::cell::Cell;
 use std::fmt::Write as _;

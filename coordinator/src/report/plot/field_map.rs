@@ -34,7 +34,7 @@ pub(crate) fn figure(
     let x = Axis::tight(&with_unit("time", time_unit), times);
     let y = Axis::counted(&format!("component of {field}"), components.iter().map(|(i, _)| *i as f64));
     let cells = Cells::new(components, (x.lo, x.hi));
-    let scale = cells.largest().max(0.5);
+    let scale = cells.largest().max(1.0);
     let marks = cells.marks(scale);
     let record = components.first().map_or("", |(_, c)| c.record.as_str());
     let caption = format!(

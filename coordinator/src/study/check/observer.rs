@@ -28,7 +28,7 @@ pub(in crate::study) fn check(source: &Source, file: &StudyFile, setup: &Setup, 
 fn built(source: &Source, file: &StudyFile, setup: &Setup, records: &[Record]) -> Option<Box<dyn Observer>> {
     let seen = |output: &String| {
         let channels = records.iter().filter(|r| r.is_trained()).flat_map(|r| &r.channels);
-        channels.into_iter().any(|c| c.output == *output && !c.held_out && c.node.is_none())
+        channels.into_iter().any(|c| c.output == *output && !c.held_out)
     };
     let fitted: Vec<String> = setup.outputs.iter().filter(|o| seen(o)).cloned().collect();
     let build = |outputs: &[String]| {
@@ -41,15 +41,6 @@ fn built(source: &Source, file: &StudyFile, setup: &Setup, records: &[Record]) -
         (Ok(observer), _) => Some(observer),
         (Err(error), Err(_)) => {
             blame(source, file, &error);
-            None
-        }
-        (Err(error), Ok(_)) if records.iter().flat_map(|r| &r.channels).any(|c| c.node.is_some()) => {
-            let message = format!("a surface shows no displacement that an observer could correct by: {error}");
-            source.report_with(
-                file.observer.kind.span(),
-                message,
-                "measure what it needs by a `column`, or use an observer of another output, or none",
-            );
             None
         }
         (Err(error), Ok(_)) => {

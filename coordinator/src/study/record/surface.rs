@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::rc::Rc;
 use std::sync::Arc;
 
-use starlings_models::Spec;
+use starlings_models::{Role, Spec};
 
 use super::channel::{ChannelReader, measured_somewhere};
 use super::shapes::Surfaces;
@@ -70,7 +70,7 @@ impl ChannelReader<'_> {
         files: &SurfaceFiles,
         context: &mut Context<'_>,
     ) -> Option<Vec<Channel>> {
-        self.quantity(section)?;
+        self.displacement(section)?;
         let noise = self.surface_noise(section)?;
         let output = section.output.get_ref();
         let n = Spec::range_of(&self.spec.outputs, output).map_or(1, |range| range.len());
@@ -116,7 +116,44 @@ impl ChannelReader<'_> {
             self.source.report_with(surface.file.span(), message, help);
             return None;
         }
+        context.warnings.push(self.what_is_compared(section, surface, [channels.len(), n]));
         Some(channels)
+    }
+
+    /// What stands under the output's name in figures and tables.
+    fn what_is_compared(
+        &self,
+        section: &ChannelSection,
+        surface: &SurfaceSection,
+        [shown, of]: [usize; 2],
+    ) -> String {
+        let (output, record) = (section.output.get_ref(), self.section.name.get_ref());
+        let file = surface.file.get_ref();
+        let lost = match of - shown {
+            0 => String::new(),
+            lost => format!(" No surface shows {lost} of its {of} nodes."),
+        };
+        format!(
+            "`{output}` in record `{record}` is compared with the surfaces of `{file}`: its predictions are signed distances, \
+             zero is observed.{lost}"
+        )
+    }
+
+    /// Only what moves a wall can be compared with a surface; an output that says nothing of itself may. Nothing after a complaint.
+    fn displacement(&self, section: &ChannelSection) -> Option<()> {
+        let quantity = self.quantity(section)?;
+        if matches!(quantity.role, Role::Displacement | Role::Other) {
+            return Some(());
+        }
+        let wanted = self.spec.outputs.iter().filter(|q| q.role == Role::Displacement);
+        let names: Vec<&str> = wanted.map(|q| q.name.as_str()).collect();
+        let message = format!("`{}` is no displacement of a wall that a surface could show", quantity.name);
+        let help = match names[..] {
+            [] => format!("model `{}` has no such output: measure it by a `column`", self.spec.kind),
+            _ => format!("its outputs of that kind: {}", quoted_list(&names)),
+        };
+        self.source.report_with(section.output.span(), message, help);
+        None
     }
 
     /// The noise of a surface is the scatter of its points along the normal, which only its maker knows.

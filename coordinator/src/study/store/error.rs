@@ -31,13 +31,13 @@ pub enum StoreError {
 fn remedy(source: &rusqlite::Error) -> &'static str {
     match source.sqlite_error_code() {
         Some(rusqlite::ErrorCode::DiskFull) => {
-            "; the disk is full: free some space and continue with --resume, every finished analysis is kept"
+            "; the disk is full: free some space and continue with --resume, all but its last moment is kept"
         }
         Some(rusqlite::ErrorCode::DatabaseBusy | rusqlite::ErrorCode::DatabaseLocked) => {
             "; another process is using this run folder"
         }
         Some(rusqlite::ErrorCode::SystemIoFailure) => {
-            "; the disk failed or is full: see that it has space and continue with --resume, every finished analysis is kept"
+            "; the disk failed or is full: see that it has space and continue with --resume, all but its last moment is kept"
         }
         Some(rusqlite::ErrorCode::ReadOnly | rusqlite::ErrorCode::CannotOpen) => {
             "; check that the folder exists and may be written"

@@ -39,8 +39,35 @@ fn snapshot(step: usize) -> Snapshot {
     Snapshot { head, states: vec![Some(DMatrix::from_element(8, 3, step as f64))] }
 }
 
+/// One analysis, committed as those of a slow run are.
+fn keep(store: &mut Store, step: usize) -> Result<(), StoreError> {
+    store.analysis(&row(step), &snapshot(step + 1))?;
+    store.commit()
+}
+
 #[test]
-fn a_full_disk_is_told_with_its_remedy_and_keeps_every_finished_analysis() {
+fn quick_analyses_are_committed_together_and_at_the_end() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("run.db");
+    let mut store = Store::create(&path, &[]).expect("a store");
+    let seen =
+        || table(&Store::open_to_read(&path).expect("readable"), "analyses", "step").expect("rows").len();
+    let mut after = |step, now_s| {
+        store.analysis(&row(step), &snapshot(step + 1)).expect("room");
+        store.commit_if_due(now_s).expect("room");
+        seen()
+    };
+    // The first at once, then nothing until the hold is over.
+    assert_eq!(
+        [after(0, 1.0), after(1, 1.01), after(2, 1.04), after(3, 1.06), after(4, 1.07)],
+        [1, 1, 1, 4, 4]
+    );
+    drop(store);
+    assert_eq!(seen(), 5);
+}
+
+#[test]
+fn a_full_disk_is_told_with_its_remedy_and_keeps_every_committed_analysis() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("run.db");
     let mut store = Store::create(&path, &[]).expect("a store");
@@ -51,8 +78,7 @@ fn a_full_disk_is_told_with_its_remedy_and_keeps_every_finished_analysis() {
         .connection
         .pragma_update_and_check(None, "max_page_count", pages + 20, |_| Ok(()))
         .expect("a limit");
-    let full =
-        (0..1000).find_map(|step| store.analysis(&row(step), &snapshot(step + 1)).err().map(|e| (step, e)));
+    let full = (0..1000).find_map(|step| keep(&mut store, step).err().map(|e| (step, e)));
     let (step, error) = full.expect("the limit is reached");
     assert!(step > 0, "some analyses fit");
     let text = error.to_string();

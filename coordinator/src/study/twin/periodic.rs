@@ -18,6 +18,9 @@ const DEPTH: usize = 10;
 /// Singular values of the combined changes below this share of the largest are rounding errors.
 const RANK: f64 = 1e-13;
 
+/// Runs one period from a state to the one at its end.
+pub(super) type Period<'a> = dyn FnMut(&[f64]) -> Result<Vec<f64>, ParticleError> + 'a;
+
 /// A state that returns to itself.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Periodic {
@@ -38,7 +41,7 @@ pub(super) enum NotPeriodic {
 
 /// Finds the fixed point of `period`, which maps a state to the one a period later; `size` scales its entries.
 pub(super) fn fixed_point(
-    period: &mut dyn FnMut(&[f64]) -> Result<Vec<f64>, ParticleError>,
+    period: &mut Period<'_>,
     start: Vec<f64>,
     size: &[f64],
 ) -> Result<Periodic, NotPeriodic> {
