@@ -11,6 +11,7 @@ test:
 # Coverage over many draws of the noise: minutes, not part of `just test`.
 battery:
     cargo test --release -p starlings-coordinator --test tube_twin -- --ignored --nocapture
+    cargo test --release --test coarctation -- --ignored --nocapture
 
 # Formatting and lints, warnings are errors.
 lint:

@@ -1,27 +1,37 @@
-//! One heart beat of the elastic tube, 800 steps of 25 cells: time, flops per step and GFLOP/s.
+//! One heart beat of the elastic tube, 800 steps of 25 cells: time, flops per step and GFLOP/s; a study of ten beats.
 //!
 //! `cargo bench --bench tube` prints a table, with `-- --json` one JSON object. The step alone, segment by segment as a run
-//! calls it, with its factors found anew each time; many steps in one segment, which share them; and the whole beat as a
-//! worker runs it, with the wall observed every 10 ms. No time is asserted; a run that fails ends the benchmark instead of
-//! being timed.
+//! calls it, with its factors found anew each time; many steps in one segment, which share them; the whole beat as a
+//! worker runs it, with the wall observed every 10 ms; and the example `fsi-tube`, six particles of five regions, on two
+//! worker processes (the program starts itself), from the study file to the stored summary. No time is asserted; a run that
+//! fails ends the benchmark instead of being timed.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, missing_docs)]
 
 use std::f64::consts::PI;
 use std::hint::black_box;
+use std::net::Ipv4Addr;
+use std::path::Path;
 use std::process::ExitCode;
-use std::sync::Arc;
+use std::sync::{Arc, mpsc};
 use std::time::Instant;
 
 use serde_json::{Map, Value, json};
+use starlings_coordinator::fleet::{FleetConfig, GrpcFleet, LocalConfig, LocalWorkers};
+use starlings_coordinator::study::{RunContext, RunFolder, Study, Summary, run::run};
 use starlings_models::model::{History, Segment};
 use starlings_models::{Job, Model, ModelDef, Setup, Signal, Window};
+use starlings_worker::WorkerConfig;
+use tokio_util::sync::CancellationToken;
 
 type Failure = Box<dyn std::error::Error>;
 
 const CELLS: usize = 25;
 const STEPS: usize = 800;
 const DT: f64 = 1e-3;
+
+/// Worker processes of a study.
+const WORKERS: usize = 2;
 
 /// Flops per cell of a step that finds its own factors, additions, products and divisions alike: stiffness 2, wall 3, factor
 /// 5 (one division), load 8, solve 5, update 6.
@@ -34,9 +44,12 @@ const SHARED_FLOPS_PER_CELL: usize = 19;
 const PLAIN_FLOPS_PER_CELL: usize = 45;
 
 fn main() -> ExitCode {
+    if let Some(address) = std::env::args().skip_while(|a| a != "--connect").nth(1) {
+        return work(address);
+    }
     let json = std::env::args().any(|a| a == "--json");
     let mut figures = Map::new();
-    let benches = [segments, one_segment, worker];
+    let benches = [segments, one_segment, worker, ten_beats];
     if let Err(error) = benches.iter().try_for_each(|bench| bench(&mut figures)) {
         eprintln!("benchmark: {error}");
         return ExitCode::FAILURE;
@@ -162,4 +175,78 @@ fn worker(figures: &mut Map<String, Value>) -> Result<(), Failure> {
     });
     figures.insert("beat_ms".into(), round(1e3 * seconds));
     Ok(())
+}
+
+/// The example's study on two worker processes, with one pass over the record and with its own two.
+fn ten_beats(figures: &mut Map<String, Value>) -> Result<(), Failure> {
+    for (key, passes) in [("tube_study_10_beats_wall_s", 1), ("tube_study_10_beats_two_passes_wall_s", 2)] {
+        let mut shortest = f64::INFINITY;
+        for _ in 0..3 {
+            let folder = tempfile::tempdir()?;
+            write_study(folder.path(), passes)?;
+            let started = Instant::now();
+            let summary = study(folder.path(), started)?;
+            shortest = shortest.min(started.elapsed().as_secs_f64());
+            let right =
+                summary.parameters.len() == 5 && summary.runs.failed == 0 && summary.workers == WORKERS;
+            if !right {
+                return Err("the study did not run as it should".into());
+            }
+        }
+        figures.insert(key.into(), round(shortest));
+    }
+    Ok(())
+}
+
+/// Copies the example with another number of passes.
+fn write_study(folder: &Path, passes: usize) -> Result<(), Failure> {
+    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/fsi-tube");
+    for name in ["wall.csv", "flow.csv", "initial.csv"] {
+        std::fs::copy(example.join(name), folder.join(name))?;
+    }
+    let text = std::fs::read_to_string(example.join("study.toml"))?;
+    if !text.contains("\npasses = 2\n") {
+        return Err("the example no longer has two passes".into());
+    }
+    let text = text.replace("\npasses = 2\n", &format!("\npasses = {passes}\n"));
+    Ok(std::fs::write(folder.join("study.toml"), text)?)
+}
+
+/// Reads the study, starts its fleet, fits, and stores the run.
+fn study(folder: &Path, started: Instant) -> Result<Summary, Failure> {
+    let study = Study::load(&folder.join("study.toml"))?;
+    let (sender, events) = mpsc::channel();
+    let mut fleet = GrpcFleet::listen(FleetConfig::new(
+        (Ipv4Addr::LOCALHOST, 0).into(),
+        &study.name,
+        CancellationToken::new(),
+        sender,
+    ))?;
+    let workers = LocalWorkers::spawn(LocalConfig {
+        program: std::env::current_exe()?,
+        args: vec![],
+        n: WORKERS,
+        address: fleet.address(),
+        fleet: fleet.handle(),
+    })?;
+    let mut stored = RunFolder::create(&folder.join("run"), &study, "benchmark", "")?;
+    let clock = || started.elapsed().as_secs_f64();
+    let mut context = RunContext { clock: &clock, watch: &mut |_| {}, events: Some(&events), earlier_s: 0.0 };
+    let summary = run(&study, &mut fleet, &mut stored, &mut context)?;
+    fleet.close();
+    drop(workers);
+    Ok(summary)
+}
+
+/// This program as a worker of its own study.
+fn work(address: String) -> ExitCode {
+    let mut config = WorkerConfig::new(address);
+    config.once = true;
+    match starlings_worker::run(config) {
+        Ok(_) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("worker: {error}");
+            ExitCode::FAILURE
+        }
+    }
 }

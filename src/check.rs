@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Parser;
 use serde_json::json;
+use starlings_coordinator::study::field::{field_of, observed_fields};
 use starlings_coordinator::study::trial::{TrialChannel, trial};
 use starlings_coordinator::study::{EstimatorKind, Study, posterior};
 use starlings_estimators::SigmaSet;
@@ -69,6 +70,19 @@ fn as_json(study: &Study, channels: &[TrialChannel], n_particle: usize) -> serde
     })
 }
 
+/// One line for a channel, or for the observed components of a field: weighted by their observations.
+fn pooled(channels: &[TrialChannel]) -> Vec<String> {
+    let outputs: Vec<String> = channels.iter().map(|c| c.output.clone()).collect();
+    let name = if channels.len() > 1 { observed_fields(&outputs).join(", ") } else { outputs.concat() };
+    let n_obs: usize = channels.iter().map(|c| c.n_obs).sum();
+    let mean_square = |of: fn(&TrialChannel) -> f64| {
+        let sum: f64 = channels.iter().map(|c| c.n_obs as f64 * of(c).powi(2)).sum();
+        number((sum / n_obs.max(1) as f64).sqrt(), None)
+    };
+    let record = channels.first().map_or(String::new(), |c| c.record.clone());
+    vec![record, name, n_obs.to_string(), mean_square(|c| c.rmse), mean_square(|c| c.noise)]
+}
+
 fn print(study: &Study, channels: &[TrialChannel], n_particle: usize) -> Result<(), Failure> {
     line(format_args!("{}: model {}, {}", study.name, study.setup.model.kind, study.describe_estimator()))?;
     line("\nparameters")?;
@@ -80,15 +94,9 @@ fn print(study: &Study, channels: &[TrialChannel], n_particle: usize) -> Result<
     text(table(&rows, false))?;
     line("\ntrial run at the prior median")?;
     let mut rows = vec![["record", "output", "observations", "rmse", "noise"].map(str::to_owned).to_vec()];
-    for c in channels {
-        rows.push(vec![
-            c.record.clone(),
-            c.output.clone(),
-            c.n_obs.to_string(),
-            number(c.rmse, None),
-            number(c.noise, None),
-        ]);
-    }
+    let of_field =
+        |a: &TrialChannel, b: &TrialChannel| a.record == b.record && field_of(&a.output) == field_of(&b.output);
+    rows.extend(channels.chunk_by(of_field).map(pooled));
     text(table(&rows, false))?;
     let runs = runs_per_pass(study, n_particle);
     let per = if study.estimator.kind == EstimatorKind::Batch { "iteration" } else { "pass" };

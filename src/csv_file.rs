@@ -2,7 +2,7 @@
 
 use std::ffi::OsStr;
 use std::io::Write;
-use std::path::{Component, Path};
+use std::path::{Component, Path, PathBuf};
 
 use crate::console;
 use crate::failure::Failure;
@@ -42,6 +42,53 @@ pub(crate) enum Place<'a> {
     Unknown,
 }
 
+/// A file that a command writes, with the option that names it.
+type Output<'a> = (&'static str, &'a Option<PathBuf>);
+
+/// Refuses, before anything runs, outputs that would overwrite the study, its data or each other, or cannot be written.
+pub(crate) fn check_outputs(outputs: &[Output<'_>], study: &str, place: &Place<'_>) -> Result<(), Failure> {
+    let given: Vec<(&str, &Path)> =
+        outputs.iter().filter_map(|(option, path)| Some((*option, path.as_deref()?))).collect();
+    for (i, (option, path)) in given.iter().enumerate() {
+        spare_study(Some(path), study, place).map_err(|failure| failure.with(&format!(" with {option}")))?;
+        let same = |other: &&(&str, &Path)| is_same(other.1, path);
+        if let Some((earlier, _)) = given[..i].iter().find(same) {
+            let path = path.display();
+            return Err(Failure::input(format!(
+                "{earlier} and {option} both name {path}, and one would overwrite the other: choose two files"
+            )));
+        }
+        probe(path).map_err(|e| Failure::input(format!("cannot write {} ({option}): {e}", path.display())))?;
+    }
+    Ok(())
+}
+
+/// Whether two paths are one file, there or still to be made; a device takes any number of outputs.
+fn is_same(one: &Path, other: &Path) -> bool {
+    let place = |path: &Path| {
+        let made = || Some(folder_of(path).canonicalize().ok()?.join(path.file_name()?));
+        path.canonicalize().ok().or_else(made).filter(|path| !path.exists() || path.is_file())
+    };
+    one == other && !one.exists() || place(one).is_some_and(|path| place(other) == Some(path))
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Opens a file for writing and leaves everything as it was; a device or a pipe is not touched.
+fn probe(path: &Path) -> std::io::Result<()> {
+    let mut options = std::fs::OpenOptions::new();
+    if path.is_file() || path.is_dir() {
+        return options.write(true).open(path).map(drop);
+    }
+    if path.symlink_metadata().is_ok() {
+        return Ok(());
+    }
+    options.write(true).create_new(true).open(path)?;
+    std::fs::remove_file(path)
+}
+
 /// Refuses an output that would overwrite the study or a file that it names.
 pub(crate) fn spare_study(output: Option<&Path>, study: &str, place: &Place<'_>) -> Result<(), Failure> {
     // What does not exist cannot be overwritten, and a device is no file of a study.
@@ -52,7 +99,7 @@ pub(crate) fn spare_study(output: Option<&Path>, study: &str, place: &Place<'_>)
     let refuse = |what: &str| {
         let given = given.display();
         Err(Failure::input(format!(
-            "{given} is {what}, and would be overwritten: choose another file with -o"
+            "{given} is {what}, and would be overwritten: choose another file"
         )))
     };
     if std::fs::read(&target).is_ok_and(|bytes| bytes == study.as_bytes()) {

@@ -66,5 +66,5 @@ fn spare(args: &Args, folder: &RunFolder) -> Result<(), Failure> {
         return Err(Failure::input(format!("{path} is a file of the run: choose another file with -o")));
     }
     let study = folder.store.meta("study").map_err(Failure::run)?.unwrap_or_default();
-    csv_file::spare_study(output, &study, &Place::Unknown)
+    csv_file::check_outputs(&[("-o", &args.output)], &study, &Place::Unknown)
 }

@@ -31,6 +31,15 @@ impl Failure {
         Self::Run(message.to_string())
     }
 
+    /// The same with an end to its message; a study's problems and a reader that left have none.
+    pub(crate) fn with(self, end: &str) -> Self {
+        match self {
+            Self::Input(message) => Self::Input(message + end),
+            Self::Run(message) => Self::Run(message + end),
+            Self::Study(_) | Self::Unread => self,
+        }
+    }
+
     /// Exit code.
     pub(crate) fn code(&self) -> ExitCode {
         match self {

@@ -46,9 +46,8 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let study = Study::load(&args.study)?;
     let plan = args.fleet.plan(&study)?;
-    for output in [&args.html, &args.csv] {
-        csv_file::spare_study(output.as_deref(), &study.text, &Place::Known(&study.file))?;
-    }
+    let outputs = [("--html", &args.html), ("--csv", &args.csv)];
+    csv_file::check_outputs(&outputs, &study.text, &Place::Known(&study.file))?;
     let at = At::from_argument(&args.at);
     at.centre(&study).map_err(Failure::input)?;
     trial(&study).map_err(Failure::input)?;

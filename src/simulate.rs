@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::Parser;
 use starlings_coordinator::study::Study;
-use starlings_coordinator::study::field::{components, quantity_of};
+use starlings_coordinator::study::field::{component_of, components, quantity_of};
 use starlings_coordinator::study::twin::{Recording, Twin, simulate};
 use starlings_models::effect::{EffectDef, library};
 use starlings_models::{Spec, catalogue, nearest};
@@ -53,6 +53,9 @@ pub(crate) struct Args {
     output: Option<PathBuf>,
 }
 
+/// Rows of a regular grid at most: beyond that a slip is likelier than a wish.
+const MOST_ROWS: f64 = 1e8;
+
 /// How much noise is added.
 #[derive(Clone, Copy)]
 enum Noise {
@@ -90,9 +93,8 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         return Err(Failure::input("--periodic must be a positive number"));
     }
     let study = Study::load(&args.study)?;
-    for output in [&args.output, &args.state_out] {
-        csv_file::spare_study(output.as_deref(), &study.text, &Place::Known(&study.file))?;
-    }
+    let outputs = [("-o", &args.output), ("--state-out", &args.state_out)];
+    csv_file::check_outputs(&outputs, &study.text, &Place::Known(&study.file))?;
     check_names(args, &study)?;
     let record = match &args.record {
         None => 0,
@@ -138,12 +140,18 @@ fn tell_noise(recording: &Recording, study: &Study) {
 fn grid(args: &Args, study: &Study, record: usize) -> Result<Vec<f64>, Failure> {
     let (Some(until), Some(step)) = (args.until, args.step) else { return Ok(Vec::new()) };
     let start = study.records[record].times.first().copied().unwrap_or_default();
-    if !(step > 0.0 && until > start && (until - start) / step < 1e8) {
+    if !(step > 0.0 && until > start) {
         return Err(Failure::input(format!(
             "--step must be positive and --until after the record's start at {start}"
         )));
     }
-    let n = ((until - start) / step + 1e-9).floor() as usize;
+    let n = (until - start) / step + 1e-9;
+    if n >= MOST_ROWS {
+        return Err(Failure::input(format!(
+            "--until {until} with --step {step} makes {n:.1e} rows, more than {MOST_ROWS:e}: give a larger step or an earlier end"
+        )));
+    }
+    let n = n.floor() as usize;
     Ok((0..=n).map(|k| step.mul_add(k as f64, start)).collect())
 }
 
@@ -162,13 +170,31 @@ fn check_names(args: &Args, study: &Study) -> Result<(), Failure> {
     for (name, _) in &args.set {
         if !names.contains(name) {
             let hint = nearest(name, &names).map(|n| format!("; did you mean `{n}`?")).unwrap_or_default();
-            let names = names.join(", ");
+            let names = listed(&names).join(", ");
             return Err(Failure::input(format!(
                 "--set {name}: the study has no parameter, constant or initial value of that name{hint} (it has: {names})"
             )));
         }
     }
     args.effect.iter().try_for_each(|(name, _)| check_host(name, study, &built_in))
+}
+
+/// The names with every field once, as `initial:wall[0..79]`.
+fn listed(names: &[String]) -> Vec<String> {
+    let mut fields: Vec<(&str, Option<(usize, usize)>)> = Vec::new();
+    for name in names {
+        match (component_of(name), fields.last_mut()) {
+            (Some((field, i)), Some((last, Some((_, end))))) if *last == field && i == *end + 1 => *end = i,
+            (Some((field, i)), _) => fields.push((field, Some((i, i)))),
+            (None, _) => fields.push((name, None)),
+        }
+    }
+    let text = |(field, span): (&str, Option<(usize, usize)>)| match span {
+        None => field.to_owned(),
+        Some((start, end)) if start == end => format!("{field}[{start}]"),
+        Some((start, end)) => format!("{field}[{start}..{end}]"),
+    };
+    fields.into_iter().map(text).collect()
 }
 
 /// Refuses an effect that exists, but not for this model.

@@ -9,9 +9,9 @@ use std::path::{Path, PathBuf};
 use clap::Parser;
 use starlings_coordinator::report::locus::{Locus, render};
 use starlings_coordinator::study::{Study, posterior};
+use starlings_models::nearest;
 use starlings_models::observer::kinds;
 use starlings_models::spectrum::{Decay, Laboratory, ObserverSpectrum};
-use starlings_models::nearest;
 
 use crate::console::line;
 use crate::csv_file::{self, Place};
@@ -91,10 +91,12 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 /// Refuses names and numbers that are wrong whatever the study is.
 fn check(args: &Args) -> Result<(), Failure> {
     let known: Vec<&str> = kinds().iter().map(|kind| kind.kind).collect();
-    for name in args.observers.iter().filter(|name| !known.contains(&name.as_str())) {
+    if let Some(name) = args.observers.iter().find(|name| !known.contains(&name.as_str())) {
         let hint = nearest(name, &known).map(|n| format!("; did you mean `{n}`?")).unwrap_or_default();
         let known = known.join(", ");
-        return Err(Failure::input(format!("--observers: no observer named `{name}`{hint} (known: {known})")));
+        return Err(Failure::input(format!(
+            "--observers: no observer named `{name}`{hint} (known: {known})"
+        )));
     }
     match args.gains.iter().find(|gain| !(gain.is_finite() && **gain >= 0.0)) {
         Some(gain) => Err(Failure::input(format!(
@@ -108,7 +110,8 @@ fn examine<'a>(args: &Args, study: &'a Study) -> Result<Found<'a>, Failure> {
     let medians = study.theta_for(0, posterior::prior(study).mean.as_slice());
     let laboratory = Laboratory::new(&study.setup, &medians).map_err(Failure::input)?;
     let listed = args.poles.unwrap_or(LISTED).min(laboratory.poles().len());
-    let given = |own: &[f64], otherwise: &[f64]| if own.is_empty() { otherwise.to_vec() } else { own.to_vec() };
+    let given =
+        |own: &[f64], otherwise: &[f64]| if own.is_empty() { otherwise.to_vec() } else { own.to_vec() };
     let mut gains = given(&args.gains, &study.spectrum.gains);
     if gains.is_empty() {
         gains = laboratory.usual_gains(2 * print::ROWS);
@@ -125,7 +128,11 @@ fn examine<'a>(args: &Args, study: &'a Study) -> Result<Found<'a>, Failure> {
         // An observer that was asked for and cannot be is an error; of the others nobody wants to know why.
         refused.clear();
         kinds.clear();
-        wanted.iter().for_each(|kind| if !kinds.contains(kind) { kinds.push(kind.clone()) });
+        for kind in wanted {
+            if !kinds.contains(kind) {
+                kinds.push(kind.clone());
+            }
+        }
     }
     let decay = args.decay.or(study.spectrum.decay);
     let work = |kind: &String| laboratory.examine(kind, &gains, listed, decay);
@@ -155,7 +162,8 @@ fn write_csv(path: &Path, found: &Found<'_>) -> Result<(), Failure> {
         for (gain, max_re) in observer.gain.iter().zip(&observer.max_re) {
             let at = gains.iter().position(|g| g.to_bits() == gain.to_bits()).unwrap_or(0);
             for (pole, way) in ways.iter().enumerate() {
-                let [gain, max_re, re, im] = [*gain, *max_re, way[at].re, way[at].im].map(|v| format!("{v:?}"));
+                let [gain, max_re, re, im] =
+                    [*gain, *max_re, way[at].re, way[at].im].map(|v| format!("{v:?}"));
                 rows.push([observer.name.clone(), gain, max_re, pole.to_string(), re, im]);
             }
         }

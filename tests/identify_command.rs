@@ -3,65 +3,17 @@
 #![allow(clippy::unwrap_used)] // a failed unwrap is a failed test
 
 mod common;
+mod identify_kit;
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use common::{output, repository, run, starlings};
+use common::{repository, run};
+use identify_kit::{Case, numbers, parameter, warns};
 use serde_json::Value;
 
 /// Distal pressure of the periodic state of the RCR example, dyn/cm^2.
 const PERIODIC: f64 = 114_922.16;
-
-/// A study in a folder of its own.
-struct Case {
-    folder: tempfile::TempDir,
-}
-
-impl Case {
-    fn new(study: &str) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join("study.toml"), study).unwrap();
-        Self { folder }
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn with(self, name: &str, text: &str) -> Self {
-        std::fs::write(self.path(name), text).unwrap();
-        self
-    }
-
-    fn identify(&self, extra: &[&str]) -> (i32, String, String) {
-        output(starlings().arg("identify").arg(self.path("study.toml")).args(extra))
-    }
-
-    fn json(&self, extra: &[&str]) -> Value {
-        let (code, stdout, stderr) = self.identify(&[&["--json"], extra].concat());
-        assert_eq!(code, 0, "{stderr}");
-        parse(&stdout)
-    }
-}
-
-fn parse(stdout: &str) -> Value {
-    serde_json::from_str(stdout).unwrap_or_else(|e| panic!("{e}: {stdout}"))
-}
-
-fn numbers(value: &Value) -> Vec<f64> {
-    value.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
-}
-
-fn parameter<'a>(found: &'a Value, name: &str) -> &'a Value {
-    let of_name = |p: &&Value| p["name"] == name;
-    found["parameters"].as_array().unwrap().iter().find(of_name).unwrap()
-}
-
-fn warns(found: &Value, words: &[&str]) -> bool {
-    let warnings = found["warnings"].as_array().unwrap();
-    warnings.iter().any(|w| words.iter().all(|word| w.as_str().unwrap().contains(word)))
-}
 
 /// The RCR example with its priors at the truth; the initial pressure is fixed, or has the prior given.
 fn windkessel(initial: &str) -> Case {
@@ -207,53 +159,6 @@ fn parameters_that_enter_only_as_a_sum_are_named_as_one_combination() {
 }
 
 #[test]
-fn stiffness_of_a_tube_and_of_the_tissue_around_it_are_known_as_one() {
-    let example = repository("examples/fsi-tube");
-    let study = std::fs::read_to_string(example.join("study.toml")).unwrap();
-    let tissue = "[[parameters]]\nname = \"k_s\"\nprior = { transform = \"log2\", median = 2e5, sd = 1.0 }\n[[records]]";
-    let mut study = study.replace("[[records]]", tissue);
-    for file in ["initial.csv", "wall.csv", "flow.csv"] {
-        study = study.replace(&format!("\"{file}"), &format!("\"{}", example.join(file).display()));
-    }
-    let found = Case::new(&study).json(&[]);
-    let names: Vec<&str> =
-        found["parameters"].as_array().unwrap().iter().map(|p| p["name"].as_str().unwrap()).collect();
-    assert_eq!(names, ["E1", "E2", "E3", "E4", "E5", "k_s"]);
-    for ring in 0..5 {
-        // The posterior of a run has about -0.99: the prior loosens a lock that is perfect in a wall of rings.
-        assert!(found["correlation"][ring][5].as_f64().unwrap() < -0.99, "{}", found["correlation"]);
-        assert!(found["posterior_correlation"][ring][5].as_f64().unwrap() < -0.99);
-        assert!(warns(&found, &[names[ring], "and k_s are correlated (-1.000)"]), "{}", found["warnings"]);
-    }
-    assert!(found["advice"].as_str().unwrap().contains("; without "), "{}", found["advice"]);
-    let weakest = &found["directions"][0];
-    assert!(weakest["combination"].as_str().unwrap().starts_with("k_s − 0.2 E1 − 0.2 E2"), "{weakest}");
-    assert!(weakest["share"].as_f64().unwrap() > 0.99 && weakest["standard_error"].is_null());
-    assert!(warns(&found, &["combination k_s"]), "{}", found["warnings"]);
-    assert!(found["advice"].as_str().unwrap().contains("tells them apart"), "{}", found["advice"]);
-}
-
-#[test]
-fn the_weak_combinations_of_the_coarctation_are_named() {
-    let study = repository("examples/coarctation/study.toml");
-    let (code, stdout, stderr) = output(starlings().arg("identify").arg(study).arg("--json"));
-    assert_eq!(code, 0, "{stderr}");
-    let found = parse(&stdout);
-    let parameters = found["parameters"].as_array().unwrap();
-    let directions = found["directions"].as_array().unwrap();
-    assert_eq!(directions.len(), parameters.len());
-    let share = |d: &Value| d["share"].as_f64().unwrap();
-    assert!(directions.windows(2).all(|pair| share(&pair[0]) >= share(&pair[1])), "the weakest first");
-    let combined = directions.iter().filter(|d| d["parameters"].as_array().unwrap().len() > 1);
-    let words: Vec<&str> = combined.map(|d| d["combination"].as_str().unwrap()).collect();
-    assert!(words.len() > 10, "{words:?}");
-    assert!(found["advice"].as_str().unwrap().contains(words[0]), "{}", found["advice"]);
-    for p in parameters {
-        assert!(p["standard_error"].as_f64().unwrap() > 0.0, "the data determine every parameter: {p}");
-    }
-}
-
-#[test]
 fn a_parameter_that_changes_nothing_is_said_in_words_and_null_in_json() {
     let case = decay("constants = { b = 0.5 }", &[("a", HALF), ("idle", HALF)]);
     let found = case.json(&[]);
@@ -302,30 +207,6 @@ fn the_page_and_the_table_hold_what_was_computed_and_no_invalid_number() {
 }
 
 #[test]
-fn two_records_share_a_parameter_and_keep_their_own_initial_values() {
-    let found = {
-        let study = repository("examples/pig-aorta-joint/study.toml");
-        let (code, stdout, stderr) = output(starlings().arg("identify").arg(study).arg("--json"));
-        assert_eq!(code, 0, "{stderr}");
-        parse(&stdout)
-    };
-    let records = found["records"].as_array().unwrap();
-    assert!(records.len() > 1, "{records:?}");
-    let steps: u64 = records.iter().map(|r| r["n"].as_u64().unwrap()).sum();
-    assert_eq!(steps as usize, found["gsf"]["time"].as_array().unwrap().len());
-    for (k, record) in records.iter().enumerate() {
-        let name = format!("initial:p[{}]", record["record"].as_str().unwrap());
-        let curve = numbers(&found["sensitivity"][&name]);
-        let (first, n) = (record["first"].as_u64().unwrap() as usize, record["n"].as_u64().unwrap() as usize);
-        assert!(curve[first] > 0.1, "{k}: a record answers to its own initial value");
-        let elsewhere = curve[..first].iter().chain(&curve[first + n..]);
-        assert!(elsewhere.copied().all(|v| v.abs() < 1e-12), "{k}: and to no other");
-    }
-    // A centre and a pair for each parameter of the study (R, C, Zc, initial:p), whatever the number of its entries.
-    assert_eq!(found["runs"].as_u64().unwrap() as usize, 9 * records.len());
-}
-
-#[test]
 fn a_finished_run_is_a_point_of_the_analysis_and_anything_else_is_refused() {
     let case = decay(
         "constants = { b = 0.5, idle = 1.0 }",
@@ -348,17 +229,6 @@ fn a_finished_run_is_a_point_of_the_analysis_and_anything_else_is_refused() {
     assert!(stderr.contains("did not estimate `b`"), "{stderr}");
     let (code, _, stderr) = case.identify(&["--at", case.path("nowhere").to_str().unwrap()]);
     assert_eq!(code, 2, "{stderr}");
-}
-
-#[test]
-fn the_observer_of_the_study_does_not_enter() {
-    let study = std::fs::read_to_string(repository("examples/pig-aorta/study.toml")).unwrap();
-    let study = study
-        .replace("data/in-vivo-1.csv", repository("examples/pig-aorta/data/in-vivo-1.csv").to_str().unwrap());
-    let free = Case::new(&study).json(&[]);
-    let observed = Case::new(&format!("{study}\n[observer]\nkind = \"nudging\"\ngain = 5.0\n")).json(&[]);
-    assert_eq!(free["gsf"], observed["gsf"]);
-    assert!(observed["conditional_on"].as_str().unwrap().contains("observer is off"));
 }
 
 #[test]

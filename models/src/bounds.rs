@@ -1,4 +1,6 @@
 //! A range as text formats can carry it: JSON has no infinity, so an absent bound travels as `"inf"` or `"-inf"`.
+//!
+//! Next file to read: [`crate::spec`], whose ranges these are.
 
 use std::fmt;
 

@@ -3,6 +3,8 @@
 //! The list is what `Setup::build` looks kinds up in, what the `models` command prints, and what the family tests run over.
 //! Next file to read: [`crate::native`] for the built-in models, [`crate::equations`] for models written in a study.
 
+use std::collections::HashSet;
+
 use crate::equations::EquationsModel;
 use crate::setup::{ModelDef, SetupError};
 use crate::{Model, Spec, equations, native, nearest};
@@ -30,7 +32,8 @@ pub fn specs() -> Vec<Spec> {
 /// Makes the model that a definition names, without effects.
 ///
 /// # Errors
-/// When the kind is unknown, equations are missing or given for another kind, or they are wrong.
+/// When the kind is unknown, equations are missing or given for another kind, or they are wrong, or a layout gives two
+/// quantities one name.
 pub fn build(def: &ModelDef) -> Result<Box<dyn Model>, SetupError> {
     match (&def.equations, def.kind == EQUATIONS) {
         (Some(equations), true) => {
@@ -57,5 +60,44 @@ pub fn build(def: &ModelDef) -> Result<Box<dyn Model>, SetupError> {
             nearest: nearest(&def.kind, known),
         });
     };
-    (kind.build)(def)
+    let model = (kind.build)(def)?;
+    check_names(model.spec())?;
+    Ok(model)
+}
+
+/// Refuses two quantities of one name in one list: names put together from those of a layout can meet.
+fn check_names(spec: &Spec) -> Result<(), SetupError> {
+    for list in [&spec.states, &spec.parameters, &spec.outputs, &spec.inputs] {
+        let mut known = HashSet::new();
+        if let Some(twice) = list.iter().find(|quantity| !known.insert(quantity.name.as_str())) {
+            return Err(SetupError::Twice(twice.name.clone()));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Quantity;
+
+    #[test]
+    fn two_quantities_of_one_name_are_refused_unless_they_stand_in_different_lists() {
+        let mut spec = specs().remove(0);
+        let name = spec.states[0].name.clone();
+        assert_eq!(check_names(&spec), Ok(()));
+        spec.outputs.insert(0, Quantity::new("another", ""));
+        spec.inputs[0].name = "another".to_owned();
+        assert_eq!(check_names(&spec), Ok(()));
+        let refused = Err(SetupError::Twice("another".to_owned()));
+        spec.outputs.push(Quantity::new("another", ""));
+        assert_eq!(check_names(&spec), refused);
+        spec.outputs.pop();
+        spec.parameters.push(Quantity::new("another", ""));
+        spec.parameters.insert(0, Quantity::new("another", ""));
+        assert_eq!(check_names(&spec), refused);
+        spec.parameters.remove(0);
+        spec.states.push(Quantity::new(&name, ""));
+        assert_eq!(check_names(&spec), Err(SetupError::Twice(name)));
+    }
 }

@@ -12,6 +12,7 @@ mod bounds;
 pub mod catalogue;
 pub mod effect;
 pub mod equations;
+mod exponential;
 mod inputs;
 pub mod integrate;
 pub mod job;

@@ -1,4 +1,6 @@
 //! The nearest valid name for a mistyped one, for error messages.
+//!
+//! Next file to read: [`crate::setup`], which reports names.
 
 /// The candidate with the smallest edit distance to `name` (insertions, deletions, substitutions and swaps of neighbours,
 /// letter case ignored), or none when even that is further than a third of the longer word.

@@ -56,9 +56,13 @@ pub trait Observer: Send + Sync {
     /// observed. [`Correction`]s are its steps.
     fn feedback(&self, model: &dyn Model, theta: &[f64]) -> DMatrix<f64>;
 
-    /// The largest stable product of gain and time between observations; `None` for a correction that any gain leaves
-    /// stable.
-    fn stable_up_to(&self) -> Option<f64> {
+    /// The largest stable gain with observations every `dt`; `None` for a correction that any gain leaves stable.
+    fn stable_up_to(&self, _dt: f64) -> Option<f64> {
+        None
+    }
+
+    /// What its poles stand for where that is not plain, to follow "poles"; `None` where [`Self::feedback`] says all.
+    fn note(&self) -> Option<&'static str> {
         None
     }
 }

@@ -36,7 +36,8 @@ pub struct Unloaded {
 /// Each step loads n + 1 shapes or more.
 ///
 /// # Errors
-/// When the image is empty or not finite, or no shape is found: the wall is too soft for the pressure.
+/// When the image is empty or not finite, or no shape is found: a suction collapses the wall, or the load map does not
+/// increase. Under a positive pressure every elastic ring has a shape, however soft: a pressure in another unit is not refused.
 pub fn unloaded(image: &[f64], mut load: impl FnMut(&[f64], &mut [f64])) -> Result<Unloaded, SetupError> {
     let scale = image.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
     if !image.iter().all(|v| v.is_finite()) || scale == 0.0 {
@@ -64,8 +65,9 @@ pub fn unloaded(image: &[f64], mut load: impl FnMut(&[f64], &mut [f64])) -> Resu
         excess = left;
     }
     Err(SetupError::Invalid(format!(
-        "no unloaded shape found: loaded, the nearest one is {:.1e} of the image's size away; the wall is too soft for \
-         the pressure of the image: raise the stiffness or check the pressure's unit",
+        "no unloaded shape found: loaded, the nearest one is {:.1e} of the image's size away; either no shape \
+         is that large under this suction, or a stiffness is not above zero: check the stiffness, and the pressure's sign and \
+         unit",
         excess.amax() / scale
     )))
 }

@@ -5,8 +5,9 @@
 //! the largest real part is the rate at which the slowest part of a wrong initial state is forgotten. Nothing is run in time
 //! here, and steps, noise and parameters that are being estimated are left out.
 //!
-//! Read [`laboratory`] for all of it together, [`linearise`] for A, [`pole`] for its eigenvalues, [`sensitivity`] for their slopes in the gain, [`gain`] for the
-//! gain to choose, [`locus`] for the way of each pole. Source: Moireau, Chapelle & Le Tallec (2008, 2009).
+//! Read [`laboratory`] for all of it together, [`linearise`] for A, [`pole`] for its eigenvalues, [`sensitivity`] for their
+//! slopes in the gain, [`gain`] for the gain to choose, [`locus`] for the way of each pole. Source: Moireau, Chapelle &
+//! Le Tallec (2008, 2009).
 
 pub mod component;
 pub mod coordinates;
@@ -29,7 +30,7 @@ pub use decay::Decay;
 pub use gain::{Best, Beyond, GainCurve};
 pub use laboratory::{Laboratory, ObserverSpectrum};
 pub use linearise::{linearisation, linearisation_at};
-pub use locus::follow;
+pub use locus::Follower;
 pub use observed::{Feedback, ObservedSystem};
 pub use pole::poles;
 pub use sensitivity::{Slope, slopes};

@@ -6,6 +6,8 @@ mod artery_1d_kit;
 use std::f64::consts::PI;
 
 use artery_1d_kit::{artery, bifurcation, drive, output, outputs, rate, run, start, theta, tube};
+use starlings_models::model::Segment;
+use starlings_models::native::Artery1d;
 use starlings_models::{Model, ModelDef, ParticleError, SetupError, native};
 
 /// A half sine of 0.3 s in every beat of 0.8 s.
@@ -101,19 +103,63 @@ fn the_rate_of_the_stored_volume_is_what_enters_less_what_leaves() {
 #[test]
 fn a_flow_that_no_vessel_carries_is_an_error_that_says_so() {
     let model = tube(20, 5, 0.8);
-    let theta = theta(&model, &[]);
+    // At the inlet, or in the cell behind it, to which the viscosity of the wall brings the flow.
+    for (c_w, at) in [(0.0, "node `inlet` at t = 0"), (2e3, "cell 0 at t = 0")] {
+        let theta = theta(&model, &[("c_w", c_w)]);
+        // Out of the vessel, and more than it carries below the speed of its waves: at 2e4 cm³/s u/c would be 1.2.
+        for flow in [-1e5, 2e4, 1e5] {
+            let mut x = start(&model, &theta);
+            let error = advance(&model, &theta, &mut x, flow).unwrap_err();
+            let ParticleError::Solver(message) = &error else { panic!("{flow}: {error}") };
+            assert!(message.contains(" of its waves") && message.contains(at), "{flow}: {message}");
+        }
+    }
+}
+
+/// Advances by a tenth of a second at a constant flow.
+fn advance(model: &Artery1d, theta: &[f64], x: &mut [f64], flow: f64) -> Result<(), ParticleError> {
+    let history = starlings_models::Drive::NONE.history;
+    model.advance(Segment { t0: 0.0, t1: 0.1, u0: &[flow], slope: &[0.0], history }, theta, x)
+}
+
+#[test]
+fn a_flow_as_fast_as_its_waves_inside_a_vessel_is_an_error_that_names_the_cell() {
+    let model = tube(20, 5, 0.8);
+    for (c_w, alpha) in [(0.0, 1.0), (2e3, 1.3)] {
+        let theta = theta(&model, &[("c_w", c_w), ("alpha", alpha)]);
+        let mut x = start(&model, &theta);
+        x[20 + 7] = 1e4;
+        let error = advance(&model, &theta, &mut x, 0.0).unwrap_err();
+        assert!(error.to_string().contains("speed of its waves in cell 7 at t = 0"), "{error}");
+        assert!(outputs(&model, &theta, &x, 0.0).iter().all(|y| y.is_nan()));
+    }
+}
+
+#[test]
+fn a_state_that_is_not_finite_is_named_whatever_stands_behind_it() {
+    let model = tube(20, 5, 0.8);
+    for c_w in [0.0, 2e3] {
+        let theta = theta(&model, &[("c_w", c_w)]);
+        for (i, name) in [(3, "A[3]"), (23, "Q[3]"), (40, "pi")] {
+            let mut x = start(&model, &theta);
+            x[i] = f64::NAN;
+            let what = format!("state `{name}`");
+            let error = advance(&model, &theta, &mut x, 0.0).unwrap_err();
+            assert_eq!(error, ParticleError::NotFinite { what, time: 0.0 });
+        }
+    }
+}
+
+#[test]
+fn a_vessel_that_has_no_waves_is_an_error_and_not_a_step() {
+    let model = tube(20, 5, 0.8);
+    let mut theta = theta(&model, &[]);
     let mut x = start(&model, &theta);
-    let slope = [0.0];
-    let flood = starlings_models::model::Segment {
-        t0: 0.0,
-        t1: 0.1,
-        u0: &[-1e5],
-        slope: &slope,
-        history: starlings_models::Drive::NONE.history,
-    };
-    let error = model.advance(flood, &theta, &mut x).unwrap_err();
-    let ParticleError::Solver(message) = &error else { panic!("{error}") };
-    assert!(message.contains("collapses") || message.contains("node `inlet`"), "{message}");
+    // Only the first region: the cells behind it have waves.
+    theta[0] = f64::NAN;
+    let error = advance(&model, &theta, &mut x, 0.0).unwrap_err();
+    let what = "the speed of waves".to_owned();
+    assert_eq!(error, ParticleError::NotFinite { what, time: 0.0 });
 }
 
 fn refused(layout: &serde_json::Value) -> (String, String) {
@@ -143,6 +189,9 @@ fn a_layout_that_makes_no_network_is_refused_with_its_place_and_a_remedy() {
         ("/segments/0/radius", serde_json::json!(-1.0), "segments[0].radius", "above zero"),
         ("/segments/0/cells", serde_json::json!(1), "segments[0].cells", "at least two"),
         ("/segments/0/regions", serde_json::json!(4), "segments[0].cells", "whole number of cells"),
+        ("/segments/0/cells", serde_json::json!(10_000), "segments[1].cells", "10006 cells up to here"),
+        ("/segments/0/cells", serde_json::json!(10_000_000_000_u64), "segments[0].cells", "at most 10000"),
+        ("/segments/1/regions", serde_json::json!(1000), "segments[1].regions", "1001 regions up to here"),
         ("/segments/0/colour", serde_json::json!("red"), "segments[0].colour", "unknown field"),
         ("/nodes/0/kind", serde_json::json!("rcr"), "nodes", "exactly one node of kind \"inlet\""),
         ("/nodes/1/kind", serde_json::json!("junction"), "nodes", "no outlet"),
@@ -158,6 +207,12 @@ fn a_layout_that_makes_no_network_is_refused_with_its_place_and_a_remedy() {
         assert_eq!(found, path, "{place}: {text}");
         assert!(text.contains(message), "{place}: {text}");
     }
+    let mut twins = good.clone();
+    twins["segments"][0]["regions"] = serde_json::json!(2);
+    twins["segments"][1]["name"] = serde_json::json!("a_2");
+    let (path, text) = refused(&twins);
+    assert_eq!(path, "segments[1].name");
+    assert!(text.contains("modulus of `a_2` is `E_a_2`, and so is another: rename"), "{text}");
     let mut island = good.clone();
     island["segments"].as_array_mut().unwrap().extend(["c", "d"].map(|name| {
         serde_json::json!({ "name": name, "from": "p", "to": "q", "length": 5.0, "radius": 1.0, "thickness": 0.1 })

@@ -18,6 +18,18 @@ fn every_kind_has_a_sentence_and_a_name_of_its_own() {
 }
 
 #[test]
+fn every_name_of_a_state_parameter_output_or_input_is_given_once() {
+    for kind in kinds() {
+        let (setup, _) = setup(&kind);
+        let spec = setup.spec().unwrap();
+        for list in [&spec.states, &spec.parameters, &spec.outputs, &spec.inputs] {
+            let names: std::collections::BTreeSet<&str> = list.iter().map(|q| q.name.as_str()).collect();
+            assert_eq!(names.len(), list.len(), "{kind}: {names:?}");
+        }
+    }
+}
+
+#[test]
 fn every_model_starts_from_a_finite_state_and_predicts_every_output() {
     for kind in kinds() {
         let (setup, theta) = setup(&kind);

@@ -112,6 +112,21 @@ fn displacements_differ_from_those_of_the_unloaded_tube_by_the_images_alone() {
 }
 
 #[test]
+fn a_pressure_in_another_unit_is_refused_with_the_factor() {
+    let refused = |pressure: f64| {
+        let layout = Layout { image_pressure: pressure, ..Layout::default() };
+        FsiTube::new(&layout, 25.0).err().map(|error| error.to_string())
+    };
+    // 80 mmHg as a bare number, and the highest number below the limit of 7.5 mmHg.
+    for pressure in [80.0, 9_999.0] {
+        let error = refused(pressure).unwrap();
+        assert!(error.contains("image_pressure") && error.contains("mmHg x 1333.22"), "{error}");
+    }
+    assert_eq!(refused(1e4), None);
+    assert_eq!(refused(0.0), None);
+}
+
+#[test]
 fn an_image_under_suction_is_refused() {
     let layout = Layout { image_pressure: -1.0, ..Layout::default() };
     let error = FsiTube::new(&layout, 25.0).err().unwrap().to_string();

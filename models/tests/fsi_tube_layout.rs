@@ -3,8 +3,10 @@
 
 mod fsi_tube_kit;
 
+use fsi_tube_kit::NoHistory;
 use serde_json::{Value, json};
-use starlings_models::{Model, ModelDef, Setup};
+use starlings_models::model::Segment;
+use starlings_models::{Model, ModelDef, ParticleError, Setup};
 
 fn built(layout: Value) -> Result<Box<dyn Model>, String> {
     let model = ModelDef { kind: "fsi-tube".to_owned(), layout: Some(layout), ..ModelDef::default() };
@@ -75,6 +77,20 @@ fn a_start_by_the_reference_does_not_know_the_regions() {
 }
 
 #[test]
+fn a_span_of_more_steps_than_anybody_waits_for_fails_at_its_start() {
+    let model = built(json!({ "step": 1e-9 })).unwrap();
+    let theta: Vec<f64> = model.spec().parameters.iter().map(|q| q.default.unwrap()).collect();
+    let mut x = vec![0.0; model.spec().n_state()];
+    model.initial(&theta, &mut x);
+    let segment = |t1: f64| Segment { t0: 2.0, t1, u0: &[0.0], slope: &[0.0], history: &NoHistory };
+    // 2e8 steps.
+    let failed = model.advance(segment(2.2), &theta, &mut x).unwrap_err();
+    assert_eq!(failed, ParticleError::TooManySteps { time: 2.0, limit: 100_000_000 });
+    // And a thousand, on the way.
+    model.advance(segment(2.0 + 1e-6), &theta, &mut x).unwrap();
+}
+
+#[test]
 fn what_cannot_be_is_refused_with_its_place_and_a_remedy() {
     let cases = [
         (strap((6.0, 25.0)), "`regions[1].from`: no region covers 5 to 6 cm: start `free` at 5"),
@@ -90,6 +106,7 @@ fn what_cannot_be_is_refused_with_its_place_and_a_remedy() {
         (json!({ "regions": 0 }), "`regions`: 0 regions"),
         (json!({ "regions": [] }), "`regions`: no regions"),
         (json!({ "step": 0.0 }), "`step`: a step of 0 s"),
+        (json!({ "step": 1e-300 }), "give a time of 1e-9 s or more"),
         (json!({ "step": "short" }), "`step`: invalid type"),
         (json!({ "regions": "many" }), "a number of equal regions, or a list"),
         (json!({ "start": "middle" }), "`equilibrium` or `reference`"),

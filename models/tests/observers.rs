@@ -1,10 +1,10 @@
 //! Observers inside a run: what they may move and what they may not.
-#![allow(clippy::float_cmp)]
+#![allow(clippy::float_cmp, clippy::unwrap_used, reason = "exact comparisons and helpers of tests")]
 
 mod common;
 
 use common::{kinds, largest_difference, run, run_in_pieces, setup, window};
-use starlings_models::{ObserverDef, Setup, Window};
+use starlings_models::{ModelDef, ObserverDef, Setup, Window};
 
 fn nudged(setup: &Setup, gain: f64) -> Setup {
     let observer = ObserverDef { kind: "nudging".to_owned(), gain, ..ObserverDef::default() };
@@ -96,6 +96,26 @@ fn walls() -> Vec<(Setup, Vec<f64>)> {
     }
     assert!(walls.len() >= 10, "both oscillators have a wall");
     walls
+}
+
+#[test]
+fn a_wall_too_large_for_dense_matrices_is_refused_by_every_observer_that_needs_them() {
+    for kind in ["dvf", "dvf-am", "sdf", "sdf-displacement", "image-force", "windkessel"] {
+        let build = |cells: usize| {
+            let layout = Some(serde_json::json!({ "cells": cells }));
+            let model = ModelDef { kind: "fsi-tube".to_owned(), layout, ..ModelDef::default() };
+            let observer = ObserverDef { kind: kind.to_owned(), gain: 1.0, ..ObserverDef::default() };
+            let outputs = ["displacement", "velocity", "pressure"].map(str::to_owned).to_vec();
+            let mut setup = Setup { model, observer, outputs, ..Setup::default() };
+            let parameters = setup.model().unwrap().spec().parameters.clone();
+            setup.parameters = parameters.into_iter().map(|q| q.name).collect();
+            setup.build().err().map(|error| error.to_string())
+        };
+        let error = build(1001).unwrap();
+        assert!(error.contains(&format!("`{kind}`")) && error.contains("at most 1000 nodes"), "{error}");
+        assert!(error.contains("1001") && error.contains("`nudging`"), "{error}");
+        assert_eq!(build(20), None, "{kind}");
+    }
 }
 
 #[test]

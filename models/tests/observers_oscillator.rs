@@ -115,6 +115,31 @@ fn implicit_corrections_are_stable_at_any_gain_and_the_explicit_one_up_to_its_li
 }
 
 #[test]
+fn the_largest_stable_gain_of_an_image_force_is_where_runs_begin_to_grow_at_any_spacing() {
+    for dt in [0.005, 0.3, 0.6, 0.9] {
+        let model = setup("oscillator").0.model().unwrap();
+        let outputs = channels(&["position", "velocity"]);
+        let wiring = Wiring { spec: model.spec(), outputs: &outputs, model: &*model, theta: &THETA };
+        let most = observer::build(&def("image-force", 1.0), wiring).unwrap().stable_up_to(dt).unwrap();
+        let largest = |gain: f64| {
+            let times = (1..=200).map(|j| f64::from(j) * dt).collect();
+            let window = Window { start: 0.0, times, observed: vec![0.0; 400], inputs: vec![] };
+            let state = run(&*observed("image-force", gain).build().unwrap(), &window, &THETA).state;
+            state[0].abs().max(state[1].abs() / OMEGA)
+        };
+        // One in a hundred of the gain to either side; growth by at least 1 % of some eigenvalue over 200 steps.
+        assert!(
+            largest(0.99 * most) < 20.0 * (1.0 / (OMEGA * dt)).max(1.0),
+            "Δt {dt}: {}",
+            largest(0.99 * most)
+        );
+        assert!(largest(1.01 * most) > 1e4, "Δt {dt}: {}", largest(1.01 * most));
+        // γ² + ω² < (2/Δt)² is enough wherever it can be kept.
+        assert!(most * most + OMEGA * OMEGA > (2.0 / dt).powi(2), "Δt {dt}: {most}");
+    }
+}
+
+#[test]
 fn a_model_without_a_wall_is_refused_with_those_that_have_one() {
     let error = |kind: &str, model: &str| {
         let setup = Setup { observer: def(kind, 1.0), ..setup(model).0 };

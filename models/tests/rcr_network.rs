@@ -7,7 +7,7 @@ mod rcr_network_kit;
 use common::{job, run};
 use rcr_network_kit::{beat, everything, flow_in, grid, network, over, series, signal, simulate};
 use serde_json::json;
-use starlings_models::Setup;
+use starlings_models::{ParticleError, Setup};
 
 #[test]
 fn a_capacitor_that_empties_through_a_resistance_decays_exponentially() {
@@ -99,6 +99,23 @@ fn a_linear_network_with_very_different_time_constants_takes_the_exact_step() {
     let want = share * (lasting * 0.5).exp() + (100.0 - share) * (quick * 0.5).exp();
     // Twenty squarings of the exponential multiply rounding by a million at most.
     assert!((got["p_b"][0] - want).abs() < 1e-8, "{} against {want}", got["p_b"][0]);
+}
+
+#[test]
+fn an_element_faster_than_numbers_hold_is_an_error_and_not_an_endless_step() {
+    for link in [1e-40, 1e-150] {
+        let setup = network(
+            json!({ "elements": [
+                { "name": "one", "kind": "C", "from": "a", "value": 1.0, "initial": 50.0 },
+                { "name": "link", "kind": "R", "from": "a", "to": "b", "value": link },
+                { "name": "two", "kind": "C", "from": "b", "value": 1.0 },
+                { "name": "out", "kind": "R", "from": "b", "value": 1.0 },
+            ]}),
+            &[],
+        );
+        let error = setup.build().unwrap().run(&job(&over(&setup, vec![0.5], vec![]), &[])).unwrap_err();
+        assert!(matches!(&error, ParticleError::NotFinite { .. }), "{link}: {error}");
+    }
 }
 
 #[test]

@@ -87,8 +87,12 @@ fn unknown_and_misspelt_nodes_are_refused() {
     refused(
         elements,
         "elements[2].to",
-        &["only one element ends at node `aorat`", "`aorta`", "declare all nodes"],
+        &["only one element ends at node `aorat`: did you mean `aorta`? Otherwise declare all nodes"],
     );
+    // The other end of the same element is no candidate, near as its name is.
+    let (path, message) = refusal(json!({ "elements": [r("out", "x", "0"), c("wall", "x", "0"), r("side", "a1", "a2")] }));
+    assert_eq!(path, "elements[2].from");
+    assert_eq!(message, "only one element ends at node `a1`: if that is meant, declare all nodes in `nodes`");
 }
 
 #[test]
@@ -126,6 +130,8 @@ fn keys_and_values_that_do_not_belong_to_an_element_are_refused() {
     refused(json!([kind]), "elements[0].kind", &["unknown variant `resistor`", "`R`"]);
     let smooth = json!({ "name": "a", "kind": "diode", "from": "x", "smooth": -1.0 });
     refused(json!([smooth]), "elements[0].smooth", &["positive"]);
+    let backwards = json!({ "name": "a", "kind": "diode", "from": "x", "open": 1e4, "closed": 0.02 });
+    refused(json!([backwards]), "elements[0].closed", &["0.02 closed is less than 10000 open"]);
     let both = json!({ "name": "a", "kind": "pressure", "to": "x", "value": 1.0, "input": "p" });
     refused(json!([both]), "elements[0]", &["remove one of the two"]);
 }

@@ -8,8 +8,8 @@ mod structure;
 use nalgebra::{Complex, DMatrix, DVector};
 use starlings_models::observer::{self, Wiring};
 use starlings_models::spectrum::{
-    Beyond, Decay, Energy, Feedback, GainCurve, Laboratory, ObservedSystem, SpectrumError, follow, linearisation, observed,
-    poles, slopes,
+    Beyond, Decay, Energy, Feedback, Follower, GainCurve, Laboratory, ObservedSystem, SpectrumError,
+    linearisation, observed, poles, slopes,
 };
 use starlings_models::{Model, ModelDef, ObserverDef, Setup, catalogue};
 use structure::{Structure, artery_modes, artery_windkessel, chain};
@@ -29,7 +29,8 @@ fn names(list: &[&str]) -> Vec<String> {
 fn under(model: &Structure, kind: &str, outputs: &[String]) -> (DMatrix<f64>, ObservedSystem) {
     let energy = Energy::new(&model.blocks(&[]).expect("blocks")).expect("positive definite");
     let a = energy.of(&linearisation(model, &[]).expect("linear"));
-    let at = |gain| Ok::<_, SpectrumError>(energy.of(&build(model, outputs, kind, gain).feedback(model, &[])));
+    let at =
+        |gain| Ok::<_, SpectrumError>(energy.of(&build(model, outputs, kind, gain).feedback(model, &[])));
     let feedback = Feedback::of(at).expect("feedback").expect("a polynomial in the gain");
     let system = ObservedSystem::new(&a, &feedback, 0.0).expect("poles");
     (a, system)
@@ -74,11 +75,9 @@ fn the_energy_coordinates_and_the_states_own_have_the_same_poles() {
 fn max_re_of_every_observer_of_an_artery_is_the_closed_form() {
     let model = artery_modes(40);
     let gains = [50.0, 100.0, 200.0, 600.0, 1e3, 2e3, 1e4, 5e4, 1e5];
-    let slow = [
-        -0.36647, -0.73294, -1.46588, -4.39763, -7.32938, -14.65875, -73.29375, -138.62181, -64.70868,
-    ];
-    let fast =
-        [-25.0, -50.0, -100.0, -300.0, -100.83541, -46.41079, -9.07500, -1.81342, -0.90668];
+    let slow =
+        [-0.36647, -0.73294, -1.46588, -4.39763, -7.32938, -14.65875, -73.29375, -138.62181, -64.70868];
+    let fast = [-25.0, -50.0, -100.0, -300.0, -100.83541, -46.41079, -9.07500, -1.81342, -0.90668];
     let table = [("dvf", slow), ("sdf-displacement", slow), ("sdf", fast), ("dvf-am", fast)];
     for (kind, expected) in table {
         let (_, system) = under(&model, kind, &all());
@@ -98,7 +97,9 @@ fn max_re_of_every_observer_of_an_artery_is_the_closed_form() {
 fn the_slopes_of_modes_are_half_the_observed_part_of_the_mass() {
     let model = artery_modes(40);
     let part = [-7.329_375_081e-3, -2.582_659_418e-2, -4.874_809_185e-2, -7.129_147_689e-2, -9.158_788_82e-2];
-    for (kind, factor) in [("dvf", None), ("sdf-displacement", None), ("sdf", Some(-0.5)), ("dvf-am", Some(-0.5))] {
+    for (kind, factor) in
+        [("dvf", None), ("sdf-displacement", None), ("sdf", Some(-0.5)), ("dvf-am", Some(-0.5))]
+    {
         let (a, system) = under(&model, kind, &all());
         let found = slopes(&system, &poles(&a).expect("poles")[..10]).expect("slopes");
         for (i, slope) in found.iter().enumerate() {
@@ -132,7 +133,12 @@ fn best_gains_saturation_and_the_gain_for_a_decay_of_an_artery() {
     // Where the first mode's damping meets the slow root of a later one.
     close(best.max_re, -236.692_58, 1e-4, "best decay");
     close(best.gain, 3.229_37e4, 1.0, "best gain");
-    close(curve.gain_for(&dvf, best, -25.0).expect("poles").expect("reached"), 3_410.93, 0.005, "gain for -25");
+    close(
+        curve.gain_for(&dvf, best, -25.0).expect("poles").expect("reached"),
+        3_410.93,
+        0.005,
+        "gain for -25",
+    );
 }
 
 #[test]
@@ -182,7 +188,10 @@ fn a_windkessel_keeps_its_own_slow_pole_unless_the_wall_itself_is_pulled() {
     let table = [
         ("sdf", [-0.566_428, -1.037_833, -2.540_716, -3.656_797, -4.842_114, -5.840_993, -6.694_876]),
         ("dvf", [-0.509_840, -0.509_840, -0.509_840, -0.509_840, -0.509_840, -0.509_839, -0.509_838]),
-        ("sdf-displacement", [-0.509_840, -0.509_840, -0.509_840, -0.509_840, -0.509_840, -0.509_839, -0.509_838]),
+        (
+            "sdf-displacement",
+            [-0.509_840, -0.509_840, -0.509_840, -0.509_840, -0.509_840, -0.509_839, -0.509_838],
+        ),
         ("dvf-am", [-0.509_840, -0.509_835, -0.509_813, -0.509_785, -0.509_730, -0.509_618, -0.509_279]),
     ];
     for (kind, expected) in table {
@@ -224,7 +233,8 @@ fn without_any_better_gain_the_best_is_none() {
 
 #[test]
 fn nudging_a_scalar_never_saturates() {
-    let model = catalogue::build(&ModelDef { kind: "windkessel-2".to_owned(), ..ModelDef::default() }).expect("model");
+    let model = catalogue::build(&ModelDef { kind: "windkessel-2".to_owned(), ..ModelDef::default() })
+        .expect("model");
     let theta = [3.0, 0.1];
     let outputs = names(&["pressure"]);
     let at = |gain: f64| {
@@ -247,8 +257,9 @@ fn nudging_a_scalar_never_saturates() {
 fn a_locus_starts_at_the_poles_and_moves_without_jumps() {
     let model = chain(8);
     let (_, system) = under(&model, "sdf", &names(&["displacement[0]", "displacement[3]"]));
-    let gains: Vec<f64> = std::iter::once(0.0).chain((0..200).map(|k| 10f64.powf(0.02 * f64::from(k)))).collect();
-    let ways = follow(&system, &gains, 16).expect("poles");
+    let gains: Vec<f64> =
+        std::iter::once(0.0).chain((0..200).map(|k| 10f64.powf(0.02 * f64::from(k)))).collect();
+    let ways = Follower::new(&system).follow(&gains, 16).expect("poles");
     assert_eq!(ways.len(), 16);
     for (k, gain) in gains.iter().enumerate() {
         let mut at: Vec<f64> = ways.iter().map(|way| way[k].norm()).collect();
@@ -317,7 +328,8 @@ fn six_hundred_poles_of_a_viscous_fluid_come_mode_by_mode_and_the_slow_ones_are_
         close(pole.re, expected, 1e-8, "slow pole");
     }
     assert!(listed.iter().all(|pole| pole.im == 0.0), "the hundred slowest are real");
-    for (kind, gain, most) in [("dvf", 1e3, 2e-8), ("sdf-displacement", 200.0, 9e-9), ("sdf", 200.0, 1.6e-4)] {
+    for (kind, gain, most) in [("dvf", 1e3, 2e-8), ("sdf-displacement", 200.0, 9e-9), ("sdf", 200.0, 1.6e-4)]
+    {
         let moved = laboratory.observed(kind).expect("hosted").poles(gain).expect("poles");
         let change = listed.iter().zip(&moved).map(|(p, q)| (p - q).norm() / p.norm()).fold(0.0, f64::max);
         // A wall observer hardly moves what the viscous fluid alone decides. 1e-9 for rounding.
@@ -335,7 +347,8 @@ fn what_cannot_be_linearised_says_so() {
         });
         let equations = Some(serde_json::from_value(def).expect("equations"));
         let model = ModelDef { kind: "equations".to_owned(), equations, ..ModelDef::default() };
-        Laboratory::new(&Setup { model, outputs: names(&["y"]), ..Setup::default() }, &[]).map(|l| l.poles().to_vec())
+        Laboratory::new(&Setup { model, outputs: names(&["y"]), ..Setup::default() }, &[])
+            .map(|l| l.poles().to_vec())
     };
     assert_eq!(equations("-2*x", "1").expect("linear")[0].re, -2.0);
     assert!(matches!(equations("-abs(x)", "0"), Err(SpectrumError::Switching { .. })));
@@ -347,12 +360,14 @@ fn what_cannot_be_linearised_says_so() {
 #[test]
 fn the_laboratory_lists_why_an_observer_cannot_be() {
     let constants = [("R", 3.0), ("C", 0.1)].map(|(name, value)| (name.to_owned(), value));
-    let model = ModelDef { kind: "windkessel-2".to_owned(), constants: constants.into(), ..ModelDef::default() };
+    let model =
+        ModelDef { kind: "windkessel-2".to_owned(), constants: constants.into(), ..ModelDef::default() };
     let setup = Setup { model, outputs: names(&["pressure"]), ..Setup::default() };
     let laboratory = Laboratory::new(&setup, &[]).expect("linear");
     let observers = laboratory.observers();
     assert!(observers.contains(&("nudging", None)));
-    let why = observers.iter().find(|(kind, _)| *kind == "sdf").and_then(|(_, why)| why.as_ref()).expect("refused");
+    let why =
+        observers.iter().find(|(kind, _)| *kind == "sdf").and_then(|(_, why)| why.as_ref()).expect("refused");
     assert!(why.to_string().contains("models that can host it"), "{why}");
     let found = laboratory.examine("nudging", &[0.0, 1.0], 5, Some(Decay::new(10.0, 0.1).expect("a decay")));
     let found = found.expect("hosted");

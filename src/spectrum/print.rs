@@ -17,6 +17,7 @@ pub(super) fn as_json(found: &Found<'_>) -> Value {
     let observers = found.observers.iter().map(|o| {
         json!({
             "name": o.name,
+            "note": o.note.map(|note| format!("poles {note}")),
             "gain": o.gain,
             "max_re": o.max_re,
             "slope": o.slopes.iter().map(|s| s.analytic.map(|s| s.re)).collect::<Vec<_>>(),
@@ -57,10 +58,15 @@ pub(super) fn text(found: &Found<'_>) -> Result<(), Failure> {
     });
     line(format_args!("\nbest gain{wanted}"))?;
     print_text(table(&bests(found), true))?;
+    for (o, note) in found.observers.iter().filter_map(|o| Some((o, o.note?))) {
+        line(format_args!("  {}: poles {note}", o.name))?;
+    }
     if !found.refused.is_empty() {
         line("\nnot possible here")?;
     }
-    refusals(&found.refused).iter().try_for_each(|(names, why)| line(format_args!("  {}: {why}", names.join(", "))))
+    refusals(&found.refused)
+        .iter()
+        .try_for_each(|(names, why)| line(format_args!("  {}: {why}", names.join(", "))))
 }
 
 /// Observers with the same reason together.
@@ -83,7 +89,8 @@ fn slopes(found: &Found<'_>) -> Vec<Vec<String>> {
     for (i, pole) in poles.filter(|(_, pole)| pole.im >= 0.0).take(found.rows) {
         let scale = pole.norm();
         let real = round_off(pole.re, scale);
-        let imaginary = if pole.im > 0.0 { format!(" ± {} i", number(pole.im, None)) } else { String::new() };
+        let imaginary =
+            if pole.im > 0.0 { format!(" ± {} i", number(pole.im, None)) } else { String::new() };
         let slope = |o: &ObserverSpectrum| {
             o.slopes[i].analytic.map_or("none".to_owned(), |slope| number(round_off(slope.re, 1.0), None))
         };
@@ -107,7 +114,8 @@ fn rates(found: &Found<'_>) -> Vec<Vec<String>> {
 
 fn bests(found: &Found<'_>) -> Vec<Vec<String>> {
     let titles = ["observer", "max Re λ", "at gain", "more gain", "gain for decay"];
-    let mut rows = vec![titles[..if found.decay.is_some() { 5 } else { 4 }].iter().map(|t| (*t).to_owned()).collect()];
+    let mut rows =
+        vec![titles[..if found.decay.is_some() { 5 } else { 4 }].iter().map(|t| (*t).to_owned()).collect()];
     let scale = found.laboratory.poles().iter().map(|pole| pole.norm()).fold(0.0, f64::max);
     for o in &found.observers {
         let mut row = vec![

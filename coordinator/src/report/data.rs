@@ -2,9 +2,8 @@
 //!
 //! A report is a function of this struct alone, so a report made again from an old run folder is the same report. Every
 //! number has the unit its row or channel names; times are in [`ReportData::time_unit`] unless the field says seconds.
-//! A number that is
-//! not finite is shown as missing, but it does not survive being stored as JSON. Deliberately absent: how the numbers were
-//! computed. Next file to read: `page.rs`.
+//! A number that is not finite is shown as missing, but it does not survive being stored as JSON. Deliberately absent: how
+//! the numbers were computed. Next file to read: `page.rs`.
 
 use serde::{Deserialize, Serialize};
 

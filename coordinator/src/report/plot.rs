@@ -18,4 +18,5 @@ pub(super) mod residual;
 pub(super) mod run_times;
 pub(super) mod scene;
 pub(super) mod thin;
+mod ticked;
 pub(super) mod track;

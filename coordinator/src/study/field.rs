@@ -1,6 +1,6 @@
 //! Fields and their components: `wall` has n components, `wall[2]` is one of them, counted from 0.
 //!
-//! Next file to read: [`crate::study::record::channel`], which takes a field apart into channels.
+//! Next file to read: `record/channel.rs`, which takes a field apart into channels.
 
 use starlings_models::{Quantity, Spec};
 

@@ -1,6 +1,7 @@
 //! What the observer does for the state: one run with it at the estimate, beside the free run without it.
 //!
-//! Both runs predict the same observations; with the observer each prediction follows the corrections of all earlier ones.
+//! Both runs predict the same observations; with the observer each prediction follows the corrections of all earlier ones, at
+//! the spacings at which the filter's own runs are corrected.
 //! Nothing of this reaches the posterior. Next file to read: [`crate::study::fit::forecast`].
 
 use std::collections::HashMap;
@@ -20,7 +21,7 @@ use super::{RunError, Study};
 pub struct ObserverFit {
     /// The observer.
     pub kind: String,
-    /// Its gain, in 1/time unit.
+    /// Its gain, in 1/time unit; that of `windkessel` counts in 1/(R_d C) and has no unit.
     pub gain: f64,
     /// With the observer: every observation predicted from a state corrected by the earlier ones.
     pub innovation_rms_with: f64,
@@ -65,7 +66,7 @@ pub fn compare(
         return Ok(None);
     }
     let trained = (0..study.records.len()).filter(|record| study.records[*record].is_trained());
-    let windows: StepWindows = trained.map(|record| (record, Arc::new(study.corrected(record)))).collect();
+    let windows: StepWindows = trained.map(|record| (record, Arc::new(study.whole(record, true)))).collect();
     let theta = DMatrix::from_column_slice(posterior.mean.len(), 1, posterior.mean.as_slice());
     let states = vec![None; study.records.len()];
     let results = flight.run(Place { pass: 0, step: 1 }, &[0], &theta, &states, &windows)?;

@@ -31,7 +31,7 @@ impl Study {
     }
 
     /// One window over a record from its first row on. With `train_only` the times and values that train, for a fit of the
-    /// whole record; otherwise every time and no observed value, for a free run.
+    /// whole record and for an observer, which then corrects at the times and spacings of the filter's windows; otherwise every time and no observed value, for a free run.
     pub fn whole(&self, record: usize, train_only: bool) -> Window {
         let of_record = &self.records[record];
         let start = of_record.times.first().copied().unwrap_or_default();
@@ -44,23 +44,6 @@ impl Study {
             observed: vec![f64::NAN; of_record.times.len() * self.setup.outputs.len()],
             inputs: of_record.inputs.clone(),
         }
-    }
-
-    /// One window over a record from its first row to the last that trains, with the values that train: what an observer
-    /// corrects by. The times between are all of the record's, so that steps end where those of a free run do.
-    pub fn corrected(&self, record: usize) -> Window {
-        let of_record = &self.records[record];
-        let rows = training_rows(of_record);
-        let n = rows.last().map_or(0, |row| row + 1);
-        let fitted = self.window(of_record, 0.0, &rows, false);
-        let n_obs = self.setup.outputs.len();
-        let mut observed = vec![f64::NAN; n * n_obs];
-        for (j, row) in rows.iter().enumerate() {
-            let values = &fitted.observed[j * n_obs..(j + 1) * n_obs];
-            observed[row * n_obs..(row + 1) * n_obs].copy_from_slice(values);
-        }
-        let times = of_record.times[..n].to_vec();
-        Window { start: times.first().copied().unwrap_or_default(), times, observed, inputs: fitted.inputs }
     }
 
     /// The window over these rows, their training values in it.

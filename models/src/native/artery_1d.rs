@@ -5,6 +5,7 @@
 //! linear tube [`super::fsi_tube`] is another model of one such vessel. Next file to read: `artery_1d/vessels.rs`, then
 //! `artery_1d/step.rs`.
 
+mod checks;
 pub mod layout;
 mod network;
 mod node;
@@ -44,14 +45,22 @@ pub struct Artery1d {
 enum Fault {
     /// A vessel has no area left.
     Collapsed { cell: usize },
+    /// The flow in a cell is not slower than its waves.
+    Supercritical { cell: usize },
     /// The vessels at a node allow no flow slower than its waves.
     Node { name: String },
+    /// The pressures of all nodes together have no solution.
+    Network,
 }
 
 impl Fault {
     fn at(self, t: f64) -> ParticleError {
         ParticleError::Solver(match self {
             Self::Collapsed { cell } => format!("the vessel collapses in cell {cell} at t = {t}"),
+            Self::Supercritical { cell } => {
+                format!("the flow reaches the speed of its waves in cell {cell} at t = {t}")
+            }
+            Self::Network => format!("no pressures of its nodes fit the network at t = {t}"),
             Self::Node { name } => {
                 format!("no flow below the speed of its waves fits the node `{name}` at t = {t}")
             }
@@ -98,10 +107,13 @@ impl Artery1d {
         let (mut work, mut volumes) = (Work::new(&vessels), Volumes::default());
         let (mut t, mut n_step) = (segment.t0, 0);
         while t < segment.t1 {
+            if let Some(i) = x.iter().position(|value| !value.is_finite()) {
+                let what = format!("state `{}`", Spec::component(&self.spec.states, i));
+                return Err(ParticleError::NotFinite { what, time: t });
+            }
             let (left, longest) = (segment.t1 - t, vessels.longest_step(x));
             if longest.is_nan() {
-                let what = "state `A`".to_owned();
-                return Err(ParticleError::NotFinite { what, time: t });
+                return Err(ParticleError::NotFinite { what: "the speed of waves".to_owned(), time: t });
             }
             // Equal steps up to the segment's end, as far as the state does not change the longest one.
             let dt = left / (left / longest).ceil().max(1.0);

@@ -47,6 +47,9 @@ pub struct FsiTube {
     image_pressure: f64,
 }
 
+/// Steps within one span of linear inflow, at most.
+const MOST_STEPS: u64 = 100_000_000;
+
 impl FsiTube {
     /// Makes a tube in this layout; `length` in cm is what its listed regions must cover, and cover in proportion when the
     /// parameter `L` has another value.
@@ -193,8 +196,11 @@ impl Model for FsiTube {
         // A hair of the layout's step is no step of its own: a segment is as long as its times' rounding lets it be.
         const HAIR: f64 = 1e-6;
         let h = segment.t1 - segment.t0;
-        let n = (h / self.step - HAIR).ceil().max(1.0) as usize;
-        self.midpoint(theta, h, n, [segment.u0[0], segment.slope[0]], State::of(x));
+        let n = (h / self.step - HAIR).ceil().max(1.0);
+        if n > MOST_STEPS as f64 {
+            return Err(ParticleError::TooManySteps { time: segment.t0, limit: MOST_STEPS });
+        }
+        self.midpoint(theta, h, n as usize, [segment.u0[0], segment.slope[0]], State::of(x));
         Ok(())
     }
 }

@@ -3,9 +3,11 @@
 //! M dc/dt + D c + Eᵀ K d = loads + γ² Eᵀ H Ms H (z − d). The error gains stiffness and no damping: its frequencies shift and
 //! its amplitude stays. It is here to be compared; take [`super::sdf`]. Next file to read: [`super::windkessel`].
 
-use nalgebra::DMatrix;
+use std::f64::consts::PI;
 
-use super::wall::{Shown, Wall, add, feedback, on_velocity, restricted, solve};
+use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
+
+use super::wall::{Shown, Wall, add, feedback, of_velocity, on_velocity, restricted, solve};
 use super::{Correction, Kind, Observer, Wiring};
 use crate::Model;
 use crate::setup::{ObserverDef, SetupError};
@@ -21,6 +23,8 @@ pub(super) const KIND: Kind = Kind {
 #[derive(Debug)]
 pub struct ImageForce {
     wall: Wall,
+    /// Circular frequency ω of every undamped mode and the share φᵀ Ms φ of the wall in its mass.
+    modes: Vec<(f64, f64)>,
 }
 
 impl ImageForce {
@@ -29,7 +33,9 @@ impl ImageForce {
     /// # Errors
     /// When the model has no wall or its displacement is not observed.
     pub fn new(def: &ObserverDef, wiring: Wiring<'_>) -> Result<Self, SetupError> {
-        Ok(Self { wall: Wall::new(def, &wiring, Shown::Displacement)? })
+        let wall = Wall::new(def, &wiring, Shown::Displacement)?;
+        let modes = wiring.model.blocks(wiring.theta).and_then(|blocks| modes(&blocks));
+        Ok(Self { wall, modes: modes.unwrap_or_default() })
     }
 
     /// Eᵀ H Ms H, n_c × n, the observed nodes given.
@@ -55,9 +61,36 @@ impl Observer for ImageForce {
         feedback(model, (self.wall.velocity, self.wall.displacement), &solve(blocks.mass, spring))
     }
 
-    /// An impulse and a drift repeat stably while γΔt < 2 √(largest eigenvalue of Ms⁻¹ M), which is at least 2. A wave of
-    /// circular frequency ω, as stiff as it comes, asks for ωΔt well below π besides.
-    fn stable_up_to(&self) -> Option<f64> {
-        Some(2.0)
+    /// An impulse after a free vibration by θ = ωΔt repeats stably while (γΔt)² share < 2θ cot(θ/2): its matrix has the
+    /// determinant 1 and the trace 2 cos θ − (γΔt)² share sin(θ)/θ. That is γΔt < 2 √(smallest eigenvalue of Ms⁻¹ M), at
+    /// least 2, for slow modes, and stricter than γ² + ω² < (2/Δt)² for none. Modes that the data do not resolve, θ ≥ π,
+    /// are left to their own damping.
+    fn stable_up_to(&self, dt: f64) -> Option<f64> {
+        let resolved = self.modes.iter().map(|(omega, share)| (omega * dt, share)).filter(|(t, _)| *t < PI);
+        let of_mode = |(theta, share): (f64, &f64)| {
+            let limit = if theta > 1e-6 { 2.0 * theta / (0.5 * theta).tan() } else { 4.0 };
+            (limit / share).sqrt()
+        };
+        let most = resolved.map(of_mode).fold(f64::INFINITY, f64::min);
+        // Without a mass or a stiffness, as where they are estimated, what holds for any slow mode.
+        Some(if most.is_finite() { most } else { 2.0 } / dt)
     }
+}
+
+/// ω and φᵀ Ms φ of the modes K φ = ω² M φ, φᵀ M φ = 1, of an undamped wall; `None` where M or K is not positive
+/// definite.
+fn modes(blocks: &crate::Blocks) -> Option<Vec<(f64, f64)>> {
+    let trace = blocks.trace.as_ref();
+    let on_velocity = |wall: &DMatrix<f64>| on_velocity(trace, of_velocity(trace, wall.clone()));
+    Cholesky::new(blocks.stiffness.clone())?;
+    let inverse = Cholesky::new(blocks.mass.clone())?.l().try_inverse()?;
+    let n = inverse.nrows();
+    let stiffness = &inverse * on_velocity(&blocks.stiffness) * inverse.transpose();
+    let eigen = SymmetricEigen::try_new(stiffness, f64::EPSILON, 100 * n.max(30))?;
+    let share = &inverse * on_velocity(&blocks.solid_mass) * inverse.transpose();
+    let of_mode = |(i, square): (usize, &f64)| {
+        let phi = eigen.eigenvectors.column(i);
+        (square.max(0.0).sqrt(), phi.dot(&(&share * phi)))
+    };
+    Some(eigen.eigenvalues.iter().enumerate().map(of_mode).collect())
 }

@@ -1,10 +1,10 @@
-//! Which state component each observed row measures.
+//! Which state component each observed row measures, and what rows together say of it.
 //!
 //! Next file to read: [`super::nudging`].
 
 use std::ops::Range;
 
-use super::Wiring;
+use super::{Correction, Wiring};
 use crate::setup::{ObserverDef, SetupError};
 use crate::{Quantity, Spec, nearest};
 
@@ -67,6 +67,16 @@ fn behind(
     }
     let first = states.start + index.unwrap_or(0);
     Ok(Some(first..first + n))
+}
+
+/// The mean of observed − predicted over rows that show the same, and how many of them were observed; `None` when none was.
+pub(super) fn mean_innovation(at: &Correction<'_>, rows: &[usize]) -> Option<(f64, u32)> {
+    let (mut sum, mut n) = (0.0, 0_u32);
+    for &row in rows.iter().filter(|&&row| !at.observed[row].is_nan()) {
+        sum += at.observed[row] - at.predicted[row];
+        n += 1;
+    }
+    (n > 0).then(|| (sum / f64::from(n), n))
 }
 
 /// Components of a named quantity or of one component of it.

@@ -8,7 +8,7 @@
 
 use nalgebra::DMatrix;
 
-use super::measured::{Measured, measured};
+use super::measured::{Measured, mean_innovation, measured};
 use super::{Correction, Kind, Observer, Wiring};
 use crate::Model;
 use crate::setup::{ObserverDef, SetupError};
@@ -55,18 +55,9 @@ impl Nudging {
 impl Observer for Nudging {
     fn correct(&self, at: Correction<'_>, x: &mut [f64]) {
         for (state, rows) in &self.channels {
-            let (mut sum, mut n) = (0.0, 0_u32);
-            for &row in rows {
-                let innovation = at.observed[row] - at.predicted[row];
-                if !at.observed[row].is_nan() {
-                    sum += innovation;
-                    n += 1;
-                }
-            }
-            if n > 0 {
+            if let Some((innovation, n)) = mean_innovation(&at, rows) {
                 // n channels pull n times as fast, towards the mean of their innovations.
-                let n = f64::from(n);
-                x[*state] += -(-n * self.gain * at.dt).exp_m1() * sum / n;
+                x[*state] += -(-f64::from(n) * self.gain * at.dt).exp_m1() * innovation;
             }
         }
     }

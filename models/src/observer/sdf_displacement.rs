@@ -2,8 +2,10 @@
 //! momentum sees the feedback (Moireau, Chapelle & Le Tallec 2009).
 //!
 //! With the solid's velocity v = dd/dt − γ Ext (z − d), elimination of v gives the error
-//! M d²e/dt² + γ Ms Ext de/dt + K e = 0 (potential flow): under full observation this is [`super::dvf`], and added mass defeats it alike.
-//! It is here to be compared; take [`super::sdf`]. Next file to read: [`super::image_force`].
+//! M d²e/dt² + γ Ms Ext de/dt + K e = 0 (potential flow): under full observation this is [`super::dvf`], and added mass
+//! defeats it alike. A step moves the displacement alone, in the velocity of the solid's momentum: only with nothing damped and
+//! no outlet has it the poles of that equation. It is here to be compared; take [`super::sdf`]. Next file to read:
+//! [`super::image_force`].
 
 use nalgebra::DMatrix;
 
@@ -50,7 +52,8 @@ impl SolidFeedback {
 impl Observer for SolidFeedback {
     /// δd = (1 + γΔt G)⁻¹ γΔt G (z − d), G = E M⁻¹ Eᵀ Ms Ext: the implicit step in the momentum velocity E c = dd/dt − γ G
     /// (z − d), stable at any gain. Its poles are those of [`Observer::feedback`], which is written in the velocity dd/dt,
-    /// where the fluid is not damped. Solved as (M + γΔt Eᵀ Ms Ext E) y = γΔt Eᵀ Ms Ext (z − d), δd = E y.
+    /// only with nothing damped and no outlet: a damping force takes E c for the velocity here, dd/dt there. Solved as
+    /// (M + γΔt Eᵀ Ms Ext E) y = γΔt Eᵀ Ms Ext (z − d), δd = E y.
     fn correct(&self, at: Correction<'_>, x: &mut [f64]) {
         let Some(innovation) = self.wall.innovation(&at) else { return };
         let Some(blocks) = at.model.blocks(at.theta) else { return };
@@ -73,5 +76,9 @@ impl Observer for SolidFeedback {
         let Some(blocks) = model.blocks(theta) else { return DMatrix::zeros(n, n) };
         let (_, damping) = self.pull(&blocks, &self.wall.observed());
         feedback(model, (self.wall.velocity, self.wall.velocity), &solve(blocks.mass, damping))
+    }
+
+    fn note(&self) -> Option<&'static str> {
+        Some("of the feedback on dd/dt; corrections have these poles only with nothing damped and no outlet")
     }
 }

@@ -4,7 +4,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::measured::find;
+use super::measured::{find, mean_innovation};
 use super::{Correction, Wiring};
 use crate::setup::{ObserverDef, SetupError};
 use crate::{Blocks, Model, Spec, native};
@@ -27,10 +27,8 @@ pub(super) struct Wall {
     pub(super) displacement: usize,
     /// Position of the first velocity unknown in the state.
     pub(super) velocity: usize,
-    /// Number of displacements.
-    n: usize,
-    /// Observed row and the node that it shows.
-    rows: Vec<(usize, usize)>,
+    /// Per node the observed rows that show it.
+    rows: Vec<Vec<usize>>,
 }
 
 /// Observed − predicted on the nodes of a wall.
@@ -54,8 +52,11 @@ impl Wall {
             Shown::Displacement => outputs.displacement,
             Shown::Velocity => outputs.velocity,
         };
-        let rows = components(wiring, field)?;
-        if rows.is_empty() {
+        let mut rows = vec![Vec::new(); blocks.n_wall()];
+        for (row, node) in components(wiring, field)? {
+            rows[node].push(row);
+        }
+        if rows.iter().all(Vec::is_empty) {
             let other = match shown {
                 Shown::Displacement => {
                     format!("where only `{}` is recorded take `dvf`, which observes that", outputs.velocity)
@@ -73,35 +74,23 @@ impl Wall {
             )));
         }
         let (displacement, velocity) = (blocks.displacement, blocks.velocity);
-        Ok(Self { gain: def.gain, displacement, velocity, n: blocks.n_wall(), rows })
+        Ok(Self { gain: def.gain, displacement, velocity, rows })
     }
 
     /// The innovation of one observation time; `None` when nothing was observed or everything was as predicted.
     pub(super) fn innovation(&self, at: &Correction<'_>) -> Option<Innovation> {
-        let mut value = DVector::zeros(self.n);
-        let mut times = vec![0_u32; self.n];
-        for &(row, node) in &self.rows {
-            if !at.observed[row].is_nan() {
-                value[node] += at.observed[row] - at.predicted[row];
-                times[node] += 1;
-            }
-        }
+        let means: Vec<Option<f64>> =
+            self.rows.iter().map(|rows| mean_innovation(at, rows).map(|(mean, _)| mean)).collect();
+        let value = DVector::from_iterator(means.len(), means.iter().map(|mean| mean.unwrap_or(0.0)));
         if value.iter().all(|v| *v == 0.0) {
             return None;
         }
-        for (v, n) in value.iter_mut().zip(&times) {
-            *v /= f64::from((*n).max(1));
-        }
-        Some(Innovation { observed: times.iter().map(|n| *n > 0).collect(), value })
+        Some(Innovation { observed: means.iter().map(Option::is_some).collect(), value })
     }
 
     /// H of the nodes that the channels can show.
     pub(super) fn observed(&self) -> Vec<bool> {
-        let mut observed = vec![false; self.n];
-        for (_, node) in &self.rows {
-            observed[*node] = true;
-        }
-        observed
+        self.rows.iter().map(|rows| !rows.is_empty()).collect()
     }
 }
 
@@ -112,10 +101,13 @@ impl Innovation {
     }
 }
 
+/// The most components of a state field behind blocks: they are dense, 8 MB each at this size, and a correction makes several.
+pub(super) const MOST_NODES: usize = 1000;
+
 /// The part of the model's blocks that an observer stands on.
 ///
 /// # Errors
-/// When the model has none: which models have, and what to do instead.
+/// When the model has none: which models have, and what to do instead; when it is too large for dense blocks.
 pub(super) fn hosted<T>(
     def: &ObserverDef,
     wiring: &Wiring<'_>,
@@ -125,6 +117,14 @@ pub(super) fn hosted<T>(
         return Err(SetupError::Invalid(format!(
             "the observer `{}` knows which states it corrects: remove `corrects`, or take `nudging`, which uses it",
             def.kind
+        )));
+    }
+    let largest = wiring.spec.states.iter().map(|q| q.size).max().unwrap_or(0);
+    if largest > MOST_NODES {
+        return Err(SetupError::Invalid(format!(
+            "the observer `{}` works with dense matrices of a wall of at most {MOST_NODES} nodes, and `{}` has a state \
+             of {largest} components: make it coarser in `[model.layout]`, or take `nudging`, which needs no matrix",
+            def.kind, wiring.spec.kind
         )));
     }
     if let Some(part) = wiring.model.blocks(wiring.theta).and_then(part) {

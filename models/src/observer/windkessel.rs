@@ -1,16 +1,18 @@
 //! The Windkessel observer: a pressure measured at the outlet corrects the pressure stored in the Windkessel.
 //!
-//! C dπ/dt = Q − π/R_d + γ (z_π − π)/R_d, where what is measured is p = π + R_p Q: with the predicted flow, z_π − π is
-//! observed − predicted pressure. The gain γ has no unit here, it counts in 1/(R_d C). The stored pressure is the slowest state of
-//! an arterial model and waves do not reach it, so that observers of the wall's velocity leave it alone. Next file to read:
-//! [`super::nudging`].
+//! C dπ/dt = Q − π/R_d + γ (z − p)/R_d, where z is the measured pressure and p = π + R_p Q the predicted one. The theory has
+//! z_π − π in place of z − p, with z_π = z − R_p Q of the true flow; here Q is the model's own, so that an error of the
+//! outflow enters with R_p besides: it feeds waves back and bounds what the gain can reach. The gain γ has no unit here, it
+//! counts in 1/(R_d C). The stored pressure is the slowest state of an arterial model and waves do not reach it, so that
+//! observers of the wall's velocity leave it alone. Next file to read: [`super::nudging`].
 
 use nalgebra::DMatrix;
 
+use super::measured::mean_innovation;
 use super::wall::{components, hosted};
 use super::{Correction, Kind, Observer, Wiring};
-use crate::Model;
 use crate::setup::{ObserverDef, SetupError};
+use crate::{Drive, Model, Spec};
 
 /// The entry of the observer list.
 pub(super) const KIND: Kind = Kind {
@@ -25,6 +27,8 @@ pub struct WindkesselObserver {
     gain: f64,
     /// Position of π in the state.
     state: usize,
+    /// Name of the pressure output.
+    pressure: &'static str,
     /// The rows that show the pressure.
     rows: Vec<usize>,
 }
@@ -44,7 +48,7 @@ impl WindkesselObserver {
                  take `sdf`, which corrects the pressure through the volume of the vessel"
             )));
         }
-        Ok(Self { gain: def.gain, state: block.state, rows })
+        Ok(Self { gain: def.gain, state: block.state, pressure, rows })
     }
 
     /// γ/(R_d C), in 1/time.
@@ -52,26 +56,56 @@ impl WindkesselObserver {
         let block = model.blocks(theta).and_then(|blocks| blocks.windkessel);
         block.map_or(0.0, |block| self.gain * block.rate)
     }
+
+    /// Γ of the theory, n_state × n_state: γ/(R_d C) on π alone, as if π itself were measured (R_p Q of the true flow taken
+    /// off the measured pressure). [`Observer::feedback`] is that of the corrections made.
+    pub fn feedback_of_stored_pressure(&self, model: &dyn Model, theta: &[f64]) -> DMatrix<f64> {
+        let n = model.spec().n_state();
+        let mut feedback = DMatrix::zeros(n, n);
+        feedback[(self.state, self.state)] = self.rate(model, theta);
+        feedback
+    }
+
+    /// ∂p/∂x, n_state: unit steps about rest, exact for a linear system.
+    fn gradient(&self, model: &dyn Model, theta: &[f64]) -> Vec<f64> {
+        let spec = model.spec();
+        let rest = vec![0.0; spec.inputs.iter().map(|q| q.size).sum()];
+        let drive = Drive { value: &rest, slope: &rest, ..Drive::NONE };
+        let at = Spec::range_of(&spec.outputs, self.pressure).map_or(0, |range| range.start);
+        let (mut x, mut y) = (vec![0.0; spec.n_state()], vec![0.0; spec.n_output()]);
+        let mut pressure = |j: usize, value: f64| {
+            x[j] = value;
+            model.output(0.0, &x, theta, drive, &mut y);
+            x[j] = 0.0;
+            y[at]
+        };
+        (0..spec.n_state()).map(|j| 0.5 * (pressure(j, 1.0) - pressure(j, -1.0))).collect()
+    }
 }
 
 impl Observer for WindkesselObserver {
     /// δπ = (1 − e^(−γΔt/(R_d C))) (z − p): exact for a held flow, stable at any gain.
     fn correct(&self, at: Correction<'_>, x: &mut [f64]) {
-        let (mut sum, mut n) = (0.0, 0_u32);
-        for &row in self.rows.iter().filter(|&&row| !at.observed[row].is_nan()) {
-            sum += at.observed[row] - at.predicted[row];
-            n += 1;
-        }
-        if n > 0 {
+        if let Some((innovation, _)) = mean_innovation(&at, &self.rows) {
             let rate = self.rate(at.model, at.theta);
-            x[self.state] += -(-rate * at.dt).exp_m1() * sum / f64::from(n);
+            x[self.state] += -(-rate * at.dt).exp_m1() * innovation;
         }
     }
 
+    /// γ/(R_d C) ∂p/∂x in the row of π: the predicted pressure holds R_p times the model's own flow.
     fn feedback(&self, model: &dyn Model, theta: &[f64]) -> DMatrix<f64> {
         let n = model.spec().n_state();
-        let mut feedback = DMatrix::zeros(n, n);
-        feedback[(self.state, self.state)] = self.rate(model, theta);
+        let (rate, mut feedback) = (self.rate(model, theta), DMatrix::zeros(n, n));
+        for (entry, slope) in feedback.row_mut(self.state).iter_mut().zip(self.gradient(model, theta)) {
+            *entry = rate * slope;
+        }
         feedback
+    }
+
+    fn note(&self) -> Option<&'static str> {
+        Some(
+            "of corrections by the outlet pressure p = π + R_p Q with the model's own Q; with π itself measured there \
+             would be no feedback of Q",
+        )
     }
 }

@@ -13,7 +13,10 @@ use crate::{Blocks, Model};
 /// S A S⁻¹ for the energy coordinates S x of the model's blocks; A itself for a model without blocks, or where a mass or a
 /// stiffness is not positive definite.
 pub fn natural(model: &dyn Model, theta: &[f64], a: &DMatrix<f64>) -> DMatrix<f64> {
-    model.blocks(theta).and_then(|blocks| Energy::new(&blocks)).map_or_else(|| a.clone(), |energy| energy.of(a))
+    model
+        .blocks(theta)
+        .and_then(|blocks| Energy::new(&blocks))
+        .map_or_else(|| a.clone(), |energy| energy.of(a))
 }
 
 /// The energy coordinates of a fluid–structure system.
@@ -34,8 +37,10 @@ impl Energy {
         let modes = modes.and_then(|svd| svd.u.zip(svd.v_t));
         let (left, right) = modes.unwrap_or_else(|| (DMatrix::identity(n, n), DMatrix::identity(n, n)));
         // Velocity unknowns beyond those of the wall have no mode of their own: they stay as they are.
-        let right = if right.is_square() { right.transpose() } else { DMatrix::identity(n_velocity, n_velocity) };
-        let change = |factor: DMatrix<f64>, turn: &DMatrix<f64>| Some((turn.tr_mul(&factor), inverse(&factor, turn)?));
+        let right =
+            if right.is_square() { right.transpose() } else { DMatrix::identity(n_velocity, n_velocity) };
+        let change =
+            |factor: DMatrix<f64>, turn: &DMatrix<f64>| Some((turn.tr_mul(&factor), inverse(&factor, turn)?));
         let ((y, d), (u, c)) = (change(stiffness, &left)?, change(mass, &right)?);
         Some(Self { changes: [(blocks.displacement, y, d), (blocks.velocity, u, c)] })
     }

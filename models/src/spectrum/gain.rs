@@ -94,7 +94,8 @@ impl GainCurve {
     /// Golden sections on the logarithm of the gain around the grid's lowest point (Kiefer 1953).
     fn golden(&self, system: &ObservedSystem, lowest: usize) -> Result<(f64, f64), SpectrumError> {
         let ratio = 0.5 * (5_f64.sqrt() - 1.0);
-        let (mut lo, mut hi) = (self.gain[lowest - 1].max(1e-3 * self.gain[lowest]).ln(), self.gain[lowest + 1].ln());
+        let (mut lo, mut hi) =
+            (self.gain[lowest - 1].max(1e-3 * self.gain[lowest]).ln(), self.gain[lowest + 1].ln());
         let at = |log: f64| system.max_re(log.exp()).map(|value| (log, value));
         let mut left = at(hi - ratio * (hi - lo))?;
         let mut right = at(lo + ratio * (hi - lo))?;

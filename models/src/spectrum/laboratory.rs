@@ -13,7 +13,7 @@ use super::gain::{Best, GainCurve};
 use super::linearise::linearisation_at;
 use super::observed::{Feedback, ObservedSystem};
 use super::sensitivity::{Slope, slopes};
-use super::{Decay, SpectrumError, follow};
+use super::{Decay, Follower, SpectrumError};
 use crate::binding::Binding;
 use crate::memory::with_memories;
 use crate::observer::{self, Wiring};
@@ -38,6 +38,8 @@ pub struct Laboratory {
 pub struct ObserverSpectrum {
     /// Kind of the observer.
     pub name: String,
+    /// What its poles stand for where that is not plain ([`observer::Observer::note`]).
+    pub note: Option<&'static str>,
     /// Gains that were asked for, in 1/time.
     pub gain: Vec<f64>,
     /// Largest real part at each of them, in 1/time.
@@ -67,7 +69,8 @@ impl Laboratory {
         let a = energy.as_ref().map_or_else(|| a.clone(), |energy| energy.of(&a));
         let none = Feedback::none(a.nrows());
         Ok(Self {
-            poles: ObservedSystem::new(&a, &none, if energy.is_some() { ROUNDING } else { 0.0 })?.poles(0.0)?,
+            poles: ObservedSystem::new(&a, &none, if energy.is_some() { ROUNDING } else { 0.0 })?
+                .poles(0.0)?,
             spec: model.spec().clone(),
             model,
             theta,
@@ -89,7 +92,8 @@ impl Laboratory {
     /// When the model cannot host the observer with the observed outputs, or the poles are not found.
     pub fn observed(&self, kind: &str) -> Result<ObservedSystem, SpectrumError> {
         let at = |gain| Ok::<_, SetupError>(self.feedback(&*self.build(kind, gain)?));
-        let feedback = Feedback::of(at)?.ok_or_else(|| SpectrumError::NotPolynomial { observer: kind.to_owned() })?;
+        let feedback =
+            Feedback::of(at)?.ok_or_else(|| SpectrumError::NotPolynomial { observer: kind.to_owned() })?;
         ObservedSystem::new(&self.a, &feedback, self.negligible())
     }
 
@@ -113,6 +117,7 @@ impl Laboratory {
         };
         Ok(ObserverSpectrum {
             name: kind.to_owned(),
+            note: self.build(kind, 1.0)?.note(),
             gain: gains.to_vec(),
             max_re: gains.iter().map(|&gain| system.max_re(gain)).collect::<Result<_, _>>()?,
             slopes: slopes(&system, &self.poles[..listed.min(self.poles.len())])?,
@@ -182,6 +187,6 @@ impl ObserverSpectrum {
     /// # Errors
     /// When the poles are not found.
     pub fn locus(&self, gains: &[f64], listed: usize) -> Result<Vec<Vec<Complex<f64>>>, SpectrumError> {
-        follow(&self.system, gains, listed)
+        Follower::new(&self.system).follow(gains, listed)
     }
 }

@@ -6,8 +6,8 @@
 
 use nalgebra::{Complex, DMatrix};
 
-use super::component::{block, components};
 use super::SpectrumError;
+use super::component::{block, components};
 use super::pole::{of_block, rightmost, sort};
 
 /// Γ(γ) = γ Γ₁ + γ² Γ₂, in the same coordinates as A.

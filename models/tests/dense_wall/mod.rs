@@ -9,10 +9,18 @@ use starlings_models::{Drive, Model, ObserverDef, Quantity, SetupError, Spec};
 /// Number of wall nodes.
 pub(crate) const N: usize = 6;
 
+/// The gain of most tests.
+pub(crate) const GAIN: f64 = 1.7;
+
+/// Observers of the wall itself.
+pub(crate) const STRUCTURAL: [&str; 5] = ["dvf", "dvf-am", "sdf", "sdf-displacement", "image-force"];
+
 /// States: π, then d, then c; outputs: pressure, velocity, displacement, in an order of their own.
 pub(crate) struct DenseWall {
     pub(crate) blocks: Blocks,
     pub(crate) damping: DMatrix<f64>,
+    /// R_p ∂Q/∂c, one row: the pressure output is π + R_p Q.
+    pub(crate) outflow: DMatrix<f64>,
     spec: Spec,
 }
 
@@ -59,6 +67,7 @@ impl DenseWall {
         let (kind, says) = ("dense-wall".to_owned(), "A wall.".to_owned());
         let (parameters, inputs, measures) = (vec![], vec![], vec![]);
         let spec = Spec { kind, says, states, parameters, outputs, inputs, measures, restart: true };
+        let outflow = random(1, mass.nrows(), 31);
         let blocks = Blocks {
             displacement: 1,
             velocity: 1 + N,
@@ -74,7 +83,7 @@ impl DenseWall {
                 pressure: Some("pressure"),
             },
         };
-        Self { blocks, damping, spec }
+        Self { blocks, damping, outflow, spec }
     }
 
     /// E, the identity where the velocity unknowns are the wall velocity.
@@ -158,8 +167,9 @@ impl Model for DenseWall {
     }
 
     fn output(&self, _t: f64, x: &[f64], _theta: &[f64], _u: Drive<'_>, y: &mut [f64]) {
-        y[0] = x[0];
-        let wall = self.trace() * DVector::from_column_slice(&x[1 + N..]);
+        let velocity = DVector::from_column_slice(&x[1 + N..]);
+        y[0] = x[0] + (&self.outflow * &velocity)[0];
+        let wall = self.trace() * velocity;
         y[1..=N].copy_from_slice(wall.as_slice());
         y[1 + N..].copy_from_slice(&x[1..=N]);
     }
@@ -179,4 +189,33 @@ pub(crate) fn poles(a: &DMatrix<f64>) -> Vec<(f64, f64)> {
     let mut poles: Vec<(f64, f64)> = a.complex_eigenvalues().iter().map(|z| (z.im, z.re)).collect();
     poles.sort_by(|a, b| a.partial_cmp(b).unwrap());
     poles
+}
+
+/// Channels that show nodes 0, 2 and 5, of displacement and of velocity.
+pub(crate) fn half() -> Vec<String> {
+    channels(&[
+        "velocity[5]",
+        "displacement[2]",
+        "velocity[0]",
+        "displacement[5]",
+        "displacement[0]",
+        "velocity[2]",
+    ])
+}
+
+/// Channels that show everything of the wall.
+pub(crate) fn full() -> Vec<String> {
+    channels(&["displacement", "velocity"])
+}
+
+/// H of `half`.
+pub(crate) fn h() -> DMatrix<f64> {
+    DMatrix::from_diagonal(&DVector::from_vec(vec![1.0, 0.0, 1.0, 0.0, 0.0, 1.0]))
+}
+
+/// Ext by the definition, for H of `half`: the least elastic energy from its stationarity, all unknowns at once.
+pub(crate) fn ext(stiffness: &DMatrix<f64>) -> DMatrix<f64> {
+    let (one, h) = (DMatrix::identity(N, N), h());
+    // Rows of observed nodes: Ext = 1; of the others: K Ext = 0.
+    (&h + (&one - &h) * stiffness).lu().solve(&h).unwrap()
 }

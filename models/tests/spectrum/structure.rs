@@ -17,7 +17,12 @@ pub(crate) struct Structure {
 }
 
 impl Structure {
-    fn new(solid: DMatrix<f64>, added: DMatrix<f64>, stiffness: DMatrix<f64>, outlet: Option<Outlet>) -> Self {
+    fn new(
+        solid: DMatrix<f64>,
+        added: DMatrix<f64>,
+        stiffness: DMatrix<f64>,
+        outlet: Option<Outlet>,
+    ) -> Self {
         let n = solid.nrows();
         let inverse = (&solid + &added).try_inverse().expect("mass");
         let size = 2 * n + usize::from(outlet.is_some());
@@ -69,7 +74,8 @@ impl Structure {
         for &i in seen {
             on_seen[i] = mode[i];
         }
-        let part = |rows: &[usize], columns: &[usize]| self.stiffness.select_rows(rows).select_columns(columns);
+        let part =
+            |rows: &[usize], columns: &[usize]| self.stiffness.select_rows(rows).select_columns(columns);
         let mut extension = on_seen.clone();
         if !hidden.is_empty() {
             let load = part(&hidden, seen) * mode.select_rows(seen);

@@ -2,7 +2,7 @@
 
 use nalgebra::{Complex, DMatrix, SymmetricEigen};
 use serde_json::Value;
-use starlings_models::observer::{self, Wiring};
+use starlings_models::observer::{self, WindkesselObserver, Wiring};
 use starlings_models::setup::{ModelDef, ObserverDef, SetupError};
 use starlings_models::spectrum::component::ROUNDING;
 use starlings_models::spectrum::{
@@ -18,6 +18,13 @@ pub(crate) struct Toy {
     pub(crate) model: Box<dyn Model>,
     pub(crate) theta: Vec<f64>,
     outputs: Vec<String>,
+}
+
+/// Stands for the Windkessel observer of the theory, to which the stored pressure is known.
+pub(crate) const STORED_PRESSURE: &str = "stored pressure";
+
+fn def(kind: &str, gain: f64) -> ObserverDef {
+    ObserverDef { kind: kind.to_owned(), gain, ..ObserverDef::default() }
 }
 
 /// Builds a kind in a layout.
@@ -55,18 +62,20 @@ impl Toy {
     }
 
     pub(crate) fn observer(&self, kind: &str, gain: f64) -> Box<dyn Observer> {
-        let wiring = Wiring {
-            spec: self.model.spec(),
-            outputs: &self.outputs,
-            model: &*self.model,
-            theta: &self.theta,
-        };
-        observer::build(&ObserverDef { kind: kind.to_owned(), gain, ..ObserverDef::default() }, wiring)
-            .unwrap()
+        observer::build(&def(kind, gain), self.wiring()).unwrap()
     }
 
-    /// Γ in the state's coordinates.
+    fn wiring(&self) -> Wiring<'_> {
+        let (spec, outputs) = (self.model.spec(), &self.outputs);
+        Wiring { spec, outputs, model: &*self.model, theta: &self.theta }
+    }
+
+    /// Γ in the state's coordinates; under `stored pressure` that of the Windkessel observer if π itself were measured.
     pub(crate) fn feedback(&self, kind: &str, gain: f64) -> DMatrix<f64> {
+        if kind == STORED_PRESSURE {
+            let observer = WindkesselObserver::new(&def("windkessel", gain), self.wiring()).unwrap();
+            return observer.feedback_of_stored_pressure(&*self.model, &self.theta);
+        }
         self.observer(kind, gain).feedback(&*self.model, &self.theta)
     }
 

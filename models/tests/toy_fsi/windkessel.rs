@@ -1,11 +1,13 @@
 //! `toy-fsi-windkessel`: the slow pole of the outlet beside the damped waves of the vessel.
 
-use nalgebra::Complex;
+use nalgebra::{Complex, DVector};
 use serde_json::json;
 use starlings_models::Drive;
+use starlings_models::model::Segment;
+use starlings_models::observer::Correction;
 use starlings_models::spectrum::poles;
 
-use crate::kit::{Toy, close, close_relative, nearest};
+use crate::kit::{STORED_PRESSURE, Toy, close, close_relative, nearest};
 
 fn toy() -> Toy {
     Toy::new("toy-fsi-windkessel", json!({ "modes": 20 }), &[])
@@ -67,7 +69,7 @@ fn slopes_of_the_slow_pole_and_of_the_first_wave_are_those_of_the_table() {
         ("sdf", -0.057_041_568, -0.200_596_215, 0.565_564_021),
         ("dvf", 2e-9, -0.003_410_529, -0.000_790_576),
         ("dvf-am", 5.5e-7, -0.778_698_713, -0.608_399_941),
-        ("windkessel", -0.509_707_558, -0.011_191_931, 0.023_154_551),
+        (STORED_PRESSURE, -0.509_707_558, -0.011_191_931, 0.023_154_551),
     ] {
         let slopes = toy.slopes(kind, &[slow, wave]);
         // Printed to nine digits behind the point.
@@ -92,18 +94,76 @@ fn the_largest_real_parts_are_those_of_the_table() {
 }
 
 #[test]
-fn the_windkessel_observer_takes_the_slow_pole_and_needs_company_for_the_waves() {
+fn with_the_stored_pressure_measured_the_slow_pole_goes_and_the_waves_need_company() {
     let toy = toy();
-    toy.holds_max_re("windkessel", &[1.0, 10.0, 50.0], &[-1.019415, -5.593358, -6.786210], 5.1e-7);
+    toy.holds_max_re(STORED_PRESSURE, &[1.0, 10.0, 50.0], &[-1.019415, -5.593358, -6.786210], 5.1e-7);
     for (gain, expected) in [(10.0, -10.26551), (100.0, -58.943442), (1e3, -106.86312)] {
-        let found = largest_real_part(&toy, &[("sdf", 200.0), ("windkessel", gain)]);
+        let found = largest_real_part(&toy, &[("sdf", 200.0), (STORED_PRESSURE, gain)]);
         close(&[found], &[expected], 5.1e-6, "sdf and windkessel");
     }
     // By the observers' own lists of digits.
     for (gain, expected) in [(10.0, -5.578257), (100.0, -45.852373), (1e3, -70.454836)] {
-        let found = largest_real_part(&toy, &[("dvf-am", 200.0), ("windkessel", gain)]);
+        let found = largest_real_part(&toy, &[("dvf-am", 200.0), (STORED_PRESSURE, gain)]);
         close(&[found], &[expected], 5.1e-7, "dvf-am and windkessel");
     }
+}
+
+#[test]
+fn the_outlet_pressure_in_place_of_the_stored_one_is_weaker_by_the_models_own_flow() {
+    let toy = toy();
+    // From the matrices written out mode by mode, with γ/(R_d C) (1, −R_p S) in the row of π.
+    toy.holds_max_re("windkessel", &[1.0, 10.0, 50.0], &[-1.024149, -5.875694, -6.765649], 5.1e-7);
+    for (gain, expected) in [(10.0, -6.760998), (50.0, -14.337826), (100.0, -23.637239)] {
+        let found = largest_real_part(&toy, &[("sdf", 200.0), ("windkessel", gain)]);
+        close(&[found], &[expected], 5.1e-7, "sdf and windkessel");
+    }
+}
+
+/// The state error of a run with corrections every `dt` by sdf and windkessel, from a wrong state until `end`.
+fn error_of_a_run(
+    toy: &Toy,
+    start: &DVector<f64>,
+    feedbacks: &[(&str, f64)],
+    end: f64,
+    n: usize,
+) -> DVector<f64> {
+    let dt = end / n as f64;
+    let observers: Vec<_> = feedbacks.iter().map(|&(kind, gain)| toy.observer(kind, gain)).collect();
+    let (mut x, mut predicted) = (start.clone(), vec![0.0; start.len()]);
+    let rest = vec![0.0; start.len()];
+    for step in 0..n {
+        let t0 = step as f64 * dt;
+        let (u0, slope, history) = (&[0.0][..], &[0.0][..], Drive::NONE.history);
+        let segment = Segment { t0, t1: t0 + dt, u0, slope, history };
+        toy.model.advance(segment, &toy.theta, x.as_mut_slice()).unwrap();
+        let drive = Drive { value: u0, slope, ..Drive::NONE };
+        toy.model.output(t0 + dt, x.as_slice(), &toy.theta, drive, &mut predicted);
+        for observer in &observers {
+            let (t, model, theta) = (t0 + dt, &*toy.model, &toy.theta[..]);
+            let at = Correction { t, dt, observed: &rest, predicted: &predicted, model, theta };
+            observer.correct(at, x.as_mut_slice());
+        }
+    }
+    x
+}
+
+#[test]
+fn a_run_under_the_windkessel_observer_follows_its_feedback_and_not_that_of_the_stored_pressure() {
+    let toy = Toy::new("toy-fsi-windkessel", json!({ "modes": 6 }), &[]);
+    let mut start = vec![0.0; 13];
+    toy.model.initial(&toy.theta, &mut start);
+    let (start, end) = (DVector::from_vec(start), 0.05);
+    let closed = |outlet: &str| {
+        let feedback = toy.feedback("sdf", 200.0) + toy.feedback(outlet, 50.0);
+        ((toy.linearisation() - feedback) * end).exp() * &start
+    };
+    let (want, theory) = (closed("windkessel")[12], closed(STORED_PRESSURE)[12]);
+    let feedbacks = [("sdf", 200.0), ("windkessel", 50.0)];
+    let [coarse, fine] =
+        [4000, 8000].map(|n| (error_of_a_run(&toy, &start, &feedbacks, end, n)[12] - want).abs());
+    // Steps of first order: halved with the step.
+    assert!((coarse / fine - 2.0).abs() < 0.05, "{coarse:e} {fine:e}");
+    assert!(fine < 0.01 * (theory - want).abs(), "{fine:e}, {want} and {theory}");
 }
 
 #[test]

@@ -51,7 +51,7 @@ pub(super) fn draw(
     }
     let n = curves.len();
     for (k, (curve, colour)) in curves.iter().zip(colours).enumerate() {
-        let width = 2.0 + 1.8 * (n - 1 - k) as f64;
+        let width = 1.8 + 1.3 * (n - 1 - k) as f64;
         for part in curve.split(|point| !visible(&point.1)).filter(|part| part.len() > 1) {
             marks.push(Mark::Line { points: part.to_vec(), colour: *colour, width });
         }
@@ -63,7 +63,8 @@ pub(super) fn draw(
         }
     }
     let title = "How fast the slowest error decays".to_owned();
-    let description = "Minus the largest real part of all poles against the gain. Dots are the best gains.".to_owned();
+    let description =
+        "Minus the largest real part of all poles against the gain. Dots are the best gains.".to_owned();
     let (lo, hi) = (y.lo, y.hi);
     let scene = Scene { title, description, x, y, marks };
     let svg = picture(SIZE, &scene.title, &scene.description, |surface| scene.draw(surface))?;
@@ -79,7 +80,8 @@ pub(super) fn draw(
 
 /// (gain, rate) of an observer: the gains of the page, and its best one between them.
 fn curve(observer: &ObserverSpectrum, ways: &Ways, gains: &[f64]) -> Vec<Point> {
-    let mut points: Vec<Point> = gains.iter().copied().zip(ways.max_re.iter().map(|re| -re)).skip(1).collect();
+    let mut points: Vec<Point> =
+        gains.iter().copied().zip(ways.max_re.iter().map(|re| -re)).skip(1).collect();
     if (gains[1]..=gains[gains.len() - 1]).contains(&observer.best.gain) {
         points.push((observer.best.gain, -observer.best.max_re));
     }

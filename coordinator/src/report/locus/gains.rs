@@ -3,14 +3,16 @@
 //! Next file to read: [`super::plane`].
 
 use nalgebra::Complex;
-use starlings_models::spectrum::{ObserverSpectrum, SpectrumError};
+use starlings_models::spectrum::{Follower, ObserverSpectrum, SpectrumError};
 
 /// Positions of the slider; the first is gain zero.
 const FRAMES: usize = 121;
 /// Rounds of halving the steps of the drawn loci.
-const ROUNDS: usize = 6;
+const ROUNDS: usize = 4;
+/// Way from one gain to the next, as part of the largest shown modulus, that is drawn as a straight line.
+const STEP: f64 = 0.02;
 /// Gains of a drawn locus at most.
-const MOST: usize = 1500;
+const MOST: usize = 600;
 /// Poles shown, those of conjugate pairs in the upper half plane only.
 const SHOWN: usize = 12;
 
@@ -18,6 +20,8 @@ const SHOWN: usize = 12;
 pub(super) struct Ways {
     /// `[pole][gain]`, upper half plane.
     pub(super) poles: Vec<Vec<Complex<f64>>>,
+    /// The same poles at as many gains as their curves need: `[pole][gain]`.
+    pub(super) loci: Vec<Vec<Complex<f64>>>,
     /// Largest real part of all poles at each gain.
     pub(super) max_re: Vec<f64>,
 }
@@ -40,37 +44,7 @@ pub(super) fn frames(shown: &[Complex<f64>], observers: &[ObserverSpectrum]) -> 
     std::iter::once(0.0).chain((0..FRAMES - 1).map(at)).collect()
 }
 
-/// The loci as they are drawn: where a shown pole moves by more than `step` from one gain to the next, gains are put between,
-/// so that curves are smooth where poles meet. Poles beyond `far` do not count.
-///
-/// # Errors
-///
-/// The poles are not found.
-pub(super) fn smooth(
-    observer: &ObserverSpectrum,
-    shown: &[Complex<f64>],
-    frames: &[f64],
-    (step, far): (f64, f64),
-) -> Result<Vec<Vec<Complex<f64>>>, SpectrumError> {
-    let mut gains = frames.to_vec();
-    let mut poles = upper(observer, shown, &gains)?;
-    for _ in 0..ROUNDS {
-        let long = |k: usize| {
-            poles.iter().any(|way| (way[k + 1] - way[k]).norm() > step && way[k].norm().min(way[k + 1].norm()) < far)
-        };
-        let between = (0..gains.len() - 1).filter(|&k| long(k)).map(|k| 0.5 * (gains[k] + gains[k + 1]));
-        let between: Vec<f64> = between.collect();
-        if between.is_empty() || gains.len() + between.len() > MOST {
-            break;
-        }
-        gains.extend(between);
-        gains.sort_by(f64::total_cmp);
-        poles = upper(observer, shown, &gains)?;
-    }
-    Ok(poles)
-}
-
-/// The shown poles of an observer at every gain.
+/// The shown poles of an observer at every gain, and their loci.
 ///
 /// # Errors
 ///
@@ -80,18 +54,47 @@ pub(super) fn ways(
     shown: &[Complex<f64>],
     gains: &[f64],
 ) -> Result<Ways, SpectrumError> {
+    let mut poles = Poles { follower: Follower::new(&observer.system), listed: observer.slopes.len(), shown };
     Ok(Ways {
-        poles: upper(observer, shown, gains)?,
+        poles: poles.at(gains)?,
+        loci: poles.smooth(gains)?,
         max_re: gains.iter().map(|&gain| observer.system.max_re(gain)).collect::<Result<_, _>>()?,
     })
 }
 
-/// Of every conjugate pair the pole that starts in the upper half plane.
-fn upper(
-    observer: &ObserverSpectrum,
-    shown: &[Complex<f64>],
-    gains: &[f64],
-) -> Result<Vec<Vec<Complex<f64>>>, SpectrumError> {
-    let all = observer.locus(gains, observer.slopes.len())?;
-    Ok(all.into_iter().filter(|way| way[0].im >= 0.0).take(shown.len()).collect())
+/// The shown poles of one observer.
+struct Poles<'a> {
+    follower: Follower<'a>,
+    listed: usize,
+    shown: &'a [Complex<f64>],
+}
+
+impl Poles<'_> {
+    /// Of every conjugate pair the pole that starts in the upper half plane.
+    fn at(&mut self, gains: &[f64]) -> Result<Vec<Vec<Complex<f64>>>, SpectrumError> {
+        let all = self.follower.follow(gains, self.listed)?;
+        Ok(all.into_iter().filter(|way| way[0].im >= 0.0).take(self.shown.len()).collect())
+    }
+
+    /// Where a pole moves far from one gain to the next, gains are put between, so that curves are smooth where poles meet.
+    fn smooth(&mut self, frames: &[f64]) -> Result<Vec<Vec<Complex<f64>>>, SpectrumError> {
+        let scale = self.shown.iter().map(|pole| pole.norm()).fold(0.0, f64::max);
+        let mut gains = frames.to_vec();
+        let mut poles = self.at(&gains)?;
+        for _ in 0..ROUNDS {
+            let long = |k: usize| {
+                let far = |way: &[Complex<f64>]| way[k].norm().min(way[k + 1].norm()) > 2.0 * scale;
+                poles.iter().any(|way| (way[k + 1] - way[k]).norm() > STEP * scale && !far(way))
+            };
+            let between = (0..gains.len() - 1).filter(|&k| long(k)).map(|k| 0.5 * (gains[k] + gains[k + 1]));
+            let between: Vec<f64> = between.collect();
+            if between.is_empty() || gains.len() + between.len() > MOST {
+                break;
+            }
+            gains.extend(between);
+            gains.sort_by(f64::total_cmp);
+            poles = self.at(&gains)?;
+        }
+        Ok(poles)
+    }
 }

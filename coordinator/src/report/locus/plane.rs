@@ -5,9 +5,7 @@
 use nalgebra::Complex;
 use plotters::style::RGBColor;
 
-use starlings_models::spectrum::ObserverSpectrum;
-
-use super::gains::{Ways, smooth};
+use super::gains::Ways;
 use crate::report::ReportError;
 use crate::report::plot::axis::Axis;
 use crate::report::plot::mark::{Mark, Point};
@@ -34,8 +32,8 @@ pub(super) type Places = Vec<Option<(i32, i32)>>;
 ///
 /// The drawing library refuses a mark.
 pub(super) fn draw(
-    (shown, frames): (&[Complex<f64>], &[f64]),
-    (observers, ways): (&[ObserverSpectrum], &[Ways]),
+    shown: &[Complex<f64>],
+    ways: &[Ways],
     colours: &[RGBColor],
     unit: &str,
 ) -> Result<Plane, ReportError> {
@@ -45,14 +43,14 @@ pub(super) fn draw(
     let top = shown.iter().map(|pole| pole.im).fold(0.2 * scale, f64::max);
     let x = Axis::tight(&format!("Re λ [{unit}]"), [-1.3 * scale, 1.2 * right + 0.06 * scale]);
     let y = Axis::tight(&format!("Im λ [{unit}]"), [0.0, 1.06 * top]);
-    let inside = |pole: &Complex<f64>| (x.lo..=x.hi).contains(&pole.re) && (-1e-9 * scale..=y.hi).contains(&pole.im);
+    let inside =
+        |pole: &Complex<f64>| (x.lo..=x.hi).contains(&pole.re) && (-1e-9 * scale..=y.hi).contains(&pole.im);
     let mut marks = vec![Mark::Line { points: vec![(0.0, y.lo), (0.0, y.hi)], colour: MUTED, width: 1.0 }];
-    let n = observers.len();
-    for (k, (observer, colour)) in observers.iter().zip(colours).enumerate() {
+    let n = ways.len();
+    for (k, (observer, colour)) in ways.iter().zip(colours).enumerate() {
         // Observers with the same locus lie on top of each other: the first stays visible as a rim.
-        let width = 2.0 + 1.8 * (n - 1 - k) as f64;
-        let loci = smooth(observer, shown, frames, (0.02 * scale, 2.0 * scale)).map_err(ReportError::drawing)?;
-        for part in loci.iter().flat_map(|way| parts(way, inside)) {
+        let width = 1.8 + 1.3 * (n - 1 - k) as f64;
+        for part in observer.loci.iter().flat_map(|way| parts(way, inside)) {
             marks.push(Mark::Line { points: part, colour: *colour, width });
         }
     }
@@ -67,7 +65,8 @@ pub(super) fn draw(
     for observer in ways {
         let mut of_observer = Vec::with_capacity(observer.poles.len());
         for way in &observer.poles {
-            let at = |pole: &Complex<f64>| if inside(pole) { (pole.re, pole.im) } else { (f64::NAN, f64::NAN) };
+            let at =
+                |pole: &Complex<f64>| if inside(pole) { (pole.re, pole.im) } else { (f64::NAN, f64::NAN) };
             let points: Vec<Point> = way.iter().map(at).collect();
             of_observer.push(scene.positions(SIZE, &points)?);
         }

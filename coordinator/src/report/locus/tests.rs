@@ -1,3 +1,7 @@
+//! The page of a root locus: self-contained, with a place for every pole.
+//!
+//! Next file to read: [`super::view`].
+
 use starlings_models::spectrum::{Decay, Laboratory};
 use starlings_models::{ModelDef, Setup};
 
@@ -6,7 +10,8 @@ use super::{Locus, render};
 fn page() -> String {
     let constants = [("m", 1.0), ("c", 0.2), ("k", 100.0)].map(|(name, value)| (name.to_owned(), value));
     let outputs = vec!["position".to_owned(), "velocity".to_owned()];
-    let model = ModelDef { kind: "oscillator".to_owned(), constants: constants.into(), ..ModelDef::default() };
+    let model =
+        ModelDef { kind: "oscillator".to_owned(), constants: constants.into(), ..ModelDef::default() };
     let setup = Setup { model, outputs: outputs.clone(), ..Setup::default() };
     let laboratory = Laboratory::new(&setup, &[]).expect("linear");
     let decay = Decay::new(10.0, 1.0).expect("a decay");
@@ -43,7 +48,8 @@ fn the_page_refers_to_nothing_outside_itself_and_shows_no_invalid_number() {
 #[test]
 fn the_script_gets_a_place_for_every_pole_at_every_gain() {
     let page = page();
-    let data = page.split("id=\"data\">").nth(1).and_then(|rest| rest.split("</script>").next()).expect("data");
+    let data =
+        page.split("id=\"data\">").nth(1).and_then(|rest| rest.split("</script>").next()).expect("data");
     let data: serde_json::Value = serde_json::from_str(data).expect("JSON");
     let gains = data["gain"].as_array().expect("gains").len();
     assert_eq!(gains, 121);

@@ -2,6 +2,7 @@
 //!
 //! The template (`locus.html`) only arranges, and its script only moves what is drawn.
 
+use nalgebra::Complex;
 use plotters::style::RGBColor;
 use serde::Serialize;
 use serde_json::json;
@@ -11,9 +12,9 @@ use super::Locus;
 use super::gains::{Ways, frames, shown, ways};
 use super::{decay, plane};
 use crate::report::ReportError;
-use crate::study::field::observed_fields;
 use crate::report::number::{ABSENT, significant};
 use crate::report::plot::palette::{BLUE, GREEN, INK, VERMILION};
+use crate::study::field::observed_fields;
 
 /// One colour per observer, safe for colour-blind readers (Okabe & Ito 2008).
 const COLOURS: [RGBColor; 7] = [
@@ -70,10 +71,8 @@ impl View {
         let colours: Vec<RGBColor> = COLOURS.into_iter().cycle().take(locus.observers.len()).collect();
         let shown = shown(locus.poles, locus.listed);
         let gains = frames(&shown, locus.observers);
-        let follow = |observer| ways(observer, &shown, &gains);
-        let ways: Vec<Ways> =
-            locus.observers.iter().map(follow).collect::<Result<_, SpectrumError>>().map_err(ReportError::drawing)?;
-        let plane = plane::draw((&shown, &gains), (locus.observers, &ways), &colours, &unit)?;
+        let ways = follow(locus.observers, &shown, &gains)?;
+        let plane = plane::draw(&shown, &ways, &colours, &unit)?;
         let figure = decay::draw(locus.observers, &ways, &gains, &colours, (locus.decay, &unit))?;
         let colour = |c: &RGBColor| format!("#{:02X}{:02X}{:02X}", c.0, c.1, c.2);
         let hex: Vec<String> = colours.iter().map(colour).collect();
@@ -98,12 +97,37 @@ impl View {
             decay: with_overlay(&figure.svg, "<line id=\"cursor\" stroke=\"#5B6670\" stroke-width=\"6\"/>"),
             // Inside a script element no text may close it.
             data: data.to_string().replace('<', "\\u003c"),
-            gains: locus.observers.first().map_or_else(Vec::new, |o| o.gain.iter().map(|g| gain_text(*g)).collect()),
-            rates: locus.observers.iter().map(|o| (o.name.clone(), o.max_re.iter().map(|r| rate_text(*r)).collect())).collect(),
+            gains: locus
+                .observers
+                .first()
+                .map_or_else(Vec::new, |o| o.gain.iter().map(|g| gain_text(*g)).collect()),
+            rates: locus
+                .observers
+                .iter()
+                .map(|o| (o.name.clone(), o.max_re.iter().map(|r| rate_text(*r)).collect()))
+                .collect(),
             slopes: slopes(locus),
             unit,
         })
     }
+}
+
+/// The poles of every observer, followed at the same time.
+fn follow(
+    observers: &[ObserverSpectrum],
+    shown: &[Complex<f64>],
+    gains: &[f64],
+) -> Result<Vec<Ways>, ReportError> {
+    let results: Vec<_> = std::thread::scope(|scope| {
+        let threads: Vec<_> = observers.iter().map(|o| scope.spawn(move || ways(o, shown, gains))).collect();
+        threads.into_iter().map(std::thread::ScopedJoinHandle::join).collect()
+    });
+    let result = |result: std::thread::Result<Result<Ways, SpectrumError>>| {
+        let result =
+            result.map_err(|_| ReportError::drawing("the poles of an observer could not be followed"))?;
+        result.map_err(ReportError::drawing)
+    };
+    results.into_iter().map(result).collect()
 }
 
 fn facts(locus: &Locus<'_>, unit: &str) -> Vec<(&'static str, String)> {
@@ -126,12 +150,17 @@ fn outputs(locus: &Locus<'_>) -> String {
 fn headline(locus: &Locus<'_>, unit: &str) -> String {
     let best = locus.observers.iter().min_by(|p, q| p.best.max_re.total_cmp(&q.best.max_re));
     match best {
-        Some(o) if o.best.beyond != Beyond::NoGain => format!(
-            "With {} the slowest error decays fastest: at {} {unit}, with a gain of {} {unit}.",
-            o.name,
-            rate_text(-o.best.max_re),
-            significant(o.best.gain, 3)
-        ),
+        Some(o) if o.best.beyond != Beyond::NoGain => {
+            // At critical damping a pole has half of the usual digits.
+            let as_fast = |p: &&ObserverSpectrum| p.best.max_re <= (1.0 - 1e-4) * o.best.max_re;
+            let names: Vec<&str> = locus.observers.iter().filter(as_fast).map(|p| p.name.as_str()).collect();
+            format!(
+                "With {} the slowest error decays fastest: at {} {unit}, with a gain of {} {unit}.",
+                names.join(" or "),
+                rate_text(-o.best.max_re),
+                significant(o.best.gain, 3)
+            )
+        }
         Some(_) => "No observer makes the slowest error decay faster.".to_owned(),
         None => "The model can host none of the observers with the observed outputs.".to_owned(),
     }
@@ -155,13 +184,15 @@ fn observer(o: &ObserverSpectrum, colour: &str) -> ObserverView {
 
 /// Per listed pole, upper half plane, its slope under every observer.
 fn slopes(locus: &Locus<'_>) -> Vec<(String, Vec<String>)> {
-    let upper = locus.poles.iter().enumerate().take(locus.listed).filter(|(_, pole)| pole.im >= 0.0).take(ROWS);
+    let upper =
+        locus.poles.iter().enumerate().take(locus.listed).filter(|(_, pole)| pole.im >= 0.0).take(ROWS);
     let slope = |o: &ObserverSpectrum, i: usize| {
         let slope = o.slopes.get(i).and_then(|slope| slope.analytic);
         slope.map_or(ABSENT.to_owned(), |slope| rate_text(slope.re))
     };
-    let row = |(i, pole): (usize, &nalgebra::Complex<f64>)| {
-        let imaginary = if pole.im > 0.0 { format!(" ± {} i", significant(pole.im, 6)) } else { String::new() };
+    let row = |(i, pole): (usize, &Complex<f64>)| {
+        let imaginary =
+            if pole.im > 0.0 { format!(" ± {} i", significant(pole.im, 6)) } else { String::new() };
         let text = format!("{}{imaginary}", rate_text(pole.re));
         (text, locus.observers.iter().map(|o| slope(o, i)).collect())
     };
@@ -184,8 +215,7 @@ fn rate_text(rate: f64) -> String {
 
 /// A drawing with elements on top.
 fn with_overlay(svg: &str, overlay: &str) -> String {
-    svg.strip_suffix("</svg>\n").or_else(|| svg.strip_suffix("</svg>")).map_or_else(
-        || svg.to_owned(),
-        |body| format!("{body}{overlay}</svg>"),
-    )
+    svg.strip_suffix("</svg>\n")
+        .or_else(|| svg.strip_suffix("</svg>"))
+        .map_or_else(|| svg.to_owned(), |body| format!("{body}{overlay}</svg>"))
 }

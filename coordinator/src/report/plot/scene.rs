@@ -7,17 +7,16 @@ use plotters::backend::SVGBackend;
 use plotters::chart::{ChartBuilder, ChartContext};
 use plotters::coord::Shift;
 use plotters::coord::cartesian::Cartesian2d;
-use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
-use plotters::coord::types::RangedCoordf64;
 use plotters::drawing::{DrawingArea, IntoDrawingArea};
 use plotters::element::{Circle, DashedPathElement, PathElement, Polygon, Rectangle, Text};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color, FontStyle, IntoFont, RGBColor, ShapeStyle, TRANSPARENT, TextStyle};
 
 use super::super::ReportError;
-use super::axis::{Axis, Tick};
+use super::axis::Axis;
 use super::mark::{Mark, Point};
 use super::palette::{FIGURE_HEIGHT, FIGURE_WIDTH, GRID, INK, MUTED, SUBUNITS, TEXT};
+use super::ticked::Ticked;
 
 /// Drawn text must look right where no font is installed with the page.
 const FONT: &str = "Helvetica, Arial, sans-serif";
@@ -270,45 +269,4 @@ fn text_style(colour: RGBColor, anchor: Pos) -> TextStyle<'static> {
 
 fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
-}
-
-/// An axis' own scale with its ticks, for the drawing library.
-struct Ticked {
-    scale: RangedCoordf64,
-    ticks: Vec<Tick>,
-}
-
-impl Ticked {
-    fn new(axis: &Axis, ticks: Vec<Tick>) -> Self {
-        let (lo, hi) = axis.ends();
-        Self { scale: (lo..hi).into(), ticks }
-    }
-}
-
-impl Ranged for Ticked {
-    type FormatOption = NoDefaultFormatting;
-    type ValueType = f64;
-
-    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
-        self.scale.map(value, limit)
-    }
-
-    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
-        if hint.weight().allow_light_points() {
-            Vec::new()
-        } else {
-            self.ticks.iter().map(|t| t.at).collect()
-        }
-    }
-
-    fn range(&self) -> std::ops::Range<f64> {
-        self.scale.range()
-    }
-}
-
-impl ValueFormatter<f64> for Ticked {
-    fn format_ext(&self, value: &f64) -> String {
-        let nearest = self.ticks.iter().min_by(|a, b| (a.at - value).abs().total_cmp(&(b.at - value).abs()));
-        nearest.map_or(String::new(), |tick| tick.text.clone())
-    }
 }

@@ -17,10 +17,8 @@ pub(in crate::study) fn check(source: &Source, file: &StudyFile, setup: &Setup, 
     if matches!(setup.observer.kind.as_str(), "" | "none") {
         return;
     }
-    if let Some(observer) = built(source, file, setup, records)
-        && let Some(most) = observer.stable_up_to()
-    {
-        check_gain(source, file, records, most);
+    if let Some(observer) = built(source, file, setup, records) {
+        check_gain(source, file, records, &*observer);
     }
 }
 
@@ -67,15 +65,13 @@ fn constants(setup: &Setup, spec: &Spec) -> Vec<f64> {
     spec.parameters.iter().map(value).collect()
 }
 
-/// A correction in steps is stable while the product of gain and time between observations stays below `most`.
-fn check_gain(source: &Source, file: &StudyFile, records: &[Record], most: f64) {
+/// A correction in steps is stable up to a gain that depends on the time between observations.
+fn check_gain(source: &Source, file: &StudyFile, records: &[Record], observer: &dyn Observer) {
     let gain = *file.observer.gain.get_ref();
     let spacings = records.iter().filter(|r| r.is_trained()).filter_map(|r| Some((r, spacing(r)?)));
     let Some((record, dt)) = spacings.max_by(|a, b| a.1.total_cmp(&b.1)) else { return };
-    if gain * dt <= most {
-        return;
-    }
-    let (unit, largest) = (&file.study.time_unit, most / dt);
+    let Some(largest) = observer.stable_up_to(dt).filter(|most| gain > *most) else { return };
+    let unit = &file.study.time_unit;
     source.report_with(
         file.observer.gain.span(),
         format!(

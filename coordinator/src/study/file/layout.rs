@@ -8,7 +8,8 @@ use std::ops::Range;
 use serde_json::Value;
 use toml::de::DeValue;
 
-use super::table::Node;
+use super::table::{Node, wrong_type};
+use crate::study::problem::Source;
 
 /// A layout as it is written.
 #[derive(Debug)]
@@ -20,10 +21,10 @@ pub(in crate::study) struct Layout {
 }
 
 impl Layout {
-    /// Reads any value of the file.
-    pub(in crate::study) fn read(node: &Node<'_>) -> Self {
+    /// Reads any value of the file; a number that is not finite is reported.
+    pub(in crate::study) fn read(source: &Source, node: &Node<'_>) -> Self {
         let mut places = Vec::new();
-        let value = convert(node, "", &mut places);
+        let value = convert(source, node, "", &mut places);
         Self { value, places }
     }
 
@@ -38,30 +39,37 @@ impl Layout {
     }
 }
 
-fn convert(node: &Node<'_>, path: &str, places: &mut Vec<(String, Range<usize>)>) -> Value {
+fn convert(source: &Source, node: &Node<'_>, path: &str, places: &mut Vec<(String, Range<usize>)>) -> Value {
     places.push((path.to_owned(), node.span()));
+    let what = || if path.is_empty() { "`layout`".to_owned() } else { format!("`{path}` in the layout") };
+    let refused = |expected: &str| {
+        wrong_type(source, node, &what(), expected);
+        Value::Null
+    };
     match node.get_ref() {
         DeValue::String(text) => Value::from(text.as_ref()),
         DeValue::Boolean(value) => Value::from(*value),
         DeValue::Array(items) => {
-            let item = |(i, item): (usize, &Node<'_>)| convert(item, &format!("{path}[{i}]"), places);
+            let item = |(i, item): (usize, &Node<'_>)| convert(source, item, &format!("{path}[{i}]"), places);
             Value::Array(items.iter().enumerate().map(item).collect())
         }
         DeValue::Table(table) => {
             let entry = |(key, value): (&toml::Spanned<std::borrow::Cow<'_, str>>, &Node<'_>)| {
                 let key = key.get_ref().to_string();
                 let inner = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
-                let value = convert(value, &inner, places);
+                let value = convert(source, value, &inner, places);
                 (key, value)
             };
             Value::Object(table.iter().map(entry).collect())
         }
         DeValue::Integer(number) => {
             let text = number.as_str().replace('_', "");
-            i64::from_str_radix(&text, number.radix()).map_or(Value::Null, Value::from)
+            let value = i64::from_str_radix(&text, number.radix()).map(Value::from);
+            value.unwrap_or_else(|_| refused("a number of at most 18 digits"))
         }
         DeValue::Float(number) => {
-            number.as_str().replace('_', "").parse::<f64>().map_or(Value::Null, Value::from)
+            let value = number.as_str().replace('_', "").parse::<f64>().ok().filter(|v| v.is_finite());
+            value.map_or_else(|| refused("a finite number"), Value::from)
         }
         DeValue::Datetime(time) => Value::from(time.to_string()),
     }

@@ -61,7 +61,7 @@ pub(in crate::study) fn model(source: &Source, root: &Table<'_>) -> ModelSection
             }
         }
     }
-    let layout = t.get("layout").map(Layout::read);
+    let layout = t.get("layout").map(|node| Layout::read(source, node));
     ModelSection { constants: constants(source, &t), initial: t.text("initial"), kind, layout, equations }
 }
 

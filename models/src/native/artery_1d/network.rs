@@ -4,6 +4,7 @@
 //! pressure are continuous whatever the walls on its two sides. Next file to read: [`super::vessels`], which gives the
 //! network the values of the parameters.
 
+use super::checks;
 use super::layout::{Layout, NodeKind, Segment};
 use crate::layout::fault;
 use crate::setup::SetupError;
@@ -69,10 +70,10 @@ impl Network {
     /// Makes the network of a layout.
     ///
     /// # Errors
-    /// When a number is not positive, a name is used twice or is none, or the vessels are no connected network between one
-    /// inlet and its outlets.
+    /// When a number is not positive or there are too many cells, a name is used twice or is none, or the vessels are no
+    /// connected network between one inlet and its outlets.
     pub(super) fn new(layout: &Layout) -> Result<Self, SetupError> {
-        check_segments(&layout.segments)?;
+        checks::segments(&layout.segments)?;
         let mut network = Self::with_nodes(layout)?;
         for segment in &layout.segments {
             network.add(segment, layout.segments.len() == 1);
@@ -87,7 +88,7 @@ impl Network {
         let (mut nodes, mut outlets, mut inlets) = (Vec::<Node>::new(), Vec::new(), Vec::new());
         for (i, entry) in layout.nodes.iter().enumerate() {
             let path = format!("nodes[{i}].name");
-            check_name(&path, &entry.name)?;
+            checks::name(&path, &entry.name)?;
             if nodes.iter().any(|node| node.name == entry.name) {
                 return Err(fault(&path, format!("two nodes are called `{}`", entry.name)));
             }
@@ -212,7 +213,7 @@ impl Network {
 }
 
 /// Name and description of one region's Young's modulus.
-fn young(segment: &Segment, region: usize, alone: bool) -> (String, String) {
+pub(super) fn young(segment: &Segment, region: usize, alone: bool) -> (String, String) {
     let name = &segment.name;
     let number = region + 1;
     match (alone, segment.regions) {
@@ -220,45 +221,4 @@ fn young(segment: &Segment, region: usize, alone: bool) -> (String, String) {
         (false, 1) => (format!("E_{name}"), format!("`{name}`")),
         (false, _) => (format!("E_{name}_{number}"), format!("region {number} of `{name}`")),
     }
-}
-
-/// Names become parts of parameters, states and outputs, which expressions may use.
-fn check_name(path: &str, name: &str) -> Result<(), SetupError> {
-    let fits = name.starts_with(|c: char| c.is_ascii_alphabetic())
-        && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
-    if fits { Ok(()) } else { Err(fault(path, format!("`{name}` is no name: use letters, digits and `_`"))) }
-}
-
-fn check_segments(segments: &[Segment]) -> Result<(), SetupError> {
-    for (i, segment) in segments.iter().enumerate() {
-        let path = |key: &str| format!("segments[{i}].{key}");
-        for (key, name) in [("name", &segment.name), ("from", &segment.from), ("to", &segment.to)] {
-            check_name(&path(key), name)?;
-        }
-        if segments[..i].iter().any(|other| other.name == segment.name) {
-            return Err(fault(&path("name"), format!("two segments are called `{}`", segment.name)));
-        }
-        if segment.from == segment.to {
-            return Err(fault(&path("to"), format!("`{}` ends where it starts", segment.name)));
-        }
-        let sizes = [
-            ("length", segment.length),
-            ("radius", segment.radius),
-            ("radius_to", segment.radius_to.unwrap_or(segment.radius)),
-            ("thickness", segment.thickness),
-        ];
-        for (key, size) in sizes {
-            if !(size > 0.0 && size.is_finite()) {
-                return Err(fault(&path(key), format!("{key} is {size}: give a number of cm above zero")));
-            }
-        }
-        let (cells, regions) = (segment.cells, segment.regions);
-        if regions == 0 || !cells.is_multiple_of(regions) || cells / regions < 2 {
-            let message = format!(
-                "{cells} cells in {regions} regions: give a whole number of cells per region, at least two"
-            );
-            return Err(fault(&path("cells"), message));
-        }
-    }
-    Ok(())
 }

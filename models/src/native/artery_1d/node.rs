@@ -76,7 +76,11 @@ impl Condition {
             let step = self.newton(rho, ends, met, &mut pressure)?;
             if step <= CONVERGED {
                 self.flows(rho, ends, met);
-                return pressure.is_finite().then_some(pressure);
+                let slow = met
+                    .iter()
+                    .zip(ends)
+                    .all(|(met, end)| (met.flow / met.area).abs() < end.ring.speed(met.area, rho));
+                return (slow && pressure.is_finite()).then_some(pressure);
             }
         }
         None
@@ -152,6 +156,8 @@ struct Local {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use super::*;
 
     fn arriving(sign: f64, stiffness: f64, radius: f64, area: f64, velocity: f64) -> Arriving {
@@ -196,7 +202,13 @@ mod tests {
     #[test]
     fn more_flow_than_a_vessel_can_carry_below_its_wave_speed_has_no_solution() {
         let ends = [arriving(-1.0, 1e6, 1.0, 4.0, 0.0)];
-        let flood = Condition::Joint { inflow: 1e9, total: false };
-        assert!(flood.meet(1.06, &ends, &mut [Met::default()]).is_none_or(|p| p > 1e7));
+        // u = Q/A reaches c where 4 (c − c0) = c, far above the flow of rest, A c0 = 2800 cm³/s.
+        let critical = 4.0 / 3.0 * ends[0].ring.speed(4.0, 1.06);
+        let area = PI * (2.0 * 1.06 * critical * critical / 1e6).powi(2);
+        let inflow = |part: f64| Condition::Joint { inflow: part * area * critical, total: false };
+        assert!(inflow(0.99).meet(1.06, &ends, &mut [Met::default()]).is_some());
+        for part in [1.01, 2.0, -1.01, 1e5, -1e5] {
+            assert_eq!(inflow(part).meet(1.06, &ends, &mut [Met::default()]), None, "{part}");
+        }
     }
 }

@@ -55,7 +55,7 @@ impl Vessels<'_> {
     /// Writes the hyperbolic part of the rate of the state; `viscous` is the viscous pressure at each end.
     ///
     /// # Errors
-    /// When a vessel has collapsed or a node allows no subcritical flow.
+    /// When a vessel has collapsed, or a cell or a node has no subcritical flow.
     pub(super) fn transport(
         &self,
         x: &[f64],
@@ -110,6 +110,11 @@ impl Vessels<'_> {
         let (cells, first) = (of.first..of.first + of.n, Self::first_face(tube, of));
         for i in cells.clone() {
             faces.pressure[i] = self.cells[i].pressure(x[i]);
+            // Of its two characteristic variables a vessel sends one to each end as long as α u² < c².
+            let (u, c) = (x[self.network.n_cell + i] / x[i], self.cells[i].speed(x[i], self.rho));
+            if self.alpha * u * u >= c * c {
+                return Err(Fault::Supercritical { cell: i });
+            }
         }
         let pressure = &faces.pressure[cells.clone()];
         let n = self.network.n_cell;
@@ -207,14 +212,19 @@ impl Vessels<'_> {
         Ok(())
     }
 
-    /// The longest stable time step: half a cell at the fastest wave, and half the shortest time of a Windkessel.
+    /// The longest stable time step: half a cell at the fastest wave, and half the shortest time of friction and of a
+    /// Windkessel; NaN where a vessel has no waves.
     pub(super) fn longest_step(&self, x: &[f64]) -> f64 {
         let n = self.network.n_cell;
         let mut rate = 0.0_f64;
         for tube in &self.network.tubes {
             for i in tube.first..tube.first + tube.n {
                 let speed = self.alpha * (x[n + i] / x[i]).abs() + self.cells[i].speed(x[i], self.rho);
-                rate = if speed.is_finite() { rate.max(speed / tube.dx) } else { f64::NAN };
+                // At once: the maximum of NaN and a number is the number.
+                if speed.is_nan() {
+                    return f64::NAN;
+                }
+                rate = rate.max(speed / tube.dx).max(self.friction / x[i]);
             }
         }
         for (outlet, &node) in self.outlets.iter().zip(&self.network.outlets) {

@@ -221,6 +221,31 @@ impl Vessels<'_> {
             }
         }
         let solved = matrix.lu().solve(&right).filter(|p: &DVector<f64>| p.iter().all(|p| p.is_finite()));
-        solved.ok_or_else(|| Fault::Node { name: nodes[self.network.inlet].name.clone() })
+        solved.ok_or(Fault::Network)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Artery1d;
+    use super::super::layout::Layout;
+    use super::super::step::Work;
+    use super::*;
+    use crate::Model;
+
+    #[test]
+    fn pressures_that_have_no_solution_are_a_fault_of_the_network_and_not_of_its_inlet() {
+        let model = Artery1d::new(&Layout::default()).expect("the default layout");
+        let theta: Vec<f64> = model.spec.parameters.iter().filter_map(|q| q.default).collect();
+        let mut x = vec![0.0; model.spec.n_state()];
+        model.initial(&theta, &mut x);
+        let vessels = Vessels::new(&model.network, &theta);
+        let mut rate = x.clone();
+        assert_eq!(vessels.rate(0.0, &x, &mut Work::new(&vessels), &mut rate), Ok(()));
+        // The pressure behind the outlet.
+        x[40] = f64::INFINITY;
+        let fault = vessels.rate(0.0, &x, &mut Work::new(&vessels), &mut rate);
+        assert_eq!(fault, Err(Fault::Network));
+        assert!(Fault::Network.at(0.5).to_string().contains("the network at t = 0.5"));
     }
 }

@@ -14,6 +14,12 @@ use crate::setup::SetupError;
 /// Cells at most: structural observers work with matrices of this size.
 const MOST_CELLS: usize = 10_000;
 
+/// Shortest accepted step in s: in it a wave passes a tenth of a micrometre, which no cell is short enough to show.
+const SHORTEST_STEP: f64 = 1e-9;
+
+/// Lowest accepted pressure of an image in dyn/cm², 7.5 mmHg: below it the number is of another unit.
+const LOWEST_IMAGE_PRESSURE: f64 = 1e4;
+
 /// Ends of regions closer than this, relative to the tube's length, are one point.
 const SAME: f64 = 1e-9;
 
@@ -117,13 +123,11 @@ impl Layout {
         if self.cells == 0 || self.cells > MOST_CELLS {
             return Err(fault("cells", format!("{} cells: give 1 to {MOST_CELLS}", self.cells)));
         }
-        if !self.step.is_finite() || self.step <= 0.0 {
-            return Err(fault("step", format!("a step of {} s: give a time above zero", self.step)));
+        if !self.step.is_finite() || self.step < SHORTEST_STEP {
+            let message = format!("a step of {} s: give a time of {SHORTEST_STEP:e} s or more", self.step);
+            return Err(fault("step", message));
         }
-        if !self.image_pressure.is_finite() || self.image_pressure < 0.0 {
-            let message = format!("an image under {} dyn/cm^2: give zero or above", self.image_pressure);
-            return Err(fault("image_pressure", message));
-        }
+        check_image(self.image_pressure)?;
         match &self.regions {
             Regions::Equal(n) => self.equal(*n, length),
             Regions::Listed(regions) => self.listed(regions, length),
@@ -174,6 +178,22 @@ impl Layout {
         }
         Ok(parts)
     }
+}
+
+/// Refuses a pressure that no vessel is imaged under.
+fn check_image(pressure: f64) -> Result<(), SetupError> {
+    if !pressure.is_finite() || pressure < 0.0 {
+        let message = format!("an image under {pressure} dyn/cm^2: give zero or above");
+        return Err(fault("image_pressure", message));
+    }
+    if pressure > 0.0 && pressure < LOWEST_IMAGE_PRESSURE {
+        let message = format!(
+            "an image under {pressure} dyn/cm^2 is hardly under pressure: give dyn/cm^2, that is mmHg x 1333.22; 0 for the \
+             radius without load"
+        );
+        return Err(fault("image_pressure", message));
+    }
+    Ok(())
 }
 
 /// Refuses regions that do not cover the tube once, from the inlet to the outlet.

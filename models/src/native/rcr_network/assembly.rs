@@ -207,12 +207,16 @@ impl Assembly {
             let ends = netlist.elements.iter().flat_map(|e| [&e.from, &e.to]);
             let count = ends.flatten().filter(|end| *end == name).count();
             if count == 1 {
-                let others = self.circuit.nodes.iter().filter(|node| *node != name);
-                let near = nearest(name, others).map(|n| format!("; did you mean `{n}`?"));
-                let message = format!(
-                    "only one element ends at node `{name}`{}; if that is meant, declare all nodes in `nodes`",
-                    near.unwrap_or_default()
-                );
+                // The element's own other end cannot be meant: it would join a node with itself.
+                let own = |e: &&Element| [&e.from, &e.to].into_iter().flatten().any(|end| end == name);
+                let own: Vec<&String> =
+                    netlist.elements.iter().filter(own).flat_map(|e| [&e.from, &e.to]).flatten().collect();
+                let others = self.circuit.nodes.iter().filter(|node| !own.contains(node));
+                let remedy = match nearest(name, others) {
+                    Some(near) => format!("did you mean `{near}`? Otherwise declare all nodes in `nodes`"),
+                    None => "if that is meant, declare all nodes in `nodes`".to_owned(),
+                };
+                let message = format!("only one element ends at node `{name}`: {remedy}");
                 return Err(fault(place, message));
             }
         }

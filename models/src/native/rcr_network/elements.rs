@@ -101,6 +101,14 @@ impl Assembly {
             self.value(element, path, Measure::Resistance, ("open", "Ropen", element.open.as_ref()))?;
         let value = element.closed.as_ref();
         let closed = self.value(element, path, Measure::Resistance, ("closed", "Rclosed", value))?;
+        if let (Some(&Value::Number(open)), Some(&Value::Number(closed))) =
+            (element.open.as_ref(), element.closed.as_ref())
+            && closed < open
+        {
+            let message =
+                format!("{closed} closed is less than {open} open: a valve leaks less than it lets through");
+            return Err(fault(&format!("{path}.closed"), message));
+        }
         let smooth = element.smooth.unwrap_or(0.0);
         let at = self.branch(ends, Law::Diode { open, closed, smooth }, None);
         self.drops.push((element.name.clone(), ends));

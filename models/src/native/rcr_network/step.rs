@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::circuit::{Level, TieKind};
 use super::solve::{Given, Network};
+use crate::exponential::exponential;
 
 /// A span on which signals are linear.
 #[derive(Clone, Copy)]
@@ -20,7 +21,7 @@ pub(super) struct Span<'a> {
     pub(super) slopes: &'a [f64],
 }
 
-/// Advances the state of a linear network.
+/// Advances the state of a linear network; to NaN where an element is faster than the step by more than numbers can hold.
 pub(super) fn exact(network: &Network, theta: &[f64], span: Span<'_>, x: &mut [f64]) {
     let n = x.len();
     if n == 0 {
@@ -44,14 +45,10 @@ pub(super) fn exact(network: &Network, theta: &[f64], span: Span<'_>, x: &mut [f
         augmented[(i, n + 1)] = h * first[i] / scale;
     }
     augmented[(n, n + 1)] = 1.0;
-    if !augmented.iter().all(|v| v.is_finite()) {
-        x.fill(f64::NAN);
-        return;
-    }
     let mut start = DVector::zeros(n + 2);
     start.rows_mut(0, n).copy_from_slice(x);
     start[n + 1] = scale;
-    let end = augmented.exp() * start;
+    let end = exponential(&augmented) * start;
     x.copy_from_slice(&end.as_slice()[..n]);
 }
 

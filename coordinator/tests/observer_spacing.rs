@@ -1,0 +1,56 @@
+//! What an observer is said to do for the state: corrected at the spacing at which the fit itself was.
+#![allow(clippy::unwrap_used)]
+mod study_kit;
+
+use std::fmt::Write as _;
+
+use study_kit::Done;
+
+const STUDY: &str = r#"
+[study]
+name = "spacing"
+[model]
+kind = "windkessel-2"
+constants = { C = 1.5, "initial:p" = 60 }
+[[parameters]]
+name = "R"
+prior = { transform = "log", median = 1.0, factor = 1.5 }
+[observer]
+kind = "nudging"
+gain = 3.0
+[[records]]
+name = "beats"
+file = "pressure.csv"
+inputs = { flow = "flow.csv:flow" }
+channels = [ { column = "pressure", output = "pressure", noise = 1.0 } ]
+"#;
+
+/// Steps of 10 ms.
+const STEPS: u32 = 200;
+
+/// The pressure at every tenth step, with or without the empty rows between.
+fn fit(empty_rows: bool) -> Done {
+    let (mut flow, mut pressure) = ("time,flow\n".to_owned(), "time,pressure\n".to_owned());
+    for i in 0..=STEPS {
+        let t = 0.01 * f64::from(i);
+        writeln!(flow, "{t:?},{:?}", 90.0 + 40.0 * (6.0 * t).sin()).unwrap();
+        if i % 10 == 0 {
+            writeln!(pressure, "{t:?},{:?}", 95.0 + 6.0 * (6.0 * t).cos()).unwrap();
+        } else if empty_rows {
+            writeln!(pressure, "{t:?},").unwrap();
+        }
+    }
+    study_kit::run_once(STUDY, &[("flow.csv", flow), ("pressure.csv", pressure)])
+}
+
+#[test]
+fn rows_without_a_value_do_not_weaken_the_observer() {
+    let (thin, empty) = (fit(false), fit(true));
+    let (of_thin, of_empty) = (thin.summary.observer.unwrap(), empty.summary.observer.unwrap());
+    let close = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-9;
+    // The same exact steps, cut at other places by the free run alone: rounding.
+    assert!(close(of_thin.innovation_rms_with, of_empty.innovation_rms_with), "{of_thin:?} {of_empty:?}");
+    assert!(close(of_thin.innovation_rms_without, of_empty.innovation_rms_without));
+    // Ten times weaker the observer would leave most of the wrong start.
+    assert!(of_thin.innovation_rms_with < 0.9 * of_thin.innovation_rms_without, "{of_thin:?}");
+}

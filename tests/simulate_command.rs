@@ -1,0 +1,123 @@
+//! `starlings simulate`: twins, their noise and effects, and what is refused.
+
+#![allow(clippy::unwrap_used)] // a failed unwrap is a failed test
+
+mod common;
+
+use common::{output, repository, starlings};
+
+const STUDY: &str = "examples/pig-aorta/study.toml";
+
+#[test]
+fn simulate_is_reproducible_and_its_noise_has_the_asked_size() {
+    let twin = |seed: &str, noise: &str| {
+        let (code, stdout, stderr) = output(starlings().args(["simulate"]).arg(repository(STUDY)).args([
+            "--set",
+            "R=3.4",
+            "--set",
+            "initial:p=100",
+            "--noise",
+            noise,
+            "--seed",
+            seed,
+        ]));
+        assert_eq!(code, 0, "{stderr}");
+        stdout
+    };
+    let pressure = |text: &str| -> Vec<f64> {
+        text.lines().skip(1).map(|line| line.split(',').nth(1).unwrap().parse().unwrap()).collect()
+    };
+    let (clean, noisy) = (twin("1", "0"), twin("1", "2.0"));
+    assert_eq!(noisy, twin("1", "2.0"));
+    assert_ne!(noisy, twin("2", "2.0"));
+    assert!(clean.starts_with("time,pressure,flow\n"), "{}", &clean[..40]);
+    let (clean, noisy) = (pressure(&clean), pressure(&noisy));
+    let n = clean.len() as f64;
+    let sd = (clean.iter().zip(&noisy).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / n).sqrt();
+    // 843 samples: the sample sd of noise 2 is within 10 % at more than four standard errors.
+    assert!((sd - 2.0).abs() < 0.2, "{sd}");
+}
+
+#[test]
+fn simulate_adds_a_built_in_effect_to_the_two_element_model() {
+    let run = |study: &str, extra: &[&str]| {
+        let mut command = starlings();
+        command.arg("simulate").arg(repository(study)).args([
+            "--set",
+            "R=3",
+            "--set",
+            "C=1.2",
+            "--set",
+            "initial:p=90",
+        ]);
+        let (code, stdout, stderr) = output(command.args(extra));
+        assert_eq!(code, 0, "{stderr}");
+        stdout
+            .lines()
+            .skip(1)
+            .map(|l| l.split(',').nth(1).unwrap().parse::<f64>().unwrap())
+            .collect::<Vec<_>>()
+    };
+    let three = run(STUDY, &["--set", "Zc=0.1"]);
+    let two = run("examples/pig-aorta/two-element.toml", &["--effect", "series-resistance=0.1"]);
+    let worst = three.iter().zip(&two).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    // The same closed-form step and one product: equal to rounding.
+    assert!(worst < 1e-10, "{worst}");
+    let (code, _, stderr) = output(
+        starlings().arg("simulate").arg(repository(STUDY)).args(["--effect", "series-resistence=0.1"]),
+    );
+    assert_eq!(code, 2);
+    assert!(stderr.contains("series-resistance"), "{stderr}");
+}
+
+#[test]
+fn simulate_names_what_is_wrong_with_its_arguments() {
+    let refused = |study: &str, arguments: &[&str]| {
+        let (code, stdout, stderr) =
+            output(starlings().arg("simulate").arg(repository(study)).args(arguments));
+        assert_eq!((code, stdout.as_str()), (2, ""), "{arguments:?}: {stderr}");
+        stderr
+    };
+    assert!(refused(STUDY, &["--noise", "-1"]).contains("--noise must be zero or a positive number"));
+    let until = refused(STUDY, &["--until", "-1", "--step", "0.1"]);
+    assert!(until.contains("--until after the record's start"), "{until}");
+    let step = refused(STUDY, &["--until", "1", "--step", "-0.1"]);
+    assert!(step.contains("--step must be positive"), "{step}");
+    let unknown = refused(STUDY, &["--set", "zz=3"]);
+    assert!(unknown.contains("no parameter, constant or initial value of that name"), "{unknown}");
+    assert!(unknown.contains("Zc") && unknown.contains("initial:p"), "{unknown}");
+    let near = refused(STUDY, &["--set", "initial:P=90"]);
+    assert!(near.contains("did you mean `initial:p`"), "{near}");
+    let host = refused("examples/oscillator/study.toml", &["--effect", "series-resistance=1"]);
+    assert!(host.contains("cannot host") && host.contains("windkessel-2"), "{host}");
+}
+
+#[test]
+fn a_twin_of_a_model_with_fields_is_a_recording_of_the_next_study() {
+    const TUBE: &str = "examples/fsi-tube/study.toml";
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    let mut command = starlings();
+    command.arg("simulate").arg(repository(TUBE)).args([
+        "--periodic",
+        "0.8",
+        "--noise",
+        "10%",
+        "--set",
+        "E2=4e6",
+    ]);
+    let (code, _, stderr) =
+        output(command.arg("--state-out").arg(at("initial.csv")).arg("-o").arg(at("wall.csv")));
+    assert_eq!(code, 0, "{stderr}");
+    assert!(stderr.contains("the periodic state was found in"), "{stderr}");
+    assert!(
+        stderr.contains("noise of displacement: standard deviation") && !stderr.contains("noise of pressure"),
+        "{stderr}"
+    );
+    let study = std::fs::read_to_string(repository(TUBE)).unwrap();
+    let study = study.replace("\"flow.csv:flow\"", "\"flow\"");
+    std::fs::write(at("study.toml"), study).unwrap();
+    let (code, stdout, stderr) = output(starlings().arg("check").arg(at("study.toml")));
+    assert_eq!(code, 0, "{stderr}");
+    assert!(stdout.contains("displacement (25 components)") && stdout.contains("the study is sound"), "{stdout}");
+}
