@@ -94,8 +94,9 @@ fn print(study: &Study, channels: &[TrialChannel], n_particle: usize) -> Result<
     text(table(&rows, false))?;
     line("\ntrial run at the prior median")?;
     let mut rows = vec![["record", "output", "observations", "rmse", "noise"].map(str::to_owned).to_vec()];
-    let of_field =
-        |a: &TrialChannel, b: &TrialChannel| a.record == b.record && field_of(&a.output) == field_of(&b.output);
+    let of_field = |a: &TrialChannel, b: &TrialChannel| {
+        a.record == b.record && field_of(&a.output) == field_of(&b.output)
+    };
     rows.extend(channels.chunk_by(of_field).map(pooled));
     text(table(&rows, false))?;
     let runs = runs_per_pass(study, n_particle);

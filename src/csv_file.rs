@@ -58,7 +58,8 @@ pub(crate) fn check_outputs(outputs: &[Output<'_>], study: &str, place: &Place<'
                 "{earlier} and {option} both name {path}, and one would overwrite the other: choose two files"
             )));
         }
-        probe(path).map_err(|e| Failure::input(format!("cannot write {} ({option}): {e}", path.display())))?;
+        probe(path)
+            .map_err(|e| Failure::input(format!("cannot write {} ({option}): {e}", path.display())))?;
     }
     Ok(())
 }
@@ -90,7 +91,7 @@ fn probe(path: &Path) -> std::io::Result<()> {
 }
 
 /// Refuses an output that would overwrite the study or a file that it names.
-pub(crate) fn spare_study(output: Option<&Path>, study: &str, place: &Place<'_>) -> Result<(), Failure> {
+fn spare_study(output: Option<&Path>, study: &str, place: &Place<'_>) -> Result<(), Failure> {
     // What does not exist cannot be overwritten, and a device is no file of a study.
     let existing = output.and_then(|path| Some((path, path.canonicalize().ok()?)));
     let Some((given, target)) = existing.filter(|(_, target)| target.is_file()) else {
@@ -98,9 +99,7 @@ pub(crate) fn spare_study(output: Option<&Path>, study: &str, place: &Place<'_>)
     };
     let refuse = |what: &str| {
         let given = given.display();
-        Err(Failure::input(format!(
-            "{given} is {what}, and would be overwritten: choose another file"
-        )))
+        Err(Failure::input(format!("{given} is {what}, and would be overwritten: choose another file")))
     };
     if std::fs::read(&target).is_ok_and(|bytes| bytes == study.as_bytes()) {
         return refuse("the study file");

@@ -183,10 +183,13 @@ fn check_names(args: &Args, study: &Study) -> Result<(), Failure> {
 fn listed(names: &[String]) -> Vec<String> {
     let mut fields: Vec<(&str, Option<(usize, usize)>)> = Vec::new();
     for name in names {
-        match (component_of(name), fields.last_mut()) {
-            (Some((field, i)), Some((last, Some((_, end))))) if *last == field && i == *end + 1 => *end = i,
-            (Some((field, i)), _) => fields.push((field, Some((i, i)))),
-            (None, _) => fields.push((name, None)),
+        let Some((field, i)) = component_of(name) else {
+            fields.push((name, None));
+            continue;
+        };
+        match fields.iter_mut().find(|(known, _)| *known == field) {
+            Some((_, Some((start, end)))) => (*start, *end) = (i.min(*start), i.max(*end)),
+            _ => fields.push((field, Some((i, i)))),
         }
     }
     let text = |(field, span): (&str, Option<(usize, usize)>)| match span {

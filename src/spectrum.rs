@@ -75,9 +75,11 @@ fn decay(text: &str) -> Result<Decay, String> {
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     check(args)?;
     let study = Study::load(&args.study)?;
-    for file in [&args.csv, &args.html] {
-        csv_file::spare_study(file.as_deref(), &study.text, &Place::Known(&study.file))?;
-    }
+    csv_file::check_outputs(
+        &[("--csv", &args.csv), ("--html", &args.html)],
+        &study.text,
+        &Place::Known(&study.file),
+    )?;
     let found = examine(args, &study)?;
     if let Some(path) = &args.csv {
         write_csv(path, &found)?;

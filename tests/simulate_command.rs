@@ -119,5 +119,8 @@ fn a_twin_of_a_model_with_fields_is_a_recording_of_the_next_study() {
     std::fs::write(at("study.toml"), study).unwrap();
     let (code, stdout, stderr) = output(starlings().arg("check").arg(at("study.toml")));
     assert_eq!(code, 0, "{stderr}");
-    assert!(stdout.contains("displacement (25 components)") && stdout.contains("the study is sound"), "{stdout}");
+    assert!(
+        stdout.contains("displacement (25 components)") && stdout.contains("the study is sound"),
+        "{stdout}"
+    );
 }

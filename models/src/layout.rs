@@ -71,9 +71,7 @@ mod tests {
     #[derive(Default, Deserialize)]
     #[serde(deny_unknown_fields, default)]
     struct Pipe {
-        #[expect(dead_code, reason = "only read from the layout")]
         cells: usize,
-        #[expect(dead_code, reason = "only read from the layout")]
         step: f64,
     }
 

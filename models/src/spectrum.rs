@@ -71,7 +71,9 @@ pub enum SpectrumError {
         state: String,
     },
     /// The rate is not a number near the state where the model is linearised.
-    #[error("the rate of state `{state}` of model `{model}` is not finite near the state where it is linearised")]
+    #[error(
+        "the rate of state `{state}` of model `{model}` is not finite near the state where it is linearised"
+    )]
     NotFinite {
         /// The model's kind.
         model: String,

@@ -83,14 +83,15 @@ fn unknown_and_misspelt_nodes_are_refused() {
     let (path, message) = refusal(layout);
     assert_eq!(path, "elements[1].from");
     assert!(message.contains("did you mean `aorta`"), "{message}");
-    let elements = json!([r("out", "aorta", "0"), c("wall", "aorta", "0"), r("side", "aorta", "aorat")]);
+    let elements = json!([r("out", "aorta", "vein"), c("wall", "aorta", "0"), r("side", "vein", "aorat")]);
     refused(
         elements,
         "elements[2].to",
         &["only one element ends at node `aorat`: did you mean `aorta`? Otherwise declare all nodes"],
     );
     // The other end of the same element is no candidate, near as its name is.
-    let (path, message) = refusal(json!({ "elements": [r("out", "x", "0"), c("wall", "x", "0"), r("side", "a1", "a2")] }));
+    let (path, message) =
+        refusal(json!({ "elements": [r("out", "x", "0"), c("wall", "x", "0"), r("side", "a1", "a2")] }));
     assert_eq!(path, "elements[2].from");
     assert_eq!(message, "only one element ends at node `a1`: if that is meant, declare all nodes in `nodes`");
 }

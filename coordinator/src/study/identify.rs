@@ -47,7 +47,9 @@ pub enum IdentifyError {
         source: ParticleError,
     },
     /// A prediction is no finite number.
-    #[error("`{output}` of record `{record}` is {value} at time {time}, {place}: check constants, priors and inputs")]
+    #[error(
+        "`{output}` of record `{record}` is {value} at time {time}, {place}: check constants, priors and inputs"
+    )]
     Prediction {
         /// Output name.
         output: String,

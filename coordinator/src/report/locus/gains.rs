@@ -12,7 +12,7 @@ const ROUNDS: usize = 4;
 /// Way from one gain to the next, as part of the largest shown modulus, that is drawn as a straight line.
 const STEP: f64 = 0.02;
 /// Gains of a drawn locus at most.
-const MOST: usize = 600;
+const MOST: usize = 1000;
 /// Poles shown, those of conjugate pairs in the upper half plane only.
 const SHOWN: usize = 12;
 

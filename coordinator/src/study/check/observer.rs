@@ -75,8 +75,7 @@ fn check_gain(source: &Source, file: &StudyFile, records: &[Record], observer: &
     source.report_with(
         file.observer.gain.span(),
         format!(
-            "a gain of {gain} is unstable: the observer `{}` corrects in steps, and record `{}` is observed every {dt:.4} \
-             {unit}",
+            "a gain of {gain} is unstable: the observer `{}` corrects in steps, and record `{}` is observed {dt:.4} {unit} apart",
             file.observer.kind.get_ref(),
             record.name
         ),
@@ -84,10 +83,8 @@ fn check_gain(source: &Source, file: &StudyFile, records: &[Record], observer: &
     );
 }
 
-/// Median time between the observations that a record fits.
+/// Largest time between the observations that a record fits: the gain must be stable over every one.
 fn spacing(record: &Record) -> Option<f64> {
     let rows = training_rows(record);
-    let mut spacings: Vec<f64> = rows.windows(2).map(|w| record.times[w[1]] - record.times[w[0]]).collect();
-    spacings.sort_by(f64::total_cmp);
-    spacings.get(spacings.len() / 2).copied()
+    rows.windows(2).map(|w| record.times[w[1]] - record.times[w[0]]).max_by(f64::total_cmp)
 }

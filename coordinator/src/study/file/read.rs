@@ -194,7 +194,11 @@ fn surface(source: &Source, t: &Table<'_>) -> Option<SurfaceSection> {
     if t.get("surface").is_none() {
         for key in ["rest", "open_ends"] {
             if let Some(span) = t.key_span(key) {
-                source.report_with(span, format!("`{key}` belongs to a `surface`"), "remove it, or give `surface`");
+                source.report_with(
+                    span,
+                    format!("`{key}` belongs to a `surface`"),
+                    "remove it, or give `surface`",
+                );
             }
         }
         return None;
@@ -202,13 +206,21 @@ fn surface(source: &Source, t: &Table<'_>) -> Option<SurfaceSection> {
     for key in ["column", "from", "start"] {
         if let Some(span) = t.key_span(key) {
             let message = format!("a channel with a `surface` has no `{key}`");
-            source.report_with(span, message, "remove it: the observed value is a distance of zero to the surface");
+            source.report_with(
+                span,
+                message,
+                "remove it: the observed value is a distance of zero to the surface",
+            );
         }
     }
-    let ends = t.count("open_ends").map_or(TUBE_ENDS, |n| usize::try_from(*n.get_ref()).unwrap_or(usize::MAX));
+    let ends =
+        t.count("open_ends").map_or(TUBE_ENDS, |n| usize::try_from(*n.get_ref()).unwrap_or(usize::MAX));
     Some(SurfaceSection {
         file: t.required_text("surface", "a CSV file of profiles or meshes"),
-        rest: t.required_text("rest", "a CSV file with the place of every node of the output without displacement"),
+        rest: t.required_text(
+            "rest",
+            "a CSV file with the place of every node of the output without displacement",
+        ),
         open_ends: ends,
     })
 }

@@ -11,7 +11,7 @@ use super::surface::SurfaceFiles;
 use super::{Context, Table};
 use crate::study::checked::Channel;
 use crate::study::file::{ChannelSection, RecordSection};
-use crate::study::problem::Source;
+use crate::study::problem::{Source, quoted_list};
 
 /// Reads the channels of one record.
 pub(in crate::study) struct ChannelReader<'a> {
@@ -71,8 +71,9 @@ impl ChannelReader<'_> {
         let read = |part: Part| Some((self.values(section, &part)?, part));
         let mut measured: Vec<(Vec<f64>, Part)> = parts.into_iter().map(read).collect::<Option<_>>()?;
         // A component without any value is one that the file lacks.
+        context.warnings.extend(self.empty_columns(&measured));
         measured.retain(|(values, _)| measured_somewhere(values));
-        if !measured.iter().any(|(values, _)| self.has_value(&derived.values(&self.table.times, values))) {
+        if !measured.iter().any(|(values, _)| self.has_value(&self.derive(derived, values))) {
             self.no_value(section, measured.is_empty());
             return None;
         }
@@ -93,10 +94,25 @@ impl ChannelReader<'_> {
             unit: unit.clone(),
             noise: noise.sd,
             noise_how: noise.how.clone(),
-            values: derived.values(&self.table.times, &values),
+            values: self.derive(derived, &values),
             node: None,
         };
         Some(measured.into_iter().map(channel).collect())
+    }
+
+    /// Columns of a field that are there but empty may be a slip.
+    fn empty_columns(&self, measured: &[(Vec<f64>, Part)]) -> Option<String> {
+        let empty = measured.iter().filter(|(values, _)| !measured_somewhere(values));
+        let names: Vec<&str> = empty.map(|(_, part)| part.column.as_str()).collect();
+        let (n, of) = (names.len(), measured.len());
+        (n > 0 && n < of).then(|| {
+            let names = quoted_list(&names);
+            format!(
+                "record `{}` has no value in {names}: {} of {of} columns are observed",
+                self.name(),
+                of - n
+            )
+        })
     }
 
     /// A noise that the study does not give is worth a word.

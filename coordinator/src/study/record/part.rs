@@ -65,6 +65,15 @@ impl ChannelReader<'_> {
             );
             return None;
         }
+        if let Some(header) = headers.iter().find(|header| is_misspelt(header, column)) {
+            let file = self.table.csv.path.display();
+            self.source.report_with(
+                section.column.span(),
+                format!("`{file}` has a column `{header}`, which is no component of output `{output}`"),
+                format!("components are counted from 0: `{column}[0]` to `{column}[{}]`", n - 1),
+            );
+            return None;
+        }
         let part = |i: usize| Part { output: format!("{output}[{i}]"), column: format!("{column}[{i}]") };
         let parts: Vec<Part> = (0..n).map(part).filter(|part| headers.contains(&part.column)).collect();
         if parts.is_empty() {
@@ -88,5 +97,27 @@ impl ChannelReader<'_> {
             format!("its columns are {}", crate::study::problem::quoted_list(&self.table.csv.headers))
         };
         self.source.report_with(section.column.span(), message, help);
+    }
+}
+
+/// Whether a header is meant as a component of a column's field and is none: its index is no plain number.
+fn is_misspelt(header: &str, column: &str) -> bool {
+    let Some(index) = header.strip_prefix(column).and_then(|rest| rest.strip_prefix('[')) else {
+        return false;
+    };
+    let index = index.strip_suffix(']').unwrap_or("");
+    index.parse::<usize>().map_or(true, |i| i.to_string() != index)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_component_is_misspelt_when_its_index_is_no_plain_number() {
+        let misspelt = ["w[x]", "w[01]", "w[+1]", "w[]", "w[1"].map(|header| is_misspelt(header, "w"));
+        assert_eq!(misspelt, [true; 5]);
+        let others = ["w[0]", "w[12]", "w", "wall[x]", "v[x]"].map(|header| is_misspelt(header, "w"));
+        assert_eq!(others, [false; 5]);
     }
 }

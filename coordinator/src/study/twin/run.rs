@@ -9,7 +9,7 @@ use starlings_models::{Forward, Job, ParticleError, Prediction, Signal, Spec, Wi
 use super::TwinError;
 use super::periodic::{NotPeriodic, fixed_point};
 
-/// Change of an input over a period, as a share of its range, beyond which it is not periodic.
+/// Change of an input's value from one period to the next, as a share of its range, beyond which it is not periodic.
 const NOT_PERIODIC: f64 = 0.05;
 /// Parts of a period at whose ends the sizes of the states are taken.
 const PARTS: usize = 32;
@@ -120,11 +120,17 @@ fn check_input(signal: &Signal, name: &str, start: f64, end: f64) -> Result<(), 
     }
     let values = signal.values.iter().copied();
     let (lo, hi) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), v| (lo.min(v), hi.max(v)));
-    let (a, b) = (signal.at(start), signal.at(end));
-    if (b - a).abs() > NOT_PERIODIC * (hi - lo) {
-        return Err(TwinError::Request(format!(
-            "input `{name}` is {a} at the start and {b} a period later: it has another period"
-        )));
+    // Every sample against the same time of the next period, as far as the input reaches: the two ends alone can agree by
+    // chance, as those of a flow at rest do.
+    let period = end - start;
+    let inner = signal.times.iter().copied().filter(|t| *t > start && t + period <= last);
+    for t in std::iter::once(start).chain(inner) {
+        let (a, b) = (signal.at(t), signal.at(t + period));
+        if (b - a).abs() > NOT_PERIODIC * (hi - lo) {
+            return Err(TwinError::Request(format!(
+                "input `{name}` is {a} at {t} and {b} a period later: it has another period"
+            )));
+        }
     }
     Ok(())
 }
@@ -170,6 +176,21 @@ mod tests {
         // Sums of numbers with few binary digits are exact, also as text.
         assert_eq!(format!("{:?}", signal.times), "[1.0, 1.25, 1.5, 2.0, 2.25, 2.5, 3.0, 3.25, 3.5, 4.0]");
         assert_eq!(format!("{:?}", signal.values), "[0.0, 1.0, 3.0, 0.0, 1.0, 3.0, 0.0, 1.0, 3.0, 0.0]");
+    }
+
+    #[test]
+    fn an_input_that_is_at_rest_at_both_ends_still_has_another_period() {
+        // A pulse of 0.3 s in a beat of 0.8 s, over two beats.
+        let times: Vec<f64> = (0..=160).map(|k| 0.01 * f64::from(k)).collect();
+        let pulse =
+            |t: &f64| (std::f64::consts::PI * (t % 0.8) / 0.3).sin().max(0.0) * f64::from(t % 0.8 < 0.3);
+        let signal = Signal { values: times.iter().map(pulse).collect(), times };
+        let told = |period: f64| check_input(&signal, "flow", 0.0, period).map_err(|error| error.to_string());
+        assert_eq!(told(0.8), Ok(()));
+        for wrong in [0.3, 0.4, 0.79] {
+            let refused = told(wrong).unwrap_err();
+            assert!(refused.contains("it has another period"), "{wrong}: {refused}");
+        }
     }
 
     #[test]
