@@ -1,6 +1,6 @@
 //! `starlings spectrum`: the poles of a study's model under every observer that it can host, and which gain to choose.
 //!
-//! Next file to read: [`print`].
+//! Next file to read: [`mod@print`].
 
 mod print;
 

@@ -1,7 +1,7 @@
 //! The laboratory: one setup, looked at under every observer that it can host.
 //!
 //! The model stands where its runs start, with the observed outputs of the setup: a setup that observes half a wall shows
-//! partial observation. Next file to read: [`super::observed`].
+//! partial observation. Next file to read: [`mod@super::observed`].
 
 use std::collections::BTreeMap;
 
