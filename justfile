@@ -13,6 +13,10 @@ battery:
     cargo test --release -p starlings-coordinator --test tube_twin -- --ignored --nocapture
     cargo test --release --test coarctation -- --ignored --nocapture
 
+# Every system, effect and noise level of docs/battery.md: about an hour. BATTERY_SYSTEMS, BATTERY_KINDS, BATTERY_NOISE, BATTERY_SEEDS, BATTERY_THREADS choose.
+explain-battery:
+    cargo test --release -p starlings-coordinator --test explain_battery -- --ignored --nocapture the_whole
+
 # Formatting and lints, warnings are errors.
 lint:
     cargo fmt --all --check

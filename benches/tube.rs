@@ -231,7 +231,9 @@ fn study(folder: &Path, started: Instant) -> Result<Summary, Failure> {
     })?;
     let mut stored = RunFolder::create(&folder.join("run"), &study, "benchmark", "")?;
     let clock = || started.elapsed().as_secs_f64();
-    let mut context = RunContext { clock: &clock, watch: &mut |_| {}, events: Some(&events), earlier_s: 0.0 };
+    let threads = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let mut context =
+        RunContext { clock: &clock, watch: &mut |_| {}, events: Some(&events), earlier_s: 0.0, threads };
     let summary = run(&study, &mut fleet, &mut stored, &mut context)?;
     fleet.close();
     drop(workers);

@@ -70,10 +70,24 @@ fn as_json(study: &Study, channels: &[TrialChannel], n_particle: usize) -> serde
     })
 }
 
-/// One line for a channel, or for the observed components of a field: weighted by their observations.
-fn pooled(channels: &[TrialChannel]) -> Vec<String> {
+/// An output, or a field with the number of its components that are observed.
+fn name_of(study: &Study, channels: &[TrialChannel]) -> String {
     let outputs: Vec<String> = channels.iter().map(|c| c.output.clone()).collect();
-    let name = if channels.len() > 1 { observed_fields(&outputs).join(", ") } else { outputs.concat() };
+    if channels.len() < 2 {
+        return outputs.concat();
+    }
+    let field = field_of(&outputs[0]);
+    match study.spec.outputs.iter().find(|q| q.name == field) {
+        Some(q) if q.size > outputs.len() => {
+            format!("{field} ({} of {} components observed)", outputs.len(), q.size)
+        }
+        _ => observed_fields(&outputs).join(", "),
+    }
+}
+
+/// One line for a channel, or for the observed components of a field: weighted by their observations.
+fn pooled(study: &Study, channels: &[TrialChannel]) -> Vec<String> {
+    let name = name_of(study, channels);
     let n_obs: usize = channels.iter().map(|c| c.n_obs).sum();
     let mean_square = |of: fn(&TrialChannel) -> f64| {
         let sum: f64 = channels.iter().map(|c| c.n_obs as f64 * of(c).powi(2)).sum();
@@ -97,7 +111,7 @@ fn print(study: &Study, channels: &[TrialChannel], n_particle: usize) -> Result<
     let of_field = |a: &TrialChannel, b: &TrialChannel| {
         a.record == b.record && field_of(&a.output) == field_of(&b.output)
     };
-    rows.extend(channels.chunk_by(of_field).map(pooled));
+    rows.extend(channels.chunk_by(of_field).map(|channels| pooled(study, channels)));
     text(table(&rows, false))?;
     let runs = runs_per_pass(study, n_particle);
     let per = if study.estimator.kind == EstimatorKind::Batch { "iteration" } else { "pass" };

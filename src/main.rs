@@ -9,6 +9,8 @@ mod check;
 mod console;
 mod crew;
 mod csv_file;
+mod effects;
+mod explain;
 mod export;
 mod failure;
 mod identify;
@@ -43,6 +45,8 @@ struct Cli {
 enum Command {
     /// Estimate the parameters of a study and write a run folder.
     Run(run::Args),
+    /// Say where a model disagrees with its recordings, name the missing effect, add it and show the gap shrink.
+    Explain(explain::Args),
     /// Validate a study and make one trial run of its model.
     Check(check::Args),
     /// Run the model forward with chosen values and noise: a twin experiment.
@@ -55,6 +59,8 @@ enum Command {
     Worker(worker::Args),
     /// List the built-in models, or describe one.
     Models(models::Args),
+    /// List the effects that a model can lack: all built-in ones, or those that would be tried for a study.
+    Effects(effects::Args),
     /// Write the result files of a run folder again.
     Report(report::Args),
     /// Write a table of a run folder as CSV.
@@ -67,12 +73,14 @@ fn main() -> ExitCode {
     console::log_to_stderr(cli.verbose);
     let outcome = match cli.command {
         Command::Run(args) => run::run(&args, started),
+        Command::Explain(args) => explain::run(&args, started),
         Command::Check(args) => check::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Identify(args) => identify::run(&args),
         Command::Spectrum(args) => spectrum::run(&args),
         Command::Worker(args) => worker::run(&args),
         Command::Models(args) => models::run(&args),
+        Command::Effects(args) => effects::run(&args),
         Command::Report(args) => report::run(&args),
         Command::Export(args) => export::run(&args),
     };

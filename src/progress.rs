@@ -5,6 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use starlings_coordinator::explain::Stage;
 use starlings_coordinator::study::Progress;
 
 use crate::console::note;
@@ -12,12 +13,22 @@ use crate::console::note;
 /// Spacing of plain lines.
 const LINE_EVERY: Duration = Duration::from_secs(10);
 
+/// Spacing of the pictures of a spinner.
+const TICK: Duration = Duration::from_millis(100);
+
+/// The line that was shown last.
+pub(crate) struct Last {
+    at: Instant,
+    /// Name of the stage, and what it said.
+    stage: Option<(&'static str, String)>,
+}
+
 /// Shows where a run stands.
 pub(crate) enum Display {
     /// Nothing is shown.
     Silent,
     /// A line now and then, the first and the last of a pass always.
-    Lines(Mutex<Instant>),
+    Lines(Mutex<Last>),
     /// A bar.
     Bar(ProgressBar),
 }
@@ -29,7 +40,7 @@ impl Display {
             return Self::Silent;
         }
         if !std::io::stderr().is_terminal() {
-            return Self::Lines(Mutex::new(Instant::now()));
+            return Self::Lines(Mutex::new(Last { at: Instant::now(), stage: None }));
         }
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr_with_hz(10));
         let style = ProgressStyle::with_template("{prefix} {wide_bar} {pos}/{len}  {msg}  {eta} left");
@@ -46,9 +57,9 @@ impl Display {
             Self::Lines(last) => {
                 let edge = p.step == 1 || p.step == p.steps;
                 let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
-                if edge || last.elapsed() > LINE_EVERY {
+                if edge || last.at.elapsed() > LINE_EVERY {
                     note(format_args!("{head}: {} of {} analyses, {tail}", p.step, p.steps));
-                    *last = Instant::now();
+                    last.at = Instant::now();
                 }
             }
             Self::Bar(bar) => {
@@ -59,6 +70,36 @@ impl Display {
                 bar.set_prefix(head);
                 bar.set_message(tail);
                 bar.set_position(p.step as u64);
+            }
+        }
+    }
+
+    /// An explanation goes on: each stage is told once, and where it stands now and then.
+    pub(crate) fn stage(&self, stage: &Stage) {
+        let says = if stage.says.is_empty() { String::new() } else { format!("{}, ", stage.says) };
+        let tail = format!("{says}{} runs, {} workers", stage.runs, stage.workers);
+        match self {
+            Self::Silent => {}
+            Self::Lines(last) => {
+                let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
+                let told = |(name, says): &(&str, String)| {
+                    *name == stage.name && (stage.says.is_empty() || *says == stage.says)
+                };
+                let new = !last.stage.as_ref().is_some_and(told);
+                if new || last.at.elapsed() > LINE_EVERY {
+                    note(format_args!("{}: {tail}", stage.name));
+                    last.at = Instant::now();
+                    last.stage = Some((stage.name, stage.says.clone()));
+                }
+            }
+            Self::Bar(bar) => {
+                if bar.prefix() != stage.name {
+                    let spinner = ProgressStyle::with_template("{spinner} {prefix}: {wide_msg} {elapsed}");
+                    bar.set_style(spinner.unwrap_or_else(|_| ProgressStyle::default_spinner()));
+                    bar.set_prefix(stage.name);
+                    bar.enable_steady_tick(TICK);
+                }
+                bar.set_message(tail);
             }
         }
     }

@@ -3,13 +3,17 @@
 use std::path::PathBuf;
 
 use clap::Parser;
+use starlings_coordinator::explain::keep::kept;
 use starlings_coordinator::report as page;
 use starlings_coordinator::study::RunFolder;
+use starlings_coordinator::study::store::Purpose;
 
 use crate::console::{line, note};
 use crate::failure::Failure;
 
-/// Write report.html, summary.json and posterior.csv of a run folder again from its run.db.
+/// Write the result files of a run folder again from its run.db: report.html, and the numbers beside it.
+///
+/// A run has summary.json and posterior.csv, an explanation explain.json and explained.toml.
 #[derive(Parser)]
 pub(crate) struct Args {
     /// The run folder.
@@ -25,6 +29,9 @@ pub(crate) struct Args {
 /// Writes the files; a run that is not finished gets a report of what there is.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let folder = RunFolder::open(&args.dir).map_err(Failure::input)?;
+    if folder.purpose().map_err(Failure::run)? == Purpose::Explanation {
+        return explanation(args, &folder);
+    }
     let data = page::reader::report_data(&folder.store).map_err(Failure::run)?;
     if let Some(path) = &args.overview {
         let svg = page::overview_svg(&data).map_err(Failure::run)?;
@@ -49,4 +56,18 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         None => serde_json::json!({ "study": data.study, "finished": false, "warnings": data.warnings }),
     };
     line(format_args!("{shown:#}"))
+}
+
+/// The files of an explanation.
+fn explanation(args: &Args, folder: &RunFolder) -> Result<(), Failure> {
+    if args.overview.is_some() {
+        return Err(Failure::input("an explanation has no overview picture: leave out --overview"));
+    }
+    if kept(&folder.store).map_err(Failure::run)?.is_none() {
+        let path = folder.path.display();
+        return Err(Failure::input(format!(
+            "the explanation in {path} is not finished: continue it with `starlings explain STUDY --out {path} --resume`"
+        )));
+    }
+    crate::explain::write(folder, args.json)
 }

@@ -52,8 +52,13 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     crew.gather(&study, &plan)?;
     let mut watch = |p: &Progress| display.step(p);
     let clock = move || started.elapsed().as_secs_f64();
-    let mut context =
-        RunContext { clock: &clock, watch: &mut watch, events: Some(&crew.events), earlier_s: 0.0 };
+    let mut context = RunContext {
+        clock: &clock,
+        watch: &mut watch,
+        events: Some(&crew.events),
+        earlier_s: 0.0,
+        threads: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
+    };
     let result = study_run::run(&study, &mut crew.fleet, &mut folder, &mut context);
     display.finish();
     crew.dismiss();

@@ -1,6 +1,6 @@
 //! `starlings spectrum`: the poles of a study's model under every observer that it can host, and which gain to choose.
 //!
-//! Next file to read: [`mod@print`].
+//! Next file to read: [`mod@print`]; what is found is found in `coordinator/src/study/spectrum.rs`.
 
 mod print;
 
@@ -8,17 +8,15 @@ use std::path::{Path, PathBuf};
 
 use clap::Parser;
 use starlings_coordinator::report::locus::{Locus, render};
-use starlings_coordinator::study::{Study, posterior};
+use starlings_coordinator::study::Study;
+use starlings_coordinator::study::spectrum::{ExamineError, Spectrum, Wanted, examine};
 use starlings_models::nearest;
 use starlings_models::observer::kinds;
-use starlings_models::spectrum::{Decay, Laboratory, ObserverSpectrum};
+use starlings_models::spectrum::Decay;
 
 use crate::console::line;
 use crate::csv_file::{self, Place};
 use crate::failure::Failure;
-
-/// Poles in the result where no number is asked for.
-const LISTED: usize = 100;
 
 /// Show how the poles of the study's model move with the gain of each observer.
 ///
@@ -51,17 +49,12 @@ pub(crate) struct Args {
     json: bool,
 }
 
-/// What was found.
+/// What was found, and how much of it people are shown.
 struct Found<'a> {
     study: &'a Study,
-    laboratory: Laboratory,
-    decay: Option<Decay>,
-    /// Poles listed, at most those that there are.
-    listed: usize,
+    spectrum: Spectrum,
     /// Poles in the table for people.
     rows: usize,
-    observers: Vec<ObserverSpectrum>,
-    refused: Vec<(String, String)>,
 }
 
 /// `FACTOR/TIME`.
@@ -80,7 +73,17 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         &study.text,
         &Place::Known(&study.file),
     )?;
-    let found = examine(args, &study)?;
+    let wanted = Wanted {
+        observers: args.observers.clone(),
+        gains: args.gains.clone(),
+        decay: args.decay,
+        poles: args.poles,
+    };
+    let spectrum = examine(&study, &wanted).map_err(|error| match error {
+        ExamineError::Spectrum(_) => Failure::input(error),
+        ExamineError::Broken(_) => Failure::run(error),
+    })?;
+    let found = Found { study: &study, spectrum, rows: args.poles.unwrap_or(print::ROWS) };
     if let Some(path) = &args.csv {
         write_csv(path, &found)?;
     }
@@ -108,67 +111,12 @@ fn check(args: &Args) -> Result<(), Failure> {
     }
 }
 
-fn examine<'a>(args: &Args, study: &'a Study) -> Result<Found<'a>, Failure> {
-    let medians = study.theta_for(0, posterior::prior(study).mean.as_slice());
-    let laboratory = Laboratory::new(&study.setup, &medians).map_err(Failure::input)?;
-    let listed = args.poles.unwrap_or(LISTED).min(laboratory.poles().len());
-    let given =
-        |own: &[f64], otherwise: &[f64]| if own.is_empty() { otherwise.to_vec() } else { own.to_vec() };
-    let mut gains = given(&args.gains, &study.spectrum.gains);
-    if gains.is_empty() {
-        gains = laboratory.usual_gains(2 * print::ROWS);
-    }
-    let wanted = if args.observers.is_empty() { &study.spectrum.observers } else { &args.observers };
-    let (mut kinds, mut refused) = (Vec::new(), Vec::new());
-    for (kind, why) in laboratory.observers() {
-        match why {
-            None => kinds.push(kind.to_owned()),
-            Some(why) => refused.push((kind.to_owned(), why.to_string())),
-        }
-    }
-    if !wanted.is_empty() {
-        // An observer that was asked for and cannot be is an error; of the others nobody wants to know why.
-        refused.clear();
-        kinds.clear();
-        for kind in wanted {
-            if !kinds.contains(kind) {
-                kinds.push(kind.clone());
-            }
-        }
-    }
-    let decay = args.decay.or(study.spectrum.decay);
-    let work = |kind: &String| laboratory.examine(kind, &gains, listed, decay);
-    let results: Vec<_> = std::thread::scope(|scope| {
-        let threads: Vec<_> = kinds.iter().map(|kind| scope.spawn(move || work(kind))).collect();
-        threads.into_iter().map(std::thread::ScopedJoinHandle::join).collect()
-    });
-    let mut observers = Vec::with_capacity(results.len());
-    for result in results {
-        let result = result.map_err(|_| Failure::run("an observer could not be examined"))?;
-        observers.push(result.map_err(Failure::input)?);
-    }
-    let rows = args.poles.unwrap_or(print::ROWS);
-    Ok(Found { study, laboratory, decay, listed, rows, observers, refused })
-}
-
 /// The listed poles at every gain, one row each.
 fn write_csv(path: &Path, found: &Found<'_>) -> Result<(), Failure> {
-    let heading = ["observer", "gain", "max_re", "pole", "re", "im"].map(str::to_owned);
-    let mut rows = vec![heading];
-    for observer in &found.observers {
-        let mut gains = observer.gain.clone();
-        gains.push(0.0);
-        gains.sort_by(f64::total_cmp);
-        gains.dedup();
-        let ways = observer.locus(&gains, found.listed).map_err(Failure::run)?;
-        for (gain, max_re) in observer.gain.iter().zip(&observer.max_re) {
-            let at = gains.iter().position(|g| g.to_bits() == gain.to_bits()).unwrap_or(0);
-            for (pole, way) in ways.iter().enumerate() {
-                let [gain, max_re, re, im] =
-                    [*gain, *max_re, way[at].re, way[at].im].map(|v| format!("{v:?}"));
-                rows.push([observer.name.clone(), gain, max_re, pole.to_string(), re, im]);
-            }
-        }
+    let mut rows = vec![["observer", "gain", "max_re", "pole", "re", "im"].map(str::to_owned)];
+    for point in found.spectrum.locus().map_err(Failure::run)? {
+        let [gain, max_re, re, im] = [point.gain, point.max_re, point.re, point.im].map(|v| format!("{v:?}"));
+        rows.push([point.observer, gain, max_re, point.pole.to_string(), re, im]);
     }
     csv_file::write(Some(path), rows)
 }
@@ -180,11 +128,11 @@ fn write_page(path: &Path, found: &Found<'_>) -> Result<(), Failure> {
         model: &found.study.setup.model.kind,
         time_unit: &found.study.time_unit,
         outputs: &found.study.setup.outputs,
-        poles: found.laboratory.poles(),
-        listed: found.listed,
-        decay: found.decay,
-        observers: &found.observers,
-        refused: &found.refused,
+        poles: found.spectrum.laboratory.poles(),
+        listed: found.spectrum.listed,
+        decay: found.spectrum.decay,
+        observers: &found.spectrum.observers,
+        refused: &found.spectrum.refused,
     });
     std::fs::write(path, page.map_err(Failure::run)?)
         .map_err(|error| Failure::input(format!("cannot write {}: {error}", path.display())))

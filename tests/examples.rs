@@ -150,6 +150,7 @@ examples! {
     pig_aorta_joint => "pig-aorta-joint",
     rcr => "rcr",
     oscillator => "oscillator",
+    knsb_motor => "knsb-motor",
     rcr_network => "rcr-network",
     coarctation => "coarctation",
     fsi_tube => "fsi-tube",

@@ -88,6 +88,8 @@ fn simulate_names_what_is_wrong_with_its_arguments() {
     assert!(unknown.contains("Zc") && unknown.contains("initial:p"), "{unknown}");
     let near = refused(STUDY, &["--set", "initial:P=90"]);
     assert!(near.contains("did you mean `initial:p`"), "{near}");
+    let period = refused("examples/fsi-tube/study.toml", &["--periodic", "0.3"]);
+    assert!(period.contains("input `flow` is") && period.contains("it has another period"), "{period}");
     let host = refused("examples/oscillator/study.toml", &["--effect", "series-resistance=1"]);
     assert!(host.contains("cannot host") && host.contains("windkessel-2"), "{host}");
 }
@@ -123,4 +125,17 @@ fn a_twin_of_a_model_with_fields_is_a_recording_of_the_next_study() {
         stdout.contains("displacement (25 components)") && stdout.contains("the study is sound"),
         "{stdout}"
     );
+    // Without the column of one component.
+    let text = std::fs::read_to_string(at("wall.csv")).unwrap();
+    let header: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+    let dropped = header.iter().position(|name| *name == "displacement[7]").unwrap();
+    let without = |line: &str| {
+        let cells = line.split(',').enumerate().filter(|(i, _)| *i != dropped);
+        cells.map(|(_, cell)| cell).collect::<Vec<_>>().join(",")
+    };
+    let rows: Vec<String> = text.lines().map(without).collect();
+    std::fs::write(at("wall.csv"), rows.join("\n")).unwrap();
+    let (code, stdout, stderr) = output(starlings().arg("check").arg(at("study.toml")));
+    assert_eq!(code, 0, "{stderr}");
+    assert!(stdout.contains("displacement (24 of 25 components observed)"), "{stdout}");
 }

@@ -38,17 +38,25 @@ pub struct Outcome {
 
 /// Anything that runs batches of jobs. Same jobs, same results, whatever runs them.
 pub trait Fleet {
-    /// Makes a setup known, to be named in [`Fleet::run`].
+    /// Makes a setup known, to be named in [`Fleet::run`] and [`Fleet::run_mixed`].
     ///
     /// # Errors
     /// [`FleetError::SetupFailed`] when it cannot be built or sent.
     fn install(&mut self, setup: &Setup) -> Result<SetupId, FleetError>;
 
-    /// Runs all jobs with one setup and returns one outcome per job, in job order.
+    /// Runs jobs, each with a setup of its own choice, and returns one outcome per job, in job order.
     ///
     /// # Errors
     /// A failure of the fleet: cancelled, no workers, a setup that no worker can build. A failed job is no error.
-    fn run(&mut self, setup: SetupId, jobs: Vec<Job>) -> Result<Vec<Outcome>, FleetError>;
+    fn run_mixed(&mut self, jobs: Vec<(SetupId, Job)>) -> Result<Vec<Outcome>, FleetError>;
+
+    /// Runs all jobs with one setup and returns one outcome per job, in job order.
+    ///
+    /// # Errors
+    /// As [`Fleet::run_mixed`].
+    fn run(&mut self, setup: SetupId, jobs: Vec<Job>) -> Result<Vec<Outcome>, FleetError> {
+        self.run_mixed(jobs.into_iter().map(|job| (setup, job)).collect())
+    }
 
     /// Number of workers now.
     fn n_workers(&self) -> usize;

@@ -5,9 +5,12 @@
 //! numbers. Deliberately absent: computing anything that was not stored. Next file to read: [`data`].
 
 pub mod data;
+mod explain;
+mod explained;
 mod files;
 mod headline;
 mod identify;
+mod layout;
 pub mod locus;
 mod number;
 mod outputs;
@@ -21,6 +24,8 @@ mod sample;
 mod tests;
 
 pub use data::ReportData;
+pub use explain::{StudyAbout, explain_page};
+pub use explained::{state_names, write_explanation};
 pub use files::{FilesError, write_files, write_page};
 pub use identify::identify_page;
 pub use overview::overview_svg;
@@ -48,11 +53,7 @@ impl ReportError {
 ///
 /// [`ReportError`] when a figure or the page cannot be made; data that are missing are shown as missing.
 pub fn render(data: &ReportData) -> Result<String, ReportError> {
-    let mut environment = minijinja::Environment::new();
-    environment.set_undefined_behavior(minijinja::UndefinedBehavior::Strict);
-    environment.add_template("report.html", include_str!("report/report.html"))?;
-    let page = page::Page::new(data)?;
-    Ok(environment.get_template("report.html")?.render(minijinja::value::Serde(page))?)
+    layout::document(include_str!("report/report.html"), page::Page::new(data)?)
 }
 
 impl ReportData {

@@ -17,11 +17,13 @@ pub mod posterior;
 pub mod problem;
 mod record;
 pub mod run;
+pub mod spectrum;
 pub mod store;
 pub mod summary;
 pub mod surfaces;
 pub mod trial;
 pub mod twin;
+pub mod variant;
 pub mod warnings;
 
 pub use checked::{EstimatorChoice, EstimatorKind, FleetChoice, Record, Study, ThetaEntry};

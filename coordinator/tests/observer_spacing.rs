@@ -4,7 +4,8 @@ mod study_kit;
 
 use std::fmt::Write as _;
 
-use study_kit::Done;
+use study_kit::fleets::{At, Failing};
+use study_kit::{Case, Done};
 
 const STUDY: &str = r#"
 [study]
@@ -30,6 +31,10 @@ const STEPS: u32 = 200;
 
 /// The pressure at every tenth step, with or without the empty rows between.
 fn fit(empty_rows: bool) -> Done {
+    case(empty_rows).run()
+}
+
+fn case(empty_rows: bool) -> Case {
     let (mut flow, mut pressure) = ("time,flow\n".to_owned(), "time,pressure\n".to_owned());
     for i in 0..=STEPS {
         let t = 0.01 * f64::from(i);
@@ -40,7 +45,7 @@ fn fit(empty_rows: bool) -> Done {
             writeln!(pressure, "{t:?},").unwrap();
         }
     }
-    study_kit::run_once(STUDY, &[("flow.csv", flow), ("pressure.csv", pressure)])
+    Case::new(STUDY, &[("flow.csv", flow), ("pressure.csv", pressure)])
 }
 
 #[test]
@@ -53,4 +58,20 @@ fn rows_without_a_value_do_not_weaken_the_observer() {
     assert!(close(of_thin.innovation_rms_without, of_empty.innovation_rms_without));
     // Ten times weaker the observer would leave most of the wrong start.
     assert!(of_thin.innovation_rms_with < 0.9 * of_thin.innovation_rms_without, "{of_thin:?}");
+}
+
+#[test]
+fn a_model_that_fails_under_its_observer_at_the_estimate_is_told_in_the_summary() {
+    // The run with the observer alone covers the whole record with data in it; the free run has none.
+    let with_observer = |at: &At<'_>| {
+        let window = &at.job.window;
+        at.again && window.times.len() > 10 && window.observed.iter().any(|v| v.is_finite())
+    };
+    let mut fleet = Failing::new(with_observer);
+    let done = case(false).run_on(&mut fleet).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(fleet.failed, 1, "the comparison, and nothing of the fit");
+    assert_eq!(done.summary.observer, None);
+    let told = "the model fails under the observer `nudging` on record `beats`";
+    assert!(done.warns(told) && done.warns("made to fail"), "{:?}", done.summary.warnings);
+    assert!(!fit(false).warns(told));
 }

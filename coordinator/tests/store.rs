@@ -89,6 +89,7 @@ fn a_resumed_run_keeps_its_clock_its_counts_and_one_row_per_job() {
         watch: &mut |p| steps.push((p.pass, p.step, p.runs)),
         events: Some(&events),
         earlier_s: 0.0,
+        threads: 1,
     };
     let summary = run(&study, &mut InProcess::new(1), &mut folder, &mut context).unwrap();
     assert!((summary.wall_s - 9.5).abs() < 1e-12, "7.5 s before, 2 s now: {}", summary.wall_s);

@@ -172,6 +172,49 @@ fn a_gain_beyond_what_the_recordings_allow_is_refused_with_the_largest_one() {
 }
 
 #[test]
+fn a_gain_is_bounded_by_the_largest_time_between_observations_of_an_irregular_record() {
+    let of = truth(Twin::default());
+    let regular = columns(&of, |c| c.starts_with("displacement") || c == "flow");
+    // Without the observations at 0.60 and 0.61 s: 30 ms instead of 10 ms once, and 2/Δt = 66.67.
+    let gap = |line: &&str| !["0.6,", "0.61,"].iter().any(|time| line.starts_with(time));
+    let irregular: Vec<&str> = regular.lines().filter(gap).collect();
+    assert_eq!(irregular.len() + 2, regular.lines().count());
+    let file = [("wall.csv", irregular.join("\n"))];
+    let with = |gain: f64| format!("{TUBE}[observer]\nkind = \"image-force\"\ngain = {gain}\n");
+    assert_eq!(problems(&with(66.0), &file), []);
+    let told = problem(&with(67.0), &file);
+    assert!(told.contains("record `beats` is observed 0.0300 s apart"), "{told}");
+    assert!(told.contains("the largest stable gain is 66.6667 1/s"), "{told}");
+}
+
+#[test]
+fn a_component_column_of_a_misspelt_index_is_refused_and_an_empty_one_is_told() {
+    let text = blank(161, 0.01, 6);
+    let misspelt = [("wall.csv", text.replacen("displacement[1]", "displacement[01]", 1))];
+    assert_eq!(
+        problem(TUBE, &misspelt),
+        "study.toml:19: `wall.csv` has a column `displacement[01]`, which is no component of output `displacement`; \
+         components are counted from 0: `displacement[0]` to `displacement[5]`"
+    );
+    // The last column without its zeros.
+    let rows: Vec<&str> = text.lines().map(|line| line.strip_suffix("0.0").unwrap_or(line)).collect();
+    let study = Case::new(TUBE, &[("wall.csv", rows.join("\n"))]).study();
+    let told = "record `beats` has no value in `displacement[5]`: 5 of 6 columns are observed";
+    assert_eq!(study.warnings.iter().filter(|w| w.as_str() == told).count(), 1, "{:?}", study.warnings);
+    assert_eq!(study.setup.outputs.len(), 5);
+}
+
+#[test]
+fn a_number_of_a_layout_that_is_not_finite_is_refused_at_its_line() {
+    let file = [("wall.csv", blank(161, 0.01, 6))];
+    for value in ["inf", "-inf", "nan"] {
+        let told = problem(&TUBE.replace("cells = 6", &format!("step = {value}\ncells = 6")), &file);
+        assert!(told.starts_with("study.toml:7: "), "{told}");
+        assert!(told.contains("`step` in the layout") && told.contains("a finite number"), "{told}");
+    }
+}
+
+#[test]
 fn an_observer_may_not_rest_on_a_held_out_channel() {
     let of = truth(Twin::default());
     let file = [("wall.csv", columns(&of, |_| true))];

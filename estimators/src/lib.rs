@@ -18,15 +18,18 @@ mod gaussian;
 mod gram;
 mod identifiability;
 mod information;
+mod least_squares;
 mod linearisation;
 mod particles;
 mod recombine;
 mod roukf;
+mod score;
 mod sigma_set;
 mod smoother;
 mod stored;
 mod transform;
 mod whiten;
+mod whiteness;
 
 pub use analysis::Analysis;
 pub use batch::{Batch, BatchState, BatchStep};
@@ -41,10 +44,13 @@ pub use gaussian::Gaussian;
 pub use identifiability::{
     Collinearity, Direction, Fisher, Sensitivities, Subset, sigma_point_sensitivities, weak_directions,
 };
+pub use least_squares::{End, LeastSquares, Need, Scaled};
 pub use linearisation::Linearisation;
 pub use particles::Particles;
 pub use recombine::recombine;
 pub use roukf::{Resampled, Root, Roukf};
+pub use score::{Optimum, Score, null_maxima};
 pub use sigma_set::{Points, SigmaSet};
 pub use smoother::smooth;
 pub use transform::Transform;
+pub use whiteness::ljung_box;

@@ -7,7 +7,7 @@ use std::collections::HashSet;
 
 use crate::equations::EquationsModel;
 use crate::setup::{ModelDef, SetupError};
-use crate::{Model, Spec, equations, native, nearest};
+use crate::{Model, Spec, equations, layout, native, nearest};
 
 pub use crate::equations::KIND as EQUATIONS;
 
@@ -37,6 +37,7 @@ pub fn specs() -> Vec<Spec> {
 pub fn build(def: &ModelDef) -> Result<Box<dyn Model>, SetupError> {
     match (&def.equations, def.kind == EQUATIONS) {
         (Some(equations), true) => {
+            layout::none(def)?;
             return Ok(Box::new(EquationsModel::with_constants(equations, &def.constants)?));
         }
         (None, true) => {

@@ -1,13 +1,14 @@
 //! An effect: a named, removable piece of physics that is added to a running model.
 //!
-//! At amplitude zero it is absent. It may enter several equations, outputs and inputs at once, carry several parameters and
-//! bring states of its own. Nothing here decides which effect a recording needs. Next file to read: [`def`] for what a study
+//! At amplitude zero it is absent. It may enter several equations, outputs, inputs and parameters of the model at once, carry
+//! several parameters and bring states of its own. Nothing here decides which effect a recording needs. Next file to read: [`def`] for what a study
 //! says, [`scope`] for what its terms may name, [`terms`] for how it is evaluated, [`extended`] for the model with its
 //! effects, [`mod@library`] for the built-in list.
 
 pub mod def;
 pub mod extended;
 pub mod library;
+pub mod scale;
 pub mod scope;
 mod scratch;
 pub mod terms;
@@ -17,7 +18,8 @@ use crate::Drive;
 pub use def::{Addition, EffectDef, EffectParameter, EffectState};
 pub use extended::Extended;
 pub use library::library;
-pub(crate) use scope::names;
+pub use scale::Scale;
+pub use scope::names;
 pub use terms::TermEffect;
 
 /// One time of an extended model. Slices follow the extended specification; `y` holds the inner model's outputs without any
@@ -46,6 +48,10 @@ pub struct Touches {
     pub outputs: bool,
     /// It adds to an input.
     pub inputs: bool,
+    /// It adds to a parameter of the model.
+    pub parameters: bool,
+    /// A term that adds to a parameter uses more than parameters and constants, so that the parameter changes during a run.
+    pub parameters_vary: bool,
     /// One of its terms reads an output.
     pub reads_outputs: bool,
     /// A term that adds to an input reads a state.
@@ -60,6 +66,8 @@ impl Touches {
             rates: self.rates || other.rates,
             outputs: self.outputs || other.outputs,
             inputs: self.inputs || other.inputs,
+            parameters: self.parameters || other.parameters,
+            parameters_vary: self.parameters_vary || other.parameters_vary,
             reads_outputs: self.reads_outputs || other.reads_outputs,
             inputs_follow_states: self.inputs_follow_states || other.inputs_follow_states,
         }
@@ -81,13 +89,16 @@ pub trait Effect: Send + Sync {
     /// or empty where it does not matter.
     fn add_to_inputs(&self, at: Moment<'_>, rate: &[f64], value: &mut [f64], slope: &mut [f64]);
 
+    /// Adds to the parameters of the model as it sees them at this time.
+    fn add_to_parameters(&self, at: Moment<'_>, theta: &mut [f64]);
+
     /// Adds to the rates of the extended state.
     fn add_to_rates(&self, at: Moment<'_>, dx: &mut [f64]);
 
     /// Adds to the outputs.
     fn add_to_outputs(&self, at: Moment<'_>, y: &mut [f64]);
 
-    /// Number of switching functions in what it adds to rates and inputs.
+    /// Number of switching functions in what it adds to rates, inputs and parameters.
     fn n_switch(&self) -> usize;
 
     /// Writes its switching functions, as [`crate::Model::switches`].

@@ -32,7 +32,7 @@ pub mod surface;
 pub mod units;
 
 pub use blocks::Blocks;
-pub use effect::{Effect, EffectDef};
+pub use effect::{Addition, Effect, EffectDef, EffectParameter, EffectState};
 pub use job::{Forward, Job, ParticleError, Prediction, Signal, Window};
 pub use memory::Memory;
 pub use model::{Drive, Model};

@@ -43,7 +43,8 @@ pub struct Setup {
     pub model: ModelDef,
     /// Names of the values in [`crate::Job::theta`]: model parameters, effect parameters, or `initial:<state>`.
     pub parameters: Vec<String>,
-    /// Names of the predicted outputs, the rows of [`crate::Prediction::outputs`].
+    /// Names of the predicted outputs, the rows of [`crate::Prediction::outputs`]. A name that no output has may be a scalar
+    /// state's: it is recorded as it is at each time, before any correction, and no observer takes it for measured.
     pub outputs: Vec<String>,
     /// The observer.
     pub observer: ObserverDef,

@@ -21,8 +21,17 @@ pub struct Simulator {
     spec: Spec,
     observer: Box<dyn Observer>,
     binding: Binding,
-    /// For each predicted row, the output component behind it.
-    rows: Vec<usize>,
+    /// What stands in each predicted row.
+    rows: Vec<Row>,
+}
+
+/// What is recorded in one row of a prediction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Row {
+    /// A component of the outputs.
+    Output(usize),
+    /// A component of the state, as it is before any correction at that time.
+    State(usize),
 }
 
 impl Simulator {
@@ -33,7 +42,7 @@ impl Simulator {
     pub fn new(setup: &Setup) -> Result<Self, SetupError> {
         let model = setup.model()?;
         let spec = with_memories(model.spec(), model.memories());
-        let rows = rows(&spec, &setup.outputs)?;
+        let rows = rows(model.spec(), &setup.outputs)?;
         let binding = Binding::new(setup, &spec, &free_names(setup, &spec)?)?;
         let wiring =
             Wiring { spec: &spec, outputs: &setup.outputs, model: &*model, theta: binding.constants() };
@@ -143,7 +152,10 @@ impl Forward for Simulator {
             let drive = Drive { history: &past, ..inputs.drive(t) };
             self.model.output(t, &x, &theta, drive, &mut y);
             self.check_finite(t, drive.value, &x, &y)?;
-            outputs.extend(self.rows.iter().map(|&row| y[row]));
+            outputs.extend(self.rows.iter().map(|&row| match row {
+                Row::Output(i) => y[i],
+                Row::State(i) => x[i],
+            }));
             let dt = t - previous;
             if dt > 0.0 {
                 let column = j * n_obs..(j + 1) * n_obs;
@@ -185,21 +197,25 @@ pub(crate) fn free_names(setup: &Setup, spec: &Spec) -> Result<Vec<String>, Setu
     Ok(effect::names(&setup.effects)?.into_iter().filter(|name| !taken(name)).collect())
 }
 
-/// The output components behind the named outputs, in their order.
-fn rows(spec: &Spec, outputs: &[String]) -> Result<Vec<usize>, SetupError> {
+/// What the named outputs record, in their order; a scalar state where no output has that name.
+fn rows(spec: &Spec, outputs: &[String]) -> Result<Vec<Row>, SetupError> {
     let mut rows = Vec::new();
     for (i, name) in outputs.iter().enumerate() {
         if outputs[..i].contains(name) {
             return Err(SetupError::Twice(name.clone()));
         }
-        let Some(range) = Spec::range_of(&spec.outputs, name) else {
+        if let Some(range) = Spec::range_of(&spec.outputs, name) {
+            rows.extend(range.map(Row::Output));
+        } else if let Some(at) = spec.scalar_state(name) {
+            rows.push(Row::State(at));
+        } else {
+            let scalars = spec.states.iter().filter(|q| q.size == 1);
             return Err(SetupError::Unknown {
-                what: "output",
+                what: "output or scalar state",
                 name: name.clone(),
-                nearest: nearest(name, spec.outputs.iter().map(|q| &q.name)),
+                nearest: nearest(name, spec.outputs.iter().chain(scalars).map(|q| &q.name)),
             });
-        };
-        rows.extend(range);
+        }
     }
     Ok(rows)
 }
@@ -215,8 +231,11 @@ mod tests {
         let list = vec![Quantity::new("p", ""), field, Quantity::new("q", "")];
         let spec = Spec { outputs: list.clone(), ..crate::catalogue::specs().remove(0) };
         let names = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
-        assert_eq!(rows(&spec, &names(&["q", "wall"])).expect("known outputs"), [4, 1, 2, 3]);
-        assert_eq!(rows(&spec, &names(&["wall[2]", "p"])).expect("known outputs"), [3, 0]);
+        assert_eq!(
+            rows(&spec, &names(&["q", "wall"])).expect("known outputs"),
+            [4, 1, 2, 3].map(Row::Output)
+        );
+        assert_eq!(rows(&spec, &names(&["wall[2]", "p"])).expect("known outputs"), [3, 0].map(Row::Output));
         assert!(rows(&spec, &names(&["wall[3]"])).is_err(), "beyond the field");
         assert_eq!(Spec::component(&list, 3), "wall[2]");
         assert_eq!(Spec::component(&list, 4), "q");

@@ -36,6 +36,16 @@ pub enum Role {
     Damping,
     /// A shift in time by which an input is read earlier or later than now.
     Shift,
+    /// The area of a nozzle's throat.
+    ThroatArea,
+    /// A coefficient to which the burning rate of a propellant is proportional.
+    BurnRate,
+    /// A factor or coefficient to which the burning surface of a propellant is proportional.
+    BurnArea,
+    /// The distance burnt into a propellant.
+    Web,
+    /// The thrust of a nozzle.
+    Thrust,
     /// Anything else.
     #[default]
     Other,
@@ -184,6 +194,11 @@ impl Spec {
             let at = field.start + index.parse::<usize>().ok()?;
             (at < field.end).then_some(at..at + 1)
         })
+    }
+
+    /// Position of a scalar state, or of one component of a field of states: what a run can record under that name.
+    pub fn scalar_state(&self, name: &str) -> Option<usize> {
+        Self::range_of(&self.states, name).filter(|range| range.len() == 1).map(|range| range.start)
     }
 
     /// Name of component `at` of the concatenation of `list`, with its index in a field; empty beyond the end.

@@ -3,7 +3,8 @@
 mod common;
 
 use common::setup;
-use starlings_models::{Setup, SetupError};
+use starlings_models::equations::{EquationsDef, StateDef};
+use starlings_models::{ModelDef, Setup, SetupError};
 
 fn refused(change: impl FnOnce(&mut Setup)) -> SetupError {
     let (mut setup, _) = setup("windkessel-3");
@@ -117,8 +118,22 @@ fn a_negative_gain_is_refused() {
 fn equations_are_given_exactly_when_the_kind_says_so() {
     let error = refused(|s| s.model.kind = "equations".to_owned());
     assert!(error.to_string().contains("needs its states"), "{error}");
-    let error = refused(|s| s.model.equations = Some(starlings_models::equations::EquationsDef::default()));
+    let error = refused(|s| s.model.equations = Some(EquationsDef::default()));
     assert!(error.to_string().contains("has its own equations"), "{error}");
+}
+
+#[test]
+fn equations_have_no_layout() {
+    let rate = vec![("x".to_owned(), "-x".to_owned())];
+    let state = StateDef { name: "x".to_owned(), initial: "1".to_owned(), rate, ..StateDef::default() };
+    let equations = EquationsDef { states: vec![state], ..EquationsDef::default() };
+    let mut model =
+        ModelDef { kind: "equations".to_owned(), equations: Some(equations), ..ModelDef::default() };
+    let build = |model: &ModelDef| Setup { model: model.clone(), ..Setup::default() }.model().map(|_| ());
+    assert_eq!(build(&model), Ok(()));
+    model.layout = Some(serde_json::json!({ "cells": 3 }));
+    let error = build(&model).expect_err("a layout");
+    assert!(error.to_string().contains("model `equations` has no layout"), "{error}");
 }
 
 #[test]

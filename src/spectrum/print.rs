@@ -13,8 +13,8 @@ pub(super) const ROWS: usize = 8;
 
 /// The result, machine-readable; a slope that does not exist is null.
 pub(super) fn as_json(found: &Found<'_>) -> Value {
-    let poles = &found.laboratory.poles()[..found.listed];
-    let observers = found.observers.iter().map(|o| {
+    let poles = &found.spectrum.laboratory.poles()[..found.spectrum.listed];
+    let observers = found.spectrum.observers.iter().map(|o| {
         json!({
             "name": o.name,
             "note": o.note.map(|note| format!("poles {note}")),
@@ -32,11 +32,11 @@ pub(super) fn as_json(found: &Found<'_>) -> Value {
         "model": found.study.setup.model.kind,
         "time_unit": found.study.time_unit,
         "observed": found.study.setup.outputs,
-        "n_poles": found.laboratory.poles().len(),
+        "n_poles": found.spectrum.laboratory.poles().len(),
         "poles": poles.iter().map(|p| [p.re, p.im]).collect::<Vec<_>>(),
-        "wanted_max_re": found.decay.map(starlings_models::spectrum::Decay::max_re),
+        "wanted_max_re": found.spectrum.decay.map(starlings_models::spectrum::Decay::max_re),
         "observers": observers.collect::<Vec<_>>(),
-        "refused": found.refused.iter().map(|(name, why)| json!({ "name": name, "reason": why })).collect::<Vec<_>>(),
+        "refused": found.spectrum.refused.iter().map(|(name, why)| json!({ "name": name, "reason": why })).collect::<Vec<_>>(),
     })
 }
 
@@ -46,25 +46,28 @@ pub(super) fn text(found: &Found<'_>) -> Result<(), Failure> {
     let unit = format!("1/{}", study.time_unit);
     let outputs = observed_fields(&study.setup.outputs).join(", ");
     line(format_args!("{}: model {}, observed {outputs}", study.name, study.setup.model.kind))?;
-    line(format_args!("\n{} poles; the slowest [{unit}], and Re ∂λ/∂γ", found.laboratory.poles().len()))?;
+    line(format_args!(
+        "\n{} poles; the slowest [{unit}], and Re ∂λ/∂γ",
+        found.spectrum.laboratory.poles().len()
+    ))?;
     print_text(table(&slopes(found), true))?;
-    if let Some(error) = disagreement(&found.observers) {
+    if let Some(error) = disagreement(&found.spectrum.observers) {
         line(format_args!("  from eigenvectors; differences of the poles agree to {error:.0e}"))?;
     }
     line(format_args!("\nmax Re λ [{unit}] against the gain [{unit}]"))?;
     print_text(table(&rates(found), true))?;
-    let wanted = found.decay.map_or(String::new(), |d| {
+    let wanted = found.spectrum.decay.map_or(String::new(), |d| {
         format!(", and the gain for a decay by {} in {} {}", d.factor(), d.time(), study.time_unit)
     });
     line(format_args!("\nbest gain{wanted}"))?;
     print_text(table(&bests(found), true))?;
-    for (o, note) in found.observers.iter().filter_map(|o| Some((o, o.note?))) {
+    for (o, note) in found.spectrum.observers.iter().filter_map(|o| Some((o, o.note?))) {
         line(format_args!("  {}: poles {note}", o.name))?;
     }
-    if !found.refused.is_empty() {
+    if !found.spectrum.refused.is_empty() {
         line("\nnot possible here")?;
     }
-    refusals(&found.refused)
+    refusals(&found.spectrum.refused)
         .iter()
         .try_for_each(|(names, why)| line(format_args!("  {}: {why}", names.join(", "))))
 }
@@ -85,7 +88,7 @@ fn refusals(refused: &[(String, String)]) -> Vec<(Vec<&str>, String)> {
 /// A pole and its slope under every observer; of a conjugate pair the upper one.
 fn slopes(found: &Found<'_>) -> Vec<Vec<String>> {
     let mut rows = vec![heading("pole", found)];
-    let poles = found.laboratory.poles()[..found.listed].iter().enumerate();
+    let poles = found.spectrum.laboratory.poles()[..found.spectrum.listed].iter().enumerate();
     for (i, pole) in poles.filter(|(_, pole)| pole.im >= 0.0).take(found.rows) {
         let scale = pole.norm();
         let real = round_off(pole.re, scale);
@@ -95,7 +98,7 @@ fn slopes(found: &Found<'_>) -> Vec<Vec<String>> {
             o.slopes[i].analytic.map_or("none".to_owned(), |slope| number(round_off(slope.re, 1.0), None))
         };
         let mut row = vec![format!("{}{imaginary}", number(real, None))];
-        row.extend(found.observers.iter().map(slope));
+        row.extend(found.spectrum.observers.iter().map(slope));
         rows.push(row);
     }
     rows
@@ -103,28 +106,34 @@ fn slopes(found: &Found<'_>) -> Vec<Vec<String>> {
 
 fn rates(found: &Found<'_>) -> Vec<Vec<String>> {
     let mut rows = vec![heading("gain", found)];
-    let Some(first) = found.observers.first() else { return rows };
-    let scale = found.laboratory.poles().iter().map(|pole| pole.norm()).fold(0.0, f64::max);
+    let Some(first) = found.spectrum.observers.first() else { return rows };
+    let scale = found.spectrum.laboratory.poles().iter().map(|pole| pole.norm()).fold(0.0, f64::max);
     for (k, gain) in first.gain.iter().enumerate() {
         let rate = |o: &ObserverSpectrum| number(round_off(o.max_re[k], scale), None);
-        rows.push(std::iter::once(number(*gain, None)).chain(found.observers.iter().map(rate)).collect());
+        rows.push(
+            std::iter::once(number(*gain, None)).chain(found.spectrum.observers.iter().map(rate)).collect(),
+        );
     }
     rows
 }
 
 fn bests(found: &Found<'_>) -> Vec<Vec<String>> {
     let titles = ["observer", "max Re λ", "at gain", "more gain", "gain for decay"];
-    let mut rows =
-        vec![titles[..if found.decay.is_some() { 5 } else { 4 }].iter().map(|t| (*t).to_owned()).collect()];
-    let scale = found.laboratory.poles().iter().map(|pole| pole.norm()).fold(0.0, f64::max);
-    for o in &found.observers {
+    let mut rows = vec![
+        titles[..if found.spectrum.decay.is_some() { 5 } else { 4 }]
+            .iter()
+            .map(|t| (*t).to_owned())
+            .collect(),
+    ];
+    let scale = found.spectrum.laboratory.poles().iter().map(|pole| pole.norm()).fold(0.0, f64::max);
+    for o in &found.spectrum.observers {
         let mut row = vec![
             o.name.clone(),
             number(round_off(o.best.max_re, scale), None),
             number(o.best.gain, None),
             beyond(o.best.beyond).to_owned(),
         ];
-        if found.decay.is_some() {
+        if found.spectrum.decay.is_some() {
             row.push(o.gain_for_decay.map_or("never".to_owned(), |gain| number(gain, None)));
         }
         rows.push(row);
@@ -133,7 +142,7 @@ fn bests(found: &Found<'_>) -> Vec<Vec<String>> {
 }
 
 fn heading(first: &str, found: &Found<'_>) -> Vec<String> {
-    std::iter::once(first.to_owned()).chain(found.observers.iter().map(|o| o.name.clone())).collect()
+    std::iter::once(first.to_owned()).chain(found.spectrum.observers.iter().map(|o| o.name.clone())).collect()
 }
 
 /// What more than the best gain does, in a word.

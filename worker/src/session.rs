@@ -98,23 +98,16 @@ fn take(
     match ToWorker::decode(message) {
         Ok(ToWorker::Job { lease, setup, job }) => match setups.get(&setup) {
             Some(forward) => slots.push(Task { lease, forward, job, outbox: outbox.clone() }),
-            None => refuse(outbox, lease, "its setup was not sent to this worker".to_owned()),
+            None => {
+                // First the setup, so that the job that comes back finds it missing here.
+                send(outbox, FromWorker::Setup { id: setup, result: Err("it is forgotten".to_owned()) });
+                answer(outbox, lease, Answer::Withdrawn, 0.0);
+            }
         },
         Err(WireError::Job { lease, source }) => refuse(outbox, lease, source.to_string()),
         Ok(ToWorker::Setup { id, setup }) => {
-            let (setups, outbox) = (setups.clone(), outbox.clone());
-            let failed = outbox.clone();
-            // A thread of its own: building may take long, and the slots may be busy.
-            let build = move || {
-                let result = if setups.get(&id).is_some() { Ok(()) } else { setups.build(id, setup) };
-                send(&outbox, FromWorker::Setup { id, result });
-            };
-            if let Err(error) = std::thread::Builder::new().name("setup".to_owned()).spawn(build) {
-                send(
-                    &failed,
-                    FromWorker::Setup { id, result: Err(format!("no thread to build it: {error}")) },
-                );
-            }
+            let outbox = outbox.clone();
+            setups.order(id, setup, Box::new(move |result| send(&outbox, FromWorker::Setup { id, result })));
         }
         Ok(ToWorker::Cancel(leases)) => slots.withdraw(&leases),
         Ok(ToWorker::Drain(reason)) => return Err(Ended::Drained(reason)),

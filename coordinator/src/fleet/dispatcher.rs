@@ -6,12 +6,16 @@
 //! an idle one. A lost worker's leases go back to the queue; the jobs it was running count an attempt. A model's failure is
 //! tried once more on another worker, unless it could only fail again. The order of outcomes is the order of jobs, whatever happened.
 //!
+//! The jobs of a batch may need different setups: all of them are sent at once, and a job goes only to a worker that has built
+//! its own, while others are still being built. A worker that forgets a setup is sent it again.
+//!
 //! Not here: what a job contains, the wire, other parameters for a failed particle. Next files to read: [`message`] for
 //! events and commands, [`roster`] for workers, [`batch`] for jobs, `hand_out` for what follows from any event.
 
 pub mod batch;
 mod hand_out;
 pub mod message;
+mod queue;
 pub mod roster;
 mod run_times;
 #[cfg(test)]
@@ -49,7 +53,7 @@ pub struct Dispatcher {
     workers: BTreeMap<WorkerId, Worker>,
     batch: Option<Batch>,
     next_job: u64,
-    last_setup: Option<SetupId>,
+    last_setups: Vec<SetupId>,
     last_tick: Option<Duration>,
     starved: Option<Starved>,
     overdue: Option<Overdue>,
@@ -66,7 +70,7 @@ impl Dispatcher {
             workers: BTreeMap::new(),
             batch: None,
             next_job: 1,
-            last_setup: None,
+            last_setups: Vec::new(),
             last_tick: None,
             starved: None,
             overdue: None,
@@ -101,7 +105,7 @@ impl Dispatcher {
             Event::SetupFailed { worker, setup, reason } => {
                 self.setup_answered(now, worker, setup, SetupState::Failed(reason));
             }
-            Event::Submit { setup, jobs } => self.submit(now, setup, jobs),
+            Event::Submit { jobs } => self.submit(now, jobs),
             Event::Answered { worker, lease, answer, cost } => {
                 self.answered(now, worker, lease, answer, cost);
             }
@@ -122,8 +126,9 @@ impl Dispatcher {
         let mut worker = Worker::new(joining, now);
         self.out.push(Command::Notice(joining.notice()));
         if let Some(batch) = &self.batch {
-            worker.setups.insert(batch.setup, SetupState::Pending { since: now });
-            self.out.push(Command::SendSetup { worker: worker.id, setup: batch.setup });
+            for &setup in batch.open_setups().filter(|setup| worker.wants(**setup, now)) {
+                self.out.push(Command::SendSetup { worker: joining.id, setup });
+            }
         }
         self.workers.insert(worker.id, worker);
     }
@@ -161,29 +166,39 @@ impl Dispatcher {
     fn setup_answered(&mut self, now: Duration, id: WorkerId, setup: SetupId, state: SetupState) {
         let Some(worker) = self.workers.get_mut(&id) else { return };
         worker.last_heard = now;
+        let needed = self.batch.as_ref().is_some_and(|batch| batch.needs(&setup));
         if let SetupState::Failed(reason) = &state {
+            if worker.is_ready(&setup) {
+                // It had built it: its cache was full.
+                worker.setups.remove(&setup);
+                if needed && worker.wants(setup, now) {
+                    self.out.push(Command::SendSetup { worker: id, setup });
+                }
+                return;
+            }
             let notice = FleetEvent::SetupFailed { worker: worker.name.clone(), reason: reason.clone() };
             self.out.push(Command::Notice(notice));
         }
-        worker.setups.insert(setup, state);
+        worker.setup_answered(setup, state, now);
     }
 
-    fn submit(&mut self, now: Duration, setup: SetupId, jobs: Vec<JobName>) {
+    fn submit(&mut self, now: Duration, jobs: Vec<(SetupId, JobName)>) {
         self.abort(BatchError::Cancelled);
-        if self.last_setup != Some(setup) {
+        let n = jobs.len() as u64;
+        let batch = Batch::new(self.next_job, jobs);
+        if !batch.shares(&self.last_setups) {
             self.workers.values_mut().for_each(Worker::forget_cost);
             self.run_times = RunTimes::default();
-            self.last_setup = Some(setup);
         }
+        self.last_setups = batch.setups().to_vec();
         for worker in self.workers.values_mut() {
-            // A setup that failed is tried again: what was missing on that host may be there now.
-            if !matches!(worker.setups.get(&setup), Some(SetupState::Ready | SetupState::Pending { .. })) {
-                worker.setups.insert(setup, SetupState::Pending { since: now });
-                self.out.push(Command::SendSetup { worker: worker.id, setup });
+            for &setup in batch.setups() {
+                if worker.wants(setup, now) {
+                    self.out.push(Command::SendSetup { worker: worker.id, setup });
+                }
             }
         }
-        let n = jobs.len() as u64;
-        self.batch = Some(Batch::new(setup, self.next_job, jobs));
+        self.batch = Some(batch);
         self.next_job += n;
     }
 
@@ -213,8 +228,8 @@ impl Dispatcher {
     fn model_failed(&mut self, id: WorkerId, index: usize, error: ParticleError) {
         let Some(batch) = &mut self.batch else { return };
         let name = self.workers.get(&id).map_or("", |w| w.name.as_str());
-        let setup = batch.setup;
-        let other = self.workers.values().any(|w| w.id != id && w.may_run(&setup));
+        let setup = batch.setup_of(index);
+        let other = self.workers.values().any(|w| w.id != id && w.may_run(setup));
         // A job that does not fit the model fits it nowhere.
         let repeatable = matches!(error, ParticleError::BadJob(_));
         if other && !repeatable && batch.may_retry(index) {

@@ -201,15 +201,15 @@ impl Fleet for GrpcFleet {
         Ok(id)
     }
 
-    fn run(&mut self, setup: SetupId, jobs: Vec<Job>) -> Result<Vec<Outcome>, FleetError> {
-        for job in &jobs {
+    fn run_mixed(&mut self, jobs: Vec<(SetupId, Job)>) -> Result<Vec<Outcome>, FleetError> {
+        for (_, job) in &jobs {
             check_size(job).map_err(FleetError::TooLarge)?;
         }
-        if !self.hub.knows(&setup) {
+        if !self.hub.knows(jobs.iter().map(|(setup, _)| setup)) {
             return Err(FleetError::UnknownSetup);
         }
         let (reply, replies) = mpsc::channel();
-        let sent = self.batches.send(Submission { setup, jobs, reply });
+        let sent = self.batches.send(Submission { jobs, reply });
         sent.map_err(|_| FleetError::Stopped(self.hub.why_stopped()))?;
         self.wait(&replies)
     }

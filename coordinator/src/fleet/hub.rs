@@ -13,6 +13,7 @@ use std::sync::mpsc::Sender;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use starlings_models::Job;
 use starlings_proto::{Bytes, Hello, PROTOCOL, SetupId, ToWorker, Welcome, wire};
 use tokio::sync::{Notify, mpsc::UnboundedSender};
 use tonic::Status;
@@ -97,8 +98,9 @@ impl Hub {
         self.lock().setups.insert(id, json);
     }
 
-    pub(super) fn knows(&self, setup: &SetupId) -> bool {
-        self.lock().setups.contains_key(setup)
+    pub(super) fn knows<'a>(&self, mut setups: impl Iterator<Item = &'a SetupId>) -> bool {
+        let state = self.lock();
+        setups.all(|setup| state.setups.contains_key(setup))
     }
 
     /// Starts a batch.
@@ -109,11 +111,11 @@ impl Hub {
             let _ = batch.reply.send(Err(BatchError::LocalWorkers(reason)));
             return;
         }
-        let names = batch.jobs.iter().map(|j| JobName { particle: j.particle, record: j.record }).collect();
-        let setup = batch.setup;
+        let name = |job: &Job| JobName { particle: job.particle, record: job.record };
+        let jobs = batch.jobs.iter().map(|(setup, job)| (*setup, name(job))).collect();
         state.handle(now, Event::Abort(BatchError::Cancelled));
         state.running = Some(batch);
-        state.handle(now, Event::Submit { setup, jobs: names });
+        state.handle(now, Event::Submit { jobs });
     }
 
     /// Takes a worker or says why not. The first message on its link is the welcome.

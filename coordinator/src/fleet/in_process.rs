@@ -45,17 +45,18 @@ impl Fleet for InProcess {
         Ok(id)
     }
 
-    fn run(&mut self, setup: SetupId, jobs: Vec<Job>) -> Result<Vec<Outcome>, FleetError> {
-        let forward = self.forwards.get(&setup).ok_or(FleetError::UnknownSetup)?.as_ref();
+    fn run_mixed(&mut self, jobs: Vec<(SetupId, Job)>) -> Result<Vec<Outcome>, FleetError> {
+        let found = jobs.iter().map(|(setup, job)| self.forwards.get(setup).map(|forward| (&**forward, job)));
+        let tasks = found.collect::<Option<Vec<_>>>().ok_or(FleetError::UnknownSetup)?;
         let next = AtomicUsize::new(0);
-        let outcomes = Mutex::new(Vec::with_capacity(jobs.len()));
+        let outcomes = Mutex::new(Vec::with_capacity(tasks.len()));
         std::thread::scope(|scope| {
-            for thread in 0..self.threads.min(jobs.len()) {
-                let (jobs, next, outcomes, cancel) = (&jobs, &next, &outcomes, &self.cancel);
+            for thread in 0..self.threads.min(tasks.len()) {
+                let (tasks, next, outcomes, cancel) = (&tasks, &next, &outcomes, &self.cancel);
                 scope.spawn(move || {
                     while !cancel.is_cancelled() {
                         let index = next.fetch_add(1, Ordering::Relaxed);
-                        let Some(job) = jobs.get(index) else { break };
+                        let Some(&(forward, job)) = tasks.get(index) else { break };
                         let outcome = run_one(forward, job, thread);
                         outcomes.lock().unwrap_or_else(PoisonError::into_inner).push((index, outcome));
                     }

@@ -57,7 +57,7 @@ pub fn write_page(folder: &RunFolder) -> Result<(), FilesError> {
     place(folder, "report.html", &page)
 }
 
-fn place(folder: &RunFolder, name: &str, text: &str) -> Result<(), FilesError> {
+pub(super) fn place(folder: &RunFolder, name: &str, text: &str) -> Result<(), FilesError> {
     let path = folder.path.join(name);
     write(&path, text).map_err(|source| FilesError::File { path, source })
 }

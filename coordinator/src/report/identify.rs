@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::data::ParameterRow;
 use super::plot::figure::Figure;
 use super::plot::interval;
-use super::{ReportError, number};
+use super::{ReportError, layout, number};
 use crate::study::identify::Identification;
 use crate::study::identify::result::{ParameterInfo, SubsetInfo};
 
@@ -20,7 +20,6 @@ const SUBSETS: usize = 12;
 /// The page, ready to be arranged.
 #[derive(Debug, Serialize)]
 struct Page<'a> {
-    css: &'static str,
     found: &'a Identification,
     facts: Vec<(&'static str, String)>,
     parameters: Vec<ParameterView>,
@@ -59,18 +58,13 @@ struct Cell {
 ///
 /// [`ReportError`] when a figure or the page cannot be made.
 pub fn identify_page(found: &Identification) -> Result<String, ReportError> {
-    let mut environment = minijinja::Environment::new();
-    environment.set_undefined_behavior(minijinja::UndefinedBehavior::Strict);
-    environment.add_template("identify.html", include_str!("identify.html"))?;
-    let page = Page::new(found)?;
-    Ok(environment.get_template("identify.html")?.render(minijinja::value::Serde(page))?)
+    layout::document(include_str!("identify.html"), Page::new(found)?)
 }
 
 impl<'a> Page<'a> {
     fn new(found: &'a Identification) -> Result<Self, ReportError> {
         let subsets = &found.collinearity.subsets;
         Ok(Self {
-            css: include_str!("report.css"),
             found,
             facts: facts(found),
             parameters: found.parameters.iter().map(parameter).collect::<Result<_, _>>()?,

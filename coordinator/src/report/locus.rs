@@ -10,7 +10,7 @@ mod view;
 
 use starlings_models::spectrum::{Decay, ObserverSpectrum};
 
-use super::ReportError;
+use super::{ReportError, layout};
 use nalgebra::Complex;
 
 /// What the page shows.
@@ -44,11 +44,7 @@ pub struct Locus<'a> {
 ///
 /// [`ReportError`] when a pole cannot be followed, or a figure or the page cannot be made.
 pub fn render(locus: &Locus<'_>) -> Result<String, ReportError> {
-    let mut environment = minijinja::Environment::new();
-    environment.set_undefined_behavior(minijinja::UndefinedBehavior::Strict);
-    environment.add_template("locus.html", include_str!("locus/locus.html"))?;
-    let view = view::View::new(locus)?;
-    Ok(environment.get_template("locus.html")?.render(minijinja::value::Serde(view))?)
+    layout::document(include_str!("locus/locus.html"), view::View::new(locus)?)
 }
 
 #[cfg(test)]

@@ -49,7 +49,8 @@ pub(crate) fn duration(seconds: f64) -> String {
 
 /// A part of one, in percent.
 pub(crate) fn percent(share: f64) -> String {
-    if share.is_finite() { format!("{:.0}\u{a0}%", 100.0 * share) } else { ABSENT.to_owned() }
+    let percent = 100.0 * share;
+    if percent.is_finite() { format!("{percent:.0}\u{a0}%") } else { ABSENT.to_owned() }
 }
 
 /// `value` rounded to 10^`place`; in powers of ten when plain digits would be long.

@@ -16,7 +16,6 @@ const EVENTS: usize = 60;
 /// The page, ready to be arranged.
 #[derive(Debug, Serialize)]
 pub(crate) struct Page<'a> {
-    css: &'static str,
     data: &'a ReportData,
     headline: String,
     facts: Vec<(&'static str, String)>,
@@ -82,7 +81,6 @@ impl<'a> Page<'a> {
         };
         let x_label = if data.x_label.is_empty() { "step" } else { &data.x_label };
         Ok(Self {
-            css: include_str!("report.css"),
             data,
             headline: headline::of(data),
             facts: facts(data),

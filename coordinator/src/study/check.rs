@@ -4,6 +4,7 @@
 //! to read: [`self::model`].
 
 mod blame;
+mod explain;
 mod initial;
 mod model;
 mod observer;
@@ -17,7 +18,7 @@ use std::path::Path;
 
 use self::model::CheckedModel;
 use self::parameters::initial_medians;
-use self::settings::{estimator, explain, fleet};
+use self::settings::{estimator, fleet};
 use super::checked::{Record, Study};
 use super::expand;
 use super::field::field_of;
@@ -62,7 +63,7 @@ fn check(path: &Path, text: &str) -> Result<Study, StudyError> {
     check_name(&source, &file);
     let estimator = estimator(&source, &file.estimator);
     let fleet = fleet(&source, &file.fleet);
-    let explain = explain(&source, &file);
+    let explain = explain::explain(&source, &file);
     let spectrum = spectrum::spectrum(&source, &file.spectrum);
     let observer = settings::observer(&source, &file.observer);
     let model = model::model(&source, &file);
@@ -71,12 +72,14 @@ fn check(path: &Path, text: &str) -> Result<Study, StudyError> {
         return Err(source.verdict().err().unwrap_or(StudyError { problems: vec![] }));
     };
     model.setup.observer = observer;
+    explain::check_names(&source, &file, &model.setup.model);
     let mut warnings = Vec::new();
     model::check_values(&source, &file, &model);
     let initial = initial::constants(&source, &file, &model.spec, &mut warnings);
     model.setup.model.constants.extend(initial);
     let priors = parameters::priors(&source, &file, &model, &mut warnings);
     let records = records(&source, &file, &mut model, &explain.hold_out_channels, &mut warnings);
+    explain::check_held_out(&source, &file, &records);
     source.verdict()?;
     model.setup.parameters = file.parameters.iter().map(|p| p.name.get_ref().clone()).collect();
     let parameters = initial_medians(&source, &file, &model.spec, &priors, &records);

@@ -196,6 +196,12 @@ pub struct ExplainChoice {
     pub budget: Option<u64>,
     /// Where candidates come from.
     pub library: Library,
+    /// Effects that are not to be tried.
+    pub without: Vec<String>,
+    /// Effects to try; empty for all.
+    pub only: Vec<String>,
+    /// Effects at most in one explanation; `None` for the command's own limit.
+    pub max_effects: Option<usize>,
 }
 
 /// Settings of `spectrum`.

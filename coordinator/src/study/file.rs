@@ -62,6 +62,8 @@ pub(super) struct EquationsSection {
     pub(super) outputs: Vec<QuantitySection>,
     pub(super) inputs: Vec<QuantitySection>,
     pub(super) replaceable: Vec<Spanned<String>>,
+    /// Meanings of parameters.
+    pub(super) roles: Vec<(Spanned<String>, Role)>,
     pub(super) solver: SolverSection,
 }
 
@@ -184,6 +186,7 @@ pub(super) struct SurfaceSection {
 pub(super) struct EffectSection {
     pub(super) name: Spanned<String>,
     pub(super) says: String,
+    pub(super) source: String,
     pub(super) built_in: Option<Spanned<String>>,
     /// To what, and the term.
     pub(super) adds: Named<String>,
@@ -205,8 +208,11 @@ pub(super) struct EffectParameterSection {
 #[derive(Debug, Default)]
 pub(super) struct ExplainSection {
     pub(super) hold_out_channels: Vec<Spanned<String>>,
-    pub(super) budget: Option<u64>,
+    pub(super) budget: Option<Spanned<u64>>,
     pub(super) library: Option<Spanned<String>>,
+    pub(super) without: Vec<Spanned<String>>,
+    pub(super) only: Vec<Spanned<String>>,
+    pub(super) max_effects: Option<Spanned<u64>>,
 }
 
 /// `[estimator]`.

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use starlings_estimators::Gaussian;
-use starlings_models::Window;
+use starlings_models::{ParticleError, Window};
 
 use super::fit::flight::{Flight, Place, StepWindows};
 use super::store::PredictionRow;
@@ -51,19 +51,29 @@ pub struct Comparison {
     pub courses: Vec<ObserverCourse>,
 }
 
-/// Runs the trained records once more, with the observer, and compares; nothing for a study without one. `free` is the free
-/// run at the same estimate.
+/// What came of the comparison.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Compared {
+    /// The study has no observer.
+    NoObserver,
+    /// Both runs, side by side.
+    Both(Comparison),
+    /// The run with the observer gave nothing to compare; a sentence that says why.
+    Failed(String),
+}
+
+/// Runs the trained records once more, with the observer, and compares. `free` is the free run at the same estimate.
 ///
 /// # Errors
-/// When the fleet fails. A model that fails under its observer at the estimate leaves nothing to compare.
+/// When the fleet fails. A model that fails under its observer at the estimate is no error: see [`Compared::Failed`].
 pub fn compare(
     flight: &mut Flight<'_>,
     posterior: &Gaussian,
     free: &[PredictionRow],
-) -> Result<Option<Comparison>, RunError> {
+) -> Result<Compared, RunError> {
     let study = flight.study();
     if study.observer_is_off() {
-        return Ok(None);
+        return Ok(Compared::NoObserver);
     }
     let trained = (0..study.records.len()).filter(|record| study.records[*record].is_trained());
     let windows: StepWindows = trained.map(|record| (record, Arc::new(study.whole(record, true)))).collect();
@@ -73,7 +83,10 @@ pub fn compare(
     let mut courses = Vec::new();
     let mut sums = Sums::default();
     for ((record, window), result) in windows.iter().zip(results.into_iter().flatten()) {
-        let Ok(prediction) = result else { return Ok(None) };
+        let prediction = match result {
+            Ok(prediction) => prediction,
+            Err(error) => return Ok(Compared::Failed(failed(study, *record, &error))),
+        };
         courses.push(course(study, *record, window, &prediction.outputs, free, &mut sums));
     }
     let fit = ObserverFit {
@@ -82,8 +95,27 @@ pub fn compare(
         innovation_rms_with: sums.with(),
         innovation_rms_without: sums.without(),
     };
-    let usable = fit.innovation_rms_with.is_finite() && fit.innovation_rms_without.is_finite();
-    Ok(usable.then_some(Comparison { fit, courses }))
+    if !(fit.innovation_rms_with.is_finite() && fit.innovation_rms_without.is_finite()) {
+        return Ok(Compared::Failed(endless(study)));
+    }
+    Ok(Compared::Both(Comparison { fit, courses }))
+}
+
+/// What a reader does not learn, and why.
+fn failed(study: &Study, record: usize, error: &ParticleError) -> String {
+    format!(
+        "with the estimated parameters the model fails under the observer `{}` on record `{}` ({error}): what the observer \
+         does for the state is not known. Lower its gain.",
+        study.setup.observer.kind, study.records[record].name
+    )
+}
+
+fn endless(study: &Study) -> String {
+    format!(
+        "the innovations under the observer `{}` are no finite numbers: what it does for the state is not known. Lower its \
+         gain.",
+        study.setup.observer.kind
+    )
 }
 
 /// Sums of squared whitened innovations.

@@ -14,6 +14,7 @@ use super::summary::Summary;
 use super::{EstimatorKind, Study, observer_gain, summary, warnings};
 use crate::fleet::{Fleet, FleetError, FleetEvent};
 use crate::study::fit::flight::Flight;
+use crate::study::observer_gain::Compared;
 use crate::study::store::folder::{self, OBSERVER, RunFolder};
 use crate::study::store::snapshot::{Counts, Snapshot};
 
@@ -136,6 +137,8 @@ pub struct RunContext<'a> {
     pub events: Option<&'a Receiver<FleetEvent>>,
     /// Wall time of the earlier parts of a resumed run, in s.
     pub earlier_s: f64,
+    /// Threads for the recombination of states, which happens here and not on the fleet; no result depends on them.
+    pub threads: usize,
 }
 
 impl RunContext<'_> {
@@ -178,6 +181,7 @@ pub fn run(
         if resumed.is_some() { "run resumed" } else { "run started" },
     )?;
     let mut flight = Flight::new(study, fleet)?;
+    flight.threads = context.threads.max(1);
     let fit = match study.estimator.kind {
         EstimatorKind::Roukf => filter::fit(&mut flight, &mut folder.store, context, resumed)?,
         EstimatorKind::Batch => batch::fit(&mut flight, &mut folder.store, context, resumed)?,
@@ -188,11 +192,17 @@ pub fn run(
     folder.store.predictions(&predictions, &jobs)?;
     context.keep_events(&folder.store)?;
     let mut result = summary::make(study, &fit, &predictions, flight.n_answered(), context.elapsed());
-    if let Some(observer) = observer {
-        folder.store.set_meta(OBSERVER, &folder::json(&observer.courses))?;
-        result.observer = Some(observer.fit);
+    let mut unknown = None;
+    match observer {
+        Compared::NoObserver => {}
+        Compared::Both(observer) => {
+            folder.store.set_meta(OBSERVER, &folder::json(&observer.courses))?;
+            result.observer = Some(observer.fit);
+        }
+        Compared::Failed(why) => unknown = Some(why),
     }
     result.warnings = warnings::collect(study, &fit, &result, &predictions);
+    result.warnings.extend(unknown);
     result.check_finite().map_err(RunError::NotFinite)?;
     folder.store.event(context.elapsed(), "run", "run finished")?;
     folder.finish(study, &fit, &result)?;

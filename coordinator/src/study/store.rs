@@ -6,6 +6,9 @@
 
 mod error;
 pub mod folder;
+mod folder_error;
+mod purpose;
+mod remembered;
 mod rows;
 mod schema;
 pub mod snapshot;
@@ -21,6 +24,8 @@ use schema::{SCHEMA, SCHEMA_VERSION, insert_analysis, insert_jobs, insert_predic
 use snapshot::Snapshot;
 
 pub use error::StoreError;
+pub use purpose::Purpose;
+pub use remembered::RunKey;
 pub use rows::{AnalysisRow, EstimateRow, InnovationRow, JobRow, PredictionRow};
 
 /// Analyses are committed together for at most so long, in s: a commit costs about as much as the rows of an analysis.
@@ -66,6 +71,7 @@ impl Store {
         let mut fill = || {
             let transaction = store.connection.transaction()?;
             transaction.execute_batch(SCHEMA)?;
+            transaction.execute_batch(remembered::TABLE)?;
             transaction.pragma_update(None, "user_version", SCHEMA_VERSION)?;
             for (key, value) in meta {
                 transaction.execute("INSERT INTO meta (key, value) VALUES (?1, ?2)", [key, value])?;
@@ -83,6 +89,7 @@ impl Store {
     pub fn open(path: &Path) -> Result<Self, StoreError> {
         let store = Self::existing(path, rusqlite::OpenFlags::SQLITE_OPEN_READ_WRITE)?;
         store.keep_a_log()?;
+        store.guard(store.connection.execute_batch(remembered::TABLE))?;
         Ok(store)
     }
 
@@ -133,6 +140,11 @@ impl Store {
     pub fn close_log(&self) -> Result<(), StoreError> {
         self.commit()?;
         self.guard(self.connection.pragma_update(None, "journal_mode", "DELETE"))
+    }
+
+    /// The folder that the database stands in.
+    pub fn folder(&self) -> &Path {
+        self.path.parent().unwrap_or(Path::new(""))
     }
 
     pub(super) fn guard<T>(&self, result: rusqlite::Result<T>) -> Result<T, StoreError> {

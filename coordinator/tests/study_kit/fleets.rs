@@ -20,7 +20,7 @@ impl Fleet for Shuffled {
         self.inner.install(setup)
     }
 
-    fn run(&mut self, setup: SetupId, jobs: Vec<Job>) -> Result<Vec<Outcome>, FleetError> {
+    fn run_mixed(&mut self, jobs: Vec<(SetupId, Job)>) -> Result<Vec<Outcome>, FleetError> {
         self.calls += 1;
         let n = jobs.len();
         let mut order: Vec<usize> = (0..n).collect();
@@ -28,7 +28,7 @@ impl Fleet for Shuffled {
         order.reverse();
         let permuted = order.iter().map(|i| jobs[*i].clone()).collect();
         let mut answers: Vec<(usize, Outcome)> =
-            order.into_iter().zip(self.inner.run(setup, permuted)?).collect();
+            order.into_iter().zip(self.inner.run_mixed(permuted)?).collect();
         answers.sort_by_key(|(i, _)| *i);
         Ok(answers
             .into_iter()
@@ -79,14 +79,15 @@ impl<R: FnMut(&At<'_>) -> bool> Fleet for Failing<R> {
         self.inner.install(setup)
     }
 
-    fn run(&mut self, setup: SetupId, jobs: Vec<Job>) -> Result<Vec<Outcome>, FleetError> {
-        let again = jobs.iter().all(|j| j.particle == jobs[0].particle);
+    fn run_mixed(&mut self, jobs: Vec<(SetupId, Job)>) -> Result<Vec<Outcome>, FleetError> {
+        let again = jobs.iter().all(|(_, job)| job.particle == jobs[0].1.particle);
         if !again {
             self.ensembles += 1;
         }
         let ensemble = self.ensembles.saturating_sub(1);
-        let fails: Vec<bool> = jobs.iter().map(|job| (self.rule)(&At { job, ensemble, again })).collect();
-        let mut outcomes = self.inner.run(setup, jobs)?;
+        let fails: Vec<bool> =
+            jobs.iter().map(|(_, job)| (self.rule)(&At { job, ensemble, again })).collect();
+        let mut outcomes = self.inner.run_mixed(jobs)?;
         for (outcome, fails) in outcomes.iter_mut().zip(fails) {
             if fails {
                 outcome.result = Err(ParticleError::Solver("made to fail".to_owned()));
@@ -125,13 +126,13 @@ impl Fleet for Mortal {
         self.inner.install(setup)
     }
 
-    fn run(&mut self, setup: SetupId, jobs: Vec<Job>) -> Result<Vec<Outcome>, FleetError> {
+    fn run_mixed(&mut self, jobs: Vec<(SetupId, Job)>) -> Result<Vec<Outcome>, FleetError> {
         if self.left == 0 {
             return Err(FleetError::Cancelled);
         }
         self.left -= 1;
         self.answered += 1;
-        self.inner.run(setup, jobs)
+        self.inner.run_mixed(jobs)
     }
 
     fn n_workers(&self) -> usize {

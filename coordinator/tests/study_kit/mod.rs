@@ -60,7 +60,8 @@ impl Case {
         } else {
             RunFolder::create(path, &study, "test", "today").unwrap()
         };
-        let mut context = RunContext { clock: &|| 0.0, watch: &mut |_| {}, events: None, earlier_s: 0.0 };
+        let mut context =
+            RunContext { clock: &|| 0.0, watch: &mut |_| {}, events: None, earlier_s: 0.0, threads: 2 };
         let summary = run(&study, fleet, &mut folder, &mut context)?;
         let csv = folder.store.meta("posterior").unwrap().unwrap();
         Ok(Done { summary, csv, folder })

@@ -4,6 +4,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::Scale;
+
 /// An effect as data: written out in a study, or the name of a built-in one.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
@@ -20,6 +22,8 @@ pub struct EffectDef {
     pub states: Vec<EffectState>,
     /// Names of effects or parameters that can look the same in data.
     pub confounders: Vec<String>,
+    /// Where the form of the terms comes from: author, year, place; empty when nobody said.
+    pub source: String,
     /// Name of the built-in effect that stands for everything above except `name`; see [`mod@super::library`].
     pub built_in: Option<String>,
 }
@@ -27,12 +31,22 @@ pub struct EffectDef {
 /// One term of an effect.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Addition {
-    /// A state (the term adds to its rate), an output or an input (the term adds to its value); a name that is both a
-    /// state's and an output's is the state.
+    /// A state (the term adds to its rate), an output, an input or a parameter of the model (the term adds to its value); of
+    /// several with that name, the first in this order. `output:NAME` is the output also where a state has its name.
     pub to: String,
     /// Expression in states, parameters, constants, inputs, outputs and `t`, in the unit of what it is added to (per time
-    /// unit for a state).
+    /// unit for a state). A term that adds to an input or a parameter may not use outputs, which follow from them.
     pub term: String,
+}
+
+/// What stands before the name of an output that a term adds to, where a state may have that name too.
+pub const OUTPUT: &str = "output:";
+
+impl Addition {
+    /// Name of what the term adds to.
+    pub fn quantity(&self) -> &str {
+        self.to.strip_prefix(OUTPUT).unwrap_or(&self.to)
+    }
 }
 
 /// A parameter of an effect.
@@ -48,11 +62,22 @@ pub struct EffectParameter {
     pub range: [f64; 2],
     /// Values to try when screening, for a parameter inside a term; its middle entry is the default.
     pub grid: Vec<f64>,
+    /// In what the range and the grid are counted.
+    pub scale: Scale,
+    /// One plain sentence; may be empty.
+    pub says: String,
 }
 
 impl Default for EffectParameter {
     fn default() -> Self {
-        Self { name: String::new(), unit: String::new(), range: crate::bounds::unbounded(), grid: Vec::new() }
+        Self {
+            name: String::new(),
+            unit: String::new(),
+            range: crate::bounds::unbounded(),
+            grid: Vec::new(),
+            scale: Scale::Absolute,
+            says: String::new(),
+        }
     }
 }
 

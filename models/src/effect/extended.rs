@@ -1,8 +1,12 @@
 //! A model with effects, which is a model again.
 //!
 //! The effects' states follow the model's states and their parameters follow its parameters. Terms see the recorded inputs;
-//! the model sees them with the effects' additions, except through `delay`, which reads the record. Where effects only add to
-//! outputs the model keeps its own step, so that its states are untouched to the last bit. An output goes on measuring the
+//! the model sees them with the effects' additions, except through `delay`, which reads the record. So it is with parameters of
+//! the model: terms see the plain values, the model the shifted ones, in its rates, outputs, switches and memories; where it
+//! starts follows from the plain values, because there is no state yet that a term could read. Where effects only add to
+//! outputs, or shift parameters by what does not change during a run, the model keeps its own step, so that its states are
+//! those of the model alone to the last bit. A parameter that a term drives out of its range may leave the model without a
+//! finite rate: the run then fails as any other. An output goes on measuring the
 //! state that it measured, for observers, though a term may bend the relation between the two. Next file to read: [`mod@super::library`].
 
 use std::collections::BTreeMap;
@@ -43,11 +47,12 @@ impl Extended {
     ) -> Result<Self, SetupError> {
         let spec = extended_spec(inner.spec(), defs)?;
         let mut memories = inner.memories().to_vec();
+        let n_own = inner.spec().parameters.len();
         let n_inner = memories.len();
         for def in defs {
-            note_memories(def, Scope { spec: &spec, constants, memories: &[] }, &mut memories)?;
+            note_memories(def, Scope { spec: &spec, constants, memories: &[], n_own }, &mut memories)?;
         }
-        let scope = Scope { spec: &spec, constants, memories: &memories };
+        let scope = Scope { spec: &spec, constants, memories: &memories, n_own };
         let sources =
             memories[n_inner..].iter().filter_map(|memory| scope.slot(&memory.of, Reach::All)).collect();
         let mut effects: Vec<Box<dyn Effect>> = Vec::with_capacity(defs.len());
@@ -55,8 +60,8 @@ impl Extended {
             effects.push(Box::new(TermEffect::new(def, scope)?));
         }
         let touches = effects.iter().fold(Touches::default(), |all, effect| all.or(effect.touches()));
-        let (n_state, n_param) = (inner.spec().n_state(), inner.spec().parameters.len());
-        Ok(Self { inner, effects, spec, touches, n_state, n_param, memories, sources })
+        let n_state = inner.spec().n_state();
+        Ok(Self { inner, effects, spec, touches, n_state, n_param: n_own, memories, sources })
     }
 
     /// The inner model's outputs without any effect, where a term reads them.
@@ -81,11 +86,34 @@ impl Extended {
         use_inputs(Drive { value: value.as_ref(), slope: slope.as_ref(), history: at.u.history });
     }
 
+    /// Calls `use_parameters` with the inner model's parameters as it sees them.
+    fn with_parameters<R>(&self, at: Moment<'_>, use_parameters: impl FnOnce(&[f64]) -> R) -> R {
+        let plain = &at.theta[..self.n_param];
+        if !self.touches.parameters {
+            return use_parameters(plain);
+        }
+        let mut theta = Scratch::of(plain);
+        for effect in &self.effects {
+            effect.add_to_parameters(at, theta.as_mut());
+        }
+        use_parameters(theta.as_ref())
+    }
+
+    /// As [`Extended::with_parameters`], where no term uses anything that changes during a run.
+    fn with_fixed_parameters<R>(&self, theta: &[f64], use_parameters: impl FnOnce(&[f64]) -> R) -> R {
+        self.with_parameters(Moment { t: 0.0, x: &[], theta, u: Drive::NONE, y: &[] }, use_parameters)
+    }
+
+    /// Calls `use_both` with the inputs and the parameters as the inner model sees them.
+    fn with_both(&self, at: Moment<'_>, rate: &[f64], use_both: impl FnOnce(&[f64], Drive<'_>)) {
+        self.with_parameters(at, |theta| self.with_inputs(at, rate, |u| use_both(theta, u)));
+    }
+
     /// The rate of the extended state, with the inputs' slopes as far as `rate` tells the state's part of them.
     fn rate(&self, at: Moment<'_>, rate: &[f64], dx: &mut [f64]) {
-        let (x, theta) = (&at.x[..self.n_state], &at.theta[..self.n_param]);
+        let x = &at.x[..self.n_state];
         let (inner, own) = dx.split_at_mut(self.n_state);
-        self.with_inputs(at, rate, |u| self.inner.rhs(at.t, x, theta, u, inner));
+        self.with_both(at, rate, |theta, u| self.inner.rhs(at.t, x, theta, u, inner));
         own.fill(0.0);
         for effect in &self.effects {
             effect.add_to_rates(at, dx);
@@ -129,16 +157,19 @@ impl Model for Extended {
         let plain = self.plain_outputs(at);
         let at = Moment { y: plain.as_ref(), ..at };
         let rate = self.rate_for_slopes(at);
-        let inner = |u: Drive<'_>| self.inner.output(t, &x[..self.n_state], &theta[..self.n_param], u, y);
-        self.with_inputs(at, rate.as_ref(), inner);
+        let x = &x[..self.n_state];
+        self.with_both(at, rate.as_ref(), |theta, u| self.inner.output(t, x, theta, u, y));
         for effect in &self.effects {
             effect.add_to_outputs(at, y);
         }
     }
 
-    /// Those of the inner model: its states come first, and what effects add is a load.
+    /// Those of the inner model: its states come first, and what effects add is a load, or shifts its parameters.
     fn blocks(&self, theta: &[f64]) -> Option<Blocks> {
-        self.inner.blocks(&theta[..self.n_param])
+        if self.touches.parameters_vary {
+            return self.inner.blocks(&theta[..self.n_param]);
+        }
+        self.with_fixed_parameters(theta, |theta| self.inner.blocks(theta))
     }
 
     fn solver(&self) -> Solver {
@@ -155,9 +186,8 @@ impl Model for Extended {
         let at = Moment { y: y.as_ref(), ..at };
         let rate = self.rate_for_slopes(at);
         let (inner, mut rest) = g.split_at_mut(self.inner.n_switch());
-        let write =
-            |u: Drive<'_>| self.inner.switches(t, &x[..self.n_state], &theta[..self.n_param], u, inner);
-        self.with_inputs(at, rate.as_ref(), write);
+        let inner_x = &x[..self.n_state];
+        self.with_both(at, rate.as_ref(), |theta, u| self.inner.switches(t, inner_x, theta, u, inner));
         for effect in &self.effects {
             let (own, others) = rest.split_at_mut(effect.n_switch());
             effect.switches(at, own);
@@ -175,8 +205,8 @@ impl Model for Extended {
         let at = Moment { y: plain.as_ref(), ..at };
         let rate = self.rate_for_slopes(at);
         let (inner, own) = values.split_at_mut(values.len() - self.sources.len());
-        let (inner_x, inner_theta) = (&x[..self.n_state], &theta[..self.n_param]);
-        self.with_inputs(at, rate.as_ref(), |u| self.inner.remembered(t, inner_x, inner_theta, u, inner));
+        let inner_x = &x[..self.n_state];
+        self.with_both(at, rate.as_ref(), |theta, u| self.inner.remembered(t, inner_x, theta, u, inner));
         for (value, source) in own.iter_mut().zip(&self.sources) {
             *value = match *source {
                 Slot::State(i) => x[i],
@@ -187,11 +217,11 @@ impl Model for Extended {
     }
 
     fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ParticleError> {
-        if self.touches.rates || self.touches.inputs {
-            integrate::advance(self, self.solver(), segment, theta, x)
-        } else {
-            self.inner.advance(segment, &theta[..self.n_param], x)
+        let Touches { rates, inputs, parameters_vary, .. } = self.touches;
+        if rates || inputs || parameters_vary {
+            return integrate::advance(self, self.solver(), segment, theta, x);
         }
+        self.with_fixed_parameters(theta, |theta| self.inner.advance(segment, theta, x))
     }
 }
 

@@ -1,21 +1,129 @@
 //! The built-in effects: they grow from a model's roles, so that one entry serves every model that has its place for it.
 //!
-//! A study names one by `built_in`, or lets a search try them all. Adding an effect is one function and one line in
-//! `GROWERS`. Next file to read: [`crate::catalogue`].
+//! A study names one by `built_in`, or lets a search try them all. Adding an effect is one function in the file of its family
+//! and one line in that family's list; being listed is being tested. Numbers that depend on how far a recording moves are
+//! counted in a [`super::Scale`]. Next files to read: [`mechanics`] for how an effect is written, then
+//! [`super::scale`].
 
-use super::{Addition, EffectDef, EffectParameter};
+mod draft;
+mod haemodynamics;
+mod hydraulics;
+mod inputs;
+mod levels;
+mod mechanics;
+mod place;
+mod propulsion;
+mod sensors;
+mod specimen;
+mod thermal;
+mod unit;
+
+use super::EffectDef;
 use crate::setup::SetupError;
-use crate::{Quantity, Role, Spec, nearest};
+use crate::{Quantity, Spec, nearest};
+
+use place::Host;
 
 /// Finds every place for one kind of effect in a model.
-type Grow = fn(&Spec) -> Vec<EffectDef>;
+type Grow = fn(Host<'_>) -> Vec<EffectDef>;
 
-/// Every kind of built-in effect.
-const GROWERS: &[Grow] = &[series_resistance];
+/// Effects of one part of physics.
+pub struct Family {
+    /// Name.
+    pub name: &'static str,
+    /// What a model needs to host its effects, as one sentence.
+    pub needs: &'static str,
+    growers: &'static [Grow],
+}
 
-/// The built-in effects that this model can host.
+/// Every family of built-in effects.
+pub const FAMILIES: &[Family] = &[
+    Family {
+        name: "mechanics",
+        needs: "A state with the role velocity, for some effects also a displacement, a force or an inertia.",
+        growers: mechanics::GROWERS,
+    },
+    Family {
+        name: "hydraulics",
+        needs: "Quantities with the roles level, pressure, flow or resistance.",
+        growers: hydraulics::GROWERS,
+    },
+    Family {
+        name: "thermal",
+        needs: "A state with the role temperature.",
+        growers: thermal::GROWERS,
+    },
+    Family {
+        name: "propulsion",
+        needs: "A combustion chamber: quantities with roles such as throat-area, burn-rate or thrust.",
+        growers: propulsion::GROWERS,
+    },
+    Family {
+        name: "haemodynamics",
+        needs: "A pressure, with a compliance or a flow.",
+        growers: haemodynamics::GROWERS,
+    },
+    Family { name: "sensors", needs: "Any output of one component.", growers: sensors::GROWERS },
+    Family { name: "inputs", needs: "Any input of one component.", growers: inputs::GROWERS },
+];
+
+impl Family {
+    /// Name with a capital.
+    pub fn title(&self) -> String {
+        let (first, rest) = self.name.split_at(1);
+        first.to_uppercase() + rest
+    }
+
+    /// One of every kind of effect of this family, as it enters an imagined model that has a place for it;
+    /// the name is without the place.
+    pub fn catalogue(&self) -> Vec<EffectDef> {
+        let one = |grow: &Grow| -> Vec<EffectDef> {
+            let grown = specimen::specimens().into_iter().flat_map(|spec| grow(Host { spec: &spec, time: "s" }));
+            let mut kinds: Vec<EffectDef> = Vec::new();
+            for mut effect in grown {
+                effect.name.truncate(stem(&effect.name).len());
+                if kinds.iter().all(|known| known.name != effect.name) {
+                    kinds.push(effect);
+                }
+            }
+            kinds
+        };
+        self.growers.iter().flat_map(one).collect()
+    }
+
+    /// Number of kinds of effects at least: each grower has one or more.
+    pub fn n_grower(&self) -> usize {
+        self.growers.len()
+    }
+
+    /// The effects of this family that a model can host. `time` is the label of the time unit.
+    pub fn grow(&self, spec: &Spec, time: &str) -> Vec<EffectDef> {
+        self.growers.iter().flat_map(|grow| grow(Host { spec, time })).collect()
+    }
+}
+
+/// The built-in effects that this model can host, with time in seconds.
 pub fn library(spec: &Spec) -> Vec<EffectDef> {
-    GROWERS.iter().flat_map(|grow| grow(spec)).collect()
+    library_in(spec, "s")
+}
+
+/// The built-in effects that this model can host. `time` is the label of the time unit; it only enters unit labels.
+pub fn library_in(spec: &Spec, time: &str) -> Vec<EffectDef> {
+    FAMILIES.iter().flat_map(|family| family.grow(spec, time)).collect()
+}
+
+/// Name of the kind of effect, without the place where it enters.
+pub fn stem(name: &str) -> &str {
+    name.split_once(':').map_or(name, |(stem, _)| stem)
+}
+
+/// Whether an effect can show in what is measured: one that adds only to outputs shows in these alone.
+pub fn shows_in(def: &EffectDef, spec: &Spec, measured: &[String]) -> bool {
+    let has = |list: &[Quantity], name: &str| list.iter().any(|q| q.name == name);
+    def.adds.iter().any(|add| {
+        let output = !has(&spec.states, &add.to) && has(&spec.outputs, add.quantity());
+        !output || measured.iter().any(|name| name == add.quantity())
+    })
 }
 
 /// Writes out a definition: one that names a built-in effect becomes that effect, under its own name if it has one.
@@ -39,110 +147,4 @@ pub fn write_out(def: &EffectDef, spec: &Spec) -> Result<EffectDef, SetupError> 
     };
     let name = if def.name.is_empty() { found.name.clone() } else { def.name.clone() };
     Ok(EffectDef { name, ..found.clone() })
-}
-
-/// A pressure drop Rs q at the place where a flow enters and its pressure is measured.
-fn series_resistance(spec: &Spec) -> Vec<EffectDef> {
-    places(&spec.outputs, Role::Pressure, &spec.inputs, Role::Flow)
-        .map(|place| EffectDef {
-            name: place.named("series-resistance", ':'),
-            says: format!("Part of the pressure is lost in proportion to the {}.", place.cause.name),
-            adds: vec![Addition {
-                to: place.host.name.clone(),
-                term: format!("{}*{}", place.named("Rs", '_'), place.cause.name),
-            }],
-            parameters: vec![EffectParameter {
-                name: place.named("Rs", '_'),
-                unit: over(&place.host.unit, &place.cause.unit),
-                range: [0.0, f64::INFINITY],
-                grid: Vec::new(),
-            }],
-            confounders: vec![
-                "a characteristic impedance".to_owned(),
-                "a flow-dependent sensor error".to_owned(),
-            ],
-            ..EffectDef::default()
-        })
-        .collect()
-}
-
-/// A quantity that an effect can add to, and the one that causes it.
-struct Place<'a> {
-    host: &'a Quantity,
-    cause: &'a Quantity,
-    /// Whether the model has no other such pair, so that names need no suffix.
-    only: bool,
-}
-
-impl Place<'_> {
-    /// `stem`, with the names of the pair when there are several.
-    fn named(&self, stem: &str, separator: char) -> String {
-        if self.only {
-            return stem.to_owned();
-        }
-        let (host, cause) = (&self.host.name, &self.cause.name);
-        format!("{stem}{separator}{host}{separator}{cause}")
-    }
-}
-
-/// Every pair of scalar quantities with these roles.
-fn places<'a>(
-    hosts: &'a [Quantity],
-    host_role: Role,
-    causes: &'a [Quantity],
-    cause_role: Role,
-) -> impl Iterator<Item = Place<'a>> {
-    let of = |list: &'a [Quantity], role: Role| -> Vec<&'a Quantity> {
-        list.iter().filter(|q| q.role == role && q.size == 1).collect()
-    };
-    let (hosts, causes) = (of(hosts, host_role), of(causes, cause_role));
-    let only = hosts.len() * causes.len() == 1;
-    hosts
-        .into_iter()
-        .flat_map(move |host| causes.clone().into_iter().map(move |cause| Place { host, cause, only }))
-}
-
-/// The unit of a quantity per another, as text: `mmHg` over `mL/s` is `mmHg s/mL`.
-fn over(unit: &str, per: &str) -> String {
-    match (unit, per.split_once('/')) {
-        ("", _) => String::new(),
-        (_, None) if per.is_empty() => unit.to_owned(),
-        (_, None) => format!("{unit}/{per}"),
-        (_, Some((amount, time))) => format!("{unit} {time}/{amount}"),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::Model;
-    use crate::native::{Oscillator, Windkessel2};
-
-    #[test]
-    fn a_pressure_outlet_with_a_flow_hosts_a_series_resistance() {
-        let library = library(Windkessel2::default().spec());
-        assert_eq!(library.len(), 1);
-        assert_eq!(library[0].adds, [Addition { to: "pressure".to_owned(), term: "Rs*flow".to_owned() }]);
-        assert_eq!(library[0].parameters[0].unit, "mmHg s/mL");
-    }
-
-    #[test]
-    fn an_oscillator_hosts_no_series_resistance() {
-        assert!(library(Oscillator::default().spec()).is_empty());
-    }
-
-    #[test]
-    fn two_outlets_get_names_of_their_own() {
-        let mut spec = Windkessel2::default().spec().clone();
-        spec.outputs.push(Quantity::new("distal", "mmHg").role(Role::Pressure));
-        let names: Vec<String> = library(&spec).into_iter().map(|effect| effect.name).collect();
-        assert_eq!(names, ["series-resistance:pressure:flow", "series-resistance:distal:flow"]);
-    }
-
-    #[test]
-    fn a_mistyped_built_in_effect_offers_the_nearest() {
-        let def = EffectDef { built_in: Some("serial-resistance".to_owned()), ..EffectDef::default() };
-        let error = write_out(&def, Windkessel2::default().spec()).expect_err("typo");
-        assert!(error.to_string().contains("did you mean `series-resistance`"), "{error}");
-    }
 }

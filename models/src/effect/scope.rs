@@ -21,6 +21,8 @@ pub struct Scope<'a> {
     pub constants: &'a BTreeMap<String, f64>,
     /// What the extended model remembers.
     pub memories: &'a [Memory],
+    /// Number of parameters of the model itself; those of effects follow.
+    pub n_own: usize,
 }
 
 /// Which names an expression may use.
@@ -28,7 +30,7 @@ pub struct Scope<'a> {
 pub(super) enum Reach {
     /// Everything.
     All,
-    /// Everything but outputs, which depend on the input that the term changes.
+    /// Everything but outputs, which depend on the input or parameter that the term changes.
     NoOutputs,
     /// Parameters and constants.
     Fixed,
@@ -58,6 +60,20 @@ impl Scope<'_> {
             .or_else(|| scalar(&spec.inputs).map(Slot::Input))
             .or_else(output)
             .or_else(constant)
+    }
+
+    /// Position of a parameter of the model itself.
+    pub(super) fn own_parameter(self, name: &str) -> Option<usize> {
+        self.spec.parameters[..self.n_own].iter().position(|q| q.name == name)
+    }
+
+    /// Whether an expression uses parameters and constants alone, so that its value is the same throughout a run.
+    pub(super) fn is_fixed(self, text: &str) -> bool {
+        let fixed =
+            |name: &str| matches!(self.slot(name, Reach::All), Some(Slot::Parameter(_) | Slot::Constant(_)));
+        Expression::parse(text).is_ok_and(|expression| {
+            !expression.uses_time() && expression.names().iter().all(|(name, _)| fixed(name))
+        })
     }
 
     fn names(self, reach: Reach) -> Vec<String> {
@@ -103,7 +119,7 @@ fn located(place: &str, text: &str, error: ExpressionError) -> SetupError {
 ///
 /// # Errors
 /// When an expression does not parse.
-pub(crate) fn names(defs: &[EffectDef]) -> Result<Vec<String>, SetupError> {
+pub fn names(defs: &[EffectDef]) -> Result<Vec<String>, SetupError> {
     let mut names = Vec::new();
     for def in defs {
         let place = format!("effect {}", def.name);

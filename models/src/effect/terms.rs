@@ -16,6 +16,8 @@ pub struct TermEffect {
     rates: Vec<(usize, Program)>,
     outputs: Vec<(usize, Program)>,
     inputs: Vec<(usize, Program)>,
+    parameters: Vec<(usize, Program)>,
+    parameters_vary: bool,
     initial: Vec<(usize, Program)>,
     switches: Vec<Program>,
 }
@@ -32,6 +34,8 @@ impl TermEffect {
             rates: Vec::new(),
             outputs: Vec::new(),
             inputs: Vec::new(),
+            parameters: Vec::new(),
+            parameters_vary: false,
             initial: Vec::new(),
             switches: Vec::new(),
         };
@@ -54,25 +58,31 @@ impl TermEffect {
         Ok(effect)
     }
 
-    /// Compiles one term into the list of what it is added to: a state's rate, an output or an input.
+    /// Compiles one term into the list of what it is added to: a state's rate, an output, an input or a parameter.
     fn add(&mut self, add: &Addition, scope: Scope<'_>) -> Result<(), SetupError> {
         let spec = scope.spec;
         let place = format!("effect {}, added to {}", self.def.name, add.to);
         let compile = |reach| scope.compile(&add.term, reach, &place);
+        // No state's name has a colon.
         if let Some(i) = target(&spec.states, &add.to)? {
             self.rates.push((i, compile(Reach::All)?));
             self.switches.extend(scope.switches(&add.term, &place)?);
-        } else if let Some(i) = target(&spec.outputs, &add.to)? {
+        } else if let Some(i) = target(&spec.outputs, add.quantity())? {
             self.outputs.push((i, compile(Reach::All)?));
         } else if let Some(i) = target(&spec.inputs, &add.to)? {
             self.inputs.push((i, compile(Reach::NoOutputs)?));
             self.switches.extend(scope.switches(&add.term, &place)?);
+        } else if let Some(i) = scope.own_parameter(&add.to) {
+            self.parameters.push((i, compile(Reach::NoOutputs)?));
+            self.parameters_vary |= !scope.is_fixed(&add.term);
+            self.switches.extend(scope.switches(&add.term, &place)?);
         } else {
             let lists = [&spec.states, &spec.outputs, &spec.inputs];
+            let own = &spec.parameters[..scope.n_own];
             return Err(SetupError::Unknown {
-                what: "state, output or input",
+                what: "state, output, input or parameter of the model",
                 name: add.to.clone(),
-                nearest: nearest(&add.to, lists.into_iter().flatten().map(|q| &q.name)),
+                nearest: nearest(&add.to, lists.into_iter().flatten().chain(own).map(|q| &q.name)),
             });
         }
         Ok(())
@@ -97,6 +107,8 @@ impl TermEffect {
             rates: !self.rates.is_empty(),
             outputs: !self.outputs.is_empty(),
             inputs: !self.inputs.is_empty(),
+            parameters: !self.parameters.is_empty(),
+            parameters_vary: self.parameters_vary,
             reads_outputs: used.iter().any(is_output),
             inputs_follow_states: inputs_follow_states(&self.def, scope)?,
         })
@@ -107,7 +119,10 @@ impl TermEffect {
 fn inputs_follow_states(def: &EffectDef, scope: Scope<'_>) -> Result<bool, SetupError> {
     let has = |list: &[Quantity], name: &str| list.iter().any(|q| q.name == name);
     let (states, outputs) = (&scope.spec.states, &scope.spec.outputs);
-    let to_inputs = def.adds.iter().filter(|a| !has(states, &a.to) && !has(outputs, &a.to));
+    let to_inputs = def
+        .adds
+        .iter()
+        .filter(|a| !has(states, &a.to) && !has(outputs, a.quantity()) && has(&scope.spec.inputs, &a.to));
     let alone = EffectDef { adds: to_inputs.cloned().collect(), ..EffectDef::default() };
     Ok(names(&[alone])?.iter().any(|name| matches!(scope.slot(name, Reach::All), Some(Slot::State(_)))))
 }
@@ -149,6 +164,12 @@ impl Effect for TermEffect {
             let (term, term_slope) = program.eval_dual(&at(moment), &along);
             value[*i] += term;
             slope[*i] += term_slope;
+        }
+    }
+
+    fn add_to_parameters(&self, moment: Moment<'_>, theta: &mut [f64]) {
+        for (i, program) in &self.parameters {
+            theta[*i] += program.eval(&at(moment));
         }
     }
 

@@ -167,7 +167,10 @@ fn spec(
             .iter()
             .map(|s| Quantity::new(&s.name, &s.unit).role(s.role).range(s.range[0], s.range[1]))
             .collect(),
-        parameters: parameters.iter().map(|name| Quantity::new(name, "")).collect(),
+        parameters: parameters
+            .iter()
+            .map(|name| Quantity::new(name, "").role(def.roles.get(name).copied().unwrap_or_default()))
+            .collect(),
         outputs: outputs.collect(),
         inputs: def.inputs.iter().map(|i| Quantity::new(&i.name, &i.unit).role(i.role)).collect(),
         measures: measures.collect(),

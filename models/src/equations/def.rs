@@ -1,10 +1,12 @@
 //! A model written as equations, as plain data.
 //!
-//! Nothing is checked here: [`super::EquationsModel::new`] does. Next file to read: [`super::model`].
+//! The expressions are not checked here: [`super::EquationsModel::new`] does that. Next file to read: [`super::model`].
+
+use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::Role;
+use crate::{Role, SetupError, nearest};
 
 /// The equations of a model, as a study states them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -18,8 +20,39 @@ pub struct EquationsDef {
     pub inputs: Vec<InputDef>,
     /// Names of rate terms that may be left out or replaced; a name shared by several states stands for all of them.
     pub replaceable: Vec<String>,
+    /// Physical meaning of parameters, by name; effects find their place by it. A name that no expression uses is ignored, so
+    /// that a term can be left out together with its parameters.
+    pub roles: BTreeMap<String, Role>,
     /// How to integrate.
     pub solver: SolverDef,
+}
+
+impl EquationsDef {
+    /// The same equations with the named rate terms left out, wherever they occur.
+    ///
+    /// # Errors
+    /// [`SetupError::Unknown`] for a term that is not replaceable.
+    pub fn without(&self, terms: &[&str]) -> Result<Self, SetupError> {
+        let mut def = self.clone();
+        for term in terms {
+            if !self.replaceable.iter().any(|name| name == term) {
+                let nearest = nearest(term, &self.replaceable);
+                return Err(SetupError::Unknown {
+                    what: "replaceable term",
+                    name: (*term).to_owned(),
+                    nearest,
+                });
+            }
+            def.replaceable.retain(|name| name != term);
+            for state in &mut def.states {
+                state.rate.retain(|(name, _)| name != term);
+                if state.rate.is_empty() {
+                    state.rate.push((state.name.clone(), "0".to_owned()));
+                }
+            }
+        }
+        Ok(def)
+    }
 }
 
 /// One state and its rate.

@@ -107,6 +107,13 @@ impl Expression {
         list
     }
 
+    /// Whether `t` stands in it.
+    pub(crate) fn uses_time(&self) -> bool {
+        let mut found = false;
+        self.node.walk(&mut |part| found |= matches!(part, Node::Time));
+        found
+    }
+
     /// Makes flat code out of the expression.
     ///
     /// `resolve` says where a name's value is, `nearest` offers a valid name for an unknown one. `ddt` of a name that is not

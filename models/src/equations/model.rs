@@ -9,7 +9,7 @@ use super::def::EquationsDef;
 use super::expression::{At, Direction, Program, Slot};
 use crate::integrate::Solver;
 use crate::model::Drive;
-use crate::{Memory, Model, SetupError, Spec, nearest};
+use crate::{Memory, Model, SetupError, Spec};
 
 /// A model whose equations a study states.
 #[derive(Clone, Debug)]
@@ -53,25 +53,7 @@ impl EquationsModel {
     /// # Errors
     /// [`SetupError::Unknown`] for a term that is not replaceable.
     pub fn without(&self, terms: &[&str]) -> Result<Self, SetupError> {
-        let mut def = self.def.clone();
-        for term in terms {
-            if !self.def.replaceable.iter().any(|name| name == term) {
-                let nearest = nearest(term, &self.def.replaceable);
-                return Err(SetupError::Unknown {
-                    what: "replaceable term",
-                    name: (*term).to_owned(),
-                    nearest,
-                });
-            }
-            def.replaceable.retain(|name| name != term);
-            for state in &mut def.states {
-                state.rate.retain(|(name, _)| name != term);
-                if state.rate.is_empty() {
-                    state.rate.push((state.name.clone(), "0".to_owned()));
-                }
-            }
-        }
-        Self::with_constants(&def, &self.constants)
+        Self::with_constants(&self.def.without(terms)?, &self.constants)
     }
 
     /// The equations as stated.

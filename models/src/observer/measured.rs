@@ -31,7 +31,10 @@ pub fn measured(def: &ObserverDef, wiring: &Wiring<'_>) -> Result<Vec<Measured>,
     let mut found = Vec::new();
     let mut row = 0;
     for output in wiring.outputs {
-        let rows = find(&spec.outputs, output, "output")?;
+        let Some(rows) = shown(spec, output)? else {
+            row += 1;
+            continue;
+        };
         if let Some(states) = behind(def, spec, output, rows.len())? {
             found.extend(states.enumerate().map(|(i, state)| Measured { row: row + i, state }));
         }
@@ -77,6 +80,15 @@ pub(super) fn mean_innovation(at: &Correction<'_>, rows: &[usize]) -> Option<(f6
         n += 1;
     }
     (n > 0).then(|| (sum / f64::from(n), n))
+}
+
+/// Components of an observed output; `None` for a recorded state, which takes one row and measures nothing.
+pub(super) fn shown(spec: &Spec, name: &str) -> Result<Option<Range<usize>>, SetupError> {
+    let unnamed = Spec::range_of(&spec.outputs, name).is_none();
+    if unnamed && spec.scalar_state(name).is_some() {
+        return Ok(None);
+    }
+    find(&spec.outputs, name, "output").map(Some)
 }
 
 /// Components of a named quantity or of one component of it.

@@ -2,8 +2,11 @@
 //! the state that it measures.
 //!
 //! The continuous observer adds γ Σ (z − y) to the rate of the measured state, the sum over its channels. Over the time Δt
-//! since the previous observation its exact solution with a held model multiplies the innovation by 1 − e^(−γΔt), so any gain
-//! is stable; the explicit form would need γ Δt < 2. On noise-free data of the true model the innovation is zero and neither
+//! since the previous observation its exact solution with a held model multiplies the innovation by 1 − e^(−γΔt). Where the
+//! output is h times the state, the state's error is left with the factor 1 − h(1 − e^(−γΔt)): any gain is stable for
+//! 0 < h ≤ 2, and no gain for a negative h; beyond 2 it must keep γΔt < ln(h/(h − 2)). What a model says of its own outputs
+//! is h = 1; a definition's `corrects` may say anything, and h is not checked: it may depend on what is estimated. The
+//! explicit form would need γ Δt < 2 already at h = 1. On noise-free data of the true model the innovation is zero and neither
 //! the state nor an estimate moves with the gain. Next file to read: [`crate::simulator`].
 
 use nalgebra::DMatrix;
@@ -120,6 +123,32 @@ mod tests {
         };
         observer.correct(at, &mut x);
         assert_eq!(x, [5.0, 2.0]);
+    }
+
+    #[test]
+    fn an_output_of_three_times_the_state_is_stable_below_the_logarithm_of_three() {
+        let model = Windkessel3::default();
+        let outputs = names(&["pressure"]);
+        // What a correction leaves of an error of one in the state, the datum being 3·10.
+        let left = |gain: f64| {
+            let observer = Nudging::new(&def(gain), wiring(&model, &outputs)).expect("nudging");
+            let mut x = [11.0];
+            let (observed, predicted) = ([30.0], [33.0]);
+            let at = Correction {
+                t: 1.0,
+                dt: 1.0,
+                observed: &observed,
+                predicted: &predicted,
+                model: &model,
+                theta: &[],
+            };
+            observer.correct(at, &mut x);
+            x[0] - 10.0
+        };
+        // 1 − 3(1 − 3⁻¹) = −1 at γΔt = ln 3; the error turns over and shrinks below, and grows beyond.
+        let bound = 3.0_f64.ln();
+        assert!(left(0.99 * bound) > -1.0 && left(0.99 * bound) < -0.9, "{}", left(0.99 * bound));
+        assert!(left(1.01 * bound) < -1.0, "{}", left(1.01 * bound));
     }
 
     #[test]

@@ -4,7 +4,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::measured::{find, mean_innovation};
+use super::measured::{mean_innovation, shown};
 use super::{Correction, Wiring};
 use crate::setup::{ObserverDef, SetupError};
 use crate::{Blocks, Model, Spec, native};
@@ -158,7 +158,10 @@ pub(super) fn components(wiring: &Wiring<'_>, field: &str) -> Result<Vec<(usize,
     let mut row = 0;
     let mut found = Vec::new();
     for name in wiring.outputs {
-        let part = find(outputs, name, "output")?;
+        let Some(part) = shown(wiring.spec, name)? else {
+            row += 1;
+            continue;
+        };
         let n = part.len();
         let inside = part.enumerate().filter(|(_, at)| whole.contains(at));
         found.extend(inside.map(|(i, at)| (row + i, at - whole.start)));

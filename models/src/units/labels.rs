@@ -117,7 +117,7 @@ impl Labels {
             let place = format!("effect `{}`, added to `{}`", def.name, add.to);
             let states = def.states.iter().map(|s| &s.name).chain(spec.states.iter().map(|q| &q.name));
             let is_state = states.into_iter().any(|name| *name == add.to);
-            let target = if is_state { labels.rate(&add.to) } else { labels.value(&add.to) };
+            let target = if is_state { labels.rate(&add.to) } else { labels.value(add.quantity()) };
             labels.check(&place, &add.term, &target, &mut list);
         }
         for state in &def.states {

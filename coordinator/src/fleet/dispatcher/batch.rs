@@ -1,11 +1,14 @@
-//! The jobs of one batch: which are waiting, how often each was tried, how each ended.
+//! The jobs of one batch: the setup that each needs, how often each was tried, how each ended.
+//!
+//! Next file to read: `queue`, for those that wait.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet};
 
 use starlings_models::{ParticleError, Prediction};
 use starlings_proto::SetupId;
 
 use super::message::WorkerId;
+use super::queue::{Again, Queue};
 use crate::fleet::{FleetEvent, Outcome};
 
 /// What a job is called in events.
@@ -29,13 +32,14 @@ pub(super) enum Lost {
 /// One batch.
 #[derive(Debug)]
 pub(super) struct Batch {
-    pub(super) setup: SetupId,
+    /// Its setups, in the order of their first jobs.
+    setups: Vec<SetupId>,
+    /// Per setup, the jobs without an outcome.
+    open: Vec<usize>,
     first_job: u64,
     names: Vec<JobName>,
     jobs: Vec<State>,
-    next: usize,
-    /// Jobs to be given again, by the worker that must not get them.
-    retry: BTreeMap<Option<WorkerId>, VecDeque<usize>>,
+    pub(super) queue: Queue,
     done: usize,
     told: usize,
 }
@@ -43,6 +47,7 @@ pub(super) struct Batch {
 /// One job.
 #[derive(Debug, Default)]
 struct State {
+    setup: usize,
     starts: u32,
     losses: u32,
     recalled: bool,
@@ -59,9 +64,51 @@ struct Failure {
 }
 
 impl Batch {
-    pub(super) fn new(setup: SetupId, first_job: u64, names: Vec<JobName>) -> Self {
-        let jobs = names.iter().map(|_| State::default()).collect();
-        Self { setup, first_job, names, jobs, next: 0, retry: BTreeMap::new(), done: 0, told: 0 }
+    pub(super) fn new(first_job: u64, jobs: Vec<(SetupId, JobName)>) -> Self {
+        let (mut setups, mut open, mut known) = (Vec::new(), Vec::new(), BTreeMap::new());
+        let (mut names, mut states) = (Vec::with_capacity(jobs.len()), Vec::with_capacity(jobs.len()));
+        for (id, name) in jobs {
+            let setup = *known.entry(id).or_insert_with(|| {
+                setups.push(id);
+                open.push(0);
+                setups.len() - 1
+            });
+            open[setup] += 1;
+            names.push(name);
+            states.push(State { setup, ..State::default() });
+        }
+        let queue = Queue::new(setups.len(), states.iter().map(|job| job.setup));
+        Self { setups, open, first_job, names, jobs: states, queue, done: 0, told: 0 }
+    }
+
+    /// The setup at this position.
+    pub(super) fn setup(&self, at: usize) -> &SetupId {
+        &self.setups[at]
+    }
+
+    /// The setup of a job.
+    pub(super) fn setup_of(&self, index: usize) -> &SetupId {
+        &self.setups[self.jobs[index].setup]
+    }
+
+    /// Setups of jobs without an outcome, in the order of their first jobs.
+    pub(super) fn open_setups(&self) -> impl Iterator<Item = &SetupId> {
+        self.setups.iter().zip(&self.open).filter(|(_, open)| **open > 0).map(|(setup, _)| setup)
+    }
+
+    /// Whether jobs of this setup have no outcome yet.
+    pub(super) fn needs(&self, setup: &SetupId) -> bool {
+        self.open_setups().any(|open| open == setup)
+    }
+
+    /// Whether it has a setup in common with these.
+    pub(super) fn shares(&self, setups: &[SetupId]) -> bool {
+        self.setups.iter().any(|setup| setups.contains(setup))
+    }
+
+    /// All its setups.
+    pub(super) fn setups(&self) -> &[SetupId] {
+        &self.setups
     }
 
     pub(super) fn job_number(&self, index: usize) -> u64 {
@@ -93,34 +140,6 @@ impl Batch {
     pub(super) fn describe(&self, job: u64) -> String {
         let name = self.index_of(job).and_then(|index| self.names.get(index));
         name.map_or_else(|| format!("run {job}"), |n| format!("particle {}, record {}", n.particle, n.record))
-    }
-
-    pub(super) fn has_fresh(&self) -> bool {
-        self.next < self.jobs.len()
-    }
-
-    pub(super) fn next_fresh(&mut self) -> Option<usize> {
-        let index = self.next;
-        self.has_fresh().then(|| {
-            self.next += 1;
-            index
-        })
-    }
-
-    pub(super) fn retry_keys(&self) -> Vec<Option<WorkerId>> {
-        self.retry.iter().filter(|(_, queue)| !queue.is_empty()).map(|(&key, _)| key).collect()
-    }
-
-    pub(super) fn avoided(&self) -> Vec<WorkerId> {
-        self.retry_keys().into_iter().flatten().collect()
-    }
-
-    pub(super) fn has_retry(&self, avoided: Option<WorkerId>) -> bool {
-        self.retry.get(&avoided).is_some_and(|queue| !queue.is_empty())
-    }
-
-    pub(super) fn next_retry(&mut self, avoided: Option<WorkerId>) -> Option<usize> {
-        self.retry.get_mut(&avoided)?.pop_front()
     }
 
     /// Counts a start and returns its number, from 1.
@@ -157,9 +176,9 @@ impl Batch {
         Lost::Requeued
     }
 
-    /// Ends the jobs that may not go back to `avoided`, with the failure they had there.
-    pub(super) fn settle(&mut self, avoided: WorkerId) -> Vec<usize> {
-        let indices = Vec::from(self.retry.remove(&Some(avoided)).unwrap_or_default());
+    /// Ends jobs that come back and may go nowhere, with the failure they had.
+    pub(super) fn settle(&mut self, again: Again) -> Vec<usize> {
+        let indices = self.queue.take_all(again);
         for &index in &indices {
             let attempts = self.attempts(index);
             if let Some(failure) = self.jobs[index].failure.take() {
@@ -174,9 +193,10 @@ impl Batch {
         self.end(index, Outcome { result, attempts, worker: name.to_owned() });
     }
 
-    /// A job is called back at most once, so that it cannot travel for ever.
-    pub(super) fn may_recall(&self, job: u64) -> bool {
-        self.index_of(job).is_some_and(|index| !self.jobs[index].recalled)
+    /// A job is called back only for one of these setups, and at most once, so that it cannot travel for ever.
+    pub(super) fn may_recall(&self, job: u64, setups: &BTreeSet<SetupId>) -> bool {
+        self.index_of(job)
+            .is_some_and(|index| !self.jobs[index].recalled && setups.contains(self.setup_of(index)))
     }
 
     pub(super) fn mark_recalled(&mut self, job: u64) {
@@ -211,7 +231,7 @@ impl Batch {
 
     fn requeue(&mut self, index: usize) {
         let avoided = self.jobs[index].failure.as_ref().map(|f| f.by);
-        self.retry.entry(avoided).or_default().push_back(index);
+        self.queue.put_back(index, Again { avoided, setup: self.jobs[index].setup });
     }
 
     fn end(&mut self, index: usize, outcome: Outcome) {
@@ -219,6 +239,7 @@ impl Batch {
         debug_assert!(job.outcome.is_none(), "a job ends once: its only lease is released before");
         if job.outcome.replace(outcome).is_none() {
             self.done += 1;
+            self.open[job.setup] -= 1;
         }
     }
 }

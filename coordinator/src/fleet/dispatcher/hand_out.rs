@@ -1,5 +1,7 @@
 //! What may follow from any event: failures settle, jobs are given out and called back, the batch ends.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use starlings_proto::{Lease, SetupId};
 
 use super::Dispatcher;
@@ -23,12 +25,11 @@ impl Dispatcher {
         }
     }
 
-    /// Ends the batch when none of the workers can build its setup and no others will come.
+    /// Ends the batch when none of the workers can build a setup that it still needs, and no others will come.
     fn fail_without_setup(&mut self) {
         let Some(batch) = &self.batch else { return };
-        if !batch.is_done()
-            && let Some(reason) = self.failed_everywhere(&batch.setup)
-        {
+        let reason = batch.open_setups().find_map(|setup| self.failed_everywhere(setup));
+        if let Some(reason) = reason {
             self.abort(BatchError::SetupFailed { reason });
         }
     }
@@ -49,10 +50,12 @@ impl Dispatcher {
     /// Ends the failed jobs that wait for another worker when there is none.
     fn settle_failures(&mut self) {
         let Some(batch) = &mut self.batch else { return };
-        for avoided in batch.avoided() {
-            let other = self.workers.values().any(|w| w.id != avoided && w.may_run(&batch.setup));
+        for again in batch.queue.again() {
+            let Some(avoided) = again.avoided else { continue };
+            let setup = batch.setup(again.setup);
+            let other = self.workers.values().any(|w| w.id != avoided && w.may_run(setup));
             if !other {
-                for index in batch.settle(avoided) {
+                for index in batch.settle(again) {
                     self.out.push(Command::Notice(batch.failed(index)));
                 }
             }
@@ -61,17 +64,21 @@ impl Dispatcher {
 
     fn give_out(&mut self) {
         let Some(batch) = &mut self.batch else { return };
-        let setup = batch.setup;
-        for avoided in batch.retry_keys() {
-            while batch.has_retry(avoided) {
-                let Some(worker) = roster::least_loaded(&mut self.workers, &setup, avoided) else { break };
-                let Some(index) = batch.next_retry(avoided) else { break };
+        for again in batch.queue.again() {
+            let setup = *batch.setup(again.setup);
+            while batch.queue.has(again) {
+                let Some(worker) = roster::least_loaded(&mut self.workers, &setup, again.avoided) else {
+                    break;
+                };
+                let Some(index) = batch.queue.next_again(again) else { break };
                 self.out.push(lease(worker, batch, index));
             }
         }
-        while batch.has_fresh() {
-            let Some(worker) = roster::least_loaded(&mut self.workers, &setup, None) else { break };
-            let Some(index) = batch.next_fresh() else { break };
+        // The earliest fresh job whose setup is built on a worker with room; jobs of setups still being built let it pass.
+        while let Some(setup) = next_setup(&self.workers, batch) {
+            let id = *batch.setup(setup);
+            let Some(worker) = roster::least_loaded(&mut self.workers, &id, None) else { break };
+            let Some(index) = batch.queue.next_fresh(setup) else { break };
             self.out.push(lease(worker, batch, index));
         }
     }
@@ -79,15 +86,17 @@ impl Dispatcher {
     /// Calls back jobs that wait behind a busy slot while another slot is idle.
     fn recall(&mut self) {
         let Some(batch) = &mut self.batch else { return };
-        // While fresh jobs wait, no slot is idle: spares the counting below.
-        if batch.has_fresh() {
+        let idle = self.workers.values().filter(|w| w.load() < w.slots).collect::<Vec<_>>();
+        if idle.is_empty() {
             return;
         }
-        let ready = || self.workers.values().filter(|w| w.is_ready(&batch.setup));
-        let idle: usize = ready().map(|w| w.slots.saturating_sub(w.load())).sum();
-        let mut open = match idle {
+        let runnable = batch.open_setups().filter(|setup| idle.iter().any(|w| w.is_ready(setup)));
+        let runnable = runnable.copied().collect::<BTreeSet<SetupId>>();
+        let useful = idle.iter().filter(|w| runnable.iter().any(|setup| w.is_ready(setup)));
+        let free: usize = useful.map(|w| w.slots - w.load()).sum();
+        let mut open = match free {
             0 => 0,
-            idle => idle.saturating_sub(ready().map(Worker::n_returning).sum()),
+            free => free.saturating_sub(self.workers.values().map(Worker::n_returning).sum()),
         };
         let mut victims = Vec::<WorkerId>::new();
         if open > 0 {
@@ -98,7 +107,11 @@ impl Dispatcher {
             let fullest =
                 victims.iter().copied().max_by_key(|id| self.workers.get(id).map_or(0, Worker::surplus));
             let Some(victim) = fullest.and_then(|id| self.workers.get_mut(&id)) else { break };
-            let held = if victim.surplus() > 0 { victim.youngest(|job| batch.may_recall(job)) } else { None };
+            let held = if victim.surplus() > 0 {
+                victim.youngest(|job| batch.may_recall(job, &runnable))
+            } else {
+                None
+            };
             let Some(held) = held else {
                 let passed = victim.id;
                 victims.retain(|&id| id != passed);
@@ -109,6 +122,15 @@ impl Dispatcher {
             open -= 1;
         }
     }
+}
+
+/// The setup of the earliest fresh job that a worker with room could run now.
+fn next_setup(workers: &BTreeMap<WorkerId, Worker>, batch: &Batch) -> Option<usize> {
+    let open = workers.values().filter(|w| w.has_room()).collect::<Vec<_>>();
+    if open.is_empty() {
+        return None;
+    }
+    batch.queue.fresh_setups().find(|&setup| open.iter().any(|w| w.is_ready(batch.setup(setup))))
 }
 
 fn lease(worker: &mut Worker, batch: &mut Batch, index: usize) -> Command {

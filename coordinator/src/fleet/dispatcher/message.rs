@@ -81,7 +81,7 @@ pub enum Event {
         /// Which setup.
         setup: SetupId,
     },
-    /// A worker could not build a setup.
+    /// A worker could not build a setup, or has forgotten one that it had built.
     SetupFailed {
         /// Which worker.
         worker: WorkerId,
@@ -92,10 +92,8 @@ pub enum Event {
     },
     /// A batch to run; one still running is cancelled.
     Submit {
-        /// The setup of all its jobs.
-        setup: SetupId,
-        /// What each job is called.
-        jobs: Vec<JobName>,
+        /// The setup that each job needs, and what it is called.
+        jobs: Vec<(SetupId, JobName)>,
     },
     /// A worker answered a lease.
     Answered {

@@ -123,7 +123,7 @@ impl Worker {
         !matches!(self.setups.get(setup), Some(SetupState::Failed(_)))
     }
 
-    fn has_room(&self) -> bool {
+    pub(super) fn has_room(&self) -> bool {
         let credit = match self.cost {
             Some(cost) => ((LOOKAHEAD / cost.max(1e-9)) as usize).clamp(MIN_CREDIT, MAX_CREDIT),
             None => MIN_CREDIT,
@@ -171,6 +171,26 @@ impl Worker {
 
     pub(super) fn learn_cost(&mut self, seconds: f64) {
         self.cost = Some(self.cost.map_or(seconds, |mean| mean + NEWEST * (seconds - mean)));
+    }
+
+    /// Notes that a setup is on its way, unless it is built or being built; says whether to send it.
+    pub(super) fn wants(&mut self, setup: SetupId, now: Duration) -> bool {
+        // A setup that failed is tried again: what was missing on that host may be there now.
+        if matches!(self.setups.get(&setup), Some(SetupState::Ready | SetupState::Pending { .. })) {
+            return false;
+        }
+        self.setups.insert(setup, SetupState::Pending { since: now });
+        true
+    }
+
+    /// Takes an answer about a setup: those that wait behind it are being built from now on.
+    pub(super) fn setup_answered(&mut self, setup: SetupId, state: SetupState, now: Duration) {
+        self.setups.insert(setup, state);
+        for state in self.setups.values_mut() {
+            if let SetupState::Pending { since } = state {
+                *since = now;
+            }
+        }
     }
 
     pub(super) fn forget_cost(&mut self) {

@@ -3,6 +3,7 @@
 mod chaos;
 mod leases;
 mod losses;
+mod mixed;
 mod recall;
 mod waiting;
 
@@ -38,7 +39,18 @@ fn names(n: u32) -> Vec<JobName> {
 }
 
 fn submit(n: u32) -> Event {
-    Event::Submit { setup: SETUP, jobs: names(n) }
+    Event::Submit { jobs: names(n).into_iter().map(|name| (SETUP, name)).collect() }
+}
+
+/// Another setup than [`SETUP`].
+fn setup(i: u8) -> SetupId {
+    [i; 32]
+}
+
+/// Jobs with these setups.
+fn submit_mixed(setups: &[u8]) -> Event {
+    let jobs = names(setups.len() as u32).into_iter().zip(setups).map(|(name, &i)| (setup(i), name));
+    Event::Submit { jobs: jobs.collect() }
 }
 
 fn prediction(index: usize) -> Prediction {

@@ -60,21 +60,22 @@ impl Dispatcher {
         let Some(batch) = &self.batch else { return };
         let patience = self.rules.patience;
         for worker in self.workers.values_mut() {
-            let Some(state) = worker.setups.get_mut(&batch.setup) else { continue };
-            if matches!(state, SetupState::Pending { since } if now.saturating_sub(*since) >= patience) {
-                let reason = format!("it was not built within {:.0} s", patience.as_secs_f64());
-                *state = SetupState::Failed(reason.clone());
-                self.out
-                    .push(Command::Notice(FleetEvent::SetupFailed { worker: worker.name.clone(), reason }));
+            for setup in batch.open_setups() {
+                let Some(state) = worker.setups.get_mut(setup) else { continue };
+                if matches!(state, SetupState::Pending { since } if now.saturating_sub(*since) >= patience) {
+                    let reason = format!("it was not built within {:.0} s", patience.as_secs_f64());
+                    *state = SetupState::Failed(reason.clone());
+                    let notice = FleetEvent::SetupFailed { worker: worker.name.clone(), reason };
+                    self.out.push(Command::Notice(notice));
+                }
             }
         }
     }
 
-    /// Says what is missing while no worker can take a job, and ends the batch when patience does.
+    /// Says what is missing while no worker can take any job of the batch, and ends the batch when patience does.
     fn watch_starvation(&mut self, now: Duration) {
         let Some(batch) = &self.batch else { return };
-        let setup = batch.setup;
-        if self.workers.values().any(|w| w.is_ready(&setup)) {
+        if batch.open_setups().any(|setup| self.workers.values().any(|w| w.is_ready(setup))) {
             self.starved = None;
             return;
         }
@@ -85,25 +86,33 @@ impl Dispatcher {
             starved.next_notice *= 2;
         }
         if waited >= self.rules.patience {
-            let error = match self.failed_everywhere(&setup) {
+            let failed = batch.open_setups().find_map(|setup| self.failed_everywhere(setup));
+            let error = match failed {
                 Some(reason) => BatchError::SetupFailed { reason },
-                None => BatchError::NoWorkers { waited, missing: self.missing(&setup) },
+                None => BatchError::NoWorkers { waited, missing: self.missing(batch) },
             };
             self.abort(error);
         } else if told {
-            let notice = FleetEvent::Waiting { seconds: waited.as_secs_f64(), missing: self.missing(&setup) };
+            let notice = FleetEvent::Waiting { seconds: waited.as_secs_f64(), missing: self.missing(batch) };
             self.out.push(Command::Notice(notice));
         }
     }
 
     /// What a batch without a ready worker lacks.
-    fn missing(&self, setup: &starlings_proto::SetupId) -> String {
+    fn missing(&self, batch: &Batch) -> String {
         let mut building = Vec::new();
         let mut failed = Vec::new();
         for worker in self.workers.values() {
-            match worker.setups.get(setup) {
-                Some(SetupState::Failed(reason)) => failed.push(format!("{} ({reason})", worker.name)),
-                _ => building.push(worker.name.as_str()),
+            let states = batch.open_setups().map(|setup| worker.setups.get(setup)).collect::<Vec<_>>();
+            let reason = states.iter().find_map(|state| match state {
+                Some(SetupState::Failed(reason)) => Some(reason),
+                _ => None,
+            });
+            if let Some(reason) = reason {
+                failed.push(format!("{} ({reason})", worker.name));
+            }
+            if !states.iter().all(|state| matches!(state, Some(SetupState::Failed(_)))) {
+                building.push(worker.name.as_str());
             }
         }
         let mut parts = Vec::new();

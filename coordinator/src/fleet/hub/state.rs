@@ -47,8 +47,7 @@ pub(in crate::fleet) enum Closed {
 
 /// A batch and who waits for it.
 pub(in crate::fleet) struct Submission {
-    pub(in crate::fleet) setup: SetupId,
-    pub(in crate::fleet) jobs: Vec<Job>,
+    pub(in crate::fleet) jobs: Vec<(SetupId, Job)>,
     pub(in crate::fleet) reply: Sender<Reply>,
 }
 
@@ -121,8 +120,8 @@ impl State {
             }
             Command::SendJob { worker, lease, index } => {
                 let Some(running) = &self.running else { return };
-                let Some(job) = running.jobs.get(index) else { return };
-                let message = self.encoder.encode(lease, &running.setup, job);
+                let Some((setup, job)) = running.jobs.get(index) else { return };
+                let message = self.encoder.encode(lease, setup, job);
                 self.send(worker, message);
             }
             Command::Cancel { worker, leases } => self.send(worker, ToWorker::cancel(&leases)),

@@ -45,7 +45,7 @@ fn batch(hub: &Hub) -> (Submission, Receiver<Reply>) {
     let job =
         starlings_models::Job { particle: 0, record: 0, window: window.into(), theta: vec![], state: None };
     let (reply, replies) = mpsc::channel();
-    (Submission { setup, jobs: vec![job], reply }, replies)
+    (Submission { jobs: vec![(setup, job)], reply }, replies)
 }
 
 #[test]

@@ -9,7 +9,6 @@ use crate::report::plot::figure::{Figure, with_unit};
 use crate::report::plot::mark::Mark;
 use crate::report::plot::palette::{BLUE, GREEN, GREY, INK, MUTED, VERMILION};
 use crate::report::plot::scene::Scene;
-use crate::report::plot::thin;
 use crate::study::identify::Identification;
 
 /// Colours of the records, and their names in a caption.
@@ -33,7 +32,7 @@ pub(super) fn sensitivity(found: &Identification) -> Result<Vec<Figure>, ReportE
         for (k, record) in found.records.iter().enumerate() {
             let span = record.first..(record.first + record.n).min(curve.len());
             let colour = RECORDS[k % RECORDS.len()].0;
-            marks.extend(lines(&series.time[span.clone()], &curve[span], colour, 1.75));
+            marks.extend(Mark::curve(&series.time[span.clone()], &curve[span], colour, 1.75));
         }
         let caption = format!(
             "At most {} noise sd for one prior sd.{} Where the curve is at zero, a datum says nothing of {name}.",
@@ -82,9 +81,9 @@ pub(super) fn generalised(found: &Identification) -> Result<Vec<Figure>, ReportE
         let ends = (x.lo, x.hi);
         let mut marks = vec![Mark::level(ends, 0.0, MUTED), Mark::dashed_level(ends, 1.0, MUTED)];
         for (_, other) in known.iter().filter(|(other, _)| other != name) {
-            marks.extend(lines(&x_values, other, GREY, 1.0));
+            marks.extend(Mark::curve(&x_values, other, GREY, 1.0));
         }
-        marks.extend(lines(&x_values, curve, BLUE, 2.0));
+        marks.extend(Mark::curve(&x_values, curve, BLUE, 2.0));
         let half = curve.iter().position(|v| *v >= 0.5).map(|k| x_values[k]);
         let caption = format!(
             "{}The data bear on {name} where the curve rises; where it falls, they bear on parameters that are \
@@ -132,9 +131,4 @@ pub(super) fn collinearity(found: &Identification) -> Result<Option<Figure>, Rep
     let scene = Scene { title, description: caption.clone(), x, y, marks };
     let keys = [("dot blue", "best conditioned subset"), ("dash muted", "critical")];
     Figure::new(&scene, &keys, caption).map(Some)
-}
-
-fn lines(x: &[f64], y: &[f64], colour: RGBColor, width: f64) -> Vec<Mark> {
-    let parts = thin::parts(x, y, y);
-    parts.iter().map(|part| Mark::Line { points: thin::curve(part), colour, width }).collect()
 }

@@ -32,7 +32,6 @@ const ROWS: usize = 10;
 /// The page, ready to be arranged.
 #[derive(Debug, Serialize)]
 pub(super) struct View {
-    css: &'static str,
     script: &'static str,
     study: String,
     says: String,
@@ -85,7 +84,6 @@ impl View {
             "height": figure.height,
         });
         Ok(Self {
-            css: include_str!("../report.css"),
             script: include_str!("locus.js"),
             study: locus.study.to_owned(),
             says: locus.says.to_owned(),

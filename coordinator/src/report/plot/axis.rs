@@ -93,6 +93,14 @@ impl Axis {
         if self.scale == Scale::Logarithmic { value.max(f64::MIN_POSITIVE).log10() } else { value }
     }
 
+    /// The value that stands at a share of the axis' length, 0 at its lower end and 1 at its upper one.
+    pub(crate) fn value_at(&self, share: f64) -> f64 {
+        let (lo, hi) = self.ends();
+        // Weighted ends, because the difference of the largest numbers overflows.
+        let at = (1.0 - share) * lo + share * hi;
+        if self.scale == Scale::Logarithmic { 10f64.powf(at) } else { at }
+    }
+
     /// Both ends, on the axis' own scale.
     pub(crate) fn ends(&self) -> (f64, f64) {
         (self.at(self.lo), self.at(self.hi))

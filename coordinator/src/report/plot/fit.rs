@@ -40,7 +40,7 @@ pub(crate) fn scene(channel: &ChannelPlot, time_unit: &str) -> Scene {
     let y = Axis::around(&with_unit(&channel.channel, &channel.unit), reach.chain(observed.iter().copied()))
         .with_headroom();
     let x = Axis::tight(&with_unit("time", time_unit), channel.time.iter().copied());
-    let mut marks = spans(channel, &x);
+    let mut marks = spans(trained(channel), &x);
     marks.extend(prediction(channel, margin, 0.16));
     marks.extend(measured(&channel.time, &observed, INK));
     marks.extend(prediction(channel, margin, 0.0));
@@ -54,8 +54,8 @@ pub(crate) fn scene(channel: &ChannelPlot, time_unit: &str) -> Scene {
 }
 
 /// The training span and the words above both spans.
-pub(crate) fn spans(channel: &ChannelPlot, x: &Axis) -> Vec<Mark> {
-    let Some([from, to]) = trained(channel) else {
+pub(crate) fn spans(trained: Option<[f64; 2]>, x: &Axis) -> Vec<Mark> {
+    let Some([from, to]) = trained else {
         return vec![Mark::Heading { x: x.lo, text: "held out".to_owned(), colour: VERMILION }];
     };
     let (from, to) = (from.clamp(x.lo, x.hi), to.clamp(x.lo, x.hi));

@@ -2,6 +2,8 @@
 
 use plotters::style::RGBColor;
 
+use super::thin;
+
 /// A point in the units of the axes.
 pub(crate) type Point = (f64, f64);
 
@@ -27,6 +29,12 @@ pub(crate) enum Mark {
 }
 
 impl Mark {
+    /// A series as one curve per part without gaps, thinned where it is long.
+    pub(crate) fn curve(x: &[f64], y: &[f64], colour: RGBColor, width: f64) -> Vec<Self> {
+        let parts = thin::parts(x, y, y);
+        parts.iter().map(|part| Self::Line { points: thin::curve(part), colour, width }).collect()
+    }
+
     /// A horizontal line over the width of `x`.
     pub(crate) fn level(x: (f64, f64), y: f64, colour: RGBColor) -> Self {
         Self::Line { points: vec![(x.0, y), (x.1, y)], colour, width: 1.2 }

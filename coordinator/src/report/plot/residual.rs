@@ -4,7 +4,7 @@ use super::super::data::ChannelPlot;
 use super::super::{ReportError, number};
 use super::axis::Axis;
 use super::figure::{Figure, with_unit};
-use super::fit::{measured, measured_key, spans};
+use super::fit::{measured, measured_key, spans, trained};
 use super::mark::Mark;
 use super::palette::{GREEN, INK, MUTED};
 use super::scene::Scene;
@@ -22,7 +22,7 @@ pub(crate) fn figure(channel: &ChannelPlot, time_unit: &str) -> Result<Figure, R
     let label = with_unit(&format!("{}, observed − predicted", channel.channel), &channel.unit);
     let y = Axis::around(&label, residual.iter().copied().chain([-margin, margin])).with_headroom();
     let ends = (x.lo, x.hi);
-    let mut marks = spans(channel, &x);
+    let mut marks = spans(trained(channel), &x);
     marks.push(Mark::flat_band(ends, (-margin, margin), GREEN, 0.16));
     marks.push(Mark::level(ends, 0.0, MUTED));
     marks.extend(measured(&channel.time, &residual, INK));

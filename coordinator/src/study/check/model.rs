@@ -55,6 +55,7 @@ pub(in crate::study) fn model(source: &Source, file: &StudyFile) -> Option<Check
     let model = ModelDef { kind: file.model.kind.get_ref().clone(), constants, equations, layout };
     let mut setup = Setup { model, ..Setup::default() };
     let bare = spec(source, file, &setup)?;
+    check_roles(source, file, &bare);
     let candidates = sort_effects(source, file, &mut setup, &bare)?;
     let spec = spec(source, file, &setup)?;
     let mut valid_names = valid_names(&spec);
@@ -149,7 +150,19 @@ fn equations(source: &Source, section: &EquationsSection) -> EquationsDef {
             .map(|i| InputDef { name: i.name.get_ref().clone(), unit: i.unit.clone(), role: i.role })
             .collect(),
         replaceable: section.replaceable.iter().map(|r| r.get_ref().clone()).collect(),
+        roles: section.roles.iter().map(|(name, role)| (name.get_ref().clone(), *role)).collect(),
         solver: solver(source, &section.solver),
+    }
+}
+
+/// A meaning is given to parameters that the equations use.
+fn check_roles(source: &Source, file: &StudyFile, bare: &Spec) {
+    let known: Vec<String> = bare.parameters.iter().map(|q| q.name.clone()).collect();
+    for (name, _) in file.model.equations.iter().flat_map(|section| &section.roles) {
+        if !known.contains(name.get_ref()) {
+            let message = format!("the equations have no parameter `{}`", name.get_ref());
+            source.report_unknown(name.span(), message, &known);
+        }
     }
 }
 
@@ -210,6 +223,7 @@ fn effect(section: &EffectSection) -> EffectDef {
         unit: p.unit.clone(),
         range: p.range.unwrap_or(EffectParameter::default().range),
         grid: p.grid.clone(),
+        ..EffectParameter::default()
     };
     let state = |s: &StateSection| EffectState {
         name: s.name.get_ref().clone(),
@@ -228,6 +242,7 @@ fn effect(section: &EffectSection) -> EffectDef {
         parameters: section.parameters.iter().map(parameter).collect(),
         states: section.states.iter().map(state).collect(),
         confounders: section.confounders.clone(),
+        source: section.source.clone(),
         built_in: section.built_in.as_ref().map(|b| b.get_ref().clone()),
     }
 }

@@ -1,4 +1,4 @@
-//! Observer, estimator, fleet and explain settings: words to choices, numbers to ranges.
+//! Observer, estimator and fleet settings: words to choices, numbers to ranges.
 //!
 //! Next file to read: [`super::model`].
 
@@ -6,8 +6,8 @@ use starlings_estimators::{Batch, Points, Root};
 use starlings_models::ObserverDef;
 use toml::Spanned;
 
-use crate::study::checked::{EstimatorChoice, EstimatorKind, ExplainChoice, FleetChoice, Library};
-use crate::study::file::{EstimatorSection, FleetSection, ObserverSection, StudyFile};
+use crate::study::checked::{EstimatorChoice, EstimatorKind, FleetChoice};
+use crate::study::file::{EstimatorSection, FleetSection, ObserverSection};
 use crate::study::problem::Source;
 
 /// `[observer]`.
@@ -82,19 +82,8 @@ pub(in crate::study) fn fleet(source: &Source, section: &FleetSection) -> FleetC
     }
 }
 
-/// `[explain]`.
-pub(in crate::study) fn explain(source: &Source, file: &StudyFile) -> ExplainChoice {
-    let section = &file.explain;
-    let libraries = [("all", Library::All), ("study", Library::Study), ("built-in", Library::BuiltIn)];
-    ExplainChoice {
-        hold_out_channels: section.hold_out_channels.iter().map(|c| c.get_ref().clone()).collect(),
-        budget: section.budget,
-        library: choose(source, section.library.as_ref(), "library", &libraries).unwrap_or_default(),
-    }
-}
-
 /// The choice behind a word; an unknown word is reported.
-fn choose<T: Copy>(
+pub(super) fn choose<T: Copy>(
     source: &Source,
     word: Option<&Spanned<String>>,
     what: &str,
@@ -110,7 +99,7 @@ fn choose<T: Copy>(
 }
 
 /// A count from 1 to `most`.
-fn counted(source: &Source, value: Option<&Spanned<u64>>, key: &str, most: u64) -> Option<usize> {
+pub(super) fn counted(source: &Source, value: Option<&Spanned<u64>>, key: &str, most: u64) -> Option<usize> {
     let value = value?;
     let n = *value.get_ref();
     if n == 0 || n > most {

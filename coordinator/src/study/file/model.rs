@@ -19,10 +19,10 @@ use super::{
 use crate::study::problem::Source;
 
 /// Keys of `[model]` that only a model of equations has.
-const EQUATIONS: [&str; 5] = ["outputs", "inputs", "replaceable", "solver", "states"];
+const EQUATIONS: [&str; 6] = ["outputs", "inputs", "replaceable", "roles", "solver", "states"];
 /// Keys of `[model]` that only an external solver has.
 const EXTERNAL: [&str; 2] = ["command", "address"];
-const ROLES: [&str; 13] = [
+const ROLES: [&str; 18] = [
     "displacement",
     "velocity",
     "level",
@@ -35,6 +35,11 @@ const ROLES: [&str; 13] = [
     "inertia",
     "stiffness",
     "damping",
+    "throat-area",
+    "burn-rate",
+    "burn-area",
+    "web",
+    "thrust",
     "other",
 ];
 
@@ -86,6 +91,7 @@ fn equations(source: &Source, model: &Table<'_>) -> EquationsSection {
         outputs: quantities(source, model, "outputs", "an output", true),
         inputs: quantities(source, model, "inputs", "an input", false),
         replaceable: model.texts("replaceable"),
+        roles: roles(source, model),
         solver: solver(model),
     }
 }
@@ -170,7 +176,16 @@ fn unit(t: &Table<'_>) -> String {
 }
 
 fn role(source: &Source, t: &Table<'_>) -> Role {
-    let Some(name) = t.text("role") else { return Role::Other };
+    t.text("role").map_or(Role::Other, |name| named_role(source, &name))
+}
+
+/// The meanings of parameters, by name.
+fn roles(source: &Source, model: &Table<'_>) -> Vec<(Spanned<String>, Role)> {
+    let named = named_texts(source, &model.free_entries("roles"));
+    named.into_iter().map(|(parameter, name)| (parameter, named_role(source, &name))).collect()
+}
+
+fn named_role(source: &Source, name: &Spanned<String>) -> Role {
     let deserializer: StrDeserializer<'_, serde::de::value::Error> =
         name.get_ref().as_str().into_deserializer();
     Role::deserialize(deserializer).unwrap_or_else(|_| {
@@ -182,7 +197,7 @@ fn role(source: &Source, t: &Table<'_>) -> Role {
 
 /// Reads `[[effects]]`.
 pub(in crate::study) fn effects(source: &Source, root: &Table<'_>) -> Vec<EffectSection> {
-    let keys = ["name", "says", "built_in", "adds", "parameters", "states", "confounders"];
+    let keys = ["name", "says", "source", "built_in", "adds", "parameters", "states", "confounders"];
     root.tables("effects", "[[effects]]", &keys).iter().map(|t| effect(source, t)).collect()
 }
 
@@ -200,13 +215,14 @@ fn effect(source: &Source, t: &Table<'_>) -> EffectSection {
         }
     }
     let add = |a: &Table<'_>| {
-        let to = a.required_text("to", "a state, an output or an input");
+        let to = a.required_text("to", "a state, an output, an input or a parameter of the model");
         (to, a.required_text("term", "an expression"))
     };
     let states = t.tables("states", "a state of an effect", &["name", "unit", "initial", "rate"]);
     EffectSection {
         name: t.required_text("name", "how the study and the report call it"),
         says: t.text("says").map(Spanned::into_inner).unwrap_or_default(),
+        source: t.text("source").map(Spanned::into_inner).unwrap_or_default(),
         built_in,
         adds: t.tables("adds", "an entry of `adds`", &["to", "term"]).iter().map(add).collect(),
         parameters: effect_parameters(t),

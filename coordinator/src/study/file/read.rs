@@ -237,13 +237,17 @@ fn noise(source: &Source, node: &Node<'_>) -> Option<Spanned<Option<f64>>> {
 }
 
 fn explain(root: &Table<'_>) -> ExplainSection {
-    let Some(t) = root.table("explain", "[explain]", &["hold_out_channels", "budget", "library"]) else {
+    let keys = ["hold_out_channels", "budget", "library", "without", "only", "max_effects"];
+    let Some(t) = root.table("explain", "[explain]", &keys) else {
         return ExplainSection::default();
     };
     ExplainSection {
         hold_out_channels: t.texts("hold_out_channels"),
-        budget: t.count("budget").map(Spanned::into_inner),
+        budget: t.count("budget"),
         library: t.text("library"),
+        without: t.texts("without"),
+        only: t.texts("only"),
+        max_effects: t.count("max_effects"),
     }
 }
 

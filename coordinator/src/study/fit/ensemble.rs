@@ -1,20 +1,15 @@
 //! What the estimator does not see of an ensemble: the states of its particles, and the noise of its rows.
 
-use std::sync::OnceLock;
-
 use nalgebra::DMatrix;
 use starlings_estimators::Noise;
 
 use super::flight::StepWindows;
 use crate::study::Study;
 
-/// X⁺ = X⁻T for the states of every record, by as many threads as there are cores; the bits do not depend on them.
-pub(super) fn recombine(states: &mut [Option<DMatrix<f64>>], transform: &DMatrix<f64>) {
-    // Asking the system reads files, which costs more than a small recombination.
-    static CORES: OnceLock<usize> = OnceLock::new();
-    let cores = *CORES.get_or_init(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get));
+/// X⁺ = X⁻T for the states of every record, by so many threads; the bits do not depend on them.
+pub(super) fn recombine(states: &mut [Option<DMatrix<f64>>], transform: &DMatrix<f64>, threads: usize) {
     for x in states.iter_mut().flatten() {
-        starlings_estimators::recombine(x, transform, cores);
+        starlings_estimators::recombine(x, transform, threads);
     }
 }
 

@@ -80,7 +80,7 @@ fn step(
     let noise = noise(schedule.study, &windows, schedule.anneal(now.head.pass));
     let (particles, analysis) =
         roukf.analysis(&particles, &predictions, &Data { values: &values, noise: &noise })?;
-    recombine(&mut now.states, &analysis.transform);
+    recombine(&mut now.states, &analysis.transform, flight.threads);
     for (record, states) in now.states.iter_mut().enumerate() {
         if schedule.windows[record].len() <= place.step + 1 {
             *states = None;

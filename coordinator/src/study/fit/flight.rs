@@ -41,6 +41,8 @@ pub struct Flight<'a> {
     pub failed: u64,
     /// Extra attempts.
     pub retried: u64,
+    /// Threads that recombine states; one unless somebody says more.
+    pub threads: usize,
     /// Workers that answered.
     workers: BTreeSet<String>,
 }
@@ -60,6 +62,7 @@ impl<'a> Flight<'a> {
             total: 0,
             failed: 0,
             retried: 0,
+            threads: 1,
             workers: BTreeSet::new(),
         })
     }

@@ -88,7 +88,7 @@ pub fn redraw(
     let Resampled { particles: redrawn, transform, dropped } =
         roukf.resample(particles, &gram(study, &roukf.set.weights, particles, states))?;
     let mut mixed = states.clone();
-    recombine(&mut mixed, &transform);
+    recombine(&mut mixed, &transform, flight.threads);
     let mut observed = predictions * transform;
     // Where an observer has brought the datum into the state, an output of that state is no prediction of it.
     if study.observer_is_off()

@@ -12,9 +12,11 @@ use starlings_models::Role;
 
 use crate::study::expand::INITIAL;
 use crate::study::field::quantity_of;
-use crate::study::store::{Store, StoreError};
+use crate::study::store::{Purpose, Store, StoreError};
 use crate::study::summary::Summary;
 use crate::study::{Fit, Study, ThetaEntry, posterior};
+
+pub use crate::study::store::folder_error::FolderError;
 
 /// What the store keeps of the study so that a report needs nothing else.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -40,6 +42,9 @@ pub struct StudyInfo {
     /// Names of parameters that are a stiffness.
     #[serde(default)]
     pub stiffness: Vec<String>,
+    /// Names of the model's states.
+    #[serde(default)]
+    pub states: Vec<String>,
     /// Record names and training spans; `None` for a record that is held out as a whole.
     pub records: Vec<(String, Option<[f64; 2]>)>,
     /// The command line of the run.
@@ -48,44 +53,6 @@ pub struct StudyInfo {
     pub started: String,
     /// Version of the program.
     pub version: String,
-}
-
-/// Why a run folder cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum FolderError {
-    /// It already holds a run.
-    #[error("{0} already holds a run: continue it with --resume, or choose another folder with --out")]
-    Occupied(PathBuf),
-    /// It holds a file that a run would overwrite.
-    #[error("{0} exists already, and a run would overwrite it: choose another folder with --out")]
-    InTheWay(PathBuf),
-    /// Another process runs in it.
-    #[error("another process is running in {0}: wait for its end, or stop it")]
-    Locked(PathBuf),
-    /// Its run never got as far as its first step.
-    #[error("{0} holds no run that could be continued: remove the folder and start again without --resume")]
-    NeverStarted(PathBuf),
-    /// It cannot be made or written.
-    #[error("cannot write to {path}: {source}")]
-    Unwritable {
-        /// The folder or file.
-        path: PathBuf,
-        /// What the system said.
-        source: io::Error,
-    },
-    /// A resumed run was started from another study.
-    #[error(
-        "{folder} was started from another study: {what} changed since; start a new run instead of --resume"
-    )]
-    OtherStudy {
-        /// The folder.
-        folder: PathBuf,
-        /// `the study file` or `the recordings`.
-        what: &'static str,
-    },
-    /// The database failed.
-    #[error(transparent)]
-    Store(#[from] StoreError),
 }
 
 /// An open run folder.
@@ -101,20 +68,32 @@ pub struct RunFolder {
 /// Name under which the store keeps the course of the innovations with and without the observer.
 pub(crate) const OBSERVER: &str = "observer";
 
-/// The files that a run writes beside its database.
-const FILES: [&str; 4] = ["study.toml", "posterior.csv", "summary.json", "report.html"];
-
 impl RunFolder {
     /// Makes the folder of a new run and freezes the study into it.
     ///
     /// # Errors
     /// When the folder holds a run or one of its files already, or cannot be written; nothing is left then.
     pub fn create(path: &Path, study: &Study, command: &str, started: &str) -> Result<Self, FolderError> {
+        Self::create_for(Purpose::Run, path, study, command, started)
+    }
+
+    /// [`RunFolder::create`] for any purpose.
+    ///
+    /// # Errors
+    /// As [`RunFolder::create`].
+    pub fn create_for(
+        purpose: Purpose,
+        path: &Path,
+        study: &Study,
+        command: &str,
+        started: &str,
+    ) -> Result<Self, FolderError> {
         let database = path.join("run.db");
         if database.exists() {
             return Err(FolderError::Occupied(path.to_owned()));
         }
-        if let Some(taken) = FILES.map(|name| path.join(name)).into_iter().find(|file| file.exists()) {
+        let mut files = purpose.files().iter().map(|name| path.join(name));
+        if let Some(taken) = files.find(|file| file.exists()) {
             return Err(FolderError::InTheWay(taken));
         }
         let unwritable = |path: &Path| {
@@ -126,7 +105,12 @@ impl RunFolder {
         write(&frozen, &study.text).map_err(unwritable(&frozen))?;
         let lock = lock(path)?;
         let (recordings, info) = (fingerprint(study), json(&info(study, command, started)));
-        let meta = [("study", study.text.as_str()), ("recordings", &recordings), ("info", &info)];
+        let meta = [
+            ("study", study.text.as_str()),
+            ("recordings", &recordings),
+            ("info", &info),
+            (Purpose::KEY, purpose.name()),
+        ];
         let store = Store::create(&database, &meta).inspect_err(|_| {
             // Already failing: a frozen study that cannot be removed either stays.
             let _ = std::fs::remove_file(&frozen);
@@ -139,8 +123,22 @@ impl RunFolder {
     /// # Errors
     /// When there is no run, another process runs in it, or it was started from another study or other recordings.
     pub fn resume(path: &Path, study: &Study) -> Result<Self, FolderError> {
+        Self::resume_for(Purpose::Run, path, study)
+    }
+
+    /// [`RunFolder::resume`] for any purpose.
+    ///
+    /// # Errors
+    /// As [`RunFolder::resume`], and when the folder serves another purpose.
+    pub fn resume_for(purpose: Purpose, path: &Path, study: &Study) -> Result<Self, FolderError> {
         let store = Store::open(&path.join("run.db"))?;
         let lock = lock(path)?;
+        let found = Purpose::of(&store)?;
+        if found != purpose {
+            let article = if found == Purpose::Run { "a" } else { "an" };
+            let (folder, holds, command) = (path.to_owned(), found.name(), found.command());
+            return Err(FolderError::OtherPurpose { folder, article, holds, command });
+        }
         let other = |what| FolderError::OtherStudy { folder: path.to_owned(), what };
         match store.meta("study")? {
             None => return Err(FolderError::NeverStarted(path.to_owned())),
@@ -159,6 +157,14 @@ impl RunFolder {
     /// When there is no run.
     pub fn open(path: &Path) -> Result<Self, FolderError> {
         Ok(Self { path: path.to_owned(), store: Store::open_to_read(&path.join("run.db"))?, _lock: None })
+    }
+
+    /// What the folder is for.
+    ///
+    /// # Errors
+    /// When the store fails.
+    pub fn purpose(&self) -> Result<Purpose, StoreError> {
+        Purpose::of(&self.store)
     }
 
     /// The summary, once the run is finished.
@@ -267,6 +273,7 @@ fn info(study: &Study, command: &str, started: &str) -> StudyInfo {
             .map(|t| t.name.clone())
             .collect(),
         stiffness: stiffness(study),
+        states: study.spec.states.iter().map(|q| q.name.clone()).collect(),
         records: study.records.iter().map(|r| (r.name.clone(), r.train_span())).collect(),
         command: command.to_owned(),
         started: started.to_owned(),

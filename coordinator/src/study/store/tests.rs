@@ -1,4 +1,5 @@
-//! What only a store can be asked: that a disk without room is told and loses nothing.
+//! What only a store can be asked: that a disk without room is told and loses nothing, that answers are remembered.
+#![allow(clippy::unwrap_used)]
 
 use nalgebra::DMatrix;
 
@@ -91,4 +92,44 @@ fn a_full_disk_is_told_with_its_remedy_and_keeps_every_committed_analysis() {
     assert_eq!(kept.head.step, step, "the snapshot is that of the last finished analysis");
     assert_eq!(table(&store, "analyses", "step").expect("rows").len(), step);
     store.analysis(&row(step), &snapshot(step + 1)).expect("with room again it goes on");
+}
+
+/// An empty store in a folder of its own.
+fn empty() -> (tempfile::TempDir, Store) {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::create(&folder.path().join("run.db"), &[("study", "text")]).unwrap();
+    (folder, store)
+}
+
+#[test]
+fn answers_of_runs_are_remembered_by_their_key_and_over_a_kill() {
+    let (folder, store) = empty();
+    let (a, b, c) = ([1_u8; 32], [2_u8; 32], [3_u8; 32]);
+    store.remember_runs([(&a, b"one".as_slice()), (&b, b"".as_slice())], &[]).unwrap();
+    store.remember_run(&a, b"again").unwrap();
+    // Neither closed nor dropped: what a killed process leaves.
+    std::mem::forget(store);
+    let store = Store::open(&folder.path().join("run.db")).unwrap();
+    assert_eq!(store.remembered_run(&a).unwrap().as_deref(), Some(b"again".as_slice()));
+    assert_eq!(store.remembered_run(&b).unwrap().as_deref(), Some(b"".as_slice()));
+    assert_eq!(store.remembered_run(&c).unwrap(), None);
+    assert_eq!(store.n_remembered_run().unwrap(), 2);
+}
+
+#[test]
+fn a_store_without_a_table_of_remembered_runs_gets_one_when_it_is_opened() {
+    let (folder, store) = empty();
+    store.connection.execute_batch("DROP TABLE remembered_runs").unwrap();
+    drop(store);
+    let store = Store::open(&folder.path().join("run.db")).unwrap();
+    assert_eq!(store.n_remembered_run().unwrap(), 0);
+    assert_eq!(store.folder(), folder.path());
+}
+
+#[test]
+fn a_store_that_does_not_say_what_it_is_for_is_a_run() {
+    let (_folder, store) = empty();
+    assert_eq!(Purpose::of(&store).unwrap(), Purpose::Run);
+    store.set_meta(Purpose::KEY, Purpose::Explanation.name()).unwrap();
+    assert_eq!(Purpose::of(&store).unwrap(), Purpose::Explanation);
 }

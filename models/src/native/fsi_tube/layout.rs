@@ -14,8 +14,9 @@ use crate::setup::SetupError;
 /// Cells at most: structural observers work with matrices of this size.
 const MOST_CELLS: usize = 10_000;
 
-/// Shortest accepted step in s: in it a wave passes a tenth of a micrometre, which no cell is short enough to show.
-const SHORTEST_STEP: f64 = 1e-9;
+/// Shortest accepted step in s: in it a wave of 10 m/s passes 10 µm, less than any cell that the model is meant for, and a
+/// second of recording takes a million steps; shorter ones would keep a long recording running without end.
+const SHORTEST_STEP: f64 = 1e-6;
 
 /// Lowest accepted pressure of an image in dyn/cm², 7.5 mmHg: below it the number is of another unit.
 const LOWEST_IMAGE_PRESSURE: f64 = 1e4;
@@ -31,7 +32,7 @@ pub struct Layout {
     pub cells: usize,
     /// Regions of one Young's modulus each.
     pub regions: Regions,
-    /// Longest time step in s.
+    /// Longest time step in s, 1e-6 or more.
     pub step: f64,
     /// Where a run starts.
     pub start: Start,

@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use proptest::prelude::*;
 use starlings_models::ParticleError;
-use starlings_proto::{Answer, Lease};
+use starlings_proto::{Answer, Lease, SetupId};
 
-use super::{RULES, SETUP, answered, joining, left, outcomes, prediction, solver, submit};
+use super::{RULES, answered, joining, left, outcomes, prediction, setup, solver, submit_mixed};
 use crate::fleet::Outcome;
 use crate::fleet::dispatcher::{BatchError, Command, Dispatcher, Event, WorkerId};
 
@@ -18,6 +18,7 @@ enum Act {
     Reconnect(usize),
     Lose(usize, bool),
     BuildSetup(usize, bool),
+    ForgetSetup(usize),
     Answer(usize, f64),
     Fail(usize),
     Repeat(usize),
@@ -30,6 +31,7 @@ fn act() -> impl Strategy<Value = Act> {
         1 => any::<usize>().prop_map(Act::Reconnect),
         2 => (any::<usize>(), any::<bool>()).prop_map(|(who, clean)| Act::Lose(who, clean)),
         4 => (any::<usize>(), prop::bool::weighted(0.8)).prop_map(|(who, ok)| Act::BuildSetup(who, ok)),
+        1 => any::<usize>().prop_map(Act::ForgetSetup),
         12 => (any::<usize>(), prop::sample::select(vec![1e-6, 1e-3, 1.0])).prop_map(|(which, cost)| Act::Answer(which, cost)),
         3 => any::<usize>().prop_map(Act::Fail),
         2 => any::<usize>().prop_map(Act::Repeat),
@@ -43,7 +45,9 @@ struct World {
     now: Duration,
     next_id: u64,
     alive: BTreeSet<u64>,
-    to_build: BTreeSet<u64>,
+    setups: Vec<u8>,
+    to_build: BTreeSet<(u64, SetupId)>,
+    built: BTreeSet<(u64, SetupId)>,
     open: BTreeMap<(u64, u64), (Lease, usize)>,
     withdrawn: Vec<Lease>,
     past: Vec<Lease>,
@@ -51,13 +55,16 @@ struct World {
 }
 
 impl World {
-    fn new(jobs: u32, local: bool) -> Self {
+    /// One job per setup number.
+    fn new(setups: &[u8], local: bool) -> Self {
         let mut world = Self {
             dispatcher: Dispatcher::new(RULES),
             now: Duration::ZERO,
             next_id: 0,
             alive: BTreeSet::new(),
+            setups: setups.to_vec(),
             to_build: BTreeSet::new(),
+            built: BTreeSet::new(),
             open: BTreeMap::new(),
             withdrawn: vec![],
             past: vec![],
@@ -66,7 +73,7 @@ impl World {
         if local {
             world.event(Event::LocalOnly);
         }
-        world.event(submit(jobs));
+        world.event(submit_mixed(setups));
         world
     }
 
@@ -78,10 +85,13 @@ impl World {
 
     fn obey(&mut self, command: Command) {
         match command {
-            Command::SendSetup { worker, .. } => {
-                self.to_build.insert(worker.0);
+            Command::SendSetup { worker, setup } => {
+                assert!(self.alive.contains(&worker.0), "a setup is sent only to a live worker");
+                assert!(self.to_build.insert((worker.0, setup)), "a setup is sent once while it is built");
             }
             Command::SendJob { worker, lease, index } => {
+                let needed = (worker.0, setup(self.setups[index]));
+                assert!(self.built.contains(&needed), "a job is sent only to a worker with its setup");
                 assert!(self.alive.contains(&worker.0), "a job is sent only to a live worker");
                 let twice = self.open.values().any(|(_, open)| *open == index);
                 assert!(!twice, "a job has one lease at a time");
@@ -101,7 +111,8 @@ impl World {
 
     fn forget(&mut self, worker: u64) {
         self.alive.remove(&worker);
-        self.to_build.remove(&worker);
+        self.to_build.retain(|(of, _)| *of != worker);
+        self.built.retain(|(of, _)| *of != worker);
         self.past.extend(self.open.values().map(|(lease, _)| *lease).filter(|lease| lease.epoch == worker));
         self.open.retain(|(of, _), _| *of != worker);
         self.withdrawn.retain(|lease| lease.epoch != worker);
@@ -138,15 +149,24 @@ impl World {
                 self.event(left(worker, clean));
             }
             Act::BuildSetup(which, ok) => {
-                let Some(worker) = choose(&self.to_build, which) else { return };
-                self.to_build.remove(&worker);
-                let (worker, setup) = (WorkerId(worker), SETUP);
+                let Some(key) = choose(&self.to_build, which) else { return };
+                self.to_build.remove(&key);
+                if ok {
+                    self.built.insert(key);
+                }
+                let (worker, setup) = (WorkerId(key.0), key.1);
                 let reason = "cannot".to_owned();
                 self.event(if ok {
                     Event::SetupDone { worker, setup }
                 } else {
                     Event::SetupFailed { worker, setup, reason }
                 });
+            }
+            Act::ForgetSetup(which) => {
+                let Some(key) = choose(&self.built, which) else { return };
+                self.built.remove(&key);
+                let reason = "forgotten".to_owned();
+                self.event(Event::SetupFailed { worker: WorkerId(key.0), setup: key.1, reason });
             }
             Act::Answer(which, cost) => match pick(&self.open, which) {
                 // A called-back job may come back unstarted.
@@ -174,9 +194,9 @@ impl World {
     }
 
     /// From here on the world is kind: one good worker, prompt answers.
-    fn finish(&mut self, jobs: u32) {
+    fn finish(&mut self) {
         self.join(2);
-        for _ in 0..20 * jobs + 50 {
+        for _ in 0..20 * self.setups.len() + 50 {
             if self.ended.is_some() {
                 return;
             }
@@ -187,7 +207,7 @@ impl World {
     }
 }
 
-fn choose(from: &BTreeSet<u64>, which: usize) -> Option<u64> {
+fn choose<T: Ord + Copy>(from: &BTreeSet<T>, which: usize) -> Option<T> {
     (!from.is_empty()).then(|| *from.iter().nth(which % from.len()).expect("within the length"))
 }
 
@@ -200,11 +220,11 @@ proptest! {
 
     #[test]
     fn every_job_ends_exactly_once_whatever_happens(
-        jobs in 1_u32..40,
+        setups in prop::collection::vec(0_u8..4, 1..40),
         local in any::<bool>(),
         acts in prop::collection::vec(act(), 0..300),
     ) {
-        let mut world = World::new(jobs, local);
+        let mut world = World::new(&setups, local);
         for act in &acts {
             if world.ended.is_some() {
                 break;
@@ -212,11 +232,11 @@ proptest! {
             world.act(act);
         }
         if world.ended.is_none() {
-            world.finish(jobs);
+            world.finish();
         }
         match world.ended.expect("finish ends it") {
             Ok(outcomes) => {
-                prop_assert_eq!(outcomes.len(), jobs as usize);
+                prop_assert_eq!(outcomes.len(), setups.len());
                 for (index, outcome) in outcomes.iter().enumerate() {
                     match &outcome.result {
                         Ok(result) => prop_assert_eq!(result, &prediction(index)),

@@ -1,0 +1,34 @@
+//! Explaining a misfit: where simulation and data disagree, which effect is missing, and the gap shrinking.
+//!
+//! Every decision is made by running the model again, never by differentiating data: one candidate effect is one run, so the
+//! screening is what the fleet is for. Next files to read: [`result`] for what comes out, [`rows`] for the common language.
+
+mod answer;
+pub mod background;
+pub mod candidate;
+pub mod candidates;
+mod experiment;
+pub mod figures;
+pub mod fit;
+pub mod form;
+pub mod judge;
+pub mod keep;
+pub mod laboratory;
+pub mod locate;
+pub mod options;
+pub mod patch;
+mod probe;
+pub mod result;
+pub mod rows;
+mod run;
+pub mod screen;
+pub mod search;
+pub mod verdict;
+pub mod version;
+mod words;
+
+pub use figures::Figures;
+pub use options::{Context, ExplainError, Findings, Options, Stage};
+pub use result::{Explanation, Verdict};
+pub use rows::{Row, Rows, Usage};
+pub use run::explain;

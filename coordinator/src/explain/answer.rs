@@ -1,0 +1,276 @@
+//! The findings in the words and numbers of `explain.json` and of its report.
+//!
+//! Nothing is decided here. Next file to read: [`super::run`].
+
+use nalgebra::DMatrix;
+
+use super::candidate::Candidate;
+use super::figures::Curve;
+use super::fit::Fitted;
+use super::judge::Judged;
+use super::laboratory::Laboratory;
+use super::patch::PatchEffect;
+use super::result::{
+    Coefficient, FalseAlarm, GapRow, NamedEffect, ParameterShift, Rejected, Remaining, Screened,
+};
+use super::rows::{Row, Usage};
+use super::screen::Hit;
+use super::search::Found;
+use super::verdict::Decision;
+use crate::study::field::quantity_of;
+
+/// Half-width of a central 95 % interval of a Gaussian, in standard deviations.
+const Z95: f64 = 1.959_963_984_540_054;
+
+/// Covariance of the transformed parameters of a fit, with the inflation of its residuals; zero where a direction is free.
+fn covariance(fit: &Fitted<'_>, inflation: f64) -> DMatrix<f64> {
+    let n = fit.version.n_param();
+    let unit = DMatrix::from_diagonal(fit.version.unit());
+    fit.optimum().map_or_else(|_| DMatrix::zeros(n, n), |o| &unit * o.covariance() * &unit * inflation)
+}
+
+/// The effects of a version with their coefficients.
+pub(super) fn effects(judged: &Judged<'_>) -> Vec<NamedEffect> {
+    let covariance = covariance(&judged.fit, judged.inflation);
+    let version = &judged.fit.version;
+    let theta = judged.fit.theta();
+    let of_member = |(m, member): (usize, &super::version::Member<'_>)| {
+        let def = &member.candidate.def;
+        let coefficient = |(k, parameter): (usize, &starlings_models::effect::EffectParameter)| {
+            let j = version.first_of(m) + k;
+            let transform = &version.study.theta[j].transform;
+            let sd = covariance[(j, j)].max(0.0).sqrt();
+            let ends = [-Z95 * sd, Z95 * sd].map(|w| transform.to_physical(theta[j] + w));
+            Coefficient {
+                name: parameter.name.clone(),
+                unit: parameter.unit.clone(),
+                estimate: transform.to_physical(theta[j]),
+                sd: transform.derivative(theta[j]).abs() * sd,
+                interval95: ends.map(|v| v.clamp(f64::MIN, f64::MAX)),
+            }
+        };
+        NamedEffect {
+            name: def.name.clone(),
+            says: def.says.clone(),
+            adds: def.adds.iter().map(|a| (a.to.clone(), a.term.clone())).collect(),
+            parameters: def.parameters.iter().enumerate().map(coefficient).collect(),
+            confounders: def.confounders.clone(),
+            source: def.source.clone(),
+        }
+    };
+    version.members.iter().enumerate().map(of_member).collect()
+}
+
+/// The effects of a version as the new study writes them.
+pub(super) fn patches(judged: &Judged<'_>) -> Vec<PatchEffect> {
+    let named = effects(judged);
+    let members = &judged.fit.version.members;
+    let patch = |(member, named): (&super::version::Member<'_>, NamedEffect)| PatchEffect {
+        def: member.candidate.def.clone(),
+        values: named.parameters,
+    };
+    members.iter().zip(named).map(patch).collect()
+}
+
+/// Every candidate at its best point, with what became of it.
+pub(super) fn screened(found: &Found<'_>, candidates: &[Candidate], decision: &Decision, n_train: usize) -> Vec<Screened> {
+    let excess = found.before.train - n_train as f64;
+    let one = |(index, candidate): (usize, &Candidate)| {
+        let sign = candidate.sign();
+        let of = found.hits.iter().filter(|h| h.candidate == index);
+        let best = of.max_by(|a, b| {
+            let key = |h: &Hit| (h.failure.is_none(), h.allowed_gain(sign), h.score.gain);
+            key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal)
+        })?;
+        let inner = candidate.def.parameters.iter().skip(1).zip(&best.point);
+        let at: Vec<String> = inner.map(|(p, v)| format!("{} = {v:.4}", p.name)).collect();
+        Some(Screened {
+            name: candidate.name().to_owned(),
+            at: at.join(", "),
+            share: if excess > 0.0 { (best.score.gain / excess).min(1.0) } else { 0.0 },
+            gain: best.score.gain,
+            amplitude: best.score.amplitude,
+            identifiable: best.score.identifiable,
+            fate: fate(found, decision, index, candidate, best),
+        })
+    };
+    let mut all: Vec<Screened> = candidates.iter().enumerate().filter_map(one).collect();
+    all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    all
+}
+
+fn fate(found: &Found<'_>, decision: &Decision, index: usize, candidate: &Candidate, best: &Hit) -> String {
+    let named = decision.best.map(|i| super::verdict::names(&found.judged[i])).unwrap_or_default();
+    let is = |names: &[String]| names.iter().any(|n| n == candidate.name());
+    let answered = matches!(decision.verdict, super::Verdict::Named | super::Verdict::Tie);
+    let text = if answered && is(&named) {
+        "named"
+    } else if decision.tied.iter().any(|set| is(set)) {
+        "tied"
+    } else if let Some(reason) = &best.failure {
+        return if reason.starts_with("no influence") { "no influence".to_owned() } else { "failed".to_owned() };
+    } else if best.is_absorbed() {
+        "absorbed by the parameters"
+    } else if found.judged.iter().any(|j| j.fit.version.members.iter().any(|m| m.index == index)) {
+        "refitted"
+    } else if best.allowed_gain(candidate.sign()) > 0.0 || best.score.gain <= 0.0 {
+        "not refitted"
+    } else {
+        "wrong sign"
+    };
+    text.to_owned()
+}
+
+/// What was refused, with reasons: refitted versions first, then candidates that failed, have no influence of their own, or
+/// would need the wrong sign.
+pub(super) fn rejected(found: &Found<'_>, candidates: &[Candidate], decision: &Decision) -> Vec<Rejected> {
+    let mut list = Vec::new();
+    let keep: Vec<usize> = decision.best.iter().copied().chain(decision.rivals.clone()).collect();
+    for (i, judged) in found.judged.iter().enumerate().filter(|(i, _)| !keep.contains(i)) {
+        let (gate, reason) = match &judged.refusal {
+            Some(refusal) => (refusal.gate.to_owned(), refusal.reason.clone()),
+            None => ("evidence".to_owned(), behind(found, decision, i)),
+        };
+        list.push(Rejected { name: judged.fit.version.name(), gate, reason });
+    }
+    for (index, candidate) in candidates.iter().enumerate() {
+        let of = || found.hits.iter().filter(|h| h.candidate == index);
+        let name = candidate.name().to_owned();
+        if let Some(reason) = of().find_map(|h| h.failure.clone()).filter(|_| of().all(|h| h.failure.is_some())) {
+            list.push(Rejected { name, gate: "failed".to_owned(), reason });
+        } else if of().count() > 0 && of().all(Hit::is_absorbed) {
+            let reason = "the model's parameters imitate it: it cannot be told from them, which does not mean absent";
+            list.push(Rejected { name, gate: "absorbed".to_owned(), reason: reason.to_owned() });
+        } else if let Some(hit) = wrong_sign(found, index, candidate) {
+            let parameter = &candidate.def.parameters[0];
+            let reason = format!(
+                "{} would have to be {:.4} ± {:.4} {}, a sign that physics does not allow",
+                parameter.name, hit.score.amplitude, hit.score.sd, parameter.unit
+            );
+            list.push(Rejected { name, gate: "sign".to_owned(), reason });
+        }
+    }
+    list
+}
+
+/// A candidate that would gain more than chance, were it not for its sign at every point of its grid.
+fn wrong_sign<'f>(found: &'f Found<'_>, index: usize, candidate: &Candidate) -> Option<&'f Hit> {
+    let of = || found.hits.iter().filter(|h| h.candidate == index && h.failure.is_none());
+    let never = of().all(|h| h.allowed_gain(candidate.sign()) <= 0.0);
+    of().filter(|h| never && h.score.gain > found.background.threshold)
+        .max_by(|a, b| a.score.gain.total_cmp(&b.score.gain))
+}
+
+fn behind(found: &Found<'_>, decision: &Decision, i: usize) -> String {
+    let Some(best) = decision.best.map(|b| &found.judged[b]) else { return String::new() };
+    let judged = &found.judged[i];
+    format!(
+        "it takes away {:.0} % of the gap, `{}` {:.0} %; {:.1} in χ² lie between them, training and held-out span together, in \
+         units of the effective noise",
+        100.0 * judged.share,
+        best.fit.version.name(),
+        100.0 * best.share,
+        (best.rank() - judged.rank()) / best.inflation
+    )
+}
+
+/// Root mean square errors before and after, by record, channel and use.
+pub(super) fn gap(laboratory: &Laboratory<'_>, before: &[f64], after: &[f64]) -> Vec<GapRow> {
+    let study = laboratory.study;
+    let mut list = Vec::new();
+    for (r, record) in study.records.iter().enumerate() {
+        for (c, channel) in record.channels.iter().enumerate() {
+            for usage in [Usage::Train, Usage::HeldOut, Usage::HeldOutChannel] {
+                let of = |row: &Row| row.record == r && row.channel == c && row.usage == usage;
+                if laboratory.rows.rows.iter().any(&of) {
+                    list.push(GapRow {
+                        record: record.name.clone(),
+                        channel: channel.output.clone(),
+                        usage: usage.word().to_owned(),
+                        before: laboratory.rows.rmse(before, of),
+                        after: laboratory.rows.rmse(after, of),
+                        noise: channel.noise,
+                    });
+                }
+            }
+        }
+    }
+    list
+}
+
+/// What is left of the gap after a fit.
+pub(super) fn remaining(laboratory: &Laboratory<'_>, fit: &Fitted<'_>, whiteness: f64, shape: String) -> Remaining {
+    let n = laboratory.rows.train.len().max(1) as f64;
+    Remaining { rmse_over_noise: (fit.residual().norm_squared() / n).sqrt(), whiteness_p: whiteness, shape }
+}
+
+/// The false-alarm rate of this search.
+pub(super) fn false_alarm(found: &Found<'_>, best_gain: f64) -> FalseAlarm {
+    let n = found.background.maxima.len() as f64;
+    let rate = found.background.exceeding();
+    // Wilson (1927), upper end.
+    let z2 = Z95 * Z95;
+    let upper = if n > 0.0 {
+        (rate + z2 / (2.0 * n) + Z95 * ((rate * (1.0 - rate) + z2 / (4.0 * n)) / n).sqrt()) / (1.0 + z2 / n)
+    } else {
+        1.0
+    };
+    FalseAlarm {
+        rate,
+        upper95: upper,
+        how: format!(
+            "{n:.0} simulations of the fitted model with white noise of the stated sd, the whole library scored on each to first \
+             order; a candidate must then still pass the other gates, so the rate is an upper bound of the search's own"
+        ),
+        runs: found.background.maxima.len() as u64,
+        threshold: found.background.threshold,
+        decoys: found.background.decoys_above(best_gain),
+    }
+}
+
+/// What the effects did to the model's own parameters.
+pub(super) fn shifts(base: &Fitted<'_>, judged: &Judged<'_>) -> Vec<ParameterShift> {
+    let covariance = covariance(&judged.fit, judged.inflation);
+    let (before, after) = (base.theta(), judged.fit.theta());
+    let study = &judged.fit.version.study;
+    let mut list = Vec::new();
+    for (j, entry) in study.theta.iter().enumerate().take(judged.fit.version.n_own) {
+        let Some(i) = base.version.study.theta.iter().position(|e| e.name == entry.name) else { continue };
+        let sd = entry.transform.derivative(after[j]).abs() * covariance[(j, j)].max(0.0).sqrt();
+        list.push(ParameterShift {
+            name: entry.name.clone(),
+            unit: entry.unit(study).to_owned(),
+            before: entry.transform.to_physical(before[i]),
+            after: entry.transform.to_physical(after[j]),
+            sd,
+        });
+    }
+    list
+}
+
+/// Measured and simulated curves of every channel.
+pub(super) fn curves(laboratory: &Laboratory<'_>, before: &[f64], after: Option<&[f64]>) -> Vec<Curve> {
+    let study = laboratory.study;
+    let mut list = Vec::new();
+    for (r, record) in study.records.iter().enumerate() {
+        for (c, channel) in record.channels.iter().enumerate() {
+            let rows = laboratory.rows.rows.iter().enumerate().filter(|(_, row)| row.record == r && row.channel == c);
+            let at: Vec<usize> = rows.map(|(i, _)| i).collect();
+            let pick = |values: &[f64]| at.iter().map(|i| values[*i]).collect::<Vec<_>>();
+            let unit = channel.unit.clone().or_else(|| quantity_of(&study.spec.outputs, &channel.output).map(|q| q.unit.clone()));
+            list.push(Curve {
+                record: record.name.clone(),
+                channel: channel.output.clone(),
+                unit: unit.unwrap_or_default(),
+                noise: channel.noise,
+                held_out: channel.held_out,
+                train: record.train_span(),
+                time: at.iter().map(|i| laboratory.rows.rows[*i].time).collect(),
+                observed: at.iter().map(|i| laboratory.rows.rows[*i].observed).collect(),
+                before: pick(before),
+                after: after.map(pick).unwrap_or_default(),
+            });
+        }
+    }
+    list
+}

@@ -1,0 +1,143 @@
+//! What chance alone would give: the effective noise of correlated residuals, the largest score of a search without a missing
+//! effect, and decoys, which are candidates with their time reversed or shifted.
+//!
+//! Nothing is run: scores are linear in the residuals, so their joint distribution without a gap follows from the
+//! sensitivities that the screening measured. Next file to read: [`super::judge`].
+
+use nalgebra::{DMatrix, DVector};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use starlings_estimators::{Optimum, effective_sample_size, ljung_box, null_maxima};
+
+use super::candidate::Candidate;
+use super::rows::{Rows, Usage};
+use super::screen::Hit;
+
+/// Simulations without a gap.
+const SIMULATIONS: usize = 4000;
+/// Rate of false alarms of the search that the threshold is set for.
+pub const ALARM_RATE: f64 = 0.005;
+/// Least fall of χ² that counts, whatever the simulations say.
+const LEAST: f64 = 10.0;
+/// A decoy that resembles its candidate more than this is none.
+const RESEMBLANCE: f64 = 0.9;
+/// Shifts of a decoy, as shares of each stretch.
+const SHIFTS: [f64; 3] = [0.21, 0.47, 0.73];
+
+/// The distribution of the search's best score where nothing is missing.
+#[derive(Clone, Debug, Default)]
+pub struct Background {
+    /// Largest gain of each simulation, sorted.
+    pub maxima: Vec<f64>,
+    /// What a gain must exceed, in units of the effective noise.
+    pub threshold: f64,
+    /// Gain of each decoy on the residuals of the model as it is.
+    pub decoys: Vec<f64>,
+}
+
+impl Background {
+    /// Simulates the search without a gap, and scores decoys.
+    pub fn new(optimum: &Optimum, rows: &Rows, hits: &[Hit], candidates: &[Candidate], seed: u64) -> Self {
+        let usable: Vec<&Hit> = hits.iter().filter(|h| h.failure.is_none() && !h.is_absorbed()).collect();
+        let own: Vec<DVector<f64>> =
+            usable.iter().map(|h| optimum.unimitated(&h.sensitivity.select_rows(&rows.train))).collect();
+        if own.is_empty() {
+            return Self { threshold: LEAST, ..Self::default() };
+        }
+        let signs: Vec<f64> = usable.iter().map(|h| candidates[h.candidate].sign()).collect();
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut normal = || StandardNormal.sample(&mut random);
+        let mut maxima = null_maxima(&DMatrix::from_columns(&own), &signs, SIMULATIONS, &mut normal);
+        maxima.sort_by(f64::total_cmp);
+        let at = ((1.0 - ALARM_RATE) * SIMULATIONS as f64) as usize;
+        let threshold = maxima[at.min(SIMULATIONS - 1)].max(LEAST);
+        let decoys = decoys(optimum, rows, &usable, &own);
+        Self { maxima, threshold, decoys }
+    }
+
+    /// Share of the simulations whose best gain exceeds the threshold.
+    pub fn exceeding(&self) -> f64 {
+        let above = self.maxima.iter().filter(|m| **m > self.threshold).count();
+        above as f64 / self.maxima.len().max(1) as f64
+    }
+
+    /// Share of the decoys that gain at least so much.
+    pub fn decoys_above(&self, gain: f64) -> f64 {
+        let above = self.decoys.iter().filter(|d| **d >= gain).count();
+        above as f64 / self.decoys.len().max(1) as f64
+    }
+}
+
+/// The gains of candidates whose influence is reversed or shifted in time within every stretch of the training data.
+fn decoys(optimum: &Optimum, rows: &Rows, hits: &[&Hit], own: &[DVector<f64>]) -> Vec<f64> {
+    let stretches = training_stretches(rows);
+    let mut gains = Vec::new();
+    for (hit, own) in hits.iter().zip(own) {
+        let sensitivity = hit.sensitivity.select_rows(&rows.train);
+        let shifted = SHIFTS.map(|share| moved(&sensitivity, &stretches, |i, n| (i + (share * n as f64) as usize) % n));
+        let reversed = moved(&sensitivity, &stretches, |i, n| n - 1 - i);
+        for decoy in shifted.into_iter().chain([reversed]) {
+            let of_decoy = optimum.unimitated(&decoy);
+            let size = own.norm() * of_decoy.norm();
+            if size > 0.0 && own.dot(&of_decoy).abs() < RESEMBLANCE * size {
+                gains.push(optimum.score(&decoy).gain);
+            }
+        }
+    }
+    gains
+}
+
+fn moved(
+    series: &DVector<f64>,
+    stretches: &[std::ops::Range<usize>],
+    from: impl Fn(usize, usize) -> usize,
+) -> DVector<f64> {
+    let mut moved = series.clone();
+    for stretch in stretches {
+        let n = stretch.len();
+        for i in 0..n {
+            moved[stretch.start + i] = series[stretch.start + from(i, n)];
+        }
+    }
+    moved
+}
+
+/// Ranges of positions among the training rows that belong to one channel of one record.
+pub fn training_stretches(rows: &Rows) -> Vec<std::ops::Range<usize>> {
+    let mut at = 0;
+    let mut ranges = Vec::new();
+    for stretch in rows.stretches().into_iter().filter(|s| rows.rows[s.start].usage == Usage::Train) {
+        ranges.push(at..at + stretch.len());
+        at += stretch.len();
+    }
+    ranges
+}
+
+/// Factor on the variance of a smooth sum of residuals that their size and correlation make, at least 1: mean square times
+/// n over the effective sample size (Geyer 1992), pooled over the stretches by their length.
+pub fn inflation(rows: &Rows, residual: &DVector<f64>) -> f64 {
+    let mut sum = 0.0;
+    let mut n = 0.0;
+    for stretch in training_stretches(rows) {
+        let values = &residual.as_slice()[stretch];
+        let length = values.len() as f64;
+        let square = values.iter().map(|v| v * v).sum::<f64>();
+        let effective = effective_sample_size(values);
+        let correlation = if effective > 0.0 { (length / effective).max(1.0) } else { 1.0 };
+        sum += square * correlation;
+        n += length;
+    }
+    (sum / f64::max(n, 1.0)).max(1.0)
+}
+
+/// Probability of residuals at least as autocorrelated if they were white: the smallest of the stretches, Bonferroni.
+pub fn whiteness(rows: &Rows, residual: &DVector<f64>) -> f64 {
+    let stretches: Vec<_> = training_stretches(rows).into_iter().filter(|s| s.len() >= 20).collect();
+    let p = |stretch: &std::ops::Range<usize>| {
+        let values = &residual.as_slice()[stretch.clone()];
+        ljung_box(values, (values.len() / 20).max(10).min(values.len() / 3))
+    };
+    let smallest = stretches.iter().map(p).filter(|p| p.is_finite()).fold(1.0, f64::min);
+    (smallest * stretches.len() as f64).min(1.0)
+}

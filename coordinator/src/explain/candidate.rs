@@ -1,0 +1,133 @@
+//! An effect to try, with the points at which it is screened and what is known of its parameters.
+//!
+//! Parameters that count in the course of a quantity are turned into its unit first, and every grid of parameters inside a
+//! term becomes a list of points. Nothing is run here. Next file to read: [`super::version`].
+
+use starlings_estimators::Transform;
+use starlings_models::effect::{EffectDef, EffectParameter, scale};
+
+use super::candidates::candidates;
+use super::locate::Track;
+use super::{ExplainError, Options};
+use crate::study::Study;
+use crate::study::variant::EffectPrior;
+
+/// Grid points of one candidate at most.
+const MOST_POINTS: usize = 9;
+/// Prior standard deviation of a parameter inside a term, in the logarithm of the odds over its range: nearly uniform.
+const ODDS_SD: f64 = 1.5;
+/// Prior standard deviation of a positive parameter without upper bound, in its logarithm.
+const LOG_SD: f64 = 1.0;
+
+/// An effect to try.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Candidate {
+    /// The effect, every number in the model's units.
+    pub def: EffectDef,
+    /// Values of the parameters after the amplitude at which it is screened, at least one point.
+    pub points: Vec<Vec<f64>>,
+}
+
+impl Candidate {
+    /// A candidate with its grid.
+    pub fn new(def: EffectDef) -> Self {
+        let mut points: Vec<Vec<f64>> = vec![Vec::new()];
+        for parameter in def.parameters.iter().skip(1) {
+            let values = values(parameter);
+            points = points
+                .iter()
+                .flat_map(|point| values.iter().map(move |v| [point.as_slice(), &[*v]].concat()))
+                .collect();
+        }
+        // The middle of every grid comes first, and a large product is thinned evenly.
+        let stride = points.len().div_ceil(MOST_POINTS).max(1);
+        let points = points.into_iter().step_by(stride).collect();
+        Self { def, points }
+    }
+
+    /// Its name.
+    pub fn name(&self) -> &str {
+        &self.def.name
+    }
+
+    /// The sign that its amplitude must have; 0 when both are possible.
+    pub fn sign(&self) -> f64 {
+        match self.def.parameters.first().map(|p| p.range) {
+            Some([lo, _]) if lo >= 0.0 => 1.0,
+            Some([_, hi]) if hi <= 0.0 => -1.0,
+            _ => 0.0,
+        }
+    }
+
+    /// What is known of its parameters before the data: nothing of the amplitude (whose prior is flat in the search), little
+    /// of the others.
+    pub fn priors(&self) -> Vec<EffectPrior> {
+        let amplitude = EffectPrior { transform: Transform::Linear, mean: 0.0, sd: 1.0 };
+        let inner = self.def.parameters.iter().skip(1).map(inner_prior);
+        std::iter::once(amplitude).chain(inner).collect()
+    }
+}
+
+/// Values of an inner parameter to screen at, the middle of its grid first.
+fn values(parameter: &EffectParameter) -> Vec<f64> {
+    let grid = &parameter.grid;
+    if !grid.is_empty() {
+        let mut values = grid.clone();
+        values.swap(0, grid.len() / 2);
+        return values;
+    }
+    match parameter.range {
+        [lo, hi] if lo.is_finite() && hi.is_finite() => vec![0.5 * (lo + hi)],
+        [lo, _] if lo.is_finite() => vec![lo + 1.0],
+        _ => vec![0.0],
+    }
+}
+
+fn inner_prior(parameter: &EffectParameter) -> EffectPrior {
+    let first = values(parameter)[0];
+    match parameter.range {
+        [lo, hi] if lo.is_finite() && hi.is_finite() => {
+            EffectPrior { transform: Transform::Logit { lo, hi }, mean: 0.0, sd: ODDS_SD }
+        }
+        [lo, _] if lo >= 0.0 && first > 0.0 => {
+            EffectPrior { transform: Transform::Log, mean: first.ln(), sd: LOG_SD }
+        }
+        _ => {
+            let reach = parameter.grid.iter().map(|v| (v - first).abs()).fold(0.0, f64::max);
+            let sd = if reach > 0.0 { reach } else { first.abs().max(1.0) };
+            EffectPrior { transform: Transform::Linear, mean: first, sd }
+        }
+    }
+}
+
+/// The candidates of a study, every number in the model's units. `tracks` are the courses of the model as it is.
+///
+/// # Errors
+/// As [`candidates`].
+pub fn all(study: &Study, tracks: &[Track], options: &Options) -> Result<Vec<Candidate>, ExplainError> {
+    let defs = resolved(study, candidates(study, options)?, tracks);
+    Ok(defs.into_iter().map(Candidate::new).collect())
+}
+
+/// The effects with their numbers in the model's units; one whose quantity does not move cannot be told and is left out.
+fn resolved(study: &Study, defs: Vec<EffectDef>, tracks: &[Track]) -> Vec<EffectDef> {
+    let course = |name: &str| {
+        let track = tracks.iter().find(|t| t.name == name)?;
+        let values = || track.values.iter().flatten().copied().filter(|v| v.is_finite());
+        Some([values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max)])
+    };
+    let times = || study.records.iter().filter(|r| r.is_trained()).filter_map(|r| r.train_span());
+    let from = times().map(|s| s[0]).fold(f64::INFINITY, f64::min);
+    let to = times().map(|s| s[1]).fold(f64::NEG_INFINITY, f64::max);
+    let resolve = |def: EffectDef| scale::resolve(&def, &course, [from, to], sampling(study));
+    defs.into_iter().map(resolve).filter(scale::is_resolved).collect()
+}
+
+/// The median interval between observations of the first trained record.
+pub fn sampling(study: &Study) -> f64 {
+    let record = study.records.iter().find(|r| r.is_trained());
+    let mut steps: Vec<f64> =
+        record.map(|r| r.times.windows(2).map(|w| w[1] - w[0]).collect()).unwrap_or_default();
+    steps.sort_by(f64::total_cmp);
+    steps.get(steps.len() / 2).copied().unwrap_or(1.0)
+}

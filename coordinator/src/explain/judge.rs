@@ -1,0 +1,228 @@
+//! The gates: what a refitted version must stand before it may be named.
+//!
+//! Sign and range of its coefficients, the held-out span, the held-out channels, and evidence in units of the effective noise
+//! against what a search over the whole library finds by chance. A lower error alone is no reason to name an effect. Next
+//! file to read: [`super::search`].
+
+use starlings_estimators::End;
+
+use super::background::{inflation, whiteness};
+use super::fit::Fitted;
+use super::laboratory::Laboratory;
+use super::rows::{Row, Usage};
+
+/// A held-out error may grow by this factor before it counts as worse.
+const WORSE: f64 = 1.02;
+/// Distance from the end of a range, as a share of it, at which an estimate counts as at its edge.
+const EDGE: f64 = 0.005;
+
+/// Squares of the whitened residuals of one version.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Misfit {
+    /// χ² of the training rows plus prior.
+    pub train: f64,
+    /// χ² of the held-out rows of the fitted channels.
+    pub held_out: f64,
+    /// Their number.
+    pub n_held_out: usize,
+    /// χ² of the channels that are never fitted.
+    pub channels: f64,
+}
+
+impl Misfit {
+    /// The misfit of a fit.
+    pub fn of(laboratory: &Laboratory<'_>, fit: &Fitted<'_>) -> Self {
+        let whitened = laboratory.rows.whitened(&fit.predicted);
+        let sum = |usage| {
+            let rows = laboratory.rows.rows.iter().zip(&whitened).filter(|(row, _)| row.usage == usage);
+            rows.fold((0, 0.0), |(n, sum), (_, e)| (n + 1, sum + e * e))
+        };
+        let (n_held_out, held_out) = sum(Usage::HeldOut);
+        Self { train: fit.cost(), held_out, n_held_out, channels: sum(Usage::HeldOutChannel).1 }
+    }
+}
+
+/// Why a version may not be named.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Refusal {
+    /// The gate.
+    pub gate: &'static str,
+    /// Why, in words with numbers.
+    pub reason: String,
+}
+
+/// A refitted version with everything that speaks for and against it.
+#[derive(Clone, Debug)]
+pub struct Judged<'c> {
+    /// The fit.
+    pub fit: Fitted<'c>,
+    /// Its misfit.
+    pub misfit: Misfit,
+    /// Factor on the variance of its residuals.
+    pub inflation: f64,
+    /// Whether its residuals could be white.
+    pub whiteness: f64,
+    /// Fall of χ² against the model as it is, training rows, less the price of parameters inside its terms and of further
+    /// effects.
+    pub gain: f64,
+    /// Fall of χ² on the held-out span.
+    pub gain_held_out: f64,
+    /// Fall of χ² on the channels that are never fitted.
+    pub gain_channels: f64,
+    /// Share of the excess χ² that it takes away, training rows.
+    pub share: f64,
+    /// The same on the held-out span; `None` without one that has an excess.
+    pub share_held_out: Option<f64>,
+    /// Why it may not be named.
+    pub refusal: Option<Refusal>,
+}
+
+impl Judged<'_> {
+    /// Fall of χ² in units of its own effective noise.
+    pub fn evidence(&self) -> f64 {
+        self.gain / self.inflation
+    }
+
+    /// Fall of χ² on the training rows, the held-out span and the held-out channels, for ranking.
+    pub fn rank(&self) -> f64 {
+        self.gain + self.gain_held_out + self.gain_channels
+    }
+}
+
+/// Judges a version against the model as it is. `threshold` is what chance alone reaches in a search.
+pub fn judge<'c>(
+    laboratory: &Laboratory<'_>,
+    base: &Fitted<'_>,
+    before: Misfit,
+    fit: Fitted<'c>,
+    threshold: f64,
+) -> Judged<'c> {
+    let misfit = Misfit::of(laboratory, &fit);
+    let m = laboratory.rows.train.len() as f64;
+    let n_inner = fit.version.n_param().saturating_sub(fit.version.n_own + fit.version.members.len());
+    let inflation = inflation(&laboratory.rows, fit.residual());
+    // A parameter inside a term costs what its prior is worth (Schwarz 1978), counted in independent values.
+    let price = n_inner as f64 * (m / inflation).max(3.0).ln();
+    // A further effect must win what a search finds by chance.
+    let further = fit.version.members.len().saturating_sub(1) as f64 * threshold * inflation;
+    let gain = before.train - misfit.train - price - further;
+    let gain_held_out = before.held_out - misfit.held_out;
+    let share = ratio(before.train - misfit.train, before.train - m);
+    let n_held = misfit.n_held_out as f64;
+    let has_excess = before.held_out > n_held + 3.0 * (2.0 * n_held).sqrt();
+    let share_held_out =
+        (misfit.n_held_out > 0 && has_excess).then(|| ratio(gain_held_out, before.held_out - n_held));
+    let whiteness = whiteness(&laboratory.rows, fit.residual());
+    let mut judged = Judged {
+        fit,
+        misfit,
+        inflation,
+        whiteness,
+        gain,
+        gain_held_out,
+        gain_channels: before.channels - misfit.channels,
+        share,
+        share_held_out,
+        refusal: None,
+    };
+    judged.refusal = refusal(laboratory, base, before, &judged, threshold);
+    judged
+}
+
+fn ratio(part: f64, whole: f64) -> f64 {
+    if whole > 0.0 { (part / whole).clamp(-1.0, 1.0) } else { 0.0 }
+}
+
+/// The first gate that a version does not pass.
+fn refusal(
+    laboratory: &Laboratory<'_>,
+    base: &Fitted<'_>,
+    before: Misfit,
+    judged: &Judged<'_>,
+    threshold: f64,
+) -> Option<Refusal> {
+    if matches!(judged.fit.end(), Some(End::NoStart)) {
+        return Some(Refusal { gate: "failed", reason: "the model fails with it".to_owned() });
+    }
+    at_edge(&judged.fit)
+        .or_else(|| held_out_span(before, judged))
+        .or_else(|| held_out_channel(laboratory, base, &judged.fit))
+        .or_else(|| {
+            let (evidence, inflation) = (judged.evidence(), judged.inflation);
+            (evidence <= threshold).then(|| Refusal {
+                gate: "evidence",
+                reason: format!(
+                    "χ² falls by {:.1}, which in units of the effective noise ({inflation:.1}) is {evidence:.1}; a search like \
+                     this one reaches {threshold:.1} by chance",
+                    judged.gain
+                ),
+            })
+        })
+}
+
+/// A coefficient at the end of its range: physics does not allow what the data ask for.
+fn at_edge(fit: &Fitted<'_>) -> Option<Refusal> {
+    let version = &fit.version;
+    let theta = fit.theta();
+    for (m, member) in version.members.iter().enumerate() {
+        for (k, parameter) in member.candidate.def.parameters.iter().enumerate() {
+            let j = version.first_of(m) + k;
+            let value = version.study.theta[j].transform.to_physical(theta[j]);
+            let [lo, hi] = parameter.range;
+            let width = if lo.is_finite() && hi.is_finite() { hi - lo } else { member.unit };
+            let near = |end: f64| end.is_finite() && (value - end).abs() <= EDGE * width;
+            if !(near(lo) || near(hi)) {
+                continue;
+            }
+            let end = if near(lo) { lo } else { hi };
+            let gate = if k == 0 && (end.abs() < f64::MIN_POSITIVE) { "sign" } else { "range" };
+            let unit = &parameter.unit;
+            return Some(Refusal {
+                gate,
+                reason: format!(
+                    "the best value of {} lies at the end of what physics allows ({end} {unit}): the shape fits, the physics \
+                     does not",
+                    parameter.name
+                ),
+            });
+        }
+    }
+    None
+}
+
+fn held_out_span(before: Misfit, judged: &Judged<'_>) -> Option<Refusal> {
+    let after = judged.misfit;
+    let n = after.n_held_out as f64;
+    let slack = 3.0 * (2.0 * n).sqrt().min(before.held_out);
+    let worse = after.n_held_out > 0
+        && after.held_out > before.held_out * WORSE * WORSE
+        && after.held_out > before.held_out + slack.min(n);
+    worse.then(|| Refusal {
+        gate: "held-out span",
+        reason: format!(
+            "the error of the held-out span grows from {:.3} to {:.3} noise sd",
+            (before.held_out / n).sqrt(),
+            (after.held_out / n).sqrt()
+        ),
+    })
+}
+
+/// A held-out channel that gets worse.
+fn held_out_channel(laboratory: &Laboratory<'_>, base: &Fitted<'_>, fit: &Fitted<'_>) -> Option<Refusal> {
+    let rows = &laboratory.rows;
+    for (output, name) in laboratory.study.setup.outputs.iter().enumerate() {
+        let of = |row: &Row| row.output == output && row.usage == Usage::HeldOutChannel;
+        let n = rows.rows.iter().filter(|row| of(row)).count() as f64;
+        if n < 1.0 {
+            continue;
+        }
+        let (before, after) = (rows.rmse(&base.predicted, of), rows.rmse(&fit.predicted, of));
+        if after > before * WORSE {
+            return Some(Refusal {
+                gate: "held-out channel",
+                reason: format!("the error of {name}, which is never fitted, grows from {before:.4} to {after:.4}"),
+            });
+        }
+    }
+    None
+}

@@ -1,0 +1,230 @@
+//! The screening: one run per candidate and point of its grid tells what it would add to a finished fit.
+//!
+//! A run with a small amplitude gives the sensitivity of every row; the score test projects the fitted parameters out of it.
+//! All candidates go to the fleet in one batch; those whose response was too small or too large for a derivative go a second
+//! time. Next files to read: `score.rs` of the estimators, then [`super::search`].
+
+use nalgebra::DVector;
+use starlings_estimators::{Optimum, Score};
+
+use super::ExplainError;
+use super::candidate::Candidate;
+use super::fit::Fitted;
+use super::laboratory::{Answer, Laboratory, Point};
+use super::locate::Track;
+use super::probe::{Along, natural_amplitude};
+use super::version::{Member, Version};
+
+/// Probe, as a share of what the term is added to.
+const PROBE: f64 = 3e-3;
+/// Response that a derivative is taken from: root mean square over the spread of the channel.
+const WANTED: f64 = 3e-3;
+/// Responses outside of these are measured again with another amplitude.
+const RESPONSE: [f64; 2] = [1e-5, 5e-2];
+/// Times that a candidate is measured again.
+const AGAIN: usize = 2;
+/// Part of its own below which a candidate's influence counts as imitated by the parameters.
+pub const ABSORBED: f64 = 0.05;
+
+/// A candidate at one point of its grid, measured at a fit.
+#[derive(Clone, Debug)]
+pub struct Hit {
+    /// Position among the candidates.
+    pub candidate: usize,
+    /// Values of its parameters after the amplitude.
+    pub point: Vec<f64>,
+    /// d prediction / d amplitude over the noise, all rows; empty where there is none.
+    pub sensitivity: DVector<f64>,
+    /// Its score.
+    pub score: Score,
+    /// Why it has no sensitivity.
+    pub failure: Option<String>,
+}
+
+impl Hit {
+    /// Fall of χ² with an amplitude of a sign that physics allows.
+    pub fn allowed_gain(&self, sign: f64) -> f64 {
+        if self.score.amplitude * sign >= 0.0 { self.score.gain } else { 0.0 }
+    }
+
+    /// Whether the parameters imitate it.
+    pub fn is_absorbed(&self) -> bool {
+        self.failure.is_none() && self.score.identifiable < ABSORBED
+    }
+}
+
+/// A probe under way.
+struct Probe<'c> {
+    candidate: usize,
+    version: Version<'c>,
+    point: Vec<f64>,
+    amplitude: f64,
+    answer: Option<Result<DVector<f64>, String>>,
+}
+
+/// Measures candidates at a fit: `of` names (candidate, point of its grid). Effects that the fit has already are left out.
+///
+/// # Errors
+/// When the fleet or the store fails, or the fit leaves a direction free.
+pub fn screen<'c>(
+    laboratory: &mut Laboratory<'_>,
+    fit: &Fitted<'c>,
+    candidates: &'c [Candidate],
+    of: &[(usize, usize)],
+    tracks: &[Track],
+) -> Result<Vec<Hit>, ExplainError> {
+    let optimum = fit.optimum()?;
+    let mut probes = Vec::new();
+    for &(index, point) in of {
+        if fit.version.members.iter().any(|m| m.index == index) {
+            continue;
+        }
+        probes.push(probe(fit, candidates, index, point, tracks)?);
+    }
+    let spread = spread(laboratory);
+    let reference = reference(laboratory, fit, &probes)?;
+    for round in 0..=AGAIN {
+        let open: Vec<usize> = (0..probes.len()).filter(|i| probes[*i].answer.is_none()).collect();
+        let points: Vec<Point<'_>> = open.iter().map(|i| at(fit, &probes[*i])).collect();
+        let answers = laboratory.run(&points)?;
+        drop(points);
+        for (i, answer) in open.into_iter().zip(answers) {
+            let base = if touches_states(&probes[i]) { &reference } else { &*fit.predicted };
+            settle(laboratory, &mut probes[i], &answer, base, &spread, round == AGAIN);
+        }
+    }
+    Ok(probes.into_iter().map(|probe| hit(laboratory, &optimum, probe)).collect())
+}
+
+/// A first guess of a probe.
+fn probe<'c>(
+    fit: &Fitted<'c>,
+    candidates: &'c [Candidate],
+    index: usize,
+    point: usize,
+    tracks: &[Track],
+) -> Result<Probe<'c>, ExplainError> {
+    let candidate = &candidates[index];
+    let point = candidate.points[point].clone();
+    let study = &fit.version.study;
+    let record = study.records.iter().position(|r| r.is_trained()).unwrap_or(0);
+    let theta = study.theta_for(record, fit.theta().as_slice());
+    let along = Along { study, theta: &theta, tracks };
+    let [lo, hi] = candidate.def.parameters[0].range;
+    let natural = natural_amplitude(&along, candidate, &point).map_or_else(
+        || if lo.is_finite() && hi.is_finite() { PROBE * (hi - lo) } else { PROBE },
+        |natural| PROBE * natural,
+    );
+    let sign = if candidate.sign() < 0.0 { -1.0 } else { 1.0 };
+    let amplitude = sign * natural.min(if hi > 0.0 { hi } else { lo.abs() });
+    let members = fit.version.members.iter().cloned();
+    let members = members.chain([Member { candidate, index, unit: 1.0 }]).collect();
+    let version = Version::new(fit.version.base, members, &fit.version.left_out)?;
+    Ok(Probe { candidate: index, version, point, amplitude, answer: None })
+}
+
+fn at<'p>(fit: &Fitted<'_>, probe: &'p Probe<'_>) -> Point<'p> {
+    let mut z = probe.version.continue_from(&fit.version, fit.z(), &probe.point);
+    z[probe.version.first_of(probe.version.members.len() - 1)] = probe.amplitude;
+    Point { study: &probe.version.study, theta: probe.version.theta(&z) }
+}
+
+/// Whether the effect changes how the states are integrated.
+fn touches_states(probe: &Probe<'_>) -> bool {
+    let Some(member) = probe.version.members.last() else { return false };
+    let outputs = &probe.version.study.spec.outputs;
+    let states = &probe.version.study.spec.states;
+    let only_output =
+        |to: &str| outputs.iter().any(|q| q.name == to) && !states.iter().any(|q| q.name == to);
+    !(member.candidate.def.states.is_empty() && member.candidate.def.adds.iter().all(|a| only_output(&a.to)))
+}
+
+/// Predictions of the fitted model with an effect of amplitude zero in its rates. A built-in model with a step of its own is
+/// then integrated in another way, and that difference is not the effect's doing.
+fn reference(
+    laboratory: &mut Laboratory<'_>,
+    fit: &Fitted<'_>,
+    probes: &[Probe<'_>],
+) -> Result<Vec<f64>, ExplainError> {
+    let own_step = fit.version.study.setup.model.equations.is_none();
+    let touching = probes.iter().find(|p| touches_states(p)).filter(|_| own_step);
+    let Some(probe) = touching else { return Ok(fit.predicted.to_vec()) };
+    let z = probe.version.continue_from(&fit.version, fit.z(), &probe.point);
+    let point = Point { study: &probe.version.study, theta: probe.version.theta(&z) };
+    let answer = laboratory.run(&[point])?.swap_remove(0);
+    Ok(answer.map_or_else(|_| fit.predicted.to_vec(), |y| y.to_vec()))
+}
+
+/// Spread of the observed values of each row's channel, over all records.
+fn spread(laboratory: &Laboratory<'_>) -> Vec<f64> {
+    let n_output = laboratory.study.setup.outputs.len();
+    let mut sums = vec![(0.0, 0.0, 0.0); n_output];
+    for row in &laboratory.rows.rows {
+        let (n, sum, square) = &mut sums[row.output];
+        *n += 1.0;
+        *sum += row.observed;
+        *square += row.observed * row.observed;
+    }
+    let sd = |(n, sum, square): &(f64, f64, f64)| ((square - sum * sum / n) / n).max(0.0).sqrt();
+    let by_output: Vec<f64> = sums.iter().map(sd).collect();
+    laboratory.rows.rows.iter().map(|row| by_output[row.output].max(row.noise)).collect()
+}
+
+/// Takes an answer: a sensitivity, or a better amplitude for the next round, or a failure.
+fn settle(
+    laboratory: &Laboratory<'_>,
+    probe: &mut Probe<'_>,
+    answer: &Answer,
+    base: &[f64],
+    spread: &[f64],
+    last: bool,
+) {
+    let predicted = match answer {
+        Ok(predicted) => predicted,
+        Err(reason) if last => {
+            probe.answer = Some(Err(reason.clone()));
+            return;
+        }
+        Err(_) => {
+            probe.amplitude *= 1e-2;
+            return;
+        }
+    };
+    let rows = &laboratory.rows.rows;
+    let n = rows.len().max(1) as f64;
+    let relative = predicted.iter().zip(base).zip(spread).map(|((y, b), s)| ((y - b) / s).powi(2));
+    let response = (relative.sum::<f64>() / n).sqrt();
+    let fits = (RESPONSE[0]..=RESPONSE[1]).contains(&response);
+    if fits || (last && response > 0.0) {
+        let change = predicted.iter().zip(base).zip(rows);
+        let change = change.map(|((y, b), row)| (y - b) / (row.noise * probe.amplitude));
+        probe.answer = Some(Ok(DVector::from_iterator(rows.len(), change)));
+    } else if last {
+        probe.answer = Some(Err(String::new()));
+    } else if response > 0.0 {
+        probe.amplitude *= (WANTED / response).clamp(1e-6, 1e6);
+    } else {
+        probe.amplitude *= 1e3;
+    }
+}
+
+fn hit(laboratory: &Laboratory<'_>, optimum: &Optimum, probe: Probe<'_>) -> Hit {
+    let none = Score { gain: 0.0, amplitude: 0.0, sd: f64::INFINITY, identifiable: 0.0 };
+    let Probe { candidate, point, answer, .. } = probe;
+    match answer.unwrap_or_else(|| Err(String::new())) {
+        Ok(sensitivity) => {
+            let train = sensitivity.select_rows(&laboratory.rows.train);
+            let score = optimum.score(&train);
+            let unfelt = train.amax() <= 0.0;
+            let failure = unfelt.then(|| "no influence on what is fitted".to_owned());
+            Hit { candidate, point, sensitivity, score, failure }
+        }
+        Err(reason) => Hit {
+            candidate,
+            point,
+            sensitivity: DVector::zeros(0),
+            score: none,
+            failure: Some(if reason.is_empty() { "no influence on what was measured".to_owned() } else { reason }),
+        },
+    }
+}

@@ -1,0 +1,316 @@
+//! The search: screen all candidates, refit the best, look again from there, add, replace, and pair.
+//!
+//! The path of one explanation: [`super::screen`] scores every candidate at the fitted model; the best run a short race whose
+//! first step costs one run each; the last few are refitted with every parameter free and [`super::judge`]d. From the best the
+//! candidates are scored again, which shows whether something is left and which replacement or pair to try. Terms that the
+//! study calls replaceable are left out in turn and the same is done without them. Next file to read: [`super::verdict`].
+
+use std::cmp::Ordering;
+
+use super::background::{Background, whiteness};
+use super::candidate::Candidate;
+use super::fit::{Fitted, drive, drive_rounds};
+use super::form::{Leftover, leftover};
+use super::judge::{Judged, Misfit, judge};
+use super::laboratory::Laboratory;
+use super::locate::Track;
+use super::screen::{Hit, screen};
+use super::version::{Member, Version};
+use super::{ExplainError, Options};
+
+/// Candidates that run the race.
+const RACE: usize = 8;
+/// Rounds of the race.
+const ROUNDS: usize = 2;
+/// Candidates that are refitted after it.
+const FINAL: usize = 3;
+/// Of the best scores, so many are refitted whatever the race says.
+const SCORED: usize = 2;
+/// Libraries of at most so many candidates are refitted whole: a large misfit can mislead a linear score.
+const SMALL: usize = 6;
+/// Further candidates are refitted when the race promises a cost within this many units of the effective noise of the best.
+const CLOSE: f64 = 12.0;
+/// Probability of residuals as autocorrelated as these below which they are not white.
+pub const NOT_WHITE: f64 = 1e-3;
+
+/// Everything that the search found.
+pub struct Found<'c> {
+    /// The model as it is.
+    pub base: Fitted<'c>,
+    /// Its misfit.
+    pub before: Misfit,
+    /// Whether its residuals could be white.
+    pub whiteness: f64,
+    /// What chance would give.
+    pub background: Background,
+    /// The screening at the model as it is, every candidate and grid point.
+    pub hits: Vec<Hit>,
+    /// Every version that was refitted, the best first.
+    pub judged: Vec<Judged<'c>>,
+    /// What is left after the best.
+    pub leftover: Leftover,
+    /// Whether the budget cut the search short.
+    pub cut_short: bool,
+}
+
+impl Found<'_> {
+    /// Whether there is a gap at all: structure in the residuals, or a candidate that gains more than chance.
+    pub fn has_gap(&self) -> bool {
+        self.whiteness < NOT_WHITE || self.judged.iter().any(|j| j.refusal.is_none())
+    }
+}
+
+/// What the stages of a search share.
+struct Searcher<'s, 'l, 'c> {
+    laboratory: &'s mut Laboratory<'l>,
+    candidates: &'c [Candidate],
+    tracks: &'s [Track],
+    cut_short: bool,
+}
+
+/// Searches from a fitted model.
+///
+/// # Errors
+/// When the fleet or the store fails, or the fit leaves a direction free.
+pub fn search<'c>(
+    laboratory: &mut Laboratory<'_>,
+    base: Fitted<'c>,
+    candidates: &'c [Candidate],
+    tracks: &[Track],
+    options: &Options,
+) -> Result<Found<'c>, ExplainError> {
+    let seed = laboratory.study.seed;
+    let mut searcher = Searcher { laboratory, candidates, tracks, cut_short: false };
+    let before = Misfit::of(searcher.laboratory, &base);
+    let whiteness = whiteness(&searcher.laboratory.rows, base.residual());
+    searcher.laboratory.stage("screen", &format!("{} candidates", candidates.len()));
+    let hits = searcher.screen_all(&base)?;
+    let background =
+        Background::new(&base.optimum()?, &searcher.laboratory.rows, &hits, candidates, seed);
+    let mut found = Found {
+        base,
+        before,
+        whiteness,
+        background,
+        hits,
+        judged: Vec::new(),
+        leftover: Leftover::default(),
+        cut_short: false,
+    };
+    let alarm = found.hits.iter().map(|h| h.allowed_gain(candidates[h.candidate].sign())).fold(0.0, f64::max);
+    if whiteness < NOT_WHITE || alarm > found.background.threshold {
+        searcher.singles(&mut found)?;
+        searcher.replacements(&mut found)?;
+        searcher.look_again(&mut found, options)?;
+    }
+    found.cut_short = searcher.cut_short;
+    Ok(found)
+}
+
+impl<'c> Searcher<'_, '_, 'c> {
+    fn screen_all(&mut self, fit: &Fitted<'c>) -> Result<Vec<Hit>, ExplainError> {
+        let of: Vec<(usize, usize)> = self
+            .candidates
+            .iter()
+            .enumerate()
+            .flat_map(|(c, candidate)| (0..candidate.points.len()).map(move |p| (c, p)))
+            .collect();
+        self.screen(fit, &of)
+    }
+
+    fn screen(&mut self, fit: &Fitted<'c>, of: &[(usize, usize)]) -> Result<Vec<Hit>, ExplainError> {
+        if !self.laboratory.affords(of.len()) {
+            self.cut_short = true;
+            return Ok(Vec::new());
+        }
+        screen(self.laboratory, fit, self.candidates, of, self.tracks)
+    }
+
+    /// Refits the best candidates alone.
+    fn singles(&mut self, found: &mut Found<'c>) -> Result<(), ExplainError> {
+        let base = found.base.clone();
+        let best = self.best_of_each(&found.hits);
+        let fits = self.explore(&base, &best)?;
+        self.judge_all(found, fits);
+        Ok(())
+    }
+
+    /// The best point of the grid of every candidate that could be named, largest gain first.
+    fn best_of_each(&self, hits: &[Hit]) -> Vec<Hit> {
+        let gain = |h: &Hit| h.allowed_gain(self.candidates[h.candidate].sign());
+        let mut best: Vec<Hit> = Vec::new();
+        for hit in hits.iter().filter(|h| h.failure.is_none() && !h.is_absorbed() && gain(h) > 0.0) {
+            match best.iter_mut().find(|b| b.candidate == hit.candidate) {
+                Some(known) if gain(hit) > gain(known) => known.clone_from(hit),
+                Some(_) => {}
+                None => best.push(hit.clone()),
+            }
+        }
+        best.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
+        best
+    }
+
+    /// Adds single candidates to a fit: a race among the best, then refits of the last few.
+    fn explore(&mut self, parent: &Fitted<'c>, best: &[Hit]) -> Result<Vec<Fitted<'c>>, ExplainError> {
+        self.laboratory.stage("refit", "a race among the best candidates");
+        let n = if best.len() <= SMALL { best.len() } else { RACE };
+        let mut fits = Vec::new();
+        for hit in best.iter().take(n) {
+            fits.push(self.with(parent, hit)?);
+        }
+        self.cut_short |= !drive_rounds(self.laboratory, &mut fits, ROUNDS)?;
+        fits.sort_by(|a, b| a.promised().total_cmp(&b.promised()));
+        let first = fits.first().map_or(0.0, Fitted::promised);
+        let scale = (first / self.laboratory.rows.train.len().max(1) as f64).max(1.0);
+        let close = fits.iter().filter(|f| f.promised() <= first + CLOSE * scale).count();
+        let keep = close.clamp(FINAL, FINAL + 2);
+        // A step too long for the secant must not cost the best two scores their refit.
+        let scored: Vec<usize> = best.iter().take(SCORED).map(|h| h.candidate).collect();
+        let last = |f: &Fitted<'_>| f.version.members.last().map(|m| m.index);
+        let mut place = 0;
+        fits.retain(|f| {
+            place += 1;
+            place <= keep || last(f).is_some_and(|index| scored.contains(&index))
+        });
+        self.laboratory.stage("refit", &format!("{} candidates with every parameter free", fits.len()));
+        self.refit(fits)
+    }
+
+    /// Refits until all have converged.
+    fn refit(&mut self, mut fits: Vec<Fitted<'c>>) -> Result<Vec<Fitted<'c>>, ExplainError> {
+        self.cut_short |= !drive(self.laboratory, &mut fits)?;
+        for fit in &mut fits {
+            fit.polish();
+        }
+        self.cut_short |= !drive(self.laboratory, &mut fits)?;
+        Ok(fits)
+    }
+
+    /// A fit that adds a candidate to a fitted version, at the amplitude that its score promises.
+    fn with(&self, parent: &Fitted<'c>, hit: &Hit) -> Result<Fitted<'c>, ExplainError> {
+        let unit = hit.score.amplitude.abs().max(hit.score.sd.min(1e300)).max(f64::MIN_POSITIVE);
+        let candidate = &self.candidates[hit.candidate];
+        let member = Member { candidate, index: hit.candidate, unit };
+        let members = parent.version.members.iter().cloned().chain([member]).collect();
+        let version = Version::new(parent.version.base, members, &parent.version.left_out)?;
+        let sensitivity = &hit.sensitivity * unit;
+        let train = &self.laboratory.rows.train;
+        Ok(Fitted::from_parent(version, parent, &hit.point, &sensitivity, train))
+    }
+
+    fn judge_all(&mut self, found: &mut Found<'c>, fits: Vec<Fitted<'c>>) {
+        self.laboratory.stage("gates", &format!("{} refitted", fits.len()));
+        for fit in fits {
+            let judged = judge(self.laboratory, &found.base, found.before, fit, found.background.threshold);
+            found.judged.push(judged);
+        }
+        found.judged.sort_by(order);
+    }
+
+    /// Leaves out every replaceable term in turn and searches for what replaces it.
+    fn replacements(&mut self, found: &mut Found<'c>) -> Result<(), ExplainError> {
+        let equations = self.laboratory.study.setup.model.equations.as_ref();
+        let terms: Vec<String> = equations.map(|e| e.replaceable.clone()).unwrap_or_default();
+        for term in terms {
+            let version = Version::new(found.base.version.base, Vec::new(), &[term])?;
+            let start = version.continue_from(&found.base.version, found.base.z(), &[]);
+            let mut without = vec![Fitted::begin(version, start)];
+            self.laboratory.stage("refit", "the model without a replaceable term");
+            if !drive(self.laboratory, &mut without)? {
+                self.cut_short = true;
+                return Ok(());
+            }
+            let without = without.swap_remove(0);
+            if !without.is_fresh() {
+                continue;
+            }
+            let hits = self.screen_all(&without)?;
+            let best = self.best_of_each(&hits);
+            let fits = self.explore(&without, &best)?;
+            self.judge_all(found, fits);
+        }
+        Ok(())
+    }
+
+    /// Scores the candidates again at the best version: what is left, and which replacements and pairs to try.
+    fn look_again(&mut self, found: &mut Found<'c>, options: &Options) -> Result<(), ExplainError> {
+        for _ in 1..=options.max_effects {
+            let Some(best) = found.judged.first().filter(|j| j.refusal.is_none()).cloned() else { return Ok(()) };
+            self.laboratory.stage("screen", &format!("again, with {}", best.fit.version.name()));
+            let hits = self.screen(&best.fit, &self.best_points(&found.hits))?;
+            let left = leftover(self.laboratory, &best.fit, &hits, best.inflation)?;
+            found.leftover = left;
+            let seconds: Vec<Hit> = self
+                .best_of_each(&hits)
+                .into_iter()
+                .filter(|h| h.score.gain / best.inflation > found.background.threshold)
+                .take(2)
+                .collect();
+            if seconds.is_empty() {
+                return Ok(());
+            }
+            let fits = self.further(found, &best, &seconds, options)?;
+            let n = fits.len();
+            self.judge_all(found, fits);
+            let same = found.judged.first().is_some_and(|j| j.fit.version.name() == best.fit.version.name());
+            if n == 0 || same {
+                return Ok(());
+            }
+        }
+        Ok(())
+    }
+
+    /// Replacements (a second effect alone, where it was not refitted yet) and pairs.
+    fn further(
+        &mut self,
+        found: &Found<'c>,
+        best: &Judged<'c>,
+        seconds: &[Hit],
+        options: &Options,
+    ) -> Result<Vec<Fitted<'c>>, ExplainError> {
+        let tried = |indices: &[usize]| {
+            found.judged.iter().any(|j| {
+                let members: Vec<usize> = j.fit.version.members.iter().map(|m| m.index).collect();
+                members.len() == indices.len() && indices.iter().all(|i| members.contains(i))
+            })
+        };
+        let mut fits = Vec::new();
+        for second in seconds {
+            if !tried(&[second.candidate])
+                && let Some(alone) = self.best_of_each(&found.hits).iter().find(|h| h.candidate == second.candidate)
+            {
+                fits.push(self.with(&found.base, alone)?);
+            }
+            let mut pair: Vec<usize> = best.fit.version.members.iter().map(|m| m.index).collect();
+            pair.push(second.candidate);
+            if pair.len() <= options.max_effects && !tried(&pair) {
+                fits.push(self.with(&best.fit, second)?);
+            }
+        }
+        self.laboratory.stage("refit", &format!("{} replacements and pairs", fits.len()));
+        self.refit(fits)
+    }
+
+    /// The best point of the grid of every candidate, as far as the first screening tells.
+    fn best_points(&self, hits: &[Hit]) -> Vec<(usize, usize)> {
+        let best = self.best_of_each(hits);
+        let point = |hit: &Hit| {
+            let points = &self.candidates[hit.candidate].points;
+            points.iter().position(|p| *p == hit.point).map(|p| (hit.candidate, p))
+        };
+        let mut of: Vec<(usize, usize)> = best.iter().filter_map(point).collect();
+        for c in 0..self.candidates.len() {
+            let sound = hits.iter().any(|h| h.candidate == c && h.failure.is_none());
+            if sound && !of.iter().any(|(known, _)| *known == c) {
+                of.push((c, 0));
+            }
+        }
+        of
+    }
+}
+
+/// Those that pass the gates first, then by rank.
+fn order(a: &Judged<'_>, b: &Judged<'_>) -> Ordering {
+    let refused = |j: &Judged<'_>| j.refusal.is_some();
+    refused(a).cmp(&refused(b)).then(b.rank().total_cmp(&a.rank()))
+}

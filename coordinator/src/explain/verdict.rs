@@ -1,0 +1,232 @@
+//! From what the search found to a verdict: named, tie, unexplained or no gap.
+//!
+//! A name says that one version passes every gate, that no rival comes close, and that what it leaves is not of the library's
+//! making. Anything less is a tie or unexplained, with what came nearest. Next file to read: [`super::answer`].
+
+use nalgebra::DVector;
+use starlings_estimators::effective_sample_size;
+use starlings_models::equations::{Expression, Slot};
+
+use super::Verdict;
+use super::candidate::Candidate;
+use super::judge::{Judged, Misfit};
+use super::laboratory::Laboratory;
+use super::search::{Found, NOT_WHITE};
+
+/// A rival within this fall of χ², in units of the effective noise, is tied.
+const MARGIN: f64 = 6.0;
+/// Candidates whose influence resembles each other this much cannot be told apart by any refit.
+const ALIKE: f64 = 0.995;
+/// A rival is tied where the difference in χ² is less than so many of its standard deviations.
+const VUONG: f64 = 1.64;
+/// Effective variance of the residuals above which what remains is a discrepancy of its own, not the form of an effect.
+const DISCREPANT: f64 = 20.0;
+/// A further effect must carry this share of the gap.
+const SECOND_SHARE: f64 = 0.1;
+/// Where the residuals stay correlated, an effect must take away this share of the excess of the training rows ...
+const SHARE: f64 = 0.5;
+/// ... and this share of that of the held-out span.
+const SHARE_HELD_OUT: f64 = 0.4;
+/// ... and no more than this share of the decoys may do as well.
+const DECOYS: f64 = 0.05;
+
+/// The verdict, with positions in [`Found::judged`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Decision {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// What is named, or the best of the tied, or what came nearest.
+    pub best: Option<usize>,
+    /// Names of the sets of effects tied with the best.
+    pub tied: Vec<Vec<String>>,
+    /// Positions of those of the tied that were refitted.
+    pub rivals: Vec<usize>,
+    /// Why it is not named, in words.
+    pub because: String,
+}
+
+/// Decides.
+pub fn decide(laboratory: &Laboratory<'_>, found: &Found<'_>, candidates: &[Candidate]) -> Decision {
+    let none = |verdict, best, because: &str| Decision {
+        verdict,
+        best,
+        tied: Vec::new(),
+        rivals: Vec::new(),
+        because: because.to_owned(),
+    };
+    let passing: Vec<usize> = (0..found.judged.len()).filter(|i| found.judged[*i].refusal.is_none()).collect();
+    if passing.is_empty() {
+        return if found.whiteness < NOT_WHITE {
+            none(Verdict::Unexplained, None, "no candidate passes the gates")
+        } else {
+            none(Verdict::NoGap, None, "")
+        };
+    }
+    let (best, second) = carried(found, &passing);
+    let judged = &found.judged[best];
+    if let Some(second) = second {
+        return none(Verdict::Unexplained, Some(best), &second);
+    }
+    if let Some(because) = doubt(found, judged) {
+        return none(Verdict::Unexplained, Some(best), &because);
+    }
+    let mut rivals = rivals(laboratory, found, &passing, best);
+    // Of forms that the data cannot tell apart the simplest is shown.
+    let mut best = best;
+    for rival in &mut rivals {
+        if complexity(&found.judged[*rival]) < complexity(&found.judged[best]) {
+            std::mem::swap(rival, &mut best);
+        }
+    }
+    let judged = &found.judged[best];
+    let mut tied: Vec<Vec<String>> = rivals.iter().map(|i| names(&found.judged[*i])).collect();
+    for twin in twins(laboratory, found, judged, candidates) {
+        if !tied.contains(&twin) {
+            tied.push(twin);
+        }
+    }
+    let verdict = if tied.is_empty() { Verdict::Named } else { Verdict::Tie };
+    Decision { verdict, best: Some(best), tied, rivals, because: String::new() }
+}
+
+/// Names of the effects of a version.
+pub fn names(judged: &Judged<'_>) -> Vec<String> {
+    judged.fit.version.members.iter().map(|m| m.candidate.name().to_owned()).collect()
+}
+
+/// The best version whose every effect carries its share of the gap, on the training data and again on the held-out span;
+/// where a further effect was found that carries too little of both, why its partner is not quite right.
+fn carried(found: &Found<'_>, passing: &[usize]) -> (usize, Option<String>) {
+    let first = passing[0];
+    let whole = &found.judged[first];
+    if whole.fit.version.members.len() < 2 {
+        return (first, None);
+    }
+    let alone = passing.iter().copied().find(|i| {
+        let judged = &found.judged[*i];
+        judged.fit.version.members.len() + 1 == whole.fit.version.members.len()
+            && names(judged).iter().all(|name| names(whole).contains(name))
+    });
+    let Some(alone) = alone else { return (first, None) };
+    let part = &found.judged[alone];
+    let share = |of: fn(&Misfit) -> f64| {
+        let whole_fall = of(&found.before) - of(&whole.misfit);
+        (of(&part.misfit) - of(&whole.misfit)) / whole_fall.max(f64::MIN_POSITIVE)
+    };
+    let train = share(|m| m.train);
+    let held_out = (whole.misfit.n_held_out > 0).then(|| share(|m| m.held_out));
+    if train >= SECOND_SHARE && held_out.is_none_or(|h| h >= SECOND_SHARE) {
+        return (first, None);
+    }
+    // What does not come again in the held-out span is not the effect's form.
+    if held_out.is_some_and(|h| h < 0.3 * train) || found.judged[alone].inflation > DISCREPANT {
+        return (alone, None);
+    }
+    let because = format!(
+        "`{}` leaves {:.1} % of what `{}` takes away, too much for chance and too little for an effect of its own: its form is \
+         not quite right",
+        part.fit.version.name(),
+        100.0 * train,
+        whole.fit.version.name()
+    );
+    (alone, Some(because))
+}
+
+/// What speaks against naming a version that passes the gates.
+fn doubt(found: &Found<'_>, judged: &Judged<'_>) -> Option<String> {
+    if found.leftover.is_systematic() {
+        return Some(format!(
+            "after `{}` the candidates together would still take away {:.0} of χ² and {:.0} on the held-out span, in units of \
+             the effective noise: something else has a similar influence",
+            judged.fit.version.name(),
+            found.leftover.gain,
+            found.leftover.gain_held_out
+        ));
+    }
+    if judged.whiteness >= NOT_WHITE {
+        return None;
+    }
+    let name = judged.fit.version.name();
+    let short = |share: f64, what: &str| {
+        format!("`{name}` takes away only {:.0} % of the gap on the {what}, and what is left is not noise", 100.0 * share)
+    };
+    if judged.share < SHARE {
+        return Some(short(judged.share, "training data"));
+    }
+    if let Some(share) = judged.share_held_out.filter(|s| *s < SHARE_HELD_OUT) {
+        return Some(short(share, "held-out span"));
+    }
+    let decoys = found.background.decoys_above(judged.gain);
+    (decoys > DECOYS).then(|| {
+        format!("{:.0} % of the decoys take away as much as `{name}`, and what is left is not noise", 100.0 * decoys)
+    })
+}
+
+/// Other versions that pass the gates and come as close as chance allows: by the fall of χ², or because the difference of
+/// their residuals is not clearly of one sign (Vuong 1989, with the autocorrelation of that difference).
+fn rivals(laboratory: &Laboratory<'_>, found: &Found<'_>, passing: &[usize], best: usize) -> Vec<usize> {
+    let of_best = &found.judged[best];
+    let size = of_best.fit.version.members.len();
+    let near = |i: &usize| {
+        let judged = &found.judged[*i];
+        let apart = of_best.rank() - judged.rank();
+        *i != best
+            && judged.fit.version.members.len() == size
+            && names(judged) != names(of_best)
+            && (apart < MARGIN * of_best.inflation || apart < VUONG * scatter(laboratory, of_best, judged))
+    };
+    passing.iter().copied().filter(near).collect()
+}
+
+/// Standard deviation of the difference in χ² of two versions, over all rows.
+fn scatter(laboratory: &Laboratory<'_>, a: &Judged<'_>, b: &Judged<'_>) -> f64 {
+    let rows = &laboratory.rows;
+    let (of_a, of_b) = (rows.whitened(&a.fit.predicted), rows.whitened(&b.fit.predicted));
+    let variance = |stretch: std::ops::Range<usize>| {
+        let apart: Vec<f64> = stretch.map(|i| of_b[i].powi(2) - of_a[i].powi(2)).collect();
+        let n = apart.len() as f64;
+        let mean = apart.iter().sum::<f64>() / n;
+        let square = apart.iter().map(|d| (d - mean).powi(2)).sum::<f64>();
+        let effective = effective_sample_size(&apart);
+        square * if effective > 0.0 { (n / effective).max(1.0) } else { 1.0 }
+    };
+    rows.stretches().into_iter().map(variance).sum::<f64>().sqrt()
+}
+
+/// Operations in the terms of a version: of the tied, the simplest is shown.
+fn complexity(judged: &Judged<'_>) -> usize {
+    let terms = judged.fit.version.members.iter().flat_map(|m| &m.candidate.def.adds);
+    let resolve = |_: &str| Some(Slot::Parameter(0));
+    let size = |term: &String| Expression::parse(term).ok()?.compile(&resolve, &|_| None).ok();
+    terms.filter_map(|add| size(&add.term)).map(|program| program.n_operations()).sum()
+}
+
+/// Candidates that were not refitted but whose influence is that of the best.
+fn twins(
+    laboratory: &Laboratory<'_>,
+    found: &Found<'_>,
+    judged: &Judged<'_>,
+    candidates: &[Candidate],
+) -> Vec<Vec<String>> {
+    let [member] = judged.fit.version.members.as_slice() else { return Vec::new() };
+    let Ok(optimum) = found.base.optimum() else { return Vec::new() };
+    let own = |s: &DVector<f64>| optimum.unimitated(&s.select_rows(&laboratory.rows.train));
+    let best = found.hits.iter().filter(|h| h.candidate == member.index && h.failure.is_none());
+    let Some(best) = best.max_by(|a, b| a.score.gain.total_cmp(&b.score.gain)) else { return Vec::new() };
+    let best = own(&best.sensitivity);
+    let mut twins: Vec<Vec<String>> = Vec::new();
+    for hit in found.hits.iter().filter(|h| h.failure.is_none() && !h.is_absorbed()) {
+        let refitted = found.judged.iter().any(|j| {
+            j.fit.version.members.len() == 1 && j.fit.version.members[0].index == hit.candidate
+        });
+        let other = own(&hit.sensitivity);
+        let alike = best.dot(&other).abs() / (best.norm() * other.norm());
+        let candidate = &candidates[hit.candidate];
+        let name = vec![candidate.name().to_owned()];
+        let allowed = hit.allowed_gain(candidate.sign()) > 0.0;
+        if !refitted && allowed && alike > ALIKE && !twins.contains(&name) {
+            twins.push(name);
+        }
+    }
+    twins
+}

@@ -1,0 +1,94 @@
+//! What was tried and what became of it, and how often chance would have given a name.
+
+use serde::Serialize;
+
+use super::quantity;
+use crate::explain::figures::Figures;
+use crate::explain::result::{Explanation, FalseAlarm, Screened};
+use crate::report::plot::alarm::{self, Gains};
+use crate::report::plot::figure::Figure;
+use crate::report::plot::meter::{Bar, meter};
+use crate::report::plot::palette::{BLUE, GREY};
+use crate::report::{ReportError, number};
+
+/// Candidates listed at most.
+const LISTED: usize = 80;
+
+/// The candidates, ready to be arranged.
+#[derive(Debug, Serialize)]
+pub(super) struct Candidates {
+    screened: Vec<CandidateRow>,
+    left_out: usize,
+    alarm: Option<Figure>,
+    alarm_facts: Vec<(&'static str, String)>,
+}
+
+#[derive(Debug, Serialize)]
+struct CandidateRow {
+    name: String,
+    at: String,
+    share: String,
+    gain: String,
+    amplitude: String,
+    identifiable: String,
+    fate: String,
+    meter: String,
+}
+
+impl Candidates {
+    /// Formats the candidates and draws the histogram of chance.
+    ///
+    /// # Errors
+    ///
+    /// A figure cannot be drawn.
+    pub(super) fn new(found: &Explanation, figures: &Figures) -> Result<Self, ReportError> {
+        let gains = Gains {
+            null: &figures.null_gains,
+            decoys: &figures.decoy_gains,
+            best: figures.best_gain,
+            threshold: found.false_alarm.threshold,
+        };
+        Ok(Self {
+            screened: found.screened.iter().take(LISTED).map(row).collect::<Result<_, _>>()?,
+            left_out: found.screened.len().saturating_sub(LISTED),
+            alarm: alarm::figure(&gains)?,
+            alarm_facts: alarm_facts(&found.false_alarm, figures.best_gain),
+        })
+    }
+}
+
+fn row(s: &Screened) -> Result<CandidateRow, ReportError> {
+    let bars = [
+        Bar { from: 0.0, to: s.share.max(0.0), lane: (6, 18), colour: BLUE },
+        Bar { from: 0.0, to: s.identifiable, lane: (10, 14), colour: GREY },
+    ];
+    let title = format!("{}: explains {} of the gap", s.name, number::percent(s.share));
+    Ok(CandidateRow {
+        name: s.name.clone(),
+        at: s.at.clone(),
+        share: number::percent(s.share),
+        gain: quantity(s.gain, ""),
+        amplitude: quantity(s.amplitude, ""),
+        identifiable: number::percent(s.identifiable),
+        fate: s.fate.clone(),
+        meter: meter(&title, "Wide bar: share of the gap. Thin bar: identifiable part.", (0.0, 1.0), &bars)?,
+    })
+}
+
+fn alarm_facts(alarm: &FalseAlarm, best: f64) -> Vec<(&'static str, String)> {
+    let percent = |share: f64| {
+        if share.is_finite() {
+            format!("{} %", number::with_sd(100.0 * share, 1.0))
+        } else {
+            number::ABSENT.to_owned()
+        }
+    };
+    vec![
+        ("False-alarm rate of this search", percent(alarm.rate)),
+        ("Its upper 95\u{a0}% limit", percent(alarm.upper95)),
+        ("Simulations behind it", alarm.runs.to_string()),
+        ("Threshold", quantity(alarm.threshold, "")),
+        ("Best candidate", quantity(best, "")),
+        ("Decoys that score as well", percent(alarm.decoys)),
+    ]
+}

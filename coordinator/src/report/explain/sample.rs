@@ -1,0 +1,287 @@
+//! Data of an explanation that never was, for the tests of the page: a pressure that a model without a series resistance misses.
+
+use super::StudyAbout;
+use crate::explain::figures::{Curve, Figures};
+use crate::explain::locate::{ChannelGap, Correlated, Located, RegionMap, ResidualSpectrum, UnknownInput};
+use crate::explain::result::{
+    Coefficient, Experiment, Explanation, FalseAlarm, GapRow, NamedEffect, ParameterShift, Place, Rejected,
+    Remaining, Screened, Verdict,
+};
+
+/// An explanation with the given verdict, of `records` recordings with `n` times each.
+pub(super) fn found(verdict: Verdict, records: usize, n: usize) -> (Explanation, Figures) {
+    let added = matches!(verdict, Verdict::Named | Verdict::Tie);
+    let mut explanation = explanation(verdict, records);
+    let mut figures = figures(records, n);
+    if !added {
+        explanation.effects.clear();
+        explanation.gap.clear();
+        explanation.parameter_shifts.clear();
+        explanation.explained_study = None;
+        figures.maps_after.clear();
+        figures.curves.iter_mut().for_each(|curve| curve.after.clear());
+    }
+    match verdict {
+        Verdict::Named => {}
+        Verdict::Tie => {
+            explanation.headline = "Characteristic impedance or source gain: the data cannot tell.".into();
+            explanation.tied_with = vec![vec!["source-gain".into(), "leak".into()]];
+            explanation.experiment = Some(experiment());
+        }
+        Verdict::Unexplained => {
+            explanation.headline = "Nothing in the library explains the gap.".into();
+            explanation.closest = Some(effect());
+        }
+        Verdict::NoGap => {
+            explanation.headline = "The model explains the data at their noise.".into();
+            explanation.places.clear();
+        }
+    }
+    (explanation, figures)
+}
+
+/// What the page says of the study.
+pub(super) fn about() -> StudyAbout {
+    StudyAbout {
+        says: "The two-element model of a pig's aorta, in vivo.".into(),
+        command: "starlings explain examples/pig-aorta/explain.toml --workers 2".into(),
+        started: "2026-03-02 14:05:31 UTC".into(),
+        version: "0.1.0".into(),
+        states: vec!["p".into()],
+    }
+}
+
+fn effect() -> NamedEffect {
+    let coefficient = Coefficient {
+        name: "Zc".into(),
+        unit: "mmHg s/mL".into(),
+        estimate: 0.0943,
+        sd: 0.0022,
+        interval95: [0.0901, 0.0987],
+    };
+    NamedEffect {
+        name: "characteristic-impedance".into(),
+        says: "The inlet pressure rises with the flow itself.".into(),
+        adds: vec![("pressure".into(), "Zc*flow".into()), ("p".into(), "-leak*p".into())],
+        parameters: vec![coefficient],
+        confounders: vec!["inertance".into(), "a gain of the flow meter".into()],
+        source: "Westerhof, Lankhaar & Westerhof (2009)".into(),
+    }
+}
+
+fn experiment() -> Experiment {
+    Experiment {
+        says: "Double the stroke volume and record the inlet pressure for 4 s.".into(),
+        separation: 412.0,
+        separation_now: 3.1,
+        tried: vec![("twice the stroke volume".into(), 412.0), ("twice as long".into(), 6.2)],
+    }
+}
+
+fn explanation(verdict: Verdict, records: usize) -> Explanation {
+    let row = |record: usize, usage: &str, before, after| GapRow {
+        record: format!("in-vivo-{record}"),
+        channel: "pressure".into(),
+        usage: usage.into(),
+        before,
+        after,
+        noise: 2.0,
+    };
+    Explanation {
+        study: "pig-aorta".into(),
+        model: "windkessel-2".into(),
+        seed: 1,
+        verdict,
+        headline: "The characteristic impedance is missing: 0.0943 mmHg s/mL.".into(),
+        places: vec![Place {
+            channel: "pressure".into(),
+            unit: "mmHg".into(),
+            from: 0.0,
+            to: 2.3,
+            region: "flow > 50 mL/s".into(),
+            rmse: 14.7,
+            interval95: [13.1, 16.2],
+            expected: 2.0,
+            sentence: "pressure where flow > 50 mL/s: 14.7 mmHg rms against 2.0 expected".into(),
+        }],
+        effects: vec![effect()],
+        replaced: Vec::new(),
+        tied_with: Vec::new(),
+        experiment: None,
+        closest: None,
+        screened: screened(),
+        rejected: vec![Rejected {
+            name: "inertance".into(),
+            gate: "held-out span".into(),
+            reason: "the held-out RMSE grows from 9.1 to 9.8 mmHg".into(),
+        }],
+        gap: (1..=records)
+            .flat_map(|k| [row(k, "train", 9.43, 2.11), row(k, "held-out", 9.12, 2.34)])
+            .collect(),
+        remaining: remaining(),
+        false_alarm: false_alarm(),
+        parameter_shifts: vec![shift("R", "mmHg s/mL", 3.21, 3.367), shift("C", "mL/mmHg", 1.91, 1.248)],
+        untried: vec!["wall-viscosity".into()],
+        explained_study: Some("explained.toml".into()),
+        conditional_on: "Noise of 2 mmHg, the stated priors, and the library that was tried.".into(),
+        runs: 184,
+        runs_by_stage: vec![("fit".into(), 32), ("screen".into(), 41), ("refit".into(), 111)],
+        workers: 2,
+        wall_s: 8.4,
+        warnings: vec!["The noise was estimated from the data.".into()],
+    }
+}
+
+fn remaining() -> Remaining {
+    Remaining {
+        rmse_over_noise: 1.06,
+        whiteness_p: 0.000_04,
+        shape: "What remains is a ripple of 0.9 mmHg at 7 1/s.".into(),
+    }
+}
+
+fn false_alarm() -> FalseAlarm {
+    FalseAlarm {
+        rate: 0.01,
+        upper95: 0.05,
+        how: "100 simulations of the fitted model with its noise.".into(),
+        runs: 100,
+        threshold: 10.0,
+        decoys: 0.0,
+    }
+}
+
+fn shift(name: &str, unit: &str, before: f64, after: f64) -> ParameterShift {
+    ParameterShift { name: name.into(), unit: unit.into(), before, after, sd: 0.02 }
+}
+
+fn screened() -> Vec<Screened> {
+    let row = |name: &str, share: f64, fate: &str| Screened {
+        name: name.into(),
+        at: String::new(),
+        share,
+        gain: 4100.0 * share,
+        amplitude: 0.09,
+        identifiable: 0.6,
+        fate: fate.into(),
+    };
+    vec![
+        row("characteristic-impedance", 0.96, "named"),
+        row("inertance", 0.41, "refitted"),
+        row("offset", 0.02, "absorbed by the parameters"),
+    ]
+}
+
+fn flow(t: f64) -> f64 {
+    (90.0 * (2.0 * std::f64::consts::PI * t / 0.52).sin()).max(0.0)
+}
+
+/// Deterministic noise of about 2, no generator needed.
+fn noise(t: f64) -> f64 {
+    2.0 * ((913.0 * t).sin() + 0.8 * (2_711.0 * t).cos())
+}
+
+fn figures(records: usize, n: usize) -> Figures {
+    let time: Vec<f64> = (0..n).map(|k| 4.2 * k as f64 / n as f64).collect();
+    let of = |value: fn(f64) -> f64| -> Vec<f64> { time.iter().map(|t| value(*t)).collect() };
+    let curve = |k: usize| Curve {
+        record: format!("in-vivo-{k}"),
+        channel: "pressure".into(),
+        unit: "mmHg".into(),
+        noise: 2.0,
+        held_out: false,
+        train: Some([0.0, 2.3]),
+        time: time.clone(),
+        observed: of(|t| 90.0 + 12.0 * (1.3 * t).sin() + 0.094 * flow(t) + noise(t)),
+        before: of(|t| 93.0 + 12.0 * (1.3 * t).sin()),
+        after: of(|t| 90.0 + 12.0 * (1.3 * t).sin() + 0.094 * flow(t)),
+    };
+    let maps = |share: f64| vec![map(share, false), map(share, true)];
+    Figures {
+        time_unit: "s".into(),
+        curves: (1..=records).map(curve).collect(),
+        before: Located {
+            places: Vec::new(),
+            channels: (1..=records).map(channel).collect(),
+            maps: maps(1.0),
+            correlations: correlations(),
+            spectra: vec![spectrum()],
+            forces: vec![force(&time)],
+        },
+        maps_after: maps(0.05),
+        null_gains: (0..100).map(|k| 4.0 * (1.7 * f64::from(k)).sin().powi(2)).collect(),
+        decoy_gains: (0..20).map(|k| 7.0 * (2.3 * f64::from(k)).sin().powi(2)).collect(),
+        best_gain: 4100.0,
+    }
+}
+
+fn channel(k: usize) -> ChannelGap {
+    ChannelGap {
+        record: format!("in-vivo-{k}"),
+        channel: "pressure".into(),
+        unit: "mmHg".into(),
+        usage: "train".into(),
+        n: 462,
+        noise: 2.0,
+        rmse: 9.43,
+        interval95: [8.7, 10.2],
+        bias: 3.1,
+        lag1: 0.97,
+        whiteness_p: 1e-12,
+        effective_n: 21.0,
+    }
+}
+
+fn map(share: f64, two: bool) -> RegionMap {
+    let (n_x, n_y) = (8, if two { 5 } else { 1 });
+    let bias = |k: usize| share * (2.0 * (k % n_x) as f64 - 3.0 + 0.3 * (k / n_x) as f64);
+    let signal = |name: &str, unit: &str| (name.to_owned(), unit.to_owned());
+    RegionMap {
+        channel: "pressure".into(),
+        unit: "mmHg".into(),
+        noise: 2.0,
+        x: signal("flow", "mL/s"),
+        y: two.then(|| signal("p", "mmHg")),
+        x_edges: (0..=n_x).map(|k| 12.0 * k as f64).collect(),
+        y_edges: if two { (0..=n_y).map(|k| 70.0 + 10.0 * k as f64).collect() } else { Vec::new() },
+        count: (0..n_x * n_y).map(|k| if k == 3 { 0 } else { 20 }).collect(),
+        bias: (0..n_x * n_y).map(|k| (k != 3).then(|| bias(k))).collect(),
+        rmse: (0..n_x * n_y).map(|k| (k != 3).then(|| bias(k).hypot(2.0))).collect(),
+        explained: 0.78,
+    }
+}
+
+fn correlations() -> Vec<Correlated> {
+    let row = |with: &str, coefficient: f64| Correlated {
+        channel: "pressure".into(),
+        with: with.into(),
+        coefficient,
+        interval95: [coefficient - 0.08, (coefficient + 0.06).min(1.0)],
+    };
+    vec![row("flow", 0.77), row("rate of flow", -0.31)]
+}
+
+fn spectrum() -> ResidualSpectrum {
+    let frequency: Vec<f64> = (0..60).map(|k| 0.5 * f64::from(k)).collect();
+    let power = |f: &f64| 1.0 + 40.0 * (-(f - 2.0).powi(2)).exp();
+    ResidualSpectrum {
+        record: "in-vivo-1".into(),
+        channel: "pressure".into(),
+        power_over_noise: frequency.iter().map(power).collect(),
+        frequency,
+        peak: 2.0,
+    }
+}
+
+fn force(time: &[f64]) -> UnknownInput {
+    UnknownInput {
+        state: "p".into(),
+        unit: "mmHg/s".into(),
+        record: "in-vivo-1".into(),
+        time: time.to_vec(),
+        value: time.iter().map(|t| 3.0 * (1.3 * t).cos().signum() + 0.2 * noise(*t)).collect(),
+        sd: vec![0.7; time.len()],
+        at: time.iter().map(|t| 90.0 + 12.0 * (1.3 * t).sin()).collect(),
+        log_likelihood_gain: 310.0,
+    }
+}

@@ -1,0 +1,152 @@
+//! The poles of a study's model under the observers that it can host: which are compared, at which gains, and what was found.
+//!
+//! The model stands at its prior medians, where its runs start. The arithmetic of poles is in `starlings_models::spectrum`;
+//! how the result is shown is the caller's. Next file to read: `models/src/spectrum.rs`.
+
+use starlings_models::spectrum::{Decay, Laboratory, ObserverSpectrum, SpectrumError};
+
+use super::{Study, posterior};
+
+/// Poles in the result where no number is asked for.
+const LISTED: usize = 100;
+
+/// The slowest poles that gains are chosen around where none are given.
+const AROUND: usize = 16;
+
+/// What is asked; everything that is left open is the study's section `[spectrum]`'s.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Wanted {
+    /// Kinds of observers; empty for all that the model can host.
+    pub observers: Vec<String>,
+    /// Gains in 1/time; empty for a range around the poles.
+    pub gains: Vec<f64>,
+    /// The decay that is wanted.
+    pub decay: Option<Decay>,
+    /// How many of the slowest poles are listed; 100 without it.
+    pub poles: Option<usize>,
+}
+
+/// What was found.
+pub struct Spectrum {
+    /// The model without observer.
+    pub laboratory: Laboratory,
+    /// The decay that is wanted.
+    pub decay: Option<Decay>,
+    /// Poles listed, at most those that there are.
+    pub listed: usize,
+    /// One entry per observer, in the order asked for.
+    pub observers: Vec<ObserverSpectrum>,
+    /// Observers that the model cannot host, with the reason; empty where observers were asked for.
+    pub refused: Vec<(String, String)>,
+}
+
+/// One listed pole at one gain.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LocusPoint {
+    /// The observer.
+    pub observer: String,
+    /// Its gain in 1/time.
+    pub gain: f64,
+    /// Largest real part of all poles at this gain, in 1/time.
+    pub max_re: f64,
+    /// Number of the pole, from 0, in the order without observer.
+    pub pole: usize,
+    /// Real part in 1/time.
+    pub re: f64,
+    /// Imaginary part in 1/time.
+    pub im: f64,
+}
+
+/// Why there is no spectrum.
+#[derive(Debug, thiserror::Error)]
+pub enum ExamineError {
+    /// The model has none, or cannot host an observer that was asked for.
+    #[error(transparent)]
+    Spectrum(#[from] SpectrumError),
+    /// The examination of an observer ended without an answer.
+    #[error("the observer `{0}` could not be examined")]
+    Broken(String),
+}
+
+/// Examines the observers of a study, each on a thread of its own.
+///
+/// # Errors
+/// When the model cannot be linearised where its runs start, or cannot host an observer that was asked for.
+pub fn examine(study: &Study, wanted: &Wanted) -> Result<Spectrum, ExamineError> {
+    let medians = study.theta_for(0, posterior::prior(study).mean.as_slice());
+    let laboratory = Laboratory::new(&study.setup, &medians)?;
+    let listed = wanted.poles.unwrap_or(LISTED).min(laboratory.poles().len());
+    let gains = gains(study, wanted, &laboratory);
+    let (kinds, refused) = kinds(study, wanted, &laboratory);
+    let decay = wanted.decay.or(study.spectrum.decay);
+    let work = |kind: &String| laboratory.examine(kind, &gains, listed, decay);
+    let results: Vec<_> = std::thread::scope(|scope| {
+        let threads: Vec<_> = kinds.iter().map(|kind| scope.spawn(move || work(kind))).collect();
+        threads.into_iter().map(std::thread::ScopedJoinHandle::join).collect()
+    });
+    let mut observers = Vec::with_capacity(results.len());
+    for (kind, result) in kinds.iter().zip(results) {
+        observers.push(result.map_err(|_| ExamineError::Broken(kind.clone()))??);
+    }
+    Ok(Spectrum { laboratory, decay, listed, observers, refused })
+}
+
+/// The gains that are asked for, else the study's, else a range around the poles.
+fn gains(study: &Study, wanted: &Wanted, laboratory: &Laboratory) -> Vec<f64> {
+    match (wanted.gains.is_empty(), study.spectrum.gains.is_empty()) {
+        (false, _) => wanted.gains.clone(),
+        (true, false) => study.spectrum.gains.clone(),
+        (true, true) => laboratory.usual_gains(AROUND),
+    }
+}
+
+/// The observers to compare, each once, and those that the model cannot host. An observer that was asked for and cannot be is
+/// an error later on; of the others nobody wants to know why.
+fn kinds(study: &Study, wanted: &Wanted, laboratory: &Laboratory) -> (Vec<String>, Vec<(String, String)>) {
+    let named = if wanted.observers.is_empty() { &study.spectrum.observers } else { &wanted.observers };
+    let (mut kinds, mut refused) = (Vec::new(), Vec::new());
+    if named.is_empty() {
+        for (kind, why) in laboratory.observers() {
+            match why {
+                None => kinds.push(kind.to_owned()),
+                Some(why) => refused.push((kind.to_owned(), why.to_string())),
+            }
+        }
+    }
+    for kind in named {
+        if !kinds.contains(kind) {
+            kinds.push(kind.clone());
+        }
+    }
+    (kinds, refused)
+}
+
+impl Spectrum {
+    /// The listed poles at every gain: by observer, then by gain, then by pole. Each pole is followed from gain to gain from
+    /// zero on, whatever the order of the gains.
+    ///
+    /// # Errors
+    /// When poles are not found.
+    pub fn locus(&self) -> Result<Vec<LocusPoint>, SpectrumError> {
+        let mut points = Vec::new();
+        for observer in &self.observers {
+            let mut gains = observer.gain.clone();
+            gains.push(0.0);
+            gains.sort_by(f64::total_cmp);
+            gains.dedup();
+            let ways = observer.locus(&gains, self.listed)?;
+            for (&gain, &max_re) in observer.gain.iter().zip(&observer.max_re) {
+                let at = gains.iter().position(|g| g.to_bits() == gain.to_bits()).unwrap_or(0);
+                points.extend(ways.iter().enumerate().map(|(pole, way)| LocusPoint {
+                    observer: observer.name.clone(),
+                    gain,
+                    max_re,
+                    pole,
+                    re: way[at].re,
+                    im: way[at].im,
+                }));
+            }
+        }
+        Ok(points)
+    }
+}

@@ -1,0 +1,69 @@
+//! Runs of the model that need not be made twice: their answers by a key that says everything that went into them.
+//!
+//! What a key covers and how an answer is written as bytes is the caller's business. Next file to read:
+//! [`crate::study::store`].
+
+use rusqlite::{OptionalExtension, params};
+
+use super::schema::insert_jobs;
+use super::{JobRow, Store, StoreError};
+
+/// BLAKE3 of everything that a run's answer depends on.
+pub type RunKey = [u8; 32];
+
+/// Made at opening too: stores of earlier programs of the same version lack it.
+pub(super) const TABLE: &str =
+    "CREATE TABLE IF NOT EXISTS remembered_runs (key BLOB PRIMARY KEY, body BLOB NOT NULL);";
+
+impl Store {
+    /// Keeps the answer of one run; an earlier one of the same key is replaced.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub fn remember_run(&self, key: &RunKey, body: &[u8]) -> Result<(), StoreError> {
+        self.remember_runs(std::iter::once((key, body)), &[])
+    }
+
+    /// Keeps the answers of many runs and the rows of their jobs in one piece: after a kill either all are there or none.
+    ///
+    /// # Errors
+    /// When the database refuses; none of them is kept then.
+    pub fn remember_runs<'a>(
+        &self,
+        runs: impl IntoIterator<Item = (&'a RunKey, &'a [u8])>,
+        jobs: &[JobRow],
+    ) -> Result<(), StoreError> {
+        self.commit()?;
+        let write = || -> rusqlite::Result<()> {
+            let transaction = self.connection.unchecked_transaction()?;
+            let mut insert = transaction
+                .prepare_cached("INSERT OR REPLACE INTO remembered_runs (key, body) VALUES (?1, ?2)")?;
+            for (key, body) in runs {
+                insert.execute(params![key.as_slice(), body])?;
+            }
+            drop(insert);
+            insert_jobs(&transaction, jobs)?;
+            transaction.commit()
+        };
+        self.guard(write())
+    }
+
+    /// The answer of an earlier run, if it was kept.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub fn remembered_run(&self, key: &RunKey) -> Result<Option<Vec<u8>>, StoreError> {
+        let mut select =
+            self.guard(self.connection.prepare_cached("SELECT body FROM remembered_runs WHERE key = ?1"))?;
+        self.guard(select.query_row([key.as_slice()], |row| row.get(0)).optional())
+    }
+
+    /// Number of runs whose answers are kept.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub fn n_remembered_run(&self) -> Result<u64, StoreError> {
+        let count = self.connection.query_row("SELECT count(*) FROM remembered_runs", [], |row| row.get(0));
+        self.guard(count)
+    }
+}

@@ -1,0 +1,262 @@
+//! Explanations end to end, in process: what is named, what is refused, and that they do not depend on who computed.
+#![allow(missing_docs, clippy::unwrap_used)]
+
+mod study_kit;
+
+use std::path::Path;
+
+use starlings_coordinator::explain::{Context, ExplainError, Explanation, Findings, Options, Verdict, explain};
+use starlings_coordinator::fleet::{Fleet, InProcess};
+use starlings_coordinator::study::Study;
+use starlings_coordinator::study::store::Store;
+use starlings_coordinator::study::twin::{Twin, simulate};
+use study_kit::fleets::{Mortal, Shuffled};
+use study_kit::{Case, csv, grid};
+
+/// A mass on a spring that swings out; what else acts on it is the test's business.
+fn study(more: &str, explain: &str) -> String {
+    format!(
+        r#"
+[study]
+name = "swing"
+seed = 3
+
+[model]
+kind = "equations"
+outputs = [ {{ name = "position", unit = "m", role = "displacement", value = "x" }} ]
+{more}
+
+[[model.states]]
+name = "x"
+unit = "m"
+role = "displacement"
+initial = 0.0
+rate = "v"
+
+[[model.states]]
+name = "v"
+unit = "m/s"
+role = "velocity"
+initial = 0.0
+rate = {{ spring = "-k*x", viscous = "-c*v" }}
+
+[[parameters]]
+name = "k"
+unit = "1/s^2"
+prior = {{ transform = "log", median = 9.0, factor = 1.5 }}
+
+[[parameters]]
+name = "c"
+unit = "1/s"
+prior = {{ transform = "log", median = 0.2, factor = 2.0 }}
+
+[[parameters]]
+name = "initial:x"
+unit = "m"
+prior = {{ transform = "linear", median = 1.0, sd = 0.2 }}
+
+[[records]]
+name = "free"
+file = "free.csv"
+time = "time"
+channels = [ {{ column = "position", output = "position", noise = 0.01 }} ]
+train = [0.0, 9.0]
+
+[explain]
+{explain}
+
+[[effects]]
+name = "wind"
+says = "A wind pushes with the square of the speed against it."
+adds = [ {{ to = "v", term = "-w*(v + 0.5)*abs(v + 0.5)" }} ]
+parameters = [ {{ name = "w", unit = "1/m", range = [0, 10] }} ]
+"#
+    )
+}
+
+/// A recording of that swing with an effect of this amplitude in it and noise of 0.01 m.
+fn recording(study: &str, effects: &[(&str, f64)], values: &[(&str, f64)], seed: u64) -> String {
+    let times = grid(300, 0.05);
+    let blank = csv("time,position", &[&times, &vec![0.0; times.len()]]);
+    let case = Case::new(study, &[("free.csv", blank)]);
+    let named = |list: &[(&str, f64)]| list.iter().map(|(name, v)| ((*name).to_owned(), *v)).collect();
+    let twin = Twin {
+        values: [&[("k".to_owned(), 10.0), ("c".to_owned(), 0.15), ("initial:x".to_owned(), 1.1)], &named(values)[..]].concat(),
+        effects: named(effects),
+        noise: 0.01,
+        seed,
+        ..Twin::default()
+    };
+    let made = simulate(&case.study(), &twin).unwrap();
+    csv("time,position", &[&made.times, &made.values[0]])
+}
+
+fn go(case: &Case, path: &Path, fleet: &mut dyn Fleet, options: &Options) -> Result<Findings, ExplainError> {
+    let study: Study = case.study();
+    std::fs::create_dir_all(path).unwrap();
+    let database = path.join("run.db");
+    let store = if database.exists() { Store::open(&database) } else { Store::create(&database, &[]) }.unwrap();
+    let mut context = Context { clock: &|| 0.0, watch: &mut |_| {}, events: None, earlier_s: 0.0 };
+    explain(&study, fleet, &store, &mut context, options)
+}
+
+fn explained(study: &str, data: String) -> Findings {
+    let case = Case::new(study, &[("free.csv", data)]);
+    go(&case, &case.fresh(), &mut InProcess::new(2), &Options::default()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn sets(found: &Explanation) -> Vec<Vec<String>> {
+    let best = found.effects.iter().map(|e| e.name.clone()).collect();
+    std::iter::once(best).chain(found.tied_with.clone()).collect()
+}
+
+/// A recording with a cubic spring in it.
+fn cubic() -> (String, String) {
+    let study = study("", "");
+    let data = recording(&study, &[("cubic-stiffness", 2.0)], &[], 1);
+    (study, data)
+}
+
+#[test]
+fn a_hidden_effect_is_named_added_and_the_gap_shrinks_where_nothing_was_fitted() {
+    let (text, data) = cubic();
+    let case = Case::new(&text, &[("free.csv", data)]);
+    let folder = case.fresh();
+    let findings = go(&case, &folder, &mut InProcess::new(2), &Options::default()).unwrap();
+    let found = &findings.explanation;
+    assert_eq!(found.verdict, Verdict::Named, "{}", found.headline);
+    assert_eq!(found.effects[0].name, "cubic-stiffness", "{}", found.headline);
+    let amplitude = &found.effects[0].parameters[0];
+    // Five posterior sd: one draw of the noise.
+    assert!((amplitude.estimate - 2.0).abs() < 5.0 * amplitude.sd && amplitude.sd < 0.2, "{amplitude:?}");
+    let held_out = found.gap.iter().find(|row| row.usage == "held-out").unwrap();
+    assert!(held_out.after < 1.15 * held_out.noise && held_out.before > 2.0 * held_out.noise, "{held_out:?}");
+    let k = found.parameter_shifts.iter().find(|p| p.name == "k").unwrap();
+    assert!((k.before - 10.0).abs() > (k.after - 10.0).abs(), "{k:?}");
+    // The study that it proposes runs as it is and knows the effect as part of its model.
+    let text = findings.explained_study.unwrap();
+    let path = folder.join("explained.toml");
+    std::fs::write(&path, &text).unwrap();
+    let explained = Study::load(&path).unwrap_or_else(|error| panic!("{error}\n{text}"));
+    assert!(explained.setup.effects.iter().any(|e| e.name == "cubic-stiffness"));
+}
+
+#[test]
+fn an_effect_that_only_the_study_describes_is_named_like_any_other() {
+    let text = study("", "");
+    let data = recording(&text, &[("wind", 0.6)], &[], 2);
+    let found = explained(&text, data).explanation;
+    assert!(sets(&found).contains(&vec!["wind".to_owned()]), "{}", found.headline);
+}
+
+#[test]
+fn nothing_is_named_where_nothing_is_missing() {
+    let text = study("", "");
+    for seed in 0..4 {
+        let found = explained(&text, recording(&text, &[], &[], seed)).explanation;
+        assert_eq!(found.verdict, Verdict::NoGap, "seed {seed}: {}", found.headline);
+        assert!(found.effects.is_empty() && found.explained_study.is_none());
+    }
+}
+
+#[test]
+fn the_same_study_gives_the_same_explanation_whoever_computes_it() {
+    let (text, data) = cubic();
+    let case = Case::new(&text, &[("free.csv", data)]);
+    let once = |fleet: &mut dyn Fleet| {
+        let mut found = go(&case, &case.fresh(), fleet, &Options::default()).unwrap();
+        found.explanation.workers = 0;
+        (serde_json::to_string(&found.explanation).unwrap(), serde_json::to_string(&found.figures).unwrap())
+    };
+    let one = once(&mut InProcess::new(1));
+    assert!(one == once(&mut InProcess::new(4)), "four threads");
+    assert!(one == once(&mut Shuffled::new(2)), "another order of computation");
+}
+
+#[test]
+fn a_killed_explanation_is_continued_without_a_run_made_twice() {
+    let (text, data) = cubic();
+    let case = Case::new(&text, &[("free.csv", data)]);
+    let whole = go(&case, &case.fresh(), &mut InProcess::new(1), &Options::default()).unwrap().explanation;
+    for left in [1, 4, 9] {
+        let folder = case.fresh();
+        let killed = go(&case, &folder, &mut Mortal::new(left), &Options::default());
+        assert!(killed.is_err(), "killed after {left} batches");
+        let before = Store::open(&folder.join("run.db")).unwrap().n_remembered_run().unwrap();
+        assert!(before > 0);
+        let mut again = Mortal::new(usize::MAX);
+        let mut found = go(&case, &folder, &mut again, &Options::default()).unwrap().explanation;
+        found.workers = whole.workers;
+        assert_eq!(found, whole, "after {left} batches");
+    }
+}
+
+#[test]
+fn a_budget_ends_the_search_and_says_what_was_left_untried() {
+    let (text, data) = cubic();
+    let case = Case::new(&text, &[("free.csv", data)]);
+    let full = go(&case, &case.fresh(), &mut InProcess::new(2), &Options::default()).unwrap().explanation;
+    let options = Options { budget: Some(full.runs / 2), ..Options::default() };
+    let cut = go(&case, &case.fresh(), &mut InProcess::new(2), &options).unwrap().explanation;
+    assert!(cut.runs <= full.runs / 2, "{} of {}", cut.runs, full.runs / 2);
+    assert!(!cut.untried.is_empty() && cut.warnings.iter().any(|w| w.contains("budget")), "{:?}", cut.warnings);
+    let options = Options { budget: Some(3), ..Options::default() };
+    let error = go(&case, &case.fresh(), &mut InProcess::new(2), &options).unwrap_err();
+    assert!(matches!(error, ExplainError::Budget { budget: 3, stage: "fit", .. }), "{error}");
+}
+
+#[test]
+fn a_candidate_whose_runs_all_fail_is_refused_with_the_reason() {
+    let broken = "\n[[effects]]\nname = \"broken\"\nsays = \"No number comes of it.\"\nadds = [ { to = \"v\", term = \"b_broken/max(0, -1 - t)\" } ]\nparameters = [ { name = \"b_broken\", range = [0, 1] } ]\n";
+    let (text, data) = cubic();
+    let found = explained(&(text + broken), data).explanation;
+    let refused = found.rejected.iter().find(|r| r.name == "broken").unwrap();
+    assert_eq!(refused.gate, "failed", "{refused:?}");
+    assert!(refused.reason.contains("not a finite number"), "{}", refused.reason);
+    assert_eq!(found.effects[0].name, "cubic-stiffness", "the others go on: {}", found.headline);
+}
+
+#[test]
+fn a_term_of_the_model_is_swapped_where_only_a_replacement_is_right() {
+    // The truth has dry friction and no viscous one; the model's viscous term may be replaced.
+    let text = study("replaceable = [\"viscous\"]", "only = [\"coulomb-friction\", \"cubic-stiffness\", \"quadratic-drag\"]");
+    let data = recording(&text, &[("coulomb-friction", 0.35)], &[("c", 1e-6)], 5);
+    let found = explained(&text, data).explanation;
+    assert!(sets(&found).contains(&vec!["coulomb-friction".to_owned()]), "{}", found.headline);
+    let held_out = found.gap.iter().find(|row| row.usage == "held-out").unwrap();
+    assert!(held_out.after < 1.2 * held_out.noise, "{held_out:?}");
+}
+
+#[test]
+fn two_missing_effects_are_found_as_a_pair() {
+    let text = study("", "only = [\"coulomb-friction\", \"cubic-stiffness\", \"quadratic-stiffness\"]");
+    let data = recording(&text, &[("coulomb-friction", 0.2), ("quadratic-stiffness", 3.0)], &[], 6);
+    let found = explained(&text, data).explanation;
+    let mut names: Vec<&str> = found.effects.iter().map(|e| e.name.as_str()).collect();
+    names.sort_unstable();
+    assert_eq!(names, ["coulomb-friction", "quadratic-stiffness"], "{}", found.headline);
+}
+
+#[test]
+fn a_tie_lists_its_class_and_proposes_an_experiment() {
+    // Two names for nearly the same push: the data of a decaying swing cannot tell them apart.
+    let twin = "\n[[effects]]\nname = \"breeze\"\nsays = \"A wind a little weaker.\"\nadds = [ { to = \"v\", term = \"-w_breeze*(v + 0.48)*abs(v + 0.48)\" } ]\nparameters = [ { name = \"w_breeze\", unit = \"1/m\", range = [0, 10] } ]\n";
+    let text = study("", "only = [\"wind\", \"breeze\", \"cubic-stiffness\"]") + twin;
+    let data = recording(&text, &[("wind", 0.6)], &[], 7);
+    let found = explained(&text, data).explanation;
+    assert_eq!(found.verdict, Verdict::Tie, "{}", found.headline);
+    let all: Vec<String> = sets(&found).concat();
+    assert!(all.contains(&"wind".to_owned()) && all.contains(&"breeze".to_owned()), "{all:?}");
+    let experiment = found.experiment.unwrap();
+    assert!(experiment.separation > experiment.separation_now && !experiment.says.is_empty(), "{experiment:?}");
+}
+
+#[test]
+fn a_baseline_that_cannot_run_is_told() {
+    let text = study("", "").replace("\"-k*x\"", "\"-k*x/max(0, -1 - t)\"");
+    let times = grid(50, 0.05);
+    let data = csv("time,position", &[&times, &times]);
+    let case = Case::new(&text, &[("free.csv", data)]);
+    let error = go(&case, &case.fresh(), &mut InProcess::new(1), &Options::default()).unwrap_err();
+    assert!(matches!(error, ExplainError::Baseline(_)) && error.is_input(), "{error}");
+}

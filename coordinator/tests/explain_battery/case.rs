@@ -1,0 +1,142 @@
+//! One case: what is missing, how it is recorded, and what the search said of it.
+//!
+//! Next file to read: [`crate::runner`].
+
+use starlings_coordinator::explain::{Explanation, Verdict};
+
+/// What is put into the data, and what the search may name.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// An effect of the library or of the study, which the search may name.
+    Library,
+    /// The same, but the search may name neither it nor its equals.
+    LeftOut,
+    /// An effect that the parameters imitate.
+    Absorbed,
+    /// An effect that no search knows.
+    Alien,
+    /// None.
+    Null,
+}
+
+impl Kind {
+    /// The word of the tables.
+    pub fn word(&self) -> &'static str {
+        match self {
+            Self::Library => "library",
+            Self::LeftOut => "left out",
+            Self::Absorbed => "absorbed",
+            Self::Alien => "alien",
+            Self::Null => "null",
+        }
+    }
+}
+
+/// A data set and a search.
+#[derive(Clone, Debug)]
+pub struct Case {
+    /// Index of the system.
+    pub system: usize,
+    pub kind: Kind,
+    /// Name of the effect in the data.
+    pub effect: Option<String>,
+    /// Names that are right.
+    pub accepted: Vec<String>,
+    /// Names that the search may not try.
+    pub without: Vec<String>,
+    /// Noise in standard deviations of the channels.
+    pub level: f64,
+    /// Samples.
+    pub n: usize,
+    pub seed: u64,
+    /// Whether the study leaves the noise to be found.
+    pub auto: bool,
+}
+
+/// What became of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// The one right name.
+    Right,
+    /// A tie that holds the right name alone.
+    RightInTie,
+    /// A wrong name, or the right one with more beside it.
+    Wrong,
+    /// A tie without the right name.
+    TieWithout,
+    Unexplained,
+    NoGap,
+    /// No explanation.
+    Failed,
+}
+
+impl Outcome {
+    pub const ALL: [Self; 7] = [
+        Self::Right,
+        Self::RightInTie,
+        Self::Wrong,
+        Self::TieWithout,
+        Self::Unexplained,
+        Self::NoGap,
+        Self::Failed,
+    ];
+
+    /// The word of the tables.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Right => "right",
+            Self::RightInTie => "right in tie",
+            Self::Wrong => "wrong",
+            Self::TieWithout => "tie without",
+            Self::Unexplained => "unexplained",
+            Self::NoGap => "no gap",
+            Self::Failed => "failed",
+        }
+    }
+
+    /// Judges an explanation against the names that are right.
+    pub fn of(found: &Explanation, accepted: &[String]) -> Self {
+        let named: Vec<&str> = found.effects.iter().map(|effect| effect.name.as_str()).collect();
+        let is_right = |set: &[&str]| set.len() == 1 && accepted.iter().any(|name| name == set[0]);
+        let tied = |set: &Vec<String>| is_right(&set.iter().map(String::as_str).collect::<Vec<_>>());
+        match found.verdict {
+            Verdict::NoGap => Self::NoGap,
+            Verdict::Unexplained => Self::Unexplained,
+            Verdict::Named if is_right(&named) => Self::Right,
+            Verdict::Named => Self::Wrong,
+            Verdict::Tie if is_right(&named) || found.tied_with.iter().any(tied) => Self::RightInTie,
+            Verdict::Tie => Self::TieWithout,
+        }
+    }
+}
+
+/// A case with its outcome and the figures of the tables.
+#[derive(Clone, Debug)]
+pub struct Result {
+    pub case: Case,
+    pub outcome: Outcome,
+    /// χ² of the wrong model refitted to data without noise.
+    pub lambda: f64,
+    /// The true amplitude.
+    pub amplitude: f64,
+    /// The estimated amplitude with its interval, where the very effect in the data was named alone.
+    pub estimate: Option<(f64, [f64; 2])>,
+    /// What was named, and what tied with it.
+    pub named: String,
+    /// χ² of the model with what was named, refitted to data without noise: below a few units the data hold nothing against it.
+    pub rival: Option<f64>,
+    /// Terms of the model that it replaces.
+    pub replaced: usize,
+    /// RMSE after over the true noise, on the span that was held out.
+    pub held_out: Option<f64>,
+    pub runs: u64,
+    pub false_alarm: f64,
+    pub wall_s: f64,
+}
+
+impl Result {
+    /// Whether the interval of the amplitude holds the truth.
+    pub fn covered(&self) -> Option<bool> {
+        self.estimate.map(|(_, [lo, hi])| (lo..=hi).contains(&self.amplitude))
+    }
+}

@@ -1,0 +1,88 @@
+//! Which cases are run: from the environment for the full battery, fixed for the small one.
+//!
+//! Next file to read: [`crate::case`].
+
+use rand::RngExt;
+
+use crate::case::{Case, Kind};
+use crate::draw::random;
+use crate::systems::System;
+
+/// Levels of noise in standard deviations of the signal.
+const LEVELS: [f64; 3] = [0.01, 0.03, 0.1];
+/// Samples, and of those seeds that record longer.
+const SHORT: usize = 250;
+const LONG: usize = 1000;
+
+/// What is run.
+pub struct Plan {
+    pub systems: Vec<String>,
+    pub kinds: Vec<String>,
+    pub levels: Vec<f64>,
+    pub seeds: std::ops::Range<u64>,
+    pub threads: usize,
+}
+
+impl Plan {
+    /// From `BATTERY_SYSTEMS`, `BATTERY_KINDS`, `BATTERY_NOISE`, `BATTERY_SEEDS` (`0..10`) and `BATTERY_THREADS`.
+    pub fn from_environment() -> Self {
+        let list = |name: &str| -> Vec<String> {
+            let text = std::env::var(name).unwrap_or_default();
+            text.split(',').map(str::trim).filter(|word| !word.is_empty()).map(str::to_owned).collect()
+        };
+        let levels: Vec<f64> = list("BATTERY_NOISE").iter().map(|word| word.parse().unwrap()).collect();
+        let seeds = std::env::var("BATTERY_SEEDS").unwrap_or_else(|_| "0..10".to_owned());
+        let (first, end) = seeds.split_once("..").expect("BATTERY_SEEDS is like 0..10");
+        let threads = std::env::var("BATTERY_THREADS").ok().and_then(|word| word.parse().ok());
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        Self {
+            systems: list("BATTERY_SYSTEMS"),
+            kinds: list("BATTERY_KINDS"),
+            levels: if levels.is_empty() { LEVELS.to_vec() } else { levels },
+            seeds: first.parse().unwrap()..end.parse().unwrap(),
+            threads: threads.unwrap_or(cores),
+        }
+    }
+
+    /// Every case of the plan.
+    pub fn cases(&self, systems: &[System]) -> Vec<Case> {
+        let mut cases = Vec::new();
+        for (index, system) in systems.iter().enumerate() {
+            if !self.systems.is_empty() && !self.systems.iter().any(|name| name == system.name) {
+                continue;
+            }
+            for seed in self.seeds.clone() {
+                for &level in &self.levels {
+                    let n = if system.long && seed % 5 == 4 { LONG } else { SHORT };
+                    let first = cases.len();
+                    of_system(index, system, &mut cases);
+                    for case in &mut cases[first..] {
+                        let what =
+                            [case.kind.word(), case.effect.as_deref().unwrap_or(""), &level.to_string()];
+                        let auto = random(&what, seed).random_range(0..2) == 0;
+                        (case.seed, case.level, case.n, case.auto) = (seed, level, n, auto);
+                    }
+                }
+            }
+        }
+        cases.retain(|case| self.kinds.is_empty() || self.kinds.iter().any(|kind| kind == case.kind.word()));
+        cases
+    }
+}
+
+/// One case of every effect in a system, seed and noise still open.
+fn of_system(index: usize, system: &System, cases: &mut Vec<Case>) {
+    let case = |kind: Kind, effect: Option<&str>, accepted: Vec<String>, without: Vec<String>| {
+        let effect = effect.map(str::to_owned);
+        Case { system: index, kind, effect, accepted, without, level: 0.0, n: 0, seed: 0, auto: false }
+    };
+    let none = Vec::new;
+    for truth in system.truths {
+        let name = Some(truth.name);
+        cases.push(case(Kind::Library, name, truth.accepted(), none()));
+        cases.push(case(Kind::LeftOut, name, truth.accepted(), truth.relatives()));
+    }
+    cases.extend(system.absorbed.iter().map(|t| case(Kind::Absorbed, Some(t.name), t.accepted(), none())));
+    cases.extend(system.alien_names().iter().map(|name| case(Kind::Alien, Some(name), none(), none())));
+    cases.push(case(Kind::Null, None, none(), none()));
+}

@@ -1,0 +1,155 @@
+//! Runs cases: draws the data, writes the study, explains it, judges. One case is one thread.
+//!
+//! Next file to read: [`crate::tally`].
+
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+use starlings_coordinator::explain::{Context, Explanation, Options, explain};
+use starlings_coordinator::fleet::InProcess;
+use starlings_coordinator::study::store::Store;
+use starlings_models::EffectDef;
+
+use crate::case::{Case, Outcome, Result};
+use crate::draw::{Draw, draw, noisy, random};
+use crate::information::{refit, refit_with};
+use crate::systems::System;
+use crate::world::{Told, World};
+
+/// Runs all cases on so many threads; results stand in the order of the cases. A truth that cannot reach the wanted strength
+/// has no result.
+pub fn run(systems: &[System], cases: &[Case], threads: usize) -> Vec<Result> {
+    let worlds = worlds(systems, cases);
+    let next = AtomicUsize::new(0);
+    let results = Mutex::new(Vec::new());
+    std::thread::scope(|scope| {
+        for _ in 0..threads.max(1) {
+            scope.spawn(|| {
+                loop {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(case) = cases.get(index) else { break };
+                    let Some(result) = one(&worlds[&(case.system, case.n)], case) else { continue };
+                    let mut results = results.lock().unwrap();
+                    results.push((index, result));
+                    if results.len() % 50 == 0 {
+                        println!("{} of {} cases", results.len(), cases.len());
+                    }
+                }
+            });
+        }
+    });
+    let mut results = results.into_inner().unwrap();
+    results.sort_by_key(|(index, _)| *index);
+    results.into_iter().map(|(_, result)| result).collect()
+}
+
+fn worlds<'a>(systems: &'a [System], cases: &[Case]) -> BTreeMap<(usize, usize), World<'a>> {
+    let mut worlds = BTreeMap::new();
+    for case in cases {
+        let key = (case.system, case.n);
+        worlds.entry(key).or_insert_with(|| World::new(&systems[case.system], case.n));
+    }
+    worlds
+}
+
+/// Runs one case.
+pub fn one(world: &World<'_>, case: &Case) -> Option<Result> {
+    let draw = draw(world, case.effect.as_deref(), case.seed)?;
+    let level = format!("{} {}", case.level, case.n);
+    let mut rng =
+        random(&[world.system.name, case.effect.as_deref().unwrap_or("null"), "noise", &level], case.seed);
+    let (data, noise) = noisy(&draw, case.level, &mut rng);
+    let lambda = refit(world, &draw, &noise).map_or(f64::NAN, |refit| refit.misfit);
+    let started = Instant::now();
+    let found = explained(world, case, &data, &noise);
+    let wall_s = started.elapsed().as_secs_f64();
+    let base = Result {
+        case: case.clone(),
+        outcome: Outcome::Failed,
+        lambda,
+        amplitude: draw.effect.as_ref().map_or(0.0, |(_, values)| values[0]),
+        estimate: None,
+        named: String::new(),
+        rival: None,
+        replaced: 0,
+        held_out: None,
+        runs: 0,
+        false_alarm: f64::NAN,
+        wall_s,
+    };
+    Some(match found {
+        Err(why) => Result { named: why, ..base },
+        Ok(found) => judged(base, &found, &draw, world, &noise),
+    })
+}
+
+fn explained(
+    world: &World<'_>,
+    case: &Case,
+    data: &[Vec<f64>],
+    noise: &[f64],
+) -> std::result::Result<Explanation, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let told = if case.auto { Told::Auto } else { Told::Sd(noise) };
+    let study = world.study_of(folder.path(), data, told, case.seed + 1);
+    let store = Store::create(&folder.path().join("run.db"), &[]).unwrap();
+    let options = Options { without: case.without.clone(), ..Options::default() };
+    let mut context = Context { clock: &|| 0.0, watch: &mut |_| {}, events: None, earlier_s: 0.0 };
+    let found = explain(&study, &mut InProcess::new(1), &store, &mut context, &options);
+    found.map(|findings| findings.explanation).map_err(|error| error.to_string())
+}
+
+fn judged(base: Result, found: &Explanation, draw: &Draw, world: &World<'_>, noise: &[f64]) -> Result {
+    let sets = std::iter::once(found.effects.iter().map(|e| e.name.clone()).collect::<Vec<_>>())
+        .chain(found.tied_with.iter().cloned());
+    let named: Vec<String> = sets.map(|set| set.join(" + ")).collect();
+    let mut result = Result {
+        outcome: Outcome::of(found, &base.case.accepted),
+        named: named.join(" | "),
+        replaced: found.replaced.len(),
+        runs: found.runs,
+        false_alarm: found.false_alarm.rate,
+        ..base
+    };
+    if !found.effects.is_empty() && found.replaced.is_empty() {
+        result.rival = rival(found, draw, world, noise);
+    }
+    if result.outcome == Outcome::Right {
+        result.held_out = held_out(found, world, noise);
+        let same = draw.effect.as_ref().is_some_and(|(def, _)| def.name == found.effects[0].name);
+        let amplitude = &found.effects[0].parameters[0];
+        result.estimate = same.then_some((amplitude.estimate, amplitude.interval95));
+    }
+    result
+}
+
+/// The noise-free misfit of what was named.
+fn rival(found: &Explanation, draw: &Draw, world: &World<'_>, noise: &[f64]) -> Option<f64> {
+    let effects: Vec<(EffectDef, Vec<f64>)> = found
+        .effects
+        .iter()
+        .map(|effect| {
+            let def = world.resolved(&effect.name, &draw.theta);
+            let estimate = |name: &str| effect.parameters.iter().find(|p| p.name == name).map(|p| p.estimate);
+            let values = def.parameters.iter().map(|p| estimate(&p.name)).collect::<Option<Vec<f64>>>();
+            values.map(|values| (def, values))
+        })
+        .collect::<Option<_>>()?;
+    refit_with(world, draw, noise, &effects).map(|fit| fit.misfit)
+}
+
+/// RMSE after over the true noise, root mean square over the channels.
+fn held_out(found: &Explanation, world: &World<'_>, noise: &[f64]) -> Option<f64> {
+    let rows: Vec<f64> = found
+        .gap
+        .iter()
+        .filter(|row| row.usage == "held-out")
+        .filter_map(|row| {
+            let channel = world.system.channels.iter().position(|name| *name == row.channel)?;
+            Some((row.after / noise[channel]).powi(2))
+        })
+        .collect();
+    (!rows.is_empty()).then(|| (rows.iter().sum::<f64>() / rows.len() as f64).sqrt())
+}

@@ -1,0 +1,166 @@
+//! Counts outcomes and writes them as tables.
+//!
+//! Next file to read: [`crate::case`].
+
+use std::fmt::Write as _;
+
+use crate::case::{Kind, Outcome, Result};
+use crate::systems::System;
+
+/// χ² above which the data carry the information.
+pub const INFORMATION: f64 = 100.0;
+
+/// A selection of results.
+pub struct Group<'a> {
+    pub name: String,
+    pub results: Vec<&'a Result>,
+}
+
+impl<'a> Group<'a> {
+    /// Those that `takes` picks.
+    pub fn of(name: impl Into<String>, results: &'a [Result], takes: impl Fn(&Result) -> bool) -> Self {
+        Self { name: name.into(), results: results.iter().filter(|result| takes(result)).collect() }
+    }
+
+    pub fn count(&self, outcome: Outcome) -> usize {
+        self.results.iter().filter(|result| result.outcome == outcome).count()
+    }
+
+    /// Share of these outcomes; NaN for an empty group.
+    pub fn share(&self, outcomes: &[Outcome]) -> f64 {
+        let n: usize = outcomes.iter().map(|outcome| self.count(*outcome)).sum();
+        n as f64 / self.results.len() as f64
+    }
+
+    /// Share of the intervals that hold the true amplitude, and their number.
+    pub fn coverage(&self) -> (f64, usize) {
+        let covered: Vec<bool> = self.results.iter().filter_map(|result| result.covered()).collect();
+        (covered.iter().filter(|covered| **covered).count() as f64 / covered.len() as f64, covered.len())
+    }
+
+    /// Median of a figure over those that have it; NaN for none.
+    pub fn median(&self, figure: impl Fn(&Result) -> Option<f64>) -> f64 {
+        self.quantile(0.5, figure)
+    }
+
+    /// A quantile of a figure over those that have it; NaN for none.
+    pub fn quantile(&self, at: f64, figure: impl Fn(&Result) -> Option<f64>) -> f64 {
+        let mut values: Vec<f64> = self.results.iter().filter_map(|result| figure(result)).collect();
+        values.sort_by(f64::total_cmp);
+        let last = values.len().saturating_sub(1);
+        values.get((at * last as f64).round() as usize).copied().unwrap_or(f64::NAN)
+    }
+
+    fn row(&self) -> String {
+        let mut row = format!("| {} | {} |", self.name, self.results.len());
+        for outcome in Outcome::ALL {
+            write!(row, " {} |", self.count(outcome)).unwrap();
+        }
+        let (coverage, n) = self.coverage();
+        let or_dash = |value: f64, digits: usize| {
+            if value.is_nan() { "–".to_owned() } else { format!("{value:.digits$}") }
+        };
+        let covered = if n == 0 { "–".to_owned() } else { format!("{coverage:.2} of {n}") };
+        let held_out = or_dash(self.median(|result| result.held_out), 2);
+        let runs = or_dash(self.median(|result| Some(result.runs as f64)), 0);
+        let most = or_dash(self.quantile(1.0, |result| Some(result.runs as f64)), 0);
+        write!(row, " {covered} | {held_out} | {runs} | {most} |").unwrap();
+        row
+    }
+}
+
+/// A Markdown table, one row per group that is not empty.
+pub fn table(groups: &[Group<'_>]) -> String {
+    let words: Vec<&str> = Outcome::ALL.iter().map(|outcome| outcome.word()).collect();
+    let head = format!(
+        "| | cases | {} | interval holds the truth | held-out RMSE / noise | runs, median | runs, most |",
+        words.join(" | ")
+    );
+    let rule = "|---".repeat(head.matches('|').count() - 1) + "|";
+    let rows = groups.iter().filter(|group| !group.results.is_empty()).map(Group::row);
+    [head, rule].into_iter().chain(rows).collect::<Vec<_>>().join("\n") + "\n"
+}
+
+/// All tables: by kind, and for effects of the library by information, noise and system.
+pub fn report(results: &[Result], systems: &[System]) -> String {
+    let of = |kind: Kind| move |result: &Result| result.case.kind == kind;
+    let informed = |result: &Result| result.lambda > INFORMATION;
+    let mut text = String::new();
+    let kinds = [Kind::Library, Kind::LeftOut, Kind::Absorbed, Kind::Alien, Kind::Null];
+    let mut groups = Vec::new();
+    for kind in &kinds {
+        let is = of(kind.clone());
+        if *kind == Kind::Null || *kind == Kind::Absorbed {
+            groups.push(Group::of(kind.word(), results, is));
+        } else {
+            let is = |result: &Result| result.case.kind == *kind;
+            groups.push(Group::of(format!("{}, λ > 100", kind.word()), results, |r| is(r) && informed(r)));
+            groups.push(Group::of(format!("{}, λ < 100", kind.word()), results, |r| is(r) && !informed(r)));
+        }
+    }
+    write!(text, "### By what is missing\n\n{}\n", table(&groups)).unwrap();
+    for kind in [Kind::Library, Kind::LeftOut] {
+        let is = |result: &Result| result.case.kind == kind && informed(result);
+        let mut groups = Vec::new();
+        for system in systems {
+            let in_system = |result: &Result| systems[result.case.system].name == system.name;
+            groups.push(Group::of(system.name, results, |r| is(r) && in_system(r)));
+        }
+        for level in [0.01, 0.03, 0.1] {
+            let at = |result: &Result| (result.case.level - level).abs() < 1e-9;
+            groups.push(Group::of(format!("noise {:.0} %", 100.0 * level), results, |r| is(r) && at(r)));
+        }
+        for (name, auto) in [("noise given", false), ("noise found", true)] {
+            groups.push(Group::of(name, results, |r| is(r) && r.case.auto == auto));
+        }
+        write!(text, "### {}, λ > 100\n\n{}\n", kind.word(), table(&groups)).unwrap();
+    }
+    let mut groups = Vec::new();
+    for system in systems {
+        for truth in system.truths {
+            let is = |r: &Result| {
+                r.case.kind == Kind::Library
+                    && informed(r)
+                    && systems[r.case.system].name == system.name
+                    && r.case.effect.as_deref() == Some(truth.name)
+            };
+            groups.push(Group::of(format!("{} {}", system.name, truth.name), results, is));
+        }
+    }
+    write!(text, "### Library effects one by one, λ > 100\n\n{}\n", table(&groups)).unwrap();
+    text
+}
+
+/// One line per case.
+pub fn csv(results: &[Result], systems: &[System]) -> String {
+    let mut text = String::from(
+        "system,kind,effect,noise,n,seed,auto,lambda,outcome,named,rival,replaced,amplitude,estimate,lo,hi,held_out,runs,false_alarm,wall_s\n",
+    );
+    for r in results {
+        let (estimate, [lo, hi]) = r.estimate.unwrap_or((f64::NAN, [f64::NAN; 2]));
+        let case = &r.case;
+        writeln!(
+            text,
+            "{},{},{},{},{},{},{},{:.4e},{},\"{}\",{:.3e},{},{:e},{estimate:e},{lo:e},{hi:e},{:.4},{},{:.4},{:.3}",
+            systems[case.system].name,
+            case.kind.word(),
+            case.effect.as_deref().unwrap_or(""),
+            case.level,
+            case.n,
+            case.seed,
+            case.auto,
+            r.lambda,
+            r.outcome.word(),
+            r.named.replace('"', "'"),
+            r.rival.unwrap_or(f64::NAN),
+            r.replaced,
+            r.amplitude,
+            r.held_out.unwrap_or(f64::NAN),
+            r.runs,
+            r.false_alarm,
+            r.wall_s,
+        )
+        .unwrap();
+    }
+    text
+}

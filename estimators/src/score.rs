@@ -1,0 +1,205 @@
+//! The score test: what a parameter that the model does not have would add to a finished fit, from its sensitivity alone.
+//!
+//! Rao (1948), in the form of Engle (1984): the part of the new sensitivity that the fitted parameters cannot imitate is
+//! compared with the residuals. Deliberately linear: whether the promise holds is for a refit to show. Everything is
+//! whitened by the noise. Read next: `least_squares.rs`.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::error::EstimatorError;
+
+/// A fit at its optimum, its prior as further rows.
+#[derive(Debug, Clone)]
+pub struct Optimum {
+    /// Orthonormal basis of what the parameters can imitate, (m + p) x rank.
+    basis: DMatrix<f64>,
+    /// (J^T J + P) inverse, p x p.
+    covariance: DMatrix<f64>,
+    jacobian: DMatrix<f64>,
+    /// Residuals with the prior's, m + p.
+    residual: DVector<f64>,
+}
+
+/// What one more parameter would add.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Score {
+    /// Fall of chi-square.
+    pub gain: f64,
+    /// Its value, in the unit of the sensitivity.
+    pub amplitude: f64,
+    /// Standard deviation of that value.
+    pub sd: f64,
+    /// Part of the sensitivity that the fitted parameters cannot imitate, from 0 to 1.
+    pub identifiable: f64,
+}
+
+impl Optimum {
+    /// A fit with whitened residuals `e` (m), Jacobian `j` (m x p), prior precisions (p) and the prior's pull: prior mean
+    /// minus estimate (p).
+    ///
+    /// # Errors
+    /// `Shape` when lengths differ; `NotPositiveDefinite` when data and prior together leave a direction free.
+    pub fn new(
+        residual: &DVector<f64>,
+        jacobian: &DMatrix<f64>,
+        precision: &DVector<f64>,
+        pull: &DVector<f64>,
+    ) -> Result<Self, EstimatorError> {
+        let (m, p) = jacobian.shape();
+        let shape = |what, expected, got| EstimatorError::Shape { what, expected, got };
+        if residual.len() != m {
+            return Err(shape("residuals of the fit", m, residual.len()));
+        }
+        if precision.len() != p || pull.len() != p {
+            return Err(shape("prior of the fit", p, precision.len().min(pull.len())));
+        }
+        let root = precision.map(f64::sqrt);
+        let mut rows = jacobian.clone().resize(m + p, p, 0.0);
+        rows.view_mut((m, 0), (p, p)).set_diagonal(&root);
+        let mut all = residual.clone().resize_vertically(m + p, 0.0);
+        all.rows_mut(m, p).copy_from(&root.component_mul(pull));
+        let normal = rows.tr_mul(&rows);
+        let covariance = normal
+            .cholesky()
+            .map(|c| c.inverse())
+            .ok_or(EstimatorError::NotPositiveDefinite { what: "posterior" })?;
+        let basis = rows.qr().q();
+        Ok(Self { basis, covariance, jacobian: jacobian.clone(), residual: all })
+    }
+
+    /// Covariance of the fitted parameters, p x p.
+    pub fn covariance(&self) -> &DMatrix<f64> {
+        &self.covariance
+    }
+
+    /// The part of a sensitivity (m) that the fitted parameters cannot imitate, with the prior's rows, m + p.
+    pub fn unimitated(&self, sensitivity: &DVector<f64>) -> DVector<f64> {
+        let (m, p) = self.jacobian.shape();
+        let s = sensitivity.clone().resize_vertically(m + p, 0.0);
+        // Twice, since one projection leaves what rounding left of the first.
+        let once = &s - &self.basis * self.basis.tr_mul(&s);
+        &once - &self.basis * self.basis.tr_mul(&once)
+    }
+
+    /// How the fitted parameters move when one more parameter moves by one: minus this, p.
+    pub fn response(&self, sensitivity: &DVector<f64>) -> DVector<f64> {
+        &self.covariance * self.jacobian.tr_mul(sensitivity)
+    }
+
+    /// The residuals with the prior's, m + p.
+    pub fn residual(&self) -> &DVector<f64> {
+        &self.residual
+    }
+
+    /// The score of a sensitivity d prediction / d amplitude (m). No gain when nothing of it is its own.
+    pub fn score(&self, sensitivity: &DVector<f64>) -> Score {
+        let whole = sensitivity.norm();
+        let own = self.unimitated(sensitivity);
+        let size = own.norm();
+        if !(size > 0.0 && whole > 0.0 && whole.is_finite()) {
+            return Score { gain: 0.0, amplitude: 0.0, sd: f64::INFINITY, identifiable: 0.0 };
+        }
+        let along = own.dot(&self.residual);
+        Score {
+            gain: (along / size).powi(2),
+            amplitude: along / (size * size),
+            sd: 1.0 / size,
+            identifiable: size / whole,
+        }
+    }
+}
+
+/// Largest gain of any of k parameters where nothing is missing, for each simulation: the distribution that a search over all
+/// of them must exceed.
+///
+/// `own` has the unimitated sensitivities as columns; `signs` says which sign of each amplitude counts (0 both). `normal`
+/// gives independent standard normal numbers. The scores are jointly Gaussian with the correlation of the columns, so k
+/// numbers make a simulation, whatever the number of data.
+pub fn null_maxima(
+    own: &DMatrix<f64>,
+    signs: &[f64],
+    n_simulation: usize,
+    normal: &mut dyn FnMut() -> f64,
+) -> Vec<f64> {
+    let mut unit = own.clone();
+    for mut column in unit.column_iter_mut() {
+        let norm = column.norm();
+        column.scale_mut(if norm > 0.0 { 1.0 / norm } else { 0.0 });
+    }
+    let eigen = unit.tr_mul(&unit).symmetric_eigen();
+    let root = &eigen.eigenvectors * DMatrix::from_diagonal(&eigen.eigenvalues.map(|v| v.max(0.0).sqrt()));
+    let one = |_| {
+        let draws = DVector::from_fn(root.ncols(), |_, _| normal());
+        let scores = &root * draws;
+        let counts = |(score, sign): (&f64, &f64)| if score * sign >= 0.0 { score * score } else { 0.0 };
+        scores.iter().zip(signs).map(counts).fold(0.0, f64::max)
+    };
+    (0..n_simulation).map(one).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(n: usize, f: impl Fn(f64) -> f64) -> DVector<f64> {
+        DVector::from_fn(n, |i, _| f(i as f64 / n as f64))
+    }
+
+    #[test]
+    fn a_missing_slope_is_found_with_its_size_and_gain() {
+        // Fitted: a constant; missing: 3 t. The gain is what least squares with both columns would win.
+        let n = 200;
+        let constant = DMatrix::from_element(n, 1, 1.0);
+        let residual = line(n, |t| 3.0 * (t - 0.4975));
+        let none = DVector::zeros(1);
+        let fit = Optimum::new(&residual, &constant, &none, &none).expect("well posed");
+        let score = fit.score(&line(n, |t| t));
+        // Exact up to rounding, since the model is linear.
+        assert!((score.amplitude - 3.0).abs() < 1e-10, "{score:?}");
+        assert!((score.gain - residual.norm_squared()).abs() < 1e-8 * score.gain);
+        assert!((score.sd * line(n, |t| t - 0.4975).norm() - 1.0).abs() < 1e-10);
+    }
+
+    #[test]
+    fn what_the_parameters_imitate_has_no_gain() {
+        let n = 100;
+        let jacobian = DMatrix::from_columns(&[line(n, |_| 1.0), line(n, |t| t)]);
+        let none = DVector::zeros(2);
+        let fit = Optimum::new(&line(n, |t| (9.0 * t).sin()), &jacobian, &none, &none).expect("well posed");
+        let score = fit.score(&line(n, |t| 2.0 - 5.0 * t));
+        assert!(score.identifiable < 1e-12 && fit.score(&line(n, |t| t * t)).identifiable > 1e-3, "{score:?}");
+    }
+
+    #[test]
+    fn a_prior_that_was_pulled_gives_the_new_parameter_room() {
+        // Prior 0 +- 0.1 on a constant, data at 1: the offset is all the new parameter's if it is the same constant.
+        let n = 50;
+        let one = DMatrix::from_element(n, 1, 1.0);
+        let precision = DVector::from_element(1, 100.0);
+        let estimate = 50.0 / 150.0;
+        let residual = line(n, |_| 1.0 - estimate);
+        let fit = Optimum::new(&residual, &one, &precision, &DVector::from_element(1, -estimate)).expect("posed");
+        let score = fit.score(&line(n, |_| 1.0));
+        // With it the constant returns to its prior mean and the amplitude is 1: the whole cost is won.
+        let cost = residual.norm_squared() + 100.0 * estimate * estimate;
+        assert!((score.amplitude - 1.0).abs() < 1e-10 && (score.gain - cost).abs() < 1e-8, "{score:?}");
+    }
+
+    #[test]
+    fn the_largest_of_independent_scores_has_the_quantile_of_its_number() {
+        let own = DMatrix::<f64>::identity(10, 10);
+        let mut state = 12345_u64;
+        let mut uniform = move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            ((state >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
+        };
+        let mut normal = || (-2.0 * uniform().ln()).sqrt() * (std::f64::consts::TAU * uniform()).cos();
+        let maxima = null_maxima(&own, &[0.0; 10], 4000, &mut normal);
+        // P(max of ten chi-square(1) > 7.88) = 1 - (1 - 0.005)^10 = 0.0489; its standard error over 4000 is 0.0034.
+        let share = maxima.iter().filter(|m| **m > 7.879).count() as f64 / 4000.0;
+        assert!((share - 0.0489).abs() < 0.014, "{share}");
+        let one_sided = null_maxima(&own, &[1.0; 10], 4000, &mut normal);
+        let share = one_sided.iter().filter(|m| **m > 7.879).count() as f64 / 4000.0;
+        assert!((share - 0.0247).abs() < 0.01, "{share}");
+    }
+}

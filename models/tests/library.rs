@@ -1,0 +1,330 @@
+//! What every built-in effect must do, in every model that can host it.
+#![allow(clippy::unwrap_used)] // a failed unwrap is a failed test
+
+mod common;
+mod library_kit;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use library_kit::{Bench, amplitudes, benches};
+use starlings_models::EffectDef;
+use starlings_models::effect::library::{FAMILIES, library, library_in, shows_in, stem, write_out};
+use starlings_models::effect::{Scale, scale};
+use starlings_models::equations::Expression;
+use starlings_models::native::{Oscillator, Windkessel2};
+use starlings_models::units::Labels;
+use starlings_models::{Model, Spec};
+
+/// Kinds of effects whose amplitude physics does not let be negative.
+const SIGNED: &[&str] = &[
+    "viscous-friction",
+    "coulomb-friction",
+    "stribeck-friction",
+    "quadratic-drag",
+    "linear-support",
+    "dead-zone",
+    "backlash",
+    "added-mass",
+    "series-resistance",
+    "inertance",
+    "leak",
+    "overflow",
+    "sensor-lag",
+    "sensor-delay",
+    "sensor-saturation",
+    "input-delay",
+];
+
+/// Every effect of the catalogue.
+fn catalogue() -> Vec<EffectDef> {
+    FAMILIES.iter().flat_map(starlings_models::effect::library::Family::catalogue).collect()
+}
+
+/// Every effect that some bench can host.
+fn grown() -> Vec<(Bench, EffectDef)> {
+    let of = |bench: Bench| library(&bench.spec).into_iter().map(move |effect| (bench.clone(), effect));
+    benches().into_iter().flat_map(of).collect()
+}
+
+#[test]
+fn every_kind_of_effect_stands_in_the_catalogue_once() {
+    let mut stems = BTreeSet::new();
+    for family in FAMILIES {
+        let effects = family.catalogue();
+        assert!(effects.len() >= family.n_grower(), "{}: a grower has no place in any specimen", family.name);
+        for effect in effects {
+            assert!(stems.insert(stem(&effect.name).to_owned()), "{} twice", effect.name);
+        }
+    }
+    assert!(stems.len() > 40, "{stems:?}");
+}
+
+#[test]
+fn every_effect_says_what_it_is_where_it_is_from_and_what_it_can_be_taken_for() {
+    let stems: BTreeSet<String> = catalogue().iter().map(|effect| stem(&effect.name).to_owned()).collect();
+    let mut faults = BTreeSet::new();
+    let all = grown().into_iter().map(|(bench, effect)| (bench.spec, effect));
+    let listed = catalogue().into_iter().map(|effect| (Windkessel2::default().spec().clone(), effect));
+    for (spec, effect) in all.chain(listed) {
+        let name = &effect.name;
+        assert!(
+            effect.says.starts_with(char::is_uppercase) && effect.says.ends_with('.'),
+            "{name}: {}",
+            effect.says
+        );
+        let year =
+            |word: &str| word.len() == 4 && word.parse::<u32>().is_ok_and(|y| (1600..2030).contains(&y));
+        assert!(effect.source.split([' ', ',', ';', '.']).any(year), "{name}: {}", effect.source);
+        assert!(!effect.confounders.is_empty(), "{name} has no confounder");
+        for other in &effect.confounders {
+            let parameter = spec.parameters.iter().any(|q| q.name == *other);
+            if !(parameter || stems.contains(other)) || other == stem(name) {
+                faults.insert(format!("{} with `{other}`", stem(name)));
+            }
+        }
+        for parameter in &effect.parameters {
+            let says = &parameter.says;
+            assert!(
+                says.starts_with(char::is_uppercase) && says.ends_with('.'),
+                "{name}, {}: {says}",
+                parameter.name
+            );
+        }
+    }
+    assert!(faults.is_empty(), "confounded with itself or with nothing known: {faults:#?}");
+}
+
+#[test]
+fn the_amplitude_may_be_zero_and_what_is_inside_a_term_has_a_grid_within_its_range() {
+    for (bench, effect) in grown() {
+        let name = format!("{}, {}", bench.name, effect.name);
+        let (amplitude, inner) = effect.parameters.split_first().unwrap();
+        let [lo, hi] = amplitude.range;
+        assert!(lo <= 0.0 && hi > 0.0, "{name}: {lo} to {hi}");
+        assert!(amplitude.grid.is_empty(), "{name}");
+        if SIGNED.contains(&stem(&effect.name)) {
+            assert!(lo >= 0.0, "{name} may be negative");
+        }
+        for parameter in inner {
+            let [lo, hi] = parameter.range;
+            assert!(lo.is_finite() && hi.is_finite() && lo <= hi, "{name}, {}", parameter.name);
+            assert!((1..=4).contains(&parameter.grid.len()), "{name}, {}", parameter.name);
+            assert!(parameter.grid.iter().all(|v| (lo..=hi).contains(v)), "{name}, {}", parameter.name);
+            assert!(
+                parameter.grid.len() == 1 || lo < hi,
+                "{name}, {}: one value has no grid",
+                parameter.name
+            );
+        }
+    }
+}
+
+#[test]
+fn names_are_given_once_in_a_library() {
+    for bench in benches() {
+        let (mut effects, mut parameters) = (BTreeSet::new(), BTreeMap::new());
+        for effect in library(&bench.spec) {
+            let own = effect.parameters.iter().map(|p| &p.name).chain(effect.states.iter().map(|s| &s.name));
+            for name in own {
+                if let Some(other) = parameters.insert(name.clone(), effect.name.clone()) {
+                    panic!("{}: `{name}` belongs to {} and {other}", bench.name, effect.name);
+                }
+            }
+            assert!(effects.insert(effect.name.clone()), "{}: {} twice", bench.name, effect.name);
+        }
+    }
+}
+
+#[test]
+fn every_unit_goes_with_the_place_where_the_term_enters() {
+    let mut faults = Vec::new();
+    for (bench, effect) in grown() {
+        let labels = Labels::new(&bench.spec, "s", true);
+        faults.extend(labels.effect(&effect, &bench.spec).iter().map(|m| format!("{}: {m}", bench.name)));
+    }
+    assert!(faults.is_empty(), "{faults:#?}");
+}
+
+/// How closely a model with an absent effect follows the model without.
+fn absence(kind: &str) -> f64 {
+    match kind {
+        // A scheme of an order of its own, which is integrated or cut at other times as soon as an effect needs it.
+        "fsi-tube" | "artery-1d" => 5e-2,
+        // Waves that take tens of thousands of steps.
+        "toy-fsi" | "toy-fsi-windkessel" | "toy-fsi-stokes" => 5e-5,
+        // A model's exact step becomes an integration to a relative tolerance of 1e-8, over many steps.
+        _ => 1e-6,
+    }
+}
+
+#[test]
+fn every_effect_is_absent_at_amplitude_zero() {
+    let mut faults = Vec::new();
+    for (bench, effect) in grown() {
+        let Some(effect) = bench.resolved(&effect) else { continue };
+        let plain = bench.run(&[], 0.0).unwrap();
+        let allowed = absence(&bench.name);
+        match bench.run(std::slice::from_ref(&effect), 0.0) {
+            Ok(absent) if bench.difference(&plain, &absent) < allowed => {}
+            Ok(absent) => {
+                faults.push(format!(
+                    "{}, {}: {:e}",
+                    bench.name,
+                    effect.name,
+                    bench.difference(&plain, &absent)
+                ));
+            }
+            Err(error) => faults.push(format!("{}, {}: {error}", bench.name, effect.name)),
+        }
+    }
+    assert!(faults.is_empty(), "{faults:#?}");
+}
+
+#[test]
+fn every_effect_changes_what_the_model_predicts() {
+    let (mut changed, mut without) = (BTreeSet::new(), Vec::new());
+    for (bench, effect) in grown() {
+        let Some(effect) = bench.resolved(&effect) else { continue };
+        let plain = bench.run(&[], 0.0).unwrap();
+        let seen = amplitudes(&effect).into_iter().any(|a| {
+            let run = bench.run(std::slice::from_ref(&effect), a);
+            // Ten times what the integration of an absent effect may leave.
+            run.is_ok_and(|with| bench.difference(&plain, &with) > 1e-5)
+        });
+        if seen {
+            changed.insert(stem(&effect.name).to_owned());
+        } else {
+            without.push(format!("{}, {}", bench.name, effect.name));
+        }
+    }
+    let all: BTreeSet<String> = catalogue().iter().map(|effect| stem(&effect.name).to_owned()).collect();
+    let untried: Vec<&String> = all.difference(&changed).collect();
+    assert!(without.is_empty() && untried.is_empty(), "without effect: {without:#?}, untried: {untried:?}");
+}
+
+#[test]
+fn every_scale_belongs_to_a_quantity_of_the_model() {
+    for (bench, effect) in grown() {
+        for parameter in &effect.parameters {
+            let (Scale::Range(name) | Scale::Amplitude(name)) = &parameter.scale else { continue };
+            let spec = &bench.spec;
+            let known =
+                [&spec.states, &spec.outputs, &spec.inputs].into_iter().flatten().any(|q| q.name == *name);
+            assert!(known, "{}, {}: {name}", bench.name, effect.name);
+        }
+    }
+}
+
+#[test]
+fn a_resolved_effect_names_nothing_that_it_lost() {
+    for (bench, effect) in grown() {
+        let Some(resolved) = bench.resolved(&effect) else { continue };
+        assert!(scale::is_resolved(&resolved));
+        let lost = |name: &String| {
+            let in_list = |def: &EffectDef| def.parameters.iter().any(|p| p.name == *name);
+            in_list(&effect) && !in_list(&resolved)
+        };
+        let texts = resolved.adds.iter().map(|a| &a.term).chain(resolved.states.iter().map(|s| &s.rate));
+        for text in texts {
+            let names = Expression::parse(text).unwrap().names();
+            assert!(names.iter().all(|(name, _)| !lost(name)), "{}: {text}", effect.name);
+        }
+    }
+}
+
+#[test]
+fn a_pressure_outlet_with_a_flow_hosts_a_series_resistance() {
+    let library = library(Windkessel2::default().spec());
+    let effect = library.iter().find(|effect| effect.name == "series-resistance").unwrap();
+    assert_eq!((effect.adds[0].to.as_str(), effect.adds[0].term.as_str()), ("pressure", "Rs*flow"));
+    assert_eq!(effect.parameters[0].unit, "mmHg s/mL");
+}
+
+#[test]
+fn an_oscillator_hosts_friction_and_no_series_resistance() {
+    let names: Vec<String> = library(Oscillator::default().spec()).into_iter().map(|e| e.name).collect();
+    assert!(names.contains(&"coulomb-friction".to_owned()), "{names:?}");
+    assert!(!names.contains(&"series-resistance".to_owned()), "{names:?}");
+}
+
+#[test]
+fn two_places_of_a_kind_get_names_of_their_own_and_one_needs_none() {
+    let names =
+        |spec: &Spec| -> Vec<String> { library(spec).into_iter().map(|effect| effect.name).collect() };
+    let mut spec = Oscillator::default().spec().clone();
+    assert!(names(&spec).contains(&"quadratic-drag".to_owned()));
+    for mut state in spec.states.clone() {
+        state.name.push('2');
+        spec.states.push(state);
+    }
+    let found = names(&spec);
+    assert!(
+        found.contains(&"quadratic-drag:v".to_owned()) && found.contains(&"quadratic-drag:v2".to_owned())
+    );
+    let second = library(&spec).into_iter().find(|effect| effect.name == "linear-support:v2").unwrap();
+    assert_eq!(
+        second.adds[0].term, "-k_support_v2*x2",
+        "the second velocity belongs to the second displacement"
+    );
+}
+
+#[test]
+fn a_name_that_the_model_has_itself_is_avoided() {
+    let mut spec = Oscillator::default().spec().clone();
+    spec.parameters.push(starlings_models::Quantity::new("c_viscous", ""));
+    let effect = library(&spec).into_iter().find(|effect| effect.name == "viscous-friction").unwrap();
+    assert_eq!(effect.parameters[0].name, "c_viscous_");
+}
+
+#[test]
+fn a_coefficient_counts_in_the_time_unit_of_the_study() {
+    let drift = |time: &str| {
+        let effects = library_in(Windkessel2::default().spec(), time);
+        effects.into_iter().find(|effect| effect.name == "sensor-drift").unwrap().parameters[0].unit.clone()
+    };
+    assert_eq!((drift("s").as_str(), drift("h").as_str()), ("mmHg/s", "mmHg/h"));
+}
+
+#[test]
+fn an_effect_on_an_output_shows_only_in_that_output() {
+    let spec = Oscillator::default().spec().clone();
+    let effects = library(&spec);
+    let find = |name: &str| effects.iter().find(|effect| effect.name == name).unwrap();
+    let measured = ["position".to_owned()];
+    assert!(shows_in(find("sensor-offset:position"), &spec, &measured));
+    assert!(!shows_in(find("sensor-offset:velocity"), &spec, &measured));
+    assert!(shows_in(find("quadratic-drag"), &spec, &measured));
+}
+
+#[test]
+fn a_sensor_of_an_output_named_as_its_state_leaves_the_state_alone() {
+    let bench = benches().into_iter().find(|bench| bench.name == "one tank").unwrap();
+    let offset = library(&bench.spec).into_iter().find(|effect| effect.name == "sensor-offset").unwrap();
+    assert_eq!(offset.adds[0].to, "output:h");
+    let (plain, with) = (bench.run(&[], 0.0).unwrap(), bench.run(&[offset], 0.5).unwrap());
+    // One sum of two numbers near one.
+    assert!(plain.iter().zip(&with).all(|(a, b)| (b - a - 0.5).abs() < 1e-12), "{plain:?} {with:?}");
+}
+
+#[test]
+fn a_lag_of_the_sensor_is_that_of_first_order() {
+    let bench = benches().into_iter().find(|bench| bench.name == "ramp").unwrap();
+    let lag = library(&bench.spec).into_iter().find(|effect| effect.name == "sensor-lag").unwrap();
+    let lag = bench.resolved(&lag).unwrap();
+    // A lag of first order shows sin(w t) as (sin(w t) - w tau cos(w t))/(1 + (w tau)^2) once the start is forgotten.
+    let (w, tau) = (8.0, 0.03);
+    let got = bench.run(&[lag], tau).unwrap();
+    // The rows are the output and the state.
+    for (t, value) in bench.window.times.iter().zip(got.iter().step_by(2)).filter(|(t, _)| **t > 0.5) {
+        let want = ((w * t).sin() - w * tau * (w * t).cos()) / (1.0 + (w * tau) * (w * tau));
+        // Three nodes leave 3!^2 of the sixth term of the expansion in w tau, (w tau)^6 = 2e-4 with its weights.
+        assert!((value - want).abs() < 5e-3, "{t}: {value} instead of {want}");
+    }
+}
+
+#[test]
+fn a_mistyped_built_in_effect_offers_the_nearest() {
+    let def = EffectDef { built_in: Some("serial-resistance".to_owned()), ..EffectDef::default() };
+    let error = write_out(&def, Windkessel2::default().spec()).unwrap_err();
+    assert!(error.to_string().contains("did you mean `series-resistance`"), "{error}");
+}

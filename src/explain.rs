@@ -1,0 +1,143 @@
+//! `starlings explain`: where simulation and recordings disagree, which effect is missing, the gap before and after.
+//!
+//! Next files to read: [`print`] for the answer on a terminal, [`crate::crew`] for the fleet.
+
+mod print;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+use clap::Parser;
+use starlings_coordinator::explain::candidates::check;
+use starlings_coordinator::explain::keep::{keep, kept};
+use starlings_coordinator::explain::{Context, ExplainError, Explanation, Options, Stage, explain};
+use starlings_coordinator::report;
+use starlings_coordinator::study::store::Purpose;
+use starlings_coordinator::study::trial::trial;
+use starlings_coordinator::study::{RunFolder, Study};
+
+use crate::console::{line, note};
+use crate::crew::{Crew, FleetArgs};
+use crate::failure::Failure;
+use crate::progress::Display;
+
+/// Say where simulation and recordings disagree, name the missing effect, add it, and show the gap before and after.
+///
+/// The model is fitted as it is, then with one effect after another (`starlings effects STUDY` lists them), on the training
+/// spans only; held-out spans and channels decide. The run folder receives explain.json, report.html and, when an effect was
+/// named, explained.toml: the study with the effect in it, for `starlings run`.
+#[derive(Parser)]
+pub(crate) struct Args {
+    /// The study file.
+    study: PathBuf,
+    /// Run folder; runs/NAME-explain-TIME without it.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    fleet: FleetArgs,
+    /// Continue an interrupted explanation in --out: runs that were made are not made again.
+    #[arg(long, requires = "out")]
+    resume: bool,
+    /// Runs of the model at most (one particle over one record each); what is left untried is reported.
+    #[arg(long, value_name = "RUNS")]
+    budget: Option<u64>,
+    /// Leave out this effect (may be given several times).
+    #[arg(long, value_name = "EFFECT")]
+    without: Vec<String>,
+    /// Try this effect and no other (may be given several times).
+    #[arg(long, value_name = "EFFECT")]
+    only: Vec<String>,
+    /// Effects at most in one explanation.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=3))]
+    max_effects: Option<u8>,
+    /// Go on although the fit of the model as it is has not converged.
+    #[arg(long)]
+    force: bool,
+    /// Print the explanation as JSON on standard output and nothing else.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Args {
+    /// What the study asks for, and the command line above it.
+    fn options(&self, study: &Study) -> Options {
+        let mut options = Options::of(study);
+        options.budget = self.budget.or(options.budget);
+        options.without.extend(self.without.iter().cloned());
+        if !self.only.is_empty() {
+            options.only.clone_from(&self.only);
+        }
+        options.max_effects = self.max_effects.map_or(options.max_effects, usize::from);
+        options.force = self.force;
+        options
+    }
+}
+
+/// Explains the study's misfit.
+pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
+    let study = Study::load(&args.study)?;
+    let plan = args.fleet.plan(&study)?;
+    let options = args.options(&study);
+    check(&study, &options).map_err(Failure::input)?;
+    trial(&study).map_err(Failure::input)?;
+    // Listen before the folder is made: a port in use must leave nothing behind.
+    let display = Arc::new(Display::new(args.json));
+    let mut crew = Crew::listen(&study, &plan, &display)?;
+    let folder = open_folder(args, &study)?;
+    if kept(&folder.store).map_err(Failure::run)?.is_some() {
+        let path = folder.path.display();
+        note(format_args!("the explanation in {path} is finished already; writing its files again"));
+        return write(&folder, args.json);
+    }
+    crew.gather(&study, &plan)?;
+    let mut watch = |stage: &Stage| display.stage(stage);
+    let clock = move || started.elapsed().as_secs_f64();
+    let earlier_s = folder.store.last_event_s().map_err(Failure::run)?;
+    let mut context = Context { clock: &clock, watch: &mut watch, events: Some(&crew.events), earlier_s };
+    let result = explain(&study, &mut crew.fleet, &folder.store, &mut context, &options);
+    display.finish();
+    crew.dismiss();
+    let found = result.map_err(|error| failed(&error, &folder.path))?;
+    keep(&folder, &found).map_err(Failure::run)?;
+    write(&folder, args.json)
+}
+
+/// What is left of an explanation that ended early, and how to go on from there.
+fn failed(error: &ExplainError, folder: &Path) -> Failure {
+    let path = folder.display();
+    match error {
+        ExplainError::NotConverged { .. } => Failure::input(format!(
+            "{error}\n  its runs are kept: --out {path} --resume --force goes on from there"
+        )),
+        _ if error.is_input() => Failure::input(error),
+        _ => Failure::run(format!(
+            "{error}\n  the explanation so far is in {path}: continue it with --out {path} --resume"
+        )),
+    }
+}
+
+fn open_folder(args: &Args, study: &Study) -> Result<RunFolder, Failure> {
+    let stamp = jiff::Timestamp::now().strftime("%Y%m%d-%H%M%S").to_string();
+    let default = || Path::new("runs").join(format!("{}-explain-{stamp}", study.name));
+    let path = args.out.clone().unwrap_or_else(default);
+    if args.resume {
+        return RunFolder::resume_for(Purpose::Explanation, &path, study).map_err(Failure::input);
+    }
+    let command = std::env::args().skip(1).collect::<Vec<_>>().join(" ");
+    let command = format!("starlings {command}");
+    RunFolder::create_for(Purpose::Explanation, &path, study, &command, &stamp).map_err(Failure::input)
+}
+
+/// Writes the files of a finished explanation and prints its answer.
+pub(crate) fn write(folder: &RunFolder, json: bool) -> Result<(), Failure> {
+    let found = report::write_explanation(folder).map_err(Failure::run)?;
+    if json {
+        return as_json(&found.explanation);
+    }
+    print::print(&found.explanation, &report::state_names(folder).map_err(Failure::run)?, &folder.path)
+}
+
+fn as_json(explanation: &Explanation) -> Result<(), Failure> {
+    line(serde_json::to_string_pretty(explanation).map_err(Failure::run)?)
+}
