@@ -3,10 +3,13 @@
 //! Every decision is made by running the model again, never by differentiating data: one candidate effect is one run, so the
 //! screening is what the fleet is for. Next files to read: [`result`] for what comes out, [`rows`] for the common language.
 
+mod again;
 mod answer;
 pub mod background;
+mod bent;
 pub mod candidate;
 pub mod candidates;
+mod course;
 mod experiment;
 pub mod figures;
 pub mod fit;
@@ -15,10 +18,13 @@ pub mod judge;
 pub mod keep;
 pub mod laboratory;
 pub mod locate;
+mod memory;
 pub mod options;
 pub mod patch;
 mod probe;
+mod refused;
 pub mod result;
+mod rhythm;
 pub mod rows;
 mod run;
 pub mod screen;

@@ -1,7 +1,8 @@
-//! The coordinator: sends particles to the fleet, runs the study, stores and reports it.
+//! The coordinator: sends particles to the fleet, runs the study, explains its misfit, stores and reports both.
 //!
 //! Floors, imports go down only: [`fleet`] dispatches jobs and knows no study; [`study`] runs the loop and writes the store;
-//! [`report`] reads only what the store holds. Next file to read: [`study`].
+//! [`explain`] says what a study's model lacks, by running versions of it; [`report`] reads only what the store holds. Next file
+//! to read: [`study`].
 
 pub mod explain;
 pub mod fleet;

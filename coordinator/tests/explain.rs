@@ -79,7 +79,7 @@ fn recording(study: &str, effects: &[(&str, f64)], values: &[(&str, f64)], seed:
     let times = grid(300, 0.05);
     let blank = csv("time,position", &[&times, &vec![0.0; times.len()]]);
     let case = Case::new(study, &[("free.csv", blank)]);
-    let named = |list: &[(&str, f64)]| list.iter().map(|(name, v)| ((*name).to_owned(), *v)).collect();
+    let named = |list: &[(&str, f64)]| list.iter().map(|(name, v)| ((*name).to_owned(), *v)).collect::<Vec<_>>();
     let twin = Twin {
         values: [&[("k".to_owned(), 10.0), ("c".to_owned(), 0.15), ("initial:x".to_owned(), 1.1)], &named(values)[..]].concat(),
         effects: named(effects),

@@ -64,6 +64,8 @@ pub struct LeastSquares {
     cost: f64,
     jacobian: DMatrix<f64>,
     fresh: bool,
+    /// The Jacobian that was measured at this point, while the secant changes `jacobian`.
+    measured: Option<DMatrix<f64>>,
     damping: f64,
     rejected: usize,
     predicted: f64,
@@ -85,6 +87,7 @@ impl LeastSquares {
             cost: f64::INFINITY,
             jacobian: DMatrix::zeros(0, 0),
             fresh: false,
+            measured: None,
             damping: 0.0,
             rejected: 0,
             predicted: 0.0,
@@ -198,6 +201,7 @@ impl LeastSquares {
     pub fn give_jacobian(&mut self, jacobian: Option<DMatrix<f64>>) {
         match jacobian.filter(|j| j.iter().all(|v| v.is_finite())) {
             Some(jacobian) => {
+                self.measured = Some(jacobian.clone());
                 self.jacobian = jacobian;
                 self.fresh = true;
                 self.plan();
@@ -212,6 +216,7 @@ impl LeastSquares {
         self.residual = e;
         self.cost = cost;
         self.fresh = false;
+        self.measured = None;
         self.rejected = 0;
         if ratio > 0.75 {
             self.damping *= 0.1;
@@ -233,15 +238,34 @@ impl LeastSquares {
         if self.trials_left == 0 {
             self.need = Need::Nothing(End::Limit);
         } else if self.rejected > STUBBORN {
-            self.need = Need::Nothing(if was_fresh { End::Stalled } else { End::Tentative });
-        } else if self.thorough && !was_fresh {
+            self.give_up(was_fresh);
+        } else if self.thorough && self.measured.is_none() {
             self.damping = 0.0;
             self.need = Need::Jacobian(self.z.clone());
+        } else if self.rejected > 1 && self.restore() {
+            // The secant did not help either: shorter steps along the measured slope must, in the end, lower the cost.
+            self.plan();
         } else {
             // The secant has learned from the failure: what it holds is no longer of this point alone.
             self.fresh = false;
             self.plan();
         }
+    }
+
+    /// Ends for want of a step that lowers the cost. What the undamped step promises tells how far from a minimum that is.
+    fn give_up(&mut self, was_fresh: bool) {
+        let of_here = self.restore() || was_fresh;
+        self.damping = 0.0;
+        let _ = self.step();
+        self.need = Need::Nothing(if of_here { End::Stalled } else { End::Tentative });
+    }
+
+    /// Back to the Jacobian that was measured at this point, if one was.
+    fn restore(&mut self) -> bool {
+        let Some(measured) = &self.measured else { return false };
+        self.jacobian.clone_from(measured);
+        self.fresh = true;
+        true
     }
 
     /// Chooses the next need from the linear model at the best point.
@@ -344,7 +368,11 @@ mod tests {
         let (end, runs, jacobians) = drive(&mut fit);
         assert_eq!(end, End::Converged);
         // The secant ends within 1e-3 noise sd of the truth, so both parameters are right to about 1e-5.
-        assert!((fit.best().0[0] - 2.0).abs() < 1e-4 && (fit.best().0[1] - 0.7).abs() < 1e-4, "{:?}", fit.best().0);
+        assert!(
+            (fit.best().0[0] - 2.0).abs() < 1e-4 && (fit.best().0[1] - 0.7).abs() < 1e-4,
+            "{:?}",
+            fit.best().0
+        );
         assert!(jacobians <= 4 && runs <= 20, "{runs} runs, {jacobians} Jacobians");
     }
 
@@ -375,6 +403,25 @@ mod tests {
         assert!(runs <= 6 && fit.cost() < 1.0, "{runs} runs, cost {}", fit.cost());
         fit.polish(10);
         assert_eq!(drive(&mut fit).0, End::Converged);
+    }
+
+    #[test]
+    fn steps_that_overshoot_are_shortened_until_one_helps() {
+        // Gauss-Newton diverges on the arctangent from here, and the secant across it overshoots too.
+        let mut fit = LeastSquares::new(DVector::from_element(1, 0.5), flat(1), 1e-9, 50);
+        let end = loop {
+            match fit.need().clone() {
+                Need::Residual(z) => fit.give_residual(Some(z.map(|z| -100.0 * (20.0 * z).atan()))),
+                Need::Jacobian(z) => {
+                    let slope = 2000.0 / (1.0 + (20.0 * z[0]).powi(2));
+                    fit.give_jacobian(Some(DMatrix::from_element(1, 1, slope)));
+                }
+                Need::Nothing(end) => break end,
+            }
+        };
+        assert_eq!(end, End::Converged, "at {}, cost {}", fit.best().0[0], fit.cost());
+        // A cost of 1e-9 at a slope of 2000 per unit is 2e-8.
+        assert!(fit.best().0[0].abs() < 1e-7, "{}", fit.best().0[0]);
     }
 
     #[test]

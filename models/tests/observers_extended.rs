@@ -15,7 +15,7 @@ fn setup(with_effect: bool) -> Setup {
             name: "leak".to_owned(),
             unit: "1/s".to_owned(),
             range: [0.0, 10.0],
-            grid: vec![],
+            ..EffectParameter::default()
         }],
         states: vec![EffectState {
             name: "lost".to_owned(),

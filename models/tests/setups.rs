@@ -40,7 +40,7 @@ fn an_unknown_state_behind_initial_is_named_as_a_state() {
 fn an_unknown_output_constant_or_observer_is_refused() {
     assert_eq!(
         refused(|s| s.outputs[0] = "presure".to_owned()),
-        unknown("output", "presure", Some("pressure"))
+        unknown("output or scalar state", "presure", Some("pressure"))
     );
     let error = refused(|s| {
         s.model.constants.insert("L".to_owned(), 1.0);

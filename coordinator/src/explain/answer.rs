@@ -10,9 +10,7 @@ use super::fit::Fitted;
 use super::judge::Judged;
 use super::laboratory::Laboratory;
 use super::patch::PatchEffect;
-use super::result::{
-    Coefficient, FalseAlarm, GapRow, NamedEffect, ParameterShift, Rejected, Remaining, Screened,
-};
+use super::result::{Coefficient, FalseAlarm, GapRow, NamedEffect, ParameterShift, Remaining, Screened};
 use super::rows::{Row, Usage};
 use super::screen::Hit;
 use super::search::Found;
@@ -27,6 +25,15 @@ fn covariance(fit: &Fitted<'_>, inflation: f64) -> DMatrix<f64> {
     let n = fit.version.n_param();
     let unit = DMatrix::from_diagonal(fit.version.unit());
     fit.optimum().map_or_else(|_| DMatrix::zeros(n, n), |o| &unit * o.covariance() * &unit * inflation)
+}
+
+/// Standard deviation of the prediction of every row by the uncertainty of the fit, in the channel's unit; zero where the fit
+/// leaves a direction free.
+pub(super) fn prediction_sd(laboratory: &Laboratory<'_>, fit: &Fitted<'_>) -> Vec<f64> {
+    let Ok(optimum) = fit.optimum() else { return vec![0.0; laboratory.rows.rows.len()] };
+    let spread = &fit.jacobian * optimum.covariance();
+    let variance = |i: usize| spread.row(i).dot(&fit.jacobian.row(i)).max(0.0);
+    laboratory.rows.rows.iter().enumerate().map(|(i, row)| row.noise * variance(i).sqrt()).collect()
 }
 
 /// The effects of a version with their coefficients.
@@ -73,7 +80,12 @@ pub(super) fn patches(judged: &Judged<'_>) -> Vec<PatchEffect> {
 }
 
 /// Every candidate at its best point, with what became of it.
-pub(super) fn screened(found: &Found<'_>, candidates: &[Candidate], decision: &Decision, n_train: usize) -> Vec<Screened> {
+pub(super) fn screened(
+    found: &Found<'_>,
+    candidates: &[Candidate],
+    decision: &Decision,
+    n_train: usize,
+) -> Vec<Screened> {
     let excess = found.before.train - n_train as f64;
     let one = |(index, candidate): (usize, &Candidate)| {
         let sign = candidate.sign();
@@ -108,7 +120,11 @@ fn fate(found: &Found<'_>, decision: &Decision, index: usize, candidate: &Candid
     } else if decision.tied.iter().any(|set| is(set)) {
         "tied"
     } else if let Some(reason) = &best.failure {
-        return if reason.starts_with("no influence") { "no influence".to_owned() } else { "failed".to_owned() };
+        return if reason.starts_with("no influence") {
+            "no influence".to_owned()
+        } else {
+            "failed".to_owned()
+        };
     } else if best.is_absorbed() {
         "absorbed by the parameters"
     } else if found.judged.iter().any(|j| j.fit.version.members.iter().any(|m| m.index == index)) {
@@ -119,59 +135,6 @@ fn fate(found: &Found<'_>, decision: &Decision, index: usize, candidate: &Candid
         "wrong sign"
     };
     text.to_owned()
-}
-
-/// What was refused, with reasons: refitted versions first, then candidates that failed, have no influence of their own, or
-/// would need the wrong sign.
-pub(super) fn rejected(found: &Found<'_>, candidates: &[Candidate], decision: &Decision) -> Vec<Rejected> {
-    let mut list = Vec::new();
-    let keep: Vec<usize> = decision.best.iter().copied().chain(decision.rivals.clone()).collect();
-    for (i, judged) in found.judged.iter().enumerate().filter(|(i, _)| !keep.contains(i)) {
-        let (gate, reason) = match &judged.refusal {
-            Some(refusal) => (refusal.gate.to_owned(), refusal.reason.clone()),
-            None => ("evidence".to_owned(), behind(found, decision, i)),
-        };
-        list.push(Rejected { name: judged.fit.version.name(), gate, reason });
-    }
-    for (index, candidate) in candidates.iter().enumerate() {
-        let of = || found.hits.iter().filter(|h| h.candidate == index);
-        let name = candidate.name().to_owned();
-        if let Some(reason) = of().find_map(|h| h.failure.clone()).filter(|_| of().all(|h| h.failure.is_some())) {
-            list.push(Rejected { name, gate: "failed".to_owned(), reason });
-        } else if of().count() > 0 && of().all(Hit::is_absorbed) {
-            let reason = "the model's parameters imitate it: it cannot be told from them, which does not mean absent";
-            list.push(Rejected { name, gate: "absorbed".to_owned(), reason: reason.to_owned() });
-        } else if let Some(hit) = wrong_sign(found, index, candidate) {
-            let parameter = &candidate.def.parameters[0];
-            let reason = format!(
-                "{} would have to be {:.4} ± {:.4} {}, a sign that physics does not allow",
-                parameter.name, hit.score.amplitude, hit.score.sd, parameter.unit
-            );
-            list.push(Rejected { name, gate: "sign".to_owned(), reason });
-        }
-    }
-    list
-}
-
-/// A candidate that would gain more than chance, were it not for its sign at every point of its grid.
-fn wrong_sign<'f>(found: &'f Found<'_>, index: usize, candidate: &Candidate) -> Option<&'f Hit> {
-    let of = || found.hits.iter().filter(|h| h.candidate == index && h.failure.is_none());
-    let never = of().all(|h| h.allowed_gain(candidate.sign()) <= 0.0);
-    of().filter(|h| never && h.score.gain > found.background.threshold)
-        .max_by(|a, b| a.score.gain.total_cmp(&b.score.gain))
-}
-
-fn behind(found: &Found<'_>, decision: &Decision, i: usize) -> String {
-    let Some(best) = decision.best.map(|b| &found.judged[b]) else { return String::new() };
-    let judged = &found.judged[i];
-    format!(
-        "it takes away {:.0} % of the gap, `{}` {:.0} %; {:.1} in χ² lie between them, training and held-out span together, in \
-         units of the effective noise",
-        100.0 * judged.share,
-        best.fit.version.name(),
-        100.0 * best.share,
-        (best.rank() - judged.rank()) / best.inflation
-    )
 }
 
 /// Root mean square errors before and after, by record, channel and use.
@@ -199,9 +162,24 @@ pub(super) fn gap(laboratory: &Laboratory<'_>, before: &[f64], after: &[f64]) ->
 }
 
 /// What is left of the gap after a fit.
-pub(super) fn remaining(laboratory: &Laboratory<'_>, fit: &Fitted<'_>, whiteness: f64, shape: String) -> Remaining {
+pub(super) fn remaining(
+    laboratory: &Laboratory<'_>,
+    found: &Found<'_>,
+    added: Option<&Judged<'_>>,
+    shape: String,
+) -> Remaining {
+    let (fit, whiteness) = added.map_or((&found.base, found.whiteness), |j| (&j.fit, j.whiteness));
     let n = laboratory.rows.train.len().max(1) as f64;
-    Remaining { rmse_over_noise: (fit.residual().norm_squared() / n).sqrt(), whiteness_p: whiteness, shape }
+    Remaining {
+        rmse_over_noise: (fit.residual().norm_squared() / n).sqrt(),
+        whiteness_p: whiteness,
+        inflation: super::background::inflation(&laboratory.rows, fit.residual()),
+        form_gain: found.leftover.gain,
+        form_gain_held_out: found.leftover.gain_held_out,
+        form_share: found.leftover.share,
+        form_power: found.leftover.power,
+        shape,
+    }
 }
 
 /// The false-alarm rate of this search.
@@ -254,10 +232,18 @@ pub(super) fn curves(laboratory: &Laboratory<'_>, before: &[f64], after: Option<
     let mut list = Vec::new();
     for (r, record) in study.records.iter().enumerate() {
         for (c, channel) in record.channels.iter().enumerate() {
-            let rows = laboratory.rows.rows.iter().enumerate().filter(|(_, row)| row.record == r && row.channel == c);
+            let rows = laboratory
+                .rows
+                .rows
+                .iter()
+                .enumerate()
+                .filter(|(_, row)| row.record == r && row.channel == c);
             let at: Vec<usize> = rows.map(|(i, _)| i).collect();
             let pick = |values: &[f64]| at.iter().map(|i| values[*i]).collect::<Vec<_>>();
-            let unit = channel.unit.clone().or_else(|| quantity_of(&study.spec.outputs, &channel.output).map(|q| q.unit.clone()));
+            let unit = channel
+                .unit
+                .clone()
+                .or_else(|| quantity_of(&study.spec.outputs, &channel.output).map(|q| q.unit.clone()));
             list.push(Curve {
                 record: record.name.clone(),
                 channel: channel.output.clone(),

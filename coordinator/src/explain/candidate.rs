@@ -4,13 +4,13 @@
 //! term becomes a list of points. Nothing is run here. Next file to read: [`super::version`].
 
 use starlings_estimators::Transform;
-use starlings_models::effect::{EffectDef, EffectParameter, scale};
+use starlings_models::effect::{EffectDef, EffectParameter, Scale, scale};
 
 use super::candidates::candidates;
 use super::locate::Track;
 use super::{ExplainError, Options};
-use crate::study::Study;
 use crate::study::variant::EffectPrior;
+use crate::study::{Record, Study};
 
 /// Grid points of one candidate at most.
 const MOST_POINTS: usize = 9;
@@ -104,22 +104,52 @@ fn inner_prior(parameter: &EffectParameter) -> EffectPrior {
 ///
 /// # Errors
 /// As [`candidates`].
-pub fn all(study: &Study, tracks: &[Track], options: &Options) -> Result<Vec<Candidate>, ExplainError> {
-    let defs = resolved(study, candidates(study, options)?, tracks);
+pub fn all(
+    study: &Study,
+    tracks: &[Track],
+    rhythms: &[f64],
+    jumps: &[f64],
+    options: &Options,
+) -> Result<Vec<Candidate>, ExplainError> {
+    let defs = resolved(study, candidates(study, options)?, tracks, rhythms, jumps);
     Ok(defs.into_iter().map(Candidate::new).collect())
 }
 
-/// The effects with their numbers in the model's units; one whose quantity does not move cannot be told and is left out.
-fn resolved(study: &Study, defs: Vec<EffectDef>, tracks: &[Track]) -> Vec<EffectDef> {
+/// The effects with their numbers in the model's units; one whose quantity does not move cannot be told and is left out. A
+/// length of time within a term is tried at the rhythms of the residuals: a period that is off by more than a cycle over the
+/// record has no sensitivity at all. An instant is tried where the residuals jump as well.
+fn resolved(
+    study: &Study,
+    defs: Vec<EffectDef>,
+    tracks: &[Track],
+    rhythms: &[f64],
+    jumps: &[f64],
+) -> Vec<EffectDef> {
     let course = |name: &str| {
         let track = tracks.iter().find(|t| t.name == name)?;
         let values = || track.values.iter().flatten().copied().filter(|v| v.is_finite());
         Some([values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max)])
     };
-    let times = || study.records.iter().filter(|r| r.is_trained()).filter_map(|r| r.train_span());
+    let times = || study.records.iter().filter(|r| r.is_trained()).filter_map(Record::train_span);
     let from = times().map(|s| s[0]).fold(f64::INFINITY, f64::min);
     let to = times().map(|s| s[1]).fold(f64::NEG_INFINITY, f64::max);
-    let resolve = |def: EffectDef| scale::resolve(&def, &course, [from, to], sampling(study));
+    let resolve = |def: EffectDef| {
+        let mut resolved = scale::resolve(&def, &course, [from, to], sampling(study));
+        for wanted in def.parameters.iter().skip(1) {
+            let Some(parameter) = resolved.parameters.iter_mut().find(|p| p.name == wanted.name) else {
+                continue;
+            };
+            let [lo, hi] = parameter.range;
+            let within =
+                |values: &[f64]| values.iter().copied().filter(|v| lo < *v && *v < hi).collect::<Vec<_>>();
+            match wanted.scale {
+                Scale::Duration if !within(rhythms).is_empty() => parameter.grid = within(rhythms),
+                Scale::Record => parameter.grid.extend(within(jumps)),
+                _ => {}
+            }
+        }
+        resolved
+    };
     defs.into_iter().map(resolve).filter(scale::is_resolved).collect()
 }
 
@@ -130,4 +160,34 @@ pub fn sampling(study: &Study) -> f64 {
         record.map(|r| r.times.windows(2).map(|w| w[1] - w[0]).collect()).unwrap_or_default();
     steps.sort_by(f64::total_cmp);
     steps.get(steps.len() / 2).copied().unwrap_or(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn effect(parameters: Vec<EffectParameter>) -> EffectDef {
+        EffectDef { name: "e".to_owned(), parameters, ..EffectDef::default() }
+    }
+
+    fn with(range: [f64; 2], grid: &[f64]) -> EffectParameter {
+        EffectParameter { range, grid: grid.to_vec(), ..EffectParameter::default() }
+    }
+
+    #[test]
+    fn the_grids_of_the_parameters_inside_a_term_become_points_with_the_middle_first() {
+        let open = [f64::NEG_INFINITY, f64::INFINITY];
+        let parameters = vec![with([0.0, 1.0], &[]), with(open, &[1.0, 2.0, 3.0]), with(open, &[5.0, 6.0])];
+        let candidate = Candidate::new(effect(parameters));
+        assert_eq!(candidate.points[0], [2.0, 6.0]);
+        assert_eq!(candidate.points.len(), 6);
+        assert!((candidate.sign() - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_parameter_with_two_bounds_stays_within_them_whatever_the_fit_tries() {
+        let prior = Candidate::new(effect(vec![with([0.0, 1.0], &[]), with([2.0, 4.0], &[2.5])])).priors();
+        let far = prior[1].transform.to_physical(prior[1].mean + 50.0 * prior[1].sd);
+        assert!(far < 4.0 && (prior[1].transform.to_physical(prior[1].mean) - 3.0).abs() < 1e-12);
+    }
 }

@@ -14,7 +14,7 @@ use super::judge::Judged;
 use super::laboratory::Laboratory;
 use super::locate::Track;
 use super::result::Experiment;
-use crate::study::Study;
+use crate::study::{Record, Study};
 
 /// Noise of a quantity that was never measured, as a share of its spread.
 const NEW_CHANNEL: f64 = 0.03;
@@ -33,14 +33,14 @@ struct Trial {
 ///
 /// # Errors
 /// When the fleet fails.
-pub fn propose(
+pub(super) fn propose(
     laboratory: &mut Laboratory<'_>,
     best: &Judged<'_>,
     rival: &Judged<'_>,
     tracks: &[Track],
 ) -> Result<Option<Experiment>, ExplainError> {
     let study = laboratory.study;
-    let Some(record) = study.records.iter().position(|r| r.is_trained()) else { return Ok(None) };
+    let Some(record) = study.records.iter().position(Record::is_trained) else { return Ok(None) };
     let mut trials = trials(study, record, tracks);
     let mut separations = Vec::new();
     for trial in &trials {
@@ -70,14 +70,19 @@ fn trials(study: &Study, record: usize, tracks: &[Track]) -> Vec<Trial> {
         let noise = NEW_CHANNEL * spread(&track.values[record]);
         if noise > 0.0 {
             let with = [measured.as_slice(), &[(track.name.clone(), noise)]].concat();
-            let says = format!("measure {} as well, to {:.0} % of its spread", track.name, 100.0 * NEW_CHANNEL);
+            let says =
+                format!("measure {} as well, to {:.0} % of its spread", track.name, 100.0 * NEW_CHANNEL);
             list.push(trial(says, as_it_was.clone(), &with));
         }
     }
     for (i, input) in study.spec.inputs.iter().enumerate() {
         for (factor, word) in [(HARDER, "twice"), (1.0 / HARDER, "half")] {
             let driven = with_input(&as_it_was, i, |signal| scaled(signal, factor));
-            list.push(trial(format!("drive {} with {word} the swing about its mean", input.name), driven, &measured));
+            list.push(trial(
+                format!("drive {} with {word} the swing about its mean", input.name),
+                driven,
+                &measured,
+            ));
         }
         let held = with_input(&as_it_was, i, step_half_way);
         list.push(trial(format!("hold {} at its mean and step it half-way", input.name), held, &measured));
@@ -123,9 +128,11 @@ fn step_half_way(signal: &Signal) -> Signal {
 /// Twice as many observations, inputs repeated.
 fn stretched(window: &Window, n_obs: usize) -> Window {
     let last = window.times.last().copied().unwrap_or(window.start);
-    let step = if window.times.len() > 1 { (last - window.start) / (window.times.len() - 1) as f64 } else { 1.0 };
+    let step =
+        if window.times.len() > 1 { (last - window.start) / (window.times.len() - 1) as f64 } else { 1.0 };
     let span = last - window.start + step;
-    let twice = |times: &[f64]| times.iter().copied().chain(times.iter().map(|t| t + span)).collect::<Vec<_>>();
+    let twice =
+        |times: &[f64]| times.iter().copied().chain(times.iter().map(|t| t + span)).collect::<Vec<_>>();
     let inputs = window.inputs.iter().map(|signal| {
         let within = signal.times.partition_point(|t| *t < window.start + span);
         let (times, values) = (&signal.times[..within], &signal.values[..within]);

@@ -190,11 +190,8 @@ pub fn drive_rounds(
         if !laboratory.affords(n) {
             return Ok(false);
         }
-        let points: Vec<Point<'_>> = fits
-            .iter()
-            .zip(&asked)
-            .flat_map(|(fit, of_fit)| of_fit.iter().map(|z| point(fit, z)))
-            .collect();
+        let points: Vec<Point<'_>> =
+            fits.iter().zip(&asked).flat_map(|(fit, of_fit)| of_fit.iter().map(|z| point(fit, z))).collect();
         let mut answers = laboratory.run(&points)?.into_iter();
         for (fit, of_fit) in fits.iter_mut().zip(asked) {
             let of_fit: Vec<_> = answers.by_ref().take(of_fit.len()).collect();

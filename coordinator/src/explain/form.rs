@@ -1,44 +1,52 @@
 //! Whether what is left after an effect is still of the library's making: then the effect has the wrong form.
 //!
-//! All candidates together are fitted to the residuals of the training rows, to first order, and judged by what that predicts
-//! of the held-out rows. A relative of the missing effect leaves something that they can still take away, and that comes again
+//! All candidates and the bent forms of the effect ([`super::bent`]) are added to the fit one after the other, to first order, and judged by what
+//! that predicts of the held-out rows. A relative of the missing effect leaves something that they can still take away, and that comes again
 //! in data which no fit has seen; noise and disturbances of another kind do not. Next file to read: [`super::search`].
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 use super::ExplainError;
+use starlings_estimators::noise_from_third_differences;
+
+use super::background::{inflation, training_stretches};
 use super::fit::Fitted;
 use super::laboratory::Laboratory;
-use super::rows::Usage;
+use super::rows::{Rows, Usage};
 use super::screen::Hit;
 
-/// Directions with less of the sensitivities' information than this are left out.
-const SMALLEST: f64 = 1e-3;
-/// A direction counts when it takes away this much of χ², in units of the effective noise.
-const COUNTS: f64 = 6.0;
+/// Part of a column that must be its own.
+const SMALLEST: f64 = 0.05;
+/// Columns that are combined at most.
+const MOST: usize = 3;
+/// A first column must take away this much of χ², in units of the effective noise ...
+const FIRST: f64 = 12.0;
+/// ... and each further one this much.
+const FURTHER: f64 = 8.0;
+/// Share of what is left above the noise that they must take away: of a discrepancy of another kind they take only a part.
+const RESOLVED: f64 = 0.5;
+/// Share of the gain on the training rows that must come again, per row, on the held-out rows.
+const AGAIN: f64 = 0.15;
 
-/// What all candidates together could still take away.
+/// What candidates and bent forms could still take away.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Leftover {
     /// Fall of χ² of the training rows, in units of the effective noise.
     pub gain: f64,
-    /// Directions that make it.
-    pub n_direction: usize,
-    /// Fall of χ² of the held-out rows that these directions bring, in the same units.
+    /// Candidates and bent forms that make it.
+    pub n_column: usize,
+    /// Fall of χ² of the held-out rows that they bring, in the same units.
     pub gain_held_out: f64,
-    /// Whether there are held-out rows.
-    pub has_held_out: bool,
+    /// Share of what is left above the noise that they take away.
+    pub share: f64,
+    /// Whether there is something left that the library, or a bent form of the effect, can take away.
+    pub is_systematic: bool,
+    /// Largest fall of χ² that a fully bent form would bring if it were the truth; small where the data do not tell forms.
+    pub power: f64,
 }
 
-impl Leftover {
-    /// Whether there is something left that the library can take away.
-    pub fn is_systematic(&self) -> bool {
-        let beyond = self.gain > 12.0 + 6.0 * (self.n_direction as f64 - 1.0).max(0.0);
-        beyond && (!self.has_held_out || self.gain_held_out > 0.1 * self.gain)
-    }
-}
-
-/// Looks at the residuals of a fit with the sensitivities that were measured there.
+/// Looks at the residuals of a fit with the sensitivities that were measured there; the first `n_library` are candidates, the
+/// others bent forms.
 ///
 /// # Errors
 /// When the fit leaves a direction free.
@@ -46,7 +54,7 @@ pub fn leftover(
     laboratory: &Laboratory<'_>,
     fit: &Fitted<'_>,
     hits: &[Hit],
-    inflation: f64,
+    n_library: usize,
 ) -> Result<Leftover, ExplainError> {
     let optimum = fit.optimum()?;
     let rows = &laboratory.rows;
@@ -54,37 +62,79 @@ pub fn leftover(
         let of_train = s.select_rows(&rows.train);
         (optimum.unimitated(&of_train), s - &fit.jacobian * optimum.response(&of_train))
     };
-    let usable = hits.iter().filter(|h| h.failure.is_none() && !h.is_absorbed());
+    let usable = hits.iter().enumerate().filter(|(_, h)| h.failure.is_none() && !h.is_absorbed());
     let (mut own, mut all) = (Vec::new(), Vec::new());
-    for hit in usable {
+    let mut power: f64 = 0.0;
+    for (i, hit) in usable {
         let (train, whole) = train_jacobian_free(&hit.sensitivity);
         let size = train.norm();
+        if i >= n_library {
+            // A bent form at amplitude one is the term itself times a signal between -1 and 1.
+            power = power.max(size * size);
+        }
         if size > 0.0 {
             own.push(train / size);
             all.push(whole / size);
         }
     }
-    let held: Vec<usize> =
-        (0..rows.rows.len()).filter(|i| rows.rows[*i].usage == Usage::HeldOut).collect();
-    let mut left = Leftover { has_held_out: !held.is_empty(), ..Leftover::default() };
-    if own.is_empty() {
-        return Ok(left);
-    }
-    let (own, all) = (DMatrix::from_columns(&own), DMatrix::from_columns(&all));
-    let eigen = own.tr_mul(&own).symmetric_eigen();
-    let along = eigen.eigenvectors.tr_mul(&own.tr_mul(optimum.residual()));
-    let mut coefficients = DVector::zeros(own.ncols());
-    for (k, value) in eigen.eigenvalues.iter().enumerate().filter(|(_, v)| **v > SMALLEST) {
-        let gain = along[k] * along[k] / value / inflation;
-        if gain > COUNTS {
-            left.gain += gain;
-            left.n_direction += 1;
-            coefficients += eigen.eigenvectors.column(k) * (along[k] / value);
+    // Held-out channels count as well: a better form must serve them too.
+    let held: Vec<usize> = (0..rows.rows.len()).filter(|i| rows.rows[*i].usage != Usage::Train).collect();
+    let mut left = Leftover { power, ..Leftover::default() };
+    let floor = noise_floor(rows, fit.residual());
+    let mut residual = optimum.residual().clone();
+    let mut correction = DVector::zeros(rows.rows.len());
+    let whitened = rows.whitened(&fit.predicted);
+    for n_column in 1..=MOST.min(own.len()) {
+        let along = |k: &usize| own[*k].dot(&residual).abs();
+        let Some(best) = (0..own.len()).max_by(|a, b| along(a).total_cmp(&along(b))) else { break };
+        let amplitude = own[best].dot(&residual);
+        residual -= &own[best] * amplitude;
+        correction += &all[best] * amplitude;
+        sweep(&mut own, &mut all, best);
+        // What remains when it was taken away tells the noise that it is judged by.
+        let noise = inflation(rows, &residual.rows(0, rows.train.len()).into_owned());
+        let fall = |i: &usize| whitened[*i].powi(2) - (whitened[*i] - correction[*i]).powi(2);
+        let gain = (optimum.residual().norm_squared() - residual.norm_squared()) / noise;
+        let gain_held_out = held.iter().map(fall).sum::<f64>() / noise;
+        let wanted = AGAIN * gain * held.len() as f64 / rows.train.len().max(1) as f64;
+        let above = |e: &DVector<f64>| e.norm_squared() - floor;
+        let share = 1.0 - above(&residual) / above(optimum.residual()).max(f64::MIN_POSITIVE);
+        let is_systematic = gain > FIRST + FURTHER * (n_column - 1) as f64
+            && (held.is_empty() || gain_held_out > wanted)
+            && share > RESOLVED;
+        if n_column == 1 || (is_systematic && !left.is_systematic) {
+            left = Leftover { gain, n_column, gain_held_out, share, is_systematic, power };
         }
     }
-    let correction = all * coefficients;
-    let whitened = rows.whitened(&fit.predicted);
-    let fall = |i: &usize| whitened[*i].powi(2) - (whitened[*i] - correction[*i]).powi(2);
-    left.gain_held_out = held.iter().map(fall).sum::<f64>() / inflation;
     Ok(left)
+}
+
+/// χ² of the white part of the residuals, at most that of the stated noise, from their third differences.
+fn noise_floor(rows: &Rows, residual: &DVector<f64>) -> f64 {
+    let of = |stretch: std::ops::Range<usize>| {
+        let values = &residual.as_slice()[stretch];
+        let sd = noise_from_third_differences(values);
+        let variance = if sd.is_finite() { (sd * sd).min(1.0) } else { 1.0 };
+        variance * values.len() as f64
+    };
+    training_stretches(rows).into_iter().map(of).sum()
+}
+
+/// Share of the residuals' squares that white noise makes, from their third differences.
+pub fn white_share(rows: &Rows, residual: &DVector<f64>) -> f64 {
+    noise_floor(rows, residual) / residual.norm_squared().max(f64::MIN_POSITIVE)
+}
+
+/// Takes the chosen column out of the others, which are made unit again; one that is nothing but the chosen becomes zero.
+fn sweep(own: &mut [DVector<f64>], all: &mut [DVector<f64>], chosen: usize) {
+    let (unit, whole) = (own[chosen].clone(), all[chosen].clone());
+    for (column, of_all) in own.iter_mut().zip(all) {
+        let shared = unit.dot(column);
+        *column -= &unit * shared;
+        *of_all -= &whole * shared;
+        let size = column.norm();
+        let scale = if size > SMALLEST { 1.0 / size } else { 0.0 };
+        *column *= scale;
+        *of_all *= scale;
+    }
 }

@@ -144,9 +144,9 @@ fn refusal(
     if matches!(judged.fit.end(), Some(End::NoStart)) {
         return Some(Refusal { gate: "failed", reason: "the model fails with it".to_owned() });
     }
-    at_edge(&judged.fit)
+    held_out_channel(laboratory, base, &judged.fit)
         .or_else(|| held_out_span(before, judged))
-        .or_else(|| held_out_channel(laboratory, base, &judged.fit))
+        .or_else(|| at_edge(&judged.fit))
         .or_else(|| {
             let (evidence, inflation) = (judged.evidence(), judged.inflation);
             (evidence <= threshold).then(|| Refusal {
@@ -220,7 +220,9 @@ fn held_out_channel(laboratory: &Laboratory<'_>, base: &Fitted<'_>, fit: &Fitted
         if after > before * WORSE {
             return Some(Refusal {
                 gate: "held-out channel",
-                reason: format!("the error of {name}, which is never fitted, grows from {before:.4} to {after:.4}"),
+                reason: format!(
+                    "the error of {name}, which is never fitted, grows from {before:.4} to {after:.4}"
+                ),
             });
         }
     }

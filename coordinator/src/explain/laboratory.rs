@@ -11,7 +11,7 @@ use std::sync::mpsc::Receiver;
 use nalgebra::DVector;
 use starlings_models::{Job, ParticleError, Window};
 
-use super::locate::Track;
+use super::memory::{Known, decode, encode, key};
 use super::{Context, ExplainError, Rows, Stage};
 use crate::fleet::{Fleet, FleetEvent, Outcome, SetupId};
 use crate::study::store::{JobRow, RunKey, Store};
@@ -28,9 +28,6 @@ pub struct Point<'v> {
 /// What a point predicts for every row, or why it could not be run.
 pub type Answer = Result<Arc<Vec<f64>>, String>;
 
-/// The outputs of one run, or why there are none.
-type Known = Result<Arc<Vec<f64>>, String>;
-
 /// Runs points and keeps count.
 pub struct Laboratory<'a> {
     /// The study as it is.
@@ -43,7 +40,7 @@ pub struct Laboratory<'a> {
     earlier_s: f64,
     watch: &'a mut dyn FnMut(&Stage),
     events: Option<&'a Receiver<FleetEvent>>,
-    windows: Vec<Arc<Window>>,
+    pub(super) windows: Vec<Arc<Window>>,
     known: HashMap<RunKey, Known>,
     budget: Option<u64>,
     stage: &'static str,
@@ -161,45 +158,6 @@ impl<'a> Laboratory<'a> {
         Ok(outputs.chunks(self.windows.len()).map(of_point).collect())
     }
 
-    /// The course of every scalar state and output of a version, and of its inputs, at the times of the records.
-    ///
-    /// # Errors
-    /// As [`Laboratory::run`]; a model that fails at this point gives no tracks.
-    pub fn tracks(&mut self, point: &Point<'_>) -> Result<Vec<Track>, ExplainError> {
-        let spec = &point.study.spec;
-        let mut seen = point.study.clone();
-        let scalar = spec.outputs.iter().chain(&spec.states).filter(|q| q.size == 1);
-        let mut names: Vec<(String, String)> = Vec::new();
-        for quantity in scalar {
-            if !names.iter().any(|(name, _)| *name == quantity.name) {
-                names.push((quantity.name.clone(), quantity.unit.clone()));
-            }
-        }
-        seen.setup.outputs = names.iter().map(|(name, _)| name.clone()).collect();
-        let n_obs = names.len();
-        let windows = self.windows.clone();
-        for window in &mut self.windows {
-            let observed = vec![f64::NAN; n_obs * window.times.len()];
-            *window = Arc::new(Window { observed, ..Window::clone(window) });
-        }
-        let runs = self.outputs(&[Point { study: &seen, theta: point.theta.clone() }]);
-        self.windows = windows;
-        let mut tracks = Vec::new();
-        let Ok(runs) = runs?.into_iter().collect::<Result<Vec<_>, String>>() else { return Ok(tracks) };
-        for (i, (name, unit)) in names.into_iter().enumerate() {
-            let values = runs.iter().map(|y| y.iter().skip(i).step_by(n_obs).copied().collect()).collect();
-            tracks.push(Track { name, unit, values });
-        }
-        for (i, input) in spec.inputs.iter().enumerate() {
-            let course = |window: &Arc<Window>| window.times.iter().map(|t| window.inputs[i].at(*t)).collect();
-            let values = self.windows.iter().map(course).collect();
-            if !tracks.iter().any(|t| t.name == input.name) {
-                tracks.push(Track { name: input.name.clone(), unit: input.unit.clone(), values });
-            }
-        }
-        Ok(tracks)
-    }
-
     /// The outputs of one run that is not over a record as it is; nothing where the model fails.
     ///
     /// # Errors
@@ -212,7 +170,7 @@ impl<'a> Laboratory<'a> {
     }
 
     /// Outputs of every point over every record: points in order, then records.
-    fn outputs(&mut self, points: &[Point<'_>]) -> Result<Vec<Known>, ExplainError> {
+    pub(super) fn outputs(&mut self, points: &[Point<'_>]) -> Result<Vec<Known>, ExplainError> {
         let mut keys = Vec::with_capacity(points.len() * self.windows.len());
         let mut jobs: Vec<(SetupId, Job)> = Vec::new();
         let mut asked: Vec<(RunKey, usize)> = Vec::new();
@@ -280,9 +238,11 @@ impl<'a> Laboratory<'a> {
             }
             .into()),
             Err(error) => Ok(Err(error.to_string())),
-            Ok(prediction) if prediction.outputs.len() != window.observed.len() => {
-                Ok(Err(format!("{} predicted values for {}", prediction.outputs.len(), window.observed.len())))
-            }
+            Ok(prediction) if prediction.outputs.len() != window.observed.len() => Ok(Err(format!(
+                "{} predicted values for {}",
+                prediction.outputs.len(),
+                window.observed.len()
+            ))),
             Ok(mut prediction) => {
                 self.study.measure(record, &window.times, &mut prediction.outputs);
                 Ok(Ok(Arc::new(prediction.outputs)))
@@ -302,32 +262,4 @@ impl<'a> Laboratory<'a> {
             cost_s: outcome.result.as_ref().map_or(0.0, |p| p.cost),
         }
     }
-}
-
-/// Everything that the answer of a run depends on; the recordings are the run folder's to check.
-fn key(setup: &SetupId, record: usize, theta: &[f64]) -> RunKey {
-    let mut hasher = blake3::Hasher::new();
-    hasher.update(setup);
-    hasher.update(&(record as u64).to_le_bytes());
-    for value in theta {
-        hasher.update(&value.to_le_bytes());
-    }
-    *hasher.finalize().as_bytes()
-}
-
-/// One byte that says which, then the numbers or the text.
-fn encode(known: &Known) -> Vec<u8> {
-    match known {
-        Ok(outputs) => std::iter::once(1).chain(outputs.iter().flat_map(|v| v.to_le_bytes())).collect(),
-        Err(reason) => [&[0], reason.as_bytes()].concat(),
-    }
-}
-
-fn decode(body: &[u8]) -> Known {
-    let (which, rest) = body.split_first().unwrap_or((&0, &[]));
-    if *which == 0 {
-        return Err(String::from_utf8_lossy(rest).into_owned());
-    }
-    let number = |bytes: &[u8]| bytes.try_into().map_or(f64::NAN, f64::from_le_bytes);
-    Ok(Arc::new(rest.chunks(8).map(number).collect()))
 }

@@ -184,6 +184,17 @@ pub struct Remaining {
     pub rmse_over_noise: f64,
     /// Probability of residuals at least as autocorrelated if they were white (Ljung & Box 1978).
     pub whiteness_p: f64,
+    /// Factor that size and correlation of the residuals make on the variance of a smooth signal's coefficient.
+    pub inflation: f64,
+    /// Fall of χ² that all candidates and bent forms of the effect together would still bring, to first order, in units of
+    /// the effective noise.
+    pub form_gain: f64,
+    /// The same on the held-out span.
+    pub form_gain_held_out: f64,
+    /// Share of what remains above the noise that these would take away.
+    pub form_share: f64,
+    /// Largest fall of χ² that a fully bent form of the effect would bring if it were the truth.
+    pub form_power: f64,
     /// The shape of what remains, in words.
     pub shape: String,
 }

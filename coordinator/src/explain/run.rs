@@ -14,6 +14,8 @@ use super::judge::Judged;
 use super::laboratory::{Laboratory, Point};
 use super::locate::{self, Located, Track, View};
 use super::patch::explained_study;
+use super::refused;
+use super::rhythm::{jumps, rhythms};
 use super::search::{Found, search};
 use super::verdict::{Decision, decide};
 use super::version::Version;
@@ -45,7 +47,9 @@ pub fn explain(
     laboratory.stage("locate", "where simulation and data disagree");
     let tracks = laboratory.tracks(&Point { study: &free, theta: base.theta() })?;
     let before = look(&laboratory, &base, &tracks);
-    let candidates = candidate::all(&free, &tracks, options)?;
+    let (rhythms, jumps) =
+        (rhythms(&laboratory.rows, &base.predicted), jumps(&laboratory.rows, &base.predicted));
+    let candidates = candidate::all(&free, &tracks, &rhythms, &jumps, options)?;
     let found = search(&mut laboratory, base, &candidates, &tracks, options)?;
     laboratory.stage("verdict", "");
     let decision = decide(&laboratory, &found, &candidates);
@@ -77,7 +81,8 @@ fn fit_as_it_is<'c>(
 
 /// Where a fit disagrees with the data.
 fn look(laboratory: &Laboratory<'_>, fit: &Fitted<'_>, tracks: &[Track]) -> Located {
-    locate::locate(&view(laboratory, fit, tracks))
+    let sd = answer::prediction_sd(laboratory, fit);
+    locate::locate(&View { prediction_sd: Some(&sd), ..view(laboratory, fit, tracks) })
 }
 
 fn view<'v>(laboratory: &'v Laboratory<'_>, fit: &'v Fitted<'_>, tracks: &'v [Track]) -> View<'v> {
@@ -143,7 +148,8 @@ fn forces(
     }
     let mut runs = 0;
     let theta = base.theta();
-    let forces = locate::unknown_inputs(&base.version.study, laboratory.fleet(), theta.as_slice(), &mut runs)?;
+    let forces =
+        locate::unknown_inputs(&base.version.study, laboratory.fleet(), theta.as_slice(), &mut runs)?;
     laboratory.count(runs);
     Ok(forces)
 }
@@ -188,7 +194,6 @@ fn explanation(
     let study = laboratory.study;
     let judged = decision.best.map(|i| &found.judged[i]);
     let added = judged.filter(|_| matches!(decision.verdict, Verdict::Named | Verdict::Tie));
-    let (fit, whiteness) = added.map_or((&found.base, found.whiteness), |j| (&j.fit, j.whiteness));
     let n_train = laboratory.rows.train.len();
     let after = added.map(|j| j.fit.predicted.as_slice());
     Explanation {
@@ -204,9 +209,9 @@ fn explanation(
         experiment: None,
         closest: judged.filter(|_| added.is_none()).and_then(|j| answer::effects(j).into_iter().next()),
         screened: answer::screened(found, candidates, decision, n_train),
-        rejected: answer::rejected(found, candidates, decision),
+        rejected: refused::rejected(found, candidates, decision),
         gap: after.map(|y| answer::gap(laboratory, &found.base.predicted, y)).unwrap_or_default(),
-        remaining: answer::remaining(laboratory, fit, whiteness, words::shape(found, added, before)),
+        remaining: answer::remaining(laboratory, found, added, words::shape(found, added, before)),
         false_alarm: answer::false_alarm(found, judged.map_or(0.0, |j| j.gain)),
         parameter_shifts: added.map(|j| answer::shifts(&found.base, j)).unwrap_or_default(),
         untried: words::untried(found, candidates),

@@ -14,6 +14,7 @@ use super::laboratory::{Answer, Laboratory, Point};
 use super::locate::Track;
 use super::probe::{Along, natural_amplitude};
 use super::version::{Member, Version};
+use crate::study::Record;
 
 /// Probe, as a share of what the term is added to.
 const PROBE: f64 = 3e-3;
@@ -76,7 +77,7 @@ pub fn screen<'c>(
     let optimum = fit.optimum()?;
     let mut probes = Vec::new();
     for &(index, point) in of {
-        if fit.version.members.iter().any(|m| m.index == index) {
+        if fit.version.members.iter().any(|m| m.candidate.name() == candidates[index].name()) {
             continue;
         }
         probes.push(probe(fit, candidates, index, point, tracks)?);
@@ -107,7 +108,7 @@ fn probe<'c>(
     let candidate = &candidates[index];
     let point = candidate.points[point].clone();
     let study = &fit.version.study;
-    let record = study.records.iter().position(|r| r.is_trained()).unwrap_or(0);
+    let record = study.records.iter().position(Record::is_trained).unwrap_or(0);
     let theta = study.theta_for(record, fit.theta().as_slice());
     let along = Along { study, theta: &theta, tracks };
     let [lo, hi] = candidate.def.parameters[0].range;
@@ -134,8 +135,7 @@ fn touches_states(probe: &Probe<'_>) -> bool {
     let Some(member) = probe.version.members.last() else { return false };
     let outputs = &probe.version.study.spec.outputs;
     let states = &probe.version.study.spec.states;
-    let only_output =
-        |to: &str| outputs.iter().any(|q| q.name == to) && !states.iter().any(|q| q.name == to);
+    let only_output = |to: &str| outputs.iter().any(|q| q.name == to) && !states.iter().any(|q| q.name == to);
     !(member.candidate.def.states.is_empty() && member.candidate.def.adds.iter().all(|a| only_output(&a.to)))
 }
 
@@ -224,7 +224,11 @@ fn hit(laboratory: &Laboratory<'_>, optimum: &Optimum, probe: Probe<'_>) -> Hit 
             point,
             sensitivity: DVector::zeros(0),
             score: none,
-            failure: Some(if reason.is_empty() { "no influence on what was measured".to_owned() } else { reason }),
+            failure: Some(if reason.is_empty() {
+                "no influence on what was measured".to_owned()
+            } else {
+                reason
+            }),
         },
     }
 }

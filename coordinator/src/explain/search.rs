@@ -10,7 +10,7 @@ use std::cmp::Ordering;
 use super::background::{Background, whiteness};
 use super::candidate::Candidate;
 use super::fit::{Fitted, drive, drive_rounds};
-use super::form::{Leftover, leftover};
+use super::form::Leftover;
 use super::judge::{Judged, Misfit, judge};
 use super::laboratory::Laboratory;
 use super::locate::Track;
@@ -61,11 +61,11 @@ impl Found<'_> {
 }
 
 /// What the stages of a search share.
-struct Searcher<'s, 'l, 'c> {
-    laboratory: &'s mut Laboratory<'l>,
-    candidates: &'c [Candidate],
-    tracks: &'s [Track],
-    cut_short: bool,
+pub(super) struct Searcher<'s, 'l, 'c> {
+    pub(super) laboratory: &'s mut Laboratory<'l>,
+    pub(super) candidates: &'c [Candidate],
+    pub(super) tracks: &'s [Track],
+    pub(super) cut_short: bool,
 }
 
 /// Searches from a fitted model.
@@ -118,7 +118,7 @@ impl<'c> Searcher<'_, '_, 'c> {
         self.screen(fit, &of)
     }
 
-    fn screen(&mut self, fit: &Fitted<'c>, of: &[(usize, usize)]) -> Result<Vec<Hit>, ExplainError> {
+    pub(super) fn screen(&mut self, fit: &Fitted<'c>, of: &[(usize, usize)]) -> Result<Vec<Hit>, ExplainError> {
         if !self.laboratory.affords(of.len()) {
             self.cut_short = true;
             return Ok(Vec::new());
@@ -136,7 +136,7 @@ impl<'c> Searcher<'_, '_, 'c> {
     }
 
     /// The best point of the grid of every candidate that could be named, largest gain first.
-    fn best_of_each(&self, hits: &[Hit]) -> Vec<Hit> {
+    pub(super) fn best_of_each(&self, hits: &[Hit]) -> Vec<Hit> {
         let gain = |h: &Hit| h.allowed_gain(self.candidates[h.candidate].sign());
         let mut best: Vec<Hit> = Vec::new();
         for hit in hits.iter().filter(|h| h.failure.is_none() && !h.is_absorbed() && gain(h) > 0.0) {
@@ -177,7 +177,7 @@ impl<'c> Searcher<'_, '_, 'c> {
     }
 
     /// Refits until all have converged.
-    fn refit(&mut self, mut fits: Vec<Fitted<'c>>) -> Result<Vec<Fitted<'c>>, ExplainError> {
+    pub(super) fn refit(&mut self, mut fits: Vec<Fitted<'c>>) -> Result<Vec<Fitted<'c>>, ExplainError> {
         self.cut_short |= !drive(self.laboratory, &mut fits)?;
         for fit in &mut fits {
             fit.polish();
@@ -187,7 +187,7 @@ impl<'c> Searcher<'_, '_, 'c> {
     }
 
     /// A fit that adds a candidate to a fitted version, at the amplitude that its score promises.
-    fn with(&self, parent: &Fitted<'c>, hit: &Hit) -> Result<Fitted<'c>, ExplainError> {
+    pub(super) fn with(&self, parent: &Fitted<'c>, hit: &Hit) -> Result<Fitted<'c>, ExplainError> {
         let unit = hit.score.amplitude.abs().max(hit.score.sd.min(1e300)).max(f64::MIN_POSITIVE);
         let candidate = &self.candidates[hit.candidate];
         let member = Member { candidate, index: hit.candidate, unit };
@@ -198,7 +198,7 @@ impl<'c> Searcher<'_, '_, 'c> {
         Ok(Fitted::from_parent(version, parent, &hit.point, &sensitivity, train))
     }
 
-    fn judge_all(&mut self, found: &mut Found<'c>, fits: Vec<Fitted<'c>>) {
+    pub(super) fn judge_all(&mut self, found: &mut Found<'c>, fits: Vec<Fitted<'c>>) {
         self.laboratory.stage("gates", &format!("{} refitted", fits.len()));
         for fit in fits {
             let judged = judge(self.laboratory, &found.base, found.before, fit, found.background.threshold);
@@ -230,82 +230,6 @@ impl<'c> Searcher<'_, '_, 'c> {
             self.judge_all(found, fits);
         }
         Ok(())
-    }
-
-    /// Scores the candidates again at the best version: what is left, and which replacements and pairs to try.
-    fn look_again(&mut self, found: &mut Found<'c>, options: &Options) -> Result<(), ExplainError> {
-        for _ in 1..=options.max_effects {
-            let Some(best) = found.judged.first().filter(|j| j.refusal.is_none()).cloned() else { return Ok(()) };
-            self.laboratory.stage("screen", &format!("again, with {}", best.fit.version.name()));
-            let hits = self.screen(&best.fit, &self.best_points(&found.hits))?;
-            let left = leftover(self.laboratory, &best.fit, &hits, best.inflation)?;
-            found.leftover = left;
-            let seconds: Vec<Hit> = self
-                .best_of_each(&hits)
-                .into_iter()
-                .filter(|h| h.score.gain / best.inflation > found.background.threshold)
-                .take(2)
-                .collect();
-            if seconds.is_empty() {
-                return Ok(());
-            }
-            let fits = self.further(found, &best, &seconds, options)?;
-            let n = fits.len();
-            self.judge_all(found, fits);
-            let same = found.judged.first().is_some_and(|j| j.fit.version.name() == best.fit.version.name());
-            if n == 0 || same {
-                return Ok(());
-            }
-        }
-        Ok(())
-    }
-
-    /// Replacements (a second effect alone, where it was not refitted yet) and pairs.
-    fn further(
-        &mut self,
-        found: &Found<'c>,
-        best: &Judged<'c>,
-        seconds: &[Hit],
-        options: &Options,
-    ) -> Result<Vec<Fitted<'c>>, ExplainError> {
-        let tried = |indices: &[usize]| {
-            found.judged.iter().any(|j| {
-                let members: Vec<usize> = j.fit.version.members.iter().map(|m| m.index).collect();
-                members.len() == indices.len() && indices.iter().all(|i| members.contains(i))
-            })
-        };
-        let mut fits = Vec::new();
-        for second in seconds {
-            if !tried(&[second.candidate])
-                && let Some(alone) = self.best_of_each(&found.hits).iter().find(|h| h.candidate == second.candidate)
-            {
-                fits.push(self.with(&found.base, alone)?);
-            }
-            let mut pair: Vec<usize> = best.fit.version.members.iter().map(|m| m.index).collect();
-            pair.push(second.candidate);
-            if pair.len() <= options.max_effects && !tried(&pair) {
-                fits.push(self.with(&best.fit, second)?);
-            }
-        }
-        self.laboratory.stage("refit", &format!("{} replacements and pairs", fits.len()));
-        self.refit(fits)
-    }
-
-    /// The best point of the grid of every candidate, as far as the first screening tells.
-    fn best_points(&self, hits: &[Hit]) -> Vec<(usize, usize)> {
-        let best = self.best_of_each(hits);
-        let point = |hit: &Hit| {
-            let points = &self.candidates[hit.candidate].points;
-            points.iter().position(|p| *p == hit.point).map(|p| (hit.candidate, p))
-        };
-        let mut of: Vec<(usize, usize)> = best.iter().filter_map(point).collect();
-        for c in 0..self.candidates.len() {
-            let sound = hits.iter().any(|h| h.candidate == c && h.failure.is_none());
-            if sound && !of.iter().any(|(known, _)| *known == c) {
-                of.push((c, 0));
-            }
-        }
-        of
     }
 }
 

@@ -9,6 +9,7 @@ use starlings_models::equations::{Expression, Slot};
 
 use super::Verdict;
 use super::candidate::Candidate;
+use super::form::white_share;
 use super::judge::{Judged, Misfit};
 use super::laboratory::Laboratory;
 use super::search::{Found, NOT_WHITE};
@@ -21,6 +22,14 @@ const ALIKE: f64 = 0.995;
 const VUONG: f64 = 1.64;
 /// Effective variance of the residuals above which what remains is a discrepancy of its own, not the form of an effect.
 const DISCREPANT: f64 = 20.0;
+/// Share of white noise in the residuals from which on they must be white altogether.
+const AUDIBLE: f64 = 0.12;
+/// ... where their effective variance says that the structure matters.
+const STRUCTURED: f64 = 3.0;
+/// Fall of χ² below which a fully bent form would not be noticed.
+const POWER: f64 = 16.0;
+/// Posterior over prior standard deviation of a parameter inside a term from which on the data do not tell it.
+const UNINFORMED: f64 = 0.5;
 /// A further effect must carry this share of the gap.
 const SECOND_SHARE: f64 = 0.1;
 /// Where the residuals stay correlated, an effect must take away this share of the excess of the training rows ...
@@ -54,10 +63,11 @@ pub fn decide(laboratory: &Laboratory<'_>, found: &Found<'_>, candidates: &[Cand
         rivals: Vec::new(),
         because: because.to_owned(),
     };
-    let passing: Vec<usize> = (0..found.judged.len()).filter(|i| found.judged[*i].refusal.is_none()).collect();
+    let passing: Vec<usize> =
+        (0..found.judged.len()).filter(|i| found.judged[*i].refusal.is_none()).collect();
     if passing.is_empty() {
         return if found.whiteness < NOT_WHITE {
-            none(Verdict::Unexplained, None, "no candidate passes the gates")
+            none(Verdict::Unexplained, None, &nearest_refused(found))
         } else {
             none(Verdict::NoGap, None, "")
         };
@@ -67,7 +77,7 @@ pub fn decide(laboratory: &Laboratory<'_>, found: &Found<'_>, candidates: &[Cand
     if let Some(second) = second {
         return none(Verdict::Unexplained, Some(best), &second);
     }
-    if let Some(because) = doubt(found, judged) {
+    if let Some(because) = doubt(laboratory, found, judged) {
         return none(Verdict::Unexplained, Some(best), &because);
     }
     let mut rivals = rivals(laboratory, found, &passing, best);
@@ -85,13 +95,50 @@ pub fn decide(laboratory: &Laboratory<'_>, found: &Found<'_>, candidates: &[Cand
             tied.push(twin);
         }
     }
+    if found.leftover.power < POWER {
+        tied.push(vec![format!("another form of {}", judged.fit.version.name())]);
+    }
+    tied.extend(limits(judged).into_iter().map(|limit| vec![limit]));
     let verdict = if tied.is_empty() { Verdict::Named } else { Verdict::Tie };
     Decision { verdict, best: Some(best), tied, rivals, because: String::new() }
+}
+
+/// The limiting forms that the data do not exclude: a parameter inside a term of which they say little.
+fn limits(judged: &Judged<'_>) -> Vec<String> {
+    let version = &judged.fit.version;
+    let Ok(optimum) = judged.fit.optimum() else { return Vec::new() };
+    let mut limits = Vec::new();
+    for (m, member) in version.members.iter().enumerate() {
+        for (k, parameter) in member.candidate.def.parameters.iter().enumerate().skip(1) {
+            let j = version.first_of(m) + k;
+            // z counts in prior sd.
+            let sd = (optimum.covariance()[(j, j)].max(0.0) * judged.inflation).sqrt();
+            if sd > UNINFORMED {
+                limits.push(format!("{} at a limit of {}", member.candidate.name(), parameter.name));
+            }
+        }
+    }
+    limits
 }
 
 /// Names of the effects of a version.
 pub fn names(judged: &Judged<'_>) -> Vec<String> {
     judged.fit.version.members.iter().map(|m| m.candidate.name().to_owned()).collect()
+}
+
+/// Which candidate came nearest and the gate that refused it.
+fn nearest_refused(found: &Found<'_>) -> String {
+    let nearest = found.judged.first().and_then(|j| Some((j, j.refusal.as_ref()?)));
+    nearest.map_or_else(
+        || "no candidate gains more than chance".to_owned(),
+        |(judged, refusal)| {
+            let name = judged.fit.version.name();
+            format!(
+                "`{name}` comes nearest and is refused by the gate `{}`: {}",
+                refusal.gate, refusal.reason
+            )
+        },
+    )
 }
 
 /// The best version whose every effect carries its share of the gap, on the training data and again on the held-out span;
@@ -133,11 +180,11 @@ fn carried(found: &Found<'_>, passing: &[usize]) -> (usize, Option<String>) {
 }
 
 /// What speaks against naming a version that passes the gates.
-fn doubt(found: &Found<'_>, judged: &Judged<'_>) -> Option<String> {
-    if found.leftover.is_systematic() {
+fn doubt(laboratory: &Laboratory<'_>, found: &Found<'_>, judged: &Judged<'_>) -> Option<String> {
+    if found.leftover.is_systematic {
         return Some(format!(
-            "after `{}` the candidates together would still take away {:.0} of χ² and {:.0} on the held-out span, in units of \
-             the effective noise: something else has a similar influence",
+            "`{}` comes nearest, but other candidates or a bent form of it would still take away {:.0} of χ² and {:.0} on the \
+             held-out span, in units of the effective noise: its form is not right",
             judged.fit.version.name(),
             found.leftover.gain,
             found.leftover.gain_held_out
@@ -147,8 +194,20 @@ fn doubt(found: &Found<'_>, judged: &Judged<'_>) -> Option<String> {
         return None;
     }
     let name = judged.fit.version.name();
+    let white = white_share(&laboratory.rows, judged.fit.residual());
+    if white > AUDIBLE && judged.inflation > STRUCTURED {
+        return Some(format!(
+            "`{name}` takes away {:.0} % of the gap, but white noise makes {:.0} % of what is left and so shows that the rest is \
+             none: its form is not right, or something else is missing too",
+            100.0 * judged.share,
+            100.0 * white
+        ));
+    }
     let short = |share: f64, what: &str| {
-        format!("`{name}` takes away only {:.0} % of the gap on the {what}, and what is left is not noise", 100.0 * share)
+        format!(
+            "`{name}` takes away only {:.0} % of the gap on the {what}, and what is left is not noise",
+            100.0 * share
+        )
     };
     if judged.share < SHARE {
         return Some(short(judged.share, "training data"));
@@ -158,12 +217,16 @@ fn doubt(found: &Found<'_>, judged: &Judged<'_>) -> Option<String> {
     }
     let decoys = found.background.decoys_above(judged.gain);
     (decoys > DECOYS).then(|| {
-        format!("{:.0} % of the decoys take away as much as `{name}`, and what is left is not noise", 100.0 * decoys)
+        format!(
+            "{:.0} % of the decoys take away as much as `{name}`, and what is left is not noise",
+            100.0 * decoys
+        )
     })
 }
 
-/// Other versions that pass the gates and come as close as chance allows: by the fall of χ², or because the difference of
-/// their residuals is not clearly of one sign (Vuong 1989, with the autocorrelation of that difference).
+/// Other versions that pass the gates and come as close as chance allows: by the fall of χ², or, up to twice that margin,
+/// because the difference of their residuals is not clearly of one sign (Vuong 1989, with the autocorrelation of that
+/// difference).
 fn rivals(laboratory: &Laboratory<'_>, found: &Found<'_>, passing: &[usize], best: usize) -> Vec<usize> {
     let of_best = &found.judged[best];
     let size = of_best.fit.version.members.len();
@@ -173,7 +236,9 @@ fn rivals(laboratory: &Laboratory<'_>, found: &Found<'_>, passing: &[usize], bes
         *i != best
             && judged.fit.version.members.len() == size
             && names(judged) != names(of_best)
-            && (apart < MARGIN * of_best.inflation || apart < VUONG * scatter(laboratory, of_best, judged))
+            && (apart < MARGIN * of_best.inflation
+                || (apart < 2.0 * MARGIN * of_best.inflation
+                    && apart < VUONG * scatter(laboratory, of_best, judged)))
     };
     passing.iter().copied().filter(near).collect()
 }
@@ -216,9 +281,10 @@ fn twins(
     let best = own(&best.sensitivity);
     let mut twins: Vec<Vec<String>> = Vec::new();
     for hit in found.hits.iter().filter(|h| h.failure.is_none() && !h.is_absorbed()) {
-        let refitted = found.judged.iter().any(|j| {
-            j.fit.version.members.len() == 1 && j.fit.version.members[0].index == hit.candidate
-        });
+        let refitted = found
+            .judged
+            .iter()
+            .any(|j| j.fit.version.members.len() == 1 && j.fit.version.members[0].index == hit.candidate);
         let other = own(&hit.sensitivity);
         let alike = best.dot(&other).abs() / (best.norm() * other.norm());
         let candidate = &candidates[hit.candidate];

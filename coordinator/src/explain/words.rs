@@ -24,7 +24,9 @@ pub(super) fn headline(laboratory: &Laboratory<'_>, found: &Found<'_>, decision:
     let base = |usage| laboratory.rows.rmse(&found.base.predicted, |row| row.usage == usage);
     let best = decision.best.map(|i| &found.judged[i]);
     match (decision.verdict, best) {
-        (Verdict::Named, Some(judged)) => format!("{} {}", subject(judged), shrinking(laboratory, found, judged)),
+        (Verdict::Named, Some(judged)) => {
+            format!("{} {}", subject(judged), capital(&shrinking(laboratory, found, judged)))
+        }
         (Verdict::Tie, Some(judged)) => {
             let rivals: Vec<String> = decision.tied.iter().map(|set| set.join(" + ")).collect();
             format!(
@@ -35,8 +37,9 @@ pub(super) fn headline(laboratory: &Laboratory<'_>, found: &Found<'_>, decision:
             )
         }
         (Verdict::Unexplained, _) => {
-            let because = if decision.because.is_empty() { String::new() } else { format!(": {}", decision.because) };
-            format!("Nothing in the library explains the gap{because}.")
+            let because =
+                if decision.because.is_empty() { String::new() } else { format!(": {}", decision.because) };
+            format!("Nothing in the library explains the gap{}.", because.trim_end_matches('.'))
         }
         _ => format!(
             "No gap: the model explains the data at their noise (root mean square residual {:.3} on the training data).",
@@ -85,16 +88,14 @@ pub(super) fn shape(found: &Found<'_>, added: Option<&Judged<'_>>, before: &Loca
         return "what remains could be noise".to_owned();
     }
     let strongest = before.correlations.first();
-    match added {
-        Some(judged) => format!(
+    if let Some(judged) = added {
+        return format!(
             "what remains is correlated in time (its squares count {:.0}-fold for smooth signals) and no candidate takes it away",
             judged.inflation
-        ),
-        None => {
-            let with = strongest.map_or_else(String::new, |c| format!(", and goes along with {}", c.with));
-            format!("what remains is correlated in time{with}")
-        }
+        );
     }
+    let with = strongest.map_or_else(String::new, |c| format!(", and goes along with {}", c.with));
+    format!("what remains is correlated in time{with}")
 }
 
 /// What the intervals and the verdict rest on.
@@ -116,7 +117,8 @@ pub(super) fn untried(found: &Found<'_>, candidates: &[Candidate]) -> Vec<String
     if !found.cut_short {
         return Vec::new();
     }
-    let seen = |index: usize| found.judged.iter().any(|j| j.fit.version.members.iter().any(|m| m.index == index));
+    let seen =
+        |index: usize| found.judged.iter().any(|j| j.fit.version.members.iter().any(|m| m.index == index));
     let open = candidates.iter().enumerate().filter(|(i, _)| !seen(*i));
     open.map(|(_, c)| c.name().to_owned()).collect()
 }
@@ -139,7 +141,7 @@ pub(super) fn warnings(laboratory: &Laboratory<'_>, found: &Found<'_>, decision:
     }
     let n = laboratory.rows.train.len().max(1) as f64;
     let ratio = found.base.residual().norm_squared() / n;
-    if decision.verdict == Verdict::NoGap && (ratio > 1.5 || ratio < 0.5) {
+    if decision.verdict == Verdict::NoGap && !(0.5..=1.5).contains(&ratio) {
         list.push(format!(
             "the residuals of the model as it is are white, but their variance is {ratio:.2} times that of the stated noise: \
              check the noise"

@@ -107,7 +107,7 @@ fn judged(base: Result, found: &Explanation, draw: &Draw, world: &World<'_>, noi
     let named: Vec<String> = sets.map(|set| set.join(" + ")).collect();
     let mut result = Result {
         outcome: Outcome::of(found, &base.case.accepted),
-        named: named.join(" | "),
+        named: if found.effects.is_empty() { found.headline.clone() } else { named.join(" | ") },
         replaced: found.replaced.len(),
         runs: found.runs,
         false_alarm: found.false_alarm.rate,

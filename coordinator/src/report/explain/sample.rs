@@ -136,6 +136,11 @@ fn remaining() -> Remaining {
     Remaining {
         rmse_over_noise: 1.06,
         whiteness_p: 0.000_04,
+        inflation: 3.2,
+        form_gain: 4.1,
+        form_gain_held_out: 0.6,
+        form_share: 0.1,
+        form_power: 340.0,
         shape: "What remains is a ripple of 0.9 mmHg at 7 1/s.".into(),
     }
 }

@@ -1,0 +1,53 @@
+//! The courses of a model's states, outputs and inputs along the records.
+//!
+//! Next file to read: [`super::laboratory`].
+
+use std::sync::Arc;
+
+use starlings_models::Window;
+
+use super::ExplainError;
+use super::laboratory::{Laboratory, Point};
+use super::locate::Track;
+
+impl Laboratory<'_> {
+    /// The course of every scalar state and output of a version, and of its inputs, at the times of the records.
+    ///
+    /// # Errors
+    /// As [`Laboratory::run`]; a model that fails at this point gives no tracks.
+    pub fn tracks(&mut self, point: &Point<'_>) -> Result<Vec<Track>, ExplainError> {
+        let spec = &point.study.spec;
+        let mut seen = point.study.clone();
+        let scalar = spec.outputs.iter().chain(&spec.states).filter(|q| q.size == 1);
+        let mut names: Vec<(String, String)> = Vec::new();
+        for quantity in scalar {
+            if !names.iter().any(|(name, _)| *name == quantity.name) {
+                names.push((quantity.name.clone(), quantity.unit.clone()));
+            }
+        }
+        seen.setup.outputs = names.iter().map(|(name, _)| name.clone()).collect();
+        let n_obs = names.len();
+        let windows = self.windows.clone();
+        for window in &mut self.windows {
+            let observed = vec![f64::NAN; n_obs * window.times.len()];
+            *window = Arc::new(Window { observed, ..Window::clone(window) });
+        }
+        let runs = self.outputs(&[Point { study: &seen, theta: point.theta.clone() }]);
+        self.windows = windows;
+        let mut tracks = Vec::new();
+        let Ok(runs) = runs?.into_iter().collect::<Result<Vec<_>, String>>() else { return Ok(tracks) };
+        for (i, (name, unit)) in names.into_iter().enumerate() {
+            let values = runs.iter().map(|y| y.iter().skip(i).step_by(n_obs).copied().collect()).collect();
+            tracks.push(Track { name, unit, values });
+        }
+        for (i, input) in spec.inputs.iter().enumerate() {
+            let course =
+                |window: &Arc<Window>| window.times.iter().map(|t| window.inputs[i].at(*t)).collect();
+            let values = self.windows.iter().map(course).collect();
+            if !tracks.iter().any(|t| t.name == input.name) {
+                tracks.push(Track { name: input.name.clone(), unit: input.unit.clone(), values });
+            }
+        }
+        Ok(tracks)
+    }
+}

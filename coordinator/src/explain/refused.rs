@@ -1,0 +1,83 @@
+//! Why the others were refused, in words with numbers.
+//!
+//! Nothing is decided here: the gates and the verdict have spoken. Next file to read: [`super::judge`].
+
+use super::candidate::Candidate;
+use super::judge::Misfit;
+use super::result::Rejected;
+use super::screen::Hit;
+use super::search::Found;
+use super::verdict::Decision;
+
+/// What was refused, with reasons: refitted versions first, then candidates that failed, have no influence of their own, or
+/// would need the wrong sign.
+pub(super) fn rejected(found: &Found<'_>, candidates: &[Candidate], decision: &Decision) -> Vec<Rejected> {
+    let mut list = Vec::new();
+    let keep: Vec<usize> = decision.best.iter().copied().chain(decision.rivals.clone()).collect();
+    for (i, judged) in found.judged.iter().enumerate().filter(|(i, _)| !keep.contains(i)) {
+        let (gate, reason) = match &judged.refusal {
+            Some(refusal) => (refusal.gate.to_owned(), refusal.reason.clone()),
+            None => ("evidence".to_owned(), behind(found, decision, i)),
+        };
+        list.push(Rejected { name: judged.fit.version.name(), gate, reason });
+    }
+    for (index, candidate) in candidates.iter().enumerate() {
+        let of = || found.hits.iter().filter(|h| h.candidate == index);
+        let name = candidate.name().to_owned();
+        if let Some(reason) =
+            of().find_map(|h| h.failure.clone()).filter(|_| of().all(|h| h.failure.is_some()))
+        {
+            list.push(Rejected { name, gate: "failed".to_owned(), reason });
+        } else if of().count() > 0 && of().all(Hit::is_absorbed) {
+            let reason =
+                "the model's parameters imitate it: it cannot be told from them, which does not mean absent";
+            list.push(Rejected { name, gate: "absorbed".to_owned(), reason: reason.to_owned() });
+        } else if let Some(hit) = wrong_sign(found, index, candidate) {
+            let parameter = &candidate.def.parameters[0];
+            let reason = format!(
+                "{} would have to be {:.4} ± {:.4} {}, a sign that physics does not allow",
+                parameter.name, hit.score.amplitude, hit.score.sd, parameter.unit
+            );
+            list.push(Rejected { name, gate: "sign".to_owned(), reason });
+        }
+    }
+    list
+}
+
+/// A candidate that would gain more than chance, were it not for its sign at every point of its grid.
+fn wrong_sign<'f>(found: &'f Found<'_>, index: usize, candidate: &Candidate) -> Option<&'f Hit> {
+    let of = || found.hits.iter().filter(|h| h.candidate == index && h.failure.is_none());
+    let never = of().all(|h| h.allowed_gain(candidate.sign()) <= 0.0);
+    of().filter(|h| never && h.score.gain > found.background.threshold)
+        .max_by(|a, b| a.score.gain.total_cmp(&b.score.gain))
+}
+
+/// Why a version that passes the gates is not the answer.
+fn behind(found: &Found<'_>, decision: &Decision, i: usize) -> String {
+    let Some(best) = decision.best.map(|b| &found.judged[b]) else { return String::new() };
+    let judged = &found.judged[i];
+    let name = best.fit.version.name();
+    if judged.fit.version.members.len() > best.fit.version.members.len() {
+        let of = |share: fn(&Misfit) -> f64| {
+            let (whole, part) = (share(&judged.misfit), share(&best.misfit));
+            100.0 * (part - whole) / (share(&found.before) - whole).max(f64::MIN_POSITIVE)
+        };
+        let held_out = if judged.misfit.n_held_out > 0 {
+            format!(" and {:.1} % on the held-out span", of(|m| m.held_out))
+        } else {
+            String::new()
+        };
+        return format!(
+            "beyond `{name}` it takes away {:.1} % of the gap on the training data{held_out}: a further effect must carry a tenth \
+             of both",
+            of(|m| m.train)
+        );
+    }
+    format!(
+        "it takes away {:.0} % of the gap, `{name}` {:.0} %; {:.1} in χ² lie between them, all data together, in units of the \
+         effective noise",
+        100.0 * judged.share,
+        100.0 * best.share,
+        (best.rank() - judged.rank()) / best.inflation
+    )
+}
