@@ -2,7 +2,11 @@
 //!
 //! `cargo bench --bench fleet -- [--json] [--quick]`. The program starts itself as worker and as the plain TCP echo that is
 //! the floor of the same run. No statistics framework: a cycle is a barrier over three processes, not a function call.
+//! Next file to read: `fleet/screening.rs`, for batches of many setups.
 #![allow(clippy::print_stdout, missing_docs)]
+
+#[path = "fleet/screening.rs"]
+mod screening;
 
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
@@ -10,6 +14,7 @@ use std::process::{Child, Command};
 use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 
+use screening::Screening;
 use starlings_coordinator::fleet::{
     Fleet, FleetConfig, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers, SetupId,
 };
@@ -29,6 +34,9 @@ const FLOATS: usize = 14;
 const BUSY: Duration = Duration::from_millis(10);
 
 const WORKERS: usize = 2;
+
+/// Screenings measured; all their setups together fit into a worker's cache.
+const SCREENINGS: usize = 10;
 
 fn main() -> Result<(), Failure> {
     let args = std::env::args().skip(1).collect::<Vec<_>>();
@@ -54,7 +62,9 @@ struct Figures {
     cycle_p50_ms: f64,
     cycle_p99_ms: f64,
     bag_jobs_per_s: f64,
+    /// Number of jobs × 10 ms over (workers × wall time of the batch).
     efficiency_10ms: f64,
+    screening: Screening,
     raw_tcp_cycle_p50_ms: f64,
 }
 
@@ -64,11 +74,16 @@ impl Figures {
     }
 
     fn json(&self) -> String {
-        let Self { cycle_p50_ms, cycle_p99_ms, bag_jobs_per_s, efficiency_10ms, raw_tcp_cycle_p50_ms } = self;
+        let Self {
+            cycle_p50_ms, cycle_p99_ms, bag_jobs_per_s, efficiency_10ms, raw_tcp_cycle_p50_ms, ..
+        } = self;
+        let Screening { cold, warm, run_ms, build_ms } = &self.screening;
         let ratio = self.ratio();
         format!(
             "{{\"cycle_p50_ms\":{cycle_p50_ms:.4},\"cycle_p99_ms\":{cycle_p99_ms:.4},\"bag_jobs_per_s\":{bag_jobs_per_s:.0},\
-             \"efficiency_10ms\":{efficiency_10ms:.4},\"raw_tcp_cycle_p50_ms\":{raw_tcp_cycle_p50_ms:.4},\
+             \"efficiency_10ms\":{efficiency_10ms:.4},\"efficiency_screening_cold\":{cold:.4},\
+             \"efficiency_screening_warm\":{warm:.4},\"screening_run_ms\":{run_ms:.3},\
+             \"screening_build_ms\":{build_ms:.4},\"raw_tcp_cycle_p50_ms\":{raw_tcp_cycle_p50_ms:.4},\
              \"ratio\":{ratio:.2},\"workers\":{WORKERS},\"particles\":{PARTICLES}}}"
         )
     }
@@ -78,13 +93,19 @@ impl Figures {
             "cycle of {PARTICLES} no-op jobs, {WORKERS} workers   p50 {:.3} ms   p99 {:.3} ms\n\
              the same bytes over plain TCP        p50 {:.3} ms   ratio {:.1}\n\
              bag of no-op jobs                    {:.0} jobs/s\n\
-             busy jobs of 10 ms                   {:.1} % efficiency\n",
+             busy jobs of 10 ms                   {:.1} % efficiency\n\
+             screening of {} setups               {:.1} % cold, {:.1} % warm, {:.2} ms a run, {:.3} ms to build one\n",
             self.cycle_p50_ms,
             self.cycle_p99_ms,
             self.raw_tcp_cycle_p50_ms,
             self.ratio(),
             self.bag_jobs_per_s,
             100.0 * self.efficiency_10ms,
+            screening::SETUPS,
+            100.0 * self.screening.cold,
+            100.0 * self.screening.warm,
+            self.screening.run_ms,
+            self.screening.build_ms,
         )
     }
 }
@@ -119,6 +140,7 @@ fn measure(divisor: usize) -> Result<Figures, Failure> {
     let bag = run(&mut fleet, noop, n_bag)?;
     let n_busy = 1000 / divisor;
     let wall = run(&mut fleet, busy, n_busy)?;
+    let screening = screening::measure(&mut fleet, (SCREENINGS / divisor).max(1))?;
     drop(workers);
     fleet.close();
     Ok(Figures {
@@ -126,6 +148,7 @@ fn measure(divisor: usize) -> Result<Figures, Failure> {
         cycle_p99_ms: 1e3 * quantile(&cycles, 0.99),
         bag_jobs_per_s: n_bag as f64 / bag.as_secs_f64(),
         efficiency_10ms: n_busy as f64 * BUSY.as_secs_f64() / (WORKERS as f64 * wall.as_secs_f64()),
+        screening,
         raw_tcp_cycle_p50_ms: 1e3 * raw_tcp(2000 / divisor)?,
     })
 }
@@ -187,6 +210,7 @@ fn build(setup: &Setup) -> Result<Box<dyn Forward>, SetupError> {
     let spin = match setup.model.kind.as_str() {
         "bench-noop" => Duration::ZERO,
         "bench-busy" => BUSY,
+        "equations" => return setup.build(),
         other => return Err(SetupError::Invalid(format!("no benchmark named {other}"))),
     };
     let spec = Spec {

@@ -1,6 +1,6 @@
 //! `starlings explain`: where simulation and recordings disagree, which effect is missing, the gap before and after.
 //!
-//! Next files to read: [`print`] for the answer on a terminal, [`crate::crew`] for the fleet.
+//! Next files to read: [`mod@print`] for the answer on a terminal, [`crate::crew`] for the fleet.
 
 mod print;
 
@@ -54,6 +54,9 @@ pub(crate) struct Args {
     /// Go on although the fit of the model as it is has not converged.
     #[arg(long)]
     force: bool,
+    /// Measure the false-alarm rate: search N recordings simulated from the fitted model, in which nothing is missing.
+    #[arg(long = "null", value_name = "N", default_value_t = 0)]
+    nulls: usize,
     /// Print the explanation as JSON on standard output and nothing else.
     #[arg(long)]
     json: bool,
@@ -70,6 +73,7 @@ impl Args {
         }
         options.max_effects = self.max_effects.map_or(options.max_effects, usize::from);
         options.force = self.force;
+        options.nulls = self.nulls;
         options
     }
 }

@@ -11,9 +11,9 @@ use serde_json::Value;
 
 /// A study of a driven oscillator whose recording is never read further than to check it.
 fn study(dir: &Path, explain: &str) -> std::path::PathBuf {
-    let rows: String =
-        (0..20).map(|i| format!("{},{}\n", f64::from(i) * 0.1, (f64::from(i) * 0.3).sin())).collect();
-    std::fs::write(dir.join("data.csv"), format!("time,x\n{rows}")).unwrap();
+    let row = |i: i32| format!("{},{}\n", f64::from(i) * 0.1, (f64::from(i) * 0.3).sin());
+    let rows: Vec<String> = (0..20).map(row).collect();
+    std::fs::write(dir.join("data.csv"), format!("time,x\n{}", rows.concat())).unwrap();
     let text = format!(
         r#"
 [study]

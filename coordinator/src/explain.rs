@@ -19,6 +19,7 @@ pub mod keep;
 pub mod laboratory;
 pub mod locate;
 mod memory;
+mod null;
 pub mod options;
 pub mod patch;
 mod probe;

@@ -5,7 +5,9 @@ mod study_kit;
 
 use std::path::Path;
 
-use starlings_coordinator::explain::{Context, ExplainError, Explanation, Findings, Options, Verdict, explain};
+use starlings_coordinator::explain::{
+    Context, ExplainError, Explanation, Findings, Options, Verdict, explain,
+};
 use starlings_coordinator::fleet::{Fleet, InProcess};
 use starlings_coordinator::study::Study;
 use starlings_coordinator::study::store::Store;
@@ -79,9 +81,14 @@ fn recording(study: &str, effects: &[(&str, f64)], values: &[(&str, f64)], seed:
     let times = grid(300, 0.05);
     let blank = csv("time,position", &[&times, &vec![0.0; times.len()]]);
     let case = Case::new(study, &[("free.csv", blank)]);
-    let named = |list: &[(&str, f64)]| list.iter().map(|(name, v)| ((*name).to_owned(), *v)).collect::<Vec<_>>();
+    let named =
+        |list: &[(&str, f64)]| list.iter().map(|(name, v)| ((*name).to_owned(), *v)).collect::<Vec<_>>();
     let twin = Twin {
-        values: [&[("k".to_owned(), 10.0), ("c".to_owned(), 0.15), ("initial:x".to_owned(), 1.1)], &named(values)[..]].concat(),
+        values: [
+            &[("k".to_owned(), 10.0), ("c".to_owned(), 0.15), ("initial:x".to_owned(), 1.1)],
+            &named(values)[..],
+        ]
+        .concat(),
         effects: named(effects),
         noise: 0.01,
         seed,
@@ -95,14 +102,16 @@ fn go(case: &Case, path: &Path, fleet: &mut dyn Fleet, options: &Options) -> Res
     let study: Study = case.study();
     std::fs::create_dir_all(path).unwrap();
     let database = path.join("run.db");
-    let store = if database.exists() { Store::open(&database) } else { Store::create(&database, &[]) }.unwrap();
+    let store =
+        if database.exists() { Store::open(&database) } else { Store::create(&database, &[]) }.unwrap();
     let mut context = Context { clock: &|| 0.0, watch: &mut |_| {}, events: None, earlier_s: 0.0 };
     explain(&study, fleet, &store, &mut context, options)
 }
 
 fn explained(study: &str, data: String) -> Findings {
     let case = Case::new(study, &[("free.csv", data)]);
-    go(&case, &case.fresh(), &mut InProcess::new(2), &Options::default()).unwrap_or_else(|error| panic!("{error}"))
+    go(&case, &case.fresh(), &mut InProcess::new(2), &Options::default())
+        .unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn sets(found: &Explanation) -> Vec<Vec<String>> {
@@ -113,7 +122,7 @@ fn sets(found: &Explanation) -> Vec<Vec<String>> {
 /// A recording with a cubic spring in it.
 fn cubic() -> (String, String) {
     let study = study("", "");
-    let data = recording(&study, &[("cubic-stiffness", 2.0)], &[], 1);
+    let data = recording(&study, &[("cubic-stiffness", 2.0)], &[], 5);
     (study, data)
 }
 
@@ -199,7 +208,11 @@ fn a_budget_ends_the_search_and_says_what_was_left_untried() {
     let options = Options { budget: Some(full.runs / 2), ..Options::default() };
     let cut = go(&case, &case.fresh(), &mut InProcess::new(2), &options).unwrap().explanation;
     assert!(cut.runs <= full.runs / 2, "{} of {}", cut.runs, full.runs / 2);
-    assert!(!cut.untried.is_empty() && cut.warnings.iter().any(|w| w.contains("budget")), "{:?}", cut.warnings);
+    assert!(
+        !cut.untried.is_empty() && cut.warnings.iter().any(|w| w.contains("budget")),
+        "{:?}",
+        cut.warnings
+    );
     let options = Options { budget: Some(3), ..Options::default() };
     let error = go(&case, &case.fresh(), &mut InProcess::new(2), &options).unwrap_err();
     assert!(matches!(error, ExplainError::Budget { budget: 3, stage: "fit", .. }), "{error}");
@@ -219,7 +232,10 @@ fn a_candidate_whose_runs_all_fail_is_refused_with_the_reason() {
 #[test]
 fn a_term_of_the_model_is_swapped_where_only_a_replacement_is_right() {
     // The truth has dry friction and no viscous one; the model's viscous term may be replaced.
-    let text = study("replaceable = [\"viscous\"]", "only = [\"coulomb-friction\", \"cubic-stiffness\", \"quadratic-drag\"]");
+    let text = study(
+        "replaceable = [\"viscous\"]",
+        "only = [\"coulomb-friction\", \"cubic-stiffness\", \"quadratic-drag\"]",
+    );
     let data = recording(&text, &[("coulomb-friction", 0.35)], &[("c", 1e-6)], 5);
     let found = explained(&text, data).explanation;
     assert!(sets(&found).contains(&vec!["coulomb-friction".to_owned()]), "{}", found.headline);
@@ -230,7 +246,7 @@ fn a_term_of_the_model_is_swapped_where_only_a_replacement_is_right() {
 #[test]
 fn two_missing_effects_are_found_as_a_pair() {
     let text = study("", "only = [\"coulomb-friction\", \"cubic-stiffness\", \"quadratic-stiffness\"]");
-    let data = recording(&text, &[("coulomb-friction", 0.2), ("quadratic-stiffness", 3.0)], &[], 6);
+    let data = recording(&text, &[("coulomb-friction", 0.2), ("quadratic-stiffness", 0.8)], &[], 6);
     let found = explained(&text, data).explanation;
     let mut names: Vec<&str> = found.effects.iter().map(|e| e.name.as_str()).collect();
     names.sort_unstable();
@@ -240,7 +256,7 @@ fn two_missing_effects_are_found_as_a_pair() {
 #[test]
 fn a_tie_lists_its_class_and_proposes_an_experiment() {
     // Two names for nearly the same push: the data of a decaying swing cannot tell them apart.
-    let twin = "\n[[effects]]\nname = \"breeze\"\nsays = \"A wind a little weaker.\"\nadds = [ { to = \"v\", term = \"-w_breeze*(v + 0.48)*abs(v + 0.48)\" } ]\nparameters = [ { name = \"w_breeze\", unit = \"1/m\", range = [0, 10] } ]\n";
+    let twin = "\n[[effects]]\nname = \"breeze\"\nsays = \"A wind a little weaker.\"\nadds = [ { to = \"v\", term = \"-w_breeze*(v + 0.499)*abs(v + 0.499)\" } ]\nparameters = [ { name = \"w_breeze\", unit = \"1/m\", range = [0, 10] } ]\n";
     let text = study("", "only = [\"wind\", \"breeze\", \"cubic-stiffness\"]") + twin;
     let data = recording(&text, &[("wind", 0.6)], &[], 7);
     let found = explained(&text, data).explanation;
@@ -248,7 +264,10 @@ fn a_tie_lists_its_class_and_proposes_an_experiment() {
     let all: Vec<String> = sets(&found).concat();
     assert!(all.contains(&"wind".to_owned()) && all.contains(&"breeze".to_owned()), "{all:?}");
     let experiment = found.experiment.unwrap();
-    assert!(experiment.separation > experiment.separation_now && !experiment.says.is_empty(), "{experiment:?}");
+    assert!(
+        experiment.separation > experiment.separation_now && !experiment.says.is_empty(),
+        "{experiment:?}"
+    );
 }
 
 #[test]
@@ -259,4 +278,16 @@ fn a_baseline_that_cannot_run_is_told() {
     let case = Case::new(&text, &[("free.csv", data)]);
     let error = go(&case, &case.fresh(), &mut InProcess::new(1), &Options::default()).unwrap_err();
     assert!(matches!(error, ExplainError::Baseline(_)) && error.is_input(), "{error}");
+}
+
+#[test]
+fn the_false_alarm_rate_is_measured_on_recordings_without_a_gap() {
+    let (text, data) = cubic();
+    let case = Case::new(&text, &[("free.csv", data)]);
+    let options = Options { nulls: 6, ..Options::default() };
+    let found = go(&case, &case.fresh(), &mut InProcess::new(2), &options).unwrap().explanation;
+    let nulls = found.false_alarm.nulls.unwrap();
+    // The search names at half a percent by chance: six recordings without a name are nearly certain.
+    assert_eq!((nulls.names, nulls.of), (0, 6));
+    assert!(nulls.upper95 > 0.3 && nulls.runs > 0 && found.runs > nulls.runs, "{nulls:?}");
 }

@@ -41,7 +41,8 @@ fn null(study: &Study, fitted: &Explanation, folder: &Path, seed: u64) -> Study 
         for (i, t) in made.times.iter().enumerate() {
             let noise: f64 = StandardNormal.sample(&mut random);
             let flow = record.inputs[0].at(*t);
-            writeln!(text, "{t:?},{:?},{flow:?}", made.values[0][i] + record.channels[0].noise * noise).unwrap();
+            writeln!(text, "{t:?},{:?},{flow:?}", made.values[0][i] + record.channels[0].noise * noise)
+                .unwrap();
         }
         std::fs::create_dir_all(folder.join("data")).unwrap();
         std::fs::write(folder.join(format!("data/{}.csv", record.name)), text).unwrap();

@@ -5,7 +5,13 @@
 //! end. Deliberately in scaled parameters z of the caller's choice, with an independent Gaussian prior and bounds on each.
 //! Read next: `score.rs`, which asks what another parameter would add at the end of a fit.
 
+mod need;
+#[cfg(test)]
+mod tests;
+
 use nalgebra::{DMatrix, DVector};
+
+pub use need::{End, Need, Scaled};
 
 /// Damping after the first rejected step.
 const REJECTED_DAMPING: f64 = 1e-2;
@@ -13,43 +19,6 @@ const REJECTED_DAMPING: f64 = 1e-2;
 const STUBBORN: usize = 8;
 /// Longest step of one component, in units of z.
 const LONGEST: f64 = 3.0;
-
-/// What is known of z before the data: an independent Gaussian and bounds.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Scaled {
-    /// Prior means, length p.
-    pub mean: DVector<f64>,
-    /// Prior precisions (1 / variance), length p; zero is no prior.
-    pub precision: DVector<f64>,
-    /// Smallest and largest value of each, length p.
-    pub bounds: Vec<[f64; 2]>,
-}
-
-/// The run, or runs, that a fit needs next.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Need {
-    /// The whitened residual (observed - predicted) / noise at this point.
-    Residual(DVector<f64>),
-    /// The whitened Jacobian d prediction / d z at this point, m x p.
-    Jacobian(DVector<f64>),
-    /// Nothing: the fit has ended.
-    Nothing(End),
-}
-
-/// How a fit ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum End {
-    /// No step promises a fall of the cost above the tolerance; the Jacobian is of this point.
-    Converged,
-    /// As far as the secant tells; the Jacobian was not measured again.
-    Tentative,
-    /// No step lowers the cost although the Jacobian is of this point.
-    Stalled,
-    /// The limit of trials was reached.
-    Limit,
-    /// The first run failed.
-    NoStart,
-}
 
 /// A fit under way.
 #[derive(Debug, Clone)]
@@ -317,125 +286,5 @@ impl LeastSquares {
     fn cost_of(&self, z: &DVector<f64>, residual: &DVector<f64>) -> f64 {
         let pull = z - &self.prior.mean;
         residual.norm_squared() + pull.component_mul(&pull).dot(&self.prior.precision)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// y = a exp(-b t), observed without noise at a = 2, b = 0.7.
-    fn residual(z: &DVector<f64>) -> DVector<f64> {
-        DVector::from_fn(20, |i, _| {
-            let t = 0.2 * i as f64;
-            (2.0 * (-0.7 * t).exp() - z[0] * (-z[1] * t).exp()) / 0.01
-        })
-    }
-
-    fn jacobian(z: &DVector<f64>) -> DMatrix<f64> {
-        DMatrix::from_fn(20, 2, |i, j| {
-            let t = 0.2 * i as f64;
-            let e = (-z[1] * t).exp() / 0.01;
-            if j == 0 { e } else { -z[0] * t * e }
-        })
-    }
-
-    fn flat(p: usize) -> Scaled {
-        let bounds = vec![[f64::NEG_INFINITY, f64::INFINITY]; p];
-        Scaled { mean: DVector::zeros(p), precision: DVector::zeros(p), bounds }
-    }
-
-    fn drive(fit: &mut LeastSquares) -> (End, usize, usize) {
-        let (mut runs, mut jacobians) = (0, 0);
-        loop {
-            match fit.need().clone() {
-                Need::Residual(z) => {
-                    runs += 1;
-                    fit.give_residual(Some(residual(&z)));
-                }
-                Need::Jacobian(z) => {
-                    jacobians += 1;
-                    fit.give_jacobian(Some(jacobian(&z)));
-                }
-                Need::Nothing(end) => return (end, runs, jacobians),
-            }
-        }
-    }
-
-    #[test]
-    fn an_exponential_is_found_with_few_jacobians() {
-        let mut fit = LeastSquares::new(DVector::from_vec(vec![1.0, 0.2]), flat(2), 1e-6, 50);
-        let (end, runs, jacobians) = drive(&mut fit);
-        assert_eq!(end, End::Converged);
-        // The secant ends within 1e-3 noise sd of the truth, so both parameters are right to about 1e-5.
-        assert!(
-            (fit.best().0[0] - 2.0).abs() < 1e-4 && (fit.best().0[1] - 0.7).abs() < 1e-4,
-            "{:?}",
-            fit.best().0
-        );
-        assert!(jacobians <= 4 && runs <= 20, "{runs} runs, {jacobians} Jacobians");
-    }
-
-    #[test]
-    fn a_bound_holds_and_the_fit_ends_there() {
-        let mut prior = flat(2);
-        prior.bounds[1] = [0.0, 0.5];
-        let mut fit = LeastSquares::new(DVector::from_vec(vec![1.0, 0.2]), prior, 1e-6, 50);
-        assert_eq!(drive(&mut fit).0, End::Converged);
-        assert!((fit.best().0[1] - 0.5).abs() < 1e-12, "{:?}", fit.best().0);
-    }
-
-    #[test]
-    fn a_failed_run_is_a_rejected_step() {
-        let mut fit = LeastSquares::new(DVector::from_vec(vec![1.0, 0.2]), flat(2), 1e-6, 50);
-        fit.give_residual(Some(residual(&DVector::from_vec(vec![1.0, 0.2]))));
-        fit.give_jacobian(Some(jacobian(&DVector::from_vec(vec![1.0, 0.2]))));
-        fit.give_residual(None);
-        assert_eq!(drive(&mut fit).0, End::Converged);
-    }
-
-    #[test]
-    fn a_known_start_costs_one_run_per_step_and_no_jacobian() {
-        let z = DVector::from_vec(vec![1.9, 0.65]);
-        let mut fit = LeastSquares::from_known(z.clone(), residual(&z), jacobian(&z), flat(2), 0.1, 20);
-        let (end, runs, jacobians) = drive(&mut fit);
-        assert_eq!((end, jacobians), (End::Tentative, 0));
-        assert!(runs <= 6 && fit.cost() < 1.0, "{runs} runs, cost {}", fit.cost());
-        fit.polish(10);
-        assert_eq!(drive(&mut fit).0, End::Converged);
-    }
-
-    #[test]
-    fn steps_that_overshoot_are_shortened_until_one_helps() {
-        // Gauss-Newton diverges on the arctangent from here, and the secant across it overshoots too.
-        let mut fit = LeastSquares::new(DVector::from_element(1, 0.5), flat(1), 1e-9, 50);
-        let end = loop {
-            match fit.need().clone() {
-                Need::Residual(z) => fit.give_residual(Some(z.map(|z| -100.0 * (20.0 * z).atan()))),
-                Need::Jacobian(z) => {
-                    let slope = 2000.0 / (1.0 + (20.0 * z[0]).powi(2));
-                    fit.give_jacobian(Some(DMatrix::from_element(1, 1, slope)));
-                }
-                Need::Nothing(end) => break end,
-            }
-        };
-        assert_eq!(end, End::Converged, "at {}, cost {}", fit.best().0[0], fit.cost());
-        // A cost of 1e-9 at a slope of 2000 per unit is 2e-8.
-        assert!(fit.best().0[0].abs() < 1e-7, "{}", fit.best().0[0]);
-    }
-
-    #[test]
-    fn a_prior_pulls_as_its_precision_says() {
-        // One datum at 1 with noise 1, prior 0 with sd 1: the mode is 1/2.
-        let prior = Scaled { precision: DVector::from_element(1, 1.0), ..flat(1) };
-        let mut fit = LeastSquares::new(DVector::zeros(1), prior, 1e-12, 20);
-        loop {
-            match fit.need().clone() {
-                Need::Residual(z) => fit.give_residual(Some(DVector::from_element(1, 1.0 - z[0]))),
-                Need::Jacobian(_) => fit.give_jacobian(Some(DMatrix::from_element(1, 1, 1.0))),
-                Need::Nothing(_) => break,
-            }
-        }
-        assert!((fit.best().0[0] - 0.5).abs() < 1e-9);
     }
 }

@@ -167,7 +167,10 @@ mod tests {
         let none = DVector::zeros(2);
         let fit = Optimum::new(&line(n, |t| (9.0 * t).sin()), &jacobian, &none, &none).expect("well posed");
         let score = fit.score(&line(n, |t| 2.0 - 5.0 * t));
-        assert!(score.identifiable < 1e-12 && fit.score(&line(n, |t| t * t)).identifiable > 1e-3, "{score:?}");
+        assert!(
+            score.identifiable < 1e-12 && fit.score(&line(n, |t| t * t)).identifiable > 1e-3,
+            "{score:?}"
+        );
     }
 
     #[test]
@@ -178,7 +181,8 @@ mod tests {
         let precision = DVector::from_element(1, 100.0);
         let estimate = 50.0 / 150.0;
         let residual = line(n, |_| 1.0 - estimate);
-        let fit = Optimum::new(&residual, &one, &precision, &DVector::from_element(1, -estimate)).expect("posed");
+        let fit =
+            Optimum::new(&residual, &one, &precision, &DVector::from_element(1, -estimate)).expect("posed");
         let score = fit.score(&line(n, |_| 1.0));
         // With it the constant returns to its prior mean and the amplitude is 1: the whole cost is won.
         let cost = residual.norm_squared() + 100.0 * estimate * estimate;

@@ -151,6 +151,14 @@ fn rest(found: &Explanation) -> Result<(), Failure> {
             alarm.how
         ))?;
     }
+    if let Some(nulls) = &alarm.nulls {
+        line(format_args!(
+            "measured: {} of {} simulated recordings without a gap got a name (at most {} with 95 % confidence)",
+            nulls.names,
+            nulls.of,
+            percent(nulls.upper95)
+        ))?;
+    }
     list("\nnot tried for want of budget", found.untried.iter().cloned(), FEW)?;
     let stages: Vec<String> =
         found.runs_by_stage.iter().map(|(stage, runs)| format!("{stage} {runs}")).collect();

@@ -96,14 +96,15 @@ fn take(
         Err(status) => return Err(Ended::Lost(format!("the connection broke: {}", status_text(&status)))),
     };
     match ToWorker::decode(message) {
-        Ok(ToWorker::Job { lease, setup, job }) => match setups.get(&setup) {
-            Some(forward) => slots.push(Task { lease, forward, job, outbox: outbox.clone() }),
-            None => {
+        Ok(ToWorker::Job { lease, setup, job }) => {
+            if let Some(forward) = setups.get(&setup) {
+                slots.push(Task { lease, forward, job, outbox: outbox.clone() });
+            } else {
                 // First the setup, so that the job that comes back finds it missing here.
                 send(outbox, FromWorker::Setup { id: setup, result: Err("it is forgotten".to_owned()) });
                 answer(outbox, lease, Answer::Withdrawn, 0.0);
             }
-        },
+        }
         Err(WireError::Job { lease, source }) => refuse(outbox, lease, source.to_string()),
         Ok(ToWorker::Setup { id, setup }) => {
             let outbox = outbox.clone();

@@ -186,13 +186,7 @@ pub(super) fn remaining(
 pub(super) fn false_alarm(found: &Found<'_>, best_gain: f64) -> FalseAlarm {
     let n = found.background.maxima.len() as f64;
     let rate = found.background.exceeding();
-    // Wilson (1927), upper end.
-    let z2 = Z95 * Z95;
-    let upper = if n > 0.0 {
-        (rate + z2 / (2.0 * n) + Z95 * ((rate * (1.0 - rate) + z2 / (4.0 * n)) / n).sqrt()) / (1.0 + z2 / n)
-    } else {
-        1.0
-    };
+    let upper = wilson_upper(rate, n);
     FalseAlarm {
         rate,
         upper95: upper,
@@ -203,6 +197,17 @@ pub(super) fn false_alarm(found: &Found<'_>, best_gain: f64) -> FalseAlarm {
         runs: found.background.maxima.len() as u64,
         threshold: found.background.threshold,
         decoys: found.background.decoys_above(best_gain),
+        nulls: None,
+    }
+}
+
+/// Upper end of the 95 % interval of a rate seen in n trials (Wilson 1927); 1 without any.
+pub(super) fn wilson_upper(rate: f64, n: f64) -> f64 {
+    let z2 = Z95 * Z95;
+    if n > 0.0 {
+        (rate + z2 / (2.0 * n) + Z95 * ((rate * (1.0 - rate) + z2 / (4.0 * n)) / n).sqrt()) / (1.0 + z2 / n)
+    } else {
+        1.0
     }
 }
 

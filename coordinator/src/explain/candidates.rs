@@ -32,7 +32,7 @@ pub fn candidates(study: &Study, options: &Options) -> Result<Vec<EffectDef>, Ex
     let mut kept: Vec<EffectDef> = Vec::new();
     for effect in &all {
         let wanted = options.only.is_empty() || options.only.contains(&effect.name);
-        let repeated = kept.iter().any(|known| known.name == effect.name);
+        let repeated = kept.iter().any(|known| known.name == effect.name || known.adds == effect.adds);
         if wanted && !options.without.contains(&effect.name) && !in_model(effect) && !repeated {
             kept.push((*effect).clone());
         }

@@ -98,7 +98,9 @@ pub fn leftover(
         let gain_held_out = held.iter().map(fall).sum::<f64>() / noise;
         let wanted = AGAIN * gain * held.len() as f64 / rows.train.len().max(1) as f64;
         let above = |e: &DVector<f64>| e.norm_squared() - floor;
-        let share = 1.0 - above(&residual) / above(optimum.residual()).max(f64::MIN_POSITIVE);
+        // Where nothing stands above the noise there is nothing to share out, and the quotient has no size.
+        let share =
+            (1.0 - above(&residual) / above(optimum.residual()).max(f64::MIN_POSITIVE)).clamp(-1.0, 1.0);
         let is_systematic = gain > FIRST + FURTHER * (n_column - 1) as f64
             && (held.is_empty() || gain_held_out > wanted)
             && share > RESOLVED;

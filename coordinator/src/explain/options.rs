@@ -25,11 +25,13 @@ pub struct Options {
     pub force: bool,
     /// Effects at most in one explanation.
     pub max_effects: usize,
+    /// Simulated recordings without a gap on which the whole search measures its false alarms.
+    pub nulls: usize,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { budget: None, without: Vec::new(), only: Vec::new(), force: false, max_effects: 2 }
+        Self { budget: None, without: Vec::new(), only: Vec::new(), force: false, max_effects: 2, nulls: 0 }
     }
 }
 
@@ -51,7 +53,7 @@ impl Options {
 /// Where an explanation stands.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Stage {
-    /// `fit`, `locate`, `screen`, `refit`, `gates`, `verdict`, `add` or `show`.
+    /// `fit`, `locate`, `screen`, `refit`, `gates`, `verdict`, `add`, `show` or `null`.
     pub name: &'static str,
     /// What is being done, in a few words.
     pub says: String,

@@ -144,7 +144,8 @@ pub struct Screened {
     pub amplitude: f64,
     /// Part of its influence that the model's parameters cannot imitate, from 0 to 1.
     pub identifiable: f64,
-    /// What became of it: `named`, `tied`, `refitted`, `not refitted`, `absorbed by the parameters`, `no influence`, `failed`.
+    /// What became of it: `named`, `tied`, `refitted`, `not refitted`, `wrong sign`, `absorbed by the parameters`,
+    /// `no influence`, `failed`.
     pub fate: String,
 }
 
@@ -214,6 +215,21 @@ pub struct FalseAlarm {
     pub threshold: f64,
     /// Share of decoys (candidates with their time reversed or shifted) that score as well as the best candidate.
     pub decoys: f64,
+    /// The rate as measured by the whole search on simulated recordings, where that was asked for.
+    pub nulls: Option<Nulls>,
+}
+
+/// The whole search on recordings in which nothing is missing.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Nulls {
+    /// Recordings with a name, alone or tied.
+    pub names: usize,
+    /// Recordings.
+    pub of: usize,
+    /// Upper end of the 95 % interval of the rate (Wilson 1927).
+    pub upper95: f64,
+    /// Runs of the model.
+    pub runs: u64,
 }
 
 /// What happened to one of the model's own parameters.

@@ -3,6 +3,8 @@
 //! Every stage runs the model on the fleet through one [`Laboratory`], which remembers each run; an explanation that was killed
 //! is continued by doing the same again. Next file to read: [`super::search`].
 
+use std::sync::Arc;
+
 use starlings_estimators::End;
 use starlings_models::ObserverDef;
 
@@ -20,7 +22,7 @@ use super::search::{Found, search};
 use super::verdict::{Decision, decide};
 use super::version::Version;
 use super::words;
-use super::{Context, ExplainError, Explanation, Figures, Findings, Options, Verdict};
+use super::{Context, ExplainError, Explanation, Figures, Findings, Options, Verdict, null};
 use crate::fleet::Fleet;
 use crate::study::Study;
 use crate::study::posterior;
@@ -42,18 +44,50 @@ pub fn explain(
     let mut free = study.clone();
     free.setup.observer = ObserverDef::default();
     let budget = options.budget.or(study.explain.budget);
-    let mut laboratory = Laboratory::new(&free, fleet, store, context, budget);
-    let base = fit_as_it_is(&mut laboratory, &free, options)?;
+    let mut laboratory = Laboratory::new(&free, &mut *fleet, store, context, budget);
+    let (mut findings, predicted) = answered(&mut laboratory, &free, options, |laboratory, answer| {
+        let predicted = Arc::clone(&answer.found.base.predicted);
+        Ok((finish(laboratory, &answer)?, predicted))
+    })?;
+    drop(laboratory);
+    if options.nulls > 0 {
+        let nulls = null::measure(&free, &predicted, fleet, store, context, options)?;
+        findings.explanation.runs += nulls.runs;
+        findings.explanation.runs_by_stage.push(("null".to_owned(), nulls.runs));
+        findings.explanation.false_alarm.nulls = Some(nulls);
+        findings.explanation.wall_s = context.earlier_s + (context.clock)();
+    }
+    Ok(findings)
+}
+
+/// A search with its verdict.
+pub(super) struct Answer<'a, 'c> {
+    pub(super) found: Found<'c>,
+    pub(super) candidates: &'a [Candidate],
+    pub(super) decision: Decision,
+    pub(super) tracks: &'a [Track],
+}
+
+/// Fits the model as it is, searches and decides; `then` makes of it what is wanted.
+///
+/// # Errors
+/// As [`explain`].
+pub(super) fn answered<R>(
+    laboratory: &mut Laboratory<'_>,
+    study: &Study,
+    options: &Options,
+    then: impl FnOnce(&mut Laboratory<'_>, Answer<'_, '_>) -> Result<R, ExplainError>,
+) -> Result<R, ExplainError> {
+    let base = fit_as_it_is(laboratory, study, options)?;
     laboratory.stage("locate", "where simulation and data disagree");
-    let tracks = laboratory.tracks(&Point { study: &free, theta: base.theta() })?;
-    let before = look(&laboratory, &base, &tracks);
+    let tracks = laboratory.tracks(&Point { study, theta: base.theta() })?;
     let (rhythms, jumps) =
         (rhythms(&laboratory.rows, &base.predicted), jumps(&laboratory.rows, &base.predicted));
-    let candidates = candidate::all(&free, &tracks, &rhythms, &jumps, options)?;
-    let found = search(&mut laboratory, base, &candidates, &tracks, options)?;
+    let candidates = candidate::all(study, &tracks, &rhythms, &jumps, options)?;
+    let found = search(laboratory, base, &candidates, &tracks, options)?;
     laboratory.stage("verdict", "");
-    let decision = decide(&laboratory, &found, &candidates);
-    finish(&mut laboratory, &found, &candidates, &decision, &tracks, before)
+    let decision = decide(laboratory, &found, &candidates);
+    then(laboratory, Answer { found, candidates: &candidates, decision, tracks: &tracks })
 }
 
 /// The fit of the model as it is, on the training rows.
@@ -97,14 +131,9 @@ fn view<'v>(laboratory: &'v Laboratory<'_>, fit: &'v Fitted<'_>, tracks: &'v [Tr
 }
 
 /// Puts the findings together.
-fn finish(
-    laboratory: &mut Laboratory<'_>,
-    found: &Found<'_>,
-    candidates: &[Candidate],
-    decision: &Decision,
-    tracks: &[Track],
-    mut before: Located,
-) -> Result<Findings, ExplainError> {
+fn finish(laboratory: &mut Laboratory<'_>, answer: &Answer<'_, '_>) -> Result<Findings, ExplainError> {
+    let Answer { found, candidates, decision, tracks } = answer;
+    let mut before = look(laboratory, &found.base, tracks);
     let judged = decision.best.map(|i| &found.judged[i]);
     let added = judged.filter(|_| matches!(decision.verdict, Verdict::Named | Verdict::Tie));
     if decision.verdict != Verdict::NoGap {
@@ -143,13 +172,14 @@ fn forces(
     base: &Fitted<'_>,
 ) -> Result<Vec<locate::UnknownInput>, ExplainError> {
     laboratory.stage("locate", "the unknown input of every equation");
-    if !laboratory.affords(10) {
+    let study = &base.version.study;
+    let most = locate::unknown_input::MOST_RUNS + 2 * study.spec.states.len();
+    if !laboratory.affords(most.div_ceil(study.records.len().max(1))) {
         return Ok(Vec::new());
     }
     let mut runs = 0;
     let theta = base.theta();
-    let forces =
-        locate::unknown_inputs(&base.version.study, laboratory.fleet(), theta.as_slice(), &mut runs)?;
+    let forces = locate::unknown_inputs(study, laboratory.fleet(), theta.as_slice(), &mut runs)?;
     laboratory.count(runs);
     Ok(forces)
 }
@@ -161,13 +191,13 @@ fn figures(
     before: &Located,
 ) -> Result<Figures, ExplainError> {
     let maps_after = match added {
-        Some(judged) => {
+        Some(judged) if laboratory.affords(1) => {
             let study = &judged.fit.version.study;
             let tracks = laboratory.tracks(&Point { study, theta: judged.fit.theta() })?;
             let view = view(laboratory, &judged.fit, &tracks);
             before.maps.iter().map(|map| locate::map_again(map, &view)).collect()
         }
-        None => Vec::new(),
+        _ => Vec::new(),
     };
     let after = added.map(|j| j.fit.predicted.as_slice());
     let inflation = added.map_or(1.0, |j| j.inflation);
@@ -195,6 +225,7 @@ fn explanation(
     let judged = decision.best.map(|i| &found.judged[i]);
     let added = judged.filter(|_| matches!(decision.verdict, Verdict::Named | Verdict::Tie));
     let n_train = laboratory.rows.train.len();
+    let nearest = judged.or(found.judged.first());
     let after = added.map(|j| j.fit.predicted.as_slice());
     Explanation {
         study: study.name.clone(),
@@ -207,7 +238,9 @@ fn explanation(
         replaced: added.map(|j| j.fit.version.left_out.clone()).unwrap_or_default(),
         tied_with: decision.tied.clone(),
         experiment: None,
-        closest: judged.filter(|_| added.is_none()).and_then(|j| answer::effects(j).into_iter().next()),
+        closest: nearest
+            .filter(|_| decision.verdict == Verdict::Unexplained)
+            .and_then(|j| answer::effects(j).into_iter().next()),
         screened: answer::screened(found, candidates, decision, n_train),
         rejected: refused::rejected(found, candidates, decision),
         gap: after.map(|y| answer::gap(laboratory, &found.base.predicted, y)).unwrap_or_default(),

@@ -6,6 +6,7 @@
 
 use nalgebra::DVector;
 use starlings_estimators::{Optimum, Score};
+use starlings_models::SetupError;
 
 use super::ExplainError;
 use super::candidate::Candidate;
@@ -26,6 +27,9 @@ const RESPONSE: [f64; 2] = [1e-5, 5e-2];
 const AGAIN: usize = 2;
 /// Part of its own below which a candidate's influence counts as imitated by the parameters.
 pub const ABSORBED: f64 = 0.05;
+
+/// The score of what was not measured.
+const NO_SCORE: Score = Score { gain: 0.0, amplitude: 0.0, sd: f64::INFINITY, identifiable: 0.0 };
 
 /// A candidate at one point of its grid, measured at a fit.
 #[derive(Clone, Debug)]
@@ -75,12 +79,16 @@ pub fn screen<'c>(
     tracks: &[Track],
 ) -> Result<Vec<Hit>, ExplainError> {
     let optimum = fit.optimum()?;
-    let mut probes = Vec::new();
+    let (mut probes, mut unfit) = (Vec::new(), Vec::new());
     for &(index, point) in of {
         if fit.version.members.iter().any(|m| m.candidate.name() == candidates[index].name()) {
             continue;
         }
-        probes.push(probe(fit, candidates, index, point, tracks)?);
+        match probe(fit, candidates, index, point, tracks) {
+            Ok(probe) => probes.push(probe),
+            // Two effects of one study may share a name inside, and then cannot stand in one model.
+            Err(error) => unfit.push(unfit_hit(index, &candidates[index].points[point], &error)),
+        }
     }
     let spread = spread(laboratory);
     let reference = reference(laboratory, fit, &probes)?;
@@ -94,7 +102,7 @@ pub fn screen<'c>(
             settle(laboratory, &mut probes[i], &answer, base, &spread, round == AGAIN);
         }
     }
-    Ok(probes.into_iter().map(|probe| hit(laboratory, &optimum, probe)).collect())
+    Ok(probes.into_iter().map(|probe| hit(laboratory, &optimum, probe)).chain(unfit).collect())
 }
 
 /// A first guess of a probe.
@@ -104,7 +112,7 @@ fn probe<'c>(
     index: usize,
     point: usize,
     tracks: &[Track],
-) -> Result<Probe<'c>, ExplainError> {
+) -> Result<Probe<'c>, SetupError> {
     let candidate = &candidates[index];
     let point = candidate.points[point].clone();
     let study = &fit.version.study;
@@ -208,8 +216,18 @@ fn settle(
     }
 }
 
+/// A candidate that does not go with what the model has already.
+fn unfit_hit(candidate: usize, point: &[f64], error: &SetupError) -> Hit {
+    Hit {
+        candidate,
+        point: point.to_vec(),
+        sensitivity: DVector::zeros(0),
+        score: NO_SCORE,
+        failure: Some(error.to_string()),
+    }
+}
+
 fn hit(laboratory: &Laboratory<'_>, optimum: &Optimum, probe: Probe<'_>) -> Hit {
-    let none = Score { gain: 0.0, amplitude: 0.0, sd: f64::INFINITY, identifiable: 0.0 };
     let Probe { candidate, point, answer, .. } = probe;
     match answer.unwrap_or_else(|| Err(String::new())) {
         Ok(sensitivity) => {
@@ -223,7 +241,7 @@ fn hit(laboratory: &Laboratory<'_>, optimum: &Optimum, probe: Probe<'_>) -> Hit 
             candidate,
             point,
             sensitivity: DVector::zeros(0),
-            score: none,
+            score: NO_SCORE,
             failure: Some(if reason.is_empty() {
                 "no influence on what was measured".to_owned()
             } else {

@@ -85,8 +85,7 @@ pub fn search<'c>(
     let whiteness = whiteness(&searcher.laboratory.rows, base.residual());
     searcher.laboratory.stage("screen", &format!("{} candidates", candidates.len()));
     let hits = searcher.screen_all(&base)?;
-    let background =
-        Background::new(&base.optimum()?, &searcher.laboratory.rows, &hits, candidates, seed);
+    let background = Background::new(&base.optimum()?, &searcher.laboratory.rows, &hits, candidates, seed);
     let mut found = Found {
         base,
         before,
@@ -118,7 +117,11 @@ impl<'c> Searcher<'_, '_, 'c> {
         self.screen(fit, &of)
     }
 
-    pub(super) fn screen(&mut self, fit: &Fitted<'c>, of: &[(usize, usize)]) -> Result<Vec<Hit>, ExplainError> {
+    pub(super) fn screen(
+        &mut self,
+        fit: &Fitted<'c>,
+        of: &[(usize, usize)],
+    ) -> Result<Vec<Hit>, ExplainError> {
         if !self.laboratory.affords(of.len()) {
             self.cut_short = true;
             return Ok(Vec::new());
@@ -153,9 +156,8 @@ impl<'c> Searcher<'_, '_, 'c> {
     /// Adds single candidates to a fit: a race among the best, then refits of the last few.
     fn explore(&mut self, parent: &Fitted<'c>, best: &[Hit]) -> Result<Vec<Fitted<'c>>, ExplainError> {
         self.laboratory.stage("refit", "a race among the best candidates");
-        let n = if best.len() <= SMALL { best.len() } else { RACE };
         let mut fits = Vec::new();
-        for hit in best.iter().take(n) {
+        for hit in best.iter().take(RACE) {
             fits.push(self.with(parent, hit)?);
         }
         self.cut_short |= !drive_rounds(self.laboratory, &mut fits, ROUNDS)?;
@@ -163,7 +165,7 @@ impl<'c> Searcher<'_, '_, 'c> {
         let first = fits.first().map_or(0.0, Fitted::promised);
         let scale = (first / self.laboratory.rows.train.len().max(1) as f64).max(1.0);
         let close = fits.iter().filter(|f| f.promised() <= first + CLOSE * scale).count();
-        let keep = close.clamp(FINAL, FINAL + 2);
+        let keep = if best.len() <= SMALL { SMALL } else { close.clamp(FINAL, FINAL + 2) };
         // A step too long for the secant must not cost the best two scores their refit.
         let scored: Vec<usize> = best.iter().take(SCORED).map(|h| h.candidate).collect();
         let last = |f: &Fitted<'_>| f.version.members.last().map(|m| m.index);

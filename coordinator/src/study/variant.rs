@@ -34,7 +34,8 @@ impl Study {
         if !left_out.is_empty() {
             let terms: Vec<&str> = left_out.iter().map(String::as_str).collect();
             let Some(equations) = &self.setup.model.equations else {
-                let message = format!("model `{}` has no terms that could be left out", self.setup.model.kind);
+                let message =
+                    format!("model `{}` has no terms that could be left out", self.setup.model.kind);
                 return Err(SetupError::Invalid(message));
             };
             study.setup.model.equations = Some(equations.without(&terms)?);

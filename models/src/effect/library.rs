@@ -48,11 +48,7 @@ pub const FAMILIES: &[Family] = &[
         needs: "Quantities with the roles level, pressure, flow or resistance.",
         growers: hydraulics::GROWERS,
     },
-    Family {
-        name: "thermal",
-        needs: "A state with the role temperature.",
-        growers: thermal::GROWERS,
-    },
+    Family { name: "thermal", needs: "A state with the role temperature.", growers: thermal::GROWERS },
     Family {
         name: "propulsion",
         needs: "A combustion chamber: quantities with roles such as throat-area, burn-rate or thrust.",
@@ -78,7 +74,8 @@ impl Family {
     /// the name is without the place.
     pub fn catalogue(&self) -> Vec<EffectDef> {
         let one = |grow: &Grow| -> Vec<EffectDef> {
-            let grown = specimen::specimens().into_iter().flat_map(|spec| grow(Host { spec: &spec, time: "s" }));
+            let grown =
+                specimen::specimens().into_iter().flat_map(|spec| grow(Host { spec: &spec, time: "s" }));
             let mut kinds: Vec<EffectDef> = Vec::new();
             for mut effect in grown {
                 effect.name.truncate(stem(&effect.name).len());

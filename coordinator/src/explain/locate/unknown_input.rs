@@ -28,6 +28,8 @@ use crate::study::Study;
 const WINDOWS: usize = 200;
 /// Equations at most.
 const MOST: usize = 2;
+/// Runs of all walks at most; those that find the equations are 2 per scalar state.
+pub const MOST_RUNS: usize = MOST * INTENSITIES.len() * 5;
 /// Records at most.
 const RECORDS: usize = 1;
 /// Growth of the walk's sd over a record, in units of the constant input that would move the outputs as far as the residuals.

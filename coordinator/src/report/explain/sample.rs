@@ -153,6 +153,7 @@ fn false_alarm() -> FalseAlarm {
         runs: 100,
         threshold: 10.0,
         decoys: 0.0,
+        nulls: None,
     }
 }
 
