@@ -4,6 +4,7 @@
 //! against what a search over the whole library finds by chance. A lower error alone is no reason to name an effect. Next
 //! file to read: [`super::search`].
 
+use nalgebra::DVector;
 use starlings_estimators::End;
 
 use super::background::{inflation, whiteness};
@@ -67,6 +68,9 @@ pub struct Judged<'c> {
     pub gain: f64,
     /// Fall of χ² on the held-out span.
     pub gain_held_out: f64,
+    /// Part of the χ² of the held-out span that a fit of all data would take away, to first order: what the uncertainty of the
+    /// estimate explains.
+    pub allowance: f64,
     /// Fall of χ² on the channels that are never fitted.
     pub gain_channels: f64,
     /// Share of the excess χ² that it takes away, training rows.
@@ -83,9 +87,10 @@ impl Judged<'_> {
         self.gain / self.inflation
     }
 
-    /// Fall of χ² on the training rows, the held-out span and the held-out channels, for ranking.
+    /// Fall of χ² on the training rows, the held-out span and the held-out channels, for ranking. An estimate that the held-out
+    /// span would move within its uncertainty is no worse for it.
     pub fn rank(&self) -> f64 {
-        self.gain + self.gain_held_out + self.gain_channels
+        self.gain + self.gain_held_out + self.allowance + self.gain_channels
     }
 }
 
@@ -113,6 +118,7 @@ pub fn judge<'c>(
     let share_held_out =
         (misfit.n_held_out > 0 && has_excess).then(|| ratio(gain_held_out, before.held_out - n_held));
     let whiteness = whiteness(&laboratory.rows, fit.residual());
+    let allowance = allowance(laboratory, &fit);
     let mut judged = Judged {
         fit,
         misfit,
@@ -120,6 +126,7 @@ pub fn judge<'c>(
         whiteness,
         gain,
         gain_held_out,
+        allowance,
         gain_channels: before.channels - misfit.channels,
         share,
         share_held_out,
@@ -127,6 +134,23 @@ pub fn judge<'c>(
     };
     judged.refusal = refusal(laboratory, base, before, &judged, threshold);
     judged
+}
+
+/// bᵀ (C⁻¹ + JᵀJ)⁻¹ b with b = Jᵀ e: the fall of χ² from the held-out rows (residuals e, Jacobian J) to a joint fit, for an
+/// estimate of covariance C. Nothing where the fit leaves a direction free or its Jacobian is of another point.
+fn allowance(laboratory: &Laboratory<'_>, fit: &Fitted<'_>) -> f64 {
+    let rows = &laboratory.rows.rows;
+    let held: Vec<usize> = (0..rows.len()).filter(|i| rows[*i].usage == Usage::HeldOut).collect();
+    let known = || {
+        let optimum = fit.optimum().ok().filter(|_| fit.is_fresh() && !held.is_empty())?;
+        let whitened = laboratory.rows.whitened(&fit.predicted);
+        let residual = DVector::from_iterator(held.len(), held.iter().map(|i| whitened[*i]));
+        let jacobian = fit.jacobian.select_rows(&held);
+        let along = jacobian.tr_mul(&residual);
+        let information = optimum.covariance().clone().cholesky()?.inverse() + jacobian.tr_mul(&jacobian);
+        Some(along.dot(&information.cholesky()?.solve(&along)))
+    };
+    known().filter(|fall| fall.is_finite()).unwrap_or(0.0)
 }
 
 fn ratio(part: f64, whole: f64) -> f64 {
