@@ -3,66 +3,13 @@
 #![allow(clippy::unwrap_used)] // a failed unwrap is a failed test
 
 mod common;
+mod small_kit;
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use common::{output, starlings};
-
-const DATA: &str =
-    "time,pressure,flow\n0.0,100.0,0.0\n0.1,101.0,10.0\n0.2,103.0,30.0\n0.3,102.0,5.0\n0.4,101.0,0.0\n";
-
-const STUDY: &str = r#"[study]
-name = "small"
-
-[model]
-kind = "windkessel-2"
-
-[[parameters]]
-name = "R"
-prior = { transform = "log", median = 3.0, factor = 2.0 }
-
-[[parameters]]
-name = "C"
-prior = { transform = "log", median = 1.0, factor = 2.0 }
-
-[[records]]
-name = "one"
-file = "data.csv"
-time = "time"
-inputs = { flow = "flow" }
-channels = [ { column = "pressure", output = "pressure", noise = 2.0 } ]
-
-[estimator]
-kind = "roukf"
-
-[fleet]
-workers = 1
-"#;
-
-/// A folder with the small study after `edit`, and its recording after `edit_data`.
-fn study(
-    edit: impl Fn(String) -> String,
-    edit_data: impl Fn(String) -> String,
-) -> (tempfile::TempDir, PathBuf) {
-    let dir = tempfile::tempdir().unwrap();
-    let edited = edit(STUDY.to_owned());
-    fs::write(dir.path().join("data.csv"), edit_data(DATA.to_owned())).unwrap();
-    let file = dir.path().join("study.toml");
-    fs::write(&file, edited).unwrap();
-    (dir, file)
-}
-
-fn same(text: String) -> String {
-    text
-}
-
-fn swap(from: &'static str, to: &'static str) -> impl Fn(String) -> String {
-    move |text| {
-        assert!(text.contains(from), "the small study no longer holds {from}");
-        text.replacen(from, to, 1)
-    }
-}
+use small_kit::{same, study, swap};
 
 /// Runs the study and expects it to be refused with every one of `words`, and no run folder.
 fn refused(file: &Path, words: &[&str]) {
@@ -259,46 +206,4 @@ fn listening_beyond_loopback_needs_a_word() {
     assert_eq!(code, 2, "{stderr}");
     assert!(stderr.contains("--insecure"), "{stderr}");
     assert!(!out.exists());
-}
-
-/// Runs a command on the small study and expects it to be refused with `words` before anything is written to `out`.
-fn refused_output(command: &[&str], words: &[&str]) {
-    let (dir, file) = study(same, same);
-    let names = || {
-        let mut names: Vec<_> = fs::read_dir(dir.path()).unwrap().map(|f| f.unwrap().file_name()).collect();
-        names.sort();
-        names
-    };
-    let before = names();
-    let mut call = starlings();
-    call.current_dir(dir.path()).arg(command[0]).arg(&file).args(&command[1..]);
-    let (code, stdout, stderr) = output(&mut call);
-    assert_eq!((code, stdout.as_str()), (2, ""), "{stderr}");
-    for word in words {
-        assert!(stderr.contains(word), "no `{word}` in: {stderr}");
-    }
-    // No ensemble was announced, and nothing is left behind.
-    assert!(!stderr.contains("runs of the model"), "{stderr}");
-    assert_eq!(names(), before);
-}
-
-#[test]
-fn two_outputs_to_one_file_are_refused() {
-    let words = ["both name", "choose two files"];
-    refused_output(&["simulate", "-o", "z.csv", "--state-out", "z.csv"], &words);
-    refused_output(&["simulate", "-o", "z.csv", "--state-out", "./z.csv"], &words);
-    refused_output(&["identify", "--csv", "x", "--html", "x"], &["--html and --csv both name"]);
-}
-
-#[test]
-fn an_output_that_cannot_be_written_is_refused_before_anything_runs() {
-    refused_output(&["identify", "--html", "nope/a.html"], &["cannot write nope/a.html (--html)"]);
-    refused_output(&["identify", "--csv", "."], &["cannot write . (--csv)"]);
-    refused_output(&["identify", "--csv", "data.csv"], &["would be overwritten", "another file with --csv"]);
-    refused_output(&["simulate", "--state-out", "nope/a.csv"], &["cannot write nope/a.csv (--state-out)"]);
-}
-
-#[test]
-fn a_grid_of_too_many_rows_is_called_so() {
-    refused_output(&["simulate", "--until", "1", "--step", "1e-9"], &["1.0e9 rows", "larger step"]);
 }

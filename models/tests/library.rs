@@ -8,12 +8,12 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use library_kit::{Bench, amplitudes, benches};
 use starlings_models::EffectDef;
-use starlings_models::effect::library::{FAMILIES, library, library_in, shows_in, stem, write_out};
+use starlings_models::Model;
+use starlings_models::effect::library::{FAMILIES, library, stem};
 use starlings_models::effect::{Scale, scale};
 use starlings_models::equations::Expression;
-use starlings_models::native::{Oscillator, Windkessel2};
+use starlings_models::native::Windkessel2;
 use starlings_models::units::Labels;
-use starlings_models::{Model, Spec};
 
 /// Kinds of effects whose amplitude physics does not let be negative.
 const SIGNED: &[&str] = &[
@@ -230,101 +230,4 @@ fn a_resolved_effect_names_nothing_that_it_lost() {
             assert!(names.iter().all(|(name, _)| !lost(name)), "{}: {text}", effect.name);
         }
     }
-}
-
-#[test]
-fn a_pressure_outlet_with_a_flow_hosts_a_series_resistance() {
-    let library = library(Windkessel2::default().spec());
-    let effect = library.iter().find(|effect| effect.name == "series-resistance").unwrap();
-    assert_eq!((effect.adds[0].to.as_str(), effect.adds[0].term.as_str()), ("pressure", "Rs*flow"));
-    assert_eq!(effect.parameters[0].unit, "mmHg s/mL");
-}
-
-#[test]
-fn an_oscillator_hosts_friction_and_no_series_resistance() {
-    let names: Vec<String> = library(Oscillator::default().spec()).into_iter().map(|e| e.name).collect();
-    assert!(names.contains(&"coulomb-friction".to_owned()), "{names:?}");
-    assert!(!names.contains(&"series-resistance".to_owned()), "{names:?}");
-}
-
-#[test]
-fn two_places_of_a_kind_get_names_of_their_own_and_one_needs_none() {
-    let names =
-        |spec: &Spec| -> Vec<String> { library(spec).into_iter().map(|effect| effect.name).collect() };
-    let mut spec = Oscillator::default().spec().clone();
-    assert!(names(&spec).contains(&"quadratic-drag".to_owned()));
-    for mut state in spec.states.clone() {
-        state.name.push('2');
-        spec.states.push(state);
-    }
-    let found = names(&spec);
-    assert!(
-        found.contains(&"quadratic-drag:v".to_owned()) && found.contains(&"quadratic-drag:v2".to_owned())
-    );
-    let second = library(&spec).into_iter().find(|effect| effect.name == "linear-support:v2").unwrap();
-    assert_eq!(
-        second.adds[0].term, "-k_support_v2*x2",
-        "the second velocity belongs to the second displacement"
-    );
-}
-
-#[test]
-fn a_name_that_the_model_has_itself_is_avoided() {
-    let mut spec = Oscillator::default().spec().clone();
-    spec.parameters.push(starlings_models::Quantity::new("c_viscous", ""));
-    let effect = library(&spec).into_iter().find(|effect| effect.name == "viscous-friction").unwrap();
-    assert_eq!(effect.parameters[0].name, "c_viscous_");
-}
-
-#[test]
-fn a_coefficient_counts_in_the_time_unit_of_the_study() {
-    let drift = |time: &str| {
-        let effects = library_in(Windkessel2::default().spec(), time);
-        effects.into_iter().find(|effect| effect.name == "sensor-drift").unwrap().parameters[0].unit.clone()
-    };
-    assert_eq!((drift("s").as_str(), drift("h").as_str()), ("mmHg/s", "mmHg/h"));
-}
-
-#[test]
-fn an_effect_on_an_output_shows_only_in_that_output() {
-    let spec = Oscillator::default().spec().clone();
-    let effects = library(&spec);
-    let find = |name: &str| effects.iter().find(|effect| effect.name == name).unwrap();
-    let measured = ["position".to_owned()];
-    assert!(shows_in(find("sensor-offset:position"), &spec, &measured));
-    assert!(!shows_in(find("sensor-offset:velocity"), &spec, &measured));
-    assert!(shows_in(find("quadratic-drag"), &spec, &measured));
-}
-
-#[test]
-fn a_sensor_of_an_output_named_as_its_state_leaves_the_state_alone() {
-    let bench = benches().into_iter().find(|bench| bench.name == "one tank").unwrap();
-    let offset = library(&bench.spec).into_iter().find(|effect| effect.name == "sensor-offset").unwrap();
-    assert_eq!(offset.adds[0].to, "output:h");
-    let (plain, with) = (bench.run(&[], 0.0).unwrap(), bench.run(&[offset], 0.5).unwrap());
-    // One sum of two numbers near one.
-    assert!(plain.iter().zip(&with).all(|(a, b)| (b - a - 0.5).abs() < 1e-12), "{plain:?} {with:?}");
-}
-
-#[test]
-fn a_lag_of_the_sensor_is_that_of_first_order() {
-    let bench = benches().into_iter().find(|bench| bench.name == "ramp").unwrap();
-    let lag = library(&bench.spec).into_iter().find(|effect| effect.name == "sensor-lag").unwrap();
-    let lag = bench.resolved(&lag).unwrap();
-    // A lag of first order shows sin(w t) as (sin(w t) - w tau cos(w t))/(1 + (w tau)^2) once the start is forgotten.
-    let (w, tau) = (8.0, 0.03);
-    let got = bench.run(&[lag], tau).unwrap();
-    // The rows are the output and the state.
-    for (t, value) in bench.window.times.iter().zip(got.iter().step_by(2)).filter(|(t, _)| **t > 0.5) {
-        let want = ((w * t).sin() - w * tau * (w * t).cos()) / (1.0 + (w * tau) * (w * tau));
-        // Three nodes leave 3!^2 of the sixth term of the expansion in w tau, (w tau)^6 = 2e-4 with its weights.
-        assert!((value - want).abs() < 5e-3, "{t}: {value} instead of {want}");
-    }
-}
-
-#[test]
-fn a_mistyped_built_in_effect_offers_the_nearest() {
-    let def = EffectDef { built_in: Some("serial-resistance".to_owned()), ..EffectDef::default() };
-    let error = write_out(&def, Windkessel2::default().spec()).unwrap_err();
-    assert!(error.to_string().contains("did you mean `series-resistance`"), "{error}");
 }

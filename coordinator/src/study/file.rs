@@ -7,6 +7,7 @@ pub(super) mod layout;
 pub(super) mod locate;
 mod model;
 pub(super) mod read;
+mod settings;
 pub(super) mod spectrum;
 mod table;
 

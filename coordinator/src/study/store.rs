@@ -12,6 +12,7 @@ mod remembered;
 mod rows;
 mod schema;
 pub mod snapshot;
+mod table;
 #[cfg(test)]
 mod tests;
 
@@ -27,6 +28,7 @@ pub use error::StoreError;
 pub use purpose::Purpose;
 pub use remembered::RunKey;
 pub use rows::{AnalysisRow, EstimateRow, InnovationRow, JobRow, PredictionRow};
+pub use table::table;
 
 /// Analyses are committed together for at most so long, in s: a commit costs about as much as the rows of an analysis.
 pub const HOLD_S: f64 = 0.05;
@@ -282,26 +284,4 @@ impl Store {
 
 fn folder_of(path: &Path) -> String {
     path.parent().map(|p| p.display().to_string()).unwrap_or_default()
-}
-
-/// The named columns of a table as text, in the order of writing; numbers keep every digit, NULL is empty.
-///
-/// # Errors
-/// When the database refuses.
-pub fn table(store: &Store, name: &str, columns: &str) -> Result<Vec<Vec<String>>, StoreError> {
-    use rusqlite::types::ValueRef;
-    let n = columns.split(", ").count();
-    store.rows(&format!("SELECT {columns} FROM {name} ORDER BY rowid"), |row| {
-        (0..n)
-            .map(|i| {
-                Ok(match row.get_ref(i)? {
-                    ValueRef::Null => String::new(),
-                    ValueRef::Integer(v) => v.to_string(),
-                    ValueRef::Real(v) => format!("{v:?}"),
-                    ValueRef::Text(v) => String::from_utf8_lossy(v).into_owned(),
-                    ValueRef::Blob(v) => format!("{} bytes", v.len()),
-                })
-            })
-            .collect()
-    })
 }

@@ -1,5 +1,7 @@
 //! Models to try built-in effects on: every kind of the catalogue, and equations with places that no kind has.
 
+#![allow(dead_code)] // each test file uses its own part
+
 #[path = "systems.rs"]
 mod systems;
 

@@ -7,10 +7,11 @@ use toml::Spanned;
 use toml::de::DeTable;
 
 use super::model::{effects, model};
+use super::settings::{estimator, explain, fleet};
 use super::table::{Node, Table, number, text, wrong_type};
 use super::{
-    ChannelSection, EstimatorSection, ExplainSection, FleetSection, Named, ObserverSection, ParameterSection,
-    PriorSection, ProcessSection, RecordSection, StudyFile, StudySection, SurfaceSection,
+    ChannelSection, Named, ObserverSection, ParameterSection, PriorSection, ProcessSection, RecordSection,
+    StudyFile, StudySection, SurfaceSection,
 };
 use crate::study::problem::{Source, StudyError};
 
@@ -233,61 +234,6 @@ fn noise(source: &Source, node: &Node<'_>) -> Option<Spanned<Option<f64>>> {
             None
         }
         None => number(source, node, "`noise`").map(|n| Spanned::new(n.span(), Some(n.into_inner()))),
-    }
-}
-
-fn explain(root: &Table<'_>) -> ExplainSection {
-    let keys = ["hold_out_channels", "budget", "library", "without", "only", "max_effects"];
-    let Some(t) = root.table("explain", "[explain]", &keys) else {
-        return ExplainSection::default();
-    };
-    ExplainSection {
-        hold_out_channels: t.texts("hold_out_channels"),
-        budget: t.count("budget"),
-        library: t.text("library"),
-        without: t.texts("without"),
-        only: t.texts("only"),
-        max_effects: t.count("max_effects"),
-    }
-}
-
-fn estimator(root: &Table<'_>) -> EstimatorSection {
-    let keys = [
-        "kind",
-        "points",
-        "kappa",
-        "root",
-        "passes",
-        "anneal",
-        "spread",
-        "resample",
-        "max_iterations",
-        "tolerance",
-    ];
-    let Some(t) = root.table("estimator", "[estimator]", &keys) else { return EstimatorSection::default() };
-    EstimatorSection {
-        kind: t.text("kind"),
-        points: t.text("points"),
-        kappa: t.number("kappa"),
-        root: t.text("root"),
-        passes: t.count("passes"),
-        anneal: t.number("anneal"),
-        spread: t.number("spread"),
-        resample: t.text("resample"),
-        max_iterations: t.count("max_iterations"),
-        tolerance: t.number("tolerance"),
-    }
-}
-
-fn fleet(root: &Table<'_>) -> FleetSection {
-    let Some(t) = root.table("fleet", "[fleet]", &["workers", "slots", "patience", "max_attempts"]) else {
-        return FleetSection::default();
-    };
-    FleetSection {
-        workers: t.count("workers"),
-        slots: t.count("slots"),
-        patience: t.number("patience"),
-        max_attempts: t.count("max_attempts"),
     }
 }
 
