@@ -8,10 +8,11 @@ check:
 test:
     cargo test --workspace
 
-# Coverage over many draws of the noise: minutes, not part of `just test`.
+# Coverage and false alarms over many draws of the noise: minutes, not part of `just test`.
 battery:
     cargo test --release -p starlings-coordinator --test tube_twin -- --ignored --nocapture
     cargo test --release --test coarctation -- --ignored --nocapture
+    cargo test --release -p starlings-coordinator --test explain_null -- --ignored --nocapture
 
 # Every system, effect and noise level of docs/battery.md: about an hour. BATTERY_SYSTEMS, BATTERY_KINDS, BATTERY_NOISE, BATTERY_SEEDS, BATTERY_THREADS choose.
 explain-battery:

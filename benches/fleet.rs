@@ -5,22 +5,21 @@
 //! Next file to read: `fleet/screening.rs`, for batches of many setups.
 #![allow(clippy::print_stdout, missing_docs)]
 
+#[path = "fleet/local.rs"]
+mod local_fleet;
 #[path = "fleet/screening.rs"]
 mod screening;
 
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::process::{Child, Command};
-use std::sync::{Arc, mpsc};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use screening::Screening;
-use starlings_coordinator::fleet::{
-    Fleet, FleetConfig, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers, SetupId,
-};
+use starlings_coordinator::fleet::{Fleet, FleetEvent, GrpcFleet, SetupId};
 use starlings_models::{Forward, Job, ModelDef, ParticleError, Prediction, Setup, SetupError, Spec, Window};
 use starlings_worker::WorkerConfig;
-use tokio_util::sync::CancellationToken;
 
 type Failure = Box<dyn std::error::Error>;
 
@@ -111,20 +110,7 @@ impl Figures {
 }
 
 fn measure(divisor: usize) -> Result<Figures, Failure> {
-    let (sender, events) = mpsc::channel();
-    let mut fleet = GrpcFleet::listen(FleetConfig::new(
-        (Ipv4Addr::LOCALHOST, 0).into(),
-        "bench",
-        CancellationToken::new(),
-        sender,
-    ))?;
-    let workers = LocalWorkers::spawn(LocalConfig {
-        program: std::env::current_exe()?,
-        args: vec![],
-        n: WORKERS,
-        address: fleet.address(),
-        fleet: fleet.handle(),
-    })?;
+    let (mut fleet, workers, events) = local_fleet::start("bench", WORKERS)?;
     for _ in 0..WORKERS {
         while !matches!(events.recv_timeout(Duration::from_secs(30))?, FleetEvent::WorkerJoined { .. }) {}
     }

@@ -8,21 +8,22 @@
 
 #![allow(clippy::print_stdout, clippy::print_stderr, missing_docs)]
 
+#[path = "fleet/local.rs"]
+mod local_fleet;
+
 use std::f64::consts::PI;
 use std::hint::black_box;
-use std::net::Ipv4Addr;
 use std::path::Path;
 use std::process::ExitCode;
-use std::sync::{Arc, mpsc};
+use std::sync::Arc;
 use std::time::Instant;
 
 use serde_json::{Map, Value, json};
-use starlings_coordinator::fleet::{FleetConfig, GrpcFleet, LocalConfig, LocalWorkers};
+use starlings_coordinator::study::store::Purpose;
 use starlings_coordinator::study::{RunContext, RunFolder, Study, Summary, run::run};
 use starlings_models::model::{History, Segment};
 use starlings_models::{Job, Model, ModelDef, Setup, Signal, Window};
 use starlings_worker::WorkerConfig;
-use tokio_util::sync::CancellationToken;
 
 type Failure = Box<dyn std::error::Error>;
 
@@ -215,21 +216,8 @@ fn write_study(folder: &Path, passes: usize) -> Result<(), Failure> {
 /// Reads the study, starts its fleet, fits, and stores the run.
 fn study(folder: &Path, started: Instant) -> Result<Summary, Failure> {
     let study = Study::load(&folder.join("study.toml"))?;
-    let (sender, events) = mpsc::channel();
-    let mut fleet = GrpcFleet::listen(FleetConfig::new(
-        (Ipv4Addr::LOCALHOST, 0).into(),
-        &study.name,
-        CancellationToken::new(),
-        sender,
-    ))?;
-    let workers = LocalWorkers::spawn(LocalConfig {
-        program: std::env::current_exe()?,
-        args: vec![],
-        n: WORKERS,
-        address: fleet.address(),
-        fleet: fleet.handle(),
-    })?;
-    let mut stored = RunFolder::create(&folder.join("run"), &study, "benchmark", "")?;
+    let (mut fleet, workers, events) = local_fleet::start(&study.name, WORKERS)?;
+    let mut stored = RunFolder::create(Purpose::Run, &folder.join("run"), &study, "benchmark", "")?;
     let clock = || started.elapsed().as_secs_f64();
     let threads = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let mut context =

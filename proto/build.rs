@@ -1,8 +1,8 @@
-//! Generates the wire types from `proto/fleet.proto` without protoc: protox compiles, tonic-prost-build emits.
+//! Generates the wire types from `proto/*.proto` without protoc: protox compiles, tonic-prost-build emits.
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("cargo:rerun-if-changed=proto");
-    let descriptors = protox::compile(["fleet.proto"], ["proto"])?;
+    let descriptors = protox::compile(["fleet.proto", "solver.proto"], ["proto"])?;
     tonic_prost_build::configure().bytes(".").compile_fds(descriptors)?;
     Ok(())
 }

@@ -11,6 +11,7 @@ use starlings_estimators::SigmaSet;
 
 use crate::console::{line, number, table, text};
 use crate::failure::Failure;
+use crate::load::load;
 
 /// Validate a study, its recordings and its model, and make one trial run at the prior median.
 #[derive(Parser)]
@@ -24,7 +25,7 @@ pub(crate) struct Args {
 
 /// Checks the study.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    let study = Study::load(&args.study)?;
+    let study = load(&args.study)?;
     let channels = trial(&study).map_err(Failure::input)?;
     let n_particle = n_particle(&study)?;
     if args.json {
@@ -106,13 +107,9 @@ fn print(study: &Study, channels: &[TrialChannel], n_particle: usize) -> Result<
         rows.push(vec![e.name, e.unit, number(e.prior_median, None), format!("{lo} … {hi}")]);
     }
     text(table(&rows, false))?;
-    line("\ntrial run at the prior median")?;
-    let mut rows = vec![["record", "output", "observations", "rmse", "noise"].map(str::to_owned).to_vec()];
-    let of_field = |a: &TrialChannel, b: &TrialChannel| {
-        a.record == b.record && field_of(&a.output) == field_of(&b.output)
-    };
-    rows.extend(channels.chunk_by(of_field).map(|channels| pooled(study, channels)));
-    text(table(&rows, false))?;
+    if !channels.is_empty() {
+        print_trial(study, channels)?;
+    }
     let runs = runs_per_pass(study, n_particle);
     let per = if study.estimator.kind == EstimatorKind::Batch { "iteration" } else { "pass" };
     line(format_args!("\n{n_particle} particles, {runs} runs of the model per {per}"))?;
@@ -120,4 +117,14 @@ fn print(study: &Study, channels: &[TrialChannel], n_particle: usize) -> Result<
         line(format_args!("warning: {warning}"))?;
     }
     line("the study is sound")
+}
+
+fn print_trial(study: &Study, channels: &[TrialChannel]) -> Result<(), Failure> {
+    line("\ntrial run at the prior median")?;
+    let mut rows = vec![["record", "output", "observations", "rmse", "noise"].map(str::to_owned).to_vec()];
+    let of_field = |a: &TrialChannel, b: &TrialChannel| {
+        a.record == b.record && field_of(&a.output) == field_of(&b.output)
+    };
+    rows.extend(channels.chunk_by(of_field).map(|channels| pooled(study, channels)));
+    text(table(&rows, false))
 }

@@ -13,6 +13,7 @@ use tokio_util::sync::CancellationToken;
 
 use crate::console::{cancel_on_signal, note};
 use crate::failure::Failure;
+use crate::load::end_solvers;
 use crate::progress::Display;
 
 /// Which workers run the model.
@@ -103,6 +104,8 @@ impl Crew {
             ));
             return Ok(());
         }
+        // Their places are the workers'.
+        end_solvers();
         let slots = study.fleet.slots.unwrap_or(1).to_string();
         let config = LocalConfig {
             program: std::env::current_exe().map_err(Failure::run)?,

@@ -50,7 +50,7 @@ pub(crate) fn check_outputs(outputs: &[Output<'_>], study: &str, place: &Place<'
     let given: Vec<(&str, &Path)> =
         outputs.iter().filter_map(|(option, path)| Some((*option, path.as_deref()?))).collect();
     for (i, (option, path)) in given.iter().enumerate() {
-        spare_study(Some(path), study, place).map_err(|failure| failure.with(&format!(" with {option}")))?;
+        spare_study(path, study, place).map_err(|failure| failure.with(&format!(" with {option}")))?;
         let same = |other: &&(&str, &Path)| is_same(other.1, path);
         if let Some((earlier, _)) = given[..i].iter().find(same) {
             let path = path.display();
@@ -91,14 +91,13 @@ fn probe(path: &Path) -> std::io::Result<()> {
 }
 
 /// Refuses an output that would overwrite the study or a file that it names.
-fn spare_study(output: Option<&Path>, study: &str, place: &Place<'_>) -> Result<(), Failure> {
+fn spare_study(output: &Path, study: &str, place: &Place<'_>) -> Result<(), Failure> {
     // What does not exist cannot be overwritten, and a device is no file of a study.
-    let existing = output.and_then(|path| Some((path, path.canonicalize().ok()?)));
-    let Some((given, target)) = existing.filter(|(_, target)| target.is_file()) else {
+    let Some(target) = output.canonicalize().ok().filter(|target| target.is_file()) else {
         return Ok(());
     };
     let refuse = |what: &str| {
-        let given = given.display();
+        let given = output.display();
         Err(Failure::input(format!("{given} is {what}, and would be overwritten: choose another file")))
     };
     if std::fs::read(&target).is_ok_and(|bytes| bytes == study.as_bytes()) {

@@ -11,6 +11,7 @@ use starlings_models::effect::library::{FAMILIES, Family, stem};
 
 use crate::console::{line, table, text};
 use crate::failure::Failure;
+use crate::load::load;
 
 /// List the effects that a search for what a model lacks can try: all built-in ones, or those with a place in a study.
 #[derive(Parser)]
@@ -31,7 +32,7 @@ struct Entry {
 /// Prints the catalogue, or what would be tried for a study.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let entries = match &args.study {
-        Some(path) => of_study(&Study::load(path)?)?,
+        Some(path) => of_study(&load(path)?)?,
         None => catalogue(),
     };
     if args.json {
@@ -54,10 +55,11 @@ fn catalogue() -> Vec<Entry> {
 /// What `starlings explain` would try.
 fn of_study(study: &Study) -> Result<Vec<Entry>, Failure> {
     let tried = candidates(study, &Options::of(study)).map_err(Failure::input)?;
+    let catalogue = catalogue();
     let origin = |effect: &EffectDef| {
         let own = study.candidates.iter().any(|candidate| candidate.name == effect.name);
-        let has = |family: &&Family| family.catalogue().iter().any(|e| e.name == stem(&effect.name));
-        if own { "study" } else { FAMILIES.iter().find(has).map_or("built-in", |family| family.name) }
+        let known = || catalogue.iter().find(|entry| entry.effect.name == stem(&effect.name));
+        if own { "study" } else { known().map_or("built-in", |entry| entry.origin) }
     };
     Ok(tried.into_iter().map(|effect| Entry { origin: origin(&effect), effect }).collect())
 }

@@ -12,7 +12,7 @@ use clap::Parser;
 use starlings_coordinator::explain::candidates::check;
 use starlings_coordinator::explain::keep::{keep, kept};
 use starlings_coordinator::explain::{Context, ExplainError, Explanation, Options, Stage, explain};
-use starlings_coordinator::report;
+use starlings_coordinator::report::{self, FilesError};
 use starlings_coordinator::study::store::Purpose;
 use starlings_coordinator::study::trial::trial;
 use starlings_coordinator::study::{RunFolder, Study};
@@ -20,7 +20,9 @@ use starlings_coordinator::study::{RunFolder, Study};
 use crate::console::{line, note};
 use crate::crew::{Crew, FleetArgs};
 use crate::failure::Failure;
+use crate::load::load;
 use crate::progress::Display;
+use crate::run_folder;
 
 /// Say where simulation and recordings disagree, name the missing effect, add it, and show the gap before and after.
 ///
@@ -80,7 +82,7 @@ impl Args {
 
 /// Explains the study's misfit.
 pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
-    let study = Study::load(&args.study)?;
+    let study = load(&args.study)?;
     let plan = args.fleet.plan(&study)?;
     let options = args.options(&study);
     check(&study, &options).map_err(Failure::input)?;
@@ -88,7 +90,7 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     // Listen before the folder is made: a port in use must leave nothing behind.
     let display = Arc::new(Display::new(args.json));
     let mut crew = Crew::listen(&study, &plan, &display)?;
-    let folder = open_folder(args, &study)?;
+    let folder = run_folder::open(Purpose::Explanation, &study, args.out.as_deref(), args.resume)?;
     if kept(&folder.store).map_err(Failure::run)?.is_some() {
         let path = folder.path.display();
         note(format_args!("the explanation in {path} is finished already; writing its files again"));
@@ -121,21 +123,12 @@ fn failed(error: &ExplainError, folder: &Path) -> Failure {
     }
 }
 
-fn open_folder(args: &Args, study: &Study) -> Result<RunFolder, Failure> {
-    let stamp = jiff::Timestamp::now().strftime("%Y%m%d-%H%M%S").to_string();
-    let default = || Path::new("runs").join(format!("{}-explain-{stamp}", study.name));
-    let path = args.out.clone().unwrap_or_else(default);
-    if args.resume {
-        return RunFolder::resume_for(Purpose::Explanation, &path, study).map_err(Failure::input);
-    }
-    let command = std::env::args().skip(1).collect::<Vec<_>>().join(" ");
-    let command = format!("starlings {command}");
-    RunFolder::create_for(Purpose::Explanation, &path, study, &command, &stamp).map_err(Failure::input)
-}
-
 /// Writes the files of a finished explanation and prints its answer.
 pub(crate) fn write(folder: &RunFolder, json: bool) -> Result<(), Failure> {
-    let found = report::write_explanation(folder).map_err(Failure::run)?;
+    let found = report::write_explanation(folder).map_err(|error| match error {
+        FilesError::Unfinished(_) => Failure::input(error),
+        _ => Failure::run(error),
+    })?;
     if json {
         return as_json(&found.explanation);
     }

@@ -13,6 +13,7 @@ use crate::console::{line, note, number, table, text};
 use crate::crew::{Crew, FleetArgs};
 use crate::csv_file::{self, Place};
 use crate::failure::Failure;
+use crate::load::load;
 use crate::progress::Display;
 
 /// At most this many lines of a list are printed; the rest is in the JSON and on the page.
@@ -44,7 +45,7 @@ pub(crate) struct Args {
 
 /// Runs the ensemble and prints what it says.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    let study = Study::load(&args.study)?;
+    let study = load(&args.study)?;
     let plan = args.fleet.plan(&study)?;
     let outputs = [("--html", &args.html), ("--csv", &args.csv)];
     csv_file::check_outputs(&outputs, &study.text, &Place::Known(&study.file))?;

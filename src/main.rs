@@ -6,6 +6,7 @@
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod check;
+mod conformance;
 mod console;
 mod crew;
 mod csv_file;
@@ -13,12 +14,17 @@ mod effects;
 mod explain;
 mod export;
 mod failure;
+mod guard;
 mod identify;
+mod load;
 mod models;
 mod progress;
 mod report;
 mod run;
+mod run_folder;
+mod serve;
 mod simulate;
+mod solvers;
 mod spectrum;
 mod worker;
 
@@ -57,6 +63,13 @@ enum Command {
     Spectrum(spectrum::Args),
     /// Be a worker: dial a coordinator and run its jobs.
     Worker(worker::Args),
+    /// Try an external solver out: does it do what a study relies on?
+    Conformance(conformance::Args),
+    /// Serve the model of a study as an external solver.
+    Serve(serve::Args),
+    /// End the solvers that a dying worker leaves behind; started by workers.
+    #[command(hide = true)]
+    Guard,
     /// List the built-in models, or describe one.
     Models(models::Args),
     /// List the effects that a model can lack: all built-in ones, or those that would be tried for a study.
@@ -79,11 +92,19 @@ fn main() -> ExitCode {
         Command::Identify(args) => identify::run(&args),
         Command::Spectrum(args) => spectrum::run(&args),
         Command::Worker(args) => worker::run(&args),
+        Command::Conformance(args) => conformance::run(&args),
+        Command::Serve(args) => serve::run(&args),
+        Command::Guard => {
+            guard::run();
+            Ok(())
+        }
         Command::Models(args) => models::run(&args),
         Command::Effects(args) => effects::run(&args),
         Command::Report(args) => report::run(&args),
         Command::Export(args) => export::run(&args),
     };
+    // Nothing else drops them: their folders would stay.
+    load::end_solvers();
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {

@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use clap::Parser;
-use starlings_coordinator::explain::keep::kept;
 use starlings_coordinator::report as page;
 use starlings_coordinator::study::RunFolder;
 use starlings_coordinator::study::store::Purpose;
@@ -62,12 +61,6 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 fn explanation(args: &Args, folder: &RunFolder) -> Result<(), Failure> {
     if args.overview.is_some() {
         return Err(Failure::input("an explanation has no overview picture: leave out --overview"));
-    }
-    if kept(&folder.store).map_err(Failure::run)?.is_none() {
-        let path = folder.path.display();
-        return Err(Failure::input(format!(
-            "the explanation in {path} is not finished: continue it with `starlings explain STUDY --out {path} --resume`"
-        )));
     }
     crate::explain::write(folder, args.json)
 }

@@ -6,13 +6,16 @@ use std::time::Instant;
 
 use clap::Parser;
 use starlings_coordinator::report;
+use starlings_coordinator::study::store::Purpose;
 use starlings_coordinator::study::trial::trial;
-use starlings_coordinator::study::{Progress, RunContext, RunFolder, Study, Summary, run as study_run};
+use starlings_coordinator::study::{Progress, RunContext, Summary, run as study_run};
 
 use crate::console::{line, note, number, table};
 use crate::crew::{Crew, FleetArgs};
 use crate::failure::Failure;
+use crate::load::load;
 use crate::progress::Display;
+use crate::run_folder;
 
 /// Estimate the parameters of a study; writes posterior.csv, summary.json and report.html into a run folder.
 #[derive(Parser)]
@@ -34,13 +37,13 @@ pub(crate) struct Args {
 
 /// Runs the study.
 pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
-    let study = Study::load(&args.study)?;
+    let study = load(&args.study)?;
     let plan = args.fleet.plan(&study)?;
     trial(&study).map_err(Failure::input)?;
     // Listen before the folder is made: a port in use must leave nothing behind.
     let display = Arc::new(Display::new(args.json));
     let mut crew = Crew::listen(&study, &plan, &display)?;
-    let mut folder = open_folder(args, &study)?;
+    let mut folder = run_folder::open(Purpose::Run, &study, args.out.as_deref(), args.resume)?;
     if let Some(summary) = folder.summary().map_err(Failure::run)? {
         note(format_args!(
             "the run in {} is finished already; writing its files again",
@@ -70,16 +73,6 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     })?;
     report::write_files(&folder).map_err(Failure::run)?;
     print(&summary, &folder.path, args.json)
-}
-
-fn open_folder(args: &Args, study: &Study) -> Result<RunFolder, Failure> {
-    let stamp = jiff::Timestamp::now().strftime("%Y%m%d-%H%M%S").to_string();
-    let path = args.out.clone().unwrap_or_else(|| Path::new("runs").join(format!("{}-{stamp}", study.name)));
-    if args.resume {
-        return RunFolder::resume(&path, study).map_err(Failure::input);
-    }
-    let command = std::env::args().skip(1).collect::<Vec<_>>().join(" ");
-    RunFolder::create(&path, study, &format!("starlings {command}"), &stamp).map_err(Failure::input)
 }
 
 fn print(summary: &Summary, folder: &Path, json: bool) -> Result<(), Failure> {

@@ -7,12 +7,14 @@ use clap::Parser;
 use starlings_coordinator::study::Study;
 use starlings_coordinator::study::field::{component_of, components, quantity_of};
 use starlings_coordinator::study::twin::{Recording, Twin, simulate};
+use starlings_models::effect::library::library_in;
 use starlings_models::effect::{EffectDef, library};
 use starlings_models::{Spec, catalogue, nearest};
 
 use crate::console::note;
 use crate::csv_file::{self, Place};
 use crate::failure::Failure;
+use crate::load::load;
 
 /// Run the study's model forward with chosen values and noise, and write the outputs as CSV.
 #[derive(Parser)]
@@ -92,7 +94,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if args.periodic.is_some_and(|period| !(period > 0.0 && period.is_finite())) {
         return Err(Failure::input("--periodic must be a positive number"));
     }
-    let study = Study::load(&args.study)?;
+    let study = load(&args.study)?;
     let outputs = [("-o", &args.output), ("--state-out", &args.state_out)];
     csv_file::check_outputs(&outputs, &study.text, &Place::Known(&study.file))?;
     check_names(args, &study)?;
@@ -121,6 +123,11 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         note(format_args!("the periodic state was found in {n} periods"));
     }
     if let Some(file) = &args.state_out {
+        if recording.start.is_empty() {
+            let message =
+                "--state-out: the model cannot restart from a state, so its state at the start is not known";
+            return Err(Failure::input(message));
+        }
         let heading = ["state", "value"].map(str::to_owned);
         let rows = recording.start.iter().map(|(state, value)| [state.clone(), format!("{value:?}")]);
         csv_file::write(Some(file), std::iter::once(heading).chain(rows))?;
@@ -157,7 +164,7 @@ fn grid(args: &Args, study: &Study, record: usize) -> Result<Vec<f64>, Failure> 
 
 /// Refuses a name that neither the model nor an effect of the twin has.
 fn check_names(args: &Args, study: &Study) -> Result<(), Failure> {
-    let built_in = library(&study.spec);
+    let built_in = library_in(&study.spec, &study.time_unit);
     let asked = |e: &&EffectDef| args.effect.iter().any(|(name, _)| *name == e.name);
     let effects = study.candidates.iter().chain(&built_in).filter(asked);
     let mut names: Vec<String> = study.setup.parameters.clone();

@@ -17,6 +17,7 @@ use starlings_models::spectrum::Decay;
 use crate::console::line;
 use crate::csv_file::{self, Place};
 use crate::failure::Failure;
+use crate::load::load;
 
 /// Show how the poles of the study's model move with the gain of each observer.
 ///
@@ -67,7 +68,7 @@ fn decay(text: &str) -> Result<Decay, String> {
 /// Examines the observers and writes what was asked for.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     check(args)?;
-    let study = Study::load(&args.study)?;
+    let study = load(&args.study)?;
     csv_file::check_outputs(
         &[("--csv", &args.csv), ("--html", &args.html)],
         &study.text,
@@ -80,7 +81,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         poles: args.poles,
     };
     let spectrum = examine(&study, &wanted).map_err(|error| match error {
-        ExamineError::Spectrum(_) => Failure::input(error),
+        ExamineError::Spectrum(_) | ExamineError::Solver => Failure::input(error),
         ExamineError::Broken(_) => Failure::run(error),
     })?;
     let found = Found { study: &study, spectrum, rows: args.poles.unwrap_or(print::ROWS) };

@@ -3,18 +3,29 @@
 use std::time::Duration;
 
 use clap::Parser;
+use starlings_models::SolverDef;
 use starlings_worker::{LIFELINE, MAX_SLOTS, WorkerConfig};
 use tokio_util::sync::CancellationToken;
 
-use crate::console::cancel_on_signal;
+use crate::console::{cancel_on_signal, line};
 use crate::failure::Failure;
+use crate::solvers::solvers;
 
 /// Be a worker: dial the coordinator, run its jobs, hold nothing it needs.
 #[derive(Parser)]
 pub(crate) struct Args {
     /// Address of the coordinator, HOST:PORT.
-    #[arg(long, value_name = "ADDR")]
-    connect: String,
+    #[arg(long, value_name = "ADDR", required_unless_present = "describe")]
+    connect: Option<String>,
+    /// The command that starts the solver on this machine, as a shell would take it apart; it replaces that of every study.
+    #[arg(long, value_name = "CMD")]
+    solver: Option<String>,
+    /// Print what the solver says of itself as JSON, for `described` in a study, and do nothing else.
+    #[arg(long, requires = "solver", conflicts_with_all = ["connect", "slots", "once"])]
+    describe: bool,
+    /// How the solver is reached, for --describe: grpc, fmu or mpi.
+    #[arg(long, default_value = "grpc", value_name = "NAME", requires = "describe")]
+    adapter: String,
     /// Runs at the same time; the number of cores without it.
     #[arg(long, value_name = "N")]
     slots: Option<usize>,
@@ -28,6 +39,8 @@ pub(crate) struct Args {
 
 /// Works until drained, cancelled or out of patience.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    let command = args.solver.as_deref().map(solver_command).transpose()?;
+    let Some(connect) = &args.connect else { return describe(&args.adapter, command.unwrap_or_default()) };
     if args.slots.is_some_and(|n| n == 0 || n > MAX_SLOTS) {
         return Err(Failure::input(format!("--slots must be from 1 to {MAX_SLOTS}")));
     }
@@ -36,15 +49,38 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let cancel = CancellationToken::new();
     cancel_on_signal(&cancel);
+    let solvers = match command {
+        Some(command) => solvers()?.with_command(command),
+        None => solvers()?,
+    };
     let config = WorkerConfig {
         slots: args.slots.unwrap_or(cores),
         once: args.once,
         patience,
         cancel,
         lifeline: std::env::var_os(LIFELINE).is_some(),
-        ..WorkerConfig::new(args.connect.clone())
+        factory: solvers.factory(),
+        ..WorkerConfig::new(connect.clone())
     };
     let report = starlings_worker::run(config).map_err(Failure::run)?;
     tracing::info!(predictions = report.predictions, failures = report.failures, reason = ?report.reason, "done");
     Ok(())
+}
+
+/// A command line in parts; there must be a program.
+fn solver_command(text: &str) -> Result<Vec<String>, Failure> {
+    let parts =
+        shell_words::split(text).map_err(|error| Failure::input(format!("--solver {text}: {error}")))?;
+    if parts.first().is_none_or(String::is_empty) {
+        return Err(Failure::input("--solver names no program: such as --solver \"python3 beam.py\""));
+    }
+    Ok(parts)
+}
+
+/// Starts the solver, asks what it is and prints the answer.
+fn describe(adapter: &str, command: Vec<String>) -> Result<(), Failure> {
+    let folder = std::env::current_dir().map_err(Failure::run)?.display().to_string();
+    let def = SolverDef { adapter: adapter.to_owned(), command, folder, ..SolverDef::default() };
+    let description = solvers()?.describe(&def).map_err(Failure::input)?;
+    line(serde_json::to_string_pretty(&description).map_err(Failure::run)?)
 }

@@ -110,7 +110,7 @@ fn a_missing_pressure_drop_is_named_added_and_shown() {
         assert!(stdout.contains(told), "no `{told}` in {stdout}");
     }
     let held_out = found["gap"].as_array().unwrap().iter().find(|row| row["use"] == "held-out").unwrap();
-    assert!(held_out["after"].as_f64() < held_out["before"].as_f64(), "{held_out}");
+    assert!(held_out["after"].as_f64().unwrap() < held_out["before"].as_f64().unwrap(), "{held_out}");
 
     // The study with the effect in it runs from where it stands.
     let summary = common::run(&out.join("explained.toml"), &dir.path().join("again"), 1);
@@ -139,6 +139,14 @@ fn a_missing_pressure_drop_is_named_added_and_shown() {
     for (file, text) in before {
         assert_eq!(bytes(&moved, file), text, "{file}");
     }
+
+    // Without its last entry the folder is that of an explanation that was killed: there is nothing to write yet.
+    let db = Connection::open(moved.join("run.db")).unwrap();
+    assert_eq!(db.execute("DELETE FROM meta WHERE key = 'explanation'", []).unwrap(), 1);
+    drop(db);
+    let (code, _, stderr) = output(starlings().arg("report").arg(&moved));
+    assert_eq!(code, 2, "{stderr}");
+    assert!(stderr.contains("is not finished: continue it with `starlings explain STUDY --out"), "{stderr}");
 }
 
 /// Answers that are kept so far; zero while there is no database.

@@ -9,6 +9,7 @@ pub mod background;
 mod bent;
 pub mod candidate;
 pub mod candidates;
+mod carried;
 mod course;
 mod experiment;
 pub mod figures;

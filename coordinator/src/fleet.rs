@@ -19,7 +19,7 @@ mod service;
 pub use error::FleetError;
 pub use event::FleetEvent;
 pub use grpc::{FleetConfig, FleetHandle, GrpcFleet};
-pub use in_process::InProcess;
+pub use in_process::{Factory, InProcess};
 pub use local_workers::{LocalConfig, LocalWorkers};
 pub use starlings_proto::SetupId;
 

@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use fleet_kit::{ThreadWorker, any_port, await_workers, factory, jobs, listen};
-use starlings_coordinator::fleet::{Fleet, FleetError, InProcess, Outcome, SetupId};
+use starlings_coordinator::fleet::{Fleet, FleetError, FleetEvent, InProcess, Outcome, SetupId};
 use starlings_models::{
     Addition, EffectDef, EffectParameter, Job, ModelDef, Prediction, Setup, SetupError, Window,
 };
@@ -78,6 +78,33 @@ fn more_setups_than_a_worker_keeps_are_sent_again_and_no_job_is_lost() {
     fleet.close();
     let report = worker.end().unwrap();
     assert_eq!((report.predictions, report.failures), (2400, 0), "each ran once, none was refused");
+}
+
+#[test]
+fn jobs_of_one_forgotten_setup_in_flight_together_do_not_end_a_batch_of_local_workers() {
+    let (mut fleet, events, _) = listen(any_port());
+    fleet.handle().local_only();
+    let worker = ThreadWorker::start(fleet.address(), gains());
+    await_workers(&events, 1);
+    let setups: Vec<_> = (0..600).map(|i| fleet.install(&gain(f64::from(i))).unwrap()).collect();
+    let pairs: Vec<_> = setups.iter().flat_map(|&setup| [setup; 2]).collect();
+    let factor = |i: usize| (i / 2) as f64;
+    for _ in 0..2 {
+        let jobs = mixed(&pairs, 1200);
+        let outcomes = fleet.run_mixed(jobs.clone()).unwrap();
+        for (i, (outcome, (_, job))) in outcomes.iter().zip(&jobs).enumerate() {
+            assert_eq!(
+                outcome.result.as_ref().unwrap().outputs,
+                multiplied(job, factor(i)).outputs,
+                "job {i}"
+            );
+        }
+    }
+    fleet.close();
+    let report = worker.end().unwrap();
+    assert_eq!((report.predictions, report.failures), (2400, 0), "each ran once, none was refused");
+    let unbuilt = |event: &FleetEvent| matches!(event, FleetEvent::SetupFailed { .. });
+    assert!(!events.try_iter().any(|event| unbuilt(&event)), "a setup that is forgotten can be built");
 }
 
 #[test]

@@ -5,6 +5,8 @@ mod study_kit;
 use std::sync::mpsc;
 
 use starlings_coordinator::fleet::InProcess;
+use starlings_coordinator::report::{FilesError, write_explanation};
+use starlings_coordinator::study::store::Purpose;
 use starlings_coordinator::study::{FolderError, RunContext, RunFolder, Summary, run::run};
 use study_kit::fleets::Mortal;
 use study_kit::{Case, linear};
@@ -79,7 +81,7 @@ fn a_resumed_run_keeps_its_clock_its_counts_and_one_row_per_job() {
     let path = case.fresh();
     assert!(case.go(&path, &mut Mortal::new(17)).is_err());
     let study = case.study();
-    let mut folder = RunFolder::resume(&path, &study).unwrap();
+    let mut folder = RunFolder::resume(Purpose::Run, &path, &study).unwrap();
     assert!(folder.summary().unwrap().is_none(), "an interrupted run has no summary");
     folder.store.event(7.5, "test", "time has passed").unwrap();
     let mut steps = Vec::new();
@@ -111,24 +113,44 @@ fn a_folder_with_a_run_and_a_changed_study_are_refused() {
     let case = line("passes = 1");
     let done = case.run();
     let study = case.study();
-    let occupied = RunFolder::create(&done.folder.path, &study, "", "").err().unwrap();
+    let occupied = RunFolder::create(Purpose::Run, &done.folder.path, &study, "", "").err().unwrap();
     assert!(matches!(occupied, FolderError::Occupied(_)), "{occupied}");
     assert!(occupied.to_string().contains("--resume"), "{occupied}");
     let path = done.folder.path.clone();
-    let locked = RunFolder::resume(&path, &study).err().unwrap();
+    let locked = RunFolder::resume(Purpose::Run, &path, &study).err().unwrap();
     assert!(matches!(locked, FolderError::Locked(_)), "the folder is still open: {locked}");
     drop(done);
     let mut changed = study.clone();
     changed.text.push_str("# another thought\n");
-    let error = RunFolder::resume(&path, &changed).err().unwrap().to_string();
+    let error = RunFolder::resume(Purpose::Run, &path, &changed).err().unwrap().to_string();
     assert!(error.contains("the study file changed"), "{error}");
     let mut changed = study.clone();
     changed.records[0].channels[0].values[3] += 1e-9;
-    let error = RunFolder::resume(&path, &changed).err().unwrap().to_string();
+    let error = RunFolder::resume(Purpose::Run, &path, &changed).err().unwrap().to_string();
     assert!(error.contains("the recordings changed"), "{error}");
     let nowhere = case.fresh();
-    let error = RunFolder::resume(&nowhere, &study).err().unwrap().to_string();
+    let error = RunFolder::resume(Purpose::Run, &nowhere, &study).err().unwrap().to_string();
     assert!(error.contains("no run in") && error.contains("run.db"), "{error}");
+}
+
+#[test]
+fn a_folder_says_which_command_it_belongs_to_and_that_its_explanation_is_not_finished() {
+    let case = line("passes = 1");
+    let (study, path) = (case.study(), case.fresh());
+    let folder = RunFolder::create(Purpose::Explanation, &path, &study, "", "").unwrap();
+    let error = write_explanation(&folder).err().unwrap();
+    assert!(matches!(&error, FilesError::Unfinished(unfinished) if *unfinished == path), "{error}");
+    let remedy = format!("continue it with `starlings explain STUDY --out {} --resume`", path.display());
+    assert!(error.to_string().ends_with(&remedy), "{error}");
+    assert_eq!(std::fs::read_dir(&path).unwrap().filter(|file| is_result(file.as_ref().unwrap())).count(), 0);
+    drop(folder);
+    let error = RunFolder::resume(Purpose::Run, &path, &study).err().unwrap().to_string();
+    assert!(error.contains("holds an explanation of `starlings explain`"), "{error}");
+}
+
+/// Whether a file of a run folder is made from its database.
+fn is_result(file: &std::fs::DirEntry) -> bool {
+    ["report.html", "explain.json", "explained.toml"].iter().any(|name| file.file_name() == *name)
 }
 
 #[test]
@@ -138,7 +160,7 @@ fn a_folder_that_holds_a_file_of_the_user_is_left_alone() {
     std::fs::create_dir_all(&folder).unwrap();
     let mine = folder.join("study.toml");
     std::fs::write(&mine, "mine").unwrap();
-    let error = RunFolder::create(&folder, &case.study(), "", "").err().unwrap();
+    let error = RunFolder::create(Purpose::Run, &folder, &case.study(), "", "").err().unwrap();
     assert!(matches!(error, FolderError::InTheWay(_)), "{error}");
     assert_eq!(std::fs::read_to_string(&mine).unwrap(), "mine");
 }
@@ -164,11 +186,11 @@ fn a_damaged_database_is_named_with_its_damage() {
     assert!(case.go(&path, &mut Mortal::new(5)).is_err());
     std::fs::write(path.join("run.db"), "this is a text, not a database; ".repeat(50)).unwrap();
     let _ = std::fs::remove_file(path.join("run.db-wal"));
-    let error = RunFolder::resume(&path, &study).err().unwrap().to_string();
+    let error = RunFolder::resume(Purpose::Run, &path, &study).err().unwrap().to_string();
     assert!(error.contains("run.db") && error.contains("not a database"), "{error}");
     let path = case.fresh();
     assert!(case.go(&path, &mut Mortal::new(5)).is_err());
     rusqlite::Connection::open(path.join("run.db")).unwrap().pragma_update(None, "user_version", 99).unwrap();
-    let error = RunFolder::resume(&path, &study).err().unwrap().to_string();
+    let error = RunFolder::resume(Purpose::Run, &path, &study).err().unwrap().to_string();
     assert!(error.contains("version 99"), "{error}");
 }

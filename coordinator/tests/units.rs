@@ -5,7 +5,8 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use starlings_coordinator::study::Study;
+use starlings_coordinator::study::store::Purpose;
+use starlings_coordinator::study::{RunFolder, Study};
 
 fn recording() -> String {
     let mut text = "time,pressure,flow\n".to_owned();
@@ -219,7 +220,7 @@ fn a_channel_keeps_the_label_that_the_study_gives() {
     let study = Study::load(&examples.join("rcr/study.toml")).unwrap();
     assert_eq!(study.records[0].channels[0].unit.as_deref(), Some("dyn/cm^2"));
     let folder = tempfile::tempdir().unwrap();
-    let run = starlings_coordinator::study::RunFolder::create(folder.path(), &study, "run", "now").unwrap();
+    let run = RunFolder::create(Purpose::Run, folder.path(), &study, "run", "now").unwrap();
     let info = run.store.meta("info").unwrap().unwrap();
     assert!(info.contains(r#"["pressure","dyn/cm^2"]"#), "{info}");
 }

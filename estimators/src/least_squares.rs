@@ -91,9 +91,10 @@ impl LeastSquares {
         self.thorough = true;
         self.trials_left = trials;
         self.rejected = 0;
-        self.need = if self.fresh { self.need.clone() } else { Need::Jacobian(self.z.clone()) };
         if self.fresh {
             self.plan();
+        } else {
+            self.need = Need::Jacobian(self.z.clone());
         }
     }
 

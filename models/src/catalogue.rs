@@ -6,7 +6,9 @@
 use std::collections::HashSet;
 
 use crate::equations::EquationsModel;
+use crate::external::Outline;
 use crate::setup::{ModelDef, SetupError};
+use crate::solver::SOLVER;
 use crate::{Model, Spec, equations, layout, native, nearest};
 
 pub use crate::equations::KIND as EQUATIONS;
@@ -35,6 +37,14 @@ pub fn specs() -> Vec<Spec> {
 /// When the kind is unknown, equations are missing or given for another kind, or they are wrong, or a layout gives two
 /// quantities one name.
 pub fn build(def: &ModelDef) -> Result<Box<dyn Model>, SetupError> {
+    if def.kind == SOLVER {
+        layout::none(def)?;
+        let description = def.description().ok_or_else(|| {
+            SetupError::Invalid("model kind `solver` needs a description of the solver".to_owned())
+        })?;
+        check_names(&description.spec)?;
+        return Ok(Box::new(Outline::new(description)));
+    }
     match (&def.equations, def.kind == EQUATIONS) {
         (Some(equations), true) => {
             layout::none(def)?;

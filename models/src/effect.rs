@@ -11,6 +11,7 @@ pub mod library;
 pub mod scale;
 pub mod scope;
 mod scratch;
+pub mod target;
 pub mod terms;
 
 use crate::Drive;
@@ -20,10 +21,11 @@ pub use extended::Extended;
 pub use library::library;
 pub use scale::Scale;
 pub use scope::names;
+pub use target::Target;
 pub use terms::TermEffect;
 
-/// One time of an extended model. Slices follow the extended specification; `y` holds the inner model's outputs without any
-/// effect, and is empty unless [`Touches::reads_outputs`].
+/// One time of an extended model. Slices follow the extended specification; `y` holds the inner model's outputs before any
+/// term is added to them, and is empty unless [`Touches::reads_outputs`].
 #[derive(Clone, Copy)]
 pub struct Moment<'a> {
     /// Time.
@@ -32,7 +34,7 @@ pub struct Moment<'a> {
     pub x: &'a [f64],
     /// The extended parameters.
     pub theta: &'a [f64],
-    /// The recorded inputs, before any effect.
+    /// The recorded inputs, before any effect; with the additions of effects for a term that adds to an output.
     pub u: Drive<'a>,
     /// The inner model's outputs.
     pub y: &'a [f64],

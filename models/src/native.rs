@@ -31,6 +31,11 @@ pub use windkessel2::Windkessel2;
 pub use windkessel3::Windkessel3;
 pub use windkessel4::Windkessel4;
 
+/// Steps of a model's own scheme within one span of linear inputs, at most.
+const MOST_STEPS: u64 = 100_000_000;
+/// Cells of all vessels together at most: structural observers work with matrices of this size.
+const MOST_CELLS: usize = 10_000;
+
 /// One built-in model of the list.
 pub struct Kind {
     /// The `kind` by which a study names it.

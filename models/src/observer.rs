@@ -56,8 +56,9 @@ pub trait Observer: Send + Sync {
     /// observed. [`Correction`]s are its steps.
     fn feedback(&self, model: &dyn Model, theta: &[f64]) -> DMatrix<f64>;
 
-    /// The largest stable gain with observations every `dt`; `None` for a correction that any gain leaves stable.
-    fn stable_up_to(&self, _dt: f64) -> Option<f64> {
+    /// The largest stable gain with observations every `dt`; `None` for a correction that any gain leaves stable. `theta` are
+    /// the parameters of `model`.
+    fn stable_up_to(&self, _model: &dyn Model, _theta: &[f64], _dt: f64) -> Option<f64> {
         None
     }
 

@@ -8,7 +8,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::effect::{EffectDef, Extended, library};
 use crate::equations::EquationsDef;
+use crate::external;
 use crate::memory::with_memories;
+use crate::solver::{Description, SOLVER, SolverDef};
 use crate::{Forward, Model, Simulator, Spec, catalogue};
 
 /// The model by kind, with the values that are not estimated.
@@ -23,6 +25,16 @@ pub struct ModelDef {
     /// How the model is put together, where its kind leaves that to the study; see [`crate::layout`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub layout: Option<serde_json::Value>,
+    /// The solver, when `kind` is [`SOLVER`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub solver: Option<Box<SolverDef>>,
+}
+
+impl ModelDef {
+    /// What the solver says of itself, where the model is one.
+    pub fn description(&self) -> Option<&Description> {
+        self.solver.as_ref()?.described.as_ref()
+    }
 }
 
 /// The observer by kind.
@@ -58,6 +70,10 @@ impl Setup {
     /// # Errors
     /// When a name is unknown (with the nearest valid one), given twice or without value, or an expression is wrong.
     pub fn build(&self) -> Result<Box<dyn Forward>, SetupError> {
+        if self.model.kind == SOLVER {
+            let message = "the model runs in a program of its own, which only a worker starts";
+            return Err(SetupError::Invalid(message.to_owned()));
+        }
         Ok(Box::new(Simulator::new(self)?))
     }
 
@@ -66,16 +82,22 @@ impl Setup {
     /// # Errors
     /// When the model or an effect does not build.
     pub fn spec(&self) -> Result<Spec, SetupError> {
+        if let Some(description) = self.model.description() {
+            return external::spec(self, description);
+        }
         let model = self.model()?;
         Ok(with_memories(model.spec(), model.memories()))
     }
 
-    /// The model with its effects.
+    /// The model with its effects. Of a solver only the specification is known: its rates and outputs are no numbers.
     ///
     /// # Errors
     /// When the model or an effect does not build.
     pub fn model(&self) -> Result<Box<dyn Model>, SetupError> {
         let inner = catalogue::build(&self.model)?;
+        if let Some(description) = self.model.description() {
+            external::check_effects(self, description)?;
+        }
         if self.effects.is_empty() {
             return Ok(inner);
         }
@@ -83,12 +105,13 @@ impl Setup {
         Ok(Box::new(Extended::new(inner, &effects, &self.model.constants)?))
     }
 
-    /// The effects with the built-in ones written out for a model of this specification.
+    /// The effects with the built-in ones written out for a model of this specification; their unit labels, which no run
+    /// reads, are those of a time in seconds.
     ///
     /// # Errors
     /// When the model has no such built-in effect.
     pub fn written_out_effects(&self, spec: &Spec) -> Result<Vec<EffectDef>, SetupError> {
-        self.effects.iter().map(|def| library::write_out(def, spec)).collect()
+        self.effects.iter().map(|def| library::write_out(def, spec, "s")).collect()
     }
 }
 

@@ -40,7 +40,14 @@ impl Simulator {
     /// # Errors
     /// When a name is unknown (with the nearest valid one), given twice or without value, or an expression is wrong.
     pub fn new(setup: &Setup) -> Result<Self, SetupError> {
-        let model = setup.model()?;
+        Self::of(setup.model()?, setup)
+    }
+
+    /// Resolves the names of a setup against a model with its effects.
+    ///
+    /// # Errors
+    /// As [`Simulator::new`].
+    pub(crate) fn of(model: Box<dyn Model>, setup: &Setup) -> Result<Self, SetupError> {
         let spec = with_memories(model.spec(), model.memories());
         let rows = rows(model.spec(), &setup.outputs)?;
         let binding = Binding::new(setup, &spec, &free_names(setup, &spec)?)?;
@@ -90,33 +97,6 @@ impl Simulator {
         past.advance(&*self.model, segment, theta, x)
     }
 
-    /// Refuses a job whose lengths or times do not fit.
-    fn check(&self, job: &Job) -> Result<(), ParticleError> {
-        let window = &*job.window;
-        let (given, wanted) = (job.theta.len(), self.binding.len());
-        if given != wanted {
-            return Err(bad(format!("{given} parameter values for {wanted} parameters")));
-        }
-        let (given, wanted) = (window.observed.len(), self.rows.len() * window.times.len());
-        if given != wanted {
-            return Err(bad(format!("{given} observed values where outputs times times make {wanted}")));
-        }
-        let (given, wanted) = (window.inputs.len(), self.spec().inputs.len());
-        if given != wanted {
-            return Err(bad(format!("{given} input signals for a model with {wanted}")));
-        }
-        for (signal, input) in window.inputs.iter().zip(&self.spec().inputs) {
-            if signal.times.len() != signal.values.len() || signal.times.is_empty() {
-                let (times, values) = (signal.times.len(), signal.values.len());
-                return Err(bad(format!("input `{}` has {times} times and {values} values", input.name)));
-            }
-            if !signal.times.is_sorted_by(|a, b| a < b) {
-                return Err(bad(format!("the times of input `{}` do not increase", input.name)));
-            }
-        }
-        check_times(window)
-    }
-
     /// The first quantity that is not finite, as an error. A wrong input is named before what it spoils.
     fn check_finite(&self, t: f64, u: &[f64], x: &[f64], y: &[f64]) -> Result<(), ParticleError> {
         if x.iter().chain(y).all(|value| value.is_finite()) {
@@ -138,7 +118,7 @@ impl Forward for Simulator {
     }
 
     fn run(&self, job: &Job) -> Result<Prediction, ParticleError> {
-        self.check(job)?;
+        check_job(job, self.binding.len(), self.rows.len(), &self.spec)?;
         let window = &*job.window;
         let theta = self.binding.theta(&job.theta, window.start)?;
         let mut inputs = Inputs::new(window);
@@ -170,6 +150,33 @@ impl Forward for Simulator {
         self.check_finite(previous, &[], &x, &[])?;
         Ok(Prediction { outputs, state: x, cost: 0.0 })
     }
+}
+
+/// Refuses a job whose lengths or times do not fit: so many parameter values, so many rows, the inputs of the specification.
+pub(crate) fn check_job(job: &Job, n_value: usize, n_row: usize, spec: &Spec) -> Result<(), ParticleError> {
+    let window = &*job.window;
+    let (given, wanted) = (job.theta.len(), n_value);
+    if given != wanted {
+        return Err(bad(format!("{given} parameter values for {wanted} parameters")));
+    }
+    let (given, wanted) = (window.observed.len(), n_row * window.times.len());
+    if given != wanted {
+        return Err(bad(format!("{given} observed values where outputs times times make {wanted}")));
+    }
+    let (given, wanted) = (window.inputs.len(), spec.inputs.len());
+    if given != wanted {
+        return Err(bad(format!("{given} input signals for a model with {wanted}")));
+    }
+    for (signal, input) in window.inputs.iter().zip(&spec.inputs) {
+        if signal.times.len() != signal.values.len() || signal.times.is_empty() {
+            let (times, values) = (signal.times.len(), signal.values.len());
+            return Err(bad(format!("input `{}` has {times} times and {values} values", input.name)));
+        }
+        if !signal.times.is_sorted_by(|a, b| a < b) {
+            return Err(bad(format!("the times of input `{}` do not increase", input.name)));
+        }
+    }
+    check_times(window)
 }
 
 /// Refuses a window without times, with times out of order or before its start.

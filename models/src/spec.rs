@@ -139,7 +139,7 @@ impl Quantity {
 }
 
 /// What a model says of itself. Vectors of states and outputs are the concatenation of the quantities in this order.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Spec {
     /// The `kind` by which a study names the model.
     pub kind: String,

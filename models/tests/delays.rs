@@ -28,8 +28,12 @@ fn equations(states: &[(&str, &str, &str)], outputs: &[(&str, &str)], constants:
         ..EquationsDef::default()
     };
     let constants = constants.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
-    let model =
-        ModelDef { kind: "equations".to_owned(), equations: Some(equations), constants, layout: None };
+    let model = ModelDef {
+        kind: "equations".to_owned(),
+        equations: Some(equations),
+        constants,
+        ..ModelDef::default()
+    };
     Setup { model, outputs: outputs.iter().map(|(name, _)| (*name).to_owned()).collect(), ..Setup::default() }
 }
 

@@ -5,9 +5,9 @@ mod common;
 mod library_kit;
 
 use library_kit::benches;
-use starlings_models::effect::library::{library, library_in, shows_in, write_out};
+use starlings_models::effect::library::{library, library_in, shows_in, stem, write_out};
 use starlings_models::native::{Oscillator, Windkessel2};
-use starlings_models::{EffectDef, Model, Spec};
+use starlings_models::{EffectDef, Model, SetupError, Spec};
 
 #[test]
 fn a_pressure_outlet_with_a_flow_hosts_a_series_resistance() {
@@ -43,6 +43,52 @@ fn two_places_of_a_kind_get_names_of_their_own_and_one_needs_none() {
         second.adds[0].term, "-k_support_v2*x2",
         "the second velocity belongs to the second displacement"
     );
+}
+
+#[test]
+fn one_velocity_between_two_displacements_has_one_friction_and_two_springs() {
+    let mut spec = Oscillator::default().spec().clone();
+    let mut other = spec.states.iter().find(|q| q.name == "x").unwrap().clone();
+    other.name = "z".to_owned();
+    spec.states.push(other);
+    let effects = library(&spec);
+    let places = |kind: &str| -> Vec<&str> {
+        effects.iter().map(|effect| effect.name.as_str()).filter(|name| stem(name) == kind).collect()
+    };
+    for kind in ["viscous-friction", "coulomb-friction", "stribeck-friction", "quadratic-drag"] {
+        assert_eq!(places(kind), [kind]);
+    }
+    for kind in ["bias-force", "periodic-forcing"] {
+        assert_eq!(places(kind), [kind]);
+    }
+    assert_eq!(places("linear-support"), ["linear-support:v:x", "linear-support:v:z"]);
+    assert_eq!(places("backlash"), ["backlash:v:x", "backlash:v:z"]);
+}
+
+#[test]
+fn a_built_in_effect_is_written_out_in_the_time_unit_of_the_study() {
+    let def = EffectDef { built_in: Some("sensor-drift".to_owned()), ..EffectDef::default() };
+    let unit =
+        |time: &str| write_out(&def, Windkessel2::default().spec(), time).unwrap().parameters[0].unit.clone();
+    assert_eq!((unit("s").as_str(), unit("min").as_str()), ("mmHg/s", "mmHg/min"));
+}
+
+#[test]
+fn numbers_that_count_in_a_course_are_neither_range_nor_default_in_the_models_units() {
+    let bench = benches().into_iter().find(|bench| bench.name == "one tank").unwrap();
+    let overflow = library(&bench.spec).into_iter().find(|effect| effect.name == "overflow").unwrap();
+    let mut setup = bench.setup.clone();
+    setup.effects.push(EffectDef { built_in: Some("overflow".to_owned()), ..EffectDef::default() });
+    let rim = &overflow.parameters[1].name;
+    let missing = setup.build().map(|_| ()).unwrap_err();
+    assert_eq!(missing, SetupError::Missing { model: "equations".to_owned(), name: rim.clone() });
+    // A level of 24 is beyond the course of 0.05 to 0.98.
+    setup.model.constants.insert(rim.clone(), 24.0);
+    setup.build().map(|_| ()).unwrap();
+    // A memory is as long as some bound on its delay.
+    setup.effects[0].built_in = Some("sensor-delay".to_owned());
+    setup.model.constants.remove(rim);
+    setup.build().map(|_| ()).unwrap();
 }
 
 #[test]
@@ -100,8 +146,17 @@ fn a_lag_of_the_sensor_is_that_of_first_order() {
 }
 
 #[test]
+fn a_lag_of_no_time_is_no_lag() {
+    let bench = benches().into_iter().find(|bench| bench.name == "ramp").unwrap();
+    let lag = library(&bench.spec).into_iter().find(|effect| effect.name == "sensor-lag").unwrap();
+    let (plain, with) = (bench.run(&[], 0.0).unwrap(), bench.run(&[lag], 0.0).unwrap());
+    // The output depends on time alone, and its past ends with its value now: every difference is zero.
+    assert!(plain.iter().zip(&with).step_by(2).all(|(a, b)| (a - b).abs() < 1e-15), "{plain:?} {with:?}");
+}
+
+#[test]
 fn a_mistyped_built_in_effect_offers_the_nearest() {
     let def = EffectDef { built_in: Some("serial-resistance".to_owned()), ..EffectDef::default() };
-    let error = write_out(&def, Windkessel2::default().spec()).unwrap_err();
+    let error = write_out(&def, Windkessel2::default().spec(), "s").unwrap_err();
     assert!(error.to_string().contains("did you mean `series-resistance`"), "{error}");
 }

@@ -120,7 +120,8 @@ fn the_largest_stable_gain_of_an_image_force_is_where_runs_begin_to_grow_at_any_
         let model = setup("oscillator").0.model().unwrap();
         let outputs = channels(&["position", "velocity"]);
         let wiring = Wiring { spec: model.spec(), outputs: &outputs, model: &*model, theta: &THETA };
-        let most = observer::build(&def("image-force", 1.0), wiring).unwrap().stable_up_to(dt).unwrap();
+        let image_force = observer::build(&def("image-force", 1.0), wiring).unwrap();
+        let most = image_force.stable_up_to(&*model, &THETA, dt).unwrap();
         let largest = |gain: f64| {
             let times = (1..=200).map(|j| f64::from(j) * dt).collect();
             let window = Window { start: 0.0, times, observed: vec![0.0; 400], inputs: vec![] };

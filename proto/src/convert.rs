@@ -1,11 +1,12 @@
 //! Translates between the wire and the project's own types, and checks everything that arrives.
 //!
-//! The only module that looks inside [`crate::wire`]. Every bit of every number survives both ways; a malformed message is a
+//! The only module that looks inside [`crate::wire`] and [`crate::solver_wire`]. Every bit of every number survives both ways; a malformed message is a
 //! [`WireError`], never a panic. Next files to read: [`from_worker`], [`to_worker`], [`job`].
 
 pub mod floats;
 pub mod from_worker;
 pub mod job;
+pub mod solver;
 pub mod to_worker;
 
 use starlings_models::Setup;

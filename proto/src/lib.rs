@@ -1,7 +1,8 @@
 //! The wire between the coordinator and its workers.
 //!
-//! `proto/fleet.proto` says what travels, in which unit and shape. [`wire`] is generated from it and nobody looks inside:
-//! [`convert`] is the only place that checks and translates. No socket and no scheduling here. Next file to read:
+//! `proto/fleet.proto` says what travels between coordinator and worker, `proto/solver.proto` between a worker and a solver
+//! outside, in which unit and shape. [`wire`] and [`solver_wire`] are generated from them and nobody looks inside: [`convert`]
+//! is the only place that checks and translates. No socket and no scheduling here. Next file to read:
 //! [`convert`].
 
 pub mod convert;
@@ -44,4 +45,10 @@ pub fn own_build() -> Option<[u8; 32]> {
 #[allow(missing_docs, unreachable_pub, clippy::all, clippy::pedantic, rust_2018_idioms)]
 pub mod wire {
     tonic::include_proto!("starlings.fleet.v1");
+}
+
+/// Types and service stubs generated from `proto/solver.proto`.
+#[allow(missing_docs, unreachable_pub, clippy::all, clippy::pedantic, rust_2018_idioms)]
+pub mod solver_wire {
+    tonic::include_proto!("starlings.solver.v1");
 }

@@ -63,10 +63,7 @@ fn list(heading: &str, lines: impl ExactSizeIterator<Item = String>, most: usize
 /// The sentence, the equations and the coefficients of an effect.
 fn described(effect: &NamedEffect, states: &[String]) -> String {
     let mut lines = vec![format!("{}: {}", effect.name, effect.says)];
-    for (to, term) in &effect.adds {
-        let left = if states.contains(to) { format!("d {to}/dt") } else { to.clone() };
-        lines.push(format!("  {left} += {term}"));
-    }
+    lines.extend(effect.equations(states).iter().map(|equation| format!("  {equation}")));
     lines.extend(effect.parameters.iter().map(|p| format!("  {}", coefficient(p))));
     lines.join("\n") + "\n"
 }

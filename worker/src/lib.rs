@@ -11,6 +11,7 @@ mod lifeline;
 mod session;
 mod setups;
 mod slots;
+pub mod solver;
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -19,6 +20,7 @@ pub use config::{Factory, WorkerConfig};
 use dial::Dialled;
 use session::Ended;
 use slots::Slots;
+pub use solver::{SiteOptions, SolverError, Solvers};
 pub use starlings_proto::{LIFELINE, MAX_SLOTS};
 
 /// What a worker did until it ended.

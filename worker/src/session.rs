@@ -100,8 +100,11 @@ fn take(
             if let Some(forward) = setups.get(&setup) {
                 slots.push(Task { lease, forward, job, outbox: outbox.clone() });
             } else {
-                // First the setup, so that the job that comes back finds it missing here.
-                send(outbox, FromWorker::Setup { id: setup, result: Err("it is forgotten".to_owned()) });
+                // First the setup, so that the job that comes back finds it missing here; and once, however many of its jobs
+                // are on their way: a second time would stand for the setup that is sent again.
+                if setups.miss(setup) {
+                    send(outbox, FromWorker::Setup { id: setup, result: Err("it is forgotten".to_owned()) });
+                }
                 answer(outbox, lease, Answer::Withdrawn, 0.0);
             }
         }
@@ -137,4 +140,52 @@ async fn goodbye(
     send(outbox, FromWorker::Goodbye(reason.to_owned()));
     let closed = async { while let Ok(Some(_)) = inbound.message().await {} };
     let _ = tokio::time::timeout(GOODBYE_PATIENCE, closed).await;
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use starlings_models::{Job, Setup, Window};
+    use starlings_proto::{JobEncoder, Lease, encode_setup};
+    use tokio::sync::mpsc::unbounded_channel;
+
+    use super::*;
+
+    /// A run of the oscillator to time 1.
+    fn job() -> Job {
+        let window = Window { start: 0.0, times: vec![1.0], observed: vec![f64::NAN], inputs: vec![] };
+        Job { particle: 0, record: 0, window: Arc::new(window), theta: vec![], state: None }
+    }
+
+    fn oscillator() -> Setup {
+        let mut setup = Setup { outputs: vec!["position".to_owned()], ..Setup::default() };
+        setup.model.kind = "oscillator".to_owned();
+        setup.model.constants = [("m", 1.0), ("c", 0.1), ("k", 1.0)].map(|(n, v)| (n.to_owned(), v)).into();
+        setup
+    }
+
+    #[test]
+    fn jobs_of_a_forgotten_setup_all_come_back_and_its_loss_is_told_once() {
+        let (outbox, mut sent) = unbounded_channel();
+        let (slots, setups) =
+            (Slots::start(1).unwrap(), Setups::new(Arc::new(|setup: &Setup| setup.build())));
+        let take = |message: wire::ToWorker| take(Ok(Some(message)), &outbox, &slots, &setups).unwrap();
+        let mut next = || FromWorker::decode(sent.blocking_recv().expect("an answer")).unwrap();
+        let (id, json) = encode_setup(&oscillator()).unwrap();
+        let mut encoder = JobEncoder::default();
+        let lease = |number| Lease { epoch: 1, job: number, attempt: 1 };
+        let mut send = |number| take(encoder.encode(lease(number), &id, &job()));
+        let back = |number| FromWorker::Result { lease: lease(number), answer: Answer::Withdrawn, cost: 0.0 };
+
+        (1..=3).for_each(&mut send);
+        assert!(matches!(next(), FromWorker::Setup { id: lost, result: Err(_) } if lost == id));
+        assert_eq!([next(), next(), next()], [back(1), back(2), back(3)]);
+
+        take(ToWorker::setup(&id, json));
+        assert_eq!(next(), FromWorker::Setup { id, result: Ok(()) });
+        send(4);
+        assert!(matches!(next(), FromWorker::Result { answer: Answer::Ran(Ok(_)), .. }));
+        slots.close();
+    }
 }

@@ -4,7 +4,7 @@
 //! [`KEPT`] setups: a job whose setup is gone goes back to the coordinator, which sends the setup again. Next file to read:
 //! `slots`.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -33,6 +33,8 @@ pub(crate) struct Setups {
 #[derive(Default)]
 struct Shared {
     built: BTreeMap<SetupId, Built>,
+    /// Missed by a job since they were last ordered.
+    missed: BTreeSet<SetupId>,
     /// Counts uses.
     now: u64,
     waiting: VecDeque<Order>,
@@ -66,9 +68,15 @@ impl Setups {
         Some(Arc::clone(&built.forward))
     }
 
+    /// Notes that a job found its setup forgotten; says whether it is the first one since the setup was last ordered.
+    pub(crate) fn miss(&self, id: SetupId) -> bool {
+        self.lock().missed.insert(id)
+    }
+
     /// Builds a setup, on another thread, and tells how that went; one that is there already is only told of.
     pub(crate) fn order(&self, id: SetupId, setup: Result<Box<Setup>, WireError>, tell: Tell) {
         let mut shared = self.lock();
+        shared.missed.remove(&id);
         shared.waiting.push_back(Order { id, setup, tell });
         if shared.builders >= BUILDERS {
             return;
@@ -165,6 +173,9 @@ mod tests {
         order(KEPT);
         assert!(setups.get(&id(0)).is_some() && setups.get(&id(KEPT)).is_some());
         assert!(setups.get(&id(1)).is_none());
+        assert_eq!([setups.miss(id(1)), setups.miss(id(1)), setups.miss(id(2))], [true, false, true]);
+        order(1);
+        assert!(setups.miss(id(1)), "ordered again, it may be missed again");
         assert_eq!(setups.lock().built.len(), KEPT);
     }
 

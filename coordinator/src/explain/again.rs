@@ -2,9 +2,11 @@
 //!
 //! Next files to read: [`super::form`], then [`super::verdict`].
 
-use super::bent::bent;
+use super::bent::{bent, constants};
+use super::candidate::Candidate;
+use super::carried::carried;
 use super::fit::Fitted;
-use super::form::{Leftover, leftover};
+use super::form::{Leftover, Measured, leftover};
 use super::judge::Judged;
 use super::screen::{Hit, screen};
 use super::search::{Found, Searcher};
@@ -13,7 +15,8 @@ use super::{ExplainError, Options};
 use crate::study::{Record, Study};
 
 impl<'c> Searcher<'_, '_, 'c> {
-    /// Scores the candidates again at the best version: what is left, and which replacements and pairs to try.
+    /// Scores the candidates again at the best version: what is left, and which replacements and pairs to try. The version that
+    /// the verdict will be about has been looked at in the end.
     pub(super) fn look_again(
         &mut self,
         found: &mut Found<'c>,
@@ -23,9 +26,7 @@ impl<'c> Searcher<'_, '_, 'c> {
             let Some(best) = found.judged.first().filter(|j| j.refusal.is_none()).cloned() else {
                 return Ok(());
             };
-            self.laboratory.stage("screen", &format!("again, with {}", best.fit.version.name()));
-            let hits = self.screen(&best.fit, &self.best_points(&found.hits))?;
-            found.leftover = self.left(&best, &hits)?;
+            let hits = self.look_at(found, &best)?;
             let seconds: Vec<Hit> = self
                 .best_of_each(&hits)
                 .into_iter()
@@ -33,22 +34,51 @@ impl<'c> Searcher<'_, '_, 'c> {
                 .take(2)
                 .collect();
             if seconds.is_empty() {
-                return Ok(());
+                break;
             }
             let fits = self.further(found, &best, &seconds, options)?;
             let n = fits.len();
             self.judge_all(found, fits);
             let same = found.judged.first().is_some_and(|j| j.fit.version.name() == best.fit.version.name());
             if n == 0 || same {
-                return Ok(());
+                break;
             }
+        }
+        let passing = found.passing();
+        if let Some(chosen) = (!passing.is_empty()).then(|| carried(found, &passing).checked)
+            && found.judged[chosen].leftover.is_none()
+        {
+            let judged = found.judged[chosen].clone();
+            self.look_at(found, &judged)?;
         }
         Ok(())
     }
 
+    /// Scores the candidates at a version and notes what they and bent forms of its effect could still take away.
+    fn look_at(&mut self, found: &mut Found<'c>, judged: &Judged<'c>) -> Result<Vec<Hit>, ExplainError> {
+        self.laboratory.stage("screen", &format!("again, with {}", judged.fit.version.name()));
+        let hits = self.screen(&judged.fit, &self.best_points(&found.hits))?;
+        let left = self.left(judged, &hits)?;
+        let name = judged.fit.version.name();
+        let same = |j: &&mut Judged<'_>| {
+            j.fit.version.name() == name && j.fit.version.left_out == judged.fit.version.left_out
+        };
+        if let Some(place) = found.judged.iter_mut().find(same) {
+            place.leftover = Some(left);
+        }
+        Ok(hits)
+    }
+
     /// What the candidates and the bent forms of the best could still take away.
-    fn left(&mut self, best: &Judged<'c>, hits: &[Hit]) -> Result<Leftover, ExplainError> {
-        let mut forms = bent(best, self.tracks, span(self.laboratory.study));
+    fn left(&mut self, best: &Judged<'c>, library: &[Hit]) -> Result<Leftover, ExplainError> {
+        let forms = bent(best, self.tracks, span(self.laboratory.study));
+        let (bent, constants) = (self.measure(best, forms)?, self.measure(best, constants(best))?);
+        let measured = Measured { library, bent: &bent, constants: &constants };
+        leftover(self.laboratory, &best.fit, &measured)
+    }
+
+    /// The influence of additions that are no candidates, as far as the budget goes.
+    fn measure(&mut self, best: &Judged<'c>, mut forms: Vec<Candidate>) -> Result<Vec<Hit>, ExplainError> {
         // Not every term can be bent in every way: an own state may not read what the term reads.
         forms.retain(|form| {
             let mut members: Vec<Member<'_>> = best.fit.version.members.clone();
@@ -56,11 +86,10 @@ impl<'c> Searcher<'_, '_, 'c> {
             Version::new(best.fit.version.base, members, &best.fit.version.left_out).is_ok()
         });
         let of: Vec<(usize, usize)> = (0..forms.len()).map(|i| (i, 0)).collect();
-        let mut all = hits.to_vec();
-        if self.laboratory.affords(of.len()) {
-            all.extend(screen(self.laboratory, &best.fit, &forms, &of, self.tracks)?);
+        if !self.laboratory.affords(of.len()) {
+            return Ok(Vec::new());
         }
-        leftover(self.laboratory, &best.fit, &all, hits.len())
+        screen(self.laboratory, &best.fit, &forms, &of, self.tracks)
     }
 
     /// Replacements (a second effect alone, where it was not refitted yet) and pairs.

@@ -3,6 +3,7 @@
 //! Nothing is decided here. Next file to read: [`super::run`].
 
 use nalgebra::DMatrix;
+use starlings_estimators::{Gaussian, Optimum};
 
 use super::candidate::Candidate;
 use super::figures::Curve;
@@ -11,20 +12,21 @@ use super::judge::Judged;
 use super::laboratory::Laboratory;
 use super::patch::PatchEffect;
 use super::result::{Coefficient, FalseAlarm, GapRow, NamedEffect, ParameterShift, Remaining, Screened};
-use super::rows::{Row, Usage};
+use super::rows::{Row, Usage, unit};
 use super::screen::Hit;
 use super::search::Found;
 use super::verdict::Decision;
-use crate::study::field::quantity_of;
+use crate::study::posterior::{self, Estimate, Z95};
 
-/// Half-width of a central 95 % interval of a Gaussian, in standard deviations.
-const Z95: f64 = 1.959_963_984_540_054;
-
-/// Covariance of the transformed parameters of a fit, with the inflation of its residuals; zero where a direction is free.
-fn covariance(fit: &Fitted<'_>, inflation: f64) -> DMatrix<f64> {
-    let n = fit.version.n_param();
-    let unit = DMatrix::from_diagonal(fit.version.unit());
-    fit.optimum().map_or_else(|_| DMatrix::zeros(n, n), |o| &unit * o.covariance() * &unit * inflation)
+/// The parameters of a version in physical units, in the order of its estimated vector; their covariance is widened by the
+/// inflation of the residuals, and zero where a direction is free.
+fn estimates(judged: &Judged<'_>) -> Vec<Estimate> {
+    let (fit, version) = (&judged.fit, &judged.fit.version);
+    let n = version.n_param();
+    let unit = DMatrix::from_diagonal(version.unit());
+    let widened = |o: Optimum| &unit * o.covariance() * &unit * judged.inflation;
+    let covariance = fit.optimum().map_or_else(|_| DMatrix::zeros(n, n), widened);
+    posterior::estimates(&version.study, &Gaussian { mean: fit.theta(), covariance })
 }
 
 /// Standard deviation of the prediction of every row by the uncertainty of the fit, in the channel's unit; zero where the fit
@@ -38,23 +40,14 @@ pub(super) fn prediction_sd(laboratory: &Laboratory<'_>, fit: &Fitted<'_>) -> Ve
 
 /// The effects of a version with their coefficients.
 pub(super) fn effects(judged: &Judged<'_>) -> Vec<NamedEffect> {
-    let covariance = covariance(&judged.fit, judged.inflation);
     let version = &judged.fit.version;
-    let theta = judged.fit.theta();
+    let estimates = estimates(judged);
     let of_member = |(m, member): (usize, &super::version::Member<'_>)| {
         let def = &member.candidate.def;
         let coefficient = |(k, parameter): (usize, &starlings_models::effect::EffectParameter)| {
-            let j = version.first_of(m) + k;
-            let transform = &version.study.theta[j].transform;
-            let sd = covariance[(j, j)].max(0.0).sqrt();
-            let ends = [-Z95 * sd, Z95 * sd].map(|w| transform.to_physical(theta[j] + w));
-            Coefficient {
-                name: parameter.name.clone(),
-                unit: parameter.unit.clone(),
-                estimate: transform.to_physical(theta[j]),
-                sd: transform.derivative(theta[j]).abs() * sd,
-                interval95: ends.map(|v| v.clamp(f64::MIN, f64::MAX)),
-            }
+            let Estimate { estimate, sd, interval95, .. } = estimates[version.first_of(m) + k];
+            let (name, unit) = (parameter.name.clone(), parameter.unit.clone());
+            Coefficient { name, unit, estimate, sd, interval95 }
         };
         NamedEffect {
             name: def.name.clone(),
@@ -161,23 +154,25 @@ pub(super) fn gap(laboratory: &Laboratory<'_>, before: &[f64], after: &[f64]) ->
     list
 }
 
-/// What is left of the gap after a fit.
+/// What is left of the gap after a fit; the form is that of the version whose form was `checked`.
 pub(super) fn remaining(
     laboratory: &Laboratory<'_>,
     found: &Found<'_>,
     added: Option<&Judged<'_>>,
+    checked: Option<&Judged<'_>>,
     shape: String,
 ) -> Remaining {
     let (fit, whiteness) = added.map_or((&found.base, found.whiteness), |j| (&j.fit, j.whiteness));
     let n = laboratory.rows.train.len().max(1) as f64;
+    let left = checked.and_then(|j| j.leftover).unwrap_or_default();
     Remaining {
         rmse_over_noise: (fit.residual().norm_squared() / n).sqrt(),
         whiteness_p: whiteness,
         inflation: super::background::inflation(&laboratory.rows, fit.residual()),
-        form_gain: found.leftover.gain,
-        form_gain_held_out: found.leftover.gain_held_out,
-        form_share: found.leftover.share,
-        form_power: found.leftover.power,
+        form_gain: left.gain,
+        form_gain_held_out: left.gain_held_out,
+        form_share: left.share,
+        form_power: left.power,
         shape,
     }
 }
@@ -192,7 +187,7 @@ pub(super) fn false_alarm(found: &Found<'_>, best_gain: f64) -> FalseAlarm {
         upper95: upper,
         how: format!(
             "{n:.0} simulations of the fitted model with white noise of the stated sd, the whole library scored on each to first \
-             order; a candidate must then still pass the other gates, so the rate is an upper bound of the search's own"
+             order, against a threshold from as many others; a candidate must then still pass the other gates, so the rate is an upper bound of the search's own"
         ),
         runs: found.background.maxima.len() as u64,
         threshold: found.background.threshold,
@@ -213,22 +208,14 @@ pub(super) fn wilson_upper(rate: f64, n: f64) -> f64 {
 
 /// What the effects did to the model's own parameters.
 pub(super) fn shifts(base: &Fitted<'_>, judged: &Judged<'_>) -> Vec<ParameterShift> {
-    let covariance = covariance(&judged.fit, judged.inflation);
-    let (before, after) = (base.theta(), judged.fit.theta());
-    let study = &judged.fit.version.study;
-    let mut list = Vec::new();
-    for (j, entry) in study.theta.iter().enumerate().take(judged.fit.version.n_own) {
-        let Some(i) = base.version.study.theta.iter().position(|e| e.name == entry.name) else { continue };
-        let sd = entry.transform.derivative(after[j]).abs() * covariance[(j, j)].max(0.0).sqrt();
-        list.push(ParameterShift {
-            name: entry.name.clone(),
-            unit: entry.unit(study).to_owned(),
-            before: entry.transform.to_physical(before[i]),
-            after: entry.transform.to_physical(after[j]),
-            sd,
-        });
-    }
-    list
+    let (before, own) = (base.theta(), &base.version.study.theta);
+    let shift = |after: Estimate| {
+        let i = own.iter().position(|entry| entry.name == after.name)?;
+        let Estimate { name, unit, estimate, sd, .. } = after;
+        let before = own[i].transform.to_physical(before[i]);
+        Some(ParameterShift { name, unit, before, after: estimate, sd })
+    };
+    estimates(judged).into_iter().take(judged.fit.version.n_own).filter_map(shift).collect()
 }
 
 /// Measured and simulated curves of every channel.
@@ -245,14 +232,10 @@ pub(super) fn curves(laboratory: &Laboratory<'_>, before: &[f64], after: Option<
                 .filter(|(_, row)| row.record == r && row.channel == c);
             let at: Vec<usize> = rows.map(|(i, _)| i).collect();
             let pick = |values: &[f64]| at.iter().map(|i| values[*i]).collect::<Vec<_>>();
-            let unit = channel
-                .unit
-                .clone()
-                .or_else(|| quantity_of(&study.spec.outputs, &channel.output).map(|q| q.unit.clone()));
             list.push(Curve {
                 record: record.name.clone(),
                 channel: channel.output.clone(),
-                unit: unit.unwrap_or_default(),
+                unit: unit(study, r, c),
                 noise: channel.noise,
                 held_out: channel.held_out,
                 train: record.train_span(),

@@ -14,7 +14,7 @@ use super::candidate::Candidate;
 use super::rows::{Rows, Usage};
 use super::screen::Hit;
 
-/// Simulations without a gap.
+/// Simulations without a gap that the threshold is taken from, and as many again that tell how often it is exceeded.
 const SIMULATIONS: usize = 4000;
 /// Rate of false alarms of the search that the threshold is set for.
 pub const ALARM_RATE: f64 = 0.005;
@@ -28,7 +28,7 @@ const SHIFTS: [f64; 3] = [0.21, 0.47, 0.73];
 /// The distribution of the search's best score where nothing is missing.
 #[derive(Clone, Debug, Default)]
 pub struct Background {
-    /// Largest gain of each simulation, sorted.
+    /// Largest gain of each of the simulations that the threshold was not taken from, sorted.
     pub maxima: Vec<f64>,
     /// What a gain must exceed, in units of the effective noise.
     pub threshold: f64,
@@ -48,10 +48,13 @@ impl Background {
         let signs: Vec<f64> = usable.iter().map(|h| candidates[h.candidate].sign()).collect();
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut normal = || StandardNormal.sample(&mut random);
-        let mut maxima = null_maxima(&DMatrix::from_columns(&own), &signs, SIMULATIONS, &mut normal);
+        let mut first = null_maxima(&DMatrix::from_columns(&own), &signs, 2 * SIMULATIONS, &mut normal);
+        // A quantile is exceeded by as many of its own sample as it was set for, whatever the truth: others must tell the rate.
+        let mut maxima = first.split_off(SIMULATIONS);
+        first.sort_by(f64::total_cmp);
         maxima.sort_by(f64::total_cmp);
         let at = ((1.0 - ALARM_RATE) * SIMULATIONS as f64) as usize;
-        let threshold = maxima[at.min(SIMULATIONS - 1)].max(LEAST);
+        let threshold = first[at.min(SIMULATIONS - 1)].max(LEAST);
         let decoys = decoys(optimum, rows, &usable, &own);
         Self { maxima, threshold, decoys }
     }
@@ -147,6 +150,8 @@ pub fn whiteness(rows: &Rows, residual: &DVector<f64>) -> f64 {
 mod tests {
     use super::*;
     use crate::explain::Row;
+    use starlings_models::EffectDef;
+    use starlings_models::effect::EffectParameter;
 
     fn rows(n: usize) -> Rows {
         let row = |step: usize| {
@@ -186,6 +191,35 @@ mod tests {
         let factor = inflation(&rows(n), &residual);
         assert!((factor / 9.0 - 1.0).abs() < 0.3, "{factor}");
         assert!(whiteness(&rows(n), &residual) < 1e-10);
+    }
+
+    #[test]
+    fn the_false_alarm_rate_is_counted_on_simulations_that_the_threshold_does_not_know() {
+        let (m, n_candidate) = (120, 30);
+        let rows = rows(m);
+        let candidate = Candidate::new(EffectDef {
+            parameters: vec![EffectParameter::default()],
+            ..EffectDef::default()
+        });
+        let candidates = vec![candidate; n_candidate];
+        let none = DVector::zeros(1);
+        let optimum = Optimum::new(&white(m, 1), &DMatrix::from_element(m, 1, 1.0), &none, &none).unwrap();
+        let hit = |candidate: usize| {
+            let sensitivity = white(m, 100 + candidate as u64);
+            let score = optimum.score(&sensitivity);
+            Hit { candidate, point: Vec::new(), sensitivity, score, failure: None }
+        };
+        let hits: Vec<Hit> = (0..n_candidate).map(hit).collect();
+        let of_seed = |seed| Background::new(&optimum, &rows, &hits, &candidates, seed);
+        let backgrounds: Vec<Background> = (0..12).map(of_seed).collect();
+        let rates: Vec<f64> = backgrounds.iter().map(Background::exceeding).collect();
+        assert!(backgrounds.iter().all(|b| b.threshold > LEAST && b.maxima.len() == SIMULATIONS));
+        let mean = rates.iter().sum::<f64>() / rates.len() as f64;
+        // Each rate scatters by the counts of both samples, sqrt(2·20)/4000 = 0.0016, their mean by a twelfth of its variance:
+        // 0.00046. Four of these.
+        assert!((mean - ALARM_RATE).abs() < 0.0019, "{rates:?}");
+        let scatter = rates.iter().map(|r| (r - mean).powi(2)).sum::<f64>().sqrt() / 11.0_f64.sqrt();
+        assert!((0.0006..0.004).contains(&scatter), "a measured rate scatters: {rates:?}");
     }
 
     #[test]

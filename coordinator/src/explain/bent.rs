@@ -1,8 +1,9 @@
 //! Bent forms of an effect: what its term would look like if its form were not quite right.
 //!
 //! Each multiplies the term by something that varies along the record (a signal of the model, time, the term's own size), or
-//! lets it act late. They are no candidates and have no names: a fit that can be improved by one of them has the wrong form,
-//! whatever the library offers instead. Next file to read: [`super::form`].
+//! lets it act late. An unknown constant in an equation is tried beside them. They are no candidates and have no names: a fit
+//! that can be improved by one of them has the wrong form, whatever the library offers instead. Next file to read:
+//! [`super::form`].
 
 use starlings_models::EffectDef;
 use starlings_models::effect::{Addition, EffectParameter, EffectState};
@@ -18,27 +19,29 @@ const CONSTANTS: usize = 3;
 /// Time constants of a late effect, as shares of the record.
 const LATE: [f64; 2] = [0.01, 0.06];
 
-/// The bent forms of the last effect of a version. `tracks` are the courses of the model.
+/// The bent forms of the effects of a version. `tracks` are the courses of the model.
 pub(super) fn bent(judged: &Judged<'_>, tracks: &[Track], span: [f64; 2]) -> Vec<Candidate> {
-    let Some(member) = judged.fit.version.members.last() else { return Vec::new() };
-    let def = &member.candidate.def;
-    let mut forms = Vec::new();
     let [from, to] = span;
     // Beyond the training span time stands still: nothing there has seen how it goes on.
     let time = format!("(min(t, {to:?}) - {:?})/{:?}", 0.5 * (from + to), 0.5 * (to - from));
-    forms.push(multiplied(def, "time", &time));
     // A term that adds to an input or a parameter may not read outputs, so states and inputs are taken.
     let spec = &judged.fit.version.study.spec;
     let may = |t: &&Track| spec.states.iter().chain(&spec.inputs).any(|q| q.name == t.name);
-    for track in tracks.iter().filter(may).filter(|t| varies(t)).take(SIGNALS) {
-        forms.push(multiplied(def, &track.name, &normalised(track)));
+    let signals: Vec<&Track> = tracks.iter().filter(may).filter(|t| varies(t)).take(SIGNALS).collect();
+    let mut forms = Vec::new();
+    for member in &judged.fit.version.members {
+        let def = &member.candidate.def;
+        forms.push(multiplied(def, "time", &time));
+        forms.extend(signals.iter().map(|track| multiplied(def, &track.name, &normalised(track))));
+        forms.extend(LATE.into_iter().enumerate().map(|(i, share)| late(def, i, share * (to - from))));
     }
-    for (i, share) in LATE.into_iter().enumerate() {
-        forms.push(late(def, i, share * (to - from)));
-    }
-    let scalar = spec.states.iter().filter(|q| q.size == 1).take(CONSTANTS);
-    forms.extend(scalar.map(|q| constant(&q.name)));
     forms.into_iter().map(Candidate::new).collect()
+}
+
+/// An unknown constant in each of the first equations of the model.
+pub(super) fn constants(judged: &Judged<'_>) -> Vec<Candidate> {
+    let scalar = judged.fit.version.study.spec.states.iter().filter(|q| q.size == 1).take(CONSTANTS);
+    scalar.map(|q| Candidate::new(constant(&q.name))).collect()
 }
 
 /// An unknown constant in the equation of a state.
@@ -52,20 +55,14 @@ fn constant(state: &str) -> EffectDef {
     }
 }
 
-/// Smallest and largest value of a course.
-fn ends(track: &Track) -> [f64; 2] {
-    let values = || track.values.iter().flatten().copied().filter(|v| v.is_finite());
-    [values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max)]
-}
-
 fn varies(track: &Track) -> bool {
-    let [lo, hi] = ends(track);
+    let [lo, hi] = track.ends();
     hi - lo > 1e-9 * hi.abs().max(lo.abs()) && hi.is_finite() && lo.is_finite()
 }
 
 /// A signal as a number between −1 and 1.
 fn normalised(track: &Track) -> String {
-    let [lo, hi] = ends(track);
+    let [lo, hi] = track.ends();
     format!("({} - {:?})/{:?}", track.name, 0.5 * (lo + hi), 0.5 * (hi - lo))
 }
 

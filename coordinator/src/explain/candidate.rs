@@ -3,6 +3,8 @@
 //! Parameters that count in the course of a quantity are turned into its unit first, and every grid of parameters inside a
 //! term becomes a list of points. Nothing is run here. Next file to read: [`super::version`].
 
+use std::collections::HashSet;
+
 use starlings_estimators::Transform;
 use starlings_models::effect::{EffectDef, EffectParameter, Scale, scale};
 
@@ -39,10 +41,7 @@ impl Candidate {
                 .flat_map(|point| values.iter().map(move |v| [point.as_slice(), &[*v]].concat()))
                 .collect();
         }
-        // The middle of every grid comes first, and a large product is thinned evenly.
-        let stride = points.len().div_ceil(MOST_POINTS).max(1);
-        let points = points.into_iter().step_by(stride).collect();
-        Self { def, points }
+        Self { def, points: thinned(points) }
     }
 
     /// Its name.
@@ -66,6 +65,29 @@ impl Candidate {
         let inner = self.def.parameters.iter().skip(1).map(inner_prior);
         std::iter::once(amplitude).chain(inner).collect()
     }
+}
+
+/// As many of the points as there may be, the first among them: the middle of every grid. They lie a stride apart, round the
+/// end of the list, and the stride has no factor in common with its length: one that has returns to the same values of the
+/// last grids and never meets the others. Of such strides it is the shortest with which most values of the grids occur.
+fn thinned(points: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+    let n = points.len();
+    if n <= MOST_POINTS {
+        return points;
+    }
+    let kept = |stride: usize| (0..MOST_POINTS).map(|k| points[k * stride % n].clone()).collect::<Vec<_>>();
+    let occurring = |points: &[Vec<f64>]| {
+        let of = |k: usize| points.iter().map(|p| p[k].to_bits()).collect::<HashSet<_>>().len();
+        (0..points[0].len()).map(of).sum::<usize>()
+    };
+    let strides = (n.div_ceil(MOST_POINTS)..n).filter(|stride| common(*stride, n) == 1);
+    let best = strides.min_by_key(|stride| std::cmp::Reverse(occurring(&kept(*stride))));
+    kept(best.unwrap_or(1))
+}
+
+/// Greatest common divisor (Euclid).
+fn common(a: usize, b: usize) -> usize {
+    if b == 0 { a } else { common(b, a % b) }
 }
 
 /// Values of an inner parameter to screen at, the middle of its grid first.
@@ -125,11 +147,7 @@ fn resolved(
     rhythms: &[f64],
     jumps: &[f64],
 ) -> Vec<EffectDef> {
-    let course = |name: &str| {
-        let track = tracks.iter().find(|t| t.name == name)?;
-        let values = || track.values.iter().flatten().copied().filter(|v| v.is_finite());
-        Some([values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max)])
-    };
+    let course = |name: &str| tracks.iter().find(|t| t.name == name).map(Track::ends);
     let times = || study.records.iter().filter(|r| r.is_trained()).filter_map(Record::train_span);
     let from = times().map(|s| s[0]).fold(f64::INFINITY, f64::min);
     let to = times().map(|s| s[1]).fold(f64::NEG_INFINITY, f64::max);
@@ -182,6 +200,36 @@ mod tests {
         assert_eq!(candidate.points[0], [2.0, 6.0]);
         assert_eq!(candidate.points.len(), 6);
         assert!((candidate.sign() - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_thinned_product_of_grids_keeps_every_value_of_every_grid() {
+        let open = [f64::NEG_INFINITY, f64::INFINITY];
+        for sizes in [
+            &[3, 3, 3][..],
+            &[4, 3],
+            &[3, 4],
+            &[4, 4],
+            &[5, 5],
+            &[5, 2],
+            &[7, 4],
+            &[2, 9],
+            &[2, 2, 3],
+            &[3, 3, 2],
+        ] {
+            let grids: Vec<Vec<f64>> = sizes.iter().map(|n| (0..*n).map(f64::from).collect()).collect();
+            let inner = grids.iter().map(|grid| with(open, grid));
+            let points =
+                Candidate::new(effect(std::iter::once(with(open, &[])).chain(inner).collect())).points;
+            assert!(points.len() <= MOST_POINTS, "{sizes:?}");
+            for (k, grid) in grids.iter().enumerate() {
+                let kept = |value: &f64| points.iter().any(|p| p[k].to_bits() == value.to_bits());
+                assert!(grid.iter().all(kept), "{sizes:?}, grid {k}: {points:?}");
+            }
+            for (i, point) in points.iter().enumerate() {
+                assert!(!points[..i].contains(point), "{sizes:?}: {point:?} twice");
+            }
+        }
     }
 
     #[test]

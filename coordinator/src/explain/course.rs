@@ -4,21 +4,26 @@
 
 use std::sync::Arc;
 
-use starlings_models::Window;
+use starlings_models::{SOLVER, Window};
 
 use super::ExplainError;
 use super::laboratory::{Laboratory, Point};
 use super::locate::Track;
 
 impl Laboratory<'_> {
-    /// The course of every scalar state and output of a version, and of its inputs, at the times of the records.
+    /// The course of every scalar state and output of a version, and of its inputs, at the times of the records. Of a solver
+    /// without the states: what they are between two calls, only it knows.
     ///
     /// # Errors
-    /// As [`Laboratory::run`]; a model that fails at this point gives no tracks.
+    /// As [`Laboratory::run`], and when the budget does not suffice for one point; a model that fails there gives no tracks.
     pub fn tracks(&mut self, point: &Point<'_>) -> Result<Vec<Track>, ExplainError> {
+        if !self.affords(1) {
+            return Err(self.beyond_budget(1));
+        }
         let spec = &point.study.spec;
         let mut seen = point.study.clone();
-        let scalar = spec.outputs.iter().chain(&spec.states).filter(|q| q.size == 1);
+        let states = spec.states.iter().filter(|_| point.study.setup.model.kind != SOLVER);
+        let scalar = spec.outputs.iter().chain(states).filter(|q| q.size == 1);
         let mut names: Vec<(String, String)> = Vec::new();
         for quantity in scalar {
             if !names.iter().any(|(name, _)| *name == quantity.name) {
@@ -32,7 +37,9 @@ impl Laboratory<'_> {
             let observed = vec![f64::NAN; n_obs * window.times.len()];
             *window = Arc::new(Window { observed, ..Window::clone(window) });
         }
-        let runs = self.outputs(&[Point { study: &seen, theta: point.theta.clone() }]);
+        let points = [Point { study: &seen, theta: point.theta.clone() }];
+        // A model of fields alone has inputs only, which need no run.
+        let runs = self.outputs(if names.is_empty() { &[] } else { &points });
         self.windows = windows;
         let mut tracks = Vec::new();
         let Ok(runs) = runs?.into_iter().collect::<Result<Vec<_>, String>>() else { return Ok(tracks) };

@@ -6,7 +6,6 @@
 
 use std::sync::Arc;
 
-use nalgebra::DVector;
 use starlings_models::{Job, Signal, Window};
 
 use super::ExplainError;
@@ -41,15 +40,11 @@ pub(super) fn propose(
 ) -> Result<Option<Experiment>, ExplainError> {
     let study = laboratory.study;
     let Some(record) = study.records.iter().position(Record::is_trained) else { return Ok(None) };
-    let mut trials = trials(study, record, tracks);
-    let mut separations = Vec::new();
-    for trial in &trials {
-        separations.push(separation(laboratory, best, rival, record, trial)?);
-    }
-    let now = separations.remove(0).unwrap_or(0.0);
-    trials.remove(0);
+    let trials = trials(study, record, tracks);
+    let mut separations = separations(laboratory, [best, rival], record, &trials)?.into_iter();
+    let now = separations.next().flatten().unwrap_or(0.0);
     let mut tried: Vec<(String, f64)> =
-        trials.into_iter().zip(separations).filter_map(|(trial, s)| Some((trial.says, s?))).collect();
+        trials.into_iter().skip(1).zip(separations).filter_map(|(trial, s)| Some((trial.says, s?))).collect();
     tried.sort_by(|a, b| b.1.total_cmp(&a.1));
     let Some((says, separation)) = tried.first().cloned() else { return Ok(None) };
     Ok(Some(Experiment { says, separation, separation_now: now, tried }))
@@ -125,51 +120,90 @@ fn step_half_way(signal: &Signal) -> Signal {
     Signal { times: signal.times.clone(), values }
 }
 
-/// Twice as many observations, inputs repeated.
+/// Twice as many observations, inputs repeated from the start of the window on; what a delay asks for before it stays.
 fn stretched(window: &Window, n_obs: usize) -> Window {
     let last = window.times.last().copied().unwrap_or(window.start);
     let step =
         if window.times.len() > 1 { (last - window.start) / (window.times.len() - 1) as f64 } else { 1.0 };
     let span = last - window.start + step;
-    let twice =
-        |times: &[f64]| times.iter().copied().chain(times.iter().map(|t| t + span)).collect::<Vec<_>>();
+    let later = |times: &[f64]| times.iter().map(|t| t + span).collect::<Vec<_>>();
     let inputs = window.inputs.iter().map(|signal| {
-        let within = signal.times.partition_point(|t| *t < window.start + span);
-        let (times, values) = (&signal.times[..within], &signal.values[..within]);
-        Signal { times: twice(times), values: [values, values].concat() }
+        let from = signal.times.partition_point(|t| *t < window.start);
+        let to = signal.times.partition_point(|t| *t < window.start + span).max(1);
+        let (mut times, mut values) = (signal.times[..to].to_vec(), signal.values[..to].to_vec());
+        for (t, value) in later(&signal.times[..to]).into_iter().zip(&signal.values).skip(from) {
+            // Samples that lie closer than numbers do, so late, are one.
+            if times.last().is_some_and(|last| *last < t) {
+                times.push(t);
+                values.push(*value);
+            }
+        }
+        Signal { times, values }
     });
     Window {
         start: window.start,
-        times: twice(&window.times),
+        times: [window.times.as_slice(), &later(&window.times)].concat(),
         observed: vec![f64::NAN; 2 * window.times.len() * n_obs],
         inputs: inputs.collect(),
     }
 }
 
-/// χ² between the two versions in a trial; nothing where one of them fails.
-fn separation(
+/// χ² between two versions in each trial, all in one batch; nothing where one of them fails. The budget decides how many of the
+/// trials there are.
+fn separations(
     laboratory: &mut Laboratory<'_>,
-    best: &Judged<'_>,
-    rival: &Judged<'_>,
+    versions: [&Judged<'_>; 2],
     record: usize,
-    trial: &Trial,
-) -> Result<Option<f64>, ExplainError> {
-    if !laboratory.affords(2) {
-        return Ok(None);
-    }
-    let names: Vec<String> = trial.measured.iter().map(|(name, _)| name.clone()).collect();
-    let mut outputs = Vec::new();
-    for version in [best, rival] {
-        let mut study = version.fit.version.study.clone();
-        study.setup.outputs.clone_from(&names);
-        let theta: DVector<f64> = version.fit.theta();
-        let observed = vec![f64::NAN; names.len() * trial.window.times.len()];
+    trials: &[Trial],
+) -> Result<Vec<Option<f64>>, ExplainError> {
+    let afforded = (1..=trials.len()).take_while(|n| laboratory.affords_runs(2 * *n as u64)).count();
+    let trials = &trials[..afforded];
+    let mut runs = Vec::with_capacity(2 * afforded);
+    for trial in trials {
+        let observed = vec![f64::NAN; trial.measured.len() * trial.window.times.len()];
         let window = Arc::new(Window { observed, ..trial.window.clone() });
-        let theta = study.theta_for(record, theta.as_slice());
-        let job = Job { particle: 0, record: record as u32, window, theta, state: None };
-        outputs.push(laboratory.run_alone(&study, job)?);
+        for version in versions {
+            let mut study = version.fit.version.study.clone();
+            study.setup.outputs = trial.measured.iter().map(|(name, _)| name.clone()).collect();
+            let theta = study.theta_for(record, version.fit.theta().as_slice());
+            let (particle, record, window) = (runs.len() as u32, record as u32, Arc::clone(&window));
+            runs.push((study, Job { particle, record, window, theta, state: None }));
+        }
     }
-    let [Some(a), Some(b)] = outputs.as_slice() else { return Ok(None) };
-    let noise = trial.measured.iter().map(|(_, noise)| *noise).cycle();
-    Ok(Some(a.iter().zip(b).zip(noise).map(|((a, b), noise)| ((a - b) / noise).powi(2)).sum()))
+    let outputs = laboratory.run_alone(runs.iter().map(|(study, job)| (study, job.clone())).collect())?;
+    let apart = |(trial, pair): (&Trial, &[Option<Arc<Vec<f64>>>])| {
+        let [Some(a), Some(b)] = pair else { return None };
+        let noise = trial.measured.iter().map(|(_, noise)| *noise).cycle();
+        Some(a.iter().zip(b.iter()).zip(noise).map(|((a, b), noise)| ((a - b) / noise).powi(2)).sum())
+    };
+    Ok(trials.iter().zip(outputs.chunks(2)).map(apart).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_record_twice_as_long_repeats_its_inputs_from_its_start_on_and_time_never_goes_back() {
+        // A delay may ask for an input before the record starts: two samples lie there.
+        let times: Vec<f64> = (0..12).map(|k| 0.5 * f64::from(k) - 1.0).collect();
+        let values: Vec<f64> = (0..12).map(f64::from).collect();
+        let window = Window {
+            start: 0.0,
+            times: vec![0.0, 1.0, 2.0, 3.0],
+            observed: vec![f64::NAN; 8],
+            inputs: vec![Signal { times, values }],
+        };
+        let longer = stretched(&window, 2);
+        assert_eq!(longer.times, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
+        assert_eq!(longer.observed.len(), 16);
+        let input = &longer.inputs[0];
+        assert!(input.times.windows(2).all(|w| w[0] < w[1]), "{:?}", input.times);
+        assert_eq!(input.times.len(), input.values.len());
+        for t in [0.0, 0.25, 1.5, 3.5] {
+            assert!((input.at(t) - window.inputs[0].at(t)).abs() < 1e-12, "as it was at {t}");
+            assert!((input.at(t + 4.0) - window.inputs[0].at(t)).abs() < 1e-12, "again at {t}");
+        }
+        assert!((input.at(-1.0) - 0.0).abs() < 1e-12, "what was before the start stays");
+    }
 }

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use starlings_estimators::{End, EstimatorError, LeastSquares, Need, Optimum};
 
 use super::ExplainError;
-use super::laboratory::{Laboratory, Point};
+use super::laboratory::{Answer, Laboratory, Point};
 use super::version::Version;
 
 /// Distance of the differences of a Jacobian, in z.
@@ -154,8 +154,7 @@ impl<'c> Fitted<'c> {
         let study = &self.version.study;
         let point = |parameter: usize| {
             let mut moved = z.clone();
-            for (j, entry) in study.theta.iter().enumerate().filter(|(_, e)| e.parameter == parameter) {
-                let _ = entry;
+            for j in (0..study.theta.len()).filter(|j| study.theta[*j].parameter == parameter) {
                 moved[j] += step * moved[j].abs().max(1.0);
             }
             moved
@@ -193,11 +192,15 @@ pub fn drive_rounds(
         let points: Vec<Point<'_>> =
             fits.iter().zip(&asked).flat_map(|(fit, of_fit)| of_fit.iter().map(|z| point(fit, z))).collect();
         let mut answers = laboratory.run(&points)?.into_iter();
+        let mut afforded = true;
         for (fit, of_fit) in fits.iter_mut().zip(asked) {
             let of_fit: Vec<_> = answers.by_ref().take(of_fit.len()).collect();
             if !of_fit.is_empty() {
-                fit.take(laboratory, of_fit)?;
+                afforded &= fit.take(laboratory, of_fit)?;
             }
+        }
+        if !afforded {
+            return Ok(false);
         }
     }
     Ok(true)
@@ -208,12 +211,9 @@ fn point<'v>(fit: &'v Fitted<'_>, z: &DVector<f64>) -> Point<'v> {
 }
 
 impl Fitted<'_> {
-    /// Hands the answers to the solver.
-    fn take(
-        &mut self,
-        laboratory: &mut Laboratory<'_>,
-        answers: Vec<super::laboratory::Answer>,
-    ) -> Result<(), ExplainError> {
+    /// Hands the answers to the solver. Returns whether the budget sufficed for the runs that had to be made once more; if
+    /// not, the fit stays where it is.
+    fn take(&mut self, laboratory: &mut Laboratory<'_>, answers: Vec<Answer>) -> Result<bool, ExplainError> {
         match self.solver.need().clone() {
             Need::Residual(z) => {
                 let answer = answers.into_iter().next().and_then(Result::ok);
@@ -224,6 +224,9 @@ impl Fitted<'_> {
                 }
             }
             Need::Jacobian(z) => {
+                if !laboratory.affords(answers.iter().filter(|a| a.is_err()).count()) {
+                    return Ok(false);
+                }
                 let jacobian = self.differences(laboratory, &z, answers)?;
                 if let Some(jacobian) = &jacobian {
                     self.jacobian.clone_from(jacobian);
@@ -233,7 +236,7 @@ impl Fitted<'_> {
             }
             Need::Nothing(_) => {}
         }
-        Ok(())
+        Ok(true)
     }
 
     /// The whitened Jacobian of all rows from forward differences; backward where the model fails on the forward side, nothing
@@ -242,7 +245,7 @@ impl Fitted<'_> {
         &self,
         laboratory: &mut Laboratory<'_>,
         z: &DVector<f64>,
-        answers: Vec<super::laboratory::Answer>,
+        answers: Vec<Answer>,
     ) -> Result<Option<DMatrix<f64>>, ExplainError> {
         let mut steps = vec![STEP; answers.len()];
         let mut found: Vec<Option<Arc<Vec<f64>>>> = answers.into_iter().map(Result::ok).collect();

@@ -33,28 +33,35 @@ const AGAIN: f64 = 0.15;
 pub struct Leftover {
     /// Fall of χ² of the training rows, in units of the effective noise.
     pub gain: f64,
-    /// Candidates and bent forms that make it.
-    pub n_column: usize,
     /// Fall of χ² of the held-out rows that they bring, in the same units.
     pub gain_held_out: f64,
     /// Share of what is left above the noise that they take away.
     pub share: f64,
     /// Whether there is something left that the library, or a bent form of the effect, can take away.
     pub is_systematic: bool,
-    /// Largest fall of χ² that a fully bent form would bring if it were the truth; small where the data do not tell forms.
+    /// Largest fall of χ² that a fully bent form would bring if it were the truth, in units of the effective noise; small
+    /// where the data do not tell forms.
     pub power: f64,
 }
 
-/// Looks at the residuals of a fit with the sensitivities that were measured there; the first `n_library` are candidates, the
-/// others bent forms.
+/// What was measured at a fit for the check of its form.
+pub struct Measured<'h> {
+    /// The candidates.
+    pub library: &'h [Hit],
+    /// The bent forms of the effect.
+    pub bent: &'h [Hit],
+    /// Unknown constants in the equations.
+    pub constants: &'h [Hit],
+}
+
+/// Looks at the residuals of a fit with the sensitivities that were measured there.
 ///
 /// # Errors
 /// When the fit leaves a direction free.
 pub fn leftover(
     laboratory: &Laboratory<'_>,
     fit: &Fitted<'_>,
-    hits: &[Hit],
-    n_library: usize,
+    measured: &Measured<'_>,
 ) -> Result<Leftover, ExplainError> {
     let optimum = fit.optimum()?;
     let rows = &laboratory.rows;
@@ -62,16 +69,11 @@ pub fn leftover(
         let of_train = s.select_rows(&rows.train);
         (optimum.unimitated(&of_train), s - &fit.jacobian * optimum.response(&of_train))
     };
-    let usable = hits.iter().enumerate().filter(|(_, h)| h.failure.is_none() && !h.is_absorbed());
     let (mut own, mut all) = (Vec::new(), Vec::new());
-    let mut power: f64 = 0.0;
-    for (i, hit) in usable {
+    let is_usable = |h: &&Hit| h.failure.is_none() && !h.is_absorbed();
+    for hit in [measured.library, measured.bent, measured.constants].into_iter().flatten().filter(is_usable) {
         let (train, whole) = train_jacobian_free(&hit.sensitivity);
         let size = train.norm();
-        if i >= n_library {
-            // A bent form at amplitude one is the term itself times a signal between -1 and 1.
-            power = power.max(size * size);
-        }
         if size > 0.0 {
             own.push(train / size);
             all.push(whole / size);
@@ -79,6 +81,11 @@ pub fn leftover(
     }
     // Held-out channels count as well: a better form must serve them too.
     let held: Vec<usize> = (0..rows.rows.len()).filter(|i| rows.rows[*i].usage != Usage::Train).collect();
+    // A bent form at amplitude one is the term itself times a signal between -1 and 1. One that the parameters imitate tells
+    // nothing of the form.
+    let fall = |hit: &Hit| train_jacobian_free(&hit.sensitivity).0.norm_squared();
+    let power = measured.bent.iter().filter(is_usable).map(fall).fold(0.0, f64::max);
+    let power = power / inflation(rows, fit.residual());
     let mut left = Leftover { power, ..Leftover::default() };
     let floor = noise_floor(rows, fit.residual());
     let mut residual = optimum.residual().clone();
@@ -105,7 +112,7 @@ pub fn leftover(
             && (held.is_empty() || gain_held_out > wanted)
             && share > RESOLVED;
         if n_column == 1 || (is_systematic && !left.is_systematic) {
-            left = Leftover { gain, n_column, gain_held_out, share, is_systematic, power };
+            left = Leftover { gain, gain_held_out, share, is_systematic, power };
         }
     }
     Ok(left)

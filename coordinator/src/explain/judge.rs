@@ -9,8 +9,10 @@ use starlings_estimators::End;
 
 use super::background::{inflation, whiteness};
 use super::fit::Fitted;
+use super::form::Leftover;
 use super::laboratory::Laboratory;
 use super::rows::{Row, Usage};
+use super::version::Member;
 
 /// A held-out error may grow by this factor before it counts as worse.
 const WORSE: f64 = 1.02;
@@ -77,8 +79,13 @@ pub struct Judged<'c> {
     pub share: f64,
     /// The same on the held-out span; `None` without one that has an excess.
     pub share_held_out: Option<f64>,
+    /// Share of that excess which neither the version, nor the uncertainty of its estimate, nor noise (two of its standard
+    /// deviations) accounts for.
+    pub unaccounted: f64,
     /// Why it may not be named.
     pub refusal: Option<Refusal>,
+    /// What candidates and bent forms could still take away, where that was looked at.
+    pub leftover: Option<Leftover>,
 }
 
 impl Judged<'_> {
@@ -119,6 +126,8 @@ pub fn judge<'c>(
         (misfit.n_held_out > 0 && has_excess).then(|| ratio(gain_held_out, before.held_out - n_held));
     let whiteness = whiteness(&laboratory.rows, fit.residual());
     let allowance = allowance(laboratory, &fit);
+    let beyond = misfit.held_out - allowance - n_held - 2.0 * (2.0 * n_held).sqrt();
+    let unaccounted = if has_excess { ratio(beyond.max(0.0), before.held_out - n_held) } else { 0.0 };
     let mut judged = Judged {
         fit,
         misfit,
@@ -130,7 +139,9 @@ pub fn judge<'c>(
         gain_channels: before.channels - misfit.channels,
         share,
         share_held_out,
+        unaccounted,
         refusal: None,
+        leftover: None,
     };
     judged.refusal = refusal(laboratory, base, before, &judged, threshold);
     judged
@@ -192,13 +203,7 @@ fn at_edge(fit: &Fitted<'_>) -> Option<Refusal> {
         for (k, parameter) in member.candidate.def.parameters.iter().enumerate() {
             let j = version.first_of(m) + k;
             let value = version.study.theta[j].transform.to_physical(theta[j]);
-            let [lo, hi] = parameter.range;
-            let width = if lo.is_finite() && hi.is_finite() { hi - lo } else { member.unit };
-            let near = |end: f64| end.is_finite() && (value - end).abs() <= EDGE * width;
-            if !(near(lo) || near(hi)) {
-                continue;
-            }
-            let end = if near(lo) { lo } else { hi };
+            let Some(end) = end_at(member, k, value) else { continue };
             let gate = if k == 0 && (end.abs() < f64::MIN_POSITIVE) { "sign" } else { "range" };
             let unit = &parameter.unit;
             return Some(Refusal {
@@ -212,6 +217,21 @@ fn at_edge(fit: &Fitted<'_>) -> Option<Refusal> {
         }
     }
     None
+}
+
+/// The end of the range of a member's parameter `k` at which a value lies. A range that is open at one side has no width: then
+/// the size of the amplitude takes its place, or that of the value at which an inner parameter was screened.
+fn end_at(member: &Member<'_>, k: usize, value: f64) -> Option<f64> {
+    let candidate = member.candidate;
+    let [lo, hi] = candidate.def.parameters[k].range;
+    let width = if lo.is_finite() && hi.is_finite() {
+        hi - lo
+    } else if k == 0 {
+        member.unit
+    } else {
+        candidate.points[0][k - 1].abs()
+    };
+    [lo, hi].into_iter().find(|end| end.is_finite() && (value - end).abs() <= EDGE * width)
 }
 
 fn held_out_span(before: Misfit, judged: &Judged<'_>) -> Option<Refusal> {
@@ -251,4 +271,30 @@ fn held_out_channel(laboratory: &Laboratory<'_>, base: &Fitted<'_>, fit: &Fitted
         }
     }
     None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::explain::candidate::Candidate;
+    use starlings_models::EffectDef;
+    use starlings_models::effect::EffectParameter;
+
+    #[test]
+    fn closeness_to_the_end_of_an_open_range_is_measured_in_the_parameters_own_size() {
+        let with = |range, grid| EffectParameter { range, grid, ..EffectParameter::default() };
+        let (open, wide) = ([0.0, f64::INFINITY], [0.0, 10.0]);
+        let parameters = vec![with(open, vec![]), with([2.0, f64::INFINITY], vec![3.0]), with(wide, vec![])];
+        let candidate = Candidate::new(EffectDef { parameters, ..EffectDef::default() });
+        // The amplitude's unit is not that of the threshold inside the term: thousands against ones, or thousandths.
+        for unit in [4000.0, 4e-3] {
+            let member = Member { candidate: &candidate, index: 0, unit };
+            assert_eq!(end_at(&member, 0, 0.004 * unit), Some(0.0));
+            assert_eq!(end_at(&member, 0, 0.006 * unit), None);
+            assert_eq!(end_at(&member, 1, 2.6), None, "a fifth of its size away, unit {unit}");
+            assert_eq!(end_at(&member, 1, 2.01), Some(2.0), "a three hundredth of it away, unit {unit}");
+            assert_eq!(end_at(&member, 2, 9.96), Some(10.0));
+            assert_eq!(end_at(&member, 2, 9.9), None);
+        }
+    }
 }

@@ -4,18 +4,18 @@
 //! in the run's database: an explanation that was killed goes on by asking again, and what is known costs nothing. Only the
 //! rows that train are ever shown to a fit; that is for the callers to keep. Next file to read: [`super::version`].
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 
 use nalgebra::DVector;
-use starlings_models::{Job, ParticleError, Window};
+use starlings_models::{Job, Window};
 
-use super::memory::{Known, decode, encode, key};
+use super::memory::{Known, decode, encode, key, sound};
 use super::{Context, ExplainError, Rows, Stage};
 use crate::fleet::{Fleet, FleetEvent, Outcome, SetupId};
+use crate::study::Study;
 use crate::study::store::{JobRow, RunKey, Store};
-use crate::study::{RunError, Study};
 
 /// A version of the model and a parameter vector (transformed units) to run it with.
 pub struct Point<'v> {
@@ -27,6 +27,15 @@ pub struct Point<'v> {
 
 /// What a point predicts for every row, or why it could not be run.
 pub type Answer = Result<Arc<Vec<f64>>, String>;
+
+/// A run that the fleet was asked for.
+struct Asked {
+    key: RunKey,
+    record: usize,
+    particle: u32,
+    /// Values that it must predict.
+    n_value: usize,
+}
 
 /// Runs points and keeps count.
 pub struct Laboratory<'a> {
@@ -47,6 +56,7 @@ pub struct Laboratory<'a> {
     runs: Vec<(&'static str, u64)>,
     workers: BTreeSet<String>,
     n_batch: usize,
+    cut_short: bool,
 }
 
 impl<'a> Laboratory<'a> {
@@ -75,6 +85,7 @@ impl<'a> Laboratory<'a> {
             runs: Vec::new(),
             workers: BTreeSet::new(),
             n_batch: 0,
+            cut_short: false,
         }
     }
 
@@ -129,7 +140,22 @@ impl<'a> Laboratory<'a> {
 
     /// Whether so many more points keep within the budget.
     pub fn affords(&self, n_point: usize) -> bool {
-        self.budget.is_none_or(|budget| self.runs() + self.cost(n_point) <= budget)
+        self.affords_runs(self.cost(n_point))
+    }
+
+    /// Whether so many more runs keep within the budget.
+    pub fn affords_runs(&self, n: u64) -> bool {
+        self.budget.is_none_or(|budget| self.runs() + n <= budget)
+    }
+
+    /// Notes that something was left undone for want of budget.
+    pub fn cut_short(&mut self) {
+        self.cut_short = true;
+    }
+
+    /// Whether something was left undone for want of budget.
+    pub fn was_cut_short(&self) -> bool {
+        self.cut_short
     }
 
     /// The error of a budget that does not suffice for so many more points.
@@ -148,72 +174,90 @@ impl<'a> Laboratory<'a> {
     /// # Errors
     /// When the fleet or the store fails, or a run was lost with its workers.
     pub fn run(&mut self, points: &[Point<'_>]) -> Result<Vec<Answer>, ExplainError> {
-        let n_obs = self.study.setup.outputs.len();
         let outputs = self.outputs(points)?;
-        let of_point = |runs: &[Known]| -> Answer {
-            let runs = runs.iter().cloned().collect::<Result<Vec<_>, String>>()?;
-            let value = |row: &super::Row| runs[row.record][row.step * n_obs + row.output];
-            Ok(Arc::new(self.rows.rows.iter().map(value).collect()))
-        };
-        Ok(outputs.chunks(self.windows.len()).map(of_point).collect())
+        Ok(outputs.chunks(self.windows.len()).map(|runs| self.answer(runs)).collect())
     }
 
-    /// The outputs of one run that is not over a record as it is; nothing where the model fails.
+    /// The rows of one point from its runs over the records: outputs turned into what the channels measure.
+    fn answer(&self, runs: &[Known]) -> Answer {
+        let n_obs = self.study.setup.outputs.len();
+        let mut measured = Vec::with_capacity(runs.len());
+        for (record, run) in runs.iter().enumerate() {
+            let mut outputs = run.as_ref().map_err(Clone::clone)?.to_vec();
+            self.study.measure(record, &self.windows[record].times, &mut outputs);
+            measured.push(outputs);
+        }
+        let value = |row: &super::Row| measured[row.record][row.step * n_obs + row.output];
+        Ok(Arc::new(self.rows.rows.iter().map(value).collect()))
+    }
+
+    /// The outputs of runs that are not over a record as it is, one batch for all; nothing where the model fails.
     ///
     /// # Errors
     /// As [`Laboratory::run`].
-    pub fn run_alone(&mut self, study: &Study, job: Job) -> Result<Option<Vec<f64>>, ExplainError> {
-        let setup = self.fleet.install(&study.setup)?;
-        self.count(1);
-        let outcome = self.fleet.run_mixed(vec![(setup, job)])?.into_iter().next();
-        Ok(outcome.and_then(|o| o.result.ok()).map(|prediction| prediction.outputs))
+    pub fn run_alone(
+        &mut self,
+        runs: Vec<(&Study, Job)>,
+    ) -> Result<Vec<Option<Arc<Vec<f64>>>>, ExplainError> {
+        let mut jobs = Vec::with_capacity(runs.len());
+        for (study, job) in runs {
+            jobs.push((self.fleet.install(&study.setup)?, job));
+        }
+        Ok(self.ask(jobs)?.into_iter().map(Result::ok).collect())
     }
 
-    /// Outputs of every point over every record: points in order, then records.
+    /// Outputs of every point over every record, as the model gives them: points in order, then records.
     pub(super) fn outputs(&mut self, points: &[Point<'_>]) -> Result<Vec<Known>, ExplainError> {
-        let mut keys = Vec::with_capacity(points.len() * self.windows.len());
-        let mut jobs: Vec<(SetupId, Job)> = Vec::new();
-        let mut asked: Vec<(RunKey, usize)> = Vec::new();
+        let mut jobs = Vec::with_capacity(points.len() * self.windows.len());
         for (particle, point) in points.iter().enumerate() {
             let setup = self.fleet.install(&point.study.setup)?;
-            for record in 0..self.windows.len() {
+            for (record, window) in self.windows.iter().enumerate() {
                 let theta = point.study.theta_for(record, point.theta.as_slice());
-                let key = key(&setup, record, &theta);
-                keys.push(key);
-                if self.known.contains_key(&key) || asked.iter().any(|(k, _)| *k == key) {
-                    continue;
-                }
-                self.count(1);
-                if let Some(body) = self.store.remembered_run(&key)? {
-                    self.known.insert(key, decode(&body));
-                    continue;
-                }
-                asked.push((key, record));
-                let window = Arc::clone(&self.windows[record]);
-                let (particle, record) = (particle as u32, record as u32);
+                let (particle, record, window) = (particle as u32, record as u32, Arc::clone(window));
                 jobs.push((setup, Job { particle, record, window, theta, state: None }));
             }
         }
-        self.fly(jobs, &asked)?;
+        self.ask(jobs)
+    }
+
+    /// The answers of these jobs, in their order; only those that nobody has asked for before are run.
+    fn ask(&mut self, jobs: Vec<(SetupId, Job)>) -> Result<Vec<Known>, ExplainError> {
+        let mut keys = Vec::with_capacity(jobs.len());
+        let (mut open, mut asked, mut twice) = (Vec::new(), Vec::new(), HashSet::new());
+        for (setup, job) in jobs {
+            let key = key(&setup, &job);
+            keys.push(key);
+            if self.known.contains_key(&key) || !twice.insert(key) {
+                continue;
+            }
+            self.count(1);
+            if let Some(body) = self.store.remembered_run(&key)? {
+                self.known.insert(key, decode(&body));
+                continue;
+            }
+            let (record, particle) = (job.record as usize, job.particle);
+            asked.push(Asked { key, record, particle, n_value: job.window.observed.len() });
+            open.push((setup, job));
+        }
+        self.fly(open, &asked)?;
         let answer = |key: &RunKey| self.known.get(key).cloned().unwrap_or_else(|| Err(String::new()));
         Ok(keys.iter().map(answer).collect())
     }
 
     /// Sends jobs and remembers their answers.
-    fn fly(&mut self, jobs: Vec<(SetupId, Job)>, asked: &[(RunKey, usize)]) -> Result<(), ExplainError> {
+    fn fly(&mut self, jobs: Vec<(SetupId, Job)>, asked: &[Asked]) -> Result<(), ExplainError> {
         if jobs.is_empty() {
             return Ok(());
         }
-        let particles: Vec<u32> = jobs.iter().map(|(_, job)| job.particle).collect();
         let outcomes = self.fleet.run_mixed(jobs)?;
         let mut bodies = Vec::with_capacity(asked.len());
         let mut rows = Vec::with_capacity(asked.len());
-        for (((key, record), particle), outcome) in asked.iter().zip(particles).zip(outcomes) {
-            rows.push(self.row(*record, particle, &outcome));
+        for (asked, outcome) in asked.iter().zip(outcomes) {
+            rows.push(self.row(asked.record, asked.particle, &outcome));
             self.workers.insert(outcome.worker.clone());
-            let known = self.sound(outcome, *record, particle)?;
-            bodies.push((*key, encode(&known)));
-            self.known.insert(*key, known);
+            let known = self.taken(outcome, asked)?;
+            bodies.push((asked.key, encode(&known)));
+            self.known.insert(asked.key, known);
         }
         self.store.remember_runs(bodies.iter().map(|(key, body)| (key, body.as_slice())), &rows)?;
         if let Some(events) = self.events {
@@ -227,27 +271,17 @@ impl<'a> Laboratory<'a> {
         Ok(())
     }
 
-    /// A failure of the model is an answer; a run lost with its workers is none.
-    fn sound(&self, outcome: Outcome, record: usize, particle: u32) -> Result<Known, ExplainError> {
-        let window = &self.windows[record];
-        match outcome.result {
-            Err(error @ (ParticleError::Lost { .. } | ParticleError::BadJob(_))) => Err(RunError::NoAnswer {
-                particle: particle as usize,
-                record: self.study.records[record].name.clone(),
-                reason: error.to_string(),
+    /// A failure of the model is an answer, and so is a prediction of another length.
+    fn taken(&self, outcome: Outcome, asked: &Asked) -> Result<Known, ExplainError> {
+        let prediction = sound(outcome, asked.particle, &self.study.records[asked.record].name)?;
+        Ok(prediction.and_then(|p| {
+            let (n, wanted) = (p.outputs.len(), asked.n_value);
+            if n == wanted {
+                Ok(Arc::new(p.outputs))
+            } else {
+                Err(format!("{n} predicted values for {wanted}"))
             }
-            .into()),
-            Err(error) => Ok(Err(error.to_string())),
-            Ok(prediction) if prediction.outputs.len() != window.observed.len() => Ok(Err(format!(
-                "{} predicted values for {}",
-                prediction.outputs.len(),
-                window.observed.len()
-            ))),
-            Ok(mut prediction) => {
-                self.study.measure(record, &window.times, &mut prediction.outputs);
-                Ok(Ok(Arc::new(prediction.outputs)))
-            }
-        }
+        }))
     }
 
     fn row(&self, record: usize, particle: u32, outcome: &Outcome) -> JobRow {

@@ -21,7 +21,7 @@ pub mod unknown_input;
 pub use bootstrap::{block_bootstrap_rms, block_length};
 pub use maps::map_again;
 pub use result::{ChannelGap, Correlated, Located, RegionMap, ResidualSpectrum, Track, UnknownInput};
-pub use unknown_input::{MOST_RUNS, goes_along, unknown_inputs};
+pub use unknown_input::{MOST_RUNS, unknown_inputs};
 
 use super::Rows;
 use crate::study::Study;

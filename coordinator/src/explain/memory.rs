@@ -1,22 +1,58 @@
-//! A run's answer as it is remembered: the key that says everything it depends on, and its bytes.
+//! A run's answer: what its outcome says, the key that says everything it depends on, and the bytes it is remembered by.
 //!
 //! Next file to read: [`super::laboratory`].
 
 use std::sync::Arc;
 
-use crate::fleet::SetupId;
+use starlings_models::{Job, ParticleError, Prediction};
+
+use super::ExplainError;
+use crate::fleet::{Outcome, SetupId};
+use crate::study::RunError;
 use crate::study::store::RunKey;
 
 /// The outputs of one run, or why there are none.
 pub(super) type Known = Result<Arc<Vec<f64>>, String>;
 
-/// Everything that the answer of a run depends on; the recordings are the run folder's to check.
-pub(super) fn key(setup: &SetupId, record: usize, theta: &[f64]) -> RunKey {
+/// The prediction of a run, or why the model has none.
+///
+/// # Errors
+/// When the run was lost with its workers or never fitted the model: that says nothing of the model, and to go on without it
+/// would make the findings depend on the fleet.
+pub(super) fn sound(
+    outcome: Outcome,
+    particle: u32,
+    record: &str,
+) -> Result<Result<Prediction, String>, ExplainError> {
+    match outcome.result {
+        Err(error @ (ParticleError::Lost { .. } | ParticleError::BadJob(_))) => {
+            let (particle, record, reason) = (particle as usize, record.to_owned(), error.to_string());
+            Err(RunError::NoAnswer { particle, record, reason }.into())
+        }
+        Err(error) => Ok(Err(error.to_string())),
+        Ok(prediction) => Ok(Ok(prediction)),
+    }
+}
+
+/// Everything that the answer of a run depends on. Not what was observed: every run is free.
+pub(super) fn key(setup: &SetupId, job: &Job) -> RunKey {
     let mut hasher = blake3::Hasher::new();
     hasher.update(setup);
-    hasher.update(&(record as u64).to_le_bytes());
-    for value in theta {
-        hasher.update(&value.to_le_bytes());
+    hasher.update(&u64::from(job.record).to_le_bytes());
+    let mut numbers = |values: &[f64]| {
+        // Lengths keep neighbouring lists apart.
+        hasher.update(&(values.len() as u64).to_le_bytes());
+        for value in values {
+            hasher.update(&value.to_le_bytes());
+        }
+    };
+    numbers(&job.theta);
+    numbers(job.state.as_deref().unwrap_or_default());
+    numbers(&[job.window.start]);
+    numbers(&job.window.times);
+    for signal in &job.window.inputs {
+        numbers(&signal.times);
+        numbers(&signal.values);
     }
     *hasher.finalize().as_bytes()
 }

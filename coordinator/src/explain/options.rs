@@ -121,7 +121,7 @@ pub enum ExplainError {
     /// The model as it is cannot be run at all.
     #[error("the model as it is fails at its prior median: {0}")]
     Baseline(String),
-    /// The budget does not even suffice for the fit.
+    /// The budget does not even suffice for the fit and one run of what was fitted.
     #[error("the budget of {budget} runs ended during the {stage}: {needed} more would be needed")]
     Budget {
         /// The budget.

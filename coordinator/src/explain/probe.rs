@@ -85,13 +85,10 @@ fn value(
     course().or_else(fitted).or_else(|| setup.model.constants.get(name).copied()).or_else(default)
 }
 
-/// Slope of a course from its neighbours in time.
+/// Slope of a course.
 fn slope(along: &Along<'_>, name: &str, record: usize, step: usize) -> Option<f64> {
-    let times = &along.study.records[record].times;
-    let course = along.tracks.iter().find(|t| t.name == name)?.values.get(record)?;
-    let (before, after) = (step.saturating_sub(1), (step + 1).min(times.len().checked_sub(1)?));
-    let dt = times[after] - times[before];
-    (dt > 0.0).then(|| (course[after] - course[before]) / dt)
+    let track = along.tracks.iter().find(|t| t.name == name)?;
+    track.slope(record, step, &along.study.records[record].times)
 }
 
 /// The size of what a term is added to: a state's rate, an output's or input's distance from its mean, a parameter's value.

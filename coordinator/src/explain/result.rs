@@ -114,6 +114,16 @@ pub struct NamedEffect {
     pub source: String,
 }
 
+impl NamedEffect {
+    /// Its terms as equations: a term is added to the rate of a state, and to the value of anything else.
+    ///
+    /// `states` are the names of the model's states.
+    pub fn equations(&self, states: &[String]) -> Vec<String> {
+        let left = |to: &String| if states.contains(to) { format!("d {to}/dt") } else { to.clone() };
+        self.adds.iter().map(|(to, term)| format!("{} += {term}", left(to))).collect()
+    }
+}
+
 /// An estimated parameter of an effect.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Coefficient {

@@ -3,6 +3,7 @@
 //! Predictions and residuals are vectors aligned with these rows. Next file to read: [`super::laboratory`].
 
 use crate::study::Study;
+use crate::study::field::quantity_of;
 
 /// What a row may be used for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,6 +46,16 @@ pub struct Row {
     pub noise: f64,
     /// What it may be used for.
     pub usage: Usage,
+}
+
+/// Unit label of a channel: its own where the study gives one, or that of its output, or of a state by that name.
+pub(super) fn unit(study: &Study, record: usize, channel: usize) -> String {
+    let of = &study.records[record].channels[channel];
+    let quantity = || {
+        let output = quantity_of(&study.spec.outputs, &of.output);
+        output.or_else(|| quantity_of(&study.spec.states, &of.output))
+    };
+    of.unit.clone().or_else(|| quantity().map(|q| q.unit.clone())).unwrap_or_default()
 }
 
 /// Every measured value: records in order, then channels, then times.

@@ -9,6 +9,7 @@ use starlings_estimators::End;
 use starlings_models::ObserverDef;
 
 use super::answer;
+use super::background::inflation;
 use super::candidate::{self, Candidate};
 use super::experiment::propose;
 use super::fit::{Fitted, drive};
@@ -159,7 +160,7 @@ fn finish(laboratory: &mut Laboratory<'_>, answer: &Answer<'_, '_>) -> Result<Fi
         _ => None,
     };
     laboratory.stage("show", "");
-    let figures = figures(laboratory, found, added, &before)?;
+    let figures = figures(laboratory, found, decision, &before)?;
     let mut explanation =
         explanation(laboratory, found, candidates, decision, &before, explained.is_some(), warnings);
     explanation.experiment = experiment;
@@ -173,8 +174,8 @@ fn forces(
 ) -> Result<Vec<locate::UnknownInput>, ExplainError> {
     laboratory.stage("locate", "the unknown input of every equation");
     let study = &base.version.study;
-    let most = locate::unknown_input::MOST_RUNS + 2 * study.spec.states.len();
-    if !laboratory.affords(most.div_ceil(study.records.len().max(1))) {
+    let most = locate::MOST_RUNS + 2 * study.spec.states.len();
+    if !laboratory.affords_runs(most as u64) {
         return Ok(Vec::new());
     }
     let mut runs = 0;
@@ -187,9 +188,11 @@ fn forces(
 fn figures(
     laboratory: &mut Laboratory<'_>,
     found: &Found<'_>,
-    added: Option<&Judged<'_>>,
+    decision: &Decision,
     before: &Located,
 ) -> Result<Figures, ExplainError> {
+    let judged = decision.best.map(|i| &found.judged[i]);
+    let added = judged.filter(|_| matches!(decision.verdict, Verdict::Named | Verdict::Tie));
     let maps_after = match added {
         Some(judged) if laboratory.affords(1) => {
             let study = &judged.fit.version.study;
@@ -200,7 +203,8 @@ fn figures(
         _ => Vec::new(),
     };
     let after = added.map(|j| j.fit.predicted.as_slice());
-    let inflation = added.map_or(1.0, |j| j.inflation);
+    let of_base = || inflation(&laboratory.rows, found.base.residual());
+    let inflation = judged.map_or_else(of_base, |j| j.inflation);
     Ok(Figures {
         time_unit: laboratory.study.time_unit.clone(),
         curves: answer::curves(laboratory, &found.base.predicted, after),
@@ -208,8 +212,13 @@ fn figures(
         maps_after,
         null_gains: found.background.maxima.clone(),
         decoy_gains: found.background.decoys.iter().map(|d| d / inflation).collect(),
-        best_gain: found.judged.first().map_or(0.0, Judged::evidence),
+        best_gain: best_gain(found, judged) / inflation,
     })
+}
+
+/// Fall of χ² by what the decision rests on, or else the largest that the screening promised: what decoys are compared with.
+fn best_gain(found: &Found<'_>, judged: Option<&Judged<'_>>) -> f64 {
+    judged.map_or(found.alarm, |j| j.gain)
 }
 
 fn explanation(
@@ -224,6 +233,7 @@ fn explanation(
     let study = laboratory.study;
     let judged = decision.best.map(|i| &found.judged[i]);
     let added = judged.filter(|_| matches!(decision.verdict, Verdict::Named | Verdict::Tie));
+    let checked = decision.checked.map(|i| &found.judged[i]);
     let n_train = laboratory.rows.train.len();
     let nearest = judged.or(found.judged.first());
     let after = added.map(|j| j.fit.predicted.as_slice());
@@ -244,8 +254,8 @@ fn explanation(
         screened: answer::screened(found, candidates, decision, n_train),
         rejected: refused::rejected(found, candidates, decision),
         gap: after.map(|y| answer::gap(laboratory, &found.base.predicted, y)).unwrap_or_default(),
-        remaining: answer::remaining(laboratory, found, added, words::shape(found, added, before)),
-        false_alarm: answer::false_alarm(found, judged.map_or(0.0, |j| j.gain)),
+        remaining: answer::remaining(laboratory, found, added, checked, words::shape(found, added, before)),
+        false_alarm: answer::false_alarm(found, best_gain(found, judged)),
         parameter_shifts: added.map(|j| answer::shifts(&found.base, j)).unwrap_or_default(),
         untried: words::untried(found, candidates),
         explained_study: explained.then(|| "explained.toml".to_owned()),

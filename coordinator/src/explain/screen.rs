@@ -28,6 +28,8 @@ const AGAIN: usize = 2;
 /// Part of its own below which a candidate's influence counts as imitated by the parameters.
 pub const ABSORBED: f64 = 0.05;
 
+/// Why a probe has no answer that the budget did not suffice for.
+const UNAFFORDED: &str = "the budget ended before its influence was measured";
 /// The score of what was not measured.
 const NO_SCORE: Score = Score { gain: 0.0, amplitude: 0.0, sd: f64::INFINITY, identifiable: 0.0 };
 
@@ -68,6 +70,8 @@ struct Probe<'c> {
 }
 
 /// Measures candidates at a fit: `of` names (candidate, point of its grid). Effects that the fit has already are left out.
+/// Where the budget does not suffice for all of them, none is measured, and what it does not suffice to measure again counts
+/// as failed; the laboratory notes it.
 ///
 /// # Errors
 /// When the fleet or the store fails, or the fit leaves a direction free.
@@ -91,9 +95,21 @@ pub fn screen<'c>(
         }
     }
     let spread = spread(laboratory);
-    let reference = reference(laboratory, fit, &probes)?;
+    let unmoved = unmoved(fit, &probes);
+    if !laboratory.affords(probes.len() + usize::from(unmoved.is_some())) {
+        laboratory.cut_short();
+        return Ok(Vec::new());
+    }
+    let reference = reference(laboratory, fit, unmoved)?;
     for round in 0..=AGAIN {
         let open: Vec<usize> = (0..probes.len()).filter(|i| probes[*i].answer.is_none()).collect();
+        if !laboratory.affords(open.len()) {
+            laboratory.cut_short();
+            for i in open {
+                probes[i].answer = Some(Err(UNAFFORDED.to_owned()));
+            }
+            break;
+        }
         let points: Vec<Point<'_>> = open.iter().map(|i| at(fit, &probes[*i])).collect();
         let answers = laboratory.run(&points)?;
         drop(points);
@@ -147,18 +163,22 @@ fn touches_states(probe: &Probe<'_>) -> bool {
     !(member.candidate.def.states.is_empty() && member.candidate.def.adds.iter().all(|a| only_output(&a.to)))
 }
 
-/// Predictions of the fitted model with an effect of amplitude zero in its rates. A built-in model with a step of its own is
-/// then integrated in another way, and that difference is not the effect's doing.
+/// The fitted model with an effect of amplitude zero in its rates, where that is not the fitted model to the bit: a built-in
+/// model with a step of its own is then integrated in another way, and that difference is not the effect's doing.
+fn unmoved<'p>(fit: &Fitted<'_>, probes: &'p [Probe<'_>]) -> Option<Point<'p>> {
+    let own_step = fit.version.study.setup.model.equations.is_none();
+    let probe = probes.iter().find(|p| touches_states(p)).filter(|_| own_step)?;
+    let z = probe.version.continue_from(&fit.version, fit.z(), &probe.point);
+    Some(Point { study: &probe.version.study, theta: probe.version.theta(&z) })
+}
+
+/// What predictions with an effect in the rates are compared with.
 fn reference(
     laboratory: &mut Laboratory<'_>,
     fit: &Fitted<'_>,
-    probes: &[Probe<'_>],
+    unmoved: Option<Point<'_>>,
 ) -> Result<Vec<f64>, ExplainError> {
-    let own_step = fit.version.study.setup.model.equations.is_none();
-    let touching = probes.iter().find(|p| touches_states(p)).filter(|_| own_step);
-    let Some(probe) = touching else { return Ok(fit.predicted.to_vec()) };
-    let z = probe.version.continue_from(&fit.version, fit.z(), &probe.point);
-    let point = Point { study: &probe.version.study, theta: probe.version.theta(&z) };
+    let Some(point) = unmoved else { return Ok(fit.predicted.to_vec()) };
     let answer = laboratory.run(&[point])?.swap_remove(0);
     Ok(answer.map_or_else(|_| fit.predicted.to_vec(), |y| y.to_vec()))
 }

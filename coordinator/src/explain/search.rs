@@ -10,7 +10,6 @@ use std::cmp::Ordering;
 use super::background::{Background, whiteness};
 use super::candidate::Candidate;
 use super::fit::{Fitted, drive, drive_rounds};
-use super::form::Leftover;
 use super::judge::{Judged, Misfit, judge};
 use super::laboratory::Laboratory;
 use super::locate::Track;
@@ -45,18 +44,18 @@ pub struct Found<'c> {
     pub background: Background,
     /// The screening at the model as it is, every candidate and grid point.
     pub hits: Vec<Hit>,
+    /// Largest fall of χ² in it, to first order, with an amplitude of a sign that physics allows.
+    pub alarm: f64,
     /// Every version that was refitted, the best first.
     pub judged: Vec<Judged<'c>>,
-    /// What is left after the best.
-    pub leftover: Leftover,
     /// Whether the budget cut the search short.
     pub cut_short: bool,
 }
 
 impl Found<'_> {
-    /// Whether there is a gap at all: structure in the residuals, or a candidate that gains more than chance.
-    pub fn has_gap(&self) -> bool {
-        self.whiteness < NOT_WHITE || self.judged.iter().any(|j| j.refusal.is_none())
+    /// Positions of the versions that pass every gate, the best first.
+    pub(super) fn passing(&self) -> Vec<usize> {
+        (0..self.judged.len()).filter(|i| self.judged[*i].refusal.is_none()).collect()
     }
 }
 
@@ -86,23 +85,15 @@ pub fn search<'c>(
     searcher.laboratory.stage("screen", &format!("{} candidates", candidates.len()));
     let hits = searcher.screen_all(&base)?;
     let background = Background::new(&base.optimum()?, &searcher.laboratory.rows, &hits, candidates, seed);
-    let mut found = Found {
-        base,
-        before,
-        whiteness,
-        background,
-        hits,
-        judged: Vec::new(),
-        leftover: Leftover::default(),
-        cut_short: false,
-    };
-    let alarm = found.hits.iter().map(|h| h.allowed_gain(candidates[h.candidate].sign())).fold(0.0, f64::max);
+    let alarm = hits.iter().map(|h| h.allowed_gain(candidates[h.candidate].sign())).fold(0.0, f64::max);
+    let (judged, cut_short) = (Vec::new(), false);
+    let mut found = Found { base, before, whiteness, background, hits, alarm, judged, cut_short };
     if whiteness < NOT_WHITE || alarm > found.background.threshold {
         searcher.singles(&mut found)?;
         searcher.replacements(&mut found)?;
         searcher.look_again(&mut found, options)?;
     }
-    found.cut_short = searcher.cut_short;
+    found.cut_short = searcher.cut_short || searcher.laboratory.was_cut_short();
     Ok(found)
 }
 

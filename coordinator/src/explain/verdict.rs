@@ -9,8 +9,9 @@ use starlings_models::equations::{Expression, Slot};
 
 use super::Verdict;
 use super::candidate::Candidate;
-use super::form::white_share;
-use super::judge::{Judged, Misfit};
+use super::carried::{Carried, carried};
+use super::form::{Leftover, white_share};
+use super::judge::Judged;
 use super::laboratory::Laboratory;
 use super::search::{Found, NOT_WHITE};
 
@@ -21,17 +22,18 @@ const ALIKE: f64 = 0.995;
 /// A rival is tied where the difference in χ² is less than so many of its standard deviations.
 const VUONG: f64 = 1.64;
 /// Effective variance of the residuals above which what remains is a discrepancy of its own, not the form of an effect.
-const DISCREPANT: f64 = 20.0;
+pub(super) const DISCREPANT: f64 = 20.0;
 /// Share of white noise in the residuals from which on they must be white altogether.
 const AUDIBLE: f64 = 0.12;
 /// ... where their effective variance says that the structure matters.
 const STRUCTURED: f64 = 3.0;
-/// Fall of χ² below which a fully bent form would not be noticed.
-const POWER: f64 = 16.0;
+/// Fall of χ² by a fully bent form from which on a form bent by half, which makes a quarter of it, passes the 12 units of the
+/// check of the form nine times in ten: 4 (√12 + 1.28)².
+const POWER: f64 = 90.0;
+/// Share of the gap of the held-out span that may be left unaccounted for where the training residuals are noise.
+const UNACCOUNTED: f64 = 0.15;
 /// Posterior over prior standard deviation of a parameter inside a term from which on the data do not tell it.
 const UNINFORMED: f64 = 0.5;
-/// A further effect must carry this share of the gap.
-const SECOND_SHARE: f64 = 0.1;
 /// Where the residuals stay correlated, an effect must take away this share of the excess of the training rows ...
 const SHARE: f64 = 0.5;
 /// ... and this share of that of the held-out span.
@@ -46,6 +48,8 @@ pub struct Decision {
     pub verdict: Verdict,
     /// What is named, or the best of the tied, or what came nearest.
     pub best: Option<usize>,
+    /// What came first by rank, whose form was checked: of a tie `best` is the simplest.
+    pub checked: Option<usize>,
     /// Names of the sets of effects tied with the best.
     pub tied: Vec<Vec<String>>,
     /// Positions of those of the tied that were refitted.
@@ -59,12 +63,12 @@ pub fn decide(laboratory: &Laboratory<'_>, found: &Found<'_>, candidates: &[Cand
     let none = |verdict, best, because: &str| Decision {
         verdict,
         best,
+        checked: best,
         tied: Vec::new(),
         rivals: Vec::new(),
         because: because.to_owned(),
     };
-    let passing: Vec<usize> =
-        (0..found.judged.len()).filter(|i| found.judged[*i].refusal.is_none()).collect();
+    let passing = found.passing();
     if passing.is_empty() {
         return if found.whiteness < NOT_WHITE {
             none(Verdict::Unexplained, None, &nearest_refused(found))
@@ -72,14 +76,15 @@ pub fn decide(laboratory: &Laboratory<'_>, found: &Found<'_>, candidates: &[Cand
             none(Verdict::NoGap, None, "")
         };
     }
-    let (best, second) = carried(found, &passing);
+    let Carried { best, checked, because } = carried(found, &passing);
     let judged = &found.judged[best];
-    if let Some(second) = second {
-        return none(Verdict::Unexplained, Some(best), &second);
+    let leftover = found.judged[checked].leftover.unwrap_or_default();
+    let because = because.or_else(|| doubt(laboratory, found, judged, leftover));
+    if let Some(because) = because {
+        return Decision { checked: Some(checked), ..none(Verdict::Unexplained, Some(best), &because) };
     }
-    if let Some(because) = doubt(laboratory, found, judged) {
-        return none(Verdict::Unexplained, Some(best), &because);
-    }
+    // What remains beside a discrepancy of its own tells nothing of a form.
+    let is_tested = judged.inflation > DISCREPANT || leftover.power >= POWER;
     let mut rivals = rivals(laboratory, found, &passing, best);
     // Of forms that the data cannot tell apart the simplest is shown.
     let mut best = best;
@@ -95,12 +100,12 @@ pub fn decide(laboratory: &Laboratory<'_>, found: &Found<'_>, candidates: &[Cand
             tied.push(twin);
         }
     }
-    if found.leftover.power < POWER {
+    if !is_tested {
         tied.push(vec![format!("another form of {}", judged.fit.version.name())]);
     }
     tied.extend(limits(judged).into_iter().map(|limit| vec![limit]));
     let verdict = if tied.is_empty() { Verdict::Named } else { Verdict::Tie };
-    Decision { verdict, best: Some(best), tied, rivals, because: String::new() }
+    Decision { verdict, best: Some(best), checked: Some(checked), tied, rivals, because: String::new() }
 }
 
 /// The limiting forms that the data do not exclude: a parameter inside a term of which they say little.
@@ -141,59 +146,32 @@ fn nearest_refused(found: &Found<'_>) -> String {
     )
 }
 
-/// The best version whose every effect carries its share of the gap, on the training data and again on the held-out span;
-/// where a further effect was found that carries too little of both, why its partner is not quite right.
-fn carried(found: &Found<'_>, passing: &[usize]) -> (usize, Option<String>) {
-    let first = passing[0];
-    let whole = &found.judged[first];
-    if whole.fit.version.members.len() < 2 {
-        return (first, None);
-    }
-    let alone = passing.iter().copied().find(|i| {
-        let judged = &found.judged[*i];
-        judged.fit.version.members.len() + 1 == whole.fit.version.members.len()
-            && names(judged).iter().all(|name| names(whole).contains(name))
-    });
-    let Some(alone) = alone else { return (first, None) };
-    let part = &found.judged[alone];
-    let share = |of: fn(&Misfit) -> f64| {
-        let whole_fall = of(&found.before) - of(&whole.misfit);
-        (of(&part.misfit) - of(&whole.misfit)) / whole_fall.max(f64::MIN_POSITIVE)
-    };
-    let train = share(|m| m.train);
-    let held_out = (whole.misfit.n_held_out > 0).then(|| share(|m| m.held_out));
-    if train >= SECOND_SHARE && held_out.is_none_or(|h| h >= SECOND_SHARE) {
-        return (first, None);
-    }
-    // What does not come again in the held-out span is not the effect's form.
-    if held_out.is_some_and(|h| h < 0.3 * train) || found.judged[alone].inflation > DISCREPANT {
-        return (alone, None);
-    }
-    let because = format!(
-        "`{}` leaves {:.1} % of what `{}` takes away, too much for chance and too little for an effect of its own: its form is \
-         not quite right",
-        part.fit.version.name(),
-        100.0 * train,
-        whole.fit.version.name()
-    );
-    (alone, Some(because))
-}
-
 /// What speaks against naming a version that passes the gates.
-fn doubt(laboratory: &Laboratory<'_>, found: &Found<'_>, judged: &Judged<'_>) -> Option<String> {
-    if found.leftover.is_systematic {
+fn doubt(
+    laboratory: &Laboratory<'_>,
+    found: &Found<'_>,
+    judged: &Judged<'_>,
+    left: Leftover,
+) -> Option<String> {
+    if left.is_systematic {
         return Some(format!(
             "`{}` comes nearest, but other candidates or a bent form of it would still take away {:.0} of χ² and {:.0} on the \
              held-out span, in units of the effective noise: its form is not right",
             judged.fit.version.name(),
-            found.leftover.gain,
-            found.leftover.gain_held_out
+            left.gain,
+            left.gain_held_out
         ));
     }
-    if judged.whiteness >= NOT_WHITE {
-        return None;
-    }
     let name = judged.fit.version.name();
+    if judged.whiteness >= NOT_WHITE {
+        return (judged.unaccounted > UNACCOUNTED).then(|| {
+            format!(
+                "with `{name}` nothing but noise is left of the training data, yet at least {:.0} % of the gap of the held-out \
+                 span stays beyond the uncertainty of the estimate: its form does not carry on",
+                100.0 * judged.unaccounted
+            )
+        });
+    }
     let white = white_share(&laboratory.rows, judged.fit.residual());
     if white > AUDIBLE && judged.inflation > STRUCTURED {
         return Some(format!(

@@ -72,11 +72,6 @@ impl<'c> Version<'c> {
         &self.centre + self.unit.component_mul(z)
     }
 
-    /// z from transformed parameters.
-    pub fn z(&self, theta: &DVector<f64>) -> DVector<f64> {
-        (theta - &self.centre).component_div(&self.unit)
-    }
-
     /// The units of z, in transformed units.
     pub fn unit(&self) -> &DVector<f64> {
         &self.unit

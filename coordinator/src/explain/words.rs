@@ -10,7 +10,7 @@ use super::laboratory::Laboratory;
 use super::locate::Located;
 use super::rows::Usage;
 use super::search::{Found, NOT_WHITE};
-use super::verdict::Decision;
+use super::verdict::{DISCREPANT, Decision};
 
 /// Where a fit stands that has not converged.
 pub(super) fn stand(fit: &Fitted<'_>) -> String {
@@ -123,6 +123,23 @@ pub(super) fn untried(found: &Found<'_>, candidates: &[Candidate]) -> Vec<String
     open.map(|(_, c)| c.name().to_owned()).collect()
 }
 
+/// What a fit that did not come to its end leaves in doubt.
+fn unfinished(fit: &Fitted<'_>) -> Option<String> {
+    let name = fit.version.name();
+    if !fit.has_converged() {
+        return Some(format!(
+            "the fit with {name} has not converged after {} steps: its figures are those of where it stands",
+            fit.trials()
+        ));
+    }
+    (!fit.is_fresh()).then(|| {
+        format!(
+            "the fit with {name} ended without a measured Jacobian: its standard deviations and intervals rest on a secant \
+             approximation"
+        )
+    })
+}
+
 /// What is doubtful.
 pub(super) fn warnings(laboratory: &Laboratory<'_>, found: &Found<'_>, decision: &Decision) -> Vec<String> {
     let mut list = Vec::new();
@@ -147,11 +164,22 @@ pub(super) fn warnings(laboratory: &Laboratory<'_>, found: &Found<'_>, decision:
              check the noise"
         ));
     }
-    if let Some(judged) = decision.best.map(|i| &found.judged[i]).filter(|j| j.inflation > 3.0) {
+    let best = decision.best.map(|i| &found.judged[i]);
+    list.extend(best.and_then(|judged| unfinished(&judged.fit)));
+    if let Some(judged) = best.filter(|j| j.inflation > 3.0) {
         list.push(format!(
             "residuals stay correlated or larger than the stated noise (effective variance {:.1}): evidence and intervals are \
              scaled by it",
             judged.inflation
+        ));
+    }
+    if let Some(judged) =
+        best.filter(|j| j.inflation > DISCREPANT && decision.verdict != Verdict::Unexplained)
+    {
+        list.push(format!(
+            "what `{}` leaves is a discrepancy of its own and no noise: whether another form of it would serve as well was not \
+             tested",
+            judged.fit.version.name()
         ));
     }
     list

@@ -4,33 +4,49 @@ use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use starlings_models::{Forward, Job, ParticleError, Setup};
+use starlings_models::{Forward, Job, ParticleError, Setup, SetupError};
 use starlings_proto::words::panic_text;
 use starlings_proto::{SetupId, encode_setup};
 use tokio_util::sync::CancellationToken;
 
 use super::{Fleet, FleetError, Outcome};
 
+/// Makes what runs the jobs of a setup.
+pub type Factory = Arc<dyn Fn(&Setup) -> Result<Box<dyn Forward>, SetupError> + Send + Sync>;
+
 /// Threads of this process as a fleet.
 pub struct InProcess {
     threads: usize,
     cancel: CancellationToken,
     forwards: BTreeMap<SetupId, Box<dyn Forward>>,
+    factory: Factory,
 }
 
 impl InProcess {
     /// A fleet of so many threads, at least one.
     pub fn new(threads: usize) -> Self {
-        Self { threads: threads.max(1), cancel: CancellationToken::new(), forwards: BTreeMap::new() }
+        Self {
+            threads: threads.max(1),
+            cancel: CancellationToken::new(),
+            forwards: BTreeMap::new(),
+            factory: Arc::new(Setup::build),
+        }
     }
 
     /// The same fleet, ended by this token: [`Fleet::run`] returns [`FleetError::Cancelled`] after the jobs being computed.
     #[must_use]
     pub fn with_cancel(mut self, cancel: CancellationToken) -> Self {
         self.cancel = cancel;
+        self
+    }
+
+    /// The same fleet with another maker of what runs jobs than [`Setup::build`], which starts no solver.
+    #[must_use]
+    pub fn with_factory(mut self, factory: Factory) -> Self {
+        self.factory = factory;
         self
     }
 }
@@ -40,7 +56,7 @@ impl Fleet for InProcess {
         let failed = |reason: String| FleetError::SetupFailed { reason };
         let (id, _) = encode_setup(setup).map_err(|e| failed(e.to_string()))?;
         if let Entry::Vacant(place) = self.forwards.entry(id) {
-            place.insert(setup.build().map_err(|e| failed(e.to_string()))?);
+            place.insert((self.factory)(setup).map_err(|e| failed(e.to_string()))?);
         }
         Ok(id)
     }

@@ -131,8 +131,3 @@ fn remaining(found: &Explanation) -> Vec<(&'static str, String)> {
 fn probability(p: f64) -> String {
     if p.is_finite() && p < 1e-3 { "< 0.001".to_owned() } else { number::with_sd(p, 0.01) }
 }
-
-/// A value with its unit.
-fn quantity(value: f64, unit: &str) -> String {
-    format!("{} {unit}", number::significant(value, 3)).trim_end().to_owned()
-}

@@ -15,13 +15,7 @@ use crate::study::store::folder::StudyInfo;
 /// # Errors
 /// When the explanation is not finished, the store is damaged, or a file cannot be written.
 pub fn write_explanation(folder: &RunFolder) -> Result<Findings, FilesError> {
-    let Some(found) = kept(&folder.store)? else {
-        let path = folder.path.display();
-        let text = format!(
-            "the explanation in {path} is not finished: continue it with `starlings explain STUDY --out {path} --resume`"
-        );
-        return Err(StoreError::Unusable(text).into());
-    };
+    let found = kept(&folder.store)?.ok_or_else(|| FilesError::Unfinished(folder.path.clone()))?;
     let page = explain_page(&found.explanation, &found.figures, &about(folder)?)?;
     place(folder, "report.html", &page)?;
     if let Some(text) = &found.explained_study {

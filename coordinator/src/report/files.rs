@@ -14,6 +14,12 @@ pub enum FilesError {
     /// The store failed, or the run is not finished.
     #[error(transparent)]
     Store(#[from] StoreError),
+    /// The explanation in this folder is not finished.
+    #[error(
+        "the explanation in {path} is not finished: continue it with `starlings explain STUDY --out {path} --resume`",
+        path = .0.display()
+    )]
+    Unfinished(PathBuf),
     /// The page could not be made.
     #[error(transparent)]
     Page(#[from] ReportError),

@@ -23,6 +23,11 @@ pub(crate) fn significant(value: f64, digits: i32) -> String {
     }
 }
 
+/// `value` to three significant digits, with its unit.
+pub(crate) fn quantity(value: f64, unit: &str) -> String {
+    format!("{} {unit}", significant(value, 3)).trim_end().to_owned()
+}
+
 /// `value` as a tick of an axis whose ticks are `step` apart.
 pub(crate) fn tick(value: f64, step: f64) -> String {
     if value.abs() < 1e-9 * step && !(1e-4..1e5).contains(&step) {
@@ -126,6 +131,13 @@ mod tests {
         assert_eq!(significant(f64::from_bits(1), 2), "4.9×10⁻³²⁴");
         assert_eq!(significant(f64::MAX, 3), "1.80×10³⁰⁸");
         assert_eq!(significant(-9.999e-7, 2), "−1.0×10⁻⁶");
+    }
+
+    #[test]
+    fn a_quantity_has_three_digits_and_its_unit_if_it_has_one() {
+        assert_eq!(quantity(-0.012_345, "mmHg"), "−0.0123 mmHg");
+        assert_eq!(quantity(2.0, ""), "2.00");
+        assert_eq!(quantity(f64::NAN, "s"), "– s");
     }
 
     #[test]

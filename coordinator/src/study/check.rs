@@ -10,7 +10,9 @@ mod model;
 mod observer;
 mod parameters;
 mod prior;
+pub(in crate::study) mod scales;
 mod settings;
+mod solver;
 mod spectrum;
 mod units;
 
@@ -19,12 +21,14 @@ use std::path::Path;
 use self::model::CheckedModel;
 use self::parameters::initial_medians;
 use self::settings::{estimator, fleet};
+use self::solver::Known;
 use super::checked::{Record, Study};
 use super::expand;
 use super::field::field_of;
 use super::file::{RecordSection, StudyFile};
 use super::problem::{Problem, Source, StudyError};
 use super::record::{Context, Recordings};
+use super::surroundings::Surroundings;
 use crate::study::file::read::read;
 
 impl Study {
@@ -33,8 +37,16 @@ impl Study {
     /// # Errors
     /// Everything that is wrong, each with its place and remedy.
     pub fn load(path: &Path) -> Result<Self, StudyError> {
+        Self::load_with(path, &Surroundings::default())
+    }
+
+    /// Reads and checks a study file where solvers can be started.
+    ///
+    /// # Errors
+    /// As [`Study::load`].
+    pub fn load_with(path: &Path, surroundings: &Surroundings) -> Result<Self, StudyError> {
         match std::fs::read_to_string(path) {
-            Ok(text) => Self::from_text(path, &text),
+            Ok(text) => Self::from_text_with(path, &text, surroundings),
             Err(error) => {
                 let problem = Problem {
                     message: format!("cannot read the study: {error}"),
@@ -53,28 +65,39 @@ impl Study {
     /// # Errors
     /// As [`Study::load`].
     pub fn from_text(file: &Path, text: &str) -> Result<Self, StudyError> {
-        check(file, text)
+        Self::from_text_with(file, text, &Surroundings::default())
+    }
+
+    /// Checks the text of a study file that stands, or stood, at `file`, where solvers can be started.
+    ///
+    /// # Errors
+    /// As [`Study::load`].
+    pub fn from_text_with(file: &Path, text: &str, surroundings: &Surroundings) -> Result<Self, StudyError> {
+        check(file, text, surroundings)
     }
 }
 
-fn check(path: &Path, text: &str) -> Result<Study, StudyError> {
+fn check(path: &Path, text: &str, surroundings: &Surroundings) -> Result<Study, StudyError> {
     let source = Source::new(path, text);
     let file = read(&source)?;
     check_name(&source, &file);
-    let estimator = estimator(&source, &file.estimator);
+    let solver = solver::solver(&source, &file, surroundings);
+    let described = solver.as_ref().and_then(Known::description);
+    let estimator = estimator(&source, &file.estimator, described);
     let fleet = fleet(&source, &file.fleet);
     let explain = explain::explain(&source, &file);
     let spectrum = spectrum::spectrum(&source, &file.spectrum);
-    let observer = settings::observer(&source, &file.observer);
-    let model = model::model(&source, &file);
+    let observer = settings::observer(&source, &file.observer, described);
+    let model = model::model(&source, &file, solver.as_ref());
     // Everything that follows is judged against the model.
     let Some(mut model) = model else {
         return Err(source.verdict().err().unwrap_or(StudyError { problems: vec![] }));
     };
     model.setup.observer = observer;
     explain::check_names(&source, &file, &model.setup.model);
-    let mut warnings = Vec::new();
-    model::check_values(&source, &file, &model);
+    let mut warnings = solver::check(&source, &file, solver.as_ref());
+    let relative: Vec<String> = scales::relative(&model.setup.effects).map(|p| p.name.clone()).collect();
+    model::check_values(&source, &file, &model, &|name| !relative.iter().any(|known| known == name));
     let initial = initial::constants(&source, &file, &model.spec, &mut warnings);
     model.setup.model.constants.extend(initial);
     let priors = parameters::priors(&source, &file, &model, &mut warnings);
@@ -83,6 +106,8 @@ fn check(path: &Path, text: &str) -> Result<Study, StudyError> {
     source.verdict()?;
     model.setup.parameters = file.parameters.iter().map(|p| p.name.get_ref().clone()).collect();
     let parameters = initial_medians(&source, &file, &model.spec, &priors, &records);
+    source.verdict()?;
+    scales::check(&source, &file, &mut model, (&parameters, &records), surroundings, &mut warnings);
     source.verdict()?;
     model::check_build(&source, &file, &model.setup);
     source.verdict()?;
@@ -108,6 +133,8 @@ fn check(path: &Path, text: &str) -> Result<Study, StudyError> {
         explain,
         spectrum,
         delays: model.delays,
+        runs_here: solver.is_none_or(|known| known.is_here),
+        surroundings: surroundings.clone(),
         warnings,
     })
 }

@@ -10,6 +10,7 @@ use starlings_models::spectrum::Decay;
 use starlings_models::{EffectDef, Setup, Signal, Spec};
 
 use super::surfaces::Node;
+use super::surroundings::Surroundings;
 
 /// A study whose names exist, whose numbers make sense and whose recordings were read.
 #[derive(Clone, Debug)]
@@ -48,6 +49,10 @@ pub struct Study {
     pub spectrum: SpectrumChoice,
     /// An input is used at earlier times: windows then carry it from the record's start.
     pub delays: bool,
+    /// Whether the model can be run in this process; a solver that a file describes may be elsewhere.
+    pub runs_here: bool,
+    /// Who starts its solver, where the model is one.
+    pub surroundings: Surroundings,
     /// What is doubtful but no error.
     pub warnings: Vec<String>,
 }

@@ -5,9 +5,11 @@
 
 pub(super) mod layout;
 pub(super) mod locate;
+mod memory;
 mod model;
 pub(super) mod read;
 mod settings;
+pub(super) mod solver;
 pub(super) mod spectrum;
 mod table;
 
@@ -54,6 +56,8 @@ pub(super) struct ModelSection {
     pub(super) layout: Option<layout::Layout>,
     /// Present when `kind` is `equations`.
     pub(super) equations: Option<EquationsSection>,
+    /// Present when `kind` is `solver`.
+    pub(super) solver: Option<solver::ProgramSection>,
 }
 
 /// The keys of `[model]` that write a model.

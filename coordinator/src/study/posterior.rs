@@ -10,7 +10,7 @@ use super::store::EstimateRow;
 use super::{Study, ThetaEntry};
 
 /// Half-width of a central 95 % interval of a Gaussian, in standard deviations.
-const Z95: f64 = 1.959_963_984_540_054;
+pub(crate) const Z95: f64 = 1.959_963_984_540_054;
 
 /// One estimated parameter in physical units.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -3,6 +3,7 @@
 //! The model stands at its prior medians, where its runs start. The arithmetic of poles is in `starlings_models::spectrum`;
 //! how the result is shown is the caller's. Next file to read: `models/src/spectrum.rs`.
 
+use starlings_models::SOLVER;
 use starlings_models::spectrum::{Decay, Laboratory, ObserverSpectrum, SpectrumError};
 
 use super::{Study, posterior};
@@ -63,6 +64,9 @@ pub enum ExamineError {
     /// The model has none, or cannot host an observer that was asked for.
     #[error(transparent)]
     Spectrum(#[from] SpectrumError),
+    /// Nothing but runs is known of a solver.
+    #[error("the model runs in a program of its own: its equations are not known, nor are its poles")]
+    Solver,
     /// The examination of an observer ended without an answer.
     #[error("the observer `{0}` could not be examined")]
     Broken(String),
@@ -73,6 +77,9 @@ pub enum ExamineError {
 /// # Errors
 /// When the model cannot be linearised where its runs start, or cannot host an observer that was asked for.
 pub fn examine(study: &Study, wanted: &Wanted) -> Result<Spectrum, ExamineError> {
+    if study.setup.model.kind == SOLVER {
+        return Err(ExamineError::Solver);
+    }
     let medians = study.theta_for(0, posterior::prior(study).mean.as_slice());
     let laboratory = Laboratory::new(&study.setup, &medians)?;
     let listed = wanted.poles.unwrap_or(LISTED).min(laboratory.poles().len());

@@ -51,12 +51,15 @@ pub enum TrialError {
     },
 }
 
-/// Runs every record once, free, at the prior median.
+/// Runs every record once, free, at the prior median; none where the model cannot be run in this process.
 ///
 /// # Errors
 /// When the setup does not build or the model fails.
 pub fn trial(study: &Study) -> Result<Vec<TrialChannel>, TrialError> {
-    let model = study.setup.build()?;
+    if !study.runs_here {
+        return Ok(Vec::new());
+    }
+    let model = study.surroundings.build(&study.setup)?;
     let prior = posterior::prior(study);
     let mut channels = Vec::new();
     for (index, record) in study.records.iter().enumerate() {

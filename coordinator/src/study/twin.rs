@@ -12,8 +12,10 @@ use std::sync::Arc;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+use starlings_models::effect::library::library_in;
 use starlings_models::{ObserverDef, ParticleError, Setup, SetupError, Window, nearest};
 
+use super::check::scales::{self, CourseError, Ruler, Trial};
 use super::field::components;
 use super::{Study, posterior};
 use crate::study::twin::run::Run;
@@ -53,7 +55,7 @@ pub struct Recording {
     pub values: Vec<Vec<f64>>,
     /// Standard deviation of the noise that was added, by output; a field counts as one.
     pub noise: Vec<(String, f64)>,
-    /// The state at the record's start, by component.
+    /// The state at the record's start, by component; empty from a model that cannot restart from one.
     pub start: Vec<(String, f64)>,
     /// Periods that were run to find a periodic start.
     pub n_period: Option<usize>,
@@ -83,7 +85,7 @@ pub fn simulate(study: &Study, twin: &Twin) -> Result<Recording, TwinError> {
         .get(twin.record)
         .ok_or_else(|| TwinError::Request(format!("the study has {} records", study.records.len())))?;
     let (setup, theta) = place(study, twin)?;
-    let model = setup.build()?;
+    let model = study.surroundings.build(&setup)?;
     let times = if twin.times.is_empty() { record.times.clone() } else { twin.times.clone() };
     let start = record.times.first().copied().unwrap_or_default();
     if times.first().is_some_and(|t| *t < start) || times.windows(2).any(|w| w[1] <= w[0]) {
@@ -97,7 +99,13 @@ pub fn simulate(study: &Study, twin: &Twin) -> Result<Recording, TwinError> {
         times,
         inputs: record.inputs.clone(),
     };
+    let restarts = model.spec().restart;
     let state = match twin.period {
+        Some(_) if !restarts => {
+            let message = "a model that cannot restart from a state has no periodic start";
+            return Err(TwinError::Request(message.to_owned()));
+        }
+        None if !restarts => Vec::new(),
         None => run.initial(&window)?,
         Some(period) => run.periodic(&mut window, period)?,
     };
@@ -130,13 +138,30 @@ fn place(study: &Study, twin: &Twin) -> Result<(Setup, Vec<f64>), TwinError> {
             }
         }
     }
+    in_units(study, twin, &mut setup, &theta)?;
     Ok((setup, theta))
+}
+
+/// Brings the effects into the model's units, as far as the twin without them tells how.
+fn in_units(study: &Study, twin: &Twin, setup: &mut Setup, theta: &[f64]) -> Result<(), TwinError> {
+    if scales::relative(&setup.effects).next().is_none() {
+        return Ok(());
+    }
+    let record = &study.records[twin.record];
+    let times = if twin.times.is_empty() { &record.times } else { &twin.times };
+    let trial = Trial { record, times: times.clone(), theta: theta.to_vec() };
+    let ruler = Ruler::new(setup, &[trial], &study.surroundings).map_err(|error| match error {
+        CourseError::Setup(error) => TwinError::Setup(error),
+        CourseError::Run(error) => TwinError::Model(error),
+    })?;
+    setup.effects = setup.effects.iter().map(|effect| ruler.in_units(effect)).collect();
+    Ok(())
 }
 
 /// Name of the amplitude of an effect; one that the model does not have yet is added from the study's candidates or the
 /// built-in list.
 fn amplitude_of(study: &Study, setup: &mut Setup, name: &str) -> Result<String, TwinError> {
-    let built_in = starlings_models::effect::library(&study.spec);
+    let built_in = library_in(&study.spec, &study.time_unit);
     if !setup.effects.iter().any(|e| e.name == name) {
         let Some(effect) = study.candidates.iter().chain(&built_in).find(|e| e.name == name) else {
             let names: Vec<&str> = setup

@@ -76,7 +76,13 @@ impl Study {
     }
 }
 
-fn has_delay(effect: &EffectDef) -> bool {
+/// Whether a term of an effect reads the past.
+pub(super) fn has_delay(effect: &EffectDef) -> bool {
     let terms = effect.adds.iter().map(|a| &a.term);
-    terms.chain(effect.states.iter().map(|s| &s.rate)).any(|text| text.replace(' ', "").contains("delay("))
+    terms.chain(effect.states.iter().map(|s| &s.rate)).any(|text| reads_past(text))
+}
+
+/// Whether an expression reads the past.
+pub(super) fn reads_past(expression: &str) -> bool {
+    expression.replace(' ', "").contains("delay(")
 }

@@ -15,6 +15,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use starlings_coordinator::fleet::{Fleet, InProcess};
 use starlings_coordinator::study::posterior::Estimate;
+use starlings_coordinator::study::store::Purpose;
 use starlings_coordinator::study::{RunContext, RunError, RunFolder, Study, Summary, run::run};
 
 /// A study and its recordings in a folder of their own.
@@ -56,9 +57,9 @@ impl Case {
     pub fn go(&self, path: &Path, fleet: &mut dyn Fleet) -> Result<Done, RunError> {
         let study = self.study();
         let mut folder = if path.exists() {
-            RunFolder::resume(path, &study).unwrap()
+            RunFolder::resume(Purpose::Run, path, &study).unwrap()
         } else {
-            RunFolder::create(path, &study, "test", "today").unwrap()
+            RunFolder::create(Purpose::Run, path, &study, "test", "today").unwrap()
         };
         let mut context =
             RunContext { clock: &|| 0.0, watch: &mut |_| {}, events: None, earlier_s: 0.0, threads: 2 };

@@ -1,6 +1,7 @@
 //! Random matrices and textbook filters that the tests compare with. Every random number is from ChaCha8 with a seed.
 #![allow(clippy::unwrap_used, dead_code, missing_docs, unreachable_pub)]
 
+pub mod batch;
 pub mod rcr;
 
 use nalgebra::{DMatrix, DVector};

@@ -1,9 +1,10 @@
 //! A model with effects, which is a model again.
 //!
-//! The effects' states follow the model's states and their parameters follow its parameters. Terms see the recorded inputs;
-//! the model sees them with the effects' additions, except through `delay`, which reads the record. So it is with parameters of
-//! the model: terms see the plain values, the model the shifted ones, in its rates, outputs, switches and memories; where it
-//! starts follows from the plain values, because there is no state yet that a term could read. Where effects only add to
+//! The effects' states follow the model's states and their parameters follow its parameters. The model sees the inputs with the
+//! effects' additions, except through `delay`, which reads the record, and so do terms that add to outputs; other terms see the
+//! recorded inputs. Parameters of the model stand in terms with their plain values; the model sees the shifted ones, in its
+//! rates, outputs, switches and memories, so that an output in a term is that of the shifted model, before any term is added to
+//! it; where it starts follows from the plain values, because there is no state yet that a term could read. Where effects only add to
 //! outputs, or shift parameters by what does not change during a run, the model keeps its own step, so that its states are
 //! those of the model alone to the last bit. A parameter that a term drives out of its range may leave the model without a
 //! finite rate: the run then fails as any other. An output goes on measuring the
@@ -13,7 +14,8 @@ use std::collections::BTreeMap;
 
 use super::scope::{Reach, Scope, note_memories};
 use super::scratch::Scratch;
-use super::{Effect, EffectDef, Moment, TermEffect, Touches};
+use super::{Effect, EffectDef, EffectParameter, Moment, Scale, TermEffect, Touches};
+use crate::bounds::unbounded;
 use crate::equations::{Slot, check};
 use crate::integrate::{self, Solver};
 use crate::model::{Drive, Segment};
@@ -64,14 +66,25 @@ impl Extended {
         Ok(Self { inner, effects, spec, touches, n_state, n_param: n_own, memories, sources })
     }
 
-    /// The inner model's outputs without any effect, where a term reads them.
-    fn plain_outputs(&self, at: Moment<'_>) -> Scratch {
+    /// The inner model's outputs as it shows them with the inputs and parameters that it sees, where a term reads them;
+    /// nothing is added to them yet. `rate` is the extended state's rate, or empty.
+    fn inner_outputs(&self, at: Moment<'_>, rate: &[f64]) -> Scratch {
         let mut y = Scratch::new(if self.touches.reads_outputs { self.spec.n_output() } else { 0 });
         if self.touches.reads_outputs {
-            let (x, theta) = (&at.x[..self.n_state], &at.theta[..self.n_param]);
-            self.inner.output(at.t, x, theta, at.u, y.as_mut());
+            let x = &at.x[..self.n_state];
+            self.with_both(at, rate, |theta, u| self.inner.output(at.t, x, theta, u, y.as_mut()));
         }
         y
+    }
+
+    /// The inner model's outputs where a term reads them, and the state's rate where an input's slope needs it.
+    fn outputs_and_rate(&self, at: Moment<'_>) -> (Scratch, Scratch) {
+        // A rate may read outputs and an output the slope of an input that follows a state: the rate is found with that slope
+        // as far as it does not follow states, as everywhere.
+        let y = self.inner_outputs(at, &[]);
+        let rate = self.rate_for_slopes(Moment { y: y.as_ref(), ..at });
+        let y = if self.touches.inputs_follow_states { self.inner_outputs(at, rate.as_ref()) } else { y };
+        (y, rate)
     }
 
     /// Calls `use_inputs` with the inputs as the inner model sees them. `rate` is the extended state's rate, or empty.
@@ -146,22 +159,20 @@ impl Model for Extended {
 
     fn rhs(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, dx: &mut [f64]) {
         let at = Moment { t, x, theta, u, y: &[] };
-        let y = self.plain_outputs(at);
-        let at = Moment { y: y.as_ref(), ..at };
-        let rate = self.rate_for_slopes(at);
-        self.rate(at, rate.as_ref(), dx);
+        let (y, rate) = self.outputs_and_rate(at);
+        self.rate(Moment { y: y.as_ref(), ..at }, rate.as_ref(), dx);
     }
 
     fn output(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, y: &mut [f64]) {
         let at = Moment { t, x, theta, u, y: &[] };
-        let plain = self.plain_outputs(at);
-        let at = Moment { y: plain.as_ref(), ..at };
-        let rate = self.rate_for_slopes(at);
-        let x = &x[..self.n_state];
-        self.with_both(at, rate.as_ref(), |theta, u| self.inner.output(t, x, theta, u, y));
-        for effect in &self.effects {
-            effect.add_to_outputs(at, y);
-        }
+        let (inner, rate) = self.outputs_and_rate(at);
+        let inner_x = &x[..self.n_state];
+        self.with_both(at, rate.as_ref(), |theta, u| self.inner.output(t, inner_x, theta, u, y));
+        self.with_inputs(at, rate.as_ref(), |u| {
+            for effect in &self.effects {
+                effect.add_to_outputs(Moment { u, y: inner.as_ref(), ..at }, y);
+            }
+        });
     }
 
     /// Those of the inner model: its states come first, and what effects add is a load, or shifts its parameters.
@@ -182,9 +193,8 @@ impl Model for Extended {
 
     fn switches(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, g: &mut [f64]) {
         let at = Moment { t, x, theta, u, y: &[] };
-        let y = self.plain_outputs(at);
+        let (y, rate) = self.outputs_and_rate(at);
         let at = Moment { y: y.as_ref(), ..at };
-        let rate = self.rate_for_slopes(at);
         let (inner, mut rest) = g.split_at_mut(self.inner.n_switch());
         let inner_x = &x[..self.n_state];
         self.with_both(at, rate.as_ref(), |theta, u| self.inner.switches(t, inner_x, theta, u, inner));
@@ -201,16 +211,14 @@ impl Model for Extended {
 
     fn remembered(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, values: &mut [f64]) {
         let at = Moment { t, x, theta, u, y: &[] };
-        let plain = self.plain_outputs(at);
-        let at = Moment { y: plain.as_ref(), ..at };
-        let rate = self.rate_for_slopes(at);
+        let (y, rate) = self.outputs_and_rate(at);
         let (inner, own) = values.split_at_mut(values.len() - self.sources.len());
         let inner_x = &x[..self.n_state];
         self.with_both(at, rate.as_ref(), |theta, u| self.inner.remembered(t, inner_x, theta, u, inner));
         for (value, source) in own.iter_mut().zip(&self.sources) {
             *value = match *source {
                 Slot::State(i) => x[i],
-                Slot::Output(i) => at.y[i],
+                Slot::Output(i) => y.as_ref()[i],
                 _ => f64::NAN,
             };
         }
@@ -246,8 +254,7 @@ fn extended_spec(inner: &Spec, defs: &[EffectDef]) -> Result<Spec, SetupError> {
             check::range(parameter.range, &format!("parameter `{}`", parameter.name))?;
             check_new(&spec, &parameter.name)?;
             let mut quantity = Quantity::new(&parameter.name, &parameter.unit);
-            quantity.range = parameter.range;
-            quantity.default = if j == 0 { Some(0.0) } else { middle(&parameter.grid) };
+            (quantity.range, quantity.default) = range_and_default(parameter, j);
             spec.parameters.push(quantity.says(&format!("Parameter of the effect `{}`.", def.name)));
         }
         for state in &def.states {
@@ -260,9 +267,15 @@ fn extended_spec(inner: &Spec, defs: &[EffectDef]) -> Result<Spec, SetupError> {
     Ok(spec)
 }
 
-/// The middle entry of a grid in the order given.
-fn middle(grid: &[f64]) -> Option<f64> {
-    grid.get(grid.len() / 2).copied()
+/// Range and default value of the `i`th parameter of an effect: zero of the amplitude, the middle entry of the grid of any
+/// other. Numbers that count in another scale say nothing in the model's units; but a memory needs some bound on a delay, the
+/// amplitude of its effect.
+fn range_and_default(parameter: &EffectParameter, i: usize) -> ([f64; 2], Option<f64>) {
+    let absolute = parameter.scale == Scale::Absolute;
+    let bounded = absolute || (i == 0 && parameter.scale == Scale::Sampling);
+    let range = if bounded { parameter.range } else { unbounded() };
+    let middle = parameter.grid.get(parameter.grid.len() / 2).copied().filter(|_| absolute);
+    (range, if i == 0 { Some(0.0) } else { middle })
 }
 
 /// Refuses a name that the model already has.

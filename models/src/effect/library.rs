@@ -18,9 +18,9 @@ mod specimen;
 mod thermal;
 mod unit;
 
-use super::EffectDef;
+use super::{EffectDef, Target};
 use crate::setup::SetupError;
-use crate::{Quantity, Spec, nearest};
+use crate::{Spec, nearest};
 
 use place::Host;
 
@@ -88,7 +88,7 @@ impl Family {
         self.growers.iter().flat_map(one).collect()
     }
 
-    /// Number of kinds of effects at least: each grower has one or more.
+    /// Number of kinds of effects.
     pub fn n_grower(&self) -> usize {
         self.growers.len()
     }
@@ -116,25 +116,25 @@ pub fn stem(name: &str) -> &str {
 
 /// Whether an effect can show in what is measured: one that adds only to outputs shows in these alone.
 pub fn shows_in(def: &EffectDef, spec: &Spec, measured: &[String]) -> bool {
-    let has = |list: &[Quantity], name: &str| list.iter().any(|q| q.name == name);
     def.adds.iter().any(|add| {
-        let output = !has(&spec.states, &add.to) && has(&spec.outputs, add.quantity());
-        !output || measured.iter().any(|name| name == add.quantity())
+        let target = Target::of(add, def, spec, spec.parameters.len());
+        target != Some(Target::Output) || measured.iter().any(|name| name == add.quantity())
     })
 }
 
-/// Writes out a definition: one that names a built-in effect becomes that effect, under its own name if it has one.
+/// Writes out a definition: one that names a built-in effect becomes that effect, under its own name if it has one. Its numbers
+/// go on counting in their scales: see [`super::scale`]. `time` is the label of the time unit; it only enters unit labels.
 ///
 /// # Errors
 /// When the model has no such built-in effect, or the definition also writes out terms.
-pub fn write_out(def: &EffectDef, spec: &Spec) -> Result<EffectDef, SetupError> {
+pub fn write_out(def: &EffectDef, spec: &Spec, time: &str) -> Result<EffectDef, SetupError> {
     let Some(name) = &def.built_in else { return Ok(def.clone()) };
     if !(def.adds.is_empty() && def.parameters.is_empty() && def.states.is_empty()) {
         return Err(SetupError::Invalid(format!(
             "effect `{name}` is built in: give either `built_in` or its terms, parameters and states"
         )));
     }
-    let library = library(spec);
+    let library = library_in(spec, time);
     let Some(found) = library.iter().find(|effect| effect.name == *name) else {
         return Err(SetupError::Unknown {
             what: "effect",

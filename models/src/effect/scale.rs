@@ -73,13 +73,12 @@ impl Course<'_> {
     }
 }
 
-/// The effect with the grids and ranges of its parameters in the model's units. A parameter whose range is one point is no
-/// unknown: it is written into the terms as a number.
+/// The effect with the grids and ranges of its parameters in the model's units.
 ///
 /// `course` gives the smallest and the largest value of a state, output or input in a run of the model without the effect,
 /// `record` the first and the last time, `sampling` the interval between observations. A parameter keeps its scale where the
 /// course that it counts in is unknown or constant: see [`is_resolved`].
-pub fn resolve(
+pub fn in_units(
     def: &EffectDef,
     course: &dyn Fn(&str) -> Option<[f64; 2]>,
     record: [f64; 2],
@@ -95,6 +94,17 @@ pub fn resolve(
             parameter.scale = Scale::Absolute;
         }
     }
+    resolved
+}
+
+/// As [`in_units`], and a parameter whose range is one point, which is no unknown, is written into the terms as a number.
+pub fn resolve(
+    def: &EffectDef,
+    course: &dyn Fn(&str) -> Option<[f64; 2]>,
+    record: [f64; 2],
+    sampling: f64,
+) -> EffectDef {
+    let mut resolved = in_units(def, course, record, sampling);
     let known = |p: &EffectParameter| p.scale == Scale::Absolute && p.range[0] >= p.range[1];
     let (fixed, free): (Vec<_>, Vec<_>) = resolved.parameters.into_iter().partition(known);
     resolved.parameters = free;
@@ -119,18 +129,18 @@ pub fn is_resolved(def: &EffectDef) -> bool {
 /// An expression with a name replaced by a text.
 fn written(expression: &str, name: &str, text: &str) -> String {
     let mut result = String::with_capacity(expression.len());
-    let mut rest = expression;
-    while let Some(at) = rest.find(name) {
-        let (before, from) = rest.split_at(at);
-        let behind = &from[name.len()..];
-        let inside = |c: char| c.is_alphanumeric() || c == '_';
+    let inside = |c: char| c.is_alphanumeric() || c == '_';
+    let mut done = 0;
+    for (at, _) in expression.match_indices(name) {
+        let behind = at + name.len();
         // A digit before may end a number, but then a sign or an operator stands between.
-        let whole = !before.ends_with(inside) && !behind.starts_with(inside);
-        result.push_str(before);
-        result.push_str(if whole { text } else { name });
-        rest = behind;
+        if !expression[..at].ends_with(inside) && !expression[behind..].starts_with(inside) {
+            result.push_str(&expression[done..at]);
+            result.push_str(text);
+            done = behind;
+        }
     }
-    result + rest
+    result + &expression[done..]
 }
 
 #[cfg(test)]
@@ -190,6 +200,19 @@ mod tests {
         let def = with(vec![parameter("a", [0.0, 1.0], &[], Scale::Range("still".to_owned()))], "a");
         assert!(!is_resolved(&resolve(&def, &course, [0.0, 1.0], 0.1)));
         assert!(is_resolved(&with(vec![parameter("a", [0.0, 1.0], &[], Scale::Absolute)], "a")));
+    }
+
+    #[test]
+    fn a_name_inside_a_longer_name_is_not_replaced() {
+        for (expression, want) in [
+            ("aa*a + a_a - a", "aa*2 + a_a - 2"),
+            ("a", "2"),
+            ("aaa", "aaa"),
+            ("max(a, 3)/a2", "max(2, 3)/a2"),
+        ] {
+            assert_eq!(written(expression, "a", "2"), want);
+        }
+        assert_eq!(written("ßa + a", "a", "2"), "ßa + 2");
     }
 
     #[test]

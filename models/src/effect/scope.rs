@@ -62,11 +62,6 @@ impl Scope<'_> {
             .or_else(constant)
     }
 
-    /// Position of a parameter of the model itself.
-    pub(super) fn own_parameter(self, name: &str) -> Option<usize> {
-        self.spec.parameters[..self.n_own].iter().position(|q| q.name == name)
-    }
-
     /// Whether an expression uses parameters and constants alone, so that its value is the same throughout a run.
     pub(super) fn is_fixed(self, text: &str) -> bool {
         let fixed =

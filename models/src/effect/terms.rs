@@ -3,7 +3,7 @@
 //! Next file to read: [`super::scope`] for what its terms may name, then [`super::extended`].
 
 use super::scope::{Reach, Scope, names};
-use super::{Addition, Effect, EffectDef, Moment, Touches};
+use super::{Addition, Effect, EffectDef, Moment, Target, Touches};
 use crate::equations::expression::{At, Direction, Program, Slot};
 use crate::model::Drive;
 use crate::setup::SetupError;
@@ -17,7 +17,6 @@ pub struct TermEffect {
     outputs: Vec<(usize, Program)>,
     inputs: Vec<(usize, Program)>,
     parameters: Vec<(usize, Program)>,
-    parameters_vary: bool,
     initial: Vec<(usize, Program)>,
     switches: Vec<Program>,
 }
@@ -35,7 +34,6 @@ impl TermEffect {
             outputs: Vec::new(),
             inputs: Vec::new(),
             parameters: Vec::new(),
-            parameters_vary: false,
             initial: Vec::new(),
             switches: Vec::new(),
         };
@@ -62,21 +60,7 @@ impl TermEffect {
     fn add(&mut self, add: &Addition, scope: Scope<'_>) -> Result<(), SetupError> {
         let spec = scope.spec;
         let place = format!("effect {}, added to {}", self.def.name, add.to);
-        let compile = |reach| scope.compile(&add.term, reach, &place);
-        // No state's name has a colon.
-        if let Some(i) = target(&spec.states, &add.to)? {
-            self.rates.push((i, compile(Reach::All)?));
-            self.switches.extend(scope.switches(&add.term, &place)?);
-        } else if let Some(i) = target(&spec.outputs, add.quantity())? {
-            self.outputs.push((i, compile(Reach::All)?));
-        } else if let Some(i) = target(&spec.inputs, &add.to)? {
-            self.inputs.push((i, compile(Reach::NoOutputs)?));
-            self.switches.extend(scope.switches(&add.term, &place)?);
-        } else if let Some(i) = scope.own_parameter(&add.to) {
-            self.parameters.push((i, compile(Reach::NoOutputs)?));
-            self.parameters_vary |= !scope.is_fixed(&add.term);
-            self.switches.extend(scope.switches(&add.term, &place)?);
-        } else {
+        let Some(target) = Target::of(add, &self.def, spec, scope.n_own) else {
             let lists = [&spec.states, &spec.outputs, &spec.inputs];
             let own = &spec.parameters[..scope.n_own];
             return Err(SetupError::Unknown {
@@ -84,6 +68,16 @@ impl TermEffect {
                 name: add.to.clone(),
                 nearest: nearest(&add.to, lists.into_iter().flatten().chain(own).map(|q| &q.name)),
             });
+        };
+        let (terms, list, reach) = match target {
+            Target::Rate => (&mut self.rates, &spec.states, Reach::All),
+            Target::Output => (&mut self.outputs, &spec.outputs, Reach::All),
+            Target::Input => (&mut self.inputs, &spec.inputs, Reach::NoOutputs),
+            Target::Parameter => (&mut self.parameters, &spec.parameters, Reach::NoOutputs),
+        };
+        terms.push((position(list, add.quantity())?, scope.compile(&add.term, reach, &place)?));
+        if target != Target::Output {
+            self.switches.extend(scope.switches(&add.term, &place)?);
         }
         Ok(())
     }
@@ -103,39 +97,34 @@ impl TermEffect {
     fn find_touches(&self, scope: Scope<'_>) -> Result<Touches, SetupError> {
         let used = names(std::slice::from_ref(&self.def))?;
         let is_output = |name: &String| matches!(scope.slot(name, Reach::All), Some(Slot::Output(_)));
+        let is_state = |name: &String| matches!(scope.slot(name, Reach::All), Some(Slot::State(_)));
+        let adding_to = |target: Target| {
+            let of =
+                move |add: &&Addition| Target::of(add, &self.def, scope.spec, scope.n_own) == Some(target);
+            self.def.adds.iter().filter(of)
+        };
+        let to_inputs =
+            EffectDef { adds: adding_to(Target::Input).cloned().collect(), ..EffectDef::default() };
         Ok(Touches {
             rates: !self.rates.is_empty(),
             outputs: !self.outputs.is_empty(),
             inputs: !self.inputs.is_empty(),
             parameters: !self.parameters.is_empty(),
-            parameters_vary: self.parameters_vary,
+            parameters_vary: adding_to(Target::Parameter).any(|add| !scope.is_fixed(&add.term)),
             reads_outputs: used.iter().any(is_output),
-            inputs_follow_states: inputs_follow_states(&self.def, scope)?,
+            inputs_follow_states: names(&[to_inputs])?.iter().any(is_state),
         })
     }
 }
 
-/// Whether a term that adds to an input uses a state.
-fn inputs_follow_states(def: &EffectDef, scope: Scope<'_>) -> Result<bool, SetupError> {
-    let has = |list: &[Quantity], name: &str| list.iter().any(|q| q.name == name);
-    let (states, outputs) = (&scope.spec.states, &scope.spec.outputs);
-    let to_inputs = def
-        .adds
-        .iter()
-        .filter(|a| !has(states, &a.to) && !has(outputs, a.quantity()) && has(&scope.spec.inputs, &a.to));
-    let alone = EffectDef { adds: to_inputs.cloned().collect(), ..EffectDef::default() };
-    Ok(names(&[alone])?.iter().any(|name| matches!(scope.slot(name, Reach::All), Some(Slot::State(_)))))
-}
-
 /// Position of a scalar quantity that a term can be added to.
-fn target(list: &[Quantity], name: &str) -> Result<Option<usize>, SetupError> {
+fn position(list: &[Quantity], name: &str) -> Result<usize, SetupError> {
     match list.iter().find(|q| q.name == name) {
         Some(q) if q.size > 1 => Err(SetupError::Invalid(format!(
             "a term cannot be added to `{name}`: it has {} components and an expression has one",
             q.size
         ))),
-        Some(_) => Ok(Spec::offset(list, name)),
-        None => Ok(None),
+        _ => Ok(Spec::offset(list, name).unwrap_or_default()),
     }
 }
 

@@ -16,6 +16,7 @@ mod vessels;
 mod viscous;
 mod wall;
 
+use super::MOST_STEPS;
 use crate::model::Segment;
 use crate::setup::{ModelDef, SetupError};
 use crate::{Drive, Model, ParticleError, Spec};
@@ -67,9 +68,6 @@ impl Fault {
         })
     }
 }
-
-/// Steps within one span of linear inputs, at most.
-const MOST_STEPS: u64 = 100_000_000;
 
 impl Artery1d {
     /// Makes a network in this layout.

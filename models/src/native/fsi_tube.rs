@@ -12,6 +12,7 @@ mod midpoint;
 mod quantities;
 mod state;
 
+use super::MOST_STEPS;
 use crate::model::Segment;
 use crate::prestress::Rings;
 use crate::setup::{ModelDef, SetupError};
@@ -46,9 +47,6 @@ pub struct FsiTube {
     /// Pressure under which the radius is R; zero for the radius without load.
     image_pressure: f64,
 }
-
-/// Steps within one span of linear inflow, at most.
-const MOST_STEPS: u64 = 100_000_000;
 
 impl FsiTube {
     /// Makes a tube in this layout; `length` in cm is what its listed regions must cover, and cover in proportion when the

@@ -23,8 +23,6 @@ pub(super) const KIND: Kind = Kind {
 #[derive(Debug)]
 pub struct ImageForce {
     wall: Wall,
-    /// Circular frequency ω of every undamped mode and the share φᵀ Ms φ of the wall in its mass.
-    modes: Vec<(f64, f64)>,
 }
 
 impl ImageForce {
@@ -33,9 +31,7 @@ impl ImageForce {
     /// # Errors
     /// When the model has no wall or its displacement is not observed.
     pub fn new(def: &ObserverDef, wiring: Wiring<'_>) -> Result<Self, SetupError> {
-        let wall = Wall::new(def, &wiring, Shown::Displacement)?;
-        let modes = wiring.model.blocks(wiring.theta).and_then(|blocks| modes(&blocks));
-        Ok(Self { wall, modes: modes.unwrap_or_default() })
+        Ok(Self { wall: Wall::new(def, &wiring, Shown::Displacement)? })
     }
 
     /// Eᵀ H Ms H, n_c × n, the observed nodes given.
@@ -65,10 +61,12 @@ impl Observer for ImageForce {
     /// determinant 1 and the trace 2 cos θ − (γΔt)² share sin(θ)/θ. That is γΔt < 2 √(smallest eigenvalue of Ms⁻¹ M), at
     /// least 2, for slow modes, and stricter than γ² + ω² < (2/Δt)² for none. Modes that the data do not resolve, θ ≥ π,
     /// are left to their own damping.
-    fn stable_up_to(&self, dt: f64) -> Option<f64> {
-        let resolved = self.modes.iter().map(|(omega, share)| (omega * dt, share)).filter(|(t, _)| *t < PI);
-        let of_mode = |(theta, share): (f64, &f64)| {
-            let limit = if theta > 1e-6 { 2.0 * theta / (0.5 * theta).tan() } else { 4.0 };
+    fn stable_up_to(&self, model: &dyn Model, theta: &[f64], dt: f64) -> Option<f64> {
+        let modes = model.blocks(theta).and_then(|blocks| modes(&blocks)).unwrap_or_default();
+        let resolved =
+            modes.iter().map(|(omega, share)| (omega * dt, share)).filter(|(angle, _)| *angle < PI);
+        let of_mode = |(angle, share): (f64, &f64)| {
+            let limit = if angle > 1e-6 { 2.0 * angle / (0.5 * angle).tan() } else { 4.0 };
             (limit / share).sqrt()
         };
         let most = resolved.map(of_mode).fold(f64::INFINITY, f64::min);
@@ -77,8 +75,8 @@ impl Observer for ImageForce {
     }
 }
 
-/// ω and φᵀ Ms φ of the modes K φ = ω² M φ, φᵀ M φ = 1, of an undamped wall; `None` where M or K is not positive
-/// definite.
+/// Circular frequency ω and share φᵀ Ms φ of the wall in the mass, of every mode K φ = ω² M φ, φᵀ M φ = 1, of an undamped
+/// wall; `None` where M or K is not positive definite.
 fn modes(blocks: &crate::Blocks) -> Option<Vec<(f64, f64)>> {
     let trace = blocks.trace.as_ref();
     let on_velocity = |wall: &DMatrix<f64>| on_velocity(trace, of_velocity(trace, wall.clone()));

@@ -57,15 +57,6 @@ impl WindkesselObserver {
         block.map_or(0.0, |block| self.gain * block.rate)
     }
 
-    /// Γ of the theory, n_state × n_state: γ/(R_d C) on π alone, as if π itself were measured (R_p Q of the true flow taken
-    /// off the measured pressure). [`Observer::feedback`] is that of the corrections made.
-    pub fn feedback_of_stored_pressure(&self, model: &dyn Model, theta: &[f64]) -> DMatrix<f64> {
-        let n = model.spec().n_state();
-        let mut feedback = DMatrix::zeros(n, n);
-        feedback[(self.state, self.state)] = self.rate(model, theta);
-        feedback
-    }
-
     /// ∂p/∂x, n_state: unit steps about rest, exact for a linear system.
     fn gradient(&self, model: &dyn Model, theta: &[f64]) -> Vec<f64> {
         let spec = model.spec();

@@ -9,7 +9,7 @@ use std::fmt;
 use super::Unit;
 use crate::equations::dimension::{Conflict, Measure, Scope, measure};
 use crate::equations::{EquationsDef, Expression};
-use crate::{EffectDef, Spec};
+use crate::{EffectDef, Spec, effect};
 
 /// Labels of names, and of time.
 #[derive(Clone, Debug, Default)]
@@ -115,9 +115,10 @@ impl Labels {
         let mut list = Vec::new();
         for add in &def.adds {
             let place = format!("effect `{}`, added to `{}`", def.name, add.to);
-            let states = def.states.iter().map(|s| &s.name).chain(spec.states.iter().map(|q| &q.name));
-            let is_state = states.into_iter().any(|name| *name == add.to);
-            let target = if is_state { labels.rate(&add.to) } else { labels.value(add.quantity()) };
+            let target = match effect::Target::of(add, def, spec, spec.parameters.len()) {
+                Some(effect::Target::Rate) => labels.rate(&add.to),
+                _ => labels.value(add.quantity()),
+            };
             labels.check(&place, &add.term, &target, &mut list);
         }
         for state in &def.states {

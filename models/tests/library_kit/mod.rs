@@ -6,7 +6,7 @@
 mod systems;
 
 use starlings_models::effect::scale;
-use starlings_models::{EffectDef, Forward, ParticleError, Setup, Signal, Simulator, Spec, Window};
+use starlings_models::{EffectDef, Forward, Job, ParticleError, Setup, Signal, Simulator, Spec, Window};
 
 use crate::common;
 
@@ -17,8 +17,8 @@ pub(crate) struct Bench {
     /// Without the effects.
     pub(crate) spec: Spec,
     pub(crate) window: Window,
-    setup: Setup,
-    theta: Vec<f64>,
+    pub(crate) setup: Setup,
+    pub(crate) theta: Vec<f64>,
     /// Lengths of the rows of the prediction: a field has several.
     sizes: Vec<usize>,
 }
@@ -71,7 +71,7 @@ impl Bench {
         Self { name, spec, window, setup, theta, sizes }
     }
 
-    /// Runs the model with effects; `amplitude` is that of each, inner parameters stand at the middle of their grids.
+    /// Runs the model with effects in its units; `amplitude` is that of each, inner parameters stand at the middle of their grids.
     pub(crate) fn run(&self, effects: &[EffectDef], amplitude: f64) -> Result<Vec<f64>, ParticleError> {
         let mut setup = Setup { effects: effects.to_vec(), ..self.setup.clone() };
         let mut theta = self.theta.clone();
@@ -79,9 +79,19 @@ impl Bench {
             setup.parameters.push(effect.parameters[0].name.clone());
             theta.push(amplitude);
         }
-        let names: Vec<&str> = effects.iter().map(|effect| effect.name.as_str()).collect();
-        let model = Simulator::new(&setup).unwrap_or_else(|e| panic!("{}, {names:?}: {e}", self.name));
-        model.run(&common::job(&self.window, &theta)).map(|prediction| prediction.outputs)
+        self.run_from(&setup, &theta, None)
+    }
+
+    /// Runs another model over the same window, from a state or its own start.
+    pub(crate) fn run_from(
+        &self,
+        setup: &Setup,
+        theta: &[f64],
+        state: Option<Vec<f64>>,
+    ) -> Result<Vec<f64>, ParticleError> {
+        let names: Vec<&str> = setup.effects.iter().map(|effect| effect.name.as_str()).collect();
+        let model = Simulator::new(setup).unwrap_or_else(|e| panic!("{}, {names:?}: {e}", self.name));
+        model.run(&Job { state, ..common::job(&self.window, theta) }).map(|prediction| prediction.outputs)
     }
 
     /// The effect in the units of this model; nothing where what it counts in does not move here.

@@ -2,7 +2,7 @@
 
 use nalgebra::{Complex, DMatrix, SymmetricEigen};
 use serde_json::Value;
-use starlings_models::observer::{self, WindkesselObserver, Wiring};
+use starlings_models::observer::{self, Wiring};
 use starlings_models::setup::{ModelDef, ObserverDef, SetupError};
 use starlings_models::spectrum::component::ROUNDING;
 use starlings_models::spectrum::{
@@ -73,8 +73,12 @@ impl Toy {
     /// Γ in the state's coordinates; under `stored pressure` that of the Windkessel observer if π itself were measured.
     pub(crate) fn feedback(&self, kind: &str, gain: f64) -> DMatrix<f64> {
         if kind == STORED_PRESSURE {
-            let observer = WindkesselObserver::new(&def("windkessel", gain), self.wiring()).unwrap();
-            return observer.feedback_of_stored_pressure(&*self.model, &self.theta);
+            // γ/(R_d C) on π alone: R_p Q of the true flow is taken off the measured pressure.
+            let block = self.model.blocks(&self.theta).unwrap().windkessel.unwrap();
+            let n = self.model.spec().n_state();
+            let mut feedback = DMatrix::zeros(n, n);
+            feedback[(block.state, block.state)] = gain * block.rate;
+            return feedback;
         }
         self.observer(kind, gain).feedback(&*self.model, &self.theta)
     }

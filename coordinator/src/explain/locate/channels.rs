@@ -5,9 +5,9 @@
 use starlings_estimators::{autocorrelation, effective_sample_size, ljung_box};
 
 use super::bootstrap::{DRAWS, block_bootstrap_rms, block_length};
-use super::residuals::unit;
 use super::{ChannelGap, View};
 use crate::explain::Usage;
+use crate::explain::rows::unit;
 
 /// The figures, by record, then channel, then use.
 pub(super) fn channels(view: &View<'_>) -> Vec<ChannelGap> {
@@ -43,7 +43,7 @@ fn gap(view: &View<'_>, record: usize, channel: usize, usage: Usage) -> Option<C
     Some(ChannelGap {
         record: view.study.records[record].name.clone(),
         channel: of.output.clone(),
-        unit: unit(view, record, channel),
+        unit: unit(view.study, record, channel),
         usage: usage.word().to_owned(),
         n,
         noise: of.noise,

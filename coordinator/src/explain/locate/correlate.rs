@@ -5,12 +5,11 @@
 use super::residuals::{Residuals, primary};
 use super::signal::{MOST_TRACKS, along};
 use super::{Correlated, Track, View};
-use crate::study::Study;
+use crate::study::posterior::Z95;
+use crate::study::{Record, Study};
 
 /// Correlations told at most.
 const MOST: usize = 12;
-/// Normal quantile of the intervals.
-const Z95: f64 = 1.959_963_984_540_054;
 /// Distance from zero that is asked for, in sd: some hundred signals are tried.
 const SURE: f64 = 3.3;
 /// Smallest correlation that is worth a line.
@@ -92,16 +91,11 @@ fn candidates(study: &Study, track: &Track, group: &Residuals) -> Vec<Candidate>
 
 /// Central differences over each record's times, one-sided at the ends.
 fn rates(study: &Study, track: &Track) -> Vec<Vec<f64>> {
-    let of = |(values, times): (&Vec<f64>, &[f64])| {
-        let last = values.len().min(times.len()).saturating_sub(1);
-        (0..values.len())
-            .map(|i| {
-                let (a, b) = (i.saturating_sub(1), (i + 1).min(last));
-                if i <= last && b > a { (values[b] - values[a]) / (times[b] - times[a]) } else { f64::NAN }
-            })
-            .collect()
+    let of = |(r, record): (usize, &Record)| {
+        let n = track.values.get(r).map_or(0, Vec::len);
+        (0..n).map(|i| track.slope(r, i, &record.times).unwrap_or(f64::NAN)).collect()
     };
-    track.values.iter().zip(study.records.iter().map(|r| r.times.as_slice())).map(of).collect()
+    study.records.iter().enumerate().map(of).collect()
 }
 
 /// The track some steps earlier, at the lag of the largest correlation where that is clearly larger than without.
@@ -146,7 +140,7 @@ fn correlate(group: &Residuals, signal: &[f64], sure: f64) -> Option<(f64, [f64;
 }
 
 /// Fisher's interval, `None` when the correlation is small or not surely other than zero.
-pub(super) fn interval(r: f64, effective: f64, sure: f64) -> Option<(f64, [f64; 2])> {
+fn interval(r: f64, effective: f64, sure: f64) -> Option<(f64, [f64; 2])> {
     let sd = 1.0 / (effective - 3.0).max(1.0).sqrt();
     let z = r.clamp(-0.999_999_9, 0.999_999_9).atanh();
     if r.abs() < LEAST || z.abs() < sure * sd {
@@ -156,7 +150,7 @@ pub(super) fn interval(r: f64, effective: f64, sure: f64) -> Option<(f64, [f64; 
 }
 
 /// Pearson's coefficient over the pairs without a missing value, and their number.
-pub(super) fn pearson(a: &[f64], b: &[f64]) -> Option<(f64, usize)> {
+fn pearson(a: &[f64], b: &[f64]) -> Option<(f64, usize)> {
     let pairs = || a.iter().zip(b).filter(|(a, b)| a.is_finite() && b.is_finite());
     let (mut n, mut sum_a, mut sum_b) = (0_usize, 0.0, 0.0);
     for (a, b) in pairs() {

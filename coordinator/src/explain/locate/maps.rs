@@ -3,6 +3,7 @@
 //! Next file to read: [`super::result`].
 
 use super::residuals::{Residuals, groups, primary};
+use super::result::ends;
 use super::signal::{MOST_TRACKS, along};
 use super::{RegionMap, Track, View};
 
@@ -137,8 +138,7 @@ fn bin(edges: &[f64], value: f64) -> Option<usize> {
 
 /// Edges at even distances, `None` when the signal does not vary.
 fn even(values: &[f64], bins: usize) -> Option<Vec<f64>> {
-    let finite = || values.iter().copied().filter(|v| v.is_finite());
-    let (lo, hi) = (finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max));
+    let [lo, hi] = ends(values.iter().copied());
     (hi > lo).then(|| (0..=bins).map(|k| lo + (hi - lo) * k as f64 / bins as f64).collect())
 }
 

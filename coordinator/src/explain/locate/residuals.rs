@@ -2,10 +2,9 @@
 //!
 //! Next file to read: [`super::signal`].
 
-use starlings_models::Spec;
-
 use super::View;
 use crate::explain::Usage;
+use crate::explain::rows::unit;
 
 /// Residuals of one channel in one use, in the order of the rows.
 pub(super) struct Residuals {
@@ -46,21 +45,6 @@ impl Residuals {
     }
 }
 
-/// Unit label of an output: the channel's own where the study gives one.
-pub(super) fn unit(view: &View<'_>, record: usize, channel: usize) -> String {
-    let of = &view.study.records[record].channels[channel];
-    of.unit.clone().unwrap_or_else(|| spec_unit(&view.study.spec, &of.output))
-}
-
-/// Unit label of an output, or of a state by that name.
-fn spec_unit(spec: &Spec, name: &str) -> String {
-    let field = name.split('[').next().unwrap_or(name);
-    let named = |list: &[starlings_models::Quantity]| {
-        list.iter().find(|q| q.name == name || q.name == field).map(|q| q.unit.clone())
-    };
-    named(&spec.outputs).or_else(|| named(&spec.states)).unwrap_or_default()
-}
-
 /// The residuals by output and use: outputs in the order of the setup, training values first.
 pub(super) fn groups(view: &View<'_>) -> Vec<Residuals> {
     let mut groups = Vec::new();
@@ -86,7 +70,7 @@ fn group(view: &View<'_>, output: usize, name: &str, usage: Usage) -> Option<Res
     let sd = |i: usize| view.prediction_sd.and_then(|sd| sd.get(i).copied()).filter(|s| s.is_finite());
     Some(Residuals {
         channel: name.to_owned(),
-        unit: unit(view, first.record, first.channel),
+        unit: unit(view.study, first.record, first.channel),
         noise: (at.iter().map(|i| row(i).noise.powi(2)).sum::<f64>() / at.len() as f64).sqrt(),
         usage,
         value: at.iter().map(|i| row(i).observed - view.predicted[*i]).collect(),

@@ -17,6 +17,29 @@ pub struct Track {
     pub values: Vec<Vec<f64>>,
 }
 
+impl Track {
+    /// Smallest and largest value over all records; infinite, the larger first, where there is none.
+    pub fn ends(&self) -> [f64; 2] {
+        ends(self.values.iter().flatten().copied())
+    }
+
+    /// Slope at a step of a record, from the neighbours in time, one-sided at the ends; `None` beyond them.
+    pub fn slope(&self, record: usize, step: usize, times: &[f64]) -> Option<f64> {
+        let values = self.values.get(record)?;
+        let last = values.len().min(times.len()).checked_sub(1)?;
+        let (before, after) = (step.saturating_sub(1), (step + 1).min(last));
+        (step <= last && after > before)
+            .then(|| (values[after] - values[before]) / (times[after] - times[before]))
+    }
+}
+
+/// Smallest and largest of the finite values; infinite, the larger first, where there is none.
+pub(super) fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    values
+        .filter(|v| v.is_finite())
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], v| [lo.min(v), hi.max(v)])
+}
+
 /// Everything that locating found.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Located {

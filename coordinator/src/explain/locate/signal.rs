@@ -4,6 +4,7 @@
 
 use super::Track;
 use super::residuals::Residuals;
+use super::result::ends;
 use crate::study::Study;
 
 /// Signals of the simulation that are looked at, at most: a field of many components must not take all the time.
@@ -37,9 +38,7 @@ pub(super) struct Signal {
 
 impl Signal {
     fn new(kind: Kind, name: &str, unit: &str, values: Vec<f64>) -> Self {
-        let finite = || values.iter().filter(|v| v.is_finite());
-        let lo = finite().fold(f64::INFINITY, |a, v| a.min(*v));
-        let hi = finite().fold(f64::NEG_INFINITY, |a, v| a.max(*v));
+        let [lo, hi] = ends(values.iter().copied());
         let range = if hi > lo { hi - lo } else { 0.0 };
         Self { kind, name: name.to_owned(), unit: unit.to_owned(), values, range }
     }

@@ -2,14 +2,14 @@
 
 use serde::Serialize;
 
-use super::quantity;
 use crate::explain::figures::Figures;
-use crate::explain::result::{Explanation, FalseAlarm, Screened};
+use crate::explain::result::{Explanation, FalseAlarm, Nulls, Screened};
+use crate::report::ReportError;
+use crate::report::number::{self, quantity};
 use crate::report::plot::alarm::{self, Gains};
 use crate::report::plot::figure::Figure;
 use crate::report::plot::meter::{Bar, meter};
 use crate::report::plot::palette::{BLUE, GREY};
-use crate::report::{ReportError, number};
 
 /// Candidates listed at most.
 const LISTED: usize = 80;
@@ -21,6 +21,7 @@ pub(super) struct Candidates {
     left_out: usize,
     alarm: Option<Figure>,
     alarm_facts: Vec<(&'static str, String)>,
+    measured: Option<String>,
 }
 
 #[derive(Debug, Serialize)]
@@ -53,6 +54,7 @@ impl Candidates {
             left_out: found.screened.len().saturating_sub(LISTED),
             alarm: alarm::figure(&gains)?,
             alarm_facts: alarm_facts(&found.false_alarm, figures.best_gain),
+            measured: found.false_alarm.nulls.as_ref().map(measured),
         })
     }
 }
@@ -76,13 +78,6 @@ fn row(s: &Screened) -> Result<CandidateRow, ReportError> {
 }
 
 fn alarm_facts(alarm: &FalseAlarm, best: f64) -> Vec<(&'static str, String)> {
-    let percent = |share: f64| {
-        if share.is_finite() {
-            format!("{} %", number::with_sd(100.0 * share, 1.0))
-        } else {
-            number::ABSENT.to_owned()
-        }
-    };
     vec![
         ("False-alarm rate of this search", percent(alarm.rate)),
         ("Its upper 95\u{a0}% limit", percent(alarm.upper95)),
@@ -91,4 +86,23 @@ fn alarm_facts(alarm: &FalseAlarm, best: f64) -> Vec<(&'static str, String)> {
         ("Best candidate", quantity(best, "")),
         ("Decoys that score as well", percent(alarm.decoys)),
     ]
+}
+
+/// The rate as the whole search was seen to have it.
+fn measured(nulls: &Nulls) -> String {
+    format!(
+        "Measured: {} of {} simulated recordings without a gap got a name (at most {} with 95\u{a0}% confidence).",
+        nulls.names,
+        nulls.of,
+        percent(nulls.upper95)
+    )
+}
+
+/// A share in percent, to its first decimal.
+fn percent(share: f64) -> String {
+    if share.is_finite() {
+        format!("{} %", number::with_sd(100.0 * share, 1.0))
+    } else {
+        number::ABSENT.to_owned()
+    }
 }

@@ -2,9 +2,8 @@
 
 use serde::Serialize;
 
-use super::quantity;
 use crate::explain::result::{Coefficient, Experiment, NamedEffect};
-use crate::report::number;
+use crate::report::number::{self, quantity};
 
 /// An effect, ready to be arranged.
 #[derive(Debug, Serialize)]
@@ -32,20 +31,11 @@ impl EffectView {
         Self {
             name: effect.name.clone(),
             says: effect.says.clone(),
-            equations: effect.adds.iter().map(|(to, term)| equation(to, term, states)).collect(),
+            equations: effect.equations(states),
             coefficients: effect.parameters.iter().map(coefficient).collect(),
             confounders: effect.confounders.join(", "),
             source: effect.source.clone(),
         }
-    }
-}
-
-/// A term is added to the rate of a state, and to the value of anything else.
-fn equation(to: &str, term: &str, states: &[String]) -> String {
-    if states.iter().any(|state| state == to) {
-        format!("d {to}/dt += {term}")
-    } else {
-        format!("{to} += {term}")
     }
 }
 

@@ -4,14 +4,14 @@
 
 use serde::Serialize;
 
-use super::quantity;
 use crate::explain::figures::{Curve, Figures};
 use crate::explain::result::{Explanation, GapRow, ParameterShift};
+use crate::report::ReportError;
+use crate::report::number::{self, quantity};
 use crate::report::plot::course;
 use crate::report::plot::figure::Figure;
 use crate::report::plot::meter::{Bar, meter};
 use crate::report::plot::palette::{BLUE, GREY, INK, VERMILION};
-use crate::report::{ReportError, number};
 use crate::study::field::component_of;
 
 /// Curves drawn at most.

@@ -4,15 +4,16 @@
 
 use serde::Serialize;
 
-use super::{probability, quantity};
+use super::probability;
 use crate::explain::figures::Figures;
 use crate::explain::locate::{ChannelGap, Correlated, Located, RegionMap, UnknownInput};
 use crate::explain::result::Explanation;
+use crate::report::ReportError;
+use crate::report::number::{self, quantity};
 use crate::report::plot::figure::Figure;
 use crate::report::plot::meter::{Bar, meter};
 use crate::report::plot::palette::{BLUE, INK, MUTED, VERMILION};
 use crate::report::plot::{force, region, spectrum};
-use crate::report::{ReportError, number};
 
 /// Maps, spectra and unknown inputs drawn at most.
 const MAPS: usize = 10;

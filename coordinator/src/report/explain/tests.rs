@@ -3,7 +3,7 @@
 use super::sample::{about, found};
 use super::{StudyAbout, explain_page};
 use crate::explain::figures::{Curve, Figures};
-use crate::explain::result::{Explanation, Verdict};
+use crate::explain::result::{Explanation, Nulls, Verdict};
 
 const VERDICTS: [Verdict; 4] = [Verdict::Named, Verdict::Tie, Verdict::Unexplained, Verdict::NoGap];
 /// The order in which a reader meets the sections.
@@ -94,6 +94,18 @@ fn a_named_effect_is_told_with_its_equations_and_its_coefficient() {
     assert!(page.contains("−33.1 sd"), "the shift in standard deviations");
     // Two curves with residuals, two maps before and after, one spectrum, one input twice, one histogram.
     assert_eq!(page.matches("<figure>").count(), 2 * 2 + 2 * 2 + 1 + 2 + 1);
+}
+
+#[test]
+fn a_measured_rate_of_false_alarms_stands_with_its_bound() {
+    let mut sample = found(Verdict::Named, 1, 60);
+    assert!(!page_of(&sample).contains("Measured:"));
+    let measured = Nulls { names: 1, of: 40, upper95: 0.129, runs: 9000 };
+    sample.0.false_alarm.nulls = Some(measured.clone());
+    let told = "Measured: 1 of 40 simulated recordings without a gap got a name";
+    assert!(page_of(&sample).contains(&format!("{told} (at most 12.9 % with 95\u{a0}% confidence).")));
+    sample.0.false_alarm.nulls = Some(Nulls { upper95: f64::NAN, ..measured });
+    assert!(page_of(&sample).contains(&format!("{told} (at most – with 95\u{a0}% confidence).")));
 }
 
 #[test]

@@ -128,8 +128,7 @@ fn prediction(channel: &ChannelPlot, margin: f64, opacity: f64) -> Vec<Mark> {
 }
 
 fn caption(channel: &ChannelPlot) -> String {
-    let with_unit =
-        |value: f64| format!("{} {}", number::significant(value, 3), channel.unit).trim_end().to_owned();
+    let with_unit = |value: f64| number::quantity(value, &channel.unit);
     let mut numbers = Vec::new();
     numbers.extend(channel.train_rmse.map(|v| format!("training RMSE {}", with_unit(v))));
     numbers.extend(channel.held_out_rmse.map(|v| format!("held-out RMSE {}", with_unit(v))));

@@ -3,7 +3,8 @@
 //! The same map before and after the effects is drawn on the same scale, so that the eye may compare. Next file to read:
 //! `force.rs`.
 
-use super::super::{ReportError, number};
+use super::super::ReportError;
+use super::super::number::{self, quantity};
 use super::axis::Axis;
 use super::figure::{Figure, with_unit};
 use super::mark::Mark;
@@ -146,10 +147,6 @@ fn worst(map: &RegionMap, bins: &[Bin]) -> String {
         quantity(bin.bias, &map.unit),
         bin.count
     )
-}
-
-fn quantity(value: f64, unit: &str) -> String {
-    format!("{} {unit}", number::significant(value, 3)).trim_end().to_owned()
 }
 
 /// The bins that hold values, with finite edges.

@@ -15,10 +15,13 @@ use toml::Spanned;
 
 use super::blame::{blame, expressions, report_missing};
 use super::parameters::{quantity, valid_names};
+use super::scales;
+use super::solver::{Known, fits};
 use crate::study::expand::INITIAL;
 use crate::study::file::locate::character;
 use crate::study::file::{EffectSection, EquationsSection, SolverSection, StateSection, StudyFile};
 use crate::study::problem::Source;
+use crate::study::variant::{has_delay, reads_past};
 
 /// A model that builds, with the effects that belong to it.
 pub(in crate::study) struct CheckedModel {
@@ -33,18 +36,16 @@ pub(in crate::study) struct CheckedModel {
 }
 
 /// Builds the model of a study; nothing after a complaint.
-pub(in crate::study) fn model(source: &Source, file: &StudyFile) -> Option<CheckedModel> {
+pub(in crate::study) fn model(
+    source: &Source,
+    file: &StudyFile,
+    solver: Option<&Known>,
+) -> Option<CheckedModel> {
     let before = source.count();
-    if file.model.kind.get_ref() == "solver" {
-        let help = "use a built-in model (`starlings models` lists them) or kind = \"equations\"";
-        source.report_with(
-            file.model.kind.span(),
-            "external solvers are not available in this version",
-            help,
-        );
+    check_expressions(source, file);
+    if file.model.solver.is_some() && solver.is_none() {
         return None;
     }
-    check_expressions(source, file);
     let constants: BTreeMap<String, f64> =
         file.model.constants.iter().map(|(name, value)| (name.get_ref().clone(), *value.get_ref())).collect();
     let equations = file.model.equations.as_ref().map(|section| equations(source, section));
@@ -52,20 +53,23 @@ pub(in crate::study) fn model(source: &Source, file: &StudyFile) -> Option<Check
         return None;
     }
     let layout = file.model.layout.as_ref().map(|layout| layout.value.clone());
-    let model = ModelDef { kind: file.model.kind.get_ref().clone(), constants, equations, layout };
+    let solver = solver.map(|known| Box::new(known.def.clone()));
+    let model = ModelDef { kind: file.model.kind.get_ref().clone(), constants, equations, layout, solver };
     let mut setup = Setup { model, ..Setup::default() };
     let bare = spec(source, file, &setup)?;
     check_roles(source, file, &bare);
     let candidates = sort_effects(source, file, &mut setup, &bare)?;
-    let spec = spec(source, file, &setup)?;
+    let mut spec = spec(source, file, &setup)?;
+    scales::open(&mut spec, &setup.effects);
     let mut valid_names = valid_names(&spec);
     valid_names.extend(candidates.iter().flat_map(|e| &e.parameters).map(|p| p.name.clone()));
-    let delays = expressions(file).iter().any(|e| e.get_ref().replace(' ', "").contains("delay("))
+    let delays = expressions(file).iter().any(|e| reads_past(e.get_ref()))
+        || setup.effects.iter().any(has_delay) // a built-in one has its terms in the library, not in the file
         || spec.parameters.iter().any(|q| q.role == Role::Shift);
     Some(CheckedModel { setup, spec, candidates, valid_names, delays })
 }
 
-fn spec(source: &Source, file: &StudyFile, setup: &Setup) -> Option<Spec> {
+pub(super) fn spec(source: &Source, file: &StudyFile, setup: &Setup) -> Option<Spec> {
     setup.model().map(|model| model.spec().clone()).map_err(|error| blame(source, file, &error)).ok()
 }
 
@@ -91,7 +95,7 @@ fn sort_effects(source: &Source, file: &StudyFile, setup: &mut Setup, bare: &Spe
                 "names are unique in a study",
             );
         }
-        match write_out(&effect(section), bare) {
+        match write_out(&effect(section), bare, &file.study.time_unit) {
             Ok(written) if written.parameters.iter().any(|p| given(&p.name)) => setup.effects.push(written),
             Ok(written) => {
                 // A candidate must build too, or the search for a missing effect would fail late.
@@ -247,8 +251,13 @@ fn effect(section: &EffectSection) -> EffectDef {
     }
 }
 
-/// Constants must be known and possible, and every parameter must have a value.
-pub(in crate::study) fn check_values(source: &Source, file: &StudyFile, model: &CheckedModel) {
+/// Constants must be known and possible, and every parameter must have a value, of those names that `which` tells.
+pub(in crate::study) fn check_values(
+    source: &Source,
+    file: &StudyFile,
+    model: &CheckedModel,
+    which: &dyn Fn(&str) -> bool,
+) {
     let spec = &model.spec;
     let in_terms: Vec<String> = file
         .effects
@@ -258,7 +267,7 @@ pub(in crate::study) fn check_values(source: &Source, file: &StudyFile, model: &
         .flat_map(|e| e.names())
         .map(|(name, _)| name)
         .collect();
-    for (name, value) in &file.model.constants {
+    for (name, value) in file.model.constants.iter().filter(|(name, _)| which(name.get_ref())) {
         match quantity(spec, name.get_ref()) {
             Some(q) if *value.get_ref() < q.range[0] || *value.get_ref() > q.range[1] => {
                 let (name, range) = (name.get_ref(), q.range_text());
@@ -273,7 +282,7 @@ pub(in crate::study) fn check_values(source: &Source, file: &StudyFile, model: &
             _ => {}
         }
     }
-    for q in spec.parameters.iter().filter(|q| q.default.is_none()) {
+    for q in spec.parameters.iter().filter(|q| q.default.is_none() && which(&q.name)) {
         let constant = file.model.constants.iter().any(|(name, _)| *name.get_ref() == q.name);
         if !constant && !file.parameters.iter().any(|p| *p.name.get_ref() == q.name) {
             report_missing(source, file, &spec.kind, &q.name);
@@ -281,7 +290,7 @@ pub(in crate::study) fn check_values(source: &Source, file: &StudyFile, model: &
     }
     let initial =
         |name: &str| name.strip_prefix(INITIAL).and_then(|s| spec.states.iter().find(|q| q.name == s));
-    for p in &file.parameters {
+    for p in file.parameters.iter().filter(|p| which(p.name.get_ref())) {
         if let Some(q) = initial(p.name.get_ref()).filter(|q| q.size != 1) {
             let message = format!("state `{}` has {} components: a parameter is one value", q.name, q.size);
             let help = format!("name one, such as `{INITIAL}{}[0]`", q.name);
@@ -290,9 +299,13 @@ pub(in crate::study) fn check_values(source: &Source, file: &StudyFile, model: &
     }
 }
 
-/// Builds the setup as workers will.
+/// Builds the setup as workers will; of a solver everything but the program.
 pub(in crate::study) fn check_build(source: &Source, file: &StudyFile, setup: &Setup) {
-    if let Err(error) = setup.build() {
+    let built = match setup.model.description() {
+        Some(description) => fits(setup, description),
+        None => setup.build().map(|_| ()),
+    };
+    if let Err(error) = built {
         blame(source, file, &error);
     }
 }

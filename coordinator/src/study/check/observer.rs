@@ -4,7 +4,7 @@
 //! [`super::blame`].
 
 use starlings_models::observer::{self, Observer, Wiring};
-use starlings_models::{Setup, Spec};
+use starlings_models::{Model, SOLVER, Setup, SetupError, Spec};
 
 use super::blame::blame;
 use crate::study::checked::Record;
@@ -14,29 +14,38 @@ use crate::study::problem::Source;
 
 /// Reports an observer that lacks what it needs, or whose gain makes its correction unstable.
 pub(in crate::study) fn check(source: &Source, file: &StudyFile, setup: &Setup, records: &[Record]) {
-    if matches!(setup.observer.kind.as_str(), "" | "none") {
+    // What an observer of a solver needs, and what gain it stands, only the solver knows.
+    if matches!(setup.observer.kind.as_str(), "" | "none") || setup.model.kind == SOLVER {
         return;
     }
-    if let Some(observer) = built(source, file, setup, records) {
-        check_gain(source, file, records, &*observer);
+    if let Some(built) = built(source, file, setup, records) {
+        check_gain(source, file, records, &built);
     }
 }
 
+/// An observer with the model that it was built against, and the model's parameters.
+struct Built {
+    observer: Box<dyn Observer>,
+    model: Box<dyn Model>,
+    theta: Vec<f64>,
+}
+
 /// The observer as it works in the fit, where held-out channels are never seen; nothing after a complaint.
-fn built(source: &Source, file: &StudyFile, setup: &Setup, records: &[Record]) -> Option<Box<dyn Observer>> {
+fn built(source: &Source, file: &StudyFile, setup: &Setup, records: &[Record]) -> Option<Built> {
     let seen = |output: &String| {
         let channels = records.iter().filter(|r| r.is_trained()).flat_map(|r| &r.channels);
         channels.into_iter().any(|c| c.output == *output && !c.held_out)
     };
     let fitted: Vec<String> = setup.outputs.iter().filter(|o| seen(o)).cloned().collect();
-    let build = |outputs: &[String]| {
+    let build = |outputs: &[String]| -> Result<Built, SetupError> {
         let (model, spec) = (setup.model()?, setup.spec()?);
         let theta = constants(setup, &spec);
         let wiring = Wiring { spec: &spec, outputs, model: &*model, theta: &theta };
-        observer::build(&setup.observer, wiring)
+        let observer = observer::build(&setup.observer, wiring)?;
+        Ok(Built { observer, model, theta })
     };
     match (build(&fitted), build(&setup.outputs)) {
-        (Ok(observer), _) => Some(observer),
+        (Ok(built), _) => Some(built),
         (Err(error), Err(_)) => {
             blame(source, file, &error);
             None
@@ -66,11 +75,14 @@ fn constants(setup: &Setup, spec: &Spec) -> Vec<f64> {
 }
 
 /// A correction in steps is stable up to a gain that depends on the time between observations.
-fn check_gain(source: &Source, file: &StudyFile, records: &[Record], observer: &dyn Observer) {
+fn check_gain(source: &Source, file: &StudyFile, records: &[Record], built: &Built) {
     let gain = *file.observer.gain.get_ref();
     let spacings = records.iter().filter(|r| r.is_trained()).filter_map(|r| Some((r, spacing(r)?)));
     let Some((record, dt)) = spacings.max_by(|a, b| a.1.total_cmp(&b.1)) else { return };
-    let Some(largest) = observer.stable_up_to(dt).filter(|most| gain > *most) else { return };
+    let Built { observer, model, theta } = built;
+    let Some(largest) = observer.stable_up_to(&**model, theta, dt).filter(|most| gain > *most) else {
+        return;
+    };
     let unit = &file.study.time_unit;
     source.report_with(
         file.observer.gain.span(),

@@ -3,7 +3,7 @@
 //! Next file to read: [`super::model`].
 
 use starlings_estimators::{Batch, Points, Root};
-use starlings_models::ObserverDef;
+use starlings_models::{Description, ObserverDef};
 use toml::Spanned;
 
 use crate::study::checked::{EstimatorChoice, EstimatorKind, FleetChoice};
@@ -11,11 +11,23 @@ use crate::study::file::{EstimatorSection, FleetSection, ObserverSection};
 use crate::study::problem::Source;
 
 /// `[observer]`.
-pub(in crate::study) fn observer(source: &Source, section: &ObserverSection) -> ObserverDef {
+pub(in crate::study) fn observer(
+    source: &Source,
+    section: &ObserverSection,
+    solver: Option<&Description>,
+) -> ObserverDef {
     let kind = section.kind.get_ref();
-    let kinds: Vec<String> = starlings_models::observer::kinds().iter().map(|k| k.kind.to_owned()).collect();
+    let known = || starlings_models::observer::kinds().iter().map(|k| k.kind.to_owned()).collect();
+    let hosted = |solver: &Description| {
+        std::iter::once("none".to_owned()).chain(solver.observers.iter().cloned()).collect::<Vec<String>>()
+    };
+    let kinds: Vec<String> = solver.map_or_else(known, hosted);
     if !kinds.contains(kind) {
-        source.report_unknown(section.kind.span(), format!("unknown observer `{kind}`"), &kinds);
+        let message = match solver {
+            Some(solver) => format!("the solver `{}` hosts no observer `{kind}`", solver.name),
+            None => format!("unknown observer `{kind}`"),
+        };
+        source.report_unknown(section.kind.span(), message, &kinds);
     }
     let gain = *section.gain.get_ref();
     if gain < 0.0 {
@@ -26,17 +38,30 @@ pub(in crate::study) fn observer(source: &Source, section: &ObserverSection) -> 
     ObserverDef { kind: kind.clone(), gain, corrects }
 }
 
-/// `[estimator]`.
-pub(in crate::study) fn estimator(source: &Source, section: &EstimatorSection) -> EstimatorChoice {
+/// `[estimator]`. A solver that cannot restart from a state has its records run as a whole.
+pub(in crate::study) fn estimator(
+    source: &Source,
+    section: &EstimatorSection,
+    solver: Option<&Description>,
+) -> EstimatorChoice {
     let kinds = [("roukf", EstimatorKind::Roukf), ("batch", EstimatorKind::Batch)];
-    let kind = choose(source, section.kind.as_ref(), "estimator", &kinds).unwrap_or(EstimatorKind::Roukf);
+    let once = solver.filter(|solver| !solver.spec.restart);
+    let default = if once.is_some() { EstimatorKind::Batch } else { EstimatorKind::Roukf };
+    let kind = choose(source, section.kind.as_ref(), "estimator", &kinds).unwrap_or(default);
+    if let (Some(solver), Some(given), EstimatorKind::Roukf) = (once, &section.kind, kind) {
+        let message = format!(
+            "kind = \"roukf\" goes on from the state of each analysis, and the solver `{}` cannot restart from a state",
+            solver.name
+        );
+        source.report_with(given.span(), message, "use kind = \"batch\", which runs whole records");
+    }
     let roots = [("symmetric", Root::Symmetric), ("cholesky", Root::Cholesky)];
     let resample = [("svd", true), ("none", false)];
     let default_spread = match kind {
         EstimatorKind::Roukf => 0.001,
         EstimatorKind::Batch => 0.1,
     };
-    foreign_keys(source, section, kind);
+    foreign_keys(source, section, kind, once);
     EstimatorChoice {
         kind,
         points: points(source, section),
@@ -133,7 +158,12 @@ fn patience(source: &Source, value: &Spanned<f64>) -> f64 {
 }
 
 /// Keys of the estimator that was not chosen: they would be ignored, which nobody expects.
-fn foreign_keys(source: &Source, section: &EstimatorSection, kind: EstimatorKind) {
+fn foreign_keys(
+    source: &Source,
+    section: &EstimatorSection,
+    kind: EstimatorKind,
+    once: Option<&Description>,
+) {
     let of_roukf = [
         ("passes", section.passes.as_ref().map(Spanned::span)),
         ("anneal", section.anneal.as_ref().map(Spanned::span)),
@@ -150,7 +180,12 @@ fn foreign_keys(source: &Source, section: &EstimatorSection, kind: EstimatorKind
     };
     for (key, span) in foreign {
         if let Some(span) = span {
-            let help = format!("remove it, or use kind = \"{owner}\"");
+            let help = match once {
+                Some(solver) => {
+                    format!("remove it: the solver `{}` cannot restart from a state", solver.name)
+                }
+                None => format!("remove it, or use kind = \"{owner}\""),
+            };
             source.report_with(span.clone(), format!("`{key}` belongs to kind = \"{owner}\""), help);
         }
     }

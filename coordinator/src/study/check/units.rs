@@ -17,7 +17,8 @@ const MODEL_TIME: &str = "s";
 
 /// Every warning about units.
 pub(in crate::study) fn warnings(file: &StudyFile, model: &CheckedModel, records: &[Record]) -> Vec<String> {
-    let exact = model.setup.model.equations.is_some();
+    // What a solver calls its units are its own: nothing converts them.
+    let exact = model.setup.model.equations.is_some() || model.setup.model.solver.is_some();
     let pairs = pairs(file, model, records);
     let mut list: Vec<String> = pairs.iter().filter(|p| p.differs(exact)).map(Pair::sentence).collect();
     if !exact {

@@ -6,11 +6,12 @@
 use serde::Deserialize;
 use serde::de::IntoDeserializer;
 use serde::de::value::StrDeserializer;
-use starlings_models::Role;
+use starlings_models::{Role, SOLVER};
 use toml::Spanned;
 
 use super::layout::Layout;
 use super::read::named_texts;
+use super::solver::{self, program};
 use super::table::{Node, Table, number, text, wrong_type};
 use super::{
     EffectParameterSection, EffectSection, EquationsSection, ModelSection, Named, QuantitySection,
@@ -20,8 +21,6 @@ use crate::study::problem::Source;
 
 /// Keys of `[model]` that only a model of equations has.
 const EQUATIONS: [&str; 6] = ["outputs", "inputs", "replaceable", "roles", "solver", "states"];
-/// Keys of `[model]` that only an external solver has.
-const EXTERNAL: [&str; 2] = ["command", "address"];
 const ROLES: [&str; 18] = [
     "displacement",
     "velocity",
@@ -45,29 +44,56 @@ const ROLES: [&str; 18] = [
 
 /// Reads `[model]`.
 pub(in crate::study) fn model(source: &Source, root: &Table<'_>) -> ModelSection {
-    let keys = [&["kind", "constants", "initial", "layout"], &EQUATIONS[..], &EXTERNAL[..]].concat();
+    let mut keys = [&["kind", "constants", "initial", "layout"], &EQUATIONS[..], &solver::KEYS[..]].concat();
+    keys.sort_unstable();
+    keys.dedup();
     if root.get("model").is_none() {
         root.missing("model", "a section `[model]` with a `kind`");
     }
     let Some(t) = root.table("model", "[model]", &keys) else {
         let kind = Spanned::new(0..0, String::new());
-        return ModelSection { kind, constants: Vec::new(), initial: None, layout: None, equations: None };
+        return ModelSection {
+            kind,
+            constants: Vec::new(),
+            initial: None,
+            layout: None,
+            equations: None,
+            solver: None,
+        };
     };
-    let kind = t.required_text("kind", "a model's name (`starlings models` lists them) or \"equations\"");
+    let kind = t
+        .required_text("kind", "a model's name (`starlings models` lists them), \"equations\" or \"solver\"");
     let of_kind = kind.get_ref().as_str();
     let equations = (of_kind == "equations").then(|| equations(source, &t));
-    for (keys, owner) in [(&EQUATIONS[..], "equations"), (&EXTERNAL[..], "solver")] {
-        for key in keys.iter().filter(|_| of_kind != owner) {
-            if let Some(span) = t.key_span(key) {
-                source.report(
-                    span,
-                    format!("`{key}` belongs to models of kind \"{owner}\", this one is \"{of_kind}\""),
-                );
-            }
+    let solver = (of_kind == SOLVER).then(|| program(source, &t, kind.span()));
+    refuse_foreign(source, &t, of_kind);
+    let layout = t.get("layout").map(|node| Layout::read(source, node));
+    ModelSection {
+        constants: constants(source, &t),
+        initial: t.text("initial"),
+        kind,
+        layout,
+        equations,
+        solver,
+    }
+}
+
+/// Keys of another kind of model.
+fn refuse_foreign(source: &Source, model: &Table<'_>, kind: &str) {
+    let kinds = [("equations", &EQUATIONS[..]), (SOLVER, &solver::KEYS[..])];
+    for (key, _) in model.entries() {
+        let owners: Vec<&str> = kinds
+            .iter()
+            .filter(|(_, keys)| keys.contains(&key.get_ref().as_str()))
+            .map(|(owner, _)| *owner)
+            .collect();
+        if !owners.is_empty() && !owners.contains(&kind) {
+            let owners = owners.join("\" or \"");
+            let message =
+                format!("`{}` belongs to models of kind \"{owners}\", this one is \"{kind}\"", key.get_ref());
+            source.report(key.span(), message);
         }
     }
-    let layout = t.get("layout").map(|node| Layout::read(source, node));
-    ModelSection { constants: constants(source, &t), initial: t.text("initial"), kind, layout, equations }
 }
 
 fn constants(source: &Source, model: &Table<'_>) -> Named<f64> {
@@ -171,11 +197,11 @@ fn rate(source: &Source, state: &Table<'_>, node: &Node<'_>) -> Named<String> {
     Vec::new()
 }
 
-fn unit(t: &Table<'_>) -> String {
+pub(super) fn unit(t: &Table<'_>) -> String {
     t.text("unit").map(Spanned::into_inner).unwrap_or_default()
 }
 
-fn role(source: &Source, t: &Table<'_>) -> Role {
+pub(super) fn role(source: &Source, t: &Table<'_>) -> Role {
     t.text("role").map_or(Role::Other, |name| named_role(source, &name))
 }
 

@@ -73,15 +73,7 @@ impl RunFolder {
     ///
     /// # Errors
     /// When the folder holds a run or one of its files already, or cannot be written; nothing is left then.
-    pub fn create(path: &Path, study: &Study, command: &str, started: &str) -> Result<Self, FolderError> {
-        Self::create_for(Purpose::Run, path, study, command, started)
-    }
-
-    /// [`RunFolder::create`] for any purpose.
-    ///
-    /// # Errors
-    /// As [`RunFolder::create`].
-    pub fn create_for(
+    pub fn create(
         purpose: Purpose,
         path: &Path,
         study: &Study,
@@ -105,9 +97,11 @@ impl RunFolder {
         write(&frozen, &study.text).map_err(unwritable(&frozen))?;
         let lock = lock(path)?;
         let (recordings, info) = (fingerprint(study), json(&info(study, command, started)));
+        let solver = solver_fingerprint(study);
         let meta = [
             ("study", study.text.as_str()),
             ("recordings", &recordings),
+            ("solver", &solver),
             ("info", &info),
             (Purpose::KEY, purpose.name()),
         ];
@@ -121,23 +115,15 @@ impl RunFolder {
     /// Opens the folder of a run that was interrupted.
     ///
     /// # Errors
-    /// When there is no run, another process runs in it, or it was started from another study or other recordings.
-    pub fn resume(path: &Path, study: &Study) -> Result<Self, FolderError> {
-        Self::resume_for(Purpose::Run, path, study)
-    }
-
-    /// [`RunFolder::resume`] for any purpose.
-    ///
-    /// # Errors
-    /// As [`RunFolder::resume`], and when the folder serves another purpose.
-    pub fn resume_for(purpose: Purpose, path: &Path, study: &Study) -> Result<Self, FolderError> {
+    /// When there is no run, another process runs in it, it serves another purpose, or it was started from another study or
+    /// other recordings.
+    pub fn resume(purpose: Purpose, path: &Path, study: &Study) -> Result<Self, FolderError> {
         let store = Store::open(&path.join("run.db"))?;
         let lock = lock(path)?;
         let found = Purpose::of(&store)?;
         if found != purpose {
-            let article = if found == Purpose::Run { "a" } else { "an" };
-            let (folder, holds, command) = (path.to_owned(), found.name(), found.command());
-            return Err(FolderError::OtherPurpose { folder, article, holds, command });
+            let (folder, holds, command) = (path.to_owned(), found.with_article(), found.command());
+            return Err(FolderError::OtherPurpose { folder, holds, command });
         }
         let other = |what| FolderError::OtherStudy { folder: path.to_owned(), what };
         match store.meta("study")? {
@@ -147,6 +133,9 @@ impl RunFolder {
         }
         if store.meta("recordings")? != Some(fingerprint(study)) {
             return Err(other("the recordings"));
+        }
+        if store.meta("solver")?.unwrap_or_default() != solver_fingerprint(study) {
+            return Err(other("the solver or one of its files"));
         }
         Ok(Self { path: path.to_owned(), store, _lock: Some(lock) })
     }
@@ -236,6 +225,21 @@ fn fingerprint(study: &Study) -> String {
         if let Some(state) = name.strip_prefix(INITIAL) {
             hasher.update(state.as_bytes());
             hasher.update(&value.to_le_bytes());
+        }
+    }
+    hasher.finalize().to_hex().to_string()
+}
+
+/// BLAKE3 of what a solver says of itself and of the files that go to it, templates and copies; empty for other models.
+fn solver_fingerprint(study: &Study) -> String {
+    let Some(solver) = &study.setup.model.solver else { return String::new() };
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(json(&solver.described).as_bytes());
+    if let Some(files) = &solver.files {
+        hasher.update(json(files).as_bytes());
+        for path in files.copies.values() {
+            // A copy that cannot be read now is told by the run that needs it.
+            hasher.update(&std::fs::read(path).unwrap_or_default());
         }
     }
     hasher.finalize().to_hex().to_string()

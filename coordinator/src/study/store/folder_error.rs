@@ -35,19 +35,15 @@ pub enum FolderError {
     OtherStudy {
         /// The folder.
         folder: PathBuf,
-        /// `the study file` or `the recordings`.
+        /// `the study file`, `the recordings` or `the solver or one of its files`.
         what: &'static str,
     },
     /// It belongs to another command.
-    #[error(
-        "{folder} holds {article} {holds} of `{command}`: continue it there, or choose another folder with --out"
-    )]
+    #[error("{folder} holds {holds} of `{command}`: continue it there, or choose another folder with --out")]
     OtherPurpose {
         /// The folder.
         folder: PathBuf,
-        /// `a` or `an`.
-        article: &'static str,
-        /// `run` or `explanation`.
+        /// `a run` or `an explanation`.
         holds: &'static str,
         /// The command that it belongs to.
         command: &'static str,

@@ -15,11 +15,19 @@ impl Purpose {
     /// Name under which the store keeps it.
     pub(super) const KEY: &'static str = "purpose";
 
-    /// What the store holds under its key, and what messages call it.
+    /// What the store holds under its key.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Run => "run",
             Self::Explanation => "explanation",
+        }
+    }
+
+    /// What messages call it.
+    pub(super) fn with_article(self) -> &'static str {
+        match self {
+            Self::Run => "a run",
+            Self::Explanation => "an explanation",
         }
     }
 

@@ -16,15 +16,8 @@ pub(super) const TABLE: &str =
     "CREATE TABLE IF NOT EXISTS remembered_runs (key BLOB PRIMARY KEY, body BLOB NOT NULL);";
 
 impl Store {
-    /// Keeps the answer of one run; an earlier one of the same key is replaced.
-    ///
-    /// # Errors
-    /// When the database refuses.
-    pub fn remember_run(&self, key: &RunKey, body: &[u8]) -> Result<(), StoreError> {
-        self.remember_runs(std::iter::once((key, body)), &[])
-    }
-
-    /// Keeps the answers of many runs and the rows of their jobs in one piece: after a kill either all are there or none.
+    /// Keeps the answers of runs and the rows of their jobs in one piece: after a kill either all are there or none. An earlier
+    /// answer of the same key is replaced.
     ///
     /// # Errors
     /// When the database refuses; none of them is kept then.

@@ -106,7 +106,7 @@ fn answers_of_runs_are_remembered_by_their_key_and_over_a_kill() {
     let (folder, store) = empty();
     let (a, b, c) = ([1_u8; 32], [2_u8; 32], [3_u8; 32]);
     store.remember_runs([(&a, b"one".as_slice()), (&b, b"".as_slice())], &[]).unwrap();
-    store.remember_run(&a, b"again").unwrap();
+    store.remember_runs([(&a, b"again".as_slice())], &[]).unwrap();
     // Neither closed nor dropped: what a killed process leaves.
     std::mem::forget(store);
     let store = Store::open(&folder.path().join("run.db")).unwrap();

@@ -73,6 +73,16 @@ impl Draft {
         self
     }
 
+    /// Adds the instant at which something changes; neither end of the record can tell it.
+    pub(super) fn instant(self, name: &str, time: &str) -> Self {
+        self.inner(name, time, ([0.02, 0.98], &[0.25, 0.5, 0.75]), Scale::Record, "When it changes.")
+    }
+
+    /// Adds the record's start, which is no unknown.
+    pub(super) fn record_start(self, name: &str, time: &str) -> Self {
+        self.inner(name, time, ([0.0, 0.0], &[0.0]), Scale::Record, "Start of the record.")
+    }
+
     /// Adds a state of the effect's own.
     pub(super) fn state(
         mut self,

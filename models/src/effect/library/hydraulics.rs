@@ -6,7 +6,6 @@ use super::draft::{ANY, Draft, POSITIVE};
 use super::place::Host;
 use super::unit::{over, per_time, power, times};
 use super::{Grow, levels};
-use crate::effect::Scale;
 use crate::{EffectDef, Role};
 
 /// Every effect of this family.
@@ -103,13 +102,7 @@ fn valve_step(host: Host<'_>) -> Vec<EffectDef> {
             Draft::new(&place, "valve-step", says)
                 .adds(r, format!("{r}*{change}*step(t - {when})"))
                 .coefficient(&change, "", [-0.95, 50.0], "Change as a share of the resistance.")
-                .inner(
-                    &when,
-                    host.time,
-                    ([0.02, 0.98], &[0.25, 0.5, 0.75]),
-                    Scale::Record,
-                    "When it changes.",
-                )
+                .instant(&when, host.time)
                 .confounders(&["valve-drift", "sensor-drift"])
                 .source("Venkatasubramanian, Rengaswamy, Yin and Kavuri 2003, Comput. Chem. Eng. 27, 293")
         })
@@ -127,7 +120,7 @@ fn valve_drift(host: Host<'_>) -> Vec<EffectDef> {
             Draft::new(&place, "valve-drift", says)
                 .adds(r, format!("{r}*(exp({rate}*(t - {start})) - 1)"))
                 .coefficient(&rate, per_time("", host.time), ANY, "Relative change per time.")
-                .inner(&start, host.time, ([0.0, 0.0], &[0.0]), Scale::Record, "Start of the record.")
+                .record_start(&start, host.time)
                 .confounders(&["valve-step", "sensor-drift"])
                 .source("Venkatasubramanian, Rengaswamy, Yin and Kavuri 2003, Comput. Chem. Eng. 27, 293")
         })

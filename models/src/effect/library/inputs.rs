@@ -57,7 +57,7 @@ fn drift(host: Host<'_>) -> Vec<EffectDef> {
         Draft::new(place, "input-drift", format!("The input {} drifts evenly away from its record.", u.name))
             .adds(&u.name, format!("{rate}*(t - {start})"))
             .coefficient(&rate, per_time(&u.unit, host.time), ANY, "Drift per time.")
-            .inner(&start, host.time, ([0.0, 0.0], &[0.0]), Scale::Record, "Start of the record.")
+            .record_start(&start, host.time)
             .confounders(&["input-offset", "sensor-drift"])
             .source("Ljung 1999, System Identification, 2nd ed., ch. 14")
     })

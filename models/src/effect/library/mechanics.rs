@@ -6,7 +6,7 @@
 
 use super::Grow;
 use super::draft::{ANY, Draft, POSITIVE};
-use super::place::{Host, Motion, Place};
+use super::place::{Host, Place};
 use super::unit::{over, per_time, power};
 use crate::effect::Scale;
 use crate::units::Unit;
@@ -39,10 +39,11 @@ struct Spring<'a> {
     x: &'a Quantity,
 }
 
-/// Every velocity that belongs to a displacement.
+/// Every velocity with its displacement.
 fn springs(host: Host<'_>) -> Vec<Spring<'_>> {
-    let motions = host.motions().into_iter();
-    motions.filter_map(|m| m.displacement.map(|x| Spring { place: m.place, v: m.velocity, x })).collect()
+    let (velocities, displacements) = (host.states(Role::Velocity), host.states(Role::Displacement));
+    let pairs = host.matched(&velocities, &displacements).into_iter();
+    pairs.map(|(place, v, x)| Spring { place, v, x }).collect()
 }
 
 /// The unit of the rate of a quantity over another's unit raised to a power.
@@ -52,7 +53,7 @@ fn coefficient(host: Host<'_>, rate_of: &Quantity, per: &Quantity, exponent: i32
 
 /// Viscous friction −c v.
 fn viscous_friction(host: Host<'_>) -> Vec<EffectDef> {
-    let one = |Motion { place, velocity: v, .. }: Motion<'_>| {
+    let one = |(place, v): (Place<'_>, &Quantity)| {
         let c = place.name("c_viscous");
         Draft::new(&place, "viscous-friction", "A friction grows in proportion to the velocity.")
             .adds(&v.name, format!("-{c}*{}", v.name))
@@ -60,12 +61,12 @@ fn viscous_friction(host: Host<'_>) -> Vec<EffectDef> {
             .confounders(&["quadratic-drag", "coulomb-friction"])
             .source("Rayleigh 1877, The Theory of Sound, ch. III")
     };
-    host.motions().into_iter().map(one).collect()
+    host.each(host.states(Role::Velocity)).into_iter().map(one).collect()
 }
 
 /// Dry friction −f sign(v).
 fn coulomb_friction(host: Host<'_>) -> Vec<EffectDef> {
-    let one = |Motion { place, velocity: v, .. }: Motion<'_>| {
+    let one = |(place, v): (Place<'_>, &Quantity)| {
         let (f, width) = (place.name("f_coulomb"), place.name("v_coulomb"));
         let draft =
             Draft::new(&place, "coulomb-friction", "A dry friction of constant size opposes the motion.")
@@ -75,7 +76,7 @@ fn coulomb_friction(host: Host<'_>) -> Vec<EffectDef> {
             .confounders(&["viscous-friction", "stribeck-friction", "backlash"])
             .source("Coulomb 1785, Théorie des machines simples")
     };
-    host.motions().into_iter().map(one).collect()
+    host.each(host.states(Role::Velocity)).into_iter().map(one).collect()
 }
 
 /// A fixed width over which a friction changes its sign.
@@ -87,7 +88,7 @@ fn sign_width(draft: Draft, velocity: &Quantity, name: &str) -> Draft {
 
 /// What dry friction has more near rest, −f sign(v) exp(−(v/v₀)²).
 fn stribeck_friction(host: Host<'_>) -> Vec<EffectDef> {
-    let one = |Motion { place, velocity: v, .. }: Motion<'_>| {
+    let one = |(place, v): (Place<'_>, &Quantity)| {
         let (f, v0, width) = (place.name("f_stribeck"), place.name("v_stribeck"), place.name("w_stribeck"));
         let says = "A dry friction is largest near rest and fades as the velocity grows.";
         let draft = Draft::new(&place, "stribeck-friction", says)
@@ -104,12 +105,12 @@ fn stribeck_friction(host: Host<'_>) -> Vec<EffectDef> {
             .confounders(&["coulomb-friction", "viscous-friction"])
             .source("Stribeck 1902, Z. VDI 46, 1341; Armstrong-Hélouvry et al. 1994, Automatica 30, 1083")
     };
-    host.motions().into_iter().map(one).collect()
+    host.each(host.states(Role::Velocity)).into_iter().map(one).collect()
 }
 
 /// Drag −c v|v|.
 fn quadratic_drag(host: Host<'_>) -> Vec<EffectDef> {
-    let one = |Motion { place, velocity: v, .. }: Motion<'_>| {
+    let one = |(place, v): (Place<'_>, &Quantity)| {
         let c = place.name("c_quadratic");
         Draft::new(&place, "quadratic-drag", "A drag grows with the square of the velocity.")
             .adds(&v.name, format!("-{c}*{0}*abs({0})", v.name))
@@ -117,7 +118,7 @@ fn quadratic_drag(host: Host<'_>) -> Vec<EffectDef> {
             .confounders(&["viscous-friction", "coulomb-friction"])
             .source("Newton 1687, Principia, book II, section II")
     };
-    host.motions().into_iter().map(one).collect()
+    host.each(host.states(Role::Velocity)).into_iter().map(one).collect()
 }
 
 /// A restoring force −k x.
@@ -214,7 +215,7 @@ fn backlash(host: Host<'_>) -> Vec<EffectDef> {
 
 /// A constant force.
 fn bias_force(host: Host<'_>) -> Vec<EffectDef> {
-    let one = |Motion { place, velocity: v, .. }: Motion<'_>| {
+    let one = |(place, v): (Place<'_>, &Quantity)| {
         let f = place.name("f_bias");
         Draft::new(&place, "bias-force", "A constant force acts all the time.")
             .adds(&v.name, f.clone())
@@ -222,12 +223,12 @@ fn bias_force(host: Host<'_>) -> Vec<EffectDef> {
             .confounders(&["sensor-offset", "input-offset", "quadratic-stiffness"])
             .source("Ljung 1999, System Identification, 2nd ed., ch. 14")
     };
-    host.motions().into_iter().map(one).collect()
+    host.each(host.states(Role::Velocity)).into_iter().map(one).collect()
 }
 
 /// A harmonic force that no input knows.
 fn periodic_forcing(host: Host<'_>) -> Vec<EffectDef> {
-    let one = |Motion { place, velocity: v, .. }: Motion<'_>| {
+    let one = |(place, v): (Place<'_>, &Quantity)| {
         let (f, period, phase) =
             (place.name("f_periodic"), place.name("T_periodic"), place.name("phase_periodic"));
         Draft::new(&place, "periodic-forcing", "A periodic force acts that no input knows.")
@@ -251,7 +252,7 @@ fn periodic_forcing(host: Host<'_>) -> Vec<EffectDef> {
             .confounders(&["bias-force", "input-gain"])
             .source("Rayleigh 1877, The Theory of Sound, ch. III")
     };
-    host.motions().into_iter().map(one).collect()
+    host.each(host.states(Role::Velocity)).into_iter().map(one).collect()
 }
 
 /// The weight of a pendulum, −g sin(x): only where the displacement is an angle.

@@ -23,13 +23,6 @@ pub(super) struct Place<'a> {
     told_by: Vec<&'a str>,
 }
 
-/// A velocity and, where the model has it, the displacement that it moves.
-pub(super) struct Motion<'a> {
-    pub(super) place: Place<'a>,
-    pub(super) velocity: &'a Quantity,
-    pub(super) displacement: Option<&'a Quantity>,
-}
-
 impl Place<'_> {
     /// Name of an effect at this place: `drag`, or `drag:v2`.
     pub(super) fn effect(&self, stem: &str) -> String {
@@ -123,17 +116,6 @@ impl<'a> Host<'a> {
         }
         let each = self.each(first.to_vec());
         each.into_iter().zip(second).map(|((place, a), b)| (place, a, *b)).collect()
-    }
-
-    /// Every velocity with its displacement.
-    pub(super) fn motions(self) -> Vec<Motion<'a>> {
-        let (velocities, displacements) = (self.states(Role::Velocity), self.states(Role::Displacement));
-        if displacements.is_empty() {
-            let alone = |(place, velocity)| Motion { place, velocity, displacement: None };
-            return self.each(velocities).into_iter().map(alone).collect();
-        }
-        let pair = |(place, velocity, x)| Motion { place, velocity, displacement: Some(x) };
-        self.matched(&velocities, &displacements).into_iter().map(pair).collect()
     }
 }
 

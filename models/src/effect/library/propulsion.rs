@@ -24,13 +24,7 @@ fn throat_step(host: Host<'_>) -> Vec<EffectDef> {
             Draft::new(&place, "throat-step", says)
                 .adds(a, format!("{a}*{change}*step(t - {when})"))
                 .coefficient(&change, "", [-0.9, 5.0], "Change as a share of the area.")
-                .inner(
-                    &when,
-                    host.time,
-                    ([0.02, 0.98], &[0.25, 0.5, 0.75]),
-                    Scale::Record,
-                    "When it changes.",
-                )
+                .instant(&when, host.time)
                 .confounders(&["throat-erosion", "burn-rate-shift"])
                 .source("Sutton and Biblarz 2016, Rocket Propulsion Elements, 9th ed., ch. 15")
         })
@@ -49,7 +43,7 @@ fn throat_erosion(host: Host<'_>) -> Vec<EffectDef> {
                 .adds(a, format!("{a}*{growth}*max(t - {start}, 0)^{power}"))
                 .coefficient(&growth, "", POSITIVE, "Relative growth in the first unit of time.")
                 .inner(&power, "", ([0.5, 4.0], &[1.0, 2.0, 3.0]), Scale::Absolute, "Power of time.")
-                .inner(&start, host.time, ([0.0, 0.0], &[0.0]), Scale::Record, "Start of the record.")
+                .record_start(&start, host.time)
                 .confounders(&["throat-step", "uneven-burn-out", "burn-rate-shift"])
                 .source("Sutton and Biblarz 2016, Rocket Propulsion Elements, 9th ed., ch. 15")
         })
@@ -66,7 +60,7 @@ fn burn_rate_shift(host: Host<'_>) -> Vec<EffectDef> {
             Draft::new(&place, "burn-rate-shift", says)
                 .adds(r, format!("{r}*{change}*step(t - {when})"))
                 .coefficient(&change, "", [-0.9, 5.0], "Change as a share of the burning rate.")
-                .inner(&when, host.time, ([0.02, 0.98], &[0.25, 0.5, 0.75]), Scale::Record, "When it changes.")
+                .instant(&when, host.time)
                 .confounders(&["throat-step", "uneven-burn-out"])
                 .source("Sutton and Biblarz 2016, Rocket Propulsion Elements, 9th ed., ch. 12")
         })

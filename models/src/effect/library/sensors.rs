@@ -49,7 +49,7 @@ fn drift(host: Host<'_>) -> Vec<EffectDef> {
         Draft::new(place, "sensor-drift", format!("The sensor of {} drifts evenly with time.", y.name))
             .adds(&place.output(y), format!("{rate}*(t - {start})"))
             .coefficient(&rate, per_time(&y.unit, host.time), ANY, "Drift per time.")
-            .inner(&start, host.time, ([0.0, 0.0], &[0.0]), Scale::Record, "Start of the record.")
+            .record_start(&start, host.time)
             .confounders(&["sensor-offset", "input-drift"])
             .source("Ljung 1999, System Identification, 2nd ed., ch. 14")
     })
@@ -78,7 +78,7 @@ fn lag(host: Host<'_>) -> Vec<EffectDef> {
         let mut term = String::new();
         for (node, weight) in LAGUERRE {
             // Writing to a text does not fail.
-            let _ = write!(term, "{weight:.9}*delay({name}, {node:.9}*{tau}) + ");
+            let _ = write!(term, "{weight}*(delay({name}, {node}*{tau}) - {name}) + ");
         }
         let term = term.trim_end_matches(" + ");
         Draft::new(
@@ -86,7 +86,7 @@ fn lag(host: Host<'_>) -> Vec<EffectDef> {
             "sensor-lag",
             format!("The sensor of {name} follows slowly, with a lag of first order."),
         )
-        .adds(&place.output(y), format!("{term} - {name}"))
+        .adds(&place.output(y), term)
         .coefficient(&tau, host.time, [0.0, LONGEST], "Time constant of the sensor.")
         .counted_in(Scale::Sampling)
         .confounders(&["sensor-delay", "input-delay"])

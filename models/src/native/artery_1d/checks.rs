@@ -7,10 +7,9 @@ use std::collections::HashSet;
 use super::layout::Segment;
 use super::network::young;
 use crate::layout::fault;
+use crate::native::MOST_CELLS;
 use crate::setup::SetupError;
 
-/// Cells of all vessels together at most, as in the linear tube.
-const MOST_CELLS: usize = 10_000;
 /// Regions of all vessels together at most: the pressures of their ends are one full system of equations in every step.
 const MOST_REGIONS: usize = 1000;
 

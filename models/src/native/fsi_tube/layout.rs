@@ -9,10 +9,8 @@ use serde::de::value::SeqAccessDeserializer;
 use serde::de::{Deserializer, SeqAccess, Visitor};
 
 use crate::layout::fault;
+use crate::native::MOST_CELLS;
 use crate::setup::SetupError;
-
-/// Cells at most: structural observers work with matrices of this size.
-const MOST_CELLS: usize = 10_000;
 
 /// Shortest accepted step in s: in it a wave of 10 m/s passes 10 µm, less than any cell that the model is meant for, and a
 /// second of recording takes a million steps; shorter ones would keep a long recording running without end.

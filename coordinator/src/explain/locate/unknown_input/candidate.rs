@@ -5,10 +5,11 @@
 use std::sync::Arc;
 
 use starlings_models::effect::{Addition, EffectParameter};
-use starlings_models::{EffectDef, Job, Prediction, Setup, Spec, Window};
+use starlings_models::{EffectDef, Job, Prediction, Quantity, SOLVER, Setup, Spec, Window};
 
 use crate::explain::ExplainError;
-use crate::fleet::{Fleet, SetupId};
+use crate::explain::memory::sound;
+use crate::fleet::{Fleet, Outcome, SetupId};
 use crate::study::Study;
 
 /// Change of the outputs, in noise sd, below which an input is not felt.
@@ -26,11 +27,24 @@ pub(super) struct Candidate {
     pub(super) setup: SetupId,
     /// The constant input that moves the outputs about as far as the residuals are.
     pub(super) scale: f64,
+    /// What the channels would have measured of the record without an input.
+    pub(super) without: Vec<f64>,
     /// Change of the outputs in noise sd by an input that would move the state by its own size over the record.
     felt: f64,
 }
 
-/// The scalar states whose input the channels feel, the most strongly felt first: two runs of the record each.
+/// An equation and the runs of the record with it.
+struct Trial<'a> {
+    quantity: &'a Quantity,
+    at: usize,
+    setup: SetupId,
+    without: Prediction,
+    /// A constant input so small that the answer is the slope of a model that may be far from linear.
+    input: f64,
+}
+
+/// The scalar states whose input the channels feel, the most strongly felt first: two runs of the record each, in two batches.
+/// None of a solver, whose equations are not open to an input in every rate.
 pub(super) fn candidates(
     study: &Study,
     fleet: &mut dyn Fleet,
@@ -38,40 +52,78 @@ pub(super) fn candidates(
     record: usize,
     runs: &mut u64,
 ) -> Result<Vec<Candidate>, ExplainError> {
-    let own = own_states(study);
+    if study.setup.model.kind == SOLVER {
+        return Ok(Vec::new());
+    }
     let window = Arc::new(study.whole(record, true));
     let values = study.theta_for(record, theta);
-    let mut found = Vec::new();
-    for quantity in study.spec.states.iter().filter(|q| q.size == 1 && !own.contains(&q.name)) {
-        let Some(at) = Spec::offset(&study.spec.states, &quantity.name) else { continue };
-        let setup = fleet.install(&with_input(study, &quantity.name))?;
-        let job = |input: f64| {
+    let mut fly = |fleet: &mut dyn Fleet,
+                   inputs: Vec<(SetupId, f64)>|
+     -> Result<Vec<Option<Prediction>>, ExplainError> {
+        *runs += inputs.len() as u64;
+        let job = |(particle, (setup, input)): (usize, (SetupId, f64))| {
             let theta = values.iter().copied().chain([input]).collect();
-            Job { particle: 0, record: record as u32, window: Arc::clone(&window), theta, state: None }
+            let (particle, record, window) = (particle as u32, record as u32, Arc::clone(&window));
+            (setup, Job { particle, record, window, theta, state: None })
         };
-        let mut run = |input: f64| -> Result<Option<Prediction>, ExplainError> {
-            *runs += 1;
-            let outcome = fleet.run(setup, vec![job(input)])?.pop();
-            Ok(outcome.and_then(|o| o.result.ok()).map(|mut p| {
-                study.measure(record, &window.times, &mut p.outputs);
-                p
-            }))
-        };
-        let Some(without) = run(0.0)? else { continue };
-        let span = window.times.last().copied().unwrap_or(window.start) - window.start;
+        let jobs = inputs.into_iter().enumerate().map(job).collect();
+        predictions(study, record, &window, fleet.run_mixed(jobs)?)
+    };
+    let equations = equations(study, fleet)?;
+    let at_rest = fly(fleet, equations.iter().map(|(_, _, setup)| (*setup, 0.0)).collect())?;
+    let span = window.times.last().copied().unwrap_or(window.start) - window.start;
+    let trial = |((quantity, at, setup), without): ((_, usize, SetupId), Option<Prediction>)| {
+        let without = without?;
         let size = without.state.get(at).map_or(0.0, |x| x.abs()).max(1e-3);
-        // Small, so that the answer is the slope of a model that may be far from linear.
-        let trial = 1e-3 * size / span.max(f64::MIN_POSITIVE);
-        let Some(with) = run(trial)? else { continue };
-        let (moved, missed) = sizes(study, record, &window, &without, &with);
-        if moved / 1e-3 > FELT {
-            let (state, unit) = (quantity.name.clone(), quantity.unit.clone());
-            let scale = trial * missed.max(1.0) / moved;
-            found.push(Candidate { state, unit, at, setup, scale, felt: moved });
-        }
-    }
+        Some(Trial { quantity, at, setup, without, input: 1e-3 * size / span.max(f64::MIN_POSITIVE) })
+    };
+    let trials: Vec<Trial<'_>> = equations.into_iter().zip(at_rest).filter_map(trial).collect();
+    let moved = fly(fleet, trials.iter().map(|t| (t.setup, t.input)).collect())?;
+    let candidate = |(trial, with): (Trial<'_>, Option<Prediction>)| {
+        let Trial { quantity, at, setup, without, input } = trial;
+        let (moved, missed) = sizes(study, record, &window, &without, &with?);
+        let (state, unit) = (quantity.name.clone(), quantity.unit.clone());
+        let (scale, without) = (input * missed.max(1.0) / moved, without.outputs);
+        (moved / 1e-3 > FELT).then_some(Candidate { state, unit, at, setup, scale, without, felt: moved })
+    };
+    let mut found: Vec<Candidate> = trials.into_iter().zip(moved).filter_map(candidate).collect();
     found.sort_by(|a, b| b.felt.total_cmp(&a.felt));
     Ok(found)
+}
+
+/// The scalar states of the model itself with their place and the setup with an input.
+fn equations<'s>(
+    study: &'s Study,
+    fleet: &mut dyn Fleet,
+) -> Result<Vec<(&'s Quantity, usize, SetupId)>, ExplainError> {
+    let own = own_states(study);
+    let mut equations = Vec::new();
+    for quantity in study.spec.states.iter().filter(|q| q.size == 1 && !own.contains(&q.name)) {
+        let Some(at) = Spec::offset(&study.spec.states, &quantity.name) else { continue };
+        equations.push((quantity, at, fleet.install(&with_input(study, &quantity.name))?));
+    }
+    Ok(equations)
+}
+
+/// What the channels would measure by each outcome, particle by particle; nothing where the model fails.
+///
+/// # Errors
+/// When a run was lost with its workers.
+pub(super) fn predictions(
+    study: &Study,
+    record: usize,
+    window: &Window,
+    outcomes: Vec<Outcome>,
+) -> Result<Vec<Option<Prediction>>, ExplainError> {
+    let name = &study.records[record].name;
+    let of = |(particle, outcome): (usize, Outcome)| {
+        let prediction = sound(outcome, particle as u32, name)?.ok();
+        Ok(prediction.filter(|p| p.outputs.len() == window.observed.len()).map(|mut p| {
+            study.measure(record, &window.times, &mut p.outputs);
+            p
+        }))
+    };
+    outcomes.into_iter().enumerate().map(of).collect()
 }
 
 /// States that effects of the study brought.

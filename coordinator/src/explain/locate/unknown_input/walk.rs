@@ -12,13 +12,13 @@ use nalgebra::{DMatrix, DVector};
 use starlings_estimators::{Data, Gaussian, Noise, Particles, Points, Root, Roukf, SigmaSet};
 use starlings_models::{Job, Prediction, Window};
 
-use super::candidate::Candidate;
+use super::candidate::{Candidate, predictions};
 use crate::explain::ExplainError;
 use crate::fleet::Fleet;
 use crate::study::Study;
 
 /// Coordinates at most.
-const DIRECTIONS: usize = 4;
+pub(super) const DIRECTIONS: usize = 4;
 /// Steps of the walk that the input may be away from zero at the start.
 const START: f64 = 4.0;
 
@@ -33,8 +33,6 @@ pub(super) struct Walk<'a> {
 
 /// What one intensity of the walk gives.
 pub(super) struct Estimate {
-    /// Growth of the walk's sd over the record, in units of the candidate's scale.
-    pub(super) intensity: f64,
     pub(super) time: Vec<f64>,
     pub(super) value: Vec<f64>,
     pub(super) sd: Vec<f64>,
@@ -77,6 +75,7 @@ impl Walk<'_> {
         runs: &mut u64,
     ) -> Result<Vec<Option<Estimate>>, ExplainError> {
         let windows = self.study.windows(self.record);
+        *runs += 1;
         let Some(start) = self.start(fleet, &windows)? else { return Ok(Vec::new()) };
         let n = start.len() + 1;
         let set = SigmaSet::new(Points::Simplex, n.min(DIRECTIONS))?;
@@ -96,11 +95,10 @@ impl Walk<'_> {
                 };
             }
         }
-        // Whole records: every walk runs all windows with every particle; the other run is the one without an input.
-        *runs += (intensities.len() * roukf.set.n_particle() + 1) as u64;
-        let Some(without) = self.without(fleet)? else { return Ok(Vec::new()) };
-        let finish = |(walk, intensity): (Option<Forward>, &f64)| Some(walk?.smooth(*intensity, without));
-        Ok(walks.into_iter().zip(intensities).map(finish).collect())
+        // Whole records: every walk runs all windows with every particle.
+        *runs += (intensities.len() * roukf.set.n_particle()) as u64;
+        let without = self.without();
+        Ok(walks.into_iter().map(|walk| Some(walk?.smooth(without))).collect())
     }
 
     fn job(&self, window: &Arc<Window>, state: Option<Vec<f64>>, input: f64) -> Job {
@@ -122,8 +120,10 @@ impl Walk<'_> {
             observed: vec![f64::NAN; n_obs],
             inputs: first.inputs.clone(),
         };
-        let outcome = fleet.run(self.candidate.setup, vec![self.job(&Arc::new(window), None, 0.0)])?.pop();
-        Ok(outcome.and_then(|o| o.result.ok()).map(|p| p.state))
+        let window = Arc::new(window);
+        let outcomes = fleet.run(self.candidate.setup, vec![self.job(&window, None, 0.0)])?;
+        let prediction = predictions(self.study, self.record, &window, outcomes)?.pop().flatten();
+        Ok(prediction.map(|p| p.state))
     }
 
     fn begin(&self, roukf: &Roukf, start: &[f64], intensity: f64, windows: usize) -> Forward {
@@ -162,16 +162,12 @@ impl Walk<'_> {
         for (index, job) in jobs.iter_mut().enumerate() {
             job.particle = index as u32;
         }
-        let mut outcomes = fleet.run(self.candidate.setup, jobs)?.into_iter();
+        let outcomes = fleet.run(self.candidate.setup, jobs)?;
+        let mut answers = predictions(self.study, self.record, window, outcomes)?.into_iter();
         let mut of_walk = |z: &DMatrix<f64>| {
-            let answers: Vec<_> = outcomes.by_ref().take(z.ncols()).map(|o| o.result.ok()).collect();
-            let mut predictions: Vec<Prediction> = answers.into_iter().collect::<Option<_>>()?;
-            for p in &mut predictions {
-                self.study.measure(self.record, &window.times, &mut p.outputs);
-            }
-            let fits =
-                |p: &Prediction| p.outputs.len() == window.observed.len() && p.state.len() + 1 == z.nrows();
-            predictions.iter().all(fits).then_some(predictions)
+            let of_walk: Vec<_> = answers.by_ref().take(z.ncols()).collect();
+            let predictions: Vec<Prediction> = of_walk.into_iter().collect::<Option<_>>()?;
+            predictions.iter().all(|p| p.state.len() + 1 == z.nrows()).then_some(predictions)
         };
         Ok(particles.iter().map(|z| z.as_ref().and_then(&mut of_walk)).collect())
     }
@@ -213,25 +209,22 @@ impl Walk<'_> {
         Some(walk)
     }
 
-    /// Log-likelihood without an input, over one run.
-    fn without(&self, fleet: &mut dyn Fleet) -> Result<Option<f64>, ExplainError> {
-        let window = Arc::new(self.study.whole(self.record, true));
-        let outcome = fleet.run(self.candidate.setup, vec![self.job(&window, None, 0.0)])?.pop();
-        let Some(mut p) = outcome.and_then(|o| o.result.ok()) else { return Ok(None) };
-        self.study.measure(self.record, &window.times, &mut p.outputs);
+    /// Log-likelihood without an input.
+    fn without(&self) -> f64 {
+        let window = self.study.whole(self.record, true);
         let sd = self.study.noise(self.record);
         let of = |(k, (y, h)): (usize, (&f64, &f64))| {
             let sd = sd[k % sd.len()];
             -0.5 * (((y - h) / sd).powi(2) + (std::f64::consts::TAU * sd * sd).ln())
         };
-        let pairs = window.observed.iter().zip(&p.outputs).enumerate();
-        Ok(Some(pairs.filter(|(_, (y, _))| y.is_finite()).map(of).sum()))
+        let pairs = window.observed.iter().zip(&self.candidate.without).enumerate();
+        pairs.filter(|(_, (y, _))| y.is_finite()).map(of).sum()
     }
 }
 
 impl Forward {
     /// Back from the last window to the first: estimates given all data.
-    fn smooth(self, intensity: f64, without: f64) -> Estimate {
+    fn smooth(self, without: f64) -> Estimate {
         let n = self.past.len();
         let (mut value, mut sd, mut at) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
         let mut later: Option<(DVector<f64>, DMatrix<f64>)> = None;
@@ -256,7 +249,7 @@ impl Forward {
             later = Some((mean, covariance));
         }
         let time = self.past.iter().map(|p| p.time).collect();
-        Estimate { intensity, time, value, sd, at, log_likelihood: self.log_likelihood, without }
+        Estimate { time, value, sd, at, log_likelihood: self.log_likelihood, without }
     }
 }
 

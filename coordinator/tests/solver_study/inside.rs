@@ -1,0 +1,155 @@
+//! A solver that runs equations inside, reached without a process: what it predicts is known to the last bit.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use starlings_coordinator::fleet::{Factory, Fleet, InProcess};
+use starlings_coordinator::study::store::Purpose;
+use starlings_coordinator::study::{
+    FolderError, RunContext, RunError, RunFolder, Study, StudyError, Summary, Surroundings, run::run,
+};
+use starlings_models::{
+    Addition, Description, EffectDef, EffectParameter, External, Job, ModelDef, ParticleError, Run, SOLVER,
+    Setup, SetupError, Solve, Solved, Spec,
+};
+
+/// Equations behind the wall that a solver is.
+#[derive(Clone)]
+pub(crate) struct Inside {
+    model: ModelDef,
+    description: Description,
+}
+
+impl Inside {
+    /// The model of a study as a solver that takes terms on these states.
+    pub(crate) fn of(native: &Study, hosts: &[&str]) -> Self {
+        let mut model = native.setup.model.clone();
+        let spec = Setup { model: model.clone(), ..Setup::default() }.spec().unwrap();
+        model.constants.retain(|name, _| spec.parameters.iter().all(|q| q.name != *name));
+        let description = Description {
+            spec: Spec { kind: SOLVER.to_owned(), ..spec },
+            name: "swing".to_owned(),
+            deterministic: true,
+            observers: vec!["nudging".to_owned()],
+            hosts: hosts.iter().map(|name| (*name).to_owned()).collect(),
+        };
+        Self { model, description }
+    }
+
+    /// The same with another description.
+    pub(crate) fn described(mut self, change: impl FnOnce(&mut Description)) -> Self {
+        change(&mut self.description);
+        self
+    }
+
+    /// Who asks and runs it.
+    pub(crate) fn surroundings(&self) -> Surroundings {
+        let known = self.description.clone();
+        Surroundings::new(move |_| Ok(known.clone()), self.factory())
+    }
+
+    /// What a fleet makes setups with.
+    pub(crate) fn factory(&self) -> Factory {
+        let own = self.clone();
+        Arc::new(move |setup: &Setup| {
+            if setup.model.kind != SOLVER {
+                return setup.build();
+            }
+            Ok(Box::new(External::new(setup, own.description.clone(), own.clone())?) as Box<_>)
+        })
+    }
+
+    pub(crate) fn description(&self) -> &Description {
+        &self.description
+    }
+}
+
+impl Solve for Inside {
+    fn solve(&self, run: &Run<'_>) -> Result<Solved, ParticleError> {
+        let broken = |error: SetupError| ParticleError::Solver(error.to_string());
+        let mut model = self.model.clone();
+        model.constants.extend(run.constants.iter().cloned());
+        let own = self.description.spec.parameters.iter().map(|q| q.name.clone());
+        let initial = run.initial.iter().map(|(state, _)| format!("initial:{state}"));
+        // An effect needs an amplitude; what the terms are worth stands in their constants.
+        let always = EffectParameter { name: "always".to_owned(), ..EffectParameter::default() };
+        let scaled = |add: &Addition| Addition { to: add.to.clone(), term: format!("always*({})", add.term) };
+        let terms = EffectDef {
+            name: "terms".to_owned(),
+            adds: run.terms.iter().map(scaled).collect(),
+            parameters: vec![always],
+            ..EffectDef::default()
+        };
+        let with_terms = !run.terms.is_empty();
+        if with_terms {
+            model.constants.insert("always".to_owned(), 1.0);
+        }
+        let setup = Setup {
+            model,
+            parameters: own.chain(initial).collect(),
+            outputs: run.outputs.to_vec(),
+            observer: run.observer.clone(),
+            effects: if with_terms { vec![terms] } else { Vec::new() },
+        };
+        let theta =
+            run.parameters.iter().copied().chain(run.initial.iter().map(|(_, value)| *value)).collect();
+        let job = Job {
+            particle: run.particle,
+            record: run.record,
+            window: Arc::new(run.window.clone()),
+            theta,
+            state: run.state.map(<[f64]>::to_vec),
+        };
+        let prediction = setup.build().map_err(broken)?.run(&job)?;
+        let state = if self.description.spec.restart { prediction.state } else { Vec::new() };
+        Ok(Solved { outputs: prediction.outputs, state })
+    }
+}
+
+/// A study with its files in a folder of their own.
+pub(crate) struct Place {
+    pub(crate) folder: tempfile::TempDir,
+}
+
+impl Place {
+    pub(crate) fn new(files: &[(&str, &str)]) -> Self {
+        let place = Self { folder: tempfile::tempdir().unwrap() };
+        for (name, text) in files {
+            place.write(name, text);
+        }
+        place
+    }
+
+    pub(crate) fn write(&self, name: &str, text: &str) {
+        std::fs::write(self.folder.path().join(name), text).unwrap();
+    }
+
+    pub(crate) fn file(&self) -> PathBuf {
+        self.folder.path().join("study.toml")
+    }
+
+    pub(crate) fn load(&self, surroundings: &Surroundings) -> Result<Study, StudyError> {
+        Study::load_with(&self.file(), surroundings)
+    }
+
+    /// Runs a study into a new folder.
+    pub(crate) fn run(&self, study: &Study, fleet: &mut dyn Fleet, out: &str) -> Result<Summary, RunError> {
+        let mut folder = RunFolder::create(Purpose::Run, &self.out(out), study, "test", "today").unwrap();
+        let mut context =
+            RunContext { clock: &|| 0.0, watch: &mut |_| {}, events: None, earlier_s: 0.0, threads: 2 };
+        run(study, fleet, &mut folder, &mut context)
+    }
+
+    pub(crate) fn resume(&self, study: &Study, out: &str) -> Result<(), FolderError> {
+        RunFolder::resume(Purpose::Run, &self.out(out), study).map(|_| ())
+    }
+
+    fn out(&self, name: &str) -> PathBuf {
+        Path::new(self.folder.path()).join(name)
+    }
+}
+
+/// Threads that make their setups with this solver.
+pub(crate) fn threads(inside: &Inside) -> InProcess {
+    InProcess::new(2).with_factory(inside.factory())
+}

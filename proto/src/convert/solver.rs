@@ -1,0 +1,150 @@
+//! What a worker and an external solver say to each other, both ways.
+//!
+//! Next files to read: `proto/solver.proto`, then [`description`] for what a solver says of itself.
+
+pub mod description;
+
+use starlings_models::{Addition, ObserverDef, ParticleError, Run, Signal, Solved, Window};
+
+use super::{WireError, floats, required};
+use crate::solver_wire::{self as wire, failure::Kind as FailureKind, run_reply::Kind as ReplyKind};
+
+/// Number of the protocol between worker and solver; both must have the same.
+pub const SOLVER_PROTOCOL: u32 = 1;
+
+/// One run as a solver receives it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Request {
+    /// Index of the sigma point.
+    pub particle: u32,
+    /// Index of the record.
+    pub record: u32,
+    /// Parameters in the order of the description.
+    pub parameters: Vec<f64>,
+    /// Initial values by the name of the state's component.
+    pub initial: Vec<(String, f64)>,
+    /// Names of the outputs asked for.
+    pub outputs: Vec<String>,
+    /// Start, times, observed values and inputs.
+    pub window: Window,
+    /// The observer.
+    pub observer: ObserverDef,
+    /// State at the start.
+    pub state: Option<Vec<f64>>,
+    /// Terms added to the rates of hosted states.
+    pub terms: Vec<Addition>,
+    /// Values of names in the terms.
+    pub constants: Vec<(String, f64)>,
+}
+
+/// One message of a solver about a run.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Reply {
+    /// The study time reached.
+    Progress(f64),
+    /// The run's end: what it predicts, or why it does not.
+    Ended(Result<Solved, ParticleError>),
+}
+
+/// The message that asks for a run; `scratch` is the run's own folder.
+pub fn encode_run(run: &Run<'_>, scratch: &str) -> wire::RunRequest {
+    let named = |values: &[(String, f64)]| {
+        values.iter().map(|(name, value)| wire::Named { name: name.clone(), value: Some(*value) }).collect()
+    };
+    let term = |add: &Addition| wire::Term { state: add.to.clone(), expression: add.term.clone() };
+    let signal =
+        |s: &Signal| wire::Signal { times: floats::encode(&s.times), values: floats::encode(&s.values) };
+    wire::RunRequest {
+        particle: run.particle,
+        record: run.record,
+        parameters: floats::encode(run.parameters),
+        initial: named(run.initial),
+        state: run.state.map(floats::encode),
+        start: Some(run.window.start),
+        times: floats::encode(&run.window.times),
+        outputs: run.outputs.to_vec(),
+        observed: floats::encode(&run.window.observed),
+        observer: Some(wire::Observer { kind: run.observer.kind.clone(), gain: run.observer.gain }),
+        inputs: run.window.inputs.iter().map(signal).collect(),
+        terms: run.terms.iter().map(term).collect(),
+        constants: named(run.constants),
+        scratch: scratch.to_owned(),
+    }
+}
+
+/// A run as a solver receives it.
+///
+/// # Errors
+/// When a field is missing or ragged.
+pub fn decode_run(message: &wire::RunRequest) -> Result<Request, WireError> {
+    let named = |values: &[wire::Named]| {
+        let one = |n: &wire::Named| Ok((n.name.clone(), required(n.value, "value")?));
+        values.iter().map(one).collect::<Result<Vec<_>, WireError>>()
+    };
+    let signal = |s: &wire::Signal| {
+        let times = floats::decode(&s.times, "input times")?;
+        Ok(Signal { times, values: floats::decode(&s.values, "input values")? })
+    };
+    let term = |t: &wire::Term| Addition { to: t.state.clone(), term: t.expression.clone() };
+    let observer = message.observer.clone().unwrap_or_default();
+    Ok(Request {
+        particle: message.particle,
+        record: message.record,
+        parameters: floats::decode(&message.parameters, "parameters")?,
+        initial: named(&message.initial)?,
+        outputs: message.outputs.clone(),
+        window: Window {
+            start: required(message.start, "start")?,
+            times: floats::decode(&message.times, "times")?,
+            observed: floats::decode(&message.observed, "observed")?,
+            inputs: message.inputs.iter().map(signal).collect::<Result<_, WireError>>()?,
+        },
+        observer: ObserverDef { kind: observer.kind, gain: observer.gain, ..ObserverDef::default() },
+        state: message.state.as_ref().map(|bytes| floats::decode(bytes, "state")).transpose()?,
+        terms: message.terms.iter().map(term).collect(),
+        constants: named(&message.constants)?,
+    })
+}
+
+/// The message of a reply.
+pub fn encode_reply(reply: &Reply) -> wire::RunReply {
+    let failure = |kind: FailureKind, text: String, time| {
+        ReplyKind::Failure(wire::Failure { kind: kind.into(), text, time })
+    };
+    let kind = match reply {
+        Reply::Progress(time) => ReplyKind::Progress(wire::Progress { time: Some(*time) }),
+        Reply::Ended(Ok(solved)) => ReplyKind::Finished(wire::Finished {
+            outputs: floats::encode(&solved.outputs),
+            state: floats::encode(&solved.state),
+        }),
+        Reply::Ended(Err(ParticleError::NotFinite { what, time })) => {
+            failure(FailureKind::NotFinite, what.clone(), Some(*time))
+        }
+        Reply::Ended(Err(ParticleError::BadJob(text))) => {
+            failure(FailureKind::BadRequest, text.clone(), None)
+        }
+        Reply::Ended(Err(error)) => failure(FailureKind::Solver, error.to_string(), None),
+    };
+    wire::RunReply { kind: Some(kind) }
+}
+
+/// A reply of a solver.
+///
+/// # Errors
+/// When it is empty or ragged.
+pub fn decode_reply(message: wire::RunReply) -> Result<Reply, WireError> {
+    Ok(match required(message.kind, "kind")? {
+        ReplyKind::Progress(progress) => Reply::Progress(required(progress.time, "time")?),
+        ReplyKind::Finished(finished) => Reply::Ended(Ok(Solved {
+            outputs: floats::decode(&finished.outputs, "outputs")?,
+            state: floats::decode(&finished.state, "state")?,
+        })),
+        ReplyKind::Failure(failure) => Reply::Ended(Err(match failure.kind() {
+            FailureKind::NotFinite => {
+                ParticleError::NotFinite { what: failure.text, time: failure.time.unwrap_or(f64::NAN) }
+            }
+            FailureKind::BadRequest => ParticleError::BadJob(failure.text),
+            FailureKind::Solver => ParticleError::Solver(failure.text),
+        })),
+    })
+}

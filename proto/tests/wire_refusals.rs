@@ -1,0 +1,81 @@
+//! What cannot be meant is refused: by the side that would send it where that can know, else by the side that receives it.
+#![allow(clippy::unwrap_used)]
+
+use std::sync::Arc;
+
+use starlings_models::{Job, Prediction, Setup, Signal, Window};
+use starlings_proto::{
+    Answer, FromWorker, JobEncoder, Lease, MAX_INLINE_STATE, MAX_SLOTS, ToWorker, WireError,
+    convert::job::check_size, encode_setup, wire,
+};
+
+fn small_job() -> Job {
+    let window = Window { start: 0.0, times: vec![1.0], observed: vec![2.0], inputs: vec![] };
+    Job { particle: 0, record: 0, window: Arc::new(window), theta: vec![], state: None }
+}
+
+#[test]
+fn a_setup_with_an_infinite_constant_is_refused_before_it_travels() {
+    let mut setup = Setup::default();
+    setup.model.constants.insert("R".to_owned(), f64::INFINITY);
+    assert!(matches!(encode_setup(&setup), Err(WireError::Setup(_))));
+}
+
+#[test]
+fn a_state_beyond_the_limit_is_refused_on_both_sides() {
+    let mut job = small_job();
+    job.state = Some(vec![0.0; MAX_INLINE_STATE / 8]);
+    assert_eq!(check_size(&job), Ok(()));
+    job.state = Some(vec![0.0; MAX_INLINE_STATE / 8 + 1]);
+    let error = check_size(&job).unwrap_err();
+    assert!(error.to_string().contains("chunked transfer of states is not available yet"), "{error}");
+
+    let lease = Lease { epoch: 1, job: 1, attempt: 1 };
+    let sent = JobEncoder::default().encode(lease, &[0; 32], &job);
+    assert!(matches!(ToWorker::decode(sent), Err(WireError::Job { lease: l, .. }) if l == lease));
+    let prediction = Prediction { outputs: vec![], state: job.state.unwrap(), cost: 0.0 };
+    let result = FromWorker::Result { lease, answer: Answer::Ran(Ok(prediction)), cost: 0.0 };
+    assert!(matches!(result.encode(), Err(WireError::StateTooLarge { .. })));
+}
+
+#[test]
+fn a_malformed_job_names_its_lease_so_that_it_can_be_answered() {
+    let lease = Lease { epoch: 1, job: 9, attempt: 1 };
+    let sent = JobEncoder::default().encode(lease, &[0; 32], &small_job());
+    let Some(wire::to_worker::Kind::Job(good)) = sent.kind else { panic!("a job is encoded as a job") };
+    let spoil: [fn(&mut wire::Job); 4] = [
+        |job| job.theta = vec![1, 2, 3].into(),
+        |job| job.setup = vec![0; 31].into(),
+        |job| job.window = None,
+        |job| job.window.as_mut().unwrap().times = bytes::Bytes::new(),
+    ];
+    for damage in spoil {
+        let mut job = good.clone();
+        damage(&mut job);
+        let message = wire::ToWorker { kind: Some(wire::to_worker::Kind::Job(job)) };
+        assert!(matches!(ToWorker::decode(message), Err(WireError::Job { lease: l, .. }) if l == lease));
+    }
+}
+
+#[test]
+fn a_worker_without_slots_or_with_too_many_is_malformed() {
+    for slots in [0, MAX_SLOTS as u32 + 1, u32::MAX] {
+        let hello = wire::Hello { slots, ..wire::Hello::default() };
+        let message = wire::FromWorker { kind: Some(wire::from_worker::Kind::Hello(hello)) };
+        assert!(matches!(FromWorker::decode(message), Err(WireError::Shape { field: "slots", .. })));
+    }
+}
+
+#[test]
+fn a_window_that_no_worker_would_take_is_refused_before_it_travels() {
+    let spoil: [fn(&mut Window); 3] = [
+        |window| window.times.clear(),
+        |window| window.times = vec![1.0, 2.0],
+        |window| window.inputs = vec![Signal { times: vec![0.0], values: vec![] }],
+    ];
+    for damage in spoil {
+        let mut job = small_job();
+        damage(Arc::make_mut(&mut job.window));
+        assert!(matches!(check_size(&job), Err(WireError::Shape { .. })), "{job:?}");
+    }
+}

@@ -1,0 +1,184 @@
+"""One run: march through the window, record, correct.
+
+For each observation time: advance, record the outputs, and only then let the observer see what was observed at that time. A run
+over consecutive windows takes the steps of one run over the whole. Next file to read: service.py.
+"""
+
+from __future__ import annotations
+
+import math
+import traceback
+from typing import Any, Callable, Dict, List, Sequence, Tuple
+
+import numpy as np
+
+from .failures import BAD_REQUEST, NOT_FINITE, SOLVER, BadRequest, Cancelled, Failed, NotFinite, told
+from .job import Answer, Job, check_finite, prepare
+from .quantity import Layout
+from .solver import Served
+from .terms import Frame
+from .values import Array, StepInputs, Values, array, named
+from .window import Row, Window
+
+
+def execute(
+    served: Served,
+    job: Job,
+    stopped: Callable[[], bool] = lambda: False,
+    progress: Callable[[float], None] = lambda time: None,
+) -> Answer:
+    """Runs a job. Raises Failed, or Cancelled when nobody waits any more."""
+    try:
+        window = prepare(served, job, stopped, progress)
+        served.solver.window = window
+        if job.state is None:
+            window.state = initial_state(served, window, job.initial)
+        if served.form == "run":
+            return _whole(served, window)
+        return _March(served, window).run()
+    except (Cancelled, Failed):
+        raise
+    except BadRequest as error:
+        raise Failed(BAD_REQUEST, str(error)) from error
+    except NotFinite as error:
+        raise Failed(NOT_FINITE, error.what, error.time) from error
+    except Exception as error:  # whatever a solver raises is data about this run
+        traceback.print_exc()
+        raise Failed(SOLVER, told(error)) from error
+
+
+class _March:
+    """A run by `step` or `rate`."""
+
+    def __init__(self, served: Served, window: Window) -> None:
+        self.served, self.window, self.solver = served, window, served.solver
+        self.advance = self._step if served.form == "step" else self._runge_kutta
+        self.n = served.states.size
+        # Begin of a span between samples, the inputs there, and their slopes on it.
+        self._line: Tuple[float, Array, Array] = (math.nan, np.zeros(0), np.zeros(0))
+
+    def run(self) -> Answer:
+        served, window = self.served, self.window
+        x = window.state
+        recorded = np.empty((window.times.size, len(window._rows)))
+        previous = window.start
+        for index, time in enumerate(window.times.tolist()):
+            x = self._to(previous, time, x)
+            y = self._outputs(time, x)
+            check_finite(served.states, "state", x, time)
+            check_finite(served.outputs, "output", y, time)
+            recorded[index] = _recorded(window._rows, y, x)
+            x = window.correct(index, x, y)
+            window.progress(time)
+            previous = time
+        check_finite(served.states, "state", x, previous)
+        return Answer(recorded, x)
+
+    def _to(self, previous: float, time: float, x: Array) -> Array:
+        """The state at `time`."""
+        for t, h in self.window.steps(previous, time, self.solver.dt, self.solver.cut_at_samples):
+            x = self.advance(t, h, x)
+        return x
+
+    def _step(self, t: float, h: float, x: Array) -> Array:
+        u = StepInputs(self.served.inputs, self.window.inputs, t, t + h)
+        told_states = self.served.states.told()
+        return array(
+            self.solver.step(t, h, x, self.window.p, u), self.n, "step returned the states", told_states
+        )
+
+    def _rate(self, t: float, x: Array) -> Array:
+        u = self._driven(t)
+        given = self.solver.rate(t, x, self.window.p, u)
+        rate = array(given, self.n, "rate returned the states' rates", self.served.states.told())
+        # A solver may give the same array every time.
+        rate = rate.copy()
+        if not self.window._terms.of:
+            return rate
+        lo, hi = self.window._span
+        self.window._terms.add(rate, Frame(t, x, u.array, 0.5 * (lo + hi)))
+        return rate
+
+    def _driven(self, t: float) -> Values:
+        """Inputs at a time inside the span that is being marched through, its end included."""
+        inputs = self.window.inputs
+        if not self.solver.cut_at_samples or not len(inputs):
+            return inputs.at(t)
+        begin = self.window._span[0]
+        if self._line[0] != begin:
+            self._line = (begin, *inputs.line(begin))
+        _, value, slope = self._line
+        return Values(self.served.inputs, value + slope * (t - begin))
+
+    def _runge_kutta(self, t: float, h: float, x: Array) -> Array:
+        """One step of the classical method (Kutta 1901)."""
+        k1 = self._rate(t, x)
+        k2 = self._rate(t + 0.5 * h, x + 0.5 * h * k1)
+        k3 = self._rate(t + 0.5 * h, x + 0.5 * h * k2)
+        k4 = self._rate(t + h, x + h * k3)
+        moved: Array = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+        check_finite(self.served.states, "state", moved, t + h)
+        return moved
+
+    def _outputs(self, time: float, x: Array) -> Array:
+        served = self.served
+        if served.plain:
+            parts = [x[served.states.slices[served.measures[name]]] for name in served.outputs.names()]
+            shown: Array = np.concatenate(parts)
+            return shown
+        given = self.solver.output(time, x, self.window.p, self.window.inputs.at(time))
+        return named(given, served.outputs, "output returned")
+
+
+def initial_state(served: Served, window: Window, estimated: Dict[str, float]) -> Array:
+    """The solver's initial state with the estimated initial values in their places."""
+    given = served.solver.initial(window.p)
+    states = served.states
+    x = np.zeros(states.size) if given is None else named(given, states, "initial returned the states").copy()
+    for name, value in estimated.items():
+        at = states.find(name)
+        if at is None:
+            raise BadRequest(f"an initial value of `{name}`, which is no state; there are {states.told()}")
+        x[at.start : at.stop] = value
+    check_finite(states, "state", x, window.start)
+    return x
+
+
+def _whole(served: Served, window: Window) -> Answer:
+    """A run by `run`."""
+    given = served.solver.run(window)
+    state: Any = np.zeros(0)
+    if served.restart:
+        if not (isinstance(given, tuple) and len(given) == 2):
+            raise ValueError("run: a solver with states returns two things, outputs and the state at the end")
+        given, state = given
+        state = array(state, served.states.size, "run returned the states", served.states.told())
+    table = _table(served.outputs, given, window.times.size)
+    for index, time in enumerate(window.times.tolist()):
+        check_finite(served.outputs, "output", table[index], time)
+    end = float(window.times[-1])
+    if served.restart:
+        check_finite(served.states, "state", state, end)
+    recorded = np.array([_recorded(window._rows, row, state) for row in table])
+    return Answer(recorded.reshape(window.times.size, len(window._rows)), state)
+
+
+def _table(outputs: Layout, given: Any, n_times: int) -> Array:
+    """Outputs of a whole window as [n_times][all components]."""
+    if isinstance(given, dict):
+        names = set(given)
+        if names != set(outputs.names()):
+            raise ValueError(
+                f"run: expected the outputs {outputs.told()}, got {', '.join(map(str, given)) or 'none'}"
+            )
+        columns = []
+        for q in outputs.quantities:
+            what = f"run returned `{q.name}` at {n_times} times"
+            columns.append(array(given[q.name], n_times * q.size, what, q.name).reshape(n_times, q.size))
+        return np.hstack(columns)
+    what = f"run returned the outputs at {n_times} times"
+    return array(given, n_times * outputs.size, what, outputs.told()).reshape(n_times, outputs.size)
+
+
+def _recorded(rows: Sequence[Row], y: Array, x: Array) -> List[float]:
+    return [float(y[at]) if what == "output" else float(x[at]) for what, at in rows]

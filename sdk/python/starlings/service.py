@@ -1,0 +1,140 @@
+"""The two calls on a socket, and the one thread that computes.
+
+gRPC's own threads only hand over: every run happens in the thread that calls `Server.work`, one after the other, in the order
+of arrival. Next file to read: serve.py.
+"""
+
+from __future__ import annotations
+
+import queue
+import time
+from concurrent import futures
+from typing import Any, Callable, Iterator, Optional
+
+import grpc
+
+from . import _solver_pb2 as pb
+from . import wire
+from .failures import BAD_REQUEST, BadRequest, Cancelled, Failed
+from .job import Answer, Job
+from .run import execute
+from .solver import Served
+
+#: What computes a job: the answer, or Failed, or Cancelled.
+Runner = Callable[[Job, Callable[[], bool], Callable[[float], None]], Answer]
+
+#: Seconds between two messages of progress at least.
+_PROGRESS_EVERY = 0.5
+
+#: States may have any size; large frames spare wake-ups.
+OPTIONS = [
+    ("grpc.max_receive_message_length", -1),
+    ("grpc.max_send_message_length", -1),
+    ("grpc.http2.max_frame_size", 16_777_215),
+    ("grpc.so_reuseport", 0),
+]
+
+
+class _Call:
+    """One call of Run: its request, its replies, and whether anybody still waits."""
+
+    def __init__(self, request: Any) -> None:
+        self.request = request
+        self.replies: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self.over = False
+        self._told = time.monotonic()
+
+    def end(self) -> None:
+        """The call was answered, or given up."""
+        self.over = True
+        self.replies.put(None)
+
+    def stopped(self) -> bool:
+        return self.over
+
+    def progress(self, reached: float) -> None:
+        now = time.monotonic()
+        if now - self._told >= _PROGRESS_EVERY:
+            self._told = now
+            self.replies.put(wire.progress(reached))
+
+
+class Server:
+    """Serves one solver at one address."""
+
+    def __init__(self, served: Served, runner: Optional[Runner] = None) -> None:
+        self._description = wire.description(served)
+        self._runner: Runner = runner or (
+            lambda job, stopped, progress: execute(served, job, stopped, progress)
+        )
+        self._calls: queue.SimpleQueue[Optional[_Call]] = queue.SimpleQueue()
+        self._server = grpc.server(futures.ThreadPoolExecutor(max_workers=8), options=OPTIONS)
+        handlers = {
+            "Describe": grpc.unary_unary_rpc_method_handler(
+                lambda request, context: self._description,
+                request_deserializer=pb.DescribeRequest.FromString,
+                response_serializer=pb.Description.SerializeToString,
+            ),
+            "Run": grpc.unary_stream_rpc_method_handler(
+                self._run,
+                request_deserializer=pb.RunRequest.FromString,
+                response_serializer=pb.RunReply.SerializeToString,
+            ),
+        }
+        service = grpc.method_handlers_generic_handler("starlings.solver.v1.Solver", handlers)
+        self._server.add_generic_rpc_handlers((service,))
+
+    def listen(self, address: str) -> str:
+        """Listens at `unix:PATH` or `host:port` and returns where; port 0 becomes the port that was free.
+
+        Raises OSError where nobody can listen.
+        """
+        try:
+            port = self._server.add_insecure_port(address)
+        except RuntimeError as error:
+            raise OSError(f"cannot listen at {address}: {error}") from error
+        if port == 0:
+            raise OSError(f"cannot listen at {address}")
+        self._server.start()
+        if address.startswith("unix:"):
+            return address
+        return f"{address.rpartition(':')[0]}:{port}"
+
+    def work(self) -> None:
+        """Computes, for ever or until `stop`."""
+        while True:
+            call = self._calls.get()
+            if call is None:
+                return
+            if not call.over:
+                self._answer(call)
+            call.end()
+
+    def stop(self) -> None:
+        """Ends `work` after the runs that have arrived, and listening."""
+        self._calls.put(None)
+        self._server.stop(None)
+
+    def _run(self, request: Any, context: Any) -> Iterator[Any]:
+        call = _Call(request)
+        if not context.add_callback(call.end):
+            return
+        self._calls.put(call)
+        while True:
+            reply = call.replies.get()
+            if reply is None:
+                return
+            yield reply
+
+    def _answer(self, call: _Call) -> None:
+        try:
+            job = wire.job(call.request)
+            # The message holds the bytes a second time.
+            call.request = None
+            call.replies.put(wire.finished(self._runner(job, call.stopped, call.progress)))
+        except Cancelled:
+            return
+        except BadRequest as error:
+            call.replies.put(wire.failure(Failed(BAD_REQUEST, str(error))))
+        except Failed as error:
+            call.replies.put(wire.failure(error))

@@ -1,0 +1,65 @@
+"""Reading what a run leaves."""
+
+import json
+
+import numpy as np
+import pytest
+
+import starlings
+
+POSTERIOR = """parameter,unit,transform,estimate,sd,lo95,hi95,mean_transformed,cov:k,cov:c
+k,N/m,log,40.25,0.5,39.0,41.0,3.69,0.0001,-2e-5
+c,N s/m,log,0.75,0.01,0.7,0.8,-0.28,-2e-5,0.0004
+"""
+SUMMARY = {
+    "study": "oscillator",
+    "parameters": [
+        {"name": "k", "unit": "N/m", "estimate": 40.25, "sd": 0.5, "interval95": [39.0, 41.0]},
+        {"name": "c", "unit": "N s/m", "estimate": 0.75, "sd": 0.01, "interval95": [0.7, 0.8]},
+    ],
+    "correlation": [[1.0, -0.1], [-0.1, 1.0]],
+    "warnings": ["short"],
+}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "posterior.csv").write_text(POSTERIOR)
+    (tmp_path / "summary.json").write_text(json.dumps(SUMMARY))
+    return tmp_path
+
+
+def test_a_run_is_read(folder):
+    run = starlings.read_run(folder)
+    assert run.names == ["k", "c"]
+    assert run["c"]["interval95"] == [0.7, 0.8]
+    assert np.array_equal(run.covariance, [[1e-4, -2e-5], [-2e-5, 4e-4]])
+    assert np.array_equal(run.correlation, [[1.0, -0.1], [-0.1, 1.0]])
+    assert run.warnings == ["short"]
+    with pytest.raises(KeyError, match="no parameter `q`"):
+        run["q"]
+
+
+def test_without_pandas_the_table_is_of_arrays(folder, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "pandas", None)
+    table = starlings.read_run(folder).parameters
+    assert table["estimate"].tolist() == [40.25, 0.75]
+    assert table["parameter"].tolist() == ["k", "c"]
+
+
+def test_with_pandas_the_table_has_one_row_per_parameter(folder):
+    pytest.importorskip("pandas")
+    table = starlings.read_run(folder).parameters
+    assert table.loc["c", "estimate"] == 0.75
+    assert table.loc["k", "unit"] == "N/m"
+
+
+def test_with_xarray_the_covariance_has_names(folder):
+    pytest.importorskip("xarray")
+    table = starlings.read_run(folder).covariance_table()
+    assert float(table.sel({"parameter": "k", "with": "c"})) == -2e-5
+
+
+def test_a_folder_of_no_run_says_what_it_lacks(tmp_path):
+    with pytest.raises(FileNotFoundError, match="it lacks summary.json"):
+        starlings.read_run(tmp_path)

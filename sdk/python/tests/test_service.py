@@ -1,0 +1,373 @@
+"""A real server process over a real socket."""
+
+import os
+import re
+import signal
+import threading
+
+import grpc
+import numpy as np
+import pytest
+
+from served import floats, numbers
+from starlings import _solver_pb2 as pb
+
+DECAY = """
+    import starlings
+
+    @starlings.solver(parameters={"rate": "1/s"}, states={"x": "m"}, outputs={"height": "m"}, inputs={"rise": "m/s"},
+                      measures={"height": "x"}, dt=0.01)
+    class Decay:
+        "A height that falls."
+        def initial(self, p):
+            return [1.0]
+        def rate(self, t, x, p, u):
+            return [-p.rate * x[0] + u.rise]
+
+    starlings.serve(Decay)
+"""
+
+
+def request(**changes):
+    fields = dict(
+        parameters=floats(0.5),
+        start=0.0,
+        times=floats(0.5, 1.0),
+        outputs=["height"],
+        observed=floats(np.nan, np.nan),
+        inputs=[pb.Signal(times=floats(0.0, 1.0), values=floats(0.0, 0.0))],
+    )
+    fields.update(changes)
+    return pb.RunRequest(**fields)
+
+
+def test_a_solver_says_what_it_is(serve):
+    said = serve(DECAY).describe()
+    assert (said.protocol, said.name, said.says) == (1, "decay", "A height that falls.")
+    assert [(q.name, q.unit) for q in said.parameters] == [("rate", "1/s")]
+    assert [(q.name, q.unit, q.size) for q in said.states] == [("x", "m", 1)]
+    assert [q.name for q in said.inputs] == ["rise"]
+    assert said.restart and said.deterministic
+    assert list(said.observers) == ["nudging"] and list(said.hosts) == ["x"]
+    assert [(m.output, m.state) for m in said.measures] == [("height", "x")]
+    assert not said.parameters[0].HasField("default_value") and not said.parameters[0].HasField("lo")
+
+
+def test_a_run_comes_back_over_a_unix_socket(serve):
+    process = serve(DECAY)
+    assert process.line == f"starlings-solver ready unix:{process.socket}\n"
+    finished = process.run(request()).finished
+    # Fifty steps of a fourth-order method: the error is (rate dt)^5/120 per step, about 1e-12 in all.
+    assert np.allclose(numbers(finished.outputs), np.exp([-0.25, -0.5]), rtol=1e-11, atol=0)
+    assert numbers(finished.state)[0] == numbers(finished.outputs)[1]
+
+
+def test_a_solver_listens_at_a_port_that_is_free(serve):
+    process = serve(DECAY, {"STARLINGS_SOLVER_ADDRESS": "127.0.0.1:0"})
+    assert re.fullmatch(r"starlings-solver ready 127\.0\.0\.1:[1-9][0-9]*\n", process.line)
+    assert process.describe().name == "decay"
+
+
+def test_a_restart_gives_the_bits_of_one_run(serve):
+    process = serve(DECAY)
+    driven = [pb.Signal(times=floats(0.0, 0.33, 1.0), values=floats(0.0, 2.0, -1.0))]
+    times = np.linspace(0.1, 1.0, 10)
+    whole = process.run(request(times=floats(*times), observed=floats(*[np.nan] * 10), inputs=driven)).finished
+    state, start, pieces = None, 0.0, []
+    for part in (times[:3], times[3:4], times[4:]):
+        observed = floats(*[np.nan] * len(part))
+        ask = request(times=floats(*part), start=start, observed=observed, inputs=driven)
+        if state is not None:
+            ask.state = state
+        finished = process.run(ask).finished
+        pieces.append(finished.outputs)
+        state, start = finished.state, part[-1]
+    assert b"".join(pieces) == whole.outputs
+    assert state == whole.state
+
+
+def test_equal_requests_give_equal_bytes(serve):
+    process = serve(DECAY)
+    assert process.run(request()) == process.run(request())
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"parameters": floats(1.0, 2.0)}, "parameters: expected 1 numbers (rate), got 2"),
+        ({"parameters": b"123"}, "parameters: 3 bytes are no whole count of 64-bit numbers"),
+        ({"state": floats(1.0, 2.0)}, "state: expected 1 numbers (x), got 2"),
+        ({"outputs": ["heigth"]}, "no output `heigth`; there are height"),
+        ({"observed": floats(1.0)}, "observed values: expected 2 times of 1 (height), got 1"),
+        ({"times": floats(0.5, 0.5)}, "observation times must increase from the start of the window"),
+        ({"times": b"", "observed": b""}, "a window without observation times"),
+        ({"inputs": []}, "input signals: expected 1 (rise), got 0"),
+        ({"start": None}, "a request without start"),
+        ({"observer": pb.Observer(kind="sdf", gain=1.0)}, "`decay` hosts no observer `sdf`; it hosts nudging"),
+        (
+            {"terms": [pb.Term(state="y", expression="1")]},
+            "a term for the state `y`, which hosts none; states that do: x",
+        ),
+        (
+            {"terms": [pb.Term(state="x", expression="2*nobody")]},
+            "the term of `x`: `2*nobody`, column 3: nothing is named `nobody`",
+        ),
+    ],
+)
+def test_what_does_not_fit_is_told_in_a_sentence(serve, changes, said):
+    failure = serve(DECAY).run(request(**changes)).failure
+    assert (failure.kind, failure.text) == (pb.Failure.BAD_REQUEST, said)
+
+
+BROKEN = """
+    import numpy as np
+    import starlings
+
+    class Broken(starlings.Solver):
+        parameters = {"how": ""}
+        states = [starlings.Quantity("wall", "m", size=2)]
+        outputs = {"y": ""}
+        dt = 1.0
+        def step(self, t, dt, x, p, u):
+            print("noise on standard output")
+            if p.how == 1.0:
+                return 1 / 0
+            if p.how == 2.0:
+                return [0.0, np.nan]
+            if p.how == 3.0:
+                return [1.0, 2.0, 3.0]
+            if p.how == 4.0:
+                raise starlings.NotFinite("pressure", t)
+            return x
+        def output(self, t, x, p, u):
+            return [np.inf if p.how == 5.0 else 0.0]
+
+    starlings.serve(Broken)
+"""
+
+
+@pytest.mark.parametrize(
+    ("how", "kind", "text", "time"),
+    [
+        (1.0, pb.Failure.SOLVER, "ZeroDivisionError: division by zero (some_solver.py:13)", None),
+        (2.0, pb.Failure.NOT_FINITE, "state `wall[1]`", 1.0),
+        (
+            3.0,
+            pb.Failure.SOLVER,
+            "ValueError: step returned the states: expected 2 numbers (wall[2]), got 3",
+            None,
+        ),
+        (4.0, pb.Failure.NOT_FINITE, "pressure", 0.0),
+        (5.0, pb.Failure.NOT_FINITE, "output `y`", 1.0),
+    ],
+)
+def test_a_failure_is_told_and_the_next_run_goes_on(serve, how, kind, text, time):
+    process = serve(BROKEN)
+
+    def ask(value):
+        return process.run(
+            pb.RunRequest(
+                parameters=floats(value), start=0.0, times=floats(1.0), outputs=["y"], observed=floats(np.nan)
+            )
+        )
+
+    failure = ask(how).failure
+    assert failure.kind == kind
+    # An exception of the package itself has no line of the solver's own to name.
+    assert failure.text.startswith(text)
+    assert "\n" not in failure.text
+    assert (failure.time if failure.HasField("time") else None) == time
+    assert ask(0.0).WhichOneof("kind") == "finished"
+    assert ("Traceback" in process.stderr()) == (kind == pb.Failure.SOLVER)
+    code, rest = process.close()
+    assert (code, rest) == (0, "")
+    assert "noise on standard output" in process.stderr()
+
+
+def test_a_solver_ends_when_its_lifeline_closes_even_in_a_run(serve, tmp_path):
+    process = serve(
+        """
+        import time
+        import starlings
+
+        class Slow(starlings.Solver):
+            parameters = {"k": ""}
+            outputs = {"y": ""}
+            def run(self, window):
+                open(window.scratch + "/started", "w").close()
+                while True:
+                    time.sleep(0.01)
+
+        starlings.serve(Slow)
+        """
+    )
+    scratch = tmp_path / "scratch"
+    scratch.mkdir()
+    ask = pb.RunRequest(
+        parameters=floats(0.0),
+        start=0.0,
+        times=floats(1.0),
+        outputs=["y"],
+        observed=floats(np.nan),
+        scratch=str(scratch),
+    )
+    call = process.stream(ask)
+    wait_for(lambda: (scratch / "started").exists())
+    process.child.stdin.close()
+    assert process.child.wait(timeout=60) == 0
+    with pytest.raises(grpc.RpcError):
+        list(call)
+
+
+def test_a_cancelled_run_stops_between_steps_and_the_next_one_is_served(serve, tmp_path):
+    process = serve(
+        """
+        import time
+        import starlings
+
+        class Long(starlings.Solver):
+            parameters = {"steps": ""}
+            states = {"x": ""}
+            outputs = {"y": ""}
+            measures = {"y": "x"}
+            dt = 1.0
+            def step(self, t, dt, x, p, u):
+                if p.steps > 2.0:
+                    open(self.window.scratch + "/started", "w").close()
+                    time.sleep(0.01)
+                return x
+
+        starlings.serve(Long)
+        """
+    )
+    long = pb.RunRequest(
+        parameters=floats(3.0),
+        start=0.0,
+        times=floats(1e6),
+        outputs=["y"],
+        observed=floats(np.nan),
+        scratch=str(tmp_path),
+    )
+    call = process.stream(long)
+    wait_for(lambda: (tmp_path / "started").exists())
+    call.cancel()
+    short = pb.RunRequest(
+        parameters=floats(1.0), start=0.0, times=floats(1.0), outputs=["y"], observed=floats(np.nan)
+    )
+    # A million steps of ten milliseconds would outlast the time that `run` allows.
+    assert process.run(short).WhichOneof("kind") == "finished"
+
+
+def test_every_run_happens_in_the_thread_that_imported_the_solver(serve):
+    process = serve(
+        """
+        import threading
+        import starlings
+
+        HOME = threading.get_ident()
+
+        @starlings.solver(parameters={"k": ""}, outputs={"same": ""})
+        def where(window):
+            return [threading.get_ident() == HOME]
+
+        starlings.serve(where)
+        """
+    )
+    ask = pb.RunRequest(
+        parameters=floats(1.0), start=0.0, times=floats(1.0), outputs=["same"], observed=floats(np.nan)
+    )
+    found = []
+    callers = [threading.Thread(target=lambda: found.append(process.run(ask))) for _ in range(4)]
+    for caller in callers:
+        caller.start()
+    for caller in callers:
+        caller.join()
+    assert [numbers(reply.finished.outputs)[0] for reply in found] == [1.0] * 4
+
+
+def test_a_large_state_travels_both_ways(serve):
+    process = serve(
+        """
+        import starlings
+
+        class Large(starlings.Solver):
+            parameters = {"k": ""}
+            states = [starlings.Quantity("field", size=1_000_000)]
+            outputs = {"first": ""}
+            def step(self, t, dt, x, p, u):
+                return x + 1.0
+            def output(self, t, x, p, u):
+                return x[:1]
+
+        starlings.serve(Large)
+        """
+    )
+    state = np.arange(1_000_000, dtype="<f8")
+    finished = process.run(
+        pb.RunRequest(
+            parameters=floats(1.0),
+            start=0.0,
+            times=floats(1.0),
+            outputs=["first"],
+            observed=floats(np.nan),
+            state=state.tobytes(),
+        )
+    ).finished
+    assert np.array_equal(numbers(finished.state), state + 1.0)
+
+
+def test_progress_is_told_before_the_answer(serve):
+    process = serve(
+        """
+        import time
+        import starlings
+
+        class Steady(starlings.Solver):
+            parameters = {"k": ""}
+            states = {"x": ""}
+            outputs = {"y": ""}
+            measures = {"y": "x"}
+            def step(self, t, dt, x, p, u):
+                time.sleep(0.3)
+                return x
+
+        starlings.serve(Steady)
+        """
+    )
+    times = [1.0, 2.0, 3.0, 4.0]
+    ask = pb.RunRequest(
+        parameters=floats(1.0), start=0.0, times=floats(*times), outputs=["y"], observed=floats(*[np.nan] * 4)
+    )
+    replies = list(process.stream(ask, timeout=60))
+    reached = [reply.progress.time for reply in replies[:-1]]
+    assert reached and set(reached) <= set(times) and reached == sorted(reached)
+    assert replies[-1].WhichOneof("kind") == "finished"
+
+
+def test_an_address_that_is_taken_is_told(serve):
+    # Port reuse is off, so that a port in use is an error and never a second listener, which would get some of the runs.
+    first = serve(DECAY, {"STARLINGS_SOLVER_ADDRESS": "127.0.0.1:0"})
+    second = serve(DECAY, {"STARLINGS_SOLVER_ADDRESS": first.address})
+    assert second.line == ""
+    assert second.child.wait(timeout=60) == 1
+    assert f"this solver cannot be served: cannot listen at {first.address}" in second.stderr()
+    assert first.describe().name == "decay"
+
+
+def test_a_solver_that_is_killed_leaves_its_caller_with_an_error(serve):
+    process = serve(DECAY)
+    process.describe()
+    os.kill(process.child.pid, signal.SIGKILL)
+    process.child.wait(timeout=60)
+    with pytest.raises(grpc.RpcError):
+        process.run(request())
+
+
+def wait_for(holds):
+    """Until it holds; the test's own time limit is a minute."""
+    reached = threading.Event()
+    for _ in range(6000):
+        if holds():
+            return
+        reached.wait(0.01)
+    raise AssertionError("waited a minute in vain")

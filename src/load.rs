@@ -1,0 +1,38 @@
+//! Studies as commands load them: with somebody who starts the solvers that they name.
+//!
+//! A solver that was asked for its description, or made a trial run, stays for the next question; it ends before the workers
+//! start theirs, or with the command. Next file to read: [`crate::solvers`].
+
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use starlings_coordinator::study::{Study, Surroundings};
+use starlings_models::SetupError;
+use starlings_worker::Solvers;
+
+use crate::failure::Failure;
+use crate::solvers::solvers;
+
+/// The solvers of this process, once one was needed.
+static HERE: Mutex<Option<Solvers>> = Mutex::new(None);
+
+/// Reads and checks a study; a solver that it names is started here and asked what it is.
+pub(crate) fn load(path: &Path) -> Result<Study, Failure> {
+    let describe = |def: &_| here()?.describe(def).map_err(|error| error.to_string());
+    let factory = Arc::new(|setup: &_| here().map_err(SetupError::Invalid)?.build(setup));
+    Ok(Study::load_with(path, &Surroundings::new(describe, factory))?)
+}
+
+/// Ends the solvers of this process; one that is needed again starts again.
+pub(crate) fn end_solvers() {
+    drop(HERE.lock().unwrap_or_else(PoisonError::into_inner).take());
+}
+
+fn here() -> Result<Solvers, String> {
+    let mut here = HERE.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(solvers) = &*here {
+        return Ok(solvers.clone());
+    }
+    let unknown = |_| "the path of this program, which watches over solvers, is not known".to_owned();
+    Ok(here.insert(solvers().map_err(unknown)?).clone())
+}

@@ -1,0 +1,275 @@
+//! A program that is started for every run and needs no code by the user: files from templates go in, numbers come out by a
+//! rule per output.
+//!
+//! The study says what the program has, since it cannot be asked. It starts every run anew, so no run continues from a state.
+//! Each run has a folder of its own, kept for people to look at when the run fails. Next files to read: [`template`] and
+//! [`request`] for what goes in, [`program`] for the run, [`rule`] and [`answer`] for what comes out.
+
+mod answer;
+mod fault;
+pub(super) mod json;
+mod program;
+mod request;
+mod rule;
+mod seats;
+mod table;
+mod template;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Display;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use starlings_models::{Description, ParticleError, Run, Solved, SolverDef, Spec, nearest};
+
+use super::{Adapter, Kind};
+use crate::solver::SolverError;
+use crate::solver::error::tail_text;
+use crate::solver::machine::cores;
+use crate::solver::process::{Launch, Process, ending, is_killed};
+use crate::solver::scratch::Scratch;
+use crate::solver::site::Site;
+use answer::Answer;
+use program::Output;
+use rule::{Rule, lies_inside};
+use seats::Seats;
+use template::{OWN_NAMES, Templates};
+
+pub(crate) const KIND: Kind = Kind {
+    name: "command",
+    says: "a program started for every run; input files from templates, outputs by rule, no code",
+    asks: false,
+    open: |def, site| Ok(Box::new(PerRun::new(def, site)?)),
+};
+
+/// Times that a run is made when somebody kills its program.
+const ATTEMPTS: u32 = 12;
+
+/// Lines of the standard output that a failure shows when the standard error is empty, and the longest of them.
+const LINES: usize = 12;
+const WIDTH: usize = 240;
+
+/// What the program is told and what it wrote, in the folder of a run that failed.
+const TOLD: &str = "starlings-input.json";
+const WROTE: &str = "starlings-output.txt";
+
+/// A program started for every run.
+struct PerRun {
+    def: SolverDef,
+    site: Arc<Site>,
+    description: Description,
+    command: Vec<String>,
+    templates: Templates,
+    copies: Vec<(String, PathBuf)>,
+    rules: BTreeMap<String, Rule>,
+    seats: Seats,
+}
+
+/// How an attempt ended that gave no answer.
+enum Failed {
+    /// By a fault that would come again, or once too often.
+    Here(String),
+    /// Somebody killed the program.
+    Killed(String),
+}
+
+impl PerRun {
+    fn new(def: &SolverDef, site: &Arc<Site>) -> Result<Self, SolverError> {
+        let incomplete = |message: String| SolverError::Incomplete(message);
+        if def.command.is_empty() {
+            return Err(incomplete("a solver through files needs a `command`".to_owned()));
+        }
+        let description = def.described.clone().filter(|d| !d.spec.outputs.is_empty()).ok_or_else(|| {
+            incomplete("a solver through files needs `parameters` and `outputs` in the study".to_owned())
+        })?;
+        let files = def.files.clone().unwrap_or_default();
+        let rules = rules(&files.reads, &description.spec)?;
+        let templates = Templates::new(&files.templates)?;
+        for name in files.templates.keys().chain(files.copies.keys()) {
+            if !lies_inside(name) {
+                return Err(incomplete(format!("the file `{name}` lies outside the run's folder")));
+            }
+        }
+        let taken = description.spec.parameters.iter().find(|q| OWN_NAMES.contains(&q.name.as_str()));
+        if let Some(q) = taken.filter(|_| !files.templates.is_empty()) {
+            let name = &q.name;
+            return Err(incomplete(format!(
+                "templates use the name `{name}` for a part of the run: rename the parameter"
+            )));
+        }
+        let inside: BTreeSet<&str> = (files.templates.keys().chain(files.copies.keys()).map(String::as_str))
+            .chain(rules.values().map(Rule::file))
+            .collect();
+        let command = request::command(&def.command, Path::new(&def.folder), &inside, &description.spec)?;
+        let copies = files.copies.into_iter().map(|(name, path)| (name, PathBuf::from(path))).collect();
+        let seats = Seats::default();
+        Ok(Self {
+            def: def.clone(),
+            site: Arc::clone(site),
+            description,
+            command,
+            templates,
+            copies,
+            rules,
+            seats,
+        })
+    }
+
+    /// Writes the files of a run.
+    fn furnish(&self, run: &Run<'_>, folder: &Path) -> Result<(), String> {
+        let placed = |name: &str| {
+            let path = folder.join(name);
+            path.parent().map_or(Ok(()), std::fs::create_dir_all).map(|()| path)
+        };
+        for (name, from) in &self.copies {
+            placed(name).and_then(|to| std::fs::copy(from, to)).map_err(|error| {
+                format!("{} cannot be copied into the run's folder: {error}", from.display())
+            })?;
+        }
+        let filled = self.templates.fill(&self.description.spec, run).map_err(|error| error.to_string())?;
+        for (name, text) in filled {
+            let written = placed(name).and_then(|to| std::fs::write(to, text));
+            written.map_err(|error| format!("{name} cannot be written into the run's folder: {error}"))?;
+        }
+        Ok(())
+    }
+
+    fn launch(&self, command: &[String], folder: &Path, seat: usize) -> Result<Process, SolverError> {
+        let threads = self.def.threads;
+        self.site.start(&Launch {
+            command,
+            base: &self.def.folder,
+            folder: Some(folder),
+            environment: self.def.environment.clone(),
+            threads,
+            cores: self.def.pin.then(|| cores(seat, threads)),
+            memory: self.def.memory,
+            input: true,
+        })
+    }
+
+    /// One start of the program, the `last` that is tried or not.
+    fn attempt(&self, run: &Run<'_>, last: bool) -> Result<Solved, Failed> {
+        let here = |what: String| Failed::Here(format!("{} cannot run: {what}", self.program()));
+        let scratch = self.site.scratch("run").map_err(|error| here(format!("no folder for it: {error}")))?;
+        self.furnish(run, scratch.path()).map_err(here)?;
+        let spec = &self.description.spec;
+        let told = request::document(spec, run).to_string();
+        let seat = self.seats.take();
+        let command = request::filled(&self.command, spec, run, scratch.path());
+        let started = self.launch(&command, scratch.path(), seat.number());
+        let mut process = started.map_err(|error| Failed::Here(error.to_string()))?;
+        let patience = Duration::try_from_secs_f64(self.def.timeout).unwrap_or(Duration::MAX);
+        let (status, output) = program::to_its_end(&mut process, told.clone().into_bytes(), patience);
+        let solved = match status {
+            Some(status) if status.success() => self.read(run, scratch.path(), &output),
+            Some(status) => Err(format!("{} {}", self.program(), ending(status))),
+            None => Err(format!(
+                "{} did not end within {} s and was killed (`timeout` sets the limit)",
+                self.program(),
+                self.def.timeout
+            )),
+        };
+        let killed = status.is_some_and(is_killed);
+        // Where the run is made again nobody needs to look at this one.
+        let tail =
+            if solved.is_ok() || (killed && !last) { String::new() } else { said(&mut process, &output) };
+        // The whole group ends before its folder is kept or removed.
+        drop(process);
+        match solved {
+            Ok(solved) => Ok(solved),
+            Err(what) if killed && !last => Err(Failed::Killed(what)),
+            Err(what) => Err(Failed::Here(what + &kept(scratch, &told, &output) + &tail_text(&tail))),
+        }
+    }
+
+    /// The outputs that were asked for.
+    fn read(&self, run: &Run<'_>, folder: &Path, output: &Output) -> Result<Solved, String> {
+        let answer = Answer::new(folder, output);
+        let times = &run.window.times;
+        let mut columns = Vec::with_capacity(run.outputs.len());
+        for name in run.outputs {
+            let quantity = self.description.spec.outputs.iter().find(|q| q.name == *name);
+            let size = quantity.map_or(1, |q| q.size);
+            let whole = Rule::whole(name);
+            let rule = self.rules.get(name).unwrap_or(&whole);
+            let values = answer.values(rule, size, times);
+            columns.push((size, values.map_err(|fault| self.unreadable(name, &fault))?));
+        }
+        let at = |j: usize| columns.iter().flat_map(move |(size, values)| &values[j * size..(j + 1) * size]);
+        let outputs = (0..times.len()).flat_map(at).copied().collect();
+        Ok(Solved { outputs, state: Vec::new() })
+    }
+
+    fn unreadable(&self, output: &str, fault: &impl Display) -> String {
+        format!("{} ended well, but its output `{output}` cannot be read: {fault}", self.program())
+    }
+
+    fn program(&self) -> String {
+        format!("the solver `{}`", self.def.command.first().map(String::as_str).unwrap_or_default())
+    }
+}
+
+impl Adapter for PerRun {
+    fn describe(&self) -> Result<Description, SolverError> {
+        Ok(self.description.clone())
+    }
+
+    fn run(&self, run: &Run<'_>) -> Result<Solved, ParticleError> {
+        if run.state.is_some() {
+            let message = format!("a state for {}, which starts every run anew", self.program());
+            return Err(ParticleError::BadJob(message));
+        }
+        let mut attempts = 1;
+        loop {
+            match self.attempt(run, attempts == ATTEMPTS) {
+                Ok(solved) => return Ok(solved),
+                // A run changes nothing outside its folder, so it can be made again.
+                Err(Failed::Killed(text)) => {
+                    tracing::warn!(particle = run.particle, record = run.record, attempts, "{text}");
+                    attempts += 1;
+                }
+                Err(Failed::Here(text)) => return Err(ParticleError::Solver(text)),
+            }
+        }
+    }
+}
+
+/// The rules of a study, each of an output that there is.
+fn rules(reads: &BTreeMap<String, String>, spec: &Spec) -> Result<BTreeMap<String, Rule>, SolverError> {
+    let mut rules = BTreeMap::new();
+    for (name, text) in reads {
+        if spec.outputs.iter().all(|q| q.name != *name) {
+            let near = nearest(name, spec.outputs.iter().map(|q| &q.name));
+            let hint = near.map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
+            return Err(SolverError::Incomplete(format!("a rule reads `{name}`, which is no output{hint}")));
+        }
+        let rule = Rule::parse(text, name)
+            .map_err(|error| SolverError::Incomplete(format!("the output `{name}`: {error}")))?;
+        rules.insert(name.clone(), rule);
+    }
+    Ok(rules)
+}
+
+/// The end of what a program said: on its standard error, else on its standard output.
+fn said(process: &mut Process, output: &Output) -> String {
+    let tail = process.tail();
+    if !tail.is_empty() {
+        return tail;
+    }
+    let text = String::from_utf8_lossy(&output.bytes);
+    let lines = text.lines().rev().map(str::trim_end).filter(|line| !line.is_empty()).take(LINES);
+    let mut last: Vec<String> = lines.map(|line| line.chars().take(WIDTH).collect()).collect();
+    last.reverse();
+    last.join("\n")
+}
+
+/// Keeps the folder of a run that failed, with what the program was told and wrote; says where it is.
+fn kept(scratch: Scratch, told: &str, output: &Output) -> String {
+    let Some(folder) = scratch.keep() else { return String::new() };
+    // Without these two the folder is still of use.
+    let _ = std::fs::write(folder.join(TOLD), told);
+    let _ = std::fs::write(folder.join(WROTE), &output.bytes);
+    format!("; the folder of the run is kept: {}", folder.display())
+}

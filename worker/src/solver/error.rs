@@ -1,0 +1,52 @@
+//! Why a solver cannot be used at all; a run that fails is a `ParticleError` instead.
+
+/// Why a solver cannot be used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SolverError {
+    /// No adapter of that name.
+    #[error("no adapter named `{name}`{}; there are {known}", nearest.as_ref().map(|n| format!("; did you mean `{n}`?")).unwrap_or_default())]
+    Adapter {
+        /// The name given.
+        name: String,
+        /// The nearest one, if close.
+        nearest: Option<String>,
+        /// All of them.
+        known: String,
+    },
+    /// The study does not say what this adapter needs.
+    #[error("{0}")]
+    Incomplete(String),
+    /// The program cannot be started.
+    #[error("the solver `{program}` cannot be started: {reason}")]
+    Start {
+        /// The program.
+        program: String,
+        /// What the system says, with the remedy where one is known.
+        reason: String,
+    },
+    /// The program ended, or was silent for too long, before it answered.
+    #[error("the solver `{program}` {what}{}", tail_text(tail))]
+    NotReady {
+        /// The program.
+        program: String,
+        /// What happened, such as `exited with status 1 before it was ready`.
+        what: String,
+        /// The end of its output.
+        tail: String,
+        /// Whether it was killed from outside.
+        killed: bool,
+    },
+    /// It speaks another protocol, or says something that makes no sense.
+    #[error("the solver `{program}` describes itself wrongly: {message}")]
+    Description {
+        /// The program.
+        program: String,
+        /// What is wrong.
+        message: String,
+    },
+}
+
+/// The end of a program's output as the end of a sentence.
+pub(crate) fn tail_text(tail: &str) -> String {
+    if tail.is_empty() { String::new() } else { format!("; the end of its output:\n{tail}") }
+}

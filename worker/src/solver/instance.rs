@@ -1,0 +1,314 @@
+//! One program that serves `solver.proto`, and the connection to it.
+//!
+//! The program is told in the environment where to listen: `STARLINGS_SOLVER_SOCKET` is the path of a Unix socket, or
+//! `STARLINGS_SOLVER_ADDRESS` a loopback address where the study asks for one with `{port}`. It is ready when it answers
+//! Describe. Its standard input closes when the worker ends. Next file to read: [`super::process`].
+
+use std::collections::BTreeMap;
+use std::process::ChildStdin;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use starlings_models::{Description, ParticleError, Run, Solved, SolverDef};
+use starlings_proto::convert::solver::description::decode_description;
+use starlings_proto::convert::solver::{Reply, SOLVER_PROTOCOL, decode_reply, encode_run};
+use starlings_proto::solver_wire::DescribeRequest;
+use starlings_proto::solver_wire::solver_client::SolverClient;
+use starlings_proto::words::{causes, status_text};
+use starlings_proto::{FRAME_SIZE, LIFELINE, WireError};
+use tokio::runtime::Runtime;
+use tonic::transport::{Channel, Endpoint};
+
+use super::SolverError;
+use super::error::tail_text;
+use super::machine::{cores, free_port};
+use super::process::{Launch, Process, ending, is_killed};
+use super::scratch::Scratch;
+use super::site::Site;
+
+/// Variable that names the Unix socket on which a solver listens.
+pub const SOCKET: &str = "STARLINGS_SOLVER_SOCKET";
+/// Variable that names the loopback address on which a solver listens.
+pub const ADDRESS: &str = "STARLINGS_SOLVER_ADDRESS";
+
+/// HTTP/2 windows per stream and per connection, bytes: a state of many megabytes travels in one go.
+const WINDOWS: (u32, u32) = (64 * 1024 * 1024, 64 * 1024 * 1024);
+/// Largest message, bytes: the limit of the format.
+const MAX_ANSWER: usize = i32::MAX as usize;
+/// How long a run that is given up on purpose may go on.
+const LEFT_AFTER: Duration = Duration::from_millis(2);
+/// How often a program that starts is asked whether it is ready.
+const LOOK: Duration = Duration::from_millis(5);
+/// How long a program that broke its connection may take to end, so that its ending can be told.
+const LAST_WORDS: Duration = Duration::from_millis(500);
+
+/// Why a program is of no more use.
+#[derive(Debug)]
+pub(crate) enum Lost {
+    /// It did not answer in time.
+    Silent(String),
+    /// It ended by itself, or broke the protocol.
+    Fell(String),
+    /// Somebody killed it.
+    Killed(String),
+}
+
+impl Lost {
+    /// In words, with how often it happened.
+    pub(crate) fn text(&self, times: u32) -> String {
+        let (Self::Silent(text) | Self::Fell(text) | Self::Killed(text)) = self;
+        if times > 1 { format!("{text} (and {} before, on the same run)", times - 1) } else { text.clone() }
+    }
+}
+
+/// A program with its connection.
+pub(crate) struct Instance {
+    name: String,
+    /// Absent where somebody else started it.
+    process: Option<Process>,
+    /// Closes when this is dropped, which tells the program to end.
+    _lifeline: Option<ChildStdin>,
+    scratch: Scratch,
+    client: SolverClient<Channel>,
+    runtime: Runtime,
+}
+
+impl Instance {
+    /// Starts a program, or only connects where there is no command, and waits until it answers.
+    ///
+    /// # Errors
+    /// When it cannot be started or does not answer in time.
+    pub(crate) fn start(
+        def: &SolverDef,
+        command: &[String],
+        site: &Arc<Site>,
+        number: usize,
+    ) -> Result<Self, SolverError> {
+        let name = command.first().or(def.address.as_ref()).cloned().unwrap_or_default();
+        let failed =
+            |error: std::io::Error| SolverError::Start { program: name.clone(), reason: error.to_string() };
+        let scratch = site.scratch("solver").map_err(failed)?;
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
+        let place = Place::of(def, command, &scratch).map_err(failed)?;
+        let mut process = None;
+        if !command.is_empty() {
+            let environment = def.environment.clone().into_iter().chain(place.environment.clone()).collect();
+            let launch = Launch {
+                command: &place.command,
+                base: &def.folder,
+                folder: None,
+                environment,
+                threads: def.threads,
+                cores: def.pin.then(|| cores(number, def.threads)),
+                memory: def.memory,
+                input: true,
+            };
+            process = Some(site.start(&launch)?);
+        }
+        let lifeline = process.as_mut().and_then(Process::input);
+        if let Some(process) = &mut process {
+            process.remember_output();
+        }
+        let patience = Duration::try_from_secs_f64(def.start_timeout).unwrap_or(Duration::MAX);
+        let client = connect(&runtime, &place.target, &name, process.as_mut(), patience)?;
+        Ok(Self { name, process, _lifeline: lifeline, scratch, client, runtime })
+    }
+
+    /// What the program says of itself.
+    ///
+    /// # Errors
+    /// When it does not answer or says something that makes no sense.
+    pub(crate) fn describe(&mut self) -> Result<Description, SolverError> {
+        let request = DescribeRequest { protocol: SOLVER_PROTOCOL };
+        let wrong = |message: String| SolverError::Description { program: self.name.clone(), message };
+        let answer = self.runtime.block_on(self.client.describe(request));
+        let answer = answer.map_err(|status| wrong(status_text(&status)))?;
+        decode_description(answer.get_ref()).map_err(|error| wrong(plain(error)))
+    }
+
+    /// Has one run made.
+    ///
+    /// # Errors
+    /// When the program is of no more use; what it reports of the run itself is an answer.
+    pub(crate) fn run(
+        &mut self,
+        run: &Run<'_>,
+        patience: Duration,
+    ) -> Result<Result<Solved, ParticleError>, Lost> {
+        let request = encode_run(run, &self.scratch.path().to_string_lossy());
+        let client = &mut self.client;
+        let conversation = async {
+            let mut replies =
+                client.run(request).await.map_err(|s| Broken::Connection(status_text(&s)))?.into_inner();
+            loop {
+                match replies.message().await {
+                    Ok(Some(reply)) => match decode_reply(reply).map_err(|e| Broken::Protocol(plain(e)))? {
+                        Reply::Progress(time) => tracing::debug!(particle = run.particle, time, "progress"),
+                        Reply::Ended(answer) => return Ok(answer),
+                    },
+                    Ok(None) => {
+                        return Err(Broken::Protocol("it ended the run without an answer".to_owned()));
+                    }
+                    Err(status) => return Err(Broken::Connection(status_text(&status))),
+                }
+            }
+        };
+        let timed = async { tokio::time::timeout(patience, conversation).await };
+        match self.runtime.block_on(timed) {
+            Ok(Ok(answer)) => Ok(answer.map_err(|error| self.with_tail(error))),
+            Ok(Err(broken)) => Err(self.lost(broken)),
+            Err(_) => {
+                let tail = self.tail();
+                let name = &self.name;
+                Err(Lost::Silent(format!(
+                    "the solver `{name}` did not answer within {} s and was ended (`timeout` sets the limit){}",
+                    patience.as_secs_f64(),
+                    tail_text(&tail)
+                )))
+            }
+        }
+    }
+
+    /// Asks for a run and cancels the call.
+    pub(crate) fn leave(&mut self, run: &Run<'_>) {
+        let request = encode_run(run, &self.scratch.path().to_string_lossy());
+        let client = &mut self.client;
+        let asked = async { tokio::time::timeout(LEFT_AFTER, client.run(request)).await };
+        drop(self.runtime.block_on(asked));
+    }
+
+    /// Adds the end of the program's output to a failure that it reports.
+    fn with_tail(&mut self, error: ParticleError) -> ParticleError {
+        match error {
+            ParticleError::Solver(text) => ParticleError::Solver(text + &tail_text(&self.tail())),
+            other => other,
+        }
+    }
+
+    fn tail(&mut self) -> String {
+        self.process.as_mut().map(Process::tail).unwrap_or_default()
+    }
+
+    fn lost(&mut self, broken: Broken) -> Lost {
+        let name = self.name.clone();
+        let status = self.process.as_mut().and_then(|process| process.wait(LAST_WORDS));
+        let tail = tail_text(&self.tail());
+        match (status, broken) {
+            (Some(status), _) => {
+                let text = format!("the solver `{name}` {} during a run{tail}", ending(status));
+                if is_killed(status) { Lost::Killed(text) } else { Lost::Fell(text) }
+            }
+            (None, Broken::Connection(what)) => {
+                Lost::Fell(format!("the connection to the solver `{name}` broke: {what}{tail}"))
+            }
+            (None, Broken::Protocol(what)) => {
+                Lost::Fell(format!("the solver `{name}` breaks the protocol: {what}{tail}"))
+            }
+        }
+    }
+}
+
+/// Why a run gave no answer.
+enum Broken {
+    Connection(String),
+    Protocol(String),
+}
+
+/// Where a program listens, and how it is told.
+struct Place {
+    target: String,
+    environment: BTreeMap<String, String>,
+    command: Vec<String>,
+}
+
+impl Place {
+    fn of(def: &SolverDef, command: &[String], scratch: &Scratch) -> std::io::Result<Self> {
+        let mut environment = BTreeMap::from([(LIFELINE.to_owned(), "1".to_owned())]);
+        let Some(address) = &def.address else {
+            let socket = scratch.path().join("s");
+            environment.insert(SOCKET.to_owned(), socket.display().to_string());
+            let target = format!("unix:{}", socket.display());
+            return Ok(Self { target, environment, command: command.to_vec() });
+        };
+        let port = if address.contains("{port}") { free_port()?.to_string() } else { String::new() };
+        let filled = |text: &String| text.replace("{port}", &port);
+        let address = filled(address);
+        environment.insert(ADDRESS.to_owned(), address.clone());
+        let target = if address.contains("://") || address.starts_with("unix:") {
+            address
+        } else {
+            format!("http://{address}")
+        };
+        Ok(Self { target, environment, command: command.iter().map(filled).collect() })
+    }
+}
+
+/// Connects until the program answers Describe, has ended, or time is up.
+fn connect(
+    runtime: &Runtime,
+    target: &str,
+    name: &str,
+    mut process: Option<&mut Process>,
+    patience: Duration,
+) -> Result<SolverClient<Channel>, SolverError> {
+    let not_ready = |what: String, tail: String| SolverError::NotReady {
+        program: name.to_owned(),
+        what,
+        tail,
+        killed: false,
+    };
+    let endpoint = Endpoint::from_shared(target.to_owned())
+        .map_err(|error| {
+            not_ready(format!("has an address that is none ({target}): {error}"), String::new())
+        })?
+        .initial_stream_window_size(WINDOWS.0)
+        .initial_connection_window_size(WINDOWS.1)
+        .max_frame_size(FRAME_SIZE)
+        .tcp_nodelay(true);
+    let started = Instant::now();
+    let mut last;
+    loop {
+        let attempt = async {
+            let channel = endpoint.connect().await.map_err(|error| causes(&error))?;
+            let mut client = SolverClient::new(channel)
+                .max_decoding_message_size(MAX_ANSWER)
+                .max_encoding_message_size(MAX_ANSWER);
+            let request = DescribeRequest { protocol: SOLVER_PROTOCOL };
+            client.describe(request).await.map_err(|status| status_text(&status))?;
+            Ok::<_, String>(client)
+        };
+        let left = patience.saturating_sub(started.elapsed());
+        match runtime.block_on(async { tokio::time::timeout(left, attempt).await }) {
+            Ok(Ok(client)) => return Ok(client),
+            Ok(Err(error)) => last = error,
+            Err(_) => last = "it accepts the connection but does not answer".to_owned(),
+        }
+        if let Some(process) = process.as_deref_mut()
+            && let Some(status) = process.ended()
+        {
+            return Err(SolverError::NotReady {
+                program: name.to_owned(),
+                what: format!("{} before it was ready", ending(status)),
+                tail: process.tail(),
+                killed: is_killed(status),
+            });
+        }
+        if started.elapsed() >= patience {
+            let tail = process.map(Process::tail).unwrap_or_default();
+            let what = format!(
+                "was not ready within {} s ({last}); it must serve solver.proto where {SOCKET} says",
+                patience.as_secs_f64()
+            );
+            return Err(not_ready(what, tail));
+        }
+        std::thread::sleep(LOOK);
+    }
+}
+
+/// What is wrong with a message, without the name of the field where that says nothing.
+fn plain(error: WireError) -> String {
+    match error {
+        WireError::Shape { field: "description", message } => message,
+        other => other.to_string(),
+    }
+}
