@@ -1,146 +1,22 @@
-//! Every example is run as a user would run it and compared with its `expected.toml`.
-
-#![allow(clippy::unwrap_used)] // a failed unwrap is a failed test
+//! Every example with a built-in model is run as a user would run it and compared with its `expected.toml`.
 
 mod common;
+mod example_kit;
 
 use std::collections::BTreeSet;
-use std::path::Path;
 
-use common::{repository, run};
-use serde::Deserialize;
-use serde_json::Value;
-
-/// What an example promises.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Expected {
-    #[serde(default)]
-    parameters: Vec<Parameter>,
-    #[serde(default)]
-    fit: Fit,
-    #[serde(default)]
-    warnings: Warnings,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Parameter {
-    name: String,
-    estimate: f64,
-    within_sd: Option<f64>,
-    within_relative: Option<f64>,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Fit {
-    #[serde(default)]
-    channels: Vec<Channel>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Channel {
-    name: String,
-    train_rmse: Option<[f64; 2]>,
-    held_out_rmse: Option<[f64; 2]>,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Warnings {
-    #[serde(default)]
-    contains: Vec<String>,
-    #[serde(default)]
-    lacks: Vec<String>,
-}
-
-fn named<'a>(list: &'a Value, name: &str) -> &'a Value {
-    list.as_array()
-        .and_then(|all| all.iter().find(|entry| entry["name"] == name))
-        .unwrap_or_else(|| panic!("no `{name}` in {list}"))
-}
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
-}
-
-fn compare(summary: &Value, expected: &Expected) {
-    for p in &expected.parameters {
-        let found = named(&summary["parameters"], &p.name);
-        let (estimate, sd) = (number(&found["estimate"]), number(&found["sd"]));
-        let off = (estimate - p.estimate).abs();
-        if let Some(limit) = p.within_sd {
-            assert!(off <= limit * sd, "{}: {estimate} is {:.2} sd from {}", p.name, off / sd, p.estimate);
-        }
-        if let Some(limit) = p.within_relative {
-            assert!(off <= limit * p.estimate.abs(), "{}: {estimate} against {}", p.name, p.estimate);
-        }
-        assert!(p.within_sd.is_some() || p.within_relative.is_some(), "{} is compared with nothing", p.name);
-    }
-    for c in &expected.fit.channels {
-        let found = named(&summary["fit"]["channels"], &c.name);
-        for (key, range) in [("train_rmse", c.train_rmse), ("held_out_rmse", c.held_out_rmse)] {
-            if let Some([lo, hi]) = range {
-                let value = number(&found[key]);
-                assert!((lo..=hi).contains(&value), "{} {key}: {value} outside [{lo}, {hi}]", c.name);
-            }
-        }
-    }
-    let warnings = summary["warnings"].to_string();
-    for text in &expected.warnings.contains {
-        assert!(warnings.contains(text), "no warning about `{text}` in {warnings}");
-    }
-    for text in &expected.warnings.lacks {
-        assert!(!warnings.contains(text), "an unexpected warning about `{text}` in {warnings}");
-    }
-}
-
-/// Runs every study of an example that has expectations: `study.toml` against `expected.toml`, and `NAME.toml` against
-/// `expected-NAME.toml`.
-fn example(name: &str) {
-    let folder = repository("examples").join(name);
-    let mut compared = 0;
-    for entry in std::fs::read_dir(&folder).unwrap() {
-        let path = entry.unwrap().path();
-        let file = path.file_name().unwrap().to_string_lossy().into_owned();
-        let Some(stem) = file.strip_prefix("expected").and_then(|f| f.strip_suffix(".toml")) else {
-            continue;
-        };
-        let study =
-            folder.join(stem.strip_prefix('-').map_or("study.toml".to_owned(), |s| format!("{s}.toml")));
-        compare_study(&study, &path);
-        compared += 1;
-    }
-    assert!(compared > 0, "{name} promises nothing");
-}
-
-fn compare_study(study: &Path, expected: &Path) {
-    let expected: Expected = toml::from_str(&std::fs::read_to_string(expected).unwrap()).unwrap();
-    let dir = tempfile::tempdir().unwrap();
-    let out = dir.path().join("run");
-    let summary = run(study, &out, 2);
-    compare(&summary, &expected);
-    let report = std::fs::read_to_string(out.join("report.html")).unwrap();
-    assert!(report.contains("<svg"), "the report has its plots inside");
-}
+use common::repository;
+use example_kit::{all, example_in, of_solvers};
 
 /// One test per example, and one that none is forgotten.
 macro_rules! examples {
     ($($test:ident => $name:literal),+ $(,)?) => {
-        $(#[test] fn $test() { example($name); })+
+        $(#[test] fn $test() { example_in(&repository("examples").join($name)); })+
 
         #[test]
         fn every_example_is_tested() {
             let listed: BTreeSet<String> = [$($name),+].map(str::to_owned).into();
-            let found: BTreeSet<String> = std::fs::read_dir(repository("examples"))
-                .unwrap()
-                .map(|entry| entry.unwrap())
-                .filter(|entry| entry.path().is_dir())
-                .map(|entry| entry.file_name().to_string_lossy().into_owned())
-                .collect();
-            assert_eq!(listed, found);
+            assert_eq!(listed, all().difference(&of_solvers()).cloned().collect());
         }
     };
 }

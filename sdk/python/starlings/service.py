@@ -6,19 +6,23 @@ of arrival. Next file to read: serve.py.
 
 from __future__ import annotations
 
+import os
 import queue
 import time
 from concurrent import futures
 from typing import Any, Callable, Iterator, Optional
 
-import grpc
+# Read when gRPC is loaded. With its handlers for forks, programs that a solver starts die now and then before they begin.
+os.environ.setdefault("GRPC_ENABLE_FORK_SUPPORT", "1")
 
-from . import _solver_pb2 as pb
-from . import wire
-from .failures import BAD_REQUEST, BadRequest, Cancelled, Failed
-from .job import Answer, Job
-from .run import execute
-from .solver import Served
+import grpc  # noqa: E402
+
+from . import _solver_pb2 as pb  # noqa: E402
+from . import wire  # noqa: E402
+from .failures import BAD_REQUEST, BadRequest, Cancelled, Failed  # noqa: E402
+from .job import Answer, Job  # noqa: E402
+from .run import execute  # noqa: E402
+from .solver import Served  # noqa: E402
 
 #: What computes a job: the answer, or Failed, or Cancelled.
 Runner = Callable[[Job, Callable[[], bool], Callable[[float], None]], Answer]

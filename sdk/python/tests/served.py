@@ -5,10 +5,12 @@ import subprocess
 import sys
 from pathlib import Path
 
-import grpc
-import numpy as np
-
+# Before gRPC: it must know that programs are started beside it.
+import starlings  # noqa: F401
 from starlings import _solver_pb2 as pb
+
+import grpc  # isort: skip
+import numpy as np  # isort: skip
 
 PACKAGE = Path(__file__).resolve().parent.parent
 UNLIMITED = [("grpc.max_receive_message_length", -1), ("grpc.max_send_message_length", -1)]

@@ -344,6 +344,27 @@ def test_progress_is_told_before_the_answer(serve):
     assert replies[-1].WhichOneof("kind") == "finished"
 
 
+def test_a_solver_may_start_programs(serve):
+    process = serve(
+        """
+        import subprocess
+        import starlings
+
+        @starlings.solver(parameters={"k": ""}, outputs={"worked": ""})
+        def calls(window):
+            # A function before the start makes Python fork, as it always does before 3.10.
+            codes = [subprocess.run(["true"], preexec_fn=lambda: None).returncode for _ in range(100)]
+            return [codes.count(0)]
+
+        starlings.serve(calls)
+        """
+    )
+    ask = pb.RunRequest(
+        parameters=floats(1.0), start=0.0, times=floats(1.0), outputs=["worked"], observed=floats(np.nan)
+    )
+    assert numbers(process.run(ask).finished.outputs)[0] == 100.0
+
+
 def test_an_address_that_is_taken_is_told(serve):
     # Port reuse is off, so that a port in use is an error and never a second listener, which would get some of the runs.
     first = serve(DECAY, {"STARLINGS_SOLVER_ADDRESS": "127.0.0.1:0"})
