@@ -35,6 +35,7 @@ doc $RUSTDOCFLAGS="-D warnings":
 bench:
     cargo bench --bench analysis
     cargo bench --bench tube
+    cargo bench --bench solver
     cargo bench --bench fleet -- --json
 
 # Licences, advisories, bans and sources (cargo install cargo-deny).

@@ -6,6 +6,7 @@
 //! where programs run, [`mod@serve`] for the other end of the wire.
 
 mod adapter;
+mod answer;
 mod backoff;
 pub mod conformance;
 mod error;

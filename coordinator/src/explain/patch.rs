@@ -67,7 +67,12 @@ pub fn explained_study(
         remove::orphans(&mut document)?;
     }
     let text = document.to_string();
-    Study::from_text(&to.join("explained.toml"), &text)?;
+    // The solver has said already what it is.
+    let surroundings = match study.setup.model.description() {
+        Some(description) => study.surroundings.knowing(description),
+        None => study.surroundings.clone(),
+    };
+    Study::from_text_with(&to.join("explained.toml"), &text, &surroundings)?;
     Ok(text)
 }
 

@@ -2,6 +2,8 @@
 //!
 //! Next file to read: [`super::result`].
 
+use starlings_models::SOLVER;
+
 use super::Verdict;
 use super::candidate::Candidate;
 use super::fit::Fitted;
@@ -155,6 +157,10 @@ pub(super) fn warnings(laboratory: &Laboratory<'_>, found: &Found<'_>, decision:
              `hold_out_channels`"
                 .to_owned(),
         );
+    }
+    if decision.verdict != Verdict::NoGap && laboratory.study.setup.model.kind == SOLVER {
+        let why = "the unknown input of every equation was not looked for: the rates of a solver are not open to one";
+        list.push(why.to_owned());
     }
     let n = laboratory.rows.train.len().max(1) as f64;
     let ratio = found.base.residual().norm_squared() / n;

@@ -1,22 +1,36 @@
 //! What a solver lacks: effects on its inputs and outputs, and on the rates that it hosts.
 
-use starlings_coordinator::explain::{Context, Explanation, Options, Verdict, explain};
-use starlings_coordinator::study::Surroundings;
+use starlings_coordinator::explain::patch::explained_study;
+use starlings_coordinator::explain::{Context, Explanation, Findings, Options, Verdict, explain};
 use starlings_coordinator::study::store::Store;
+use starlings_coordinator::study::{Study, Surroundings};
 
 use crate::inside::{Inside, Place, threads};
+use crate::messages;
 use crate::swing::{native, recording, solver};
 
 /// The explanation of a recording by a solver that takes terms on these states.
 fn explained(data: &str, hosts: &[&str]) -> Explanation {
+    let (found, ..) = findings(data, hosts, &solver(""));
+    assert!(
+        found.explanation.warnings.iter().any(|w| w.contains("unknown input")),
+        "{:?}",
+        found.explanation.warnings
+    );
+    found.explanation
+}
+
+fn findings(data: &str, hosts: &[&str], text: &str) -> (Findings, Place, Inside) {
     let here = Place::new(&[("study.toml", &native("")), ("swing.csv", data)]);
-    let there = Place::new(&[("study.toml", &solver("")), ("swing.csv", data)]);
+    let there = Place::new(&[("study.toml", text), ("swing.csv", data)]);
     let inside = Inside::of(&here.load(&Surroundings::default()).unwrap(), hosts);
+    std::fs::create_dir(there.folder.path().join("out")).unwrap();
     let study = there.load(&inside.surroundings()).unwrap();
-    let store = Store::create(&there.folder.path().join("run.db"), &[]).unwrap();
+    let store = Store::create(&there.folder.path().join("out/run.db"), &[]).unwrap();
     let mut context = Context { clock: &|| 0.0, watch: &mut |_| {}, events: None, earlier_s: 0.0 };
     let found = explain(&study, &mut threads(&inside), &store, &mut context, &Options::default());
-    found.unwrap_or_else(|error| panic!("{error}")).explanation
+    let found = found.unwrap_or_else(|error| panic!("{error}"));
+    (found, there, inside)
 }
 
 fn assert_named(found: &Explanation, name: &str, amplitude: f64) {
@@ -45,4 +59,34 @@ fn an_input_that_is_recorded_too_small_is_named() {
 fn a_term_that_the_solver_hosts_is_named() {
     let found = explained(&recording(&[("cubic-stiffness", 2.0)], &[], 13), &["v"]);
     assert_named(&found, "cubic-stiffness", 2.0);
+}
+
+#[test]
+fn the_explained_study_finds_the_solver_from_the_folder_that_it_stands_in() {
+    let data = recording(&[("sensor-offset:velocity", 0.15)], &[], 11);
+    let (found, there, inside) = findings(&data, &[], &solver(""));
+    let text = found.explained_study.unwrap();
+    let out = there.folder.path().join("out");
+    let file = out.join("explained.toml");
+    std::fs::write(&file, &text).unwrap();
+    let explained =
+        Study::load_with(&file, &inside.surroundings()).unwrap_or_else(|error| panic!("{error}\n{text}"));
+    let solver = explained.setup.model.solver.unwrap();
+    assert_eq!(solver.folder, there.folder.path().canonicalize().unwrap().display().to_string());
+    assert_eq!(explained.setup.effects.len(), 1);
+}
+
+#[test]
+fn the_files_of_a_program_are_found_from_another_folder() {
+    let place = messages::place(&messages::command());
+    let study = place.load(&Surroundings::default()).unwrap();
+    let out = place.folder.path().join("runs/one");
+    std::fs::create_dir_all(&out).unwrap();
+    let text = explained_study(&study, &[], &[], &out).unwrap_or_else(|error| panic!("{error}"));
+    let moved = Study::from_text(&out.join("explained.toml"), &text).unwrap();
+    let (before, after) = (study.setup.model.solver.unwrap(), moved.setup.model.solver.unwrap());
+    let (before, after) = (before.files.unwrap(), after.files.unwrap());
+    assert_eq!(after.templates, before.templates);
+    let real = |path: &String| std::fs::canonicalize(path).unwrap();
+    assert_eq!(real(&after.copies["mesh.inp"]), real(&before.copies["mesh.inp"]));
 }

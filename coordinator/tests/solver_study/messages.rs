@@ -30,14 +30,14 @@ copies = ["mesh.inp"]
 "#;
 
 /// The study of such a program, which has no initial value to estimate.
-fn command() -> String {
+pub(crate) fn command() -> String {
     let study = solver("").replace(crate::swing::SOLVER, COMMAND);
     let initial = "\n[[parameters]]\nname = \"initial:x\"\nprior = { transform = \"linear\", median = 0.5, sd = 0.2 }\n";
     assert!(study.contains(COMMAND) && study.contains(initial));
     study.replace(initial, "")
 }
 
-fn place(study: &str) -> Place {
+pub(crate) fn place(study: &str) -> Place {
     let data = recording(&[], &[], 7);
     let (template, mesh) = ("k = {{ k }}\n", "1 2 3\n");
     Place::new(&[

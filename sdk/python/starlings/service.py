@@ -13,7 +13,7 @@ from concurrent import futures
 from typing import Any, Callable, Iterator, Optional
 
 # Read when gRPC is loaded. With its handlers for forks, programs that a solver starts die now and then before they begin.
-os.environ.setdefault("GRPC_ENABLE_FORK_SUPPORT", "1")
+os.environ.setdefault("GRPC_ENABLE_FORK_SUPPORT", "0")
 
 import grpc  # noqa: E402
 

@@ -11,6 +11,7 @@ import grpc
 import numpy as np
 import pytest
 
+import starlings
 from served import floats, numbers
 from starlings import _solver_pb2 as pb
 
@@ -48,9 +49,10 @@ SUM = """
 
 
 class Ranks:
-    def __init__(self, folder):
-        script = folder / "sum.py"
-        script.write_text(textwrap.dedent(SUM))
+    def __init__(self, folder, script=None):
+        if script is None:
+            script = folder / "sum.py"
+            script.write_text(textwrap.dedent(SUM))
         # Open MPI refuses to run as root and to share cores unless it is told that this is meant.
         allowed = {
             "OMPI_ALLOW_RUN_AS_ROOT": "1",
@@ -129,3 +131,30 @@ def test_all_ranks_end_when_the_lifeline_closes(ranks):
     ranks.run(2.0)
     ranks.child.stdin.close()
     assert ranks.child.wait(timeout=60) == 0
+
+
+def test_the_examples_rod_gives_the_same_bits_on_two_ranks_as_on_one(tmp_path):
+    example = Path(__file__).resolve().parents[3] / "examples" / "mpi" / "rod.py"
+    two = Ranks(tmp_path, example)
+    try:
+        times = np.arange(1.0, 11.0)
+        drive = ([0.0, 10.0], [0.0, 0.02])
+        request = pb.RunRequest(
+            parameters=floats(9e-5, 0.004),
+            start=0.0,
+            times=floats(*times),
+            outputs=["sensors"],
+            observed=floats(*[np.nan] * 40),
+            inputs=[pb.Signal(times=floats(*drive[0]), values=floats(*drive[1]))],
+        )
+        finished = list(two.stream(request, timeout=60))[-1].finished
+    finally:
+        two.child.kill()
+        two.child.wait()
+    names = {"__name__": "rod"}
+    exec(example.read_text(), names)  # the repository's own text
+    one = starlings.simulate(
+        names["Rod"], parameters={"kappa": 9e-5, "loss": 0.004}, times=times, inputs={"heater": drive}
+    )
+    assert one.outputs["sensors"].tobytes() == finished.outputs
+    assert one.state.tobytes() == finished.state

@@ -86,6 +86,24 @@ def test_a_restart_gives_the_bits_of_one_run(serve):
     assert state == whole.state
 
 
+def test_a_scalar_state_can_be_asked_for_as_if_it_were_an_output(serve):
+    process = serve(DECAY)
+    finished = process.run(request(outputs=["height", "x"], observed=floats(*[np.nan] * 4))).finished
+    table = numbers(finished.outputs).reshape(2, 2)
+    assert np.array_equal(table[:, 0], table[:, 1])
+    nudged = process.run(
+        request(
+            outputs=["x"],
+            times=floats(0.5),
+            observed=floats(5.0),
+            observer=pb.Observer(kind="nudging", gain=1e6),
+        )
+    ).finished
+    # At such a gain the state is the datum; what was predicted before stays.
+    assert numbers(nudged.state)[0] == pytest.approx(5.0, rel=1e-15)
+    assert numbers(nudged.outputs)[0] == table[0, 1]
+
+
 def test_equal_requests_give_equal_bytes(serve):
     process = serve(DECAY)
     assert process.run(request()) == process.run(request())

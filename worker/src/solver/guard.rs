@@ -1,17 +1,20 @@
 //! A process that outlives its worker by a moment, to end the solvers that the worker leaves behind.
 //!
 //! The worker holds the writing end of the guard's standard input. A line `+N` puts a process group under guard, `-N` takes it
-//! out; when the input ends, however the worker died, every group still under guard is killed. Next file to read:
-//! [`super::process`].
+//! out; `+/folder` and `-/folder` do so with a folder that the worker made, and `=/folder/inner` says that a folder in it stays.
+//! When the input ends, however the worker died, every group still under guard is killed and every folder removed. Next files
+//! to read: [`super::process`], [`super::scratch`].
 
 use std::collections::BTreeSet;
 use std::io::{self, BufRead, Write};
 use std::os::unix::process::CommandExt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use rustix::process::{Pid, Signal, kill_process_group};
+
+use super::scratch::clear;
 
 /// The guard of this process.
 pub(crate) struct Guard {
@@ -35,45 +38,94 @@ impl Guard {
         Ok(Self { input: Arc::new(Mutex::new(input)), _child: child })
     }
 
-    /// A way to tell it of a group.
+    /// A way to tell it of groups and folders.
     pub(crate) fn notice(&self) -> Notice {
         Notice(Arc::clone(&self.input))
     }
 }
 
-/// A way to tell the guard of a group.
+/// A way to tell the guard of groups and folders.
 #[derive(Clone)]
 pub(crate) struct Notice(Arc<Mutex<ChildStdin>>);
 
 impl Notice {
     pub(crate) fn begin(&self, group: u32) {
-        self.tell('+', group);
+        self.tell('+', &group.to_string());
     }
 
     pub(crate) fn end(&self, group: u32) {
-        self.tell('-', group);
+        self.tell('-', &group.to_string());
     }
 
-    fn tell(&self, sign: char, group: u32) {
+    pub(crate) fn begin_folder(&self, folder: &Path) {
+        self.tell_folder('+', folder);
+    }
+
+    pub(crate) fn end_folder(&self, folder: &Path) {
+        self.tell_folder('-', folder);
+    }
+
+    /// A folder inside of one under guard stays.
+    pub(crate) fn keep_folder(&self, folder: &Path) {
+        self.tell_folder('=', folder);
+    }
+
+    /// A path that does not fit on a line is not under guard: it stays when the worker is killed.
+    fn tell_folder(&self, sign: char, folder: &Path) {
+        if let Some(path) = folder.to_str().filter(|path| !path.contains(['\n', '\r'])) {
+            self.tell(sign, path);
+        }
+    }
+
+    fn tell(&self, sign: char, what: &str) {
         let mut input = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         // A guard that is gone guards nothing; the run itself goes on.
-        let _ = input.write_all(format!("{sign}{group}\n").as_bytes());
+        let _ = input.write_all(format!("{sign}{what}\n").as_bytes());
     }
 }
 
-/// Guards the groups that `input` names until it ends, then kills those left.
-pub fn guard(input: impl BufRead) {
-    let mut groups = BTreeSet::new();
-    for line in input.lines() {
-        let Ok(line) = line else { break };
-        match line.split_at_checked(1) {
-            Some(("+", group)) => groups.extend(group.parse::<i32>()),
-            Some(("-", group)) => drop(group.parse::<i32>().map(|group| groups.remove(&group))),
-            _ => {}
+/// What is under guard.
+#[derive(Default)]
+struct Guarded {
+    groups: BTreeSet<i32>,
+    folders: BTreeSet<PathBuf>,
+    kept: BTreeSet<PathBuf>,
+}
+
+impl Guarded {
+    /// Takes one line to heart; one that makes no sense is passed over.
+    fn hear(&mut self, line: &str) {
+        let Some((sign, what)) = line.split_at_checked(1) else { return };
+        if what.starts_with('/') {
+            let folder = PathBuf::from(what);
+            match sign {
+                "+" => _ = self.folders.insert(folder),
+                "-" => _ = self.folders.remove(&folder),
+                "=" => _ = self.kept.insert(folder),
+                _ => {}
+            }
+        } else if let Ok(group) = what.parse() {
+            match sign {
+                "+" => _ = self.groups.insert(group),
+                "-" => _ = self.groups.remove(&group),
+                _ => {}
+            }
         }
     }
-    for group in groups {
+}
+
+/// Guards the groups and folders that `input` names until it ends, then kills and removes those left.
+pub fn guard(input: impl BufRead) {
+    let mut guarded = Guarded::default();
+    for line in input.lines() {
+        let Ok(line) = line else { break };
+        guarded.hear(&line);
+    }
+    for group in guarded.groups {
         kill_group(group);
+    }
+    for folder in guarded.folders {
+        clear(&folder, &guarded.kept);
     }
 }
 
@@ -81,5 +133,26 @@ pub fn guard(input: impl BufRead) {
 pub(crate) fn kill_group(group: i32) {
     if let Some(group) = Pid::from_raw(group) {
         let _ = kill_process_group(group, Signal::KILL);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn folders_left_under_guard_are_removed_and_those_taken_out_or_kept_stay() {
+        let base = tempfile::tempdir().expect("a folder");
+        let at = |name: &str| base.path().join(name);
+        for name in ["left/run-1", "left/run-2", "out", "never"] {
+            std::fs::create_dir_all(at(name)).expect("made");
+        }
+        let base = base.path().display();
+        let lines = format!(
+            "+{base}/left\n+{base}/out\n-{base}/out\n={base}/left/run-2\nnonsense\n\n+relative\n+{base}/nowhere\n"
+        );
+        guard(lines.as_bytes());
+        assert!(!at("left/run-1").exists());
+        assert!(at("left/run-2").exists() && at("out").exists() && at("never").exists());
     }
 }

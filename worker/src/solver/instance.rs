@@ -2,7 +2,7 @@
 //!
 //! The program is told in the environment where to listen: `STARLINGS_SOLVER_SOCKET` is the path of a Unix socket, or
 //! `STARLINGS_SOLVER_ADDRESS` a loopback address where the study asks for one with `{port}`. It is ready when it answers
-//! Describe. Its standard input closes when the worker ends. Next file to read: [`super::process`].
+//! Describe. Its standard input closes when the worker ends. Next files to read: [`super::process`], [`super::answer`].
 
 use std::collections::BTreeMap;
 use std::process::ChildStdin;
@@ -20,6 +20,7 @@ use tokio::runtime::Runtime;
 use tonic::transport::{Channel, Endpoint};
 
 use super::SolverError;
+use super::answer;
 use super::error::tail_text;
 use super::machine::{cores, free_port};
 use super::process::{Launch, Process, ending, is_killed};
@@ -44,20 +45,29 @@ const LAST_WORDS: Duration = Duration::from_millis(500);
 
 /// Why a program is of no more use.
 #[derive(Debug)]
-pub(crate) enum Lost {
+pub(crate) struct Lost {
+    pub(crate) how: How,
+    what: String,
+    tail: String,
+}
+
+/// How a program was lost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum How {
     /// It did not answer in time.
-    Silent(String),
+    Silent,
     /// It ended by itself, or broke the protocol.
-    Fell(String),
+    Fell,
     /// Somebody killed it.
-    Killed(String),
+    Killed,
 }
 
 impl Lost {
     /// In words, with how often it happened.
     pub(crate) fn text(&self, times: u32) -> String {
-        let (Self::Silent(text) | Self::Fell(text) | Self::Killed(text)) = self;
-        if times > 1 { format!("{text} (and {} before, on the same run)", times - 1) } else { text.clone() }
+        let before =
+            if times > 1 { format!(" (and {} before, on the same run)", times - 1) } else { String::new() };
+        format!("{}{before}{}", self.what, tail_text(&self.tail))
     }
 }
 
@@ -71,6 +81,8 @@ pub(crate) struct Instance {
     scratch: Scratch,
     client: SolverClient<Channel>,
     runtime: Runtime,
+    /// What it said of itself when it was ready, where that makes sense.
+    described: Option<Description>,
 }
 
 impl Instance {
@@ -110,8 +122,8 @@ impl Instance {
             process.remember_output();
         }
         let patience = Duration::try_from_secs_f64(def.start_timeout).unwrap_or(Duration::MAX);
-        let client = connect(&runtime, &place.target, &name, process.as_mut(), patience)?;
-        Ok(Self { name, process, _lifeline: lifeline, scratch, client, runtime })
+        let (client, described) = connect(&runtime, &place.target, &name, process.as_mut(), patience)?;
+        Ok(Self { name, process, _lifeline: lifeline, scratch, client, runtime, described })
     }
 
     /// What the program says of itself.
@@ -120,16 +132,20 @@ impl Instance {
     /// When it does not answer or says something that makes no sense.
     pub(crate) fn describe(&mut self) -> Result<Description, SolverError> {
         let request = DescribeRequest { protocol: SOLVER_PROTOCOL };
-        let wrong = |message: String| SolverError::Description { program: self.name.clone(), message };
         let answer = self.runtime.block_on(self.client.describe(request));
-        let answer = answer.map_err(|status| wrong(status_text(&status)))?;
-        decode_description(answer.get_ref()).map_err(|error| wrong(plain(error)))
+        let described = answer
+            .map_err(|status| status_text(&status))
+            .and_then(|answer| decode_description(answer.get_ref()).map_err(plain));
+        described.map_err(|what| SolverError::Description {
+            program: self.name.clone(),
+            message: what + &tail_text(&self.tail()),
+        })
     }
 
     /// Has one run made.
     ///
     /// # Errors
-    /// When the program is of no more use; what it reports of the run itself is an answer.
+    /// When the program is of no more use; what it reports of the run itself is an answer, and so is an unsound prediction.
     pub(crate) fn run(
         &mut self,
         run: &Run<'_>,
@@ -144,7 +160,7 @@ impl Instance {
                 match replies.message().await {
                     Ok(Some(reply)) => match decode_reply(reply).map_err(|e| Broken::Protocol(plain(e)))? {
                         Reply::Progress(time) => tracing::debug!(particle = run.particle, time, "progress"),
-                        Reply::Ended(answer) => return Ok(answer),
+                        Reply::Ended(answer) => return Ok(answer.map_err(answer::reported)),
                     },
                     Ok(None) => {
                         return Err(Broken::Protocol("it ended the run without an answer".to_owned()));
@@ -155,16 +171,19 @@ impl Instance {
         };
         let timed = async { tokio::time::timeout(patience, conversation).await };
         match self.runtime.block_on(timed) {
-            Ok(Ok(answer)) => Ok(answer.map_err(|error| self.with_tail(error))),
+            Ok(Ok(answer)) => {
+                Ok(answer.and_then(|solved| self.sound(run, solved)).map_err(|e| self.named(e)))
+            }
             Ok(Err(broken)) => Err(self.lost(broken)),
             Err(_) => {
-                let tail = self.tail();
-                let name = &self.name;
-                Err(Lost::Silent(format!(
-                    "the solver `{name}` did not answer within {} s and was ended (`timeout` sets the limit){}",
+                // A program that somebody else started is not ended.
+                let ended = if self.process.is_some() { " and was ended" } else { "" };
+                let what = format!(
+                    "the solver `{}` did not answer within {} s{ended} (`timeout` sets the limit)",
+                    self.name,
                     patience.as_secs_f64(),
-                    tail_text(&tail)
-                )))
+                );
+                Err(Lost { how: How::Silent, what, tail: self.tail() })
             }
         }
     }
@@ -177,10 +196,35 @@ impl Instance {
         drop(self.runtime.block_on(asked));
     }
 
-    /// Adds the end of the program's output to a failure that it reports.
-    fn with_tail(&mut self, error: ParticleError) -> ParticleError {
+    /// Refuses an answer of another length than asked for, or one that is not finite, while the program's output is at hand.
+    fn sound(&self, run: &Run<'_>, solved: Solved) -> Result<Solved, ParticleError> {
+        let Some(described) = &self.described else { return Ok(solved) };
+        match answer::fault(&described.spec, run, &solved) {
+            Some(fault) => Err(ParticleError::Solver(fault)),
+            None => Ok(solved),
+        }
+    }
+
+    /// A failure of a run with the program's name and the end of its output.
+    fn named(&mut self, error: ParticleError) -> ParticleError {
+        let tail = tail_text(&self.tail());
+        let name = &self.name;
         match error {
-            ParticleError::Solver(text) => ParticleError::Solver(text + &tail_text(&self.tail())),
+            ParticleError::BadJob(text) => ParticleError::BadJob(format!(
+                "the solver `{name}` refuses it: {}{tail}",
+                answer::short(&text)
+            )),
+            ParticleError::Solver(text) => {
+                ParticleError::Solver(format!("the solver `{name}` {}{tail}", answer::short(&text)))
+            }
+            ParticleError::NotFinite { what, time } if time.is_finite() => ParticleError::NotFinite {
+                what: format!("{} of the solver `{name}`", answer::short(&what)),
+                time,
+            },
+            ParticleError::NotFinite { what, .. } => ParticleError::Solver(format!(
+                "the solver `{name}` says that {} is not a finite number{tail}",
+                answer::short(&what)
+            )),
             other => other,
         }
     }
@@ -190,21 +234,22 @@ impl Instance {
     }
 
     fn lost(&mut self, broken: Broken) -> Lost {
-        let name = self.name.clone();
         let status = self.process.as_mut().and_then(|process| process.wait(LAST_WORDS));
-        let tail = tail_text(&self.tail());
-        match (status, broken) {
+        let tail = self.tail();
+        let name = &self.name;
+        let (how, what) = match (status, broken) {
             (Some(status), _) => {
-                let text = format!("the solver `{name}` {} during a run{tail}", ending(status));
-                if is_killed(status) { Lost::Killed(text) } else { Lost::Fell(text) }
+                let how = if is_killed(status) { How::Killed } else { How::Fell };
+                (how, format!("the solver `{name}` {} during a run", ending(status)))
             }
             (None, Broken::Connection(what)) => {
-                Lost::Fell(format!("the connection to the solver `{name}` broke: {what}{tail}"))
+                (How::Fell, format!("the connection to the solver `{name}` broke: {what}"))
             }
             (None, Broken::Protocol(what)) => {
-                Lost::Fell(format!("the solver `{name}` breaks the protocol: {what}{tail}"))
+                (How::Fell, format!("the solver `{name}` breaks the protocol: {what}"))
             }
-        }
+        };
+        Lost { how, what, tail }
     }
 }
 
@@ -250,7 +295,7 @@ fn connect(
     name: &str,
     mut process: Option<&mut Process>,
     patience: Duration,
-) -> Result<SolverClient<Channel>, SolverError> {
+) -> Result<(SolverClient<Channel>, Option<Description>), SolverError> {
     let not_ready = |what: String, tail: String| SolverError::NotReady {
         program: name.to_owned(),
         what,
@@ -274,12 +319,13 @@ fn connect(
                 .max_decoding_message_size(MAX_ANSWER)
                 .max_encoding_message_size(MAX_ANSWER);
             let request = DescribeRequest { protocol: SOLVER_PROTOCOL };
-            client.describe(request).await.map_err(|status| status_text(&status))?;
-            Ok::<_, String>(client)
+            let answer = client.describe(request).await.map_err(|status| status_text(&status))?;
+            // What is wrong with it is said when somebody asks for it.
+            Ok::<_, String>((client, decode_description(answer.get_ref()).ok()))
         };
         let left = patience.saturating_sub(started.elapsed());
         match runtime.block_on(async { tokio::time::timeout(left, attempt).await }) {
-            Ok(Ok(client)) => return Ok(client),
+            Ok(Ok(ready)) => return Ok(ready),
             Ok(Err(error)) => last = error,
             Err(_) => last = "it accepts the connection but does not answer".to_owned(),
         }

@@ -7,6 +7,7 @@ use std::io::{self, BufRead, BufReader, Read};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
+use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -19,6 +20,9 @@ use super::guard::{Notice, kill_group};
 /// Lines of the end of a program's output that travel with a failure, and the longest of them.
 const TAIL_LINES: usize = 12;
 const TAIL_WIDTH: usize = 240;
+
+/// How long the last lines of a program that has ended may take to arrive.
+const LAST_LINES: Duration = Duration::from_millis(500);
 
 /// Variables by which numerical libraries learn how many threads they may start.
 const THREAD_COUNTS: [&str; 6] = [
@@ -58,7 +62,8 @@ pub(crate) struct Process {
     child: Child,
     group: i32,
     tail: Arc<Mutex<VecDeque<String>>>,
-    reader: Option<std::thread::JoinHandle<()>>,
+    /// Closes when its standard error is read up.
+    read_up: Option<Receiver<()>>,
     notice: Option<Notice>,
 }
 
@@ -87,11 +92,16 @@ impl Process {
             notice.begin(child.id());
         }
         let tail = Arc::default();
-        let reader = child.stderr.take().map(|stderr| {
+        let read_up = child.stderr.take().map(|stderr| {
+            let (done, read_up) = channel();
             let tail = Arc::clone(&tail);
-            std::thread::spawn(move || remember(stderr, &tail))
+            std::thread::spawn(move || {
+                remember(stderr, &tail);
+                drop(done);
+            });
+            read_up
         });
-        let process = Self { child, group, tail, reader, notice };
+        let process = Self { child, group, tail, read_up, notice };
         process.limit(launch).map_err(failed)?;
         Ok(process)
     }
@@ -155,11 +165,11 @@ impl Process {
     /// The end of what it said on its standard error. Waits for the last of it when the program has ended.
     pub(crate) fn tail(&mut self) -> String {
         if self.ended().is_some()
-            && let Some(reader) = self.reader.take()
+            && let Some(read_up) = self.read_up.take()
         {
-            // A child of the program may hold the pipe open: it is killed first.
+            // A child of the program may hold the pipe open: it is killed first. One that left the group is not waited for.
             kill_group(self.group);
-            let _ = reader.join();
+            let _: Result<(), _> = read_up.recv_timeout(LAST_LINES);
         }
         let tail = self.tail.lock().unwrap_or_else(PoisonError::into_inner);
         tail.iter().map(String::as_str).collect::<Vec<_>>().join("\n")
@@ -212,19 +222,70 @@ fn reason(error: &io::Error) -> String {
     }
 }
 
-/// Keeps the last lines of a stream.
+/// Keeps the last lines of a stream, and of a long line its beginning.
 fn remember(stream: impl Read, tail: &Mutex<VecDeque<String>>) {
-    for line in BufReader::new(stream).split(b'\n') {
-        let Ok(line) = line else { break };
-        let text: String = String::from_utf8_lossy(&line).chars().take(TAIL_WIDTH).collect();
-        let text = text.trim_end().to_owned();
-        if text.is_empty() {
-            continue;
+    let mut stream = BufReader::new(stream);
+    let mut line = Vec::new();
+    loop {
+        let piece = match stream.fill_buf() {
+            Ok(piece) if !piece.is_empty() => piece,
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+            _ => break,
+        };
+        let end = piece.iter().position(|byte| *byte == b'\n');
+        let own = &piece[..end.unwrap_or(piece.len())];
+        // A character has at most four bytes.
+        let room = (4 * TAIL_WIDTH).saturating_sub(line.len());
+        line.extend_from_slice(&own[..own.len().min(room)]);
+        let read = end.map_or(piece.len(), |end| end + 1);
+        stream.consume(read);
+        if end.is_some() {
+            keep_line(&line, tail);
+            line.clear();
         }
-        let mut tail = tail.lock().unwrap_or_else(PoisonError::into_inner);
-        if tail.len() == TAIL_LINES {
-            tail.pop_front();
-        }
-        tail.push_back(text);
+    }
+    keep_line(&line, tail);
+}
+
+fn keep_line(line: &[u8], tail: &Mutex<VecDeque<String>>) {
+    // Bytes that would steer a terminal are shown as what they are: no text.
+    let shown = |c: char| if c.is_control() && c != '\t' { char::REPLACEMENT_CHARACTER } else { c };
+    let text = String::from_utf8_lossy(line.trim_ascii_end());
+    let text: String = text.chars().take(TAIL_WIDTH).map(shown).collect();
+    if text.is_empty() {
+        return;
+    }
+    let mut tail = tail.lock().unwrap_or_else(PoisonError::into_inner);
+    if tail.len() == TAIL_LINES {
+        tail.pop_front();
+    }
+    tail.push_back(text);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn remembered(bytes: &[u8]) -> Vec<String> {
+        let tail = Mutex::default();
+        remember(bytes, &tail);
+        tail.into_inner().expect("nobody panicked").into()
+    }
+
+    #[test]
+    fn of_what_a_program_says_the_last_lines_are_kept_and_of_a_long_line_the_beginning() {
+        let many: String = (0..50).map(|i| format!("line {i}\r\n\n")).collect();
+        let kept = remembered(many.as_bytes());
+        assert_eq!((kept.len(), kept[0].as_str(), kept[11].as_str()), (TAIL_LINES, "line 38", "line 49"));
+        let long = [vec![b'x'; 10_000_000], b"\nend".to_vec()].concat();
+        assert_eq!(remembered(&long), ["x".repeat(TAIL_WIDTH), "end".to_owned()]);
+    }
+
+    #[test]
+    fn garbage_is_shown_as_no_text_and_steers_no_terminal() {
+        assert_eq!(
+            remembered(b"\x1b[2Jcleared \xff\n\0\0"),
+            ["\u{fffd}[2Jcleared \u{fffd}", "\u{fffd}\u{fffd}"]
+        );
     }
 }

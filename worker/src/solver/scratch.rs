@@ -1,61 +1,186 @@
 //! Scratch folders: one for every program or run, removed when it is done; those of failed runs are kept, up to a limit.
+//!
+//! All of a process lie in one root, which goes with the last of them. A process that ends without dropping anything leaves
+//! its root to the guard, through [`clear`]. Next file to read: [`super::guard`].
 
+use std::collections::BTreeSet;
+use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
 
-use tempfile::{Builder, TempDir};
+use tempfile::Builder;
+
+use super::guard::Notice;
 
 /// Folders of failed runs that one worker keeps.
 const KEPT: usize = 8;
 
+/// How often a folder is tried to be removed while a program that was just killed still writes into it, and the wait between.
+const TRIES: usize = 40;
+const BETWEEN: Duration = Duration::from_millis(5);
+
 /// The folder of this process.
-pub(crate) struct ScratchRoot {
-    /// Removed with what is left in it, unless something is kept.
+pub(crate) struct ScratchRoot(Arc<Root>);
+
+/// Lives as long as the last folder in it.
+struct Root {
     folder: PathBuf,
-    kept: Arc<AtomicUsize>,
+    kept: AtomicUsize,
+    notice: Option<Notice>,
 }
 
 impl ScratchRoot {
-    pub(crate) fn new(base: Option<&Path>) -> io::Result<Self> {
-        let base = base.map_or_else(std::env::temp_dir, Path::to_path_buf);
-        std::fs::create_dir_all(&base)?;
+    /// A new root in `base`, under guard where there is one.
+    pub(crate) fn new(base: Option<&Path>, notice: Option<Notice>) -> io::Result<Self> {
+        let base = std::path::absolute(base.map_or_else(std::env::temp_dir, Path::to_path_buf))?;
+        fs::create_dir_all(&base)?;
         let prefix = format!("starlings-{}-", std::process::id());
         let folder = Builder::new().prefix(&prefix).tempdir_in(base)?.keep();
-        Ok(Self { folder, kept: Arc::default() })
+        if let Some(notice) = &notice {
+            notice.begin_folder(&folder);
+        }
+        Ok(Self(Arc::new(Root { folder, kept: AtomicUsize::new(0), notice })))
     }
 
     pub(crate) fn folder(&self, label: &str) -> io::Result<Scratch> {
-        let folder = Builder::new().prefix(&format!("{label}-")).tempdir_in(&self.folder)?;
-        Ok(Scratch { folder, kept: Arc::clone(&self.kept) })
+        let folder = Builder::new().prefix(&format!("{label}-")).tempdir_in(&self.0.folder)?.keep();
+        Ok(Scratch { folder, is_kept: false, root: Arc::clone(&self.0) })
     }
 }
 
-impl Drop for ScratchRoot {
+impl Drop for Root {
     fn drop(&mut self) {
         // Not empty where runs failed: then it stays.
-        let _ = std::fs::remove_dir(&self.folder);
+        let _ = fs::remove_dir(&self.folder);
+        if let Some(notice) = &self.notice {
+            notice.end_folder(&self.folder);
+        }
     }
 }
 
 /// One folder.
 pub(crate) struct Scratch {
-    folder: TempDir,
-    kept: Arc<AtomicUsize>,
+    folder: PathBuf,
+    is_kept: bool,
+    root: Arc<Root>,
 }
 
 impl Scratch {
     pub(crate) fn path(&self) -> &Path {
-        self.folder.path()
+        &self.folder
     }
 
     /// Keeps the folder for people to look at, unless as many are kept as may be; says where it is.
     pub(crate) fn keep(mut self) -> Option<PathBuf> {
-        if self.kept.fetch_add(1, Ordering::Relaxed) >= KEPT {
+        if self.root.kept.fetch_add(1, Ordering::Relaxed) >= KEPT {
             return None;
         }
-        self.folder.disable_cleanup(true);
-        Some(self.folder.path().to_path_buf())
+        if let Some(notice) = &self.root.notice {
+            notice.keep_folder(&self.folder);
+        }
+        self.is_kept = true;
+        Some(self.folder.clone())
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        if !self.is_kept {
+            patiently(|| remove(&self.folder));
+        }
+    }
+}
+
+/// Removes a root that its process left behind, except the kept folders in it.
+pub(super) fn clear(root: &Path, kept: &BTreeSet<PathBuf>) {
+    // A link in its place is not the folder that was made.
+    if !fs::symlink_metadata(root).is_ok_and(|about| about.is_dir()) {
+        return;
+    }
+    patiently(|| {
+        let mut stays = false;
+        for entry in fs::read_dir(root)? {
+            let entry = entry?;
+            if kept.contains(&entry.path()) {
+                stays = true;
+            } else if entry.file_type()?.is_dir() {
+                remove(&entry.path())?;
+            } else {
+                fs::remove_file(entry.path())?;
+            }
+        }
+        if stays { Ok(()) } else { fs::remove_dir(root) }
+    });
+}
+
+/// Removes a folder; links in it are removed and not followed.
+fn remove(folder: &Path) -> io::Result<()> {
+    match fs::remove_dir_all(folder) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        removed => removed,
+    }
+}
+
+/// Tries until it works, or somebody writes for too long.
+fn patiently(mut attempt: impl FnMut() -> io::Result<()>) {
+    for _ in 0..TRIES {
+        if attempt().is_ok() {
+            return;
+        }
+        std::thread::sleep(BETWEEN);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_root_goes_with_its_last_folder_whoever_is_dropped_first() {
+        let base = tempfile::tempdir().expect("a folder");
+        let root = ScratchRoot::new(Some(base.path()), None).expect("a root");
+        let folder = root.folder("solver").expect("a folder in it");
+        fs::write(folder.path().join("mesh"), "1 2 3").expect("written");
+        drop(root);
+        assert!(folder.path().join("mesh").exists());
+        drop(folder);
+        assert_eq!(fs::read_dir(base.path()).expect("readable").count(), 0);
+    }
+
+    #[test]
+    fn folders_of_failed_runs_stay_up_to_the_limit() {
+        let base = tempfile::tempdir().expect("a folder");
+        let root = ScratchRoot::new(Some(base.path()), None).expect("a root");
+        let kept: Vec<_> =
+            (0..KEPT + 3).filter_map(|_| root.folder("run").expect("a folder").keep()).collect();
+        let top = kept[0].parent().expect("the root").to_path_buf();
+        drop(root);
+        assert_eq!(kept.len(), KEPT);
+        assert_eq!(fs::read_dir(top).expect("it stays").count(), KEPT);
+    }
+
+    #[test]
+    fn what_is_cleared_are_the_folders_of_the_root_and_never_what_links_lead_to() {
+        let base = tempfile::tempdir().expect("a folder");
+        let (root, other) = (base.path().join("root"), base.path().join("other"));
+        for folder in ["run-1", "run-2"] {
+            fs::create_dir_all(root.join(folder)).expect("made");
+        }
+        fs::create_dir(&other).expect("made");
+        fs::write(other.join("precious"), "1").expect("written");
+        std::os::unix::fs::symlink(&other, root.join("link")).expect("linked");
+        std::os::unix::fs::symlink(&other, root.join("run-1").join("link")).expect("linked");
+        std::os::unix::fs::symlink(&other, base.path().join("posing")).expect("linked");
+        clear(&root, &BTreeSet::from([root.join("run-2")]));
+        clear(&base.path().join("posing"), &BTreeSet::new());
+        let left: Vec<_> =
+            fs::read_dir(&root).expect("it stays").flatten().map(|entry| entry.file_name()).collect();
+        assert_eq!(left, ["run-2"]);
+        assert!(other.join("precious").exists());
+        clear(&root, &BTreeSet::new());
+        assert!(!root.exists());
     }
 }

@@ -17,8 +17,8 @@ use super::scratch::{Scratch, ScratchRoot};
 pub struct SiteOptions {
     /// Folder for scratch folders; the system's without it.
     pub scratch: Option<PathBuf>,
-    /// Program and arguments that watch over the process groups, as [`super::guard`] says; without it a killed worker leaves
-    /// its solvers to notice by themselves.
+    /// Program and arguments that watch over process groups and folders, as [`super::guard`] says; without it a killed worker
+    /// leaves its solvers to notice by themselves, and its scratch folders to somebody else.
     pub guard: Option<(PathBuf, Vec<String>)>,
 }
 
@@ -41,7 +41,8 @@ impl Site {
     pub(crate) fn scratch(&self, label: &str) -> io::Result<Scratch> {
         let mut root = self.scratch.lock().unwrap_or_else(PoisonError::into_inner);
         if root.is_none() {
-            *root = Some(ScratchRoot::new(self.options.scratch.as_deref())?);
+            let notice = self.guard().map_err(io::Error::other)?;
+            *root = Some(ScratchRoot::new(self.options.scratch.as_deref(), notice)?);
         }
         match &*root {
             Some(root) => root.folder(label),
@@ -58,7 +59,7 @@ impl Site {
         Process::start(launch, notice)
     }
 
-    /// The way to tell the guard of a group, started with the first program.
+    /// The way to tell the guard, which is started with the first folder or program.
     fn guard(&self) -> Result<Option<super::guard::Notice>, SolverError> {
         let Some((program, arguments)) = &self.options.guard else { return Ok(None) };
         let mut guard = self.guard.lock().unwrap_or_else(PoisonError::into_inner);

@@ -4,11 +4,12 @@
 
 use std::path::{Component, Path, PathBuf};
 
-use toml_edit::{DocumentMut, Item};
+use starlings_models::SOLVER;
+use toml_edit::{DocumentMut, Item, TableLike, Value};
 
-use super::{each_table, set_text, text};
+use super::{array, each_table, set_text, text};
 
-/// Renames every file of the study: initial values, recordings, inputs of their own files, surfaces.
+/// Renames every file of the study: initial values, recordings, inputs of their own files, surfaces, those of a solver.
 pub(super) fn relocate(document: &mut DocumentMut, study: &Path, to: &Path) {
     let from = study.parent().unwrap_or(Path::new(""));
     let Some(to) = real(to) else { return };
@@ -17,6 +18,11 @@ pub(super) fn relocate(document: &mut DocumentMut, study: &Path, to: &Path) {
         && let Some(new) = moved(&text(model, "initial"))
     {
         set_text(model, "initial", &new);
+    }
+    if let Some(model) = document.get_mut("model").and_then(Item::as_table_like_mut)
+        && text(model, "kind") == SOLVER
+    {
+        relocate_solver(model, from, &to);
     }
     each_table(document.as_table_mut(), "records", &mut |record| {
         if let Some(new) = moved(&text(record, "file")) {
@@ -41,6 +47,40 @@ pub(super) fn relocate(document: &mut DocumentMut, study: &Path, to: &Path) {
             }
         });
     });
+}
+
+/// Renames the files of a solver and the folder that it runs in, from which its command leads.
+fn relocate_solver(model: &mut dyn TableLike, from: &Path, to: &Path) {
+    let moved = |name: &str| moved(from, to, name);
+    if let Some(new) = moved(&text(model, "described")) {
+        set_text(model, "described", &new);
+    }
+    for key in ["templates", "copies"] {
+        let Some(files) = model.get_mut(key).and_then(Item::as_table_like_mut) else { continue };
+        let names: Vec<String> = files.iter().map(|(name, _)| name.to_owned()).collect();
+        for name in names {
+            if let Some(new) = moved(&text(files, &name)) {
+                set_text(files, &name, &new);
+            }
+        }
+    }
+    for file in array(model, "copies").into_iter().flat_map(|list| list.iter_mut()) {
+        if let Some(new) = file.as_str().and_then(moved) {
+            let decor = file.decor().clone();
+            *file = Value::from(new);
+            *file.decor_mut() = decor;
+        }
+    }
+    let folder = text(model, "folder");
+    if Path::new(&folder).is_absolute() {
+        return;
+    }
+    let Some(place) = real(&from.join(&folder)) else { return };
+    let parts: Vec<String> = between(to, &place)
+        .components()
+        .map(|part| part.as_os_str().to_string_lossy().into_owned())
+        .collect();
+    model.insert("folder", toml_edit::value(if parts.is_empty() { ".".to_owned() } else { parts.join("/") }));
 }
 
 /// The name of an existing file as seen from the folder `to`; nothing for an absolute path or what is no file.

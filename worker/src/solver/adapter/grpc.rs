@@ -12,7 +12,7 @@ use starlings_models::{Description, ParticleError, Run, Solved, SolverDef};
 use super::{Adapter, Kind};
 use crate::solver::SolverError;
 use crate::solver::backoff::Backoff;
-use crate::solver::instance::{Instance, Lost};
+use crate::solver::instance::{How, Instance};
 use crate::solver::site::Site;
 
 pub(crate) const KIND: Kind = Kind {
@@ -116,10 +116,10 @@ impl Adapter for Grpc {
                 // The program is gone or of no more use: dropping it ends its whole group.
                 Err(lost) => {
                     losses += 1;
-                    let most = match lost {
-                        Lost::Silent(_) => 1,
-                        Lost::Fell(_) => FELL,
-                        Lost::Killed(_) => KILLED,
+                    let most = match lost.how {
+                        How::Silent => 1,
+                        How::Fell => FELL,
+                        How::Killed => KILLED,
                     };
                     let text = lost.text(losses);
                     drop(instance);

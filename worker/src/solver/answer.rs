@@ -1,0 +1,60 @@
+//! What can be wrong with what a solver answers, each in half a sentence that follows the solver's name.
+//!
+//! Said here as well as where every prediction is checked, since only here the program's output is at hand. Next file to read:
+//! [`super::instance`].
+
+use starlings_models::{ParticleError, Run, Solved, Spec};
+
+/// Letters of a solver's own words that a message repeats.
+const LONGEST: usize = 2000;
+
+/// What is wrong with an answer of this length and these values; nothing where it is sound.
+pub(super) fn fault(spec: &Spec, run: &Run<'_>, solved: &Solved) -> Option<String> {
+    let window = run.window;
+    let length = |what: &str, got: usize, wanted: usize| {
+        (got != wanted).then(|| format!("returned {got} {what} where {wanted} belong"))
+    };
+    length("output values", solved.outputs.len(), window.observed.len())
+        .or_else(|| length("state values", solved.state.len(), spec.n_state()).filter(|_| spec.restart))
+        .or_else(|| {
+            let at = solved.outputs.iter().position(|value| !value.is_finite())?;
+            let n_row = solved.outputs.len() / window.times.len().max(1);
+            let (time, value) = (window.times[at / n_row.max(1)], solved.outputs[at]);
+            Some(format!(
+                "returned {value} for the output `{}` at t = {time}",
+                output(spec, run, at % n_row.max(1))
+            ))
+        })
+        .or_else(|| {
+            let at = solved.state.iter().position(|value| !value.is_finite()).filter(|_| spec.restart)?;
+            let time = window.times.last().copied().unwrap_or(window.start);
+            let (name, value) = (Spec::component(&spec.states, at), solved.state[at]);
+            Some(format!("returned {value} for the state `{name}` at t = {time}"))
+        })
+}
+
+/// Name of a row of the outputs that were asked for.
+fn output(spec: &Spec, run: &Run<'_>, row: usize) -> String {
+    let known = |name: &String| spec.outputs.iter().find(|q| q.name == *name).cloned();
+    let asked: Vec<_> = run.outputs.iter().filter_map(known).collect();
+    Spec::component(&asked, row)
+}
+
+/// A failure that a solver reports, in words that follow its name.
+pub(super) fn reported(error: ParticleError) -> ParticleError {
+    match error {
+        ParticleError::Solver(text) if text.trim().is_empty() => {
+            ParticleError::Solver("reports a failure and does not say which".to_owned())
+        }
+        ParticleError::Solver(text) => ParticleError::Solver(format!("reports: {text}")),
+        other => other,
+    }
+}
+
+/// The beginning of a long text.
+pub(super) fn short(text: &str) -> String {
+    match text.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{} …", &text[..end]),
+        None => text.to_owned(),
+    }
+}
