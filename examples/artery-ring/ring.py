@@ -1,10 +1,10 @@
 """A ring of an artery in a soft, viscous gel, pulsating under the pressure inside: two-dimensional elastodynamics.
 
 Plane strain, linear and isotropic: rho d2u/dt2 = div sigma(u), with the pressure on the inner wall and a gel on the outer one
-that answers with k_s u + c_s du/dt. Young's modulus differs between three sectors of 120 degrees. Displacements are counted from
-the ring at its lowest pressure, so that only the pressure above that loads it. The ring starts in equilibrium with the pressure
-of that moment, which is not how a gel that creeps leaves it: an observer forgets the difference. Biquadratic elements on curved
-quadrilaterals; in time the two-stage method of Alexander (1977), second order and damping what is faster than a step.
+that answers with k_s u + c_s du/dt. Young's modulus differs between three sectors of 120 degrees. Displacements are counted
+from the ring at its lowest pressure, so that only the pressure above that loads it. The ring starts in equilibrium with the
+pressure of that moment, which is not how a gel that creeps leaves it: an observer forgets the difference. Biquadratic elements
+on curved quadrilaterals; in time the two-stage method of Alexander (1977), second order and damping what is faster than a step.
 """
 
 from functools import lru_cache

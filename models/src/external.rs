@@ -6,24 +6,22 @@
 
 mod applied;
 mod outline;
+mod parts;
 mod replay;
 mod rows;
 mod split;
 
 use crate::binding::Binding;
-use crate::effect::{Addition, Extended};
+use crate::effect::Addition;
 use crate::setup::{Setup, SetupError};
 use crate::simulator::{check_job, free_names};
 use crate::solver::Description;
-use crate::{
-    EffectDef, Forward, Job, Model, ObserverDef, ParticleError, Prediction, Quantity, Signal, Spec, Window,
-    nearest,
-};
+use crate::{Forward, Job, ObserverDef, ParticleError, Prediction, Signal, Spec, Window};
 use applied::Applied;
 pub(crate) use outline::{Outline, check_effects};
-use replay::Replay;
+pub(crate) use parts::spec;
+use parts::{Parts, check_observer};
 use rows::Rows;
-use split::Split;
 
 /// One run, as the program is asked for it.
 #[derive(Clone, Copy, Debug)]
@@ -83,43 +81,6 @@ pub struct External<S> {
     /// Places of the parameters of the terms among all, with their names.
     of_terms: Vec<(String, usize)>,
     constants: Vec<(String, f64)>,
-}
-
-/// What a setup of a program says of itself, with what effects carry from window to window.
-pub(crate) fn spec(setup: &Setup, description: &Description) -> Result<Spec, SetupError> {
-    Parts::of(setup, description).map(|parts| parts.spec)
-}
-
-/// What is made of the effects of a setup.
-struct Parts {
-    /// The description with all effects' parameters and states.
-    whole: Spec,
-    spec: Spec,
-    on_inputs: Option<Applied>,
-    on_outputs: Option<Applied>,
-    hosted: Vec<EffectDef>,
-}
-
-impl Parts {
-    fn of(setup: &Setup, description: &Description) -> Result<Self, SetupError> {
-        let effects = setup.written_out_effects(&description.spec)?;
-        let split = Split::of(&effects, description)?;
-        let constants = &setup.model.constants;
-        let whole = Extended::new(Box::new(Outline::new(description)), &effects, constants)?.spec().clone();
-        let applied = |replay, effects: Vec<_>| {
-            (!effects.is_empty()).then(|| Applied::new(replay, effects, &whole, constants)).transpose()
-        };
-        let on_inputs = applied(Replay::of_inputs(&description.spec), split.inputs)?;
-        let on_outputs = applied(Replay::of_outputs(&description.spec), split.outputs)?;
-        let mut spec = Spec { states: description.spec.states.clone(), ..whole.clone() };
-        let n_hidden = on_inputs.as_ref().map_or(0, Applied::n_state)
-            + on_outputs.as_ref().map_or(0, |a| a.n_state() + description.spec.n_output());
-        if n_hidden > 0 && spec.restart {
-            let hidden = Quantity::new("effects:", "").size(n_hidden);
-            spec.states.push(hidden.says("What effects on inputs and outputs carry from window to window."));
-        }
-        Ok(Self { whole, spec, on_inputs, on_outputs, hosted: split.hosted })
-    }
 }
 
 impl<S: Solve> External<S> {
@@ -314,18 +275,6 @@ impl<S: Solve> Forward for External<S> {
         };
         Ok(Prediction { outputs, state, cost: 0.0 })
     }
-}
-
-fn check_observer(observer: &ObserverDef, description: &Description) -> Result<(), SetupError> {
-    let kind = observer.kind.as_str();
-    if kind.is_empty() || kind == "none" || description.observers.iter().any(|known| known == kind) {
-        return Ok(());
-    }
-    Err(SetupError::Unknown {
-        what: "observer of the solver",
-        name: kind.to_owned(),
-        nearest: nearest(kind, description.observers.iter()),
-    })
 }
 
 fn bad(message: String) -> ParticleError {

@@ -6,7 +6,6 @@
 //! where programs run, [`mod@serve`] for the other end of the wire.
 
 mod adapter;
-mod answer;
 mod backoff;
 pub mod conformance;
 mod error;

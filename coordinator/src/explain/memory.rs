@@ -27,7 +27,7 @@ pub(super) fn sound(
     match outcome.result {
         Err(error @ (ParticleError::Lost { .. } | ParticleError::BadJob(_))) => {
             let (particle, record, reason) = (particle as usize, record.to_owned(), error.to_string());
-            Err(RunError::NoAnswer { particle, record, reason }.into())
+            Err(RunError::NoAnswer { particle, record, values: String::new(), reason }.into())
         }
         Err(error) => Ok(Err(error.to_string())),
         Ok(prediction) => Ok(Ok(prediction)),

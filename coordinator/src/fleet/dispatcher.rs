@@ -156,7 +156,7 @@ impl Dispatcher {
                         self.out.push(Command::Notice(batch.retried(index, &worker.name, &why)));
                     }
                 }
-                Lost::GivenUp => self.out.push(Command::Notice(batch.failed(index))),
+                Lost::GivenUp => self.out.push(batch.failed(index)),
             }
         }
         let notice = FleetEvent::WorkerLeft { worker: worker.name, reason: reason.to_owned(), requeued };
@@ -237,7 +237,7 @@ impl Dispatcher {
             batch.retry_elsewhere(index, id, error, name);
         } else {
             batch.finish(index, Err(error), name);
-            self.out.push(Command::Notice(batch.failed(index)));
+            self.out.push(batch.failed(index));
         }
     }
 

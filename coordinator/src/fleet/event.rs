@@ -79,6 +79,8 @@ pub enum FleetEvent {
         particle: u32,
         /// Index of the record.
         record: u32,
+        /// Values of the parameters by name, in physical units; empty where they are not known.
+        parameters: Vec<(String, f64)>,
         /// Attempts made.
         attempts: u32,
         /// How the last one ended.

@@ -71,11 +71,12 @@ impl fmt::Display for FleetEvent {
             Self::JobRetried { particle, record, worker, reason } => {
                 write!(f, "particle {particle}, record {record}: tried again after worker {worker}: {reason}")
             }
-            Self::JobFailed { particle, record, attempts, reason } => {
+            Self::JobFailed { particle, record, parameters, attempts, reason } => {
                 let s = if *attempts == 1 { "" } else { "s" };
+                let with = with(parameters);
                 write!(
                     f,
-                    "particle {particle}, record {record}: given up after {attempts} attempt{s}: {reason}"
+                    "particle {particle}, record {record}{with}: given up after {attempts} attempt{s}: {reason}"
                 )
             }
             Self::LateAnswer { worker, job } => {
@@ -96,6 +97,23 @@ impl fmt::Display for FleetEvent {
     }
 }
 
+/// Parameters that a message lists.
+const LISTED: usize = 20;
+
+/// Parameters and their values in brackets.
+fn with(parameters: &[(String, f64)]) -> String {
+    if parameters.is_empty() {
+        return String::new();
+    }
+    let shown = parameters.iter().take(LISTED).map(|(name, value)| format!("{name} = {value}"));
+    let shown = shown.collect::<Vec<_>>().join(", ");
+    let more = match parameters.len().saturating_sub(LISTED) {
+        0 => String::new(),
+        n => format!(" and {n} more"),
+    };
+    format!(" ({shown}{more})")
+}
+
 /// The first digits of a hash: enough to tell two builds apart.
 fn short(hash: &str) -> &str {
     hash.get(..12).unwrap_or(hash)
@@ -108,9 +126,21 @@ mod tests {
     #[test]
     fn a_failed_job_says_its_attempts_once_and_in_the_right_number() {
         let text = |attempts| {
-            FleetEvent::JobFailed { particle: 1, record: 0, attempts, reason: "no".to_owned() }.to_string()
+            let (parameters, reason) = (Vec::new(), "no".to_owned());
+            FleetEvent::JobFailed { particle: 1, record: 0, parameters, attempts, reason }.to_string()
         };
         assert_eq!(text(1), "particle 1, record 0: given up after 1 attempt: no");
         assert_eq!(text(2), "particle 1, record 0: given up after 2 attempts: no");
+    }
+
+    #[test]
+    fn a_failed_job_says_its_parameters_and_of_many_the_first() {
+        let text = |n: usize| {
+            let parameters = (0..n).map(|i| (format!("p{i}"), i as f64 + 0.5)).collect();
+            let reason = "no".to_owned();
+            FleetEvent::JobFailed { particle: 1, record: 0, parameters, attempts: 1, reason }.to_string()
+        };
+        assert_eq!(text(2), "particle 1, record 0 (p0 = 0.5, p1 = 1.5): given up after 1 attempt: no");
+        assert!(text(23).contains("p19 = 19.5 and 3 more): given up"), "{}", text(23));
     }
 }

@@ -197,7 +197,7 @@ impl Fleet for GrpcFleet {
             let reason = format!("its text has {} bytes, a message holds {MAX_MESSAGE}", json.len());
             return Err(FleetError::SetupFailed { reason });
         }
-        self.hub.install(id, json);
+        self.hub.install(id, json, setup.parameters.clone());
         Ok(id)
     }
 

@@ -94,8 +94,11 @@ impl Hub {
         (state.dispatcher.n_workers(), state.dispatcher.slots())
     }
 
-    pub(super) fn install(&self, id: SetupId, json: Bytes) {
-        self.lock().setups.insert(id, json);
+    /// Takes a setup as it travels, with the names of its parameters.
+    pub(super) fn install(&self, id: SetupId, json: Bytes, parameters: Vec<String>) {
+        let mut state = self.lock();
+        state.setups.insert(id, json);
+        state.names.insert(id, parameters);
     }
 
     pub(super) fn knows<'a>(&self, mut setups: impl Iterator<Item = &'a SetupId>) -> bool {

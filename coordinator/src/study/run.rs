@@ -49,12 +49,14 @@ pub enum RunError {
         source: EstimatorError,
     },
     /// A run has no answer, and that is not the model's doing.
-    #[error("the run of particle {particle} over record `{record}` has no usable answer: {reason}")]
+    #[error("the run of particle {particle} over record `{record}`{} has no usable answer: {reason}", in_brackets(values))]
     NoAnswer {
         /// Index of the sigma point.
         particle: usize,
         /// Record name.
         record: String,
+        /// Its parameters in physical units; empty where they are not known.
+        values: String,
         /// What came instead.
         reason: String,
     },
@@ -74,6 +76,10 @@ pub enum RunError {
     /// A value that must serialise did not.
     #[error("internal: {0}")]
     Internal(String),
+}
+
+fn in_brackets(values: &str) -> String {
+    if values.is_empty() { String::new() } else { format!(" ({values})") }
 }
 
 /// What a fit leaves behind.

@@ -105,7 +105,8 @@ pub fn trial(study: &Study) -> Result<Vec<TrialChannel>, TrialError> {
     Ok(channels)
 }
 
-fn named(study: &Study, theta: &[f64]) -> String {
+/// Names and values of a job's parameters.
+pub(super) fn named(study: &Study, theta: &[f64]) -> String {
     let pairs = study.setup.parameters.iter().zip(theta).map(|(name, value)| format!("{name} = {value}"));
     pairs.collect::<Vec<_>>().join(", ")
 }

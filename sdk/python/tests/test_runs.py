@@ -174,7 +174,7 @@ def test_values_come_by_name_and_in_order():
         k, c = window.p
         seen.update(k=k, c=c, by_key=window.p["c"], by_place=window.p[0], n=len(window.p))
         with pytest.raises(AttributeError, match="no `q` among the parameters: k, c"):
-            window.p.q
+            getattr(window.p, "q")  # noqa: B009
         seen["u"] = window.inputs.at(0.25).u
         return [0.0]
 

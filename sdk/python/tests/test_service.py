@@ -393,6 +393,14 @@ def test_an_address_that_is_taken_is_told(serve):
     assert first.describe().name == "decay"
 
 
+def test_a_socket_that_a_killed_solver_left_is_taken_over(serve):
+    first = serve(DECAY)
+    first.child.kill()
+    first.child.wait(timeout=60)
+    second = serve(DECAY)
+    assert second.address == first.address and second.describe().name == "decay"
+
+
 def test_a_solver_that_is_killed_leaves_its_caller_with_an_error(serve):
     process = serve(DECAY)
     process.describe()

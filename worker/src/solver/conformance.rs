@@ -4,13 +4,17 @@
 //! with each other. Next files to read: [`mod@trial`] for the run that they vary, [`mod@checks`] for the checks.
 
 mod checks;
+mod hosted;
+mod refusals;
+mod subject;
 pub mod trial;
 
 use serde::Serialize;
 use starlings_models::{Description, ObserverDef, SolverDef};
 
 use super::{SolverError, Solvers};
-use checks::{CHECKS, Verdict};
+use checks::CHECKS;
+use subject::{Subject, Verdict};
 pub use trial::Trial;
 
 /// What was found.
@@ -45,7 +49,7 @@ pub fn conformance(
     let reached = solvers.reach(def)?;
     let description = reached.describe()?;
     let trial = trial(&description).map_err(SolverError::Incomplete)?;
-    let subject = checks::Subject {
+    let subject = Subject {
         solvers,
         def,
         adapter: &*reached.adapter,

@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use starlings_models::{ParticleError, Prediction};
 use starlings_proto::SetupId;
 
-use super::message::WorkerId;
+use super::message::{Command, WorkerId};
 use super::queue::{Again, Queue};
 use crate::fleet::{FleetEvent, Outcome};
 
@@ -210,7 +210,8 @@ impl Batch {
         FleetEvent::JobRetried { particle, record, worker: worker.to_owned(), reason: reason.to_owned() }
     }
 
-    pub(super) fn failed(&self, index: usize) -> FleetEvent {
+    /// That a job is given up; its parameters are known to whoever holds the jobs.
+    pub(super) fn failed(&self, index: usize) -> Command {
         let JobName { particle, record } = self.names[index];
         let outcome = self.jobs[index].outcome.as_ref();
         let attempts = outcome.map_or(0, |o| o.attempts);
@@ -220,7 +221,8 @@ impl Batch {
             Some(error) => error.to_string(),
             None => String::new(),
         };
-        FleetEvent::JobFailed { particle, record, attempts, reason }
+        let notice = FleetEvent::JobFailed { particle, record, parameters: Vec::new(), attempts, reason };
+        Command::GivenUp { index, notice }
     }
 
     /// Attempts that ended with a lost worker or a model's failure.

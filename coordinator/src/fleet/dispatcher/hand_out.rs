@@ -56,7 +56,7 @@ impl Dispatcher {
             let other = self.workers.values().any(|w| w.id != avoided && w.may_run(setup));
             if !other {
                 for index in batch.settle(again) {
-                    self.out.push(Command::Notice(batch.failed(index)));
+                    self.out.push(batch.failed(index));
                 }
             }
         }

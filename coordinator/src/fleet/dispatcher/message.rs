@@ -174,4 +174,11 @@ pub enum Command {
     BatchFailed(BatchError),
     /// Something worth telling.
     Notice(FleetEvent),
+    /// A job is given up, which is worth telling together with its parameters.
+    GivenUp {
+        /// Index of the job in the batch.
+        index: usize,
+        /// [`FleetEvent::JobFailed`] without parameters.
+        notice: FleetEvent,
+    },
 }

@@ -19,6 +19,8 @@ pub(super) struct State {
     pub(super) dispatcher: Dispatcher,
     pub(super) links: BTreeMap<WorkerId, Link>,
     pub(super) setups: BTreeMap<SetupId, Bytes>,
+    /// Names of the parameters of each setup, in the order of a job's.
+    pub(super) names: BTreeMap<SetupId, Vec<String>>,
     pub(super) running: Option<Submission>,
     pub(super) encoder: JobEncoder,
     pub(super) events: Sender<FleetEvent>,
@@ -57,6 +59,7 @@ impl State {
             dispatcher: Dispatcher::new(rules),
             links: BTreeMap::new(),
             setups: BTreeMap::new(),
+            names: BTreeMap::new(),
             running: None,
             encoder: JobEncoder::default(),
             events,
@@ -131,11 +134,27 @@ impl State {
             }
             Command::BatchDone(outcomes) => self.reply(Ok(outcomes)),
             Command::BatchFailed(error) => self.reply(Err(error)),
-            Command::Notice(event) => {
-                tracing::debug!(?event, "fleet");
-                let _ = self.events.send(event);
+            Command::Notice(event) => self.tell(event),
+            Command::GivenUp { index, mut notice } => {
+                if let FleetEvent::JobFailed { parameters, .. } = &mut notice {
+                    *parameters = self.parameters(index);
+                }
+                self.tell(notice);
             }
         }
+    }
+
+    fn tell(&self, event: FleetEvent) {
+        tracing::debug!(?event, "fleet");
+        let _ = self.events.send(event);
+    }
+
+    /// Names and values of the parameters of a job of the running batch.
+    fn parameters(&self, index: usize) -> Vec<(String, f64)> {
+        let job = self.running.as_ref().and_then(|running| running.jobs.get(index));
+        let Some((setup, job)) = job else { return Vec::new() };
+        let names = self.names.get(setup).into_iter().flatten();
+        names.cloned().zip(job.theta.iter().copied()).collect()
     }
 
     fn send(&self, worker: WorkerId, message: wire::ToWorker) {

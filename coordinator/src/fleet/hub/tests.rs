@@ -2,8 +2,8 @@
 
 use std::sync::mpsc::{self, Receiver};
 
-use starlings_models::{Setup, Window};
-use starlings_proto::encode_setup;
+use starlings_models::{ParticleError, Setup, Window};
+use starlings_proto::{Answer, encode_setup};
 use tokio::sync::mpsc::unbounded_channel;
 
 use super::*;
@@ -40,10 +40,10 @@ fn hub(build: Option<[u8; 32]>) -> (Hub, Receiver<FleetEvent>) {
 
 fn batch(hub: &Hub) -> (Submission, Receiver<Reply>) {
     let (setup, json) = encode_setup(&Setup::default()).expect("it travels");
-    hub.install(setup, json);
+    hub.install(setup, json, vec!["k".to_owned()]);
     let window = Window { start: 0.0, times: vec![1.0], observed: vec![0.0], inputs: vec![] };
     let job =
-        starlings_models::Job { particle: 0, record: 0, window: window.into(), theta: vec![], state: None };
+        starlings_models::Job { particle: 0, record: 0, window: window.into(), theta: vec![2.5], state: None };
     let (reply, replies) = mpsc::channel();
     (Submission { jobs: vec![(setup, job)], reply }, replies)
 }
@@ -59,6 +59,30 @@ fn a_fleet_given_up_while_its_last_worker_was_still_linked_ends_when_it_leaves()
     assert!(replies.try_recv().is_err(), "a worker is there");
     hub.leave(worker, "it died too".to_owned(), false);
     assert_eq!(replies.try_recv(), Ok(Err(BatchError::LocalWorkers("each died".to_owned()))));
+}
+
+#[test]
+fn a_run_that_is_given_up_is_told_with_the_values_of_its_parameters() {
+    let (hub, events) = hub(None);
+    let (link, mut outgoing) = unbounded_channel();
+    let worker = hub.join(hello(1, None), link).expect("it fits");
+    let (batch, replies) = batch(&hub);
+    let setup = batch.jobs[0].0;
+    hub.submit(batch);
+    hub.handle(Event::SetupDone { worker, setup });
+    let sent = std::iter::from_fn(|| outgoing.try_recv().ok());
+    let lease = sent.flatten().find_map(|message| match ToWorker::decode(message) {
+        Ok(ToWorker::Job { lease, .. }) => Some(lease),
+        _ => None,
+    });
+    let answer = Answer::Ran(Err(ParticleError::Solver("diverged".to_owned())));
+    hub.handle(Event::Answered { worker, lease: lease.expect("it is sent"), answer, cost: 0.1 });
+    assert!(replies.try_recv().is_ok(), "the batch has ended");
+    let told = events.try_iter().filter(FleetEvent::is_notable).map(|e| e.to_string()).collect::<Vec<_>>();
+    assert_eq!(
+        told,
+        ["particle 0, record 0 (k = 2.5): given up after 1 attempt: the solver failed: diverged"]
+    );
 }
 
 #[test]

@@ -11,6 +11,7 @@ use starlings_models::{Job, ParticleError, Prediction, Window};
 
 use crate::fleet::{Fleet, SetupId};
 use crate::study::store::JobRow;
+use crate::study::trial::named;
 use crate::study::{RunError, Study};
 
 /// The windows of one step, one per record that still has data: (record, window).
@@ -108,7 +109,7 @@ impl<'a> Flight<'a> {
                 }
                 self.retried += u64::from(outcome.attempts.saturating_sub(1));
                 self.failed += u64::from(outcome.result.is_err());
-                let mut sound = self.sound(outcome.result, *record, particle, window)?;
+                let mut sound = self.sound(outcome.result, *record, particle, theta, window)?;
                 if let Ok(prediction) = &mut sound {
                     self.study.measure(*record, &window.times, &mut prediction.outputs);
                 }
@@ -126,6 +127,7 @@ impl<'a> Flight<'a> {
         result: Result<Prediction, ParticleError>,
         record: usize,
         particle: usize,
+        theta: &DMatrix<f64>,
         window: &Window,
     ) -> Result<Result<Prediction, ParticleError>, RunError> {
         let reason = match &result {
@@ -135,7 +137,9 @@ impl<'a> Flight<'a> {
             }
             _ => return Ok(result),
         };
-        Err(RunError::NoAnswer { particle, record: self.study.records[record].name.clone(), reason })
+        let column: DVector<f64> = theta.column(particle).into_owned();
+        let values = named(self.study, &self.study.theta_for(record, column.as_slice()));
+        Err(RunError::NoAnswer { particle, record: self.study.records[record].name.clone(), values, reason })
     }
 
     fn row(&self, place: Place, record: usize, particle: usize, outcome: &crate::fleet::Outcome) -> JobRow {

@@ -58,7 +58,7 @@ fn rescue(
     place: Place,
     particle: usize,
 ) -> Result<(), RunError> {
-    let cause = failure(&flown.results[particle]).unwrap_or_default();
+    let cause = cause(flight, windows, &flown.results[particle]);
     for distance in DISTANCES {
         let (pulled, transform) = roukf.pull(&flown.particles, particle, distance);
         for x in states.iter_mut().flatten() {
@@ -88,6 +88,17 @@ fn failure(
     of_particle: &[Result<starlings_models::Prediction, starlings_models::ParticleError>],
 ) -> Option<String> {
     of_particle.iter().find_map(|r| r.as_ref().err().map(ToString::to_string))
+}
+
+/// The first failure among a particle's windows, with its record.
+fn cause(
+    flight: &Flight<'_>,
+    windows: &StepWindows,
+    of_particle: &[Result<starlings_models::Prediction, starlings_models::ParticleError>],
+) -> String {
+    let mut failed = windows.iter().zip(of_particle).filter_map(|((record, _), r)| Some((*record, r.as_ref().err()?)));
+    let Some((record, error)) = failed.next() else { return String::new() };
+    format!("over record `{}`, {error}", flight.study().records[record].name)
 }
 
 fn describe(flight: &Flight<'_>, particles: &Particles, particle: usize) -> String {

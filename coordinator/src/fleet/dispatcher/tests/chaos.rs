@@ -105,7 +105,7 @@ impl World {
             Command::BatchFailed(error) => {
                 assert!(self.ended.replace(Err(error)).is_none(), "a batch ends once");
             }
-            Command::Notice(_) => {}
+            Command::Notice(_) | Command::GivenUp { .. } => {}
         }
     }
 

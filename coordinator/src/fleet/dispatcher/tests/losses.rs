@@ -30,7 +30,7 @@ fn only_the_jobs_that_were_running_count_an_attempt_when_their_worker_dies() {
         let died = stage.step(left(id - 1, false));
         if id == 4 {
             let failed = died.iter().any(|c| {
-                matches!(c, Command::Notice(FleetEvent::JobFailed { particle: 0, attempts: 3, .. }))
+                matches!(c, Command::GivenUp { notice: FleetEvent::JobFailed { particle: 0, attempts: 3, .. }, .. })
             });
             assert!(failed, "{died:?}");
         }
@@ -89,7 +89,7 @@ fn a_failed_job_does_not_wait_for_another_worker_that_left() {
         stage.jobs(answered(on_first, Answer::Ran(Err(solver("no"))), 1.0)).iter().all(|(l, _)| l.epoch == 1)
     );
     let commands = stage.step(left(2, false));
-    assert!(commands.iter().any(|c| matches!(c, Command::Notice(FleetEvent::JobFailed { attempts: 1, .. }))));
+    assert!(commands.iter().any(|c| matches!(c, Command::GivenUp { notice: FleetEvent::JobFailed { attempts: 1, .. }, .. })));
 }
 
 #[test]
@@ -122,7 +122,7 @@ fn a_job_given_up_says_its_attempts_once() {
     assert_eq!(stage.jobs(submit(1)).len(), 1);
     let commands = stage.step(left(1, false));
     let text = commands.iter().find_map(|command| match command {
-        Command::Notice(event @ FleetEvent::JobFailed { .. }) => Some(event.to_string()),
+        Command::GivenUp { notice, index: 0 } => Some(notice.to_string()),
         _ => None,
     });
     assert_eq!(text.expect("told"), "particle 0, record 0: given up after 1 attempt: w1 was lost: gone");

@@ -155,7 +155,7 @@ fn a_failed_job_goes_to_another_worker_only_if_that_may_have_its_setup() {
     let jobs = stage.jobs(done(1, 1));
     let commands = stage.step(answered(jobs[0].0, Answer::Ran(Err(solver("no"))), 1.0));
     assert!(
-        commands.iter().any(|c| matches!(c, Command::Notice(FleetEvent::JobFailed { .. }))),
+        commands.iter().any(|c| matches!(c, Command::GivenUp { .. })),
         "{commands:?}"
     );
 }

@@ -1,7 +1,7 @@
 //! What can be wrong with what a solver answers, each in half a sentence that follows the solver's name.
 //!
 //! Said here as well as where every prediction is checked, since only here the program's output is at hand. Next file to read:
-//! [`super::instance`].
+//! [`super`].
 
 use starlings_models::{ParticleError, Run, Solved, Spec};
 
