@@ -8,7 +8,7 @@ use starlings_worker::solver::conformance::{Conformance, Trial, conformance};
 
 use crate::console::{line, text};
 use crate::failure::Failure;
-use crate::solvers::solvers;
+use crate::solvers::{adapter_names, solvers};
 
 /// Try a solver out: restart, determinism, refusals, cancellation, observers. Exit code 1 when a check fails.
 #[derive(Parser)]
@@ -19,8 +19,8 @@ pub(crate) struct Args {
     /// Where a solver listens that is running already.
     #[arg(long, value_name = "ADDR")]
     address: Option<String>,
-    /// How the solver is reached: grpc, fmu, mpi or um-bridge.
-    #[arg(long, default_value = "grpc", value_name = "NAME")]
+    /// How the solver is reached.
+    #[arg(long, default_value = "grpc", value_name = "NAME", value_parser = adapter_names())]
     adapter: String,
     /// Value of a parameter, or of an input, which is then constant; defaults and middles of ranges without it.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = pair)]
@@ -28,6 +28,9 @@ pub(crate) struct Args {
     /// Times of the trial: START:STEP:END, in the solver's time unit.
     #[arg(long, default_value = "0:0.1:2", value_name = "START:STEP:END", value_parser = span)]
     times: Span,
+    /// Seconds that a run may take.
+    #[arg(long, default_value_t = 60.0, value_name = "SECONDS")]
+    timeout: f64,
     /// Ranks of an MPI solver.
     #[arg(long, default_value_t = 1, value_name = "N")]
     ranks: usize,
@@ -50,6 +53,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         address: args.address.clone(),
         folder: folder.display().to_string(),
         ranks: args.ranks,
+        timeout: args.timeout,
         ..SolverDef::default()
     };
     let given: BTreeMap<String, f64> = args.set.iter().cloned().collect();

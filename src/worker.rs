@@ -9,7 +9,7 @@ use tokio_util::sync::CancellationToken;
 
 use crate::console::{cancel_on_signal, line};
 use crate::failure::Failure;
-use crate::solvers::solvers;
+use crate::solvers::{adapter_names, solvers};
 
 /// Be a worker: dial the coordinator, run its jobs, hold nothing it needs.
 #[derive(Parser)]
@@ -23,8 +23,8 @@ pub(crate) struct Args {
     /// Print what the solver says of itself as JSON, for `described` in a study, and do nothing else.
     #[arg(long, requires = "solver", conflicts_with_all = ["connect", "slots", "once"])]
     describe: bool,
-    /// How the solver is reached, for --describe: grpc, fmu or mpi.
-    #[arg(long, default_value = "grpc", value_name = "NAME", requires = "describe")]
+    /// How the solver is reached, for --describe.
+    #[arg(long, default_value = "grpc", value_name = "NAME", requires = "describe", value_parser = adapter_names())]
     adapter: String,
     /// Runs at the same time; the number of cores without it.
     #[arg(long, value_name = "N")]
@@ -35,6 +35,9 @@ pub(crate) struct Args {
     /// End when the coordinator's connection closes instead of dialling again.
     #[arg(long)]
     once: bool,
+    /// Place among the workers that one coordinator started on this machine, by which their solvers find their cores.
+    #[arg(long, default_value_t = 0, value_name = "I", hide = true)]
+    place: usize,
 }
 
 /// Works until drained, cancelled or out of patience.
@@ -49,12 +52,13 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let cancel = CancellationToken::new();
     cancel_on_signal(&cancel);
-    let solvers = match command {
-        Some(command) => solvers()?.with_command(command),
-        None => solvers()?,
-    };
+    let slots = args.slots.unwrap_or(cores);
+    let mut solvers = solvers()?.seated_after(args.place.saturating_mul(slots));
+    if let Some(command) = command {
+        solvers = solvers.with_command(command, here()?);
+    }
     let config = WorkerConfig {
-        slots: args.slots.unwrap_or(cores),
+        slots,
         once: args.once,
         patience,
         cancel,
@@ -77,10 +81,14 @@ fn solver_command(text: &str) -> Result<Vec<String>, Failure> {
     Ok(parts)
 }
 
+/// Where names of files in a command line lead.
+fn here() -> Result<String, Failure> {
+    Ok(std::env::current_dir().map_err(Failure::run)?.display().to_string())
+}
+
 /// Starts the solver, asks what it is and prints the answer.
 fn describe(adapter: &str, command: Vec<String>) -> Result<(), Failure> {
-    let folder = std::env::current_dir().map_err(Failure::run)?.display().to_string();
-    let def = SolverDef { adapter: adapter.to_owned(), command, folder, ..SolverDef::default() };
+    let def = SolverDef { adapter: adapter.to_owned(), command, folder: here()?, ..SolverDef::default() };
     let description = solvers()?.describe(&def).map_err(Failure::input)?;
     line(serde_json::to_string_pretty(&description).map_err(Failure::run)?)
 }

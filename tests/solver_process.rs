@@ -94,7 +94,7 @@ fn what_is_wrong_with_a_solver_is_said_once_with_the_end_of_its_output() {
         ),
         ("x = [0]*10**9", "memory = \"200 MiB\"", &["before it was ready", "MemoryError"]),
         (
-            "import os, subprocess; subprocess.Popen(['sleep', '600']); os._exit(1)",
+            "import os, subprocess, sys; subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)', sys.argv[1]]); os._exit(1)",
             "",
             &["exited with status 1 before it was ready"],
         ),

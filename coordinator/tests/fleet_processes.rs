@@ -84,8 +84,10 @@ fn workers_that_die_at_once_end_the_run_with_their_last_words() {
     let mut config = FleetConfig::new(any_port(), "broken", CancellationToken::new(), sender);
     config.max_attempts = 1;
     let mut fleet = GrpcFleet::listen(config).unwrap();
-    let script = "echo 'no such library: libphysics' >&2; exit 3";
-    let _workers = LocalWorkers::spawn(local(&fleet, 2, "/bin/sh", &["-c", script])).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let started = folder.path().join("started").display().to_string();
+    let script = "echo \"$@\" >> \"$0\"; echo 'no such library: libphysics' >&2; exit 3";
+    let _workers = LocalWorkers::spawn(local(&fleet, 2, "/bin/sh", &["-c", script, &started])).unwrap();
     let setup = fleet.install(&Setup::default()).unwrap();
     let error = fleet.run(setup, jobs(1)).unwrap_err();
     assert!(matches!(&error, FleetError::LocalWorkers(words) if words.contains("libphysics")), "{error}");
@@ -108,6 +110,11 @@ fn workers_that_die_at_once_end_the_run_with_their_last_words() {
         }
     }
     assert_eq!((given_up, restarted), (2, 6), "each of two was started three times again");
+    let told = std::fs::read_to_string(started).unwrap();
+    for place in ["--place 0", "--place 1"] {
+        let times = told.lines().filter(|line| line.ends_with(place)).count();
+        assert_eq!(times, 4, "and kept its place: {told}");
+    }
 }
 
 #[test]

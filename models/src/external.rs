@@ -20,7 +20,7 @@ use crate::{Forward, Job, ObserverDef, ParticleError, Prediction, Signal, Spec, 
 use applied::Applied;
 pub(crate) use outline::{Outline, check_effects};
 pub(crate) use parts::spec;
-use parts::{Parts, check_observer};
+use parts::{Parts, check_initial, check_observer};
 use rows::Rows;
 
 /// One run, as the program is asked for it.
@@ -90,7 +90,8 @@ impl<S: Solve> External<S> {
     /// When a name is unknown, a value is missing, or an effect or the observer is more than the program takes.
     pub fn new(setup: &Setup, description: Description, solve: S) -> Result<Self, SetupError> {
         let Parts { whole, spec, on_inputs, on_outputs, hosted } = Parts::of(setup, &description)?;
-        check_observer(&setup.observer, &description)?;
+        check_observer(&setup.observer, &description, on_outputs.is_some())?;
+        check_initial(setup, &whole, description.spec.n_state())?;
         let binding = Binding::new(setup, &whole, &free_names(setup, &whole)?)?;
         let all = on_outputs.is_some();
         let rows = Rows::new(&description.spec, &setup.outputs, all)?;
@@ -212,11 +213,17 @@ impl<S: Solve> External<S> {
         }
         let n_row = self.rows.n_asked().max(1);
         if let Some(at) = solved.outputs.iter().position(|v| !v.is_finite()) {
-            let what = format!("output `{}`", Spec::component(self.rows.quantities(), at % n_row));
+            let what = format!(
+                "output `{}` of the solver `{name}`",
+                Spec::component(self.rows.quantities(), at % n_row)
+            );
             return Err(ParticleError::NotFinite { what, time: window.times[at / n_row] });
         }
         if let Some(at) = solved.state.iter().position(|v| !v.is_finite()) {
-            let what = format!("state `{}`", Spec::component(&self.description.spec.states, at));
+            let what = format!(
+                "state `{}` of the solver `{name}`",
+                Spec::component(&self.description.spec.states, at)
+            );
             let time = window.times.last().copied().unwrap_or(window.start);
             return Err(ParticleError::NotFinite { what, time });
         }
@@ -244,7 +251,7 @@ impl<S: Solve> Forward for External<S> {
         let theta = self.binding.theta(&job.theta, job.window.start)?;
         let (state, mut carried) = self.carried(job.state.as_deref())?;
         let window = self.window(job, &theta, &mut carried)?;
-        let mut start = vec![f64::NAN; own.n_state() + self.spec.n_state()];
+        let mut start = vec![f64::NAN; own.n_state()];
         self.binding.initial(&job.theta, &mut start);
         let given = (0..own.n_state()).filter(|i| !start[*i].is_nan());
         let initial: Vec<(String, f64)> =

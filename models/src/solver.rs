@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::Spec;
+use crate::{Quantity, Spec, nearest};
 
 /// The `kind` of a model that runs in a program of its own.
 pub const SOLVER: &str = "solver";
@@ -92,4 +92,71 @@ pub struct Description {
     pub observers: Vec<String>,
     /// Scalar states to whose rate a term may be added.
     pub hosts: Vec<String>,
+}
+
+impl Description {
+    /// What makes no sense about it, as half a sentence after "it describes itself wrongly"; nothing where it is sound.
+    pub fn fault(&self) -> Option<String> {
+        let spec = &self.spec;
+        let lists = [
+            ("state", &spec.states),
+            ("parameter", &spec.parameters),
+            ("output", &spec.outputs),
+            ("input", &spec.inputs),
+        ];
+        if let Some(fault) = lists.iter().find_map(|(what, list)| fault_of_list(what, list)) {
+            return Some(fault);
+        }
+        if spec.outputs.is_empty() {
+            return Some("it has no outputs, so nothing could be compared with data".to_owned());
+        }
+        if spec.restart && spec.states.is_empty() {
+            return Some("it can restart from a state but describes no states".to_owned());
+        }
+        let scalar = spec.states.iter().filter(|q| q.size == 1);
+        let scalar: Vec<&str> = scalar.map(|q| q.name.as_str()).collect();
+        if let Some(host) = self.hosts.iter().find(|host| !scalar.contains(&host.as_str())) {
+            let what =
+                format!("it names the state `{host}` as a host of terms, which is none of its scalar states");
+            return Some(what + &meant(host, &scalar));
+        }
+        for (output, state) in &spec.measures {
+            for (what, name, list) in [("output", output, &spec.outputs), ("state", state, &spec.states)] {
+                if Spec::range_of(list, name).is_none() {
+                    let known: Vec<&str> = list.iter().map(|q| q.name.as_str()).collect();
+                    let fault = format!("it names the {what} `{name}`, which is not among its {what}s");
+                    return Some(fault + &meant(name, &known));
+                }
+            }
+        }
+        None
+    }
+}
+
+fn fault_of_list(what: &str, list: &[Quantity]) -> Option<String> {
+    list.iter().enumerate().find_map(|(i, q)| {
+        let name = &q.name;
+        if name.is_empty() {
+            return Some(format!("{what} {} has no name", i + 1));
+        }
+        // Studies write `initial:x` for the start of a state and `x[3]` for a component.
+        if name.contains([':', '[', ']']) {
+            return Some(format!("`{name}` is no name for a {what}: it has one of `:`, `[` and `]` in it"));
+        }
+        if list[..i].iter().any(|earlier| earlier.name == *name) {
+            return Some(format!("it describes the {what} `{name}` twice"));
+        }
+        if q.size == 0 {
+            return Some(format!("{what} `{name}` has 0 components"));
+        }
+        if q.size > 1 && matches!(what, "parameter" | "input") {
+            return Some(format!("{what} `{name}` has {} components; it must be a scalar", q.size));
+        }
+        let [lo, hi] = q.range;
+        (lo.is_nan() || hi.is_nan() || lo > hi).then(|| format!("{what} `{name}` has the range {lo} to {hi}"))
+    })
+}
+
+fn meant(name: &str, known: &[&str]) -> String {
+    nearest(name, known).map(|near| format!("; did you mean `{near}`?")).unwrap_or_default()
 }

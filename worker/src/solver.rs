@@ -11,9 +11,11 @@ pub mod conformance;
 mod error;
 mod guard;
 pub mod instance;
+mod losses;
 mod machine;
 mod process;
 mod scratch;
+mod seats;
 pub mod serve;
 mod site;
 
@@ -43,9 +45,17 @@ pub struct Solvers(Arc<Shared>);
 struct Shared {
     options: SiteOptions,
     site: Arc<Site>,
-    /// Replaces the command of every study.
-    command: Option<Vec<String>>,
+    settings: Settings,
     open: Mutex<BTreeMap<String, Arc<Reached>>>,
+}
+
+/// What holds for the solvers of every study here.
+#[derive(Clone, Default)]
+struct Settings {
+    /// Replaces the command of every study, and the folder that it starts from.
+    command: Option<(Vec<String>, String)>,
+    /// Programs of other processes that come first where cores are shared out.
+    first: usize,
 }
 
 /// A solver with what it says of itself, once it has been asked.
@@ -57,23 +67,32 @@ struct Reached {
 impl Solvers {
     /// No solver is started yet.
     pub fn new(options: SiteOptions) -> Self {
-        Self::with(options, None)
+        Self::with(options, Settings::default())
     }
 
-    /// The same with another command than the studies say, as on a machine where the program lies elsewhere.
+    /// The same with another command than the studies say, as on a machine where the program lies elsewhere; names in it are
+    /// those of files in `folder`.
     #[must_use]
-    pub fn with_command(self, command: Vec<String>) -> Self {
-        Self::with(self.0.options.clone(), Some(command))
+    pub fn with_command(self, command: Vec<String>, folder: String) -> Self {
+        let settings = Settings { command: Some((command, folder)), ..self.0.settings.clone() };
+        Self::with(self.0.options.clone(), settings)
+    }
+
+    /// The same beside `first` programs of other processes on this machine, which are bound to cores before its own.
+    #[must_use]
+    pub fn seated_after(self, first: usize) -> Self {
+        let settings = Settings { first, ..self.0.settings.clone() };
+        Self::with(self.0.options.clone(), settings)
     }
 
     /// The same solvers with programs and folders of their own.
     pub(crate) fn apart(&self) -> Self {
-        Self::with(self.0.options.clone(), self.0.command.clone())
+        Self::with(self.0.options.clone(), self.0.settings.clone())
     }
 
-    fn with(options: SiteOptions, command: Option<Vec<String>>) -> Self {
-        let site = Arc::new(Site::new(options.clone()));
-        Self(Arc::new(Shared { options, site, command, open: Mutex::default() }))
+    fn with(options: SiteOptions, settings: Settings) -> Self {
+        let site = Arc::new(Site::new(options.clone(), settings.first));
+        Self(Arc::new(Shared { options, site, settings, open: Mutex::default() }))
     }
 
     /// What a solver says of itself; starts it.
@@ -111,8 +130,8 @@ impl Solvers {
 
     fn reach(&self, def: &SolverDef) -> Result<Arc<Reached>, SolverError> {
         let mut def = def.clone();
-        if let Some(command) = &self.0.command {
-            (def.command, def.folder) = (command.clone(), String::new());
+        if let Some((command, folder)) = &self.0.settings.command {
+            (def.command, def.folder) = (command.clone(), folder.clone());
         }
         // Studies of one solver share its programs, whatever else they say.
         let described = def.described.clone().filter(|_| !adapter::asks(&def.adapter));

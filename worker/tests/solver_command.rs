@@ -146,6 +146,15 @@ fn arguments_take_values_and_other_braces_stay() {
 }
 
 #[test]
+fn a_command_of_the_machine_leads_to_files_of_its_own_folder() {
+    let mut bench = Bench::new("echo '{\"tip\": 7}'", &[]).command(&["no-such-program"]);
+    let folder = bench.def.folder.clone();
+    let command = ["sh", "solve.sh"].map(str::to_owned).to_vec();
+    bench.solvers = bench.solvers.with_command(command, folder);
+    assert_eq!(bench.run(1.0, &[1.0]).unwrap(), [7.0]);
+}
+
+#[test]
 fn numbers_are_found_by_pattern_and_by_column() {
     let script = "echo 'tip = 1.5D-1 m'; echo 'tip = 2.5D-1 m'\n\
                   printf 'node  ux  uy\\n 1  10 100\\n\\n 1  20 200\\n' > beam.dat\n";

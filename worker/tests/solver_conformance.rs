@@ -62,20 +62,20 @@ impl Decay {
 
     fn run(&self, request: &Request) -> Result<Solved, ParticleError> {
         let runs = self.runs.fetch_add(1, Ordering::Relaxed);
-        let [mut k] = *request.parameters.as_slice() else {
-            let message = format!("{} parameters where one belongs", request.parameters.len());
-            match self.flaw {
-                Flaw::TakesAnything => return self.go(request, 0.7, runs),
-                _ => return Err(ParticleError::BadJob(message)),
+        let mut k = match request.parameters.as_slice() {
+            [k] => *k,
+            _ if self.flaw == Flaw::TakesAnything => 0.7,
+            others => {
+                return Err(ParticleError::BadJob(format!("{} parameters where one belongs", others.len())));
             }
         };
         if k.is_nan() && self.flaw == Flaw::MakesUpNumbers {
             k = 0.1;
         }
-        self.go(request, k, runs)
+        Ok(self.go(request, k, runs))
     }
 
-    fn go(&self, request: &Request, k: f64, runs: u64) -> Result<Solved, ParticleError> {
+    fn go(&self, request: &Request, k: f64, runs: u64) -> Solved {
         let window = &request.window;
         let mut x = request.state.as_ref().map_or(1.0, |state| state[0]);
         if self.flaw == Flaw::Wanders {
@@ -119,7 +119,7 @@ impl Decay {
         if self.flaw == Flaw::ForgetsOutputs {
             outputs.pop();
         }
-        Ok(Solved { outputs, state: vec![x, before] })
+        Solved { outputs, state: vec![x, before] }
     }
 }
 

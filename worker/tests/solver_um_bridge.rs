@@ -2,68 +2,21 @@
 
 #![allow(clippy::unwrap_used)] // a failed unwrap is a failed test
 
+use std::collections::BTreeMap;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 
 use starlings_models::{
     Description, Forward, Job, ModelDef, Quantity, SOLVER, Setup, SolverDef, Spec, Window,
 };
+use starlings_worker::solver::conformance::{Trial, conformance};
 use starlings_worker::solver::{SiteOptions, Solvers};
 use tempfile::TempDir;
 
-/// Protocol 1.0 with six models: `line` gives a + b t for every time, `two` takes two vectors, `odd` answers with too little,
-/// `sick` with an error; `die` ends the server once, `hang` never answers its first run.
-const SERVER: &str = r#"
-import json, os, pathlib, signal, threading
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-
-SIZES = {"line": [2], "two": [1, 1], "odd": [2], "sick": [2], "die": [2], "hang": [2]}
-
-class Handler(BaseHTTPRequestHandler):
-    protocol_version = "HTTP/1.1"
-
-    def say(self, answer, status=200):
-        body = json.dumps(answer).encode()
-        self.send_response(status)
-        self.send_header("Content-Length", str(len(body)))
-        self.end_headers()
-        self.wfile.write(body)
-
-    def do_GET(self):
-        self.say({"protocolVersion": VERSION, "models": list(SIZES)})
-
-    def do_POST(self):
-        asked = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
-        name = asked["name"]
-        if self.path == "/ModelInfo":
-            self.say({"support": {"Evaluate": True, "Gradient": False}})
-        elif self.path == "/InputSizes":
-            self.say({"inputSizes": SIZES[name]})
-        elif self.path == "/OutputSizes":
-            self.say({"outputSizes": [1]})
-        elif name == "sick":
-            self.say({"error": {"type": "InvalidInput", "message": "a is below the melting point"}}, 400)
-        elif name == "odd":
-            self.say({"output": [[1.0]]})
-        else:
-            if name == "die" and not MARK.exists():
-                MARK.touch()
-                os.kill(os.getpid(), signal.SIGKILL)
-            if name == "hang" and not MARK.exists():
-                MARK.touch()
-                threading.Event().wait()
-            a, b = [v for vector in asked["input"] for v in vector]
-            self.say({"output": [[a + b * t for t in asked["config"]["times"]]]})
-
-    def log_message(self, *_):
-        pass
-
-VERSION = float(os.environ.get("VERSION", "1.0"))
-MARK = pathlib.Path(__file__).with_name("mark")
-server = ThreadingHTTPServer(("127.0.0.1", int(os.environ["PORT"])), Handler)
-print("serving", flush=True)
-server.serve_forever()
-"#;
+/// Protocol 1.0 with nine models: `line` gives a + b t for every time, `two` takes two vectors, `odd` answers with too little,
+/// `sick` with an error; `die` ends the server once, `hang` never answers its first run. `pair` answers when two servers run,
+/// `doom` kills the server five times under two runs, `luck` has it killed, then fall, then answers.
+const SERVER: &str = include_str!("solver_um_bridge/server.py");
 
 struct Bench {
     folder: TempDir,
@@ -145,6 +98,57 @@ fn a_server_that_dies_under_a_run_is_started_again() {
     assert!(bench.folder.path().join("mark").exists(), "it did die");
 }
 
+/// What two threads get that make the same run of one forward model.
+fn twice_at_once(bench: &Bench) -> [Result<Vec<f64>, String>; 2] {
+    let forward = bench.forward().unwrap();
+    let run = || {
+        let window = Window { start: 0.0, times: vec![3.0], observed: vec![f64::NAN], inputs: Vec::new() };
+        let job =
+            Job { particle: 0, record: 0, window: Arc::new(window), theta: vec![1.0, 2.0], state: None };
+        forward.run(&job).map(|prediction| prediction.outputs).map_err(|error| error.to_string())
+    };
+    std::thread::scope(|scope| {
+        let threads = [scope.spawn(run), scope.spawn(run)];
+        threads.map(|thread| thread.join().unwrap())
+    })
+}
+
+#[test]
+fn runs_at_the_same_time_have_servers_of_their_own() {
+    let bench = Bench::new("pair");
+    assert_eq!(twice_at_once(&bench), [Ok(vec![7.0]), Ok(vec![7.0])]);
+}
+
+#[test]
+fn a_server_at_a_fixed_address_that_is_killed_under_two_runs_fails_neither() {
+    let mut bench = Bench::new("doom");
+    let port = std::net::TcpListener::bind(("127.0.0.1", 0)).unwrap().local_addr().unwrap().port();
+    bench.def.address = Some(format!("http://127.0.0.1:{port}"));
+    bench.def.environment.insert("PORT".to_owned(), port.to_string());
+    assert_eq!(twice_at_once(&bench), [Ok(vec![7.0]), Ok(vec![7.0])]);
+    let deaths = std::fs::read_dir(bench.folder.path())
+        .unwrap()
+        .filter(|entry| entry.as_ref().unwrap().file_name().to_string_lossy().starts_with("doom-"));
+    assert_eq!(deaths.count(), 5);
+}
+
+#[test]
+fn a_server_that_was_killed_before_may_still_fall_once() {
+    assert_eq!(Bench::new("luck").run(&[1.0, 2.0], &[3.0]), Ok(vec![7.0]));
+}
+
+#[test]
+fn a_model_behind_a_server_passes_the_checks_of_conformance() {
+    let bench = Bench::new("line").named(&["a", "b"], &["y"]);
+    let trial = |d: &Description| Trial::of(d, &BTreeMap::new(), &[0.0, 0.5, 1.0, 1.5, 2.0]);
+    let found = conformance(&bench.solvers, &bench.def, trial).unwrap();
+    assert!(found.failed.is_empty(), "{found:?}");
+    assert!(
+        found.passed.iter().any(|name| name.starts_with("a request that does not fit is refused")),
+        "{found:?}"
+    );
+}
+
 #[test]
 fn a_server_that_never_answers_is_ended_and_the_next_run_has_a_new_one() {
     let mut bench = Bench::new("hang");
@@ -170,13 +174,20 @@ fn what_the_server_says_of_an_error_is_told() {
 fn a_study_that_does_not_fit_the_server_is_refused() {
     let says = Bench::new("lne").forward().map(|_| ()).unwrap_err();
     assert!(
-        says.contains("no model `lne`; it has line, two, odd, sick, die, hang; did you mean `line`?"),
+        says.contains(
+            "no model `lne`; it has line, two, odd, sick, die, hang, pair, doom, luck; did you mean `line`?"
+        ),
         "{says}"
     );
     let mut bench = Bench::new("line");
     bench.def.model = None;
     let says = bench.forward().map(|_| ()).unwrap_err();
-    assert!(says.contains("several models, line, two, odd, sick, die, hang: say which by `model`"), "{says}");
+    assert!(
+        says.contains(
+            "several models, line, two, odd, sick, die, hang, pair, doom, luck: say which by `model`"
+        ),
+        "{says}"
+    );
     let says = Bench::new("line").named(&["a"], &["y"]).forward().map(|_| ()).unwrap_err();
     assert!(says.contains("takes 2 values ([2]), the study has 1 parameters"), "{says}");
     let mut bench = Bench::new("line");

@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 use starlings_models::equations::EquationsDef;
 use starlings_models::{
-    Addition, EffectDef, EffectParameter, EffectState, Forward, Job, ModelDef, SOLVER, Setup, Signal,
-    SolverDef, Window,
+    Addition, EffectDef, EffectParameter, EffectState, External, Forward, Job, ModelDef, ObserverDef,
+    ParticleError, Run, SOLVER, Setup, Signal, Solve, Solved, SolverDef, Window,
 };
 use starlings_worker::solver::conformance::{Trial, conformance};
 use starlings_worker::solver::serve::{Served, serve};
@@ -173,6 +173,49 @@ fn a_hosted_term_is_that_of_the_native_model_and_another_is_refused_in_words() {
         error.contains("effect `drag` adds to the rate of `v`") && error.contains("it hosts none"),
         "{error}"
     );
+}
+
+#[test]
+fn what_a_solver_cannot_do_from_outside_is_refused_in_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let (solvers, def) = served(folder.path());
+    let mut described = solvers.describe(&def).unwrap();
+    described.observers.push("nudging".to_owned());
+    let state = EffectState {
+        name: "lagging".to_owned(),
+        rate: "place - lagging".to_owned(),
+        ..EffectState::default()
+    };
+    let lag = effect("lag", "output:place", "a*(lagging - place)", vec![state]);
+    let solver = Some(Box::new(SolverDef { described: Some(described.clone()), ..def }));
+    let setup = Setup {
+        model: ModelDef { kind: SOLVER.to_owned(), solver, ..ModelDef::default() },
+        parameters: ["k", "c", "a"].map(str::to_owned).to_vec(),
+        outputs: vec!["place".to_owned()],
+        effects: vec![lag],
+        ..Setup::default()
+    };
+    let refused = |setup: &Setup| External::new(setup, described.clone(), Nobody).err().unwrap().to_string();
+    let mut pulled = setup.clone();
+    pulled.observer = ObserverDef { kind: "nudging".to_owned(), gain: 1.0, ..ObserverDef::default() };
+    assert!(
+        refused(&pulled).contains("cannot go with an observer inside the solver"),
+        "{}",
+        refused(&pulled)
+    );
+    let mut begun = setup.clone();
+    begun.parameters.push("initial:lagging".to_owned());
+    assert!(refused(&begun).contains("initial value of an effect's own state"), "{}", refused(&begun));
+    assert!(External::new(&setup, described, Nobody).is_ok());
+}
+
+/// A solver that is never asked.
+struct Nobody;
+
+impl Solve for Nobody {
+    fn solve(&self, _run: &Run<'_>) -> Result<Solved, ParticleError> {
+        Err(ParticleError::Solver("nobody is asked here".to_owned()))
+    }
 }
 
 #[test]

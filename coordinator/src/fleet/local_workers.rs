@@ -41,7 +41,8 @@ const LEAVE_PATIENCE: Duration = Duration::from_secs(2);
 pub struct LocalConfig {
     /// The program, usually this one.
     pub program: PathBuf,
-    /// Its first arguments, such as `worker --slots 1`; `--connect ADDRESS --once --patience SECONDS` follow.
+    /// Its first arguments, such as `worker --slots 1`; `--connect ADDRESS --once --patience SECONDS --place I` follow, the
+    /// last with the process's place among the `n`, which the one that is started after it keeps.
     pub args: Vec<String>,
     /// How many processes.
     pub n: usize,
@@ -66,7 +67,7 @@ impl LocalWorkers {
     /// [`FleetError::Spawn`] when the program cannot be started.
     pub fn spawn(config: LocalConfig) -> Result<Self, FleetError> {
         config.fleet.local_only();
-        let slots = (0..config.n).map(|_| Slot::start(&config)).collect::<Result<Vec<_>, _>>()?;
+        let slots = (0..config.n).map(|place| Slot::start(&config, place)).collect::<Result<Vec<_>, _>>()?;
         let pids = Arc::new(Mutex::new(pids(&slots)));
         let (stop, stopped) = mpsc::channel();
         let shared = Arc::clone(&pids);
@@ -94,6 +95,7 @@ impl Drop for LocalWorkers {
 
 /// The place of one process.
 struct Slot {
+    place: usize,
     process: Option<Process>,
     deaths: u32,
     restart_at: Option<Instant>,
@@ -102,10 +104,17 @@ struct Slot {
 }
 
 impl Slot {
-    fn start(config: &LocalConfig) -> Result<Self, FleetError> {
-        let process = Process::start(config)?;
+    fn start(config: &LocalConfig, place: usize) -> Result<Self, FleetError> {
+        let process = Process::start(config, place)?;
         let last_pid = process.pid();
-        Ok(Self { process: Some(process), deaths: 0, restart_at: None, last_pid, last_words: String::new() })
+        Ok(Self {
+            place,
+            process: Some(process),
+            deaths: 0,
+            restart_at: None,
+            last_pid,
+            last_words: String::new(),
+        })
     }
 
     /// Looks after the process; true when it changed.
@@ -117,7 +126,7 @@ impl Slot {
         }
         if self.restart_at.is_some_and(|at| at <= now) {
             self.restart_at = None;
-            match Process::start(config) {
+            match Process::start(config, self.place) {
                 Ok(process) => {
                     let (pid, reason) = (self.last_pid, self.last_words.clone());
                     config.fleet.tell(FleetEvent::LocalWorkerRestarted { pid, reason });

@@ -49,7 +49,10 @@ pub enum RunError {
         source: EstimatorError,
     },
     /// A run has no answer, and that is not the model's doing.
-    #[error("the run of particle {particle} over record `{record}`{} has no usable answer: {reason}", in_brackets(values))]
+    #[error(
+        "the run of particle {particle} over record `{record}`{} has no usable answer: {reason}",
+        in_brackets(values)
+    )]
     NoAnswer {
         /// Index of the sigma point.
         particle: usize,

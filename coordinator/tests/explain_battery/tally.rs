@@ -67,6 +67,21 @@ impl<'a> Group<'a> {
         write!(row, " {covered} | {held_out} | {runs} | {most} |").unwrap();
         row
     }
+
+    /// Root mean square of the held-out RMSE over the noise, where the right effect was named, and the share above 1.1.
+    fn held_out(&self) -> (f64, f64) {
+        let values: Vec<f64> = self.results.iter().filter_map(|result| result.held_out).collect();
+        let n = values.len() as f64;
+        let above = values.iter().filter(|v| **v > 1.1).count() as f64;
+        ((values.iter().map(|v| v * v).sum::<f64>() / n).sqrt(), above / n)
+    }
+
+    /// Wrong names, and those of them whose misfit to data without noise is below 30.
+    fn undetectable(&self) -> (usize, usize) {
+        let wrong = self.results.iter().filter(|result| result.outcome == Outcome::Wrong);
+        let near = wrong.clone().filter(|result| result.rival.is_some_and(|rival| rival < 30.0));
+        (wrong.count(), near.count())
+    }
 }
 
 /// A Markdown table, one row per group that is not empty.
@@ -99,6 +114,7 @@ pub fn report(results: &[Result], systems: &[System]) -> String {
         }
     }
     write!(text, "### By what is missing\n\n{}\n", table(&groups)).unwrap();
+    text += &in_words(&groups[0], &groups[2]);
     for kind in [Kind::Library, Kind::LeftOut] {
         let is = |result: &Result| result.case.kind == kind && informed(result);
         let mut groups = Vec::new();
@@ -129,6 +145,17 @@ pub fn report(results: &[Result], systems: &[System]) -> String {
     }
     write!(text, "### Library effects one by one, λ > 100\n\n{}\n", table(&groups)).unwrap();
     text
+}
+
+/// What the first table does not say of effects that the library holds, and of those left out.
+fn in_words(library: &Group<'_>, left_out: &Group<'_>) -> String {
+    let ((rms, above), (wrong, near)) = (library.held_out(), left_out.undetectable());
+    format!(
+        "Held-out RMSE over the noise where the right effect was named, λ > 100: root mean square {rms:.3}; {:.0} % of the cases \
+         are above 1.1.\n\nOf the {wrong} wrong names of effects left out, λ > 100, {near} have a `rival` below 30: the data hold next \
+         to nothing against them.\n\n",
+        100.0 * above
+    )
 }
 
 /// One line per case.

@@ -164,26 +164,32 @@ fn a_description_that_makes_no_sense_is_told_at_the_command() {
     assert_eq!(
         twice,
         wrong(&format!(
-            "the parameter `{}` is described twice",
+            "it describes the parameter `{}` twice",
             inside().description().spec.parameters[0].name
         ))
     );
-    assert_eq!(described(|d| d.spec.outputs[0].size = 0), wrong("the output `position` has 0 components"));
+    assert_eq!(described(|d| d.spec.outputs[0].size = 0), wrong("output `position` has 0 components"));
     let hosted = described(|d| d.hosts = vec!["vv".to_owned()]);
     assert_eq!(
         hosted,
-        wrong("it hosts terms on `vv`, which is none of its scalar states; did you mean `v`?")
+        wrong(
+            "it names the state `vv` as a host of terms, which is none of its scalar states; did you mean `v`?"
+        )
     );
     let range = described(|d| d.spec.parameters[0].range = [2.0, 1.0]);
     assert_eq!(
         range,
         wrong(&format!(
-            "the range of the parameter `{}` is 2 to 1",
+            "parameter `{}` has the range 2 to 1",
             inside().description().spec.parameters[0].name
         ))
     );
     let nameless = described(|d| d.spec.inputs[0].name = String::new());
     assert!(nameless[0].ends_with("input 1 has no name"), "{nameless:?}");
+    let indexed = described(|d| d.spec.parameters[0].name = "k[0]".to_owned());
+    assert_eq!(indexed, wrong("`k[0]` is no name for a parameter: it has one of `:`, `[` and `]` in it"));
+    let measured = described(|d| d.spec.measures = vec![("position".to_owned(), "vv".to_owned())]);
+    assert_eq!(measured, wrong("it names the state `vv`, which is not among its states; did you mean `v`?"));
 }
 
 #[test]

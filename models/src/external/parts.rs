@@ -48,15 +48,42 @@ impl Parts {
     }
 }
 
-/// Refuses an observer that the program does not host.
-pub(super) fn check_observer(observer: &ObserverDef, description: &Description) -> Result<(), SetupError> {
+/// Refuses an observer that the program does not host, and one beside effects on outputs: the program compares its own outputs
+/// with the data and would pull its state towards what the effects explain.
+pub(super) fn check_observer(
+    observer: &ObserverDef,
+    description: &Description,
+    changes_outputs: bool,
+) -> Result<(), SetupError> {
     let kind = observer.kind.as_str();
-    if kind.is_empty() || kind == "none" || description.observers.iter().any(|known| known == kind) {
+    if kind.is_empty() || kind == "none" {
         return Ok(());
     }
-    Err(SetupError::Unknown {
-        what: "observer of the solver",
-        name: kind.to_owned(),
-        nearest: nearest(kind, description.observers.iter()),
-    })
+    if !description.observers.iter().any(|known| known == kind) {
+        return Err(SetupError::Unknown {
+            what: "observer of the solver",
+            name: kind.to_owned(),
+            nearest: nearest(kind, description.observers.iter()),
+        });
+    }
+    if changes_outputs && observer.gain > 0.0 {
+        let message = "an effect on an output cannot go with an observer inside the solver, which would pull the state towards \
+                       what the effect explains: set the observer's kind to \"none\"";
+        return Err(SetupError::Invalid(message.to_owned()));
+    }
+    Ok(())
+}
+
+/// Refuses initial values of states that only effects have: where those begin is said by the effects.
+pub(super) fn check_initial(setup: &Setup, whole: &Spec, n_own: usize) -> Result<(), SetupError> {
+    let named = setup.parameters.iter().chain(setup.model.constants.keys());
+    for (name, state) in named.filter_map(|name| Some((name, name.strip_prefix("initial:")?))) {
+        if Spec::range_of(&whole.states, state).is_some_and(|range| range.start >= n_own) {
+            return Err(SetupError::Invalid(format!(
+                "`{name}` is the initial value of an effect's own state, which cannot be given for a solver: write it into the \
+                 effect"
+            )));
+        }
+    }
+    Ok(())
 }

@@ -46,7 +46,7 @@ pub enum Reply {
     Ended(Result<Solved, ParticleError>),
 }
 
-/// The message that asks for a run; `scratch` is the run's own folder.
+/// The message that asks for a run; `scratch` is the program's own folder.
 pub fn encode_run(run: &Run<'_>, scratch: &str) -> wire::RunRequest {
     let named = |values: &[(String, f64)]| {
         values.iter().map(|(name, value)| wire::Named { name: name.clone(), value: Some(*value) }).collect()

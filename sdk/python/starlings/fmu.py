@@ -17,15 +17,17 @@ from __future__ import annotations
 import argparse
 import atexit
 import math
+import os
 import re
 import shutil
+import tempfile
 from typing import Any, List, Optional, Sequence
 
 import numpy as np
 
 from .failures import DeclarationError
 from .quantity import Quantity
-from .serve import serve
+from .serve import SOCKET, serve
 from .solver import Solver
 from .values import Array
 from .window import Window
@@ -57,8 +59,8 @@ class Fmu(Solver):
         self.states = [_quantity(v) for v in self._states]
         self._variable_step = exchange.canHandleVariableCommunicationStepSize
         self._step = step if step is not None else _own_step(description)
-        self._folder = fmpy.extract(path)
-        atexit.register(shutil.rmtree, self._folder, ignore_errors=True)
+        self._folder = _own_folder()
+        fmpy.extract(path, unzipdir=self._folder)
         self._unit = (
             _Two(description, self._folder)
             if description.fmiMajorVersion == 2
@@ -186,6 +188,14 @@ class _Three(_Two):
         _, ended, early, reached = self._slave.doStep(t, h)
         if ended or early:
             raise ArithmeticError(f"the FMU stopped at {reached}, inside the step from {t} to {t + h}")
+
+
+def _own_folder() -> str:
+    """Where the FMU is unpacked: beside the socket, in the folder that the worker removes however this process ends."""
+    socket = os.environ.get(SOCKET)
+    folder = tempfile.mkdtemp(prefix="fmu-", dir=os.path.dirname(os.path.abspath(socket)) if socket else None)
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
 
 
 def _identity(description: Any, folder: str) -> Any:

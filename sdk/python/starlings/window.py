@@ -50,7 +50,7 @@ class Window:
     gain: float
     #: Values of the parameters of terms.
     constants: Dict[str, float]
-    #: A folder of this run's own, for files.
+    #: A folder of this program's own, for files: the same for all its runs, removed after its end.
     scratch: str
     #: Index of the sigma point and of the record, for names of files.
     particle: int

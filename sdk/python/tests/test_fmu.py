@@ -183,3 +183,20 @@ def test_what_is_no_fmu_is_told_in_one_line(tmp_path):
     )
     assert done.returncode == 1
     assert done.stderr.count("\n") == 1 and "this FMU cannot be served" in done.stderr
+
+
+def test_an_fmu_is_unpacked_where_the_worker_removes_it_when_its_program_is_killed(library, tmp_path):
+    script = tmp_path / "decay.py"
+    script.write_text("from starlings.fmu import main\n\nmain()\n")
+    given, worker, system = (tmp_path / name for name in ("given", "worker", "system"))
+    for folder in (given, worker, system):
+        folder.mkdir()
+    chosen = {"STARLINGS_SOLVER_SOCKET": str(worker / "s"), "TMPDIR": str(system)}
+    process = Process(script, tmp_path, environment=chosen, arguments=[fmi3(library, given)])
+    try:
+        assert process.describe().name == "decay"
+        process.child.kill()
+    finally:
+        process.close()
+    assert list(worker.glob("*/modelDescription.xml")), "beside the socket"
+    assert list(system.iterdir()) == [], "nothing in the folder of the system"

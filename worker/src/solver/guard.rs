@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 use std::io::{self, BufRead, Write};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdin, Command, Stdio};
+use std::process::{ChildStdin, Command, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use rustix::process::{Pid, Signal, kill_process_group};
@@ -19,8 +19,6 @@ use super::scratch::clear;
 /// The guard of this process.
 pub(crate) struct Guard {
     input: Arc<Mutex<ChildStdin>>,
-    /// Waited for by nobody: it ends by itself after this process.
-    _child: Child,
 }
 
 impl Guard {
@@ -35,7 +33,9 @@ impl Guard {
             .process_group(0);
         let mut child = command.spawn()?;
         let input = child.stdin.take().ok_or_else(|| io::Error::other("the guard has no standard input"))?;
-        Ok(Self { input: Arc::new(Mutex::new(input)), _child: child })
+        // It ends by itself when its input closes, and is waited for lest it stay as a zombie.
+        std::thread::Builder::new().name("guard".to_owned()).spawn(move || child.wait())?;
+        Ok(Self { input: Arc::new(Mutex::new(input)) })
     }
 
     /// A way to tell it of groups and folders.
@@ -139,6 +139,26 @@ pub(crate) fn kill_group(group: i32) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_guard_that_is_needed_no_more_leaves_no_process_and_no_zombie() {
+        let base = tempfile::tempdir().expect("a folder");
+        let written = base.path().join("pid");
+        let script = format!("echo $$ > '{}'; exec cat", written.display());
+        let guard = Guard::start(Path::new("sh"), &["-c".to_owned(), script]).expect("there is a shell");
+        let started = std::time::Instant::now();
+        let until = |ready: &dyn Fn() -> bool| {
+            while !ready() {
+                assert!(started.elapsed() < std::time::Duration::from_secs(60), "waited too long");
+                std::thread::yield_now();
+            }
+        };
+        let pid = || std::fs::read_to_string(&written).unwrap_or_default().trim().to_owned();
+        until(&|| !pid().is_empty());
+        let process = Path::new("/proc").join(pid());
+        drop(guard);
+        until(&|| !process.exists());
+    }
 
     #[test]
     fn folders_left_under_guard_are_removed_and_those_taken_out_or_kept_stay() {

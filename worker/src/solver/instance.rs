@@ -14,9 +14,7 @@ use std::time::Duration;
 
 use starlings_models::{Description, ParticleError, Run, Solved, SolverDef};
 use starlings_proto::WireError;
-use starlings_proto::convert::solver::description::decode_description;
-use starlings_proto::convert::solver::{Reply, SOLVER_PROTOCOL, decode_reply, encode_run};
-use starlings_proto::solver_wire::DescribeRequest;
+use starlings_proto::convert::solver::{Reply, decode_reply, encode_run};
 use starlings_proto::solver_wire::solver_client::SolverClient;
 use starlings_proto::words::status_text;
 use tokio::runtime::Runtime;
@@ -27,7 +25,6 @@ use connect::{Place, connect};
 
 use super::SolverError;
 use super::error::tail_text;
-use super::machine::cores;
 use super::process::{Launch, Process, ending, is_killed};
 use super::scratch::Scratch;
 use super::site::Site;
@@ -75,8 +72,8 @@ pub(crate) struct Instance {
     scratch: Scratch,
     client: SolverClient<Channel>,
     runtime: Runtime,
-    /// What it said of itself when it was ready, where that makes sense.
-    described: Option<Description>,
+    /// What it said of itself when it was ready, or what is wrong with that.
+    described: Result<Description, String>,
 }
 
 impl Instance {
@@ -105,7 +102,7 @@ impl Instance {
                 folder: None,
                 environment,
                 threads: def.threads,
-                cores: def.pin.then(|| cores(number, def.threads)),
+                cores: def.pin.then(|| site.cores(number, def.threads)),
                 memory: def.memory,
                 input: true,
             };
@@ -120,17 +117,12 @@ impl Instance {
         Ok(Self { name, process, _lifeline: lifeline, scratch, client, runtime, described })
     }
 
-    /// What the program says of itself.
+    /// What the program said of itself when it was ready.
     ///
     /// # Errors
-    /// When it does not answer or says something that makes no sense.
+    /// When that makes no sense.
     pub(crate) fn describe(&mut self) -> Result<Description, SolverError> {
-        let request = DescribeRequest { protocol: SOLVER_PROTOCOL };
-        let answer = self.runtime.block_on(self.client.describe(request));
-        let described = answer
-            .map_err(|status| status_text(&status))
-            .and_then(|answer| decode_description(answer.get_ref()).map_err(plain));
-        described.map_err(|what| SolverError::Description {
+        self.described.clone().map_err(|what| SolverError::Description {
             program: self.name.clone(),
             message: what + &tail_text(&self.tail()),
         })
@@ -192,7 +184,7 @@ impl Instance {
 
     /// Refuses an answer of another length than asked for, or one that is not finite, while the program's output is at hand.
     fn sound(&self, run: &Run<'_>, solved: Solved) -> Result<Solved, ParticleError> {
-        let Some(described) = &self.described else { return Ok(solved) };
+        let Ok(described) = &self.described else { return Ok(solved) };
         match answer::fault(&described.spec, run, &solved) {
             Some(fault) => Err(ParticleError::Solver(fault)),
             None => Ok(solved),

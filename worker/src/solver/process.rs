@@ -21,6 +21,9 @@ use super::guard::{Notice, kill_group};
 const TAIL_LINES: usize = 12;
 const TAIL_WIDTH: usize = 240;
 
+/// How long the words of a program that runs on are waited for once it has failed.
+const MOMENT: Duration = Duration::from_millis(20);
+
 /// How long the last lines of a program that has ended may take to arrive.
 const LAST_LINES: Duration = Duration::from_millis(500);
 
@@ -164,9 +167,10 @@ impl Process {
 
     /// The end of what it said on its standard error. Waits for the last of it when the program has ended.
     pub(crate) fn tail(&mut self) -> String {
-        if self.ended().is_some()
-            && let Some(read_up) = self.read_up.take()
-        {
+        if self.ended().is_none() {
+            // What it said before its answer may still be in the pipe.
+            std::thread::sleep(MOMENT);
+        } else if let Some(read_up) = self.read_up.take() {
             // A child of the program may hold the pipe open: it is killed first. One that left the group is not waited for.
             kill_group(self.group);
             let _: Result<(), _> = read_up.recv_timeout(LAST_LINES);
@@ -197,10 +201,11 @@ pub(crate) fn ending(status: ExitStatus) -> String {
     }
 }
 
-/// Whether somebody else ended a program.
+/// Whether somebody else ended a program, or what a shell or a launcher of MPI started for it: those pass a signal on as 128
+/// and its number.
 pub(crate) fn is_killed(status: ExitStatus) -> bool {
     use std::os::unix::process::ExitStatusExt;
-    matches!(status.signal(), Some(9 | 15))
+    matches!(status.signal(), Some(9 | 15)) || matches!(status.code(), Some(137 | 143))
 }
 
 /// A program next to the study, or wherever the system finds it.
@@ -274,11 +279,22 @@ mod tests {
 
     #[test]
     fn of_what_a_program_says_the_last_lines_are_kept_and_of_a_long_line_the_beginning() {
-        let many: String = (0..50).map(|i| format!("line {i}\r\n\n")).collect();
+        let many = (0..50).map(|i| format!("line {i}\r\n\n")).collect::<Vec<_>>().concat();
         let kept = remembered(many.as_bytes());
         assert_eq!((kept.len(), kept[0].as_str(), kept[11].as_str()), (TAIL_LINES, "line 38", "line 49"));
         let long = [vec![b'x'; 10_000_000], b"\nend".to_vec()].concat();
         assert_eq!(remembered(&long), ["x".repeat(TAIL_WIDTH), "end".to_owned()]);
+    }
+
+    #[test]
+    fn a_program_that_was_killed_under_a_wrapper_was_killed_and_one_that_failed_was_not() {
+        let ended = |script: &str| {
+            let status = Command::new("sh").args(["-c", script]).stderr(Stdio::null()).status();
+            is_killed(status.expect("there is a shell"))
+        };
+        assert!(ended("kill -9 $$") && ended("kill -15 $$"));
+        assert!(ended("sh -c 'kill -9 $$'; exit $?") && ended("sh -c 'kill -15 $$'; exit $?"));
+        assert!(!ended("exit 3") && !ended("sh -c 'kill -11 $$'; exit $?"));
     }
 
     #[test]

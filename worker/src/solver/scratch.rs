@@ -6,6 +6,7 @@
 use std::collections::BTreeSet;
 use std::fs;
 use std::io;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -38,7 +39,7 @@ impl ScratchRoot {
         let base = std::path::absolute(base.map_or_else(std::env::temp_dir, Path::to_path_buf))?;
         fs::create_dir_all(&base)?;
         let prefix = format!("starlings-{}-", std::process::id());
-        let folder = Builder::new().prefix(&prefix).tempdir_in(base)?.keep();
+        let folder = private(&prefix, &base)?;
         if let Some(notice) = &notice {
             notice.begin_folder(&folder);
         }
@@ -46,7 +47,7 @@ impl ScratchRoot {
     }
 
     pub(crate) fn folder(&self, label: &str) -> io::Result<Scratch> {
-        let folder = Builder::new().prefix(&format!("{label}-")).tempdir_in(&self.0.folder)?.keep();
+        let folder = private(&format!("{label}-"), &self.0.folder)?;
         Ok(Scratch { folder, is_kept: false, root: Arc::clone(&self.0) })
     }
 }
@@ -59,6 +60,12 @@ impl Drop for Root {
             notice.end_folder(&self.folder);
         }
     }
+}
+
+/// A new folder that is nobody else's business: other users of the machine neither read it nor reach the sockets in it.
+fn private(prefix: &str, within: &Path) -> io::Result<PathBuf> {
+    let permissions = fs::Permissions::from_mode(0o700);
+    Ok(Builder::new().prefix(prefix).permissions(permissions).tempdir_in(within)?.keep())
 }
 
 /// One folder.
@@ -148,6 +155,17 @@ mod tests {
         assert!(folder.path().join("mesh").exists());
         drop(folder);
         assert_eq!(fs::read_dir(base.path()).expect("readable").count(), 0);
+    }
+
+    #[test]
+    fn nobody_else_looks_into_the_folders() {
+        let base = tempfile::tempdir().expect("a folder");
+        let root = ScratchRoot::new(Some(base.path()), None).expect("a root");
+        let folder = root.folder("solver").expect("a folder in it");
+        for path in [folder.path(), folder.path().parent().expect("the root")] {
+            let mode = fs::metadata(path).expect("it is there").permissions().mode();
+            assert_eq!(mode & 0o777, 0o700, "{}", path.display());
+        }
     }
 
     #[test]

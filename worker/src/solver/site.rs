@@ -9,6 +9,7 @@ use std::sync::{Mutex, PoisonError};
 
 use super::SolverError;
 use super::guard::Guard;
+use super::machine::cores;
 use super::process::{Launch, Process};
 use super::scratch::{Scratch, ScratchRoot};
 
@@ -25,13 +26,15 @@ pub struct SiteOptions {
 /// The place where solvers run.
 pub(crate) struct Site {
     options: SiteOptions,
+    /// Number of its first program among all of the machine.
+    first: usize,
     scratch: Mutex<Option<ScratchRoot>>,
     guard: Mutex<Option<Guard>>,
 }
 
 impl Site {
-    pub(crate) fn new(options: SiteOptions) -> Self {
-        Self { options, scratch: Mutex::default(), guard: Mutex::default() }
+    pub(crate) fn new(options: SiteOptions, first: usize) -> Self {
+        Self { options, first, scratch: Mutex::default(), guard: Mutex::default() }
     }
 
     /// A new folder of its own, removed when dropped unless it is kept.
@@ -48,6 +51,11 @@ impl Site {
             Some(root) => root.folder(label),
             None => Err(io::Error::other("no scratch folder")),
         }
+    }
+
+    /// The cores of the program that has this number among those that run here at the same time.
+    pub(crate) fn cores(&self, number: usize, threads: usize) -> Vec<usize> {
+        cores(self.first.saturating_add(number), threads)
     }
 
     /// Starts a program in a process group of its own, under the guard.

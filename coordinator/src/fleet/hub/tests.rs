@@ -42,8 +42,13 @@ fn batch(hub: &Hub) -> (Submission, Receiver<Reply>) {
     let (setup, json) = encode_setup(&Setup::default()).expect("it travels");
     hub.install(setup, json, vec!["k".to_owned()]);
     let window = Window { start: 0.0, times: vec![1.0], observed: vec![0.0], inputs: vec![] };
-    let job =
-        starlings_models::Job { particle: 0, record: 0, window: window.into(), theta: vec![2.5], state: None };
+    let job = starlings_models::Job {
+        particle: 0,
+        record: 0,
+        window: window.into(),
+        theta: vec![2.5],
+        state: None,
+    };
     let (reply, replies) = mpsc::channel();
     (Submission { jobs: vec![(setup, job)], reply }, replies)
 }

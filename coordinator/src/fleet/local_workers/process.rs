@@ -32,10 +32,12 @@ pub(super) struct Process {
 }
 
 impl Process {
-    pub(super) fn start(config: &LocalConfig) -> Result<Self, FleetError> {
+    pub(super) fn start(config: &LocalConfig, place: usize) -> Result<Self, FleetError> {
         let mut command = Command::new(&config.program);
         command.args(&config.args).args(["--connect", &config.address.to_string()]);
-        command.args(["--once", "--patience", PATIENCE]).env(LIFELINE, "stdin");
+        command
+            .args(["--once", "--patience", PATIENCE, "--place", &place.to_string()])
+            .env(LIFELINE, "stdin");
         command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
         // A group of its own: an interrupt on the terminal reaches the coordinator only, which ends the workers in order.
         #[cfg(unix)]
@@ -125,7 +127,7 @@ mod tests {
             address,
             fleet: fleet.handle(),
         };
-        let process = Process::start(&config).expect("there is a shell");
+        let process = Process::start(&config, 0).expect("there is a shell");
         let pid = process.pid().to_string();
         let alive = || {
             let sent = Command::new("kill").args(["-0", &pid]).stderr(Stdio::null()).status();

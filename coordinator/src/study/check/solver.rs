@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use starlings_models::{
     Description, External, FilesDef, ParticleError, Quantity, Run, SOLVER, Setup, SetupError, Solve, Solved,
-    SolverDef, Spec, nearest,
+    SolverDef, Spec,
 };
 
 use self::files::{copies, described, templates};
@@ -192,46 +192,10 @@ fn asked(
 /// Refuses a description that makes no sense.
 fn check_description(source: &Source, section: &ProgramSection, description: &Description) {
     let place = section.described.as_ref().map_or(section.place.clone(), toml::Spanned::span);
-    for fault in faults(description) {
+    if let Some(fault) = description.fault() {
         let message = format!("the solver `{}` describes itself wrongly: {fault}", description.name);
-        source.report_with(place.clone(), message, "mend the solver's description");
+        source.report_with(place, message, "mend the solver's description");
     }
-}
-
-fn faults(description: &Description) -> Vec<String> {
-    let spec = &description.spec;
-    let mut faults = Vec::new();
-    for (what, list) in [
-        ("state", &spec.states),
-        ("parameter", &spec.parameters),
-        ("output", &spec.outputs),
-        ("input", &spec.inputs),
-    ] {
-        for (i, q) in list.iter().enumerate() {
-            let name = &q.name;
-            if name.is_empty() {
-                faults.push(format!("{what} {} has no name", i + 1));
-            } else if list[..i].iter().any(|earlier| earlier.name == *name) {
-                faults.push(format!("the {what} `{name}` is described twice"));
-            }
-            if q.size == 0 || (q.size > 1 && matches!(what, "parameter" | "input")) {
-                faults.push(format!("the {what} `{name}` has {} components", q.size));
-            }
-            let [lo, hi] = q.range;
-            if lo.is_nan() || hi.is_nan() || lo > hi {
-                faults.push(format!("the range of the {what} `{name}` is {lo} to {hi}"));
-            }
-        }
-    }
-    if spec.outputs.is_empty() {
-        faults.push("it has no output".to_owned());
-    }
-    let scalar: Vec<&str> = spec.states.iter().filter(|q| q.size == 1).map(|q| q.name.as_str()).collect();
-    for host in description.hosts.iter().filter(|host| !scalar.contains(&host.as_str())) {
-        let near = nearest(host, &scalar).map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
-        faults.push(format!("it hosts terms on `{host}`, which is none of its scalar states{near}"));
-    }
-    faults
 }
 
 /// Refuses what no observer of a solver can be told, and returns what is worth a word.

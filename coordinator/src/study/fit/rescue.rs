@@ -96,7 +96,8 @@ fn cause(
     windows: &StepWindows,
     of_particle: &[Result<starlings_models::Prediction, starlings_models::ParticleError>],
 ) -> String {
-    let mut failed = windows.iter().zip(of_particle).filter_map(|((record, _), r)| Some((*record, r.as_ref().err()?)));
+    let mut failed =
+        windows.iter().zip(of_particle).filter_map(|((record, _), r)| Some((*record, r.as_ref().err()?)));
     let Some((record, error)) = failed.next() else { return String::new() };
     format!("over record `{}`, {error}", flight.study().records[record].name)
 }

@@ -1,7 +1,5 @@
 //! What a solver says of itself, both ways.
 
-use std::collections::HashSet;
-
 use starlings_models::{Description, Quantity, Role, SOLVER, Spec};
 
 use super::{SOLVER_PROTOCOL, WireError};
@@ -32,7 +30,7 @@ pub fn encode_description(description: &Description) -> wire::Description {
 /// What a solver says of itself.
 ///
 /// # Errors
-/// When it speaks another protocol, gives two quantities one name, or names something that it does not have.
+/// When it speaks another protocol, or describes what makes no sense ([`Description::fault`]).
 pub fn decode_description(message: &wire::Description) -> Result<Description, WireError> {
     if message.protocol != SOLVER_PROTOCOL {
         return Err(wrong(format!(
@@ -50,33 +48,18 @@ pub fn decode_description(message: &wire::Description) -> Result<Description, Wi
         measures: message.measures.iter().map(|m| (m.output.clone(), m.state.clone())).collect(),
         restart: message.restart,
     };
-    let scalars = [("parameter", &spec.parameters), ("input", &spec.inputs)];
-    for (what, quantities) in scalars {
-        if let Some(field) = quantities.iter().find(|q| q.size != 1) {
-            return Err(wrong(format!(
-                "{what} `{}` has {} components; it must be a scalar",
-                field.name, field.size
-            )));
-        }
-    }
-    if spec.outputs.is_empty() {
-        return Err(wrong("it has no outputs, so nothing could be compared with data".to_owned()));
-    }
-    if spec.restart && spec.states.is_empty() {
-        return Err(wrong("it can restart from a state but describes no states".to_owned()));
-    }
-    let known = |state: &String| Spec::range_of(&spec.states, state).is_some();
-    let measured = spec.measures.iter().map(|(_, state)| state);
-    if let Some(state) = message.hosts.iter().chain(measured).find(|state| !known(state)) {
-        return Err(wrong(format!("it names the state `{state}`, which is not among its states")));
-    }
-    Ok(Description {
+    let name = if message.name.is_empty() { "solver" } else { &message.name };
+    let description = Description {
         spec,
-        name: if message.name.is_empty() { "solver".to_owned() } else { message.name.clone() },
+        name: name.to_owned(),
         deterministic: message.deterministic,
         observers: message.observers.clone(),
         hosts: message.hosts.clone(),
-    })
+    };
+    match description.fault() {
+        Some(fault) => Err(wrong(fault)),
+        None => Ok(description),
+    }
 }
 
 fn encode_quantity(q: &Quantity) -> wire::Quantity {
@@ -95,21 +78,11 @@ fn encode_quantity(q: &Quantity) -> wire::Quantity {
 }
 
 fn list(what: &str, quantities: &[wire::Quantity]) -> Result<Vec<Quantity>, WireError> {
-    let mut names = HashSet::new();
     let one = |q: &wire::Quantity| {
-        if q.name.is_empty() || q.name.contains([':', '[', ']']) {
-            return Err(wrong(format!("`{}` is no name for a {what}", q.name)));
-        }
-        if !names.insert(q.name.clone()) {
-            return Err(wrong(format!("it describes the {what} `{}` twice", q.name)));
-        }
         let role = if q.role.is_empty() { "other" } else { &q.role };
         let role: Role = serde_json::from_value(role.into())
             .map_err(|_| wrong(format!("{what} `{}` has the role `{role}`, which does not exist", q.name)))?;
         let range = [q.lo.unwrap_or(f64::NEG_INFINITY), q.hi.unwrap_or(f64::INFINITY)];
-        if range[0] > range[1] || range.iter().any(|bound| bound.is_nan()) {
-            return Err(wrong(format!("{what} `{}` has the range {} to {}", q.name, range[0], range[1])));
-        }
         Ok(Quantity {
             range,
             default: q.default_value,

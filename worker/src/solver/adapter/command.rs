@@ -11,7 +11,6 @@ pub(super) mod json;
 mod program;
 mod request;
 mod rule;
-mod seats;
 mod table;
 mod template;
 
@@ -26,14 +25,13 @@ use starlings_models::{Description, ParticleError, Run, Solved, SolverDef, Spec,
 use super::{Adapter, Kind};
 use crate::solver::SolverError;
 use crate::solver::error::tail_text;
-use crate::solver::machine::cores;
 use crate::solver::process::{Launch, Process, ending, is_killed};
 use crate::solver::scratch::Scratch;
+use crate::solver::seats::Seats;
 use crate::solver::site::Site;
 use answer::Answer;
 use program::Output;
 use rule::{Rule, lies_inside};
-use seats::Seats;
 use template::{OWN_NAMES, Templates};
 
 pub(crate) const KIND: Kind = Kind {
@@ -143,7 +141,7 @@ impl PerRun {
             folder: Some(folder),
             environment: self.def.environment.clone(),
             threads,
-            cores: self.def.pin.then(|| cores(seat, threads)),
+            cores: self.def.pin.then(|| self.site.cores(seat, threads)),
             memory: self.def.memory,
             input: true,
         })

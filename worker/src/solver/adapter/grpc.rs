@@ -13,6 +13,8 @@ use super::{Adapter, Kind};
 use crate::solver::SolverError;
 use crate::solver::backoff::Backoff;
 use crate::solver::instance::{How, Instance};
+use crate::solver::losses::Losses;
+use crate::solver::seats::{Seat, Seats};
 use crate::solver::site::Site;
 
 pub(crate) const KIND: Kind = Kind {
@@ -22,20 +24,20 @@ pub(crate) const KIND: Kind = Kind {
     open: |def, site| Ok(Box::new(Grpc::new(def, site, def.command.clone())?)),
 };
 
-/// Times that a run is made when its program dies: more often when it was killed from outside than when it fell by itself,
-/// which is likely to happen again.
-const KILLED: u32 = 12;
-const FELL: u32 = 2;
-
 /// Programs that serve `solver.proto`.
 pub(crate) struct Grpc {
     def: SolverDef,
     command: Vec<String>,
     site: Arc<Site>,
-    idle: Mutex<Vec<Instance>>,
+    idle: Mutex<Vec<Seated>>,
     backoff: Mutex<Backoff>,
-    /// Programs started so far, by which each finds its cores.
-    started: Mutex<usize>,
+    seats: Seats,
+}
+
+/// A program and the number by which it found its cores, which is free again after its end.
+struct Seated {
+    instance: Instance,
+    _seat: Seat,
 }
 
 impl Grpc {
@@ -48,83 +50,79 @@ impl Grpc {
             let message = "a solver needs a `command` that starts it, or an `address` where it listens";
             return Err(SolverError::Incomplete(message.to_owned()));
         }
-        let (idle, backoff, started) = (Mutex::default(), Mutex::default(), Mutex::default());
-        Ok(Self { def: def.clone(), command, site: Arc::clone(site), idle, backoff, started })
+        let (idle, backoff, seats) = (Mutex::default(), Mutex::default(), Seats::default());
+        Ok(Self { def: def.clone(), command, site: Arc::clone(site), idle, backoff, seats })
     }
 
     /// An idle program, or a new one.
-    fn take(&self) -> Result<Instance, SolverError> {
-        if let Some(instance) = self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop() {
-            return Ok(instance);
+    fn take(&self) -> Result<Seated, SolverError> {
+        if let Some(idle) = self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop() {
+            return Ok(idle);
         }
         let pause = self.backoff.lock().unwrap_or_else(PoisonError::into_inner).pause();
         std::thread::sleep(pause);
-        let number = {
-            let mut started = self.started.lock().unwrap_or_else(PoisonError::into_inner);
-            *started += 1;
-            *started - 1
-        };
-        let instance = Instance::start(&self.def, &self.command, &self.site, number);
+        let seat = self.seats.take();
+        let instance = Instance::start(&self.def, &self.command, &self.site, seat.number());
         let mut backoff = self.backoff.lock().unwrap_or_else(PoisonError::into_inner);
         if instance.is_ok() {
             backoff.worked();
         } else {
             backoff.failed();
         }
-        instance
+        Ok(Seated { instance: instance?, _seat: seat })
     }
 
-    fn give_back(&self, instance: Instance) {
-        self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(instance);
+    fn give_back(&self, seated: Seated) {
+        self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(seated);
     }
 }
 
 impl Adapter for Grpc {
     fn describe(&self) -> Result<Description, SolverError> {
-        let mut kills = 0;
-        let mut instance = loop {
+        let mut losses = Losses::default();
+        let mut seated = loop {
             match self.take() {
-                Err(SolverError::NotReady { killed: true, .. }) if kills < KILLED => kills += 1,
+                Err(SolverError::NotReady { killed: true, .. }) if losses.killed() => {}
                 taken => break taken?,
             }
         };
-        let description = instance.describe()?;
-        self.give_back(instance);
+        let description = seated.instance.describe()?;
+        self.give_back(seated);
         Ok(description)
     }
 
     fn run(&self, run: &Run<'_>) -> Result<Solved, ParticleError> {
         let patience = Duration::try_from_secs_f64(self.def.timeout).unwrap_or(Duration::MAX);
-        let mut losses = 0;
+        let mut losses = Losses::default();
         loop {
-            let mut instance = match self.take() {
-                Ok(instance) => instance,
+            let mut seated = match self.take() {
+                Ok(seated) => seated,
                 Err(error) => {
-                    losses += 1;
                     let killed = matches!(error, SolverError::NotReady { killed: true, .. });
-                    if losses >= if killed { KILLED } else { FELL } {
+                    let again = if killed { losses.killed() } else { losses.fell() };
+                    if !again {
                         return Err(ParticleError::Solver(error.to_string()));
                     }
                     continue;
                 }
             };
-            match instance.run(run, patience) {
+            match seated.instance.run(run, patience) {
                 Ok(answer) => {
-                    self.give_back(instance);
+                    self.give_back(seated);
                     return answer;
                 }
                 // The program is gone or of no more use: dropping it ends its whole group.
                 Err(lost) => {
-                    losses += 1;
-                    let most = match lost.how {
-                        How::Silent => 1,
-                        How::Fell => FELL,
-                        How::Killed => KILLED,
+                    let again = match lost.how {
+                        How::Silent => false,
+                        How::Fell => losses.fell(),
+                        How::Killed => losses.killed(),
                     };
-                    let text = lost.text(losses);
-                    drop(instance);
-                    tracing::warn!(particle = run.particle, record = run.record, losses, "{text}");
-                    if losses >= most {
+                    let times = losses.total() + u32::from(lost.how == How::Silent);
+                    let text = lost.text(times);
+                    drop(seated);
+                    tracing::warn!(particle = run.particle, record = run.record, times, "{text}");
+                    if !again {
                         return Err(ParticleError::Solver(text));
                     }
                 }
@@ -133,9 +131,9 @@ impl Adapter for Grpc {
     }
 
     fn run_and_leave(&self, run: &Run<'_>) -> bool {
-        let Ok(mut instance) = self.take() else { return false };
-        instance.leave(run);
-        self.give_back(instance);
+        let Ok(mut seated) = self.take() else { return false };
+        seated.instance.leave(run);
+        self.give_back(seated);
         true
     }
 }

@@ -76,7 +76,10 @@ pub(super) fn distance(a: &[f64], b: &[f64]) -> f64 {
     if a.len() != b.len() {
         return f64::INFINITY;
     }
-    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, |most, d| if d.is_nan() { f64::INFINITY } else { f64::max(most, d) })
 }
 
 pub(super) fn failed(what: &str) -> impl Fn(ParticleError) -> Verdict + '_ {

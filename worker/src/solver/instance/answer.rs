@@ -20,16 +20,14 @@ pub(super) fn fault(spec: &Spec, run: &Run<'_>, solved: &Solved) -> Option<Strin
             let at = solved.outputs.iter().position(|value| !value.is_finite())?;
             let n_row = solved.outputs.len() / window.times.len().max(1);
             let (time, value) = (window.times[at / n_row.max(1)], solved.outputs[at]);
-            Some(format!(
-                "returned {value} for the output `{}` at t = {time}",
-                output(spec, run, at % n_row.max(1))
-            ))
+            let name = output(spec, run, at % n_row.max(1));
+            Some(format!("returned {value}: output `{name}` is not a finite number at t = {time}"))
         })
         .or_else(|| {
             let at = solved.state.iter().position(|value| !value.is_finite()).filter(|_| spec.restart)?;
             let time = window.times.last().copied().unwrap_or(window.start);
             let (name, value) = (Spec::component(&spec.states, at), solved.state[at]);
-            Some(format!("returned {value} for the state `{name}` at t = {time}"))
+            Some(format!("returned {value}: state `{name}` is not a finite number at t = {time}"))
         })
 }
 

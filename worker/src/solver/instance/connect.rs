@@ -15,6 +15,7 @@ use starlings_proto::{FRAME_SIZE, LIFELINE};
 use tokio::runtime::Runtime;
 use tonic::transport::{Channel, Endpoint};
 
+use super::plain;
 use crate::solver::SolverError;
 use crate::solver::machine::free_port;
 use crate::solver::process::{Process, ending, is_killed};
@@ -68,7 +69,7 @@ pub(super) fn connect(
     name: &str,
     mut process: Option<&mut Process>,
     patience: Duration,
-) -> Result<(SolverClient<Channel>, Option<Description>), SolverError> {
+) -> Result<(SolverClient<Channel>, Result<Description, String>), SolverError> {
     let not_ready = |what: String, tail: String| SolverError::NotReady {
         program: name.to_owned(),
         what,
@@ -94,7 +95,7 @@ pub(super) fn connect(
             let request = DescribeRequest { protocol: SOLVER_PROTOCOL };
             let answer = client.describe(request).await.map_err(|status| status_text(&status))?;
             // What is wrong with it is said when somebody asks for it.
-            Ok::<_, String>((client, decode_description(answer.get_ref()).ok()))
+            Ok::<_, String>((client, decode_description(answer.get_ref()).map_err(plain)))
         };
         let left = patience.saturating_sub(started.elapsed());
         match runtime.block_on(async { tokio::time::timeout(left, attempt).await }) {

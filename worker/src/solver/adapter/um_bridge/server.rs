@@ -2,6 +2,7 @@
 //!
 //! Next file to read: [`super::client`].
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -31,14 +32,20 @@ pub(super) struct Server {
     /// Lengths of the vectors that the model takes.
     pub(super) input_sizes: Vec<usize>,
     process: Mutex<Option<Process>>,
+    /// Whether the program that was started here was ended here.
+    is_over: AtomicBool,
 }
 
 impl Server {
-    /// Starts the server, where the study has a command for it, and waits until it answers.
+    /// Starts the server on these cores, where the study has a command for it, and waits until it answers.
     ///
     /// # Errors
     /// When it cannot be started, does not answer in time, or lacks the model.
-    pub(super) fn start(def: &SolverDef, site: &Site) -> Result<Self, SolverError> {
+    pub(super) fn start(
+        def: &SolverDef,
+        site: &Site,
+        cores: Option<Vec<usize>>,
+    ) -> Result<Self, SolverError> {
         let address = def.address.as_deref().unwrap_or(HERE);
         let port = if address.contains("{port}") { port()? } else { String::new() };
         let filled = |text: &str| text.replace("{port}", &port);
@@ -56,7 +63,7 @@ impl Server {
                 folder: None,
                 environment,
                 threads: def.threads,
-                cores: None,
+                cores,
                 memory: def.memory,
                 input: false,
             };
@@ -76,7 +83,8 @@ impl Server {
             return Err(wrong(format!("the model `{model}` does not support Evaluate")));
         }
         let input_sizes = client.sizes("/InputSizes", "inputSizes", &model, patience).map_err(trouble)?;
-        Ok(Self { client, model, input_sizes, process: Mutex::new(process) })
+        let (process, is_over) = (Mutex::new(process), AtomicBool::new(false));
+        Ok(Self { client, model, input_sizes, process, is_over })
     }
 
     /// The model and where it is, for messages.
@@ -87,13 +95,18 @@ impl Server {
     /// Whether the program that was started here has ended.
     pub(super) fn has_ended(&self) -> bool {
         let mut process = self.process.lock().unwrap_or_else(PoisonError::into_inner);
-        process.as_mut().is_some_and(|process| process.ended().is_some())
+        self.is_over.load(Ordering::Acquire)
+            || process.as_mut().is_some_and(|process| process.ended().is_some())
     }
 
     /// How the program ended after a connection broke: whether somebody killed it, and in words with the end of its output.
-    /// None for a server of somebody else, or one that still runs.
+    /// A run that lost its server because another slot ended it lost it to a kill. None for a server of somebody else, or one
+    /// that still runs.
     pub(super) fn ending(&self) -> Option<(bool, String)> {
         let mut process = self.process.lock().unwrap_or_else(PoisonError::into_inner);
+        if self.is_over.load(Ordering::Acquire) {
+            return Some((true, "its program was ended for another run".to_owned()));
+        }
         let process = process.as_mut()?;
         let status = process.wait(LAST_WORDS)?;
         let text = format!("its program {}{}", ending(status), tail_text(&process.tail()));
@@ -108,7 +121,10 @@ impl Server {
 
     /// Ends the program that was started here, with whatever it is doing.
     pub(super) fn end(&self) {
-        self.process.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let mut process = self.process.lock().unwrap_or_else(PoisonError::into_inner);
+        if process.take().is_some() {
+            self.is_over.store(true, Ordering::Release);
+        }
     }
 }
 

@@ -1,37 +1,37 @@
 //! Numbers for programs that run at the same time, by which each finds its cores.
 //!
-//! Next file to read: [`super::program`].
+//! Next file to read: [`super::machine`].
 
 use std::collections::BTreeSet;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// The numbers in use.
-#[derive(Default)]
-pub(super) struct Seats(Mutex<BTreeSet<usize>>);
+#[derive(Clone, Default)]
+pub(crate) struct Seats(Arc<Mutex<BTreeSet<usize>>>);
 
 /// A number until it is dropped.
-pub(super) struct Seat<'a> {
-    seats: &'a Seats,
+pub(crate) struct Seat {
+    seats: Seats,
     number: usize,
 }
 
 impl Seats {
     /// The smallest number that is free.
-    pub(super) fn take(&self) -> Seat<'_> {
+    pub(crate) fn take(&self) -> Seat {
         let mut taken = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let number = (0..=taken.len()).find(|number| !taken.contains(number)).unwrap_or_default();
         taken.insert(number);
-        Seat { seats: self, number }
+        Seat { seats: self.clone(), number }
     }
 }
 
-impl Seat<'_> {
-    pub(super) fn number(&self) -> usize {
+impl Seat {
+    pub(crate) fn number(&self) -> usize {
         self.number
     }
 }
 
-impl Drop for Seat<'_> {
+impl Drop for Seat {
     fn drop(&mut self) {
         self.seats.0.lock().unwrap_or_else(PoisonError::into_inner).remove(&self.number);
     }
