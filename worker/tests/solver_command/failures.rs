@@ -71,9 +71,9 @@ fn of_an_endless_output_no_more_than_a_limit_is_remembered() {
 }
 
 #[test]
-fn a_value_that_is_not_finite_is_named_with_its_output_and_time() {
+fn a_value_that_is_not_finite_is_named_with_its_output_its_solver_and_its_time() {
     let says = Bench::new("echo '{\"tip\": [1, NaN]}'", &[]).run(1.0, &[1.0, 2.0]).unwrap_err();
-    assert_eq!(says, "output `tip` is not a finite number at t = 2");
+    assert_eq!(says, "output `tip` of the solver `sh` is not a finite number at t = 2");
 }
 
 #[test]

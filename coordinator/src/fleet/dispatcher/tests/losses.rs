@@ -30,7 +30,10 @@ fn only_the_jobs_that_were_running_count_an_attempt_when_their_worker_dies() {
         let died = stage.step(left(id - 1, false));
         if id == 4 {
             let failed = died.iter().any(|c| {
-                matches!(c, Command::GivenUp { notice: FleetEvent::JobFailed { particle: 0, attempts: 3, .. }, .. })
+                matches!(
+                    c,
+                    Command::GivenUp { notice: FleetEvent::JobFailed { particle: 0, attempts: 3, .. }, .. }
+                )
             });
             assert!(failed, "{died:?}");
         }
@@ -89,7 +92,11 @@ fn a_failed_job_does_not_wait_for_another_worker_that_left() {
         stage.jobs(answered(on_first, Answer::Ran(Err(solver("no"))), 1.0)).iter().all(|(l, _)| l.epoch == 1)
     );
     let commands = stage.step(left(2, false));
-    assert!(commands.iter().any(|c| matches!(c, Command::GivenUp { notice: FleetEvent::JobFailed { attempts: 1, .. }, .. })));
+    assert!(
+        commands
+            .iter()
+            .any(|c| matches!(c, Command::GivenUp { notice: FleetEvent::JobFailed { attempts: 1, .. }, .. }))
+    );
 }
 
 #[test]

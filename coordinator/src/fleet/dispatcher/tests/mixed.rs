@@ -154,8 +154,5 @@ fn a_failed_job_goes_to_another_worker_only_if_that_may_have_its_setup() {
     stage.step(failed(2, 1, "no legs"));
     let jobs = stage.jobs(done(1, 1));
     let commands = stage.step(answered(jobs[0].0, Answer::Ran(Err(solver("no"))), 1.0));
-    assert!(
-        commands.iter().any(|c| matches!(c, Command::GivenUp { .. })),
-        "{commands:?}"
-    );
+    assert!(commands.iter().any(|c| matches!(c, Command::GivenUp { .. })), "{commands:?}");
 }
