@@ -1,7 +1,8 @@
 //! Batch fit: iterated sigma-point Gauss-Newton with damping, for solvers that cannot restart from a state.
 //!
 //! One iteration is one ensemble of whole-record runs: the centre, and sigma points around it whose regression replaces
-//! the derivative. Gauss-Newton with the prior as a term of its own (Bell 1994), damped after Levenberg (1944) and
+//! the derivative. Gauss-Newton with the prior as a term of its own (Bell 1994), solved by QR of the
+//! stacked whitened rows (`linearisation.rs`), damped after Levenberg (1944) and
 //! Marquardt (1963), the damping controlled after Nielsen (1999). A centre that lowers the cost is kept; otherwise the
 //! step is shortened and recomputed from the linearisation of the best centre. It deliberately stops nowhere by itself:
 //! the caller looks at `converged` and `max_iterations`. Read next: `linearisation.rs`.
@@ -10,6 +11,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::data::same;
 use crate::linearisation::{Ensemble, Linearisation, Outcome};
+use crate::spectral;
 use crate::{Data, EstimatorError, Gaussian, SigmaSet};
 
 /// Damping of the first step, relative to the diagonal of the information.
@@ -192,31 +194,30 @@ impl Batch {
         best: &Linearisation,
         accepted: bool,
     ) -> Result<BatchStep, EstimatorError> {
-        let hessian = best.hessian();
         let singular = EstimatorError::NotPositiveDefinite { what: "posterior" };
-        let root = hessian.clone().cholesky().ok_or_else(|| singular.clone())?;
-        let newton = -root.solve(&best.gradient);
-        let step = (-newton.dot(&best.gradient)).max(0.0).sqrt();
+        let newton = best.newton().ok_or_else(|| singular.clone())?;
+        let step = best.along.norm();
         let again = !accepted && next.rejected.is_multiple_of(STUBBORN);
         if again {
             next.trial.clone_from(&best.centre);
             next.width *= 0.3;
             next.refresh();
         } else {
-            next.trial = &best.centre + damped(&hessian, &best.gradient, next.damping).ok_or(singular)?;
+            let damped = best.damped(next.damping).ok_or_else(|| singular.clone())?;
+            next.trial = &best.centre + shortened(damped);
             if accepted {
                 next.width = step.clamp(NARROWEST, 1.0);
             }
         }
-        let eigen = hessian.symmetric_eigen();
-        let sd = DMatrix::from_diagonal(&eigen.eigenvalues.map(|v| 1.0 / v.sqrt()));
-        let log_det: f64 = eigen.eigenvalues.iter().map(|v| v.ln()).sum();
-        next.scale = &eigen.eigenvectors * sd * eigen.eigenvectors.transpose() * (self.spread * next.width);
+        next.scale = inverse_root(&best.root)? * (self.spread * next.width);
+        let log_det: f64 = best.root.diagonal().iter().map(|v| 2.0 * v.abs().ln()).sum();
         next.converged = step < self.tolerance;
         let (u, gain) =
             if next.converged { (&best.centre + newton, step * step) } else { (best.centre.clone(), 0.0) };
         let l = next.prior.factor();
-        let covariance = &l * root.inverse() * l.transpose();
+        let p = best.centre.len();
+        let inverse = best.root.solve_upper_triangular(&DMatrix::identity(p, p)).ok_or(singular)?;
+        let factor = &l * inverse;
         Ok(BatchStep {
             cost: best.cost,
             misfit: best.misfit,
@@ -224,10 +225,7 @@ impl Batch {
             step,
             accepted,
             converged: next.converged,
-            posterior: Gaussian {
-                mean: &next.prior.mean + l * u,
-                covariance: (&covariance + covariance.transpose()) * 0.5,
-            },
+            posterior: Gaussian { mean: &next.prior.mean + l * u, covariance: &factor * factor.transpose() },
             log_likelihood: best.log_likelihood,
             evidence: best.log_likelihood + 0.5 * (best.misfit - best.cost + gain - log_det),
         })
@@ -253,7 +251,7 @@ impl BatchState {
     /// Lowers the damping by how well the linear model foretold the fall of the cost.
     fn relax(&mut self, from: &Linearisation, to: &Linearisation) {
         let s = &to.centre - &from.centre;
-        let foretold = -2.0 * s.dot(&from.gradient) - s.dot(&(from.hessian() * &s));
+        let foretold = from.foretold(&s);
         if foretold > 0.0 {
             let ratio = (from.cost - to.cost) / foretold;
             self.damping *= (1.0 - (2.0 * ratio - 1.0).powi(3)).clamp(0.3, 2.0);
@@ -275,18 +273,15 @@ impl BatchState {
     }
 }
 
-impl Linearisation {
-    /// Half the second derivative of the cost (Gauss-Newton), p x p.
-    fn hessian(&self) -> DMatrix<f64> {
-        let p = self.centre.len();
-        DMatrix::identity(p, p) + &self.information
-    }
+/// (R^T R)^{-1/2}, symmetric, from the singular values of R.
+fn inverse_root(root: &DMatrix<f64>) -> Result<DMatrix<f64>, EstimatorError> {
+    let (_, values, vectors) = spectral::svd(root.clone(), "posterior")?;
+    let sd = DMatrix::from_diagonal(&values.map(|v| 1.0 / v));
+    Ok(vectors.tr_mul(&(sd * &vectors)))
 }
 
-/// Solves (H + damping diag H) step = -gradient; no component longer than [`LONGEST`].
-fn damped(hessian: &DMatrix<f64>, gradient: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
-    let matrix = hessian + DMatrix::from_diagonal(&(hessian.diagonal() * damping));
-    let step = -matrix.cholesky()?.solve(gradient);
+/// A step of which no component is longer than [`LONGEST`].
+fn shortened(step: DVector<f64>) -> DVector<f64> {
     let longest = step.amax();
-    Some(if longest > LONGEST { step * (LONGEST / longest) } else { step })
+    if longest > LONGEST { step * (LONGEST / longest) } else { step }
 }

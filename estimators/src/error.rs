@@ -129,6 +129,17 @@ pub enum EstimatorError {
         /// How many ensembles were tried.
         attempt: usize,
     },
+    /// Eigenvalues or singular values were not found within the limit of their iteration.
+    #[error(
+        "the decomposition of the {what} matrix did not end within {limit} iterations: its entries are out of all \
+         proportion, scale priors and noise to the data"
+    )]
+    NotDecomposed {
+        /// Which matrix.
+        what: &'static str,
+        /// Iterations that were allowed.
+        limit: usize,
+    },
     /// An iteration produced no finite number (an observation model that overflows).
     #[error("{what} is not finite")]
     NotFinite {

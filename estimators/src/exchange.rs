@@ -7,7 +7,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::data::same;
-use crate::{EstimatorError, Gaussian};
+use crate::{EstimatorError, Gaussian, spectral};
 
 /// Information of a direction, in units of that of the used prior, up to which it counts as none; the next decade fades in.
 ///
@@ -44,7 +44,7 @@ impl Exchanged {
 /// `wanted`, wherever their mean went: a slope of the likelihood without curvature would move it without bound.
 ///
 /// # Errors
-/// `Shape`, and `NotPositiveDefinite` for a singular covariance.
+/// `Shape`, `NotPositiveDefinite` for a singular covariance, `NotFinite` and `NotDecomposed` when the two are out of all proportion.
 pub fn exchange_prior(
     posterior: &Gaussian,
     used: &Gaussian,
@@ -58,11 +58,11 @@ pub fn exchange_prior(
     let singular = EstimatorError::NotPositiveDefinite { what: "posterior" };
     // Information of the data in coordinates y, theta = m2 + L V y: diagonal, (L2^-1 L)^T (L2^-1 L) - 1.
     let ratio = l2.solve_lower_triangular(&l).ok_or_else(|| singular.clone())?;
-    let svd = ratio.svd(false, true);
-    let v = svd.v_t.ok_or_else(|| singular.clone())?.transpose();
+    let (_, singular_values, v_t) = spectral::svd(ratio, "ratio of used prior to posterior")?;
+    let v = v_t.transpose();
     // Singular values have the rounding of the largest.
-    let none = NO_INFORMATION.max(100.0 * f64::EPSILON * svd.singular_values.max());
-    let sharpening = svd.singular_values.map(|s| (s - 1.0) * (s + 1.0));
+    let none = NO_INFORMATION.max(100.0 * f64::EPSILON * singular_values.max());
+    let sharpening = singular_values.map(|s| (s - 1.0) * (s + 1.0));
     let share = sharpening.map(|e| ((e - none) / (9.0 * none)).clamp(0.0, 1.0));
     let information = sharpening.component_mul(&share);
     let whiten =

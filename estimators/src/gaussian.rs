@@ -5,6 +5,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::spectral;
+
 /// Mean and covariance of p transformed parameters.
 #[derive(serde::Serialize, serde::Deserialize, Debug, Clone, PartialEq)]
 pub struct Gaussian {
@@ -32,11 +34,17 @@ impl Gaussian {
     }
 
     /// A factor L with L L^T = covariance: lower Cholesky, or the symmetric root where the covariance is singular.
+    ///
+    /// # Panics
+    /// When the covariance has no eigenvalues, because an entry is no finite number.
     pub(crate) fn factor(&self) -> DMatrix<f64> {
         if let Some(cholesky) = self.covariance.clone().cholesky() {
             return cholesky.l();
         }
-        let eigen = self.covariance.clone().symmetric_eigen();
+        let eigen = match spectral::eigen(self.covariance.clone(), "covariance") {
+            Ok(eigen) => eigen,
+            Err(error) => panic!("a Gaussian has a covariance of finite numbers: {error}"),
+        };
         let root = DMatrix::from_diagonal(&eigen.eigenvalues.map(|v| v.max(0.0).sqrt()));
         &eigen.eigenvectors * root * eigen.eigenvectors.transpose()
     }

@@ -7,6 +7,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::particles::Geometry;
+use crate::spectral;
 
 /// Above this squared size of S the unit matrix in 1 + S^T S drowns in rounding.
 const LARGEST: f64 = 1e12;
@@ -69,7 +70,7 @@ impl Information {
         }
         let p = ss.nrows();
         let unit = DMatrix::identity(p, p) + (&ss + ss.transpose()) * 0.5;
-        let eigen = unit.symmetric_eigen();
+        let eigen = spectral::eigen(unit, "information").ok()?;
         let values = eigen.eigenvalues.map(|v| v.max(1.0));
         let step = &eigen.eigenvectors * eigen.eigenvectors.tr_mul(&sd).component_div(&values);
         let step = DVector::from_column_slice(step.as_slice());

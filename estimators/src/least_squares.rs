@@ -5,6 +5,7 @@
 //! end. Deliberately in scaled parameters z of the caller's choice, with an independent Gaussian prior and bounds on each.
 //! Read next: `score.rs`, which asks what another parameter would add at the end of a fit.
 
+mod damped;
 mod need;
 #[cfg(test)]
 mod tests;
@@ -261,26 +262,24 @@ impl LeastSquares {
     /// outwards are left where they are.
     fn step(&mut self) -> Option<DVector<f64>> {
         let p = self.z.len();
-        let weight = DMatrix::from_diagonal(&self.prior.precision);
-        let hessian = self.jacobian.tr_mul(&self.jacobian) + &weight;
-        let gradient = self.jacobian.tr_mul(&self.residual) + weight * (&self.prior.mean - &self.z);
+        let precision = &self.prior.precision;
+        let pull = &self.prior.mean - &self.z;
+        let gradient = self.jacobian.tr_mul(&self.residual) + precision.component_mul(&pull);
+        let curvature = DVector::from_fn(p, |j, _| self.jacobian.column(j).norm_squared() + precision[j]);
         let held = |j: usize| {
             let [lo, hi] = self.prior.bounds[j];
             (self.z[j] <= lo && gradient[j] < 0.0) || (self.z[j] >= hi && gradient[j] > 0.0)
         };
-        let free: Vec<usize> = (0..p).filter(|j| !held(*j) && hessian[(*j, *j)] > 0.0).collect();
-        let mut damped = hessian.select_rows(&free).select_columns(&free);
-        for (k, j) in free.iter().enumerate() {
-            damped[(k, k)] += hessian[(*j, *j)] * (self.damping + 1e-12);
-        }
-        let solved = damped.cholesky()?.solve(&gradient.select_rows(&free));
+        let free: Vec<usize> = (0..p).filter(|j| !held(*j) && curvature[*j] > 0.0).collect();
+        let solved = damped::solve(self, &free, &pull, &curvature)?;
         let shrink = (LONGEST / solved.amax().max(f64::MIN_POSITIVE)).min(1.0);
         let mut step = DVector::zeros(p);
         for (k, j) in free.iter().enumerate() {
             let [lo, hi] = self.prior.bounds[*j];
             step[*j] = (self.z[*j] + solved[k] * shrink).clamp(lo, hi) - self.z[*j];
         }
-        self.predicted = 2.0 * gradient.dot(&step) - step.dot(&(&hessian * &step));
+        let prior = precision.component_mul(&step).dot(&step);
+        self.predicted = 2.0 * gradient.dot(&step) - (&self.jacobian * &step).norm_squared() - prior;
         Some(step)
     }
 

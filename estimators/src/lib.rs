@@ -26,6 +26,7 @@ mod roukf;
 mod score;
 mod sigma_set;
 mod smoother;
+mod spectral;
 mod stored;
 mod transform;
 mod whiten;

@@ -7,7 +7,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::SigmaSet;
+use crate::{SigmaSet, spectral};
 
 /// Directions with a smaller share of the unit covariance than this count as lost.
 pub(crate) const SPANNED: f64 = 1e-8;
@@ -73,12 +73,8 @@ impl Geometry {
         let dual = weighted_transpose(&centred, &weights);
         let m = &centred * &dual;
         let information = (m.trace() / p as f64).min(1.0);
-        let eigen = m.symmetric_eigen();
-        let weak = eigen.eigenvalues.imin();
-        let weakest = (eigen.eigenvectors.column(weak).clone_owned(), eigen.eigenvalues[weak]);
-        let inverse =
-            DMatrix::from_diagonal(&eigen.eigenvalues.map(|v| if v > SPANNED { 1.0 / v } else { 0.0 }));
-        let slope = dual * &eigen.eigenvectors * inverse * eigen.eigenvectors.transpose();
+        let (inverse, weakest) = inverted(m);
+        let slope = dual * inverse;
         let mean = &weights - &slope * &c;
         Self { whole: false, redundant, points, weights, mean, slope, information, weakest }
     }
@@ -112,6 +108,19 @@ impl Geometry {
         }
         factor
     }
+}
+
+/// The inverse over the directions that are spanned, and the direction with the least spread with its variance. A moment that
+/// cannot be decomposed spans nothing.
+fn inverted(moment: DMatrix<f64>) -> (DMatrix<f64>, (DVector<f64>, f64)) {
+    let p = moment.nrows();
+    let Ok(eigen) = spectral::eigen(moment, "second moment of the sigma points") else {
+        return (DMatrix::zeros(p, p), (DVector::zeros(p), 0.0));
+    };
+    let weak = eigen.eigenvalues.imin();
+    let weakest = (eigen.eigenvectors.column(weak).clone_owned(), eigen.eigenvalues[weak]);
+    let inverse = DMatrix::from_diagonal(&eigen.eigenvalues.map(|v| if v > SPANNED { 1.0 / v } else { 0.0 }));
+    (&eigen.eigenvectors * inverse * eigen.eigenvectors.transpose(), weakest)
 }
 
 /// D I^T, r x p.

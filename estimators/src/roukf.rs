@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::analysis::analyse;
 use crate::data::same;
 use crate::particles::{Geometry, SPANNED};
-use crate::{Analysis, Data, Drift, EstimatorError, Gaussian, Particles, SigmaSet, drift};
+use crate::{Analysis, Data, Drift, EstimatorError, Gaussian, Particles, SigmaSet, drift, spectral};
 
 /// Which root C of the posterior covariance U^{-1} moves the particles; mean and covariance do not depend on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -119,7 +119,7 @@ impl Roukf {
     /// simplex, are left as they are (R = 1): a pulled set has no even part that could be trusted.
     ///
     /// # Errors
-    /// `Shape`, `NotFinite` for a bad Gram matrix.
+    /// `Shape`, `NotFinite`, `NotDecomposed` for a bad Gram matrix.
     pub fn resample(&self, p: &Particles, gram: &DMatrix<f64>) -> Result<Resampled, EstimatorError> {
         let (n_param, r) = (self.set.n_param(), self.set.n_particle());
         self.check(p)?;
@@ -131,7 +131,7 @@ impl Roukf {
         if r == n_param + 1 || p.pull.iter().any(|s| *s < 1.0) {
             return Ok(Resampled { particles: p.clone(), transform: DMatrix::identity(r, r), dropped: 0.0 });
         }
-        let eigen = ((gram + gram.transpose()) * 0.5).symmetric_eigen();
+        let eigen = spectral::eigen((gram + gram.transpose()) * 0.5, "Gram")?;
         let mut order: Vec<usize> = (0..r).collect();
         order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
         let whole: f64 = eigen.eigenvalues.iter().map(|v| v.max(0.0)).sum();

@@ -7,6 +7,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::error::EstimatorError;
+use crate::spectral;
 
 /// A fit at its optimum, its prior as further rows.
 #[derive(Debug, Clone)]
@@ -58,12 +59,14 @@ impl Optimum {
         rows.view_mut((m, 0), (p, p)).set_diagonal(&root);
         let mut all = residual.clone().resize_vertically(m + p, 0.0);
         all.rows_mut(m, p).copy_from(&root.component_mul(pull));
-        let normal = rows.tr_mul(&rows);
-        let covariance = normal
-            .cholesky()
-            .map(|c| c.inverse())
-            .ok_or(EstimatorError::NotPositiveDefinite { what: "posterior" })?;
-        let basis = rows.qr().q();
+        // From the triangle of the rows: their square would lose what a wide prior leaves of an informed direction.
+        let largest = rows.column_iter().map(|c| c.norm()).fold(0.0, f64::max);
+        let qr = rows.qr();
+        let (basis, triangle) = (qr.q(), qr.unpack_r());
+        let free = triangle.diagonal().iter().any(|v| !(v.abs() > f64::EPSILON * largest));
+        let inverse = triangle.solve_upper_triangular(&DMatrix::identity(p, p)).filter(|_| !free);
+        let inverse = inverse.ok_or(EstimatorError::NotPositiveDefinite { what: "posterior" })?;
+        let covariance = &inverse * inverse.transpose();
         Ok(Self { basis, covariance, jacobian: jacobian.clone(), residual: all })
     }
 
@@ -114,7 +117,8 @@ impl Optimum {
 ///
 /// `own` has the unimitated sensitivities as columns; `signs` says which sign of each amplitude counts (0 both). `normal`
 /// gives independent standard normal numbers. The scores are jointly Gaussian with the correlation of the columns, so k
-/// numbers make a simulation, whatever the number of data.
+/// numbers make a simulation, whatever the number of data. Infinite throughout, so that nothing exceeds it, for sensitivities
+/// that are not finite.
 pub fn null_maxima(
     own: &DMatrix<f64>,
     signs: &[f64],
@@ -126,7 +130,9 @@ pub fn null_maxima(
         let norm = column.norm();
         column.scale_mut(if norm > 0.0 { 1.0 / norm } else { 0.0 });
     }
-    let eigen = unit.tr_mul(&unit).symmetric_eigen();
+    let Ok(eigen) = spectral::eigen(unit.tr_mul(&unit), "correlation of the scores") else {
+        return vec![f64::INFINITY; n_simulation];
+    };
     let root = &eigen.eigenvectors * DMatrix::from_diagonal(&eigen.eigenvalues.map(|v| v.max(0.0).sqrt()));
     let one = |_| {
         let draws = DVector::from_fn(root.ncols(), |_, _| normal());

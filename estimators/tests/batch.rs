@@ -6,7 +6,7 @@ use common::batch::{Model, compartments, fit};
 use common::rcr::{MM_HG, pressure, prior, truth};
 use common::{difference, gauss, normal, rng, uniform};
 use nalgebra::{DMatrix, DVector};
-use starlings_estimators::{BatchState, BatchStep, Data, Gaussian, Noise, Points};
+use starlings_estimators::{BatchState, BatchStep, Data, Gaussian, Noise, Points, Root, Roukf, SigmaSet};
 
 /// Minimum of the cost by a slow and safe search: coordinate steps that shrink when none improves.
 fn minimum(model: &Model<'_>, prior: &Gaussian, data: &Data<'_>, start: &DVector<f64>) -> DVector<f64> {
@@ -169,5 +169,54 @@ fn a_model_that_cannot_follow_the_data_still_ends_at_the_minimum() {
         let end = fit(points, &model, &prior, &data);
         assert_at_minimum(&format!("{points:?}"), &model, &prior, &data, &end);
         assert!(end.1.misfit / 60.0 > 10.0, "the misfit is large: {}", end.1.misfit);
+    }
+}
+
+/// Eight observations of two parameters through orthogonal columns, so that the posterior is two known Gaussians: the first is
+/// known `ratio` times better than its prior, the second sqrt(2) times.
+fn informed_by(ratio: f64) -> (DMatrix<f64>, Gaussian, Vec<f64>, DVector<f64>, DVector<f64>) {
+    let (m, noise) = (8.0_f64, 1.0);
+    let sd = DVector::from_vec(vec![ratio.recip(), 0.5_f64.sqrt()]);
+    // 1 / sd^2 = 1 + m h^2 with prior and noise of one.
+    let h = sd.map(|sd| ((sd.powi(-2) - 1.0) / m).sqrt());
+    let columns = DMatrix::from_fn(8, 2, |k, j| h[j] * if j == 0 || k % 2 == 0 { 1.0 } else { -1.0 });
+    let prior = Gaussian::independent(&[0.0, 0.0], &[1.0, 1.0]);
+    let scatter = [0.3, -0.8, 1.1, 0.4, -0.6, -1.2, 0.7, 0.1];
+    let truth = DVector::from_vec(vec![0.7, -0.4]);
+    let values: Vec<f64> = (0..8).map(|k| (columns.row(k) * &truth)[0] + noise * scatter[k]).collect();
+    let mean = columns.tr_mul(&DVector::from_vec(values.clone())).component_mul(&sd.map(|sd| sd * sd));
+    (columns, prior, values, mean, sd)
+}
+
+#[test]
+fn a_posterior_ten_thousand_million_times_sharper_than_its_prior_is_the_closed_form_and_the_filters() {
+    for ratio in [1e3, 1e5, 1e7, 3e9, 1e10] {
+        let (columns, prior, values, mean, sd) = informed_by(ratio);
+        let noise = Noise::Diagonal(vec![1.0; 8]);
+        let data = Data { values: &values, noise: &noise };
+        let model = |theta: &[f64]| (&columns * DVector::from_column_slice(theta)).as_slice().to_vec();
+        let (_, step) = fit(Points::Simplex, &model, &prior, &data);
+        assert!(step.converged, "ratio {ratio:e}: step {}", step.step);
+        let set = SigmaSet::new(Points::Simplex, 2).unwrap();
+        let roukf = Roukf { set, root: Root::Symmetric, drift: Vec::new() };
+        let particles = roukf.init(&prior);
+        let (after, _) = roukf.analysis(&particles, &(&columns * &particles.theta), &data).unwrap();
+        let filtered = roukf.gaussian(&after);
+        // A double holds a value of one to 2e-16, which is 2e-6 sd at the largest ratio; a hundred such roundings.
+        let rounding = 1e-10 + 2e-14 * ratio;
+        for (what, found) in [("batch", &step.posterior), ("filter", &filtered)] {
+            for j in 0..2 {
+                let off = (found.mean[j] - mean[j]).abs() / sd[j];
+                let share = found.sd()[j] / sd[j];
+                assert!(
+                    off < 1e-8 + rounding,
+                    "{what}, ratio {ratio:e}, parameter {j}: mean off by {off} sd"
+                );
+                assert!(
+                    (share - 1.0).abs() < 1e-8 + rounding,
+                    "{what}, ratio {ratio:e}, parameter {j}: sd {share} of the closed form"
+                );
+            }
+        }
     }
 }

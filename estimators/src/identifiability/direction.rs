@@ -5,6 +5,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::spectral;
+
 /// Share of the prior variance above which directions are as good as untouched, and may be turned among themselves.
 const UNTOUCHED: f64 = 0.99;
 /// Coefficients below this pass for rounding.
@@ -33,16 +35,13 @@ pub(super) struct Axis {
 
 /// The directions of a posterior that keep more than `share` of their prior sd, the least informed first.
 ///
-/// `covariance` is p x p and `prior_sd` has length p, both in transformed units.
+/// `covariance` is p x p and `prior_sd` has length p, both in transformed units. None for a covariance without eigenvalues.
 pub fn weak_directions(covariance: &DMatrix<f64>, prior_sd: &[f64], share: f64) -> Vec<Direction> {
     let p = prior_sd.len();
     let whitened = DMatrix::from_fn(p, p, |i, j| {
         0.5 * (covariance[(i, j)] + covariance[(j, i)]) / (prior_sd[i] * prior_sd[j])
     });
-    if !whitened.iter().all(|v| v.is_finite()) {
-        return Vec::new();
-    }
-    let eigen = whitened.symmetric_eigen();
+    let Ok(eigen) = spectral::eigen(whitened, "posterior covariance") else { return Vec::new() };
     let mut order: Vec<usize> = (0..p).filter(|k| eigen.eigenvalues[*k] > share * share).collect();
     order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
     let axis = |k: usize| {

@@ -7,7 +7,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::direction::{Axis, Direction, named};
-use crate::EstimatorError;
+use crate::{EstimatorError, spectral};
 
 /// Below this many noise sd per prior sd the data alone leave more than a thousand prior sd: no information.
 const LEAST: f64 = 1e-3;
@@ -32,17 +32,16 @@ impl Fisher {
         prior_sd: &[f64],
         accuracy: f64,
     ) -> Result<Self, EstimatorError> {
-        let failed = EstimatorError::NotFinite { what: "the decomposition of the sensitivities" };
         let p = scaled.ncols();
         // R of the QR factorisation has the singular values of S_u in p rows.
         let tall = scaled.clone().resize_vertically(scaled.nrows().max(p), 0.0);
-        let svd = tall.qr().r().try_svd(false, true, f64::EPSILON, 0).ok_or_else(|| failed.clone())?;
-        let vectors = svd.v_t.ok_or(failed)?.transpose();
+        let (_, values, v_t) = spectral::svd(tall.qr().r(), "sensitivity")?;
+        let vectors = v_t.transpose();
         let lengths: Vec<f64> = scaled.column_iter().map(|c| c.norm()).collect();
         let singular = DVector::from_fn(p, |k, _| {
             let v = vectors.column(k);
             let error = v.iter().zip(&lengths).map(|(v, length)| (v * length).powi(2)).sum::<f64>().sqrt();
-            let s = svd.singular_values[k];
+            let s = values[k];
             if s > LEAST.max(accuracy * error) { s } else { 0.0 }
         });
         // The directions are known no better than the columns.

@@ -17,6 +17,8 @@ const LIMIT: usize = 60;
 const DEPTH: usize = 10;
 /// Singular values of the combined changes below this share of the largest are rounding errors.
 const RANK: f64 = 1e-13;
+/// Iterations of the decomposition at most; a few per column are usual.
+const ITERATIONS: usize = 3000;
 
 /// Runs one period from a state to the one at its end.
 pub(super) type Period<'a> = dyn FnMut(&[f64]) -> Result<Vec<f64>, ParticleError> + 'a;
@@ -95,9 +97,10 @@ impl Mixing {
         let mut next = image.clone();
         if !self.residuals.is_empty() {
             let differences: Vec<DVector<f64>> = self.residuals.iter().cloned().collect();
-            let svd = DMatrix::from_columns(&differences).svd(true, true);
-            let least = RANK * svd.singular_values.max();
-            if let Ok(gamma) = svd.solve(&residual, least) {
+            // Differences that cannot be decomposed are a plain step.
+            let svd = DMatrix::from_columns(&differences).try_svd(true, true, f64::EPSILON, ITERATIONS);
+            let least = RANK * svd.as_ref().map_or(0.0, |svd| svd.singular_values.max());
+            if let Some(Ok(gamma)) = svd.map(|svd| svd.solve(&residual, least)) {
                 for (difference, share) in self.images.iter().zip(gamma.iter()) {
                     next.axpy(-share, difference, 1.0);
                 }

@@ -269,7 +269,8 @@ fn leading(factor: &DMatrix<f64>, size: &DVector<f64>, k: usize) -> Option<DMatr
     if gram.iter().any(|v| !v.is_finite()) {
         return None;
     }
-    let eigen = gram.symmetric_eigen();
+    let limit = 100 * gram.nrows().max(30);
+    let eigen = gram.try_symmetric_eigen(f64::EPSILON, limit)?;
     let mut order: Vec<usize> = (0..factor.ncols()).collect();
     order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
     Some(eigen.eigenvectors.select_columns(&order[..k]))
