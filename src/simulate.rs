@@ -209,7 +209,7 @@ fn listed(names: &[String]) -> Vec<String> {
 
 /// Refuses an effect that exists, but not for this model.
 fn check_host(name: &str, study: &Study, built_in: &[EffectDef]) -> Result<(), Failure> {
-    let mut known = study.setup.effects.iter().chain(&study.candidates).chain(built_in);
+    let mut known = study.setup.effects.iter().chain(study.candidates.iter()).chain(built_in);
     if known.any(|e| e.name == name) {
         return Ok(());
     }

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)]
 mod study_kit;
 
+use std::sync::Arc;
 use std::sync::mpsc;
 
 use starlings_coordinator::fleet::InProcess;
@@ -121,11 +122,11 @@ fn a_folder_with_a_run_and_a_changed_study_are_refused() {
     assert!(matches!(locked, FolderError::Locked(_)), "the folder is still open: {locked}");
     drop(done);
     let mut changed = study.clone();
-    changed.text.push_str("# another thought\n");
+    changed.text = format!("{}# another thought\n", changed.text).into();
     let error = RunFolder::resume(Purpose::Run, &path, &changed).err().unwrap().to_string();
     assert!(error.contains("the study file changed"), "{error}");
     let mut changed = study.clone();
-    changed.records[0].channels[0].values[3] += 1e-9;
+    Arc::make_mut(&mut changed.records)[0].channels[0].values[3] += 1e-9;
     let error = RunFolder::resume(Purpose::Run, &path, &changed).err().unwrap().to_string();
     assert!(error.contains("the recordings changed"), "{error}");
     let nowhere = case.fresh();

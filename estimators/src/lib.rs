@@ -21,6 +21,7 @@ mod information;
 mod least_squares;
 mod linearisation;
 mod particles;
+mod qr;
 mod recombine;
 mod roukf;
 mod score;

@@ -40,22 +40,24 @@ impl Background {
     /// Simulates the search without a gap, and scores decoys.
     pub fn new(optimum: &Optimum, rows: &Rows, hits: &[Hit], candidates: &[Candidate], seed: u64) -> Self {
         let usable: Vec<&Hit> = hits.iter().filter(|h| h.failure.is_none() && !h.is_absorbed()).collect();
-        let own: Vec<DVector<f64>> =
-            usable.iter().map(|h| optimum.unimitated(&h.sensitivity.select_rows(&rows.train))).collect();
-        if own.is_empty() {
+        if usable.is_empty() {
             return Self { threshold: LEAST, ..Self::default() };
         }
+        let mut own = DMatrix::zeros(optimum.residual().len(), usable.len());
+        for (k, hit) in usable.iter().enumerate() {
+            own.set_column(k, &optimum.unimitated(&hit.sensitivity.select_rows(&rows.train)));
+        }
+        let decoys = decoys(optimum, rows, &usable, &own);
         let signs: Vec<f64> = usable.iter().map(|h| candidates[h.candidate].sign()).collect();
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut normal = || StandardNormal.sample(&mut random);
-        let mut first = null_maxima(&DMatrix::from_columns(&own), &signs, 2 * SIMULATIONS, &mut normal);
+        let mut first = null_maxima(own, &signs, 2 * SIMULATIONS, &mut normal);
         // A quantile is exceeded by as many of its own sample as it was set for, whatever the truth: others must tell the rate.
         let mut maxima = first.split_off(SIMULATIONS);
         first.sort_by(f64::total_cmp);
         maxima.sort_by(f64::total_cmp);
         let at = ((1.0 - ALARM_RATE) * SIMULATIONS as f64) as usize;
         let threshold = first[at.min(SIMULATIONS - 1)].max(LEAST);
-        let decoys = decoys(optimum, rows, &usable, &own);
         Self { maxima, threshold, decoys }
     }
 
@@ -73,10 +75,10 @@ impl Background {
 }
 
 /// The gains of candidates whose influence is reversed or shifted in time within every stretch of the training data.
-fn decoys(optimum: &Optimum, rows: &Rows, hits: &[&Hit], own: &[DVector<f64>]) -> Vec<f64> {
+fn decoys(optimum: &Optimum, rows: &Rows, hits: &[&Hit], own: &DMatrix<f64>) -> Vec<f64> {
     let stretches = training_stretches(rows);
     let mut gains = Vec::new();
-    for (hit, own) in hits.iter().zip(own) {
+    for (hit, own) in hits.iter().zip(own.column_iter()) {
         let sensitivity = hit.sensitivity.select_rows(&rows.train);
         let shifted =
             SHIFTS.map(|share| moved(&sensitivity, &stretches, |i, n| (i + (share * n as f64) as usize) % n));

@@ -3,6 +3,8 @@
 //! Each recording is the fitted model as it is plus noise of the stated sd, with the gaps and spans of the measured one. Runs
 //! that the search has made already cost nothing, since what they depend on is not the data. Next file to read: [`super::run`].
 
+use std::sync::Arc;
+
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -60,9 +62,10 @@ pub(super) fn measure(
 fn simulated(study: &Study, predicted: &[f64], seed: u64) -> Study {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut simulated = study.clone();
+    let records = Arc::make_mut(&mut simulated.records);
     for (row, y) in Rows::new(study).rows.iter().zip(predicted) {
         let noise: f64 = StandardNormal.sample(&mut random);
-        simulated.records[row.record].channels[row.channel].values[row.step] = y + row.noise * noise;
+        records[row.record].channels[row.channel].values[row.step] = y + row.noise * noise;
     }
     simulated
 }

@@ -17,6 +17,7 @@ mod spectrum;
 mod units;
 
 use std::path::Path;
+use std::sync::Arc;
 
 use self::model::CheckedModel;
 use self::parameters::initial_medians;
@@ -117,17 +118,17 @@ fn check(path: &Path, text: &str, surroundings: &Surroundings) -> Result<Study, 
     let theta = expand::theta(&parameters, &records);
     Ok(Study {
         file: path.to_owned(),
-        text: text.to_owned(),
+        text: Arc::clone(&source.text),
         name: file.study.name.into_inner(),
         says: file.study.says,
         seed: file.study.seed,
         time_unit: file.study.time_unit,
         setup: model.setup,
         spec: model.spec,
-        candidates: model.candidates,
+        candidates: Arc::new(model.candidates),
         parameters,
         theta,
-        records,
+        records: Arc::new(records),
         estimator,
         fleet,
         explain,

@@ -4,6 +4,7 @@
 //! estimated vector to a job's values, [`super::plan`] for the windows.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use starlings_estimators::{Drift, Points, Root, Transform};
 use starlings_models::spectrum::Decay;
@@ -18,7 +19,7 @@ pub struct Study {
     /// The study file.
     pub file: PathBuf,
     /// Its text, as read.
-    pub text: String,
+    pub text: Arc<str>,
     /// Name of the study.
     pub name: String,
     /// What it is about, in the author's words.
@@ -32,13 +33,13 @@ pub struct Study {
     /// What the model with its effects says of itself.
     pub spec: Spec,
     /// Effects that the file describes and that are not part of the model: none of their parameters has a value.
-    pub candidates: Vec<EffectDef>,
+    pub candidates: Arc<Vec<EffectDef>>,
     /// The uncertain parameters, in the order of [`Setup::parameters`].
     pub parameters: Vec<StudyParameter>,
     /// The estimated vector: shared parameters once, the others once per trained record.
     pub theta: Vec<ThetaEntry>,
-    /// The recordings.
-    pub records: Vec<Record>,
+    /// The recordings, which versions of the study share.
+    pub records: Arc<Vec<Record>>,
     /// The estimator.
     pub estimator: EstimatorChoice,
     /// The fleet.

@@ -167,7 +167,7 @@ fn amplitude_of(study: &Study, setup: &mut Setup, name: &str) -> Result<String, 
             let names: Vec<&str> = setup
                 .effects
                 .iter()
-                .chain(&study.candidates)
+                .chain(study.candidates.iter())
                 .chain(&built_in)
                 .map(|e| e.name.as_str())
                 .collect();

@@ -56,7 +56,7 @@ impl<'a> World<'a> {
         let window = Arc::new(Window { start: times[0], times: times.clone(), observed, inputs });
         let mut world = World { system, times, study, model, truth, effects: Vec::new(), window };
         world.effects = library(&spec);
-        world.effects.extend(world.study.candidates.clone());
+        world.effects.extend(world.study.candidates.iter().cloned());
         world
     }
 

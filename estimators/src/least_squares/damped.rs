@@ -5,6 +5,7 @@
 use nalgebra::DVector;
 
 use super::LeastSquares;
+use crate::qr;
 
 /// Damping of every step, which keeps columns apart that are dependent but for rounding.
 const LEAST_DAMPING: f64 = 1e-12;
@@ -26,7 +27,7 @@ pub(super) fn solve(
         rows[(m + k, n)] = root * pull[j];
         rows[(m + n + k, k)] = (curvature[j] * (fit.damping + LEAST_DAMPING)).sqrt();
     }
-    let triangle = rows.qr().unpack_r();
+    let triangle = qr::triangle(rows);
     let right = triangle.view((0, n), (n, 1)).column(0).into_owned();
     let solved = triangle.view((0, 0), (n, n)).solve_upper_triangular(&right)?;
     solved.iter().all(|v| v.is_finite()).then_some(solved)

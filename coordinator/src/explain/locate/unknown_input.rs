@@ -13,6 +13,8 @@
 mod candidate;
 mod walk;
 
+use std::sync::Arc;
+
 use starlings_models::ObserverDef;
 
 use self::candidate::{Candidate, candidates};
@@ -78,7 +80,7 @@ fn input(study: &Study, candidate: &Candidate, record: usize, best: Estimate) ->
 /// The study with windows joined until a record has no more than [`WINDOWS`], and its observer off.
 fn thinned(study: &Study) -> Study {
     let mut thinned = study.clone();
-    for record in &mut thinned.records {
+    for record in Arc::make_mut(&mut thinned.records) {
         let rows =
             record.times.iter().filter(|t| record.train.is_some_and(|[from, to]| from <= **t && **t <= to));
         record.every = record.every.max(rows.count().div_ceil(WINDOWS));

@@ -14,7 +14,8 @@ use crate::study::Study;
 /// Puts an effect into the model of the study.
 pub(super) fn add(document: &mut DocumentMut, study: &Study, found: &PatchEffect) -> Result<(), PatchError> {
     let def = &found.def;
-    let described = study.setup.effects.iter().chain(&study.candidates).any(|known| known.name == def.name);
+    let described =
+        study.setup.effects.iter().chain(study.candidates.iter()).any(|known| known.name == def.name);
     if !described {
         append(document.as_table_mut(), "effects", described_effect(def))?;
     }

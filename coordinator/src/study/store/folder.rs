@@ -99,7 +99,7 @@ impl RunFolder {
         let (recordings, info) = (fingerprint(study), json(&info(study, command, started)));
         let solver = solver_fingerprint(study);
         let meta = [
-            ("study", study.text.as_str()),
+            ("study", &*study.text),
             ("recordings", &recordings),
             ("solver", &solver),
             ("info", &info),
@@ -128,7 +128,7 @@ impl RunFolder {
         let other = |what| FolderError::OtherStudy { folder: path.to_owned(), what };
         match store.meta("study")? {
             None => return Err(FolderError::NeverStarted(path.to_owned())),
-            Some(text) if text != study.text => return Err(other("the study file")),
+            Some(text) if *text != *study.text => return Err(other("the study file")),
             Some(_) => {}
         }
         if store.meta("recordings")? != Some(fingerprint(study)) {
@@ -206,7 +206,7 @@ fn fingerprint(study: &Study) -> String {
             hasher.update(&v.to_le_bytes());
         }
     };
-    for record in &study.records {
+    for record in study.records.iter() {
         feed(&record.times);
         for channel in &record.channels {
             feed(&channel.values);
