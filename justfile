@@ -18,6 +18,10 @@ battery:
 explain-battery:
     cargo test --release -p starlings-coordinator --test explain_battery -- --ignored --nocapture the_whole
 
+# Faults of the place in running studies, and docs/faults.md: minutes. Needs what .ci/solvers installs, and mounts in a namespace of its own.
+faults:
+    PATH="$PWD/target/solvers/bin:$PATH" STARLINGS_WRITE_PAGES=1 cargo test --test faults -- --ignored --nocapture
+
 # Formatting and lints, warnings are errors.
 lint:
     cargo fmt --all --check

@@ -11,10 +11,12 @@ use starlings_coordinator::fleet::{FleetConfig, FleetEvent, GrpcFleet, LocalConf
 use starlings_coordinator::study::Study;
 use tokio_util::sync::CancellationToken;
 
-use crate::console::{cancel_on_signal, note};
+use crate::console::note;
 use crate::failure::Failure;
+use crate::interrupt;
 use crate::load::end_solvers;
 use crate::progress::Display;
+use crate::solvers::own_program;
 
 /// Which workers run the model.
 #[derive(Args)]
@@ -79,7 +81,7 @@ impl Crew {
     /// Listens for workers; none is started yet.
     pub(crate) fn listen(study: &Study, plan: &Plan, display: &Arc<Display>) -> Result<Self, Failure> {
         let cancel = CancellationToken::new();
-        cancel_on_signal(&cancel);
+        interrupt::cancels(&cancel);
         let (sender, heard) = mpsc::channel();
         let (kept, events) = mpsc::channel();
         let mut config = FleetConfig::new(plan.address, &study.name, cancel, sender);
@@ -108,7 +110,7 @@ impl Crew {
         end_solvers();
         let slots = study.fleet.slots.unwrap_or(1).to_string();
         let config = LocalConfig {
-            program: std::env::current_exe().map_err(Failure::run)?,
+            program: own_program().map_err(Failure::run)?,
             args: ["worker", "--slots", &slots].map(str::to_owned).to_vec(),
             n: plan.n_worker,
             address,

@@ -20,6 +20,7 @@ use starlings_coordinator::study::{RunFolder, Study};
 use crate::console::{line, note};
 use crate::crew::{Crew, FleetArgs};
 use crate::failure::Failure;
+use crate::interrupt;
 use crate::load::load;
 use crate::progress::Display;
 use crate::run_folder;
@@ -38,9 +39,8 @@ pub(crate) struct Args {
     out: Option<PathBuf>,
     #[command(flatten)]
     fleet: FleetArgs,
-    /// Continue an interrupted explanation in --out: runs that were made are not made again.
-    #[arg(long, requires = "out")]
-    resume: bool,
+    #[command(flatten)]
+    resume: run_folder::Resume,
     /// Runs of the model at most (one particle over one record each); what is left untried is reported.
     #[arg(long, value_name = "RUNS")]
     budget: Option<u64>,
@@ -82,6 +82,7 @@ impl Args {
 
 /// Explains the study's misfit.
 pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
+    interrupt::watch();
     let study = load(&args.study)?;
     let plan = args.fleet.plan(&study)?;
     let options = args.options(&study);
@@ -99,7 +100,7 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     crew.gather(&study, &plan)?;
     let mut watch = |stage: &Stage| display.stage(stage);
     let clock = move || started.elapsed().as_secs_f64();
-    let earlier_s = folder.store.last_event_s().map_err(Failure::run)?;
+    let earlier_s = folder.store.elapsed_s().map_err(Failure::run)?;
     let mut context = Context { clock: &clock, watch: &mut watch, events: Some(&crew.events), earlier_s };
     let result = explain(&study, &mut crew.fleet, &folder.store, &mut context, &options);
     display.finish();
@@ -117,9 +118,14 @@ fn failed(error: &ExplainError, folder: &Path) -> Failure {
             "{error}\n  its runs are kept: --out {path} --resume --force goes on from there"
         )),
         _ if error.is_input() => Failure::input(error),
-        _ => Failure::run(format!(
-            "{error}\n  the explanation so far is in {path}: continue it with --out {path} --resume"
-        )),
+        _ => {
+            let remedy =
+                format!("the explanation so far is in {path}: continue it with --out {path} --resume");
+            if error.is_cancelled() {
+                return interrupt::failure(&remedy);
+            }
+            Failure::run(format!("{error}\n  {remedy}"))
+        }
     }
 }
 

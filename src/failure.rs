@@ -16,6 +16,13 @@ pub(crate) enum Failure {
     Study(StudyError),
     /// The run failed: exit code 1.
     Run(String),
+    /// A signal ended the work: exit code 130 for Ctrl-C.
+    Interrupted {
+        /// What became of the work, and how to go on.
+        message: String,
+        /// 128 and the number of the signal.
+        code: u8,
+    },
     /// Whoever read standard output has seen enough, as `head` does: nothing is wrong, exit code 0.
     Unread,
 }
@@ -36,7 +43,7 @@ impl Failure {
         match self {
             Self::Input(message) => Self::Input(message + end),
             Self::Run(message) => Self::Run(message + end),
-            Self::Study(_) | Self::Unread => self,
+            Self::Study(_) | Self::Interrupted { .. } | Self::Unread => self,
         }
     }
 
@@ -45,6 +52,7 @@ impl Failure {
         match self {
             Self::Input(_) | Self::Study(_) => ExitCode::from(2),
             Self::Run(_) => ExitCode::from(1),
+            Self::Interrupted { code, .. } => ExitCode::from(*code),
             Self::Unread => ExitCode::SUCCESS,
         }
     }
@@ -53,7 +61,9 @@ impl Failure {
     pub(crate) fn print(&self) {
         match self {
             Self::Unread => {}
-            Self::Input(message) | Self::Run(message) => note(format_args!("error: {message}")),
+            Self::Input(message) | Self::Run(message) | Self::Interrupted { message, .. } => {
+                note(format_args!("error: {message}"))
+            }
             Self::Study(error) => {
                 for problem in &error.problems {
                     note(format_args!("{:?}", Report::new(Shown::from(problem))));

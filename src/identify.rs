@@ -6,13 +6,14 @@ use std::sync::Arc;
 use clap::Parser;
 use starlings_coordinator::report::identify_page;
 use starlings_coordinator::study::Study;
-use starlings_coordinator::study::identify::{At, Identification, identify};
+use starlings_coordinator::study::identify::{At, Identification, IdentifyError, identify};
 use starlings_coordinator::study::trial::trial;
 
 use crate::console::{line, note, number, table, text};
 use crate::crew::{Crew, FleetArgs};
 use crate::csv_file::{self, Place};
 use crate::failure::Failure;
+use crate::interrupt;
 use crate::load::load;
 use crate::progress::Display;
 
@@ -66,8 +67,13 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let result = identify(&study, &mut crew.fleet, &at);
     display.finish();
     crew.dismiss();
-    let found =
-        result.map_err(|error| if error.is_input() { Failure::input(error) } else { Failure::run(error) })?;
+    let found = result.map_err(|error| match error {
+        IdentifyError::Run(cause) if cause.is_cancelled() => {
+            interrupt::failure("nothing is kept of it: start again")
+        }
+        error if error.is_input() => Failure::input(error),
+        error => Failure::run(error),
+    })?;
     if let Some(path) = &args.csv {
         csv_file::write(Some(path), table_of_rows(&study, &found))?;
     }

@@ -1,6 +1,6 @@
 //! The command line of Starlings: one file per command, nothing here computes.
 //!
-//! Exit code 0: done; 1: the run failed; 2: the input is wrong. With `--json` standard output holds the machine-readable
+//! Exit code 0: done; 1: the run failed; 2: the input is wrong; 130: Ctrl-C. With `--json` standard output holds the machine-readable
 //! result and nothing else; everything for people goes to standard error. Next file to read: [`run`].
 
 #![allow(clippy::print_stdout, clippy::print_stderr)]
@@ -16,6 +16,7 @@ mod export;
 mod failure;
 mod guard;
 mod identify;
+mod interrupt;
 mod load;
 mod models;
 mod progress;

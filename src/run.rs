@@ -13,6 +13,7 @@ use starlings_coordinator::study::{Progress, RunContext, Summary, run as study_r
 use crate::console::{line, note, number, table};
 use crate::crew::{Crew, FleetArgs};
 use crate::failure::Failure;
+use crate::interrupt;
 use crate::load::load;
 use crate::progress::Display;
 use crate::run_folder;
@@ -27,9 +28,8 @@ pub(crate) struct Args {
     out: Option<PathBuf>,
     #[command(flatten)]
     fleet: FleetArgs,
-    /// Continue an interrupted run in --out from its last stored analysis.
-    #[arg(long, requires = "out")]
-    resume: bool,
+    #[command(flatten)]
+    resume: run_folder::Resume,
     /// Print the summary as JSON on standard output and nothing else.
     #[arg(long)]
     json: bool,
@@ -37,6 +37,7 @@ pub(crate) struct Args {
 
 /// Runs the study.
 pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
+    interrupt::watch();
     let study = load(&args.study)?;
     let plan = args.fleet.plan(&study)?;
     trial(&study).map_err(Failure::input)?;
@@ -67,9 +68,11 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     crew.dismiss();
     let path = folder.path.display();
     let summary = result.map_err(|error| {
-        Failure::run(format!(
-            "{error}\n  the run so far is in {path}: continue it with --out {path} --resume"
-        ))
+        let remedy = format!("the run so far is in {path}: continue it with --out {path} --resume");
+        if error.is_cancelled() {
+            return interrupt::failure(&remedy);
+        }
+        Failure::run(format!("{error}\n  {remedy}"))
     })?;
     report::write_files(&folder).map_err(Failure::run)?;
     print(&summary, &folder.path, args.json)

@@ -2,17 +2,30 @@
 
 use std::path::{Path, PathBuf};
 
+use clap::Args;
 use starlings_coordinator::study::store::Purpose;
-use starlings_coordinator::study::{RunFolder, Study};
+use starlings_coordinator::study::store::folder::Call;
+use starlings_coordinator::study::{FolderError, RunFolder, Study};
 
 use crate::failure::Failure;
+
+/// Whether an interrupted command goes on.
+#[derive(Args, Clone, Copy)]
+pub(crate) struct Resume {
+    /// Continue what was interrupted in --out: nothing that is stored is computed again.
+    #[arg(long, requires = "out")]
+    resume: bool,
+    /// Continue although this program is another build, or the solver another, than the one that began; the result says so.
+    #[arg(long, requires = "resume")]
+    other_build: bool,
+}
 
 /// Opens the folder `out`, or one under `runs` with the names of the study and of the command and the time of now.
 pub(crate) fn open(
     purpose: Purpose,
     study: &Study,
     out: Option<&Path>,
-    resume: bool,
+    resume: Resume,
 ) -> Result<RunFolder, Failure> {
     let stamp = jiff::Timestamp::now().strftime("%Y%m%d-%H%M%S").to_string();
     let kind = match purpose {
@@ -21,10 +34,15 @@ pub(crate) fn open(
     };
     let default = || Path::new("runs").join(format!("{}{kind}-{stamp}", study.name));
     let path: PathBuf = out.map_or_else(default, Path::to_owned);
-    if resume {
-        return RunFolder::resume(purpose, &path, study).map_err(Failure::input);
-    }
     let command = std::env::args().skip(1).collect::<Vec<_>>().join(" ");
     let command = format!("starlings {command}");
-    RunFolder::create(purpose, &path, study, &command, &stamp).map_err(Failure::input)
+    if resume.resume {
+        let call = Call { command: &command, started: &stamp, other_build: resume.other_build };
+        return RunFolder::resume(purpose, &path, study, &call).map_err(|error| failed(&error));
+    }
+    RunFolder::create(purpose, &path, study, &command, &stamp).map_err(|error| failed(&error))
+}
+
+fn failed(error: &FolderError) -> Failure {
+    if error.is_input() { Failure::input(error) } else { Failure::run(error) }
 }

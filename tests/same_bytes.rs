@@ -3,10 +3,11 @@
 #![allow(clippy::unwrap_used)] // a failed unwrap is a failed test
 
 mod common;
+mod small_kit;
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::{Child, Stdio};
+use std::process::{Child, Command, Stdio};
 
 use common::{analyses, bytes, kill, repository, run, starlings, wait_until};
 
@@ -96,4 +97,46 @@ fn a_coordinator_killed_in_the_middle_resumes_to_the_same_bytes() {
     let (code, _, stderr) = common::output(&mut command);
     assert_eq!(code, 0, "{stderr}");
     assert_eq!(bytes(&whole, "posterior.csv"), bytes(&broken, "posterior.csv"));
+}
+
+/// A command that the system kills when a file of it, or of a process that it started, grows beyond so many blocks of 512
+/// bytes: a kill at one and the same write every time.
+fn killed_beyond(blocks: u32, command: &Command) -> Command {
+    let mut limited = Command::new("sh");
+    limited.args(["-c", &format!("ulimit -c 0; ulimit -f {blocks}; exec \"$@\""), "sh"]);
+    limited.arg(command.get_program()).args(command.get_args());
+    limited
+}
+
+#[test]
+fn a_run_that_is_killed_at_any_write_of_its_start_is_begun_or_continued_by_the_same_command() {
+    let (dir, study) = small_kit::study(small_kit::same, small_kit::same);
+    let whole = dir.path().join("whole");
+    run(&study, &whole, 1);
+    let (mut unfinished, mut begun) = (0, 0);
+    // Page by page, until a whole run fits.
+    for page in 0..100_u32 {
+        let out = dir.path().join(page.to_string());
+        let mut command = starlings();
+        command.arg("run").arg(&study).arg("--out").arg(&out);
+        let (code, _, stderr) = common::output(&mut killed_beyond(8 * page, &command));
+        if code == 0 {
+            assert!(unfinished > 5 && begun > 5, "{unfinished} before the store, {begun} after");
+            return;
+        }
+        let has_store = out.join("run.db").exists();
+        (unfinished, begun) = (unfinished + u32::from(!has_store), begun + u32::from(has_store));
+        // Every other one without --resume, as far as there is nothing to resume.
+        if page % 2 == 0 || has_store {
+            command.arg("--resume");
+        }
+        let (code, _, said) = common::output(&mut command);
+        assert_eq!(code, 0, "{page} pages: {said}\nafter: {stderr}");
+        assert_eq!(bytes(&whole, "posterior.csv"), bytes(&out, "posterior.csv"), "{page} pages");
+        let names = std::fs::read_dir(&out).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap());
+        let left: Vec<String> =
+            names.filter(|name| name.contains("unfinished") || name.contains("partial")).collect();
+        assert!(left.is_empty(), "{page} pages: {left:?}");
+    }
+    panic!("a run needs more room than was allowed");
 }

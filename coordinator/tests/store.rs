@@ -8,6 +8,7 @@ use std::sync::mpsc;
 use starlings_coordinator::fleet::InProcess;
 use starlings_coordinator::report::{FilesError, write_explanation};
 use starlings_coordinator::study::store::Purpose;
+use starlings_coordinator::study::store::folder::Call;
 use starlings_coordinator::study::{FolderError, RunContext, RunFolder, Summary, run::run};
 use study_kit::fleets::Mortal;
 use study_kit::{Case, linear};
@@ -82,7 +83,7 @@ fn a_resumed_run_keeps_its_clock_its_counts_and_one_row_per_job() {
     let path = case.fresh();
     assert!(case.go(&path, &mut Mortal::new(17)).is_err());
     let study = case.study();
-    let mut folder = RunFolder::resume(Purpose::Run, &path, &study).unwrap();
+    let mut folder = RunFolder::resume(Purpose::Run, &path, &study, &Call::default()).unwrap();
     assert!(folder.summary().unwrap().is_none(), "an interrupted run has no summary");
     folder.store.event(7.5, "test", "time has passed").unwrap();
     let mut steps = Vec::new();
@@ -118,19 +119,21 @@ fn a_folder_with_a_run_and_a_changed_study_are_refused() {
     assert!(matches!(occupied, FolderError::Occupied(_)), "{occupied}");
     assert!(occupied.to_string().contains("--resume"), "{occupied}");
     let path = done.folder.path.clone();
-    let locked = RunFolder::resume(Purpose::Run, &path, &study).err().unwrap();
+    let locked = RunFolder::resume(Purpose::Run, &path, &study, &Call::default()).err().unwrap();
     assert!(matches!(locked, FolderError::Locked(_)), "the folder is still open: {locked}");
     drop(done);
     let mut changed = study.clone();
-    changed.text = format!("{}# another thought\n", changed.text).into();
-    let error = RunFolder::resume(Purpose::Run, &path, &changed).err().unwrap().to_string();
-    assert!(error.contains("the study file changed"), "{error}");
+    changed.text = changed.text.replacen("passes = 1", "passes = 3", 1).into();
+    changed.estimator.passes = 3;
+    let error = RunFolder::resume(Purpose::Run, &path, &changed, &Call::default()).err().unwrap().to_string();
+    assert!(error.contains("the study file changed since: `estimator.passes` from 1 to 3;"), "{error}");
     let mut changed = study.clone();
     Arc::make_mut(&mut changed.records)[0].channels[0].values[3] += 1e-9;
-    let error = RunFolder::resume(Purpose::Run, &path, &changed).err().unwrap().to_string();
-    assert!(error.contains("the recordings changed"), "{error}");
+    let error = RunFolder::resume(Purpose::Run, &path, &changed, &Call::default()).err().unwrap().to_string();
+    assert!(error.contains("the recordings changed since: `"), "{error}");
     let nowhere = case.fresh();
-    let error = RunFolder::resume(Purpose::Run, &nowhere, &study).err().unwrap().to_string();
+    let error =
+        RunFolder::resume(Purpose::Run, &nowhere, &study, &Call::default()).err().unwrap().to_string();
     assert!(error.contains("no run in") && error.contains("run.db"), "{error}");
 }
 
@@ -145,7 +148,7 @@ fn a_folder_says_which_command_it_belongs_to_and_that_its_explanation_is_not_fin
     assert!(error.to_string().ends_with(&remedy), "{error}");
     assert_eq!(std::fs::read_dir(&path).unwrap().filter(|file| is_result(file.as_ref().unwrap())).count(), 0);
     drop(folder);
-    let error = RunFolder::resume(Purpose::Run, &path, &study).err().unwrap().to_string();
+    let error = RunFolder::resume(Purpose::Run, &path, &study, &Call::default()).err().unwrap().to_string();
     assert!(error.contains("holds an explanation of `starlings explain`"), "{error}");
 }
 
@@ -187,11 +190,11 @@ fn a_damaged_database_is_named_with_its_damage() {
     assert!(case.go(&path, &mut Mortal::new(5)).is_err());
     std::fs::write(path.join("run.db"), "this is a text, not a database; ".repeat(50)).unwrap();
     let _ = std::fs::remove_file(path.join("run.db-wal"));
-    let error = RunFolder::resume(Purpose::Run, &path, &study).err().unwrap().to_string();
+    let error = RunFolder::resume(Purpose::Run, &path, &study, &Call::default()).err().unwrap().to_string();
     assert!(error.contains("run.db") && error.contains("not a database"), "{error}");
     let path = case.fresh();
     assert!(case.go(&path, &mut Mortal::new(5)).is_err());
     rusqlite::Connection::open(path.join("run.db")).unwrap().pragma_update(None, "user_version", 99).unwrap();
-    let error = RunFolder::resume(Purpose::Run, &path, &study).err().unwrap().to_string();
+    let error = RunFolder::resume(Purpose::Run, &path, &study, &Call::default()).err().unwrap().to_string();
     assert!(error.contains("version 99"), "{error}");
 }

@@ -38,7 +38,10 @@ pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// BLAKE3 of the running program; `None` when it cannot be read.
 pub fn own_build() -> Option<[u8; 32]> {
-    std::env::current_exe().and_then(std::fs::read).ok().map(|bytes| digest(&bytes))
+    static OWN: std::sync::OnceLock<Option<[u8; 32]>> = std::sync::OnceLock::new();
+    // The file that this process runs, also after another was put in its place.
+    let running = || std::fs::read("/proc/self/exe").or_else(|_| std::fs::read(std::env::current_exe()?));
+    *OWN.get_or_init(|| running().ok().map(|bytes| digest(&bytes)))
 }
 
 /// Types and service stubs generated from `proto/fleet.proto`.

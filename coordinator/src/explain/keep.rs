@@ -8,10 +8,9 @@ use serde::de::DeserializeOwned;
 use super::{Explanation, Figures, Findings};
 use crate::study::RunFolder;
 use crate::study::store::folder::json;
-use crate::study::store::{Store, StoreError};
+use crate::study::store::{EXPLANATION, Store, StoreError};
 
 /// Names under which the store keeps the parts.
-const EXPLANATION: &str = "explanation";
 const FIGURES: &str = "figures";
 const EXPLAINED: &str = "explained";
 

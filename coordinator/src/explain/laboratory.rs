@@ -223,9 +223,10 @@ impl<'a> Laboratory<'a> {
     /// The answers of these jobs, in their order; only those that nobody has asked for before are run.
     fn ask(&mut self, jobs: Vec<(SetupId, Job)>) -> Result<Vec<Known>, ExplainError> {
         let mut keys = Vec::with_capacity(jobs.len());
+        let programs = self.store.program()?.digest();
         let (mut open, mut asked, mut twice) = (Vec::new(), Vec::new(), HashSet::new());
         for (setup, job) in jobs {
-            let key = key(&setup, &job);
+            let key = key(&programs, &setup, &job);
             keys.push(key);
             if self.known.contains_key(&key) || !twice.insert(key) {
                 continue;
@@ -259,6 +260,7 @@ impl<'a> Laboratory<'a> {
             bodies.push((asked.key, encode(&known)));
             self.known.insert(asked.key, known);
         }
+        self.store.note_elapsed(self.elapsed())?;
         self.store.remember_runs(bodies.iter().map(|(key, body)| (key, body.as_slice())), &rows)?;
         if let Some(events) = self.events {
             let at = self.elapsed();

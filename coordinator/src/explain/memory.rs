@@ -34,9 +34,11 @@ pub(super) fn sound(
     }
 }
 
-/// Everything that the answer of a run depends on. Not what was observed: every run is free.
-pub(super) fn key(setup: &SetupId, job: &Job) -> RunKey {
+/// Everything that the answer of a run depends on: the programs that make it (a digest), the setup and the job. Not what was
+/// observed: every run is free.
+pub(super) fn key(programs: &[u8; 32], setup: &SetupId, job: &Job) -> RunKey {
     let mut hasher = blake3::Hasher::new();
+    hasher.update(programs);
     hasher.update(setup);
     hasher.update(&u64::from(job.record).to_le_bytes());
     let mut numbers = |values: &[f64]| {

@@ -137,6 +137,15 @@ pub enum ExplainError {
 }
 
 impl ExplainError {
+    /// Whether somebody cancelled the work, rather than that it failed.
+    pub fn is_cancelled(&self) -> bool {
+        match self {
+            Self::Fleet(error) => matches!(error, FleetError::Cancelled),
+            Self::Run(error) => error.is_cancelled(),
+            _ => false,
+        }
+    }
+
     /// Whether the input is wrong, rather than the run.
     pub fn is_input(&self) -> bool {
         matches!(

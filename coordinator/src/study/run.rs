@@ -81,6 +81,13 @@ pub enum RunError {
     Internal(String),
 }
 
+impl RunError {
+    /// Whether somebody cancelled the work, rather than that it failed.
+    pub fn is_cancelled(&self) -> bool {
+        matches!(self, Self::Fleet(FleetError::Cancelled))
+    }
+}
+
 fn in_brackets(values: &str) -> String {
     if values.is_empty() { String::new() } else { format!(" ({values})") }
 }
@@ -183,7 +190,7 @@ pub fn run(
     context: &mut RunContext<'_>,
 ) -> Result<Summary, RunError> {
     let resumed = Snapshot::read(&folder.store, study.records.len())?;
-    context.earlier_s = folder.store.last_event_s()?;
+    context.earlier_s = folder.store.elapsed_s()?;
     folder.store.event(
         context.elapsed(),
         "run",
@@ -212,6 +219,7 @@ pub fn run(
     }
     result.warnings = warnings::collect(study, &fit, &result, &predictions);
     result.warnings.extend(unknown);
+    result.warnings.extend(folder.mixed()?);
     result.check_finite().map_err(RunError::NotFinite)?;
     folder.store.event(context.elapsed(), "run", "run finished")?;
     folder.finish(study, &fit, &result)?;

@@ -4,11 +4,17 @@
 //! written in one piece with the snapshot that a resumed run starts from, and a few quick ones are committed together, so a
 //! run killed at any instant continues from a whole analysis at most [`HOLD_S`] before. Nothing here computes. Next file to read: [`crate::study::store::snapshot`].
 
+mod changes;
 mod error;
 pub mod folder;
 mod folder_error;
+mod info;
+mod make;
+mod meaning;
+mod program;
 mod purpose;
 mod remembered;
+mod resume;
 mod rows;
 mod schema;
 pub mod snapshot;
@@ -21,10 +27,12 @@ use std::path::{Path, PathBuf};
 
 use rusqlite::{Connection, OptionalExtension, Row, params};
 
-use schema::{SCHEMA, SCHEMA_VERSION, insert_analysis, insert_jobs, insert_predictions};
+use schema::{SCHEMA_VERSION, insert_analysis, insert_jobs, insert_predictions};
 use snapshot::Snapshot;
 
 pub use error::StoreError;
+pub use program::Program;
+pub(crate) use purpose::EXPLANATION;
 pub use purpose::Purpose;
 pub use remembered::RunKey;
 pub use rows::{AnalysisRow, EstimateRow, InnovationRow, JobRow, PredictionRow};
@@ -32,6 +40,9 @@ pub use table::table;
 
 /// Analyses are committed together for at most so long, in s: a commit costs about as much as the rows of an analysis.
 pub const HOLD_S: f64 = 0.05;
+
+/// Name under which the store keeps how far the run has come.
+const ELAPSED: &str = "elapsed_s";
 
 /// An open run database.
 pub struct Store {
@@ -49,41 +60,6 @@ impl Drop for Store {
 }
 
 impl Store {
-    /// Makes the database of a new run with its first named values, all or nothing.
-    ///
-    /// # Errors
-    /// When the file exists or cannot be written; a file begun is removed.
-    pub fn create(path: &Path, meta: &[(&str, &str)]) -> Result<Self, StoreError> {
-        if path.exists() {
-            return Err(StoreError::Unusable(format!("{} already holds a run", path.display())));
-        }
-        let made = Self::make(path, meta);
-        if made.is_err() {
-            for ending in ["", "-wal", "-shm", "-journal"] {
-                // Already failing: what cannot be removed either stays.
-                let _ = std::fs::remove_file(format!("{}{ending}", path.display()));
-            }
-        }
-        made
-    }
-
-    fn make(path: &Path, meta: &[(&str, &str)]) -> Result<Self, StoreError> {
-        let mut store = Self::connect(path, rusqlite::OpenFlags::default())?;
-        store.keep_a_log()?;
-        let mut fill = || {
-            let transaction = store.connection.transaction()?;
-            transaction.execute_batch(SCHEMA)?;
-            transaction.execute_batch(remembered::TABLE)?;
-            transaction.pragma_update(None, "user_version", SCHEMA_VERSION)?;
-            for (key, value) in meta {
-                transaction.execute("INSERT INTO meta (key, value) VALUES (?1, ?2)", [key, value])?;
-            }
-            transaction.commit()
-        };
-        fill().map_err(|source| StoreError::Database { path: path.to_owned(), source })?;
-        Ok(store)
-    }
-
     /// Opens the database of an existing run to continue it.
     ///
     /// # Errors
@@ -114,6 +90,12 @@ impl Store {
         let store = Self::connect(path, flags)?;
         let version: i64 =
             store.guard(store.connection.pragma_query_value(None, "user_version", |row| row.get(0)))?;
+        if version == 0 {
+            return Err(StoreError::Unusable(format!(
+                "{} holds nothing: the program was ended while it was made; remove the file and start again",
+                path.display()
+            )));
+        }
         if version != SCHEMA_VERSION {
             return Err(StoreError::Unusable(format!(
                 "{} has store version {version}, this program reads version {SCHEMA_VERSION}",
@@ -236,6 +218,7 @@ impl Store {
     /// When the database refuses.
     pub fn commit_if_due(&self, now_s: f64) -> Result<(), StoreError> {
         if now_s - self.committed_s.get() >= HOLD_S {
+            self.note_elapsed(now_s)?;
             self.commit()?;
             self.committed_s.set(now_s);
         }
@@ -260,14 +243,33 @@ impl Store {
         write(&mut self.connection).map_err(|source| StoreError::Database { path, source })
     }
 
-    /// Time of the last event, in s of the run's wall time; zero for a new run.
+    /// How far the run had come, in s of its wall time: the last commit or the last event, whichever is later; zero for a
+    /// new run.
     ///
     /// # Errors
     /// When the database refuses.
-    pub fn last_event_s(&self) -> Result<f64, StoreError> {
-        self.guard(
-            self.connection().query_row("SELECT coalesce(max(at_s), 0.0) FROM events", [], |row| row.get(0)),
-        )
+    pub fn elapsed_s(&self) -> Result<f64, StoreError> {
+        let of_events = "SELECT coalesce(max(at_s), 0.0) FROM events";
+        let told: f64 = self.guard(self.connection.query_row(of_events, [], |row| row.get(0)))?;
+        let kept = self.meta(ELAPSED)?.and_then(|text| text.parse().ok());
+        Ok(kept.unwrap_or(0.0_f64).max(told))
+    }
+
+    /// Notes how far the run has come.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub fn note_elapsed(&self, now_s: f64) -> Result<(), StoreError> {
+        self.set_meta(ELAPSED, &now_s.to_string())
+    }
+
+    /// The programs that the run's numbers come from; empty where the store does not say.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub fn program(&self) -> Result<Program, StoreError> {
+        let text = self.meta(Program::KEY)?;
+        Ok(text.and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default())
     }
 
     /// All rows of a query, each mapped by `map`.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use starlings_coordinator::fleet::{Factory, Fleet, InProcess};
 use starlings_coordinator::study::store::Purpose;
+use starlings_coordinator::study::store::folder::Call;
 use starlings_coordinator::study::{
     FolderError, RunContext, RunError, RunFolder, Study, StudyError, Summary, Surroundings, run::run,
 };
@@ -141,7 +142,7 @@ impl Place {
     }
 
     pub(crate) fn resume(&self, study: &Study, out: &str) -> Result<(), FolderError> {
-        RunFolder::resume(Purpose::Run, &self.out(out), study).map(|_| ())
+        RunFolder::resume(Purpose::Run, &self.out(out), study, &Call::default()).map(|_| ())
     }
 
     fn out(&self, name: &str) -> PathBuf {

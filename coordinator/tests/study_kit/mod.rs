@@ -16,6 +16,7 @@ use rand_distr::{Distribution, StandardNormal};
 use starlings_coordinator::fleet::{Fleet, InProcess};
 use starlings_coordinator::study::posterior::Estimate;
 use starlings_coordinator::study::store::Purpose;
+use starlings_coordinator::study::store::folder::Call;
 use starlings_coordinator::study::{RunContext, RunError, RunFolder, Study, Summary, run::run};
 
 /// A study and its recordings in a folder of their own.
@@ -57,7 +58,7 @@ impl Case {
     pub fn go(&self, path: &Path, fleet: &mut dyn Fleet) -> Result<Done, RunError> {
         let study = self.study();
         let mut folder = if path.exists() {
-            RunFolder::resume(Purpose::Run, path, &study).unwrap()
+            RunFolder::resume(Purpose::Run, path, &study, &Call::default()).unwrap()
         } else {
             RunFolder::create(Purpose::Run, path, &study, "test", "today").unwrap()
         };

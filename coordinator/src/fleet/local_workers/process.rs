@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader};
+use std::path::Path;
 use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -31,9 +32,20 @@ pub(super) struct Process {
     _lifeline: Option<ChildStdin>,
 }
 
+/// The program, where it is this one also after another was put in its place: all workers of a run are of one build.
+fn standing(program: &Path) -> &Path {
+    let own = std::fs::read_link(OWN).unwrap_or_default();
+    let gone = own.to_str().and_then(|own| own.strip_suffix(DELETED)).map(Path::new);
+    if gone == Some(program) { Path::new(OWN) } else { program }
+}
+
+/// Where Linux keeps the program that a process runs, and how it says that its file is gone.
+const OWN: &str = "/proc/self/exe";
+const DELETED: &str = " (deleted)";
+
 impl Process {
     pub(super) fn start(config: &LocalConfig, place: usize) -> Result<Self, FleetError> {
-        let mut command = Command::new(&config.program);
+        let mut command = Command::new(standing(&config.program));
         command.args(&config.args).args(["--connect", &config.address.to_string()]);
         command
             .args(["--once", "--patience", PATIENCE, "--place", &place.to_string()])

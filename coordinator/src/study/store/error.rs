@@ -28,6 +28,15 @@ pub enum StoreError {
     },
 }
 
+impl StoreError {
+    /// Whether the disk failed or has no room.
+    pub fn is_of_disk(&self) -> bool {
+        let Self::Database { source, .. } = self else { return false };
+        let code = source.sqlite_error_code();
+        matches!(code, Some(rusqlite::ErrorCode::DiskFull | rusqlite::ErrorCode::SystemIoFailure))
+    }
+}
+
 fn remedy(source: &rusqlite::Error) -> &'static str {
     match source.sqlite_error_code() {
         Some(rusqlite::ErrorCode::DiskFull) => {

@@ -30,13 +30,60 @@ pub enum FolderError {
     },
     /// A resumed run was started from another study.
     #[error(
-        "{folder} was started from another study: {what} changed since; start a new run instead of --resume"
+        "{folder} was started from another study: {what} changed since{which}; start a new run instead of --resume"
     )]
     OtherStudy {
         /// The folder.
         folder: PathBuf,
         /// `the study file`, `the recordings` or `the solver or one of its files`.
         what: &'static str,
+        /// The keys with both values, or the records; empty where that is not known.
+        which: String,
+    },
+    /// It was begun by another version of this program.
+    #[error(
+        "{folder} was begun by starlings {}, this is {this}: another version may give other estimates and intervals; \
+         continue with the version that began it, or start a new run instead of --resume",
+        if version.is_empty() { "of an earlier state" } else { version }
+    )]
+    OtherVersion {
+        /// The folder.
+        folder: PathBuf,
+        /// The version that began it; empty where it did not say.
+        version: String,
+        /// This version.
+        this: String,
+    },
+    /// It was begun by another build of the same version.
+    #[error(
+        "{folder} was begun by another build of starlings {version} ({build}; this is {this}): estimates, intervals and \
+         likelihoods may differ in their last digits, or by more where a model changed between the two; continue with the \
+         program that began it, start a new run, or go on all the same with --resume --other-build: {kept}"
+    )]
+    OtherBuild {
+        /// The folder.
+        folder: PathBuf,
+        /// The version of both.
+        version: String,
+        /// The build that began it.
+        build: String,
+        /// This build.
+        this: String,
+        /// What becomes of what is stored.
+        kept: &'static str,
+    },
+    /// It was begun with another solver.
+    #[error(
+        "{folder} was begun with another solver: {what}; every number may differ. Put back what it was, start a new run, or \
+         go on all the same with --resume --other-build: {kept}"
+    )]
+    OtherSolver {
+        /// The folder.
+        folder: PathBuf,
+        /// What differs.
+        what: String,
+        /// What becomes of what is stored.
+        kept: &'static str,
     },
     /// It belongs to another command.
     #[error("{folder} holds {holds} of `{command}`: continue it there, or choose another folder with --out")]
@@ -51,4 +98,15 @@ pub enum FolderError {
     /// The database failed.
     #[error(transparent)]
     Store(#[from] StoreError),
+}
+
+impl FolderError {
+    /// Whether the input is wrong, rather than that the disk failed.
+    pub fn is_input(&self) -> bool {
+        match self {
+            Self::Unwritable { source, .. } => source.kind() != io::ErrorKind::StorageFull,
+            Self::Store(error) => !error.is_of_disk(),
+            _ => true,
+        }
+    }
 }

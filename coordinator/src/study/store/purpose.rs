@@ -2,6 +2,9 @@
 
 use super::{Store, StoreError};
 
+/// Name under which the store keeps a finished explanation.
+pub(crate) const EXPLANATION: &str = "explanation";
+
 /// The command that a run folder belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Purpose {
@@ -19,7 +22,7 @@ impl Purpose {
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Run => "run",
-            Self::Explanation => "explanation",
+            Self::Explanation => EXPLANATION,
         }
     }
 
@@ -36,6 +39,14 @@ impl Purpose {
         match self {
             Self::Run => "starlings run",
             Self::Explanation => "starlings explain",
+        }
+    }
+
+    /// Name under which the store keeps the result of the command once it is finished.
+    pub(super) fn result(self) -> &'static str {
+        match self {
+            Self::Run => "summary",
+            Self::Explanation => EXPLANATION,
         }
     }
 
