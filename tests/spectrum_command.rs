@@ -117,6 +117,8 @@ fn wrong_options_are_refused_with_the_remedy() {
         (["--observers", "sfd"], "did you mean `sdf`?"),
         (["--gains", "-5"], "zero or above"),
         (["--gains", "1,inf"], "finite"),
+        (["--gains", "1,1e308"], "the gain 1e308 is too large: the model's own rates are lost"),
+        (["--gains", "1,1e308"], "no pole can be found; give gains below "),
         (["--decay", "0.5/1"], "a factor above 1"),
         (["--decay", "10"], "FACTOR/TIME"),
         (["--observers", "windkessel"], "models that can host it"),

@@ -173,6 +173,37 @@ fn an_equation_holds_in_the_units_that_it_is_written_in() {
 }
 
 #[test]
+fn an_output_that_corrects_a_state_in_another_unit_is_one_warning() {
+    let study = |kind: &str, layout: &str, [output, state]: [&str; 2]| {
+        load(&format!(
+            "[study]\nname = \"a\"\n[model]\nkind = \"{kind}\"\n{layout}\n\
+             [[parameters]]\nname = \"p0\"\nprior = {{ transform = \"log\", median = 1e5, factor = 2 }}\n\
+             [observer]\nkind = \"nudging\"\ngain = 1.0\ncorrects = {{ {output} = \"{state}\" }}\n\
+             [[records]]\nname = \"r\"\nfile = \"data.csv\"\ninputs = {{ flow = \"flow\" }}\n\
+             channels = [ {{ column = \"pressure\", output = \"{output}[0]\", noise = 1 }} ]\n"
+        ))
+        .warnings
+    };
+    let segment = "layout = { segments = [ { name = \"a\", from = \"i\", to = \"o\", length = 5, radius = 1, thickness = 0.1, \
+                   cells = 5 } ], nodes = [ { name = \"i\", kind = \"inlet\" }, { name = \"o\", kind = \"rcr\" } ] }";
+    assert_eq!(
+        study("artery-1d", segment, ["displacement", "A"]),
+        [
+            "`corrects`: output `displacement` is in cm, state `A` in cm^2: its innovations are added to the state as they \
+          stand; name the state that the output shows, or an output in cm^2."
+        ]
+    );
+    assert_eq!(study("artery-1d", segment, ["flow_rate", "Q"]), [""; 0]);
+    assert_eq!(study("fsi-tube", "", ["displacement", "eta"]), [""; 0]);
+    let tube = study("fsi-tube", "", ["displacement", "w"]);
+    assert_eq!(tube.len(), 1, "{tube:?}");
+    assert!(
+        tube[0].starts_with("`corrects`: output `displacement` is in cm, state `w` in cm/s: "),
+        "{tube:?}"
+    );
+}
+
+#[test]
 fn a_term_of_an_effect_is_compared_be_it_used_or_not() {
     let effect = "[[effects]]\nname = \"stiffening\"\nadds = [ { to = \"v\", term = \"-q*x^3\" } ]\n\
                   parameters = [ { name = \"q\", unit = \"N/m^3\" } ]\n";

@@ -80,6 +80,17 @@ pub enum SpectrumError {
         /// The state component.
         state: String,
     },
+    /// A gain so large that the model is lost in the rounding of the feedback.
+    #[error(
+        "the gain {gain:e} is too large: the model's own rates are lost in the rounding of its feedback, and no pole can be found; \
+         give gains below {largest:.0e}"
+    )]
+    GainTooLarge {
+        /// The gain.
+        gain: f64,
+        /// The gain from which on it is so.
+        largest: f64,
+    },
     /// The QR iteration did not converge.
     #[error("the poles of a matrix of {n} states were not found: the QR iteration did not converge")]
     NotConverged {

@@ -100,7 +100,7 @@ impl Laboratory {
     /// What an observer does: at the given gains, to the first `listed` poles, and at best.
     ///
     /// # Errors
-    /// When the model cannot host the observer with the observed outputs, or the poles are not found.
+    /// When the model cannot host the observer with the observed outputs, a gain is too large, or the poles are not found.
     pub fn examine(
         &self,
         kind: &str,
@@ -109,6 +109,7 @@ impl Laboratory {
         decay: Option<Decay>,
     ) -> Result<ObserverSpectrum, SpectrumError> {
         let system = self.observed(kind)?;
+        gains.iter().try_for_each(|&gain| system.check_gain(gain))?;
         let curve = GainCurve::scan(&system)?;
         let best = curve.best(&system)?;
         let gain_for_decay = match decay {

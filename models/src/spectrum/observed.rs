@@ -82,6 +82,25 @@ impl ObservedSystem {
         Ok(system)
     }
 
+    /// Refuses a gain at which every rate of the model is below the rounding of the feedback: its poles would be those of the
+    /// feedback alone, or none that an iteration finds.
+    ///
+    /// # Errors
+    /// [`SpectrumError::GainTooLarge`], with the gain from which on it is so.
+    pub fn check_gain(&self, gain: f64) -> Result<(), SpectrumError> {
+        for block in &self.blocks {
+            let own = block.a.amax();
+            // Of a model without rates nothing is lost.
+            let visible = if own > 0.0 { own / f64::EPSILON } else { f64::MAX };
+            let [linear, quadratic] = [block.feedback.linear.amax(), block.feedback.quadratic.amax()];
+            let largest = (visible / linear).min((visible / quadratic).sqrt());
+            if gain > largest {
+                return Err(SpectrumError::GainTooLarge { gain, largest });
+            }
+        }
+        Ok(())
+    }
+
     /// All poles at a gain, sorted by modulus, then by imaginary part.
     ///
     /// # Errors

@@ -24,6 +24,7 @@ pub(in crate::study) fn warnings(file: &StudyFile, model: &CheckedModel, records
     if !exact {
         list.extend(mixed_systems(&pairs, &file.study.time_unit));
     }
+    list.extend(corrections(file, model));
     let mut labels = Labels::new(&model.spec, &file.study.time_unit, exact);
     for parameter in &file.parameters {
         if let Some(unit) = &parameter.unit {
@@ -36,6 +37,26 @@ pub(in crate::study) fn warnings(file: &StudyFile, model: &CheckedModel, records
     mismatches.extend(effects.flat_map(|effect| labels.effect(effect, &model.spec)));
     list.extend(mismatches.iter().map(|m| format!("units: {m}; its numbers are taken as they stand.")));
     list
+}
+
+/// Outputs whose innovation `corrects` adds to a state in another unit. The model's own labels are compared: what the study's
+/// labels contradict in them is told of them. A warning as everywhere, for an output may show a state in a unit of its own; an
+/// observer then pulls by another share than its gain says, and the wrong state looks just like it.
+fn corrections(file: &StudyFile, model: &CheckedModel) -> Vec<String> {
+    let warn = |(output, state): &(toml::Spanned<String>, toml::Spanned<String>)| {
+        let (output, state) = (output.get_ref(), state.get_ref());
+        let shown = quantity_of(&model.spec.outputs, output)?;
+        let corrected = quantity_of(&model.spec.states, state)?;
+        let (a, b) = Unit::parse(&shown.unit).zip(Unit::parse(&corrected.unit))?;
+        let (unit, other) = (&shown.unit, &corrected.unit);
+        (!a.same(&b)).then(|| {
+            format!(
+                "`corrects`: output `{output}` is in {unit}, state `{state}` in {other}: its innovations are added to the state \
+                 as they stand; name the state that the output shows, or an output in {other}."
+            )
+        })
+    };
+    file.observer.corrects.iter().filter_map(warn).collect()
 }
 
 /// A label beside the model's for the same quantity.
