@@ -124,3 +124,14 @@ fn a_record_that_ends_early_leaves_the_others_running() {
     let total: usize = LENGTHS.iter().map(|n| n * 8).sum();
     assert_eq!(done.summary.runs.total, total as u64, "p + 1 = 8 particles, one job per record and window");
 }
+
+#[test]
+fn a_batch_fit_makes_no_run_of_a_record_for_the_values_of_another() {
+    let done = joint("kind = \"batch\"", ["", "", ""]);
+    let jobs = done.table("jobs", "pass, step");
+    let ensembles = done.table("analyses", "step").len();
+    let of_fit = jobs.iter().filter(|row| row[0] == "1").count();
+    // a, b and x0 of one record take four simplex points and their centre, though seven values are estimated.
+    assert_eq!(of_fit, ensembles * 3 * 5);
+    assert_eq!(done.summary.runs.total, (of_fit + 3) as u64, "and one free run of each record at the end");
+}

@@ -9,9 +9,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::blocks::{self, Block};
 use crate::data::same;
 use crate::linearisation::{Ensemble, Linearisation, Outcome};
-use crate::spectral;
 use crate::{Data, EstimatorError, Gaussian, SigmaSet};
 
 /// Damping of the first step, relative to the diagonal of the information.
@@ -32,8 +32,11 @@ const STARTS: usize = 4;
 /// Settings of a batch fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Batch {
-    /// Sigma points, r of them.
+    /// Sigma points, r of them, for all p parameters or for the q of one of the blocks.
     pub set: SigmaSet,
+    /// Rows that answer to some of the parameters only; empty where every row may answer to all. The noise of different blocks
+    /// is independent.
+    pub blocks: Vec<Block>,
     /// Spread of the points in units of the current posterior sd (of the prior sd at first). As the steps get shorter
     /// than one sd, the points close in with them, down to a tenth of this.
     pub spread: f64,
@@ -51,7 +54,7 @@ pub struct BatchState {
     pub prior: Gaussian,
     /// Centre u of the next ensemble, length p.
     pub trial: DVector<f64>,
-    /// Factor of the offsets of the next ensemble, p x p: point i is trial + scale I_i.
+    /// Factor of the offsets of the next ensemble, p x p or p x q: point i is trial + scale I_i.
     pub scale: DMatrix<f64>,
     /// Distance of the points relative to [`Batch::spread`].
     pub width: f64,
@@ -98,7 +101,7 @@ impl Batch {
 
     /// A batch fit with the usual settings: spread 0.1, tolerance 0.01, at most [`Batch::MAX_ITERATIONS`] ensembles.
     pub fn new(set: SigmaSet) -> Self {
-        Self { set, spread: 0.1, max_iterations: Self::MAX_ITERATIONS, tolerance: 1e-2 }
+        Self { set, blocks: Vec::new(), spread: 0.1, max_iterations: Self::MAX_ITERATIONS, tolerance: 1e-2 }
     }
 
     /// The state before any ensemble: centred at the prior mean, points at `spread` prior sd.
@@ -106,12 +109,12 @@ impl Batch {
     /// # Panics
     /// When the prior has not the p parameters of the sigma points.
     pub fn init(&self, prior: &Gaussian) -> BatchState {
-        let p = self.set.n_param();
+        let p = blocks::n_param(&self.blocks, &self.set);
         assert_eq!(prior.n_param(), p, "prior and sigma points differ in parameters");
         BatchState {
             prior: prior.clone(),
             trial: DVector::zeros(p),
-            scale: DMatrix::identity(p, p) * self.spread,
+            scale: blocks::first(&self.blocks, &self.set) * self.spread,
             width: 1.0,
             damping: FIRST_DAMPING,
             growth: FIRST_GROWTH,
@@ -150,12 +153,19 @@ impl Batch {
         failed: &[bool],
         data: &Data<'_>,
     ) -> Result<(BatchState, BatchStep), EstimatorError> {
-        same("parameters of the state", self.set.n_param(), s.trial.len())?;
+        same("parameters of the state", blocks::n_param(&self.blocks, &self.set), s.trial.len())?;
         if !(self.spread > 0.0 && self.spread.is_finite()) {
             return Err(EstimatorError::Spread { value: self.spread });
         }
-        let ensemble =
-            Ensemble { set: &self.set, centre: &s.trial, scale: &s.scale, predictions, failed, data };
+        let ensemble = Ensemble {
+            set: &self.set,
+            blocks: &self.blocks,
+            centre: &s.trial,
+            scale: &s.scale,
+            predictions,
+            failed,
+            data,
+        };
         let mut next = s.clone();
         next.iteration += 1;
         let outcome = ensemble.linearise()?;
@@ -209,14 +219,16 @@ impl Batch {
                 next.width = step.clamp(NARROWEST, 1.0);
             }
         }
-        next.scale = inverse_root(&best.root)? * (self.spread * next.width);
         let log_det: f64 = best.root.diagonal().iter().map(|v| 2.0 * v.abs().ln()).sum();
         next.converged = step < self.tolerance;
         let (u, gain) =
             if next.converged { (&best.centre + newton, step * step) } else { (best.centre.clone(), 0.0) };
         let l = next.prior.factor();
         let p = best.centre.len();
-        let inverse = best.root.solve_upper_triangular(&DMatrix::identity(p, p)).ok_or(singular)?;
+        let identity = DMatrix::identity(p, p);
+        let inverse = best.root.solve_upper_triangular(&identity).ok_or_else(|| singular.clone())?;
+        next.scale =
+            blocks::scale(&self.blocks, &best.root, &inverse)?.ok_or(singular)? * (self.spread * next.width);
         let factor = &l * inverse;
         Ok(BatchStep {
             cost: best.cost,
@@ -271,13 +283,6 @@ impl BatchState {
         self.damping = (self.damping * REJECTED_DAMPING).sqrt();
         self.growth = FIRST_GROWTH;
     }
-}
-
-/// (R^T R)^{-1/2}, symmetric, from the singular values of R.
-fn inverse_root(root: &DMatrix<f64>) -> Result<DMatrix<f64>, EstimatorError> {
-    let (_, values, vectors) = spectral::svd(root.clone(), "posterior")?;
-    let sd = DMatrix::from_diagonal(&values.map(|v| 1.0 / v));
-    Ok(vectors.tr_mul(&(sd * &vectors)))
 }
 
 /// A step of which no component is longer than [`LONGEST`].

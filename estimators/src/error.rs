@@ -8,6 +8,9 @@ use thiserror::Error;
 /// What an estimator could not do, and why.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum EstimatorError {
+    /// Rows of different blocks of parameters whose noise is correlated.
+    #[error("a fit in blocks of parameters needs noise that is independent from row to row")]
+    CorrelatedBlocks,
     /// There is nothing to estimate.
     #[error("no parameter to estimate: at least one is needed")]
     NoParameters,

@@ -9,6 +9,7 @@
 
 mod analysis;
 mod batch;
+mod blocks;
 mod data;
 mod diagnostics;
 mod drift;
@@ -35,6 +36,7 @@ mod whiteness;
 
 pub use analysis::Analysis;
 pub use batch::{Batch, BatchState, BatchStep};
+pub use blocks::Block;
 pub use data::{Data, Noise};
 pub use diagnostics::{
     autocorrelation, correlation, effective_sample_size, nis_band, noise_from_third_differences,

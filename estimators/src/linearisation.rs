@@ -7,11 +7,12 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::blocks::Block;
 use crate::data::same;
 use crate::particles::{SPANNED, weighted_transpose};
 use crate::spectral;
 use crate::whiten::{Spread, Sweep};
-use crate::{Data, EstimatorError, Noise, SigmaSet};
+use crate::{Data, EstimatorError, Noise, SigmaSet, qr};
 
 /// Rows that are factored at once.
 const BLOCK: usize = 4096;
@@ -42,7 +43,9 @@ pub(crate) struct Ensemble<'a> {
     pub(crate) set: &'a SigmaSet,
     /// Centre u, length p.
     pub(crate) centre: &'a DVector<f64>,
-    /// Factor of the offsets of the points, p x p: point i is u + scale I_i.
+    /// Rows that answer to some of the parameters only; empty where every row may answer to all.
+    pub(crate) blocks: &'a [Block],
+    /// Factor of the offsets of the points, p x p or p x q: point i is u + scale I_i.
     pub(crate) scale: &'a DMatrix<f64>,
     /// m x (r+1).
     pub(crate) predictions: &'a DMatrix<f64>,
@@ -68,66 +71,118 @@ impl Ensemble<'_> {
         same("columns of the predictions", r + 1, self.predictions.ncols())?;
         same("failed particles", r + 1, self.failed.len())?;
         let rows = self.data.observed()?;
-        let active: Vec<bool> = (0..=r)
-            .map(|j| !self.failed[j] && rows.iter().all(|&k| self.predictions[(k, j)].is_finite()))
-            .collect();
-        if !active[0] {
-            return Ok(Outcome::NoCentre);
-        }
-        let Some(slope) = self.regression(&active)? else { return Ok(Outcome::NotSpanned) };
-        match self.fit(&active, &rows, &slope) {
-            Ok(fit) => Ok(Outcome::Fit(fit)),
+        let fit = if self.blocks.is_empty() { self.whole(&rows) } else { self.in_blocks(&rows) };
+        match fit {
             // Finite predictions whose square overflows: as far from the data as a failed run.
             Err(EstimatorError::NotFinite { .. }) => Ok(Outcome::NoCentre),
-            Err(error) => Err(error),
+            fit => fit,
         }
     }
 
-    /// Whitens block by block and takes each into the triangle.
-    fn fit(
-        &self,
-        active: &[bool],
-        rows: &[usize],
-        slope: &DMatrix<f64>,
-    ) -> Result<Linearisation, EstimatorError> {
-        let r = self.set.n_particle();
-        let mut reference = DVector::zeros(r + 1);
-        reference[0] = 1.0;
+    /// The points that ran, as far as these rows tell.
+    fn active(&self, rows: &[usize]) -> Vec<bool> {
+        let finite = |j: usize| rows.iter().all(|&k| self.predictions[(k, j)].is_finite());
+        (0..=self.set.n_particle()).map(|j| !self.failed[j] && finite(j)).collect()
+    }
+
+    /// Every row answers to every parameter: whitened part by part, each taken into the triangle.
+    fn whole(&self, rows: &[usize]) -> Result<Outcome, EstimatorError> {
+        let active = self.active(rows);
+        if !active[0] {
+            return Ok(Outcome::NoCentre);
+        }
+        let Some(slope) = self.regression(&active, self.scale)? else { return Ok(Outcome::NotSpanned) };
         let mut stack = Stack::new(self.centre);
-        let (mut misfit, mut log_det_noise) = (0.0, 0.0);
+        let mut figures = Figures::default();
         // Correlated noise whitens all rows together.
         let block = if matches!(self.data.noise, Noise::Diagonal(_)) { BLOCK } else { rows.len().max(1) };
         for rows in rows.chunks(block) {
-            let sweep = Sweep {
-                predictions: self.predictions,
-                reference: &reference,
-                active,
-                data: self.data,
-                rows,
-                spread: Spread::Ignored,
-            };
-            let whitened = sweep.run(true)?;
-            let columns = whitened.columns.ok_or(EstimatorError::NotFinite { what: "the whitened rows" })?;
-            stack.take(&(columns.columns(1, r) * slope), &columns.column(r + 1).into_owned())?;
-            misfit += columns.column(r + 1).norm_squared();
-            log_det_noise += whitened.log_det_noise;
+            stack.take(&self.whitened(rows, &active, &slope, &mut figures)?)?;
         }
-        let constant = rows.len() as f64 * (2.0 * std::f64::consts::PI).ln();
+        Ok(Outcome::Fit(self.fit(&stack, &figures, rows.len())))
+    }
+
+    /// Every block of rows is factored for itself, and the small triangles together.
+    fn in_blocks(&self, rows: &[usize]) -> Result<Outcome, EstimatorError> {
+        if !matches!(self.data.noise, Noise::Diagonal(_)) {
+            return Err(EstimatorError::CorrelatedBlocks);
+        }
+        let (p, q) = (self.centre.len(), self.set.n_param());
+        let mut figures = Figures::default();
+        let mut below = DMatrix::zeros(self.blocks.len() * (q + 1), p + 1);
+        for (first, block) in (0..).step_by(q + 1).zip(self.blocks) {
+            let of_block: Vec<usize> = rows.iter().copied().filter(|row| block.rows.contains(row)).collect();
+            let active = self.active(&of_block);
+            if !active[0] {
+                return Ok(Outcome::NoCentre);
+            }
+            let scale = self.scale.select_rows(&block.parameters);
+            let Some(slope) = self.regression(&active, &scale)? else { return Ok(Outcome::NotSpanned) };
+            if of_block.is_empty() {
+                continue;
+            }
+            let triangle = qr::triangle(self.whitened(&of_block, &active, &slope, &mut figures)?);
+            for (column, &j) in block.parameters.iter().chain([&p]).enumerate() {
+                below.view_mut((first, j), (triangle.nrows(), 1)).copy_from(&triangle.column(column));
+            }
+        }
+        let mut stack = Stack::new(self.centre);
+        stack.take(&below)?;
+        Ok(Outcome::Fit(self.fit(&stack, &figures, rows.len())))
+    }
+
+    /// The whitened Jacobian of these rows with their whitened residual as a last column.
+    fn whitened(
+        &self,
+        rows: &[usize],
+        active: &[bool],
+        slope: &DMatrix<f64>,
+        figures: &mut Figures,
+    ) -> Result<DMatrix<f64>, EstimatorError> {
+        let r = self.set.n_particle();
+        let mut reference = DVector::zeros(r + 1);
+        reference[0] = 1.0;
+        let sweep = Sweep {
+            predictions: self.predictions,
+            reference: &reference,
+            active,
+            data: self.data,
+            rows,
+            spread: Spread::Ignored,
+        };
+        let whitened = sweep.run(true)?;
+        let columns = whitened.columns.ok_or(EstimatorError::NotFinite { what: "the whitened rows" })?;
+        let residual = columns.column(r + 1);
+        figures.misfit += residual.norm_squared();
+        figures.log_det_noise += whitened.log_det_noise;
+        let p = slope.ncols();
+        let mut whole = (columns.columns(1, r) * slope).insert_column(p, 0.0);
+        whole.column_mut(p).copy_from(&residual);
+        Ok(whole)
+    }
+
+    fn fit(&self, stack: &Stack, figures: &Figures, n_used: usize) -> Linearisation {
+        let constant = n_used as f64 * (2.0 * std::f64::consts::PI).ln();
+        let Figures { misfit, log_det_noise } = *figures;
         let p = self.centre.len();
-        Ok(Linearisation {
+        Linearisation {
             centre: self.centre.clone(),
             root: stack.triangle.view((0, 0), (p, p)).into_owned(),
             along: stack.triangle.view((0, p), (p, 1)).column(0).into_owned(),
             cost: misfit + self.centre.norm_squared(),
             misfit,
-            n_used: rows.len(),
+            n_used,
             log_likelihood: -0.5 * (constant + log_det_noise + misfit),
-        })
+        }
     }
 
     /// D X^T (X D X^T)^{-1}, r x p, over the points that ran, X their offsets from the centre: deviations from the
     /// centre times this is the slope. `None` when the points do not span.
-    fn regression(&self, active: &[bool]) -> Result<Option<DMatrix<f64>>, EstimatorError> {
+    fn regression(
+        &self,
+        active: &[bool],
+        scale: &DMatrix<f64>,
+    ) -> Result<Option<DMatrix<f64>>, EstimatorError> {
         let weights =
             DVector::from_fn(
                 self.set.n_particle(),
@@ -141,8 +196,15 @@ impl Ensemble<'_> {
             return Ok(None);
         }
         let per_point = moment.lu().solve(&dual.transpose());
-        Ok(per_point.and_then(|d| self.scale.transpose().lu().solve(&d)).map(|d| d.transpose()))
+        Ok(per_point.and_then(|d| scale.transpose().lu().solve(&d)).map(|d| d.transpose()))
     }
+}
+
+/// What is summed over the rows.
+#[derive(Default)]
+struct Figures {
+    misfit: f64,
+    log_det_noise: f64,
 }
 
 /// The triangle of everything stacked so far, its right-hand side as a last column, (p+1) x (p+1).
@@ -161,12 +223,11 @@ impl Stack {
     }
 
     /// Puts whitened rows below and factors again.
-    fn take(&mut self, jacobian: &DMatrix<f64>, residual: &DVector<f64>) -> Result<(), EstimatorError> {
-        let (m, p) = jacobian.shape();
-        let mut rows = self.triangle.clone().resize_vertically(p + 1 + m, 0.0);
-        rows.view_mut((p + 1, 0), (m, p)).copy_from(jacobian);
-        rows.view_mut((p + 1, p), (m, 1)).copy_from(residual);
-        self.triangle = rows.qr().unpack_r();
+    fn take(&mut self, below: &DMatrix<f64>) -> Result<(), EstimatorError> {
+        let (m, n) = below.shape();
+        let mut rows = self.triangle.clone().resize_vertically(n + m, 0.0);
+        rows.view_mut((n, 0), (m, n)).copy_from(below);
+        self.triangle = qr::triangle(rows);
         let finite = self.triangle.iter().all(|v| v.is_finite());
         if finite { Ok(()) } else { Err(EstimatorError::NotFinite { what: "the stacked sensitivity" }) }
     }
@@ -192,7 +253,7 @@ impl Linearisation {
         for (j, column) in self.root.column_iter().enumerate() {
             rows[(p + j, j)] = damping.sqrt() * column.norm();
         }
-        let triangle = rows.qr().unpack_r();
+        let triangle = qr::triangle(rows);
         triangle.view((0, 0), (p, p)).solve_upper_triangular(&triangle.view((0, p), (p, 1)).column(0))
     }
 }

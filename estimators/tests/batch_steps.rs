@@ -5,7 +5,9 @@ mod common;
 use common::batch::{compartments, ensemble, fit};
 use common::rcr::{MM_HG, pressure, prior, truth};
 use nalgebra::{DMatrix, DVector};
-use starlings_estimators::{Batch, BatchState, Data, EstimatorError, Gaussian, Noise, Points, SigmaSet};
+use starlings_estimators::{
+    Batch, BatchState, Block, Data, EstimatorError, Gaussian, Noise, Points, SigmaSet,
+};
 
 #[test]
 fn failed_centres_are_rejected_steps_and_failed_points_are_left_out() {
@@ -78,6 +80,84 @@ fn a_new_slope_at_the_same_centre_half_forgets_the_damping() {
         state = go(&state, false);
     }
     assert!(state.damping < 0.02, "{}", state.damping);
+}
+
+/// Two shared parameters and one of its own for each of three records of four rows, slightly curved.
+fn of_three_records(theta: &[f64]) -> Vec<f64> {
+    let row = |k: usize, i: usize| {
+        let x = i as f64 / 3.0 + 0.1 * k as f64;
+        theta[0] + theta[1] * x + theta[2 + k] * (1.0 + x * x) + 0.01 * (theta[0] * theta[2 + k]).powi(2)
+    };
+    (0..3).flat_map(|k| (0..4).map(move |i| row(k, i))).collect()
+}
+
+#[test]
+fn a_fit_in_blocks_is_the_fit_of_the_whole_with_fewer_points() {
+    let prior = Gaussian::independent(&[0.0; 5], &[1.0, 2.0, 1.0, 0.5, 3.0]);
+    let values = of_three_records(&[0.4, -0.3, 1.2, 0.7, -0.9]);
+    let noise = Noise::Diagonal(vec![0.1; 12]);
+    let data = Data { values: &values, noise: &noise };
+    let block = |k: usize| Block { rows: 4 * k..4 * k + 4, parameters: vec![0, 1, 2 + k] };
+    let blocks: Vec<Block> = (0..3).map(block).collect();
+    let go = |set: SigmaSet, blocks: Vec<Block>| {
+        let batch = Batch { blocks, tolerance: 1e-6, spread: 1e-3, ..Batch::new(set) };
+        let mut state = batch.init(&prior);
+        for _ in 0..batch.max_iterations {
+            let theta = batch.sample(&state);
+            let (z, failed) = ensemble(&of_three_records, &theta, 12);
+            let (next, step) = batch.step(&state, &z, &failed, &data).unwrap();
+            state = next;
+            if step.converged {
+                return (step, theta.ncols());
+            }
+        }
+        panic!("it converges")
+    };
+    let (whole, n_whole) = go(SigmaSet::new(Points::Simplex, 5).unwrap(), Vec::new());
+    let (parts, n_parts) = go(SigmaSet::new(Points::Simplex, 3).unwrap(), blocks.clone());
+    assert_eq!((n_whole, n_parts), (7, 5));
+    // Both are at the mode; slopes over a thousandth of an sd differ from the derivative by its square.
+    let sd = whole.posterior.covariance.diagonal().map(f64::sqrt);
+    assert!((&whole.posterior.mean - &parts.posterior.mean).component_div(&sd).amax() < 1e-4);
+    let apart = (&whole.posterior.covariance - &parts.posterior.covariance).amax();
+    assert!(apart < 1e-5 * whole.posterior.covariance.amax(), "{apart:e}");
+    assert!((whole.evidence - parts.evidence).abs() < 1e-4, "{} {}", whole.evidence, parts.evidence);
+
+    let correlated = Noise::Dense(DMatrix::identity(12, 12));
+    let batch = Batch { blocks, ..Batch::new(SigmaSet::new(Points::Simplex, 3).unwrap()) };
+    let data = Data { values: &values, noise: &correlated };
+    let refused = batch.step(&batch.init(&prior), &DMatrix::zeros(12, 5), &[false; 5], &data).unwrap_err();
+    assert_eq!(refused, EstimatorError::CorrelatedBlocks);
+}
+
+#[test]
+fn a_point_that_fails_in_one_block_is_left_out_there_alone() {
+    let prior = Gaussian::independent(&[0.0; 4], &[1.0; 4]);
+    let noise = Noise::Diagonal(vec![0.1; 8]);
+    let truth = [0.5, 0.2, -0.4, 0.8];
+    let model = |t: &[f64]| -> Vec<f64> {
+        (0..2)
+            .flat_map(|k| (0..4).map(move |i| (k, i)))
+            .map(|(k, i)| t[0] + t[1 + k] * i as f64 + t[3])
+            .collect()
+    };
+    let values = model(&truth);
+    let data = Data { values: &values, noise: &noise };
+    let block = |k: usize| Block { rows: 4 * k..4 * k + 4, parameters: vec![0, 3, 1 + k] };
+    // Twice as many points as parameters: one may be missing.
+    let set = SigmaSet::new(Points::Canonical, 3).unwrap();
+    let batch = Batch { blocks: (0..2).map(block).collect(), ..Batch::new(set) };
+    let state = batch.init(&prior);
+    let theta = batch.sample(&state);
+    let (mut z, failed) = ensemble(&model, &theta, 8);
+    let clean = batch.step(&state, &z, &failed, &data).unwrap().1;
+    z.view_mut((4, 2), (4, 1)).fill(f64::NAN);
+    let step = batch.step(&state, &z, &failed, &data).unwrap().1;
+    // The model is linear: the other points tell the same slope.
+    assert!((&step.posterior.covariance - &clean.posterior.covariance).amax() < 1e-10);
+    z.view_mut((4, 0), (4, 1)).fill(f64::NAN);
+    let lost = batch.step(&state, &z, &failed, &data).unwrap_err();
+    assert_eq!(lost, EstimatorError::StartFailed { attempt: 1 });
 }
 
 #[test]

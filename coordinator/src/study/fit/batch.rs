@@ -5,14 +5,16 @@
 
 use std::sync::Arc;
 
+use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
-use starlings_estimators::{Batch, BatchState, BatchStep, Data, EstimatorError, Gaussian, SigmaSet};
+use starlings_estimators::{Batch, BatchState, BatchStep, Block, Data, EstimatorError, Gaussian, SigmaSet};
+use starlings_models::Window;
 
 use super::ensemble::noise;
-use super::flight::{Flight, Place, StepWindows, stack_outputs};
+use super::flight::{Flight, Place, Results, StepWindows, stack_outputs};
 use crate::study::store::snapshot::{Head, Snapshot};
 use crate::study::store::{AnalysisRow, Store};
-use crate::study::{Fit, Progress, RunContext, RunError, posterior};
+use crate::study::{Fit, Progress, RunContext, RunError, Study, posterior};
 
 /// Iterates to the posterior mode, continuing from `resumed` if there is one.
 ///
@@ -25,16 +27,19 @@ pub fn fit(
     resumed: Option<Snapshot>,
 ) -> Result<Fit, RunError> {
     let study = flight.study();
-    let batch = Batch {
-        set: SigmaSet::new(study.estimator.points, study.theta.len())?,
-        max_iterations: study.estimator.max_iterations,
-        tolerance: study.estimator.tolerance,
-        spread: study.estimator.spread,
-    };
     let windows: StepWindows = (0..study.records.len())
         .filter(|record| study.records[*record].is_trained())
         .map(|record| (record, Arc::new(study.whole(record, true))))
         .collect();
+    let blocks = blocks(study, &windows);
+    let n_point_param = blocks.first().map_or(study.theta.len(), |block| block.parameters.len());
+    let batch = Batch {
+        set: SigmaSet::new(study.estimator.points, n_point_param)?,
+        blocks,
+        max_iterations: study.estimator.max_iterations,
+        tolerance: study.estimator.tolerance,
+        spread: study.estimator.spread,
+    };
     let values: Vec<f64> = windows.iter().flat_map(|(_, w)| w.observed.iter().copied()).collect();
     let noise = noise(study, &windows, 1.0);
     let (mut known, mut now) = match resumed {
@@ -45,8 +50,7 @@ pub fn fit(
         let place = Place { pass: 1, step: now.head.step };
         let theta = batch.sample(&known.state);
         let results = fly(flight, &mut now, place, &theta, &windows)?;
-        let failed: Vec<bool> = results.iter().map(|of| of.iter().any(Result::is_err)).collect();
-        let predictions = stack_outputs(&results, &windows);
+        let (predictions, failed) = gathered(&batch, &results, &windows);
         let (next, step) =
             batch.step(&known.state, &predictions, &failed, &Data { values: &values, noise: &noise })?;
         known = Known { state: next, posterior: step.posterior.clone() };
@@ -62,6 +66,46 @@ pub fn fit(
     Ok(finish(&now, known))
 }
 
+/// The rows of each record with what all records share and the values of its own, where there are such: a record's own values
+/// need no runs of the others. None for a study that shares everything, or has one record to fit.
+fn blocks(study: &Study, windows: &StepWindows) -> Vec<Block> {
+    if windows.len() < 2 || study.theta.iter().all(|entry| entry.record.is_none()) {
+        return Vec::new();
+    }
+    let of = |record: Option<usize>| {
+        let entries = study.theta.iter().enumerate();
+        entries.filter(move |(_, entry)| entry.record == record).map(|(j, _)| j)
+    };
+    let mut end = 0;
+    let block = |(record, window): &(usize, Arc<Window>)| {
+        let first = end;
+        end += window.observed.len();
+        Block { rows: first..end, parameters: of(None).chain(of(Some(*record))).collect() }
+    };
+    windows.iter().map(block).collect()
+}
+
+/// Predictions and which points failed. In blocks a run that failed counts against its own record alone: its values are no
+/// numbers, and no point has failed as a whole.
+fn gathered(batch: &Batch, results: &Results, windows: &StepWindows) -> (DMatrix<f64>, Vec<bool>) {
+    if batch.blocks.is_empty() {
+        let failed = results.iter().map(|of| of.iter().any(Result::is_err)).collect();
+        return (stack_outputs(results, windows), failed);
+    }
+    let m = batch.blocks.last().map_or(0, |block| block.rows.end);
+    let mut predictions = DMatrix::from_element(m, results.len(), f64::NAN);
+    for (column, of_point) in results.iter().enumerate() {
+        for (block, result) in batch.blocks.iter().zip(of_point) {
+            if let Ok(prediction) = result {
+                predictions
+                    .view_mut((block.rows.start, column), (block.rows.len(), 1))
+                    .copy_from_slice(&prediction.outputs);
+            }
+        }
+    }
+    (predictions, vec![false; results.len()])
+}
+
 /// All that is known after an ensemble; what a killed run continues from, or ends with if it was the last one.
 #[derive(Serialize, Deserialize)]
 struct Known {
@@ -69,7 +113,7 @@ struct Known {
     posterior: Gaussian,
 }
 
-fn begin(batch: &Batch, study: &crate::study::Study) -> (Known, Snapshot) {
+fn begin(batch: &Batch, study: &Study) -> (Known, Snapshot) {
     let prior = posterior::prior(study);
     let state = batch.init(&prior);
     let head = Head {
@@ -98,9 +142,9 @@ fn fly(
     flight: &mut Flight<'_>,
     now: &mut Snapshot,
     place: Place,
-    theta: &nalgebra::DMatrix<f64>,
+    theta: &DMatrix<f64>,
     windows: &StepWindows,
-) -> Result<super::flight::Results, RunError> {
+) -> Result<Results, RunError> {
     let before = (flight.total, flight.failed, flight.retried);
     let everyone: Vec<usize> = (0..theta.ncols()).collect();
     let states = vec![None; now.states.len()];
@@ -123,7 +167,7 @@ fn keep(now: &mut Snapshot, known: &Known, step: &BatchStep) -> Result<(), RunEr
     Ok(())
 }
 
-fn row(study: &crate::study::Study, place: Place, step: &BatchStep) -> AnalysisRow {
+fn row(study: &Study, place: Place, step: &BatchStep) -> AnalysisRow {
     AnalysisRow {
         pass: place.pass,
         step: place.step,
