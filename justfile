@@ -14,6 +14,10 @@ battery:
     cargo test --release --test coarctation -- --ignored --nocapture
     cargo test --release -p starlings-coordinator --test explain_null -- --ignored --nocapture
 
+# Coverage at default settings, warnings of wrong models, false alarms: the tables of docs/coverage.md. COVERAGE_SEEDS draws, 40 by default.
+coverage:
+    cargo test --release -p starlings-coordinator --test coverage -- --ignored --nocapture --test-threads 1
+
 # Every system, effect and noise level of docs/battery.md: about an hour. BATTERY_SYSTEMS, BATTERY_KINDS, BATTERY_NOISE, BATTERY_SEEDS, BATTERY_THREADS choose.
 explain-battery:
     cargo test --release -p starlings-coordinator --test explain_battery -- --ignored --nocapture the_whole

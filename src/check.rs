@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Parser;
 use serde_json::json;
 use starlings_coordinator::study::field::{field_of, observed_fields};
+use starlings_coordinator::study::fit::settle;
 use starlings_coordinator::study::trial::{TrialChannel, trial};
 use starlings_coordinator::study::{EstimatorKind, Study, posterior};
 use starlings_estimators::SigmaSet;
@@ -53,6 +54,12 @@ fn runs_per_pass(study: &Study, n_particle: usize) -> usize {
     n_particle * windows.iter().sum::<usize>() * if redrawn { 2 } else { 1 }
 }
 
+/// Passes of the filter at least and at most; none of the batch fit.
+fn passes(study: &Study) -> Option<(usize, usize)> {
+    let of_filter = study.estimator.kind == EstimatorKind::Roukf;
+    of_filter.then(|| study.passes().map_or((2, settle::LIMIT), |n| (n, n)))
+}
+
 fn as_json(study: &Study, channels: &[TrialChannel], n_particle: usize) -> serde_json::Value {
     let estimates = posterior::estimates(study, &posterior::prior(study));
     json!({
@@ -64,6 +71,7 @@ fn as_json(study: &Study, channels: &[TrialChannel], n_particle: usize) -> serde
         })).collect::<Vec<_>>(),
         "particles": n_particle,
         "runs_per_pass": runs_per_pass(study, n_particle),
+        "passes": passes(study).map(|(least, most)| json!({ "at_least": least, "at_most": most })),
         "trial": channels.iter().map(|c| json!({
             "record": c.record, "output": c.output, "observations": c.n_obs, "rmse": c.rmse, "noise": c.noise,
         })).collect::<Vec<_>>(),
@@ -111,7 +119,15 @@ fn print(study: &Study, channels: &[TrialChannel], n_particle: usize) -> Result<
         print_trial(study, channels)?;
     }
     let runs = runs_per_pass(study, n_particle);
-    let per = if study.estimator.kind == EstimatorKind::Batch { "iteration" } else { "pass" };
+    let per = match passes(study) {
+        None => "iteration".to_owned(),
+        Some((least, most)) if least == most => {
+            format!("pass, {least} pass{}", if least == 1 { "" } else { "es" })
+        }
+        Some((least, most)) => {
+            format!("pass, {least} to {most} passes: as many as the estimate takes to settle")
+        }
+    };
     line(format_args!("\n{n_particle} particles, {runs} runs of the model per {per}"))?;
     for warning in &study.warnings {
         line(format_args!("warning: {warning}"))?;

@@ -16,6 +16,7 @@ use crate::failure::Failure;
 use crate::interrupt;
 use crate::load::load;
 use crate::progress::Display;
+use crate::run::hangs_on;
 
 /// At most this many lines of a list are printed; the rest is in the JSON and on the page.
 const LINES: usize = 8;
@@ -60,7 +61,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         let records = study.records.iter().filter(|record| record.is_trained()).count();
         let runs = (2 * study.parameters.len() + 1) * records;
         display.say(&format!(
-            "{runs} runs of the model: a centre and a pair per parameter, over {records} record{}",
+            "{runs} runs of the model: a centre and a pair per parameter, over {records} record{}; then one per constant and record",
             if records == 1 { "" } else { "s" }
         ));
     }
@@ -139,6 +140,10 @@ fn print(found: &Identification) -> Result<(), Failure> {
     text(combinations(found))?;
     let index = found.collinearity.index.map_or_else(|| "beyond measure".to_owned(), |v| format!("{v:.2}"));
     line(format_args!("\ncollinearity index of the whole set: {index} (critical from about 10)"))?;
+    if found.hangs_on.runs > 0 {
+        line("")?;
+        hangs_on(&found.hangs_on)?;
+    }
     line(format_args!("\n{}", found.advice))?;
     line(&found.conditional_on)
 }

@@ -50,7 +50,11 @@ impl Display {
 
     /// One analysis more.
     pub(crate) fn step(&self, p: &Progress) {
-        let head = if p.passes > 1 { format!("pass {}/{}", p.pass, p.passes) } else { p.stage.to_owned() };
+        let head = match p.passes {
+            None => format!("pass {}", p.pass),
+            Some(passes) if passes > 1 => format!("pass {}/{passes}", p.pass),
+            Some(_) => p.stage.to_owned(),
+        };
         let tail = format!("{} runs, {} workers", p.runs, p.workers);
         match self {
             Self::Silent => {}

@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use clap::Parser;
 use starlings_coordinator::report;
+use starlings_coordinator::study::constants::HangsOn;
 use starlings_coordinator::study::store::Purpose;
 use starlings_coordinator::study::trial::trial;
 use starlings_coordinator::study::{Progress, RunContext, Summary, run as study_run};
@@ -17,6 +18,9 @@ use crate::interrupt;
 use crate::load::load;
 use crate::progress::Display;
 use crate::run_folder;
+
+/// At most this many constants are told on the terminal.
+const TOLD: usize = 3;
 
 /// Estimate the parameters of a study; writes posterior.csv, summary.json and report.html into a run folder.
 #[derive(Parser)]
@@ -108,6 +112,9 @@ fn print(summary: &Summary, folder: &Path, json: bool) -> Result<(), Failure> {
             number(c.noise, None)
         ))?;
     }
+    if let Some(found) = &summary.hangs_on {
+        hangs_on(found)?;
+    }
     line(format_args!(
         "{} runs ({} failed, {} retried) on {} worker{} in {:.2} s; NIS {:.2} per observation",
         summary.runs.total,
@@ -119,4 +126,16 @@ fn print(summary: &Summary, folder: &Path, json: bool) -> Result<(), Failure> {
         summary.fit.nis_per_observation
     ))?;
     line(format_args!("report: {}", folder.join("report.html").display()))
+}
+
+/// The constants that matter most, in a sentence each.
+pub(crate) fn hangs_on(found: &HangsOn) -> Result<(), Failure> {
+    for sentence in found.sentences(TOLD) {
+        line(format_args!("hangs on a constant: {sentence}"))?;
+    }
+    line(format_args!(
+        "{} constants moved by 1 %, {} runs: all figures are in the report",
+        found.constants.len(),
+        found.runs
+    ))
 }

@@ -23,7 +23,16 @@ fn check_counts_the_runs_and_shows_the_prior_misfit() {
     assert_eq!(found["particles"], 5, "four parameters, simplex points");
     // 463 samples lie in the training span 0–2.31 s at 200 Hz.
     assert_eq!(found["runs_per_pass"], 5 * 463);
+    assert_eq!(found["passes"], serde_json::json!({ "at_least": 2, "at_most": 12 }));
     assert!(found["trial"][0]["rmse"].as_f64().unwrap() > 2.0);
+}
+
+#[test]
+fn check_says_how_often_the_data_are_gone_through() {
+    let (code, stdout, _) = output(starlings().arg("check").arg(repository(STUDY)));
+    assert_eq!(code, 0);
+    let told = "5 particles, 2315 runs of the model per pass, 2 to 12 passes: as many as the estimate takes to settle";
+    assert!(stdout.contains(told), "{stdout}");
 }
 
 #[test]
@@ -63,9 +72,10 @@ fn report_and_export_read_only_the_run_folder() {
         ["report.html", "summary.json", "posterior.csv"].map(|f| bytes(&moved, f)).into();
     assert_eq!(before, after);
     assert!(std::fs::read_to_string(picture).unwrap().starts_with("<svg"));
-    for (table, rows) in
-        [("estimates", 2 * 463 * 4), ("innovations", 2 * 463), ("analyses", 2 * 463), ("predictions", 843)]
-    {
+    // The estimate settles with the fourth pass.
+    let tables =
+        [("estimates", 4 * 463 * 4), ("innovations", 4 * 463), ("analyses", 4 * 463), ("predictions", 843)];
+    for (table, rows) in tables {
         let (code, stdout, stderr) = output(starlings().arg("export").arg(&moved).args(["--table", table]));
         assert_eq!(code, 0, "{stderr}");
         assert_eq!(stdout.lines().count(), rows + 1, "{table}");

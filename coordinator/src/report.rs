@@ -8,6 +8,7 @@ pub mod data;
 mod explain;
 mod explained;
 mod files;
+mod hangs_on;
 mod headline;
 mod identify;
 mod layout;

@@ -6,6 +6,7 @@
 
 mod check;
 pub mod checked;
+pub mod constants;
 mod expand;
 pub mod field;
 mod file;
@@ -29,7 +30,7 @@ pub mod warnings;
 
 pub use checked::{EstimatorChoice, EstimatorKind, FleetChoice, Record, Study, ThetaEntry};
 pub use problem::{Problem, StudyError};
-pub use run::{Fit, Progress, RunContext, RunError};
+pub use run::{Fit, Move, Progress, RunContext, RunError};
 pub use store::folder::{FolderError, RunFolder};
 pub use summary::Summary;
 pub use surroundings::Surroundings;

@@ -67,6 +67,8 @@ fn cases() -> Vec<(&'static str, Case)> {
         ("one pass", windkessel("passes = 1", 1, "")),
         ("two passes", windkessel("passes = 2", 1, "")),
         ("three passes, Cholesky root", windkessel("passes = 3\nroot = \"cholesky\"", 1, "")),
+        ("as many passes as it takes", windkessel("", 1, "")),
+        ("as many as it takes, several records, star points", windkessel("points = \"star\"", 2, "")),
         ("star points, resampled", windkessel("points = \"star\"\npasses = 2", 1, "")),
         ("several records", windkessel("passes = 2", 3, "")),
         ("several records, star points", windkessel("points = \"star\"\npasses = 2", 3, "")),

@@ -101,7 +101,7 @@ fn parameters_expand_over_the_trained_records() {
     assert_eq!(study.theta[2].drift, Drift::Forgetting(0.98));
     assert_eq!(study.theta[3].transform, Transform::Logit { lo: 0.0, hi: 1.0 });
     assert_eq!(study.estimator.points, Points::Simplex);
-    assert_eq!((study.estimator.passes, study.fleet.workers, study.seed), (2, 2, 1));
+    assert_eq!((study.estimator.passes, study.fleet.workers, study.seed), (None, 2, 1));
     assert_eq!(study.parameters[0].unit, "mmHg s/mL", "the model's unit where the study gives none");
     assert!(study.warnings.iter().any(|w| w.contains("`Zc` is given in kPa s/mL")), "{:?}", study.warnings);
 }

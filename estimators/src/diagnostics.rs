@@ -84,7 +84,11 @@ pub fn effective_sample_size(series: &[f64]) -> f64 {
 /// Band that holds NIS per observation with probability `level` (in (0, 1)) when the model explains `n_used` values:
 /// central chi-square quantiles over `n_used`. (NaN, NaN) without observations.
 pub fn nis_band(n_used: usize, level: f64) -> (f64, f64) {
-    let n = n_used as f64;
+    effective_nis_band(n_used as f64, level)
+}
+
+/// The same for values that vary together as `n` independent ones do, not necessarily a whole number.
+pub fn effective_nis_band(n: f64, level: f64) -> (f64, f64) {
     ChiSquared::new(n).map_or((f64::NAN, f64::NAN), |chi| {
         let tail = 0.5 * (1.0 - level);
         (chi.inverse_cdf(tail) / n, chi.inverse_cdf(1.0 - tail) / n)

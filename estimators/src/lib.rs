@@ -22,6 +22,7 @@ mod information;
 mod least_squares;
 mod linearisation;
 mod particles;
+mod pooled;
 mod qr;
 mod recombine;
 mod roukf;
@@ -39,7 +40,8 @@ pub use batch::{Batch, BatchState, BatchStep};
 pub use blocks::Block;
 pub use data::{Data, Noise};
 pub use diagnostics::{
-    autocorrelation, correlation, effective_sample_size, nis_band, noise_from_third_differences,
+    autocorrelation, correlation, effective_nis_band, effective_sample_size, nis_band,
+    noise_from_third_differences,
 };
 pub use drift::Drift;
 pub use error::EstimatorError;
@@ -51,6 +53,7 @@ pub use identifiability::{
 pub use least_squares::{End, LeastSquares, Need, Scaled};
 pub use linearisation::Linearisation;
 pub use particles::Particles;
+pub use pooled::Pooled;
 pub use recombine::recombine;
 pub use roukf::{Resampled, Root, Roukf};
 pub use score::{Optimum, Score, null_maxima};

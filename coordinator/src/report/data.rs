@@ -1,9 +1,7 @@
-//! What a report shows: plain data, filled by the reader of the store and by nothing else.
+//! What a report shows: plain data, filled by the reader of the store and by nothing else; how it was computed is absent.
 //!
-//! A report is a function of this struct alone, so a report made again from an old run folder is the same report. Every
-//! number has the unit its row or channel names; times are in [`ReportData::time_unit`] unless the field says seconds.
-//! A number that is not finite is shown as missing, but it does not survive being stored as JSON. Deliberately absent: how
-//! the numbers were computed. Next file to read: `page.rs`.
+//! A report made again from an old run folder is the same report. Every number has the unit that its row or channel names;
+//! times are in [`ReportData::time_unit`] unless the field says seconds. What is not finite is missing. Next: `page.rs`.
 
 use serde::{Deserialize, Serialize};
 
@@ -39,9 +37,11 @@ pub struct ReportData {
     pub families: Vec<Family>,
     /// What the observer does for the state; `None` without one.
     pub observer: Option<ObserverRow>,
+    /// Which constants the estimates hang on.
+    pub hangs_on: Option<crate::study::constants::HangsOn>,
     /// One per parameter: how its estimate moved during the run.
     pub tracks: Vec<Track>,
-    /// What the horizontal axis of the tracks is, with its unit: `time [s]` or `iteration`.
+    /// What the horizontal axis of the tracks is, with its unit.
     pub x_label: String,
     /// One per record and observed output.
     pub channels: Vec<ChannelPlot>,

@@ -8,6 +8,7 @@ mod figures;
 use serde::Serialize;
 
 use super::data::ParameterRow;
+use super::hangs_on::{self, HangsOnView};
 use super::plot::figure::Figure;
 use super::plot::interval;
 use super::{ReportError, layout, number};
@@ -30,6 +31,7 @@ struct Page<'a> {
     collinearity: Option<Figure>,
     subsets: Vec<[String; 2]>,
     subsets_left_out: usize,
+    hangs_on: Option<HangsOnView>,
 }
 
 #[derive(Debug, Serialize)]
@@ -75,6 +77,7 @@ impl<'a> Page<'a> {
             collinearity: figures::collinearity(found)?,
             subsets: subsets.iter().take(SUBSETS).map(subset).collect(),
             subsets_left_out: subsets.len().saturating_sub(SUBSETS),
+            hangs_on: hangs_on::view(Some(&found.hangs_on)),
         })
     }
 }

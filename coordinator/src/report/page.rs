@@ -6,6 +6,7 @@
 use serde::Serialize;
 
 use super::data::{ObserverRow, ParameterRow, ReportData};
+use super::hangs_on::{self, HangsOnView};
 use super::plot::figure::Figure;
 use super::plot::{along, interval, nis, observer as observer_plot, run_times, track};
 use super::{ReportError, headline, number, outputs};
@@ -26,6 +27,7 @@ pub(crate) struct Page<'a> {
     tracks: Vec<Figure>,
     nis: Option<Figure>,
     observer: Option<ObserverView>,
+    hangs_on: Option<HangsOnView>,
     nis_mean: String,
     log_likelihood: String,
     correlation: Vec<Vec<CorrelationCell>>,
@@ -91,6 +93,7 @@ impl<'a> Page<'a> {
             tracks: data.tracks.iter().map(|t| track::figure(t, x_label)).collect::<Result<_, _>>()?,
             nis: nis::figure(&data.nis, x_label)?,
             observer: data.observer.as_ref().map(|row| observer(row, data)).transpose()?,
+            hangs_on: hangs_on::view(data.hangs_on.as_ref()),
             nis_mean: optional(data.nis_per_observation),
             log_likelihood: optional(data.log_likelihood),
             correlation: data

@@ -106,6 +106,8 @@ fn families(parameters: &[ParameterRow], stiffness: &[String]) -> Vec<Family> {
 
 fn finished(data: &mut ReportData, summary: Summary) {
     data.warnings = summary.warnings;
+    data.estimator = summary.estimator;
+    data.hangs_on = summary.hangs_on;
     data.wall_s = summary.wall_s;
     data.correlation = summary.correlation;
     data.nis_per_observation = Some(summary.fit.nis_per_observation);

@@ -4,6 +4,7 @@ mod extremes;
 
 use super::data::{ChannelPlot, Family, ObserverPlot, ObserverRow, ParameterRow, ReportData};
 use super::{overview_svg, render, sample};
+use crate::study::constants::{ConstantEffect, Follows, HangsOn};
 
 /// The order in which a reader meets the sections.
 const SECTIONS: [&str; 11] = [
@@ -183,6 +184,26 @@ fn the_observer_is_told_in_a_sentence_and_a_figure() {
     assert!(page.contains("With the observer dvf at a gain of 20.0"));
     assert!(page.contains("by 1.04 noise sd") && page.contains("by 5.50"));
     assert!(page.contains("Record in-vivo-1: innovations with and without the observer dvf"));
+}
+
+#[test]
+fn a_constant_that_the_answer_hangs_on_is_told_in_a_sentence_and_a_table() {
+    let mut data = sample::run(60);
+    assert!(!render(&data).unwrap().contains("id=\"constants\""));
+    let moves = [("R", -4.21), ("C", 0.52), ("Zc", 0.01)];
+    let moves = moves.map(|(name, sd_per_percent)| Follows { parameter: name.to_owned(), sd_per_percent });
+    let constant = ConstantEffect { constant: "L".to_owned(), value: Some(0.004), moves: moves.into() };
+    data.hangs_on =
+        Some(HangsOn { constants: vec![constant], not_tried: vec!["p_venous".to_owned()], runs: 7 });
+    let page = render(&data).unwrap();
+    assert_well_formed(&page);
+    assert!(page.contains("R moves by 4.2 posterior sd when L is 1 % off."));
+    assert!(page.contains("<td>R</td><td class=\"number\">−4.2</td><td>C 0.5</td>"), "{page}");
+    assert!(
+        page.contains(
+            "Not moved, because they are zero or the model refuses: p_venous. 7 runs of the model."
+        )
+    );
 }
 
 #[test]

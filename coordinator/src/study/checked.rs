@@ -154,8 +154,8 @@ pub struct EstimatorChoice {
     pub points: Points,
     /// Root of the covariance that moves the particles.
     pub root: Root,
-    /// Passes of the filter over the data.
-    pub passes: usize,
+    /// Passes of the filter over the data; `None` for as many as the estimate takes to settle.
+    pub passes: Option<usize>,
     /// Factor on the noise sd in the first of several passes.
     pub anneal: f64,
     /// Width of the sigma points: of the prior sd from the filter's second pass on, of the posterior sd in the batch fit.
@@ -232,23 +232,32 @@ impl Study {
         self.theta.iter().any(|t| !matches!(t.drift, Drift::None))
     }
 
-    /// Passes of the filter; a study with a drifting parameter has two at most.
-    pub fn passes(&self) -> usize {
-        if self.drifts() { self.estimator.passes.min(2) } else { self.estimator.passes }
+    /// Number of passes of the filter where it is fixed; a study with a drifting parameter has two at most.
+    pub fn passes(&self) -> Option<usize> {
+        let given = self.estimator.passes;
+        if self.drifts() { Some(given.map_or(2, |n| n.min(2))) } else { given }
     }
 
     /// The estimator in one line, such as `roukf, simplex points, 2 passes`.
     pub fn describe_estimator(&self) -> String {
+        self.describe_with(self.passes())
+    }
+
+    /// The same with the number of passes that were made.
+    pub fn describe_with(&self, passes: Option<usize>) -> String {
         let points = match self.estimator.points {
             Points::Simplex => "simplex",
             Points::Canonical => "canonical",
             Points::Star => "star",
             Points::JulierUhlmann { .. } => "julier-uhlmann",
         };
-        match (self.estimator.kind, self.passes()) {
+        match (self.estimator.kind, passes) {
             (EstimatorKind::Batch, _) => format!("batch, {points} points"),
-            (EstimatorKind::Roukf, 1) => format!("roukf, {points} points, 1 pass"),
-            (EstimatorKind::Roukf, n) => format!("roukf, {points} points, {n} passes"),
+            (EstimatorKind::Roukf, None) => {
+                format!("roukf, {points} points, passes until the estimate has settled")
+            }
+            (EstimatorKind::Roukf, Some(1)) => format!("roukf, {points} points, 1 pass"),
+            (EstimatorKind::Roukf, Some(n)) => format!("roukf, {points} points, {n} passes"),
         }
     }
 

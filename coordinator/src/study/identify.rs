@@ -21,7 +21,7 @@ use starlings_models::ParticleError;
 
 use super::fit::flight::Flight;
 use super::store::StoreError;
-use super::{FolderError, RunError, Study};
+use super::{FolderError, RunError, Study, constants};
 use crate::fleet::Fleet;
 
 /// Why the sensitivities could not be had.
@@ -91,7 +91,9 @@ pub fn identify(study: &Study, fleet: &mut dyn Fleet, at: &At) -> Result<Identif
     let prior_sd: Vec<f64> = study.theta.iter().map(|t| t.prior_sd).collect();
     let spread = ensemble::spread(study);
     let sensitivities = Sensitivities::new(&response.whitened, &prior_sd, ensemble::accuracy(spread))?;
+    let hangs_on = constants::of_ensemble(&mut flight, &centre, &response, &sensitivities)?;
     let mut result = gather::make(study, at, &centre, response, &sensitivities)?;
+    result.hangs_on = hangs_on;
     result.workers = flight.n_answered();
     result.spread = spread;
     result.warnings = advice::warnings(study, &result);

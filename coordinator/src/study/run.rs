@@ -8,7 +8,9 @@ use std::sync::mpsc::Receiver;
 use starlings_estimators::{EstimatorError, Gaussian};
 use starlings_models::ParticleError;
 
+use super::constants::{self, HangsOn};
 use super::fit::{batch, filter, forecast};
+use super::identify::IdentifyError;
 use super::store::{Store, StoreError};
 use super::summary::Summary;
 use super::{EstimatorKind, Study, observer_gain, summary, warnings};
@@ -113,8 +115,27 @@ pub struct Fit {
     pub passes: usize,
     /// False when the iteration limit came first.
     pub converged: bool,
-    /// How far the last pass moved the estimate, the largest entry in posterior standard deviations; zero for one pass.
-    pub last_move: f64,
+    /// How far the last pass moved the estimate; `None` for one pass, which has nothing to be compared with.
+    pub last_move: Option<Move>,
+}
+
+/// The entry of the estimated vector that a pass moved most.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Move {
+    /// Its position.
+    pub entry: usize,
+    /// How far, in its posterior standard deviations.
+    pub size: f64,
+}
+
+impl Move {
+    /// Below this many posterior standard deviations an estimate counts as settled.
+    pub const SETTLED: f64 = 0.1;
+
+    /// Whether no entry moved further.
+    pub fn is_settled(&self) -> bool {
+        self.size < Self::SETTLED
+    }
 }
 
 impl Fit {
@@ -131,8 +152,8 @@ pub struct Progress {
     pub stage: &'static str,
     /// Pass, from 1.
     pub pass: usize,
-    /// Passes in all.
-    pub passes: usize,
+    /// Passes in all; `None` when they go on until the estimate has settled.
+    pub passes: Option<usize>,
     /// Analyses done in this pass.
     pub step: usize,
     /// Analyses of a pass, at most.
@@ -204,6 +225,7 @@ pub fn run(
     };
     let predictions = forecast::run(&mut flight, &fit.posterior)?;
     let observer = observer_gain::compare(&mut flight, &fit.posterior, &predictions)?;
+    let hangs_on = hangs_on(&mut flight, &fit)?;
     let jobs = flight.take_rows();
     folder.store.predictions(&predictions, &jobs)?;
     context.keep_events(&folder.store)?;
@@ -217,11 +239,29 @@ pub fn run(
         }
         Compared::Failed(why) => unknown = Some(why),
     }
-    result.warnings = warnings::collect(study, &fit, &result, &predictions);
+    let residuals = warnings::residuals::residuals(study, &fit, &folder.store, &predictions)?;
+    result.warnings = warnings::collect(study, &fit, &result, &predictions, &residuals);
     result.warnings.extend(unknown);
     result.warnings.extend(folder.mixed()?);
+    match hangs_on {
+        Ok(found) => result.hangs_on = (found.runs > 0).then_some(found),
+        Err(why) => result.warnings.push(why),
+    }
     result.check_finite().map_err(RunError::NotFinite)?;
     folder.store.event(context.elapsed(), "run", "run finished")?;
     folder.finish(study, &fit, &result)?;
     Ok(result)
+}
+
+/// Which constants the answer hangs on, or why that is not known. Nothing is said of parameters that drift: they follow
+/// whatever is wrong.
+fn hangs_on(flight: &mut Flight<'_>, fit: &Fit) -> Result<Result<HangsOn, String>, RunError> {
+    if flight.study().drifts() {
+        return Ok(Ok(HangsOn::default()));
+    }
+    match constants::of_fit(flight, fit.posterior.mean.as_slice()) {
+        Ok(found) => Ok(Ok(found)),
+        Err(IdentifyError::Run(error)) => Err(error),
+        Err(error) => Ok(Err(format!("which constants the answer hangs on is not known: {error}"))),
+    }
 }

@@ -6,6 +6,7 @@
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
+use super::constants::HangsOn;
 use super::field::field_of;
 use super::observer_gain::ObserverFit;
 use super::posterior::{Estimate, estimates};
@@ -80,6 +81,9 @@ pub struct Summary {
     /// What the observer does for the state; absent without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub observer: Option<ObserverFit>,
+    /// Which constants of the model the estimates hang on; absent where it has none, and for parameters that drift.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hangs_on: Option<HangsOn>,
     /// Runs.
     pub runs: Runs,
     /// Workers that answered at least one run.
@@ -114,12 +118,13 @@ pub fn make(study: &Study, fit: &Fit, predictions: &[PredictionRow], workers: us
     Summary {
         study: study.name.clone(),
         model: study.setup.model.kind.clone(),
-        estimator: study.describe_estimator(),
+        estimator: study.describe_with(Some(fit.passes)),
         seed: study.seed,
         parameters: estimates(study, &fit.posterior),
         correlation: rows_of(&starlings_estimators::correlation(&fit.posterior.covariance)),
         fit: fit_figures(study, fit, predictions),
         observer: None,
+        hangs_on: None,
         runs: Runs {
             total: fit.counts.total,
             failed: fit.counts.failed,

@@ -66,7 +66,7 @@ pub(in crate::study) fn estimator(
         kind,
         points: points(source, section),
         root: choose(source, section.root.as_ref(), "root", &roots).unwrap_or(Root::Symmetric),
-        passes: counted(source, section.passes.as_ref(), "passes", 1000).unwrap_or(2),
+        passes: counted(source, section.passes.as_ref(), "passes", 1000),
         anneal: anneal(source, section.anneal.as_ref()),
         spread: positive(source, section.spread.as_ref(), "spread", default_spread),
         resample: choose(source, section.resample.as_ref(), "resampling", &resample).unwrap_or(true),

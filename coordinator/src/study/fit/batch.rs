@@ -129,6 +129,8 @@ fn begin(batch: &Batch, study: &Study) -> (Known, Snapshot) {
         information_lost: 0.0,
         dropped: 0.0,
         counts: crate::study::store::snapshot::Counts::default(),
+        cost: None,
+        narrow: 1.0,
     };
     (Known { state, posterior: prior }, Snapshot { head, states: vec![None; study.records.len()] })
 }
@@ -194,7 +196,7 @@ fn finish(now: &Snapshot, known: Known) -> Fit {
         counts: now.head.counts,
         passes: 1,
         converged: known.state.converged,
-        last_move: 0.0,
+        last_move: None,
     }
 }
 
@@ -202,7 +204,7 @@ fn progress(now: &Snapshot, batch: &Batch, flight: &Flight<'_>) -> Progress {
     Progress {
         stage: "batch",
         pass: 1,
-        passes: 1,
+        passes: Some(1),
         step: now.head.step,
         steps: batch.max_iterations,
         runs: now.head.counts.total,

@@ -1,6 +1,6 @@
 //! The sequential fit: passes of the reduced-order UKF over the training windows, one ensemble per step.
 //!
-//! What differs from pass to pass is in [`super::schedule`]; the sigma-point arithmetic lives in `starlings-estimators`; model
+//! What differs from pass to pass is in [`super::schedule`], when they end in [`super::settle`]; the sigma-point arithmetic lives in `starlings-estimators`; model
 //! states are only recombined here. Next file to read: [`super::schedule`], then [`super::rescue`].
 
 use starlings_estimators::{Analysis, Data, Particles};
@@ -10,6 +10,7 @@ use super::flight::{Flight, Place, StepWindows, stack_outputs, stack_states};
 use super::resample;
 use super::rescue::{Flown, fly};
 use super::schedule::{Reported, Schedule, particles};
+use super::settle;
 use crate::study::store::snapshot::Snapshot;
 use crate::study::store::{AnalysisRow, InnovationRow, Store};
 use crate::study::{Fit, RunContext, RunError, Study, posterior};
@@ -38,14 +39,17 @@ pub fn fit(
             store.analysis(&row, &now)?;
             context.after_step(store, &schedule.progress(&now, flight))?;
         }
-        if now.head.pass + 1 == schedule.passes {
-            return Ok(schedule.finish(&now, reported));
-        }
-        let head = now.head;
-        now = schedule.start(head.pass + 1, &reported.posterior);
-        now.head.counts = head.counts;
-        now.head.information_lost = head.information_lost;
-        now.head.dropped = head.dropped;
+        let counted = (flight.total, flight.failed, flight.retried);
+        let next = settle::next(flight, &schedule, &now, &reported)?;
+        let counts = &mut now.head.counts;
+        counts.total += flight.total - counted.0;
+        counts.failed += flight.failed - counted.1;
+        counts.retried += flight.retried - counted.2;
+        let Some(mut next) = next else { return Ok(schedule.finish(&now, reported)) };
+        next.head.counts = now.head.counts;
+        next.head.information_lost = now.head.information_lost;
+        next.head.dropped = now.head.dropped;
+        now = next;
         reported = schedule.reported(&now)?;
     }
 }

@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
-use starlings_models::{Job, ParticleError, Prediction, Window};
+use starlings_models::{Job, ParticleError, Prediction, Setup, Window};
 
 use crate::fleet::{Fleet, SetupId};
 use crate::study::store::JobRow;
@@ -116,6 +116,48 @@ impl<'a> Flight<'a> {
                 of_particle.push(sound);
             }
             results.push(of_particle);
+        }
+        Ok(results)
+    }
+
+    /// Runs one particle over the windows with each of the setups, which differ from the study's in the model's numbers only.
+    /// Returns `[setup][window]`.
+    ///
+    /// # Errors
+    /// When the fleet fails as a whole, or refuses a setup.
+    pub fn run_setups(
+        &mut self,
+        place: Place,
+        setups: &[Setup],
+        theta: &DMatrix<f64>,
+        windows: &StepWindows,
+    ) -> Result<Results, RunError> {
+        let values: Vec<f64> = theta.column(0).iter().copied().collect();
+        let mut jobs = Vec::with_capacity(setups.len() * windows.len());
+        for (particle, setup) in setups.iter().enumerate() {
+            let setup = self.fleet.install(setup)?;
+            for (record, window) in windows {
+                let window = self.study.sendable(*record, window);
+                let theta = self.study.theta_for(*record, &values);
+                let job =
+                    Job { particle: particle as u32, record: *record as u32, window, theta, state: None };
+                jobs.push((setup, job));
+            }
+        }
+        self.total += jobs.len() as u64;
+        let mut outcomes = self.fleet.run_mixed(jobs)?.into_iter();
+        let mut results = Vec::with_capacity(setups.len());
+        for particle in 0..setups.len() {
+            let mut of_setup = Vec::with_capacity(windows.len());
+            for ((record, window), outcome) in windows.iter().zip(outcomes.by_ref()) {
+                self.rows.push(self.row(place, *record, particle, &outcome));
+                let mut result = self.sound(outcome.result, *record, 0, theta, window)?;
+                if let Ok(prediction) = &mut result {
+                    self.study.measure(*record, &window.times, &mut prediction.outputs);
+                }
+                of_setup.push(result);
+            }
+            results.push(of_setup);
         }
         Ok(results)
     }

@@ -3,11 +3,12 @@
 //! Pass 1 of several runs with the noise annealed (its sd multiplied), so that early data do not trap the ensemble while the
 //! particles are still far apart; it only chooses where the later passes linearise. These start from tight sigma points
 //! around the previous estimate, and the study's real prior is put back exactly at every report ([`exchange_prior`]): no
-//! datum counts twice.
+//! datum counts twice. Such a pass is a step of Gauss and Newton; where the study does not fix their number, [`super::settle`]
+//! says how far along it the next pass starts, and when the passes end.
 //!
 //! A parameter that drifts has no single value to linearise around, and exchanging priors is not exact for it. A study with
 //! one has two passes at most: the annealed one without drift, and one with drift that starts from the annealed posterior,
-//! in which the data count with 1/anneal² of their weight. Next file to read: [`super::filter`].
+//! in which the data count with 1/anneal² of their weight. Next file to read: [`super::settle`].
 
 use std::sync::Arc;
 
@@ -16,14 +17,18 @@ use starlings_models::Window;
 
 use super::flight::{Flight, StepWindows};
 use crate::study::store::snapshot::{Counts, Head, Snapshot};
-use crate::study::{Fit, Progress, RunError, Study, posterior};
+use crate::study::{Fit, Move, Progress, RunError, Study, ThetaEntry, posterior};
+
+/// Least width of the points in prior sd: closer, rounding inside the model would show.
+const CLOSEST: f64 = 1e-6;
 
 /// Everything about the fit that does not change from step to step.
 pub(super) struct Schedule<'a> {
     pub(super) study: &'a Study,
     still: Roukf,
     drifting: Option<Roukf>,
-    pub(super) passes: usize,
+    /// Number of passes where it is fixed; `None` for as many as it takes.
+    pub(super) passes: Option<usize>,
     pub(super) resample: bool,
     prior: Gaussian,
     /// Training windows by record.
@@ -56,8 +61,12 @@ impl<'a> Schedule<'a> {
 
     /// The filter of one pass: drift belongs to the last.
     pub(super) fn roukf(&self, pass: usize) -> &Roukf {
-        let last = pass + 1 == self.passes;
-        self.drifting.as_ref().filter(|_| last).unwrap_or(&self.still)
+        self.drifting.as_ref().filter(|_| self.is_last(pass)).unwrap_or(&self.still)
+    }
+
+    /// Whether a fixed number of passes ends with this one.
+    pub(super) fn is_last(&self, pass: usize) -> bool {
+        self.passes == Some(pass + 1)
     }
 
     pub(super) fn n_step(&self) -> usize {
@@ -66,22 +75,34 @@ impl<'a> Schedule<'a> {
 
     /// Factor on the noise sd in this pass.
     pub(super) fn anneal(&self, pass: usize) -> f64 {
-        if pass == 0 && self.passes > 1 { self.study.estimator.anneal } else { 1.0 }
+        if pass == 0 && self.passes != Some(1) { self.study.estimator.anneal } else { 1.0 }
     }
 
     /// Standard deviations of the points at the start of a pass, transformed units.
-    fn scale(&self, pass: usize, around: &Gaussian) -> Vec<f64> {
+    ///
+    /// Where the number of passes is open, no point starts further out than one posterior sd: with data that know a parameter
+    /// to less than `spread` of its prior, a wider ensemble would bend on its way to the estimate.
+    fn scale(&self, pass: usize, around: &Gaussian, narrow: f64) -> Vec<f64> {
+        let sd = posterior::standard_deviations(around);
         if pass > 0 && self.drifting.is_some() {
-            return posterior::standard_deviations(around);
+            return sd;
         }
         let spread = if pass == 0 { 1.0 } else { self.study.estimator.spread };
-        self.study.theta.iter().map(|t| spread * t.prior_sd).collect()
+        let closest = |prior: f64, sd: f64| narrow * sd.max(CLOSEST * prior).min(spread * prior);
+        let open = pass > 0 && self.passes.is_none();
+        let scale =
+            |(t, sd): (&ThetaEntry, f64)| if open { closest(t.prior_sd, sd) } else { spread * t.prior_sd };
+        self.study.theta.iter().zip(sd).map(scale).collect()
     }
 
     /// The ensemble at the start of a pass, around the given estimate.
     pub(super) fn start(&self, pass: usize, around: &Gaussian) -> Snapshot {
-        let scale = self.scale(pass, around);
-        let centre: Vec<f64> = around.mean.iter().copied().collect();
+        self.start_at(pass, around, around.mean.iter().copied().collect(), 1.0)
+    }
+
+    /// The ensemble at the start of a pass around `centre`, no wider than `around`; `narrow` draws it together.
+    pub(super) fn start_at(&self, pass: usize, around: &Gaussian, centre: Vec<f64>, narrow: f64) -> Snapshot {
+        let scale = self.scale(pass, around, narrow);
         let particles = self.still.init(&posterior::independent(&centre, &scale));
         Snapshot {
             head: Head {
@@ -97,6 +118,8 @@ impl<'a> Schedule<'a> {
                 information_lost: 0.0,
                 dropped: 0.0,
                 counts: Counts::default(),
+                cost: None,
+                narrow,
             },
             states: vec![None; self.study.records.len()],
         }
@@ -122,12 +145,21 @@ impl<'a> Schedule<'a> {
         })
     }
 
-    pub(super) fn finish(&self, now: &Snapshot, reported: Reported) -> Fit {
+    /// How far the pass moved the estimate from where it started: the entry that moved most, in posterior standard deviations.
+    /// `None` for a first pass, which starts at the prior, and for parameters that drift.
+    pub(super) fn last_move(&self, now: &Snapshot, reported: &Reported) -> Option<Move> {
+        if now.head.pass == 0 || self.drifting.is_some() {
+            return None;
+        }
         let sd = posterior::standard_deviations(&reported.posterior);
-        let moved = reported.posterior.mean.iter().zip(&now.head.centre).map(|(m, c)| (m - c).abs());
-        let one_value = now.head.pass > 0 && self.drifting.is_none();
+        let moved = reported.posterior.mean.iter().zip(&now.head.centre).zip(sd);
+        let moves = moved.enumerate().map(|(entry, ((m, c), sd))| Move { entry, size: (m - c).abs() / sd });
+        moves.max_by(|a, b| a.size.total_cmp(&b.size))
+    }
+
+    pub(super) fn finish(&self, now: &Snapshot, reported: Reported) -> Fit {
         Fit {
-            last_move: if one_value { moved.zip(sd).map(|(m, sd)| m / sd).fold(0.0, f64::max) } else { 0.0 },
+            last_move: self.last_move(now, &reported),
             posterior: reported.posterior,
             log_likelihood: reported.log_likelihood,
             nis: reported.nis,
@@ -135,7 +167,7 @@ impl<'a> Schedule<'a> {
             information_lost: now.head.information_lost,
             dropped: now.head.dropped,
             counts: now.head.counts,
-            passes: self.passes,
+            passes: now.head.pass + 1,
             converged: true,
         }
     }

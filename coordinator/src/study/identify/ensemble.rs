@@ -5,9 +5,9 @@
 
 use std::sync::Arc;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use starlings_estimators::{EstimatorError, Points, SigmaSet, sigma_point_sensitivities};
-use starlings_models::Window;
+use starlings_models::{ParticleError, Prediction, Window};
 
 use super::IdentifyError;
 use crate::study::Study;
@@ -54,28 +54,79 @@ pub fn accuracy(spread: f64) -> f64 {
     spread * spread
 }
 
+/// What a run sees of the recordings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Seen {
+    /// Nothing: it runs freely, whatever the observer.
+    Freely,
+    /// What a run of the fit sees: an observer corrects it.
+    AsFitted,
+}
+
 /// Runs the ensemble around `centre` (transformed units).
 ///
 /// # Errors
 /// When the fleet fails, or the model fails at one of the points.
 pub fn run(flight: &mut Flight<'_>, centre: &[f64]) -> Result<Response, IdentifyError> {
+    run_with(flight, centre, Points::Star, Seen::Freely)
+}
+
+/// The same with other points.
+///
+/// # Errors
+/// When the fleet fails, or the model fails at one of the points.
+pub fn run_with(
+    flight: &mut Flight<'_>,
+    centre: &[f64],
+    points: Points,
+    seen: Seen,
+) -> Result<Response, IdentifyError> {
     let study = flight.study();
-    let set = SigmaSet::new(Points::Star, study.parameters.len())?;
+    let set = SigmaSet::new(points, study.parameters.len())?;
     let reach = set.points.amax();
     let points = Around { study, centre, set, scale: spread(study) / reach };
-    let windows: Vec<(usize, Window)> = (0..study.records.len())
-        .filter(|record| study.records[*record].is_trained())
-        .map(|record| (record, study.whole(record, true)))
-        .collect();
-    let free: StepWindows =
-        windows.iter().map(|(record, window)| (*record, Arc::new(freed(window)))).collect();
+    let observed = windows(study, Seen::AsFitted);
+    let sent = windows(study, seen);
     let everyone: Vec<usize> = (0..points.set.n_particle()).collect();
     let states = vec![None; study.records.len()];
-    let results = flight.run(Place { pass: 1, step: 0 }, &everyone, &points.theta(), &states, &free)?;
-    points.check(&results, &free)?;
-    let (rows, predictions) = points.gather(&windows, &results)?;
+    let results = flight.run(Place { pass: 1, step: 0 }, &everyone, &points.theta(), &states, &sent)?;
+    points.check(&results, &sent)?;
+    let (rows, predictions) = points.gather(&observed, &results)?;
     let whitened = points.whitened(&rows, &predictions)?;
-    Ok(Response { rows, whitened, runs: (everyone.len() * free.len()) as u64 })
+    Ok(Response { rows, whitened, runs: (everyone.len() * sent.len()) as u64 })
+}
+
+/// Every trained record from its start.
+pub fn windows(study: &Study, seen: Seen) -> StepWindows {
+    let trained = (0..study.records.len()).filter(|record| study.records[*record].is_trained());
+    let window = |record: usize| {
+        let window = study.whole(record, true);
+        if seen == Seen::Freely { freed(&window) } else { window }
+    };
+    trained.map(|record| (record, Arc::new(window(record)))).collect()
+}
+
+/// What one run of every window predicts of the given rows; `None` when a run failed or a value is not finite.
+pub fn outputs(
+    study: &Study,
+    windows: &StepWindows,
+    results: &[Result<Prediction, ParticleError>],
+    rows: &[Row],
+) -> Option<DVector<f64>> {
+    let n_out = study.setup.outputs.len();
+    let mut values = Vec::with_capacity(rows.len());
+    let mut step = 0;
+    for ((_, window), result) in windows.iter().zip(results) {
+        let prediction = result.as_ref().ok()?;
+        let later = rows[values.len()..].iter();
+        let of_window = later.take_while(|row| row.step < step + window.times.len());
+        let found: Vec<f64> =
+            of_window.map(|row| prediction.outputs[(row.step - step) * n_out + row.output]).collect();
+        values.extend(found);
+        step += window.times.len();
+    }
+    let finite = values.len() == rows.len() && values.iter().all(|v| v.is_finite());
+    finite.then(|| DVector::from_vec(values))
 }
 
 /// The same window without an observed value: nothing can pull the run.
@@ -135,7 +186,7 @@ impl Around<'_> {
     /// The observed values and their predictions, m x r.
     fn gather(
         &self,
-        windows: &[(usize, Window)],
+        windows: &StepWindows,
         results: &Results,
     ) -> Result<(Vec<Row>, DMatrix<f64>), IdentifyError> {
         let n_out = self.study.setup.outputs.len();

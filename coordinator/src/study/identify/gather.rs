@@ -13,6 +13,7 @@ use super::result::{
 use super::series::Series;
 use super::words::{combination, members};
 use super::{At, IdentifyError};
+use crate::study::constants::HangsOn;
 use crate::study::posterior::{Estimate, estimates, independent, standard_deviations};
 use crate::study::{Study, ThetaEntry};
 
@@ -52,6 +53,7 @@ pub(super) fn make(
         sensitivity: curves(magnitudes(study, &response, n_step)),
         records: record_steps(study, &response.rows),
         silent: named(&sensitivities.silent()),
+        hangs_on: HangsOn::default(),
         n_obs: response.rows.len(),
         runs: response.runs,
         workers: 0,

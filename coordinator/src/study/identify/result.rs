@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::ensemble::Row;
 use super::series::Series;
+use crate::study::constants::HangsOn;
 
 /// One parameter.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -123,6 +124,8 @@ pub struct Identification {
     pub records: Vec<RecordSteps>,
     /// Names of the parameters that change no observed prediction.
     pub silent: Vec<String>,
+    /// Which constants of the model an estimate would hang on.
+    pub hangs_on: HangsOn,
     /// Observed values.
     pub n_obs: usize,
     /// Runs of the model.

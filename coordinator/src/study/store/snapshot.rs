@@ -73,6 +73,16 @@ pub struct Head {
     pub dropped: f64,
     /// Runs so far.
     pub counts: Counts,
+    /// Cost of a run at `centre`, where it is known: squared misfit plus squared distance from the prior.
+    #[serde(default)]
+    pub cost: Option<f64>,
+    /// Factor on the width of the points of this pass.
+    #[serde(default = "whole")]
+    pub narrow: f64,
+}
+
+fn whole() -> f64 {
+    1.0
 }
 
 /// Head and states.
