@@ -18,6 +18,11 @@ battery:
 coverage:
     cargo test --release -p starlings-coordinator --test coverage -- --ignored --nocapture --test-threads 1
 
+# How often the two intervals hold the truth: the table of docs/intervals.md, about a quarter of an hour. INTERVALS_TWINS: twins of a row.
+intervals:
+    cargo test --release -p starlings-coordinator --test intervals -- --ignored --nocapture --test-threads 1
+    cargo test --release -p starlings-estimators --lib alternatives -- --ignored --nocapture
+
 # Every system, effect and noise level of docs/battery.md: about an hour. BATTERY_SYSTEMS, BATTERY_KINDS, BATTERY_NOISE, BATTERY_SEEDS, BATTERY_THREADS choose.
 explain-battery:
     cargo test --release -p starlings-coordinator --test explain_battery -- --ignored --nocapture the_whole

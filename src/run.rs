@@ -82,6 +82,32 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     print(&summary, &folder.path, args.json)
 }
 
+/// The estimates with their intervals: both, that given the residuals first, where they differ much, else that at the stated noise.
+fn estimates(summary: &Summary) -> Vec<Vec<String>> {
+    let both = summary.residuals_first();
+    let intervals: &[&str] =
+        if both { &["95 % given the residuals", "95 % at the stated noise"] } else { &["95 % interval"] };
+    let head = ["parameter", "unit", "estimate"].iter().chain(intervals).chain(&["prior median"]);
+    let mut rows = vec![head.map(|title| (*title).to_owned()).collect::<Vec<_>>()];
+    let text = |[lo, hi]: [f64; 2], sd| format!("{} … {}", number(lo, Some(sd)), number(hi, Some(sd)));
+    for p in &summary.parameters {
+        let given = p.interval95_given_residuals.zip(p.sd_given_residuals).filter(|_| both);
+        let sd = given.map_or(p.sd, |(_, sd)| sd);
+        let mut row = vec![p.name.clone(), p.unit.clone(), number(p.estimate, Some(sd))];
+        row.extend(given.map(|(ends, sd)| text(ends, sd)));
+        row.push(text(p.interval95, p.sd));
+        row.push(number(p.prior_median, None));
+        rows.push(row);
+    }
+    rows
+}
+
+/// What the residuals say of intervals that stand alone in the table.
+fn alike(summary: &Summary) -> Option<String> {
+    let wider = summary.wider_given_residuals().filter(|_| !summary.residuals_first())?;
+    Some(format!("given the residuals the intervals are at most {wider:.2} times as wide"))
+}
+
 fn print(summary: &Summary, folder: &Path, json: bool) -> Result<(), Failure> {
     if json {
         return line(serde_json::to_string_pretty(summary).map_err(Failure::run)?);
@@ -89,19 +115,10 @@ fn print(summary: &Summary, folder: &Path, json: bool) -> Result<(), Failure> {
     for warning in &summary.warnings {
         line(format_args!("warning: {warning}"))?;
     }
-    let mut rows =
-        vec![["parameter", "unit", "estimate", "95 % interval", "prior median"].map(str::to_owned).to_vec()];
-    for p in &summary.parameters {
-        let [lo, hi] = p.interval95.map(|v| number(v, Some(p.sd)));
-        rows.push(vec![
-            p.name.clone(),
-            p.unit.clone(),
-            number(p.estimate, Some(p.sd)),
-            format!("{lo} … {hi}"),
-            number(p.prior_median, None),
-        ]);
+    line(format_args!("\n{}", table(&estimates(summary), false)))?;
+    if let Some(alike) = alike(summary) {
+        line(alike)?;
     }
-    line(format_args!("\n{}", table(&rows, false)))?;
     let shown = |rmse: Option<f64>| rmse.map_or_else(|| "–".to_owned(), |v| number(v, None));
     for c in &summary.fit.channels {
         line(format_args!(

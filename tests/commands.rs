@@ -53,6 +53,37 @@ fn models_lists_every_kind_and_offers_the_nearest() {
 }
 
 #[test]
+fn the_interval_given_the_residuals_comes_first_where_it_is_much_wider_and_in_a_line_where_it_is_not() {
+    let dir = tempfile::tempdir().unwrap();
+    let told = |study: &str, name: &str| {
+        let out = dir.path().join(name);
+        let mut command = starlings();
+        command.arg("run").arg(repository(study)).arg("--out").arg(&out).args(["--workers", "1"]);
+        let (code, stdout, stderr) = output(&mut command);
+        assert_eq!(code, 0, "{stderr}");
+        let page = String::from_utf8(bytes(&out, "report.html")).unwrap();
+        (stdout, page, json(&String::from_utf8(bytes(&out, "summary.json")).unwrap()))
+    };
+    // 463 samples of a living animal whose residuals carry the information of a few.
+    let (stdout, page, summary) = told(STUDY, "pig");
+    let at = |text: &str, title: &str| text.find(title).unwrap_or_else(|| panic!("{title}: {stdout}"));
+    assert!(at(&stdout, "95 % given the residuals") < at(&stdout, "95 % at the stated noise"));
+    assert!(at(&page, "95\u{a0}% given the residuals") < at(&page, "95\u{a0}% at the stated noise"));
+    let resistance = &summary["parameters"][0];
+    let [stated, given] = ["sd", "sd_given_residuals"].map(|key| resistance[key].as_f64().unwrap());
+    assert!(given > 3.0 * stated, "{resistance}");
+    let [lo, hi] = [0, 1].map(|end| resistance["interval95_given_residuals"][end].as_f64().unwrap());
+    assert!(
+        lo < resistance["interval95"][0].as_f64().unwrap() && hi > resistance["estimate"].as_f64().unwrap()
+    );
+    // A known model with white noise of the stated size.
+    let (stdout, page, _) = told("examples/rcr/study.toml", "rcr");
+    assert!(stdout.contains("95 % interval ") && !stdout.contains("95 % given the residuals"), "{stdout}");
+    assert!(stdout.contains("given the residuals the intervals are at most 1."), "{stdout}");
+    assert!(at(&page, "95\u{a0}% given the residuals") > at(&page, "95\u{a0}% at the stated noise"));
+}
+
+#[test]
 fn report_and_export_read_only_the_run_folder() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("run");

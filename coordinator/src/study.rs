@@ -11,6 +11,7 @@ mod expand;
 pub mod field;
 mod file;
 pub mod fit;
+pub mod given_residuals;
 pub mod identify;
 pub mod observer_gain;
 mod plan;

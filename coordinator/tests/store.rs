@@ -21,9 +21,9 @@ fn line(estimator: &str) -> Case {
 #[test]
 fn every_job_analysis_and_estimate_has_its_row() {
     let done = line("passes = 2").run();
-    // Four particles; twelve windows, twice; then the final run.
+    // Four particles; twelve windows, twice; then the final run, and four at and beside the estimate for the second interval.
     let jobs = done.table("jobs", "pass, step, particle, attempts, status, cost_s");
-    assert_eq!(jobs.len(), 2 * 12 * 4 + 1);
+    assert_eq!(jobs.len(), 2 * 12 * 4 + 1 + 4);
     assert_eq!(done.summary.runs.total as usize, jobs.iter().filter(|row| row[0] != "0").count());
     assert!(jobs.iter().all(|row| row[3] == "1" && row[4] == "done" && row[5].parse::<f64>().is_ok()));
     for pass in 0..2 {
@@ -59,7 +59,7 @@ fn the_batch_fit_has_a_row_per_ensemble() {
     assert!(n >= 2);
     // The centre and four points.
     assert_eq!(done.summary.runs.total as usize, 5 * n);
-    assert_eq!(done.table("jobs", "pass").len(), 5 * n + 1);
+    assert_eq!(done.table("jobs", "pass").len(), 5 * n + 1 + 4);
     assert_eq!(done.table("estimates", "step").len(), 3 * n);
 }
 

@@ -3,7 +3,11 @@
 //! A report made again from an old run folder is the same report. Every number has the unit that its row or channel names;
 //! times are in [`ReportData::time_unit`] unless the field says seconds. What is not finite is missing. Next: `page.rs`.
 
+mod parameter;
+
 use serde::{Deserialize, Serialize};
+
+pub use parameter::ParameterRow;
 
 /// Everything one report shows.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -31,6 +35,8 @@ pub struct ReportData {
     pub warnings: Vec<String>,
     /// One row per estimated parameter, in the order of the study.
     pub parameters: Vec<ParameterRow>,
+    /// The intervals given the residuals come first, because they are much wider than those at the stated noise.
+    pub residuals_first: bool,
     /// Posterior correlation of the parameters, n_param rows of n_param values, in the order of `parameters`.
     pub correlation: Vec<Vec<f64>>,
     /// Families of numbered parameters of one unit, such as E1 to E5, in the order of their numbers.
@@ -61,30 +67,6 @@ pub struct ReportData {
     pub command: String,
     /// Version of the program that made the run.
     pub version: String,
-}
-
-/// One estimated parameter. `lo` and `hi` bound 95 % in the parameter's own scale.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct ParameterRow {
-    /// Name in the study.
-    pub name: String,
-    /// Unit; empty for a pure number.
-    pub unit: String,
-    /// Posterior estimate.
-    pub estimate: f64,
-    /// Posterior standard deviation.
-    pub sd: f64,
-    /// Lower end of the posterior 95 % interval.
-    pub lo: f64,
-    /// Upper end of the posterior 95 % interval.
-    pub hi: f64,
-    /// Prior median.
-    pub prior_median: f64,
-    /// Lower end of the prior 95 % interval.
-    pub prior_lo: f64,
-    /// Upper end of the prior 95 % interval.
-    pub prior_hi: f64,
 }
 
 /// Parameters that differ by a number alone.

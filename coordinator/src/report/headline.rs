@@ -18,7 +18,8 @@ pub(crate) fn of(data: &ReportData) -> String {
     if data.parameters.len() > LISTED {
         listed.push(format!("and {} more", data.parameters.len() - LISTED));
     }
-    format!("{} (95\u{a0}% intervals){}.", listed.join(", "), held_out(data))
+    let given = if data.residuals_first { " given the residuals" } else { "" };
+    format!("{} (95\u{a0}% intervals{given}){}.", listed.join(", "), held_out(data))
 }
 
 fn estimate(row: &ParameterRow) -> String {

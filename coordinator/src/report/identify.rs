@@ -100,6 +100,7 @@ fn parameter(p: &ParameterInfo) -> Result<ParameterView, ReportError> {
         sd: p.expected_sd_physical,
         lo: p.expected_interval95[0],
         hi: p.expected_interval95[1],
+        other: None,
         prior_median: p.prior_median,
         prior_lo: p.prior_interval95[0],
         prior_hi: p.prior_interval95[1],

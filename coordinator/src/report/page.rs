@@ -14,11 +14,17 @@ use super::{ReportError, headline, number, outputs};
 /// At most this many events of the fleet are listed.
 const EVENTS: usize = 60;
 
+/// What the intervals are called.
+const STATED: &str = "95\u{a0}% at the stated noise";
+const GIVEN: &str = "95\u{a0}% given the residuals";
+
 /// The page, ready to be arranged.
 #[derive(Debug, Serialize)]
 pub(crate) struct Page<'a> {
     data: &'a ReportData,
     headline: String,
+    /// What the two intervals of every parameter are called, in their order.
+    intervals: [&'static str; 2],
     facts: Vec<(&'static str, String)>,
     parameters: Vec<ParameterView>,
     families: Vec<Figure>,
@@ -41,6 +47,7 @@ struct ParameterView {
     estimate: String,
     sd: String,
     interval: String,
+    other: String,
     prior_median: String,
     strip: String,
 }
@@ -85,6 +92,7 @@ impl<'a> Page<'a> {
         Ok(Self {
             data,
             headline: headline::of(data),
+            intervals: if data.residuals_first { [GIVEN, STATED] } else { [STATED, GIVEN] },
             facts: facts(data),
             parameters: data.parameters.iter().map(|row| parameter(row, data)).collect::<Result<_, _>>()?,
             families: data.families.iter().map(|f| along::figure(f, data)).collect::<Result<_, _>>()?,
@@ -141,6 +149,14 @@ fn parameter(row: &ParameterRow, data: &ReportData) -> Result<ParameterView, Rep
         estimate: digits(row.estimate),
         sd: number::significant(row.sd, 2),
         interval: format!("{} to {}", digits(row.lo), digits(row.hi)),
+        other: row.other.map_or_else(
+            || number::ABSENT.to_owned(),
+            |[lo, hi]| {
+                // Its own length tells how many digits it deserves; an interval of 95 % is about four sd long.
+                let of_other = |value| number::with_sd(value, 0.25 * (hi - lo));
+                format!("{} to {}", of_other(lo), of_other(hi))
+            },
+        ),
         prior_median: number::significant(row.prior_median, 3),
         strip: interval::strip(row, data.log_axis(&row.name))?,
     })

@@ -16,6 +16,7 @@ use super::data::{
     ReportData, Track,
 };
 use crate::study::observer_gain::ObserverCourse;
+use crate::study::posterior::Estimate;
 use crate::study::store::folder::{OBSERVER, StudyInfo};
 use crate::study::store::{Store, StoreError};
 use crate::study::summary::Summary;
@@ -105,6 +106,7 @@ fn families(parameters: &[ParameterRow], stiffness: &[String]) -> Vec<Family> {
 }
 
 fn finished(data: &mut ReportData, summary: Summary) {
+    data.residuals_first = summary.residuals_first();
     data.warnings = summary.warnings;
     data.estimator = summary.estimator;
     data.hangs_on = summary.hangs_on;
@@ -113,21 +115,27 @@ fn finished(data: &mut ReportData, summary: Summary) {
     data.nis_per_observation = Some(summary.fit.nis_per_observation);
     data.log_likelihood = Some(summary.fit.log_likelihood);
     data.conditional_on = summary.conditional_on;
-    data.parameters = summary
-        .parameters
-        .into_iter()
-        .map(|p| ParameterRow {
-            name: p.name,
-            unit: p.unit,
-            estimate: p.estimate,
-            sd: p.sd,
-            lo: p.interval95[0],
-            hi: p.interval95[1],
-            prior_median: p.prior_median,
-            prior_lo: p.prior_interval95[0],
-            prior_hi: p.prior_interval95[1],
-        })
-        .collect();
+    data.parameters = summary.parameters.into_iter().map(|p| parameter(p, data.residuals_first)).collect();
+}
+
+fn parameter(p: Estimate, residuals_first: bool) -> ParameterRow {
+    let given = p.interval95_given_residuals.zip(p.sd_given_residuals);
+    let ([lo, hi], sd, other) = match given {
+        Some((ends, sd)) if residuals_first => (ends, sd, Some(p.interval95)),
+        _ => (p.interval95, p.sd, p.interval95_given_residuals),
+    };
+    ParameterRow {
+        name: p.name,
+        unit: p.unit,
+        estimate: p.estimate,
+        sd,
+        lo,
+        hi,
+        other,
+        prior_median: p.prior_median,
+        prior_lo: p.prior_interval95[0],
+        prior_hi: p.prior_interval95[1],
+    }
 }
 
 /// (name, pass, time, estimate, lo, hi) in the order of the run.

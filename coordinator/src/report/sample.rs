@@ -54,6 +54,7 @@ fn row(name: &str, unit: &str, posterior: [f64; 4], prior: [f64; 3]) -> Paramete
         sd,
         lo,
         hi,
+        other: Some([lo - 1.5 * sd, hi + 1.5 * sd]),
         prior_median,
         prior_lo,
         prior_hi,

@@ -23,8 +23,16 @@ pub struct Estimate {
     pub estimate: f64,
     /// Standard deviation, to first order.
     pub sd: f64,
-    /// Central 95 % interval.
+    /// Central 95 % interval at the stated noise.
     pub interval95: [f64; 2],
+    /// Half-width of the interval given the residuals over 1.96, to first order as `sd` is; `None` when the residuals say
+    /// nothing of it.
+    #[serde(default)]
+    pub sd_given_residuals: Option<f64>,
+    /// 95 % interval given the residuals: whatever noise was stated, for errors as large and as correlated as those that the
+    /// fit leaves. Never narrower than the other.
+    #[serde(default)]
+    pub interval95_given_residuals: Option<[f64; 2]>,
     /// Prior median.
     pub prior_median: f64,
     /// Prior central 95 % interval.
@@ -60,11 +68,24 @@ pub fn estimates(study: &Study, posterior: &Gaussian) -> Vec<Estimate> {
                 estimate: entry.transform.to_physical(mean),
                 sd: entry.transform.derivative(mean).abs() * sd[j],
                 interval95: interval(&entry.transform, mean, Z95 * sd[j]),
+                sd_given_residuals: None,
+                interval95_given_residuals: None,
                 prior_median: entry.transform.to_physical(entry.prior_mean),
                 prior_interval95: interval(&entry.transform, entry.prior_mean, Z95 * entry.prior_sd),
             }
         })
         .collect()
+}
+
+/// Adds the intervals given the residuals, which are so many times wider in transformed units.
+pub(super) fn widen(study: &Study, posterior: &Gaussian, estimates: &mut [Estimate], factors: &[f64]) {
+    let sd = standard_deviations(posterior);
+    for (j, (estimate, factor)) in estimates.iter_mut().zip(factors).enumerate() {
+        let transform = &study.theta[j].transform;
+        estimate.sd_given_residuals = Some(estimate.sd * factor);
+        estimate.interval95_given_residuals =
+            Some(interval(transform, posterior.mean[j], Z95 * sd[j] * factor));
+    }
 }
 
 /// Rows for the store: median and the band of two standard deviations.

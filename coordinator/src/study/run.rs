@@ -10,6 +10,7 @@ use starlings_models::ParticleError;
 
 use super::constants::{self, HangsOn};
 use super::fit::{batch, filter, forecast};
+use super::given_residuals::{self, GivenResiduals};
 use super::identify::IdentifyError;
 use super::store::{Store, StoreError};
 use super::summary::Summary;
@@ -226,10 +227,16 @@ pub fn run(
     let predictions = forecast::run(&mut flight, &fit.posterior)?;
     let observer = observer_gain::compare(&mut flight, &fit.posterior, &predictions)?;
     let hangs_on = hangs_on(&mut flight, &fit)?;
+    let given_residuals = match &observer {
+        // What fails at the estimate itself need not be tried beside it.
+        Compared::Failed(_) => GivenResiduals::Unknown("the model fails under its observer".to_owned()),
+        Compared::NoObserver | Compared::Both(_) => given_residuals::compare(&mut flight, &fit.posterior)?,
+    };
     let jobs = flight.take_rows();
     folder.store.predictions(&predictions, &jobs)?;
     context.keep_events(&folder.store)?;
     let mut result = summary::make(study, &fit, &predictions, flight.n_answered(), context.elapsed());
+    result.add_residuals(study, &fit, &given_residuals);
     let mut unknown = None;
     match observer {
         Compared::NoObserver => {}

@@ -3,15 +3,24 @@
 //! Everything is computed from the posterior and the stored forward run; nothing is re-estimated here. Next file to read:
 //! [`super::warnings`].
 
+use std::fmt::Write as _;
+
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use super::constants::HangsOn;
 use super::field::field_of;
+use super::given_residuals::GivenResiduals;
 use super::observer_gain::ObserverFit;
-use super::posterior::{Estimate, estimates};
+use super::posterior::{self, Estimate, estimates};
 use super::store::PredictionRow;
 use super::{Fit, Study};
+
+/// Ratio of the two intervals above which the one given the residuals comes first.
+const FIRST: f64 = 1.5;
+/// What the intervals given the residuals ask for.
+const RESIDUALS: &str = " The intervals given the residuals ask nothing of the noise's size and correlation, which they take from \
+    the residuals; they ask that what the model lacks does not repeat with its inputs.";
 
 /// How well the estimate reproduces one output.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -97,6 +106,31 @@ pub struct Summary {
 }
 
 impl Summary {
+    /// Adds the intervals given the residuals, or why there are none.
+    pub(super) fn add_residuals(&mut self, study: &Study, fit: &Fit, given: &GivenResiduals) {
+        match given {
+            GivenResiduals::Wider(factors) => {
+                posterior::widen(study, &fit.posterior, &mut self.parameters, factors);
+                self.conditional_on.push_str(RESIDUALS);
+            }
+            GivenResiduals::Unknown(why) => {
+                let _ = write!(self.conditional_on, " Intervals given the residuals are not stated: {why}.");
+            }
+        }
+    }
+
+    /// Whether the interval of a parameter given the residuals is more than 1.5 times that at the stated noise: then it is the
+    /// one to look at first.
+    pub fn residuals_first(&self) -> bool {
+        self.wider_given_residuals().is_some_and(|wider| wider > FIRST)
+    }
+
+    /// How many times wider the intervals given the residuals are, at the most; `None` when there are none.
+    pub fn wider_given_residuals(&self) -> Option<f64> {
+        let wider = self.parameters.iter().filter_map(|p| Some(p.sd_given_residuals? / p.sd));
+        wider.filter(|wider| wider.is_finite()).reduce(f64::max)
+    }
+
     /// Names the first figure that is no finite number: such a summary could be written but not read again.
     ///
     /// # Errors
@@ -104,7 +138,9 @@ impl Summary {
     pub fn check_finite(&self) -> Result<(), String> {
         let of_parameters = self.parameters.iter().flat_map(|p| {
             let values = [p.estimate, p.sd, p.interval95[0], p.interval95[1], p.prior_median];
-            values.map(|v| (format!("estimate of {}", p.name), v))
+            let given = p.interval95_given_residuals.into_iter().flatten().chain(p.sd_given_residuals);
+            let all = values.into_iter().chain(given);
+            all.map(|v| (format!("estimate of {}", p.name), v)).collect::<Vec<_>>()
         });
         let of_correlation = self.correlation.iter().flatten().map(|v| ("correlation".to_owned(), *v));
         let of_fit = [("log-likelihood", self.fit.log_likelihood), ("NIS", self.fit.nis_per_observation)];
