@@ -86,8 +86,8 @@ impl HangsOn {
 pub fn of_fit(flight: &mut Flight<'_>, centre: &[f64]) -> Result<HangsOn, IdentifyError> {
     let study = flight.study();
     let moved = moved::all(study);
-    if moved.is_empty() {
-        return Ok(HangsOn::default());
+    if let Some(nothing) = none_of(&moved) {
+        return Ok(nothing);
     }
     // One point more than parameters: to first order the same as pairs, at half the price.
     let response = ensemble::run_with(flight, centre, Points::Simplex, Seen::AsFitted)?;
@@ -106,12 +106,18 @@ pub fn of_ensemble(
     sensitivities: &Sensitivities,
 ) -> Result<HangsOn, IdentifyError> {
     let moved = moved::all(flight.study());
-    if moved.is_empty() {
-        return Ok(HangsOn::default());
+    if let Some(nothing) = none_of(&moved) {
+        return Ok(nothing);
     }
     let mut found = around(flight, centre, response, sensitivities, &moved, Seen::Freely)?;
     found.runs -= response.runs;
     Ok(found)
+}
+
+/// What is found without a run, where no constant can be moved.
+fn none_of(moved: &[Moved]) -> Option<HangsOn> {
+    let not_tried = moved.iter().map(|m| m.name.clone()).collect();
+    moved.iter().all(|m| m.setup.is_none()).then(|| HangsOn { not_tried, ..HangsOn::default() })
 }
 
 fn prior_sd(study: &Study) -> Vec<f64> {

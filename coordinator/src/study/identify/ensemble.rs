@@ -89,7 +89,7 @@ pub fn run_with(
     let sent = windows(study, seen);
     let everyone: Vec<usize> = (0..points.set.n_particle()).collect();
     let states = vec![None; study.records.len()];
-    let results = flight.run(Place { pass: 1, step: 0 }, &everyone, &points.theta(), &states, &sent)?;
+    let results = flight.run(Place { pass: 0, step: 2 }, &everyone, &points.theta(), &states, &sent)?;
     points.check(&results, &sent)?;
     let (rows, predictions) = points.gather(&observed, &results)?;
     let whitened = points.whitened(&rows, &predictions)?;
