@@ -6,7 +6,7 @@ use clap::Parser;
 use serde_json::json;
 use starlings_coordinator::study::field::{field_of, observed_fields};
 use starlings_coordinator::study::fit::settle;
-use starlings_coordinator::study::trial::{TrialChannel, trial};
+use starlings_coordinator::study::trial::{Depth, TrialChannel, dry_run};
 use starlings_coordinator::study::{EstimatorKind, Study, posterior};
 use starlings_estimators::SigmaSet;
 
@@ -21,13 +21,14 @@ pub(crate) struct Args {
     study: PathBuf,
     /// Print what was found as JSON.
     #[arg(long)]
-    json: bool,
+    pub(crate) json: bool,
 }
 
 /// Checks the study.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    let study = load(&args.study)?;
-    let channels = trial(&study).map_err(Failure::input)?;
+    let mut study = load(&args.study)?;
+    let kind = study.estimator.kind;
+    let channels = dry_run(&mut study, kind, Depth::All).map_err(Failure::input)?;
     let n_particle = n_particle(&study)?;
     if args.json {
         line(format_args!("{:#}", as_json(&study, &channels, n_particle)))

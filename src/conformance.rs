@@ -36,7 +36,7 @@ pub(crate) struct Args {
     ranks: usize,
     /// Print what was found as JSON.
     #[arg(long)]
-    json: bool,
+    pub(crate) json: bool,
 }
 
 /// Times of a trial.
@@ -66,7 +66,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     }
     match found.failed.len() {
         0 => Ok(()),
-        n => Err(Failure::run(format!("{n} of {} checks do not hold", n + found.passed.len()))),
+        n => Err(Failure::Answered(format!("{n} of {} checks do not hold", n + found.passed.len()))),
     }
 }
 

@@ -20,7 +20,7 @@ pub(crate) struct Args {
     study: Option<PathBuf>,
     /// Print the list as JSON.
     #[arg(long)]
-    json: bool,
+    pub(crate) json: bool,
 }
 
 /// An effect and where it comes from: a family of the library, or the study.

@@ -61,7 +61,7 @@ pub(crate) struct Args {
     nulls: usize,
     /// Print the explanation as JSON on standard output and nothing else.
     #[arg(long)]
-    json: bool,
+    pub(crate) json: bool,
 }
 
 impl Args {

@@ -4,6 +4,7 @@ use std::fmt::Display;
 use std::process::ExitCode;
 
 use miette::{Diagnostic, LabeledSpan, NamedSource, Report, Severity, SourceCode};
+use serde_json::{Value, json};
 use starlings_coordinator::study::{Problem, StudyError};
 
 use crate::console::note;
@@ -23,6 +24,8 @@ pub(crate) enum Failure {
         /// 128 and the number of the signal.
         code: u8,
     },
+    /// The answer itself is that something does not hold, and was printed: exit code 1.
+    Answered(String),
     /// Whoever read standard output has seen enough, as `head` does: nothing is wrong, exit code 0.
     Unread,
 }
@@ -43,7 +46,7 @@ impl Failure {
         match self {
             Self::Input(message) => Self::Input(message + end),
             Self::Run(message) => Self::Run(message + end),
-            Self::Study(_) | Self::Interrupted { .. } | Self::Unread => self,
+            Self::Study(_) | Self::Answered(_) | Self::Interrupted { .. } | Self::Unread => self,
         }
     }
 
@@ -51,9 +54,29 @@ impl Failure {
     pub(crate) fn code(&self) -> ExitCode {
         match self {
             Self::Input(_) | Self::Study(_) => ExitCode::from(2),
-            Self::Run(_) => ExitCode::from(1),
+            Self::Run(_) | Self::Answered(_) => ExitCode::from(1),
             Self::Interrupted { code, .. } => ExitCode::from(*code),
             Self::Unread => ExitCode::SUCCESS,
+        }
+    }
+
+    /// The same for programs: `{ "error": ... }` with the message, and every problem of a study with its place. Nothing where
+    /// standard output holds an answer already.
+    pub(crate) fn as_json(&self) -> Option<Value> {
+        match self {
+            Self::Unread | Self::Answered(_) => None,
+            Self::Input(message) | Self::Run(message) | Self::Interrupted { message, .. } => {
+                Some(json!({ "error": message }))
+            }
+            Self::Study(error) => {
+                let problems = error.problems.iter().map(|problem| {
+                    let (line, column) = problem.line_column().unzip();
+                    json!({
+                        "file": problem.file, "line": line, "column": column, "message": problem.message, "help": problem.help,
+                    })
+                });
+                Some(json!({ "error": error.to_string(), "problems": problems.collect::<Vec<_>>() }))
+            }
         }
     }
 
@@ -61,8 +84,11 @@ impl Failure {
     pub(crate) fn print(&self) {
         match self {
             Self::Unread => {}
-            Self::Input(message) | Self::Run(message) | Self::Interrupted { message, .. } => {
-                note(format_args!("error: {message}"))
+            Self::Input(message)
+            | Self::Run(message)
+            | Self::Answered(message)
+            | Self::Interrupted { message, .. } => {
+                note(format_args!("error: {message}"));
             }
             Self::Study(error) => {
                 for problem in &error.problems {

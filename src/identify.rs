@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use clap::Parser;
 use starlings_coordinator::report::identify_page;
-use starlings_coordinator::study::Study;
 use starlings_coordinator::study::identify::{At, Identification, IdentifyError, identify};
-use starlings_coordinator::study::trial::trial;
+use starlings_coordinator::study::trial::{Depth, dry_run};
+use starlings_coordinator::study::{EstimatorKind, Study};
 
 use crate::console::{line, note, number, table, text};
 use crate::crew::{Crew, FleetArgs};
@@ -42,18 +42,18 @@ pub(crate) struct Args {
     csv: Option<PathBuf>,
     /// Print the result as JSON on standard output and nothing else.
     #[arg(long)]
-    json: bool,
+    pub(crate) json: bool,
 }
 
 /// Runs the ensemble and prints what it says.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    let study = load(&args.study)?;
+    let mut study = load(&args.study)?;
     let plan = args.fleet.plan(&study)?;
     let outputs = [("--html", &args.html), ("--csv", &args.csv)];
     csv_file::check_outputs(&outputs, &study.text, &Place::Known(&study.file))?;
     let at = At::from_argument(&args.at);
     at.centre(&study).map_err(Failure::input)?;
-    trial(&study).map_err(Failure::input)?;
+    dry_run(&mut study, EstimatorKind::Batch, Depth::First).map_err(Failure::input)?;
     let display = Arc::new(Display::new(args.json));
     let mut crew = Crew::listen(&study, &plan, &display)?;
     crew.gather(&study, &plan)?;

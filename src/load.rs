@@ -6,9 +6,10 @@
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use starlings_coordinator::study::{Study, Surroundings};
+use starlings_coordinator::study::{Study, Surroundings, Undescribed};
 use starlings_models::SetupError;
 use starlings_worker::Solvers;
+use starlings_worker::solver::faults;
 
 use crate::failure::Failure;
 use crate::solvers::solvers;
@@ -18,9 +19,15 @@ static HERE: Mutex<Option<Solvers>> = Mutex::new(None);
 
 /// Reads and checks a study; a solver that it names is started here and asked what it is.
 pub(crate) fn load(path: &Path) -> Result<Study, Failure> {
-    let describe = |def: &_| here()?.describe(def).map_err(|error| error.to_string());
+    let describe = |def: &_| {
+        here()?.describe(def).map_err(|error| Undescribed {
+            reason: error.to_string(),
+            last_words: error.last_words(),
+            is_absent: error.is_absent(),
+        })
+    };
     let factory = Arc::new(|setup: &_| here().map_err(SetupError::Invalid)?.build(setup));
-    Ok(Study::load_with(path, &Surroundings::new(describe, factory))?)
+    Ok(Study::load_with(path, &Surroundings::asking(describe, factory).inspecting(faults))?)
 }
 
 /// Ends the solvers of this process; one that is needed again starts again.

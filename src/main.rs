@@ -83,7 +83,8 @@ enum Command {
 
 fn main() -> ExitCode {
     let started = Instant::now();
-    let cli = Cli::parse();
+    let cli = Cli::try_parse().unwrap_or_else(|error| refuse(&error));
+    let json = cli.command.prints_json();
     console::log_to_stderr(cli.verbose);
     let outcome = match cli.command {
         Command::Run(args) => run::run(&args, started),
@@ -110,7 +111,39 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             failure.print();
+            if let Some(error) = failure.as_json().filter(|_| json) {
+                // Where nobody reads it, the message stands on standard error.
+                let _ = console::line(format_args!("{error:#}"));
+            }
             failure.code()
+        }
+    }
+}
+
+/// Ends the program for arguments that make no command, as clap does, with JSON where it is asked for.
+fn refuse(error: &clap::Error) -> ! {
+    if error.exit_code() != 0 && std::env::args_os().any(|argument| argument == "--json") {
+        let text = error.render().to_string();
+        let message = text.trim().strip_prefix("error: ").unwrap_or(text.trim());
+        let _ = console::line(format_args!("{:#}", serde_json::json!({ "error": message })));
+    }
+    error.exit()
+}
+
+impl Command {
+    /// Whether standard output holds JSON and nothing else.
+    fn prints_json(&self) -> bool {
+        match self {
+            Self::Run(args) => args.json,
+            Self::Explain(args) => args.json,
+            Self::Check(args) => args.json,
+            Self::Identify(args) => args.json,
+            Self::Spectrum(args) => args.json,
+            Self::Conformance(args) => args.json,
+            Self::Models(args) => args.json,
+            Self::Effects(args) => args.json,
+            Self::Report(args) => args.json,
+            Self::Simulate(_) | Self::Worker(_) | Self::Serve(_) | Self::Guard | Self::Export(_) => false,
         }
     }
 }

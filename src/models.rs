@@ -13,7 +13,7 @@ pub(crate) struct Args {
     kind: Option<String>,
     /// Print the catalogue as JSON.
     #[arg(long)]
-    json: bool,
+    pub(crate) json: bool,
 }
 
 /// Prints the catalogue or one of its entries.

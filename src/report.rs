@@ -22,7 +22,7 @@ pub(crate) struct Args {
     overview: Option<PathBuf>,
     /// Print the summary as JSON.
     #[arg(long)]
-    json: bool,
+    pub(crate) json: bool,
 }
 
 /// Writes the files; a run that is not finished gets a report of what there is.

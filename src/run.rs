@@ -8,7 +8,7 @@ use clap::Parser;
 use starlings_coordinator::report;
 use starlings_coordinator::study::constants::HangsOn;
 use starlings_coordinator::study::store::Purpose;
-use starlings_coordinator::study::trial::trial;
+use starlings_coordinator::study::trial::{Depth, dry_run};
 use starlings_coordinator::study::{Progress, RunContext, Summary, run as study_run};
 
 use crate::console::{line, note, number, table};
@@ -36,15 +36,16 @@ pub(crate) struct Args {
     resume: run_folder::Resume,
     /// Print the summary as JSON on standard output and nothing else.
     #[arg(long)]
-    json: bool,
+    pub(crate) json: bool,
 }
 
 /// Runs the study.
 pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     interrupt::watch();
-    let study = load(&args.study)?;
+    let mut study = load(&args.study)?;
     let plan = args.fleet.plan(&study)?;
-    trial(&study).map_err(Failure::input)?;
+    let kind = study.estimator.kind;
+    dry_run(&mut study, kind, Depth::First).map_err(Failure::input)?;
     // Listen before the folder is made: a port in use must leave nothing behind.
     let display = Arc::new(Display::new(args.json));
     let mut crew = Crew::listen(&study, &plan, &display)?;

@@ -47,7 +47,7 @@ pub(crate) struct Args {
     html: Option<PathBuf>,
     /// Print the result as JSON.
     #[arg(long)]
-    json: bool,
+    pub(crate) json: bool,
 }
 
 /// What was found, and how much of it people are shown.

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use clap::Parser;
 use starlings_models::SolverDef;
-use starlings_worker::{LIFELINE, MAX_SLOTS, WorkerConfig};
+use starlings_worker::{LIFELINE, MAX_SLOTS, WorkerConfig, WorkerError};
 use tokio_util::sync::CancellationToken;
 
 use crate::console::{cancel_on_signal, line};
@@ -66,7 +66,10 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         factory: solvers.factory(),
         ..WorkerConfig::new(connect.clone())
     };
-    let report = starlings_worker::run(config).map_err(Failure::run)?;
+    let report = starlings_worker::run(config).map_err(|error| match error {
+        WorkerError::BadAddress { .. } => Failure::input(format!("--connect: {error}")),
+        _ => Failure::run(error),
+    })?;
     tracing::info!(predictions = report.predictions, failures = report.failures, reason = ?report.reason, "done");
     Ok(())
 }

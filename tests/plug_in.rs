@@ -188,6 +188,7 @@ fn troubles() -> Vec<(String, &'static str, &'static str)> {
         (twice.to_owned(), "", "parameters name `k` twice"),
         (body("raise ValueError('mesh folded over')"), "", "ValueError: mesh folded over"),
         (body("return window.times*numpy.nan"), "", "is not a finite number at t = 0"),
+        (body("return numpy.zeros((1, 61))"), "", "the array of shape (1, 61) is transposed"),
         (body("return [1.0]"), "", "expected 61 numbers (temperature), got 1"),
         (body("time.sleep(60)"), "timeout = 1", "did not answer within 1 s and was ended"),
         (body("os.kill(os.getpid(), 11)"), "", "was ended by signal 11 during a run"),

@@ -15,13 +15,15 @@ mod in_process;
 mod local_workers;
 mod network;
 mod service;
+mod travel;
 
 pub use error::FleetError;
 pub use event::FleetEvent;
 pub use grpc::{FleetConfig, FleetHandle, GrpcFleet};
 pub use in_process::{Factory, InProcess};
 pub use local_workers::{LocalConfig, LocalWorkers};
-pub use starlings_proto::SetupId;
+pub use starlings_proto::{SetupId, WireError};
+pub use travel::travels;
 
 use starlings_models::{Job, ParticleError, Prediction, Setup};
 

@@ -34,4 +34,4 @@ pub use problem::{Problem, StudyError};
 pub use run::{Fit, Move, Progress, RunContext, RunError};
 pub use store::folder::{FolderError, RunFolder};
 pub use summary::Summary;
-pub use surroundings::Surroundings;
+pub use surroundings::{Surroundings, Undescribed};

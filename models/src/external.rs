@@ -10,6 +10,7 @@ mod parts;
 mod replay;
 mod rows;
 mod split;
+pub mod table;
 
 use crate::binding::Binding;
 use crate::effect::Addition;

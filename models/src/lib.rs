@@ -43,5 +43,5 @@ pub use nearest::nearest;
 pub use observer::Observer;
 pub use setup::{ModelDef, ObserverDef, Setup, SetupError};
 pub use simulator::Simulator;
-pub use solver::{Description, FilesDef, SOLVER, SolverDef};
+pub use solver::{Description, FaultPlace, FilesDef, SOLVER, SolverDef, SolverFault};
 pub use spec::{Quantity, Role, Spec};

@@ -79,6 +79,30 @@ pub struct FilesDef {
     pub reads: BTreeMap<String, String>,
 }
 
+/// What is wrong with the files or the command of a solver, found without starting it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SolverFault {
+    /// Where.
+    pub place: FaultPlace,
+    /// What was found, and what was expected.
+    pub message: String,
+    /// The remedy.
+    pub help: Option<String>,
+}
+
+/// Where a solver's files or command are wrong.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum FaultPlace {
+    /// A line, from 1, of the template of this file of the run.
+    Template(String, usize),
+    /// The rule of this output.
+    Output(String),
+    /// This parameter.
+    Parameter(String),
+    /// The command.
+    Command,
+}
+
 /// What a solver says of itself.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Description {

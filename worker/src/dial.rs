@@ -85,6 +85,8 @@ pub(crate) async fn dial(
 ) -> Result<Dialled, WorkerError> {
     let started = Instant::now();
     let mut wait = FIRST_WAIT;
+    // Local workers may be a moment ahead of whoever listens; others are told what they wait for.
+    let mut told = config.lifeline;
     loop {
         let attempt = async {
             let patience = tokio::time::timeout(ATTEMPT, attach(endpoint, hello.clone()));
@@ -106,7 +108,15 @@ pub(crate) async fn dial(
             let address = config.connect.clone();
             return Err(WorkerError::NoCoordinator { address, waited: waited.as_secs_f64(), last });
         }
-        tracing::debug!(last, "dialling again");
+        if told {
+            tracing::debug!(last, "dialling again");
+        } else {
+            told = true;
+            let (address, patience) = (&config.connect, config.patience.as_secs_f64());
+            tracing::warn!(
+                "no coordinator at {address} yet ({last}): dialling for up to {patience} s (`--patience` sets the wait)"
+            );
+        }
         // Spread by the process's nonce, so that a thousand workers do not knock at the same moment.
         let spread = 0.5 + (hello.nonce % 1024) as f64 / 2048.0;
         tokio::select! {

@@ -24,6 +24,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use starlings_models::{
     Description, External, Forward, ParticleError, Run, SOLVER, Setup, SetupError, Solve, Solved, SolverDef,
+    SolverFault,
 };
 
 use crate::config::Factory;
@@ -36,6 +37,11 @@ pub use site::SiteOptions;
 /// The ways to reach a solver, by name, with a sentence about each.
 pub fn adapters() -> impl Iterator<Item = (&'static str, &'static str)> {
     adapter::KINDS.iter().map(|kind| (kind.name, kind.says))
+}
+
+/// What is wrong with the files and the command of a program that is started for every run; nothing is started.
+pub fn faults(def: &SolverDef) -> Vec<SolverFault> {
+    if def.adapter == adapter::command::KIND.name { adapter::command::faults(def) } else { Vec::new() }
 }
 
 /// The solvers of one process.

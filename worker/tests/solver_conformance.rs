@@ -33,6 +33,11 @@ enum Flaw {
     AlwaysNudges,
     CorrectsFirst,
     AddsToItself,
+    Transposes,
+    AnswersIntegers,
+    SwapsBytes,
+    DividesByTheFirstStep,
+    IgnoresTheStart,
 }
 
 /// A quantity that decays, dx/dt = -k x, shown as it is and doubled; with a flaw.
@@ -77,7 +82,10 @@ impl Decay {
 
     fn go(&self, request: &Request, k: f64, runs: u64) -> Solved {
         let window = &request.window;
-        let mut x = request.state.as_ref().map_or(1.0, |state| state[0]);
+        let begun =
+            request.initial.iter().find(|(name, _)| name == "x" && self.flaw != Flaw::IgnoresTheStart);
+        let begin = begun.map_or(1.0, |(_, value)| *value);
+        let mut x = request.state.as_ref().map_or(begin, |state| state[0]);
         if self.flaw == Flaw::Wanders {
             x += 1e-12 * runs as f64;
         }
@@ -116,10 +124,33 @@ impl Decay {
             }
             before = t;
         }
-        if self.flaw == Flaw::ForgetsOutputs {
-            outputs.pop();
+        self.spoil(&mut outputs, asked.len());
+        if self.flaw == Flaw::DividesByTheFirstStep {
+            outputs[0] *= (window.times[0] - window.start) / (window.times[0] - window.start);
         }
         Solved { outputs, state: vec![x, before] }
+    }
+}
+
+impl Decay {
+    /// What is wrong with the table of `n` outputs alone.
+    fn spoil(&self, outputs: &mut Vec<f64>, n: usize) {
+        match self.flaw {
+            Flaw::ForgetsOutputs => drop(outputs.pop()),
+            Flaw::Transposes => {
+                *outputs = (0..n).flat_map(|i| outputs.iter().skip(i).step_by(n)).copied().collect();
+            }
+            // As numpy gives the bytes of an array that was made of whole numbers.
+            Flaw::AnswersIntegers => {
+                outputs.iter_mut().for_each(|v| *v = f64::from_bits((100.0 * *v) as u64))
+            }
+            Flaw::SwapsBytes => {
+                // So few digits that all of them stand in the first bytes.
+                let round = |v: f64| (64.0 * v).round() / 64.0;
+                outputs.iter_mut().for_each(|v| *v = f64::from_bits(round(*v).to_bits().swap_bytes()));
+            }
+            _ => {}
+        }
     }
 }
 
@@ -141,6 +172,8 @@ impl Solver for Service {
         Ok(Response::new(tokio_stream::once(Ok(encode_reply(&Reply::Ended(answer))))))
     }
 }
+
+const ROWS: &str = "outputs are a row of 64-bit floats per time, however many times there are";
 
 /// Tries a solver with this flaw out.
 fn tried(flaw: Flaw, folder: &Path) -> Conformance {
@@ -170,7 +203,7 @@ fn tried(flaw: Flaw, folder: &Path) -> Conformance {
 fn a_solver_without_a_flaw_passes_every_check() {
     let folder = tempfile::tempdir().unwrap();
     let found = tried(Flaw::Nothing, folder.path());
-    assert_eq!((found.failed.len(), found.skipped.len(), found.passed.len()), (0, 0, 11), "{found:?}");
+    assert_eq!((found.failed.len(), found.skipped.len(), found.passed.len()), (0, 0, 14), "{found:?}");
 }
 
 #[test]
@@ -178,6 +211,12 @@ fn every_flaw_is_found_by_the_check_that_is_there_for_it() {
     let folder = tempfile::tempdir().unwrap();
     let cases = [
         (Flaw::ForgetsOutputs, "a run gives the outputs and the state that the description promises"),
+        (Flaw::ForgetsOutputs, ROWS),
+        (Flaw::Transposes, ROWS),
+        (Flaw::AnswersIntegers, ROWS),
+        (Flaw::SwapsBytes, ROWS),
+        (Flaw::DividesByTheFirstStep, "a first time that is the start itself is served"),
+        (Flaw::IgnoresTheStart, "a run begins with the initial value that it is given"),
         (Flaw::Wanders, "equal requests give equal bits, in another process too"),
         (Flaw::KeepsTimeToItself, "a run in two pieces is the run in one piece"),
         (Flaw::IgnoresTheOrder, "outputs come in the order in which they are asked for"),
@@ -195,4 +234,42 @@ fn every_flaw_is_found_by_the_check_that_is_there_for_it() {
         assert!(failed.contains(&check), "{flaw:?} is not found by `{check}`: {found:?}");
         assert!(found.failed.iter().all(|f| !f.reason.is_empty()), "{found:?}");
     }
+}
+
+/// The reason for which this check fails.
+fn reason(found: &Conformance, check: &str) -> String {
+    found
+        .failed
+        .iter()
+        .find(|f| f.name == check)
+        .map(|f| f.reason.clone())
+        .unwrap_or_else(|| panic!("{found:?}"))
+}
+
+#[test]
+fn a_transposed_table_is_called_so_also_where_times_and_outputs_are_as_many() {
+    let folder = tempfile::tempdir().unwrap();
+    let transposed = reason(&tried(Flaw::Transposes, folder.path()), ROWS);
+    assert!(
+        transposed.starts_with("the outputs are transposed: all times of the first output come first"),
+        "{transposed}"
+    );
+    assert!(transposed.contains("`sol.y.T`"), "{transposed}");
+    let integers = reason(&tried(Flaw::AnswersIntegers, folder.path()), ROWS);
+    assert!(integers.contains("are the bytes of integers, or in another byte order"), "{integers}");
+}
+
+#[test]
+fn a_trial_that_fails_is_told_by_the_checks_of_its_shape_and_not_by_every_other_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let found = tried(Flaw::ForgetsOutputs, folder.path());
+    assert_eq!(found.failed.len(), 2, "{found:?}");
+    assert!(
+        found.failed.iter().all(|f| f.reason.contains("returned 39 output values where 40 belong")),
+        "{found:?}"
+    );
+    assert!(
+        found.skipped.iter().all(|f| f.reason == "the trial itself fails") && found.skipped.len() == 12,
+        "{found:?}"
+    );
 }

@@ -14,6 +14,7 @@ pub(in crate::study) mod scales;
 mod settings;
 mod solver;
 mod spectrum;
+mod survey;
 mod units;
 
 use std::path::Path;
@@ -81,6 +82,11 @@ impl Study {
 fn check(path: &Path, text: &str, surroundings: &Surroundings) -> Result<Study, StudyError> {
     let source = Source::new(path, text);
     let file = read(&source)?;
+    if source.count() > 0 {
+        // What is written in a wrong form would be judged wrongly; what stands in the files can be told.
+        survey::survey(&source, &file);
+        source.verdict()?;
+    }
     check_name(&source, &file);
     let solver = solver::solver(&source, &file, surroundings);
     let described = solver.as_ref().and_then(Known::description);
@@ -92,6 +98,7 @@ fn check(path: &Path, text: &str, surroundings: &Surroundings) -> Result<Study, 
     let model = model::model(&source, &file, solver.as_ref());
     // Everything that follows is judged against the model.
     let Some(mut model) = model else {
+        survey::survey(&source, &file);
         return Err(source.verdict().err().unwrap_or(StudyError { problems: vec![] }));
     };
     model.setup.observer = observer;
@@ -135,6 +142,7 @@ fn check(path: &Path, text: &str, surroundings: &Surroundings) -> Result<Study, 
         spectrum,
         delays: model.delays,
         runs_here: solver.is_none_or(|known| known.is_here),
+        whole_answers: false,
         surroundings: surroundings.clone(),
         warnings,
     })

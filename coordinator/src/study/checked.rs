@@ -52,6 +52,8 @@ pub struct Study {
     pub delays: bool,
     /// Whether the model can be run in this process; a solver that a file describes may be elsewhere.
     pub runs_here: bool,
+    /// Whether every run covers a whole record, since the solver answers for nothing less; found by a dry run.
+    pub whole_answers: bool,
     /// Who starts its solver, where the model is one.
     pub surroundings: Surroundings,
     /// What is doubtful but no error.

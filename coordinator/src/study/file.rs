@@ -3,6 +3,7 @@
 //! Types, missing and unknown keys are settled here; whether names exist and numbers make sense is [`super::check`]'s
 //! business. Next file to read: [`crate::study::file::read`], which fills these.
 
+mod brackets;
 pub(super) mod layout;
 pub(super) mod locate;
 mod memory;

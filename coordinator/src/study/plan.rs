@@ -46,6 +46,29 @@ impl Study {
         }
     }
 
+    /// The window that is asked for where this one is wanted from the record's start: all times of the record where the solver
+    /// answers for nothing less, the values of the others missing.
+    pub(super) fn asked(&self, record: usize, window: &Arc<Window>) -> Arc<Window> {
+        if !self.whole_answers {
+            return Arc::clone(window);
+        }
+        let n_obs = self.setup.outputs.len();
+        let mut whole = self.whole(record, false);
+        for (j, values) in rows_of(&whole.times, window).zip(window.observed.chunks(n_obs.max(1))) {
+            whole.observed[j * n_obs..(j + 1) * n_obs].copy_from_slice(values);
+        }
+        Arc::new(whole)
+    }
+
+    /// The outputs at the times of a window out of those at the times that were asked for.
+    pub(super) fn picked(&self, record: usize, window: &Window, outputs: Vec<f64>) -> Vec<f64> {
+        let (n_obs, times) = (self.setup.outputs.len(), &self.records[record].times);
+        if !self.whole_answers || outputs.len() != n_obs * times.len() {
+            return outputs;
+        }
+        rows_of(times, window).flat_map(|j| outputs[j * n_obs..(j + 1) * n_obs].iter().copied()).collect()
+    }
+
     /// The window over these rows, their training values in it.
     fn window(&self, record: &Record, start: f64, rows: &[usize], cut: bool) -> Window {
         let n_obs = self.setup.outputs.len();
@@ -64,6 +87,11 @@ impl Study {
         };
         Window { start, times, observed, inputs }
     }
+}
+
+/// Places of a window's times among these, which hold them all.
+fn rows_of<'a>(times: &'a [f64], window: &'a Window) -> impl Iterator<Item = usize> + 'a {
+    window.times.iter().filter_map(|time| times.binary_search_by(|t| t.total_cmp(time)).ok())
 }
 
 /// Rows within the training span where a channel that is fitted was measured.

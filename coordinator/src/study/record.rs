@@ -9,6 +9,7 @@ mod input;
 mod noise;
 mod off;
 mod part;
+mod separator;
 mod shapes;
 mod surface;
 
@@ -96,13 +97,13 @@ impl<'a> Recordings<'a> {
                 return None;
             }
         };
-        let Ok(text) = String::from_utf8(bytes) else {
-            self.source.report_with(
-                at.span(),
-                format!("`{name}` is not UTF-8 text"),
-                "save it as CSV in UTF-8",
-            );
-            return None;
+        let text = match String::from_utf8(bytes) {
+            Ok(text) => text,
+            Err(error) => {
+                let (what, help) = separator::of_bytes(error.as_bytes());
+                self.source.report_with(at.span(), format!("`{name}` {what}"), help);
+                return None;
+            }
         };
         Csv::new(path, &text)
             .map_err(|error| error.problems.into_iter().for_each(|p| self.source.adopt(p)))
@@ -139,7 +140,14 @@ impl<'a> Recordings<'a> {
                 "1 makes a window per row",
             );
         }
-        let table = self.table(section.file.get_ref(), &section.file, &section.time)?;
+        let Some(table) = self.table(section.file.get_ref(), &section.file, &section.time) else {
+            // Names can be told without the file.
+            for channel in &section.channels {
+                part::quantity(self.source, channel, spec);
+            }
+            input::unknown_names(self.source, section, spec);
+            return None;
+        };
         let train = training_span(self.source, section, &table.times);
         let surfaces = self.surfaces(section)?;
         let reader = ChannelReader {
@@ -150,7 +158,10 @@ impl<'a> Recordings<'a> {
             spec,
             surfaces: &surfaces,
         };
-        let mut channels = reader.channels(context)?;
+        let Some(mut channels) = reader.channels(context) else {
+            inputs(self, section, &table, &[], spec);
+            return None;
+        };
         let rows: Vec<usize> = (0..table.times.len())
             .filter(|row| channels.iter().any(|c| c.values[*row].is_finite()))
             .collect();
@@ -167,6 +178,39 @@ impl<'a> Recordings<'a> {
             train: train.ok()?,
             every: usize::try_from(*section.every.get_ref()).unwrap_or(usize::MAX).max(1),
         })
+    }
+}
+
+impl Recordings<'_> {
+    /// What is wrong with the files of a record, whatever the model has: missing files and columns, cells that are no numbers.
+    pub(super) fn survey(&mut self, section: &RecordSection) {
+        if section.file.get_ref().is_empty() {
+            return;
+        }
+        let Some(table) = self.table(section.file.get_ref(), &section.file, &section.time) else { return };
+        for channel in section.channels.iter().filter(|c| c.surface.is_none()) {
+            let column = channel.column.get_ref();
+            // Of a field the file has one column per component.
+            let is_field = table
+                .csv
+                .headers
+                .iter()
+                .any(|h| h.strip_prefix(column.as_str()).is_some_and(|r| r.starts_with('[')));
+            if column.is_empty() || is_field {
+                continue;
+            }
+            match table.csv.index(column) {
+                Ok(index) => {
+                    if let Err(problem) = table.csv.numbers(index) {
+                        self.source.adopt(problem);
+                    }
+                }
+                Err((message, help)) => self.source.report_with(channel.column.span(), message, help),
+            }
+        }
+        for (_, column) in &section.inputs {
+            input::signal(self, section, &table, column);
+        }
     }
 }
 

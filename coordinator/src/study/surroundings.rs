@@ -6,17 +6,38 @@
 use std::fmt;
 use std::sync::Arc;
 
-use starlings_models::{Description, Forward, Setup, SetupError, SolverDef};
+use starlings_models::{Description, Forward, Setup, SetupError, SolverDef, SolverFault};
 
 use crate::fleet::Factory;
 
+/// Why a solver does not say what it is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Undescribed {
+    /// One sentence, with the end of the program's output where there is one.
+    pub reason: String,
+    /// The last that the program itself said before it ended.
+    pub last_words: Option<String>,
+    /// Whether the program is not on this machine, so that somebody elsewhere has to describe it.
+    pub is_absent: bool,
+}
+
+impl From<String> for Undescribed {
+    fn from(reason: String) -> Self {
+        Self { reason, last_words: None, is_absent: true }
+    }
+}
+
 /// Asks a solver what it is.
-type Describe = Arc<dyn Fn(&SolverDef) -> Result<Description, String> + Send + Sync>;
+type Describe = Arc<dyn Fn(&SolverDef) -> Result<Description, Undescribed> + Send + Sync>;
+
+/// Looks at the files of a solver without starting it.
+type Inspect = Arc<dyn Fn(&SolverDef) -> Vec<SolverFault> + Send + Sync>;
 
 /// Who starts solvers. The default starts none: built-in models and equations need nobody.
 #[derive(Clone)]
 pub struct Surroundings {
     describe: Describe,
+    inspect: Inspect,
     factory: Factory,
 }
 
@@ -26,22 +47,44 @@ impl Surroundings {
         describe: impl Fn(&SolverDef) -> Result<Description, String> + Send + Sync + 'static,
         factory: Factory,
     ) -> Self {
-        Self { describe: Arc::new(describe), factory }
+        Self::asking(move |def| describe(def).map_err(Undescribed::from), factory)
+    }
+
+    /// The same where it is known why a solver does not describe itself.
+    pub fn asking(
+        describe: impl Fn(&SolverDef) -> Result<Description, Undescribed> + Send + Sync + 'static,
+        factory: Factory,
+    ) -> Self {
+        Self { describe: Arc::new(describe), inspect: Arc::new(|_| Vec::new()), factory }
+    }
+
+    /// The same surroundings, in which somebody looks at the files of a solver while the study is read.
+    #[must_use]
+    pub fn inspecting(
+        self,
+        inspect: impl Fn(&SolverDef) -> Vec<SolverFault> + Send + Sync + 'static,
+    ) -> Self {
+        Self { inspect: Arc::new(inspect), ..self }
     }
 
     /// The same surroundings, in which every solver is known to be this one.
     #[must_use]
     pub fn knowing(&self, description: &Description) -> Self {
         let known = description.clone();
-        Self { describe: Arc::new(move |_| Ok(known.clone())), factory: Arc::clone(&self.factory) }
+        Self { describe: Arc::new(move |_| Ok(known.clone())), ..self.clone() }
     }
 
     /// What a solver says of itself.
     ///
     /// # Errors
-    /// Why it does not, in one sentence.
-    pub fn describe(&self, solver: &SolverDef) -> Result<Description, String> {
+    /// Why it does not.
+    pub fn describe(&self, solver: &SolverDef) -> Result<Description, Undescribed> {
         (self.describe)(solver)
+    }
+
+    /// What is wrong with the files of a solver; nothing is started.
+    pub fn inspect(&self, solver: &SolverDef) -> Vec<SolverFault> {
+        (self.inspect)(solver)
     }
 
     /// What runs the jobs of a setup.

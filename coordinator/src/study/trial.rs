@@ -1,10 +1,17 @@
 //! One trial run of every record at the prior median, in this process: does the model run at all where the study starts?
+//!
+//! Next file to read: [`mod@dry_run`], which makes the runs of a fit.
+
+pub mod dry_run;
 
 use std::sync::Arc;
 
-use starlings_models::{Job, ParticleError, SetupError};
+use starlings_models::external::table::foreign_bytes;
+use starlings_models::{Forward, Job, ParticleError, Prediction, SOLVER, SetupError, Window};
 
 use super::{Study, posterior};
+use crate::fleet::{WireError, travels};
+pub use dry_run::{Depth, dry_run};
 
 /// What the trial showed about one channel.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,6 +46,41 @@ pub enum TrialError {
         /// Why it failed.
         source: ParticleError,
     },
+    /// The whole record runs, and a run of the fit does not.
+    #[error(
+        "the model fails at the prior median on record `{record}` in a run of the fit, {span} ({values}): {source}"
+    )]
+    Fit {
+        /// Record name.
+        record: String,
+        /// What is run, such as `over the training span alone, 0 to 48`.
+        span: String,
+        /// The values it was run with.
+        values: String,
+        /// Why it failed.
+        source: ParticleError,
+    },
+    /// The numbers are no table of 64-bit floats with a row per time.
+    #[error(
+        "the answer of the model on record `{record}` is no table with a row per time: {what}; `starlings conformance` tells more"
+    )]
+    Table {
+        /// Record name.
+        record: String,
+        /// What it is instead.
+        what: String,
+    },
+    /// Coordinator and workers could not send it to each other.
+    #[error(
+        "a run of record `{record}` cannot travel between coordinator and workers: {source}; a coarser model has a smaller state, and \
+         a solver that declares no states keeps them to itself (estimator kind \"batch\")"
+    )]
+    Travel {
+        /// Record name.
+        record: String,
+        /// What is too large.
+        source: WireError,
+    },
     /// Model and data are so far apart that the square of their difference is no number.
     #[error(
         "`{output}` of record `{record}` and its prediction at the prior median are out of all proportion: check units, and values that are codes for missing ones"
@@ -65,18 +107,14 @@ pub fn trial(study: &Study) -> Result<Vec<TrialChannel>, TrialError> {
     for (index, record) in study.records.iter().enumerate() {
         let window = Arc::new(study.whole(index, false));
         let theta = study.theta_for(index, prior.mean.as_slice());
-        let job = Job {
-            particle: 0,
-            record: index as u32,
-            window: Arc::clone(&window),
-            theta: theta.clone(),
-            state: None,
-        };
-        let mut prediction = model.run(&job).map_err(|source| TrialError::Model {
-            record: record.name.clone(),
-            values: named(study, &theta),
-            source,
+        let ran = run(&*model, index, &window, &theta, None);
+        let mut prediction = ran.map_err(|fault| match fault {
+            Fault::Run(source) => {
+                TrialError::Model { record: record.name.clone(), values: named(study, &theta), source }
+            }
+            Fault::Travel(source) => TrialError::Travel { record: record.name.clone(), source },
         })?;
+        check_bytes(study, &record.name, &prediction)?;
         study.measure(index, &window.times, &mut prediction.outputs);
         let n_obs = study.setup.outputs.len();
         for channel in &record.channels {
@@ -105,8 +143,43 @@ pub fn trial(study: &Study) -> Result<Vec<TrialChannel>, TrialError> {
     Ok(channels)
 }
 
+/// Why a run of a trial is none.
+enum Fault {
+    Run(ParticleError),
+    Travel(WireError),
+}
+
+/// One run, here as on a worker, that could also have been sent there.
+fn run(
+    model: &dyn Forward,
+    record: usize,
+    window: &Arc<Window>,
+    theta: &[f64],
+    state: Option<Vec<f64>>,
+) -> Result<Prediction, Fault> {
+    let job =
+        Job { particle: 0, record: record as u32, window: Arc::clone(window), theta: theta.to_vec(), state };
+    let prediction = model.run(&job).map_err(Fault::Run)?;
+    travels(&job, &prediction).map_err(Fault::Travel)?;
+    Ok(prediction)
+}
+
+/// Refuses what a program of its own sent in other bytes than those of 64-bit floats.
+fn check_bytes(study: &Study, record: &str, prediction: &Prediction) -> Result<(), TrialError> {
+    if study.setup.model.kind != SOLVER {
+        return Ok(());
+    }
+    foreign_bytes(&prediction.outputs).map_or(Ok(()), |value| {
+        let what = format!("values such as {value:e} are the bytes of integers, or in another byte order");
+        Err(TrialError::Table { record: record.to_owned(), what })
+    })
+}
+
 /// Names and values of a job's parameters.
 pub(super) fn named(study: &Study, theta: &[f64]) -> String {
-    let pairs = study.setup.parameters.iter().zip(theta).map(|(name, value)| format!("{name} = {value}"));
+    // A median that went through a logarithm and back is itself but for the last digits.
+    let short = |value: &f64| format!("{value:.12e}").parse::<f64>().unwrap_or(*value);
+    let pairs =
+        study.setup.parameters.iter().zip(theta).map(|(name, value)| format!("{name} = {}", short(value)));
     pairs.collect::<Vec<_>>().join(", ")
 }

@@ -1,13 +1,10 @@
 """Why a run gave no prediction, and why a solver cannot be served.
 
-Next file to read: run.py.
+Next file to read: places.py.
 """
 
 from __future__ import annotations
 
-import os
-import sysconfig
-import traceback
 from typing import Optional
 
 #: The three kinds of failure, by the names of the wire.
@@ -34,6 +31,17 @@ class BadRequest(ValueError):
     """A request does not fit the solver; the text says how."""
 
 
+class Misfit(ValueError):
+    """What a method of a solver returned has the wrong shape or kind; the text says which and what to do.
+
+    `method` is the method's name, by which its place in the solver's file is found.
+    """
+
+    def __init__(self, method: str, text: str) -> None:
+        super().__init__(text)
+        self.method = method
+
+
 class Cancelled(Exception):
     """Nobody waits for the run any more."""
 
@@ -46,19 +54,3 @@ class Failed(Exception):
         self.kind = kind
         self.text = text
         self.time = time
-
-
-_OWN = os.path.dirname(os.path.abspath(__file__)) + os.sep
-_LIBRARIES = tuple(
-    sysconfig.get_paths()[name] + os.sep for name in ("stdlib", "platstdlib", "purelib", "platlib")
-)
-
-
-def told(error: BaseException) -> str:
-    """One line for an exception: its kind, its words, and the last line of the solver's own code that it passed."""
-    text = " ".join(str(error).split())
-    frames = traceback.extract_tb(error.__traceback__)
-    own = [f for f in frames if not f.filename.startswith((_OWN, "<frozen", *_LIBRARIES))]
-    place = (own or frames)[-1:]
-    where = f" ({os.path.basename(place[0].filename)}:{place[0].lineno})" if place else ""
-    return type(error).__name__ + (f": {text}" if text else "") + where

@@ -18,6 +18,7 @@ from typing import Any, Callable, List, Optional, Type, Union
 
 from .failures import Cancelled, DeclarationError, Failed
 from .job import Answer, Job
+from .places import caller
 from .run import execute
 from .serve import address_of, run
 from .serve import serve as serve_alone
@@ -42,7 +43,7 @@ def serve(solver: Union[Solver, Type[Solver]], argv: Optional[List[str]] = None)
     try:
         served = Served(solver)
     except DeclarationError as error:
-        raise SystemExit(f"this solver cannot be served: {error}") from None
+        raise SystemExit(f"this solver cannot be served: {error}{caller()}") from None
     # What the ranks tell each other never mixes with what the solver sends.
     ranks = _Ranks(world.Dup(), served)
     if world.rank == 0:

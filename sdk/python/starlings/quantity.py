@@ -44,8 +44,8 @@ def quantities(what: str, declared: Quantities) -> Tuple[Quantity, ...]:
 
     Raises DeclarationError for a name twice, a name that is no name, or a size below one.
     """
-    if isinstance(declared, str):
-        raise DeclarationError(f"{what} are a table of names and units or a list, not the text {declared!r}")
+    if isinstance(declared, str) or not isinstance(declared, (Mapping, Iterable)):
+        raise DeclarationError(f"{what} are a table of names and units or a list, not {declared!r}")
     found: List[Quantity] = []
     if isinstance(declared, Mapping):
         for name, value in declared.items():
@@ -92,6 +92,8 @@ class Layout:
             self.slices[q.name] = slice(at, at + q.size)
             at += q.size
         self.size = at
+        #: Whether one of them has several components.
+        self.has_fields = at > len(self.quantities)
 
     def __len__(self) -> int:
         return len(self.quantities)

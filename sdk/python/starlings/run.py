@@ -7,17 +7,17 @@ over consecutive windows takes the steps of one run over the whole. Next file to
 from __future__ import annotations
 
 import math
-import traceback
 from typing import Any, Callable, Dict, List, Sequence, Tuple
 
 import numpy as np
 
-from .failures import BAD_REQUEST, NOT_FINITE, SOLVER, BadRequest, Cancelled, Failed, NotFinite, told
+from .failures import BAD_REQUEST, NOT_FINITE, SOLVER, BadRequest, Cancelled, Failed, Misfit, NotFinite
 from .job import Answer, Job, check_finite, prepare
-from .quantity import Layout
+from .places import show, told
+from .shapes import table, vector
 from .solver import Served
 from .terms import Frame
-from .values import Array, StepInputs, Values, array, named
+from .values import Array, StepInputs, Values
 from .window import Row, Window
 
 
@@ -43,8 +43,8 @@ def execute(
     except NotFinite as error:
         raise Failed(NOT_FINITE, error.what, error.time) from error
     except Exception as error:  # whatever a solver raises is data about this run
-        traceback.print_exc()
-        raise Failed(SOLVER, told(error)) from error
+        show(error, served.solver)
+        raise Failed(SOLVER, told(error, served.solver)) from error
 
 
 class _March:
@@ -53,7 +53,6 @@ class _March:
     def __init__(self, served: Served, window: Window) -> None:
         self.served, self.window, self.solver = served, window, served.solver
         self.advance = self._step if served.form == "step" else self._runge_kutta
-        self.n = served.states.size
         # Begin of a span between samples, the inputs there, and their slopes on it.
         self._line: Tuple[float, Array, Array] = (math.nan, np.zeros(0), np.zeros(0))
 
@@ -82,15 +81,13 @@ class _March:
 
     def _step(self, t: float, h: float, x: Array) -> Array:
         u = StepInputs(self.served.inputs, self.window.inputs, t, t + h)
-        told_states = self.served.states.told()
-        return array(
-            self.solver.step(t, h, x, self.window.p, u), self.n, "step returned the states", told_states
-        )
+        given = self.solver.step(t, h, x, self.window.p, u)
+        return vector("step", "step returned the states", given, self.served.states)
 
     def _rate(self, t: float, x: Array) -> Array:
         u = self._driven(t)
         given = self.solver.rate(t, x, self.window.p, u)
-        rate = array(given, self.n, "rate returned the states' rates", self.served.states.told())
+        rate = vector("rate", "rate returned the states' rates", given, self.served.states)
         # A solver may give the same array every time.
         rate = rate.copy()
         if not self.window._terms.of:
@@ -127,14 +124,16 @@ class _March:
             shown: Array = np.concatenate(parts)
             return shown
         given = self.solver.output(time, x, self.window.p, self.window.inputs.at(time))
-        return named(given, served.outputs, "output returned")
+        return vector("output", "output returned", given, served.outputs)
 
 
 def initial_state(served: Served, window: Window, estimated: Dict[str, float]) -> Array:
     """The solver's initial state with the estimated initial values in their places."""
     given = served.solver.initial(window.p)
     states = served.states
-    x = np.zeros(states.size) if given is None else named(given, states, "initial returned the states").copy()
+    x = np.zeros(states.size)
+    if given is not None:
+        x = vector("initial", "initial returned the states", given, states).copy()
     for name, value in estimated.items():
         at = states.find(name)
         if at is None:
@@ -150,34 +149,19 @@ def _whole(served: Served, window: Window) -> Answer:
     state: Any = np.zeros(0)
     if served.restart:
         if not (isinstance(given, tuple) and len(given) == 2):
-            raise ValueError("run: a solver with states returns two things, outputs and the state at the end")
+            got = f"{len(given)} things" if isinstance(given, tuple) else f"a {type(given).__name__}"
+            what = "run: a solver with states returns two things, outputs and the state at the end"
+            raise Misfit("run", f"{what}; got {got}: `return outputs, state`")
         given, state = given
-        state = array(state, served.states.size, "run returned the states", served.states.told())
-    table = _table(served.outputs, given, window.times.size)
+        state = vector("run", "run returned the states", state, served.states)
+    shown = table("run", given, served.outputs, window.times.size)
     for index, time in enumerate(window.times.tolist()):
-        check_finite(served.outputs, "output", table[index], time)
+        check_finite(served.outputs, "output", shown[index], time)
     end = float(window.times[-1])
     if served.restart:
         check_finite(served.states, "state", state, end)
-    recorded = np.array([_recorded(window._rows, row, state) for row in table])
+    recorded = np.array([_recorded(window._rows, row, state) for row in shown])
     return Answer(recorded.reshape(window.times.size, len(window._rows)), state)
-
-
-def _table(outputs: Layout, given: Any, n_times: int) -> Array:
-    """Outputs of a whole window as [n_times][all components]."""
-    if isinstance(given, dict):
-        names = set(given)
-        if names != set(outputs.names()):
-            raise ValueError(
-                f"run: expected the outputs {outputs.told()}, got {', '.join(map(str, given)) or 'none'}"
-            )
-        columns = []
-        for q in outputs.quantities:
-            what = f"run returned `{q.name}` at {n_times} times"
-            columns.append(array(given[q.name], n_times * q.size, what, q.name).reshape(n_times, q.size))
-        return np.hstack(columns)
-    what = f"run returned the outputs at {n_times} times"
-    return array(given, n_times * outputs.size, what, outputs.told()).reshape(n_times, outputs.size)
 
 
 def _recorded(rows: Sequence[Row], y: Array, x: Array) -> List[float]:

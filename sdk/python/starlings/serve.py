@@ -13,6 +13,7 @@ from typing import Callable, List, Mapping, Optional, Type, Union
 
 from .describe import help_text, table
 from .failures import DeclarationError
+from .places import caller
 from .service import Runner, Server
 from .solver import Served, Solver
 
@@ -34,7 +35,7 @@ def serve(solver: Union[Solver, Type[Solver]], argv: Optional[List[str]] = None)
     try:
         served = Served(solver)
     except DeclarationError as error:
-        raise SystemExit(f"this solver cannot be served: {error}") from None
+        raise SystemExit(f"this solver cannot be served: {error}{caller()}") from None
     arguments = sys.argv[1:] if argv is None else argv
     if "--describe" in arguments:
         print(table(served))

@@ -68,8 +68,9 @@ class Solver:
         raise NotImplementedError
 
     def run(self, window: Window) -> Any:
-        """Outputs at every time of the window: a table of names with [n_times] or [n_times][size] numbers, or one array
-        [n_times][all components]. A solver with states returns them and the state at the end: `outputs, state`."""
+        """Outputs at every time of the window: one array [n_times][n_outputs] ([n_times] of a single output), or a table of
+        names with [n_times] or [n_times][size] numbers each. The shape is checked and never changed: of SciPy's solve_ivp
+        return `sol.y.T`. A solver with states returns them and the state at the end: `outputs, state`."""
         raise NotImplementedError
 
 
@@ -196,7 +197,13 @@ def solver(
         if inspect.isclass(what):
             bases = (what,) if issubclass(what, Solver) else (what, Solver)
             return type(what.__name__, bases, declared)
-        declared["run"] = lambda self, window: what(window)
+
+        def run(self: Any, window: Window) -> Any:
+            return what(window)
+
+        # Where a message names the line that returned something, it is that of the function itself.
+        run.__wrapped__ = what  # type: ignore[attr-defined]
+        declared["run"] = run
         return type(what.__name__, (Solver,), declared)
 
     return decorate

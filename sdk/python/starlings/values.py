@@ -6,7 +6,7 @@ Next file to read: window.py.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple, Union
+from typing import Any, Dict, Iterator, List, Sequence, Tuple, Union
 
 import numpy as np
 from numpy.typing import NDArray
@@ -146,29 +146,13 @@ def array(values: Any, size: int, what: str, names: str, error: type = ValueErro
     try:
         flat = np.asarray(values, dtype=np.float64).reshape(-1)
     except (TypeError, ValueError):
-        raise error(f"{what}: expected {size} numbers ({names}), got {_short(values)}") from None
+        raise error(f"{what}: expected {size} numbers ({names}), got {short(values)}") from None
     if flat.size != size:
         raise error(f"{what}: expected {size} numbers ({names}), got {flat.size}")
     return flat
 
 
-def named(values: Any, layout: Layout, what: str) -> Array:
-    """`values` (a list in declared order, or a table of names) as one flat array over all quantities of the layout."""
-    if isinstance(values, dict):
-        missing: Optional[str] = next((n for n in layout.names() if n not in values), None)
-        extra = next((n for n in values if n not in layout), None)
-        if missing is not None or extra is not None:
-            fault = f"`{missing}` is missing" if missing is not None else f"there is no `{extra}`"
-            raise ValueError(f"{what}: expected {layout.told()}; {fault}")
-        parts = [array(values[q.name], q.size, f"{what} `{q.name}`", q.name) for q in layout.quantities]
-        return np.concatenate(parts) if parts else np.zeros(0)
-    if isinstance(values, (list, tuple)) and any(q.size > 1 for q in layout.quantities):
-        if len(values) == len(layout) and len(values) != layout.size:
-            parts = [array(v, q.size, f"{what} `{q.name}`", q.name) for v, q in zip(values, layout.quantities)]
-            return np.concatenate(parts)
-    return array(values, layout.size, what, layout.told())
-
-
-def _short(value: Any) -> str:
+def short(value: Any) -> str:
+    """The beginning of how a value prints, for messages."""
     text = " ".join(repr(value).split())
     return text if len(text) <= 60 else text[:57] + "..."

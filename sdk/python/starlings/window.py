@@ -14,8 +14,9 @@ import numpy as np
 from .failures import Cancelled
 from .observers import Correction, Observer
 from .quantity import Layout
+from .shapes import vector
 from .terms import Frame, Terms
-from .values import Array, Inputs, Values, named
+from .values import Array, Inputs, Values
 
 #: One row of the prediction: of the outputs ("output") or of the state ("state"), and which component.
 Row = Tuple[str, int]
@@ -123,7 +124,7 @@ class Window:
         if self._corrector is None or not self.gain > 0.0 or not dt > 0.0:
             return x
         declared, states = self._layouts
-        y = named(outputs, declared, "outputs")
+        y = vector("run", "correct was given the outputs", outputs, declared)
         innovation, of_state = np.full(declared.size, np.nan), np.full(states.size, np.nan)
         for value, (what, at) in zip(self.observed[index], self._rows):
             if what == "output":

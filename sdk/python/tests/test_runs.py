@@ -158,7 +158,7 @@ def test_a_whole_window_with_states_starts_again_from_its_end():
 
         def run(self, window):
             counted = window.state[0] + np.arange(1, window.times.size + 1)
-            return [counted], counted[-1:]
+            return counted, counted[-1:]
 
     first = starlings.simulate(Counter, times=[1.0, 2.0])
     second = starlings.simulate(Counter, times=[3.0], start=2.0, state=first.state)
@@ -209,6 +209,8 @@ def test_a_rate_may_give_the_same_array_every_time():
     ("attributes", "words"),
     [
         ({"parameters": ["k", "k"]}, "parameters name `k` twice"),
+        ({"parameters": "k"}, "parameters are a table of names and units or a list, not 'k'"),
+        ({"parameters": 3}, "parameters are a table of names and units or a list, not 3"),
         ({"parameters": ["2k"]}, "'2k' cannot be a name"),
         ({"parameters": ["t"]}, "'t' cannot be a name"),
         ({"parameters": [starlings.Quantity("k", size=2)]}, "parameters are single numbers"),

@@ -191,8 +191,9 @@ def test_a_failure_is_told_and_the_next_run_goes_on(serve, how, kind, text, time
 
     failure = ask(how).failure
     assert failure.kind == kind
-    # An exception of the package itself has no line of the solver's own to name.
     assert failure.text.startswith(text)
+    # What was returned wrongly is placed where it was returned; several lines return here, so it is that of the method.
+    assert how != 3.0 or failure.text.endswith("(some_solver.py:10)"), failure.text
     assert "\n" not in failure.text
     assert (failure.time if failure.HasField("time") else None) == time
     assert ask(0.0).WhichOneof("kind") == "finished"
@@ -381,6 +382,23 @@ def test_a_solver_may_start_programs(serve):
         parameters=floats(1.0), start=0.0, times=floats(1.0), outputs=["worked"], observed=floats(np.nan)
     )
     assert numbers(process.run(ask).finished.outputs)[0] == 100.0
+
+
+def test_a_declaration_that_is_wrong_names_the_file_of_the_solver(serve):
+    process = serve(
+        """
+        import starlings
+
+        @starlings.solver(parameters={"k": ""}, outputs=())
+        def none(window):
+            return []
+
+        starlings.serve(none)
+        """
+    )
+    assert process.child.wait(timeout=60) == 1
+    said = "this solver cannot be served: `none` declares no outputs: nothing of it could be observed (some_solver.py:8)"
+    assert process.stderr().strip() == said
 
 
 def test_an_address_that_is_taken_is_told(serve):

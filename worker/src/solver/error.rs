@@ -46,6 +46,24 @@ pub enum SolverError {
     },
 }
 
+impl SolverError {
+    /// The last that a program said which ended before it was ready: what people look for first.
+    pub fn last_words(&self) -> Option<String> {
+        let Self::NotReady { what, tail, .. } = self else { return None };
+        let ended = what.ends_with(" before it was ready");
+        tail.lines().rev().map(str::trim).find(|line| !line.is_empty()).filter(|_| ended).map(str::to_owned)
+    }
+
+    /// Whether the program is not on this machine.
+    pub fn is_absent(&self) -> bool {
+        matches!(self, Self::Start { reason, .. } if reason == ABSENT)
+    }
+}
+
+/// Why a program that is nowhere cannot be started.
+pub(crate) const ABSENT: &str =
+    "no such program, neither in the study's folder nor on the search path; check `command`";
+
 /// The end of a program's output as the end of a sentence.
 pub(crate) fn tail_text(tail: &str) -> String {
     if tail.is_empty() { String::new() } else { format!("; the end of its output:\n{tail}") }

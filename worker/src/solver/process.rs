@@ -15,6 +15,7 @@ use rustix::process::{Pid, Resource, Rlimit, prlimit};
 use rustix::thread::{CpuSet, sched_setaffinity};
 
 use super::SolverError;
+use super::error::ABSENT;
 use super::guard::{Notice, kill_group};
 
 /// Lines of the end of a program's output that travel with a failure, and the longest of them.
@@ -216,10 +217,7 @@ fn resolved(program: &str, base: &str) -> PathBuf {
 
 fn reason(error: &io::Error) -> String {
     match error.kind() {
-        io::ErrorKind::NotFound => {
-            "no such program, neither in the study's folder nor on the search path; check `command`"
-                .to_owned()
-        }
+        io::ErrorKind::NotFound => ABSENT.to_owned(),
         io::ErrorKind::PermissionDenied => {
             "it may not be executed; make it executable or name its interpreter first".to_owned()
         }

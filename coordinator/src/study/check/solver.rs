@@ -56,6 +56,14 @@ pub(in crate::study) fn solver(
     if source.count() > before {
         return None;
     }
+    if let Some(written) = def.described.clone().filter(|_| section.adapter == "command") {
+        let def = SolverDef { described: Some(written), ..def.clone() };
+        let faults = surroundings.inspect(&def);
+        faults.into_iter().for_each(|fault| files::report(source, section, &def, &folder, fault));
+    }
+    if source.count() > before {
+        return None;
+    }
     let found = match &section.described {
         Some(name) => described(source, name, &folder)?,
         None => match def.described.take_if(|_| section.adapter == "command") {
@@ -177,16 +185,30 @@ fn asked(
     def: &SolverDef,
     surroundings: &Surroundings,
 ) -> Option<Description> {
-    let told = surroundings.describe(def).map_err(|reason| {
-        let help = "give `described = \"solver.json\"` where this machine cannot start it: `starlings worker --solver \"COMMAND\" \
-                    --describe > solver.json`, run where it can, makes that file";
-        source.report_with(
-            section.place.clone(),
-            format!("the solver does not say what it is: {reason}"),
-            help,
-        );
+    let told = surroundings.describe(def).map_err(|why| {
+        let message = match &why.last_words {
+            Some(words) => format!("{words}: {}", why.reason),
+            None => format!("the solver does not say what it is: {}", why.reason),
+        };
+        let help = if why.is_absent {
+            "give `described = \"solver.json\"` where this machine cannot start it: `starlings worker --solver \"COMMAND\" \
+             --describe > solver.json`, run where it can, makes that file"
+                .to_owned()
+        } else {
+            format!("started by hand in `{}`, `{}` says the same", def.folder, def.command.join(" "))
+        };
+        source.report_with(section.place.clone(), message, help);
     });
     told.ok()
+}
+
+/// Reports files of a solver that are missing, where the rest of the study is not looked at.
+pub(in crate::study) fn check_files(source: &Source, section: &ProgramSection) {
+    let folder = source.file.parent().unwrap_or(Path::new(""));
+    let folder = std::path::absolute(if folder.as_os_str().is_empty() { Path::new(".") } else { folder });
+    let folder = folder.unwrap_or_default();
+    templates(source, section, &folder);
+    copies(source, section, &folder);
 }
 
 /// Refuses a description that makes no sense.

@@ -28,12 +28,15 @@ const SECTIONS: [&str; 10] = [
     "fleet",
 ];
 
-/// Reads the text of a study file.
+/// Reads the text of a study file; faults of form are with the source then.
 ///
 /// # Errors
-/// Every fault of form.
+/// Where the text is no TOML, or has a table in the place of a list.
 pub(in crate::study) fn read(source: &Source) -> Result<StudyFile, StudyError> {
     let (root, faults) = DeTable::parse_recoverable(&source.text);
+    if super::brackets::report(source, root.get_ref(), !faults.is_empty()) {
+        source.verdict()?;
+    }
     for fault in &faults {
         let end = source.text.len();
         source.report(fault.span().unwrap_or(end..end), format!("this is not TOML: {}", fault.message()));
@@ -52,7 +55,6 @@ pub(in crate::study) fn read(source: &Source) -> Result<StudyFile, StudyError> {
         estimator: estimator(&root),
         fleet: fleet(&root),
     };
-    source.verdict()?;
     Ok(file)
 }
 

@@ -83,7 +83,7 @@ impl<'a> Flight<'a> {
     ) -> Result<Results, RunError> {
         let mut jobs = Vec::with_capacity(particles.len() * windows.len());
         let sent: StepWindows =
-            windows.iter().map(|(record, window)| (*record, self.study.sendable(*record, window))).collect();
+            windows.iter().map(|(record, window)| (*record, self.sent(*record, window))).collect();
         for &particle in particles {
             let column: DVector<f64> = theta.column(particle).into_owned();
             for (record, window) in &sent {
@@ -137,7 +137,7 @@ impl<'a> Flight<'a> {
         for (particle, setup) in setups.iter().enumerate() {
             let setup = self.fleet.install(setup)?;
             for (record, window) in windows {
-                let window = self.study.sendable(*record, window);
+                let window = self.sent(*record, window);
                 let theta = self.study.theta_for(*record, &values);
                 let job =
                     Job { particle: particle as u32, record: *record as u32, window, theta, state: None };
@@ -162,6 +162,11 @@ impl<'a> Flight<'a> {
         Ok(results)
     }
 
+    /// The window that a job carries: what the solver answers for, with what an observer knows.
+    fn sent(&self, record: usize, window: &Arc<Window>) -> Arc<Window> {
+        self.study.sendable(record, &self.study.asked(record, window))
+    }
+
     /// A failure of the model is data. A run that was lost with its workers, or that does not fit the study, is none: it
     /// says nothing of this particle, and treating it as a failure would let the fleet change the posterior.
     fn sound(
@@ -172,6 +177,10 @@ impl<'a> Flight<'a> {
         theta: &DMatrix<f64>,
         window: &Window,
     ) -> Result<Result<Prediction, ParticleError>, RunError> {
+        let result = result.map(|prediction| {
+            let outputs = self.study.picked(record, window, prediction.outputs);
+            Prediction { outputs, ..prediction }
+        });
         let reason = match &result {
             Err(error @ (ParticleError::Lost { .. } | ParticleError::BadJob(_))) => error.to_string(),
             Ok(p) if p.outputs.len() != window.observed.len() => {

@@ -5,6 +5,7 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use super::separator::Foreign;
 use crate::study::file::locate::{csv_field, line_column};
 use crate::study::problem::{Problem, Source, StudyError, suggestion};
 
@@ -26,6 +27,7 @@ impl Csv {
     /// When it has no header, no row, or a row of another length than the header.
     pub(in crate::study) fn new(path: &Path, text: &str) -> Result<Self, StudyError> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        refuse_foreign(path, text)?;
         let mut csv = Self {
             path: path.to_owned(),
             source: Source::new(path, text),
@@ -70,13 +72,29 @@ impl Csv {
         }
         let wanted = self.headers.len();
         if let Some(row) = self.cells.iter().position(|cells| cells.len() != wanted) {
-            let message = format!("this row has {} cells, the header has {wanted}", self.cells[row].len());
-            self.source.report_with(
-                self.cell(row, 0),
-                message,
-                "leave a missing value empty between its commas",
+            let n = self.cells[row].len();
+            let message = format!("this row has {n} cells, the header has {wanted}");
+            self.source.report_with(self.cell(row, 0), message, self.row_help(row));
+        }
+    }
+
+    /// Why a row has another number of cells than the header, as far as one can guess.
+    fn row_help(&self, row: usize) -> String {
+        let (cells, wanted) = (&self.cells[row], self.headers.len());
+        let whole = |cell: &str| cell.parse::<i64>().is_ok();
+        if row == 0 && wanted == 1 && cells.len() > 1 {
+            let first = &self.headers[0];
+            return format!(
+                "the first line must name the columns: remove `{first}` and other lines above the names"
             );
         }
+        if cells.len() == wanted + 1 && cells.get(wanted) == Some("") {
+            return "it ends with a comma that the header has not".to_owned();
+        }
+        if cells.len() == 2 * wanted && cells.iter().all(whole) {
+            return "are these decimal commas? write the numbers with points: `0.5`, not `0,5`".to_owned();
+        }
+        "leave a missing value empty between its commas".to_owned()
     }
 
     /// Position of a column, or what is wrong with its name and the remedy.
@@ -86,14 +104,13 @@ impl Csv {
             [one] => Ok(one),
             [] => {
                 let message = format!("`{}` has no column `{column}`", self.path.display());
-                let only =
-                    self.headers.first().filter(|h| self.headers.len() == 1 && h.contains([';', '\t']));
-                let help = match only {
-                    Some(_) => {
-                        "its header has no comma: separate columns by commas, not by semicolons or tabs"
-                            .to_owned()
-                    }
-                    None => self.columns_help(column),
+                let numbers = self.headers.iter().all(|h| h.parse::<f64>().is_ok());
+                let help = match self.headers.as_slice() {
+                    [first, ..] if numbers => format!(
+                        "its first line holds numbers (`{first}`): put a line with the names of the columns above it, such as \
+                         `time,{column}`"
+                    ),
+                    _ => self.columns_help(column),
                 };
                 Err((message, help))
             }
@@ -131,12 +148,19 @@ impl Csv {
         let name = &self.headers[column];
         let message =
             format!("`{}` in column `{name}` is not a finite number{more}", &self.cells[row][column]);
-        Err(self.problem(
-            row,
-            column,
-            message,
-            "write a number with a decimal point; leave a missing value empty",
-        ))
+        Err(self.problem(row, column, message, self.cell_help(row, column)))
+    }
+
+    /// What to do about a cell that is no number.
+    fn cell_help(&self, row: usize, column: usize) -> &'static str {
+        let cell = &self.cells[row][column];
+        if row == 0 && self.cells[row].iter().all(|c| parse(c).is_none_or(f64::is_nan)) {
+            return "the second line holds no number: remove it where it names units, which belong into the study";
+        }
+        if cell.contains(':') || cell.matches(['-', '/']).count() == 2 {
+            return "a time is a number, such as seconds since the start, in the study's time unit";
+        }
+        "write a number with a decimal point; leave a missing value empty"
     }
 
     /// The texts of a column.
@@ -197,6 +221,18 @@ impl Csv {
     fn cell(&self, row: usize, column: usize) -> Range<usize> {
         csv_field(&self.source.text, self.starts[row], column)
     }
+}
+
+/// Refuses what has other separators than commas, before every row is told to have too few cells.
+fn refuse_foreign(path: &Path, text: &str) -> Result<(), StudyError> {
+    let Some(foreign) = Foreign::of(text) else { return Ok(()) };
+    let source = Source::new(path, text);
+    let start = text.len() - text.trim_start().len();
+    let end = start + text[start..].lines().next().map_or(0, str::len);
+    let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let message = format!("the columns of `{file}` are separated by {}, not by commas", foreign.separator);
+    source.report_with(start..end, message, foreign.help());
+    source.verdict()
 }
 
 /// A finite number; NaN for an empty cell; `None` for anything else.

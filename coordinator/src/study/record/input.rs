@@ -7,7 +7,7 @@ use toml::Spanned;
 
 use super::{Recordings, Table};
 use crate::study::file::RecordSection;
-use crate::study::problem::quoted_list;
+use crate::study::problem::{Source, quoted_list};
 
 /// The signals in the order of the model's inputs; nothing after a complaint.
 pub(in crate::study) fn inputs(
@@ -20,16 +20,7 @@ pub(in crate::study) fn inputs(
     let before = files.source.count();
     let known: Vec<String> = spec.inputs.iter().map(|q| q.name.clone()).collect();
     // A misspelt input is told once, not also as a missing one.
-    let mut meant = Vec::new();
-    for (name, _) in section.inputs.iter().filter(|(n, _)| !known.contains(n.get_ref())) {
-        meant.extend(starlings_models::nearest(name.get_ref(), &known));
-        let message = format!("model `{}` has no input `{}`", spec.kind, name.get_ref());
-        if known.is_empty() {
-            files.source.report_with(name.span(), message, "it needs none: remove `inputs`");
-        } else {
-            files.source.report_unknown(name.span(), message, &known);
-        }
-    }
+    let meant = unknown_names(files.source, section, spec);
     let mut signals = Vec::new();
     for input in &known {
         if let Some((_, column)) = section.inputs.iter().find(|(n, _)| n.get_ref() == input) {
@@ -47,8 +38,24 @@ pub(in crate::study) fn inputs(
     (files.source.count() == before).then_some(signals)
 }
 
+/// Reports names that are no inputs of the model; returns the inputs that they probably mean.
+pub(super) fn unknown_names(source: &Source, section: &RecordSection, spec: &Spec) -> Vec<String> {
+    let known: Vec<String> = spec.inputs.iter().map(|q| q.name.clone()).collect();
+    let mut meant = Vec::new();
+    for (name, _) in section.inputs.iter().filter(|(n, _)| !known.contains(n.get_ref())) {
+        meant.extend(starlings_models::nearest(name.get_ref(), &known));
+        let message = format!("model `{}` has no input `{}`", spec.kind, name.get_ref());
+        if known.is_empty() {
+            source.report_with(name.span(), message, "it needs none: remove `inputs`");
+        } else {
+            source.report_unknown(name.span(), message, &known);
+        }
+    }
+    meant
+}
+
 /// One signal: a column of the record's file, or `file:column`.
-fn signal(
+pub(super) fn signal(
     files: &mut Recordings<'_>,
     section: &RecordSection,
     table: &Table,

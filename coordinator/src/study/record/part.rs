@@ -8,6 +8,7 @@ use starlings_models::{Quantity, Spec};
 use super::channel::ChannelReader;
 use crate::study::field::{component_of, quantity_of};
 use crate::study::file::ChannelSection;
+use crate::study::problem::Source;
 
 /// A scalar output and its column.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,30 +20,7 @@ pub(super) struct Part {
 impl ChannelReader<'_> {
     /// The quantity that a channel measures; nothing after a complaint.
     pub(super) fn quantity(&self, section: &ChannelSection) -> Option<&Quantity> {
-        let output = section.output.get_ref();
-        let found = quantity_of(&self.spec.outputs, output);
-        if found.is_none() {
-            let (message, valid) = self.unknown(output);
-            self.source.report_unknown(section.output.span(), message, &valid);
-        }
-        found
-    }
-
-    fn unknown(&self, output: &str) -> (String, Vec<String>) {
-        let valid: Vec<String> = self.spec.outputs.iter().map(|q| q.name.clone()).collect();
-        let kind = &self.spec.kind;
-        let field = component_of(output)
-            .and_then(|(field, _)| self.spec.outputs.iter().find(|q| q.name == field))
-            .filter(|q| q.size > 1);
-        let message = match field {
-            Some(q) => format!(
-                "model `{kind}` has no output `{output}`: `{0}` has the components `{0}[0]` to `{0}[{1}]`",
-                q.name,
-                q.size - 1
-            ),
-            None => format!("model `{kind}` has no output `{output}`"),
-        };
-        (message, valid)
+        quantity(self.source, section, self.spec)
     }
 
     /// The scalar channels behind a written one; nothing after a complaint.
@@ -98,6 +76,38 @@ impl ChannelReader<'_> {
         };
         self.source.report_with(section.column.span(), message, help);
     }
+}
+
+/// The quantity that a channel measures; nothing after a complaint.
+pub(super) fn quantity<'a>(
+    source: &Source,
+    section: &ChannelSection,
+    spec: &'a Spec,
+) -> Option<&'a Quantity> {
+    let output = section.output.get_ref();
+    let found = quantity_of(&spec.outputs, output);
+    if found.is_none() {
+        let (message, valid) = unknown(spec, output);
+        source.report_unknown(section.output.span(), message, &valid);
+    }
+    found
+}
+
+fn unknown(spec: &Spec, output: &str) -> (String, Vec<String>) {
+    let valid: Vec<String> = spec.outputs.iter().map(|q| q.name.clone()).collect();
+    let kind = &spec.kind;
+    let field = component_of(output)
+        .and_then(|(field, _)| spec.outputs.iter().find(|q| q.name == field))
+        .filter(|q| q.size > 1);
+    let message = match field {
+        Some(q) => format!(
+            "model `{kind}` has no output `{output}`: `{0}` has the components `{0}[0]` to `{0}[{1}]`",
+            q.name,
+            q.size - 1
+        ),
+        None => format!("model `{kind}` has no output `{output}`"),
+    };
+    (message, valid)
 }
 
 /// Whether a header is meant as a component of a column's field and is none: its index is no plain number.

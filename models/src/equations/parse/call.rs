@@ -38,9 +38,10 @@ impl Parser {
                 return Ok(Node::Ddt(signal(u, name, column)?));
             }
             unknown => {
-                let hint = match nearest(unknown, FUNCTIONS) {
-                    Some(near) => format!("; did you mean `{near}`?"),
-                    None => format!("; a product is written `{unknown}*(...)`"),
+                let hint = match (elsewhere(unknown), nearest(unknown, FUNCTIONS)) {
+                    (Some(here), _) => format!("; {here}"),
+                    (None, Some(near)) => format!("; did you mean `{near}`?"),
+                    (None, None) => format!("; a product is written `{unknown}*(...)`"),
                 };
                 return Err(ExpressionError::new(
                     name.column,
@@ -104,4 +105,16 @@ fn signal(node: Node, of: &Name, column: usize) -> Result<Name, ExpressionError>
             format!("`{}` needs the name of an input or an output", of.text),
         )),
     }
+}
+
+/// What a function of other languages is called here.
+fn elsewhere(name: &str) -> Option<&'static str> {
+    Some(match name {
+        "ln" => "the natural logarithm is `log`",
+        "log10" => "write `log(x)/log(10)`",
+        "pow" | "power" => "a power is written `a^b`",
+        "fabs" => "the magnitude is `abs`",
+        "heaviside" => "it is `step` here",
+        _ => return None,
+    })
 }

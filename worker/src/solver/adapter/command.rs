@@ -7,6 +7,7 @@
 
 mod answer;
 mod fault;
+mod inspect;
 pub(super) mod json;
 mod program;
 mod request;
@@ -30,6 +31,7 @@ use crate::solver::scratch::Scratch;
 use crate::solver::seats::Seats;
 use crate::solver::site::Site;
 use answer::Answer;
+pub(in crate::solver) use inspect::faults;
 use program::Output;
 use rule::{Rule, lies_inside};
 use template::{OWN_NAMES, Templates};

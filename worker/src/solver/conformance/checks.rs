@@ -6,20 +6,24 @@ use starlings_models::{ObserverDef, Run, Window};
 
 use super::hosted::{gain_zero, predict_then_correct, zero_term};
 use super::refusals::{cancelled, not_a_number, refuses};
+use super::rows::{at_start, begins, rows};
 use super::subject::{Subject, Verdict, distance, failed, got, same, same_bits};
 use super::trial::all_outputs;
 
 /// Difference between a run in one piece and in two, relative to the largest value: what a solver may lose by writing its
 /// state down with fewer digits is already too much.
-const SAME: f64 = 1e-9;
+pub(super) const SAME: f64 = 1e-9;
 
 type Check = fn(&Subject<'_>) -> Verdict;
 
 /// Every check, in the order in which they are made.
-pub(super) const CHECKS: [(&str, Check); 11] = [
+pub(super) const CHECKS: [(&str, Check); 14] = [
     ("a run gives the outputs and the state that the description promises", shape),
+    ("outputs are a row of 64-bit floats per time, however many times there are", rows),
+    ("a first time that is the start itself is served", at_start),
     ("equal requests give equal bits, in another process too", deterministic),
     ("a run in two pieces is the run in one piece", restart),
+    ("a run begins with the initial value that it is given", begins),
     ("outputs come in the order in which they are asked for", order),
     ("a later time changes nothing at an earlier one", causal),
     ("a request that does not fit is refused in words, and the next one is served", refuses),

@@ -86,6 +86,7 @@ pub(super) fn connect(
         .tcp_nodelay(true);
     let started = Instant::now();
     let mut last;
+    let mut told = process.is_some();
     loop {
         let attempt = async {
             let channel = endpoint.connect().await.map_err(|error| causes(&error))?;
@@ -113,13 +114,26 @@ pub(super) fn connect(
                 killed: is_killed(status),
             });
         }
+        let seconds = patience.as_secs_f64();
         if started.elapsed() >= patience {
-            let tail = process.map(Process::tail).unwrap_or_default();
-            let what = format!(
-                "was not ready within {} s ({last}); it must serve solver.proto where {SOCKET} says",
-                patience.as_secs_f64()
+            let what = match &process {
+                Some(_) => {
+                    format!(
+                        "was not ready within {seconds} s ({last}); it must serve solver.proto where {SOCKET} says"
+                    )
+                }
+                None => format!(
+                    "was not ready within {seconds} s ({last}); start it there, or give the study its `command`"
+                ),
+            };
+            return Err(not_ready(what, process.map(Process::tail).unwrap_or_default()));
+        }
+        if !told {
+            told = true;
+            tracing::warn!(
+                "waiting up to {seconds} s for a solver at {name} ({last}): start it there, such as by {ADDRESS}={name} python3 \
+                 solver.py (`start_timeout` sets the wait)"
             );
-            return Err(not_ready(what, tail));
         }
         std::thread::sleep(LOOK);
     }

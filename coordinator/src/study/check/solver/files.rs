@@ -5,13 +5,14 @@
 
 use std::collections::BTreeMap;
 use std::path::{Component, Path};
+use std::sync::Arc;
 
-use starlings_models::{Description, nearest};
+use starlings_models::{Description, FaultPlace, SolverDef, SolverFault, nearest};
 use toml::Spanned;
 
 use crate::study::file::Named;
 use crate::study::file::solver::ProgramSection;
-use crate::study::problem::Source;
+use crate::study::problem::{Problem, Source};
 
 /// Texts of the templates by file of the run.
 pub(super) fn templates(
@@ -58,6 +59,49 @@ pub(super) fn described(source: &Source, name: &Spanned<String>, folder: &Path) 
         source.report_with(name.span(), message, help);
     });
     description.ok()
+}
+
+/// Reports what somebody found who looked at the solver's files: a template at its line, the rest where the study names it.
+pub(super) fn report(
+    source: &Source,
+    section: &ProgramSection,
+    def: &SolverDef,
+    folder: &Path,
+    fault: SolverFault,
+) {
+    let SolverFault { place, message, help } = fault;
+    let named = |list: &[crate::study::file::solver::ProgramQuantity], name: &str| {
+        list.iter()
+            .find(|q| q.name.get_ref() == name)
+            .map(|q| (q.name.span(), q.read.as_ref().map(Spanned::span)))
+    };
+    let span = match &place {
+        FaultPlace::Template(name, line) => {
+            let text = def.files.as_ref().and_then(|files| files.templates.get(name));
+            let file = section.templates.iter().find(|(n, _)| n.get_ref() == name).map(|(_, file)| file);
+            if let (Some(text), Some(file)) = (text, file) {
+                let start: usize = text.split_inclusive('\n').take(line - 1).map(str::len).sum();
+                let length = text[start..].lines().next().map_or(0, str::len);
+                source.adopt(Problem {
+                    message,
+                    help,
+                    file: folder.join(file.get_ref()),
+                    source_text: Some(Arc::from(text.as_str())),
+                    span: Some(start..start + length),
+                });
+                return;
+            }
+            None
+        }
+        FaultPlace::Output(name) => named(&section.outputs, name).map(|(name, rule)| rule.unwrap_or(name)),
+        FaultPlace::Parameter(name) => named(&section.parameters, name).map(|(name, _)| name),
+        FaultPlace::Command => None,
+    };
+    let span = span.unwrap_or_else(|| section.place.clone());
+    match help {
+        Some(help) => source.report_with(span, message, help),
+        None => source.report(span, message),
+    }
 }
 
 /// A file of the run stays in its folder, and is one.

@@ -93,7 +93,7 @@ pub(super) fn filled(command: &[String], spec: &Spec, run: &Run<'_>, folder: &Pa
 }
 
 /// Words in braces.
-fn placeholders(argument: &str) -> impl Iterator<Item = &str> {
+pub(super) fn placeholders(argument: &str) -> impl Iterator<Item = &str> {
     argument.split('{').skip(1).filter_map(|part| part.split_once('}')).map(|(name, _)| name)
 }
 

@@ -21,7 +21,7 @@ const PLAIN: std::ops::Range<f64> = 1e-4..1e16;
 
 /// The templates of a study.
 pub(super) struct Templates {
-    environment: Environment<'static>,
+    pub(super) environment: Environment<'static>,
     files: Vec<String>,
 }
 
@@ -30,8 +30,8 @@ pub(super) struct Templates {
 #[error("the template of `{file}`, line {line}: {reason}")]
 pub(super) struct TemplateError {
     file: String,
-    line: usize,
-    reason: String,
+    pub(super) line: usize,
+    pub(super) reason: String,
 }
 
 impl Templates {
@@ -40,11 +40,20 @@ impl Templates {
     /// # Errors
     /// When one is not well formed.
     pub(super) fn new(texts: &BTreeMap<String, String>) -> Result<Self, SolverError> {
+        Self::parsed(texts).map_err(|error| SolverError::Incomplete(error.to_string()))
+    }
+
+    pub(super) fn parsed(texts: &BTreeMap<String, String>) -> Result<Self, TemplateError> {
         let mut environment = Environment::new();
         environment.set_undefined_behavior(UndefinedBehavior::Strict);
         environment.set_auto_escape_callback(|_| AutoEscape::None);
         let syntax = SyntaxConfig::builder().keep_trailing_newline(true).build();
-        environment.set_syntax(syntax.map_err(|error| SolverError::Incomplete(error.to_string()))?);
+        let refused = |error: minijinja::Error| TemplateError {
+            file: String::new(),
+            line: 1,
+            reason: error.to_string(),
+        };
+        environment.set_syntax(syntax.map_err(refused)?);
         environment.set_formatter(|out, state, value| match float(value) {
             Some(number) => Ok(out.write_str(&text_of(number))?),
             None => minijinja::escape_formatter(out, state, value),
@@ -54,7 +63,7 @@ impl Templates {
             added.map_err(|error| {
                 let reason = error.detail().unwrap_or("not well formed").to_owned();
                 let line = error.line().unwrap_or(1);
-                SolverError::Incomplete(TemplateError { file: file.clone(), line, reason }.to_string())
+                TemplateError { file: file.clone(), line, reason }
             })?;
         }
         Ok(Self { environment, files: texts.keys().cloned().collect() })
@@ -81,11 +90,7 @@ impl Templates {
         if error.kind() == ErrorKind::UndefinedError
             && let Some(unknown) = self.unknown(file, line, names)
         {
-            let (inside, name) = unknown.rsplit_once('.').unwrap_or(("", &unknown));
-            let known = keys(&if inside.is_empty() { names.clone() } else { at(inside, names) });
-            let hint =
-                nearest(name, &known).map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
-            reason = format!("nothing is named `{unknown}`{hint}; there are {}", known.join(", "));
+            reason = meant(&unknown, names);
         }
         TemplateError { file: file.to_owned(), line, reason }
     }
@@ -101,8 +106,16 @@ impl Templates {
     }
 }
 
+/// That a path stands for nothing, and what is near.
+pub(super) fn meant(unknown: &str, names: &Value) -> String {
+    let (inside, name) = unknown.rsplit_once('.').unwrap_or(("", unknown));
+    let known = keys(&if inside.is_empty() { names.clone() } else { at(inside, names) });
+    let hint = nearest(name, &known).map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
+    format!("nothing is named `{unknown}`{hint}; there are {}", known.join(", "))
+}
+
 /// The shortest beginning of a path that leads nowhere.
-fn stands_for_nothing(path: &str, names: &Value) -> Option<String> {
+pub(super) fn stands_for_nothing(path: &str, names: &Value) -> Option<String> {
     let ends = path.match_indices('.').map(|(at, _)| at).chain([path.len()]);
     let mut beginnings = ends.map(|end| &path[..end]);
     beginnings.find(|part| at(part, names).is_undefined()).map(str::to_owned)
@@ -127,7 +140,7 @@ fn float(value: &Value) -> Option<f64> {
 }
 
 /// What stands in a template for a run.
-fn names(spec: &Spec, run: &Run<'_>) -> Value {
+pub(super) fn names(spec: &Spec, run: &Run<'_>) -> Value {
     let parameters: Vec<(String, Value)> =
         spec.parameters.iter().zip(run.parameters).map(|(q, v)| (q.name.clone(), Value::from(*v))).collect();
     let initial = run.initial.iter().map(|(name, value)| (name.clone(), Value::from(*value)));

@@ -1,0 +1,26 @@
+//! What can be told of a study whose form or whose model is wrong: its priors by themselves, and its files.
+//!
+//! Somebody who mends the one should not learn of the others only then. Nothing is judged against the model here. Next file to
+//! read: [`crate::study::record`].
+
+use crate::study::check::prior;
+use crate::study::check::solver::check_files;
+use crate::study::file::StudyFile;
+use crate::study::problem::Source;
+use crate::study::record::Recordings;
+
+/// Reports what is wrong with priors and files whatever the model is.
+pub(in crate::study) fn survey(source: &Source, file: &StudyFile) {
+    let whole = source.count();
+    for parameter in file.parameters.iter().filter(|p| p.prior.transform.is_some()) {
+        prior::prior(source, parameter, None);
+    }
+    if let Some(section) = &file.model.solver {
+        check_files(source, section);
+    }
+    let mut recordings = Recordings::new(source);
+    for record in &file.records {
+        recordings.survey(record);
+    }
+    tracing::debug!(found = source.count() - whole, "files of a study that is not understood");
+}
