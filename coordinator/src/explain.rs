@@ -3,6 +3,7 @@
 //! Every decision is made by running the model again, never by differentiating data: one candidate effect is one run, so the
 //! screening is what the fleet is for. Next files to read: [`result`] for what comes out, [`rows`] for the common language.
 
+pub mod adequacy;
 mod again;
 mod answer;
 pub mod background;
@@ -11,10 +12,13 @@ pub mod candidate;
 pub mod candidates;
 mod carried;
 mod course;
+mod differences;
+mod doubt;
 mod experiment;
 pub mod figures;
 pub mod fit;
 pub mod form;
+pub mod held_out;
 pub mod judge;
 pub mod keep;
 pub mod laboratory;
@@ -22,8 +26,10 @@ pub mod locate;
 mod memory;
 mod null;
 pub mod options;
+mod own_values;
 pub mod patch;
 mod probe;
+pub mod reach;
 mod refused;
 pub mod result;
 mod rhythm;
@@ -33,6 +39,7 @@ pub mod screen;
 pub mod search;
 pub mod verdict;
 pub mod version;
+mod warnings;
 mod words;
 
 pub use figures::Figures;

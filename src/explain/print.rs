@@ -38,6 +38,7 @@ pub(super) fn print(found: &Explanation, states: &[String], folder: &Path) -> Re
         text(described(nearest, states))?;
     }
     gap(found)?;
+    held_out(found)?;
     shifts(found)?;
     list("\nrefused", found.rejected.iter().map(refusal), FEW)?;
     rest(found)?;
@@ -83,7 +84,7 @@ fn coefficient(value: &Coefficient) -> String {
 fn ties(found: &Explanation) -> Result<(), Failure> {
     list("\nthe recordings cannot tell it from", found.tied_with.iter().map(|set| set.join(" + ")), ROWS)?;
     match &found.experiment {
-        Some(experiment) => line(format_args!("  what would separate them: {}", experiment.says)),
+        Some(experiment) => line(format_args!("  experiments: {}", experiment.sentence())),
         None => Ok(()),
     }
 }
@@ -103,6 +104,14 @@ fn gap(found: &Explanation) -> Result<(), Failure> {
     text(table(&rows, false))?;
     let more = found.gap.len().saturating_sub(ROWS);
     if more > 0 { line(format_args!("  and {more} more in the report")) } else { Ok(()) }
+}
+
+/// What of the held-out data fails; of a version that was added the table before and after has the figures.
+fn held_out(found: &Explanation) -> Result<(), Failure> {
+    let several = found.held_out.iter().any(|h| h.record != found.held_out[0].record);
+    let mut failing: Vec<_> = found.held_out.iter().filter(|h| h.fails).collect();
+    failing.sort_by(|a, b| b.beyond.total_cmp(&a.beyond));
+    list("\nheld out and failing", failing.into_iter().map(|h| h.says(several)), ROWS)
 }
 
 /// What the effects did to the model's own parameters, the largest shift first.
@@ -131,14 +140,25 @@ fn refusal(rejected: &Rejected) -> String {
     format!("{} ({}): {}", rejected.name, rejected.gate, rejected.reason)
 }
 
+/// Kinds of physics of which nothing was tried: those that share a reason on one line.
+fn not_tried(found: &Explanation) -> Result<(), Failure> {
+    let mut by_reason: Vec<(&str, Vec<&str>)> = Vec::new();
+    for kind in found.not_tried.iter().filter(|_| found.verdict == Verdict::Unexplained) {
+        // What a family needs is for the report.
+        let reason = kind.reason.split(';').next().unwrap_or_default();
+        match by_reason.iter_mut().find(|(known, _)| *known == reason) {
+            Some((_, kinds)) => kinds.push(&kind.kind),
+            None => by_reason.push((reason, vec![&kind.kind])),
+        }
+    }
+    let lines = by_reason.iter().map(|(reason, kinds)| format!("{}: {reason}", kinds.join(", ")));
+    list("\nnot tried", lines, ROWS)
+}
+
 /// What is left of the gap, how sure the verdict is, and what it cost.
 fn rest(found: &Explanation) -> Result<(), Failure> {
-    let remaining = &found.remaining;
-    line(format_args!(
-        "\nleft of the gap: {} × noise on the training data; {}",
-        number(remaining.rmse_over_noise, Some(0.1)),
-        remaining.shape
-    ))?;
+    let version = if found.effects.is_empty() { "the model as it is" } else { "the model with it" };
+    line(format_args!("\non the training data, with {version}: {}", found.remaining.shape))?;
     let alarm = &found.false_alarm;
     if alarm.runs > 0 {
         line(format_args!(
@@ -156,6 +176,7 @@ fn rest(found: &Explanation) -> Result<(), Failure> {
             percent(nulls.upper95)
         ))?;
     }
+    not_tried(found)?;
     list("\nnot tried for want of budget", found.untried.iter().cloned(), FEW)?;
     let stages: Vec<String> =
         found.runs_by_stage.iter().map(|(stage, runs)| format!("{stage} {runs}")).collect();

@@ -38,7 +38,7 @@ impl<'c> Searcher<'_, '_, 'c> {
             }
             let fits = self.further(found, &best, &seconds, options)?;
             let n = fits.len();
-            self.judge_all(found, fits);
+            self.judge_all(found, fits)?;
             let same = found.judged.first().is_some_and(|j| j.fit.version.name() == best.fit.version.name());
             if n == 0 || same {
                 break;

@@ -29,12 +29,14 @@ fn estimates(judged: &Judged<'_>) -> Vec<Estimate> {
     posterior::estimates(&version.study, &Gaussian { mean: fit.theta(), covariance })
 }
 
-/// Standard deviation of the prediction of every row by the uncertainty of the fit, in the channel's unit; zero where the fit
-/// leaves a direction free.
+/// Standard deviation of the prediction of every row by the uncertainty of the fit and of the values that a held-out record has
+/// of its own, in the channel's unit; zero where the fit leaves a direction free.
 pub(super) fn prediction_sd(laboratory: &Laboratory<'_>, fit: &Fitted<'_>) -> Vec<f64> {
     let Ok(optimum) = fit.optimum() else { return vec![0.0; laboratory.rows.rows.len()] };
     let spread = &fit.jacobian * optimum.covariance();
-    let variance = |i: usize| spread.row(i).dot(&fit.jacobian.row(i)).max(0.0);
+    let own = |i: usize| fit.own_values.row(i).norm_squared();
+    let own = |i: usize| if fit.own_values.is_empty() { 0.0 } else { own(i) };
+    let variance = |i: usize| spread.row(i).dot(&fit.jacobian.row(i)).max(0.0) + own(i);
     laboratory.rows.rows.iter().enumerate().map(|(i, row)| row.noise * variance(i).sqrt()).collect()
 }
 
@@ -156,19 +158,18 @@ pub(super) fn gap(laboratory: &Laboratory<'_>, before: &[f64], after: &[f64]) ->
 
 /// What is left of the gap after a fit; the form is that of the version whose form was `checked`.
 pub(super) fn remaining(
-    laboratory: &Laboratory<'_>,
     found: &Found<'_>,
     added: Option<&Judged<'_>>,
     checked: Option<&Judged<'_>>,
     shape: String,
 ) -> Remaining {
-    let (fit, whiteness) = added.map_or((&found.base, found.whiteness), |j| (&j.fit, j.whiteness));
-    let n = laboratory.rows.train.len().max(1) as f64;
+    let adequacy = added.map_or(&found.adequacy, |j| &j.adequacy);
     let left = checked.and_then(|j| j.leftover).unwrap_or_default();
     Remaining {
-        rmse_over_noise: (fit.residual().norm_squared() / n).sqrt(),
-        whiteness_p: whiteness,
-        inflation: super::background::inflation(&laboratory.rows, fit.residual()),
+        rmse_over_noise: adequacy.rmse_over_noise,
+        whiteness_p: adequacy.whiteness.unwrap_or(1.0),
+        whiteness_tested: adequacy.whiteness.is_some(),
+        inflation: adequacy.inflation,
         form_gain: left.gain,
         form_gain_held_out: left.gain_held_out,
         form_share: left.share,

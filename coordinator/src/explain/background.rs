@@ -137,15 +137,17 @@ pub fn inflation(rows: &Rows, residual: &DVector<f64>) -> f64 {
     (sum / f64::max(n, 1.0)).max(1.0)
 }
 
-/// Probability of residuals at least as autocorrelated if they were white: the smallest of the stretches, Bonferroni.
-pub fn whiteness(rows: &Rows, residual: &DVector<f64>) -> f64 {
+/// Probability of residuals at least as autocorrelated if they were white: the smallest of the stretches, Bonferroni. `None`
+/// where no stretch has twenty values that vary.
+pub fn whiteness(rows: &Rows, residual: &DVector<f64>) -> Option<f64> {
     let stretches: Vec<_> = training_stretches(rows).into_iter().filter(|s| s.len() >= 20).collect();
     let p = |stretch: &std::ops::Range<usize>| {
         let values = &residual.as_slice()[stretch.clone()];
         ljung_box(values, (values.len() / 20).max(10).min(values.len() / 3))
     };
-    let smallest = stretches.iter().map(p).filter(|p| p.is_finite()).fold(1.0, f64::min);
-    (smallest * stretches.len() as f64).min(1.0)
+    let known: Vec<f64> = stretches.iter().map(p).filter(|p| p.is_finite()).collect();
+    let smallest = known.iter().copied().fold(1.0, f64::min);
+    (!known.is_empty()).then(|| (smallest * known.len() as f64).min(1.0))
 }
 
 #[cfg(test)]
@@ -174,7 +176,7 @@ mod tests {
         for seed in 0..20 {
             let residual = white(400, seed);
             factors.push(inflation(&rows, &residual));
-            assert!(whiteness(&rows, &residual) > 1e-3, "seed {seed}");
+            assert!(whiteness(&rows, &residual).is_some_and(|p| p > 1e-3), "seed {seed}");
         }
         let mean = factors.iter().sum::<f64>() / 20.0;
         // One at least by definition; the estimate of the correlation adds a few percent.
@@ -192,7 +194,14 @@ mod tests {
         // Unit variance times (1 + rho)/(1 - rho) = 9; over twenty thousand values the estimate scatters by about 10 %.
         let factor = inflation(&rows(n), &residual);
         assert!((factor / 9.0 - 1.0).abs() < 0.3, "{factor}");
-        assert!(whiteness(&rows(n), &residual) < 1e-10);
+        assert!(whiteness(&rows(n), &residual).is_some_and(|p| p < 1e-10));
+    }
+
+    #[test]
+    fn few_values_and_constant_residuals_tell_nothing_of_correlation() {
+        assert_eq!(whiteness(&rows(19), &white(19, 1)), None);
+        assert_eq!(whiteness(&rows(50), &DVector::from_element(50, 2.0)), None);
+        assert_eq!(whiteness(&rows(0), &DVector::zeros(0)), None);
     }
 
     #[test]

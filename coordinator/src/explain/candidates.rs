@@ -5,6 +5,7 @@
 use starlings_models::effect::library::{library_in, shows_in};
 use starlings_models::{EffectDef, Setup, nearest};
 
+use super::locate::number::three;
 use super::{ExplainError, Options};
 use crate::study::{Study, checked::Library};
 
@@ -44,17 +45,49 @@ pub fn candidates(study: &Study, options: &Options) -> Result<Vec<EffectDef>, Ex
 }
 
 /// Outputs that a channel of the fit measures.
-fn fitted(study: &Study) -> Vec<String> {
+pub(super) fn fitted(study: &Study) -> Vec<String> {
     let channels = study.records.iter().filter(|r| r.is_trained()).flat_map(|r| &r.channels);
     channels.filter(|c| !c.held_out).map(|c| c.output.clone()).collect()
 }
 
-/// Everything that can be told before the first run: names, an empty library, a budget below one set of runs for the fit.
+/// Powers of ten by which a noise and the largest recorded value may differ: beyond them the smaller is lost in the rounding of the
+/// larger.
+const APART: f64 = 1e15;
+
+/// A noise below the last digit of the values, or so far above them that nothing could ever show.
+fn check_noise(study: &Study) -> Result<(), ExplainError> {
+    for record in study.records.iter() {
+        for channel in &record.channels {
+            let known = channel.values.iter().filter(|v| v.is_finite());
+            let largest = known.fold(0.0_f64, |most, v| most.max(v.abs()));
+            let size = if largest > 0.0 { largest } else { 1.0 };
+            let ratio = channel.noise / size;
+            if (1.0 / APART..=APART).contains(&ratio) {
+                continue;
+            }
+            let why = if ratio < 1.0 { "below the last digit of" } else { "so far above" };
+            let what = if ratio < 1.0 { "" } else { " that nothing could show" };
+            return Err(ExplainError::Noise(format!(
+                "the noise of {} in record `{}`, {}, lies {why} its values, the largest of which is {}{what}: give the standard \
+                 deviation of the measurement error in the channel's unit, or \"auto\"",
+                channel.output,
+                record.name,
+                three(channel.noise),
+                three(largest)
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Everything that can be told before the first run: names, an empty library, a noise that has nothing to do with the values, a
+/// budget below one set of runs for the fit.
 ///
 /// # Errors
 /// The first thing that is wrong.
 pub fn check(study: &Study, options: &Options) -> Result<(), ExplainError> {
     candidates(study, options)?;
+    check_noise(study)?;
     let trained = study.records.iter().filter(|record| record.is_trained()).count();
     let needed = (trained * (study.theta.len() + 1)) as u64;
     match options.budget.or(study.explain.budget) {

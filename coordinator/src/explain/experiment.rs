@@ -12,11 +12,14 @@ use super::ExplainError;
 use super::judge::Judged;
 use super::laboratory::Laboratory;
 use super::locate::Track;
+use super::locate::number::three;
 use super::result::Experiment;
 use crate::study::{Record, Study};
 
 /// Noise of a quantity that was never measured, as a share of its spread.
 const NEW_CHANNEL: f64 = 0.03;
+/// Difference in χ² up to which a verdict can call two versions tied.
+const SEPARATED: f64 = 12.0;
 /// Factors on the drive.
 const HARDER: f64 = 2.0;
 
@@ -47,7 +50,30 @@ pub(super) fn propose(
         trials.into_iter().skip(1).zip(separations).filter_map(|(trial, s)| Some((trial.says, s?))).collect();
     tried.sort_by(|a, b| b.1.total_cmp(&a.1));
     let Some((says, separation)) = tried.first().cloned() else { return Ok(None) };
-    Ok(Some(Experiment { says, separation, separation_now: now, tried }))
+    let between = [best, rival].map(|judged| judged.fit.version.name()).to_vec();
+    Ok(Some(Experiment { says, between, separation, separation_now: now, tried }))
+}
+
+impl Experiment {
+    /// What the best of the simulated experiments is worth, in one sentence.
+    pub fn sentence(&self) -> String {
+        // Differences of rounding are none.
+        let figure = |chi2: f64| three(if chi2 < 1e-3 { 0.0 } else { chi2 });
+        let (separation, now) = (figure(self.separation), figure(self.separation_now));
+        let of = if self.between.is_empty() { "them".to_owned() } else { self.between.join(" and ") };
+        if self.separation < SEPARATED {
+            return format!(
+                "none of the {} simulated experiments would separate {of}: the best, {}, gives a difference in χ² of {separation}, \
+                 the data at hand {now}",
+                self.tried.len(),
+                self.says
+            );
+        }
+        format!(
+            "to separate {of}, {}: a difference in χ² of {separation} at most, where the data at hand give {now}",
+            self.says
+        )
+    }
 }
 
 /// The record as it was, then everything that could be done instead.
@@ -70,7 +96,9 @@ fn trials(study: &Study, record: usize, tracks: &[Track]) -> Vec<Trial> {
             list.push(trial(says, as_it_was.clone(), &with));
         }
     }
-    for (i, input) in study.spec.inputs.iter().enumerate() {
+    // An input that does not move has no swing.
+    let moves = |i: usize| spread(&as_it_was.inputs[i].values) > 0.0;
+    for (i, input) in study.spec.inputs.iter().enumerate().filter(|(i, _)| moves(*i)) {
         for (factor, word) in [(HARDER, "twice"), (1.0 / HARDER, "half")] {
             let driven = with_input(&as_it_was, i, |signal| scaled(signal, factor));
             list.push(trial(

@@ -9,11 +9,11 @@ use nalgebra::{DMatrix, DVector};
 use starlings_estimators::{End, EstimatorError, LeastSquares, Need, Optimum};
 
 use super::ExplainError;
+use super::differences::STEP;
 use super::laboratory::{Answer, Laboratory, Point};
+use super::own_values::own_values;
 use super::version::Version;
 
-/// Distance of the differences of a Jacobian, in z.
-const STEP: f64 = 1e-3;
 /// Fall of χ² below which a fit has converged.
 const TOLERANCE: f64 = 0.02;
 /// Fall of χ² below which a tentative fit stops.
@@ -29,8 +29,12 @@ pub struct Fitted<'c> {
     solver: LeastSquares,
     /// Predictions of all rows at the best point.
     pub predicted: Arc<Vec<f64>>,
-    /// d prediction / d z over the noise at the best point, all rows × parameters, from the last measured Jacobian.
+    /// d prediction / d z over the noise at the best point, all rows × parameters, from the last measured Jacobian. The rows of a
+    /// held-out record depend on the fitted records by the mean that it is run with.
     pub jacobian: DMatrix<f64>,
+    /// d prediction over the noise for one standard deviation of each value that a held-out record has of its own, all rows ×
+    /// values; without columns until it was measured.
+    pub own_values: DMatrix<f64>,
 }
 
 impl<'c> Fitted<'c> {
@@ -43,7 +47,8 @@ impl<'c> Fitted<'c> {
     /// A fit of a version from a point that was not run.
     pub fn begin(version: Version<'c>, start: DVector<f64>) -> Self {
         let solver = LeastSquares::new(start, version.scaled.clone(), TOLERANCE, TRIALS);
-        Self { version, solver, predicted: Arc::default(), jacobian: DMatrix::zeros(0, 0) }
+        let none = DMatrix::zeros(0, 0);
+        Self { version, solver, predicted: Arc::default(), jacobian: none.clone(), own_values: none }
     }
 
     /// A fit of a version that adds one effect to a fitted one: at amplitude zero it is where that one is, and the effect's
@@ -69,7 +74,19 @@ impl<'c> Fitted<'c> {
         let residual = parent.residual().clone();
         let of_train = jacobian.select_rows(train);
         let solver = LeastSquares::from_known(z, residual, of_train, version.scaled.clone(), ROUGH, TRIALS);
-        Self { version, solver, predicted: Arc::clone(&parent.predicted), jacobian }
+        let (predicted, own_values) = (Arc::clone(&parent.predicted), DMatrix::zeros(0, 0));
+        Self { version, solver, predicted, jacobian, own_values }
+    }
+
+    /// Measures what the values that a held-out record has of its own would change, at the best point.
+    ///
+    /// # Errors
+    /// When the fleet or the store fails.
+    pub fn measure_own_values(&mut self, laboratory: &mut Laboratory<'_>) -> Result<(), ExplainError> {
+        if !self.predicted.is_empty() {
+            self.own_values = own_values(laboratory, self)?;
+        }
+        Ok(())
     }
 
     /// Asks for measured Jacobians until it has converged.
@@ -148,19 +165,6 @@ impl<'c> Fitted<'c> {
             Need::Nothing(_) => Vec::new(),
         }
     }
-
-    /// One point per parameter of the study, all of its entries moved by `step`.
-    fn moved(&self, z: &DVector<f64>, step: f64) -> Vec<DVector<f64>> {
-        let study = &self.version.study;
-        let point = |parameter: usize| {
-            let mut moved = z.clone();
-            for j in (0..study.theta.len()).filter(|j| study.theta[*j].parameter == parameter) {
-                moved[j] += step * moved[j].abs().max(1.0);
-            }
-            moved
-        };
-        (0..study.parameters.len()).map(point).collect()
-    }
 }
 
 /// Runs fits until none needs anything more. Returns whether the budget sufficed; a fit that it cut off stays where it is.
@@ -206,7 +210,7 @@ pub fn drive_rounds(
     Ok(true)
 }
 
-fn point<'v>(fit: &'v Fitted<'_>, z: &DVector<f64>) -> Point<'v> {
+pub(super) fn point<'v>(fit: &'v Fitted<'_>, z: &DVector<f64>) -> Point<'v> {
     Point { study: &fit.version.study, theta: fit.version.theta(z) }
 }
 
@@ -237,39 +241,6 @@ impl Fitted<'_> {
             Need::Nothing(_) => {}
         }
         Ok(true)
-    }
-
-    /// The whitened Jacobian of all rows from forward differences; backward where the model fails on the forward side, nothing
-    /// where it fails on both.
-    fn differences(
-        &self,
-        laboratory: &mut Laboratory<'_>,
-        z: &DVector<f64>,
-        answers: Vec<Answer>,
-    ) -> Result<Option<DMatrix<f64>>, ExplainError> {
-        let mut steps = vec![STEP; answers.len()];
-        let mut found: Vec<Option<Arc<Vec<f64>>>> = answers.into_iter().map(Result::ok).collect();
-        let failed: Vec<usize> = (0..found.len()).filter(|k| found[*k].is_none()).collect();
-        if !failed.is_empty() {
-            let back = self.moved(z, -STEP);
-            let points: Vec<Point<'_>> = failed.iter().map(|k| point(self, &back[*k])).collect();
-            for (k, answer) in failed.iter().zip(laboratory.run(&points)?) {
-                found[*k] = answer.ok();
-                steps[*k] = -STEP;
-            }
-        }
-        let rows = &laboratory.rows.rows;
-        let mut jacobian = DMatrix::zeros(rows.len(), self.version.n_param());
-        for (j, entry) in self.version.study.theta.iter().enumerate() {
-            let Some(moved) = &found[entry.parameter] else { return Ok(None) };
-            let h = steps[entry.parameter] * z[j].abs().max(1.0);
-            for (i, row) in rows.iter().enumerate() {
-                if entry.record.is_none_or(|r| r == row.record) {
-                    jacobian[(i, j)] = (moved[i] - self.predicted[i]) / (h * row.noise);
-                }
-            }
-        }
-        Ok(Some(jacobian))
     }
 }
 

@@ -4,14 +4,16 @@
 //! against what a search over the whole library finds by chance. A lower error alone is no reason to name an effect. Next
 //! file to read: [`super::search`].
 
-use nalgebra::DVector;
 use starlings_estimators::End;
 
-use super::background::{inflation, whiteness};
+use super::adequacy::{Adequacy, times};
+use super::doubt::too_weak;
 use super::fit::Fitted;
 use super::form::Leftover;
+use super::held_out::{HeldOut, allowance, held_out};
 use super::laboratory::Laboratory;
-use super::rows::{Row, Usage};
+use super::locate::number::three;
+use super::rows::{Row, Usage, unit};
 use super::version::Member;
 
 /// A held-out error may grow by this factor before it counts as worse.
@@ -63,8 +65,10 @@ pub struct Judged<'c> {
     pub misfit: Misfit,
     /// Factor on the variance of its residuals.
     pub inflation: f64,
-    /// Whether its residuals could be white.
-    pub whiteness: f64,
+    /// Its training residuals against the stated noise.
+    pub adequacy: Adequacy,
+    /// What the data say that no fit has seen, by record and channel.
+    pub held_out: Vec<HeldOut>,
     /// Fall of χ² against the model as it is, training rows, less the price of parameters inside its terms and of further
     /// effects.
     pub gain: f64,
@@ -112,7 +116,8 @@ pub fn judge<'c>(
     let misfit = Misfit::of(laboratory, &fit);
     let m = laboratory.rows.train.len() as f64;
     let n_inner = fit.version.n_param().saturating_sub(fit.version.n_own + fit.version.members.len());
-    let inflation = inflation(&laboratory.rows, fit.residual());
+    let adequacy = Adequacy::of(laboratory, &fit);
+    let inflation = adequacy.inflation;
     // A parameter inside a term costs what its prior is worth (Schwarz 1978), counted in independent values.
     let price = n_inner as f64 * (m / inflation).max(3.0).ln();
     // A further effect must win what a search finds by chance.
@@ -124,15 +129,18 @@ pub fn judge<'c>(
     let has_excess = before.held_out > n_held + 3.0 * (2.0 * n_held).sqrt();
     let share_held_out =
         (misfit.n_held_out > 0 && has_excess).then(|| ratio(gain_held_out, before.held_out - n_held));
-    let whiteness = whiteness(&laboratory.rows, fit.residual());
-    let allowance = allowance(laboratory, &fit);
+    let rows = &laboratory.rows.rows;
+    let held: Vec<usize> = (0..rows.len()).filter(|i| rows[*i].usage == Usage::HeldOut).collect();
+    let allowance = allowance(laboratory, &fit, &held);
+    let held_out = held_out(laboratory, base, &fit);
     let beyond = misfit.held_out - allowance - n_held - 2.0 * (2.0 * n_held).sqrt();
     let unaccounted = if has_excess { ratio(beyond.max(0.0), before.held_out - n_held) } else { 0.0 };
     let mut judged = Judged {
         fit,
         misfit,
         inflation,
-        whiteness,
+        adequacy,
+        held_out,
         gain,
         gain_held_out,
         allowance,
@@ -145,23 +153,6 @@ pub fn judge<'c>(
     };
     judged.refusal = refusal(laboratory, base, before, &judged, threshold);
     judged
-}
-
-/// bᵀ (C⁻¹ + JᵀJ)⁻¹ b with b = Jᵀ e: the fall of χ² from the held-out rows (residuals e, Jacobian J) to a joint fit, for an
-/// estimate of covariance C. Nothing where the fit leaves a direction free or its Jacobian is of another point.
-fn allowance(laboratory: &Laboratory<'_>, fit: &Fitted<'_>) -> f64 {
-    let rows = &laboratory.rows.rows;
-    let held: Vec<usize> = (0..rows.len()).filter(|i| rows[*i].usage == Usage::HeldOut).collect();
-    let known = || {
-        let optimum = fit.optimum().ok().filter(|_| fit.is_fresh() && !held.is_empty())?;
-        let whitened = laboratory.rows.whitened(&fit.predicted);
-        let residual = DVector::from_iterator(held.len(), held.iter().map(|i| whitened[*i]));
-        let jacobian = fit.jacobian.select_rows(&held);
-        let along = jacobian.tr_mul(&residual);
-        let information = optimum.covariance().clone().cholesky()?.inverse() + jacobian.tr_mul(&jacobian);
-        Some(along.dot(&information.cholesky()?.solve(&along)))
-    };
-    known().filter(|fall| fall.is_finite()).unwrap_or(0.0)
 }
 
 fn ratio(part: f64, whole: f64) -> f64 {
@@ -183,16 +174,14 @@ fn refusal(
         .or_else(|| held_out_span(before, judged))
         .or_else(|| at_edge(&judged.fit))
         .or_else(|| {
-            let (evidence, inflation) = (judged.evidence(), judged.inflation);
-            (evidence <= threshold).then(|| Refusal {
-                gate: "evidence",
-                reason: format!(
-                    "χ² falls by {:.1}, which in units of the effective noise ({inflation:.1}) is {evidence:.1}; a search like \
-                     this one reaches {threshold:.1} by chance",
-                    judged.gain
-                ),
-            })
+            (judged.evidence() <= threshold)
+                .then(|| Refusal { gate: "evidence", reason: too_weak(judged, threshold) })
         })
+}
+
+/// A unit label as it follows a number.
+pub(super) fn spaced(unit: &str) -> String {
+    if unit.is_empty() { String::new() } else { format!(" {unit}") }
 }
 
 /// A coefficient at the end of its range: physics does not allow what the data ask for.
@@ -205,13 +194,14 @@ fn at_edge(fit: &Fitted<'_>) -> Option<Refusal> {
             let value = version.study.theta[j].transform.to_physical(theta[j]);
             let Some(end) = end_at(member, k, value) else { continue };
             let gate = if k == 0 && (end.abs() < f64::MIN_POSITIVE) { "sign" } else { "range" };
-            let unit = &parameter.unit;
+            let unit = spaced(&parameter.unit);
             return Some(Refusal {
                 gate,
                 reason: format!(
-                    "the best value of {} lies at the end of what physics allows ({end} {unit}): the shape fits, the physics \
-                     does not",
-                    parameter.name
+                    "the best value of {} lies at the end of what physics allows ({}{unit}): the shape fits, the physics does \
+                     not",
+                    parameter.name,
+                    three(end)
                 ),
             });
         }
@@ -237,6 +227,7 @@ fn end_at(member: &Member<'_>, k: usize, value: f64) -> Option<f64> {
 fn held_out_span(before: Misfit, judged: &Judged<'_>) -> Option<Refusal> {
     let after = judged.misfit;
     let n = after.n_held_out as f64;
+    let size = |chi2: f64| times((chi2 / n).sqrt());
     let slack = 3.0 * (2.0 * n).sqrt().min(before.held_out);
     let worse = after.n_held_out > 0
         && after.held_out > before.held_out * WORSE * WORSE
@@ -244,9 +235,9 @@ fn held_out_span(before: Misfit, judged: &Judged<'_>) -> Option<Refusal> {
     worse.then(|| Refusal {
         gate: "held-out span",
         reason: format!(
-            "the error of the held-out span grows from {:.3} to {:.3} noise sd",
-            (before.held_out / n).sqrt(),
-            (after.held_out / n).sqrt()
+            "the error of the held-out span grows from {} to {} the noise",
+            size(before.held_out),
+            size(after.held_out)
         ),
     })
 }
@@ -256,16 +247,16 @@ fn held_out_channel(laboratory: &Laboratory<'_>, base: &Fitted<'_>, fit: &Fitted
     let rows = &laboratory.rows;
     for (output, name) in laboratory.study.setup.outputs.iter().enumerate() {
         let of = |row: &Row| row.output == output && row.usage == Usage::HeldOutChannel;
-        let n = rows.rows.iter().filter(|row| of(row)).count() as f64;
-        if n < 1.0 {
-            continue;
-        }
+        let Some(row) = rows.rows.iter().find(|row| of(row)) else { continue };
         let (before, after) = (rows.rmse(&base.predicted, of), rows.rmse(&fit.predicted, of));
         if after > before * WORSE {
             return Some(Refusal {
                 gate: "held-out channel",
                 reason: format!(
-                    "the error of {name}, which is never fitted, grows from {before:.4} to {after:.4}"
+                    "the error of {name}, which is never fitted, grows from {} to {}{}",
+                    three(before),
+                    three(after),
+                    spaced(&unit(laboratory.study, row.record, row.channel))
                 ),
             });
         }

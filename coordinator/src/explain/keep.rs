@@ -20,8 +20,8 @@ const EXPLAINED: &str = "explained";
 /// When the store fails, or a figure is no finite number and so could not be read again.
 pub fn keep(folder: &RunFolder, findings: &Findings) -> Result<(), StoreError> {
     let store = &folder.store;
-    let explanation = readable(store, EXPLANATION, &findings.explanation)?;
-    let figures = readable(store, FIGURES, &findings.figures)?;
+    let explanation = readable(EXPLANATION, &findings.explanation)?;
+    let figures = readable(FIGURES, &findings.figures)?;
     store.set_meta(FIGURES, &figures)?;
     store.set_meta(EXPLAINED, findings.explained_study.as_deref().unwrap_or_default())?;
     // Last: with it the explanation counts as finished.
@@ -48,13 +48,9 @@ fn parsed<T: DeserializeOwned>(store: &Store, name: &'static str) -> Result<Opti
 }
 
 /// JSON writes a NaN as `null` and does not read it as a number again: such a value is told now and not later.
-fn readable<T: Serialize + DeserializeOwned>(
-    store: &Store,
-    name: &'static str,
-    value: &T,
-) -> Result<String, StoreError> {
+fn readable<T: Serialize + DeserializeOwned>(name: &'static str, value: &T) -> Result<String, StoreError> {
     let text = json(value);
     serde_json::from_str::<T>(&text)
-        .map_err(|e| store.damaged(name, format!("a figure is no finite number: {e}")))?;
+        .map_err(|e| StoreError::NotFinite { what: name, reason: e.to_string() })?;
     Ok(text)
 }

@@ -7,7 +7,7 @@ mod bootstrap;
 mod channels;
 mod correlate;
 mod maps;
-mod number;
+pub(super) mod number;
 mod places;
 mod region;
 mod residuals;

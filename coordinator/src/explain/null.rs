@@ -33,7 +33,7 @@ pub(super) fn measure(
     let mut nulls = Nulls { of: options.nulls, ..Nulls::default() };
     let options = Options { force: true, ..options.clone() };
     for k in 0..nulls.of {
-        let simulated = simulated(study, predicted, study.seed.wrapping_add(1 + k as u64));
+        let simulated = simulated(study, predicted, &mut random(study.seed, k as u64));
         let (runs, n_worker) = (nulls.runs, fleet.n_workers());
         let says = format!("{} of {} recordings without a gap", k + 1, nulls.of);
         (context.watch)(&Stage { name: "null", says, runs, workers: n_worker });
@@ -58,14 +58,46 @@ pub(super) fn measure(
     Ok(nulls)
 }
 
-/// The study with its measured values replaced by predictions and noise.
-fn simulated(study: &Study, predicted: &[f64], seed: u64) -> Study {
+/// The random numbers of recording `k`: the seed of the study is the key of the generator and the recording a stream of it, so
+/// that no two studies and no two recordings share one (Bernstein 2008: key and stream are different words of the ChaCha
+/// block). Stream 0 is the search's own.
+fn random(seed: u64, k: u64) -> ChaCha8Rng {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
+    random.set_stream(k + 1);
+    random
+}
+
+/// The study with its measured values replaced by predictions and noise.
+fn simulated(study: &Study, predicted: &[f64], random: &mut ChaCha8Rng) -> Study {
     let mut simulated = study.clone();
     let records = Arc::make_mut(&mut simulated.records);
     for (row, y) in Rows::new(study).rows.iter().zip(predicted) {
-        let noise: f64 = StandardNormal.sample(&mut random);
+        let noise: f64 = StandardNormal.sample(random);
         records[row.record].channels[row.channel].values[row.step] = y + row.noise * noise;
     }
     simulated
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashMap;
+
+    use rand::Rng;
+
+    use super::*;
+
+    #[test]
+    fn recordings_of_neighbouring_study_seeds_share_no_stream_with_each_other_nor_with_the_search() {
+        let mut first: HashMap<u64, (u64, u64)> = HashMap::new();
+        for seed in 0..40 {
+            for k in 0..40 {
+                let number = random(seed, k).next_u64();
+                assert_eq!(first.insert(number, (seed, k)), None, "seed {seed}, recording {k}");
+            }
+            let of_search = ChaCha8Rng::seed_from_u64(seed).next_u64();
+            assert_eq!(first.insert(of_search, (seed, u64::MAX)), None, "the search with seed {seed}");
+        }
+        assert_eq!(first.len(), 40 * 41);
+        assert_eq!(random(3, 7).next_u64(), random(3, 7).next_u64(), "the same recording has the same noise");
+    }
 }

@@ -134,6 +134,9 @@ pub enum ExplainError {
     /// A name that is not among the candidates.
     #[error("{0}")]
     Name(String),
+    /// A noise that has nothing to do with the values it belongs to.
+    #[error("{0}")]
+    Noise(String),
 }
 
 impl ExplainError {
@@ -153,6 +156,7 @@ impl ExplainError {
             Self::NothingToTry(_)
                 | Self::NotConverged { .. }
                 | Self::Name(_)
+                | Self::Noise(_)
                 | Self::Baseline(_)
                 | Self::Budget { .. }
         )

@@ -3,7 +3,8 @@
 //! Nothing is decided here: the gates and the verdict have spoken. Next file to read: [`super::judge`].
 
 use super::candidate::Candidate;
-use super::judge::Misfit;
+use super::judge::{Misfit, spaced};
+use super::locate::number::three;
 use super::result::Rejected;
 use super::screen::Hit;
 use super::search::Found;
@@ -35,8 +36,11 @@ pub(super) fn rejected(found: &Found<'_>, candidates: &[Candidate], decision: &D
         } else if let Some(hit) = wrong_sign(found, index, candidate) {
             let parameter = &candidate.def.parameters[0];
             let reason = format!(
-                "{} would have to be {:.4} ± {:.4} {}, a sign that physics does not allow",
-                parameter.name, hit.score.amplitude, hit.score.sd, parameter.unit
+                "{} would have to be {} ± {}{}, a sign that physics does not allow",
+                parameter.name,
+                three(hit.score.amplitude),
+                three(hit.score.sd),
+                spaced(&parameter.unit)
             );
             list.push(Rejected { name, gate: "sign".to_owned(), reason });
         }
@@ -62,22 +66,21 @@ fn behind(found: &Found<'_>, decision: &Decision, i: usize) -> String {
             let (whole, part) = (share(&judged.misfit), share(&best.misfit));
             100.0 * (part - whole) / (share(&found.before) - whole).max(f64::MIN_POSITIVE)
         };
-        let held_out = if judged.misfit.n_held_out > 0 {
-            format!(" and {:.1} % on the held-out span", of(|m| m.held_out))
-        } else {
-            String::new()
-        };
-        return format!(
-            "beyond `{name}` it takes away {:.1} % of the gap on the training data{held_out}: a further effect must carry a tenth \
-             of both",
-            of(|m| m.train)
-        );
+        let train = of(|m| m.train);
+        let held_out = (judged.misfit.n_held_out > 0).then(|| of(|m| m.held_out));
+        if train < 10.0 || held_out.is_some_and(|h| h < 10.0) {
+            return format!(
+                "beyond `{name}` it takes away {train:.1} % of the gap on the training data{}: a further effect must carry a \
+                 tenth of {}",
+                held_out.map_or_else(String::new, |h| format!(" and {h:.1} % on the held-out span")),
+                if held_out.is_some() { "both" } else { "it" }
+            );
+        }
     }
     format!(
-        "it takes away {:.0} % of the gap, `{name}` {:.0} %; {:.1} in χ² lie between them, all data together, in units of the \
-         effective noise",
-        100.0 * judged.share,
-        100.0 * best.share,
-        (best.rank() - judged.rank()) / best.inflation
+        "with it χ² of all data together, less the price of its further parameters, falls by {:.1}, with `{name}` by {:.1}, in \
+         units of the effective noise",
+        judged.rank() / best.inflation,
+        best.rank() / best.inflation
     )
 }

@@ -4,6 +4,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::held_out::HeldOut;
+use super::reach::NotTried;
+
 /// The verdict on a misfit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -50,6 +53,12 @@ pub struct Explanation {
     pub rejected: Vec<Rejected>,
     /// Root mean square error before and after, by channel and use; empty when nothing was added.
     pub gap: Vec<GapRow>,
+    /// What the data say that no fit has seen, by record and channel, with the effects that were named or came nearest.
+    #[serde(default)]
+    pub held_out: Vec<HeldOut>,
+    /// Kinds of physics of which nothing was tried, and why.
+    #[serde(default)]
+    pub not_tried: Vec<NotTried>,
     /// What is left of the gap.
     pub remaining: Remaining,
     /// How often this search would name an effect where none is missing.
@@ -193,8 +202,11 @@ pub struct GapRow {
 pub struct Remaining {
     /// Root mean square of the residuals of the training data over their noise.
     pub rmse_over_noise: f64,
-    /// Probability of residuals at least as autocorrelated if they were white (Ljung & Box 1978).
+    /// Probability of residuals at least as autocorrelated if they were white (Ljung & Box 1978); 1 where that was not tested.
     pub whiteness_p: f64,
+    /// Whether the residuals are long and varied enough to be tested for it.
+    #[serde(default)]
+    pub whiteness_tested: bool,
     /// Factor that size and correlation of the residuals make on the variance of a smooth signal's coefficient.
     pub inflation: f64,
     /// Fall of χ² that all candidates and bent forms of the effect together would still bring, to first order, in units of
@@ -260,8 +272,11 @@ pub struct ParameterShift {
 /// An experiment that separates tied effects.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Experiment {
-    /// What to do, in one sentence.
+    /// What to do, in one sentence; of several the one with the largest separation.
     pub says: String,
+    /// The two sets of effects that it is about.
+    #[serde(default)]
+    pub between: Vec<String>,
     /// Expected difference in χ² between the two sets hardest to separate, in that experiment.
     pub separation: f64,
     /// The same in the data at hand.

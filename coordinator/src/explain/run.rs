@@ -17,11 +17,13 @@ use super::judge::Judged;
 use super::laboratory::{Laboratory, Point};
 use super::locate::{self, Located, Track, View};
 use super::patch::explained_study;
+use super::reach;
 use super::refused;
 use super::rhythm::{jumps, rhythms};
 use super::search::{Found, search};
 use super::verdict::{Decision, decide};
 use super::version::Version;
+use super::warnings;
 use super::words;
 use super::{Context, ExplainError, Explanation, Figures, Findings, Options, Verdict, null};
 use crate::fleet::Fleet;
@@ -103,7 +105,7 @@ fn fit_as_it_is<'c>(
     if !drive(laboratory, &mut fits)? {
         return Err(laboratory.beyond_budget(study.parameters.len()));
     }
-    let [fit] = fits;
+    let [mut fit] = fits;
     if fit.end() == Some(End::NoStart) {
         let reason = "no run succeeds at the prior median or next to it".to_owned();
         return Err(ExplainError::Baseline(reason));
@@ -111,6 +113,7 @@ fn fit_as_it_is<'c>(
     if !fit.has_converged() && !options.force {
         return Err(ExplainError::NotConverged { iterations: fit.trials(), stand: words::stand(&fit) });
     }
+    fit.measure_own_values(laboratory)?;
     Ok(fit)
 }
 
@@ -141,7 +144,7 @@ fn finish(laboratory: &mut Laboratory<'_>, answer: &Answer<'_, '_>) -> Result<Fi
         before.forces = forces(laboratory, &found.base)?;
     }
     laboratory.stage("add", "");
-    let mut warnings = words::warnings(laboratory, found, decision);
+    let mut warnings = warnings::warnings(laboratory, found, decision);
     let explained = match added {
         Some(judged) => {
             let left_out = &judged.fit.version.left_out;
@@ -242,7 +245,7 @@ fn explanation(
         model: study.setup.model.kind.clone(),
         seed: study.seed,
         verdict: decision.verdict,
-        headline: words::headline(laboratory, found, decision),
+        headline: words::headline(laboratory, found, candidates, decision),
         places: before.places.clone(),
         effects: added.map(answer::effects).unwrap_or_default(),
         replaced: added.map(|j| j.fit.version.left_out.clone()).unwrap_or_default(),
@@ -254,7 +257,9 @@ fn explanation(
         screened: answer::screened(found, candidates, decision, n_train),
         rejected: refused::rejected(found, candidates, decision),
         gap: after.map(|y| answer::gap(laboratory, &found.base.predicted, y)).unwrap_or_default(),
-        remaining: answer::remaining(laboratory, found, added, checked, words::shape(found, added, before)),
+        held_out: nearest.map_or(&found.held_out, |j| &j.held_out).clone(),
+        not_tried: reach::not_tried(study, candidates),
+        remaining: answer::remaining(found, added, checked, words::shape(found, added, before)),
         false_alarm: answer::false_alarm(found, best_gain(found, judged)),
         parameter_shifts: added.map(|j| answer::shifts(&found.base, j)).unwrap_or_default(),
         untried: words::untried(found, candidates),

@@ -7,9 +7,11 @@
 
 use std::cmp::Ordering;
 
-use super::background::{Background, whiteness};
+use super::adequacy::Adequacy;
+use super::background::Background;
 use super::candidate::Candidate;
 use super::fit::{Fitted, drive, drive_rounds};
+use super::held_out::{HeldOut, held_out};
 use super::judge::{Judged, Misfit, judge};
 use super::laboratory::Laboratory;
 use super::locate::Track;
@@ -29,8 +31,6 @@ const SCORED: usize = 2;
 const SMALL: usize = 6;
 /// Further candidates are refitted when the race promises a cost within this many units of the effective noise of the best.
 const CLOSE: f64 = 12.0;
-/// Probability of residuals as autocorrelated as these below which they are not white.
-pub const NOT_WHITE: f64 = 1e-3;
 
 /// Everything that the search found.
 pub struct Found<'c> {
@@ -38,8 +38,10 @@ pub struct Found<'c> {
     pub base: Fitted<'c>,
     /// Its misfit.
     pub before: Misfit,
-    /// Whether its residuals could be white.
-    pub whiteness: f64,
+    /// Its training residuals against the stated noise.
+    pub adequacy: Adequacy,
+    /// What the data say of it that no fit has seen.
+    pub held_out: Vec<HeldOut>,
     /// What chance would give.
     pub background: Background,
     /// The screening at the model as it is, every candidate and grid point.
@@ -81,14 +83,15 @@ pub fn search<'c>(
     let seed = laboratory.study.seed;
     let mut searcher = Searcher { laboratory, candidates, tracks, cut_short: false };
     let before = Misfit::of(searcher.laboratory, &base);
-    let whiteness = whiteness(&searcher.laboratory.rows, base.residual());
+    let adequacy = Adequacy::of(searcher.laboratory, &base);
+    let held_out = held_out(searcher.laboratory, &base, &base);
     searcher.laboratory.stage("screen", &format!("{} candidates", candidates.len()));
     let hits = searcher.screen_all(&base)?;
     let background = Background::new(&base.optimum()?, &searcher.laboratory.rows, &hits, candidates, seed);
     let alarm = hits.iter().map(|h| h.allowed_gain(candidates[h.candidate].sign())).fold(0.0, f64::max);
     let (judged, cut_short) = (Vec::new(), false);
-    let mut found = Found { base, before, whiteness, background, hits, alarm, judged, cut_short };
-    if whiteness < NOT_WHITE || alarm > found.background.threshold {
+    let mut found = Found { base, before, adequacy, held_out, background, hits, alarm, judged, cut_short };
+    if adequacy.is_gap() || alarm > found.background.threshold {
         searcher.singles(&mut found)?;
         searcher.replacements(&mut found)?;
         searcher.look_again(&mut found, options)?;
@@ -125,8 +128,7 @@ impl<'c> Searcher<'_, '_, 'c> {
         let base = found.base.clone();
         let best = self.best_of_each(&found.hits);
         let fits = self.explore(&base, &best)?;
-        self.judge_all(found, fits);
-        Ok(())
+        self.judge_all(found, fits)
     }
 
     /// The best point of the grid of every candidate that could be named, largest gain first.
@@ -191,13 +193,19 @@ impl<'c> Searcher<'_, '_, 'c> {
         Ok(Fitted::from_parent(version, parent, &hit.point, &sensitivity, train))
     }
 
-    pub(super) fn judge_all(&mut self, found: &mut Found<'c>, fits: Vec<Fitted<'c>>) {
+    pub(super) fn judge_all(
+        &mut self,
+        found: &mut Found<'c>,
+        fits: Vec<Fitted<'c>>,
+    ) -> Result<(), ExplainError> {
         self.laboratory.stage("gates", &format!("{} refitted", fits.len()));
-        for fit in fits {
+        for mut fit in fits {
+            fit.measure_own_values(self.laboratory)?;
             let judged = judge(self.laboratory, &found.base, found.before, fit, found.background.threshold);
             found.judged.push(judged);
         }
         found.judged.sort_by(order);
+        Ok(())
     }
 
     /// Leaves out every replaceable term in turn and searches for what replaces it.
@@ -220,7 +228,7 @@ impl<'c> Searcher<'_, '_, 'c> {
             let hits = self.screen_all(&without)?;
             let best = self.best_of_each(&hits);
             let fits = self.explore(&without, &best)?;
-            self.judge_all(found, fits);
+            self.judge_all(found, fits)?;
         }
         Ok(())
     }

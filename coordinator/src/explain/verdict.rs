@@ -10,10 +10,10 @@ use starlings_models::equations::{Expression, Slot};
 use super::Verdict;
 use super::candidate::Candidate;
 use super::carried::{Carried, carried};
-use super::form::{Leftover, white_share};
+use super::doubt::{doubt, nearest_refused};
 use super::judge::Judged;
 use super::laboratory::Laboratory;
-use super::search::{Found, NOT_WHITE};
+use super::search::Found;
 
 /// A rival within this fall of χ², in units of the effective noise, is tied.
 const MARGIN: f64 = 6.0;
@@ -23,23 +23,11 @@ const ALIKE: f64 = 0.995;
 const VUONG: f64 = 1.64;
 /// Effective variance of the residuals above which what remains is a discrepancy of its own, not the form of an effect.
 pub(super) const DISCREPANT: f64 = 20.0;
-/// Share of white noise in the residuals from which on they must be white altogether.
-const AUDIBLE: f64 = 0.12;
-/// ... where their effective variance says that the structure matters.
-const STRUCTURED: f64 = 3.0;
 /// Fall of χ² by a fully bent form from which on a form bent by half, which makes a quarter of it, passes the 12 units of the
 /// check of the form nine times in ten: 4 (√12 + 1.28)².
 const POWER: f64 = 90.0;
-/// Share of the gap of the held-out span that may be left unaccounted for where the training residuals are noise.
-const UNACCOUNTED: f64 = 0.15;
 /// Posterior over prior standard deviation of a parameter inside a term from which on the data do not tell it.
 const UNINFORMED: f64 = 0.5;
-/// Where the residuals stay correlated, an effect must take away this share of the excess of the training rows ...
-const SHARE: f64 = 0.5;
-/// ... and this share of that of the held-out span.
-const SHARE_HELD_OUT: f64 = 0.4;
-/// ... and no more than this share of the decoys may do as well.
-const DECOYS: f64 = 0.05;
 
 /// The verdict, with positions in [`Found::judged`].
 #[derive(Clone, Debug, PartialEq)]
@@ -70,7 +58,8 @@ pub fn decide(laboratory: &Laboratory<'_>, found: &Found<'_>, candidates: &[Cand
     };
     let passing = found.passing();
     if passing.is_empty() {
-        return if found.whiteness < NOT_WHITE {
+        let is_gap = found.adequacy.is_gap() && !found.adequacy.is_numerical();
+        return if is_gap || found.held_out.iter().any(|h| h.fails) {
             none(Verdict::Unexplained, None, &nearest_refused(found))
         } else {
             none(Verdict::NoGap, None, "")
@@ -129,77 +118,6 @@ fn limits(judged: &Judged<'_>) -> Vec<String> {
 /// Names of the effects of a version.
 pub fn names(judged: &Judged<'_>) -> Vec<String> {
     judged.fit.version.members.iter().map(|m| m.candidate.name().to_owned()).collect()
-}
-
-/// Which candidate came nearest and the gate that refused it.
-fn nearest_refused(found: &Found<'_>) -> String {
-    let nearest = found.judged.first().and_then(|j| Some((j, j.refusal.as_ref()?)));
-    nearest.map_or_else(
-        || "no candidate gains more than chance".to_owned(),
-        |(judged, refusal)| {
-            let name = judged.fit.version.name();
-            format!(
-                "`{name}` comes nearest and is refused by the gate `{}`: {}",
-                refusal.gate, refusal.reason
-            )
-        },
-    )
-}
-
-/// What speaks against naming a version that passes the gates.
-fn doubt(
-    laboratory: &Laboratory<'_>,
-    found: &Found<'_>,
-    judged: &Judged<'_>,
-    left: Leftover,
-) -> Option<String> {
-    if left.is_systematic {
-        return Some(format!(
-            "`{}` comes nearest, but other candidates or a bent form of it would still take away {:.0} of χ² and {:.0} on the \
-             held-out span, in units of the effective noise: its form is not right",
-            judged.fit.version.name(),
-            left.gain,
-            left.gain_held_out
-        ));
-    }
-    let name = judged.fit.version.name();
-    if judged.whiteness >= NOT_WHITE {
-        return (judged.unaccounted > UNACCOUNTED).then(|| {
-            format!(
-                "with `{name}` nothing but noise is left of the training data, yet at least {:.0} % of the gap of the held-out \
-                 span stays beyond the uncertainty of the estimate: its form does not carry on",
-                100.0 * judged.unaccounted
-            )
-        });
-    }
-    let white = white_share(&laboratory.rows, judged.fit.residual());
-    if white > AUDIBLE && judged.inflation > STRUCTURED {
-        return Some(format!(
-            "`{name}` takes away {:.0} % of the gap, but white noise makes {:.0} % of what is left and so shows that the rest is \
-             none: its form is not right, or something else is missing too",
-            100.0 * judged.share,
-            100.0 * white
-        ));
-    }
-    let short = |share: f64, what: &str| {
-        format!(
-            "`{name}` takes away only {:.0} % of the gap on the {what}, and what is left is not noise",
-            100.0 * share
-        )
-    };
-    if judged.share < SHARE {
-        return Some(short(judged.share, "training data"));
-    }
-    if let Some(share) = judged.share_held_out.filter(|s| *s < SHARE_HELD_OUT) {
-        return Some(short(share, "held-out span"));
-    }
-    let decoys = found.background.decoys_above(judged.gain);
-    (decoys > DECOYS).then(|| {
-        format!(
-            "{:.0} % of the decoys take away as much as `{name}`, and what is left is not noise",
-            100.0 * decoys
-        )
-    })
 }
 
 /// Other versions that pass the gates and come as close as chance allows: by the fall of χ², or, up to twice that margin,

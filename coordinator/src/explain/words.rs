@@ -1,29 +1,36 @@
-//! The sentences of an explanation.
+//! The sentences of an explanation: each is made from the figures that it stands beside.
 //!
-//! Next file to read: [`super::result`].
-
-use starlings_models::SOLVER;
+//! What speaks of noise is in [`super::adequacy`], what of held-out data in [`super::held_out`]. Next file to read:
+//! [`super::warnings`].
 
 use super::Verdict;
+use super::adequacy::{Nature, factor, times};
 use super::candidate::Candidate;
 use super::fit::Fitted;
+use super::held_out::{HeldOut, listed};
 use super::judge::Judged;
 use super::laboratory::Laboratory;
 use super::locate::Located;
+use super::locate::number::percent;
+use super::reach;
 use super::rows::Usage;
-use super::search::{Found, NOT_WHITE};
-use super::verdict::{DISCREPANT, Decision};
+use super::search::Found;
+use super::verdict::Decision;
 
 /// Where a fit stands that has not converged.
 pub(super) fn stand(fit: &Fitted<'_>) -> String {
     let n = fit.residual().len().max(1) as f64;
     let rms = (fit.residual().norm_squared() / n).sqrt();
-    format!("{} (root mean square residual {rms:.3} noise sd)", super::run::values(fit))
+    format!("{} (root mean square residual {} noise sd)", super::run::values(fit), factor(rms))
 }
 
-/// The verdict in one or two sentences.
-pub(super) fn headline(laboratory: &Laboratory<'_>, found: &Found<'_>, decision: &Decision) -> String {
-    let base = |usage| laboratory.rows.rmse(&found.base.predicted, |row| row.usage == usage);
+/// The verdict in a few sentences.
+pub(super) fn headline(
+    laboratory: &Laboratory<'_>,
+    found: &Found<'_>,
+    candidates: &[Candidate],
+    decision: &Decision,
+) -> String {
     let best = decision.best.map(|i| &found.judged[i]);
     match (decision.verdict, best) {
         (Verdict::Named, Some(judged)) => {
@@ -38,16 +45,58 @@ pub(super) fn headline(laboratory: &Laboratory<'_>, found: &Found<'_>, decision:
                 capital(&shrinking(laboratory, found, judged))
             )
         }
-        (Verdict::Unexplained, _) => {
-            let because =
-                if decision.because.is_empty() { String::new() } else { format!(": {}", decision.because) };
-            format!("Nothing in the library explains the gap{}.", because.trim_end_matches('.'))
-        }
-        _ => format!(
-            "No gap: the model explains the data at their noise (root mean square residual {:.3} on the training data).",
-            base(Usage::Train)
-        ),
+        (Verdict::Unexplained, _) => unexplained(laboratory, found, candidates, decision),
+        _ => no_gap(found),
     }
+}
+
+/// That nothing explains the gap, why, what fails of what was held out, and what was not tried.
+fn unexplained(
+    laboratory: &Laboratory<'_>,
+    found: &Found<'_>,
+    candidates: &[Candidate],
+    decision: &Decision,
+) -> String {
+    let because = if decision.because.is_empty() { String::new() } else { format!(": {}", decision.because) };
+    let nearest = decision.best.or((!found.judged.is_empty()).then_some(0)).map(|i| &found.judged[i]);
+    let mut sentences =
+        vec![format!("Nothing that was tried explains the gap{}.", because.trim_end_matches('.'))];
+    let of = nearest.map_or(&found.held_out, |j| &j.held_out);
+    let failing: Vec<&HeldOut> = of.iter().filter(|h| h.fails).collect();
+    if !failing.is_empty() {
+        let with = nearest.map_or_else(String::new, |j| format!(" with `{}`", j.fit.version.name()));
+        sentences.push(format!("Held out and failing{with}: {}.", listed(&failing)));
+    }
+    if nearest.is_none() {
+        sentences.push(format!("On the training data {}.", found.adequacy.says()));
+    }
+    let not_tried = reach::sentence(laboratory.study, candidates);
+    if !not_tried.is_empty() {
+        sentences.push(not_tried);
+    }
+    sentences.join(" ")
+}
+
+/// That the data show no gap, by what they could show.
+fn no_gap(found: &Found<'_>) -> String {
+    let says = found.adequacy.says();
+    let training = match found.adequacy.nature() {
+        Nature::Nothing => return format!("No gap could be seen: {says}."),
+        Nature::Noise if found.adequacy.whiteness.is_some() => {
+            format!("No gap: the model explains the training data at their noise; {says}.")
+        }
+        _ => format!("No gap that these data show: {says}."),
+    };
+    let largest = found.held_out.iter().map(|h| h.after).fold(f64::NAN, f64::max);
+    if largest.is_nan() {
+        return training;
+    }
+    let explained = if found.adequacy.is_numerical() {
+        ""
+    } else {
+        ", no more than noise and the uncertainty of the estimate explain"
+    };
+    format!("{training} What was held out is {} its noise at most{explained}.", times(largest))
 }
 
 fn subject(judged: &Judged<'_>) -> String {
@@ -56,7 +105,7 @@ fn subject(judged: &Judged<'_>) -> String {
     format!("Missing: {}. {}", version.name(), says.join(" "))
 }
 
-/// How the gap shrinks, for each use that there is.
+/// What becomes of the error, for each use that there is.
 fn shrinking(laboratory: &Laboratory<'_>, found: &Found<'_>, judged: &Judged<'_>) -> String {
     let noise = |y: &[f64], usage| {
         let whitened = laboratory.rows.whitened(y);
@@ -71,11 +120,32 @@ fn shrinking(laboratory: &Laboratory<'_>, found: &Found<'_>, judged: &Judged<'_>
     ];
     let part = |(usage, what)| {
         let before = noise(&found.base.predicted, usage)?;
-        let after = noise(&judged.fit.predicted, usage)?;
-        Some(format!("from {before:.2} to {after:.2} noise sd on {what}"))
+        Some((before, noise(&judged.fit.predicted, usage)?, what))
     };
-    let parts: Vec<String> = spans.into_iter().filter_map(part).collect();
-    format!("the error falls {}.", parts.join(", "))
+    moves(&spans.into_iter().filter_map(part).collect::<Vec<(f64, f64, &str)>>())
+}
+
+/// How errors in noise sd move, in words: (before, after, of what). The verb is said once for neighbours that move alike.
+pub(super) fn moves(parts: &[(f64, f64, &str)]) -> String {
+    let mut last = "";
+    let mut words = Vec::new();
+    for (before, after, what) in parts {
+        let (from, to) = (factor(*before), factor(*after));
+        let verb = if from == to {
+            "stays"
+        } else if after < before {
+            "falls"
+        } else {
+            "rises"
+        };
+        let said = if verb == last { String::new() } else { format!("{verb} ") };
+        last = verb;
+        words.push(match verb {
+            "stays" => format!("{said}at {to} noise sd on {what}"),
+            _ => format!("{said}from {from} to {to} noise sd on {what}"),
+        });
+    }
+    format!("the error {}.", words.join(", "))
 }
 
 fn capital(text: &str) -> String {
@@ -85,27 +155,36 @@ fn capital(text: &str) -> String {
 
 /// The shape of what remains.
 pub(super) fn shape(found: &Found<'_>, added: Option<&Judged<'_>>, before: &Located) -> String {
-    let white = added.map_or(found.whiteness, |j| j.whiteness) >= NOT_WHITE;
-    if white {
-        return "what remains could be noise".to_owned();
+    let adequacy = added.map_or(&found.adequacy, |j| &j.adequacy);
+    let mut text = adequacy.says();
+    if adequacy.nature() != Nature::Correlated {
+        return text;
     }
-    let strongest = before.correlations.first();
-    if let Some(judged) = added {
-        return format!(
-            "what remains is correlated in time (its squares count {:.0}-fold for smooth signals) and no candidate takes it away",
-            judged.inflation
-        );
+    match added {
+        Some(judged) => {
+            text.push_str(&format!("; against a smooth signal they count {} one", times(judged.inflation)));
+            if let Some(left) = judged.leftover.filter(|left| left.share > 0.0) {
+                let share = percent(left.share);
+                text.push_str(&format!(
+                    "; of what lies above the noise, candidates and bent forms of the effect would take away {share}, to first order"
+                ));
+            }
+        }
+        None => {
+            if let Some(strongest) = before.correlations.first() {
+                text.push_str(&format!("; those of {} go along with {}", strongest.channel, strongest.with));
+            }
+        }
     }
-    let with = strongest.map_or_else(String::new, |c| format!(", and goes along with {}", c.with));
-    format!("what remains is correlated in time{with}")
+    text
 }
 
 /// What the intervals and the verdict rest on.
 pub(super) fn conditional_on(added: Option<&Judged<'_>>) -> String {
-    let noise = added.map_or_else(String::new, |j| {
+    let widened = added.map(|j| j.inflation.sqrt()).filter(|factor| *factor > 1.005);
+    let noise = widened.map_or_else(String::new, |factor| {
         format!(
-            " Intervals are widened by {:.2} for the size and correlation of the residuals.",
-            j.inflation.sqrt()
+            " Intervals are widened by a factor of {factor:.2} for the size and correlation of the residuals."
         )
     });
     format!(
@@ -125,68 +204,32 @@ pub(super) fn untried(found: &Found<'_>, candidates: &[Candidate]) -> Vec<String
     open.map(|(_, c)| c.name().to_owned()).collect()
 }
 
-/// What a fit that did not come to its end leaves in doubt.
-fn unfinished(fit: &Fitted<'_>) -> Option<String> {
-    let name = fit.version.name();
-    if !fit.has_converged() {
-        return Some(format!(
-            "the fit with {name} has not converged after {} steps: its figures are those of where it stands",
-            fit.trials()
-        ));
-    }
-    (!fit.is_fresh()).then(|| {
-        format!(
-            "the fit with {name} ended without a measured Jacobian: its standard deviations and intervals rest on a secant \
-             approximation"
-        )
-    })
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// What is doubtful.
-pub(super) fn warnings(laboratory: &Laboratory<'_>, found: &Found<'_>, decision: &Decision) -> Vec<String> {
-    let mut list = Vec::new();
-    if found.cut_short {
-        list.push(format!(
-            "the budget ended the search after {} runs: candidates named under `untried` were not refitted",
-            laboratory.runs()
-        ));
-    }
-    if !laboratory.rows.rows.iter().any(|row| row.usage != Usage::Train) {
-        list.push(
-            "nothing is held out: neither a span nor a channel could speak against a name; set `train` or \
-             `hold_out_channels`"
-                .to_owned(),
+    #[test]
+    fn an_error_falls_rises_or_stays_as_its_figures_do() {
+        let all = [(2.16, 0.8, "the training data"), (2.54, 1.7, "the held-out span")];
+        assert_eq!(
+            moves(&all),
+            "the error falls from 2.16 to 0.80 noise sd on the training data, from 2.54 to 1.70 noise sd on the held-out span."
+        );
+        let mixed = [(2.0, 1.0, "a"), (1.0, 1.3, "b"), (1.001, 1.002, "c")];
+        assert_eq!(
+            moves(&mixed),
+            "the error falls from 2.00 to 1.00 noise sd on a, rises from 1.00 to 1.30 noise sd on b, stays at 1.00 noise sd on c."
         );
     }
-    if decision.verdict != Verdict::NoGap && laboratory.study.setup.model.kind == SOLVER {
-        let why = "the unknown input of every equation was not looked for: the rates of a solver are not open to one";
-        list.push(why.to_owned());
+
+    #[test]
+    fn the_verb_is_that_of_the_figures_whatever_they_are() {
+        for before in [0.0, 1e-9, 0.5, 1.0, 3.0, 1e9] {
+            for after in [0.0, 1e-9, 0.5, 1.0, 3.0, 1e9] {
+                let text = moves(&[(before, after, "x")]);
+                assert_eq!(text.contains("falls"), after < before, "{text}");
+                assert_eq!(text.contains("rises"), after > before, "{text}");
+            }
+        }
     }
-    let n = laboratory.rows.train.len().max(1) as f64;
-    let ratio = found.base.residual().norm_squared() / n;
-    if decision.verdict == Verdict::NoGap && !(0.5..=1.5).contains(&ratio) {
-        list.push(format!(
-            "the residuals of the model as it is are white, but their variance is {ratio:.2} times that of the stated noise: \
-             check the noise"
-        ));
-    }
-    let best = decision.best.map(|i| &found.judged[i]);
-    list.extend(best.and_then(|judged| unfinished(&judged.fit)));
-    if let Some(judged) = best.filter(|j| j.inflation > 3.0) {
-        list.push(format!(
-            "residuals stay correlated or larger than the stated noise (effective variance {:.1}): evidence and intervals are \
-             scaled by it",
-            judged.inflation
-        ));
-    }
-    if let Some(judged) =
-        best.filter(|j| j.inflation > DISCREPANT && decision.verdict != Verdict::Unexplained)
-    {
-        list.push(format!(
-            "what `{}` leaves is a discrepancy of its own and no noise: whether another form of it would serve as well was not \
-             tested",
-            judged.fit.version.name()
-        ));
-    }
-    list
 }

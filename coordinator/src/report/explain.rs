@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{ReportError, layout, number};
 use crate::explain::figures::Figures;
-use crate::explain::result::{Explanation, Verdict};
+use crate::explain::result::{Experiment, Explanation, Verdict};
 use candidates::Candidates;
 use effect::EffectView;
 use gap::Gap;
@@ -59,6 +59,7 @@ struct Page<'a> {
     verdict_words: &'static str,
     facts: Vec<(&'static str, String)>,
     gap: Gap,
+    failing: Vec<String>,
     effect_title: &'static str,
     effects: Vec<EffectView>,
     ties: Vec<String>,
@@ -89,6 +90,7 @@ impl<'a> Page<'a> {
             verdict_words,
             facts: facts(found, about),
             gap: Gap::new(found, figures)?,
+            failing: failing(found),
             effect_title: match found.verdict {
                 _ if nearest => "What came nearest",
                 Verdict::Tie => "The best of the tied effects",
@@ -96,7 +98,7 @@ impl<'a> Page<'a> {
             },
             effects: shown.iter().map(|effect| EffectView::new(effect, &about.states)).collect(),
             ties: found.tied_with.iter().map(|set| set.join(" + ")).collect(),
-            separation: experiment.map_or(String::new(), effect::separation),
+            separation: experiment.map_or_else(String::new, Experiment::sentence),
             experiments: experiment.map_or(Vec::new(), effect::experiments),
             places: Places::new(found, figures)?,
             candidates: Candidates::new(found, figures)?,
@@ -105,6 +107,12 @@ impl<'a> Page<'a> {
             stages: found.runs_by_stage.iter().map(|(stage, n)| (stage.clone(), n.to_string())).collect(),
         })
     }
+}
+
+/// The held-out data that fail, in words.
+fn failing(found: &Explanation) -> Vec<String> {
+    let several = found.held_out.iter().any(|h| h.record != found.held_out[0].record);
+    found.held_out.iter().filter(|h| h.fails).map(|h| h.says(several)).collect()
 }
 
 fn facts(found: &Explanation, about: &StudyAbout) -> Vec<(&'static str, String)> {
@@ -123,7 +131,14 @@ fn remaining(found: &Explanation) -> Vec<(&'static str, String)> {
     let left = &found.remaining;
     vec![
         ("Training RMSE over noise (1 expected)", number::significant(left.rmse_over_noise, 3)),
-        ("Probability of such autocorrelation in white residuals", probability(left.whiteness_p)),
+        (
+            "Probability of such autocorrelation in white residuals",
+            if left.whiteness_tested {
+                probability(left.whiteness_p)
+            } else {
+                "too few values to tell".to_owned()
+            },
+        ),
     ]
 }
 

@@ -31,6 +31,13 @@ pub(super) fn theta(parameters: &[StudyParameter], records: &[Record]) -> Vec<Th
     entries
 }
 
+impl StudyParameter {
+    /// Whether it is the initial value of a state.
+    pub fn is_initial(&self) -> bool {
+        self.name.starts_with(INITIAL)
+    }
+}
+
 impl Study {
     /// Physical values in the order of [`starlings_models::Setup::parameters`] for one record, from the estimated vector in
     /// transformed units.
@@ -48,11 +55,8 @@ impl Study {
                 sum += value;
                 count += 1;
             }
-            let mean = if parameter.name.starts_with(INITIAL) {
-                parameter.prior_mean[record]
-            } else {
-                sum / f64::from(count)
-            };
+            let mean =
+                if parameter.is_initial() { parameter.prior_mean[record] } else { sum / f64::from(count) };
             parameter.transform.to_physical(mean)
         };
         self.parameters.iter().enumerate().map(value).collect()

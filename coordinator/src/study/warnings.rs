@@ -23,6 +23,9 @@ pub(super) const UNINFORMED: f64 = 0.9;
 const DROPPED: f64 = 0.05;
 /// Prior standard deviations beyond which an estimate contradicts its prior.
 const FAR_FROM_PRIOR: f64 = 4.0;
+/// Share of the distance between two bounds within which an estimate sits at one of them.
+const AT_BOUND: f64 = 0.01;
+
 /// All warnings of a finished fit, the study's own first.
 pub fn collect(
     study: &Study,
@@ -133,17 +136,30 @@ fn far_from_prior(study: &Study, fit: &Fit) -> Vec<String> {
         .enumerate()
         .filter_map(|(j, entry)| {
             let distance = (fit.posterior.mean[j] - prior.mean[j]).abs() / entry.prior_sd;
-            let bounded = matches!(entry.transform, Transform::Logit { .. });
+            let estimate = entry.transform.to_physical(fit.posterior.mean[j]);
             (distance > FAR_FROM_PRIOR).then(|| {
-                let remedy =
-                    if bounded { "it sits at a bound" } else { "widen the prior, or bound it with logit" };
                 format!(
-                    "{} is {distance:.1} prior standard deviations from its prior median: {remedy}.",
-                    entry.name
+                    "{} is {distance:.1} prior standard deviations from its prior median: {}.",
+                    entry.name,
+                    far_remedy(entry.transform, estimate)
                 )
             })
         })
         .collect()
+}
+
+/// What to do about an estimate far from its prior: one with two bounds may lie at one of them, or just far from the median.
+fn far_remedy(transform: Transform, estimate: f64) -> String {
+    match transform {
+        Transform::Logit { lo, hi } if estimate - lo < AT_BOUND * (hi - lo) => {
+            format!("it sits at its lower bound, {lo}")
+        }
+        Transform::Logit { lo, hi } if hi - estimate < AT_BOUND * (hi - lo) => {
+            format!("it sits at its upper bound, {hi}")
+        }
+        Transform::Logit { .. } => "widen the prior".to_owned(),
+        _ => "widen the prior, or bound it with logit".to_owned(),
+    }
 }
 
 fn dropped(fit: &Fit) -> Option<String> {
@@ -165,4 +181,18 @@ fn lost(fit: &Fit) -> Option<String> {
             100.0 * fit.information_lost
         )
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_an_estimate_at_a_bound_is_said_to_sit_there() {
+        let bounded = Transform::Logit { lo: 0.0, hi: 10.0 };
+        assert_eq!(far_remedy(bounded, 0.05), "it sits at its lower bound, 0");
+        assert_eq!(far_remedy(bounded, 9.95), "it sits at its upper bound, 10");
+        assert_eq!(far_remedy(bounded, 6.0), "widen the prior");
+        assert_eq!(far_remedy(Transform::Log, 6.0), "widen the prior, or bound it with logit");
+    }
 }

@@ -30,7 +30,7 @@ pub(super) fn threshold(value: f64, range: f64) -> String {
 }
 
 /// Three significant digits, fewer where the last are zero.
-pub(super) fn three(value: f64) -> String {
+pub(in crate::explain) fn three(value: f64) -> String {
     if !value.is_finite() {
         return "–".to_owned();
     }
@@ -48,7 +48,7 @@ fn trimmed(text: &str) -> String {
 }
 
 /// A share in per cent.
-pub(super) fn percent(share: f64) -> String {
+pub(in crate::explain) fn percent(share: f64) -> String {
     if share < 0.01 { format!("{:.1} %", 100.0 * share) } else { format!("{:.0} %", 100.0 * share) }
 }
 

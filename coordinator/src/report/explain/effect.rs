@@ -51,15 +51,6 @@ fn coefficient(c: &Coefficient) -> CoefficientView {
     }
 }
 
-/// What the proposed experiment is worth.
-pub(super) fn separation(experiment: &Experiment) -> String {
-    format!(
-        "It would separate the two sets that are hardest to tell apart by a difference in χ² of {}; the data at hand do so by {}.",
-        quantity(experiment.separation, ""),
-        quantity(experiment.separation_now, "")
-    )
-}
-
 /// All experiments that were simulated.
 pub(super) fn experiments(experiment: &Experiment) -> Vec<[String; 2]> {
     experiment.tried.iter().map(|(what, separation)| [what.clone(), quantity(*separation, "")]).collect()

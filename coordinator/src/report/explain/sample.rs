@@ -2,7 +2,9 @@
 
 use super::StudyAbout;
 use crate::explain::figures::{Curve, Figures};
+use crate::explain::held_out::HeldOut;
 use crate::explain::locate::{ChannelGap, Correlated, Located, RegionMap, ResidualSpectrum, UnknownInput};
+use crate::explain::reach::NotTried;
 use crate::explain::result::{
     Coefficient, Experiment, Explanation, FalseAlarm, GapRow, NamedEffect, ParameterShift, Place, Rejected,
     Remaining, Screened, Verdict,
@@ -33,7 +35,7 @@ pub(super) fn found(verdict: Verdict, records: usize, n: usize) -> (Explanation,
             explanation.closest = Some(effect());
         }
         Verdict::NoGap => {
-            explanation.headline = "The model explains the data at their noise.".into();
+            explanation.headline = "No gap: the model explains the training data at their noise.".into();
             explanation.places.clear();
         }
     }
@@ -73,6 +75,7 @@ fn experiment() -> Experiment {
     Experiment {
         says: "Double the stroke volume and record the inlet pressure for 4 s.".into(),
         separation: 412.0,
+        between: vec!["series-resistance".into(), "quadratic-loss".into()],
         separation_now: 3.1,
         tried: vec![("twice the stroke volume".into(), 412.0), ("twice as long".into(), 6.2)],
     }
@@ -118,6 +121,11 @@ fn explanation(verdict: Verdict, records: usize) -> Explanation {
         gap: (1..=records)
             .flat_map(|k| [row(k, "train", 9.43, 2.11), row(k, "held-out", 9.12, 2.34)])
             .collect(),
+        held_out: held_out(),
+        not_tried: vec![NotTried {
+            kind: "thermal".into(),
+            reason: "this model has no place for it; it needs: a state with the role temperature".into(),
+        }],
         remaining: remaining(),
         false_alarm: false_alarm(),
         parameter_shifts: vec![shift("R", "mmHg s/mL", 3.21, 3.367), shift("C", "mL/mmHg", 1.91, 1.248)],
@@ -132,10 +140,26 @@ fn explanation(verdict: Verdict, records: usize) -> Explanation {
     }
 }
 
+fn held_out() -> Vec<HeldOut> {
+    let of = |channel: &str, usage: &str, after: f64| HeldOut {
+        record: "in-vivo-1".into(),
+        channel: channel.into(),
+        usage: usage.into(),
+        n: 463,
+        before: 4.6,
+        after,
+        beyond: 0.9 * after,
+        fails: after > 2.0,
+        mended: 0.7,
+    };
+    vec![of("pressure", "held-out", 2.46), of("inlet", "held-out-channel", 1.02)]
+}
+
 fn remaining() -> Remaining {
     Remaining {
         rmse_over_noise: 1.06,
         whiteness_p: 0.000_04,
+        whiteness_tested: true,
         inflation: 3.2,
         form_gain: 4.1,
         form_gain_held_out: 0.6,

@@ -16,6 +16,17 @@ pub enum StoreError {
     /// The folder or its database is missing or of another version.
     #[error("{0}")]
     Unusable(String),
+    /// A result holds a figure that is no finite number, and so is not stored.
+    #[error(
+        "a figure of the {what} is no finite number ({reason}): the recorded values, their noise and the priors differ by too \
+         many powers of ten; give quantities in units in which they are between 1e-6 and 1e6"
+    )]
+    NotFinite {
+        /// Which result.
+        what: &'static str,
+        /// Where in it.
+        reason: String,
+    },
     /// A stored value cannot be read back.
     #[error("{path} holds a damaged {what}: {reason}")]
     Damaged {

@@ -1,0 +1,72 @@
+//! The Jacobian of a fit from differences: one run per parameter of the study and record.
+//!
+//! A parameter with one value per record is moved in all records at once, and each record answers to its own; a held-out record
+//! is run with their mean and answers to each of them. Next file to read: [`super::fit`].
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::ExplainError;
+use super::fit::{Fitted, point};
+use super::laboratory::{Answer, Laboratory, Point};
+
+/// Distance of the differences, in z.
+pub(super) const STEP: f64 = 1e-3;
+
+impl Fitted<'_> {
+    /// One point per parameter of the study, all of its entries moved by `step`.
+    pub(super) fn moved(&self, z: &DVector<f64>, step: f64) -> Vec<DVector<f64>> {
+        let study = &self.version.study;
+        let point = |parameter: usize| {
+            let mut moved = z.clone();
+            for j in (0..study.theta.len()).filter(|j| study.theta[*j].parameter == parameter) {
+                moved[j] += step * moved[j].abs().max(1.0);
+            }
+            moved
+        };
+        (0..study.parameters.len()).map(point).collect()
+    }
+
+    /// The whitened Jacobian of all rows from forward differences; backward where the model fails on the forward side, nothing
+    /// where it fails on both.
+    pub(super) fn differences(
+        &self,
+        laboratory: &mut Laboratory<'_>,
+        z: &DVector<f64>,
+        answers: Vec<Answer>,
+    ) -> Result<Option<DMatrix<f64>>, ExplainError> {
+        let mut steps = vec![STEP; answers.len()];
+        let mut found: Vec<Option<Arc<Vec<f64>>>> = answers.into_iter().map(Result::ok).collect();
+        let failed: Vec<usize> = (0..found.len()).filter(|k| found[*k].is_none()).collect();
+        if !failed.is_empty() {
+            let back = self.moved(z, -STEP);
+            let points: Vec<Point<'_>> = failed.iter().map(|k| point(self, &back[*k])).collect();
+            for (k, answer) in failed.iter().zip(laboratory.run(&points)?) {
+                found[*k] = answer.ok();
+                steps[*k] = -STEP;
+            }
+        }
+        let rows = &laboratory.rows.rows;
+        let study = &self.version.study;
+        let distance = |j: usize| steps[study.theta[j].parameter] * z[j].abs().max(1.0);
+        let mut jacobian = DMatrix::zeros(rows.len(), self.version.n_param());
+        for (j, entry) in study.theta.iter().enumerate() {
+            let Some(moved) = &found[entry.parameter] else { return Ok(None) };
+            // A held-out record is run with the mean of the entries, which moved by the mean of their distances: per entry that
+            // mean changes by one in their number.
+            let of_all = || (0..study.theta.len()).filter(|k| study.theta[*k].parameter == entry.parameter);
+            let together: f64 = of_all().map(distance).sum();
+            for (i, row) in rows.iter().enumerate() {
+                let h = match entry.record {
+                    Some(r) if r == row.record => distance(j),
+                    Some(_) if !study.records[row.record].is_trained() => together,
+                    Some(_) => continue,
+                    None => distance(j),
+                };
+                jacobian[(i, j)] = (moved[i] - self.predicted[i]) / (h * row.noise);
+            }
+        }
+        Ok(Some(jacobian))
+    }
+}

@@ -1,0 +1,223 @@
+//! What the data that no fit has seen say of a version, one channel of one record at a time.
+//!
+//! Held-out data *fail* where their error is larger than the noise, the scatter of so many values, and the uncertainty of what was
+//! estimated explain together. No name is given while one fails that the version should have mended: see [`withheld`].
+//! Next files to read: [`super::judge`] for the gates, [`super::own_values`] for what a held-out record adds to the uncertainty.
+
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+use starlings_estimators::nis_band;
+
+use super::adequacy::{Adequacy, times};
+use super::fit::Fitted;
+use super::laboratory::Laboratory;
+use super::rows::{Row, Usage};
+
+/// Root mean square over what is expected from which held-out data fail ...
+const FAILS: f64 = 1.25;
+/// ... where chance does not reach it: level of the band of a mean square.
+const LEVEL: f64 = 0.9998;
+/// What the uncertainty of the estimate takes up is known to first order: a rest below this share of it is no failure.
+const FIRST_ORDER: f64 = 0.05;
+/// Where the training residuals are no noise either, a version must take away this share of the excess χ² of every held-out
+/// channel of every record that fails ...
+const SHARE_OF_EACH: f64 = 0.25;
+/// ... and leave no more than this root mean square over the noise beyond the uncertainty of the estimate.
+const FAR: f64 = 2.5;
+/// Channels that a sentence names at most.
+const NAMED: usize = 3;
+
+/// One channel of one record in data that no fit has seen. Sizes are root mean squares over the stated noise.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HeldOut {
+    /// Record name.
+    pub record: String,
+    /// Output name.
+    pub channel: String,
+    /// `held-out` (span or record) or `held-out-channel`.
+    #[serde(rename = "use")]
+    pub usage: String,
+    /// Number of values.
+    pub n: usize,
+    /// Error of the model as it is.
+    pub before: f64,
+    /// Error with the effects that were named or came nearest; that of the model as it is where there are none.
+    pub after: f64,
+    /// What of the latter stays when the estimate takes up all that its uncertainty allows: one is expected of noise.
+    pub beyond: f64,
+    /// Whether that is surely more than noise.
+    pub fails: bool,
+    /// Share of the excess χ² that went away, with what the uncertainty of the estimate explains; 0 where there was no excess.
+    pub mended: f64,
+}
+
+impl HeldOut {
+    /// Where it is and how large, in words: `product (never fitted) at 4.60 times its noise, 4.21 times beyond the uncertainty of
+    /// the estimate`.
+    pub fn says(&self, several_records: bool) -> String {
+        let what = if self.usage == Usage::HeldOutChannel.word() { "never fitted" } else { "held out" };
+        let of = if several_records { format!(", {}", self.record) } else { String::new() };
+        format!(
+            "{} ({what}{of}) at {} its noise, {} beyond the uncertainty of the estimate",
+            self.channel,
+            times(self.after),
+            times(self.beyond)
+        )
+    }
+}
+
+/// Every held-out channel of every record under a version; `base` is the model as it is.
+pub(super) fn held_out(laboratory: &Laboratory<'_>, base: &Fitted<'_>, fit: &Fitted<'_>) -> Vec<HeldOut> {
+    let rows = &laboratory.rows;
+    if fit.predicted.len() != rows.rows.len() {
+        return Vec::new();
+    }
+    let level = Adequacy::of(laboratory, fit).level();
+    let (before, after) = (rows.whitened(&base.predicted), rows.whitened(&fit.predicted));
+    let one = |at: Vec<usize>| {
+        let row: &Row = &rows.rows[at[0]];
+        let n = at.len() as f64;
+        let squares = |e: &[f64]| at.iter().map(|i| e[*i].powi(2)).sum::<f64>();
+        let (was, is) = (squares(&before), squares(&after));
+        let explained = allowance(laboratory, fit, &at);
+        let record = &laboratory.study.records[row.record];
+        let beyond = (is - explained).max(0.0) / (n * level * level);
+        HeldOut {
+            record: record.name.clone(),
+            channel: record.channels[row.channel].output.clone(),
+            usage: row.usage.word().to_owned(),
+            n: at.len(),
+            before: (was / n).sqrt(),
+            after: (is / n).sqrt(),
+            beyond: beyond.sqrt(),
+            fails: beyond > (FAILS * FAILS).max(nis_band(at.len(), LEVEL).1)
+                && is - explained > FIRST_ORDER * explained,
+            mended: if was > n { ((was - is + explained) / (was - n)).clamp(-1.0, 1.0) } else { 0.0 },
+        }
+    };
+    groups(&rows.rows).into_iter().map(one).collect()
+}
+
+/// Positions of the rows that no fit sees, by record, channel and use: what lies before the training span and what lies after
+/// it are one.
+fn groups(rows: &[Row]) -> Vec<Vec<usize>> {
+    let key = |i: usize| (rows[i].record, rows[i].channel, rows[i].usage);
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    for i in (0..rows.len()).filter(|i| rows[*i].usage != Usage::Train) {
+        match groups.iter_mut().find(|group| key(group[0]) == key(i)) {
+            Some(group) => group.push(i),
+            None => groups.push(vec![i]),
+        }
+    }
+    groups
+}
+
+/// The held-out data that forbid to name a version: all that fail where its training residuals are noise, for then nothing
+/// remains that they could have in common with them; else those that fail by far or of which it takes away too little.
+pub(super) fn withheld<'h>(adequacy: &Adequacy, of: &'h [HeldOut]) -> Vec<&'h HeldOut> {
+    let strict = adequacy.could_be_white();
+    of.iter().filter(|h| h.fails && (strict || h.mended < SHARE_OF_EACH || h.beyond > FAR)).collect()
+}
+
+/// Those that fail, the worst first, in words; empty without any.
+pub(super) fn listed(of: &[&HeldOut]) -> String {
+    let mut worst: Vec<&&HeldOut> = of.iter().collect();
+    worst.sort_by(|a, b| b.beyond.total_cmp(&a.beyond));
+    let several = of.iter().any(|h| h.record != of[0].record);
+    let mut words: Vec<String> = worst.iter().take(NAMED).map(|h| h.says(several)).collect();
+    if of.len() > NAMED {
+        words.push(format!("{} more", of.len() - NAMED));
+    }
+    words.join("; ")
+}
+
+/// bᵀ (C⁻¹ + JᵀJ)⁻¹ b with b = Jᵀ e: the fall of χ² from these rows (residuals e, Jacobian J) to a joint fit, for an estimate of
+/// covariance C and values of a held-out record's own of unit variance. χ² less this is eᵀ (1 + J C Jᵀ)⁻¹ e, the squared distance
+/// of the rows from their prediction (Mahalanobis 1936). Nothing where the fit leaves a direction free or its
+/// Jacobian is of another point.
+pub(super) fn allowance(laboratory: &Laboratory<'_>, fit: &Fitted<'_>, rows: &[usize]) -> f64 {
+    let known = || {
+        let optimum = fit.optimum().ok().filter(|_| fit.is_fresh() && !rows.is_empty())?;
+        let whitened = laboratory.rows.whitened(&fit.predicted);
+        let residual = DVector::from_iterator(rows.len(), rows.iter().map(|i| whitened[*i]));
+        let (jacobian, prior) = with_own_values(fit, rows, optimum.covariance())?;
+        let along = jacobian.tr_mul(&residual);
+        let information = prior + jacobian.tr_mul(&jacobian);
+        Some(along.dot(&information.cholesky()?.solve(&along)))
+    };
+    known().filter(|fall| fall.is_finite()).unwrap_or(0.0)
+}
+
+/// The Jacobian of some rows to the estimated and the unknown values, and the information on these before the rows are seen.
+fn with_own_values(
+    fit: &Fitted<'_>,
+    rows: &[usize],
+    covariance: &DMatrix<f64>,
+) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
+    let p = covariance.nrows();
+    let of = |column: usize| rows.iter().any(|i| fit.own_values[(*i, column)] != 0.0);
+    let own: Vec<usize> = (0..fit.own_values.ncols()).filter(|c| of(*c)).collect();
+    let mut jacobian = fit.jacobian.select_rows(rows).resize_horizontally(p + own.len(), 0.0);
+    let mut prior = DMatrix::identity(p + own.len(), p + own.len());
+    prior.view_mut((0, 0), (p, p)).copy_from(&covariance.clone().cholesky()?.inverse());
+    for (k, column) in own.into_iter().enumerate() {
+        for (r, i) in rows.iter().enumerate() {
+            jacobian[(r, p + k)] = fit.own_values[(*i, column)];
+        }
+    }
+    Some((jacobian, prior))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn channel(after: f64, beyond: f64, mended: f64) -> HeldOut {
+        HeldOut {
+            record: "batch".to_owned(),
+            channel: "product".to_owned(),
+            usage: "held-out-channel".to_owned(),
+            n: 100,
+            before: 5.0,
+            after,
+            beyond,
+            fails: beyond > FAILS,
+            mended,
+        }
+    }
+
+    fn residuals(rmse_over_noise: f64, p: f64) -> Adequacy {
+        let inflation = if p < 1e-3 { 20.0 } else { 1.0 };
+        Adequacy { n: 200, rmse_over_noise, whiteness: Some(p), inflation, over_spread: 0.1 }
+    }
+
+    #[test]
+    fn a_name_is_withheld_while_anything_held_out_fails_and_the_training_residuals_are_noise() {
+        let noise = residuals(1.0, 0.4);
+        for (after, beyond, mended) in [(4.6, 4.2, 0.2), (4.6, 4.2, 0.95), (1.6, 1.5, 0.8)] {
+            let all = [channel(after, beyond, mended)];
+            assert_eq!(withheld(&noise, &all).len(), 1, "{all:?}");
+        }
+        assert!(withheld(&noise, &[channel(3.0, 1.1, 0.0)]).is_empty(), "the uncertainty explains it");
+    }
+
+    #[test]
+    fn where_the_training_residuals_are_no_noise_what_falls_enough_does_not_withhold_the_name() {
+        let correlated = residuals(0.8, 1e-9);
+        assert!(withheld(&correlated, &[channel(1.9, 1.7, 0.42)]).is_empty());
+        assert_eq!(withheld(&correlated, &[channel(1.9, 1.7, 0.1)]).len(), 1, "nothing improved it");
+        assert_eq!(withheld(&correlated, &[channel(4.6, 4.2, 0.9)]).len(), 1, "far from its noise");
+    }
+
+    #[test]
+    fn what_fails_is_said_with_its_figures_the_worst_first() {
+        let mut all = [channel(4.6, 4.2, 0.2), channel(9.1, 8.05, 0.0)];
+        all[1].usage = "held-out".to_owned();
+        assert_eq!(
+            listed(&all.iter().collect::<Vec<_>>()),
+            "product (held out) at 9.10 times its noise, 8.05 times beyond the uncertainty of the estimate; product (never \
+             fitted) at 4.60 times its noise, 4.20 times beyond the uncertainty of the estimate"
+        );
+        assert_eq!(listed(&[]), "");
+    }
+}
