@@ -124,7 +124,7 @@ fn a_folder_with_a_run_and_a_changed_study_are_refused() {
     drop(done);
     let mut changed = study.clone();
     changed.text = changed.text.replacen("passes = 1", "passes = 3", 1).into();
-    changed.estimator.passes = 3;
+    changed.estimator.passes = Some(3);
     let error = RunFolder::resume(Purpose::Run, &path, &changed, &Call::default()).err().unwrap().to_string();
     assert!(error.contains("the study file changed since: `estimator.passes` from 1 to 3;"), "{error}");
     let mut changed = study.clone();

@@ -51,6 +51,8 @@ fn snapshot(rescued: u64) -> Snapshot {
         log_likelihood: 0.0,
         information_lost: 0.0,
         dropped: 0.0,
+        cost: None,
+        narrow: 1.0,
         counts: Counts { rescued, ..Counts::default() },
     };
     Snapshot { head, states: Vec::new() }

@@ -35,6 +35,8 @@ fn snapshot(step: usize) -> Snapshot {
         log_likelihood: 0.0,
         information_lost: 0.0,
         dropped: 0.0,
+        cost: None,
+        narrow: 1.0,
         counts: Counts::default(),
     };
     Snapshot { head, states: vec![Some(DMatrix::from_element(8, 3, step as f64))] }
