@@ -95,7 +95,8 @@ fn disturbed(case: &Case, place: &Place, clean: &Clean) -> Result<Outcome, Strin
 
 /// The error names the cause and says how to go on.
 fn named(case: &Case, ended: &Ended) -> Result<(), String> {
-    let said = &ended.stderr;
+    let at = ended.stderr.rfind("error: ").ok_or_else(|| format!("no error is told: {}", ended.stderr))?;
+    let said = &ended.stderr[at..];
     if !case.fault.causes.iter().any(|cause| said.contains(cause)) {
         return Err(format!("the error names none of {:?}: {said}", case.fault.causes));
     }
@@ -122,10 +123,15 @@ pub(crate) fn nothing_left(place: &Place, ended: &Ended) -> Result<(), String> {
     }
 }
 
+/// Beginning of the folders that Open MPI keeps for itself, and leaves where its launcher is killed.
+const OF_LAUNCHER: &str = "ompi.";
+
 /// Scratch folders that are there and that no message names.
 fn scratch(place: &Place, ended: &Ended) -> Vec<String> {
     let mut found = Vec::new();
-    for root in std::fs::read_dir(place.path("scratch")).unwrap().filter_map(Result::ok) {
+    let is_ours = |entry: &std::fs::DirEntry| !entry.file_name().to_string_lossy().starts_with(OF_LAUNCHER);
+    let roots = std::fs::read_dir(place.path("scratch")).unwrap().filter_map(Result::ok).filter(is_ours);
+    for root in roots {
         let runs: Vec<_> =
             std::fs::read_dir(root.path()).into_iter().flatten().filter_map(Result::ok).collect();
         if runs.is_empty() {

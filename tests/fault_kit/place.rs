@@ -157,7 +157,7 @@ impl Place {
 /// The last lines, which hold the error.
 fn end_of(text: &str) -> String {
     let lines: Vec<&str> = text.lines().collect();
-    lines[lines.len().saturating_sub(LINES)..].iter().map(|line| format!("{line}\n")).collect()
+    lines[lines.len().saturating_sub(LINES)..].join("\n") + "\n"
 }
 
 /// Lines that are kept of what a command says.
