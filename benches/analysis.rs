@@ -16,6 +16,7 @@ use serde_json::{Map, Value, json};
 use starlings_estimators::{Data, Drift, Noise, Particles, Points, Root, Roukf, SigmaSet, recombine};
 use starlings_models::equations::{EquationsDef, EquationsModel};
 use starlings_models::integrate::{Tolerance, dopri5};
+use starlings_models::limits::Limits;
 use starlings_models::model::{History, Segment};
 use starlings_models::{Drive, Job, Model, ModelDef, Setup, Signal, Spec, Window};
 
@@ -210,7 +211,8 @@ fn equations_against_rust(figures: &mut Map<String, Value>) -> Result<(), Failur
     let rust = Duffing { spec: equations.spec().clone() };
     let order: BTreeMap<&str, f64> = [("k", 1.0), ("c", 0.1), ("b", 0.5)].into();
     let theta: Vec<f64> = equations.spec().parameters.iter().map(|q| order[q.name.as_str()]).collect();
-    let segment = Segment { t0: 0.0, t1: 50.0, u0: &[], slope: &[], history: &NoHistory };
+    let segment =
+        Segment { t0: 0.0, t1: 50.0, u0: &[], slope: &[], history: &NoHistory, limits: &Limits::none() };
     let mut x = [0.1, 0.0];
     dopri5::advance(&rust, segment, &[1.0, 0.1, 0.5], &mut x, Tolerance::default())?;
     let native = best(20, || {

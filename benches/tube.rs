@@ -21,6 +21,7 @@ use std::time::Instant;
 use serde_json::{Map, Value, json};
 use starlings_coordinator::study::store::Purpose;
 use starlings_coordinator::study::{RunContext, RunFolder, Study, Summary, run::run};
+use starlings_models::limits::Limits;
 use starlings_models::model::{History, Segment};
 use starlings_models::{Job, Model, ModelDef, Setup, Signal, Window};
 use starlings_worker::WorkerConfig;
@@ -113,7 +114,8 @@ fn start(model: &dyn Model) -> Result<(Vec<f64>, Vec<f64>), Failure> {
 
 fn advance(model: &dyn Model, theta: &[f64], [from, to]: [f64; 2], x: &mut [f64]) -> Result<(), Failure> {
     let (u0, slope) = ([inflow(from)], [(inflow(to) - inflow(from)) / (to - from)]);
-    let segment = Segment { t0: from, t1: to, u0: &u0, slope: &slope, history: &NoHistory };
+    let segment =
+        Segment { t0: from, t1: to, u0: &u0, slope: &slope, history: &NoHistory, limits: &Limits::none() };
     Ok(model.advance(segment, theta, x)?)
 }
 

@@ -5,6 +5,7 @@ mod study_kit;
 use std::f64::consts::PI;
 
 use starlings_models::Model;
+use starlings_models::limits::Limits;
 use starlings_models::model::{History, Segment};
 use starlings_models::native::Artery1d;
 use study_kit::{Done, csv, grid, normals, run_once};
@@ -92,8 +93,14 @@ impl Twin {
             let u0 = inflow(sample, self.peak);
             let slope = [(inflow(sample + 1, self.peak) - u0) / 1e-3];
             let times = [sample, sample + 1].map(|i| i as f64 * 1e-3);
-            let segment =
-                Segment { t0: times[0], t1: times[1], u0: &[u0], slope: &slope, history: &NoHistory };
+            let segment = Segment {
+                t0: times[0],
+                t1: times[1],
+                u0: &[u0],
+                slope: &slope,
+                history: &NoHistory,
+                limits: &Limits::none(),
+            };
             model.advance(segment, &theta, &mut x).unwrap();
             if !rows.is_empty() && (sample + 1) % 10 == 0 {
                 rows.push(observe(&x));

@@ -2,6 +2,7 @@
 //!
 //! Walks forward only; the walk costs no search and no allocation per step. Next file to read: [`crate::simulator`].
 
+use crate::limits::Limits;
 use crate::model::{Drive, History, Segment};
 use crate::{Signal, Window};
 
@@ -82,18 +83,19 @@ impl<'a> Inputs<'a> {
         next
     }
 
-    /// Calls `span` for each stretch of `(from, to]` on which all inputs are linear, in order, and stops at the first error.
+    /// Calls `span` for each stretch of `(from, to]` on which all inputs are linear, in order, and stops at the first error; the
+    /// stretches carry the limits of the run.
     pub(crate) fn walk<E>(
         &mut self,
-        from: f64,
-        to: f64,
+        [from, to]: [f64; 2],
+        limits: &Limits<'_>,
         mut span: impl FnMut(Segment<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
         let mut t0 = from;
         while t0 < to {
             let next = self.enter(t0);
             let t1 = if next + rounding(next) >= to { to } else { next };
-            span(Segment { t0, t1, u0: &self.value, slope: &self.slope, history: self.window })?;
+            span(Segment { t0, t1, u0: &self.value, slope: &self.slope, history: self.window, limits })?;
             t0 = t1;
         }
         Ok(())
@@ -133,7 +135,7 @@ mod tests {
         let window = window();
         let mut ends = Vec::new();
         let mut inputs = Inputs::new(&window);
-        let walked: Result<(), ()> = inputs.walk(0.0, 4.0, |s| {
+        let walked: Result<(), ()> = inputs.walk([0.0, 4.0], &Limits::none(), |s| {
             ends.push((s.t1, s.u0[0], s.slope[1]));
             Ok(())
         });
@@ -158,7 +160,7 @@ mod tests {
         let end = 0.1 + 0.2;
         let mut spans = 0;
         let mut inputs = Inputs::new(&window);
-        let _: Result<(), ()> = inputs.walk(0.0, end, |_| {
+        let _: Result<(), ()> = inputs.walk([0.0, end], &Limits::none(), |_| {
             spans += 1;
             Ok(())
         });

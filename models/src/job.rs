@@ -79,8 +79,8 @@ pub enum ParticleError {
         /// The refused step.
         step: f64,
     },
-    /// The integrator took more steps than allowed within one span of linear inputs.
-    #[error("more than {limit} integration steps in one span of inputs, at t = {time}")]
+    /// The run would take more steps than allowed: a step, a delay or a time constant is too short for it.
+    #[error("more than {limit} steps of integration, at t = {time}")]
     TooManySteps {
         /// Time reached.
         time: f64,

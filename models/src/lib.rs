@@ -18,6 +18,7 @@ mod inputs;
 pub mod integrate;
 pub mod job;
 pub mod layout;
+pub mod limits;
 pub mod memory;
 pub mod model;
 pub mod native;

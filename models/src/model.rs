@@ -4,6 +4,7 @@
 //! built-in models, [`crate::equations`] for models written in a study.
 
 use crate::integrate::{self, Solver};
+use crate::limits::Limits;
 use crate::memory::Memory;
 use crate::{Blocks, ParticleError, Spec};
 
@@ -52,6 +53,8 @@ pub struct Segment<'a> {
     pub slope: &'a [f64],
     /// The inputs at earlier times.
     pub history: &'a dyn History,
+    /// What the run may cost; a step that takes time counts itself.
+    pub limits: &'a Limits<'a>,
 }
 
 /// A dynamical system dx/dt = f(t, x, θ, u), y = h(t, x, θ, u).

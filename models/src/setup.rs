@@ -62,6 +62,9 @@ pub struct Setup {
     pub observer: ObserverDef,
     /// Effects added to the model.
     pub effects: Vec<EffectDef>,
+    /// Steps that one run may take; [`crate::limits::MAX_STEPS`] where nothing is said. A solver counts its own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_steps: Option<u64>,
 }
 
 impl Setup {

@@ -7,6 +7,7 @@
 use crate::binding::Binding;
 use crate::effect;
 use crate::inputs::Inputs;
+use crate::limits::{Limits, MAX_STEPS};
 use crate::memory::with_memories;
 use crate::model::Segment;
 use crate::observer::{self, Correction, Observer, Wiring};
@@ -23,6 +24,8 @@ pub struct Simulator {
     binding: Binding,
     /// What stands in each predicted row.
     rows: Vec<Row>,
+    /// Steps of one run at most.
+    max_steps: u64,
 }
 
 /// What is recorded in one row of a prediction.
@@ -54,7 +57,8 @@ impl Simulator {
         let wiring =
             Wiring { spec: &spec, outputs: &setup.outputs, model: &*model, theta: binding.constants() };
         let observer = observer::build(&setup.observer, wiring)?;
-        Ok(Self { model, spec, observer, binding, rows })
+        let max_steps = setup.max_steps.unwrap_or(MAX_STEPS);
+        Ok(Self { model, spec, observer, binding, rows, max_steps })
     }
 
     /// The model's state at the window's start, and the past that led to it.
@@ -127,8 +131,13 @@ impl Forward for Simulator {
         let mut outputs = Vec::with_capacity(window.observed.len());
         let n_obs = self.rows.len();
         let mut previous = window.start;
+        let end = window.times.last().copied().unwrap_or(previous);
+        let limits = Limits::new(self.max_steps, end, None);
         for (j, &t) in window.times.iter().enumerate() {
-            inputs.walk(previous, t, |segment| self.advance(&mut past, segment, &theta, &mut x))?;
+            inputs.walk([previous, t], &limits, |segment| {
+                limits.take(1, segment.t0)?;
+                self.advance(&mut past, segment, &theta, &mut x)
+            })?;
             let drive = Drive { history: &past, ..inputs.drive(t) };
             self.model.output(t, &x, &theta, drive, &mut y);
             self.check_finite(t, drive.value, &x, &y)?;

@@ -6,6 +6,7 @@ mod artery_1d_kit;
 use std::f64::consts::PI;
 
 use artery_1d_kit::{artery, bifurcation, drive, output, outputs, rate, run, start, theta, tube};
+use starlings_models::limits::Limits;
 use starlings_models::model::Segment;
 use starlings_models::native::Artery1d;
 use starlings_models::{Model, ModelDef, ParticleError, SetupError, native};
@@ -119,7 +120,11 @@ fn a_flow_that_no_vessel_carries_is_an_error_that_says_so() {
 /// Advances by a tenth of a second at a constant flow.
 fn advance(model: &Artery1d, theta: &[f64], x: &mut [f64], flow: f64) -> Result<(), ParticleError> {
     let history = starlings_models::Drive::NONE.history;
-    model.advance(Segment { t0: 0.0, t1: 0.1, u0: &[flow], slope: &[0.0], history }, theta, x)
+    model.advance(
+        Segment { t0: 0.0, t1: 0.1, u0: &[flow], slope: &[0.0], history, limits: &Limits::none() },
+        theta,
+        x,
+    )
 }
 
 #[test]

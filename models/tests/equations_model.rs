@@ -3,6 +3,7 @@
 #![allow(clippy::float_cmp)]
 
 use starlings_models::equations::{EquationsDef, EquationsModel, InputDef, Method, OutputDef, StateDef};
+use starlings_models::limits::Limits;
 use starlings_models::model::{Drive, History, Segment};
 use starlings_models::{Model, Role, SetupError};
 
@@ -275,7 +276,14 @@ fn every_solver_runs_the_damped_oscillator_to_its_closed_form() {
         (def.solver.method, def.solver.step) = (method, Some(0.01));
         let model = EquationsModel::new(&def).unwrap();
         let mut x = [1.0, 0.0];
-        let segment = Segment { t0: 0.0, t1: 5.0, u0: &[0.0], slope: &[0.0], history: &Square };
+        let segment = Segment {
+            t0: 0.0,
+            t1: 5.0,
+            u0: &[0.0],
+            slope: &[0.0],
+            history: &Square,
+            limits: &Limits::none(),
+        };
         model.advance(segment, &[1.0, 1.01, 1.0, 0.2], &mut x).unwrap();
         // Some hundred steps of tolerance 1e-8; h⁴/120 for the fixed step.
         assert!((x[0] - exact(5.0)).abs() < 2e-7, "{method:?}: {} against {}", x[0], exact(5.0));

@@ -5,6 +5,7 @@ mod common;
 
 use common::{job, kinds, largest_difference, plausible, run, run_in_pieces, setup, window};
 use starlings_models::integrate::{self, Solver, Tolerance};
+use starlings_models::limits::Limits;
 use starlings_models::model::Segment;
 use starlings_models::{Forward, Model, ParticleError, Simulator, Spec, catalogue, native};
 
@@ -180,7 +181,14 @@ fn every_closed_step_agrees_with_the_integrated_rate() {
         let Some(allowed) = closed_step_tolerance(&spec.kind) else { continue };
         let theta = plausible(spec);
         let (u0, slope) = (vec![30.0; spec.inputs.len()], vec![-12.0; spec.inputs.len()]);
-        let segment = Segment { t0: 0.2, t1: 0.9, u0: &u0, slope: &slope, history: &NoHistory };
+        let segment = Segment {
+            t0: 0.2,
+            t1: 0.9,
+            u0: &u0,
+            slope: &slope,
+            history: &NoHistory,
+            limits: &Limits::none(),
+        };
         let mut exact = vec![0.0; spec.n_state()];
         model.initial(&theta, &mut exact);
         let mut integrated = exact.clone();

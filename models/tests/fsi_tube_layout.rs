@@ -5,6 +5,7 @@ mod fsi_tube_kit;
 
 use fsi_tube_kit::NoHistory;
 use serde_json::{Value, json};
+use starlings_models::limits::Limits;
 use starlings_models::model::Segment;
 use starlings_models::{Model, ModelDef, ParticleError, Setup};
 
@@ -82,7 +83,9 @@ fn a_span_of_more_steps_than_anybody_waits_for_fails_at_its_start() {
     let theta: Vec<f64> = model.spec().parameters.iter().map(|q| q.default.unwrap()).collect();
     let mut x = vec![0.0; model.spec().n_state()];
     model.initial(&theta, &mut x);
-    let segment = |t1: f64| Segment { t0: 2.0, t1, u0: &[0.0], slope: &[0.0], history: &NoHistory };
+    let limits = Limits::none();
+    let segment =
+        |t1: f64| Segment { t0: 2.0, t1, u0: &[0.0], slope: &[0.0], history: &NoHistory, limits: &limits };
     // 2e8 steps.
     let failed = model.advance(segment(202.0), &theta, &mut x).unwrap_err();
     assert_eq!(failed, ParticleError::TooManySteps { time: 2.0, limit: 100_000_000 });

@@ -1,6 +1,7 @@
 //! The integrators across jumps, kinks and along switching surfaces, on problems with closed-form solutions.
 
 use starlings_models::equations::{EquationsDef, EquationsModel, InputDef, Method, StateDef};
+use starlings_models::limits::Limits;
 use starlings_models::model::{History, Segment};
 use starlings_models::{Model, ParticleError};
 
@@ -38,7 +39,11 @@ fn run(model: &EquationsModel, end: f64, pieces: u32) -> Result<Vec<f64>, Partic
     let time = |i: u32| end * f64::from(i) / f64::from(pieces);
     for i in 0..pieces {
         let (t0, t1) = (time(i), time(i + 1));
-        model.advance(Segment { t0, t1, u0: &[t0], slope: &[1.0], history: &Ramp }, &[], &mut x)?;
+        model.advance(
+            Segment { t0, t1, u0: &[t0], slope: &[1.0], history: &Ramp, limits: &Limits::none() },
+            &[],
+            &mut x,
+        )?;
     }
     Ok(x)
 }

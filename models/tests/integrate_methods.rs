@@ -1,6 +1,7 @@
 //! The integrators on smooth problems with known solutions: order, tolerance, stiffness, restart, failure.
 
 use starlings_models::integrate::{Solver, Tolerance, advance};
+use starlings_models::limits::Limits;
 use starlings_models::model::{Drive, History, Segment};
 use starlings_models::{Model, ParticleError, Quantity, Spec};
 
@@ -47,7 +48,7 @@ impl History for Never {
 
 fn run(model: &Ode, solver: Solver, [t0, t1]: [f64; 2], x0: &[f64]) -> Result<Vec<f64>, ParticleError> {
     let mut x = x0.to_vec();
-    let segment = Segment { t0, t1, u0: &[1.0], slope: &[2.0], history: &Never };
+    let segment = Segment { t0, t1, u0: &[1.0], slope: &[2.0], history: &Never, limits: &Limits::none() };
     advance(model, solver, segment, &[], &mut x).map(|()| x)
 }
 

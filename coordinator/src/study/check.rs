@@ -6,6 +6,7 @@
 mod blame;
 mod explain;
 mod initial;
+mod limits;
 mod model;
 mod observer;
 mod parameters;
@@ -119,6 +120,7 @@ fn check(path: &Path, text: &str, surroundings: &Surroundings) -> Result<Study, 
     source.verdict()?;
     model::check_build(&source, &file, &model.setup);
     source.verdict()?;
+    limits::check_delays(&source, &file, &model.setup, &records);
     observer::check(&source, &file, &model.setup, &records);
     source.verdict()?;
     warnings.extend(units::warnings(&file, &model, &records));

@@ -57,6 +57,8 @@ pub(super) struct ModelSection {
     pub(super) layout: Option<layout::Layout>,
     /// Present when `kind` is `equations`.
     pub(super) equations: Option<EquationsSection>,
+    /// Steps that one run may take.
+    pub(super) max_steps: Option<Spanned<u64>>,
     /// Present when `kind` is `solver`.
     pub(super) solver: Option<solver::ProgramSection>,
 }

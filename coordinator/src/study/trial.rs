@@ -35,9 +35,7 @@ pub enum TrialError {
     #[error(transparent)]
     Setup(#[from] SetupError),
     /// The model fails at the prior median.
-    #[error(
-        "the model fails at the prior median on record `{record}` ({values}): {source}; check constants, priors and inputs"
-    )]
+    #[error("the model fails at the prior median on record `{record}` ({values}): {source}; {remedy}")]
     Model {
         /// Record name.
         record: String,
@@ -45,6 +43,8 @@ pub enum TrialError {
         values: String,
         /// Why it failed.
         source: ParticleError,
+        /// What to do.
+        remedy: String,
     },
     /// The whole record runs, and a run of the fit does not.
     #[error(
@@ -110,7 +110,8 @@ pub fn trial(study: &Study) -> Result<Vec<TrialChannel>, TrialError> {
         let ran = run(&*model, index, &window, &theta, None);
         let mut prediction = ran.map_err(|fault| match fault {
             Fault::Run(source) => {
-                TrialError::Model { record: record.name.clone(), values: named(study, &theta), source }
+                let (values, remedy) = (named(study, &theta), remedy(&source, &window));
+                TrialError::Model { record: record.name.clone(), values, source, remedy }
             }
             Fault::Travel(source) => TrialError::Travel { record: record.name.clone(), source },
         })?;
@@ -182,4 +183,22 @@ pub(super) fn named(study: &Study, theta: &[f64]) -> String {
     let pairs =
         study.setup.parameters.iter().zip(theta).map(|(name, value)| format!("{name} = {}", short(value)));
     pairs.collect::<Vec<_>>().join(", ")
+}
+
+/// What to do about a failure; where steps were too many, with how many there would be.
+fn remedy(error: &ParticleError, window: &Window) -> String {
+    let ParticleError::TooManySteps { time, limit } = error else {
+        return "check constants, priors and inputs".to_owned();
+    };
+    let end = window.times.last().copied().unwrap_or(window.start);
+    let done = (time - window.start) / (end - window.start);
+    let all = if done > 0.0 {
+        format!("to t = {end} there would be about {:.0e}", *limit as f64 / done)
+    } else {
+        format!("to t = {end} there would be many times as many")
+    };
+    format!(
+        "{all}: a `step` of the model, a time constant or a tolerance is too short for the record; change it, or allow more \
+         with `max_steps` in `[model]`"
+    )
 }

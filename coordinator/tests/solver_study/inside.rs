@@ -91,6 +91,7 @@ impl Solve for Inside {
             outputs: run.outputs.to_vec(),
             observer: run.observer.clone(),
             effects: if with_terms { vec![terms] } else { Vec::new() },
+            max_steps: None,
         };
         let theta =
             run.parameters.iter().copied().chain(run.initial.iter().map(|(_, value)| *value)).collect();

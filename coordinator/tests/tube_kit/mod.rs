@@ -6,6 +6,7 @@ use std::fmt::Write as _;
 
 use nalgebra::{DMatrix, DVector};
 use starlings_models::Model;
+use starlings_models::limits::Limits;
 use starlings_models::model::{History, Segment};
 use starlings_models::native::FsiTube;
 use starlings_models::native::fsi_tube::Layout;
@@ -244,7 +245,14 @@ fn theta(model: &FsiTube, octaves: &[f64], others: &[(&str, f64)]) -> Vec<f64> {
 
 fn step(model: &FsiTube, theta: &[f64], q: [f64; 2], x: &mut [f64]) {
     let slope = [(q[1] - q[0]) / STEP];
-    let segment = Segment { t0: 0.0, t1: STEP, u0: &q[..1], slope: &slope, history: &NoHistory };
+    let segment = Segment {
+        t0: 0.0,
+        t1: STEP,
+        u0: &q[..1],
+        slope: &slope,
+        history: &NoHistory,
+        limits: &Limits::none(),
+    };
     model.advance(segment, theta, x).unwrap();
 }
 

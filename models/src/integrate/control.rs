@@ -10,7 +10,7 @@ use super::events::Events;
 use super::system::{System, not_finite};
 use crate::ParticleError;
 
-/// Most steps, accepted or not, within one segment.
+/// Most steps, accepted or not, within one segment of a run without limits.
 pub(super) const MAX_STEPS: u64 = 1_000_000;
 const SAFETY: f64 = 0.9;
 /// Weight of the integral part.
@@ -199,9 +199,11 @@ impl<'a, S: System, P: Stepper> Run<'a, S, P> {
     }
 
     fn attempt(&mut self, h: f64) -> Result<f64, ParticleError> {
+        self.system.limits().take(1, self.t)?;
         self.steps += 1;
-        if self.steps > MAX_STEPS {
-            return Err(ParticleError::TooManySteps { time: self.t, limit: MAX_STEPS });
+        let limit = self.system.limits().in_one_span(MAX_STEPS);
+        if self.steps > limit {
+            return Err(ParticleError::TooManySteps { time: self.t, limit });
         }
         Ok(self.stepper.attempt(self.system, self.t, self.x, h, &mut self.new, self.tolerance))
     }

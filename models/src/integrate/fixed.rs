@@ -22,15 +22,18 @@ pub fn advance<M: Model + ?Sized>(
     let mut system = OnSegment::new(model, segment, theta, n);
     // A step that divides the segment but for rounding must not be cut in two.
     let count = ((segment.t1 - segment.t0) / step - 1e-9).ceil().max(1.0);
-    if count > MAX_STEPS as f64 || count.is_nan() {
-        return Err(ParticleError::TooManySteps { time: segment.t0, limit: MAX_STEPS });
+    let limit = segment.limits.in_one_span(MAX_STEPS);
+    if count > limit as f64 || count.is_nan() {
+        return Err(ParticleError::TooManySteps { time: segment.t0, limit });
     }
     let h = (segment.t1 - segment.t0) / count;
+    segment.limits.foresee(h, segment.t0)?;
     let mut work = vec![0.0; 3 * n];
     let (k, rest) = work.split_at_mut(n);
     let (sum, stage) = rest.split_at_mut(n);
     for i in 0..count as u64 {
         let t = segment.t0 + i as f64 * h;
+        segment.limits.take(1, t)?;
         sum.fill(0.0);
         for (c, weight) in [(0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)] {
             // The first stage has c = 0, so that what k holds from the step before does not enter.

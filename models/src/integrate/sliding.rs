@@ -10,6 +10,7 @@ use super::control::{Run, Stepper};
 use super::dopri5::Dopri5;
 use super::system::System;
 use crate::ParticleError;
+use crate::limits::Limits;
 
 /// Distance from the surface at which the two sides' rates are taken, in tolerances: beyond rounding, below notice.
 const OFFSET: f64 = 100.0;
@@ -148,6 +149,10 @@ impl<S: System> System for Surface<'_, S> {
         for (g, other) in g[2..].iter_mut().zip(others) {
             *g = other;
         }
+    }
+
+    fn limits(&self) -> &Limits<'_> {
+        self.inner.limits()
     }
 
     fn name(&self, component: usize) -> String {

@@ -2,6 +2,7 @@
 //!
 //! Parameters and inputs are bound here and appear no further. Next file to read: [`super::control`].
 
+use crate::limits::Limits;
 use crate::model::{Drive, Segment};
 use crate::{Model, ParticleError, Spec};
 
@@ -24,6 +25,9 @@ pub(super) trait System {
     ) {
         differences(self, t, x, f, dfdx, dfdt, scratch);
     }
+
+    /// What the run may cost.
+    fn limits(&self) -> &Limits<'_>;
 
     /// What one state component is called in an error.
     fn name(&self, component: usize) -> String;
@@ -132,6 +136,10 @@ impl<M: Model + ?Sized> System for OnSegment<'_, M> {
         if !self.model.jacobian(t, x, self.theta, self.drive(), dfdx, dfdt) {
             differences(self, t, x, f, dfdx, dfdt, scratch);
         }
+    }
+
+    fn limits(&self) -> &Limits<'_> {
+        self.segment.limits
     }
 
     fn name(&self, component: usize) -> String {

@@ -119,6 +119,8 @@ impl Artery1d {
             if next <= t {
                 return Err(ParticleError::StepTooSmall { time: t, step: dt });
             }
+            segment.limits.foresee(longest, t)?;
+            segment.limits.take(1, t)?;
             let inflow = Inflow {
                 start: segment.u0[0] + segment.slope[0] * (t - segment.t0),
                 slope: segment.slope[0],

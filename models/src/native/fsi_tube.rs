@@ -198,7 +198,7 @@ impl Model for FsiTube {
         if n > MOST_STEPS as f64 {
             return Err(ParticleError::TooManySteps { time: segment.t0, limit: MOST_STEPS });
         }
-        self.midpoint(theta, h, n as usize, [segment.u0[0], segment.slope[0]], State::of(x));
-        Ok(())
+        segment.limits.foresee(h / n, segment.t0)?;
+        self.midpoint(theta, segment, n as usize, State::of(x))
     }
 }

@@ -60,8 +60,11 @@ impl Past<'_> {
         x: &mut [f64],
     ) -> Result<(), ParticleError> {
         let motion = Motion { model, segment, theta };
+        let spacing = self.tracks.iter().map(|track| track.memory.spacing()).fold(f64::INFINITY, f64::min);
+        segment.limits.foresee(spacing, segment.t0)?;
         let mut t = segment.t0;
         while t < segment.t1 {
+            segment.limits.take(1, t)?;
             let knot = self.tracks.iter().map(|track| track.memory.next_knot(t)).fold(segment.t1, f64::min);
             let shortest = (knot - t) * 0.5_f64.powi(MAX_HALVINGS);
             let mut end = knot;
@@ -117,7 +120,7 @@ impl Past<'_> {
         let step = self.difference_step(t1);
         let before = motion.memories(self, t0, x, step);
         let u0 = motion.inputs(t0);
-        let stretch = Segment { t0, t1, u0: &u0, slope: motion.segment.slope, history: self };
+        let stretch = Segment { t0, t1, u0: &u0, history: self, ..motion.segment };
         motion.model.advance(stretch, motion.theta, x)?;
         let after = motion.memories(self, t1, x, -step);
         let ends = before.into_iter().zip(after);

@@ -1,6 +1,7 @@
 //! Arterial networks for tests, and ways to run and read them.
 #![allow(clippy::unwrap_used, dead_code, reason = "test helpers; each test binary uses its part")]
 
+use starlings_models::limits::Limits;
 use starlings_models::model::{Drive, History, Segment};
 use starlings_models::native::Artery1d;
 use starlings_models::{Model, Spec};
@@ -82,7 +83,8 @@ pub(crate) fn run(
     flow: [f64; 2],
 ) -> [f64; 2] {
     let slope = [(flow[1] - flow[0]) / (t1 - t0)];
-    let segment = Segment { t0, t1, u0: &flow[..1], slope: &slope, history: &NoHistory };
+    let segment =
+        Segment { t0, t1, u0: &flow[..1], slope: &slope, history: &NoHistory, limits: &Limits::none() };
     let volumes = model.advance_counting(segment, theta, x).unwrap();
     [volumes.inflow, volumes.outflow]
 }

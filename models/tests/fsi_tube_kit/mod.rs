@@ -4,6 +4,7 @@
 use std::f64::consts::PI;
 
 use nalgebra::{DMatrix, DVector};
+use starlings_models::limits::Limits;
 use starlings_models::model::{History, Segment};
 use starlings_models::native::FsiTube;
 use starlings_models::native::fsi_tube::Layout;
@@ -49,7 +50,8 @@ pub(crate) fn inflow(t: f64) -> f64 {
 /// Advances by one segment from inflow `q[0]` to `q[1]`.
 pub(crate) fn advance(model: &FsiTube, theta: &[f64], q: [f64; 2], dt: f64, x: &mut [f64]) {
     let slope = [(q[1] - q[0]) / dt];
-    let segment = Segment { t0: 0.0, t1: dt, u0: &q[..1], slope: &slope, history: &NoHistory };
+    let segment =
+        Segment { t0: 0.0, t1: dt, u0: &q[..1], slope: &slope, history: &NoHistory, limits: &Limits::none() };
     model.advance(segment, theta, x).unwrap();
 }
 

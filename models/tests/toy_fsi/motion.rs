@@ -1,6 +1,7 @@
 //! Motion in time: closed forms, energy, and what damps it.
 
 use serde_json::json;
+use starlings_models::limits::Limits;
 use starlings_models::model::{History, Segment};
 
 use crate::kit::Toy;
@@ -18,7 +19,7 @@ fn advanced(toy: &Toy, x: &[f64], h: f64, flow: [f64; 2]) -> Vec<f64> {
     let n_input = toy.model.spec().inputs.len();
     let (u0, slope) = (&flow[..n_input], &flow[1..=n_input]);
     let mut x = x.to_vec();
-    let segment = Segment { t0: 0.0, t1: h, u0, slope, history: &NoHistory };
+    let segment = Segment { t0: 0.0, t1: h, u0, slope, history: &NoHistory, limits: &Limits::none() };
     toy.model.advance(segment, &toy.theta, &mut x).unwrap();
     x
 }

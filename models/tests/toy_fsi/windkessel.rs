@@ -3,6 +3,7 @@
 use nalgebra::{Complex, DVector};
 use serde_json::json;
 use starlings_models::Drive;
+use starlings_models::limits::Limits;
 use starlings_models::model::Segment;
 use starlings_models::observer::Correction;
 use starlings_models::spectrum::poles;
@@ -134,7 +135,7 @@ fn error_of_a_run(
     for step in 0..n {
         let t0 = step as f64 * dt;
         let (u0, slope, history) = (&[0.0][..], &[0.0][..], Drive::NONE.history);
-        let segment = Segment { t0, t1: t0 + dt, u0, slope, history };
+        let segment = Segment { t0, t1: t0 + dt, u0, slope, history, limits: &Limits::none() };
         toy.model.advance(segment, &toy.theta, x.as_mut_slice()).unwrap();
         let drive = Drive { value: u0, slope, ..Drive::NONE };
         toy.model.output(t0 + dt, x.as_slice(), &toy.theta, drive, &mut predicted);

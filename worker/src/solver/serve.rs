@@ -71,6 +71,7 @@ impl Served {
             outputs: request.outputs,
             observer: request.observer,
             effects,
+            max_steps: None,
         };
         let theta =
             request.parameters.into_iter().chain(request.initial.iter().map(|(_, value)| *value)).collect();

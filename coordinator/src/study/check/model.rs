@@ -14,6 +14,7 @@ use starlings_models::{EffectDef, ModelDef, Role, Setup, Spec};
 use toml::Spanned;
 
 use super::blame::{blame, expressions, report_missing};
+use super::limits;
 use super::parameters::{quantity, valid_names};
 use super::scales;
 use super::solver::{Known, fits};
@@ -55,7 +56,8 @@ pub(in crate::study) fn model(
     let layout = file.model.layout.as_ref().map(|layout| layout.value.clone());
     let solver = solver.map(|known| Box::new(known.def.clone()));
     let model = ModelDef { kind: file.model.kind.get_ref().clone(), constants, equations, layout, solver };
-    let mut setup = Setup { model, ..Setup::default() };
+    let max_steps = limits::max_steps(source, file)?;
+    let mut setup = Setup { model, max_steps, ..Setup::default() };
     let bare = spec(source, file, &setup)?;
     check_roles(source, file, &bare);
     let candidates = sort_effects(source, file, &mut setup, &bare)?;

@@ -44,7 +44,9 @@ const ROLES: [&str; 18] = [
 
 /// Reads `[model]`.
 pub(in crate::study) fn model(source: &Source, root: &Table<'_>) -> ModelSection {
-    let mut keys = [&["kind", "constants", "initial", "layout"], &EQUATIONS[..], &solver::KEYS[..]].concat();
+    let mut keys =
+        [&["kind", "constants", "initial", "layout", "max_steps"], &EQUATIONS[..], &solver::KEYS[..]]
+            .concat();
     keys.sort_unstable();
     keys.dedup();
     if root.get("model").is_none() {
@@ -57,6 +59,7 @@ pub(in crate::study) fn model(source: &Source, root: &Table<'_>) -> ModelSection
             constants: Vec::new(),
             initial: None,
             layout: None,
+            max_steps: None,
             equations: None,
             solver: None,
         };
@@ -73,6 +76,7 @@ pub(in crate::study) fn model(source: &Source, root: &Table<'_>) -> ModelSection
         initial: t.text("initial"),
         kind,
         layout,
+        max_steps: t.count("max_steps"),
         equations,
         solver,
     }

@@ -8,6 +8,8 @@ use super::FsiTube;
 use super::chain::Chain;
 use super::coefficients::Coefficients;
 use super::state::State;
+use crate::ParticleError;
+use crate::model::Segment;
 
 /// Work arrays of one call, an entry per cell each.
 struct Scratch<'a> {
@@ -35,8 +37,18 @@ struct Step {
 }
 
 impl FsiTube {
-    /// Advances the state by `n` steps that fill `h`, the inflow going from `q` at slope `slope`.
-    pub(super) fn midpoint(&self, theta: &[f64], h: f64, n: usize, [q, slope]: [f64; 2], x: State<'_>) {
+    /// Advances the state by `n` steps that fill a segment.
+    ///
+    /// # Errors
+    /// When the run has reached its limits.
+    pub(super) fn midpoint(
+        &self,
+        theta: &[f64],
+        segment: Segment<'_>,
+        n: usize,
+        x: State<'_>,
+    ) -> Result<(), ParticleError> {
+        let (h, q, slope) = (segment.t1 - segment.t0, segment.u0[0], segment.slope[0]);
         let c = self.coefficients(theta);
         let cells = self.n_cell();
         let mut work = vec![0.0; 5 * cells];
@@ -55,10 +67,12 @@ impl FsiTube {
         let mut scratch = Scratch { stiffness, wall, flow };
         let State { eta, w, pi } = x;
         for i in 0..n {
+            segment.limits.take(1, segment.t0 + step.dt * i as f64)?;
             let start = q + slope * step.dt * i as f64;
             let x = State { eta: &mut *eta, w: &mut *w, pi: &mut *pi };
             step.advance(&c, &chain, [start, start + slope * step.dt], &mut scratch, x);
         }
+        Ok(())
     }
 }
 

@@ -129,7 +129,8 @@ mod tests {
         let values = times.iter().map(|t| 400.0 * (7.0 * t).sin()).collect();
         let record = Record(Signal { times, values });
         let source = Source { input: 0, shift: Some(0) };
-        let segment = Segment { t0, t1, u0: &[0.0], slope: &[0.0], history: &record };
+        let segment =
+            Segment { t0, t1, u0: &[0.0], slope: &[0.0], history: &record, limits: &Limits::none() };
         bends(&[source], segment, &[shift])
     }
 
