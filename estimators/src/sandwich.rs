@@ -5,9 +5,9 @@
 //! 1980). With white errors of the stated size S is the data's information and the sandwich is H^-1; with errors that are
 //! larger or correlated it is wider. S is estimated from the residuals in two ways, and the larger counts, parameter by parameter:
 //! `scores.rs` asks nothing of the errors but that they are stationary beyond the record, and has too little to go on when they
-//! stay correlated over a good part of it; `working.rs` then has enough, by assuming how the correlation falls. Where the errors are likely white
-//! the cosines are left out, which know the size of white scores less well than the scores themselves do. Deliberately
-//! never narrower than the interval at the stated noise, up to which the estimate itself is computed. Errors that repeat with
+//! stay correlated over a good part of it; `working.rs` then has enough, by assuming how the correlation falls. Where the
+//! errors are likely white the cosines are left out, which know the size of white scores less well than the scores themselves do.
+//! Deliberately never narrower than the interval at the stated noise, up to which the estimate itself is computed. Errors that repeat with
 //! the input, and so look like an effect of the parameters, leave no residual and are not covered. Read next: `scores.rs`.
 
 #[cfg(test)]
@@ -16,6 +16,8 @@ mod scores;
 #[cfg(test)]
 mod tests;
 mod working;
+
+use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector};
 
@@ -96,18 +98,16 @@ impl Residuals<'_> {
             let rows = first..first + of_record.len();
             let mut times: Vec<f64> = of_record.iter().map(|place| place.time).collect();
             times.dedup();
-            let mut channels: Vec<usize> = of_record.iter().map(|place| place.channel).collect();
-            channels.sort_unstable();
-            channels.dedup();
-            let series = channels.iter().map(|channel| {
-                let own: Vec<usize> = rows.clone().filter(|k| self.places[*k].channel == *channel).collect();
-                Series {
-                    step: own.iter().map(|k| times.partition_point(|t| *t < self.places[*k].time)).collect(),
-                    time: own.iter().map(|k| self.places[*k].time).collect(),
-                    residual: own.iter().map(|k| self.values[*k]).collect(),
-                    basis: influence.basis.select_rows(&own),
-                    influence: influence.rows.select_rows(&own),
-                }
+            let mut channels: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+            for k in rows.clone() {
+                channels.entry(self.places[k].channel).or_default().push(k);
+            }
+            let series = channels.values().map(|own| Series {
+                step: own.iter().map(|k| times.partition_point(|t| *t < self.places[*k].time)).collect(),
+                time: own.iter().map(|k| self.places[*k].time).collect(),
+                residual: own.iter().map(|k| self.values[*k]).collect(),
+                basis: influence.basis.select_rows(own),
+                influence: influence.rows.select_rows(own),
             });
             records.push(Record { n_time: times.len(), series: series.collect() });
             first = rows.end;

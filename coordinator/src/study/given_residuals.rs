@@ -61,7 +61,7 @@ fn run(
 ) -> Result<Option<DMatrix<f64>>, RunError> {
     let particles: Vec<usize> = (0..theta.ncols()).collect();
     let states = vec![None; flight.study().records.len()];
-    let results = flight.run(flight::Place { pass: 0, step: 2 }, &particles, theta, &states, windows)?;
+    let results = flight.run(flight::Place { pass: 0, step: 3 }, &particles, theta, &states, windows)?;
     if results.iter().flatten().any(Result::is_err) {
         return Ok(None);
     }

@@ -226,11 +226,15 @@ pub fn run(
     };
     let predictions = forecast::run(&mut flight, &fit.posterior)?;
     let observer = observer_gain::compare(&mut flight, &fit.posterior, &predictions)?;
-    let hangs_on = hangs_on(&mut flight, &fit)?;
-    let given_residuals = match &observer {
+    let (hangs_on, given_residuals) = match &observer {
         // What fails at the estimate itself need not be tried beside it.
-        Compared::Failed(_) => GivenResiduals::Unknown("the model fails under its observer".to_owned()),
-        Compared::NoObserver | Compared::Both(_) => given_residuals::compare(&mut flight, &fit.posterior)?,
+        Compared::Failed(_) => {
+            let why = "the model fails under its observer".to_owned();
+            (Ok(HangsOn::default()), GivenResiduals::Unknown(why))
+        }
+        Compared::NoObserver | Compared::Both(_) => {
+            (hangs_on(&mut flight, &fit)?, given_residuals::compare(&mut flight, &fit.posterior)?)
+        }
     };
     let jobs = flight.take_rows();
     folder.store.predictions(&predictions, &jobs)?;

@@ -25,7 +25,7 @@ const NEGLIGIBLE: f64 = 1e-6;
 /// Residuals of a channel below which nothing is said of their correlation.
 const FEWEST: usize = 8;
 /// Residuals times squared number of columns beyond which this file is not used.
-const LARGEST: f64 = 5e7;
+const LARGEST: f64 = 1e7;
 
 /// What the forms say of the errors.
 pub(super) struct Working {

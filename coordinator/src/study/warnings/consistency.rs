@@ -40,7 +40,7 @@ pub(super) fn nis(fit: &Fit, residuals: &[Residuals]) -> Option<String> {
         let far = if ratio > 1.5 { "far above" } else { "above" };
         Some(format!(
             "NIS is {ratio:.2} per observation, {far} 1 ({band}): the model does not explain the data at the stated noise; \
-             residuals are about {:.1} times the noise and the intervals too narrow. Look for a missing effect, or state \
+             residuals are about {:.1} times the noise and the intervals at the stated noise too narrow. Look for a missing effect, or state \
              a larger noise.",
             ratio.sqrt()
         ))
@@ -78,7 +78,7 @@ fn correlated_in_time(residuals: &Residuals, n_series: usize) -> Option<String> 
     };
     Some(format!(
         "residuals of {} in {} are autocorrelated ({lag1:.2} at one sample): {n} samples carry the information of about \
-         {effective:.0}, and the intervals are too narrow.",
+         {effective:.0}, and the intervals at the stated noise are too narrow.",
         residuals.output, residuals.record
     ))
 }
