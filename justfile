@@ -49,6 +49,7 @@ bench:
     cargo bench --bench analysis
     cargo bench --bench tube
     cargo bench --bench solver
+    cargo bench --bench memory
     cargo bench --bench fleet -- --json
 
 # Licences, advisories, bans and sources (cargo install cargo-deny).

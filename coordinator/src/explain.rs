@@ -30,6 +30,7 @@ mod own_values;
 pub mod patch;
 mod probe;
 pub mod reach;
+mod recent;
 mod refused;
 pub mod result;
 mod rhythm;

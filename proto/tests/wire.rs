@@ -236,3 +236,27 @@ fn a_setup_arrives_as_sent_and_a_damaged_one_says_so() {
     assert_eq!(decode_setup(&id, &json), Ok(setup));
     assert!(matches!(decode_setup(&id, &json[1..]), Err(WireError::Setup(_))));
 }
+
+#[test]
+fn the_windows_of_a_batch_are_encoded_once_and_shared_by_its_messages() {
+    let window = |start: f64| {
+        let signal = Signal { times: vec![start, start + 1.0], values: vec![0.0, 1.0] };
+        Arc::new(Window { start, times: vec![start + 0.5], observed: vec![f64::NAN], inputs: vec![signal] })
+    };
+    let windows = [window(0.0), window(1.0)];
+    // Particle by particle, as an ensemble over two records travels.
+    let job = |k: usize| {
+        let (particle, record, window) = (k as u32 / 2, k as u32 % 2, Arc::clone(&windows[k % 2]));
+        Job { particle, record, window, theta: vec![k as f64], state: None }
+    };
+    let jobs: Vec<Job> = (0..6).map(job).collect();
+    let mut encoder = JobEncoder::of(&jobs);
+    let mut times_of = |job: &Job| {
+        let sent = encoder.encode(Lease { epoch: 1, job: 2, attempt: 1 }, &[7; 32], job);
+        let Some(wire::to_worker::Kind::Job(message)) = sent.kind else { panic!("a job") };
+        message.window.expect("a window").times.as_ptr()
+    };
+    let places: Vec<_> = jobs.iter().map(&mut times_of).collect();
+    assert!(places.iter().enumerate().all(|(k, place)| *place == places[k % 2]), "{places:?}");
+    assert_ne!(places[0], places[1]);
+}

@@ -26,6 +26,9 @@ pub fn keep(folder: &RunFolder, findings: &Findings) -> Result<(), StoreError> {
     store.set_meta(EXPLAINED, findings.explained_study.as_deref().unwrap_or_default())?;
     // Last: with it the explanation counts as finished.
     store.set_meta(EXPLANATION, &explanation)?;
+    // A finished explanation is never searched again, and its answers are most of the file. One that cannot be made smaller is
+    // finished all the same.
+    let _ = store.forget_runs();
     // Somebody who reads the database right now keeps its log open; the explanation is finished all the same.
     let _ = store.close_log();
     Ok(())

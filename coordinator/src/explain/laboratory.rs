@@ -4,7 +4,7 @@
 //! in the run's database: an explanation that was killed goes on by asking again, and what is known costs nothing. Only the
 //! rows that train are ever shown to a fit; that is for the callers to keep. Next file to read: [`super::version`].
 
-use std::collections::{BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeSet, HashSet};
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 
@@ -12,6 +12,7 @@ use nalgebra::DVector;
 use starlings_models::{Job, Window};
 
 use super::memory::{Known, decode, encode, key, sound};
+use super::recent::Recent;
 use super::{Context, ExplainError, Rows, Stage};
 use crate::fleet::{Fleet, FleetEvent, Outcome, SetupId};
 use crate::study::Study;
@@ -27,6 +28,11 @@ pub struct Point<'v> {
 
 /// What a point predicts for every row, or why it could not be run.
 pub type Answer = Result<Arc<Vec<f64>>, String>;
+
+/// Bytes of outputs that one batch brings, about.
+const PORTION: usize = 4 << 20;
+/// Runs of one batch per slot at least: that many keep every slot busy.
+const PER_SLOT: usize = 8;
 
 /// A run that the fleet was asked for.
 struct Asked {
@@ -50,7 +56,9 @@ pub struct Laboratory<'a> {
     watch: &'a mut dyn FnMut(&Stage),
     events: Option<&'a Receiver<FleetEvent>>,
     pub(super) windows: Vec<Arc<Window>>,
-    known: HashMap<RunKey, Known>,
+    /// Every run that was asked for and counted; its answer is in the store.
+    counted: HashSet<RunKey>,
+    recent: Recent,
     budget: Option<u64>,
     stage: &'static str,
     runs: Vec<(&'static str, u64)>,
@@ -79,7 +87,8 @@ impl<'a> Laboratory<'a> {
             watch: &mut *context.watch,
             events: context.events,
             windows,
-            known: HashMap::new(),
+            counted: HashSet::new(),
+            recent: Recent::new(),
             budget,
             stage: "fit",
             runs: Vec::new(),
@@ -174,8 +183,20 @@ impl<'a> Laboratory<'a> {
     /// # Errors
     /// When the fleet or the store fails, or a run was lost with its workers.
     pub fn run(&mut self, points: &[Point<'_>]) -> Result<Vec<Answer>, ExplainError> {
-        let outputs = self.outputs(points)?;
-        Ok(outputs.chunks(self.windows.len()).map(|runs| self.answer(runs)).collect())
+        let mut answers = Vec::with_capacity(points.len());
+        while answers.len() < points.len() {
+            let rest = &points[answers.len()..];
+            let outputs = self.outputs(&rest[..self.at_a_time().min(rest.len())])?;
+            answers.extend(outputs.chunks(self.windows.len()).map(|runs| self.answer(runs)));
+        }
+        Ok(answers)
+    }
+
+    /// Points of one batch: as many as [`PORTION`] of their outputs allows, but enough for every slot to have work.
+    fn at_a_time(&self) -> usize {
+        let bytes: usize = self.windows.iter().map(|window| 8 * window.observed.len()).sum();
+        let busy = PER_SLOT * self.fleet.slots() / self.windows.len().max(1);
+        (PORTION / bytes.max(1)).max(busy).max(1)
     }
 
     /// The rows of one point from its runs over the records: outputs turned into what the channels measure.
@@ -224,16 +245,16 @@ impl<'a> Laboratory<'a> {
     fn ask(&mut self, jobs: Vec<(SetupId, Job)>) -> Result<Vec<Known>, ExplainError> {
         let mut keys = Vec::with_capacity(jobs.len());
         let programs = self.store.program()?.digest();
-        let (mut open, mut asked, mut twice) = (Vec::new(), Vec::new(), HashSet::new());
+        let (mut open, mut asked, mut here) = (Vec::new(), Vec::new(), HashSet::new());
         for (setup, job) in jobs {
             let key = key(&programs, &setup, &job);
             keys.push(key);
-            if self.known.contains_key(&key) || !twice.insert(key) {
+            if !here.insert(key) || self.counted.contains(&key) {
                 continue;
             }
+            self.counted.insert(key);
             self.count(1);
-            if let Some(body) = self.store.remembered_run(&key)? {
-                self.known.insert(key, decode(&body));
+            if self.store.has_remembered_run(&key)? {
                 continue;
             }
             let (record, particle) = (job.record as usize, job.particle);
@@ -241,8 +262,18 @@ impl<'a> Laboratory<'a> {
             open.push((setup, job));
         }
         self.fly(open, &asked)?;
-        let answer = |key: &RunKey| self.known.get(key).cloned().unwrap_or_else(|| Err(String::new()));
-        Ok(keys.iter().map(answer).collect())
+        keys.iter().map(|key| self.remembered(key)).collect()
+    }
+
+    /// An answer that was given before, read back from the store if it is not held.
+    fn remembered(&mut self, key: &RunKey) -> Result<Known, ExplainError> {
+        if let Some(known) = self.recent.get(key) {
+            return Ok(known);
+        }
+        let body = self.store.remembered_run(key)?;
+        let known = body.map_or_else(|| Err(String::new()), |body| decode(&body));
+        self.recent.insert(*key, known.clone());
+        Ok(known)
     }
 
     /// Sends jobs and remembers their answers.
@@ -258,7 +289,7 @@ impl<'a> Laboratory<'a> {
             self.workers.insert(outcome.worker.clone());
             let known = self.taken(outcome, asked)?;
             bodies.push((asked.key, encode(&known)));
-            self.known.insert(asked.key, known);
+            self.recent.insert(asked.key, known);
         }
         self.store.note_elapsed(self.elapsed())?;
         self.store.remember_runs(bodies.iter().map(|(key, body)| (key, body.as_slice())), &rows)?;

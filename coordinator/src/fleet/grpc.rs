@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use starlings_models::{Job, Setup};
 use starlings_proto::convert::job::check_size;
-use starlings_proto::{MAX_MESSAGE, SetupId, encode_setup, own_build};
+use starlings_proto::{JobEncoder, MAX_MESSAGE, SetupId, encode_setup, own_build};
 use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
 use tokio_util::sync::CancellationToken;
 
@@ -209,7 +209,9 @@ impl Fleet for GrpcFleet {
             return Err(FleetError::UnknownSetup);
         }
         let (reply, replies) = mpsc::channel();
-        let sent = self.batches.send(Submission { jobs, reply });
+        // Here and not under the hub's lock.
+        let encoder = JobEncoder::of(jobs.iter().map(|(_, job)| job));
+        let sent = self.batches.send(Submission { jobs, encoder, reply });
         sent.map_err(|_| FleetError::Stopped(self.hub.why_stopped()))?;
         self.wait(&replies)
     }

@@ -1,5 +1,6 @@
 //! Jobs and windows, both ways.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use starlings_models::{Job, Signal, Window};
@@ -10,13 +11,24 @@ use crate::{MAX_INLINE_STATE, MAX_MESSAGE, wire};
 /// Room left in a message for everything that is no array.
 const MESSAGE_MARGIN: usize = 64 * 1024;
 
-/// Encodes jobs and keeps the encoded form of the last window, which all particles of an ensemble share.
+/// Encodes jobs and keeps the encoded form of their windows, which all particles of an ensemble share: each is encoded once,
+/// and the messages of its jobs refer to the same bytes.
 #[derive(Debug, Default)]
 pub struct JobEncoder {
-    last: Option<(Arc<Window>, wire::Window)>,
+    /// By the place of a window in memory, which stays its own for as long as the window is held here.
+    windows: HashMap<usize, (Arc<Window>, wire::Window)>,
 }
 
 impl JobEncoder {
+    /// Encodes the windows of a batch ahead, so that giving its jobs away copies nothing.
+    pub fn of<'a>(jobs: impl IntoIterator<Item = &'a Job>) -> Self {
+        let mut encoder = Self::default();
+        for job in jobs {
+            encoder.window(&job.window);
+        }
+        encoder
+    }
+
     /// The message that gives one job to a worker.
     pub fn encode(&mut self, lease: Lease, setup: &SetupId, job: &Job) -> wire::ToWorker {
         let message = wire::Job {
@@ -32,14 +44,9 @@ impl JobEncoder {
     }
 
     fn window(&mut self, window: &Arc<Window>) -> wire::Window {
-        match &self.last {
-            Some((known, encoded)) if Arc::ptr_eq(known, window) => encoded.clone(),
-            _ => {
-                let encoded = encode_window(window);
-                self.last = Some((Arc::clone(window), encoded.clone()));
-                encoded
-            }
-        }
+        let place = Arc::as_ptr(window) as usize;
+        let known = self.windows.entry(place).or_insert_with(|| (Arc::clone(window), encode_window(window)));
+        known.1.clone()
     }
 }
 

@@ -22,7 +22,6 @@ pub(super) struct State {
     /// Names of the parameters of each setup, in the order of a job's.
     pub(super) names: BTreeMap<SetupId, Vec<String>>,
     pub(super) running: Option<Submission>,
-    pub(super) encoder: JobEncoder,
     pub(super) events: Sender<FleetEvent>,
     pub(super) first_epoch: u64,
     pub(super) joined: u64,
@@ -50,6 +49,8 @@ pub(in crate::fleet) enum Closed {
 /// A batch and who waits for it.
 pub(in crate::fleet) struct Submission {
     pub(in crate::fleet) jobs: Vec<(SetupId, Job)>,
+    /// Holds the windows of the jobs as they travel.
+    pub(in crate::fleet) encoder: JobEncoder,
     pub(in crate::fleet) reply: Sender<Reply>,
 }
 
@@ -61,7 +62,6 @@ impl State {
             setups: BTreeMap::new(),
             names: BTreeMap::new(),
             running: None,
-            encoder: JobEncoder::default(),
             events,
             first_epoch,
             joined: 0,
@@ -122,9 +122,9 @@ impl State {
                 }
             }
             Command::SendJob { worker, lease, index } => {
-                let Some(running) = &self.running else { return };
+                let Some(running) = &mut self.running else { return };
                 let Some((setup, job)) = running.jobs.get(index) else { return };
-                let message = self.encoder.encode(lease, setup, job);
+                let message = running.encoder.encode(lease, setup, job);
                 self.send(worker, message);
             }
             Command::Cancel { worker, leases } => self.send(worker, ToWorker::cancel(&leases)),

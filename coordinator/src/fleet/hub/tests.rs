@@ -3,7 +3,7 @@
 use std::sync::mpsc::{self, Receiver};
 
 use starlings_models::{ParticleError, Setup, Window};
-use starlings_proto::{Answer, encode_setup};
+use starlings_proto::{Answer, JobEncoder, encode_setup};
 use tokio::sync::mpsc::unbounded_channel;
 
 use super::*;
@@ -50,7 +50,7 @@ fn batch(hub: &Hub) -> (Submission, Receiver<Reply>) {
         state: None,
     };
     let (reply, replies) = mpsc::channel();
-    (Submission { jobs: vec![(setup, job)], reply }, replies)
+    (Submission { jobs: vec![(setup, job)], encoder: JobEncoder::default(), reply }, replies)
 }
 
 #[test]

@@ -31,7 +31,6 @@ fn analysis(step: usize, n_used: usize, jobs: Vec<JobRow>) -> AnalysisRow {
         nis: 3.0,
         log_likelihood: -1.0,
         information_lost: 0.0,
-        transform: None,
         estimates: Vec::new(),
         innovations: Vec::new(),
         jobs,
@@ -54,6 +53,8 @@ fn snapshot(rescued: u64) -> Snapshot {
         cost: None,
         narrow: 1.0,
         counts: Counts { rescued, ..Counts::default() },
+        cost: None,
+        narrow: 1.0,
     };
     Snapshot { head, states: Vec::new() }
 }

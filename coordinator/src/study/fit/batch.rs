@@ -178,7 +178,6 @@ fn row(study: &Study, place: Place, step: &BatchStep) -> AnalysisRow {
         nis: step.misfit,
         log_likelihood: step.log_likelihood,
         information_lost: 0.0,
-        transform: None,
         estimates: posterior::rows(study, &step.posterior),
         innovations: Vec::new(),
         jobs: Vec::new(),

@@ -126,7 +126,6 @@ fn row(
         nis: after.nis - before.nis,
         log_likelihood: after.log_likelihood - before.log_likelihood,
         information_lost: analysis.information_lost,
-        transform: Some(analysis.transform.clone()),
         estimates: posterior::rows(study, &after.posterior),
         innovations: innovations(study, windows, analysis),
         jobs: Vec::new(),

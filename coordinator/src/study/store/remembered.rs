@@ -51,6 +51,25 @@ impl Store {
         self.guard(select.query_row([key.as_slice()], |row| row.get(0)).optional())
     }
 
+    /// Whether the answer of an earlier run was kept.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub fn has_remembered_run(&self, key: &RunKey) -> Result<bool, StoreError> {
+        let mut select =
+            self.guard(self.connection.prepare_cached("SELECT 1 FROM remembered_runs WHERE key = ?1"))?;
+        self.guard(select.exists([key.as_slice()]))
+    }
+
+    /// Forgets all answers, which nobody asks for any more, and gives their space back.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub fn forget_runs(&self) -> Result<(), StoreError> {
+        self.commit()?;
+        self.guard(self.connection.execute_batch("DELETE FROM remembered_runs; VACUUM"))
+    }
+
     /// Number of runs whose answers are kept.
     ///
     /// # Errors

@@ -1,7 +1,5 @@
 //! The rows of the run's tables, as plain data.
 
-use nalgebra::DMatrix;
-
 /// One row of the table `jobs`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JobRow {
@@ -72,8 +70,6 @@ pub struct AnalysisRow {
     pub log_likelihood: f64,
     /// Share of the spread lost to pulled or dropped sigma points.
     pub information_lost: f64,
-    /// The r × r transform; `None` for the batch estimator.
-    pub transform: Option<DMatrix<f64>>,
     /// One row per estimated parameter.
     pub estimates: Vec<EstimateRow>,
     /// One row per used observation.

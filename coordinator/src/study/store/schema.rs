@@ -13,9 +13,9 @@ CREATE TABLE events (id INTEGER PRIMARY KEY, at_s REAL NOT NULL, kind TEXT NOT N
 CREATE TABLE jobs (id INTEGER PRIMARY KEY, pass INTEGER NOT NULL, step INTEGER NOT NULL, record TEXT NOT NULL,
   particle INTEGER NOT NULL, attempts INTEGER NOT NULL, worker TEXT NOT NULL, status TEXT NOT NULL, error TEXT, cost_s REAL);
 CREATE TABLE analyses (pass INTEGER NOT NULL, step INTEGER NOT NULL, time REAL NOT NULL, n_used INTEGER NOT NULL,
-  nis REAL NOT NULL, log_likelihood REAL NOT NULL, information_lost REAL NOT NULL, transform BLOB, PRIMARY KEY (pass, step));
+  nis REAL NOT NULL, log_likelihood REAL NOT NULL, information_lost REAL NOT NULL, PRIMARY KEY (pass, step));
 CREATE TABLE estimates (pass INTEGER NOT NULL, step INTEGER NOT NULL, parameter TEXT NOT NULL, estimate REAL NOT NULL,
-  lo REAL NOT NULL, hi REAL NOT NULL, mean REAL NOT NULL, sd REAL NOT NULL, PRIMARY KEY (pass, step, parameter));
+  lo REAL NOT NULL, hi REAL NOT NULL, mean REAL NOT NULL, sd REAL NOT NULL);
 CREATE TABLE innovations (pass INTEGER NOT NULL, step INTEGER NOT NULL, record TEXT NOT NULL, output TEXT NOT NULL,
   time REAL NOT NULL, innovation REAL NOT NULL, sd REAL NOT NULL);
 CREATE TABLE predictions (record TEXT NOT NULL, output TEXT NOT NULL, time REAL NOT NULL, observed REAL, predicted REAL NOT NULL,
@@ -26,7 +26,9 @@ CREATE TABLE snapshot_states (record INTEGER PRIMARY KEY, rows INTEGER NOT NULL,
 
 pub(super) fn insert_analysis(connection: &Connection, row: &AnalysisRow) -> rusqlite::Result<()> {
     connection
-        .prepare_cached("INSERT OR REPLACE INTO analyses VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)")?
+        .prepare_cached("INSERT OR REPLACE INTO analyses (pass, step, time, n_used, nis, log_likelihood, information_lost)
+             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)",
+        )?
         .execute(params![
             row.pass,
             row.step,
@@ -34,11 +36,10 @@ pub(super) fn insert_analysis(connection: &Connection, row: &AnalysisRow) -> rus
             row.n_used,
             row.nis,
             row.log_likelihood,
-            row.information_lost,
-            row.transform.as_ref().map(|t| super::snapshot::to_bytes(t.as_slice()))
+            row.information_lost
         ])?;
-    let mut insert = connection
-        .prepare_cached("INSERT OR REPLACE INTO estimates VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)")?;
+    let mut insert =
+        connection.prepare_cached("INSERT INTO estimates VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)")?;
     for e in &row.estimates {
         insert.execute(params![row.pass, row.step, e.parameter, e.estimate, e.lo, e.hi, e.mean, e.sd])?;
     }

@@ -7,6 +7,8 @@ use super::*;
 use crate::study::store::snapshot::{Counts, Head, Matrix};
 
 fn row(step: usize) -> AnalysisRow {
+    let (record, output) = ("one".to_owned(), "y".to_owned());
+    let innovation = InnovationRow { record, output, time: 0.5, innovation: 0.25, sd: 0.125 };
     AnalysisRow {
         pass: 1,
         step,
@@ -15,9 +17,8 @@ fn row(step: usize) -> AnalysisRow {
         nis: 1.0,
         log_likelihood: -1.0,
         information_lost: 0.0,
-        transform: Some(DMatrix::zeros(30, 30)),
         estimates: Vec::new(),
-        innovations: Vec::new(),
+        innovations: vec![innovation; 100],
         jobs: Vec::new(),
     }
 }
@@ -38,6 +39,8 @@ fn snapshot(step: usize) -> Snapshot {
         cost: None,
         narrow: 1.0,
         counts: Counts::default(),
+        cost: None,
+        narrow: 1.0,
     };
     Snapshot { head, states: vec![Some(DMatrix::from_element(8, 3, step as f64))] }
 }
@@ -116,6 +119,21 @@ fn answers_of_runs_are_remembered_by_their_key_and_over_a_kill() {
     assert_eq!(store.remembered_run(&b).unwrap().as_deref(), Some(b"".as_slice()));
     assert_eq!(store.remembered_run(&c).unwrap(), None);
     assert_eq!(store.n_remembered_run().unwrap(), 2);
+}
+
+#[test]
+fn forgotten_answers_give_their_space_back() {
+    let (folder, store) = empty();
+    let path = folder.path().join("run.db");
+    let body = vec![7_u8; 1 << 20];
+    store.remember_runs([(&[1_u8; 32], body.as_slice())], &[]).unwrap();
+    assert!(store.has_remembered_run(&[1; 32]).unwrap() && !store.has_remembered_run(&[2; 32]).unwrap());
+    store.forget_runs().unwrap();
+    assert_eq!(store.n_remembered_run().unwrap(), 0);
+    store.close_log().unwrap();
+    let size = std::fs::metadata(path).unwrap().len();
+    assert!(size < 1 << 18, "{size} bytes: what was forgotten is gone from the file");
+    assert_eq!(store.meta("study").unwrap().as_deref(), Some("text"));
 }
 
 #[test]
