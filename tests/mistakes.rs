@@ -185,6 +185,7 @@ fn an_address_where_nobody_listens_is_told_at_once() {
     files.insert("study.toml".to_owned(), format!("{}{model}{}", &text[..start], &text[end..]).into_bytes());
     let (code, _, stderr) = typed(placed(&files).path(), "check study.toml");
     assert_eq!(code, 2, "{stderr}");
+    let stderr = stderr.replace('│', " ").split_whitespace().collect::<Vec<_>>().join(" ");
     let wait =
         stderr.find("waiting up to 0.5 s for a solver at 127.0.0.1:1").unwrap_or_else(|| panic!("{stderr}"));
     assert!(wait < stderr.find("was not ready within 0.5 s").unwrap_or(0), "{stderr}");

@@ -194,6 +194,8 @@ fn asked(
             "give `described = \"solver.json\"` where this machine cannot start it: `starlings worker --solver \"COMMAND\" \
              --describe > solver.json`, run where it can, makes that file"
                 .to_owned()
+        } else if def.command.is_empty() {
+            "a solver at an address is started by somebody else, before the study is read".to_owned()
         } else {
             format!("started by hand in `{}`, `{}` says the same", def.folder, def.command.join(" "))
         };
