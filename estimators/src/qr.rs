@@ -79,7 +79,7 @@ mod tests {
     fn columns(apart: f64) -> DMatrix<f64> {
         DMatrix::from_fn(500, P, |i, j| {
             let x = (i as f64 + 0.5) / 500.0;
-            let size = 10.0_f64.powi((j % 7) as i32 * 3 - 9);
+            let size = 10.0_f64.powf((j % 7) as f64 * 3.0 - 9.0);
             size * ((1.0 + 0.01 * j as f64) * x).cos() + if i % P == j { size * apart } else { 0.0 }
         })
     }

@@ -62,7 +62,7 @@ impl Optimum {
         // From the triangle of the rows: their square would lose what a wide prior leaves of an informed direction.
         let largest = rows.column_iter().map(|c| c.norm()).fold(0.0, f64::max);
         let (basis, triangle) = qr::factors(rows);
-        let free = triangle.diagonal().iter().any(|v| !(v.abs() > f64::EPSILON * largest));
+        let free = triangle.diagonal().iter().any(|v| v.is_nan() || v.abs() <= f64::EPSILON * largest);
         let inverse = triangle.solve_upper_triangular(&DMatrix::identity(p, p)).filter(|_| !free);
         let inverse = inverse.ok_or(EstimatorError::NotPositiveDefinite { what: "posterior" })?;
         let covariance = &inverse * inverse.transpose();

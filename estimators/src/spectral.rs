@@ -34,23 +34,19 @@ fn eigen_within(
     SymmetricEigen::try_new(matrix, f64::EPSILON, limit).ok_or(EstimatorError::NotDecomposed { what, limit })
 }
 
-/// M = U diag(s) V^T: U, s in decreasing order, V^T; `what` names M.
+/// U, s in decreasing order and V^T of M = U diag(s) V^T.
+pub(crate) type Svd = (DMatrix<f64>, DVector<f64>, DMatrix<f64>);
+
+/// M = U diag(s) V^T; `what` names M.
 ///
 /// # Errors
 /// As for [`eigen`].
-pub(crate) fn svd(
-    matrix: DMatrix<f64>,
-    what: &'static str,
-) -> Result<(DMatrix<f64>, DVector<f64>, DMatrix<f64>), EstimatorError> {
+pub(crate) fn svd(matrix: DMatrix<f64>, what: &'static str) -> Result<Svd, EstimatorError> {
     let limit = limit(&matrix);
     svd_within(matrix, what, limit)
 }
 
-fn svd_within(
-    matrix: DMatrix<f64>,
-    what: &'static str,
-    limit: usize,
-) -> Result<(DMatrix<f64>, DVector<f64>, DMatrix<f64>), EstimatorError> {
+fn svd_within(matrix: DMatrix<f64>, what: &'static str, limit: usize) -> Result<Svd, EstimatorError> {
     finite(&matrix, what)?;
     let found = matrix.try_svd(true, true, 5.0 * f64::EPSILON, limit);
     let parts = found.and_then(|svd| Some((svd.u?, svd.singular_values, svd.v_t?)));

@@ -80,7 +80,7 @@ fn cosines(scores: &[f64]) -> usize {
     let rho = rho.clamp(-MOST_CORRELATED, MOST_CORRELATED);
     let curvature = PI * PI / 6.0 * 2.0 * rho.abs() / (1.0 - rho).powi(2);
     let best = ((n as f64).powi(4) / (2.0 * curvature * curvature)).powf(0.2).floor();
-    let most = (n / 2).min(MOST).max(2).min(n.saturating_sub(1));
+    let most = (n / 2).clamp(2, MOST).min(n.saturating_sub(1));
     // An infinite number, for no correlation at all, is the most.
     (best.clamp(2.0, MOST as f64) as usize).min(most)
 }

@@ -97,7 +97,7 @@ fn average(series: &Series, sum: &mut Working) -> Filtered {
         })
         .collect();
     let whole: f64 = weights.iter().sum();
-    if !(whole > 0.0) {
+    if whole.is_nan() || whole <= 0.0 {
         return white;
     }
     sum.white *= weights[0] / whole;
@@ -117,7 +117,7 @@ fn forms(series: &Series) -> Vec<Form> {
     let mut forms = vec![Form { time: 1.0, white: 1.0 }];
     let n = series.time.len();
     let span = series.time[n - 1] - series.time[0];
-    if n < FEWEST || !(span > 0.0) {
+    if n < FEWEST || span.is_nan() || span <= 0.0 {
         return forms;
     }
     let shortest = 0.5 * span / (n - 1) as f64;

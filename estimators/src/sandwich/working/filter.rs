@@ -92,10 +92,10 @@ impl Filtered {
         let (n, p) = series.influence.shape();
         let mut innovation = vec![0.0; n];
         let mut state = 0.0;
-        for t in 0..n {
+        for (t, innovation) in innovation.iter_mut().enumerate() {
             state *= gains.kept[t];
-            innovation[t] = series.residual[t] - state;
-            state += gains.gain[t] * innovation[t];
+            *innovation = series.residual[t] - state;
+            state += gains.gain[t] * *innovation;
         }
         let mut influence = vec![DVector::zeros(p); n];
         let mut later = DVector::<f64>::zeros(p);

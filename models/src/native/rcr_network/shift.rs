@@ -115,6 +115,7 @@ impl Shifted<'_> {
 mod tests {
     use super::*;
     use crate::Signal;
+    use crate::limits::Limits;
 
     struct Record(Signal);
 

@@ -70,15 +70,9 @@ pub(super) fn connect(
     mut process: Option<&mut Process>,
     patience: Duration,
 ) -> Result<(SolverClient<Channel>, Result<Description, String>), SolverError> {
-    let not_ready = |what: String, tail: String| SolverError::NotReady {
-        program: name.to_owned(),
-        what,
-        tail,
-        killed: false,
-    };
     let endpoint = Endpoint::from_shared(target.to_owned())
         .map_err(|error| {
-            not_ready(format!("has an address that is none ({target}): {error}"), String::new())
+            not_ready(name, format!("has an address that is none ({target}): {error}"), String::new())
         })?
         .initial_stream_window_size(WINDOWS.0)
         .initial_connection_window_size(WINDOWS.1)
@@ -114,22 +108,12 @@ pub(super) fn connect(
                 killed: is_killed(status),
             });
         }
-        let seconds = patience.as_secs_f64();
         if started.elapsed() >= patience {
-            let what = match &process {
-                Some(_) => {
-                    format!(
-                        "was not ready within {seconds} s ({last}); it must serve solver.proto where {SOCKET} says"
-                    )
-                }
-                None => format!(
-                    "was not ready within {seconds} s ({last}); start it there, or give the study its `command`"
-                ),
-            };
-            return Err(not_ready(what, process.map(Process::tail).unwrap_or_default()));
+            return Err(too_late(name, process, patience, &last));
         }
         if !told {
             told = true;
+            let seconds = patience.as_secs_f64();
             tracing::warn!(
                 "waiting up to {seconds} s for a solver at {name} ({last}): start it there, such as by {ADDRESS}={name} python3 \
                  solver.py (`start_timeout` sets the wait)"
@@ -137,4 +121,18 @@ pub(super) fn connect(
         }
         std::thread::sleep(LOOK);
     }
+}
+
+fn not_ready(name: &str, what: String, tail: String) -> SolverError {
+    SolverError::NotReady { program: name.to_owned(), what, tail, killed: false }
+}
+
+/// What is said of a program that did not answer in time; `last` is what the last attempt ended with.
+fn too_late(name: &str, process: Option<&mut Process>, patience: Duration, last: &str) -> SolverError {
+    let remedy = match &process {
+        Some(_) => format!("it must serve solver.proto where {SOCKET} says"),
+        None => "start it there, or give the study its `command`".to_owned(),
+    };
+    let what = format!("was not ready within {} s ({last}); {remedy}", patience.as_secs_f64());
+    not_ready(name, what, process.map(|process| process.tail()).unwrap_or_default())
 }
