@@ -45,7 +45,7 @@ channels = [{ column = "position", output = "position", noise = 0.002 }]
 "#;
 
 fn main() {
-    let rows = std::env::args().filter_map(|a| a.parse().ok()).next().unwrap_or(40_000);
+    let rows = std::env::args().find_map(|a| a.parse().ok()).unwrap_or(40_000);
     let folder = tempfile::tempdir().unwrap();
     let study = folder.path().join("study.toml");
     let span = format!("train = [0.0, {}]\n", 0.008 * rows as f64);

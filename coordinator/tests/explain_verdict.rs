@@ -2,14 +2,15 @@
 //! that tell nothing. The sentences are those that the user reads.
 #![allow(missing_docs, clippy::unwrap_used)]
 
+mod reactor_kit;
 mod study_kit;
 
+use reactor_kit::{reactor, recorded};
 use starlings_coordinator::explain::candidates::check;
 use starlings_coordinator::explain::{Context, ExplainError, Explanation, Options, Verdict, explain};
 use starlings_coordinator::fleet::InProcess;
 use starlings_coordinator::study::Study;
 use starlings_coordinator::study::store::Store;
-use starlings_coordinator::study::twin::{Twin, simulate};
 use study_kit::{Case, csv, grid, normals};
 
 fn explained(case: &Case) -> Result<Explanation, ExplainError> {
@@ -19,114 +20,6 @@ fn explained(case: &Case) -> Result<Explanation, ExplainError> {
     let store = Store::create(&path.join("run.db"), &[]).unwrap();
     let mut context = Context { clock: &|| 0.0, watch: &mut |_| {}, events: None, earlier_s: 0.0 };
     explain(&study, &mut InProcess::new(2), &store, &mut context, &Options::default()).map(|f| f.explanation)
-}
-
-/// Growth of biomass on a substrate, and its product, after Monod (1949). Nothing dies in the model.
-fn reactor(noise: [f64; 3], train: f64, held_out: &str, death: bool) -> String {
-    let [x, s, p] = noise;
-    let death = if death {
-        "[[effects]]\nname = \"death\"\nsays = \"Cells die.\"\nadds = [ { to = \"X\", term = \"-kd*X\" } ]\n\
-         parameters = [ { name = \"kd\", unit = \"1/h\", range = [0, 1] } ]\n"
-    } else {
-        ""
-    };
-    format!(
-        r#"
-[study]
-name = "reactor"
-seed = 1
-time_unit = "h"
-
-[model]
-kind = "equations"
-outputs = [
-  {{ name = "biomass", unit = "g/L", value = "X" }},
-  {{ name = "substrate", unit = "g/L", value = "S" }},
-  {{ name = "product", unit = "g/L", value = "P" }},
-]
-
-[[model.states]]
-name = "X"
-unit = "g/L"
-initial = 0.2
-rate = "mu*max(S, 0)/(Ks + max(S, 0))*X"
-
-[[model.states]]
-name = "S"
-unit = "g/L"
-initial = 10.0
-rate = "-mu*max(S, 0)/(Ks + max(S, 0))*X/Y"
-
-[[model.states]]
-name = "P"
-unit = "g/L"
-initial = 0.0
-rate = "(a*mu*max(S, 0)/(Ks + max(S, 0)) + b)*X"
-
-[[parameters]]
-name = "mu"
-unit = "1/h"
-prior = {{ transform = "log", median = 0.35, factor = 1.3 }}
-
-[[parameters]]
-name = "Ks"
-unit = "g/L"
-prior = {{ transform = "log", median = 0.5, factor = 1.5 }}
-
-[[parameters]]
-name = "a"
-unit = ""
-prior = {{ transform = "log", median = 0.3, factor = 1.3 }}
-
-[[parameters]]
-name = "b"
-unit = "1/h"
-prior = {{ transform = "log", median = 0.02, factor = 1.5 }}
-
-[[parameters]]
-name = "Y"
-unit = ""
-prior = {{ transform = "log", median = 0.5, factor = 1.3 }}
-
-[[records]]
-name = "batch"
-file = "batch.csv"
-time = "time"
-channels = [
-  {{ column = "biomass", output = "biomass", noise = {x} }},
-  {{ column = "substrate", output = "substrate", noise = {s} }},
-  {{ column = "product", output = "product", noise = {p} }},
-]
-train = [0.0, {train}]
-
-[explain]
-hold_out_channels = ["{held_out}"]
-
-{death}
-"#
-    )
-}
-
-/// The reactor's recording with cells dying at this rate.
-fn recorded(noise: [f64; 3], span: f64, kd: f64) -> String {
-    let times = grid(120, span / 119.0);
-    let flat = vec![1.0; times.len()];
-    let text = reactor(noise, span, "product", true);
-    let blank = csv("time,biomass,substrate,product", &[&times, &flat, &flat, &flat]);
-    let values = [("mu", 0.4), ("Ks", 0.5), ("a", 0.3), ("b", 0.02), ("Y", 0.5)];
-    let twin = Twin {
-        values: values.map(|(name, v)| (name.to_owned(), v)).to_vec(),
-        effects: vec![("death".to_owned(), kd)],
-        seed: 1,
-        ..Twin::default()
-    };
-    let made = simulate(&Case::new(&text, &[("batch.csv", blank)]).study(), &twin).unwrap();
-    let noisy = |k: usize| -> Vec<f64> {
-        let clean = &made.values
-            [made.columns.iter().position(|c| c == ["biomass", "substrate", "product"][k]).unwrap()];
-        clean.iter().zip(normals(times.len(), 10 + k as u64)).map(|(y, e)| y + noise[k] * e).collect()
-    };
-    csv("time,biomass,substrate,product", &[&times, &noisy(0), &noisy(1), &noisy(2)])
 }
 
 const NOISE: [f64; 3] = [0.05, 0.1, 0.03];
@@ -254,6 +147,9 @@ fn assert_true(found: &Explanation, case: &str) {
     assert_eq!(found.effects.is_empty(), !matches!(found.verdict, Verdict::Named | Verdict::Tie), "{case}");
 }
 
+/// A case, its noise, its training span, times, values, the verdict, and words of the answer.
+type Row<'a> = (&'a str, &'a str, &'a str, &'a [f64], &'a [f64], Verdict, &'a str);
+
 #[test]
 fn degenerate_data_get_a_sentence_of_their_own_and_no_name() {
     let (times, clean) = decaying(60, 0.0);
@@ -264,7 +160,7 @@ fn degenerate_data_get_a_sentence_of_their_own_and_no_name() {
     let ones = vec![1.0; 60];
     let zeros = vec![0.0; 60];
     let (no_gap, open) = (Verdict::NoGap, Verdict::Unexplained);
-    let table: Vec<(&str, &str, &str, &[f64], &[f64], Verdict, &str)> = vec![
+    let table: Vec<Row<'_>> = vec![
         (
             "as it should be",
             "0.02",

@@ -1,7 +1,7 @@
 //! How often the 95 % intervals hold the truth: at the stated noise and given the residuals, with white and correlated errors.
 //!
 //! `just intervals` makes the table of docs/intervals.md; `INTERVALS_TWINS` sets the number of twins of a row.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::print_stdout)] // the figures, with --nocapture
 mod intervals_kit;
 mod study_kit;
 

@@ -126,7 +126,10 @@ impl Decay {
         }
         self.spoil(&mut outputs, asked.len());
         if self.flaw == Flaw::DividesByTheFirstStep {
-            outputs[0] *= (window.times[0] - window.start) / (window.times[0] - window.start);
+            // A ratio to the first step has no value where the first time is the start.
+            if window.times[0] <= window.start {
+                outputs[0] = f64::NAN;
+            }
         }
         Solved { outputs, state: vec![x, before] }
     }
@@ -142,12 +145,16 @@ impl Decay {
             }
             // As numpy gives the bytes of an array that was made of whole numbers.
             Flaw::AnswersIntegers => {
-                outputs.iter_mut().for_each(|v| *v = f64::from_bits((100.0 * *v) as u64))
+                for value in outputs {
+                    *value = f64::from_bits((100.0 * *value) as u64);
+                }
             }
             Flaw::SwapsBytes => {
                 // So few digits that all of them stand in the first bytes.
                 let round = |v: f64| (64.0 * v).round() / 64.0;
-                outputs.iter_mut().for_each(|v| *v = f64::from_bits(round(*v).to_bits().swap_bytes()));
+                for value in outputs {
+                    *value = f64::from_bits(round(*value).to_bits().swap_bytes());
+                }
             }
             _ => {}
         }
@@ -238,12 +245,7 @@ fn every_flaw_is_found_by_the_check_that_is_there_for_it() {
 
 /// The reason for which this check fails.
 fn reason(found: &Conformance, check: &str) -> String {
-    found
-        .failed
-        .iter()
-        .find(|f| f.name == check)
-        .map(|f| f.reason.clone())
-        .unwrap_or_else(|| panic!("{found:?}"))
+    found.failed.iter().find(|f| f.name == check).map_or_else(|| panic!("{found:?}"), |f| f.reason.clone())
 }
 
 #[test]

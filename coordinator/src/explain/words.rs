@@ -3,6 +3,8 @@
 //! What speaks of noise is in [`super::adequacy`], what of held-out data in [`super::held_out`]. Next file to read:
 //! [`super::warnings`].
 
+use std::fmt::Write as _;
+
 use super::Verdict;
 use super::adequacy::{Nature, factor, times};
 use super::candidate::Candidate;
@@ -162,17 +164,18 @@ pub(super) fn shape(found: &Found<'_>, added: Option<&Judged<'_>>, before: &Loca
     }
     match added {
         Some(judged) => {
-            text.push_str(&format!("; against a smooth signal they count {} one", times(judged.inflation)));
+            let _ = write!(text, "; against a smooth signal they count {} one", times(judged.inflation));
             if let Some(left) = judged.leftover.filter(|left| left.share > 0.0) {
                 let share = percent(left.share);
-                text.push_str(&format!(
+                let _ = write!(
+                    text,
                     "; of what lies above the noise, candidates and bent forms of the effect would take away {share}, to first order"
-                ));
+                );
             }
         }
         None => {
             if let Some(strongest) = before.correlations.first() {
-                text.push_str(&format!("; those of {} go along with {}", strongest.channel, strongest.with));
+                let _ = write!(text, "; those of {} go along with {}", strongest.channel, strongest.with);
             }
         }
     }

@@ -21,6 +21,8 @@ mod units;
 use std::path::Path;
 use std::sync::Arc;
 
+use starlings_models::Setup;
+
 use self::model::CheckedModel;
 use self::parameters::initial_medians;
 use self::settings::{estimator, fleet};
@@ -98,10 +100,7 @@ fn check(path: &Path, text: &str, surroundings: &Surroundings) -> Result<Study, 
     let observer = settings::observer(&source, &file.observer, described);
     let model = model::model(&source, &file, solver.as_ref());
     // Everything that follows is judged against the model.
-    let Some(mut model) = model else {
-        survey::survey(&source, &file);
-        return Err(source.verdict().err().unwrap_or(StudyError { problems: vec![] }));
-    };
+    let Some(mut model) = model else { return Err(survey::without_model(&source, &file)) };
     model.setup.observer = observer;
     explain::check_names(&source, &file, &model.setup.model);
     let mut warnings = solver::check(&source, &file, solver.as_ref());
@@ -118,11 +117,7 @@ fn check(path: &Path, text: &str, surroundings: &Surroundings) -> Result<Study, 
     source.verdict()?;
     scales::check(&source, &file, &mut model, (&parameters, &records), surroundings, &mut warnings);
     source.verdict()?;
-    model::check_build(&source, &file, &model.setup);
-    source.verdict()?;
-    limits::check_delays(&source, &file, &model.setup, &records);
-    observer::check(&source, &file, &model.setup, &records);
-    source.verdict()?;
+    check_setup(&source, &file, &model.setup, &records)?;
     warnings.extend(units::warnings(&file, &model, &records));
     let theta = expand::theta(&parameters, &records);
     Ok(Study {
@@ -148,6 +143,20 @@ fn check(path: &Path, text: &str, surroundings: &Surroundings) -> Result<Study, 
         surroundings: surroundings.clone(),
         warnings,
     })
+}
+
+/// What only the finished setup can tell: whether it builds, what a run of it costs, whether its observer fits.
+fn check_setup(
+    source: &Source,
+    file: &StudyFile,
+    setup: &Setup,
+    records: &[Record],
+) -> Result<(), StudyError> {
+    model::check_build(source, file, setup);
+    source.verdict()?;
+    limits::check_delays(source, file, setup, records);
+    observer::check(source, file, setup, records);
+    source.verdict()
 }
 
 /// The name becomes a folder's.

@@ -127,7 +127,7 @@ impl Slopes<'_> {
         }
         let column = entry.parameter + 1;
         let step = self.theta[(j, column)] - self.theta[(j, 0)];
-        if !(step.abs() > 0.0) {
+        if step.is_nan() || step == 0.0 {
             return 0.0;
         }
         let change = self.outputs[(row.at, column)] - self.outputs[(row.at, 0)];

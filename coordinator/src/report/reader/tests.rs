@@ -53,8 +53,6 @@ fn snapshot(rescued: u64) -> Snapshot {
         cost: None,
         narrow: 1.0,
         counts: Counts { rescued, ..Counts::default() },
-        cost: None,
-        narrow: 1.0,
     };
     Snapshot { head, states: Vec::new() }
 }

@@ -4,6 +4,7 @@
 
 use starlings_models::limits::MAX_STEPS;
 use starlings_models::{Memory, SOLVER, Setup};
+use toml::Spanned;
 
 use super::blame::expressions;
 use crate::study::checked::Record;
@@ -11,15 +12,15 @@ use crate::study::file::StudyFile;
 use crate::study::problem::Source;
 use crate::study::variant::reads_past;
 
-/// The limit of steps that the study sets, if any; nothing after a complaint.
-pub(super) fn max_steps(source: &Source, file: &StudyFile) -> Option<Option<u64>> {
-    let Some(given) = &file.model.max_steps else { return Some(None) };
+/// The limit of steps that the study sets, if any; a limit that makes no sense is reported.
+pub(super) fn max_steps(source: &Source, file: &StudyFile) -> Option<u64> {
+    let given = file.model.max_steps.as_ref()?;
     let (message, help) = if file.model.kind.get_ref() == SOLVER {
         ("a solver counts its own steps", "remove `max_steps`; `timeout` limits the wall time of a run")
     } else if *given.get_ref() == 0 {
         ("a run takes at least one step", "give the steps that one run may take at most")
     } else {
-        return Some(Some(*given.get_ref()));
+        return Some(*given.get_ref());
     };
     source.report_with(given.span(), message, help);
     None
@@ -30,7 +31,8 @@ pub(super) fn max_steps(source: &Source, file: &StudyFile) -> Option<Option<u64>
 pub(super) fn check_delays(source: &Source, file: &StudyFile, setup: &Setup, records: &[Record]) {
     let Ok(model) = setup.model() else { return };
     let most = setup.max_steps.unwrap_or(MAX_STEPS);
-    let length = |record: &Record| record.times.last().zip(record.times.first()).map(|(b, a)| b - a);
+    let length =
+        |record: &Record| record.times.last().zip(record.times.first()).map(|(last, first)| last - first);
     let spans = records.iter().filter_map(|record| Some((record, length(record)?)));
     let Some((record, length)) = spans.max_by(|a, b| a.1.total_cmp(&b.1)) else { return };
     for Memory { of, longest } in model.memories() {
@@ -39,7 +41,7 @@ pub(super) fn check_delays(source: &Source, file: &StudyFile, setup: &Setup, rec
             let mut places = expressions(file).into_iter().filter(|text| reads_past(text.get_ref()));
             let place = places.find(|text| text.get_ref().contains(&**of));
             source.report_with(
-                place.map_or(file.model.kind.span(), |text| text.span()),
+                place.map_or(file.model.kind.span(), Spanned::span),
                 format!(
                     "the delay of `{of}` is at most {longest:e} {unit}: over the {length} {unit} of record `{}` a run would take \
                      {steps:.1e} steps, more than {most}",

@@ -56,7 +56,7 @@ pub(in crate::study) fn model(
     let layout = file.model.layout.as_ref().map(|layout| layout.value.clone());
     let solver = solver.map(|known| Box::new(known.def.clone()));
     let model = ModelDef { kind: file.model.kind.get_ref().clone(), constants, equations, layout, solver };
-    let max_steps = limits::max_steps(source, file)?;
+    let max_steps = limits::max_steps(source, file);
     let mut setup = Setup { model, max_steps, ..Setup::default() };
     let bare = spec(source, file, &setup)?;
     check_roles(source, file, &bare);

@@ -58,8 +58,9 @@ pub(in crate::study) fn solver(
     }
     if let Some(written) = def.described.clone().filter(|_| section.adapter == "command") {
         let def = SolverDef { described: Some(written), ..def.clone() };
-        let faults = surroundings.inspect(&def);
-        faults.into_iter().for_each(|fault| files::report(source, section, &def, &folder, fault));
+        for fault in surroundings.inspect(&def) {
+            files::report(source, section, &def, &folder, fault);
+        }
     }
     if source.count() > before {
         return None;

@@ -6,8 +6,14 @@
 use crate::study::check::prior;
 use crate::study::check::solver::check_files;
 use crate::study::file::StudyFile;
-use crate::study::problem::Source;
+use crate::study::problem::{Source, StudyError};
 use crate::study::record::Recordings;
+
+/// What is wrong with a study whose model is none.
+pub(in crate::study) fn without_model(source: &Source, file: &StudyFile) -> StudyError {
+    survey(source, file);
+    source.verdict().err().unwrap_or(StudyError { problems: vec![] })
+}
 
 /// Reports what is wrong with priors and files whatever the model is.
 pub(in crate::study) fn survey(source: &Source, file: &StudyFile) {

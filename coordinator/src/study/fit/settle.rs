@@ -19,7 +19,7 @@ use crate::study::{Move, RunError, posterior};
 /// Passes at most.
 pub const LIMIT: usize = 12;
 /// Lengths of the step that are tried where its full length raises the cost.
-const SHORTER: [f64; 5] = [0.5, 0.25, 0.125, 0.0625, 0.015625];
+const SHORTER: [f64; 5] = [0.5, 0.25, 0.125, 0.0625, 0.015_625];
 /// A rise of the cost that a move of so many posterior sd, which counts as settled, could make.
 const LEVEL: f64 = Move::SETTLED * Move::SETTLED;
 /// Factor on the width of the points where no step lowers the cost.
@@ -121,7 +121,7 @@ impl<'a> Search<'a> {
         let point = |(k, of_point): (usize, &Vec<Result<_, _>>)| {
             let at = theta.column(k);
             let far =
-                (&at - &prior.mean).component_div(&prior.covariance.diagonal().map(f64::sqrt)).norm_squared();
+                (at - &prior.mean).component_div(&prior.covariance.diagonal().map(f64::sqrt)).norm_squared();
             Point { point: at.iter().copied().collect(), cost: far + self.misfit(of_point) }
         };
         Ok(results.iter().enumerate().map(point).collect())

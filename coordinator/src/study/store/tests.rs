@@ -39,8 +39,6 @@ fn snapshot(step: usize) -> Snapshot {
         cost: None,
         narrow: 1.0,
         counts: Counts::default(),
-        cost: None,
-        narrow: 1.0,
     };
     Snapshot { head, states: vec![Some(DMatrix::from_element(8, 3, step as f64))] }
 }

@@ -134,5 +134,5 @@ fn too_late(name: &str, process: Option<&mut Process>, patience: Duration, last:
         None => "start it there, or give the study its `command`".to_owned(),
     };
     let what = format!("was not ready within {} s ({last}); {remedy}", patience.as_secs_f64());
-    not_ready(name, what, process.map(|process| process.tail()).unwrap_or_default())
+    not_ready(name, what, process.map(Process::tail).unwrap_or_default())
 }
