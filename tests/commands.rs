@@ -269,7 +269,7 @@ fn an_interrupted_run_ends_its_workers_and_says_how_to_go_on() {
     let status = child.wait().unwrap();
     let mut stderr = String::new();
     child.stderr.take().unwrap().read_to_string(&mut stderr).unwrap();
-    assert_eq!(status.code(), Some(1), "{stderr}");
+    assert_eq!(status.code(), Some(130), "{stderr}");
     assert!(stderr.contains("--resume"), "{stderr}");
     assert!(!out.join("posterior.csv").exists());
     let workers = worker_processes(&out);

@@ -249,7 +249,7 @@ fn an_interrupted_command_leaves_no_solver_and_no_folder() {
     assert!(groups.iter().all(|group| members(*group) == 2), "the solver and its child");
     signal("-INT", &command.id().to_string());
     gone(&groups);
-    assert_eq!(command.wait().unwrap().code(), Some(1));
+    assert_eq!(command.wait().unwrap().code(), Some(130));
     wait_until("no folder is left", || place.left().is_empty());
 }
 
@@ -332,6 +332,6 @@ fn a_program_that_stops_while_it_serves_ends_with_an_interrupted_command() {
     }
     signal("-INT", &command.id().to_string());
     gone(&groups);
-    assert_eq!(command.wait().unwrap().code(), Some(1));
+    assert_eq!(command.wait().unwrap().code(), Some(130));
     wait_until("no folder is left", || place.left().is_empty());
 }

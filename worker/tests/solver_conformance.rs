@@ -215,7 +215,6 @@ fn a_solver_without_a_flaw_passes_every_check() {
 
 #[test]
 fn every_flaw_is_found_by_the_check_that_is_there_for_it() {
-    let folder = tempfile::tempdir().unwrap();
     let cases = [
         (Flaw::ForgetsOutputs, "a run gives the outputs and the state that the description promises"),
         (Flaw::ForgetsOutputs, ROWS),
@@ -236,6 +235,7 @@ fn every_flaw_is_found_by_the_check_that_is_there_for_it() {
         (Flaw::AddsToItself, "a hosted term of zero is none"),
     ];
     for (flaw, check) in cases {
+        let folder = tempfile::tempdir().unwrap();
         let found = tried(flaw, folder.path());
         let failed: Vec<&str> = found.failed.iter().map(|f| f.name.as_str()).collect();
         assert!(failed.contains(&check), "{flaw:?} is not found by `{check}`: {found:?}");

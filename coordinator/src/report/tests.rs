@@ -198,7 +198,7 @@ fn a_constant_that_the_answer_hangs_on_is_told_in_a_sentence_and_a_table() {
     let page = render(&data).unwrap();
     assert_well_formed(&page);
     assert!(page.contains("R moves by 4.2 posterior sd when L is 1 % off."));
-    assert!(page.contains("<td>R</td><td class=\"number\">−4.2</td><td>C 0.5</td>"), "{page}");
+    assert!(page.contains("<td>R</td><td class=\"number\">−4.21</td><td>C 0.52</td>"), "{page}");
     assert!(
         page.contains(
             "Not moved, because they are zero or the model refuses: p_venous. 7 runs of the model."

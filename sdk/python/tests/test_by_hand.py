@@ -84,7 +84,7 @@ def test_an_address_that_is_none_is_told_in_a_line(tmp_path, environment, words)
 def test_a_declaration_that_does_not_fit_is_told_in_a_line(tmp_path):
     done = start(tmp_path, "--describe", source=SOLVER.replace('{"tip": "m"}', '["tip", "tip"]'))
     assert (done.returncode, done.stdout) == (1, "")
-    assert done.stderr == "this solver cannot be served: outputs name `tip` twice\n"
+    assert done.stderr == "this solver cannot be served: outputs name `tip` twice (beam.py:16)\n"
 
 
 def blocks():

@@ -142,9 +142,10 @@ fn same_study(
     let kept = store.meta(Meaning::KEY)?.unwrap_or_default();
     let kept: Meaning = serde_json::from_str(&kept).unwrap_or_default();
     let (parts, records) = kept.differences(&Meaning::of(study, purpose));
-    let Some(part) = first(&parts) else { return Ok(()) };
+    let told = changes(text, &study.text);
+    let Some(part) = first(&parts, &told) else { return Ok(()) };
     let (what, which) = match part {
-        Part::StudyFile => ("the study file", changes(text, &study.text)),
+        Part::StudyFile => ("the study file", told),
         Part::Recordings => ("the recordings", records.iter().map(|name| format!("`{name}`")).collect()),
         Part::Solver => ("the solver or one of its files", Vec::new()),
     };
@@ -152,9 +153,11 @@ fn same_study(
     Err(FolderError::OtherStudy { folder: path.to_owned(), what, which })
 }
 
-/// A change of the study file may change what is read of the others, not the other way round.
-fn first(parts: &BTreeSet<Part>) -> Option<Part> {
-    parts.first().copied()
+/// The part to tell of. A change of the study file may change what is read of the others; where the file says the same, it is what a
+/// solver says of itself that gave its words another meaning.
+fn first(parts: &BTreeSet<Part>, told: &[String]) -> Option<Part> {
+    let by_itself = parts.contains(&Part::Solver) && told.is_empty();
+    parts.iter().copied().find(|part| !(by_itself && *part == Part::StudyFile))
 }
 
 /// What becomes of what is stored, where a run goes on with another program.
