@@ -184,7 +184,7 @@ fn troubles() -> Vec<(String, &'static str, &'static str)> {
     vec![
         ("raise SystemExit(3)".to_owned(), "", "exited with status 3 before it was ready"),
         ("import time; time.sleep(60)".to_owned(), "start_timeout = 1", "was not ready within 1 s"),
-        (OTHER_PROTOCOL.to_owned(), "", "it speaks protocol 99, this worker speaks 1"),
+        (OTHER_PROTOCOL.to_owned(), "", "it speaks protocol 99, this worker speaks 2"),
         (twice.to_owned(), "", "parameters name `k` twice"),
         (body("raise ValueError('mesh folded over')"), "", "ValueError: mesh folded over"),
         (body("return window.times*numpy.nan"), "", "is not a finite number at t = 0"),

@@ -2,8 +2,9 @@
 //!
 //! [`dispatcher`] decides (pure: events in, commands out); [`GrpcFleet`] is the shell that carries its commands over the
 //! network; [`InProcess`] runs jobs on threads of this process; [`LocalWorkers`] keeps worker processes on this machine
-//! alive. Nothing here knows estimators, studies or stores, and nothing here retries with other parameters: a particle that
-//! no worker can finish is an [`Outcome`] whose result is an error. Next file to read: [`dispatcher`].
+//! alive. Nothing here knows estimators, studies or stores, and nothing here retries with other parameters: a particle whose
+//! model fails is an [`Outcome`] whose result is an error. A failure of a place sets a worker aside; when none is left the batch
+//! ends with a [`FleetError`]. Next file to read: [`dispatcher`].
 
 pub mod dispatcher;
 mod error;
@@ -12,6 +13,7 @@ mod event_text;
 mod grpc;
 mod hub;
 mod in_process;
+mod job_name;
 mod local_workers;
 mod network;
 mod service;
@@ -25,13 +27,13 @@ pub use local_workers::{LocalConfig, LocalWorkers};
 pub use starlings_proto::{SetupId, WireError};
 pub use travel::travels;
 
-use starlings_models::{Job, ParticleError, Prediction, Setup};
+use starlings_models::{Failure, Job, Prediction, Setup};
 
 /// How one job of a batch ended.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
-    /// The prediction, or why there is none.
-    pub result: Result<Prediction, ParticleError>,
+    /// The prediction, or why there is none: the model's doing, or the limit of wall time. A failure of a place is never here.
+    pub result: Result<Prediction, Failure>,
     /// How often the job was started; depends on the workers and must not enter an estimate.
     pub attempts: u32,
     /// The worker that answered last.
@@ -49,7 +51,8 @@ pub trait Fleet {
     /// Runs jobs, each with a setup of its own choice, and returns one outcome per job, in job order.
     ///
     /// # Errors
-    /// A failure of the fleet: cancelled, no workers, a setup that no worker can build. A failed job is no error.
+    /// A failure of the fleet: cancelled, no workers, a setup that no worker can build, no place that can make the runs. A
+    /// failure of the model is no error.
     fn run_mixed(&mut self, jobs: Vec<(SetupId, Job)>) -> Result<Vec<Outcome>, FleetError>;
 
     /// Runs all jobs with one setup and returns one outcome per job, in job order.

@@ -19,6 +19,7 @@ pub mod posterior;
 pub mod problem;
 mod record;
 pub mod run;
+pub(crate) mod run_key;
 pub mod spectrum;
 pub mod store;
 pub mod summary;

@@ -11,7 +11,7 @@ use starlings_coordinator::fleet::{Fleet, FleetError, InProcess, Outcome, SetupI
 use starlings_coordinator::study::RunError;
 use starlings_coordinator::study::store::Store;
 use starlings_coordinator::study::twin::{Twin, simulate};
-use starlings_models::{Job, ParticleError, Setup};
+use starlings_models::{Job, Setup};
 use study_kit::{Case, csv, grid};
 
 /// A built-in model with a step of its own: effects in its rates are compared with a run of their own.
@@ -123,13 +123,13 @@ impl Fleet for Counting {
 
     fn run_mixed(&mut self, jobs: Vec<(SetupId, Job)>) -> Result<Vec<Outcome>, FleetError> {
         self.jobs += jobs.len() as u64;
-        let mut outcomes = self.inner.run_mixed(jobs)?;
         if self.lost == Some(self.calls) {
-            outcomes[0].result =
-                Err(ParticleError::Lost { attempts: 3, reason: "the machine went away".to_owned() });
+            let Job { particle, record, .. } = jobs[0].1;
+            let reason = "the machine went away".to_owned();
+            return Err(FleetError::NoAnswer { job: 0, particle, record, reason });
         }
         self.calls += 1;
-        Ok(outcomes)
+        self.inner.run_mixed(jobs)
     }
 
     fn n_workers(&self) -> usize {

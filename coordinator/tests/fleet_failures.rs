@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use fleet_kit::{ThreadWorker, any_port, await_workers, factory, jobs, listen, square};
 use starlings_coordinator::fleet::{Fleet, FleetConfig, FleetError, GrpcFleet};
-use starlings_models::{ParticleError, Setup, SetupError};
+use starlings_models::{Failure, ModelFailure, Setup, SetupError};
 use starlings_worker::{MAX_SLOTS, WorkerConfig, WorkerError};
 use tokio_util::sync::CancellationToken;
 
@@ -18,7 +18,7 @@ fn a_model_failure_is_an_outcome_after_two_workers_tried() {
     let (mut fleet, events, _) = listen(any_port());
     let failing = || {
         factory(|job| match job.particle {
-            3 => Err(ParticleError::NotFinite { what: "p".to_owned(), time: f64::INFINITY }),
+            3 => Err(ModelFailure::NotFinite { what: "p".to_owned(), time: f64::INFINITY }.into()),
             4 => panic!("what a model"),
             _ => Ok(square(job)),
         })
@@ -29,9 +29,11 @@ fn a_model_failure_is_an_outcome_after_two_workers_tried() {
     let outcomes = fleet.run(setup, jobs(6)).unwrap();
     assert_eq!(
         outcomes[3].result,
-        Err(ParticleError::NotFinite { what: "p".to_owned(), time: f64::INFINITY })
+        Err(ModelFailure::NotFinite { what: "p".to_owned(), time: f64::INFINITY }.into())
     );
-    assert!(matches!(&outcomes[4].result, Err(ParticleError::Solver(text)) if text.contains("what a model")));
+    assert!(
+        matches!(&outcomes[4].result, Err(Failure::Model(ModelFailure::Solver(text))) if text.contains("what a model"))
+    );
     assert_eq!(outcomes.iter().map(|o| o.attempts).collect::<Vec<_>>(), [1, 1, 1, 2, 2, 1]);
     assert_eq!(outcomes.iter().filter(|o| o.result.is_ok()).count(), 4);
 }

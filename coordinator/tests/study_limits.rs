@@ -99,3 +99,19 @@ fn a_run_that_reaches_its_limit_says_how_many_steps_there_would_be() {
         "{none}"
     );
 }
+
+#[test]
+fn a_run_that_computes_for_longer_than_it_may_is_given_up_with_the_limit() {
+    let limited = |seconds: &str| told(&equations("cos(3e2*t) - k*x", &format!("timeout = {seconds}")));
+    let late = limited("1e-9");
+    assert!(
+        late.contains("the run computed for more than 0.000000001 s (`timeout` in `[model]` sets the limit)"),
+        "{late}"
+    );
+    assert_eq!(limited("60"), "");
+    assert!(
+        limited("0").contains("`timeout` must be above zero and at most 3.2e9 s, found 0"),
+        "{}",
+        limited("0")
+    );
+}

@@ -3,7 +3,7 @@
 //! Names are resolved once, when a setup is built; a run only follows indices. Next file to read: [`crate::simulator`].
 
 use crate::setup::{Setup, SetupError};
-use crate::{ParticleError, Quantity, Spec, nearest};
+use crate::{ModelFailure, Quantity, Spec, nearest};
 
 /// Prefix of a name that gives a state its initial value.
 const INITIAL: &str = "initial:";
@@ -89,11 +89,11 @@ impl Binding {
     ///
     /// # Errors
     /// When a value is not finite.
-    pub(crate) fn theta(&self, values: &[f64], t: f64) -> Result<Vec<f64>, ParticleError> {
+    pub(crate) fn theta(&self, values: &[f64], t: f64) -> Result<Vec<f64>, ModelFailure> {
         let mut theta = self.theta.clone();
         for ((target, &value), name) in self.targets.iter().zip(values).zip(&self.names) {
             if !value.is_finite() {
-                return Err(ParticleError::NotFinite { what: format!("parameter `{name}`"), time: t });
+                return Err(ModelFailure::NotFinite { what: format!("parameter `{name}`"), time: t });
             }
             if let Target::Parameter(i) = *target {
                 theta[i] = value;

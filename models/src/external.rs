@@ -17,7 +17,7 @@ use crate::effect::Addition;
 use crate::setup::{Setup, SetupError};
 use crate::simulator::{check_job, free_names};
 use crate::solver::Description;
-use crate::{Forward, Job, ObserverDef, ParticleError, Prediction, Signal, Spec, Window};
+use crate::{Forward, Job, ModelFailure, ObserverDef, ParticleError, Prediction, Signal, Spec, Window};
 use applied::Applied;
 pub(crate) use outline::{Outline, check_effects};
 pub(crate) use parts::spec;
@@ -197,11 +197,11 @@ impl<S: Solve> External<S> {
         Ok((Some(own.to_vec()), carried))
     }
 
-    /// Refuses an answer of another shape, or one that is not finite.
+    /// Refuses an answer of another shape, of which nobody knows whose doing it is, and one that is not finite.
     fn check(&self, solved: &Solved, window: &Window) -> Result<(), ParticleError> {
         let name = &self.description.name;
         let wrong = |what: &str, got: usize, wanted: usize| {
-            Err(ParticleError::Solver(format!(
+            Err(ParticleError::Undecided(format!(
                 "the solver `{name}` returned {got} {what} where {wanted} belong"
             )))
         };
@@ -218,7 +218,7 @@ impl<S: Solve> External<S> {
                 "output `{}` of the solver `{name}`",
                 Spec::component(self.rows.quantities(), at % n_row)
             );
-            return Err(ParticleError::NotFinite { what, time: window.times[at / n_row] });
+            return Err(ModelFailure::NotFinite { what, time: window.times[at / n_row] }.into());
         }
         if let Some(at) = solved.state.iter().position(|v| !v.is_finite()) {
             let what = format!(
@@ -226,7 +226,7 @@ impl<S: Solve> External<S> {
                 Spec::component(&self.description.spec.states, at)
             );
             let time = window.times.last().copied().unwrap_or(window.start);
-            return Err(ParticleError::NotFinite { what, time });
+            return Err(ModelFailure::NotFinite { what, time }.into());
         }
         Ok(())
     }

@@ -14,7 +14,7 @@ mod sliding;
 mod system;
 
 use crate::model::Segment;
-use crate::{Model, ParticleError};
+use crate::{Model, ModelFailure};
 
 /// How exact a step must be: its error estimate stays below `absolute + relative · |x|` in the root mean square.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,14 +56,14 @@ impl Default for Solver {
 /// Advances `x` over the segment by the chosen method.
 ///
 /// # Errors
-/// [`ParticleError::TooManySteps`], [`ParticleError::StepTooSmall`] or [`ParticleError::NotFinite`], with the time reached.
+/// [`ModelFailure::TooManySteps`], [`ModelFailure::StepTooSmall`] or [`ModelFailure::NotFinite`], with the time reached.
 pub fn advance<M: Model + ?Sized>(
     model: &M,
     solver: Solver,
     segment: Segment<'_>,
     theta: &[f64],
     x: &mut [f64],
-) -> Result<(), ParticleError> {
+) -> Result<(), ModelFailure> {
     match solver {
         Solver::Auto(tolerance) => auto::advance(model, segment, theta, x, tolerance),
         Solver::Dopri5(tolerance) => dopri5::advance(model, segment, theta, x, tolerance),

@@ -1,10 +1,11 @@
 //! One particle's run over one window of data: what a worker receives and what it returns.
 //!
-//! No scheduling and no wire format here. Next file to read: [`crate::simulator`], which runs a job on a [`crate::Model`].
+//! No scheduling and no wire format here. Next files to read: [`crate::failure`] for why there may be no prediction,
+//! [`crate::simulator`], which runs a job on a [`crate::Model`].
 
 use std::sync::Arc;
 
-use crate::Spec;
+use crate::{ParticleError, Spec};
 
 /// A sampled signal, linear between its samples and constant beyond them.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,51 +59,6 @@ pub struct Prediction {
     pub cost: f64,
 }
 
-/// Why one particle's run gave no prediction. A failure is data: the fleet retries it, the study pulls it in.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ParticleError {
-    /// A state or output stopped being a finite number.
-    #[error("{what} is not a finite number at t = {time}")]
-    NotFinite {
-        /// The state or output.
-        what: String,
-        /// Time in the study's unit.
-        time: f64,
-    },
-    /// The integrator could not go on with a positive step.
-    #[error(
-        "the integrator's step fell to {step:e} at t = {time}: the model is too stiff for it or has a singularity there"
-    )]
-    StepTooSmall {
-        /// Time in the study's unit.
-        time: f64,
-        /// The refused step.
-        step: f64,
-    },
-    /// The run would take more steps than allowed: a step, a delay or a time constant is too short for it.
-    #[error("more than {limit} steps of integration, at t = {time}")]
-    TooManySteps {
-        /// Time reached.
-        time: f64,
-        /// The limit.
-        limit: u64,
-    },
-    /// The job does not fit the setup: a wrong length or an unknown record.
-    #[error("the job does not fit the model: {0}")]
-    BadJob(String),
-    /// The run panicked or its process failed.
-    #[error("the solver failed: {0}")]
-    Solver(String),
-    /// No worker could finish the run; the text lists what happened at each attempt.
-    #[error("given up after {attempts} attempt{}: {reason}", if *attempts == 1 { "" } else { "s" })]
-    Lost {
-        /// How often it was tried.
-        attempts: u32,
-        /// What happened at the last attempt.
-        reason: String,
-    },
-}
-
 /// What a worker runs. Native models and every adapter to an external solver implement it. Same job, same bits.
 pub trait Forward: Send + Sync {
     /// What the model says of itself, effects included.
@@ -111,6 +67,16 @@ pub trait Forward: Send + Sync {
     /// Runs one job.
     ///
     /// # Errors
-    /// When the run gives no usable prediction; the caller treats it as data.
+    /// When the run gives no usable prediction; only a model failure among them is data about the parameters.
     fn run(&self, job: &Job) -> Result<Prediction, ParticleError>;
+
+    /// Runs one job, which may take as long as its setup says: `spent` tells the seconds that it has computed so far. What runs
+    /// in a program of its own is timed by whoever started the program.
+    ///
+    /// # Errors
+    /// As [`Forward::run`], and [`ParticleError::Timeout`].
+    fn run_within(&self, job: &Job, spent: &dyn Fn() -> f64) -> Result<Prediction, ParticleError> {
+        let _ = spent;
+        self.run(job)
+    }
 }

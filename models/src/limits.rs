@@ -1,4 +1,4 @@
-//! What one run may cost: the steps of its integrator, counted, and a caller's word to stop.
+//! What one run may cost: the steps of its integrator, counted, its time, and a caller's word to stop.
 //!
 //! The count speaks of the model and the study alone, so that every place ends a run at the same step. No clock is here: a
 //! caller that has one, or that no longer wants the answer, passes a function that says so, and the run looks at it between
@@ -6,13 +6,16 @@
 
 use std::cell::Cell;
 
-use crate::ParticleError;
+use crate::ModelFailure;
 
 /// Steps of one run where the study does not say otherwise.
 pub const MAX_STEPS: u64 = 2_000_000;
 
+/// Seconds of computing of one run where the study does not say otherwise.
+pub const TIMEOUT: f64 = 3600.0;
+
 /// Steps between two looks at whether to stop: a look may read a clock, a step may be as short.
-const LOOK: u64 = 64;
+const LOOK: u64 = 256;
 
 /// The limits of one run, and how much of them is used.
 pub struct Limits<'a> {
@@ -37,8 +40,8 @@ impl<'a> Limits<'a> {
     /// Counts so many steps that begin at time `t`.
     ///
     /// # Errors
-    /// [`ParticleError::TooManySteps`] beyond the limit, and when the run is to stop; [`Limits::stopped`] tells which.
-    pub fn take(&self, steps: u64, t: f64) -> Result<(), ParticleError> {
+    /// [`ModelFailure::TooManySteps`] beyond the limit, and when the run is to stop; [`Limits::stopped`] tells which.
+    pub fn take(&self, steps: u64, t: f64) -> Result<(), ModelFailure> {
         let before = self.taken.get();
         let taken = before.saturating_add(steps);
         self.taken.set(taken);
@@ -56,8 +59,8 @@ impl<'a> Limits<'a> {
     /// left: a run that cannot end is not begun.
     ///
     /// # Errors
-    /// [`ParticleError::TooManySteps`].
-    pub fn foresee(&self, dt: f64, t: f64) -> Result<(), ParticleError> {
+    /// [`ModelFailure::TooManySteps`].
+    pub fn foresee(&self, dt: f64, t: f64) -> Result<(), ModelFailure> {
         let left = self.most.saturating_sub(self.taken.get());
         if (self.until - t) / dt > 2.0 * left as f64 { Err(self.exceeded(t)) } else { Ok(()) }
     }
@@ -72,8 +75,8 @@ impl<'a> Limits<'a> {
         self.stopped.get()
     }
 
-    fn exceeded(&self, time: f64) -> ParticleError {
-        ParticleError::TooManySteps { time, limit: self.most }
+    fn exceeded(&self, time: f64) -> ModelFailure {
+        ModelFailure::TooManySteps { time, limit: self.most }
     }
 }
 
@@ -85,11 +88,11 @@ mod tests {
     fn a_run_ends_at_the_step_after_its_limit_and_is_not_begun_where_it_cannot_end() {
         let limits = Limits::new(1000, 8.0, None);
         assert_eq!(limits.take(1000, 0.5), Ok(()));
-        assert_eq!(limits.take(1, 0.5), Err(ParticleError::TooManySteps { time: 0.5, limit: 1000 }));
+        assert_eq!(limits.take(1, 0.5), Err(ModelFailure::TooManySteps { time: 0.5, limit: 1000 }));
         assert!(!limits.stopped());
         let limits = Limits::new(1000, 8.0, None);
         assert_eq!(limits.foresee(8e-3, 0.0), Ok(()));
-        assert_eq!(limits.foresee(3e-3, 0.0), Err(ParticleError::TooManySteps { time: 0.0, limit: 1000 }));
+        assert_eq!(limits.foresee(3e-3, 0.0), Err(ModelFailure::TooManySteps { time: 0.0, limit: 1000 }));
         assert_eq!(limits.foresee(3e-3, 6.0), Ok(()));
         // Steps of no length, and without limits.
         assert!(limits.foresee(0.0, 0.0).is_err());
@@ -101,7 +104,7 @@ mod tests {
         let stop = || true;
         let limits = Limits::new(u64::MAX, 1.0, Some(&stop));
         let taken = (0..1000).take_while(|_| limits.take(1, 0.0).is_ok()).count();
-        assert_eq!(taken, 63);
+        assert_eq!(taken, LOOK as usize - 1);
         assert!(limits.stopped());
     }
 }

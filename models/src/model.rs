@@ -6,7 +6,7 @@
 use crate::integrate::{self, Solver};
 use crate::limits::Limits;
 use crate::memory::Memory;
-use crate::{Blocks, ParticleError, Spec};
+use crate::{Blocks, ModelFailure, Spec};
 
 /// Access to input signals, and to what the model remembers of itself, at other times than now.
 pub trait History {
@@ -127,7 +127,7 @@ pub trait Model: Send + Sync {
     ///
     /// # Errors
     /// When the integrator cannot reach the segment's end.
-    fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ParticleError> {
+    fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ModelFailure> {
         integrate::advance(self, self.solver(), segment, theta, x)
     }
 }

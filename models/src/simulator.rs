@@ -7,13 +7,15 @@
 use crate::binding::Binding;
 use crate::effect;
 use crate::inputs::Inputs;
-use crate::limits::{Limits, MAX_STEPS};
+use crate::limits::{Limits, MAX_STEPS, TIMEOUT};
 use crate::memory::with_memories;
 use crate::model::Segment;
 use crate::observer::{self, Correction, Observer, Wiring};
 use crate::past::Past;
 use crate::setup::{Setup, SetupError};
-use crate::{Drive, Forward, Job, Model, ParticleError, Prediction, Spec, Window, nearest};
+use crate::{
+    Drive, Forward, Job, Model, ModelFailure, ParticleError, Prediction, Spec, Timeout, Window, nearest,
+};
 
 /// A model, its observer, and the way from a job's values to its parameters.
 pub struct Simulator {
@@ -26,6 +28,8 @@ pub struct Simulator {
     rows: Vec<Row>,
     /// Steps of one run at most.
     max_steps: u64,
+    /// Seconds of computing of one run at most.
+    timeout: f64,
 }
 
 /// What is recorded in one row of a prediction.
@@ -58,7 +62,8 @@ impl Simulator {
             Wiring { spec: &spec, outputs: &setup.outputs, model: &*model, theta: binding.constants() };
         let observer = observer::build(&setup.observer, wiring)?;
         let max_steps = setup.max_steps.unwrap_or(MAX_STEPS);
-        Ok(Self { model, spec, observer, binding, rows, max_steps })
+        let timeout = setup.timeout.unwrap_or(TIMEOUT);
+        Ok(Self { model, spec, observer, binding, rows, max_steps, timeout })
     }
 
     /// The model's state at the window's start, and the past that led to it.
@@ -94,7 +99,7 @@ impl Simulator {
         segment: Segment<'_>,
         theta: &[f64],
         x: &mut [f64],
-    ) -> Result<(), ParticleError> {
+    ) -> Result<(), ModelFailure> {
         if self.model.memories().is_empty() {
             return self.model.advance(segment, theta, x);
         }
@@ -102,7 +107,7 @@ impl Simulator {
     }
 
     /// The first quantity that is not finite, as an error. A wrong input is named before what it spoils.
-    fn check_finite(&self, t: f64, u: &[f64], x: &[f64], y: &[f64]) -> Result<(), ParticleError> {
+    fn check_finite(&self, t: f64, u: &[f64], x: &[f64], y: &[f64]) -> Result<(), ModelFailure> {
         if x.iter().chain(y).all(|value| value.is_finite()) {
             return Ok(());
         }
@@ -112,7 +117,7 @@ impl Simulator {
             let at = values.iter().position(|value| !value.is_finite())?;
             Some(format!("{what} `{}`", Spec::component(list, at)))
         });
-        Err(ParticleError::NotFinite { what: found.unwrap_or_default(), time: t })
+        Err(ModelFailure::NotFinite { what: found.unwrap_or_default(), time: t })
     }
 }
 
@@ -122,7 +127,22 @@ impl Forward for Simulator {
     }
 
     fn run(&self, job: &Job) -> Result<Prediction, ParticleError> {
+        self.run_within(job, &|| 0.0)
+    }
+
+    fn run_within(&self, job: &Job, spent: &dyn Fn() -> f64) -> Result<Prediction, ParticleError> {
         check_job(job, self.binding.len(), self.rows.len(), &self.spec)?;
+        let end = job.window.times.last().copied().unwrap_or(job.window.start);
+        let is_late = || spent() > self.timeout;
+        let limits = Limits::new(self.max_steps, end, Some(&is_late));
+        let ran = self.limited(job, &limits);
+        if limits.stopped() { Err(self.late().into()) } else { ran }
+    }
+}
+
+impl Simulator {
+    /// Runs a job that fits.
+    fn limited(&self, job: &Job, limits: &Limits<'_>) -> Result<Prediction, ParticleError> {
         let window = &*job.window;
         let theta = self.binding.theta(&job.theta, window.start)?;
         let mut inputs = Inputs::new(window);
@@ -131,10 +151,8 @@ impl Forward for Simulator {
         let mut outputs = Vec::with_capacity(window.observed.len());
         let n_obs = self.rows.len();
         let mut previous = window.start;
-        let end = window.times.last().copied().unwrap_or(previous);
-        let limits = Limits::new(self.max_steps, end, None);
         for (j, &t) in window.times.iter().enumerate() {
-            inputs.walk([previous, t], &limits, |segment| {
+            inputs.walk([previous, t], limits, |segment| {
                 limits.take(1, segment.t0)?;
                 self.advance(&mut past, segment, &theta, &mut x)
             })?;
@@ -158,6 +176,13 @@ impl Forward for Simulator {
         // An observer moves the state after the last check.
         self.check_finite(previous, &[], &x, &[])?;
         Ok(Prediction { outputs, state: x, cost: 0.0 })
+    }
+
+    fn late(&self) -> Timeout {
+        let limit = self.timeout;
+        let says =
+            format!("the run computed for more than {limit} s (`timeout` in `[model]` sets the limit)");
+        Timeout { limit, says }
     }
 }
 

@@ -9,7 +9,7 @@ use artery_1d_kit::{artery, bifurcation, drive, output, outputs, rate, run, star
 use starlings_models::limits::Limits;
 use starlings_models::model::Segment;
 use starlings_models::native::Artery1d;
-use starlings_models::{Model, ModelDef, ParticleError, SetupError, native};
+use starlings_models::{Model, ModelDef, ModelFailure, SetupError, native};
 
 /// A half sine of 0.3 s in every beat of 0.8 s.
 fn beat(t: f64) -> f64 {
@@ -111,14 +111,14 @@ fn a_flow_that_no_vessel_carries_is_an_error_that_says_so() {
         for flow in [-1e5, 2e4, 1e5] {
             let mut x = start(&model, &theta);
             let error = advance(&model, &theta, &mut x, flow).unwrap_err();
-            let ParticleError::Solver(message) = &error else { panic!("{flow}: {error}") };
+            let ModelFailure::Solver(message) = &error else { panic!("{flow}: {error}") };
             assert!(message.contains(" of its waves") && message.contains(at), "{flow}: {message}");
         }
     }
 }
 
 /// Advances by a tenth of a second at a constant flow.
-fn advance(model: &Artery1d, theta: &[f64], x: &mut [f64], flow: f64) -> Result<(), ParticleError> {
+fn advance(model: &Artery1d, theta: &[f64], x: &mut [f64], flow: f64) -> Result<(), ModelFailure> {
     let history = starlings_models::Drive::NONE.history;
     model.advance(
         Segment { t0: 0.0, t1: 0.1, u0: &[flow], slope: &[0.0], history, limits: &Limits::none() },
@@ -150,7 +150,7 @@ fn a_state_that_is_not_finite_is_named_whatever_stands_behind_it() {
             x[i] = f64::NAN;
             let what = format!("state `{name}`");
             let error = advance(&model, &theta, &mut x, 0.0).unwrap_err();
-            assert_eq!(error, ParticleError::NotFinite { what, time: 0.0 });
+            assert_eq!(error, ModelFailure::NotFinite { what, time: 0.0 });
         }
     }
 }
@@ -164,7 +164,7 @@ fn a_vessel_that_has_no_waves_is_an_error_and_not_a_step() {
     theta[0] = f64::NAN;
     let error = advance(&model, &theta, &mut x, 0.0).unwrap_err();
     let what = "the speed of waves".to_owned();
-    assert_eq!(error, ParticleError::NotFinite { what, time: 0.0 });
+    assert_eq!(error, ModelFailure::NotFinite { what, time: 0.0 });
 }
 
 fn refused(layout: &serde_json::Value) -> (String, String) {

@@ -5,7 +5,9 @@ mod common;
 use common::{job, largest_difference, run, run_in_pieces, setup, window};
 use starlings_models::effect::{Addition, EffectParameter};
 use starlings_models::equations::{EquationsDef, InputDef, OutputDef, StateDef};
-use starlings_models::{EffectDef, ModelDef, ParticleError, Setup, SetupError, Signal, Window, memory};
+use starlings_models::{
+    EffectDef, ModelDef, ModelFailure, ParticleError, Setup, SetupError, Signal, Window, memory,
+};
 
 fn state(name: &str, initial: &str, rate: &str) -> StateDef {
     StateDef {
@@ -95,7 +97,13 @@ fn a_delay_far_below_its_bound_and_down_to_zero_is_still_followed() {
         assert!(error < 1e-6, "τ = {tau}: {error:e}");
     }
     for tau in [-0.1, f64::NAN] {
-        assert!(matches!(model.run(&job(&window, &[tau])), Err(ParticleError::NotFinite { .. })), "{tau}");
+        assert!(
+            matches!(
+                model.run(&job(&window, &[tau])),
+                Err(ParticleError::Model(ModelFailure::NotFinite { .. }))
+            ),
+            "{tau}"
+        );
     }
 }
 
@@ -204,7 +212,7 @@ fn a_late_sensor_shows_the_output_of_then() {
     assert!(largest_difference(&absent, &plain) < 1e-11, "the same exact steps, cut at knots");
     let beyond = model.run(&job(&window, &values(1.0, 0.6)));
     assert!(
-        matches!(beyond, Err(ParticleError::NotFinite { .. })),
+        matches!(beyond, Err(ParticleError::Model(ModelFailure::NotFinite { .. }))),
         "nothing is remembered beyond the range: {beyond:?}"
     );
     // A flow without kinks leaves nothing but rounding and the cubics' error.

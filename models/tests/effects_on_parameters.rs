@@ -8,7 +8,8 @@ use std::time::{Duration, Instant};
 use common::{job, kinds, largest_difference, run, run_in_pieces, setup, window};
 use starlings_models::equations::{EquationsDef, InputDef, OutputDef, StateDef};
 use starlings_models::{
-    Addition, EffectDef, EffectParameter, Job, ModelDef, ParticleError, Setup, SetupError, Window,
+    Addition, EffectDef, EffectParameter, Job, ModelDef, ModelFailure, ParticleError, Setup, SetupError,
+    Window,
 };
 
 fn effect(adds: &[(&str, &str)], parameters: &[&str]) -> EffectDef {
@@ -176,15 +177,17 @@ fn a_parameter_driven_out_of_its_range_fails_the_run_and_ends() {
     };
     // Not a number from the first step on.
     let error = failure("a*sqrt(p - 1000)", 0.0, 80.0);
-    assert!(matches!(error, ParticleError::NotFinite { .. } | ParticleError::StepTooSmall { .. }), "{error}");
+    let ParticleError::Model(error) = error else { panic!("{error}") };
+    assert!(matches!(error, ModelFailure::NotFinite { .. } | ModelFailure::StepTooSmall { .. }), "{error}");
     // C falls through zero as the pressure rises to 90: the rate grows beyond all bounds on both sides.
     let error = failure("-a*p*1.0/90", 1000.0, 10.0);
+    let ParticleError::Model(error) = error else { panic!("{error}") };
     assert!(
         matches!(
             error,
-            ParticleError::StepTooSmall { .. }
-                | ParticleError::TooManySteps { .. }
-                | ParticleError::NotFinite { .. }
+            ModelFailure::StepTooSmall { .. }
+                | ModelFailure::TooManySteps { .. }
+                | ModelFailure::NotFinite { .. }
         ),
         "{error}"
     );

@@ -7,7 +7,7 @@ use common::{job, kinds, largest_difference, plausible, run, run_in_pieces, setu
 use starlings_models::integrate::{self, Solver, Tolerance};
 use starlings_models::limits::Limits;
 use starlings_models::model::Segment;
-use starlings_models::{Forward, Model, ParticleError, Simulator, Spec, catalogue, native};
+use starlings_models::{Forward, Model, ModelFailure, ParticleError, Simulator, Spec, catalogue, native};
 
 #[test]
 fn every_kind_has_a_sentence_and_a_name_of_its_own() {
@@ -96,7 +96,7 @@ fn a_value_that_is_not_finite_is_an_error_that_names_it() {
             spoiled[i] = f64::NAN;
             let error = model.run(&job(&window, &spoiled)).unwrap_err();
             let what = format!("parameter `{name}`");
-            assert_eq!(error, ParticleError::NotFinite { what, time: 0.0 }, "{kind}");
+            assert_eq!(error, ModelFailure::NotFinite { what, time: 0.0 }.into(), "{kind}");
         }
     }
 }
@@ -112,7 +112,7 @@ fn a_state_that_is_not_finite_is_named_before_anything_runs() {
         let what = format!("state `{}`", Spec::component(&spec.states, spec.n_state() - 1));
         assert_eq!(
             setup.build().unwrap().run(&job),
-            Err(ParticleError::NotFinite { what, time: 0.0 }),
+            Err(ModelFailure::NotFinite { what, time: 0.0 }.into()),
             "{kind}"
         );
     }
@@ -151,7 +151,7 @@ fn an_input_that_is_not_finite_is_an_error_and_not_a_panic() {
         let Some(input) = window.inputs.first_mut() else { continue };
         input.values[10] = f64::NAN;
         let error = setup.build().unwrap().run(&job(&window, &theta)).unwrap_err();
-        assert!(matches!(error, ParticleError::NotFinite { .. }), "{kind}: {error}");
+        assert!(matches!(error, ParticleError::Model(ModelFailure::NotFinite { .. })), "{kind}: {error}");
     }
 }
 

@@ -7,7 +7,7 @@ use fsi_tube_kit::NoHistory;
 use serde_json::{Value, json};
 use starlings_models::limits::Limits;
 use starlings_models::model::Segment;
-use starlings_models::{Model, ModelDef, ParticleError, Setup};
+use starlings_models::{Model, ModelDef, ModelFailure, Setup};
 
 fn built(layout: Value) -> Result<Box<dyn Model>, String> {
     let model = ModelDef { kind: "fsi-tube".to_owned(), layout: Some(layout), ..ModelDef::default() };
@@ -88,7 +88,7 @@ fn a_span_of_more_steps_than_anybody_waits_for_fails_at_its_start() {
         |t1: f64| Segment { t0: 2.0, t1, u0: &[0.0], slope: &[0.0], history: &NoHistory, limits: &limits };
     // 2e8 steps.
     let failed = model.advance(segment(202.0), &theta, &mut x).unwrap_err();
-    assert_eq!(failed, ParticleError::TooManySteps { time: 2.0, limit: 100_000_000 });
+    assert_eq!(failed, ModelFailure::TooManySteps { time: 2.0, limit: 100_000_000 });
     // And a thousand, on the way.
     model.advance(segment(2.0 + 1e-3), &theta, &mut x).unwrap();
 }

@@ -3,7 +3,7 @@
 use starlings_models::equations::{EquationsDef, EquationsModel, InputDef, Method, StateDef};
 use starlings_models::limits::Limits;
 use starlings_models::model::{History, Segment};
-use starlings_models::{Model, ParticleError};
+use starlings_models::{Model, ModelFailure};
 
 struct Ramp;
 
@@ -33,7 +33,7 @@ fn model(states: &[(&str, &str, &str)], method: Method) -> EquationsModel {
 }
 
 /// Runs over `[0, end]` in `pieces` equal windows; the input is u = t.
-fn run(model: &EquationsModel, end: f64, pieces: u32) -> Result<Vec<f64>, ParticleError> {
+fn run(model: &EquationsModel, end: f64, pieces: u32) -> Result<Vec<f64>, ModelFailure> {
     let mut x = vec![0.0; model.spec().n_state()];
     model.initial(&[], &mut x);
     let time = |i: u32| end * f64::from(i) / f64::from(pieces);

@@ -3,7 +3,7 @@
 use starlings_models::integrate::{Solver, Tolerance, advance};
 use starlings_models::limits::Limits;
 use starlings_models::model::{Drive, History, Segment};
-use starlings_models::{Model, ParticleError, Quantity, Spec};
+use starlings_models::{Model, ModelFailure, Quantity, Spec};
 
 type Rate = fn(f64, &[f64], &[f64], &mut [f64]);
 
@@ -46,7 +46,7 @@ impl History for Never {
     }
 }
 
-fn run(model: &Ode, solver: Solver, [t0, t1]: [f64; 2], x0: &[f64]) -> Result<Vec<f64>, ParticleError> {
+fn run(model: &Ode, solver: Solver, [t0, t1]: [f64; 2], x0: &[f64]) -> Result<Vec<f64>, ModelFailure> {
     let mut x = x0.to_vec();
     let segment = Segment { t0, t1, u0: &[1.0], slope: &[2.0], history: &Never, limits: &Limits::none() };
     advance(model, solver, segment, &[], &mut x).map(|()| x)
@@ -174,7 +174,7 @@ fn auto_goes_over_to_rosenbrock_where_dormand_prince_gives_up() {
     let tolerance = Tolerance { relative: 1e-6, absolute: 1e-10 };
     let y0 = [1.0, 0.0, 0.0];
     let stuck = run(&robertson(), Solver::Dopri5(tolerance), [0.0, 4e3], &y0);
-    assert!(matches!(stuck, Err(ParticleError::TooManySteps { .. })), "{stuck:?}");
+    assert!(matches!(stuck, Err(ModelFailure::TooManySteps { .. })), "{stuck:?}");
     let y = run(&robertson(), Solver::Auto(tolerance), [0.0, 4e3], &y0).unwrap();
     let strict = Tolerance { relative: 1e-10, absolute: 1e-15 };
     let exact = run(&robertson(), Solver::Rosenbrock(strict), [0.0, 4e3], &y0).unwrap();
@@ -230,7 +230,7 @@ fn failures_are_named() {
     // x' = x² from 1 has a pole at t = 1.
     let pole = ode(1, |_, x, _, dx| dx[0] = x[0] * x[0]);
     match run(&pole, solver, [0.0, 2.0], &[1.0]) {
-        Err(ParticleError::StepTooSmall { time, .. } | ParticleError::NotFinite { time, .. }) => {
+        Err(ModelFailure::StepTooSmall { time, .. } | ModelFailure::NotFinite { time, .. }) => {
             assert!((time - 1.0).abs() < 1e-6, "{time}");
         }
         other => panic!("{other:?}"),
@@ -241,7 +241,7 @@ fn failures_are_named() {
     });
     for solver in [solver, Solver::Rosenbrock(Tolerance::default()), Solver::Fixed { step: 0.01 }] {
         match run(&nan, solver, [0.0, 1.0], &[0.0, 0.0]) {
-            Err(ParticleError::NotFinite { what, time }) => {
+            Err(ModelFailure::NotFinite { what, time }) => {
                 assert_eq!(what, "state `x1`");
                 assert!((time - 0.5).abs() < 0.02, "{time}");
             }
@@ -249,5 +249,5 @@ fn failures_are_named() {
         }
     }
     let error = run(&oscillator(), Solver::Fixed { step: 1e-9 }, [0.0, 1.0], &[1.0, 0.0]).unwrap_err();
-    assert!(matches!(error, ParticleError::TooManySteps { limit: 1_000_000, .. }));
+    assert!(matches!(error, ModelFailure::TooManySteps { limit: 1_000_000, .. }));
 }

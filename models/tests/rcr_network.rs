@@ -7,7 +7,7 @@ mod rcr_network_kit;
 use common::{job, run};
 use rcr_network_kit::{beat, everything, flow_in, grid, network, over, series, signal, simulate};
 use serde_json::json;
-use starlings_models::{ParticleError, Setup};
+use starlings_models::{ModelFailure, ParticleError, Setup};
 
 #[test]
 fn a_capacitor_that_empties_through_a_resistance_decays_exponentially() {
@@ -114,7 +114,7 @@ fn an_element_faster_than_numbers_hold_is_an_error_and_not_an_endless_step() {
             &[],
         );
         let error = setup.build().unwrap().run(&job(&over(&setup, vec![0.5], vec![]), &[])).unwrap_err();
-        assert!(matches!(&error, ParticleError::NotFinite { .. }), "{link}: {error}");
+        assert!(matches!(&error, ParticleError::Model(ModelFailure::NotFinite { .. })), "{link}: {error}");
     }
 }
 

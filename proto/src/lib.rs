@@ -6,6 +6,7 @@
 //! [`convert`].
 
 pub mod convert;
+pub mod spent;
 pub mod words;
 
 pub use bytes::Bytes;
@@ -15,7 +16,7 @@ pub use convert::{
 };
 
 /// Number of the protocol; coordinator and worker must have the same.
-pub const PROTOCOL: u32 = 1;
+pub const PROTOCOL: u32 = 2;
 
 /// Largest state that travels inside a job or a prediction, bytes.
 pub const MAX_INLINE_STATE: usize = 256 * 1024;

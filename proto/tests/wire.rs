@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 use prost::Message;
-use starlings_models::{Job, ModelDef, ParticleError, Prediction, Setup, Signal, Window};
+use starlings_models::{
+    Job, ModelDef, ModelFailure, ParticleError, Prediction, Setup, Signal, Timeout, Window,
+};
 use starlings_proto::{
     Answer, FromWorker, Hello, JobEncoder, Lease, MAX_SLOTS, ToWorker, Welcome, WireError, decode_setup,
     encode_setup, wire,
@@ -70,12 +72,21 @@ fn lease() -> impl Strategy<Value = Lease> {
 
 fn failure() -> impl Strategy<Value = ParticleError> {
     prop_oneof![
-        (".*", any_float()).prop_map(|(what, time)| ParticleError::NotFinite { what, time }),
-        (any_float(), any_float()).prop_map(|(time, step)| ParticleError::StepTooSmall { time, step }),
-        (any_float(), any::<u64>()).prop_map(|(time, limit)| ParticleError::TooManySteps { time, limit }),
+        model_failure().prop_map(ParticleError::Model),
         ".*".prop_map(ParticleError::BadJob),
-        ".*".prop_map(ParticleError::Solver),
-        (any::<u32>(), ".*").prop_map(|(attempts, reason)| ParticleError::Lost { attempts, reason }),
+        ".*".prop_map(ParticleError::Infrastructure),
+        ".*".prop_map(ParticleError::Undecided),
+        (any_float(), ".*").prop_map(|(limit, says)| Timeout { limit, says }.into()),
+    ]
+}
+
+fn model_failure() -> impl Strategy<Value = ModelFailure> {
+    prop_oneof![
+        (".*", any_float()).prop_map(|(what, time)| ModelFailure::NotFinite { what, time }),
+        (any_float(), any_float()).prop_map(|(time, step)| ModelFailure::StepTooSmall { time, step }),
+        (any_float(), any::<u64>()).prop_map(|(time, limit)| ModelFailure::TooManySteps { time, limit }),
+        ".*".prop_map(ModelFailure::OutsideDomain),
+        ".*".prop_map(ModelFailure::Solver),
     ]
 }
 
@@ -141,12 +152,14 @@ fn same_window(a: &Window, b: &Window) -> bool {
 
 fn failure_bits(error: &ParticleError) -> (String, Vec<u64>) {
     let numbers = match error {
-        ParticleError::NotFinite { time, .. } => vec![*time],
-        ParticleError::StepTooSmall { time, step } => vec![*time, *step],
-        ParticleError::TooManySteps { time, limit } => vec![*time, *limit as f64],
+        ParticleError::Model(ModelFailure::NotFinite { time, .. }) => vec![*time],
+        ParticleError::Model(ModelFailure::StepTooSmall { time, step }) => vec![*time, *step],
+        ParticleError::Model(ModelFailure::TooManySteps { time, limit }) => vec![*time, *limit as f64],
+        ParticleError::Timeout(timeout) => vec![timeout.limit],
         _ => vec![],
     };
-    (error.to_string(), bits(&numbers))
+    // The type, too: an undecided end reads as a model failure does.
+    (format!("{:?} {error}", std::mem::discriminant(error)), bits(&numbers))
 }
 
 proptest! {

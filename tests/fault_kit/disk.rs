@@ -53,7 +53,7 @@ fn disturbed(place: &Place, command: &mut Command, verb: Verb) -> Result<Outcome
     let ended = place.to_the_end(command)?;
     let kept = |name: &str| fs::read_to_string(place.path("kept").join(name)).unwrap_or_default();
     if !processes::of(&place.mark()).is_empty() {
-        super::judge::nothing_left(place, &ended)?;
+        super::judge::nothing_left(place, &[&ended])?;
     }
     let (first, said) = (kept("first-code"), kept("first"));
     let outcome = match first.trim() {

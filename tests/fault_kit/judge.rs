@@ -65,7 +65,7 @@ pub(crate) fn judge(case: &Case) -> Result<Outcome, String> {
 
 fn disturbed(case: &Case, place: &Place, clean: &Clean) -> Result<Outcome, String> {
     let first = place.go(&[])?;
-    nothing_left(place, &first)?;
+    nothing_left(place, &[&first])?;
     let outcome = match first.code {
         Some(0) => Outcome::WentOn,
         Some(1) => {
@@ -78,7 +78,7 @@ fn disturbed(case: &Case, place: &Place, clean: &Clean) -> Result<Outcome, Strin
                     second.code, second.stderr, first.stderr
                 ));
             }
-            nothing_left(place, &second)?;
+            nothing_left(place, &[&first, &second])?;
             Outcome::Resumed
         }
         code => return Err(format!("ended with {code:?}: {}", first.stderr)),
@@ -108,16 +108,17 @@ fn named(case: &Case, ended: &Ended) -> Result<(), String> {
 }
 
 /// No process, and no scratch folder but those that the error says are kept.
-pub(crate) fn nothing_left(place: &Place, ended: &Ended) -> Result<(), String> {
+pub(crate) fn nothing_left(place: &Place, ended: &[&Ended]) -> Result<(), String> {
+    let said: String = ended.iter().map(|command| command.stderr.as_str()).collect();
     let started = Instant::now();
     loop {
         let processes = processes::of(&place.mark());
-        let folders = scratch(place, ended);
+        let folders = scratch(place, &said);
         if processes.is_empty() && folders.is_empty() {
             return Ok(());
         }
         if started.elapsed() > AFTERWARDS {
-            return Err(format!("left behind: {processes:?}, {folders:?}; it said: {}", ended.stderr));
+            return Err(format!("left behind: {processes:?}, {folders:?}; it said: {said}"));
         }
         std::thread::sleep(Duration::from_millis(5));
     }
@@ -126,8 +127,8 @@ pub(crate) fn nothing_left(place: &Place, ended: &Ended) -> Result<(), String> {
 /// Beginning of the folders that Open MPI keeps for itself, and leaves where its launcher is killed.
 const OF_LAUNCHER: &str = "ompi.";
 
-/// Scratch folders that are there and that no message names.
-fn scratch(place: &Place, ended: &Ended) -> Vec<String> {
+/// Scratch folders that are there and that nothing of what was `said` names.
+fn scratch(place: &Place, said: &str) -> Vec<String> {
     let mut found = Vec::new();
     let is_ours = |entry: &std::fs::DirEntry| !entry.file_name().to_string_lossy().starts_with(OF_LAUNCHER);
     let roots = std::fs::read_dir(place.path("scratch")).unwrap().filter_map(Result::ok).filter(is_ours);
@@ -139,7 +140,7 @@ fn scratch(place: &Place, ended: &Ended) -> Vec<String> {
         }
         found.extend(runs.iter().map(|run| run.path().display().to_string()));
     }
-    found.retain(|folder| !ended.stderr.contains(folder.as_str()) && !told_in_store(place, folder));
+    found.retain(|folder| !said.contains(folder.as_str()) && !told_in_store(place, folder));
     found
 }
 

@@ -62,7 +62,7 @@ pub(crate) struct Case {
     pub(crate) fault: Fault,
 }
 
-const GONE: &[&str] = &["No such file or directory", "scratch", "No such"];
+const GONE: &[&str] = &["No such file or directory", "scratch", "No such", "no such program"];
 const KILLED: &[&str] = &["signal 9", "killed"];
 const SILENT: &[&str] = &["stopped", "did not answer within", "did not end within", "paused"];
 const WORKER: &[&str] = &["waited", "worker"];
@@ -140,15 +140,18 @@ fn cases(reached: Reached, faults: &[Fault], moments: u64) -> Vec<Case> {
     cases
 }
 
+/// Runs of the trial by which a command checks its study: the whole record, and the training span.
+const TRIAL: u64 = 2;
+
 impl Case {
-    /// The first run that meets the fault and the last, of a study that takes `n_run` runs; the first run of all is the trial
-    /// by which a command checks its study.
+    /// The first run that meets the fault and the last, of a study that takes `n_run` runs. The trial is not disturbed: it is made
+    /// by the command itself, before there is anything to resume.
     pub(crate) fn runs(&self, n_run: u64) -> (u64, u64) {
         // SplitMix64 (Steele, Lea & Flood 2014).
         let mut z = self.seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        let first = 2 + (z ^ (z >> 31)) % (n_run - 1);
+        let first = TRIAL + 1 + (z ^ (z >> 31)) % (n_run - TRIAL);
         (first, if self.fault.lasts == Lasts::Once { first } else { u64::from(u32::MAX) })
     }
 

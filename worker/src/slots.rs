@@ -9,7 +9,8 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Instant;
 
-use starlings_models::{Forward, Job, ParticleError};
+use starlings_models::{Forward, Job, ModelFailure, ParticleError};
+use starlings_proto::spent::spent;
 use starlings_proto::words::panic_text;
 use starlings_proto::{Answer, FromWorker, Lease, wire};
 use tokio::sync::mpsc::UnboundedSender;
@@ -136,8 +137,8 @@ impl Shared {
         while let Some(Task { lease, forward, job, outbox }) = self.next() {
             self.running.fetch_add(1, Ordering::Relaxed);
             let started = Instant::now();
-            let result = catch_unwind(AssertUnwindSafe(|| forward.run(&job)))
-                .unwrap_or_else(|panic| Err(ParticleError::Solver(panic_text(panic.as_ref()))));
+            let result = catch_unwind(AssertUnwindSafe(|| forward.run_within(&job, &spent())))
+                .unwrap_or_else(|panic| Err(ModelFailure::Solver(panic_text(panic.as_ref())).into()));
             let cost = started.elapsed().as_secs_f64();
             self.running.fetch_sub(1, Ordering::Relaxed);
             let counter = if result.is_ok() { &self.predictions } else { &self.failures };

@@ -18,6 +18,8 @@ mod scratch;
 mod seats;
 pub mod serve;
 mod site;
+mod stopped;
+mod stopwatch;
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};

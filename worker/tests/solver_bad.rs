@@ -11,7 +11,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use kit::{Bad, Reaction, finished, job, quantity, reaching, setup, sound, soundly};
-use starlings_models::ParticleError;
+use starlings_models::{ModelFailure, ParticleError};
 use starlings_proto::convert::floats;
 use starlings_proto::solver_wire::run_reply::Kind;
 use starlings_proto::solver_wire::{Failure, Finished, Measure, Progress, RunReply, failure};
@@ -91,7 +91,7 @@ fn failures_that_a_solver_reports_carry_its_name_and_keep_their_kind() {
         "{refused}"
     );
     let broken = failure_of(|| failing(failure::Kind::NotFinite, "pressure", Some(0.25)));
-    let ParticleError::NotFinite { what, time } = &broken else { panic!("{broken}") };
+    let ParticleError::Model(ModelFailure::NotFinite { what, time }) = &broken else { panic!("{broken}") };
     assert!(what.starts_with("pressure of the solver `") && time.to_bits() == 0.25_f64.to_bits(), "{broken}");
     let timeless = failure_of(|| failing(failure::Kind::NotFinite, "pressure", None)).to_string();
     assert!(
@@ -189,7 +189,7 @@ fn refused(change: impl FnOnce(&mut starlings_proto::solver_wire::Description)) 
 fn a_description_that_makes_no_sense_is_refused_with_what_is_wrong() {
     let starts = "describes itself wrongly: ";
     let says = refused(|d| d.protocol = 9);
-    assert!(says.contains(&format!("{starts}it speaks protocol 9, this worker speaks 1")), "{says}");
+    assert!(says.contains(&format!("{starts}it speaks protocol 9, this worker speaks 2")), "{says}");
     let says = refused(|d| d.parameters.push(quantity("k", "N/m")));
     assert!(says.contains(&format!("{starts}it describes the parameter `k` twice")), "{says}");
     let says = refused(|d| d.parameters[1].size = 40);

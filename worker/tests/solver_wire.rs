@@ -214,7 +214,7 @@ struct Nobody;
 
 impl Solve for Nobody {
     fn solve(&self, _run: &Run<'_>) -> Result<Solved, ParticleError> {
-        Err(ParticleError::Solver("nobody is asked here".to_owned()))
+        Err(ParticleError::Infrastructure("nobody is asked here".to_owned()))
     }
 }
 

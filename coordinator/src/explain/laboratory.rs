@@ -11,12 +11,12 @@ use std::sync::mpsc::Receiver;
 use nalgebra::DVector;
 use starlings_models::{Job, Window};
 
-use super::memory::{Known, decode, encode, key, sound};
+use super::memory::{Known, decode, encode, taken, told};
 use super::recent::Recent;
 use super::{Context, ExplainError, Rows, Stage};
 use crate::fleet::{Fleet, FleetEvent, Outcome, SetupId};
-use crate::study::Study;
-use crate::study::store::{JobRow, RunKey, Store};
+use crate::study::store::{JobRow, RunKey, Store, StoreError};
+use crate::study::{Study, run_key};
 
 /// A version of the model and a parameter vector (transformed units) to run it with.
 pub struct Point<'v> {
@@ -181,7 +181,7 @@ impl<'a> Laboratory<'a> {
     /// record has none.
     ///
     /// # Errors
-    /// When the fleet or the store fails, or a run was lost with its workers.
+    /// When the fleet or the store fails, or no place could make a run.
     pub fn run(&mut self, points: &[Point<'_>]) -> Result<Vec<Answer>, ExplainError> {
         let mut answers = Vec::with_capacity(points.len());
         while answers.len() < points.len() {
@@ -247,8 +247,8 @@ impl<'a> Laboratory<'a> {
         let programs = self.store.program()?.digest();
         let (mut open, mut asked, mut here) = (Vec::new(), Vec::new(), HashSet::new());
         for (setup, job) in jobs {
-            let key = key(&programs, &setup, &job);
-            keys.push(key);
+            let key = run_key::free(&programs, &setup, &job);
+            keys.push((key, job.window.observed.len()));
             if !here.insert(key) || self.counted.contains(&key) {
                 continue;
             }
@@ -262,16 +262,19 @@ impl<'a> Laboratory<'a> {
             open.push((setup, job));
         }
         self.fly(open, &asked)?;
-        keys.iter().map(|key| self.remembered(key)).collect()
+        keys.iter().map(|(key, n_value)| self.remembered(key, *n_value)).collect()
     }
 
     /// An answer that was given before, read back from the store if it is not held.
-    fn remembered(&mut self, key: &RunKey) -> Result<Known, ExplainError> {
+    fn remembered(&mut self, key: &RunKey, n_value: usize) -> Result<Known, ExplainError> {
         if let Some(known) = self.recent.get(key) {
             return Ok(known);
         }
         let body = self.store.remembered_run(key)?;
         let known = body.map_or_else(|| Err(String::new()), |body| decode(&body));
+        if let Some(n) = known.as_ref().map(|outputs| outputs.len()).ok().filter(|n| *n != n_value) {
+            return Err(self.store.damaged("run", format!("{n} values where {n_value} belong")).into());
+        }
         self.recent.insert(*key, known.clone());
         Ok(known)
     }
@@ -281,40 +284,31 @@ impl<'a> Laboratory<'a> {
         if jobs.is_empty() {
             return Ok(());
         }
-        let outcomes = self.fleet.run_mixed(jobs)?;
+        let outcomes = self.fleet.run_mixed(jobs);
+        // Also those that led to an error.
+        self.keep_events()?;
+        let outcomes = outcomes.map_err(|error| told(self.study, error))?;
         let mut bodies = Vec::with_capacity(asked.len());
         let mut rows = Vec::with_capacity(asked.len());
         for (asked, outcome) in asked.iter().zip(outcomes) {
             rows.push(self.row(asked.record, asked.particle, &outcome));
             self.workers.insert(outcome.worker.clone());
-            let known = self.taken(outcome, asked)?;
+            let known = taken(self.study, outcome, asked.particle, asked.record, asked.n_value)?;
             bodies.push((asked.key, encode(&known)));
             self.recent.insert(asked.key, known);
         }
         self.store.note_elapsed(self.elapsed())?;
         self.store.remember_runs(bodies.iter().map(|(key, body)| (key, body.as_slice())), &rows)?;
-        if let Some(events) = self.events {
-            let at = self.elapsed();
-            for event in events.try_iter() {
-                self.store.event(at, event.kind(), &event.to_string())?;
-            }
-        }
         self.n_batch += 1;
         self.tell("");
         Ok(())
     }
 
-    /// A failure of the model is an answer, and so is a prediction of another length.
-    fn taken(&self, outcome: Outcome, asked: &Asked) -> Result<Known, ExplainError> {
-        let prediction = sound(outcome, asked.particle, &self.study.records[asked.record].name)?;
-        Ok(prediction.and_then(|p| {
-            let (n, wanted) = (p.outputs.len(), asked.n_value);
-            if n == wanted {
-                Ok(Arc::new(p.outputs))
-            } else {
-                Err(format!("{n} predicted values for {wanted}"))
-            }
-        }))
+    fn keep_events(&self) -> Result<(), StoreError> {
+        for event in self.events.iter().flat_map(|events| events.try_iter()) {
+            self.store.event(self.elapsed(), event.kind(), &event.to_string())?;
+        }
+        Ok(())
     }
 
     fn row(&self, record: usize, particle: u32, outcome: &Outcome) -> JobRow {

@@ -1,62 +1,52 @@
-//! A run's answer: what its outcome says, the key that says everything it depends on, and the bytes it is remembered by.
+//! A run's answer and the bytes it is remembered by.
 //!
+//! Answers are predictions, model failures and timeouts: an outcome has nothing else, so that no failure of a place is remembered.
 //! Next file to read: [`super::laboratory`].
 
 use std::sync::Arc;
 
-use starlings_models::{Job, ParticleError, Prediction};
-
 use super::ExplainError;
-use crate::fleet::{Outcome, SetupId};
-use crate::study::RunError;
-use crate::study::store::RunKey;
+use crate::fleet::{FleetError, Outcome};
+use crate::study::{RunError, Study};
 
 /// The outputs of one run, or why there are none.
 pub(super) type Known = Result<Arc<Vec<f64>>, String>;
 
-/// The prediction of a run, or why the model has none.
+/// What an outcome says: a failure of the model is an answer, and so is a timeout.
 ///
 /// # Errors
-/// When the run was lost with its workers or never fitted the model: that says nothing of the model, and to go on without it
-/// would make the findings depend on the fleet.
-pub(super) fn sound(
+/// When the prediction has another length than the run asked for, which says nothing of the model.
+pub(super) fn taken(
+    study: &Study,
     outcome: Outcome,
     particle: u32,
-    record: &str,
-) -> Result<Result<Prediction, String>, ExplainError> {
-    match outcome.result {
-        Err(error @ (ParticleError::Lost { .. } | ParticleError::BadJob(_))) => {
-            let (particle, record, reason) = (particle as usize, record.to_owned(), error.to_string());
-            Err(RunError::NoAnswer { particle, record, values: String::new(), reason }.into())
+    record: usize,
+    n_value: usize,
+) -> Result<Known, ExplainError> {
+    let prediction = match outcome.result {
+        Ok(prediction) => prediction,
+        Err(failure) => return Ok(Err(failure.to_string())),
+    };
+    let n = prediction.outputs.len();
+    if n == n_value {
+        return Ok(Ok(Arc::new(prediction.outputs)));
+    }
+    Err(no_answer(study, particle, record, format!("{n} predicted values for {n_value}")))
+}
+
+/// A fleet's failure, with the name of the record where it is about one run.
+pub(super) fn told(study: &Study, error: FleetError) -> ExplainError {
+    match error {
+        FleetError::NoAnswer { particle, record, reason, .. } => {
+            no_answer(study, particle, record as usize, reason)
         }
-        Err(error) => Ok(Err(error.to_string())),
-        Ok(prediction) => Ok(Ok(prediction)),
+        other => other.into(),
     }
 }
 
-/// Everything that the answer of a run depends on: the programs that make it (a digest), the setup and the job. Not what was
-/// observed: every run is free.
-pub(super) fn key(programs: &[u8; 32], setup: &SetupId, job: &Job) -> RunKey {
-    let mut hasher = blake3::Hasher::new();
-    hasher.update(programs);
-    hasher.update(setup);
-    hasher.update(&u64::from(job.record).to_le_bytes());
-    let mut numbers = |values: &[f64]| {
-        // Lengths keep neighbouring lists apart.
-        hasher.update(&(values.len() as u64).to_le_bytes());
-        for value in values {
-            hasher.update(&value.to_le_bytes());
-        }
-    };
-    numbers(&job.theta);
-    numbers(job.state.as_deref().unwrap_or_default());
-    numbers(&[job.window.start]);
-    numbers(&job.window.times);
-    for signal in &job.window.inputs {
-        numbers(&signal.times);
-        numbers(&signal.values);
-    }
-    *hasher.finalize().as_bytes()
+fn no_answer(study: &Study, particle: u32, record: usize, reason: String) -> ExplainError {
+    let record = study.records[record].name.clone();
+    RunError::NoAnswer { particle: particle as usize, record, values: String::new(), reason }.into()
 }
 
 /// One byte that says which, then the numbers or the text.

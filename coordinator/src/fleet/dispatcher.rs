@@ -3,8 +3,12 @@
 //! Rules. A job is given under a lease (stream, job, attempt); an answer without a valid lease is ignored. Jobs go to the
 //! least loaded worker, so that few jobs spread over all slots. A worker holds two jobs per slot when they are long, up to
 //! 64 when they are shorter than a message's way. At the end of a batch, jobs that wait behind a busy slot are recalled for
-//! an idle one. A lost worker's leases go back to the queue; the jobs it was running count an attempt. A model's failure is
-//! tried once more on another worker, unless it could only fail again. The order of outcomes is the order of jobs, whatever happened.
+//! an idle one. A lost worker's leases go back to the queue; the jobs it was running count an attempt. The order of outcomes is the
+//! order of jobs, whatever happened.
+//!
+//! A model failure and a timeout are tried once more on another worker, if there is one; then they are the outcome. An
+//! infrastructure failure is none: it sets the worker aside (`aside`) and the job runs elsewhere or waits. An abnormal end is decided by
+//! a control run (`doubt`), made of a run that is known to work (`proven`).
 //!
 //! The jobs of a batch may need different setups: all of them are sent at once, and a job goes only to a worker that has built
 //! its own, while others are still being built. A worker that forgets a setup is sent it again.
@@ -12,9 +16,13 @@
 //! Not here: what a job contains, the wire, other parameters for a failed particle. Next files to read: [`message`] for
 //! events and commands, [`roster`] for workers, [`batch`] for jobs, `hand_out` for what follows from any event.
 
+mod answers;
+mod aside;
 pub mod batch;
+mod doubt;
 mod hand_out;
 pub mod message;
+mod proven;
 mod queue;
 pub mod roster;
 mod run_times;
@@ -25,12 +33,14 @@ mod watch;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use starlings_models::ParticleError;
-use starlings_proto::{Answer, Lease, SetupId};
+use starlings_proto::SetupId;
 
 use super::FleetEvent;
-use batch::{Batch, JobName, Lost};
-pub use message::{BatchError, Command, Event, Joining, WorkerId};
+use super::job_name::JobName;
+use batch::{Batch, Lost};
+pub(in crate::fleet) use doubt::Asked;
+pub use message::{BatchError, Command, ControlId, Event, Joining, WorkerId};
+use proven::Proven;
 use roster::{SetupState, Worker};
 use run_times::RunTimes;
 use watch::{Overdue, Starved};
@@ -58,6 +68,7 @@ pub struct Dispatcher {
     starved: Option<Starved>,
     overdue: Option<Overdue>,
     run_times: RunTimes,
+    proven: Proven,
     local_only: bool,
     out: Vec<Command>,
 }
@@ -75,6 +86,7 @@ impl Dispatcher {
             starved: None,
             overdue: None,
             run_times: RunTimes::default(),
+            proven: Proven::default(),
             local_only: false,
             out: Vec::new(),
         }
@@ -142,25 +154,28 @@ impl Dispatcher {
     /// Takes a worker out and returns its leases to the queue. A clean leave counts no attempt.
     fn lose(&mut self, id: WorkerId, reason: &str, clean: bool) {
         let Some(worker) = self.workers.remove(&id) else { return };
-        let mut requeued = 0;
+        let (mut requeued, mut given_up) = (0, None);
         let leases = worker.leases_in_order();
         for (position, job) in leases.into_iter().enumerate() {
             let Some(batch) = &mut self.batch else { break };
             let Some(index) = batch.index_of(job) else { continue };
             let counted = !clean && position < worker.slots;
             let why = format!("{} was lost: {reason}", worker.name);
-            match batch.lost(index, counted, self.rules.max_attempts, &worker.name, &why) {
+            match batch.lost(index, counted, self.rules.max_attempts) {
                 Lost::Requeued => {
                     requeued += 1;
                     if counted {
                         self.out.push(Command::Notice(batch.retried(index, &worker.name, &why)));
                     }
                 }
-                Lost::GivenUp => self.out.push(batch.failed(index)),
+                Lost::GivenUp => given_up = Some((index, batch.attempts(index), why)),
             }
         }
         let notice = FleetEvent::WorkerLeft { worker: worker.name, reason: reason.to_owned(), requeued };
         self.out.push(Command::Notice(notice));
+        if let Some((index, attempts, why)) = given_up {
+            self.unanswered(index, attempts, &why);
+        }
     }
 
     fn setup_answered(&mut self, now: Duration, id: WorkerId, setup: SetupId, state: SetupState) {
@@ -198,47 +213,9 @@ impl Dispatcher {
                 }
             }
         }
+        self.proven.keep_only(batch.names(), &mut self.out);
         self.batch = Some(batch);
         self.next_job += n;
-    }
-
-    fn answered(&mut self, now: Duration, id: WorkerId, lease: Lease, answer: Answer, cost: f64) {
-        let Some(worker) = self.workers.get_mut(&id) else { return };
-        worker.last_heard = now;
-        let valid = lease.epoch == id.0 && worker.release(lease.job, lease.attempt);
-        let index = self.batch.as_ref().and_then(|batch| batch.index_of(lease.job));
-        let (true, Some(index), Some(batch)) = (valid, index, &mut self.batch) else {
-            if matches!(answer, Answer::Ran(_)) {
-                let notice = FleetEvent::LateAnswer { worker: worker.name.clone(), job: lease.job };
-                self.out.push(Command::Notice(notice));
-            }
-            return;
-        };
-        match answer {
-            Answer::Withdrawn => batch.withdrawn(index),
-            Answer::Ran(Ok(prediction)) => {
-                worker.learn_cost(cost);
-                self.run_times.learn(cost);
-                batch.finish(index, Ok(prediction), &worker.name);
-            }
-            Answer::Ran(Err(error)) => self.model_failed(id, index, error),
-        }
-    }
-
-    fn model_failed(&mut self, id: WorkerId, index: usize, error: ParticleError) {
-        let Some(batch) = &mut self.batch else { return };
-        let name = self.workers.get(&id).map_or("", |w| w.name.as_str());
-        let setup = batch.setup_of(index);
-        let other = self.workers.values().any(|w| w.id != id && w.may_run(setup));
-        // A job that does not fit the model fits it nowhere.
-        let repeatable = matches!(error, ParticleError::BadJob(_));
-        if other && !repeatable && batch.may_retry(index) {
-            self.out.push(Command::Notice(batch.retried(index, name, &error.to_string())));
-            batch.retry_elsewhere(index, id, error, name);
-        } else {
-            batch.finish(index, Err(error), name);
-            self.out.push(batch.failed(index));
-        }
     }
 
     fn abort(&mut self, error: BatchError) {

@@ -54,9 +54,52 @@ pub enum FleetError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// Every place that could make the runs cannot, for too long.
+    #[error(
+        "no worker could run the model for {waited:.0} s: {reasons}; mend that, then continue with --resume"
+    )]
+    Unavailable {
+        /// How long it was waited, seconds.
+        waited: f64,
+        /// Each worker with its reason.
+        reasons: String,
+    },
+    /// A program ends abnormally, and no run is known to work that could tell whether the parameters or the place do it.
+    #[error(
+        "the run of particle {particle} over record {record}{} ends abnormally wherever it is made, and no other run of that \
+         window works: nobody can tell whether its parameters or the machines are at fault: {reason}\n  mend what it names, then \
+         continue with --resume",
+        in_brackets(parameters)
+    )]
+    NoControl {
+        /// Index of the sigma point.
+        particle: u32,
+        /// Index of the record.
+        record: u32,
+        /// Values of the parameters in physical units by name, as a list.
+        parameters: String,
+        /// How it ended last.
+        reason: String,
+    },
+    /// A job has no answer, and not by the model's doing.
+    #[error("the run of particle {particle} over record {record} has no usable answer: {reason}")]
+    NoAnswer {
+        /// Index of the job among those that were to run.
+        job: usize,
+        /// Index of the sigma point.
+        particle: u32,
+        /// Index of the record.
+        record: u32,
+        /// What happened.
+        reason: String,
+    },
     /// The network thread ended although nobody closed the fleet.
     #[error("the fleet's network stopped: {0}")]
     Stopped(String),
+}
+
+fn in_brackets(text: &str) -> String {
+    if text.is_empty() { String::new() } else { format!(" ({text})") }
 }
 
 fn remedy(source: &std::io::Error, address: SocketAddr) -> String {

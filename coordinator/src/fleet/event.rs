@@ -62,6 +62,31 @@ pub enum FleetEvent {
         /// Why.
         reason: String,
     },
+    /// A worker is given no jobs for a while, since its place cannot make runs.
+    WorkerSetAside {
+        /// Its name.
+        worker: String,
+        /// Why.
+        reason: String,
+        /// For how long, seconds; then it is tried with one job.
+        seconds: f64,
+    },
+    /// A worker that was set aside makes runs again.
+    WorkerBack {
+        /// Its name.
+        worker: String,
+    },
+    /// A run that is known to work was made again where another one had failed twice.
+    ControlRun {
+        /// Index of the sigma point that failed.
+        particle: u32,
+        /// Index of the record.
+        record: u32,
+        /// Where.
+        worker: String,
+        /// Why the known run failed there, where it did: then the place is at fault, and not the parameters.
+        fault: Option<String>,
+    },
     /// A job goes to a worker again.
     JobRetried {
         /// Index of the sigma point.

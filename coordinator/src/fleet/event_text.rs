@@ -14,6 +14,9 @@ impl FleetEvent {
             Self::WorkerRefused { .. } => "worker-refused",
             Self::WorkerLeft { .. } => "worker-left",
             Self::SetupFailed { .. } => "setup-failed",
+            Self::WorkerSetAside { .. } => "worker-set-aside",
+            Self::WorkerBack { .. } => "worker-back",
+            Self::ControlRun { .. } => "control-run",
             Self::JobRetried { .. } => "job-retried",
             Self::JobFailed { .. } => "job-failed",
             Self::LateAnswer { .. } => "late-answer",
@@ -31,6 +34,7 @@ impl FleetEvent {
             Self::WorkerRefused { .. }
                 | Self::OtherBuild { .. }
                 | Self::SetupFailed { .. }
+                | Self::WorkerSetAside { .. }
                 | Self::JobFailed { .. }
                 | Self::Waiting { .. }
                 | Self::LocalWorkerRestarted { .. }
@@ -68,6 +72,14 @@ impl fmt::Display for FleetEvent {
             Self::SetupFailed { worker, reason } => {
                 write!(f, "worker {worker} cannot build the model: {reason}")
             }
+            Self::WorkerSetAside { worker, reason, seconds } => {
+                write!(f, "worker {worker} is set aside for {seconds} s, its runs go to others: {reason}")
+            }
+            Self::WorkerBack { worker } => write!(f, "worker {worker} makes runs again"),
+            Self::ControlRun { particle, record, worker, fault } => {
+                let found = controlled(fault.as_deref());
+                write!(f, "particle {particle}, record {record}: failed again on worker {worker}, {found}")
+            }
             Self::JobRetried { particle, record, worker, reason } => {
                 write!(f, "particle {particle}, record {record}: tried again after worker {worker}: {reason}")
             }
@@ -93,6 +105,19 @@ impl fmt::Display for FleetEvent {
                     "local worker process {pid} ended ({reason}) and is not started again after {deaths} deaths in a row"
                 )
             }
+        }
+    }
+}
+
+/// What a control run found.
+fn controlled(fault: Option<&str>) -> String {
+    match fault {
+        None => {
+            "where a run that is known to work does work: its parameters are at fault unless it works now"
+                .to_owned()
+        }
+        Some(fault) => {
+            format!("where a run that is known to work fails too ({fault}): the worker is at fault")
         }
     }
 }

@@ -185,6 +185,15 @@ impl GrpcFleet {
             BatchError::SetupFailed { reason } => FleetError::SetupFailed { reason },
             BatchError::LocalWorkers(reason) => FleetError::LocalWorkers(reason),
             BatchError::Stopped(reason) => FleetError::Stopped(reason),
+            BatchError::Unavailable { waited, reasons } => {
+                FleetError::Unavailable { waited: waited.as_secs_f64(), reasons }
+            }
+            BatchError::NoControl { particle, record, parameters, reason, .. } => {
+                FleetError::NoControl { particle, record, parameters, reason }
+            }
+            BatchError::NoAnswer { index, particle, record, reason } => {
+                FleetError::NoAnswer { job: index, particle, record, reason }
+            }
         }
     }
 }
@@ -197,7 +206,12 @@ impl Fleet for GrpcFleet {
             let reason = format!("its text has {} bytes, a message holds {MAX_MESSAGE}", json.len());
             return Err(FleetError::SetupFailed { reason });
         }
-        self.hub.install(id, json, setup.parameters.clone());
+        // A state of another length would be noticed only where states are mixed: where the specification is known, so is its
+        // length.
+        if !self.hub.knows(std::iter::once(&id)) {
+            let n_state = setup.spec().ok().filter(|spec| spec.restart).map(|spec| spec.n_state());
+            self.hub.install(id, json, setup.parameters.clone(), n_state);
+        }
         Ok(id)
     }
 

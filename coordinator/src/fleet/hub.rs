@@ -4,6 +4,7 @@
 //! the next event panics too, and the network thread turns that into the end of the fleet. Nothing is decided here. Next file to
 //! read: `state`, then [`super::service`], which brings the workers' events.
 
+mod arrival;
 mod state;
 #[cfg(test)]
 mod tests;
@@ -13,17 +14,16 @@ use std::sync::mpsc::Sender;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use starlings_models::Job;
 use starlings_proto::{Bytes, Hello, PROTOCOL, SetupId, ToWorker, Welcome, wire};
 use tokio::sync::{Notify, mpsc::UnboundedSender};
 use tonic::Status;
 
-use super::dispatcher::batch::JobName;
 use super::dispatcher::message::hex;
 use super::dispatcher::{BatchError, Event, Joining, Rules, WorkerId};
+use super::job_name::JobName;
 use super::{FleetEvent, Outcome};
 pub(super) use state::{Closed, Submission};
-use state::{Link, State};
+use state::{Known, Link, State};
 
 /// What a link carries to its worker.
 pub(super) type Outgoing = Result<wire::ToWorker, Status>;
@@ -94,11 +94,11 @@ impl Hub {
         (state.dispatcher.n_workers(), state.dispatcher.slots())
     }
 
-    /// Takes a setup as it travels, with the names of its parameters.
-    pub(super) fn install(&self, id: SetupId, json: Bytes, parameters: Vec<String>) {
+    /// Takes a setup as it travels, with the names of its parameters, and the length of a state where it is known.
+    pub(super) fn install(&self, id: SetupId, json: Bytes, parameters: Vec<String>, n_state: Option<usize>) {
         let mut state = self.lock();
         state.setups.insert(id, json);
-        state.names.insert(id, parameters);
+        state.known.insert(id, Known { parameters, n_state });
     }
 
     pub(super) fn knows<'a>(&self, mut setups: impl Iterator<Item = &'a SetupId>) -> bool {
@@ -114,8 +114,7 @@ impl Hub {
             let _ = batch.reply.send(Err(BatchError::LocalWorkers(reason)));
             return;
         }
-        let name = |job: &Job| JobName { particle: job.particle, record: job.record };
-        let jobs = batch.jobs.iter().map(|(setup, job)| (*setup, name(job))).collect();
+        let jobs = batch.jobs.iter().map(|(setup, job)| (*setup, JobName::of(job))).collect();
         state.handle(now, Event::Abort(BatchError::Cancelled));
         state.running = Some(batch);
         state.handle(now, Event::Submit { jobs });

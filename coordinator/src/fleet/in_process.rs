@@ -1,4 +1,8 @@
 //! A fleet without a network: runs the jobs on threads of this process.
+//!
+//! There is one place only: what it cannot make ends the batch. Next file to read: `settle`, for runs that end abnormally.
+
+mod settle;
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -7,7 +11,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use starlings_models::{Forward, Job, ParticleError, Setup, SetupError};
+use starlings_models::{Forward, Job, ModelFailure, ParticleError, Prediction, Setup, SetupError};
+use starlings_proto::spent::spent;
 use starlings_proto::words::panic_text;
 use starlings_proto::{SetupId, encode_setup};
 use tokio_util::sync::CancellationToken;
@@ -73,8 +78,8 @@ impl Fleet for InProcess {
                     while !cancel.is_cancelled() {
                         let index = next.fetch_add(1, Ordering::Relaxed);
                         let Some(&(forward, job)) = tasks.get(index) else { break };
-                        let outcome = run_one(forward, job, thread);
-                        outcomes.lock().unwrap_or_else(PoisonError::into_inner).push((index, outcome));
+                        let result = run_one(forward, job);
+                        outcomes.lock().unwrap_or_else(PoisonError::into_inner).push((index, result, thread));
                     }
                 });
             }
@@ -82,9 +87,10 @@ impl Fleet for InProcess {
         if self.cancel.is_cancelled() {
             return Err(FleetError::Cancelled);
         }
-        let mut outcomes = outcomes.into_inner().unwrap_or_else(PoisonError::into_inner);
-        outcomes.sort_unstable_by_key(|(index, _)| *index);
-        Ok(outcomes.into_iter().map(|(_, outcome)| outcome).collect())
+        let mut ran = outcomes.into_inner().unwrap_or_else(PoisonError::into_inner);
+        ran.sort_unstable_by_key(|(index, _, _)| *index);
+        let (results, threads) = ran.into_iter().map(|(_, result, thread)| (result, thread)).unzip();
+        settle::settled(&jobs, &tasks, results, threads)
     }
 
     fn n_workers(&self) -> usize {
@@ -96,12 +102,13 @@ impl Fleet for InProcess {
     }
 }
 
-fn run_one(forward: &dyn Forward, job: &Job, thread: usize) -> Outcome {
+/// One run; a panic of the model is a failure of the model.
+fn run_one(forward: &dyn Forward, job: &Job) -> Result<Prediction, ParticleError> {
     let started = Instant::now();
-    let mut result = catch_unwind(AssertUnwindSafe(|| forward.run(job)))
-        .unwrap_or_else(|panic| Err(ParticleError::Solver(panic_text(panic.as_ref()))));
+    let mut result = catch_unwind(AssertUnwindSafe(|| forward.run_within(job, &spent())))
+        .unwrap_or_else(|panic| Err(ModelFailure::Solver(panic_text(panic.as_ref())).into()));
     if let Ok(prediction) = &mut result {
         prediction.cost = started.elapsed().as_secs_f64();
     }
-    Outcome { result, attempts: 1, worker: format!("thread {thread}") }
+    result
 }

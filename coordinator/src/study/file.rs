@@ -59,6 +59,8 @@ pub(super) struct ModelSection {
     pub(super) equations: Option<EquationsSection>,
     /// Steps that one run may take.
     pub(super) max_steps: Option<Spanned<u64>>,
+    /// Seconds; a solver's stand in its own section.
+    pub(super) timeout: Option<Spanned<f64>>,
     /// Present when `kind` is `solver`.
     pub(super) solver: Option<solver::ProgramSection>,
 }

@@ -14,3 +14,5 @@ pub mod resample;
 pub mod rescue;
 mod schedule;
 pub mod settle;
+pub mod stack;
+mod timeouts;

@@ -11,6 +11,7 @@ use nalgebra::{DMatrix, DVector};
 use starlings_estimators::{Gaussian, Place, Residuals};
 
 use super::fit::flight::{self, Flight, StepWindows};
+use super::fit::stack::stack_outputs;
 use super::{EstimatorKind, RunError, Study, posterior};
 
 /// Distance of the points from the estimate, in posterior sd: close enough for a model that is nearly linear within one.
@@ -65,7 +66,7 @@ fn run(
     if results.iter().flatten().any(Result::is_err) {
         return Ok(None);
     }
-    Ok(Some(flight::stack_outputs(&results, windows)))
+    Ok(Some(stack_outputs(&results, windows)))
 }
 
 /// One ensemble around the estimate: column 0 is the estimate, then one parameter of the study moved in each.

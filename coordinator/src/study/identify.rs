@@ -17,7 +17,7 @@ pub use at::At;
 pub use result::Identification;
 
 use starlings_estimators::{EstimatorError, Sensitivities};
-use starlings_models::ParticleError;
+use starlings_models::Failure;
 
 use super::fit::flight::Flight;
 use super::store::StoreError;
@@ -44,7 +44,7 @@ pub enum IdentifyError {
         /// Which parameter was moved, which way and to what value.
         place: String,
         /// Why it failed.
-        source: ParticleError,
+        source: Failure,
     },
     /// A prediction is no finite number.
     #[error(

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use starlings_estimators::Gaussian;
-use starlings_models::{ParticleError, Window};
+use starlings_models::{Failure, Window};
 
 use super::fit::flight::{Flight, Place, StepWindows};
 use super::store::PredictionRow;
@@ -102,7 +102,7 @@ pub fn compare(
 }
 
 /// What a reader does not learn, and why.
-fn failed(study: &Study, record: usize, error: &ParticleError) -> String {
+fn failed(study: &Study, record: usize, error: &Failure) -> String {
     format!(
         "with the estimated parameters the model fails under the observer `{}` on record `{}` ({error}): what the observer \
          does for the state is not known. Lower its gain.",

@@ -6,7 +6,7 @@
 use std::sync::mpsc::Receiver;
 
 use starlings_estimators::{EstimatorError, Gaussian};
-use starlings_models::ParticleError;
+use starlings_models::Failure;
 
 use super::constants::{self, HangsOn};
 use super::fit::{batch, filter, forecast};
@@ -77,7 +77,7 @@ pub enum RunError {
         /// Record name.
         record: String,
         /// Why.
-        source: ParticleError,
+        source: Failure,
     },
     /// A value that must serialise did not.
     #[error("internal: {0}")]
@@ -204,8 +204,22 @@ impl RunContext<'_> {
 /// Runs or continues a study in its folder and writes the result.
 ///
 /// # Errors
-/// When the fleet, the estimator or the store fails; what was done until then stays in the store.
+/// When the fleet, the estimator or the store fails; what was done until then stays in the store, with what the fleet told.
 pub fn run(
+    study: &Study,
+    fleet: &mut dyn Fleet,
+    folder: &mut RunFolder,
+    context: &mut RunContext<'_>,
+) -> Result<Summary, RunError> {
+    let result = from_start_to_end(study, fleet, folder, context);
+    if result.is_err() {
+        // The error itself is what counts, also where the store is why.
+        let _ = context.keep_events(&folder.store);
+    }
+    result
+}
+
+fn from_start_to_end(
     study: &Study,
     fleet: &mut dyn Fleet,
     folder: &mut RunFolder,
@@ -218,11 +232,11 @@ pub fn run(
         "run",
         if resumed.is_some() { "run resumed" } else { "run started" },
     )?;
-    let mut flight = Flight::new(study, fleet)?;
+    let mut flight = Flight::new(study, fleet)?.deciding(&folder.store)?;
     flight.threads = context.threads.max(1);
     let fit = match study.estimator.kind {
-        EstimatorKind::Roukf => filter::fit(&mut flight, &mut folder.store, context, resumed)?,
-        EstimatorKind::Batch => batch::fit(&mut flight, &mut folder.store, context, resumed)?,
+        EstimatorKind::Roukf => filter::fit(&mut flight, &folder.store, context, resumed)?,
+        EstimatorKind::Batch => batch::fit(&mut flight, &folder.store, context, resumed)?,
     };
     let predictions = forecast::run(&mut flight, &fit.posterior)?;
     let observer = observer_gain::compare(&mut flight, &fit.posterior, &predictions)?;
@@ -254,6 +268,7 @@ pub fn run(
     result.warnings = warnings::collect(study, &fit, &result, &predictions, &residuals);
     result.warnings.extend(unknown);
     result.warnings.extend(folder.mixed()?);
+    result.warnings.extend(flight.timeouts());
     match hangs_on {
         Ok(found) => result.hangs_on = (found.runs > 0).then_some(found),
         Err(why) => result.warnings.push(why),

@@ -182,18 +182,25 @@ impl Store {
     ///
     /// # Errors
     /// When the database refuses; nothing of the analysis is then kept, and those before are committed.
-    pub fn analysis(&mut self, row: &AnalysisRow, snapshot: &Snapshot) -> Result<(), StoreError> {
-        let write = |connection: &mut Connection| -> rusqlite::Result<()> {
+    pub fn analysis(&self, row: &AnalysisRow, snapshot: &Snapshot) -> Result<(), StoreError> {
+        let connection = &self.connection;
+        let insert = || -> rusqlite::Result<()> {
+            insert_analysis(connection, row)?;
+            insert_jobs(connection, &row.jobs)?;
+            snapshot.write(connection)?;
+            connection.execute_batch("RELEASE analysis")
+        };
+        let write = || -> rusqlite::Result<()> {
             if connection.is_autocommit() {
                 connection.execute_batch("BEGIN IMMEDIATE")?;
             }
-            let savepoint = connection.savepoint()?;
-            insert_analysis(&savepoint, row)?;
-            insert_jobs(&savepoint, &row.jobs)?;
-            snapshot.write(&savepoint)?;
-            savepoint.commit()
+            connection.execute_batch("SAVEPOINT analysis")?;
+            insert().inspect_err(|_| {
+                // The failure before is the one to tell; a full disk may have ended the transaction already.
+                let _ = connection.execute_batch("ROLLBACK TO analysis; RELEASE analysis");
+            })
         };
-        let written = write(&mut self.connection);
+        let written = write();
         if written.is_err() {
             // The first failure is the one to tell.
             let _ = self.commit();
@@ -229,18 +236,17 @@ impl Store {
     ///
     /// # Errors
     /// When the database refuses.
-    pub fn predictions(&mut self, rows: &[PredictionRow], jobs: &[JobRow]) -> Result<(), StoreError> {
+    pub fn predictions(&self, rows: &[PredictionRow], jobs: &[JobRow]) -> Result<(), StoreError> {
         self.commit()?;
-        let path = self.path.clone();
-        let write = |connection: &mut Connection| -> rusqlite::Result<()> {
-            let transaction = connection.transaction()?;
+        let write = || -> rusqlite::Result<()> {
+            let transaction = self.connection.unchecked_transaction()?;
             transaction.execute("DELETE FROM predictions", [])?;
             transaction.execute("DELETE FROM jobs WHERE pass = 0", [])?;
             insert_predictions(&transaction, rows)?;
             insert_jobs(&transaction, jobs)?;
             transaction.commit()
         };
-        write(&mut self.connection).map_err(|source| StoreError::Database { path, source })
+        self.guard(write())
     }
 
     /// How far the run had come, in s of its wall time: the last commit or the last event, whichever is later; zero for a

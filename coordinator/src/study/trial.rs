@@ -7,7 +7,8 @@ pub mod dry_run;
 use std::sync::Arc;
 
 use starlings_models::external::table::foreign_bytes;
-use starlings_models::{Forward, Job, ParticleError, Prediction, SOLVER, SetupError, Window};
+use starlings_models::{Forward, Job, ModelFailure, ParticleError, Prediction, SOLVER, SetupError, Window};
+use starlings_proto::spent::spent;
 
 use super::{Study, posterior};
 use crate::fleet::{WireError, travels};
@@ -160,7 +161,7 @@ fn run(
 ) -> Result<Prediction, Fault> {
     let job =
         Job { particle: 0, record: record as u32, window: Arc::clone(window), theta: theta.to_vec(), state };
-    let prediction = model.run(&job).map_err(Fault::Run)?;
+    let prediction = model.run_within(&job, &spent()).map_err(Fault::Run)?;
     travels(&job, &prediction).map_err(Fault::Travel)?;
     Ok(prediction)
 }
@@ -187,7 +188,7 @@ pub(super) fn named(study: &Study, theta: &[f64]) -> String {
 
 /// What to do about a failure; where steps were too many, with how many there would be.
 fn remedy(error: &ParticleError, window: &Window) -> String {
-    let ParticleError::TooManySteps { time, limit } = error else {
+    let ParticleError::Model(ModelFailure::TooManySteps { time, limit }) = error else {
         return "check constants, priors and inputs".to_owned();
     };
     let end = window.times.last().copied().unwrap_or(window.start);

@@ -67,7 +67,7 @@ impl Inside {
 
 impl Solve for Inside {
     fn solve(&self, run: &Run<'_>) -> Result<Solved, ParticleError> {
-        let broken = |error: SetupError| ParticleError::Solver(error.to_string());
+        let broken = |error: SetupError| ParticleError::Undecided(error.to_string());
         let mut model = self.model.clone();
         model.constants.extend(run.constants.iter().cloned());
         let own = self.description.spec.parameters.iter().map(|q| q.name.clone());
@@ -92,6 +92,7 @@ impl Solve for Inside {
             observer: run.observer.clone(),
             effects: if with_terms { vec![terms] } else { Vec::new() },
             max_steps: None,
+            timeout: None,
         };
         let theta =
             run.parameters.iter().copied().chain(run.initial.iter().map(|(_, value)| *value)).collect();

@@ -1,7 +1,7 @@
 //! Fleets around the in-process one: they compute in another order, lose particles, or stop after some calls.
 
 use starlings_coordinator::fleet::{Fleet, FleetError, InProcess, Outcome, SetupId};
-use starlings_models::{Job, ParticleError, Setup};
+use starlings_models::{Job, ModelFailure, Setup};
 
 /// Computes the jobs of a batch in another order, another one at every call; answers stand in the order of the jobs.
 pub struct Shuffled {
@@ -90,7 +90,7 @@ impl<R: FnMut(&At<'_>) -> bool> Fleet for Failing<R> {
         let mut outcomes = self.inner.run_mixed(jobs)?;
         for (outcome, fails) in outcomes.iter_mut().zip(fails) {
             if fails {
-                outcome.result = Err(ParticleError::Solver("made to fail".to_owned()));
+                outcome.result = Err(ModelFailure::Solver("made to fail".to_owned()).into());
                 self.failed += 1;
             }
         }

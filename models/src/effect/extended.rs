@@ -20,7 +20,7 @@ use crate::equations::{Slot, check};
 use crate::integrate::{self, Solver};
 use crate::model::{Drive, Segment};
 use crate::setup::SetupError;
-use crate::{Blocks, Memory, Model, ParticleError, Quantity, Spec};
+use crate::{Blocks, Memory, Model, ModelFailure, Quantity, Spec};
 
 /// A model and the effects added to it.
 pub struct Extended {
@@ -224,7 +224,7 @@ impl Model for Extended {
         }
     }
 
-    fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ParticleError> {
+    fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ModelFailure> {
         let Touches { rates, inputs, parameters_vary, .. } = self.touches;
         if rates || inputs || parameters_vary {
             return integrate::advance(self, self.solver(), segment, theta, x);

@@ -3,7 +3,7 @@
 //! It has the parameters of that program, so that terms may name them, and no state. Next file to read: [`super::split`].
 
 use crate::model::Segment;
-use crate::{Drive, Model, ParticleError, Quantity, Spec};
+use crate::{Drive, Model, ModelFailure, Quantity, Spec};
 
 /// Shows the inputs from `first` on.
 pub(super) struct Replay {
@@ -49,7 +49,7 @@ impl Model for Replay {
         y.copy_from_slice(&u.value[self.first..]);
     }
 
-    fn advance(&self, _segment: Segment<'_>, _theta: &[f64], _x: &mut [f64]) -> Result<(), ParticleError> {
+    fn advance(&self, _segment: Segment<'_>, _theta: &[f64], _x: &mut [f64]) -> Result<(), ModelFailure> {
         Ok(())
     }
 }

@@ -8,19 +8,19 @@ use super::dopri5::Dopri5;
 use super::rosenbrock::Rosenbrock;
 use super::system::OnSegment;
 use crate::model::Segment;
-use crate::{Model, ParticleError};
+use crate::{Model, ModelFailure};
 
 /// Advances `x` over the segment within the tolerance.
 ///
 /// # Errors
-/// [`ParticleError::TooManySteps`], [`ParticleError::StepTooSmall`] or [`ParticleError::NotFinite`], with the time reached.
+/// [`ModelFailure::TooManySteps`], [`ModelFailure::StepTooSmall`] or [`ModelFailure::NotFinite`], with the time reached.
 pub fn advance<M: Model + ?Sized>(
     model: &M,
     segment: Segment<'_>,
     theta: &[f64],
     x: &mut [f64],
     tolerance: Tolerance,
-) -> Result<(), ParticleError> {
+) -> Result<(), ModelFailure> {
     let n = x.len();
     let mut system = OnSegment::new(model, segment, theta, n);
     let span = [segment.t0, segment.t1];

@@ -8,7 +8,7 @@ mod crossing;
 use super::Tolerance;
 use super::events::Events;
 use super::system::{System, not_finite};
-use crate::ParticleError;
+use crate::ModelFailure;
 
 /// Most steps, accepted or not, within one segment of a run without limits.
 pub(super) const MAX_STEPS: u64 = 1_000_000;
@@ -79,7 +79,7 @@ pub(super) fn integrate<S: System, P: Stepper>(
     span: [f64; 2],
     x: &mut [f64],
     tolerance: Tolerance,
-) -> Result<Reached, ParticleError> {
+) -> Result<Reached, ModelFailure> {
     if x.is_empty() {
         return Ok(Reached::End);
     }
@@ -153,7 +153,7 @@ impl<'a, S: System, P: Stepper> Run<'a, S, P> {
     }
 
     /// Evaluates the starting point and guesses the first step.
-    pub(super) fn start(&mut self) -> Result<(), ParticleError> {
+    pub(super) fn start(&mut self) -> Result<(), ModelFailure> {
         self.stepper.restart(self.system, self.t, self.x);
         let rate = self.stepper.rate();
         if !rate.iter().all(|v| v.is_finite()) {
@@ -179,7 +179,7 @@ impl<'a, S: System, P: Stepper> Run<'a, S, P> {
     }
 
     /// One attempt at a step.
-    pub(super) fn step(&mut self) -> Result<Step, ParticleError> {
+    pub(super) fn step(&mut self) -> Result<Step, ModelFailure> {
         let left = self.end - self.t;
         let last = self.h * 1.01 >= left;
         let h = if last { left } else { self.h };
@@ -198,12 +198,12 @@ impl<'a, S: System, P: Stepper> Run<'a, S, P> {
         Ok(if stiff { Step::Stiff } else { Step::Passed })
     }
 
-    fn attempt(&mut self, h: f64) -> Result<f64, ParticleError> {
+    fn attempt(&mut self, h: f64) -> Result<f64, ModelFailure> {
         self.system.limits().take(1, self.t)?;
         self.steps += 1;
         let limit = self.system.limits().in_one_span(MAX_STEPS);
         if self.steps > limit {
-            return Err(ParticleError::TooManySteps { time: self.t, limit });
+            return Err(ModelFailure::TooManySteps { time: self.t, limit });
         }
         Ok(self.stepper.attempt(self.system, self.t, self.x, h, &mut self.new, self.tolerance))
     }
@@ -222,7 +222,7 @@ impl<'a, S: System, P: Stepper> Run<'a, S, P> {
         (SAFETY * error.max(1e-10).powf(-alpha) * self.last_error.powf(BETA)).clamp(FACTOR[0], FACTOR[1])
     }
 
-    fn refuse(&mut self, h: f64, error: f64) -> Result<Step, ParticleError> {
+    fn refuse(&mut self, h: f64, error: f64) -> Result<Step, ModelFailure> {
         let factor = if error.is_finite() {
             (SAFETY * error.powf(-1.0 / P::ORDER)).clamp(FACTOR[0], 0.9)
         } else {
@@ -233,13 +233,13 @@ impl<'a, S: System, P: Stepper> Run<'a, S, P> {
             return Ok(Step::Refused);
         }
         if self.new.iter().all(|v| v.is_finite()) {
-            return Err(ParticleError::StepTooSmall { time: self.t, step: self.h });
+            return Err(ModelFailure::StepTooSmall { time: self.t, step: self.h });
         }
         Err(self.culprit(h))
     }
 
     /// The state whose rate stops being finite just ahead; a method's stages spread the fault over all of them.
-    fn culprit(&mut self, h: f64) -> ParticleError {
+    fn culprit(&mut self, h: f64) -> ModelFailure {
         let (mut ahead, mut rate) = (self.x.to_vec(), self.x.to_vec());
         for (x, f) in ahead.iter_mut().zip(self.stepper.rate()) {
             *x += h * f;

@@ -7,19 +7,19 @@ use super::Tolerance;
 use super::control::{self, Stepper};
 use super::system::{OnSegment, System};
 use crate::model::Segment;
-use crate::{Model, ParticleError};
+use crate::{Model, ModelFailure};
 
 /// Advances `x` over the segment within the tolerance.
 ///
 /// # Errors
-/// [`ParticleError::TooManySteps`], [`ParticleError::StepTooSmall`] or [`ParticleError::NotFinite`], with the time reached.
+/// [`ModelFailure::TooManySteps`], [`ModelFailure::StepTooSmall`] or [`ModelFailure::NotFinite`], with the time reached.
 pub fn advance<M: Model + ?Sized>(
     model: &M,
     segment: Segment<'_>,
     theta: &[f64],
     x: &mut [f64],
     tolerance: Tolerance,
-) -> Result<(), ParticleError> {
+) -> Result<(), ModelFailure> {
     let mut system = OnSegment::new(model, segment, theta, x.len());
     let mut stepper = Dopri5::new(x.len(), false);
     control::integrate(&mut system, &mut stepper, [segment.t0, segment.t1], x, tolerance).map(|_| ())

@@ -5,7 +5,7 @@
 use super::control::MAX_STEPS;
 use super::system::{OnSegment, System, not_finite};
 use crate::model::Segment;
-use crate::{Model, ParticleError};
+use crate::{Model, ModelFailure};
 
 /// Advances `x` over the segment in equal steps no longer than `step`.
 ///
@@ -17,14 +17,14 @@ pub fn advance<M: Model + ?Sized>(
     theta: &[f64],
     x: &mut [f64],
     step: f64,
-) -> Result<(), ParticleError> {
+) -> Result<(), ModelFailure> {
     let n = x.len();
     let mut system = OnSegment::new(model, segment, theta, n);
     // A step that divides the segment but for rounding must not be cut in two.
     let count = ((segment.t1 - segment.t0) / step - 1e-9).ceil().max(1.0);
     let limit = segment.limits.in_one_span(MAX_STEPS);
     if count > limit as f64 || count.is_nan() {
-        return Err(ParticleError::TooManySteps { time: segment.t0, limit });
+        return Err(ModelFailure::TooManySteps { time: segment.t0, limit });
     }
     let h = (segment.t1 - segment.t0) / count;
     segment.limits.foresee(h, segment.t0)?;

@@ -9,7 +9,7 @@ use super::Tolerance;
 use super::control::{Run, Stepper};
 use super::dopri5::Dopri5;
 use super::system::System;
-use crate::ParticleError;
+use crate::ModelFailure;
 use crate::limits::Limits;
 
 /// Distance from the surface at which the two sides' rates are taken, in tolerances: beyond rounding, below notice.
@@ -20,7 +20,7 @@ const OFFSET: f64 = 100.0;
 pub(super) fn slide<S: System, P: Stepper>(
     run: &mut Run<'_, S, P>,
     candidates: Range<usize>,
-) -> Result<(), ParticleError> {
+) -> Result<(), ModelFailure> {
     run.fresh = false;
     for index in candidates {
         let mut surface = Surface::new(run.system, index, run.tolerance);

@@ -4,7 +4,7 @@
 
 use crate::limits::Limits;
 use crate::model::{Drive, Segment};
-use crate::{Model, ParticleError, Spec};
+use crate::{Model, ModelFailure, Spec};
 
 /// A system of ordinary differential equations.
 pub(super) trait System {
@@ -69,9 +69,9 @@ pub(super) fn differences<S: System + ?Sized>(
 }
 
 /// The first component that is not finite, as an error.
-pub(super) fn not_finite<S: System + ?Sized>(system: &S, t: f64, values: &[f64]) -> ParticleError {
+pub(super) fn not_finite<S: System + ?Sized>(system: &S, t: f64, values: &[f64]) -> ModelFailure {
     let component = values.iter().position(|v| !v.is_finite()).unwrap_or(0);
-    ParticleError::NotFinite { what: system.name(component), time: t }
+    ModelFailure::NotFinite { what: system.name(component), time: t }
 }
 
 /// A model on one segment.

@@ -19,7 +19,7 @@ mod wall;
 use super::MOST_STEPS;
 use crate::model::Segment;
 use crate::setup::{ModelDef, SetupError};
-use crate::{Drive, Model, ParticleError, Spec};
+use crate::{Drive, Model, ModelFailure, Spec};
 
 pub use layout::Layout;
 use network::Network;
@@ -55,8 +55,8 @@ enum Fault {
 }
 
 impl Fault {
-    fn at(self, t: f64) -> ParticleError {
-        ParticleError::Solver(match self {
+    fn at(self, t: f64) -> ModelFailure {
+        ModelFailure::Solver(match self {
             Self::Collapsed { cell } => format!("the vessel collapses in cell {cell} at t = {t}"),
             Self::Supercritical { cell } => {
                 format!("the flow reaches the speed of its waves in cell {cell} at t = {t}")
@@ -96,10 +96,10 @@ impl Artery1d {
         segment: Segment<'_>,
         theta: &[f64],
         x: &mut [f64],
-    ) -> Result<Volumes, ParticleError> {
+    ) -> Result<Volumes, ModelFailure> {
         let finite = |value: &f64| value.is_finite();
         if !(segment.u0.iter().all(finite) && segment.slope.iter().all(finite)) {
-            return Err(ParticleError::NotFinite { what: "input `flow`".to_owned(), time: segment.t0 });
+            return Err(ModelFailure::NotFinite { what: "input `flow`".to_owned(), time: segment.t0 });
         }
         let vessels = Vessels::new(&self.network, theta);
         let (mut work, mut volumes) = (Work::new(&vessels), Volumes::default());
@@ -107,17 +107,17 @@ impl Artery1d {
         while t < segment.t1 {
             if let Some(i) = x.iter().position(|value| !value.is_finite()) {
                 let what = format!("state `{}`", Spec::component(&self.spec.states, i));
-                return Err(ParticleError::NotFinite { what, time: t });
+                return Err(ModelFailure::NotFinite { what, time: t });
             }
             let (left, longest) = (segment.t1 - t, vessels.longest_step(x));
             if longest.is_nan() {
-                return Err(ParticleError::NotFinite { what: "the speed of waves".to_owned(), time: t });
+                return Err(ModelFailure::NotFinite { what: "the speed of waves".to_owned(), time: t });
             }
             // Equal steps up to the segment's end, as far as the state does not change the longest one.
             let dt = left / (left / longest).ceil().max(1.0);
             let next = if dt < left { t + dt } else { segment.t1 };
             if next <= t {
-                return Err(ParticleError::StepTooSmall { time: t, step: dt });
+                return Err(ModelFailure::StepTooSmall { time: t, step: dt });
             }
             segment.limits.foresee(longest, t)?;
             segment.limits.take(1, t)?;
@@ -129,7 +129,7 @@ impl Artery1d {
             t = next;
             n_step += 1;
             if n_step > MOST_STEPS {
-                return Err(ParticleError::TooManySteps { time: t, limit: MOST_STEPS });
+                return Err(ModelFailure::TooManySteps { time: t, limit: MOST_STEPS });
             }
         }
         Ok(volumes)
@@ -189,7 +189,7 @@ impl Model for Artery1d {
         }
     }
 
-    fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ParticleError> {
+    fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ModelFailure> {
         self.advance_counting(segment, theta, x).map(|_| ())
     }
 }

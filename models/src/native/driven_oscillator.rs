@@ -4,7 +4,7 @@
 
 use super::oscillator::{INITIAL_POSITION, blocks, free_motion, measures, outputs, parameters, states};
 use crate::model::Segment;
-use crate::{Blocks, Drive, Model, ParticleError, Quantity, Role, Spec};
+use crate::{Blocks, Drive, Model, ModelFailure, Quantity, Role, Spec};
 
 /// m d²x/dt² + c dx/dt + k x = F(t), with position x and velocity v as states and outputs.
 pub struct DrivenOscillator {
@@ -53,7 +53,7 @@ impl Model for DrivenOscillator {
     }
 
     /// Exact for a force linear in time: the free motion about the particular solution x = (F − c Ḟ/k)/k, v = Ḟ/k.
-    fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ParticleError> {
+    fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ModelFailure> {
         let (damping, stiffness) = (theta[1], theta[2]);
         let h = segment.t1 - segment.t0;
         let v = segment.slope[0] / stiffness;

@@ -16,7 +16,7 @@ use super::MOST_STEPS;
 use crate::model::Segment;
 use crate::prestress::Rings;
 use crate::setup::{ModelDef, SetupError};
-use crate::{Blocks, Drive, Model, ParticleError, Spec};
+use crate::{Blocks, Drive, Model, ModelFailure, Spec};
 use chain::Chain;
 use coefficients::Coefficients;
 pub use layout::{Layout, Start};
@@ -190,13 +190,13 @@ impl Model for FsiTube {
     }
 
     /// Implicit midpoint steps of one length, none longer than the layout's.
-    fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ParticleError> {
+    fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ModelFailure> {
         // A hair of the layout's step is no step of its own: a segment is as long as its times' rounding lets it be.
         const HAIR: f64 = 1e-6;
         let h = segment.t1 - segment.t0;
         let n = (h / self.step - HAIR).ceil().max(1.0);
         if n > MOST_STEPS as f64 {
-            return Err(ParticleError::TooManySteps { time: segment.t0, limit: MOST_STEPS });
+            return Err(ModelFailure::TooManySteps { time: segment.t0, limit: MOST_STEPS });
         }
         segment.limits.foresee(h / n, segment.t0)?;
         self.midpoint(theta, segment, n as usize, State::of(x))

@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 
 use crate::blocks::WallOutputs;
 use crate::model::Segment;
-use crate::{Blocks, Drive, Model, ParticleError, Quantity, Role, Spec};
+use crate::{Blocks, Drive, Model, ModelFailure, Quantity, Role, Spec};
 
 /// m d²x/dt² + c dx/dt + k x = 0, with position x and velocity v as states and outputs.
 pub struct Oscillator {
@@ -135,7 +135,7 @@ impl Model for Oscillator {
         Some(blocks(theta))
     }
 
-    fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ParticleError> {
+    fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ModelFailure> {
         x.copy_from_slice(&free_motion(theta, segment.t1 - segment.t0, [x[0], x[1]]));
         Ok(())
     }

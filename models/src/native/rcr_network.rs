@@ -20,7 +20,7 @@ mod units;
 
 use crate::integrate::{self, Solver, Tolerance};
 use crate::model::Segment;
-use crate::{Drive, Model, ModelDef, ParticleError, Quantity, SetupError, Spec, layout};
+use crate::{Drive, Model, ModelDef, ModelFailure, Quantity, SetupError, Spec, layout};
 
 use assembly::Assembly;
 use circuit::{Ends, FlowOf, Law};
@@ -103,7 +103,7 @@ impl RcrNetwork {
         segment: Segment<'_>,
         theta: &[f64],
         x: &mut [f64],
-    ) -> Result<(), ParticleError> {
+    ) -> Result<(), ModelFailure> {
         if !self.network.circuit.is_linear() {
             return integrate::advance(self, self.solver(), segment, theta, x);
         }
@@ -189,7 +189,7 @@ impl Model for RcrNetwork {
     }
 
     /// Spans end where a shifted signal bends, so that no step runs across a bend.
-    fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ParticleError> {
+    fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ModelFailure> {
         if self.sources.iter().all(|source| source.shift.is_none()) {
             return self.advance_straight(segment, theta, x);
         }

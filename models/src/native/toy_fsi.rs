@@ -19,7 +19,7 @@ use std::sync::Arc;
 use crate::blocks::{Blocks, WallOutputs};
 use crate::model::Segment;
 use crate::setup::{ModelDef, SetupError};
-use crate::{Drive, Model, ParticleError, Spec};
+use crate::{Drive, Model, ModelFailure, Spec};
 
 use cache::Cache;
 use elements::Matrices;
@@ -164,7 +164,7 @@ impl Model for ToyFsi {
         })
     }
 
-    fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ParticleError> {
+    fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ModelFailure> {
         let (d, v) = x.split_at_mut(self.n());
         self.vibration(theta).advance(segment.t1 - segment.t0, d, v);
         Ok(())

@@ -22,7 +22,7 @@ use super::toy_fsi::{WALL, bump, modal_matrices};
 use crate::blocks::Blocks;
 use crate::model::Segment;
 use crate::setup::{ModelDef, SetupError};
-use crate::{Drive, Model, ParticleError, Quantity, Role, Spec};
+use crate::{Drive, Model, ModelFailure, Quantity, Role, Spec};
 
 /// A Stokes flow under a generalised string.
 pub struct ToyFsiStokes {
@@ -218,7 +218,7 @@ impl Model for ToyFsiStokes {
         })
     }
 
-    fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ParticleError> {
+    fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ModelFailure> {
         let modes = self.modes(theta);
         let h = segment.t1 - segment.t0;
         let steps: Vec<_> = modes.iter().map(|mode| mode.propagator.step(h)).collect();

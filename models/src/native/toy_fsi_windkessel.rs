@@ -20,7 +20,7 @@ use super::toy_fsi::{WALL, modal_matrices};
 use crate::blocks::{Blocks, WallOutputs, WindkesselBlock};
 use crate::model::Segment;
 use crate::setup::{ModelDef, SetupError};
-use crate::{Drive, Model, ParticleError, Quantity, Role, Spec};
+use crate::{Drive, Model, ModelFailure, Quantity, Role, Spec};
 
 /// A channel under an elastic wall, from a known inflow to a Windkessel.
 pub struct ToyFsiWindkessel {
@@ -255,7 +255,7 @@ impl Model for ToyFsiWindkessel {
         })
     }
 
-    fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ParticleError> {
+    fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ModelFailure> {
         let (n, system) = (self.spectral.len(), self.system(theta));
         let mut start = DVector::zeros(2 * n + 3);
         start.rows_mut(0, n).copy_from(&self.spectral.apply(&x[..n]));

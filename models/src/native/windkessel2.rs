@@ -4,7 +4,7 @@
 
 use super::relaxation;
 use crate::model::Segment;
-use crate::{Drive, Model, ParticleError, Quantity, Role, Spec};
+use crate::{Drive, Model, ModelFailure, Quantity, Role, Spec};
 
 /// C dp/dt = q − p/R; the pressure is p.
 pub struct Windkessel2 {
@@ -90,7 +90,7 @@ impl Model for Windkessel2 {
         y[0] = x[0];
     }
 
-    fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ParticleError> {
+    fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ModelFailure> {
         x[0] = advance_stored(segment, theta[0], theta[1], x[0]);
         Ok(())
     }

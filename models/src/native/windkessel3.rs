@@ -6,7 +6,7 @@ use super::windkessel2::{
     INITIAL_PRESSURE, advance_stored, compliance, flow, pressure, resistance, stored_pressure,
 };
 use crate::model::Segment;
-use crate::{Drive, Model, ParticleError, Quantity, Role, Spec};
+use crate::{Drive, Model, ModelFailure, Quantity, Role, Spec};
 
 /// C dp/dt = q − p/R; the inlet pressure is p + Zc q.
 pub struct Windkessel3 {
@@ -57,7 +57,7 @@ impl Model for Windkessel3 {
         y[0] = x[0] + theta[2] * u.value[0];
     }
 
-    fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ParticleError> {
+    fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ModelFailure> {
         x[0] = advance_stored(segment, theta[0], theta[1], x[0]);
         Ok(())
     }

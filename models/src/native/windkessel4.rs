@@ -11,7 +11,7 @@ use super::windkessel2::{
 };
 use super::windkessel3::characteristic_impedance;
 use crate::model::Segment;
-use crate::{Drive, Model, ParticleError, Quantity, Role, Spec};
+use crate::{Drive, Model, ModelFailure, Quantity, Role, Spec};
 
 /// C dp/dt = q − p/R and L diL/dt = Zc (q − iL); the inlet pressure is p + Zc (q − iL).
 pub struct Windkessel4 {
@@ -69,7 +69,7 @@ impl Model for Windkessel4 {
         y[0] = x[0] + theta[2] * (u.value[0] - x[1]);
     }
 
-    fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ParticleError> {
+    fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ModelFailure> {
         let rate = theta[2] / theta[3];
         let start = rate * (segment.u0[0] - x[1]);
         let h = segment.t1 - segment.t0;

@@ -7,7 +7,7 @@
 use super::Past;
 use super::track::{Piece, Track};
 use crate::model::{Drive, Segment};
-use crate::{Model, ParticleError};
+use crate::{Model, ModelFailure};
 
 /// Most runs of one stretch that reads itself, before it is halved.
 const MAX_ROUNDS: u32 = 25;
@@ -58,7 +58,7 @@ impl Past<'_> {
         segment: Segment<'_>,
         theta: &[f64],
         x: &mut [f64],
-    ) -> Result<(), ParticleError> {
+    ) -> Result<(), ModelFailure> {
         let motion = Motion { model, segment, theta };
         let spacing = self.tracks.iter().map(|track| track.memory.spacing()).fold(f64::INFINITY, f64::min);
         segment.limits.foresee(spacing, segment.t0)?;
@@ -71,7 +71,7 @@ impl Past<'_> {
             while !self.stretch(&motion, [t, end], x)? {
                 end = t + 0.5 * (end - t);
                 if end - t < shortest {
-                    return Err(ParticleError::StepTooSmall { time: t, step: end - t });
+                    return Err(ModelFailure::StepTooSmall { time: t, step: end - t });
                 }
             }
             t = end;
@@ -80,7 +80,7 @@ impl Past<'_> {
     }
 
     /// Advances `x` over one stretch and records it, or leaves both as they were; says whether it did.
-    fn stretch(&mut self, motion: &Motion<'_>, span: [f64; 2], x: &mut [f64]) -> Result<bool, ParticleError> {
+    fn stretch(&mut self, motion: &Motion<'_>, span: [f64; 2], x: &mut [f64]) -> Result<bool, ModelFailure> {
         let start = x.to_vec();
         self.ahead.set(false);
         let mut pieces = self.attempt(motion, span, x)?;
@@ -116,7 +116,7 @@ impl Past<'_> {
         motion: &Motion<'_>,
         [t0, t1]: [f64; 2],
         x: &mut [f64],
-    ) -> Result<Vec<Piece>, ParticleError> {
+    ) -> Result<Vec<Piece>, ModelFailure> {
         let step = self.difference_step(t1);
         let before = motion.memories(self, t0, x, step);
         let u0 = motion.inputs(t0);
@@ -129,7 +129,7 @@ impl Past<'_> {
         match pieces.iter().position(|piece| !piece.scale().is_finite()) {
             Some(i) => {
                 let what = format!("the delayed `{}`", self.tracks[i].memory.of);
-                Err(ParticleError::NotFinite { what, time: t1 })
+                Err(ModelFailure::NotFinite { what, time: t1 })
             }
             None => Ok(pieces),
         }

@@ -1,7 +1,7 @@
 //! What a worker says to the coordinator, both ways.
 
 use bytes::Bytes;
-use starlings_models::{ParticleError, Prediction};
+use starlings_models::{ModelFailure, ParticleError, Prediction, Timeout};
 
 use super::{Lease, SetupId, WireError, floats, job::check_state, required, setup_id};
 use crate::MAX_SLOTS;
@@ -33,7 +33,7 @@ pub struct Hello {
 /// How one lease ended on a worker.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Answer {
-    /// A prediction, or the model's failure.
+    /// A prediction, or why there is none.
     Ran(Result<Prediction, ParticleError>),
     /// The job was withdrawn before it started.
     Withdrawn,
@@ -156,34 +156,51 @@ fn decode_result(result: wire::Result) -> Result<FromWorker, WireError> {
 
 fn encode_failure(error: ParticleError) -> failure::Kind {
     match error {
-        ParticleError::NotFinite { what, time } => {
+        ParticleError::Model(failed) => encode_model_failure(failed),
+        ParticleError::BadJob(text) => failure::Kind::BadJob(text),
+        ParticleError::Infrastructure(text) => failure::Kind::Infrastructure(text),
+        ParticleError::Timeout(Timeout { limit, says }) => {
+            failure::Kind::Timeout(wire::Timeout { limit_s: Some(limit), says })
+        }
+        ParticleError::Undecided(text) => failure::Kind::Undecided(text),
+    }
+}
+
+fn encode_model_failure(failed: ModelFailure) -> failure::Kind {
+    match failed {
+        ModelFailure::NotFinite { what, time } => {
             failure::Kind::NotFinite(wire::NotFinite { what, time: Some(time) })
         }
-        ParticleError::StepTooSmall { time, step } => {
+        ModelFailure::StepTooSmall { time, step } => {
             failure::Kind::StepTooSmall(wire::StepTooSmall { time: Some(time), step: Some(step) })
         }
-        ParticleError::TooManySteps { time, limit } => {
+        ModelFailure::TooManySteps { time, limit } => {
             failure::Kind::TooManySteps(wire::TooManySteps { time: Some(time), limit })
         }
-        ParticleError::BadJob(text) => failure::Kind::BadJob(text),
-        ParticleError::Solver(text) => failure::Kind::Solver(text),
-        ParticleError::Lost { attempts, reason } => failure::Kind::Lost(wire::Lost { attempts, reason }),
+        ModelFailure::OutsideDomain(text) => failure::Kind::OutsideDomain(text),
+        ModelFailure::Solver(text) => failure::Kind::Solver(text),
     }
 }
 
 fn decode_failure(kind: failure::Kind) -> Result<ParticleError, WireError> {
-    Ok(match kind {
+    let failed = match kind {
+        failure::Kind::BadJob(text) => return Ok(ParticleError::BadJob(text)),
+        failure::Kind::Infrastructure(text) => return Ok(ParticleError::Infrastructure(text)),
+        failure::Kind::Undecided(text) => return Ok(ParticleError::Undecided(text)),
+        failure::Kind::Timeout(f) => {
+            return Ok(Timeout { limit: required(f.limit_s, "limit_s")?, says: f.says }.into());
+        }
         failure::Kind::NotFinite(f) => {
-            ParticleError::NotFinite { what: f.what, time: required(f.time, "time")? }
+            ModelFailure::NotFinite { what: f.what, time: required(f.time, "time")? }
         }
         failure::Kind::StepTooSmall(f) => {
-            ParticleError::StepTooSmall { time: required(f.time, "time")?, step: required(f.step, "step")? }
+            ModelFailure::StepTooSmall { time: required(f.time, "time")?, step: required(f.step, "step")? }
         }
         failure::Kind::TooManySteps(f) => {
-            ParticleError::TooManySteps { time: required(f.time, "time")?, limit: f.limit }
+            ModelFailure::TooManySteps { time: required(f.time, "time")?, limit: f.limit }
         }
-        failure::Kind::BadJob(text) => ParticleError::BadJob(text),
-        failure::Kind::Solver(text) => ParticleError::Solver(text),
-        failure::Kind::Lost(f) => ParticleError::Lost { attempts: f.attempts, reason: f.reason },
-    })
+        failure::Kind::OutsideDomain(text) => ModelFailure::OutsideDomain(text),
+        failure::Kind::Solver(text) => ModelFailure::Solver(text),
+    };
+    Ok(failed.into())
 }

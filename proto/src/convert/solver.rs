@@ -4,13 +4,13 @@
 
 pub mod description;
 
-use starlings_models::{Addition, ObserverDef, ParticleError, Run, Signal, Solved, Window};
+use starlings_models::{Addition, ModelFailure, ObserverDef, ParticleError, Run, Signal, Solved, Window};
 
 use super::{WireError, floats, required};
 use crate::solver_wire::{self as wire, failure::Kind as FailureKind, run_reply::Kind as ReplyKind};
 
 /// Number of the protocol between worker and solver; both must have the same.
-pub const SOLVER_PROTOCOL: u32 = 1;
+pub const SOLVER_PROTOCOL: u32 = 2;
 
 /// One run as a solver receives it.
 #[derive(Clone, Debug, PartialEq)]
@@ -117,13 +117,25 @@ pub fn encode_reply(reply: &Reply) -> wire::RunReply {
             outputs: floats::encode(&solved.outputs),
             state: floats::encode(&solved.state),
         }),
-        Reply::Ended(Err(ParticleError::NotFinite { what, time })) => {
+        Reply::Ended(Err(ParticleError::Model(ModelFailure::NotFinite { what, time }))) => {
             failure(FailureKind::NotFinite, what.clone(), Some(*time))
+        }
+        Reply::Ended(Err(ParticleError::Model(ModelFailure::OutsideDomain(text)))) => {
+            failure(FailureKind::OutsideDomain, text.clone(), None)
+        }
+        Reply::Ended(Err(ParticleError::Model(failed))) => {
+            failure(FailureKind::OutsideDomain, failed.to_string(), None)
         }
         Reply::Ended(Err(ParticleError::BadJob(text))) => {
             failure(FailureKind::BadRequest, text.clone(), None)
         }
-        Reply::Ended(Err(error)) => failure(FailureKind::Solver, error.to_string(), None),
+        Reply::Ended(Err(ParticleError::Infrastructure(text))) => {
+            failure(FailureKind::Unavailable, text.clone(), None)
+        }
+        Reply::Ended(Err(ParticleError::Undecided(text))) => failure(FailureKind::Solver, text.clone(), None),
+        Reply::Ended(Err(ParticleError::Timeout(timeout))) => {
+            failure(FailureKind::Solver, timeout.to_string(), None)
+        }
     };
     wire::RunReply { kind: Some(kind) }
 }
@@ -141,10 +153,13 @@ pub fn decode_reply(message: wire::RunReply) -> Result<Reply, WireError> {
         })),
         ReplyKind::Failure(failure) => Reply::Ended(Err(match failure.kind() {
             FailureKind::NotFinite => {
-                ParticleError::NotFinite { what: failure.text, time: failure.time.unwrap_or(f64::NAN) }
+                let time = failure.time.unwrap_or(f64::NAN);
+                ModelFailure::NotFinite { what: failure.text, time }.into()
             }
+            FailureKind::OutsideDomain => ModelFailure::OutsideDomain(failure.text).into(),
             FailureKind::BadRequest => ParticleError::BadJob(failure.text),
-            FailureKind::Solver => ParticleError::Solver(failure.text),
+            FailureKind::Unavailable => ParticleError::Infrastructure(failure.text),
+            FailureKind::Solver => ParticleError::Undecided(failure.text),
         })),
     })
 }

@@ -15,7 +15,7 @@ A solver says what it has and does one thing: `rate`, `step` or `run` (`Solver`)
 """
 
 from .expression import Expression, ExpressionError
-from .failures import DeclarationError, Failed, NotFinite
+from .failures import DeclarationError, Failed, NotFinite, OutsideDomain, Unavailable
 from .matrices import extension
 from .observers import Correction, Observer
 from .quantity import Quantity
@@ -35,12 +35,14 @@ __all__ = [
     "Inputs",
     "NotFinite",
     "Observer",
+    "OutsideDomain",
     "Quantity",
     "Run",
     "Signal",
     "Simulated",
     "Solver",
     "StepInputs",
+    "Unavailable",
     "Values",
     "Window",
     "extension",

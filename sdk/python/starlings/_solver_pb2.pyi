@@ -164,9 +164,13 @@ class Failure(_message.Message):
         SOLVER: _ClassVar[Failure.Kind]
         NOT_FINITE: _ClassVar[Failure.Kind]
         BAD_REQUEST: _ClassVar[Failure.Kind]
+        OUTSIDE_DOMAIN: _ClassVar[Failure.Kind]
+        UNAVAILABLE: _ClassVar[Failure.Kind]
     SOLVER: Failure.Kind
     NOT_FINITE: Failure.Kind
     BAD_REQUEST: Failure.Kind
+    OUTSIDE_DOMAIN: Failure.Kind
+    UNAVAILABLE: Failure.Kind
     KIND_FIELD_NUMBER: _ClassVar[int]
     TEXT_FIELD_NUMBER: _ClassVar[int]
     TIME_FIELD_NUMBER: _ClassVar[int]

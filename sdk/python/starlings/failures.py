@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from typing import Optional
 
-#: The three kinds of failure, by the names of the wire.
+#: The kinds of failure, by the names of the wire.
 SOLVER, NOT_FINITE, BAD_REQUEST = "SOLVER", "NOT_FINITE", "BAD_REQUEST"
+OUTSIDE_DOMAIN, UNAVAILABLE = "OUTSIDE_DOMAIN", "UNAVAILABLE"
 
 
 class DeclarationError(ValueError):
@@ -25,6 +26,17 @@ class NotFinite(ArithmeticError):
         super().__init__(what if time is None else f"{what} at time {time:g}")
         self.what = what
         self.time = time
+
+
+class OutsideDomain(ArithmeticError):
+    """The model has no solution for these parameters, such as no convergence. A solver raises it itself; the text says how."""
+
+
+class Unavailable(Exception):
+    """The solver cannot compute here and now, such as a refused licence. A solver raises it itself; the text says why.
+
+    It says nothing of the parameters: the run is made elsewhere or later.
+    """
 
 
 class BadRequest(ValueError):

@@ -11,7 +11,20 @@ from typing import Any, Callable, Dict, List, Sequence, Tuple
 
 import numpy as np
 
-from .failures import BAD_REQUEST, NOT_FINITE, SOLVER, BadRequest, Cancelled, Failed, Misfit, NotFinite
+from .failures import (
+    BAD_REQUEST,
+    NOT_FINITE,
+    OUTSIDE_DOMAIN,
+    SOLVER,
+    UNAVAILABLE,
+    BadRequest,
+    Cancelled,
+    Failed,
+    Misfit,
+    NotFinite,
+    OutsideDomain,
+    Unavailable,
+)
 from .job import Answer, Job, check_finite, prepare
 from .places import show, told
 from .shapes import table, vector
@@ -42,6 +55,13 @@ def execute(
         raise Failed(BAD_REQUEST, str(error)) from error
     except NotFinite as error:
         raise Failed(NOT_FINITE, error.what, error.time) from error
+    except OutsideDomain as error:
+        raise Failed(OUTSIDE_DOMAIN, str(error)) from error
+    except Unavailable as error:
+        raise Failed(UNAVAILABLE, str(error)) from error
+    except (OSError, MemoryError) as error:  # of the machine, not of the parameters
+        show(error, served.solver)
+        raise Failed(UNAVAILABLE, told(error, served.solver)) from error
     except Exception as error:  # whatever a solver raises is data about this run
         show(error, served.solver)
         raise Failed(SOLVER, told(error, served.solver)) from error

@@ -17,7 +17,7 @@ from .solver import Served
 from .values import Array, Signal
 
 #: Number of the protocol that this package speaks.
-PROTOCOL = 1
+PROTOCOL = 2
 
 _FLOAT = np.dtype("<f8")
 

@@ -57,7 +57,7 @@ class Process:
         )
 
     def describe(self):
-        return self._describe(pb.DescribeRequest(protocol=1), timeout=60)
+        return self._describe(pb.DescribeRequest(protocol=2), timeout=60)
 
     def run(self, request):
         """The last reply."""

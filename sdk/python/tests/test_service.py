@@ -43,7 +43,7 @@ def request(**changes):
 
 def test_a_solver_says_what_it_is(serve):
     said = serve(DECAY).describe()
-    assert (said.protocol, said.name, said.says) == (1, "decay", "A height that falls.")
+    assert (said.protocol, said.name, said.says) == (2, "decay", "A height that falls.")
     assert [(q.name, q.unit) for q in said.parameters] == [("rate", "1/s")]
     assert [(q.name, q.unit, q.size) for q in said.states] == [("x", "m", 1)]
     assert [q.name for q in said.inputs] == ["rise"]

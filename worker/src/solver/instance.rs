@@ -8,11 +8,12 @@
 mod answer;
 mod connect;
 
+use std::pin::pin;
 use std::process::ChildStdin;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use starlings_models::{Description, ParticleError, Run, Solved, SolverDef};
+use starlings_models::{Description, ModelFailure, ParticleError, Run, Solved, SolverDef};
 use starlings_proto::WireError;
 use starlings_proto::convert::solver::{Reply, decode_reply, encode_run};
 use starlings_proto::solver_wire::solver_client::SolverClient;
@@ -28,6 +29,8 @@ use super::error::tail_text;
 use super::process::{Launch, Process, ending, is_killed};
 use super::scratch::Scratch;
 use super::site::Site;
+use super::stopped::stopped;
+use super::stopwatch::{Stopwatch, Time};
 
 /// How long a run that is given up on purpose may go on.
 const LEFT_AFTER: Duration = Duration::from_millis(2);
@@ -47,6 +50,8 @@ pub(crate) struct Lost {
 pub(crate) enum How {
     /// It did not answer in time.
     Silent,
+    /// It did not answer in time because somebody stopped it.
+    Stopped,
     /// It ended by itself, or broke the protocol.
     Fell,
     /// Somebody killed it.
@@ -155,23 +160,31 @@ impl Instance {
                 }
             }
         };
-        let timed = async { tokio::time::timeout(patience, conversation).await };
-        match self.runtime.block_on(timed) {
+        let process = self.process.as_ref();
+        match self.runtime.block_on(within(patience, process, conversation)) {
             Ok(Ok(answer)) => {
                 Ok(answer.and_then(|solved| self.sound(run, solved)).map_err(|e| self.named(e)))
             }
             Ok(Err(broken)) => Err(self.lost(broken)),
-            Err(_) => {
-                // A program that somebody else started is not ended.
-                let ended = if self.process.is_some() { " and was ended" } else { "" };
-                let what = format!(
-                    "the solver `{}` did not answer within {} s{ended} (`timeout` sets the limit)",
-                    self.name,
-                    patience.as_secs_f64(),
-                );
-                Err(Lost { how: How::Silent, what, tail: self.tail() })
-            }
+            Err(how) => Err(self.late(how, patience.as_secs_f64())),
         }
+    }
+
+    /// No answer in time.
+    fn late(&mut self, how: How, seconds: f64) -> Lost {
+        let solver = format!("the solver `{}`", self.name);
+        // A program that somebody else started is not ended.
+        let ended = if self.process.is_some() { " and was ended" } else { "" };
+        let what = match how {
+            How::Stopped => stopped(&solver, seconds),
+            _ => format!("{solver} did not answer within {seconds} s{ended} (`timeout` sets the limit)"),
+        };
+        Lost { how, what, tail: self.tail() }
+    }
+
+    /// Whether somebody has removed its folder.
+    pub(crate) fn is_homeless(&self) -> bool {
+        self.scratch.is_gone()
     }
 
     /// Asks for a run and cancels the call.
@@ -185,8 +198,11 @@ impl Instance {
     /// Refuses an answer of another length than asked for, or one that is not finite, while the program's output is at hand.
     fn sound(&self, run: &Run<'_>, solved: Solved) -> Result<Solved, ParticleError> {
         let Ok(described) = &self.described else { return Ok(solved) };
-        match answer::fault(&described.spec, run, &solved) {
-            Some(fault) => Err(ParticleError::Solver(fault)),
+        if let Some(fault) = answer::wrong_length(&described.spec, run, &solved) {
+            return Err(ParticleError::Undecided(fault));
+        }
+        match answer::not_finite(&described.spec, run, &solved) {
+            Some(fault) => Err(ModelFailure::Solver(fault).into()),
             None => Ok(solved),
         }
     }
@@ -200,18 +216,15 @@ impl Instance {
                 "the solver `{name}` refuses it: {}{tail}",
                 answer::short(&text)
             )),
-            ParticleError::Solver(text) => {
-                ParticleError::Solver(format!("the solver `{name}` {}{tail}", answer::short(&text)))
+            ParticleError::Undecided(text) => {
+                ParticleError::Undecided(format!("the solver `{name}` {}{tail}", answer::short(&text)))
             }
-            ParticleError::NotFinite { what, time } if time.is_finite() => ParticleError::NotFinite {
-                what: format!("{} of the solver `{name}`", answer::short(&what)),
-                time,
-            },
-            ParticleError::NotFinite { what, .. } => ParticleError::Solver(format!(
-                "the solver `{name}` says that {} is not a finite number{tail}",
-                answer::short(&what)
+            ParticleError::Infrastructure(text) => ParticleError::Infrastructure(format!(
+                "the solver `{name}` cannot compute now: {}{tail}",
+                answer::short(&text)
             )),
-            other => other,
+            ParticleError::Model(failed) => answer::named(name, failed, &tail).into(),
+            ParticleError::Timeout(_) => error,
         }
     }
 
@@ -236,6 +249,27 @@ impl Instance {
             }
         };
         Lost { how, what, tail }
+    }
+}
+
+/// An answer within so much time, in which the program was not stopped.
+async fn within<T>(
+    patience: Duration,
+    process: Option<&Process>,
+    answer: impl Future<Output = T>,
+) -> Result<T, How> {
+    let mut watch = Stopwatch::start(patience, Instant::now());
+    let mut answer = pin!(answer);
+    loop {
+        match watch.look(Instant::now(), || process.is_some_and(Process::is_stopped)) {
+            Time::Left(left) => {
+                if let Ok(answer) = tokio::time::timeout(left, &mut answer).await {
+                    return Ok(answer);
+                }
+            }
+            Time::Up => return Err(How::Silent),
+            Time::Stopped => return Err(How::Stopped),
+        }
     }
 }
 

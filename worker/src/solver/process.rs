@@ -1,26 +1,29 @@
 //! One program of a solver: its own process group, limits, and the end of what it says.
 //!
-//! Dropping it kills the whole group, children that the program left behind included. Next file to read: [`super::guard`].
+//! Dropping it kills the whole group, children that the program left behind included. The number of a group belongs to it as long
+//! as its leader is not reaped, so the leader is reaped last, after the group was signalled. Next file to read: [`super::guard`].
+
+mod ending;
+mod last_lines;
 
 use std::collections::{BTreeMap, VecDeque};
-use std::io::{self, BufRead, BufReader, Read};
-use std::os::unix::process::CommandExt;
+use std::io;
+use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use rustix::process::{Pid, Resource, Rlimit, prlimit};
+use rustix::process::{Pid, Resource, Rlimit, WaitId, WaitIdOptions, prlimit, waitid};
 use rustix::thread::{CpuSet, sched_setaffinity};
 
 use super::SolverError;
 use super::error::ABSENT;
 use super::guard::{Notice, kill_group};
-
-/// Lines of the end of a program's output that travel with a failure, and the longest of them.
-const TAIL_LINES: usize = 12;
-const TAIL_WIDTH: usize = 240;
+use super::stopped::is_stopped;
+pub(crate) use ending::{ending, is_killed};
+use last_lines::remember;
 
 /// How long the words of a program that runs on are waited for once it has failed.
 const MOMENT: Duration = Duration::from_millis(20);
@@ -145,9 +148,19 @@ impl Process {
         }
     }
 
-    /// How it ended, if it has.
-    pub(crate) fn ended(&mut self) -> Option<ExitStatus> {
-        self.child.try_wait().ok().flatten()
+    /// How it ended, if it has. It is not reaped: its number, and that of its group, are given to no other process.
+    pub(crate) fn ended(&self) -> Option<ExitStatus> {
+        let pid = Pid::from_raw(self.group)?;
+        let looks = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
+        let ended = waitid(WaitId::Pid(pid), looks).ok().flatten()?;
+        // As `wait` packs them: the code in the second byte, a signal in the first.
+        let raw = ended.exit_status().map(|code| code << 8).or(ended.terminating_signal())?;
+        Some(ExitStatus::from_raw(raw))
+    }
+
+    /// Whether somebody stopped it, or a process that it started.
+    pub(crate) fn is_stopped(&self) -> bool {
+        is_stopped(self.group)
     }
 
     /// Waits for its end for so long.
@@ -184,29 +197,11 @@ impl Process {
 impl Drop for Process {
     fn drop(&mut self) {
         kill_group(self.group);
-        let _ = self.child.wait();
         if let Some(notice) = &self.notice {
             notice.end(self.group.cast_unsigned());
         }
+        let _ = self.child.wait();
     }
-}
-
-/// How a program ended, in words.
-pub(crate) fn ending(status: ExitStatus) -> String {
-    use std::os::unix::process::ExitStatusExt;
-    match (status.code(), status.signal()) {
-        (Some(code), _) => format!("exited with status {code}"),
-        (None, Some(9)) => "was killed (signal 9: out of memory, or somebody killed it)".to_owned(),
-        (None, Some(signal)) => format!("was ended by signal {signal}"),
-        (None, None) => "ended".to_owned(),
-    }
-}
-
-/// Whether somebody else ended a program, or what a shell or a launcher of MPI started for it: those pass a signal on as 128
-/// and its number.
-pub(crate) fn is_killed(status: ExitStatus) -> bool {
-    use std::os::unix::process::ExitStatusExt;
-    matches!(status.signal(), Some(9 | 15)) || matches!(status.code(), Some(137 | 143))
 }
 
 /// A program next to the study, or wherever the system finds it.
@@ -225,81 +220,43 @@ fn reason(error: &io::Error) -> String {
     }
 }
 
-/// Keeps the last lines of a stream, and of a long line its beginning.
-fn remember(stream: impl Read, tail: &Mutex<VecDeque<String>>) {
-    let mut stream = BufReader::new(stream);
-    let mut line = Vec::new();
-    loop {
-        let piece = match stream.fill_buf() {
-            Ok(piece) if !piece.is_empty() => piece,
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
-            _ => break,
-        };
-        let end = piece.iter().position(|byte| *byte == b'\n');
-        let own = &piece[..end.unwrap_or(piece.len())];
-        // A character has at most four bytes.
-        let room = (4 * TAIL_WIDTH).saturating_sub(line.len());
-        line.extend_from_slice(&own[..own.len().min(room)]);
-        let read = end.map_or(piece.len(), |end| end + 1);
-        stream.consume(read);
-        if end.is_some() {
-            keep_line(&line, tail);
-            line.clear();
-        }
-    }
-    keep_line(&line, tail);
-}
-
-fn keep_line(line: &[u8], tail: &Mutex<VecDeque<String>>) {
-    // Bytes that would steer a terminal are shown as what they are: no text.
-    let shown = |c: char| if c.is_control() && c != '\t' { char::REPLACEMENT_CHARACTER } else { c };
-    let text = String::from_utf8_lossy(line.trim_ascii_end());
-    let text: String = text.chars().take(TAIL_WIDTH).map(shown).collect();
-    if text.is_empty() {
-        return;
-    }
-    let mut tail = tail.lock().unwrap_or_else(PoisonError::into_inner);
-    if tail.len() == TAIL_LINES {
-        tail.pop_front();
-    }
-    tail.push_back(text);
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn remembered(bytes: &[u8]) -> Vec<String> {
-        let tail = Mutex::default();
-        remember(bytes, &tail);
-        tail.into_inner().expect("nobody panicked").into()
-    }
-
-    #[test]
-    fn of_what_a_program_says_the_last_lines_are_kept_and_of_a_long_line_the_beginning() {
-        let many = (0..50).map(|i| format!("line {i}\r\n\n")).collect::<Vec<_>>().concat();
-        let kept = remembered(many.as_bytes());
-        assert_eq!((kept.len(), kept[0].as_str(), kept[11].as_str()), (TAIL_LINES, "line 38", "line 49"));
-        let long = [vec![b'x'; 10_000_000], b"\nend".to_vec()].concat();
-        assert_eq!(remembered(&long), ["x".repeat(TAIL_WIDTH), "end".to_owned()]);
-    }
-
-    #[test]
-    fn a_program_that_was_killed_under_a_wrapper_was_killed_and_one_that_failed_was_not() {
-        let ended = |script: &str| {
-            let status = Command::new("sh").args(["-c", script]).stderr(Stdio::null()).status();
-            is_killed(status.expect("there is a shell"))
+    fn started(script: &str) -> Process {
+        let command = ["sh", "-c", script].map(str::to_owned);
+        let launch = Launch {
+            command: &command,
+            base: "",
+            folder: None,
+            environment: BTreeMap::new(),
+            threads: 1,
+            cores: None,
+            memory: None,
+            input: false,
         };
-        assert!(ended("kill -9 $$") && ended("kill -15 $$"));
-        assert!(ended("sh -c 'kill -9 $$'; exit $?") && ended("sh -c 'kill -15 $$'; exit $?"));
-        assert!(!ended("exit 3") && !ended("sh -c 'kill -11 $$'; exit $?"));
+        Process::start(&launch, None).expect("there is a shell")
     }
 
     #[test]
-    fn garbage_is_shown_as_no_text_and_steers_no_terminal() {
-        assert_eq!(
-            remembered(b"\x1b[2Jcleared \xff\n\0\0"),
-            ["\u{fffd}[2Jcleared \u{fffd}", "\u{fffd}\u{fffd}"]
-        );
+    fn a_program_that_ended_keeps_its_number_until_its_group_was_ended() {
+        let mut process = started("sleep 1000 & echo last words >&2; exit 7");
+        let status = process.wait(Duration::from_mins(1)).expect("it ends at once");
+        assert_eq!(status.code(), Some(7));
+        assert_eq!(process.tail(), "last words");
+        // Asking again gives the same: it is still there to be asked.
+        assert_eq!(process.ended().and_then(|status| status.code()), Some(7));
+        let pid = Pid::from_raw(process.group).expect("a number above zero");
+        drop(process);
+        let options = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
+        assert!(waitid(WaitId::Pid(pid), options).is_err(), "it is reaped");
+    }
+
+    #[test]
+    fn a_program_that_is_killed_tells_its_signal() {
+        let mut process = started("kill -9 $$");
+        let status = process.wait(Duration::from_mins(1)).expect("it ends at once");
+        assert!(is_killed(status) && ending(status).contains("signal 9"), "{}", ending(status));
     }
 }

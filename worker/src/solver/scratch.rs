@@ -1,15 +1,14 @@
-//! Scratch folders: one for every program or run, removed when it is done; those of failed runs are kept, up to a limit.
+//! Scratch folders: one for every program or run, removed when it is done; of runs that failed alike one is kept, up to a limit.
 //!
 //! All of a process lie in one root, which goes with the last of them. A process that ends without dropping anything leaves
 //! its root to the guard, through [`clear`]. Next file to read: [`super::guard`].
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use tempfile::Builder;
@@ -29,7 +28,8 @@ pub(crate) struct ScratchRoot(Arc<Root>);
 /// Lives as long as the last folder in it.
 struct Root {
     folder: PathBuf,
-    kept: AtomicUsize,
+    /// By what is told of the failure.
+    kept: Mutex<BTreeMap<String, PathBuf>>,
     notice: Option<Notice>,
 }
 
@@ -43,13 +43,29 @@ impl ScratchRoot {
         if let Some(notice) = &notice {
             notice.begin_folder(&folder);
         }
-        Ok(Self(Arc::new(Root { folder, kept: AtomicUsize::new(0), notice })))
+        Ok(Self(Arc::new(Root { folder, kept: Mutex::default(), notice })))
+    }
+
+    /// Whether somebody else has removed it.
+    pub(crate) fn is_gone(&self) -> bool {
+        !self.0.folder.is_dir()
     }
 
     pub(crate) fn folder(&self, label: &str) -> io::Result<Scratch> {
         let folder = private(&format!("{label}-"), &self.0.folder)?;
         Ok(Scratch { folder, is_kept: false, root: Arc::clone(&self.0) })
     }
+}
+
+/// What became of the folder of a failed run.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) enum Kept {
+    /// It stays.
+    This(PathBuf),
+    /// It goes; the folder of a run that failed alike is there.
+    Alike(PathBuf),
+    /// It goes, with nothing that is like it.
+    TooMany,
 }
 
 impl Drop for Root {
@@ -80,16 +96,26 @@ impl Scratch {
         &self.folder
     }
 
-    /// Keeps the folder for people to look at, unless as many are kept as may be; says where it is.
-    pub(crate) fn keep(mut self) -> Option<PathBuf> {
-        if self.root.kept.fetch_add(1, Ordering::Relaxed) >= KEPT {
-            return None;
+    /// Whether somebody else has removed it, as a cleaner of temporary folders does.
+    pub(crate) fn is_gone(&self) -> bool {
+        !self.folder.is_dir()
+    }
+
+    /// Keeps the folder for people to look at, unless one of the same failure is there already or as many are kept as may be.
+    pub(crate) fn keep(mut self, failure: &str) -> Kept {
+        let root = Arc::clone(&self.root);
+        let mut kept = root.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        match kept.get(failure) {
+            Some(folder) if folder.is_dir() => return Kept::Alike(folder.clone()),
+            None if kept.len() >= KEPT => return Kept::TooMany,
+            _ => {}
         }
-        if let Some(notice) = &self.root.notice {
+        kept.insert(failure.to_owned(), self.folder.clone());
+        if let Some(notice) = &root.notice {
             notice.keep_folder(&self.folder);
         }
         self.is_kept = true;
-        Some(self.folder.clone())
+        Kept::This(self.folder.clone())
     }
 }
 
@@ -169,14 +195,19 @@ mod tests {
     }
 
     #[test]
-    fn folders_of_failed_runs_stay_up_to_the_limit() {
+    fn of_runs_that_failed_alike_one_folder_stays_and_of_others_as_many_as_may() {
         let base = tempfile::tempdir().expect("a folder");
         let root = ScratchRoot::new(Some(base.path()), None).expect("a root");
-        let kept: Vec<_> =
-            (0..KEPT + 3).filter_map(|_| root.folder("run").expect("a folder").keep()).collect();
-        let top = kept[0].parent().expect("the root").to_path_buf();
+        let keep = |failure: &str| root.folder("run").expect("a folder").keep(failure);
+        let Kept::This(first) = keep("status 1") else { panic!("the first one stays") };
+        assert_eq!(keep("status 1"), Kept::Alike(first.clone()));
+        let others = (0..KEPT + 3).map(|i| keep(&format!("diverged at {i}")));
+        assert_eq!(others.filter(|kept| *kept == Kept::TooMany).count(), 4);
+        assert_eq!(keep("status 1"), Kept::Alike(first.clone()));
+        fs::remove_dir_all(&first).expect("somebody cleans up");
+        assert!(matches!(keep("status 1"), Kept::This(folder) if folder != first));
+        let top = first.parent().expect("the root").to_path_buf();
         drop(root);
-        assert_eq!(kept.len(), KEPT);
         assert_eq!(fs::read_dir(top).expect("it stays").count(), KEPT);
     }
 

@@ -8,8 +8,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use starlings_models::{
-    Addition, Description, EffectDef, EffectParameter, Job, ModelDef, ParticleError, Quantity, SOLVER, Setup,
-    SetupError, Solved, Spec,
+    Addition, Description, EffectDef, EffectParameter, Job, ModelDef, ModelFailure, ParticleError, Quantity,
+    SOLVER, Setup, SetupError, Solved, Spec,
 };
 use starlings_proto::FRAME_SIZE;
 use starlings_proto::convert::solver::description::encode_description;
@@ -72,6 +72,7 @@ impl Served {
             observer: request.observer,
             effects,
             max_steps: None,
+            timeout: None,
         };
         let theta =
             request.parameters.into_iter().chain(request.initial.iter().map(|(_, value)| *value)).collect();
@@ -131,11 +132,11 @@ impl Solver for Service {
                 decode_run(request.get_ref()).map_err(|error| ParticleError::BadJob(error.to_string()));
             answer.and_then(|request| {
                 catch_unwind(AssertUnwindSafe(|| served.run(request)))
-                    .unwrap_or_else(|panic| Err(ParticleError::Solver(panic_text(panic.as_ref()))))
+                    .unwrap_or_else(|panic| Err(ModelFailure::Solver(panic_text(panic.as_ref())).into()))
             })
         };
         let answer = tokio::task::spawn_blocking(work).await;
-        let answer = answer.unwrap_or_else(|error| Err(ParticleError::Solver(error.to_string())));
+        let answer = answer.unwrap_or_else(|error| Err(ParticleError::Undecided(error.to_string())));
         Ok(Response::new(tokio_stream::once(Ok(encode_reply(&Reply::Ended(answer))))))
     }
 }

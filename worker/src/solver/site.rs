@@ -43,7 +43,8 @@ impl Site {
     /// When it cannot be made.
     pub(crate) fn scratch(&self, label: &str) -> io::Result<Scratch> {
         let mut root = self.scratch.lock().unwrap_or_else(PoisonError::into_inner);
-        if root.is_none() {
+        // A cleaner of temporary folders may have taken it away with all that was in it.
+        if root.as_ref().is_none_or(ScratchRoot::is_gone) {
             let notice = self.guard().map_err(io::Error::other)?;
             *root = Some(ScratchRoot::new(self.options.scratch.as_deref(), notice)?);
         }

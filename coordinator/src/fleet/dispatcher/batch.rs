@@ -1,24 +1,19 @@
 //! The jobs of one batch: the setup that each needs, how often each was tried, how each ended.
 //!
-//! Next file to read: `queue`, for those that wait.
+//! Next files to read: `queue`, for those that wait, `doubt` for those that failed and nobody knows why.
+
+mod notices;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use starlings_models::{ParticleError, Prediction};
+use starlings_models::{Failure, Prediction};
 use starlings_proto::SetupId;
 
-use super::message::{Command, WorkerId};
+use super::doubt::Doubt;
+use super::message::WorkerId;
 use super::queue::{Again, Queue};
-use crate::fleet::{FleetEvent, Outcome};
-
-/// What a job is called in events.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct JobName {
-    /// Index of the sigma point.
-    pub particle: u32,
-    /// Index of the record.
-    pub record: u32,
-}
+use crate::fleet::Outcome;
+use crate::fleet::job_name::JobName;
 
 /// What the loss of a worker means for a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,6 +35,8 @@ pub(super) struct Batch {
     names: Vec<JobName>,
     jobs: Vec<State>,
     pub(super) queue: Queue,
+    /// Jobs that failed twice and wait for a run that is known to work.
+    parked: BTreeMap<usize, WorkerId>,
     done: usize,
     told: usize,
 }
@@ -51,16 +48,27 @@ struct State {
     starts: u32,
     losses: u32,
     recalled: bool,
-    failure: Option<Failure>,
+    /// The worker that it must not go to, as long as another one may run it.
+    avoided: Option<WorkerId>,
+    earlier: Option<Earlier>,
+    doubt: Option<Doubt>,
     outcome: Option<Outcome>,
 }
 
-/// A model's failure, kept while another worker tries.
+/// How an attempt ended, kept while the job is tried again.
 #[derive(Debug)]
-struct Failure {
-    error: ParticleError,
-    by: WorkerId,
+struct Earlier {
+    end: Ended,
     name: String,
+}
+
+/// How an attempt without a prediction ended.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Ended {
+    /// It is the model's doing, or the limit of wall time.
+    Decided(Failure),
+    /// Abnormally: nobody knows yet whose doing it is.
+    Undecided(String),
 }
 
 impl Batch {
@@ -78,7 +86,17 @@ impl Batch {
             states.push(State { setup, ..State::default() });
         }
         let queue = Queue::new(setups.len(), states.iter().map(|job| job.setup));
-        Self { setups, open, first_job, names, jobs: states, queue, done: 0, told: 0 }
+        Self {
+            setups,
+            open,
+            first_job,
+            names,
+            jobs: states,
+            queue,
+            parked: BTreeMap::new(),
+            done: 0,
+            told: 0,
+        }
     }
 
     /// The setup at this position.
@@ -129,74 +147,116 @@ impl Batch {
         self.jobs.into_iter().filter_map(|job| job.outcome).collect()
     }
 
-    /// How far the batch is, when that changed.
-    pub(super) fn progress(&mut self) -> Option<FleetEvent> {
-        let changed = self.told != self.done;
-        self.told = self.done;
-        changed.then_some(FleetEvent::Progress { done: self.done, total: self.jobs.len() })
-    }
-
-    /// What a job is called in a sentence.
-    pub(super) fn describe(&self, job: u64) -> String {
-        let name = self.index_of(job).and_then(|index| self.names.get(index));
-        name.map_or_else(|| format!("run {job}"), |n| format!("particle {}, record {}", n.particle, n.record))
-    }
-
     /// Counts a start and returns its number, from 1.
     pub(super) fn start(&mut self, index: usize) -> u32 {
         self.jobs[index].starts += 1;
         self.jobs[index].starts
     }
 
+    /// A job comes back that was not started.
     pub(super) fn withdrawn(&mut self, index: usize) {
+        self.jobs[index].doubt = None;
         self.requeue(index);
     }
 
-    /// Whether a model's failure may be tried on another worker.
+    /// Whether no attempt has failed yet: it may be tried once more.
     pub(super) fn may_retry(&self, index: usize) -> bool {
-        self.jobs[index].failure.is_none()
+        self.jobs[index].earlier.is_none()
     }
 
-    pub(super) fn retry_elsewhere(&mut self, index: usize, by: WorkerId, error: ParticleError, name: &str) {
-        self.jobs[index].failure = Some(Failure { error, by, name: name.to_owned() });
+    pub(super) fn retry_elsewhere(&mut self, index: usize, by: WorkerId, end: Ended, name: &str) {
+        self.remember(index, end, name);
+        self.jobs[index].avoided = Some(by);
         self.requeue(index);
+    }
+
+    /// Keeps how an attempt ended.
+    pub(super) fn remember(&mut self, index: usize, end: Ended, name: &str) {
+        self.jobs[index].earlier = Some(Earlier { end, name: name.to_owned() });
+    }
+
+    /// What it is being tried for.
+    pub(super) fn doubt(&self, index: usize) -> Option<Doubt> {
+        self.jobs[index].doubt
+    }
+
+    pub(super) fn set_doubt(&mut self, index: usize, doubt: Option<Doubt>) {
+        self.jobs[index].doubt = doubt;
+    }
+
+    /// Has a job wait until a run is known to work that can be made where it failed.
+    pub(super) fn park(&mut self, index: usize, by: WorkerId) {
+        self.parked.insert(index, by);
+    }
+
+    /// The jobs that wait so, each with where it failed.
+    pub(super) fn parked(&self) -> &BTreeMap<usize, WorkerId> {
+        &self.parked
+    }
+
+    /// Takes a job out of those that wait so.
+    pub(super) fn unpark(&mut self, index: usize) {
+        self.parked.remove(&index);
+    }
+
+    /// The names of its jobs, in their order.
+    pub(super) fn names(&self) -> impl Iterator<Item = &JobName> {
+        self.names.iter()
+    }
+
+    pub(super) fn name(&self, index: usize) -> JobName {
+        self.names[index]
+    }
+
+    /// Jobs without an outcome.
+    pub(super) fn n_open(&self) -> usize {
+        self.jobs.len() - self.done
     }
 
     /// Takes back a job whose worker is gone; `counted` when the worker may have died of it.
-    pub(super) fn lost(&mut self, index: usize, counted: bool, limit: u32, name: &str, reason: &str) -> Lost {
+    pub(super) fn lost(&mut self, index: usize, counted: bool, limit: u32) -> Lost {
         let job = &mut self.jobs[index];
         job.losses += u32::from(counted);
+        job.doubt = None;
         if counted && job.losses >= limit {
-            let attempts = self.attempts(index);
-            let error = ParticleError::Lost { attempts, reason: reason.to_owned() };
-            self.end(index, Outcome { result: Err(error), attempts, worker: name.to_owned() });
             return Lost::GivenUp;
         }
         self.requeue(index);
         Lost::Requeued
     }
 
-    /// Ends jobs that come back and may go nowhere, with the failure they had.
+    /// Jobs that come back and may go to no other worker: those that are decided end with the failure they had, the others may go
+    /// back to where they failed. Returns those that ended.
     pub(super) fn settle(&mut self, again: Again) -> Vec<usize> {
-        let indices = self.queue.take_all(again);
-        for &index in &indices {
+        let mut ended = Vec::new();
+        for index in self.queue.take_all(again) {
             let attempts = self.attempts(index);
-            if let Some(failure) = self.jobs[index].failure.take() {
-                self.end(index, Outcome { result: Err(failure.error), attempts, worker: failure.name });
+            match self.jobs[index].earlier.take() {
+                Some(Earlier { end: Ended::Decided(failure), name }) => {
+                    self.end(index, Outcome { result: Err(failure), attempts, worker: name });
+                    ended.push(index);
+                }
+                other => {
+                    self.jobs[index].earlier = other;
+                    self.jobs[index].avoided = None;
+                    self.requeue(index);
+                }
             }
         }
-        indices
+        ended
     }
 
-    pub(super) fn finish(&mut self, index: usize, result: Result<Prediction, ParticleError>, name: &str) {
+    pub(super) fn finish(&mut self, index: usize, result: Result<Prediction, Failure>, name: &str) {
         let attempts = self.attempts(index) + 1;
         self.end(index, Outcome { result, attempts, worker: name.to_owned() });
     }
 
     /// A job is called back only for one of these setups, and at most once, so that it cannot travel for ever.
     pub(super) fn may_recall(&self, job: u64, setups: &BTreeSet<SetupId>) -> bool {
-        self.index_of(job)
-            .is_some_and(|index| !self.jobs[index].recalled && setups.contains(self.setup_of(index)))
+        self.index_of(job).is_some_and(|index| {
+            let job = &self.jobs[index];
+            !job.recalled && job.doubt.is_none() && setups.contains(self.setup_of(index))
+        })
     }
 
     pub(super) fn mark_recalled(&mut self, job: u64) {
@@ -205,35 +265,16 @@ impl Batch {
         }
     }
 
-    pub(super) fn retried(&self, index: usize, worker: &str, reason: &str) -> FleetEvent {
-        let JobName { particle, record } = self.names[index];
-        FleetEvent::JobRetried { particle, record, worker: worker.to_owned(), reason: reason.to_owned() }
-    }
-
-    /// That a job is given up; its parameters are known to whoever holds the jobs.
-    pub(super) fn failed(&self, index: usize) -> Command {
-        let JobName { particle, record } = self.names[index];
-        let outcome = self.jobs[index].outcome.as_ref();
-        let attempts = outcome.map_or(0, |o| o.attempts);
-        let reason = match outcome.and_then(|o| o.result.as_ref().err()) {
-            // The event counts the attempts itself.
-            Some(ParticleError::Lost { reason, .. }) => reason.clone(),
-            Some(error) => error.to_string(),
-            None => String::new(),
-        };
-        let notice = FleetEvent::JobFailed { particle, record, parameters: Vec::new(), attempts, reason };
-        Command::GivenUp { index, notice }
-    }
-
-    /// Attempts that ended with a lost worker or a model's failure.
-    fn attempts(&self, index: usize) -> u32 {
+    /// Attempts that ended with a lost worker or a failure; those that a place could not make are none.
+    pub(super) fn attempts(&self, index: usize) -> u32 {
         let job = &self.jobs[index];
-        job.losses + u32::from(job.failure.is_some())
+        job.losses + u32::from(job.earlier.is_some())
     }
 
-    fn requeue(&mut self, index: usize) {
-        let avoided = self.jobs[index].failure.as_ref().map(|f| f.by);
-        self.queue.put_back(index, Again { avoided, setup: self.jobs[index].setup });
+    /// Has a job wait again.
+    pub(super) fn requeue(&mut self, index: usize) {
+        let job = &self.jobs[index];
+        self.queue.put_back(index, Again { avoided: job.avoided, setup: job.setup });
     }
 
     fn end(&mut self, index: usize, outcome: Outcome) {

@@ -1,4 +1,4 @@
-//! What may follow from any event: failures settle, jobs are given out and called back, the batch ends.
+//! What may follow from any event: failures settle, control runs are made, jobs are given out and called back, the batch ends.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,12 +10,14 @@ use super::message::{BatchError, Command, WorkerId};
 use super::roster::{self, SetupState, Worker};
 
 impl Dispatcher {
-    /// Everything that may follow from any event: settle, give out, recall, end.
+    /// Everything that may follow from any event: settle, make control runs, give out, recall, end.
     pub(super) fn proceed(&mut self) {
         if self.local_only {
             self.fail_without_setup();
         }
         self.settle_failures();
+        // Before jobs are given out: a place on trial makes one run at a time, and this one tells more.
+        self.control();
         self.give_out();
         self.recall();
         if let Some(batch) = self.batch.take_if(|batch| batch.is_done()) {
@@ -47,13 +49,14 @@ impl Dispatcher {
         (!reasons.is_empty()).then(|| reasons.join("; "))
     }
 
-    /// Ends the failed jobs that wait for another worker when there is none.
+    /// Ends the failed jobs that wait for another worker when there is none; those whose failure is undecided may then go back to
+    /// the one where they failed.
     fn settle_failures(&mut self) {
         let Some(batch) = &mut self.batch else { return };
         for again in batch.queue.again() {
             let Some(avoided) = again.avoided else { continue };
             let setup = batch.setup(again.setup);
-            let other = self.workers.values().any(|w| w.id != avoided && w.may_run(setup));
+            let other = self.workers.values().any(|w| w.id != avoided && w.could_take(setup));
             if !other {
                 for index in batch.settle(again) {
                     self.out.push(batch.failed(index));
@@ -86,7 +89,8 @@ impl Dispatcher {
     /// Calls back jobs that wait behind a busy slot while another slot is idle.
     fn recall(&mut self) {
         let Some(batch) = &mut self.batch else { return };
-        let idle = self.workers.values().filter(|w| w.load() < w.slots).collect::<Vec<_>>();
+        let idle =
+            self.workers.values().filter(|w| w.aside.is_none() && w.load() < w.slots).collect::<Vec<_>>();
         if idle.is_empty() {
             return;
         }
@@ -133,7 +137,8 @@ fn next_setup(workers: &BTreeMap<WorkerId, Worker>, batch: &Batch) -> Option<usi
     batch.queue.fresh_setups().find(|&setup| open.iter().any(|w| w.is_ready(batch.setup(setup))))
 }
 
-fn lease(worker: &mut Worker, batch: &mut Batch, index: usize) -> Command {
+/// Gives a job to a worker.
+pub(super) fn lease(worker: &mut Worker, batch: &mut Batch, index: usize) -> Command {
     let lease = Lease { epoch: worker.id.0, job: batch.job_number(index), attempt: batch.start(index) };
     worker.hold(lease);
     Command::SendJob { worker: worker.id, lease, index }

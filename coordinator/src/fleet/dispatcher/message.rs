@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use starlings_proto::{Answer, Lease, SetupId};
 
-use super::batch::JobName;
+use crate::fleet::job_name::JobName;
 use crate::fleet::{FleetEvent, Outcome};
 
 /// Number of a worker's stream: the epoch of its leases. A process that connects again gets a new one.
@@ -135,7 +135,42 @@ pub enum BatchError {
     LocalWorkers(String),
     /// The network ended although nobody closed the fleet.
     Stopped(String),
+    /// Every worker that could take a job was set aside for too long.
+    Unavailable {
+        /// How long.
+        waited: Duration,
+        /// Each with its reason.
+        reasons: String,
+    },
+    /// A program ends abnormally again and again, and no run is known to work that could tell whose doing it is.
+    NoControl {
+        /// Index of the job in the batch.
+        index: usize,
+        /// Index of the sigma point.
+        particle: u32,
+        /// Index of the record.
+        record: u32,
+        /// Its parameters as a list, for whoever holds the jobs to fill in.
+        parameters: String,
+        /// How it ended last.
+        reason: String,
+    },
+    /// A job has no answer, and not by the model's doing: it was lost with worker after worker, or does not fit the model.
+    NoAnswer {
+        /// Index of the job in the batch.
+        index: usize,
+        /// Index of the sigma point.
+        particle: u32,
+        /// Index of the record.
+        record: u32,
+        /// What happened.
+        reason: String,
+    },
 }
+
+/// A run that is known to work, by the place in which it is kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ControlId(pub u64);
 
 /// Something to do.
 #[derive(Clone, Debug, PartialEq)]
@@ -155,6 +190,27 @@ pub enum Command {
         lease: Lease,
         /// Index of the job in the batch.
         index: usize,
+    },
+    /// Keep a copy of a job of the running batch: it is known to work.
+    Keep {
+        /// As what.
+        control: ControlId,
+        /// Index of the job in the batch.
+        index: usize,
+    },
+    /// A kept job is of no more use.
+    Forget {
+        /// Which.
+        control: ControlId,
+    },
+    /// Send a kept job, under the lease of the job that failed.
+    SendControl {
+        /// To whom.
+        worker: WorkerId,
+        /// Under which lease.
+        lease: Lease,
+        /// Which.
+        control: ControlId,
     },
     /// Withdraw jobs that have not started.
     Cancel {

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use starlings_proto::{Lease, SetupId};
 
+use super::aside::Aside;
 use super::message::{Joining, WorkerId};
 
 /// Jobs per slot held by a worker whose jobs are long: one runs, one waits.
@@ -45,6 +46,8 @@ pub(super) struct Worker {
     pub(super) nonce: u64,
     pub(super) last_heard: Duration,
     pub(super) setups: BTreeMap<SetupId, SetupState>,
+    /// Why it gets no jobs at the moment.
+    pub(super) aside: Option<Aside>,
     held: BTreeMap<u64, Held>,
     sent: u64,
     cost: Option<f64>,
@@ -69,6 +72,7 @@ impl Worker {
             nonce: joining.nonce,
             last_heard: now,
             setups: BTreeMap::new(),
+            aside: None,
             held: BTreeMap::new(),
             sent: 0,
             cost: None,
@@ -123,7 +127,26 @@ impl Worker {
         !matches!(self.setups.get(setup), Some(SetupState::Failed(_)))
     }
 
+    /// Whether the worker may get jobs of this setup, now or once it is built.
+    pub(super) fn could_take(&self, setup: &SetupId) -> bool {
+        self.aside.is_none() && self.may_run(setup)
+    }
+
+    /// Whether it runs jobs of this setup now.
+    pub(super) fn takes(&self, setup: &SetupId) -> bool {
+        self.aside.is_none() && self.is_ready(setup)
+    }
+
+    /// Whether a control run can be made there now. In a place that was set aside it is how the place is tried when a job that
+    /// tried it crashed.
+    pub(super) fn may_control(&self, setup: &SetupId) -> bool {
+        self.is_ready(setup) && self.aside.as_ref().is_none_or(|aside| aside.is_due && self.load() == 0)
+    }
+
     pub(super) fn has_room(&self) -> bool {
+        if let Some(aside) = &self.aside {
+            return aside.is_due && self.load() == 0;
+        }
         let credit = match self.cost {
             Some(cost) => ((LOOKAHEAD / cost.max(1e-9)) as usize).clamp(MIN_CREDIT, MAX_CREDIT),
             None => MIN_CREDIT,

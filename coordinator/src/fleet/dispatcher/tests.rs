@@ -1,6 +1,8 @@
 //! Events in, commands compared.
 
+mod aside;
 mod chaos;
+mod doubt;
 mod leases;
 mod losses;
 mod mixed;
@@ -9,11 +11,11 @@ mod waiting;
 
 use std::time::Duration;
 
-use starlings_models::{ParticleError, Prediction};
+use starlings_models::{ModelFailure, ParticleError, Prediction};
 use starlings_proto::{Answer, Lease, SetupId};
 
-use super::batch::JobName;
-use super::{BatchError, Command, Dispatcher, Event, Joining, Rules, WorkerId};
+use super::{BatchError, Command, ControlId, Dispatcher, Event, Joining, Rules, WorkerId};
+use crate::fleet::job_name::JobName;
 use crate::fleet::{FleetEvent, Outcome};
 
 const SETUP: SetupId = [7; 32];
@@ -35,7 +37,7 @@ fn joining(id: u64, slots: u32) -> Joining {
 }
 
 fn names(n: u32) -> Vec<JobName> {
-    (0..n).map(|particle| JobName { particle, record: 0 }).collect()
+    (0..n).map(|particle| JobName { particle, record: 0, span: [0, 1] }).collect()
 }
 
 fn submit(n: u32) -> Event {
@@ -120,6 +122,35 @@ fn outcomes(commands: &[Command]) -> Option<&[Outcome]> {
     })
 }
 
+/// A failure of the model, as a worker tells it.
 fn solver(text: &str) -> ParticleError {
-    ParticleError::Solver(text.to_owned())
+    failed(text).into()
+}
+
+/// A failure of the model.
+fn failed(text: &str) -> ModelFailure {
+    ModelFailure::Solver(text.to_owned())
+}
+
+/// An abnormal end.
+fn crash(text: &str) -> ParticleError {
+    ParticleError::Undecided(text.to_owned())
+}
+
+/// A failure of the place.
+fn place(text: &str) -> ParticleError {
+    ParticleError::Infrastructure(text.to_owned())
+}
+
+fn ran(lease: Lease, result: Result<Prediction, ParticleError>) -> Event {
+    answered(lease, Answer::Ran(result), 1.0)
+}
+
+/// The control runs among commands.
+fn controls(commands: &[Command]) -> Vec<(Lease, ControlId)> {
+    let sent = commands.iter().filter_map(|command| match command {
+        Command::SendControl { lease, control, .. } => Some((*lease, *control)),
+        _ => None,
+    });
+    sent.collect()
 }

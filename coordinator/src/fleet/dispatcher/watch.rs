@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use super::batch::Batch;
-use super::roster::SetupState;
+use super::roster::{SetupState, Worker};
 use super::{BatchError, Command, Dispatcher};
 use crate::fleet::FleetEvent;
 
@@ -47,6 +47,7 @@ impl Dispatcher {
             self.out.push(Command::Close { worker: id });
             self.lose(id, &reason, false);
         }
+        self.workers.values_mut().for_each(|worker| worker.look_again(now));
         if let Some(progress) = self.batch.as_mut().and_then(Batch::progress) {
             self.out.push(Command::Notice(progress));
         }
@@ -75,7 +76,7 @@ impl Dispatcher {
     /// Says what is missing while no worker can take any job of the batch, and ends the batch when patience does.
     fn watch_starvation(&mut self, now: Duration) {
         let Some(batch) = &self.batch else { return };
-        if batch.open_setups().any(|setup| self.workers.values().any(|w| w.is_ready(setup))) {
+        if batch.open_setups().any(|setup| self.workers.values().any(|w| w.takes(setup))) {
             self.starved = None;
             return;
         }
@@ -85,10 +86,14 @@ impl Dispatcher {
         if told {
             starved.next_notice *= 2;
         }
-        if waited >= self.rules.patience {
+        // A worker that was set aside and computes a run to try it may be well again.
+        let tried = self.workers.values().any(|w| w.aside.is_some() && w.load() > 0);
+        if waited >= self.rules.patience && !tried {
             let failed = batch.open_setups().find_map(|setup| self.failed_everywhere(setup));
+            let aside = self.reasons_aside();
             let error = match failed {
                 Some(reason) => BatchError::SetupFailed { reason },
+                None if !aside.is_empty() => BatchError::Unavailable { waited, reasons: aside },
                 None => BatchError::NoWorkers { waited, missing: self.missing(batch) },
             };
             self.abort(error);
@@ -96,6 +101,12 @@ impl Dispatcher {
             let notice = FleetEvent::Waiting { seconds: waited.as_secs_f64(), missing: self.missing(batch) };
             self.out.push(Command::Notice(notice));
         }
+    }
+
+    /// The workers that are set aside, with their reasons.
+    fn reasons_aside(&self) -> String {
+        let aside = |w: &Worker| w.aside.as_ref().map(|aside| format!("{} ({})", w.name, aside.reason));
+        self.workers.values().filter_map(aside).collect::<Vec<_>>().join("; ")
     }
 
     /// What a batch without a ready worker lacks.
@@ -111,7 +122,8 @@ impl Dispatcher {
             if let Some(reason) = reason {
                 failed.push(format!("{} ({reason})", worker.name));
             }
-            if !states.iter().all(|state| matches!(state, Some(SetupState::Failed(_)))) {
+            let is_failed = states.iter().all(|state| matches!(state, Some(SetupState::Failed(_))));
+            if worker.aside.is_none() && !is_failed {
                 building.push(worker.name.as_str());
             }
         }
@@ -121,6 +133,16 @@ impl Dispatcher {
         }
         if !failed.is_empty() {
             parts.push(format!("the model cannot be built by {}", failed.join(", ")));
+        }
+        // Their reasons were told when they were set aside.
+        let aside = self.workers.values().filter(|w| w.aside.is_some());
+        let aside = aside.map(|w| w.name.as_str()).collect::<Vec<_>>();
+        if !aside.is_empty() {
+            parts.push(format!(
+                "every run fails on {}, which {} tried now and then",
+                aside.join(", "),
+                if aside.len() == 1 { "is" } else { "are" }
+            ));
         }
         if parts.is_empty() { "no worker is connected".to_owned() } else { parts.join("; ") }
     }

@@ -12,16 +12,17 @@ use tokio::sync::mpsc::UnboundedSender;
 
 use super::{Outgoing, Reply};
 use crate::fleet::FleetEvent;
-use crate::fleet::dispatcher::{BatchError, Command, Dispatcher, Event, Rules, WorkerId};
+use crate::fleet::dispatcher::{BatchError, Command, ControlId, Dispatcher, Event, Rules, WorkerId};
 
 /// Guarded by the hub's lock.
 pub(super) struct State {
     pub(super) dispatcher: Dispatcher,
     pub(super) links: BTreeMap<WorkerId, Link>,
     pub(super) setups: BTreeMap<SetupId, Bytes>,
-    /// Names of the parameters of each setup, in the order of a job's.
-    pub(super) names: BTreeMap<SetupId, Vec<String>>,
+    pub(super) known: BTreeMap<SetupId, Known>,
     pub(super) running: Option<Submission>,
+    /// Jobs that are known to work, for control runs.
+    pub(super) kept: BTreeMap<ControlId, (SetupId, Job)>,
     pub(super) events: Sender<FleetEvent>,
     pub(super) first_epoch: u64,
     pub(super) joined: u64,
@@ -29,6 +30,14 @@ pub(super) struct State {
     pub(super) given_up: Option<String>,
     pub(super) stopped: Option<String>,
     pub(super) other_builds: BTreeSet<[u8; 32]>,
+}
+
+/// What is known of a setup without building it.
+pub(super) struct Known {
+    /// Names of its parameters, in the order of a job's.
+    pub(super) parameters: Vec<String>,
+    /// Length of a state, where it is known.
+    pub(super) n_state: Option<usize>,
 }
 
 /// The way to one worker.
@@ -60,8 +69,9 @@ impl State {
             dispatcher: Dispatcher::new(rules),
             links: BTreeMap::new(),
             setups: BTreeMap::new(),
-            names: BTreeMap::new(),
+            known: BTreeMap::new(),
             running: None,
+            kept: BTreeMap::new(),
             events,
             first_epoch,
             joined: 0,
@@ -87,6 +97,13 @@ impl State {
     }
 
     pub(super) fn handle(&mut self, now: Duration, event: Event) {
+        let event = match event {
+            Event::Answered { worker, lease, answer, cost } => {
+                let answer = self.checked(&lease, answer);
+                Event::Answered { worker, lease, answer, cost }
+            }
+            other => other,
+        };
         for command in self.dispatcher.step(now, event) {
             self.carry_out(command);
         }
@@ -127,13 +144,33 @@ impl State {
                 let message = running.encoder.encode(lease, setup, job);
                 self.send(worker, message);
             }
+            Command::SendControl { worker, lease, control } => {
+                let Some(running) = &mut self.running else { return };
+                let Some((setup, job)) = self.kept.get(&control) else { return };
+                let message = running.encoder.encode(lease, setup, job);
+                self.send(worker, message);
+            }
+            Command::Keep { control, index } => {
+                let job = self.running.as_ref().and_then(|running| running.jobs.get(index));
+                self.kept.extend(job.map(|job| (control, job.clone())));
+            }
+            Command::Forget { control } => {
+                self.kept.remove(&control);
+            }
             Command::Cancel { worker, leases } => self.send(worker, ToWorker::cancel(&leases)),
             // Its stream ends without a word: a worker that still lives dials again.
             Command::Close { worker } => {
                 self.links.remove(&worker);
             }
             Command::BatchDone(outcomes) => self.reply(Ok(outcomes)),
-            Command::BatchFailed(error) => self.reply(Err(error)),
+            Command::BatchFailed(mut error) => {
+                if let BatchError::NoControl { index, parameters, .. } = &mut error {
+                    let named = self.parameters(*index);
+                    let listed = named.iter().map(|(name, value)| format!("{name} = {value}"));
+                    *parameters = listed.collect::<Vec<_>>().join(", ");
+                }
+                self.reply(Err(error));
+            }
             Command::Notice(event) => self.tell(event),
             Command::GivenUp { index, mut notice } => {
                 if let FleetEvent::JobFailed { parameters, .. } = &mut notice {
@@ -153,7 +190,7 @@ impl State {
     fn parameters(&self, index: usize) -> Vec<(String, f64)> {
         let job = self.running.as_ref().and_then(|running| running.jobs.get(index));
         let Some((setup, job)) = job else { return Vec::new() };
-        let names = self.names.get(setup).into_iter().flatten();
+        let names = self.known.get(setup).map(|known| &known.parameters).into_iter().flatten();
         names.cloned().zip(job.theta.iter().copied()).collect()
     }
 

@@ -2,7 +2,7 @@
 
 use std::sync::mpsc::{self, Receiver};
 
-use starlings_models::{ParticleError, Setup, Window};
+use starlings_models::{ModelFailure, Setup, Window};
 use starlings_proto::{Answer, JobEncoder, encode_setup};
 use tokio::sync::mpsc::unbounded_channel;
 
@@ -40,7 +40,7 @@ fn hub(build: Option<[u8; 32]>) -> (Hub, Receiver<FleetEvent>) {
 
 fn batch(hub: &Hub) -> (Submission, Receiver<Reply>) {
     let (setup, json) = encode_setup(&Setup::default()).expect("it travels");
-    hub.install(setup, json, vec!["k".to_owned()]);
+    hub.install(setup, json, vec!["k".to_owned()], None);
     let window = Window { start: 0.0, times: vec![1.0], observed: vec![0.0], inputs: vec![] };
     let job = starlings_models::Job {
         particle: 0,
@@ -80,7 +80,7 @@ fn a_run_that_is_given_up_is_told_with_the_values_of_its_parameters() {
         Ok(ToWorker::Job { lease, .. }) => Some(lease),
         _ => None,
     });
-    let answer = Answer::Ran(Err(ParticleError::Solver("diverged".to_owned())));
+    let answer = Answer::Ran(Err(ModelFailure::Solver("diverged".to_owned()).into()));
     hub.handle(Event::Answered { worker, lease: lease.expect("it is sent"), answer, cost: 0.1 });
     assert!(replies.try_recv().is_ok(), "the batch has ended");
     let told = events.try_iter().filter(FleetEvent::is_notable).map(|e| e.to_string()).collect::<Vec<_>>();

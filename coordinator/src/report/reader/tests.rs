@@ -77,7 +77,7 @@ fn parameters_that_differ_by_a_number_are_a_family() {
 fn killed() -> (tempfile::TempDir, Store) {
     let folder = tempfile::tempdir().unwrap();
     let info = serde_json::to_string(&StudyInfo::default()).unwrap();
-    let mut store = Store::create(&folder.path().join("run.db"), &[("info", &info)]).unwrap();
+    let store = Store::create(&folder.path().join("run.db"), &[("info", &info)]).unwrap();
     let joined = FleetEvent::WorkerJoined {
         worker: "1@node-07/311".into(),
         host: "node-07".into(),
@@ -131,7 +131,7 @@ fn a_worker_is_busy_by_the_share_of_its_slots() {
     let of_two = fleet::table(&store, Some(&summary())).unwrap();
     assert_eq!(of_two.workers[0].busy_share, Some(0.3));
     let unknown = tempfile::tempdir().unwrap();
-    let mut store = Store::create(&unknown.path().join("run.db"), &[]).unwrap();
+    let store = Store::create(&unknown.path().join("run.db"), &[]).unwrap();
     store.analysis(&analysis(0, 1, vec![job(0, 0, 1, None)]), &snapshot(0)).unwrap();
     let without_event = fleet::table(&store, Some(&summary())).unwrap();
     assert_eq!(without_event.workers[0].busy_share, None);

@@ -26,6 +26,21 @@ pub(super) fn max_steps(source: &Source, file: &StudyFile) -> Option<u64> {
     None
 }
 
+/// The limit of computing time that the study sets for a model that is no solver, if any; one that makes no sense is reported.
+pub(super) fn timeout(source: &Source, file: &StudyFile) -> Option<f64> {
+    file.model.timeout.as_ref().map(|given| seconds(source, "timeout", given))
+}
+
+/// A time of the study in seconds; one that makes no sense is reported.
+pub(super) fn seconds(source: &Source, key: &str, given: &Spanned<f64>) -> f64 {
+    let found = *given.get_ref();
+    if !(found > 0.0 && found <= 3.2e9) {
+        let message = format!("`{key}` must be above zero and at most 3.2e9 s, found {found}");
+        source.report(given.span(), message);
+    }
+    found
+}
+
 /// Refuses a record over which a delay of a state or an output would take too many steps: a run steps from one sample of what is
 /// remembered to the next, whatever the tolerance.
 pub(super) fn check_delays(source: &Source, file: &StudyFile, setup: &Setup, records: &[Record]) {

@@ -56,8 +56,8 @@ pub(in crate::study) fn model(
     let layout = file.model.layout.as_ref().map(|layout| layout.value.clone());
     let solver = solver.map(|known| Box::new(known.def.clone()));
     let model = ModelDef { kind: file.model.kind.get_ref().clone(), constants, equations, layout, solver };
-    let max_steps = limits::max_steps(source, file);
-    let mut setup = Setup { model, max_steps, ..Setup::default() };
+    let (max_steps, timeout) = (limits::max_steps(source, file), limits::timeout(source, file));
+    let mut setup = Setup { model, max_steps, timeout, ..Setup::default() };
     let bare = spec(source, file, &setup)?;
     check_roles(source, file, &bare);
     let candidates = sort_effects(source, file, &mut setup, &bare)?;

@@ -11,6 +11,7 @@ use std::sync::Arc;
 
 use starlings_models::effect::{EffectParameter, Scale, names, scale};
 use starlings_models::{EffectDef, Job, ObserverDef, ParticleError, SOLVER, Setup, SetupError, Spec, Window};
+use starlings_proto::spent::spent;
 
 use super::model::{self, CheckedModel};
 use super::prior;
@@ -158,7 +159,7 @@ fn courses(
         };
         let theta = trial.theta.iter().zip(&kept).filter(|(_, kept)| **kept).map(|(v, _)| *v).collect();
         let job = Job { particle: 0, record: index as u32, window: Arc::new(window), theta, state: None };
-        let outputs = model.run(&job)?.outputs;
+        let outputs = model.run_within(&job, &spent())?.outputs;
         for row in outputs.chunks(n_obs.max(1)) {
             bare.outputs.iter().zip(row).for_each(|(name, value)| widen(name, *value));
         }

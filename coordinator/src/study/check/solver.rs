@@ -14,6 +14,7 @@ use starlings_models::{
 };
 
 use self::files::{copies, described, templates};
+use super::limits;
 use super::settings::counted;
 use crate::study::Surroundings;
 use crate::study::file::StudyFile;
@@ -91,13 +92,7 @@ fn run_folder(source: &Source, section: &ProgramSection, folder: &Path) -> PathB
 fn def(source: &Source, section: &ProgramSection, folder: &Path) -> SolverDef {
     let default = SolverDef::default();
     let seconds = |key: &str, value: &Option<toml::Spanned<f64>>, default: f64| {
-        let Some(value) = value else { return default };
-        let found = *value.get_ref();
-        if !(found > 0.0 && found <= 3.2e9) {
-            let message = format!("`{key}` must be above zero and at most 3.2e9 s, found {found}");
-            source.report(value.span(), message);
-        }
-        found
+        value.as_ref().map_or(default, |given| limits::seconds(source, key, given))
     };
     SolverDef {
         adapter: section.adapter.clone(),
@@ -269,6 +264,6 @@ struct Nobody;
 
 impl Solve for Nobody {
     fn solve(&self, _: &Run<'_>) -> Result<Solved, ParticleError> {
-        Err(ParticleError::Solver("no solver was started".to_owned()))
+        Err(ParticleError::Infrastructure("no solver was started".to_owned()))
     }
 }

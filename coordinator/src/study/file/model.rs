@@ -44,9 +44,12 @@ const ROLES: [&str; 18] = [
 
 /// Reads `[model]`.
 pub(in crate::study) fn model(source: &Source, root: &Table<'_>) -> ModelSection {
-    let mut keys =
-        [&["kind", "constants", "initial", "layout", "max_steps"], &EQUATIONS[..], &solver::KEYS[..]]
-            .concat();
+    let mut keys = [
+        &["kind", "constants", "initial", "layout", "max_steps", "timeout"],
+        &EQUATIONS[..],
+        &solver::KEYS[..],
+    ]
+    .concat();
     keys.sort_unstable();
     keys.dedup();
     if root.get("model").is_none() {
@@ -60,6 +63,7 @@ pub(in crate::study) fn model(source: &Source, root: &Table<'_>) -> ModelSection
             initial: None,
             layout: None,
             max_steps: None,
+            timeout: None,
             equations: None,
             solver: None,
         };
@@ -70,6 +74,7 @@ pub(in crate::study) fn model(source: &Source, root: &Table<'_>) -> ModelSection
     let equations = (of_kind == "equations").then(|| equations(source, &t));
     let solver = (of_kind == SOLVER).then(|| program(source, &t, kind.span()));
     refuse_foreign(source, &t, of_kind);
+    let timeout = if of_kind == SOLVER { None } else { t.number("timeout") };
     let layout = t.get("layout").map(|node| Layout::read(source, node));
     ModelSection {
         constants: constants(source, &t),
@@ -77,6 +82,7 @@ pub(in crate::study) fn model(source: &Source, root: &Table<'_>) -> ModelSection
         kind,
         layout,
         max_steps: t.count("max_steps"),
+        timeout,
         equations,
         solver,
     }
@@ -88,7 +94,7 @@ fn refuse_foreign(source: &Source, model: &Table<'_>, kind: &str) {
     for (key, _) in model.entries() {
         let owners: Vec<&str> = kinds
             .iter()
-            .filter(|(_, keys)| keys.contains(&key.get_ref().as_str()))
+            .filter(|(_, keys)| keys.contains(&key.get_ref().as_str()) && key.get_ref() != "timeout")
             .map(|(owner, _)| *owner)
             .collect();
         if !owners.is_empty() && !owners.contains(&kind) {

@@ -11,7 +11,8 @@ use starlings_estimators::{Batch, BatchState, BatchStep, Block, Data, EstimatorE
 use starlings_models::Window;
 
 use super::ensemble::noise;
-use super::flight::{Flight, Place, Results, StepWindows, stack_outputs};
+use super::flight::{Flight, Place, Results, StepWindows};
+use super::stack::stack_outputs;
 use crate::study::store::snapshot::{Head, Snapshot};
 use crate::study::store::{AnalysisRow, Store};
 use crate::study::{Fit, Progress, RunContext, RunError, Study, posterior};
@@ -22,7 +23,7 @@ use crate::study::{Fit, Progress, RunContext, RunError, Study, posterior};
 /// When the fleet or the store fails, or no run around the estimate succeeds.
 pub fn fit(
     flight: &mut Flight<'_>,
-    store: &mut Store,
+    store: &Store,
     context: &mut RunContext<'_>,
     resumed: Option<Snapshot>,
 ) -> Result<Fit, RunError> {

@@ -6,11 +6,12 @@
 use starlings_estimators::{Analysis, Data, Particles};
 
 use super::ensemble::{noise, recombine};
-use super::flight::{Flight, Place, StepWindows, stack_outputs, stack_states};
+use super::flight::{Flight, Place, StepWindows};
 use super::resample;
 use super::rescue::{Flown, fly};
 use super::schedule::{Reported, Schedule, particles};
 use super::settle;
+use super::stack::{stack_outputs, stack_states};
 use crate::study::store::snapshot::Snapshot;
 use crate::study::store::{AnalysisRow, InnovationRow, Store};
 use crate::study::{Fit, RunContext, RunError, Study, posterior};
@@ -21,7 +22,7 @@ use crate::study::{Fit, RunContext, RunError, Study, posterior};
 /// When the fleet or the store fails, or too few sigma points can be run.
 pub fn fit(
     flight: &mut Flight<'_>,
-    store: &mut Store,
+    store: &Store,
     context: &mut RunContext<'_>,
     resumed: Option<Snapshot>,
 ) -> Result<Fit, RunError> {

@@ -7,10 +7,11 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
-use starlings_models::{Job, ParticleError, Prediction, Setup, Window};
+use starlings_models::{Failure, Job, Prediction, Setup, Window};
 
-use crate::fleet::{Fleet, SetupId};
-use crate::study::store::JobRow;
+use super::timeouts::Timeouts;
+use crate::fleet::{Fleet, FleetError, Outcome, SetupId};
+use crate::study::store::{JobRow, Store};
 use crate::study::trial::named;
 use crate::study::{RunError, Study};
 
@@ -26,8 +27,8 @@ pub struct Place {
     pub step: usize,
 }
 
-/// A prediction per particle and window, or why there is none.
-pub type Results = Vec<Vec<Result<Prediction, ParticleError>>>;
+/// A prediction per particle and window, or why there is none: the model's doing, or the limit of wall time.
+pub type Results = Vec<Vec<Result<Prediction, Failure>>>;
 
 /// Sends runs to a fleet and keeps the rows that the store will want.
 pub struct Flight<'a> {
@@ -46,6 +47,10 @@ pub struct Flight<'a> {
     pub threads: usize,
     /// Workers that answered.
     workers: BTreeSet<String>,
+    /// Length of a state, where the model's specification says it.
+    n_state: Option<usize>,
+    /// Runs that were given up after their limit of wall time, where a store keeps them.
+    timeouts: Option<Timeouts<'a>>,
 }
 
 impl<'a> Flight<'a> {
@@ -55,6 +60,8 @@ impl<'a> Flight<'a> {
     /// When the fleet refuses the setup.
     pub fn new(study: &'a Study, fleet: &'a mut dyn Fleet) -> Result<Self, RunError> {
         let setup = fleet.install(&study.setup)?;
+        let spec = study.setup.spec().ok();
+        let n_state = spec.filter(|spec| spec.restart).map(|spec| spec.n_state());
         Ok(Self {
             study,
             fleet,
@@ -65,7 +72,23 @@ impl<'a> Flight<'a> {
             retried: 0,
             threads: 1,
             workers: BTreeSet::new(),
+            n_state,
+            timeouts: None,
         })
+    }
+
+    /// The same, with timeouts kept in a store: one that is there is repeated without a run.
+    ///
+    /// # Errors
+    /// When the store cannot be read.
+    pub fn deciding(mut self, store: &'a Store) -> Result<Self, RunError> {
+        self.timeouts = Some(Timeouts::read(store)?);
+        Ok(self)
+    }
+
+    /// A warning about the timeouts in the store, if there are any.
+    pub fn timeouts(&self) -> Option<String> {
+        self.timeouts.as_ref()?.warning()
     }
 
     /// Runs the given particles over the windows and gives back what the study's channels measure of them. `theta` is p × r in transformed units, `states[record]` is n × r or
@@ -81,39 +104,40 @@ impl<'a> Flight<'a> {
         states: &[Option<DMatrix<f64>>],
         windows: &StepWindows,
     ) -> Result<Results, RunError> {
-        let mut jobs = Vec::with_capacity(particles.len() * windows.len());
         let sent: StepWindows =
             windows.iter().map(|(record, window)| (*record, self.sent(*record, window))).collect();
-        for &particle in particles {
+        let study = self.study;
+        let job = |index: usize| {
+            let (particle, (record, window)) = (particles[index / sent.len()], &sent[index % sent.len()]);
             let column: DVector<f64> = theta.column(particle).into_owned();
-            for (record, window) in &sent {
-                jobs.push(Job {
-                    particle: particle as u32,
-                    record: *record as u32,
-                    window: Arc::clone(window),
-                    theta: self.study.theta_for(*record, column.as_slice()),
-                    state: states[*record].as_ref().map(|x| x.column(particle).iter().copied().collect()),
-                });
+            Job {
+                particle: particle as u32,
+                record: *record as u32,
+                window: Arc::clone(window),
+                theta: study.theta_for(*record, column.as_slice()),
+                state: states[*record].as_ref().map(|x| x.column(particle).iter().copied().collect()),
             }
-        }
-        self.total += jobs.len() as u64;
-        let outcomes = self.fleet.run(self.setup, jobs)?;
-        let mut outcomes = outcomes.into_iter();
+        };
+        let n_job = particles.len() * sent.len();
+        self.total += n_job as u64;
+        let mut outcomes = self.outcomes(place, n_job, job)?.into_iter();
         let mut results = Vec::with_capacity(particles.len());
         for &particle in particles {
             let mut of_particle = Vec::with_capacity(windows.len());
             for ((record, window), outcome) in windows.iter().zip(outcomes.by_ref()) {
                 self.rows.push(self.row(place, *record, particle, &outcome));
-                if !self.workers.contains(&outcome.worker) {
+                // A timeout that is repeated from the store has no worker.
+                if !outcome.worker.is_empty() && !self.workers.contains(&outcome.worker) {
                     self.workers.insert(outcome.worker.clone());
                 }
                 self.retried += u64::from(outcome.attempts.saturating_sub(1));
                 self.failed += u64::from(outcome.result.is_err());
-                let mut sound = self.sound(outcome.result, *record, particle, theta, window)?;
-                if let Ok(prediction) = &mut sound {
+                let mut result = outcome.result.map(|p| self.picked(*record, window, p));
+                if let Ok(prediction) = &mut result {
+                    self.check(prediction, *record, particle, theta, window)?;
                     self.study.measure(*record, &window.times, &mut prediction.outputs);
                 }
-                of_particle.push(sound);
+                of_particle.push(result);
             }
             results.push(of_particle);
         }
@@ -145,14 +169,16 @@ impl<'a> Flight<'a> {
             }
         }
         self.total += jobs.len() as u64;
-        let mut outcomes = self.fleet.run_mixed(jobs)?.into_iter();
+        let outcomes = self.fleet.run_mixed(jobs).map_err(|error| told(self.study, error, |_| None))?;
+        let mut outcomes = outcomes.into_iter();
         let mut results = Vec::with_capacity(setups.len());
         for particle in 0..setups.len() {
             let mut of_setup = Vec::with_capacity(windows.len());
             for ((record, window), outcome) in windows.iter().zip(outcomes.by_ref()) {
                 self.rows.push(self.row(place, *record, particle, &outcome));
-                let mut result = self.sound(outcome.result, *record, 0, theta, window)?;
+                let mut result = outcome.result.map(|p| self.picked(*record, window, p));
                 if let Ok(prediction) = &mut result {
+                    self.check(prediction, *record, 0, theta, window)?;
                     self.study.measure(*record, &window.times, &mut prediction.outputs);
                 }
                 of_setup.push(result);
@@ -167,33 +193,65 @@ impl<'a> Flight<'a> {
         self.study.sendable(record, &self.study.asked(record, window))
     }
 
-    /// A failure of the model is data. A run that was lost with its workers, or that does not fit the study, is none: it
-    /// says nothing of this particle, and treating it as a failure would let the fleet change the posterior.
-    fn sound(
+    /// The outputs that the study asked for, of those that the solver gave.
+    fn picked(&self, record: usize, window: &Window, prediction: Prediction) -> Prediction {
+        let outputs = self.study.picked(record, window, prediction.outputs);
+        Prediction { outputs, ..prediction }
+    }
+
+    /// One outcome per job; those that are known to be timeouts are not run.
+    fn outcomes(
+        &mut self,
+        place: Place,
+        n_job: usize,
+        job: impl Fn(usize) -> Job,
+    ) -> Result<Vec<Outcome>, RunError> {
+        // The forward run with the estimate decides nothing about a sigma point: it is tried anew.
+        let mut timeouts = self.timeouts.as_mut().filter(|_| place.pass > 0);
+        let mut known: Vec<Option<Outcome>> = match &timeouts {
+            Some(timeouts) if !timeouts.is_empty() => {
+                (0..n_job).map(|index| timeouts.known(&self.setup, &job(index))).collect()
+            }
+            _ => vec![None; n_job],
+        };
+        let open: Vec<usize> = (0..n_job).filter(|index| known[*index].is_none()).collect();
+        if open.is_empty() {
+            return Ok(known.into_iter().flatten().collect());
+        }
+        let outcomes = self.fleet.run(self.setup, open.iter().map(|index| job(*index)).collect());
+        let values = |at: usize| open.get(at).map(|index| named(self.study, &job(*index).theta));
+        for (index, outcome) in open.iter().zip(outcomes.map_err(|error| told(self.study, error, values))?) {
+            if let (Some(timeouts), Err(Failure::Timeout(timeout))) = (&mut timeouts, &outcome.result) {
+                timeouts.keep(&self.setup, &job(*index), timeout)?;
+            }
+            known[*index] = Some(outcome);
+        }
+        Ok(known.into_iter().flatten().collect())
+    }
+
+    /// A prediction of another length is no answer: it says nothing of this particle.
+    fn check(
         &self,
-        result: Result<Prediction, ParticleError>,
+        prediction: &Prediction,
         record: usize,
         particle: usize,
         theta: &DMatrix<f64>,
         window: &Window,
-    ) -> Result<Result<Prediction, ParticleError>, RunError> {
-        let result = result.map(|prediction| {
-            let outputs = self.study.picked(record, window, prediction.outputs);
-            Prediction { outputs, ..prediction }
-        });
-        let reason = match &result {
-            Err(error @ (ParticleError::Lost { .. } | ParticleError::BadJob(_))) => error.to_string(),
-            Ok(p) if p.outputs.len() != window.observed.len() => {
-                format!("{} predicted values where {} were asked for", p.outputs.len(), window.observed.len())
-            }
-            _ => return Ok(result),
+    ) -> Result<(), RunError> {
+        let (outputs, state) = (prediction.outputs.len(), prediction.state.len());
+        let reason = if outputs != window.observed.len() {
+            format!("{outputs} predicted values where {} were asked for", window.observed.len())
+        } else if let Some(wanted) = self.n_state.filter(|n| *n != state) {
+            format!("a state of {state} values where {wanted} belong")
+        } else {
+            return Ok(());
         };
         let column: DVector<f64> = theta.column(particle).into_owned();
         let values = named(self.study, &self.study.theta_for(record, column.as_slice()));
         Err(RunError::NoAnswer { particle, record: self.study.records[record].name.clone(), values, reason })
     }
 
-    fn row(&self, place: Place, record: usize, particle: usize, outcome: &crate::fleet::Outcome) -> JobRow {
+    fn row(&self, place: Place, record: usize, particle: usize, outcome: &Outcome) -> JobRow {
         JobRow {
             pass: place.pass,
             step: place.step,
@@ -227,25 +285,14 @@ impl<'a> Flight<'a> {
     }
 }
 
-/// Stacks the predictions of all particles: m × r, rows by window, then time, then output. A failed particle's column is
-/// zero and must be masked by the caller.
-pub fn stack_outputs(results: &Results, windows: &StepWindows) -> DMatrix<f64> {
-    let columns: Vec<Vec<f64>> = results
-        .iter()
-        .map(|windows| windows.iter().flatten().flat_map(|p| p.outputs.iter().copied()).collect())
-        .collect();
-    let m = windows.iter().map(|(_, window)| window.observed.len()).sum();
-    DMatrix::from_fn(m, columns.len(), |row, column| columns[column].get(row).copied().unwrap_or(0.0))
-}
-
-/// The states of all particles at the end of window `index`: n × r. A failed particle's column is zero.
-pub fn stack_states(results: &Results, index: usize) -> DMatrix<f64> {
-    let n = results.iter().filter_map(|w| w[index].as_ref().ok()).map(|p| p.state.len()).max().unwrap_or(0);
-    let mut x = DMatrix::zeros(n, results.len());
-    for (column, windows) in results.iter().enumerate() {
-        if let Ok(p) = &windows[index] {
-            x.column_mut(column).copy_from_slice(&p.state);
+/// A fleet's failure, with names and values where it is about one run.
+fn told(study: &Study, error: FleetError, values: impl Fn(usize) -> Option<String>) -> RunError {
+    match error {
+        FleetError::NoAnswer { job, particle, record, reason } => {
+            let (record, values) =
+                (study.records[record as usize].name.clone(), values(job).unwrap_or_default());
+            RunError::NoAnswer { particle: particle as usize, record, values, reason }
         }
+        other => other.into(),
     }
-    x
 }

@@ -12,7 +12,8 @@ use starlings_estimators::{Particles, Resampled, Roukf};
 use starlings_models::Window;
 
 use super::ensemble::recombine;
-use super::flight::{Flight, Place, StepWindows, stack_outputs};
+use super::flight::{Flight, Place, StepWindows};
+use super::stack::stack_outputs;
 use crate::study::expand::INITIAL;
 use crate::study::{RunError, Study};
 

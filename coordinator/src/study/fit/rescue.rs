@@ -85,7 +85,7 @@ fn rescue(
 }
 
 fn failure(
-    of_particle: &[Result<starlings_models::Prediction, starlings_models::ParticleError>],
+    of_particle: &[Result<starlings_models::Prediction, starlings_models::Failure>],
 ) -> Option<String> {
     of_particle.iter().find_map(|r| r.as_ref().err().map(ToString::to_string))
 }
@@ -94,7 +94,7 @@ fn failure(
 fn cause(
     flight: &Flight<'_>,
     windows: &StepWindows,
-    of_particle: &[Result<starlings_models::Prediction, starlings_models::ParticleError>],
+    of_particle: &[Result<starlings_models::Prediction, starlings_models::Failure>],
 ) -> String {
     let mut failed =
         windows.iter().zip(of_particle).filter_map(|((record, _), r)| Some((*record, r.as_ref().err()?)));

@@ -128,10 +128,7 @@ impl<'a> Search<'a> {
     }
 
     /// Squared whitened misfit of one point over all records; infinite where a run failed.
-    fn misfit(
-        &self,
-        of_point: &[Result<starlings_models::Prediction, starlings_models::ParticleError>],
-    ) -> f64 {
+    fn misfit(&self, of_point: &[Result<starlings_models::Prediction, starlings_models::Failure>]) -> f64 {
         let mut sum = 0.0;
         for ((record, window), result) in self.windows.iter().zip(of_point) {
             let Ok(prediction) = result else { return f64::INFINITY };

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 use starlings_estimators::{EstimatorError, Points, SigmaSet, sigma_point_sensitivities};
-use starlings_models::{ParticleError, Prediction, Window};
+use starlings_models::{Failure, Prediction, Window};
 
 use super::IdentifyError;
 use crate::study::Study;
@@ -110,7 +110,7 @@ pub fn windows(study: &Study, seen: Seen) -> StepWindows {
 pub fn outputs(
     study: &Study,
     windows: &StepWindows,
-    results: &[Result<Prediction, ParticleError>],
+    results: &[Result<Prediction, Failure>],
     rows: &[Row],
 ) -> Option<DVector<f64>> {
     let n_out = study.setup.outputs.len();

@@ -70,6 +70,14 @@ impl Store {
         self.guard(self.connection.execute_batch("DELETE FROM remembered_runs; VACUUM"))
     }
 
+    /// All answers that are kept.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub fn remembered_runs(&self) -> Result<Vec<(RunKey, Vec<u8>)>, StoreError> {
+        self.rows("SELECT key, body FROM remembered_runs", |row| Ok((row.get(0)?, row.get(1)?)))
+    }
+
     /// Number of runs whose answers are kept.
     ///
     /// # Errors

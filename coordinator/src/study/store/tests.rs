@@ -44,7 +44,7 @@ fn snapshot(step: usize) -> Snapshot {
 }
 
 /// One analysis, committed as those of a slow run are.
-fn keep(store: &mut Store, step: usize) -> Result<(), StoreError> {
+fn keep(store: &Store, step: usize) -> Result<(), StoreError> {
     store.analysis(&row(step), &snapshot(step + 1))?;
     store.commit()
 }
@@ -53,10 +53,10 @@ fn keep(store: &mut Store, step: usize) -> Result<(), StoreError> {
 fn quick_analyses_are_committed_together_and_at_the_end() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("run.db");
-    let mut store = Store::create(&path, &[]).expect("a store");
+    let store = Store::create(&path, &[]).expect("a store");
     let seen =
         || table(&Store::open_to_read(&path).expect("readable"), "analyses", "step").expect("rows").len();
-    let mut after = |step, now_s| {
+    let after = |step, now_s| {
         store.analysis(&row(step), &snapshot(step + 1)).expect("room");
         store.commit_if_due(now_s).expect("room");
         seen()
@@ -74,7 +74,7 @@ fn quick_analyses_are_committed_together_and_at_the_end() {
 fn a_full_disk_is_told_with_its_remedy_and_keeps_every_committed_analysis() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("run.db");
-    let mut store = Store::create(&path, &[]).expect("a store");
+    let store = Store::create(&path, &[]).expect("a store");
     // The database may grow by a few pages only, as on a disk with no more room.
     let pages: i64 =
         store.connection.pragma_query_value(None, "page_count", |row| row.get(0)).expect("its size");
@@ -82,7 +82,7 @@ fn a_full_disk_is_told_with_its_remedy_and_keeps_every_committed_analysis() {
         .connection
         .pragma_update_and_check(None, "max_page_count", pages + 20, |_| Ok(()))
         .expect("a limit");
-    let full = (0..1000).find_map(|step| keep(&mut store, step).err().map(|e| (step, e)));
+    let full = (0..1000).find_map(|step| keep(&store, step).err().map(|e| (step, e)));
     let (step, error) = full.expect("the limit is reached");
     assert!(step > 0, "some analyses fit");
     let text = error.to_string();
@@ -90,7 +90,7 @@ fn a_full_disk_is_told_with_its_remedy_and_keeps_every_committed_analysis() {
         assert!(text.contains(part), "`{part}` is missing: {text}");
     }
     drop(store);
-    let mut store = Store::open(&path).expect("the store opens again");
+    let store = Store::open(&path).expect("the store opens again");
     let kept = Snapshot::read(&store, 1).expect("readable").expect("a snapshot");
     assert_eq!(kept.head.step, step, "the snapshot is that of the last finished analysis");
     assert_eq!(table(&store, "analyses", "step").expect("rows").len(), step);

@@ -86,23 +86,27 @@ fn correlated_in_time(residuals: &Residuals, n_series: usize) -> Option<String> 
 /// The last pass moved the estimate further than an estimate that has settled is moved.
 pub(super) fn still_moving(study: &Study, fit: &Fit) -> Option<String> {
     let moved = fit.last_move.filter(|m| !m.is_settled())?;
-    let name = &study.theta[moved.entry].name;
-    let passes = fit.passes;
-    let size = size(moved);
-    Some(match study.passes() {
-        Some(_) => format!(
+    Some(moving(&study.theta[moved.entry].name, &size(moved), fit.passes, study.passes().is_some()))
+}
+
+/// That the last of so many passes, fixed in the study or not, moved an estimate so far.
+fn moving(name: &str, size: &str, passes: usize, are_fixed: bool) -> String {
+    if are_fixed {
+        format!(
             "the last pass, number {passes}, still moved {name} by {size} posterior standard deviations: whether the estimate \
              has settled is not known. Leave out [estimator] passes, and there are as many as it takes."
-        ),
-        None if passes == settle::LIMIT => format!(
+        )
+    } else if passes == settle::LIMIT {
+        format!(
             "after {passes} passes, the limit, the last pass still moved {name} by {size} posterior standard deviations: the \
              estimate has not settled. Start from priors nearer to it, or use kind = \"batch\"."
-        ),
-        None => format!(
+        )
+    } else {
+        format!(
             "after {passes} passes the last pass still moved {name} by {size} posterior standard deviations, and no part of \
              that step lowers the misfit: the estimate has not settled. Use kind = \"batch\"."
-        ),
-    })
+        )
+    }
 }
 
 fn size(moved: Move) -> String {
@@ -137,4 +141,28 @@ pub(super) fn free_run(fit: &Fit, study: &Study, predictions: &[PredictionRow]) 
             excess.sqrt()
         )
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_estimate_that_moves_still_is_told_with_what_to_do_about_it() {
+        let told = moving("R", "2.4", settle::LIMIT, false);
+        assert_eq!(
+            told,
+            "after 12 passes, the limit, the last pass still moved R by 2.4 posterior standard deviations: the estimate has not \
+             settled. Start from priors nearer to it, or use kind = \"batch\"."
+        );
+        let stuck = moving("R", "2.4", 5, false);
+        assert!(
+            stuck.contains("and no part of that step lowers the misfit") && stuck.contains("batch"),
+            "{stuck}"
+        );
+        assert!(
+            moving("R", "2.4", 12, true)
+                .ends_with("Leave out [estimator] passes, and there are as many as it takes.")
+        );
+    }
 }

@@ -3,12 +3,12 @@
 //! Next file to read: [`super::super::events`].
 
 use super::{Run, Step, Stepper};
-use crate::ParticleError;
+use crate::ModelFailure;
 use crate::integrate::system::System;
 
 impl<S: System, P: Stepper> Run<'_, S, P> {
     /// Steps up to the first switching point within `h` and across it, unless the step up to it is refused.
-    pub(super) fn cross(&mut self, h: f64) -> Result<Step, ParticleError> {
+    pub(super) fn cross(&mut self, h: f64) -> Result<Step, ModelFailure> {
         let [before, after] = self.locate(h)?;
         if before > self.shortest {
             let error = self.attempt(before)?;
@@ -36,7 +36,7 @@ impl<S: System, P: Stepper> Run<'_, S, P> {
 
     /// Narrows the first change of side within `h` down to two step lengths, before and after it, by the Illinois variant of
     /// regula falsi (Dowell & Jarratt 1971) on repeated steps, safeguarded by bisection.
-    fn locate(&mut self, h: f64) -> Result<[f64; 2], ParticleError> {
+    fn locate(&mut self, h: f64) -> Result<[f64; 2], ModelFailure> {
         let narrow = (1e-12 * h).max(self.shortest);
         let mut bracket = [0.0, h];
         let mut weights = self.events.ends();

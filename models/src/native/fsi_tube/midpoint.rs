@@ -8,7 +8,7 @@ use super::FsiTube;
 use super::chain::Chain;
 use super::coefficients::Coefficients;
 use super::state::State;
-use crate::ParticleError;
+use crate::ModelFailure;
 use crate::model::Segment;
 
 /// Work arrays of one call, an entry per cell each.
@@ -47,7 +47,7 @@ impl FsiTube {
         segment: Segment<'_>,
         n: usize,
         x: State<'_>,
-    ) -> Result<(), ParticleError> {
+    ) -> Result<(), ModelFailure> {
         let (h, q, slope) = (segment.t1 - segment.t0, segment.u0[0], segment.slope[0]);
         let c = self.coefficients(theta);
         let cells = self.n_cell();

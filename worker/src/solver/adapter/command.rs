@@ -14,6 +14,7 @@ mod request;
 mod rule;
 mod table;
 mod template;
+mod traces;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Display;
@@ -21,20 +22,21 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use starlings_models::{Description, ParticleError, Run, Solved, SolverDef, Spec, nearest};
+use starlings_models::{Description, ParticleError, Run, Solved, SolverDef, Spec, Timeout, nearest};
 
 use super::{Adapter, Kind};
 use crate::solver::SolverError;
 use crate::solver::error::tail_text;
 use crate::solver::process::{Launch, Process, ending, is_killed};
-use crate::solver::scratch::Scratch;
 use crate::solver::seats::Seats;
 use crate::solver::site::Site;
+use crate::solver::stopped::stopped;
 use answer::Answer;
 pub(in crate::solver) use inspect::faults;
-use program::Output;
+use program::{End, Output};
 use rule::{Rule, lies_inside};
 use template::{OWN_NAMES, Templates};
+use traces::{kept, said};
 
 pub(crate) const KIND: Kind = Kind {
     name: "command",
@@ -43,16 +45,8 @@ pub(crate) const KIND: Kind = Kind {
     open: |def, site| Ok(Box::new(PerRun::new(def, site)?)),
 };
 
-/// Times that a run is made when somebody kills its program.
+/// Times that a run is made when somebody kills its program or removes its folder.
 const ATTEMPTS: u32 = 12;
-
-/// Lines of the standard output that a failure shows when the standard error is empty, and the longest of them.
-const LINES: usize = 12;
-const WIDTH: usize = 240;
-
-/// What the program is told and what it wrote, in the folder of a run that failed.
-const TOLD: &str = "starlings-input.json";
-const WROTE: &str = "starlings-output.txt";
 
 /// A program started for every run.
 struct PerRun {
@@ -68,10 +62,14 @@ struct PerRun {
 
 /// How an attempt ended that gave no answer.
 enum Failed {
-    /// By a fault that would come again, or once too often.
-    Here(String),
-    /// Somebody killed the program.
-    Killed(String),
+    /// The program failed, or wrote what cannot be read.
+    Program(String),
+    /// It did not end in time.
+    Late(String),
+    /// The place cannot make the run.
+    Place(String),
+    /// Somebody killed the program, or took its folder away: worth another attempt at once.
+    Disturbed(String),
 }
 
 impl PerRun {
@@ -151,37 +149,60 @@ impl PerRun {
 
     /// One start of the program, the `last` that is tried or not.
     fn attempt(&self, run: &Run<'_>, last: bool) -> Result<Solved, Failed> {
-        let here = |what: String| Failed::Here(format!("{} cannot run: {what}", self.program()));
-        let scratch = self.site.scratch("run").map_err(|error| here(format!("no folder for it: {error}")))?;
-        self.furnish(run, scratch.path()).map_err(here)?;
+        let place = |what: String| Failed::Place(format!("{} cannot run: {what}", self.program()));
+        let scratch =
+            self.site.scratch("run").map_err(|error| place(format!("no folder for it: {error}")))?;
+        if let Err(what) = self.furnish(run, scratch.path()) {
+            let disturbed = scratch.is_gone() && !last;
+            return Err(if disturbed { Failed::Disturbed(what) } else { place(what) });
+        }
         let spec = &self.description.spec;
         let told = request::document(spec, run).to_string();
         let seat = self.seats.take();
         let command = request::filled(&self.command, spec, run, scratch.path());
         let started = self.launch(&command, scratch.path(), seat.number());
-        let mut process = started.map_err(|error| Failed::Here(error.to_string()))?;
+        let mut process = started.map_err(|error| {
+            let what = error.to_string();
+            if scratch.is_gone() && !last { Failed::Disturbed(what) } else { Failed::Place(what) }
+        })?;
         let patience = Duration::try_from_secs_f64(self.def.timeout).unwrap_or(Duration::MAX);
-        let (status, output) = program::to_its_end(&mut process, told.clone().into_bytes(), patience);
-        let solved = match status {
-            Some(status) if status.success() => self.read(run, scratch.path(), &output),
-            Some(status) => Err(format!("{} {}", self.program(), ending(status))),
-            None => Err(format!(
+        let (end, output) = program::to_its_end(&mut process, told.clone().into_bytes(), patience);
+        let solved = match end {
+            End::Ended(status) if status.success() => self.read(run, scratch.path(), &output),
+            End::Ended(status) => Err(format!("{} {}", self.program(), ending(status))),
+            End::Stopped => Err(stopped(&self.program(), self.def.timeout)),
+            End::Late => Err(format!(
                 "{} did not end within {} s and was killed (`timeout` sets the limit)",
                 self.program(),
                 self.def.timeout
             )),
         };
-        let killed = status.is_some_and(is_killed);
+        // A program without its folder fails or writes nothing, whatever the parameters.
+        let killed = matches!(end, End::Ended(status) if is_killed(status));
+        let disturbed = killed || scratch.is_gone();
         // Where the run is made again nobody needs to look at this one.
         let tail =
-            if solved.is_ok() || (killed && !last) { String::new() } else { said(&mut process, &output) };
+            if solved.is_ok() || (disturbed && !last) { String::new() } else { said(&mut process, &output) };
         // The whole group ends before its folder is kept or removed.
         drop(process);
-        match solved {
-            Ok(solved) => Ok(solved),
-            Err(what) if killed && !last => Err(Failed::Killed(what)),
-            Err(what) => Err(Failed::Here(what + &kept(scratch, &told, &output) + &tail_text(&tail))),
-        }
+        let what = match solved {
+            Ok(solved) => return Ok(solved),
+            Err(what) if disturbed && !last => return Err(Failed::Disturbed(what)),
+            Err(what) if scratch.is_gone() => {
+                let folder = scratch.path().display();
+                return Err(Failed::Place(format!("{what}; its folder {folder} was removed while it ran")));
+            }
+            Err(what) => {
+                let said = tail_text(&tail);
+                let kept = kept(scratch, &format!("{what}{said}"), &told, &output);
+                what + &kept + &said
+            }
+        };
+        Err(match end {
+            End::Late => Failed::Late(what),
+            End::Ended(_) if !killed => Failed::Program(what),
+            End::Ended(_) | End::Stopped => Failed::Place(what),
+        })
     }
 
     /// The outputs that were asked for.
@@ -226,11 +247,13 @@ impl Adapter for PerRun {
             match self.attempt(run, attempts == ATTEMPTS) {
                 Ok(solved) => return Ok(solved),
                 // A run changes nothing outside its folder, so it can be made again.
-                Err(Failed::Killed(text)) => {
+                Err(Failed::Disturbed(text)) => {
                     tracing::warn!(particle = run.particle, record = run.record, attempts, "{text}");
                     attempts += 1;
                 }
-                Err(Failed::Here(text)) => return Err(ParticleError::Solver(text)),
+                Err(Failed::Program(text)) => return Err(ParticleError::Undecided(text)),
+                Err(Failed::Place(text)) => return Err(ParticleError::Infrastructure(text)),
+                Err(Failed::Late(says)) => return Err(Timeout { limit: self.def.timeout, says }.into()),
             }
         }
     }
@@ -250,26 +273,4 @@ fn rules(reads: &BTreeMap<String, String>, spec: &Spec) -> Result<BTreeMap<Strin
         rules.insert(name.clone(), rule);
     }
     Ok(rules)
-}
-
-/// The end of what a program said: on its standard error, else on its standard output.
-fn said(process: &mut Process, output: &Output) -> String {
-    let tail = process.tail();
-    if !tail.is_empty() {
-        return tail;
-    }
-    let text = String::from_utf8_lossy(&output.bytes);
-    let lines = text.lines().rev().map(str::trim_end).filter(|line| !line.is_empty()).take(LINES);
-    let mut last: Vec<String> = lines.map(|line| line.chars().take(WIDTH).collect()).collect();
-    last.reverse();
-    last.join("\n")
-}
-
-/// Keeps the folder of a run that failed, with what the program was told and wrote; says where it is.
-fn kept(scratch: Scratch, told: &str, output: &Output) -> String {
-    let Some(folder) = scratch.keep() else { return String::new() };
-    // Without these two the folder is still of use.
-    let _ = std::fs::write(folder.join(TOLD), told);
-    let _ = std::fs::write(folder.join(WROTE), &output.bytes);
-    format!("; the folder of the run is kept: {}", folder.display())
 }

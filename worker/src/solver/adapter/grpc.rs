@@ -7,7 +7,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use starlings_models::{Description, ParticleError, Run, Solved, SolverDef};
+use starlings_models::{Description, ParticleError, Run, Solved, SolverDef, Timeout};
 
 use super::{Adapter, Kind};
 use crate::solver::SolverError;
@@ -56,8 +56,11 @@ impl Grpc {
 
     /// An idle program, or a new one.
     fn take(&self) -> Result<Seated, SolverError> {
-        if let Some(idle) = self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop() {
-            return Ok(idle);
+        while let Some(idle) = self.idle() {
+            // A program whose folder was taken away would fail: it ends here.
+            if !idle.instance.is_homeless() {
+                return Ok(idle);
+            }
         }
         let pause = self.backoff.lock().unwrap_or_else(PoisonError::into_inner).pause();
         std::thread::sleep(pause);
@@ -70,6 +73,10 @@ impl Grpc {
             backoff.failed();
         }
         Ok(Seated { instance: instance?, _seat: seat })
+    }
+
+    fn idle(&self) -> Option<Seated> {
+        self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop()
     }
 
     fn give_back(&self, seated: Seated) {
@@ -100,30 +107,39 @@ impl Adapter for Grpc {
                 Err(error) => {
                     let killed = matches!(error, SolverError::NotReady { killed: true, .. });
                     let again = if killed { losses.killed() } else { losses.fell() };
+                    // A program that is not even ready has not seen the parameters.
                     if !again {
-                        return Err(ParticleError::Solver(error.to_string()));
+                        return Err(ParticleError::Infrastructure(error.to_string()));
                     }
                     continue;
                 }
             };
             match seated.instance.run(run, patience) {
                 Ok(answer) => {
+                    let homeless = answer.is_err() && seated.instance.is_homeless();
+                    if homeless && losses.killed() {
+                        continue;
+                    }
                     self.give_back(seated);
                     return answer;
                 }
                 // The program is gone or of no more use: dropping it ends its whole group.
                 Err(lost) => {
                     let again = match lost.how {
-                        How::Silent => false,
+                        How::Silent | How::Stopped => false,
                         How::Fell => losses.fell(),
                         How::Killed => losses.killed(),
                     };
-                    let times = losses.total() + u32::from(lost.how == How::Silent);
+                    let times = losses.total() + u32::from(matches!(lost.how, How::Silent | How::Stopped));
                     let text = lost.text(times);
                     drop(seated);
                     tracing::warn!(particle = run.particle, record = run.record, times, "{text}");
                     if !again {
-                        return Err(ParticleError::Solver(text));
+                        return Err(match lost.how {
+                            How::Silent => Timeout { limit: self.def.timeout, says: text }.into(),
+                            How::Fell => ParticleError::Undecided(text),
+                            How::Killed | How::Stopped => ParticleError::Infrastructure(text),
+                        });
                     }
                 }
             }

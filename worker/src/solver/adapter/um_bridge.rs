@@ -14,12 +14,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use serde_json::{Map, Value, json};
-use starlings_models::{Description, ParticleError, Quantity, Run, SOLVER, Solved, SolverDef, Spec};
+use starlings_models::{Description, ParticleError, Quantity, Run, SOLVER, Solved, SolverDef, Spec, Timeout};
 
 use super::{Adapter, Kind};
 use crate::solver::SolverError;
 use crate::solver::losses::Losses;
 use crate::solver::site::Site;
+use crate::solver::stopped::stopped;
 use answer::{asked, rows};
 use client::Trouble;
 use pool::Pool;
@@ -41,12 +42,20 @@ struct UmBridge {
 
 /// How an attempt ended that gave no answer.
 enum Failed {
-    /// The server has given an answer that would come again, or cannot be reached.
-    Here(String),
+    /// The server has said that it fails, or answered nonsense.
+    Said(String),
+    /// It did not answer in time.
+    Late(String),
     /// The server ended by itself.
     Fell(String),
+    /// The connection broke while the server ran on.
+    Unreached(String),
+    /// There is no server.
+    Missing(String),
     /// Somebody killed the server.
     Killed(String),
+    /// Somebody stopped the server, so that it did not answer in time.
+    Stopped(String),
 }
 
 impl UmBridge {
@@ -64,14 +73,14 @@ impl UmBridge {
     }
 
     fn attempt(&self, run: &Run<'_>, spec: &Spec) -> Result<Solved, Failed> {
-        let taken = self.pool.take().map_err(|error| Failed::Here(error.to_string()))?;
+        let taken = self.pool.take().map_err(|error| Failed::Missing(error.to_string()))?;
         let server = Arc::clone(&taken.server);
         let question = question(&server, run, spec);
         let trouble = match server.client.ask("/Evaluate", &question, self.patience()) {
             Ok(answer) => {
                 self.pool.give_back(taken);
                 let rows = rows(&answer, spec, run.window.times.len());
-                let rows = rows.map_err(|what| Failed::Here(format!("{} {what}", server.name())))?;
+                let rows = rows.map_err(|what| Failed::Said(format!("{} {what}", server.name())))?;
                 return Ok(Solved { outputs: asked(&rows, spec, run.outputs), state: Vec::new() });
             }
             Err(trouble) => trouble,
@@ -79,10 +88,14 @@ impl UmBridge {
         let text = format!("{} {trouble}", server.name());
         match trouble {
             Trouble::Silent { .. } => {
-                let text = format!("{text} (`timeout` sets the limit){}", server.tail());
+                let (is_stopped, tail) = (server.is_stopped(), server.tail());
                 // It may work on that run for long: one that was started here is ended.
                 server.end();
-                Err(Failed::Here(text))
+                Err(if is_stopped {
+                    Failed::Stopped(stopped(&server.name(), self.def.timeout) + &tail)
+                } else {
+                    Failed::Late(format!("{text} (`timeout` sets the limit){tail}"))
+                })
             }
             Trouble::Connection { .. } => {
                 if let Some((killed, ending)) = server.ending() {
@@ -93,12 +106,12 @@ impl UmBridge {
                 // The network failed, or the server gave this run up without an answer: once more.
                 let text = text + &server.tail();
                 self.pool.give_back(taken);
-                Err(Failed::Fell(text))
+                Err(Failed::Unreached(text))
             }
             Trouble::Said(..) | Trouble::Garbage { .. } => {
                 let text = text + &server.tail();
                 self.pool.give_back(taken);
-                Err(Failed::Here(text))
+                Err(Failed::Said(text))
             }
         }
     }
@@ -146,7 +159,6 @@ impl Adapter for UmBridge {
     }
 
     fn run(&self, run: &Run<'_>) -> Result<Solved, ParticleError> {
-        let failed = |text: String| Err(ParticleError::Solver(text));
         if run.state.is_some() {
             let message = "a state for a UM-Bridge model, which starts every run anew".to_owned();
             return Err(ParticleError::BadJob(message));
@@ -154,7 +166,7 @@ impl Adapter for UmBridge {
         let known = self.described.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let description = match known.map_or_else(|| self.describe(), Ok) {
             Ok(description) => description,
-            Err(error) => return failed(error.to_string()),
+            Err(error) => return Err(ParticleError::Infrastructure(error.to_string())),
         };
         let (given, wanted) = (run.parameters.len(), description.spec.parameters.len());
         if given != wanted {
@@ -164,16 +176,31 @@ impl Adapter for UmBridge {
         }
         let mut losses = Losses::default();
         loop {
-            let (again, text) = match self.attempt(run, &description.spec) {
+            let failed = match self.attempt(run, &description.spec) {
                 Ok(solved) => return Ok(solved),
-                Err(Failed::Killed(text)) => (losses.killed(), text),
-                Err(Failed::Fell(text)) => (losses.fell(), text),
-                Err(Failed::Here(text)) => (false, text),
+                Err(failed) => failed,
+            };
+            let again = match &failed {
+                Failed::Killed(_) => losses.killed(),
+                Failed::Fell(_) | Failed::Unreached(_) => losses.fell(),
+                Failed::Said(_) | Failed::Late(_) | Failed::Missing(_) | Failed::Stopped(_) => false,
             };
             if !again {
-                return failed(text);
+                return Err(match failed {
+                    Failed::Said(text) | Failed::Fell(text) => ParticleError::Undecided(text),
+                    Failed::Late(says) => Timeout { limit: self.def.timeout, says }.into(),
+                    Failed::Unreached(text)
+                    | Failed::Missing(text)
+                    | Failed::Killed(text)
+                    | Failed::Stopped(text) => ParticleError::Infrastructure(text),
+                });
             }
-            tracing::warn!(particle = run.particle, record = run.record, losses = losses.total(), "{text}");
+            tracing::warn!(
+                particle = run.particle,
+                record = run.record,
+                losses = losses.total(),
+                "made again"
+            );
         }
     }
 }

@@ -8,7 +8,7 @@ use starlings_models::effect::{Addition, EffectParameter};
 use starlings_models::{EffectDef, Job, Prediction, Quantity, SOLVER, Setup, Spec, Window};
 
 use crate::explain::ExplainError;
-use crate::explain::memory::sound;
+use crate::explain::memory::told;
 use crate::fleet::{Fleet, Outcome, SetupId};
 use crate::study::Study;
 
@@ -67,7 +67,8 @@ pub(super) fn candidates(
             (setup, Job { particle, record, window, theta, state: None })
         };
         let jobs = inputs.into_iter().enumerate().map(job).collect();
-        predictions(study, record, &window, fleet.run_mixed(jobs)?)
+        let outcomes = fleet.run_mixed(jobs).map_err(|error| told(study, error))?;
+        Ok(predictions(study, record, &window, outcomes))
     };
     let equations = equations(study, fleet)?;
     let at_rest = fly(fleet, equations.iter().map(|(_, _, setup)| (*setup, 0.0)).collect())?;
@@ -106,24 +107,18 @@ fn equations<'s>(
 }
 
 /// What the channels would measure by each outcome, particle by particle; nothing where the model fails.
-///
-/// # Errors
-/// When a run was lost with its workers.
 pub(super) fn predictions(
     study: &Study,
     record: usize,
     window: &Window,
     outcomes: Vec<Outcome>,
-) -> Result<Vec<Option<Prediction>>, ExplainError> {
-    let name = &study.records[record].name;
-    let of = |(particle, outcome): (usize, Outcome)| {
-        let prediction = sound(outcome, particle as u32, name)?.ok();
-        Ok(prediction.filter(|p| p.outputs.len() == window.observed.len()).map(|mut p| {
-            study.measure(record, &window.times, &mut p.outputs);
-            p
-        }))
+) -> Vec<Option<Prediction>> {
+    let of = |outcome: Outcome| {
+        let mut prediction = outcome.result.ok().filter(|p| p.outputs.len() == window.observed.len())?;
+        study.measure(record, &window.times, &mut prediction.outputs);
+        Some(prediction)
     };
-    outcomes.into_iter().enumerate().map(of).collect()
+    outcomes.into_iter().map(of).collect()
 }
 
 /// States that effects of the study brought.

@@ -14,6 +14,7 @@ use starlings_models::{Job, Prediction, Window};
 
 use super::candidate::{Candidate, predictions};
 use crate::explain::ExplainError;
+use crate::explain::memory::told;
 use crate::fleet::Fleet;
 use crate::study::Study;
 
@@ -121,8 +122,9 @@ impl Walk<'_> {
             inputs: first.inputs.clone(),
         };
         let window = Arc::new(window);
-        let outcomes = fleet.run(self.candidate.setup, vec![self.job(&window, None, 0.0)])?;
-        let prediction = predictions(self.study, self.record, &window, outcomes)?.pop().flatten();
+        let outcomes = fleet.run(self.candidate.setup, vec![self.job(&window, None, 0.0)]);
+        let outcomes = outcomes.map_err(|error| told(self.study, error))?;
+        let prediction = predictions(self.study, self.record, &window, outcomes).pop().flatten();
         Ok(prediction.map(|p| p.state))
     }
 
@@ -162,8 +164,8 @@ impl Walk<'_> {
         for (index, job) in jobs.iter_mut().enumerate() {
             job.particle = index as u32;
         }
-        let outcomes = fleet.run(self.candidate.setup, jobs)?;
-        let mut answers = predictions(self.study, self.record, window, outcomes)?.into_iter();
+        let outcomes = fleet.run(self.candidate.setup, jobs).map_err(|error| told(self.study, error))?;
+        let mut answers = predictions(self.study, self.record, window, outcomes).into_iter();
         let mut of_walk = |z: &DMatrix<f64>| {
             let of_walk: Vec<_> = answers.by_ref().take(z.ncols()).collect();
             let predictions: Vec<Prediction> = of_walk.into_iter().collect::<Option<_>>()?;

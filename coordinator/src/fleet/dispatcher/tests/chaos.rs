@@ -1,219 +1,14 @@
 //! Random joins, losses, answers, failures and silences: every job ends exactly once, no credit is lost, and it ends.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::time::Duration;
+mod world;
+
+use world::{Act, World, act, late};
 
 use proptest::prelude::*;
-use starlings_models::ParticleError;
-use starlings_proto::{Answer, Lease, SetupId};
+use starlings_models::{Failure, ParticleError};
 
-use super::{RULES, answered, joining, left, outcomes, prediction, setup, solver, submit_mixed};
-use crate::fleet::Outcome;
-use crate::fleet::dispatcher::{BatchError, Command, Dispatcher, Event, WorkerId};
-
-/// One thing that the world does; numbers choose among what is possible then.
-#[derive(Clone, Debug)]
-enum Act {
-    Join(u32),
-    Reconnect(usize),
-    Lose(usize, bool),
-    BuildSetup(usize, bool),
-    ForgetSetup(usize),
-    Answer(usize, f64),
-    Fail(usize),
-    Repeat(usize),
-    Wait(u64),
-}
-
-fn act() -> impl Strategy<Value = Act> {
-    prop_oneof![
-        2 => (1_u32..4).prop_map(Act::Join),
-        1 => any::<usize>().prop_map(Act::Reconnect),
-        2 => (any::<usize>(), any::<bool>()).prop_map(|(who, clean)| Act::Lose(who, clean)),
-        4 => (any::<usize>(), prop::bool::weighted(0.8)).prop_map(|(who, ok)| Act::BuildSetup(who, ok)),
-        1 => any::<usize>().prop_map(Act::ForgetSetup),
-        12 => (any::<usize>(), prop::sample::select(vec![1e-6, 1e-3, 1.0])).prop_map(|(which, cost)| Act::Answer(which, cost)),
-        3 => any::<usize>().prop_map(Act::Fail),
-        2 => any::<usize>().prop_map(Act::Repeat),
-        1 => (1_u64..30).prop_map(Act::Wait),
-    ]
-}
-
-/// Workers as the dispatcher's commands make them: what each was sent and has not answered.
-struct World {
-    dispatcher: Dispatcher,
-    now: Duration,
-    next_id: u64,
-    alive: BTreeSet<u64>,
-    setups: Vec<u8>,
-    to_build: BTreeSet<(u64, SetupId)>,
-    built: BTreeSet<(u64, SetupId)>,
-    open: BTreeMap<(u64, u64), (Lease, usize)>,
-    withdrawn: Vec<Lease>,
-    past: Vec<Lease>,
-    ended: Option<Result<Vec<Outcome>, BatchError>>,
-}
-
-impl World {
-    /// One job per setup number.
-    fn new(setups: &[u8], local: bool) -> Self {
-        let mut world = Self {
-            dispatcher: Dispatcher::new(RULES),
-            now: Duration::ZERO,
-            next_id: 0,
-            alive: BTreeSet::new(),
-            setups: setups.to_vec(),
-            to_build: BTreeSet::new(),
-            built: BTreeSet::new(),
-            open: BTreeMap::new(),
-            withdrawn: vec![],
-            past: vec![],
-            ended: None,
-        };
-        if local {
-            world.event(Event::LocalOnly);
-        }
-        world.event(submit_mixed(setups));
-        world
-    }
-
-    fn event(&mut self, event: Event) {
-        for command in self.dispatcher.step(self.now, event) {
-            self.obey(command);
-        }
-    }
-
-    fn obey(&mut self, command: Command) {
-        match command {
-            Command::SendSetup { worker, setup } => {
-                assert!(self.alive.contains(&worker.0), "a setup is sent only to a live worker");
-                assert!(self.to_build.insert((worker.0, setup)), "a setup is sent once while it is built");
-            }
-            Command::SendJob { worker, lease, index } => {
-                let needed = (worker.0, setup(self.setups[index]));
-                assert!(self.built.contains(&needed), "a job is sent only to a worker with its setup");
-                assert!(self.alive.contains(&worker.0), "a job is sent only to a live worker");
-                let twice = self.open.values().any(|(_, open)| *open == index);
-                assert!(!twice, "a job has one lease at a time");
-                self.open.insert((worker.0, lease.job), (lease, index));
-            }
-            Command::Cancel { leases, .. } => self.withdrawn.extend(leases),
-            Command::Close { worker } => self.forget(worker.0),
-            Command::BatchDone(outcomes) => {
-                assert!(self.ended.replace(Ok(outcomes)).is_none(), "a batch ends once");
-            }
-            Command::BatchFailed(error) => {
-                assert!(self.ended.replace(Err(error)).is_none(), "a batch ends once");
-            }
-            Command::Notice(_) | Command::GivenUp { .. } => {}
-        }
-    }
-
-    fn forget(&mut self, worker: u64) {
-        self.alive.remove(&worker);
-        self.to_build.retain(|(of, _)| *of != worker);
-        self.built.retain(|(of, _)| *of != worker);
-        self.past.extend(self.open.values().map(|(lease, _)| *lease).filter(|lease| lease.epoch == worker));
-        self.open.retain(|(of, _), _| *of != worker);
-        self.withdrawn.retain(|lease| lease.epoch != worker);
-    }
-
-    fn join(&mut self, slots: u32) {
-        self.next_id += 1;
-        self.alive.insert(self.next_id);
-        self.event(Event::Joined(joining(self.next_id, slots)));
-    }
-
-    fn answer(&mut self, which: usize, answer: impl FnOnce(usize) -> Answer, cost: f64) {
-        let Some((&key, &(lease, index))) = pick(&self.open, which) else { return };
-        self.open.remove(&key);
-        self.withdrawn.retain(|other| *other != lease);
-        self.past.push(lease);
-        self.event(answered(lease, answer(index), cost));
-    }
-
-    fn act(&mut self, act: &Act) {
-        match *act {
-            Act::Join(slots) => self.join(slots),
-            Act::Reconnect(which) => {
-                let Some(old) = choose(&self.alive, which) else { return };
-                self.next_id += 1;
-                self.alive.insert(self.next_id);
-                let mut twin = joining(self.next_id, 1);
-                twin.nonce = old;
-                self.event(Event::Joined(twin));
-            }
-            Act::Lose(which, clean) => {
-                let Some(worker) = choose(&self.alive, which) else { return };
-                self.forget(worker);
-                self.event(left(worker, clean));
-            }
-            Act::BuildSetup(which, ok) => {
-                let Some(key) = choose(&self.to_build, which) else { return };
-                self.to_build.remove(&key);
-                if ok {
-                    self.built.insert(key);
-                }
-                let (worker, setup) = (WorkerId(key.0), key.1);
-                let reason = "cannot".to_owned();
-                self.event(if ok {
-                    Event::SetupDone { worker, setup }
-                } else {
-                    Event::SetupFailed { worker, setup, reason }
-                });
-            }
-            Act::ForgetSetup(which) => {
-                let Some(key) = choose(&self.built, which) else { return };
-                self.built.remove(&key);
-                let reason = "forgotten".to_owned();
-                self.event(Event::SetupFailed { worker: WorkerId(key.0), setup: key.1, reason });
-            }
-            Act::Answer(which, cost) => match pick(&self.open, which) {
-                // A called-back job may come back unstarted.
-                Some((_, (lease, _))) if self.withdrawn.contains(lease) && which % 2 == 0 => {
-                    self.answer(which, |_| Answer::Withdrawn, 0.0);
-                }
-                _ => self.answer(which, |index| Answer::Ran(Ok(prediction(index))), cost),
-            },
-            Act::Fail(which) => self.answer(which, |_| Answer::Ran(Err(solver("no"))), 1.0),
-            Act::Repeat(which) => {
-                if !self.past.is_empty() {
-                    let lease = self.past[which % self.past.len()];
-                    self.event(answered(lease, Answer::Ran(Ok(prediction(usize::MAX))), 1.0));
-                }
-            }
-            Act::Wait(seconds) => {
-                self.now += Duration::from_secs(seconds);
-                self.event(Event::Tick);
-            }
-        }
-        for &worker in &self.alive {
-            let open = self.open.keys().filter(|(of, _)| *of == worker).count();
-            assert_eq!(self.dispatcher.in_flight(WorkerId(worker)), open, "credit follows the open leases");
-        }
-    }
-
-    /// From here on the world is kind: one good worker, prompt answers.
-    fn finish(&mut self) {
-        self.join(2);
-        for _ in 0..20 * self.setups.len() + 50 {
-            if self.ended.is_some() {
-                return;
-            }
-            self.act(&Act::BuildSetup(0, true));
-            self.act(&Act::Answer(1, 1e-3));
-        }
-        panic!("a batch with a good worker ends within a few events per job");
-    }
-}
-
-fn choose<T: Ord + Copy>(from: &BTreeSet<T>, which: usize) -> Option<T> {
-    (!from.is_empty()).then(|| *from.iter().nth(which % from.len()).expect("within the length"))
-}
-
-fn pick<K: Ord, V>(from: &BTreeMap<K, V>, which: usize) -> Option<(&K, &V)> {
-    (!from.is_empty()).then(|| from.iter().nth(which % from.len()).expect("within the length"))
-}
+use super::{RULES, crash, failed, outcomes, prediction, solver};
+use crate::fleet::dispatcher::{BatchError, Event};
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(512))]
@@ -240,16 +35,70 @@ proptest! {
                 for (index, outcome) in outcomes.iter().enumerate() {
                     match &outcome.result {
                         Ok(result) => prop_assert_eq!(result, &prediction(index)),
-                        Err(ParticleError::Lost { attempts, .. }) => prop_assert!(*attempts >= RULES.max_attempts),
-                        Err(error) => prop_assert_eq!(error, &solver("no")),
+                        Err(Failure::Timeout(timeout)) => prop_assert_eq!(timeout, &late()),
+                        Err(Failure::Model(error)) => {
+                            prop_assert!(*error == failed("no") || *error == failed("crash"));
+                        }
                     }
                     prop_assert!(outcome.attempts >= 1 && outcome.attempts <= RULES.max_attempts + 2);
                 }
             }
             Err(BatchError::NoWorkers { waited, .. }) => prop_assert!(waited >= RULES.patience),
-            Err(BatchError::SetupFailed { .. }) => {}
+            Err(BatchError::SetupFailed { .. } | BatchError::NoControl { .. } | BatchError::NoAnswer { .. }) => {}
+            Err(BatchError::Unavailable { waited, .. }) => prop_assert!(waited >= RULES.patience),
             Err(error) => prop_assert!(false, "unexpected end: {error:?}"),
         }
         prop_assert!(outcomes(&world.dispatcher.step(world.now, Event::Tick)).is_none());
+    }
+
+    /// What a run of a job gives depends on the job alone; places fail now and then, workers leave and come.
+    #[test]
+    fn infrastructure_never_changes_an_outcome(
+        natures in prop::collection::vec(0_u8..8, 1..30),
+        acts in prop::collection::vec(act(), 0..400),
+    ) {
+        let setups = vec![0; natures.len()];
+        // The first one works: without any, nobody can tell.
+        let ends = |index: usize| match natures[index] {
+            0 if index > 0 => Err(solver("no")),
+            1 if index > 0 => Err(crash("crash")),
+            2 if index > 0 => Err(late().into()),
+            _ => Ok(prediction(index)),
+        };
+        let mut world = World::new(&setups, false);
+        world.join(2);
+        world.act(&Act::BuildSetup(0, true));
+        let mut acts = acts.iter();
+        for _ in 0..2000 {
+            if world.ended.is_some() {
+                break;
+            }
+            match acts.next() {
+                Some(Act::Answer(which, _) | Act::Fail(which) | Act::Crash(which) | Act::Late(which)) => {
+                    world.truly(*which, ends);
+                }
+                // It leaves without counting an attempt.
+                Some(Act::Lose(which, _)) => world.act(&Act::Lose(*which, true)),
+                Some(Act::BuildSetup(which, _)) => world.act(&Act::BuildSetup(*which, true)),
+                Some(act @ (Act::Place(_) | Act::Join(_) | Act::Repeat(_) | Act::Reconnect(_))) => world.act(act),
+                Some(_) => {}
+                None => {
+                    world.join(2);
+                    world.act(&Act::BuildSetup(usize::MAX, true));
+                    world.act(&Act::BuildSetup(0, true));
+                    (0..8).for_each(|_| world.truly(0, ends));
+                }
+            }
+        }
+        let outcomes = world.ended.expect("it ends").expect("good workers came");
+        for (index, outcome) in outcomes.iter().enumerate() {
+            let wanted = match ends(index) {
+                Ok(prediction) => Ok(prediction),
+                Err(ParticleError::Timeout(timeout)) => Err(timeout.into()),
+                Err(ParticleError::Model(error)) => Err(error.into()),
+                Err(_) => Err(failed("crash").into()),
+            };
+            prop_assert_eq!(&outcome.result, &wanted);
+        }
     }
 }

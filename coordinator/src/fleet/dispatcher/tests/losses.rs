@@ -23,29 +23,42 @@ fn a_lost_worker_returns_all_its_leases() {
 fn only_the_jobs_that_were_running_count_an_attempt_when_their_worker_dies() {
     let mut stage = Stage::with(&[1]);
     let mut last = stage.step(submit(2));
-    for id in 2..=4 {
-        // Job 0 runs and kills each worker in turn; job 1 only waits behind it.
+    for id in 2..=3 {
+        // Job 0 runs and kills two workers in turn; job 1 only waits behind it.
         let first = sent(&last).first().map(|(_, index)| *index);
         assert_eq!(first, Some(0), "the requeued job is first again");
-        let died = stage.step(left(id - 1, false));
-        if id == 4 {
-            let failed = died.iter().any(|c| {
-                matches!(
-                    c,
-                    Command::GivenUp { notice: FleetEvent::JobFailed { particle: 0, attempts: 3, .. }, .. }
-                )
-            });
-            assert!(failed, "{died:?}");
-        }
+        stage.step(left(id - 1, false));
         stage.step(Event::Joined(joining(id, 1)));
         last = stage.step(Event::SetupDone { worker: WorkerId(id), setup: SETUP });
     }
     let jobs = sent(&last);
-    assert_eq!(jobs.len(), 1);
-    let last = stage.step(answered(jobs[0].0, Answer::Ran(Ok(prediction(1))), 1.0));
+    assert_eq!(jobs.len(), 2);
+    stage.step(ran(jobs[0].0, Ok(prediction(0))));
+    let last = stage.step(ran(jobs[1].0, Ok(prediction(1))));
     let outcomes = outcomes(&last).expect("both jobs ended");
-    assert!(matches!(&outcomes[0].result, Err(ParticleError::Lost { attempts: 3, .. })));
-    assert_eq!((outcomes[1].attempts, outcomes[1].result.is_ok()), (1, true));
+    assert_eq!(
+        outcomes.iter().map(|o| (o.attempts, o.result.is_ok())).collect::<Vec<_>>(),
+        [(3, true), (1, true)]
+    );
+}
+
+#[test]
+fn a_job_that_loses_worker_after_worker_ends_the_batch_and_is_no_failure_of_its_parameters() {
+    let mut stage = Stage::with(&[1]);
+    stage.step(submit(2));
+    let mut died = vec![];
+    for id in 2..=4 {
+        died = stage.step(left(id - 1, false));
+        stage.step(Event::Joined(joining(id, 1)));
+        stage.step(Event::SetupDone { worker: WorkerId(id), setup: SETUP });
+    }
+    let failed = died.iter().any(|c| {
+        matches!(c, Command::GivenUp { notice: FleetEvent::JobFailed { particle: 0, attempts: 3, .. }, .. })
+    });
+    assert!(failed, "{died:?}");
+    let reason = "given up after 3 attempts: w3 was lost: gone".to_owned();
+    let ended = BatchError::NoAnswer { index: 0, particle: 0, record: 0, reason };
+    assert!(died.contains(&Command::BatchFailed(ended)), "{died:?}");
 }
 
 #[test]
@@ -71,7 +84,7 @@ fn a_model_failure_is_tried_once_more_on_another_worker() {
     assert_ne!(again[0].0.epoch, jobs[0].0.epoch);
     let done = stage.step(answered(again[0].0, Answer::Ran(Err(solver("no, again"))), 1.0));
     let outcome = &outcomes(&done).expect("a second failure ends it")[0];
-    assert_eq!((outcome.result.clone(), outcome.attempts), (Err(solver("no, again")), 2));
+    assert_eq!((outcome.result.clone(), outcome.attempts), (Err(failed("no, again").into()), 2));
 }
 
 #[test]
@@ -79,7 +92,7 @@ fn a_model_failure_on_the_only_worker_ends_at_once() {
     let mut stage = Stage::with(&[4]);
     let jobs = stage.jobs(submit(1));
     let done = stage.step(answered(jobs[0].0, Answer::Ran(Err(solver("no"))), 1.0));
-    assert_eq!(outcomes(&done).expect("ended")[0].result, Err(solver("no")));
+    assert_eq!(outcomes(&done).expect("ended")[0].result, Err(failed("no").into()));
 }
 
 #[test]
@@ -116,8 +129,10 @@ fn a_job_that_does_not_fit_the_model_is_not_tried_elsewhere() {
     let jobs = stage.jobs(submit(1));
     let error = ParticleError::BadJob("three values, expected two".to_owned());
     let done = stage.step(answered(jobs[0].0, Answer::Ran(Err(error.clone())), 1.0));
-    let outcome = &outcomes(&done).expect("it fits nowhere")[0];
-    assert_eq!((&outcome.result, outcome.attempts), (&Err(error), 1));
+    let reason =
+        "given up after 1 attempt: the job does not fit the model: three values, expected two".to_owned();
+    let ended = BatchError::NoAnswer { index: 0, particle: 0, record: 0, reason };
+    assert!(done.contains(&Command::BatchFailed(ended)), "{done:?}");
 }
 
 #[test]

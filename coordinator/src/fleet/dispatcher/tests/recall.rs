@@ -10,7 +10,8 @@ fn a_job_waiting_behind_a_long_one_is_called_back_for_an_idle_slot() {
     assert_ne!(idle.epoch, jobs[0].0.epoch);
     let commands = stage.step(answered(idle, Answer::Ran(Ok(prediction(1))), 1.0));
     let waiting = jobs[2].0;
-    assert_eq!(commands, [Command::Cancel { worker: WorkerId(waiting.epoch), leases: vec![waiting] }]);
+    let kept = Command::Keep { control: ControlId(1), index: 1 };
+    assert_eq!(commands, [kept, Command::Cancel { worker: WorkerId(waiting.epoch), leases: vec![waiting] }]);
     let moved = stage.jobs(answered(waiting, Answer::Withdrawn, 0.0));
     assert_eq!(moved.len(), 1);
     assert_eq!((moved[0].0.epoch, moved[0].0.attempt), (idle.epoch, 2));

@@ -9,6 +9,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use crate::solver::process::Process;
+use crate::solver::stopwatch::{Stopwatch, Time};
 
 /// Bytes of standard output that are remembered.
 pub(super) const LIMIT: usize = 64 * 1024 * 1024;
@@ -26,13 +27,20 @@ pub(super) struct Output {
     pub(super) cut: bool,
 }
 
-/// Runs a started program to its end: `input` goes to its standard input. No status when it took longer than `patience`.
-pub(super) fn to_its_end(
-    process: &mut Process,
-    input: Vec<u8>,
-    patience: Duration,
-) -> (Option<ExitStatus>, Output) {
-    let started = Instant::now();
+/// How a program ended that was waited for.
+#[derive(Clone, Copy)]
+pub(super) enum End {
+    /// By itself, or by somebody's signal.
+    Ended(ExitStatus),
+    /// It took longer than it may.
+    Late,
+    /// Somebody stopped it for as long as it may take.
+    Stopped,
+}
+
+/// Runs a started program to its end: `input` goes to its standard input.
+pub(super) fn to_its_end(process: &mut Process, input: Vec<u8>, patience: Duration) -> (End, Output) {
+    let mut watch = Stopwatch::start(patience, Instant::now());
     if let Some(mut pipe) = process.input() {
         // A program that reads nothing is none the worse: its pipe breaks when it ends.
         std::thread::spawn(move || drop(pipe.write_all(&input)));
@@ -40,24 +48,28 @@ pub(super) fn to_its_end(
     let output = Arc::new(Mutex::new(Output::default()));
     let read_up = drain(process, &output);
     let mut is_open = true;
-    let status = loop {
-        let left = patience.saturating_sub(started.elapsed());
+    let end = loop {
+        let left = match watch.look(Instant::now(), || process.is_stopped()) {
+            Time::Left(left) => left,
+            Time::Up => break End::Late,
+            Time::Stopped => break End::Stopped,
+        };
         if is_open {
             // Most programs close their output by ending, which wakes this at once.
             is_open = matches!(read_up.recv_timeout(LOOK.min(left)), Err(RecvTimeoutError::Timeout));
         }
         let status = if is_open { process.ended() } else { process.wait(left) };
-        if status.is_some() || started.elapsed() >= patience {
-            break status;
+        if let Some(status) = status {
+            break End::Ended(status);
         }
     };
-    if status.is_some() && is_open {
+    if is_open && matches!(end, End::Ended(_)) {
         // Something that the program started holds the pipe: asking for the tail ends the whole group.
         process.tail();
         let _ = read_up.recv_timeout(LAST_WORDS);
     }
     let output = std::mem::take(&mut *output.lock().unwrap_or_else(PoisonError::into_inner));
-    (status, output)
+    (end, output)
 }
 
 /// Reads the standard output on a thread; the receiver wakes when it is closed.

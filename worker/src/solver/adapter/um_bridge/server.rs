@@ -99,6 +99,12 @@ impl Server {
             || process.as_mut().is_some_and(|process| process.ended().is_some())
     }
 
+    /// Whether somebody stopped the program that was started here.
+    pub(super) fn is_stopped(&self) -> bool {
+        let process = self.process.lock().unwrap_or_else(PoisonError::into_inner);
+        process.as_ref().is_some_and(Process::is_stopped)
+    }
+
     /// How the program ended after a connection broke: whether somebody killed it, and in words with the end of its output.
     /// A run that lost its server because another slot ended it lost it to a kill. None for a server of somebody else, or one
     /// that still runs.

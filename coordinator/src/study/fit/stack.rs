@@ -1,0 +1,28 @@
+//! Predictions as the columns of matrices, one per particle.
+
+use nalgebra::DMatrix;
+
+use super::flight::{Results, StepWindows};
+
+/// Stacks the predictions of all particles: m × r, rows by window, then time, then output. A failed particle's column is
+/// zero and must be masked by the caller.
+pub fn stack_outputs(results: &Results, windows: &StepWindows) -> DMatrix<f64> {
+    let columns: Vec<Vec<f64>> = results
+        .iter()
+        .map(|windows| windows.iter().flatten().flat_map(|p| p.outputs.iter().copied()).collect())
+        .collect();
+    let m = windows.iter().map(|(_, window)| window.observed.len()).sum();
+    DMatrix::from_fn(m, columns.len(), |row, column| columns[column].get(row).copied().unwrap_or(0.0))
+}
+
+/// The states of all particles at the end of window `index`: n × r. A failed particle's column is zero.
+pub fn stack_states(results: &Results, index: usize) -> DMatrix<f64> {
+    let n = results.iter().filter_map(|w| w[index].as_ref().ok()).map(|p| p.state.len()).max().unwrap_or(0);
+    let mut x = DMatrix::zeros(n, results.len());
+    for (column, windows) in results.iter().enumerate() {
+        if let Ok(p) = &windows[index] {
+            x.column_mut(column).copy_from_slice(&p.state);
+        }
+    }
+    x
+}
