@@ -157,7 +157,11 @@ fn not_tried(found: &Explanation) -> Result<(), Failure> {
 
 /// What is left of the gap, how sure the verdict is, and what it cost.
 fn rest(found: &Explanation) -> Result<(), Failure> {
-    let version = if found.effects.is_empty() { "the model as it is" } else { "the model with it" };
+    let version = match found.effects.len() {
+        0 => "the model as it is",
+        1 => "the effect",
+        _ => "the effects",
+    };
     line(format_args!("\non the training data, with {version}: {}", found.remaining.shape))?;
     let alarm = &found.false_alarm;
     if alarm.runs > 0 {
