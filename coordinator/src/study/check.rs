@@ -4,6 +4,7 @@
 //! to read: [`self::model`].
 
 mod blame;
+mod defs;
 mod explain;
 mod initial;
 mod limits;

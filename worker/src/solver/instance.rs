@@ -34,8 +34,10 @@ use super::stopwatch::{Stopwatch, Time};
 
 /// How long a run that is given up on purpose may go on.
 const LEFT_AFTER: Duration = Duration::from_millis(2);
-/// How long a program that broke its connection may take to end, so that its ending can be told.
-const LAST_WORDS: Duration = Duration::from_millis(500);
+/// How long a program that broke its connection may take to end, so that its ending can be told: a launcher of ranks cleans up
+/// first. One that only broke the protocol need not end at all.
+const LAST_WORDS: Duration = Duration::from_secs(5);
+const SHORT: Duration = Duration::from_millis(500);
 
 /// Why a program is of no more use.
 #[derive(Debug)]
@@ -233,7 +235,8 @@ impl Instance {
     }
 
     fn lost(&mut self, broken: Broken) -> Lost {
-        let status = self.process.as_mut().and_then(|process| process.wait(LAST_WORDS));
+        let patience = if matches!(broken, Broken::Connection(_)) { LAST_WORDS } else { SHORT };
+        let status = self.process.as_mut().and_then(|process| process.wait(patience));
         let tail = self.tail();
         let name = &self.name;
         let (how, what) = match (status, broken) {
