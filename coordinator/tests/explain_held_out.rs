@@ -141,7 +141,7 @@ fn the_band_of_a_held_out_record_is_that_of_the_means_and_priors_that_it_is_run_
     let (predicted, covariance) = closed_form(&data[1], &data[2], &data[0]);
     let of_c: Vec<usize> =
         (0..laboratory.rows.rows.len()).filter(|i| laboratory.rows.rows[*i].record == 2).collect();
-    let jacobian = fit.jacobian.select_rows(&of_c);
+    let jacobian = fit.jacobian.whole(&laboratory.rows).select_rows(&of_c);
     let own = fit.own_values.select_rows(&of_c);
     let optimum = fit.optimum().unwrap();
     let band = &jacobian * optimum.covariance() * jacobian.transpose() + &own * own.transpose();

@@ -10,6 +10,8 @@ mod need;
 #[cfg(test)]
 mod tests;
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 
 pub use need::{End, Need, Scaled};
@@ -32,10 +34,10 @@ pub struct LeastSquares {
     z: DVector<f64>,
     residual: DVector<f64>,
     cost: f64,
-    jacobian: DMatrix<f64>,
+    jacobian: Arc<DMatrix<f64>>,
     fresh: bool,
     /// The Jacobian that was measured at this point, while the secant changes `jacobian`.
-    measured: Option<DMatrix<f64>>,
+    measured: Option<Arc<DMatrix<f64>>>,
     damping: f64,
     rejected: usize,
     predicted: f64,
@@ -55,7 +57,7 @@ impl LeastSquares {
             z: start,
             residual: DVector::zeros(0),
             cost: f64::INFINITY,
-            jacobian: DMatrix::zeros(0, 0),
+            jacobian: Arc::new(DMatrix::zeros(0, 0)),
             fresh: false,
             measured: None,
             damping: 0.0,
@@ -70,7 +72,7 @@ impl LeastSquares {
     pub fn from_known(
         z: DVector<f64>,
         residual: DVector<f64>,
-        jacobian: DMatrix<f64>,
+        jacobian: Arc<DMatrix<f64>>,
         prior: Scaled,
         tolerance: f64,
         trials: usize,
@@ -158,8 +160,9 @@ impl LeastSquares {
         let ratio = (self.cost - cost) / self.predicted.max(f64::MIN_POSITIVE);
         if let Some(new) = &residual {
             // Broyden's update: the change of the prediction is minus that of the residual.
-            let surprise = &self.residual - new - &self.jacobian * &step;
-            self.jacobian += surprise * step.transpose() / step.norm_squared().max(f64::MIN_POSITIVE);
+            let surprise = &self.residual - new - &*self.jacobian * &step;
+            let change = surprise * step.transpose() / step.norm_squared().max(f64::MIN_POSITIVE);
+            *Arc::make_mut(&mut self.jacobian) += change;
         }
         if let Some(residual) = residual.filter(|_| cost < self.cost) {
             self.accept(trial, residual, cost, ratio, was_fresh);
@@ -168,11 +171,12 @@ impl LeastSquares {
         }
     }
 
-    /// Takes the Jacobian (m x p) that was asked for; `None` when one of its runs failed.
-    pub fn give_jacobian(&mut self, jacobian: Option<DMatrix<f64>>) {
+    /// Takes the Jacobian (m x p) that was asked for, which is not copied until the secant changes it; `None` when one of its runs
+    /// failed.
+    pub fn give_jacobian(&mut self, jacobian: Option<Arc<DMatrix<f64>>>) {
         match jacobian.filter(|j| j.iter().all(|v| v.is_finite())) {
             Some(jacobian) => {
-                self.measured = Some(jacobian.clone());
+                self.measured = Some(Arc::clone(&jacobian));
                 self.jacobian = jacobian;
                 self.fresh = true;
                 self.plan();
@@ -234,7 +238,7 @@ impl LeastSquares {
     /// Back to the Jacobian that was measured at this point, if one was.
     fn restore(&mut self) -> bool {
         let Some(measured) = &self.measured else { return false };
-        self.jacobian.clone_from(measured);
+        self.jacobian = Arc::clone(measured);
         self.fresh = true;
         true
     }
@@ -279,7 +283,7 @@ impl LeastSquares {
             step[*j] = (self.z[*j] + solved[k] * shrink).clamp(lo, hi) - self.z[*j];
         }
         let prior = precision.component_mul(&step).dot(&step);
-        self.predicted = 2.0 * gradient.dot(&step) - (&self.jacobian * &step).norm_squared() - prior;
+        self.predicted = 2.0 * gradient.dot(&step) - (&*self.jacobian * &step).norm_squared() - prior;
         Some(step)
     }
 

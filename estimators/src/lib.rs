@@ -58,7 +58,7 @@ pub use pooled::Pooled;
 pub use recombine::recombine;
 pub use roukf::{Resampled, Root, Roukf};
 pub use sandwich::{Place, Residuals};
-pub use score::{Optimum, Score, null_maxima};
+pub use score::{Optimum, Score, null_maxima, score_correlation};
 pub use sigma_set::{Points, SigmaSet};
 pub use smoother::smooth;
 pub use transform::Transform;

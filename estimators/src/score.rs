@@ -120,25 +120,60 @@ const RIDGE: f64 = 1e-10;
 /// Simulations that are drawn at a time.
 const AT_A_TIME: usize = 64;
 
+/// Products of k columns made of length one, k x k; a column of length zero stays so.
+///
+/// `column` gives one of them, all of the same length. Of at most [`SPECTRAL`] columns so many are held at a time, and each is
+/// asked for once with every such block; of more, whose products are dearer, all are held.
+///
+/// # Errors
+/// Those of `column`.
+pub fn score_correlation<E>(
+    k: usize,
+    at_a_time: usize,
+    mut column: impl FnMut(usize) -> Result<DVector<f64>, E>,
+) -> Result<DMatrix<f64>, E> {
+    let mut unit = |i: usize| {
+        let mut column = column(i)?;
+        let norm = column.norm();
+        column.scale_mut(if norm > 0.0 { 1.0 / norm } else { 0.0 });
+        Ok(column)
+    };
+    if k > SPECTRAL {
+        let all: Vec<DVector<f64>> = (0..k).map(&mut unit).collect::<Result<_, E>>()?;
+        let all = DMatrix::from_columns(&all);
+        return Ok(all.transpose() * &all);
+    }
+    let mut products = DMatrix::zeros(k, k);
+    let mut block: Vec<DVector<f64>> = Vec::new();
+    for first in (0..k).step_by(at_a_time.max(1)) {
+        block.clear();
+        for j in first..k {
+            let right = unit(j)?;
+            if j - first < at_a_time.max(1) {
+                block.push(right.clone());
+            }
+            for (i, left) in block.iter().enumerate() {
+                products[(first + i, j)] = left.dot(&right);
+                products[(j, first + i)] = products[(first + i, j)];
+            }
+        }
+    }
+    Ok(products)
+}
+
 /// Largest gain of any of k parameters where nothing is missing, for each simulation: the distribution that a search over all
 /// of them must exceed.
 ///
-/// `own` has the unimitated sensitivities as columns; `signs` says which sign of each amplitude counts (0 both). `draw`
+/// `correlation` is that of the unimitated sensitivities, as [`score_correlation`] gives it; `signs` says which sign of each amplitude counts (0 both). `draw`
 /// gives independent standard normal numbers. The scores are jointly Gaussian with the correlation of the columns, so k
 /// numbers make a simulation, whatever the number of data. Infinite throughout, so that nothing exceeds it, for sensitivities
 /// that are not finite.
 pub fn null_maxima(
-    mut own: DMatrix<f64>,
+    correlation: DMatrix<f64>,
     signs: &[f64],
     n_simulation: usize,
     draw: &mut dyn FnMut() -> f64,
 ) -> Vec<f64> {
-    for mut column in own.column_iter_mut() {
-        let norm = column.norm();
-        column.scale_mut(if norm > 0.0 { 1.0 / norm } else { 0.0 });
-    }
-    let correlation = if own.ncols() > SPECTRAL { own.transpose() * &own } else { own.tr_mul(&own) };
-    drop(own);
     let Some(root) = root(correlation) else { return vec![f64::INFINITY; n_simulation] };
     let mut maxima = Vec::with_capacity(n_simulation);
     while maxima.len() < n_simulation {
@@ -181,91 +216,4 @@ fn largest(scores: &DVectorView<'_, f64>, signs: &[f64]) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn line(n: usize, f: impl Fn(f64) -> f64) -> DVector<f64> {
-        DVector::from_fn(n, |i, _| f(i as f64 / n as f64))
-    }
-
-    #[test]
-    fn a_missing_slope_is_found_with_its_size_and_gain() {
-        // Fitted: a constant; missing: 3 t. The gain is what least squares with both columns would win.
-        let n = 200;
-        let constant = DMatrix::from_element(n, 1, 1.0);
-        let residual = line(n, |t| 3.0 * (t - 0.4975));
-        let none = DVector::zeros(1);
-        let fit = Optimum::new(&residual, &constant, &none, &none).expect("well posed");
-        let score = fit.score(&line(n, |t| t));
-        // Exact up to rounding, since the model is linear.
-        assert!((score.amplitude - 3.0).abs() < 1e-10, "{score:?}");
-        assert!((score.gain - residual.norm_squared()).abs() < 1e-8 * score.gain);
-        assert!((score.sd * line(n, |t| t - 0.4975).norm() - 1.0).abs() < 1e-10);
-    }
-
-    #[test]
-    fn what_the_parameters_imitate_has_no_gain() {
-        let n = 100;
-        let jacobian = DMatrix::from_columns(&[line(n, |_| 1.0), line(n, |t| t)]);
-        let none = DVector::zeros(2);
-        let fit = Optimum::new(&line(n, |t| (9.0 * t).sin()), &jacobian, &none, &none).expect("well posed");
-        let score = fit.score(&line(n, |t| 2.0 - 5.0 * t));
-        assert!(
-            score.identifiable < 1e-12 && fit.score(&line(n, |t| t * t)).identifiable > 1e-3,
-            "{score:?}"
-        );
-    }
-
-    #[test]
-    fn a_prior_that_was_pulled_gives_the_new_parameter_room() {
-        // Prior 0 +- 0.1 on a constant, data at 1: the offset is all the new parameter's if it is the same constant.
-        let n = 50;
-        let one = DMatrix::from_element(n, 1, 1.0);
-        let precision = DVector::from_element(1, 100.0);
-        let estimate = 50.0 / 150.0;
-        let residual = line(n, |_| 1.0 - estimate);
-        let fit =
-            Optimum::new(&residual, &one, &precision, &DVector::from_element(1, -estimate)).expect("posed");
-        let score = fit.score(&line(n, |_| 1.0));
-        // With it the constant returns to its prior mean and the amplitude is 1: the whole cost is won.
-        let cost = residual.norm_squared() + 100.0 * estimate * estimate;
-        assert!((score.amplitude - 1.0).abs() < 1e-10 && (score.gain - cost).abs() < 1e-8, "{score:?}");
-    }
-
-    /// Standard normal numbers by Box and Muller from a linear congruence.
-    fn standard_normal() -> impl FnMut() -> f64 {
-        let mut state = 12345_u64;
-        let mut uniform = move || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            ((state >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
-        };
-        move || (-2.0 * uniform().ln()).sqrt() * (std::f64::consts::TAU * uniform()).cos()
-    }
-
-    #[test]
-    fn the_largest_of_independent_scores_has_the_quantile_of_its_number() {
-        let own = DMatrix::<f64>::identity(10, 10);
-        let mut normal = standard_normal();
-        let maxima = null_maxima(own.clone(), &[0.0; 10], 4000, &mut normal);
-        // P(max of ten chi-square(1) > 7.88) = 1 - (1 - 0.005)^10 = 0.0489; its standard error over 4000 is 0.0034.
-        let share = maxima.iter().filter(|m| **m > 7.879).count() as f64 / 4000.0;
-        assert!((share - 0.0489).abs() < 0.014, "{share}");
-        let one_sided = null_maxima(own, &[1.0; 10], 4000, &mut normal);
-        let share = one_sided.iter().filter(|m| **m > 7.879).count() as f64 / 4000.0;
-        assert!((share - 0.0247).abs() < 0.01, "{share}");
-    }
-
-    #[test]
-    fn many_scores_have_the_quantile_of_their_number_and_repeated_ones_count_once() {
-        let k = SPECTRAL + 8;
-        let mut normal = standard_normal();
-        let independent = null_maxima(DMatrix::identity(k, k), &vec![0.0; k], 4000, &mut normal);
-        // P(max of 520 chi-square(1) > 15.137) = 1 - (1 - 0.0001)^520 = 0.0507; its standard error over 4000 is 0.0035.
-        let share = independent.iter().filter(|m| **m > 15.137).count() as f64 / 4000.0;
-        assert!((share - 0.0507).abs() < 0.014, "{share}");
-        let repeated = null_maxima(DMatrix::from_element(3, k, 1.0), &vec![0.0; k], 4000, &mut normal);
-        // All are one: P(chi-square(1) > 3.841) = 0.05. The ridge makes them differ by 1e-5.
-        let share = repeated.iter().filter(|m| **m > 3.841).count() as f64 / 4000.0;
-        assert!((share - 0.05).abs() < 0.014, "{share}");
-    }
-}
+mod tests;

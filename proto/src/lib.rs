@@ -5,11 +5,13 @@
 //! is the only place that checks and translates. No socket and no scheduling here. Next file to read:
 //! [`convert`].
 
+mod codec;
 pub mod convert;
 pub mod spent;
 pub mod words;
 
 pub use bytes::Bytes;
+pub use codec::Codec;
 pub use convert::{
     Answer, FromWorker, Hello, JobEncoder, Lease, SetupId, ToWorker, Welcome, WireError, decode_setup,
     digest, encode_setup,
@@ -41,8 +43,14 @@ pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 pub fn own_build() -> Option<[u8; 32]> {
     static OWN: std::sync::OnceLock<Option<[u8; 32]>> = std::sync::OnceLock::new();
     // The file that this process runs, also after another was put in its place.
-    let running = || std::fs::read("/proc/self/exe").or_else(|_| std::fs::read(std::env::current_exe()?));
-    *OWN.get_or_init(|| running().ok().map(|bytes| digest(&bytes)))
+    let running =
+        || std::fs::File::open("/proc/self/exe").or_else(|_| std::fs::File::open(std::env::current_exe()?));
+    *OWN.get_or_init(|| {
+        // Piece by piece: the whole would be most of what a small run ever holds.
+        let mut hasher = blake3::Hasher::new();
+        std::io::copy(&mut running().ok()?, &mut hasher).ok()?;
+        Some(*hasher.finalize().as_bytes())
+    })
 }
 
 /// Types and service stubs generated from `proto/fleet.proto`.

@@ -23,10 +23,12 @@ impl<'c> Searcher<'_, '_, 'c> {
         options: &Options,
     ) -> Result<(), ExplainError> {
         for _ in 1..=options.max_effects {
-            let Some(best) = found.judged.first().filter(|j| j.refusal.is_none()).cloned() else {
+            if found.judged.first().is_none_or(|j| j.refusal.is_some()) {
                 return Ok(());
-            };
-            let hits = self.look_at(found, &best)?;
+            }
+            let hits = self.look_at(found, 0)?;
+            let best = &found.judged[0];
+            let name = best.fit.version.name();
             let seconds: Vec<Hit> = self
                 .best_of_each(&hits)
                 .into_iter()
@@ -36,10 +38,10 @@ impl<'c> Searcher<'_, '_, 'c> {
             if seconds.is_empty() {
                 break;
             }
-            let fits = self.further(found, &best, &seconds, options)?;
+            let fits = self.further(found, best, &seconds, options)?;
             let n = fits.len();
             self.judge_all(found, fits)?;
-            let same = found.judged.first().is_some_and(|j| j.fit.version.name() == best.fit.version.name());
+            let same = found.judged.first().is_some_and(|j| j.fit.version.name() == name);
             if n == 0 || same {
                 break;
             }
@@ -48,23 +50,21 @@ impl<'c> Searcher<'_, '_, 'c> {
         if let Some(chosen) = (!passing.is_empty()).then(|| carried(found, &passing).checked)
             && found.judged[chosen].leftover.is_none()
         {
-            let judged = found.judged[chosen].clone();
-            self.look_at(found, &judged)?;
+            self.look_at(found, chosen)?;
         }
         Ok(())
     }
 
-    /// Scores the candidates at a version and notes what they and bent forms of its effect could still take away.
-    fn look_at(&mut self, found: &mut Found<'c>, judged: &Judged<'c>) -> Result<Vec<Hit>, ExplainError> {
+    /// Scores the candidates at a refitted version, by its position, and notes what they and bent forms of its effect could still take away.
+    fn look_at(&mut self, found: &mut Found<'c>, place: usize) -> Result<Vec<Hit>, ExplainError> {
+        let judged = &found.judged[place];
         self.laboratory.stage("screen", &format!("again, with {}", judged.fit.version.name()));
         let hits = self.screen(&judged.fit, &self.best_points(&found.hits))?;
         let left = self.left(judged, &hits)?;
-        let name = judged.fit.version.name();
-        let same = |j: &&mut Judged<'_>| {
-            j.fit.version.name() == name && j.fit.version.left_out == judged.fit.version.left_out
-        };
-        if let Some(place) = found.judged.iter_mut().find(same) {
-            place.leftover = Some(left);
+        let version = |j: &Judged<'_>| (j.fit.version.name(), j.fit.version.left_out.clone());
+        let of_place = version(judged);
+        if let Some(first) = found.judged.iter_mut().find(|j| version(j) == of_place) {
+            first.leftover = Some(left);
         }
         Ok(hits)
     }

@@ -33,10 +33,11 @@ fn estimates(judged: &Judged<'_>) -> Vec<Estimate> {
 /// of its own, in the channel's unit; zero where the fit leaves a direction free.
 pub(super) fn prediction_sd(laboratory: &Laboratory<'_>, fit: &Fitted<'_>) -> Vec<f64> {
     let Ok(optimum) = fit.optimum() else { return vec![0.0; laboratory.rows.rows.len()] };
-    let spread = &fit.jacobian * optimum.covariance();
+    let jacobian = fit.jacobian.whole(&laboratory.rows);
+    let spread = &jacobian * optimum.covariance();
     let own = |i: usize| fit.own_values.row(i).norm_squared();
     let own = |i: usize| if fit.own_values.is_empty() { 0.0 } else { own(i) };
-    let variance = |i: usize| spread.row(i).dot(&fit.jacobian.row(i)).max(0.0) + own(i);
+    let variance = |i: usize| spread.row(i).dot(&jacobian.row(i)).max(0.0) + own(i);
     laboratory.rows.rows.iter().enumerate().map(|(i, row)| row.noise * variance(i).sqrt()).collect()
 }
 

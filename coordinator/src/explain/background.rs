@@ -4,12 +4,13 @@
 //! Nothing is run: scores are linear in the residuals, so their joint distribution without a gap follows from the
 //! sensitivities that the screening measured. Next file to read: [`super::judge`].
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use starlings_estimators::{Optimum, effective_sample_size, ljung_box, null_maxima};
+use starlings_estimators::{Optimum, effective_sample_size, ljung_box, null_maxima, score_correlation};
 
+use super::ExplainError;
 use super::candidate::Candidate;
 use super::rows::{Rows, Usage};
 use super::screen::Hit;
@@ -37,28 +38,42 @@ pub struct Background {
 }
 
 impl Background {
-    /// Simulates the search without a gap, and scores decoys.
-    pub fn new(optimum: &Optimum, rows: &Rows, hits: &[Hit], candidates: &[Candidate], seed: u64) -> Self {
+    /// Simulates the search without a gap, and scores decoys. `sensitivity` gives the influence of a hit on the rows that train;
+    /// about so many are held at a time.
+    ///
+    /// # Errors
+    /// Those of `sensitivity`.
+    pub fn new(
+        optimum: &Optimum,
+        rows: &Rows,
+        hits: &[Hit],
+        candidates: &[Candidate],
+        seed: u64,
+        at_a_time: usize,
+        sensitivity: &dyn Fn(&Hit) -> Result<DVector<f64>, ExplainError>,
+    ) -> Result<Self, ExplainError> {
         let usable: Vec<&Hit> = hits.iter().filter(|h| h.failure.is_none() && !h.is_absorbed()).collect();
         if usable.is_empty() {
-            return Self { threshold: LEAST, ..Self::default() };
+            return Ok(Self { threshold: LEAST, ..Self::default() });
         }
-        let mut own = DMatrix::zeros(optimum.residual().len(), usable.len());
-        for (k, hit) in usable.iter().enumerate() {
-            own.set_column(k, &optimum.unimitated(&hit.sensitivity.select_rows(&rows.train)));
+        let stretches = training_stretches(rows);
+        let mut decoys = Vec::new();
+        for hit in &usable {
+            decoys.extend(decoys_of(optimum, &stretches, &sensitivity(hit)?));
         }
-        let decoys = decoys(optimum, rows, &usable, &own);
+        let own = |k: usize| Ok::<_, ExplainError>(optimum.unimitated(&sensitivity(usable[k])?));
+        let correlation = score_correlation(usable.len(), at_a_time, own)?;
         let signs: Vec<f64> = usable.iter().map(|h| candidates[h.candidate].sign()).collect();
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut normal = || StandardNormal.sample(&mut random);
-        let mut first = null_maxima(own, &signs, 2 * SIMULATIONS, &mut normal);
+        let mut first = null_maxima(correlation, &signs, 2 * SIMULATIONS, &mut normal);
         // A quantile is exceeded by as many of its own sample as it was set for, whatever the truth: others must tell the rate.
         let mut maxima = first.split_off(SIMULATIONS);
         first.sort_by(f64::total_cmp);
         maxima.sort_by(f64::total_cmp);
         let at = ((1.0 - ALARM_RATE) * SIMULATIONS as f64) as usize;
         let threshold = first[at.min(SIMULATIONS - 1)].max(LEAST);
-        Self { maxima, threshold, decoys }
+        Ok(Self { maxima, threshold, decoys })
     }
 
     /// Share of the simulations whose best gain exceeds the threshold.
@@ -74,24 +89,23 @@ impl Background {
     }
 }
 
-/// The gains of candidates whose influence is reversed or shifted in time within every stretch of the training data.
-fn decoys(optimum: &Optimum, rows: &Rows, hits: &[&Hit], own: &DMatrix<f64>) -> Vec<f64> {
-    let stretches = training_stretches(rows);
-    let mut gains = Vec::new();
-    for (hit, own) in hits.iter().zip(own.column_iter()) {
-        let sensitivity = hit.sensitivity.select_rows(&rows.train);
-        let shifted =
-            SHIFTS.map(|share| moved(&sensitivity, &stretches, |i, n| (i + (share * n as f64) as usize) % n));
-        let reversed = moved(&sensitivity, &stretches, |i, n| n - 1 - i);
-        for decoy in shifted.into_iter().chain([reversed]) {
-            let of_decoy = optimum.unimitated(&decoy);
-            let size = own.norm() * of_decoy.norm();
-            if size > 0.0 && own.dot(&of_decoy).abs() < RESEMBLANCE * size {
-                gains.push(optimum.score(&decoy).gain);
-            }
-        }
-    }
-    gains
+/// The gains of a candidate whose influence is reversed or shifted in time within every stretch of the training data.
+fn decoys_of(
+    optimum: &Optimum,
+    stretches: &[std::ops::Range<usize>],
+    sensitivity: &DVector<f64>,
+) -> Vec<f64> {
+    let own = optimum.unimitated(sensitivity);
+    let gain = |decoy: DVector<f64>| {
+        let of_decoy = optimum.unimitated(&decoy);
+        let size = own.norm() * of_decoy.norm();
+        let differs = size > 0.0 && own.dot(&of_decoy).abs() < RESEMBLANCE * size;
+        differs.then(|| optimum.score(&decoy).gain)
+    };
+    let shifted = |share: f64| moved(sensitivity, stretches, |i, n| (i + (share * n as f64) as usize) % n);
+    let reversed = || moved(sensitivity, stretches, |i, n| n - 1 - i);
+    let shifted = SHIFTS.into_iter().filter_map(|share| gain(shifted(share)));
+    shifted.chain(std::iter::once_with(|| gain(reversed())).flatten()).collect()
 }
 
 fn moved(
@@ -152,8 +166,13 @@ pub fn whiteness(rows: &Rows, residual: &DVector<f64>) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
+    use nalgebra::DMatrix;
+
     use super::*;
     use crate::explain::Row;
+    use crate::explain::influence::Influence;
     use starlings_models::EffectDef;
     use starlings_models::effect::EffectParameter;
 
@@ -218,10 +237,16 @@ mod tests {
         let hit = |candidate: usize| {
             let sensitivity = white(m, 100 + candidate as u64);
             let score = optimum.score(&sensitivity);
-            Hit { candidate, point: Vec::new(), sensitivity, score, failure: None }
+            let influence = Influence::Held(Arc::new(sensitivity));
+            Hit { candidate, point: Vec::new(), influence, score, failure: None }
         };
         let hits: Vec<Hit> = (0..n_candidate).map(hit).collect();
-        let of_seed = |seed| Background::new(&optimum, &rows, &hits, &candidates, seed);
+        let held = |hit: &Hit| match &hit.influence {
+            Influence::Held(sensitivity) => Ok(DVector::clone(sensitivity)),
+            Influence::Remembered { .. } => unreachable!("none is remembered here"),
+        };
+        let of_seed =
+            |seed| Background::new(&optimum, &rows, &hits, &candidates, seed, n_candidate, &held).unwrap();
         let backgrounds: Vec<Background> = (0..12).map(of_seed).collect();
         let rates: Vec<f64> = backgrounds.iter().map(Background::exceeding).collect();
         assert!(backgrounds.iter().all(|b| b.threshold > LEAST && b.maxima.len() == SIMULATIONS));

@@ -10,8 +10,10 @@ use starlings_estimators::{End, EstimatorError, LeastSquares, Need, Optimum};
 
 use super::ExplainError;
 use super::differences::STEP;
+use super::influences::Influences;
 use super::laboratory::{Answer, Laboratory, Point};
 use super::own_values::own_values;
+use super::rows::Rows;
 use super::version::Version;
 
 /// Fall of χ² below which a fit has converged.
@@ -31,7 +33,7 @@ pub struct Fitted<'c> {
     pub predicted: Arc<Vec<f64>>,
     /// d prediction / d z over the noise at the best point, all rows × parameters, from the last measured Jacobian. The rows of a
     /// held-out record depend on the fitted records by the mean that it is run with.
-    pub jacobian: DMatrix<f64>,
+    pub jacobian: Influences,
     /// d prediction over the noise for one standard deviation of each value that a held-out record has of its own, all rows ×
     /// values; without columns until it was measured.
     pub own_values: DMatrix<f64>,
@@ -47,8 +49,8 @@ impl<'c> Fitted<'c> {
     /// A fit of a version from a point that was not run.
     pub fn begin(version: Version<'c>, start: DVector<f64>) -> Self {
         let solver = LeastSquares::new(start, version.scaled.clone(), TOLERANCE, TRIALS);
-        let none = DMatrix::zeros(0, 0);
-        Self { version, solver, predicted: Arc::default(), jacobian: none.clone(), own_values: none }
+        let (jacobian, own_values) = (Influences::default(), DMatrix::zeros(0, 0));
+        Self { version, solver, predicted: Arc::default(), jacobian, own_values }
     }
 
     /// A fit of a version that adds one effect to a fitted one: at amplitude zero it is where that one is, and the effect's
@@ -59,21 +61,23 @@ impl<'c> Fitted<'c> {
         parent: &Fitted<'_>,
         point: &[f64],
         sensitivity: &DVector<f64>,
-        train: &[usize],
+        rows: &Rows,
     ) -> Self {
         let z = version.continue_from(&parent.version, parent.z(), point);
-        let mut jacobian = DMatrix::zeros(parent.jacobian.nrows(), version.n_param());
+        let known = parent.jacobian.whole(rows);
+        let mut jacobian = DMatrix::zeros(known.nrows(), version.n_param());
         for (j, entry) in version.study.theta.iter().enumerate() {
             if let Some(i) = parent.version.study.theta.iter().position(|e| e.name == entry.name) {
                 let ratio = version.unit()[j] / parent.version.unit()[i];
-                jacobian.set_column(j, &(parent.jacobian.column(i) * ratio));
+                jacobian.set_column(j, &(known.column(i) * ratio));
             }
         }
         let amplitude = version.first_of(version.members.len() - 1);
         jacobian.set_column(amplitude, sensitivity);
         let residual = parent.residual().clone();
-        let of_train = jacobian.select_rows(train);
-        let solver = LeastSquares::from_known(z, residual, of_train, version.scaled.clone(), ROUGH, TRIALS);
+        let jacobian = Influences::of(&jacobian, rows);
+        let (of_train, scaled) = (Arc::clone(&jacobian.of_train), version.scaled.clone());
+        let solver = LeastSquares::from_known(z, residual, of_train, scaled, ROUGH, TRIALS);
         let (predicted, own_values) = (Arc::clone(&parent.predicted), DMatrix::zeros(0, 0));
         Self { version, solver, predicted, jacobian, own_values }
     }
@@ -232,11 +236,9 @@ impl Fitted<'_> {
                     return Ok(false);
                 }
                 let jacobian = self.differences(laboratory, &z, answers)?;
-                if let Some(jacobian) = &jacobian {
-                    self.jacobian.clone_from(jacobian);
-                }
-                let train = |j: DMatrix<f64>| j.select_rows(&laboratory.rows.train);
-                self.solver.give_jacobian(jacobian.map(train));
+                let jacobian = jacobian.map(|whole| Influences::of(&whole, &laboratory.rows));
+                self.solver.give_jacobian(jacobian.as_ref().map(|j| Arc::clone(&j.of_train)));
+                self.jacobian = jacobian.unwrap_or_else(|| std::mem::take(&mut self.jacobian));
             }
             Need::Nothing(_) => {}
         }

@@ -5,18 +5,16 @@
 //! in data which no fit has seen; noise and disturbances of another kind do not. Next file to read: [`super::search`].
 
 use nalgebra::DVector;
-
-use super::ExplainError;
 use starlings_estimators::noise_from_third_differences;
 
+use super::ExplainError;
 use super::background::{inflation, training_stretches};
+use super::column::{Column, Columns};
 use super::fit::Fitted;
 use super::laboratory::Laboratory;
 use super::rows::{Rows, Usage};
 use super::screen::Hit;
 
-/// Part of a column that must be its own.
-const SMALLEST: f64 = 0.05;
 /// Columns that are combined at most.
 const MOST: usize = 3;
 /// A first column must take away this much of χ², in units of the effective noise ...
@@ -65,39 +63,30 @@ pub fn leftover(
 ) -> Result<Leftover, ExplainError> {
     let optimum = fit.optimum()?;
     let rows = &laboratory.rows;
-    let train_jacobian_free = |s: &DVector<f64>| {
-        let of_train = s.select_rows(&rows.train);
-        (optimum.unimitated(&of_train), s - &fit.jacobian * optimum.response(&of_train))
-    };
-    let (mut own, mut all) = (Vec::new(), Vec::new());
     let is_usable = |h: &&Hit| h.failure.is_none() && !h.is_absorbed();
-    for hit in [measured.library, measured.bent, measured.constants].into_iter().flatten().filter(is_usable) {
-        let (train, whole) = train_jacobian_free(&hit.sensitivity);
-        let size = train.norm();
-        if size > 0.0 {
-            own.push(train / size);
-            all.push(whole / size);
-        }
-    }
+    let all = [measured.library, measured.bent, measured.constants].into_iter().flatten().filter(is_usable);
+    let columns = Columns::new(laboratory, fit, &optimum, all.collect())?;
     // Held-out channels count as well: a better form must serve them too.
     let held: Vec<usize> = (0..rows.rows.len()).filter(|i| rows.rows[*i].usage != Usage::Train).collect();
     // A bent form at amplitude one is the term itself times a signal between -1 and 1. One that the parameters imitate tells
     // nothing of the form.
-    let fall = |hit: &Hit| train_jacobian_free(&hit.sensitivity).0.norm_squared();
-    let power = measured.bent.iter().filter(is_usable).map(fall).fold(0.0, f64::max);
+    let mut power = 0.0_f64;
+    for hit in measured.bent.iter().filter(is_usable) {
+        power = power.max(optimum.unimitated(&hit.influence.of_train(laboratory)?).norm_squared());
+    }
     let power = power / inflation(rows, fit.residual());
     let mut left = Leftover { power, ..Leftover::default() };
     let floor = noise_floor(rows, fit.residual());
     let mut residual = optimum.residual().clone();
     let mut correction = DVector::zeros(rows.rows.len());
     let whitened = rows.whitened(&fit.predicted);
-    for n_column in 1..=MOST.min(own.len()) {
-        let along = |k: &usize| own[*k].dot(&residual).abs();
-        let Some(best) = (0..own.len()).max_by(|a, b| along(a).total_cmp(&along(b))) else { break };
-        let amplitude = own[best].dot(&residual);
-        residual -= &own[best] * amplitude;
-        correction += &all[best] * amplitude;
-        sweep(&mut own, &mut all, best);
+    let mut taken: Vec<Column> = Vec::new();
+    for n_column in 1..=MOST.min(columns.len()) {
+        let Some(best) = columns.nearest(&residual, &taken)? else { break };
+        let amplitude = best.own.dot(&residual);
+        residual -= &best.own * amplitude;
+        correction += &best.all * amplitude;
+        taken.push(best);
         // What remains when it was taken away tells the noise that it is judged by.
         let noise = inflation(rows, &residual.rows(0, rows.train.len()).into_owned());
         let fall = |i: &usize| whitened[*i].powi(2) - (whitened[*i] - correction[*i]).powi(2);
@@ -132,18 +121,4 @@ fn noise_floor(rows: &Rows, residual: &DVector<f64>) -> f64 {
 /// Share of the residuals' squares that white noise makes, from their third differences.
 pub fn white_share(rows: &Rows, residual: &DVector<f64>) -> f64 {
     noise_floor(rows, residual) / residual.norm_squared().max(f64::MIN_POSITIVE)
-}
-
-/// Takes the chosen column out of the others, which are made unit again; one that is nothing but the chosen becomes zero.
-fn sweep(own: &mut [DVector<f64>], all: &mut [DVector<f64>], chosen: usize) {
-    let (unit, whole) = (own[chosen].clone(), all[chosen].clone());
-    for (column, of_all) in own.iter_mut().zip(all) {
-        let shared = unit.dot(column);
-        *column -= &unit * shared;
-        *of_all -= &whole * shared;
-        let size = column.norm();
-        let scale = if size > SMALLEST { 1.0 / size } else { 0.0 };
-        *column *= scale;
-        *of_all *= scale;
-    }
 }

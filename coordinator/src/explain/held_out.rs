@@ -140,7 +140,8 @@ pub(super) fn allowance(laboratory: &Laboratory<'_>, fit: &Fitted<'_>, rows: &[u
         let optimum = fit.optimum().ok().filter(|_| fit.is_fresh() && !rows.is_empty())?;
         let whitened = laboratory.rows.whitened(&fit.predicted);
         let residual = DVector::from_iterator(rows.len(), rows.iter().map(|i| whitened[*i]));
-        let (jacobian, prior) = with_own_values(fit, rows, optimum.covariance())?;
+        let all = fit.jacobian.whole(&laboratory.rows);
+        let (jacobian, prior) = with_own_values(fit, &all, rows, optimum.covariance())?;
         let along = jacobian.tr_mul(&residual);
         let information = prior + jacobian.tr_mul(&jacobian);
         Some(along.dot(&information.cholesky()?.solve(&along)))
@@ -148,16 +149,17 @@ pub(super) fn allowance(laboratory: &Laboratory<'_>, fit: &Fitted<'_>, rows: &[u
     known().filter(|fall| fall.is_finite()).unwrap_or(0.0)
 }
 
-/// The Jacobian of some rows to the estimated and the unknown values, and the information on these before the rows are seen.
+/// The Jacobian of some of all rows to the estimated and the unknown values, and the information on these before the rows are seen.
 fn with_own_values(
     fit: &Fitted<'_>,
+    all: &DMatrix<f64>,
     rows: &[usize],
     covariance: &DMatrix<f64>,
 ) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
     let p = covariance.nrows();
     let of = |column: usize| rows.iter().any(|i| fit.own_values[(*i, column)] != 0.0);
     let own: Vec<usize> = (0..fit.own_values.ncols()).filter(|c| of(*c)).collect();
-    let mut jacobian = fit.jacobian.select_rows(rows).resize_horizontally(p + own.len(), 0.0);
+    let mut jacobian = all.select_rows(rows).resize_horizontally(p + own.len(), 0.0);
     let mut prior = DMatrix::identity(p + own.len(), p + own.len());
     prior.view_mut((0, 0), (p, p)).copy_from(&covariance.clone().cholesky()?.inverse());
     for (k, column) in own.into_iter().enumerate() {

@@ -2,21 +2,23 @@
 //!
 //! Points of different versions go in one batch, so that a screening is one round for the fleet. Every answer is remembered
 //! in the run's database: an explanation that was killed goes on by asking again, and what is known costs nothing. Only the
-//! rows that train are ever shown to a fit; that is for the callers to keep. Next file to read: [`super::version`].
+//! rows that train are ever shown to a fit; that is for the callers to keep. Next files to read: [`runs`], then
+//! [`super::version`].
+
+mod runs;
 
 use std::collections::{BTreeSet, HashSet};
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 
 use nalgebra::DVector;
-use starlings_models::{Job, Window};
+use starlings_models::Window;
 
-use super::memory::{Known, decode, encode, taken, told};
 use super::recent::Recent;
 use super::{Context, ExplainError, Rows, Stage};
-use crate::fleet::{Fleet, FleetEvent, Outcome, SetupId};
-use crate::study::store::{JobRow, RunKey, Store, StoreError};
-use crate::study::{Study, run_key};
+use crate::fleet::{Fleet, FleetEvent};
+use crate::study::Study;
+use crate::study::store::{RunKey, Store};
 
 /// A version of the model and a parameter vector (transformed units) to run it with.
 pub struct Point<'v> {
@@ -29,20 +31,8 @@ pub struct Point<'v> {
 /// What a point predicts for every row, or why it could not be run.
 pub type Answer = Result<Arc<Vec<f64>>, String>;
 
-/// Bytes of outputs that one batch brings, about.
-const PORTION: usize = 4 << 20;
-/// Runs of one batch per slot at least: that many keep every slot busy.
-const PER_SLOT: usize = 8;
-
-/// A run that the fleet was asked for.
-struct Asked {
-    key: RunKey,
-    record: usize,
-    particle: u32,
-    /// Values that it must predict.
-    n_value: usize,
-}
-
+/// Bytes of intermediate results of one kind that are held unless something else is asked for.
+pub const HOLD: usize = 1 << 20;
 /// Runs points and keeps count.
 pub struct Laboratory<'a> {
     /// The study as it is.
@@ -59,6 +49,8 @@ pub struct Laboratory<'a> {
     /// Every run that was asked for and counted; its answer is in the store.
     counted: HashSet<RunKey>,
     recent: Recent,
+    /// Bytes of one kind of intermediate results that are held at most; what is more is worked out again when it is needed.
+    pub(super) hold: usize,
     budget: Option<u64>,
     stage: &'static str,
     runs: Vec<(&'static str, u64)>,
@@ -88,7 +80,8 @@ impl<'a> Laboratory<'a> {
             events: context.events,
             windows,
             counted: HashSet::new(),
-            recent: Recent::new(),
+            recent: Recent::new(HOLD),
+            hold: HOLD,
             budget,
             stage: "fit",
             runs: Vec::new(),
@@ -96,6 +89,21 @@ impl<'a> Laboratory<'a> {
             n_batch: 0,
             cut_short: false,
         }
+    }
+
+    /// Holds so many bytes of every kind of intermediate results at most. Nothing that is found depends on it.
+    pub fn hold_at_most(&mut self, bytes: usize) {
+        (self.hold, self.recent) = (bytes, Recent::new(bytes));
+    }
+
+    /// Whether so many series of all rows may be held.
+    pub(super) fn holds(&self, n_series: usize) -> bool {
+        n_series <= self.series_held()
+    }
+
+    /// Series of all rows that may be held.
+    pub(super) fn series_held(&self) -> usize {
+        self.hold / (8 * self.rows.rows.len()).max(1)
     }
 
     /// A new stage begins.
@@ -175,152 +183,5 @@ impl<'a> Laboratory<'a> {
 
     fn cost(&self, n_point: usize) -> u64 {
         (n_point * self.windows.len()) as u64
-    }
-
-    /// Runs all points over all records in one batch; one answer per point, in their order. A point whose run fails on any
-    /// record has none.
-    ///
-    /// # Errors
-    /// When the fleet or the store fails, or no place could make a run.
-    pub fn run(&mut self, points: &[Point<'_>]) -> Result<Vec<Answer>, ExplainError> {
-        let mut answers = Vec::with_capacity(points.len());
-        while answers.len() < points.len() {
-            let rest = &points[answers.len()..];
-            let outputs = self.outputs(&rest[..self.at_a_time().min(rest.len())])?;
-            answers.extend(outputs.chunks(self.windows.len()).map(|runs| self.answer(runs)));
-        }
-        Ok(answers)
-    }
-
-    /// Points of one batch: as many as [`PORTION`] of their outputs allows, but enough for every slot to have work.
-    fn at_a_time(&self) -> usize {
-        let bytes: usize = self.windows.iter().map(|window| 8 * window.observed.len()).sum();
-        let busy = PER_SLOT * self.fleet.slots() / self.windows.len().max(1);
-        (PORTION / bytes.max(1)).max(busy).max(1)
-    }
-
-    /// The rows of one point from its runs over the records: outputs turned into what the channels measure.
-    fn answer(&self, runs: &[Known]) -> Answer {
-        let n_obs = self.study.setup.outputs.len();
-        let mut measured = Vec::with_capacity(runs.len());
-        for (record, run) in runs.iter().enumerate() {
-            let mut outputs = run.as_ref().map_err(Clone::clone)?.to_vec();
-            self.study.measure(record, &self.windows[record].times, &mut outputs);
-            measured.push(outputs);
-        }
-        let value = |row: &super::Row| measured[row.record][row.step * n_obs + row.output];
-        Ok(Arc::new(self.rows.rows.iter().map(value).collect()))
-    }
-
-    /// The outputs of runs that are not over a record as it is, one batch for all; nothing where the model fails.
-    ///
-    /// # Errors
-    /// As [`Laboratory::run`].
-    pub fn run_alone(
-        &mut self,
-        runs: Vec<(&Study, Job)>,
-    ) -> Result<Vec<Option<Arc<Vec<f64>>>>, ExplainError> {
-        let mut jobs = Vec::with_capacity(runs.len());
-        for (study, job) in runs {
-            jobs.push((self.fleet.install(&study.setup)?, job));
-        }
-        Ok(self.ask(jobs)?.into_iter().map(Result::ok).collect())
-    }
-
-    /// Outputs of every point over every record, as the model gives them: points in order, then records.
-    pub(super) fn outputs(&mut self, points: &[Point<'_>]) -> Result<Vec<Known>, ExplainError> {
-        let mut jobs = Vec::with_capacity(points.len() * self.windows.len());
-        for (particle, point) in points.iter().enumerate() {
-            let setup = self.fleet.install(&point.study.setup)?;
-            for (record, window) in self.windows.iter().enumerate() {
-                let theta = point.study.theta_for(record, point.theta.as_slice());
-                let (particle, record, window) = (particle as u32, record as u32, Arc::clone(window));
-                jobs.push((setup, Job { particle, record, window, theta, state: None }));
-            }
-        }
-        self.ask(jobs)
-    }
-
-    /// The answers of these jobs, in their order; only those that nobody has asked for before are run.
-    fn ask(&mut self, jobs: Vec<(SetupId, Job)>) -> Result<Vec<Known>, ExplainError> {
-        let mut keys = Vec::with_capacity(jobs.len());
-        let programs = self.store.program()?.digest();
-        let (mut open, mut asked, mut here) = (Vec::new(), Vec::new(), HashSet::new());
-        for (setup, job) in jobs {
-            let key = run_key::free(&programs, &setup, &job);
-            keys.push((key, job.window.observed.len()));
-            if !here.insert(key) || self.counted.contains(&key) {
-                continue;
-            }
-            self.counted.insert(key);
-            self.count(1);
-            if self.store.has_remembered_run(&key)? {
-                continue;
-            }
-            let (record, particle) = (job.record as usize, job.particle);
-            asked.push(Asked { key, record, particle, n_value: job.window.observed.len() });
-            open.push((setup, job));
-        }
-        self.fly(open, &asked)?;
-        keys.iter().map(|(key, n_value)| self.remembered(key, *n_value)).collect()
-    }
-
-    /// An answer that was given before, read back from the store if it is not held.
-    fn remembered(&mut self, key: &RunKey, n_value: usize) -> Result<Known, ExplainError> {
-        if let Some(known) = self.recent.get(key) {
-            return Ok(known);
-        }
-        let body = self.store.remembered_run(key)?;
-        let known = body.map_or_else(|| Err(String::new()), |body| decode(&body));
-        if let Some(n) = known.as_ref().map(|outputs| outputs.len()).ok().filter(|n| *n != n_value) {
-            return Err(self.store.damaged("run", format!("{n} values where {n_value} belong")).into());
-        }
-        self.recent.insert(*key, known.clone());
-        Ok(known)
-    }
-
-    /// Sends jobs and remembers their answers.
-    fn fly(&mut self, jobs: Vec<(SetupId, Job)>, asked: &[Asked]) -> Result<(), ExplainError> {
-        if jobs.is_empty() {
-            return Ok(());
-        }
-        let outcomes = self.fleet.run_mixed(jobs);
-        // Also those that led to an error.
-        self.keep_events()?;
-        let outcomes = outcomes.map_err(|error| told(self.study, error))?;
-        let mut bodies = Vec::with_capacity(asked.len());
-        let mut rows = Vec::with_capacity(asked.len());
-        for (asked, outcome) in asked.iter().zip(outcomes) {
-            rows.push(self.row(asked.record, asked.particle, &outcome));
-            self.workers.insert(outcome.worker.clone());
-            let known = taken(self.study, outcome, asked.particle, asked.record, asked.n_value)?;
-            bodies.push((asked.key, encode(&known)));
-            self.recent.insert(asked.key, known);
-        }
-        self.store.note_elapsed(self.elapsed())?;
-        self.store.remember_runs(bodies.iter().map(|(key, body)| (key, body.as_slice())), &rows)?;
-        self.n_batch += 1;
-        self.tell("");
-        Ok(())
-    }
-
-    fn keep_events(&self) -> Result<(), StoreError> {
-        for event in self.events.iter().flat_map(|events| events.try_iter()) {
-            self.store.event(self.elapsed(), event.kind(), &event.to_string())?;
-        }
-        Ok(())
-    }
-
-    fn row(&self, record: usize, particle: u32, outcome: &Outcome) -> JobRow {
-        JobRow {
-            pass: 0,
-            step: self.n_batch,
-            record: self.study.records[record].name.clone(),
-            particle,
-            attempts: outcome.attempts,
-            worker: outcome.worker.clone(),
-            error: outcome.result.as_ref().err().map(ToString::to_string),
-            cost_s: outcome.result.as_ref().map_or(0.0, |p| p.cost),
-        }
     }
 }

@@ -45,6 +45,7 @@ pub(super) fn measure(
             earlier_s: context.earlier_s,
         };
         let mut laboratory = Laboratory::new(&simulated, &mut *fleet, store, &mut inner, None);
+        laboratory.hold_at_most(options.hold);
         let verdict =
             answered(&mut laboratory, &simulated, &options, |_, answer| Ok(answer.decision.verdict));
         nulls.runs += laboratory.runs();

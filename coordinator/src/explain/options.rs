@@ -7,6 +7,7 @@ use std::sync::mpsc::Receiver;
 use starlings_estimators::EstimatorError;
 use starlings_models::SetupError;
 
+use super::laboratory::HOLD;
 use super::{Explanation, Figures};
 use crate::fleet::{FleetError, FleetEvent};
 use crate::study::store::StoreError;
@@ -27,11 +28,22 @@ pub struct Options {
     pub max_effects: usize,
     /// Simulated recordings without a gap on which the whole search measures its false alarms.
     pub nulls: usize,
+    /// Bytes of intermediate results of one kind that are held at most: more takes less time where recordings are long, and no
+    /// finding depends on it.
+    pub hold: usize,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { budget: None, without: Vec::new(), only: Vec::new(), force: false, max_effects: 2, nulls: 0 }
+        Self {
+            budget: None,
+            without: Vec::new(),
+            only: Vec::new(),
+            force: false,
+            max_effects: 2,
+            nulls: 0,
+            hold: HOLD,
+        }
     }
 }
 

@@ -31,7 +31,8 @@ pub(super) fn own_values(
             let influence = if study.parameters[parameter].is_initial() {
                 of_initial(laboratory, fit, record, parameter)?
             } else {
-                (!fit.jacobian.is_empty()).then(|| of_mean(fit, parameter) * scatter(fit, parameter))
+                (!fit.jacobian.is_empty())
+                    .then(|| of_mean(laboratory, fit, parameter) * scatter(fit, parameter))
             };
             columns.extend(influence.map(|all| only(laboratory, &all, record)));
         }
@@ -45,9 +46,10 @@ fn entries(study: &Study, parameter: usize) -> impl Iterator<Item = usize> + '_ 
 }
 
 /// The influence of the mean of the fitted values: all of them move by one prior standard deviation.
-fn of_mean(fit: &Fitted<'_>, parameter: usize) -> DVector<f64> {
-    let none = DVector::zeros(fit.jacobian.nrows());
-    entries(&fit.version.study, parameter).fold(none, |sum, j| sum + fit.jacobian.column(j))
+fn of_mean(laboratory: &Laboratory<'_>, fit: &Fitted<'_>, parameter: usize) -> DVector<f64> {
+    let jacobian = fit.jacobian.whole(&laboratory.rows);
+    let none = DVector::zeros(jacobian.nrows());
+    entries(&fit.version.study, parameter).fold(none, |sum, j| sum + jacobian.column(j))
 }
 
 /// Standard deviation of a further value beside the mean of the fitted ones, in prior standard deviations.

@@ -8,9 +8,6 @@ use std::sync::Arc;
 use super::memory::Known;
 use crate::study::store::RunKey;
 
-/// Bytes of outputs that are held at most, whatever was asked for.
-const MOST: usize = 8 << 20;
-
 /// Answers by key, the one that was not asked for longest leaving first.
 pub(super) struct Recent {
     /// An answer and when it was asked for last.
@@ -22,9 +19,9 @@ pub(super) struct Recent {
 }
 
 impl Recent {
-    /// Nothing yet.
-    pub(super) fn new() -> Self {
-        Self { answers: HashMap::new(), by_time: BTreeMap::new(), now: 0, bytes: 0, most: MOST }
+    /// Nothing yet, and so many bytes of outputs at most, whatever is asked for.
+    pub(super) fn new(most: usize) -> Self {
+        Self { answers: HashMap::new(), by_time: BTreeMap::new(), now: 0, bytes: 0, most }
     }
 
     /// An answer that is held.
@@ -71,7 +68,7 @@ mod tests {
     #[test]
     fn what_was_not_asked_for_longest_leaves_when_the_bytes_are_used_up() {
         let answer = |value: f64| -> Known { Ok(Arc::new(vec![value; 100])) };
-        let mut recent = Recent { most: 3 * size(&answer(0.0)), ..Recent::new() };
+        let mut recent = Recent::new(3 * size(&answer(0.0)));
         for k in 0..3 {
             recent.insert([k; 32], answer(f64::from(k)));
         }

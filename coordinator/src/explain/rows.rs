@@ -70,7 +70,9 @@ pub struct Rows {
 impl Rows {
     /// The rows of a study. Missing values have none.
     pub fn new(study: &Study) -> Self {
-        let mut rows = Vec::new();
+        let channels = || study.records.iter().flat_map(|record| &record.channels);
+        let n = channels().flat_map(|channel| &channel.values).filter(|v| v.is_finite()).count();
+        let mut rows = Vec::with_capacity(n);
         for (r, record) in study.records.iter().enumerate() {
             for (c, channel) in record.channels.iter().enumerate() {
                 for (step, (&time, &observed)) in record.times.iter().zip(&channel.values).enumerate() {
@@ -89,8 +91,14 @@ impl Rows {
                 }
             }
         }
-        let train = (0..rows.len()).filter(|i| rows[*i].usage == Usage::Train).collect();
+        let mut train: Vec<usize> = (0..rows.len()).filter(|i| rows[*i].usage == Usage::Train).collect();
+        train.shrink_to_fit();
         Self { rows, train }
+    }
+
+    /// Positions of the rows that do not train, increasing.
+    pub fn others(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.rows.len()).filter(|i| self.rows[*i].usage != Usage::Train)
     }
 
     /// Runs of consecutive rows of one record, channel and use: (first, one past the last).

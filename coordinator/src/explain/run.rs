@@ -48,6 +48,7 @@ pub fn explain(
     free.setup.observer = ObserverDef::default();
     let budget = options.budget.or(study.explain.budget);
     let mut laboratory = Laboratory::new(&free, &mut *fleet, store, context, budget);
+    laboratory.hold_at_most(options.hold);
     let (mut findings, predicted) = answered(&mut laboratory, &free, options, |laboratory, answer| {
         let predicted = Arc::clone(&answer.found.base.predicted);
         Ok((finish(laboratory, &answer)?, predicted))
@@ -89,7 +90,7 @@ pub(super) fn answered<R>(
     let candidates = candidate::all(study, &tracks, &rhythms, &jumps, options)?;
     let found = search(laboratory, base, &candidates, &tracks, options)?;
     laboratory.stage("verdict", "");
-    let decision = decide(laboratory, &found, &candidates);
+    let decision = decide(laboratory, &found, &candidates)?;
     then(laboratory, Answer { found, candidates: &candidates, decision, tracks: &tracks })
 }
 

@@ -2,16 +2,22 @@
 //!
 //! A run with a small amplitude gives the sensitivity of every row; the score test projects the fitted parameters out of it.
 //! All candidates go to the fleet in one batch; those whose response was too small or too large for a derivative go a second
-//! time. Next files to read: `score.rs` of the estimators, then [`super::search`].
+//! time. Next files to read: [`response`], `score.rs` of the estimators, then [`super::search`].
 
-use nalgebra::DVector;
-use starlings_estimators::{Optimum, Score};
+mod response;
+
+use std::sync::Arc;
+
+use starlings_estimators::Score;
 use starlings_models::SetupError;
+
+use response::{Next, Response, Scale};
 
 use super::ExplainError;
 use super::candidate::Candidate;
 use super::fit::Fitted;
-use super::laboratory::{Answer, Laboratory, Point};
+use super::influence::Influence;
+use super::laboratory::{Laboratory, Point};
 use super::locate::Track;
 use super::probe::{Along, natural_amplitude};
 use super::version::{Member, Version};
@@ -19,10 +25,6 @@ use crate::study::Record;
 
 /// Probe, as a share of what the term is added to.
 const PROBE: f64 = 3e-3;
-/// Response that a derivative is taken from: root mean square over the spread of the channel.
-const WANTED: f64 = 3e-3;
-/// Responses outside of these are measured again with another amplitude.
-const RESPONSE: [f64; 2] = [1e-5, 5e-2];
 /// Times that a candidate is measured again.
 const AGAIN: usize = 2;
 /// Part of its own below which a candidate's influence counts as imitated by the parameters.
@@ -40,8 +42,8 @@ pub struct Hit {
     pub candidate: usize,
     /// Values of its parameters after the amplitude.
     pub point: Vec<f64>,
-    /// d prediction / d amplitude over the noise, all rows; empty where there is none.
-    pub sensitivity: DVector<f64>,
+    /// What it changes; nothing where there is none.
+    pub influence: Influence,
     /// Its score.
     pub score: Score,
     /// Why it has no sensitivity.
@@ -66,7 +68,15 @@ struct Probe<'c> {
     version: Version<'c>,
     point: Vec<f64>,
     amplitude: f64,
-    answer: Option<Result<DVector<f64>, String>>,
+    answer: Option<Result<Felt, String>>,
+}
+
+/// An influence that was measured.
+struct Felt {
+    influence: Influence,
+    score: Score,
+    /// Whether the rows that train feel nothing of it.
+    is_unfelt: bool,
 }
 
 /// Measures candidates at a fit: `of` names (candidate, point of its grid). Effects that the fit has already are left out.
@@ -101,6 +111,7 @@ pub fn screen<'c>(
         return Ok(Vec::new());
     }
     let reference = reference(laboratory, fit, unmoved)?;
+    let scale = Scale { optimum: &optimum, spread: &spread, is_held: laboratory.holds(probes.len()) };
     for round in 0..=AGAIN {
         let open: Vec<usize> = (0..probes.len()).filter(|i| probes[*i].answer.is_none()).collect();
         if !laboratory.affords(open.len()) {
@@ -111,14 +122,22 @@ pub fn screen<'c>(
             break;
         }
         let points: Vec<Point<'_>> = open.iter().map(|i| at(fit, &probes[*i])).collect();
-        let answers = laboratory.run(&points)?;
+        let mut found = Vec::with_capacity(open.len());
+        laboratory.run_each(&points, |laboratory, k, runs, answer| {
+            let probe = &probes[open[k]];
+            let base = if touches_states(probe) { &reference } else { &fit.predicted };
+            let response = Response { probe, answer, runs, base };
+            found.push(response.next(laboratory, &scale, round == AGAIN));
+        })?;
         drop(points);
-        for (i, answer) in open.into_iter().zip(answers) {
-            let base = if touches_states(&probes[i]) { &reference } else { &*fit.predicted };
-            settle(laboratory, &mut probes[i], &answer, base, &spread, round == AGAIN);
+        for (i, next) in open.into_iter().zip(found) {
+            match next {
+                Next::Amplitude(amplitude) => probes[i].amplitude = amplitude,
+                Next::Answer(answer) => probes[i].answer = Some(answer),
+            }
         }
     }
-    Ok(probes.into_iter().map(|probe| hit(laboratory, &optimum, probe)).chain(unfit).collect())
+    Ok(probes.into_iter().map(hit).chain(unfit).collect())
 }
 
 /// A first guess of a probe.
@@ -177,10 +196,10 @@ fn reference(
     laboratory: &mut Laboratory<'_>,
     fit: &Fitted<'_>,
     unmoved: Option<Point<'_>>,
-) -> Result<Vec<f64>, ExplainError> {
-    let Some(point) = unmoved else { return Ok(fit.predicted.to_vec()) };
+) -> Result<Arc<Vec<f64>>, ExplainError> {
+    let Some(point) = unmoved else { return Ok(Arc::clone(&fit.predicted)) };
     let answer = laboratory.run(&[point])?.swap_remove(0);
-    Ok(answer.map_or_else(|_| fit.predicted.to_vec(), |y| y.to_vec()))
+    Ok(answer.unwrap_or_else(|_| Arc::clone(&fit.predicted)))
 }
 
 /// Spread of the observed values of each row's channel, over all records.
@@ -198,75 +217,26 @@ fn spread(laboratory: &Laboratory<'_>) -> Vec<f64> {
     laboratory.rows.rows.iter().map(|row| by_output[row.output].max(row.noise)).collect()
 }
 
-/// Takes an answer: a sensitivity, or a better amplitude for the next round, or a failure.
-fn settle(
-    laboratory: &Laboratory<'_>,
-    probe: &mut Probe<'_>,
-    answer: &Answer,
-    base: &[f64],
-    spread: &[f64],
-    last: bool,
-) {
-    let predicted = match answer {
-        Ok(predicted) => predicted,
-        Err(reason) if last => {
-            probe.answer = Some(Err(reason.clone()));
-            return;
-        }
-        Err(_) => {
-            probe.amplitude *= 1e-2;
-            return;
-        }
-    };
-    let rows = &laboratory.rows.rows;
-    let n = rows.len().max(1) as f64;
-    let relative = predicted.iter().zip(base).zip(spread).map(|((y, b), s)| ((y - b) / s).powi(2));
-    let response = (relative.sum::<f64>() / n).sqrt();
-    let fits = (RESPONSE[0]..=RESPONSE[1]).contains(&response);
-    if fits || (last && response > 0.0) {
-        let change = predicted.iter().zip(base).zip(rows);
-        let change = change.map(|((y, b), row)| (y - b) / (row.noise * probe.amplitude));
-        probe.answer = Some(Ok(DVector::from_iterator(rows.len(), change)));
-    } else if last {
-        probe.answer = Some(Err(String::new()));
-    } else if response > 0.0 {
-        probe.amplitude *= (WANTED / response).clamp(1e-6, 1e6);
-    } else {
-        probe.amplitude *= 1e3;
-    }
-}
-
 /// A candidate that does not go with what the model has already.
 fn unfit_hit(candidate: usize, point: &[f64], error: &SetupError) -> Hit {
     Hit {
         candidate,
         point: point.to_vec(),
-        sensitivity: DVector::zeros(0),
+        influence: Influence::none(),
         score: NO_SCORE,
         failure: Some(error.to_string()),
     }
 }
 
-fn hit(laboratory: &Laboratory<'_>, optimum: &Optimum, probe: Probe<'_>) -> Hit {
+fn hit(probe: Probe<'_>) -> Hit {
     let Probe { candidate, point, answer, .. } = probe;
-    match answer.unwrap_or_else(|| Err(String::new())) {
-        Ok(sensitivity) => {
-            let train = sensitivity.select_rows(&laboratory.rows.train);
-            let score = optimum.score(&train);
-            let unfelt = train.amax() <= 0.0;
-            let failure = unfelt.then(|| "no influence on what is fitted".to_owned());
-            Hit { candidate, point, sensitivity, score, failure }
+    let reason = match answer.unwrap_or_else(|| Err(String::new())) {
+        Ok(Felt { influence, score, is_unfelt }) => {
+            let failure = is_unfelt.then(|| "no influence on what is fitted".to_owned());
+            return Hit { candidate, point, influence, score, failure };
         }
-        Err(reason) => Hit {
-            candidate,
-            point,
-            sensitivity: DVector::zeros(0),
-            score: NO_SCORE,
-            failure: Some(if reason.is_empty() {
-                "no influence on what was measured".to_owned()
-            } else {
-                reason
-            }),
-        },
-    }
+        Err(reason) if reason.is_empty() => "no influence on what was measured".to_owned(),
+        Err(reason) => reason,
+    };
+    Hit { candidate, point, influence: Influence::none(), score: NO_SCORE, failure: Some(reason) }
 }

@@ -80,14 +80,13 @@ pub fn search<'c>(
     tracks: &[Track],
     options: &Options,
 ) -> Result<Found<'c>, ExplainError> {
-    let seed = laboratory.study.seed;
     let mut searcher = Searcher { laboratory, candidates, tracks, cut_short: false };
     let before = Misfit::of(searcher.laboratory, &base);
     let adequacy = Adequacy::of(searcher.laboratory, &base);
     let held_out = held_out(searcher.laboratory, &base, &base);
     searcher.laboratory.stage("screen", &format!("{} candidates", candidates.len()));
     let hits = searcher.screen_all(&base)?;
-    let background = Background::new(&base.optimum()?, &searcher.laboratory.rows, &hits, candidates, seed);
+    let background = background(searcher.laboratory, &base, &hits, candidates)?;
     let alarm = hits.iter().map(|h| h.allowed_gain(candidates[h.candidate].sign())).fold(0.0, f64::max);
     let (judged, cut_short) = (Vec::new(), false);
     let mut found = Found { base, before, adequacy, held_out, background, hits, alarm, judged, cut_short };
@@ -98,6 +97,19 @@ pub fn search<'c>(
     }
     found.cut_short = searcher.cut_short || searcher.laboratory.was_cut_short();
     Ok(found)
+}
+
+/// What chance would give at a fit.
+fn background(
+    laboratory: &Laboratory<'_>,
+    fit: &Fitted<'_>,
+    hits: &[Hit],
+    candidates: &[Candidate],
+) -> Result<Background, ExplainError> {
+    let (rows, seed) = (&laboratory.rows, laboratory.study.seed);
+    let at_a_time = laboratory.series_held();
+    let of_train = |hit: &Hit| hit.influence.of_train(laboratory);
+    Background::new(&fit.optimum()?, rows, hits, candidates, seed, at_a_time, &of_train)
 }
 
 impl<'c> Searcher<'_, '_, 'c> {
@@ -125,9 +137,8 @@ impl<'c> Searcher<'_, '_, 'c> {
 
     /// Refits the best candidates alone.
     fn singles(&mut self, found: &mut Found<'c>) -> Result<(), ExplainError> {
-        let base = found.base.clone();
         let best = self.best_of_each(&found.hits);
-        let fits = self.explore(&base, &best)?;
+        let fits = self.explore(&found.base, &best)?;
         self.judge_all(found, fits)
     }
 
@@ -146,29 +157,59 @@ impl<'c> Searcher<'_, '_, 'c> {
         best
     }
 
-    /// Adds single candidates to a fit: a race among the best, then refits of the last few.
+    /// Adds single candidates to a fit: a race among the best, then refits of the last few. Where recordings are long, a few are
+    /// held at a time, and those that go on are raced again, which takes no run.
     fn explore(&mut self, parent: &Fitted<'c>, best: &[Hit]) -> Result<Vec<Fitted<'c>>, ExplainError> {
         self.laboratory.stage("refit", "a race among the best candidates");
-        let mut fits = Vec::new();
-        for hit in best.iter().take(RACE) {
-            fits.push(self.with(parent, hit)?);
+        let racing = &best[..best.len().min(RACE)];
+        let at_a_time = self.fits_held(parent);
+        let (mut raced, mut promised) = (Vec::new(), Vec::new());
+        for some in racing.chunks(at_a_time) {
+            raced.clear();
+            raced.extend(self.race(parent, some)?.into_iter().map(Some));
+            promised.extend(raced.iter().flatten().map(Fitted::promised));
         }
+        let kept = self.kept(best, &promised);
+        self.laboratory.stage("refit", &format!("{} candidates with every parameter free", kept.len()));
+        if racing.len() <= at_a_time {
+            return self.refit(kept.into_iter().filter_map(|i| raced[i].take()).collect());
+        }
+        drop(raced);
+        let mut fits = Vec::with_capacity(kept.len());
+        for some in kept.chunks(at_a_time) {
+            let hits: Vec<Hit> = some.iter().map(|i| racing[*i].clone()).collect();
+            let again = self.race(parent, &hits)?;
+            fits.extend(self.refit(again)?);
+        }
+        Ok(fits)
+    }
+
+    /// A few steps of the fits that add each of these to a fit.
+    fn race(&mut self, parent: &Fitted<'c>, hits: &[Hit]) -> Result<Vec<Fitted<'c>>, ExplainError> {
+        let mut fits = hits.iter().map(|hit| self.with(parent, hit)).collect::<Result<Vec<_>, _>>()?;
         self.cut_short |= !drive_rounds(self.laboratory, &mut fits, ROUNDS)?;
-        fits.sort_by(|a, b| a.promised().total_cmp(&b.promised()));
-        let first = fits.first().map_or(0.0, Fitted::promised);
+        Ok(fits)
+    }
+
+    /// Fits with one effect more than `parent` that are held at a time, at least two for each slot of the fleet: with fewer it waits.
+    fn fits_held(&mut self, parent: &Fitted<'c>) -> usize {
+        let slots = self.laboratory.fleet().slots();
+        // Two Jacobians, the predictions and the residuals.
+        let series = 2 * (parent.version.n_param() + 2);
+        (self.laboratory.series_held() / series).max(2 * slots).max(1)
+    }
+
+    /// Positions of the best that go on after a race, the one that promises most first.
+    fn kept(&self, best: &[Hit], promised: &[f64]) -> Vec<usize> {
+        let mut order: Vec<usize> = (0..promised.len()).collect();
+        order.sort_by(|a, b| promised[*a].total_cmp(&promised[*b]));
+        let first = order.first().map_or(0.0, |i| promised[*i]);
         let scale = (first / self.laboratory.rows.train.len().max(1) as f64).max(1.0);
-        let close = fits.iter().filter(|f| f.promised() <= first + CLOSE * scale).count();
+        let close = promised.iter().filter(|p| **p <= first + CLOSE * scale).count();
         let keep = if best.len() <= SMALL { SMALL } else { close.clamp(FINAL, FINAL + 2) };
         // A step too long for the secant must not cost the best two scores their refit.
-        let scored: Vec<usize> = best.iter().take(SCORED).map(|h| h.candidate).collect();
-        let last = |f: &Fitted<'_>| f.version.members.last().map(|m| m.index);
-        let mut place = 0;
-        fits.retain(|f| {
-            place += 1;
-            place <= keep || last(f).is_some_and(|index| scored.contains(&index))
-        });
-        self.laboratory.stage("refit", &format!("{} candidates with every parameter free", fits.len()));
-        self.refit(fits)
+        let goes_on = |(place, i): &(usize, usize)| *place < keep || *i < SCORED;
+        order.into_iter().enumerate().filter(goes_on).map(|(_, i)| i).collect()
     }
 
     /// Refits until all have converged.
@@ -188,9 +229,8 @@ impl<'c> Searcher<'_, '_, 'c> {
         let member = Member { candidate, index: hit.candidate, unit };
         let members = parent.version.members.iter().cloned().chain([member]).collect();
         let version = Version::new(parent.version.base, members, &parent.version.left_out)?;
-        let sensitivity = &hit.sensitivity * unit;
-        let train = &self.laboratory.rows.train;
-        Ok(Fitted::from_parent(version, parent, &hit.point, &sensitivity, train))
+        let sensitivity = &*hit.influence.sensitivity(self.laboratory)? * unit;
+        Ok(Fitted::from_parent(version, parent, &hit.point, &sensitivity, &self.laboratory.rows))
     }
 
     pub(super) fn judge_all(

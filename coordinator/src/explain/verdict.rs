@@ -3,17 +3,17 @@
 //! A name says that one version passes every gate, that no rival comes close, and that what it leaves is not of the library's
 //! making. Anything less is a tie or unexplained, with what came nearest. Next file to read: [`super::answer`].
 
-use nalgebra::DVector;
 use starlings_estimators::effective_sample_size;
 use starlings_models::equations::{Expression, Slot};
 
-use super::Verdict;
 use super::candidate::Candidate;
 use super::carried::{Carried, carried};
 use super::doubt::{doubt, nearest_refused};
 use super::judge::Judged;
 use super::laboratory::Laboratory;
+use super::screen::Hit;
 use super::search::Found;
+use super::{ExplainError, Verdict};
 
 /// A rival within this fall of χ², in units of the effective noise, is tied.
 const MARGIN: f64 = 6.0;
@@ -47,7 +47,14 @@ pub struct Decision {
 }
 
 /// Decides.
-pub fn decide(laboratory: &Laboratory<'_>, found: &Found<'_>, candidates: &[Candidate]) -> Decision {
+///
+/// # Errors
+/// When the store fails.
+pub fn decide(
+    laboratory: &Laboratory<'_>,
+    found: &Found<'_>,
+    candidates: &[Candidate],
+) -> Result<Decision, ExplainError> {
     let none = |verdict, best, because: &str| Decision {
         verdict,
         best,
@@ -59,18 +66,18 @@ pub fn decide(laboratory: &Laboratory<'_>, found: &Found<'_>, candidates: &[Cand
     let passing = found.passing();
     if passing.is_empty() {
         let is_gap = found.adequacy.is_gap() && !found.adequacy.is_numerical();
-        return if is_gap || found.held_out.iter().any(|h| h.fails) {
+        return Ok(if is_gap || found.held_out.iter().any(|h| h.fails) {
             none(Verdict::Unexplained, None, &nearest_refused(found))
         } else {
             none(Verdict::NoGap, None, "")
-        };
+        });
     }
     let Carried { best, checked, because } = carried(found, &passing);
     let judged = &found.judged[best];
     let leftover = found.judged[checked].leftover.unwrap_or_default();
     let because = because.or_else(|| doubt(laboratory, found, judged, leftover));
     if let Some(because) = because {
-        return Decision { checked: Some(checked), ..none(Verdict::Unexplained, Some(best), &because) };
+        return Ok(Decision { checked: Some(checked), ..none(Verdict::Unexplained, Some(best), &because) });
     }
     // What remains beside a discrepancy of its own tells nothing of a form.
     let is_tested = judged.inflation > DISCREPANT || leftover.power >= POWER;
@@ -84,7 +91,7 @@ pub fn decide(laboratory: &Laboratory<'_>, found: &Found<'_>, candidates: &[Cand
     }
     let judged = &found.judged[best];
     let mut tied: Vec<Vec<String>> = rivals.iter().map(|i| names(&found.judged[*i])).collect();
-    for twin in twins(laboratory, found, judged, candidates) {
+    for twin in twins(laboratory, found, judged, candidates)? {
         if !tied.contains(&twin) {
             tied.push(twin);
         }
@@ -94,7 +101,7 @@ pub fn decide(laboratory: &Laboratory<'_>, found: &Found<'_>, candidates: &[Cand
     }
     tied.extend(limits(judged).into_iter().map(|limit| vec![limit]));
     let verdict = if tied.is_empty() { Verdict::Named } else { Verdict::Tie };
-    Decision { verdict, best: Some(best), checked: Some(checked), tied, rivals, because: String::new() }
+    Ok(Decision { verdict, best: Some(best), checked: Some(checked), tied, rivals, because: String::new() })
 }
 
 /// The limiting forms that the data do not exclude: a parameter inside a term of which they say little.
@@ -168,20 +175,20 @@ fn twins(
     found: &Found<'_>,
     judged: &Judged<'_>,
     candidates: &[Candidate],
-) -> Vec<Vec<String>> {
-    let [member] = judged.fit.version.members.as_slice() else { return Vec::new() };
-    let Ok(optimum) = found.base.optimum() else { return Vec::new() };
-    let own = |s: &DVector<f64>| optimum.unimitated(&s.select_rows(&laboratory.rows.train));
+) -> Result<Vec<Vec<String>>, ExplainError> {
+    let [member] = judged.fit.version.members.as_slice() else { return Ok(Vec::new()) };
+    let Ok(optimum) = found.base.optimum() else { return Ok(Vec::new()) };
+    let own = |hit: &Hit| Ok::<_, ExplainError>(optimum.unimitated(&hit.influence.of_train(laboratory)?));
     let best = found.hits.iter().filter(|h| h.candidate == member.index && h.failure.is_none());
-    let Some(best) = best.max_by(|a, b| a.score.gain.total_cmp(&b.score.gain)) else { return Vec::new() };
-    let best = own(&best.sensitivity);
+    let Some(best) = best.max_by(|a, b| a.score.gain.total_cmp(&b.score.gain)) else { return Ok(Vec::new()) };
+    let best = own(best)?;
     let mut twins: Vec<Vec<String>> = Vec::new();
     for hit in found.hits.iter().filter(|h| h.failure.is_none() && !h.is_absorbed()) {
         let refitted = found
             .judged
             .iter()
             .any(|j| j.fit.version.members.len() == 1 && j.fit.version.members[0].index == hit.candidate);
-        let other = own(&hit.sensitivity);
+        let other = own(hit)?;
         let alike = best.dot(&other).abs() / (best.norm() * other.norm());
         let candidate = &candidates[hit.candidate];
         let name = vec![candidate.name().to_owned()];
@@ -190,5 +197,5 @@ fn twins(
             twins.push(name);
         }
     }
-    twins
+    Ok(twins)
 }

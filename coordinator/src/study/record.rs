@@ -105,7 +105,7 @@ impl<'a> Recordings<'a> {
                 return None;
             }
         };
-        Csv::new(path, &text)
+        Csv::new(path, text)
             .map_err(|error| error.problems.into_iter().for_each(|p| self.source.adopt(p)))
             .ok()
     }

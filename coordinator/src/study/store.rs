@@ -114,7 +114,9 @@ impl Store {
     /// WAL with NORMAL keeps every committed transaction through a killed process at the price of one write each.
     fn keep_a_log(&self) -> Result<(), StoreError> {
         self.guard(self.connection.pragma_update(None, "journal_mode", "WAL"))?;
-        self.guard(self.connection.pragma_update(None, "synchronous", "NORMAL"))
+        self.guard(self.connection.pragma_update(None, "synchronous", "NORMAL"))?;
+        // KiB of pages in memory: rows are written once and hardly read again.
+        self.guard(self.connection.pragma_update(None, "cache_size", -1024))
     }
 
     /// Folds the log into the one file, so that a finished run can be read from a read-only folder.

@@ -33,7 +33,7 @@ fn drive(fit: &mut LeastSquares) -> (End, usize, usize) {
             }
             Need::Jacobian(z) => {
                 jacobians += 1;
-                fit.give_jacobian(Some(jacobian(&z)));
+                fit.give_jacobian(Some(jacobian(&z).into()));
             }
             Need::Nothing(end) => return (end, runs, jacobians),
         }
@@ -67,7 +67,7 @@ fn a_bound_holds_and_the_fit_ends_there() {
 fn a_failed_run_is_a_rejected_step() {
     let mut fit = LeastSquares::new(DVector::from_vec(vec![1.0, 0.2]), flat(2), 1e-6, 50);
     fit.give_residual(Some(residual(&DVector::from_vec(vec![1.0, 0.2]))));
-    fit.give_jacobian(Some(jacobian(&DVector::from_vec(vec![1.0, 0.2]))));
+    fit.give_jacobian(Some(jacobian(&DVector::from_vec(vec![1.0, 0.2])).into()));
     fit.give_residual(None);
     assert_eq!(drive(&mut fit).0, End::Converged);
 }
@@ -75,7 +75,7 @@ fn a_failed_run_is_a_rejected_step() {
 #[test]
 fn a_known_start_costs_one_run_per_step_and_no_jacobian() {
     let z = DVector::from_vec(vec![1.9, 0.65]);
-    let mut fit = LeastSquares::from_known(z.clone(), residual(&z), jacobian(&z), flat(2), 0.1, 20);
+    let mut fit = LeastSquares::from_known(z.clone(), residual(&z), jacobian(&z).into(), flat(2), 0.1, 20);
     let (end, runs, jacobians) = drive(&mut fit);
     assert_eq!((end, jacobians), (End::Tentative, 0));
     assert!(runs <= 6 && fit.cost() < 1.0, "{runs} runs, cost {}", fit.cost());
@@ -92,7 +92,7 @@ fn steps_that_overshoot_are_shortened_until_one_helps() {
             Need::Residual(z) => fit.give_residual(Some(z.map(|z| -100.0 * (20.0 * z).atan()))),
             Need::Jacobian(z) => {
                 let slope = 2000.0 / (1.0 + (20.0 * z[0]).powi(2));
-                fit.give_jacobian(Some(DMatrix::from_element(1, 1, slope)));
+                fit.give_jacobian(Some(DMatrix::from_element(1, 1, slope).into()));
             }
             Need::Nothing(end) => break end,
         }
@@ -110,7 +110,7 @@ fn a_prior_pulls_as_its_precision_says() {
     loop {
         match fit.need().clone() {
             Need::Residual(z) => fit.give_residual(Some(DVector::from_element(1, 1.0 - z[0]))),
-            Need::Jacobian(_) => fit.give_jacobian(Some(DMatrix::from_element(1, 1, 1.0))),
+            Need::Jacobian(_) => fit.give_jacobian(Some(DMatrix::from_element(1, 1, 1.0).into())),
             Need::Nothing(_) => break,
         }
     }

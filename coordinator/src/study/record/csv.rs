@@ -4,10 +4,20 @@
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::separator::Foreign;
 use crate::study::file::locate::{csv_field, line_column};
 use crate::study::problem::{Problem, Source, StudyError, suggestion};
+
+/// Where a row begins.
+#[derive(Debug)]
+struct Row {
+    /// Byte of the file's text.
+    start: usize,
+    /// Number of cells before it.
+    first: usize,
+}
 
 /// The text of a recording, cut into rows and columns.
 #[derive(Debug)]
@@ -15,9 +25,11 @@ pub(in crate::study) struct Csv {
     pub(in crate::study) path: PathBuf,
     source: Source,
     pub(in crate::study) headers: Vec<String>,
-    /// Byte at which each row starts.
-    starts: Vec<usize>,
-    cells: Vec<csv::StringRecord>,
+    rows: Vec<Row>,
+    /// The texts of all cells, one after the other: a text of its own for every cell would take several times the file.
+    cells: String,
+    /// Where each of them ends there.
+    ends: Vec<usize>,
 }
 
 impl Csv {
@@ -25,27 +37,35 @@ impl Csv {
     ///
     /// # Errors
     /// When it has no header, no row, or a row of another length than the header.
-    pub(in crate::study) fn new(path: &Path, text: &str) -> Result<Self, StudyError> {
-        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-        refuse_foreign(path, text)?;
+    pub(in crate::study) fn new(path: &Path, text: String) -> Result<Self, StudyError> {
+        let bare = text.strip_prefix('\u{feff}').unwrap_or(&text);
+        refuse_foreign(path, bare)?;
+        let source = Source::new(path, bare);
+        drop(text);
+        let text = Arc::clone(&source.text);
+        let n_line = text.bytes().filter(|b| *b == b'\n').count() + 1;
         let mut csv = Self {
             path: path.to_owned(),
-            source: Source::new(path, text),
+            source,
             headers: Vec::new(),
-            starts: Vec::new(),
-            cells: Vec::new(),
+            rows: Vec::with_capacity(n_line),
+            cells: String::with_capacity(text.len()),
+            ends: Vec::new(),
         };
         let mut reader = csv::ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
             .trim(csv::Trim::All)
             .from_reader(text.as_bytes());
-        for row in reader.records() {
-            match row {
-                Ok(row) if csv.headers.is_empty() => {
+        let mut row = csv::StringRecord::new();
+        loop {
+            match reader.read_record(&mut row) {
+                Ok(false) => break,
+                Ok(true) if csv.headers.is_empty() => {
                     csv.headers = row.iter().map(ToOwned::to_owned).collect();
+                    csv.ends.reserve(n_line * csv.headers.len());
                 }
-                Ok(row) => csv.add(row),
+                Ok(true) => csv.add(&row),
                 Err(error) => csv.source.report(0..0, format!("this is not CSV: {error}")),
             }
         }
@@ -54,25 +74,44 @@ impl Csv {
         Ok(csv)
     }
 
-    fn add(&mut self, row: csv::StringRecord) {
+    fn add(&mut self, row: &csv::StringRecord) {
         // The reader's position may stand before blank lines.
         let from = row.position().map_or(0, |p| p.byte() as usize);
         let blank =
             self.source.text.as_bytes()[from..].iter().take_while(|b| matches!(b, b'\n' | b'\r')).count();
-        self.starts.push(from + blank);
-        self.cells.push(row);
+        self.rows.push(Row { start: from + blank, first: self.ends.len() });
+        for cell in row {
+            self.cells.push_str(cell);
+            self.ends.push(self.cells.len());
+        }
+    }
+
+    /// Number of cells of a row.
+    fn width(&self, row: usize) -> usize {
+        self.rows.get(row + 1).map_or(self.ends.len(), |next| next.first) - self.rows[row].first
+    }
+
+    /// The text of a cell, without the spaces and quotes around it.
+    fn text(&self, row: usize, column: usize) -> &str {
+        let cell = self.rows[row].first + column;
+        let from = if cell == 0 { 0 } else { self.ends[cell - 1] };
+        &self.cells[from..self.ends[cell]]
+    }
+
+    fn texts_of(&self, row: usize) -> impl Iterator<Item = &str> {
+        (0..self.width(row)).map(move |column| self.text(row, column))
     }
 
     fn check_shape(&self) {
         let end = self.source.text.len();
         if self.headers.is_empty() {
             self.source.report(end..end, "the file is empty: expected a header line and one row per time");
-        } else if self.cells.is_empty() {
+        } else if self.rows.is_empty() {
             self.source.report(end..end, "the file has a header and no row");
         }
         let wanted = self.headers.len();
-        if let Some(row) = self.cells.iter().position(|cells| cells.len() != wanted) {
-            let n = self.cells[row].len();
+        if let Some(row) = (0..self.rows.len()).find(|row| self.width(*row) != wanted) {
+            let n = self.width(row);
             let message = format!("this row has {n} cells, the header has {wanted}");
             self.source.report_with(self.cell(row, 0), message, self.row_help(row));
         }
@@ -80,18 +119,18 @@ impl Csv {
 
     /// Why a row has another number of cells than the header, as far as one can guess.
     fn row_help(&self, row: usize) -> String {
-        let (cells, wanted) = (&self.cells[row], self.headers.len());
+        let (width, wanted) = (self.width(row), self.headers.len());
         let whole = |cell: &str| cell.parse::<i64>().is_ok();
-        if row == 0 && wanted == 1 && cells.len() > 1 {
+        if row == 0 && wanted == 1 && width > 1 {
             let first = &self.headers[0];
             return format!(
                 "the first line must name the columns: remove `{first}` and other lines above the names"
             );
         }
-        if cells.len() == wanted + 1 && cells.get(wanted) == Some("") {
+        if width == wanted + 1 && self.text(row, wanted).is_empty() {
             return "it ends with a comma that the header has not".to_owned();
         }
-        if cells.len() == 2 * wanted && cells.iter().all(whole) {
+        if width == 2 * wanted && self.texts_of(row).all(whole) {
             return "are these decimal commas? write the numbers with points: `0.5`, not `0,5`".to_owned();
         }
         "leave a missing value empty between its commas".to_owned()
@@ -135,26 +174,29 @@ impl Csv {
     /// # Errors
     /// When a cell is neither; the first such cell, with the count of the others.
     pub(in crate::study) fn numbers(&self, column: usize) -> Result<Vec<f64>, Problem> {
-        let parsed: Vec<Option<f64>> = self.cells.iter().map(|cells| parse(&cells[column])).collect();
-        let wrong: Vec<usize> = (0..parsed.len()).filter(|row| parsed[*row].is_none()).collect();
-        let Some(&row) = wrong.first() else {
-            return Ok(parsed.into_iter().flatten().collect());
-        };
+        let mut numbers = Vec::with_capacity(self.rows.len());
+        let mut wrong = Vec::new();
+        for (row, cell) in self.texts(column).enumerate() {
+            match parse(cell) {
+                Some(number) => numbers.push(number),
+                None => wrong.push(row),
+            }
+        }
+        let Some(&row) = wrong.first() else { return Ok(numbers) };
         let more = match wrong.len() {
             1 => String::new(),
             2 => ", nor is one other cell of this column".to_owned(),
             n => format!(", nor are {} other cells of this column", n - 1),
         };
         let name = &self.headers[column];
-        let message =
-            format!("`{}` in column `{name}` is not a finite number{more}", &self.cells[row][column]);
+        let message = format!("`{}` in column `{name}` is not a finite number{more}", self.text(row, column));
         Err(self.problem(row, column, message, self.cell_help(row, column)))
     }
 
     /// What to do about a cell that is no number.
     fn cell_help(&self, row: usize, column: usize) -> &'static str {
-        let cell = &self.cells[row][column];
-        if row == 0 && self.cells[row].iter().all(|c| parse(c).is_none_or(f64::is_nan)) {
+        let cell = self.text(row, column);
+        if row == 0 && self.texts_of(row).all(|c| parse(c).is_none_or(f64::is_nan)) {
             return "the second line holds no number: remove it where it names units, which belong into the study";
         }
         if cell.contains(':') || cell.matches(['-', '/']).count() == 2 {
@@ -165,7 +207,7 @@ impl Csv {
 
     /// The texts of a column.
     pub(in crate::study) fn texts(&self, column: usize) -> impl Iterator<Item = &str> {
-        self.cells.iter().map(move |cells| &cells[column])
+        (0..self.rows.len()).map(move |row| self.text(row, column))
     }
 
     /// The numbers of a time column, strictly increasing.
@@ -198,7 +240,7 @@ impl Csv {
 
     /// Line of a row, from 1, the header included.
     pub(in crate::study) fn line(&self, row: usize) -> usize {
-        line_column(&self.source.text, self.starts[row]).0
+        line_column(&self.source.text, self.rows[row].start).0
     }
 
     /// A problem at one cell.
@@ -219,7 +261,7 @@ impl Csv {
     }
 
     fn cell(&self, row: usize, column: usize) -> Range<usize> {
-        csv_field(&self.source.text, self.starts[row], column)
+        csv_field(&self.source.text, self.rows[row].start, column)
     }
 }
 

@@ -23,7 +23,7 @@ impl Store {
     /// When the database refuses; none of them is kept then.
     pub fn remember_runs<'a>(
         &self,
-        runs: impl IntoIterator<Item = (&'a RunKey, &'a [u8])>,
+        runs: impl IntoIterator<Item = (&'a RunKey, impl AsRef<[u8]>)>,
         jobs: &[JobRow],
     ) -> Result<(), StoreError> {
         self.commit()?;
@@ -32,7 +32,7 @@ impl Store {
             let mut insert = transaction
                 .prepare_cached("INSERT OR REPLACE INTO remembered_runs (key, body) VALUES (?1, ?2)")?;
             for (key, body) in runs {
-                insert.execute(params![key.as_slice(), body])?;
+                insert.execute(params![key.as_slice(), body.as_ref()])?;
             }
             drop(insert);
             insert_jobs(&transaction, jobs)?;
