@@ -251,7 +251,17 @@ impl Instance {
                 (How::Fell, format!("the solver `{name}` breaks the protocol: {what}"))
             }
         };
-        Lost { how, what, tail }
+        Lost { how, what: what + &self.homeless(), tail }
+    }
+
+    /// That its folder is gone, as the end of a sentence: whatever it says of its end, that is why.
+    fn homeless(&self) -> String {
+        let folder = self.scratch.path().display();
+        if self.is_homeless() {
+            format!("; its folder {folder} was removed meanwhile")
+        } else {
+            String::new()
+        }
     }
 }
 
