@@ -34,9 +34,9 @@ use super::stopwatch::{Stopwatch, Time};
 
 /// How long a run that is given up on purpose may go on.
 const LEFT_AFTER: Duration = Duration::from_millis(2);
-/// How long a program that broke its connection may take to end, so that its ending can be told: a launcher of ranks cleans up
-/// first. One that only broke the protocol need not end at all.
+/// How long a program that broke its connection may take to end, as a launcher of ranks does, so that its ending can be told.
 const LAST_WORDS: Duration = Duration::from_secs(5);
+/// The same of one that only broke the protocol and need not end.
 const SHORT: Duration = Duration::from_millis(500);
 
 /// Why a program is of no more use.
@@ -256,12 +256,8 @@ impl Instance {
 
     /// That its folder is gone, as the end of a sentence: whatever it says of its end, that is why.
     fn homeless(&self) -> String {
-        let folder = self.scratch.path().display();
-        if self.is_homeless() {
-            format!("; its folder {folder} was removed meanwhile")
-        } else {
-            String::new()
-        }
+        let gone = self.is_homeless().then(|| self.scratch.path().display());
+        gone.map(|folder| format!("; its folder {folder} was removed meanwhile")).unwrap_or_default()
     }
 }
 
