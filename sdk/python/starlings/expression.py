@@ -13,9 +13,7 @@ import re
 from typing import Any, Callable, List, Mapping, Optional, Tuple
 
 from .arithmetic import ONE, TWO, whole_power
-
-#: What a compiled part is called with: a frame of the caller's own; see `Scope`.
-Code = Callable[[Any], float]
+from .scope import Code, Scope
 
 _MAX_DEPTH = 200
 _MAX_LENGTH = 4000
@@ -28,26 +26,6 @@ class ExpressionError(ValueError):
         super().__init__(f"`{text}`, column {column}: {message}")
         self.column = column
         self.message = message
-
-
-class Scope:
-    """What the names of an expression stand for. Every method gives a closure over the frame, or None."""
-
-    def name(self, name: str) -> Optional[Code]:
-        """The value of a name."""
-        return None
-
-    def time(self) -> Code:
-        """The value of `t`."""
-        return lambda frame: float(frame)
-
-    def delayed(self, name: str) -> Optional[Callable[[Any, float], float]]:
-        """The value of an input at an earlier time, from frame and delay."""
-        return None
-
-    def slope(self, name: str) -> Optional[Code]:
-        """The time derivative of an input."""
-        return None
 
 
 class _Table(Scope):

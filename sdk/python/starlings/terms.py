@@ -8,7 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple
 
-from .expression import Code, Expression, ExpressionError, Scope
+from .expression import Expression, ExpressionError
+from .scope import Code, Scope
 from .failures import BadRequest
 from .quantity import Layout
 from .values import Array, Inputs, Values
