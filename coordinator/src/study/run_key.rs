@@ -10,20 +10,20 @@ use crate::study::store::RunKey;
 /// The key of a run that nothing pulls: the programs that make it (a digest), the setup and the job, without what was observed.
 pub(crate) fn free(programs: &[u8; 32], setup: &SetupId, job: &Job) -> RunKey {
     let mut hasher = blake3::Hasher::new();
-    hasher.update(programs);
-    hash(&mut hasher, setup, job);
+    hash(&mut hasher, programs, setup, job);
     *hasher.finalize().as_bytes()
 }
 
-/// The key of a run that an observer may pull to what was observed, whatever program makes it.
-pub(crate) fn observed(setup: &SetupId, job: &Job) -> RunKey {
+/// The key of a run that an observer may pull to what was observed.
+pub(crate) fn observed(programs: &[u8; 32], setup: &SetupId, job: &Job) -> RunKey {
     let mut hasher = blake3::Hasher::new();
-    hash(&mut hasher, setup, job);
+    hash(&mut hasher, programs, setup, job);
     numbers(&mut hasher, &job.window.observed);
     *hasher.finalize().as_bytes()
 }
 
-fn hash(hasher: &mut blake3::Hasher, setup: &SetupId, job: &Job) {
+fn hash(hasher: &mut blake3::Hasher, programs: &[u8; 32], setup: &SetupId, job: &Job) {
+    hasher.update(programs);
     hasher.update(setup);
     hasher.update(&u64::from(job.record).to_le_bytes());
     numbers(hasher, &job.theta);

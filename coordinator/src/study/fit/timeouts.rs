@@ -15,6 +15,8 @@ use crate::study::store::{RunKey, Store, StoreError};
 pub(super) struct Timeouts<'a> {
     store: &'a Store,
     known: HashMap<RunKey, Timeout>,
+    /// Digest of the programs that make the runs now: another one decides for itself.
+    programs: [u8; 32],
 }
 
 impl<'a> Timeouts<'a> {
@@ -25,7 +27,7 @@ impl<'a> Timeouts<'a> {
     pub(super) fn read(store: &'a Store) -> Result<Self, StoreError> {
         let known =
             store.remembered_runs()?.into_iter().filter_map(|(key, body)| Some((key, decode(&body)?)));
-        Ok(Self { store, known: known.collect() })
+        Ok(Self { store, known: known.collect(), programs: store.program()?.digest() })
     }
 
     /// Whether there is none.
@@ -46,7 +48,7 @@ impl<'a> Timeouts<'a> {
 
     /// The timeout of a job as its outcome, if it was decided before.
     pub(super) fn known(&self, setup: &SetupId, job: &Job) -> Option<Outcome> {
-        let timeout = self.known.get(&run_key::observed(setup, job))?;
+        let timeout = self.known.get(&run_key::observed(&self.programs, setup, job))?;
         Some(Outcome { result: Err(timeout.clone().into()), attempts: 0, worker: String::new() })
     }
 
@@ -55,7 +57,7 @@ impl<'a> Timeouts<'a> {
     /// # Errors
     /// When the store refuses.
     pub(super) fn keep(&mut self, setup: &SetupId, job: &Job, timeout: &Timeout) -> Result<(), StoreError> {
-        let key = run_key::observed(setup, job);
+        let key = run_key::observed(&self.programs, setup, job);
         self.store.remember_runs([(&key, encode(timeout).as_slice())], &[])?;
         self.known.insert(key, timeout.clone());
         Ok(())
@@ -73,4 +75,32 @@ fn decode(body: &[u8]) -> Option<Timeout> {
     let rest = body.strip_prefix(&[MARK])?;
     let (limit, says) = rest.split_first_chunk::<8>()?;
     Some(Timeout { limit: f64::from_le_bytes(*limit), says: String::from_utf8_lossy(says).into_owned() })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use starlings_models::Window;
+
+    use super::*;
+
+    #[test]
+    fn another_program_decides_anew_whether_a_run_is_in_time() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let store = Store::create(&folder.path().join("run.db"), &[("program", r#"{"build": "one"}"#)]);
+        let store = store.expect("a store");
+        let window = Window { start: 0.0, times: vec![1.0], observed: vec![2.0], inputs: Vec::new() };
+        let job = Job { particle: 0, record: 0, window: Arc::new(window), theta: vec![3.0], state: None };
+        let setup = [7; 32];
+        let late = Timeout { limit: 5.0, says: "it did not answer within 5 s".to_owned() };
+        let mut timeouts = Timeouts::read(&store).expect("none");
+        timeouts.keep(&setup, &job, &late).expect("room");
+        let same = Timeouts::read(&store).expect("one");
+        assert!(same.known(&setup, &job).is_some());
+        store.set_meta("program", r#"{"build": "another"}"#).expect("room");
+        let other = Timeouts::read(&store).expect("one");
+        assert!(other.known(&setup, &job).is_none());
+        assert!(!other.is_empty(), "it is told all the same: earlier analyses may rest on it");
+    }
 }
