@@ -12,37 +12,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 /// A mass on a spring whose force is not quite linear: the study lacks the cube.
-const STUDY: &str = r#"
-[study]
-name = "long"
-[model]
-kind = "equations"
-outputs = [{ name = "position", unit = "m", value = "x" }]
-inputs = [{ name = "F", unit = "N" }]
-solver = { method = "auto", rtol = 1e-6, atol = 1e-8 }
-[[model.states]]
-name = "x"
-unit = "m"
-role = "displacement"
-initial = 0.08
-rate = "v"
-[[model.states]]
-name = "v"
-unit = "m/s"
-role = "velocity"
-rate = { spring = "-k*x", viscous = "-c*v", drive = "F" }
-[[parameters]]
-name = "k"
-prior = { transform = "log", median = 30.0, factor = 1.5 }
-[[parameters]]
-name = "c"
-prior = { transform = "log", median = 1.5, factor = 2.0 }
-[[records]]
-name = "long"
-file = "long.csv"
-inputs = { F = "F" }
-channels = [{ column = "position", output = "position", noise = 0.002 }]
-"#;
+const STUDY: &str = include_str!("../coordinator/tests/study_kit/spring.toml");
 
 fn main() {
     let rows = std::env::args().find_map(|a| a.parse().ok()).unwrap_or(40_000);
@@ -50,7 +20,7 @@ fn main() {
     let study = folder.path().join("study.toml");
     let span = format!("train = [0.0, {}]\n", 0.008 * rows as f64);
     fs::write(&study, format!("{STUDY}{span}")).unwrap();
-    fs::write(folder.path().join("long.csv"), recording(rows)).unwrap();
+    fs::write(folder.path().join("driven.csv"), recording(rows)).unwrap();
     println!("{rows} rows, two parameters, two workers");
     println!("{:8} {:>12} {:>12} {:>9}", "command", "peak memory", "run.db", "time");
     for command in ["run", "explain"] {

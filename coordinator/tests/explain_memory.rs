@@ -8,38 +8,11 @@ use starlings_coordinator::fleet::InProcess;
 use starlings_coordinator::study::store::Store;
 use study_kit::{Case, csv, grid, normals};
 
-/// A mass on a spring that is driven; a piece of the recording is held out.
-const STUDY: &str = r#"
-[study]
-name = "driven"
-[model]
-kind = "equations"
-outputs = [{ name = "position", unit = "m", value = "x" }]
-inputs = [{ name = "F", unit = "N" }]
-[[model.states]]
-name = "x"
-unit = "m"
-role = "displacement"
-initial = 0.08
-rate = "v"
-[[model.states]]
-name = "v"
-unit = "m/s"
-role = "velocity"
-rate = { spring = "-k*x", viscous = "-c*v", drive = "F" }
-[[parameters]]
-name = "k"
-prior = { transform = "log", median = 30.0, factor = 1.5 }
-[[parameters]]
-name = "c"
-prior = { transform = "log", median = 1.5, factor = 2.0 }
-[[records]]
-name = "driven"
-file = "driven.csv"
-inputs = { F = "F" }
-channels = [{ column = "position", output = "position", noise = 0.002 }]
-train = [0.0, 12.0]
-"#;
+/// A mass on a spring that is driven.
+const STUDY: &str = include_str!("study_kit/spring.toml");
+
+/// The rest of the recording is held out.
+const TRAIN: &str = "train = [0.0, 12.0]\n";
 
 /// The recording of a mass whose spring stiffens, by small steps of a symplectic rule.
 fn recording() -> String {
@@ -69,7 +42,7 @@ fn holding(case: &Case, hold: usize) -> Findings {
 
 #[test]
 fn an_explanation_that_may_hold_nothing_finds_the_same() {
-    let case = Case::new(STUDY, &[("driven.csv", recording())]);
+    let case = Case::new(&format!("{STUDY}{TRAIN}"), &[("driven.csv", recording())]);
     let plenty = holding(&case, Options::default().hold);
     assert!(!plenty.explanation.effects.is_empty(), "{:?}", plenty.explanation);
     // Nothing at all, and so much that some are held and others are not.
