@@ -248,9 +248,11 @@ mod tests {
         // Asking again gives the same: it is still there to be asked.
         assert_eq!(process.ended().and_then(|status| status.code()), Some(7));
         let pid = Pid::from_raw(process.group).expect("a number above zero");
-        drop(process);
         let options = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
-        assert!(waitid(WaitId::Pid(pid), options).is_err(), "it is reaped");
+        let looked = || waitid(WaitId::Pid(pid), options);
+        assert!(looked().is_ok_and(|found| found.is_some()), "nobody has reaped it");
+        drop(process);
+        assert!(looked().is_err(), "it is reaped");
     }
 
     #[test]

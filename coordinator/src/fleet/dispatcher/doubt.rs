@@ -29,29 +29,27 @@ impl Dispatcher {
     pub(super) fn doubted(&mut self, id: WorkerId, index: usize, text: String) {
         let Some(batch) = &mut self.batch else { return };
         let name = self.workers.get(&id).map_or("", |w| w.name.as_str());
-        let end = Ended::Undecided(text);
         if batch.doubt(index) == Some(Doubt::Confirmed) {
-            let Ended::Undecided(text) = end else { return };
             batch.set_doubt(index, None);
             batch.finish(index, Err(Failure::Model(ModelFailure::Solver(text))), name);
             self.out.push(batch.failed(index));
             return;
         }
-        if batch.may_retry(index) {
-            let setup = batch.setup_of(index);
-            let other = self.workers.values().any(|w| w.id != id && w.could_take(setup));
-            let Ended::Undecided(text) = &end else { return };
-            self.out.push(Command::Notice(batch.retried(index, name, text)));
-            if other {
-                batch.retry_elsewhere(index, id, end, name);
-            } else {
-                batch.remember(index, end, name);
-                batch.requeue(index);
-            }
+        if !batch.may_retry(index) {
+            batch.remember(index, Ended::Undecided(text), name);
+            batch.park(index, id);
             return;
         }
-        batch.remember(index, end, name);
-        batch.park(index, id);
+        let setup = batch.setup_of(index);
+        let other = self.workers.values().any(|w| w.id != id && w.could_take(setup));
+        self.out.push(Command::Notice(batch.retried(index, name, &text)));
+        let end = Ended::Undecided(text);
+        if other {
+            batch.retry_elsewhere(index, id, end, name);
+        } else {
+            batch.remember(index, end, name);
+            batch.requeue(index);
+        }
     }
 
     /// Starts the control runs that have become possible; ends the batch when none can become so.
