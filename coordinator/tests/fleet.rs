@@ -4,7 +4,7 @@
 mod fleet_kit;
 
 use std::net::TcpListener;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::Duration;
 
@@ -167,17 +167,23 @@ fn a_once_worker_ends_when_its_wire_is_cut_even_while_a_job_computes() {
 fn a_cancelled_worker_says_goodbye_and_its_jobs_go_elsewhere() {
     let (mut fleet, events, _) = listen(any_port());
     let leaving = CancellationToken::new();
-    let (token, flag) = (leaving.clone(), Arc::new(AtomicBool::new(false)));
+    let (token, seen) = (leaving.clone(), leaving.clone());
     let first = ThreadWorker::start_with(
         fleet.address(),
         factory(move |job| {
-            flag.store(true, Ordering::Relaxed);
             token.cancel();
             Ok(square(job))
         }),
         |config| config.cancel = leaving.clone(),
     );
-    let _second = ThreadWorker::start(fleet.address(), factory(|job| Ok(square(job))));
+    // It waits for the other one, which may join much later on a busy machine.
+    let slow = factory(move |job| {
+        while !seen.is_cancelled() {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        Ok(square(job))
+    });
+    let _second = ThreadWorker::start(fleet.address(), slow);
     await_workers(&events, 2);
     let setup = fleet.install(&Setup::default()).unwrap();
     let jobs = jobs(50);
