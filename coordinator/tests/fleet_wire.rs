@@ -11,7 +11,7 @@ use fleet_kit::{
 use starlings_coordinator::fleet::{Fleet, FleetEvent};
 use starlings_models::Setup;
 use starlings_proto::wire::{self, fleet_client::FleetClient};
-use starlings_proto::{Answer, FromWorker, Hello, Lease, PROTOCOL, ToWorker, VERSION};
+use starlings_proto::{Answer, FromWorker, Hello, Lease, PROTOCOL, ReceivedWindows, ToWorker, VERSION};
 use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
 use tokio_stream::wrappers::UnboundedReceiverStream;
 use tonic::Streaming;
@@ -20,6 +20,7 @@ use tonic::Streaming;
 struct Hand {
     outbox: UnboundedSender<wire::FromWorker>,
     inbound: Streaming<wire::ToWorker>,
+    windows: ReceivedWindows,
 }
 
 impl Hand {
@@ -28,7 +29,7 @@ impl Hand {
         let (outbox, outgoing) = unbounded_channel();
         outbox.send(FromWorker::Hello(hello).encode().unwrap()).unwrap();
         let inbound = client.work(UnboundedReceiverStream::new(outgoing)).await.unwrap().into_inner();
-        Self { outbox, inbound }
+        Self { outbox, inbound, windows: ReceivedWindows::default() }
     }
 
     fn say(&self, message: FromWorker) {
@@ -38,7 +39,7 @@ impl Hand {
     /// The next message that is no heartbeat; `None` when the stream ended.
     async fn hear(&mut self) -> Option<ToWorker> {
         while let Ok(Some(message)) = self.inbound.message().await {
-            match ToWorker::decode(message).unwrap() {
+            match ToWorker::decode(message, &mut self.windows).unwrap() {
                 ToWorker::Heartbeat => {}
                 message => return Some(message),
             }

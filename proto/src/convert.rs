@@ -8,12 +8,14 @@ pub mod from_worker;
 pub mod job;
 pub mod solver;
 pub mod to_worker;
+pub mod windows;
 
 use starlings_models::Setup;
 
 pub use from_worker::{Answer, FromWorker, Hello};
 pub use job::JobEncoder;
 pub use to_worker::{ToWorker, Welcome};
+pub use windows::{ReceivedWindows, SentWindows};
 
 use crate::wire;
 
@@ -53,6 +55,9 @@ pub enum WireError {
         /// What is wrong.
         message: String,
     },
+    /// A job over a window that was not sent before it.
+    #[error("a job names a window that was not sent before it")]
+    UnknownWindow,
     /// A state beyond [`crate::MAX_INLINE_STATE`].
     #[error(
         "the state has {bytes} bytes; more than {limit} cannot travel inside a job, and chunked transfer of states is not \

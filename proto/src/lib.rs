@@ -13,12 +13,12 @@ pub mod words;
 pub use bytes::Bytes;
 pub use codec::Codec;
 pub use convert::{
-    Answer, FromWorker, Hello, JobEncoder, Lease, SetupId, ToWorker, Welcome, WireError, decode_setup,
-    digest, encode_setup,
+    Answer, FromWorker, Hello, JobEncoder, Lease, ReceivedWindows, SentWindows, SetupId, ToWorker, Welcome,
+    WireError, decode_setup, digest, encode_setup,
 };
 
 /// Number of the protocol; coordinator and worker must have the same.
-pub const PROTOCOL: u32 = 2;
+pub const PROTOCOL: u32 = 3;
 
 /// Largest state that travels inside a job or a prediction, bytes.
 pub const MAX_INLINE_STATE: usize = 256 * 1024;

@@ -5,9 +5,18 @@ use std::sync::Arc;
 
 use starlings_models::{Job, Prediction, Setup, Signal, Window};
 use starlings_proto::{
-    Answer, FromWorker, JobEncoder, Lease, MAX_INLINE_STATE, MAX_SLOTS, ToWorker, WireError,
-    convert::job::check_size, encode_setup, wire,
+    Answer, FromWorker, JobEncoder, Lease, MAX_INLINE_STATE, MAX_SLOTS, ReceivedWindows, SentWindows,
+    ToWorker, WireError, convert::job::check_size, encode_setup, wire,
 };
+
+/// The message of a job whose window travels inside it.
+fn encode(lease: Lease, job: &Job) -> wire::ToWorker {
+    JobEncoder::default().encode(lease, &[0; 32], job, &mut SentWindows::default()).1
+}
+
+fn decode(message: wire::ToWorker) -> Result<ToWorker, WireError> {
+    ToWorker::decode(message, &mut ReceivedWindows::default())
+}
 
 fn small_job() -> Job {
     let window = Window { start: 0.0, times: vec![1.0], observed: vec![2.0], inputs: vec![] };
@@ -31,8 +40,8 @@ fn a_state_beyond_the_limit_is_refused_on_both_sides() {
     assert!(error.to_string().contains("chunked transfer of states is not available yet"), "{error}");
 
     let lease = Lease { epoch: 1, job: 1, attempt: 1 };
-    let sent = JobEncoder::default().encode(lease, &[0; 32], &job);
-    assert!(matches!(ToWorker::decode(sent), Err(WireError::Job { lease: l, .. }) if l == lease));
+    let sent = encode(lease, &job);
+    assert!(matches!(decode(sent), Err(WireError::Job { lease: l, .. }) if l == lease));
     let prediction = Prediction { outputs: vec![], state: job.state.unwrap(), cost: 0.0 };
     let result = FromWorker::Result { lease, answer: Answer::Ran(Ok(prediction)), cost: 0.0 };
     assert!(matches!(result.encode(), Err(WireError::StateTooLarge { .. })));
@@ -41,19 +50,20 @@ fn a_state_beyond_the_limit_is_refused_on_both_sides() {
 #[test]
 fn a_malformed_job_names_its_lease_so_that_it_can_be_answered() {
     let lease = Lease { epoch: 1, job: 9, attempt: 1 };
-    let sent = JobEncoder::default().encode(lease, &[0; 32], &small_job());
+    let sent = encode(lease, &small_job());
     let Some(wire::to_worker::Kind::Job(good)) = sent.kind else { panic!("a job is encoded as a job") };
-    let spoil: [fn(&mut wire::Job); 4] = [
-        |job| job.theta = vec![1, 2, 3].into(),
-        |job| job.setup = vec![0; 31].into(),
-        |job| job.window = None,
-        |job| job.window.as_mut().unwrap().times = bytes::Bytes::new(),
+    let without_times = wire::Window { start: Some(0.0), ..wire::Window::default() };
+    let spoil: [&dyn Fn(&mut wire::Job); 4] = [
+        &|job| job.theta = vec![1, 2, 3].into(),
+        &|job| job.setup = vec![0; 31].into(),
+        &|job| job.over = None,
+        &|job| job.over = Some(wire::job::Over::Window(without_times.clone())),
     ];
     for damage in spoil {
         let mut job = good.clone();
         damage(&mut job);
         let message = wire::ToWorker { kind: Some(wire::to_worker::Kind::Job(job)) };
-        assert!(matches!(ToWorker::decode(message), Err(WireError::Job { lease: l, .. }) if l == lease));
+        assert!(matches!(decode(message), Err(WireError::Job { lease: l, .. }) if l == lease));
     }
 }
 

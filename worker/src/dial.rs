@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use starlings_proto::wire::{self, fleet_client::FleetClient};
 use starlings_proto::words::{causes, status_text};
-use starlings_proto::{FRAME_SIZE, FromWorker, Hello, MAX_MESSAGE, ToWorker, Welcome};
+use starlings_proto::{FRAME_SIZE, FromWorker, Hello, MAX_MESSAGE, ReceivedWindows, ToWorker, Welcome};
 use tokio::sync::mpsc::{self, UnboundedSender};
 use tokio_stream::wrappers::UnboundedReceiverStream;
 use tonic::Streaming;
@@ -37,6 +37,8 @@ pub(crate) struct Stay {
     pub(crate) welcome: Welcome,
     pub(crate) outbox: UnboundedSender<wire::FromWorker>,
     pub(crate) inbound: Streaming<wire::ToWorker>,
+    /// The named windows that have arrived.
+    pub(crate) windows: ReceivedWindows,
 }
 
 pub(crate) enum Dialled {
@@ -139,9 +141,10 @@ async fn attach(endpoint: &Endpoint, hello: Hello) -> Result<Stay, Attempt> {
     let response =
         client.work(UnboundedReceiverStream::new(outgoing)).await.map_err(|s| failed(&status_text(&s)))?;
     let mut inbound = response.into_inner();
+    let mut windows = ReceivedWindows::default();
     let first = inbound.message().await.map_err(|s| failed(&status_text(&s)))?;
-    match first.map(ToWorker::decode) {
-        Some(Ok(ToWorker::Welcome(welcome))) => Ok(Stay { welcome, outbox, inbound }),
+    match first.map(|message| ToWorker::decode(message, &mut windows)) {
+        Some(Ok(ToWorker::Welcome(welcome))) => Ok(Stay { welcome, outbox, inbound, windows }),
         Some(Ok(ToWorker::Refuse(reason))) => Err(Attempt::Refused(reason)),
         Some(Ok(ToWorker::Drain(reason))) => Err(Attempt::Over(reason)),
         Some(Ok(_)) => Err(failed("it did not answer with a Welcome")),

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use starlings_models::ParticleError;
 use starlings_proto::words::status_text;
-use starlings_proto::{Answer, FromWorker, ToWorker, WireError, wire};
+use starlings_proto::{Answer, FromWorker, ReceivedWindows, ToWorker, WireError, wire};
 use tokio::sync::mpsc::UnboundedSender;
 use tonic::Streaming;
 
@@ -37,7 +37,7 @@ pub(crate) async fn serve(mut stay: Stay, slots: &Slots, setups: &Setups, config
             biased;
             message = stay.inbound.message() => {
                 silence.broken();
-                match take(message, &stay.outbox, slots, setups) {
+                match take(message, &stay.outbox, &mut stay.windows, slots, setups) {
                     Ok(()) => {}
                     Err(Ended::Drained(reason)) => {
                         goodbye(&stay.outbox, &mut stay.inbound, &reason).await;
@@ -87,6 +87,7 @@ impl Silence {
 fn take(
     message: Result<Option<wire::ToWorker>, tonic::Status>,
     outbox: &UnboundedSender<wire::FromWorker>,
+    windows: &mut ReceivedWindows,
     slots: &Slots,
     setups: &Setups,
 ) -> Result<(), Ended> {
@@ -95,7 +96,7 @@ fn take(
         Ok(None) => return Err(Ended::Lost("the coordinator closed the connection".to_owned())),
         Err(status) => return Err(Ended::Lost(format!("the connection broke: {}", status_text(&status)))),
     };
-    match ToWorker::decode(message) {
+    match ToWorker::decode(message, windows) {
         Ok(ToWorker::Job { lease, setup, job }) => {
             if let Some(forward) = setups.get(&setup) {
                 slots.push(Task { lease, forward, job, outbox: outbox.clone() });
@@ -115,7 +116,7 @@ fn take(
         }
         Ok(ToWorker::Cancel(leases)) => slots.withdraw(&leases),
         Ok(ToWorker::Drain(reason)) => return Err(Ended::Drained(reason)),
-        Ok(ToWorker::Heartbeat | ToWorker::Welcome(_) | ToWorker::Refuse(_)) => {}
+        Ok(ToWorker::Window | ToWorker::Heartbeat | ToWorker::Welcome(_) | ToWorker::Refuse(_)) => {}
         Err(error) => return Err(Ended::Lost(format!("the coordinator sent a malformed message: {error}"))),
     }
     Ok(())
@@ -147,7 +148,7 @@ mod tests {
     use std::sync::Arc;
 
     use starlings_models::{Job, Setup, Window};
-    use starlings_proto::{JobEncoder, Lease, encode_setup};
+    use starlings_proto::{JobEncoder, Lease, SentWindows, encode_setup};
     use tokio::sync::mpsc::unbounded_channel;
 
     use super::*;
@@ -170,21 +171,22 @@ mod tests {
         let (outbox, mut sent) = unbounded_channel();
         let (slots, setups) =
             (Slots::start(1).unwrap(), Setups::new(Arc::new(|setup: &Setup| setup.build())));
-        let take = |message: wire::ToWorker| take(Ok(Some(message)), &outbox, &slots, &setups).unwrap();
+        let mut windows = ReceivedWindows::default();
+        let mut take = |message| take(Ok(Some(message)), &outbox, &mut windows, &slots, &setups).unwrap();
         let mut next = || FromWorker::decode(sent.blocking_recv().expect("an answer")).unwrap();
         let (id, json) = encode_setup(&oscillator()).unwrap();
         let mut encoder = JobEncoder::default();
         let lease = |number| Lease { epoch: 1, job: number, attempt: 1 };
-        let mut send = |number| take(encoder.encode(lease(number), &id, &job()));
+        let mut given = |number| encoder.encode(lease(number), &id, &job(), &mut SentWindows::default()).1;
         let back = |number| FromWorker::Result { lease: lease(number), answer: Answer::Withdrawn, cost: 0.0 };
 
-        (1..=3).for_each(&mut send);
+        (1..=3).for_each(|number| take(given(number)));
         assert!(matches!(next(), FromWorker::Setup { id: lost, result: Err(_) } if lost == id));
         assert_eq!([next(), next(), next()], [back(1), back(2), back(3)]);
 
         take(ToWorker::setup(&id, json));
         assert_eq!(next(), FromWorker::Setup { id, result: Ok(()) });
-        send(4);
+        take(given(4));
         assert!(matches!(next(), FromWorker::Result { answer: Answer::Ran(Ok(_)), .. }));
         slots.close();
     }

@@ -139,7 +139,7 @@ impl Hub {
             epoch: id.0,
         };
         let _ = link.send(Ok(ToWorker::welcome(welcome)));
-        state.links.insert(id, Link { sender: link, pid: hello.pid });
+        state.links.insert(id, Link::new(link, hello.pid));
         let name = format!("{}@{}/{}", state.joined, hello.host, hello.pid);
         let Hello { cores, slots, host, pid, nonce, build, .. } = hello;
         let other = state.other_build(self.build, build).map(|(own, build)| FleetEvent::OtherBuild {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use starlings_models::{Job, Signal, Window};
 
+use super::windows::{self, ReceivedWindows, SentWindows, WindowId};
 use super::{Lease, SetupId, WireError, floats, required};
 use crate::{MAX_INLINE_STATE, MAX_MESSAGE, wire};
 
@@ -16,7 +17,16 @@ const MESSAGE_MARGIN: usize = 64 * 1024;
 #[derive(Debug, Default)]
 pub struct JobEncoder {
     /// By the place of a window in memory, which stays its own for as long as the window is held here.
-    windows: HashMap<usize, (Arc<Window>, wire::Window)>,
+    windows: HashMap<usize, Encoded>,
+}
+
+#[derive(Debug)]
+struct Encoded {
+    /// Keeps its place in memory.
+    _window: Arc<Window>,
+    wire: wire::Window,
+    /// Where it is too large to travel inside every job.
+    name: Option<WindowId>,
 }
 
 impl JobEncoder {
@@ -29,24 +39,39 @@ impl JobEncoder {
         encoder
     }
 
-    /// The message that gives one job to a worker.
-    pub fn encode(&mut self, lease: Lease, setup: &SetupId, job: &Job) -> wire::ToWorker {
+    /// The messages that give one job to a worker: its window, where that is large and was not `sent` on this stream, and the job.
+    pub fn encode(
+        &mut self,
+        lease: Lease,
+        setup: &SetupId,
+        job: &Job,
+        sent: &mut SentWindows,
+    ) -> (Option<wire::ToWorker>, wire::ToWorker) {
+        let window = self.window(&job.window);
+        let (ahead, over) = match &window.name {
+            Some(id) => {
+                let name = bytes::Bytes::copy_from_slice(id);
+                (windows::ahead(id, &window.wire, sent), wire::job::Over::WindowId(name))
+            }
+            None => (None, wire::job::Over::Window(window.wire.clone())),
+        };
         let message = wire::Job {
             lease: Some(lease.into()),
             setup: bytes::Bytes::copy_from_slice(setup),
             particle: job.particle,
             record: job.record,
-            window: Some(self.window(&job.window)),
+            over: Some(over),
             theta: floats::encode(&job.theta),
             state: job.state.as_deref().map(floats::encode),
         };
-        wire::ToWorker { kind: Some(wire::to_worker::Kind::Job(message)) }
+        (ahead, wire::ToWorker { kind: Some(wire::to_worker::Kind::Job(message)) })
     }
 
-    fn window(&mut self, window: &Arc<Window>) -> wire::Window {
-        let place = Arc::as_ptr(window) as usize;
-        let known = self.windows.entry(place).or_insert_with(|| (Arc::clone(window), encode_window(window)));
-        known.1.clone()
+    fn window(&mut self, window: &Arc<Window>) -> &Encoded {
+        self.windows.entry(Arc::as_ptr(window) as usize).or_insert_with(|| {
+            let wire = encode_window(window);
+            Encoded { _window: Arc::clone(window), name: windows::name(&wire), wire }
+        })
     }
 }
 
@@ -92,19 +117,26 @@ fn encode_window(window: &Window) -> wire::Window {
     }
 }
 
-pub(super) fn decode_job(job: &wire::Job) -> Result<Job, WireError> {
+pub(super) fn decode_job(job: &wire::Job, received: &ReceivedWindows) -> Result<Job, WireError> {
     let state = job.state.as_ref().map(|bytes| floats::decode(bytes, "state")).transpose()?;
     check_state(state.as_deref().unwrap_or_default())?;
     Ok(Job {
         particle: job.particle,
         record: job.record,
-        window: Arc::new(decode_window(required(job.window.as_ref(), "window")?)?),
+        window: match required(job.over.as_ref(), "window")? {
+            wire::job::Over::Window(window) => Arc::new(decode_window(window)?),
+            wire::job::Over::WindowId(id) => Arc::clone(named(id, received).ok_or(WireError::UnknownWindow)?),
+        },
         theta: floats::decode(&job.theta, "theta")?,
         state,
     })
 }
 
-fn decode_window(window: &wire::Window) -> Result<Window, WireError> {
+fn named<'a>(id: &[u8], received: &'a ReceivedWindows) -> Option<&'a Arc<Window>> {
+    received.get(id.try_into().ok()?)
+}
+
+pub(super) fn decode_window(window: &wire::Window) -> Result<Window, WireError> {
     let times = floats::decode(&window.times, "times")?;
     let observed = floats::decode(&window.observed, "observed")?;
     let inputs = window.inputs.iter().map(decode_signal).collect::<Result<_, _>>()?;

@@ -3,7 +3,7 @@
 use bytes::Bytes;
 use starlings_models::{Job, Setup};
 
-use super::{Lease, SetupId, WireError, decode_setup, job, required, setup_id};
+use super::{Lease, ReceivedWindows, SetupId, WireError, decode_setup, job, required, setup_id, windows};
 use crate::wire::{self, to_worker::Kind};
 
 /// The coordinator takes the worker.
@@ -33,6 +33,8 @@ pub enum ToWorker {
         /// The setup, or what is wrong with it.
         setup: Result<Box<Setup>, WireError>,
     },
+    /// A window that jobs will name: it is kept.
+    Window,
     /// A job to run.
     Job {
         /// The right to answer.
@@ -82,11 +84,11 @@ impl ToWorker {
         message(Kind::Drain(wire::Drain { reason: reason.to_owned() }))
     }
 
-    /// Checks a message that arrived.
+    /// Checks a message that arrived on a stream of which these windows were `received` before.
     ///
     /// # Errors
     /// What is missing or does not fit; [`WireError::Job`] where the lease is good and can be answered.
-    pub fn decode(message: wire::ToWorker) -> Result<Self, WireError> {
+    pub fn decode(message: wire::ToWorker, received: &mut ReceivedWindows) -> Result<Self, WireError> {
         Ok(match required(message.kind, "kind")? {
             Kind::Welcome(w) => Self::Welcome(decode_welcome(w)?),
             Kind::Refuse(r) => Self::Refuse(r.reason),
@@ -94,7 +96,11 @@ impl ToWorker {
                 let id = setup_id(&s.id)?;
                 Self::Setup { id, setup: decode_setup(&id, &s.json).map(Box::new) }
             }
-            Kind::Job(job) => decode_job(&job)?,
+            Kind::Window(window) => {
+                windows::receive(&window, received)?;
+                Self::Window
+            }
+            Kind::Job(job) => decode_job(&job, received)?,
             Kind::Cancel(c) => Self::Cancel(c.leases.into_iter().map(Into::into).collect()),
             Kind::Heartbeat(_) => Self::Heartbeat,
             Kind::Drain(d) => Self::Drain(d.reason),
@@ -117,11 +123,14 @@ fn decode_welcome(welcome: wire::Welcome) -> Result<Welcome, WireError> {
     Ok(Welcome { protocol, run, heartbeat, epoch })
 }
 
-fn decode_job(wire_job: &wire::Job) -> Result<ToWorker, WireError> {
+fn decode_job(wire_job: &wire::Job, received: &ReceivedWindows) -> Result<ToWorker, WireError> {
     let lease: Lease = required(wire_job.lease, "lease")?.into();
-    let decoded = setup_id(&wire_job.setup).and_then(|setup| Ok((setup, job::decode_job(wire_job)?)));
+    let decoded =
+        setup_id(&wire_job.setup).and_then(|setup| Ok((setup, job::decode_job(wire_job, received)?)));
     match decoded {
         Ok((setup, job)) => Ok(ToWorker::Job { lease, setup, job }),
+        // The stream is broken, not the job.
+        Err(WireError::UnknownWindow) => Err(WireError::UnknownWindow),
         Err(source) => Err(WireError::Job { lease, source: Box::new(source) }),
     }
 }

@@ -7,7 +7,9 @@ use std::sync::mpsc::Sender;
 use std::time::Duration;
 
 use starlings_models::Job;
-use starlings_proto::{Bytes, Hello, JobEncoder, PROTOCOL, SetupId, ToWorker, VERSION, wire};
+use starlings_proto::{
+    Bytes, Hello, JobEncoder, Lease, PROTOCOL, SentWindows, SetupId, ToWorker, VERSION, wire,
+};
 use tokio::sync::mpsc::UnboundedSender;
 
 use super::{Outgoing, Reply};
@@ -44,6 +46,26 @@ pub(super) struct Known {
 pub(super) struct Link {
     pub(super) sender: UnboundedSender<Outgoing>,
     pub(super) pid: u32,
+    /// Windows that were sent on it.
+    pub(super) windows: SentWindows,
+}
+
+impl Link {
+    pub(super) fn new(sender: UnboundedSender<Outgoing>, pid: u32) -> Self {
+        Self { sender, pid, windows: SentWindows::default() }
+    }
+
+    fn give(&mut self, encoder: &mut JobEncoder, lease: Lease, (setup, job): &(SetupId, Job)) {
+        let (window, job) = encoder.encode(lease, setup, job, &mut self.windows);
+        for message in window.into_iter().chain([job]) {
+            self.send(message);
+        }
+    }
+
+    /// A link that is closing ends in `leave`, which returns its leases.
+    fn send(&self, message: wire::ToWorker) {
+        let _ = self.sender.send(Ok(message));
+    }
 }
 
 /// Why a worker is not taken.
@@ -139,16 +161,16 @@ impl State {
                 }
             }
             Command::SendJob { worker, lease, index } => {
-                let Some(running) = &mut self.running else { return };
-                let Some((setup, job)) = running.jobs.get(index) else { return };
-                let message = running.encoder.encode(lease, setup, job);
-                self.send(worker, message);
+                let Some(Submission { jobs, encoder, .. }) = &mut self.running else { return };
+                let (Some(job), Some(link)) = (jobs.get(index), self.links.get_mut(&worker)) else { return };
+                link.give(encoder, lease, job);
             }
             Command::SendControl { worker, lease, control } => {
-                let Some(running) = &mut self.running else { return };
-                let Some((setup, job)) = self.kept.get(&control) else { return };
-                let message = running.encoder.encode(lease, setup, job);
-                self.send(worker, message);
+                let Some(Submission { encoder, .. }) = &mut self.running else { return };
+                let (Some(job), Some(link)) = (self.kept.get(&control), self.links.get_mut(&worker)) else {
+                    return;
+                };
+                link.give(encoder, lease, job);
             }
             Command::Keep { control, index } => {
                 let job = self.running.as_ref().and_then(|running| running.jobs.get(index));
@@ -195,9 +217,8 @@ impl State {
     }
 
     fn send(&self, worker: WorkerId, message: wire::ToWorker) {
-        // A link that is closing ends in `leave`, which returns its leases.
         if let Some(link) = self.links.get(&worker) {
-            let _ = link.sender.send(Ok(message));
+            link.send(message);
         }
     }
 

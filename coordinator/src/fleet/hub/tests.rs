@@ -3,7 +3,7 @@
 use std::sync::mpsc::{self, Receiver};
 
 use starlings_models::{ModelFailure, Setup, Window};
-use starlings_proto::{Answer, JobEncoder, encode_setup};
+use starlings_proto::{Answer, JobEncoder, ReceivedWindows, encode_setup};
 use tokio::sync::mpsc::unbounded_channel;
 
 use super::*;
@@ -76,10 +76,11 @@ fn a_run_that_is_given_up_is_told_with_the_values_of_its_parameters() {
     hub.submit(batch);
     hub.handle(Event::SetupDone { worker, setup });
     let sent = std::iter::from_fn(|| outgoing.try_recv().ok());
-    let lease = sent.flatten().find_map(|message| match ToWorker::decode(message) {
-        Ok(ToWorker::Job { lease, .. }) => Some(lease),
-        _ => None,
-    });
+    let lease =
+        sent.flatten().find_map(|message| match ToWorker::decode(message, &mut ReceivedWindows::default()) {
+            Ok(ToWorker::Job { lease, .. }) => Some(lease),
+            _ => None,
+        });
     let answer = Answer::Ran(Err(ModelFailure::Solver("diverged".to_owned()).into()));
     hub.handle(Event::Answered { worker, lease: lease.expect("it is sent"), answer, cost: 0.1 });
     assert!(replies.try_recv().is_ok(), "the batch has ended");

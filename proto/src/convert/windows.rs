@@ -1,0 +1,143 @@
+//! Large windows travel once on a stream, ahead of the first job that needs them and under a name; both ends keep the same ones.
+//!
+//! All particles of an ensemble share their windows, and the window of a long recording is more than all else that a job says.
+//! What is kept follows from the order of sending alone, so that the sender knows what the receiver has without being told. Next
+//! file to read: [`super::job`].
+
+use std::collections::{HashMap, VecDeque};
+use std::sync::Arc;
+
+use prost::Message;
+use starlings_models::Window;
+
+use super::{WireError, job};
+use crate::wire;
+
+/// Name of a window: BLAKE3 of its arrays with their lengths.
+pub type WindowId = [u8; 32];
+
+/// Largest window that travels inside its jobs, encoded bytes.
+const INLINE: usize = 16 * 1024;
+
+/// Encoded bytes of the named windows that both ends keep, or one window where that is larger.
+const KEPT: usize = 32 * 1024 * 1024;
+
+/// The named windows of one stream, as one end holds them: those sent last.
+#[derive(Debug)]
+pub struct Windows<T> {
+    held: HashMap<WindowId, (usize, T)>,
+    order: VecDeque<WindowId>,
+    bytes: usize,
+}
+
+/// What the coordinator notes of the windows that it has sent on a stream.
+pub type SentWindows = Windows<()>;
+
+/// The windows that a worker has received on a stream.
+pub type ReceivedWindows = Windows<Arc<Window>>;
+
+impl<T> Default for Windows<T> {
+    fn default() -> Self {
+        Self { held: HashMap::new(), order: VecDeque::new(), bytes: 0 }
+    }
+}
+
+impl<T> Windows<T> {
+    /// What is held under a name.
+    pub fn get(&self, id: &WindowId) -> Option<&T> {
+        self.held.get(id).map(|(_, window)| window)
+    }
+
+    /// Notes a window of so many encoded bytes as the one sent last; the first ones make room for it.
+    pub(super) fn keep(&mut self, id: WindowId, bytes: usize, window: T) {
+        if self.held.insert(id, (bytes, window)).is_some() {
+            return;
+        }
+        self.order.push_back(id);
+        self.bytes += bytes;
+        while self.bytes > KEPT && self.order.len() > 1 {
+            let Some((bytes, _)) = self.order.pop_front().and_then(|first| self.held.remove(&first)) else {
+                break;
+            };
+            self.bytes -= bytes;
+        }
+    }
+}
+
+/// The name of a window, where it is large enough to travel under one.
+pub(super) fn name(window: &wire::Window) -> Option<WindowId> {
+    (window.encoded_len() > INLINE).then(|| digest(window))
+}
+
+/// The message that sends a window ahead of its jobs; nothing where the stream has it.
+pub(super) fn ahead(id: &WindowId, window: &wire::Window, sent: &mut SentWindows) -> Option<wire::ToWorker> {
+    if sent.get(id).is_some() {
+        return None;
+    }
+    sent.keep(*id, window.encoded_len(), ());
+    let message = wire::WindowMsg { id: bytes::Bytes::copy_from_slice(id), window: Some(window.clone()) };
+    Some(wire::ToWorker { kind: Some(wire::to_worker::Kind::Window(message)) })
+}
+
+/// Checks a window that arrived ahead of its jobs, and keeps it.
+pub(super) fn receive(message: &wire::WindowMsg, received: &mut ReceivedWindows) -> Result<(), WireError> {
+    let window = super::required(message.window.as_ref(), "window")?;
+    let id = digest(window);
+    if *message.id != id {
+        let message = "does not hash to its name".to_owned();
+        return Err(WireError::Shape { field: "window", message });
+    }
+    received.keep(id, window.encoded_len(), Arc::new(job::decode_window(window)?));
+    Ok(())
+}
+
+fn digest(window: &wire::Window) -> WindowId {
+    let mut hasher = blake3::Hasher::new();
+    let mut add = |part: &[u8]| {
+        // Lengths keep neighbouring arrays apart.
+        hasher.update(&(part.len() as u64).to_le_bytes());
+        hasher.update(part);
+    };
+    add(&window.start.map(f64::to_le_bytes).unwrap_or_default());
+    add(&window.times);
+    add(&window.observed);
+    for signal in &window.inputs {
+        add(&signal.times);
+        add(&signal.values);
+    }
+    *hasher.finalize().as_bytes()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn id(i: usize) -> WindowId {
+        *blake3::hash(&i.to_le_bytes()).as_bytes()
+    }
+
+    #[test]
+    fn both_ends_forget_the_windows_that_were_sent_first() {
+        let mut windows = Windows::default();
+        for i in 0..5 {
+            windows.keep(id(i), KEPT / 4, i);
+        }
+        assert_eq!(windows.get(&id(0)), None, "a fifth quarter does not fit");
+        assert_eq!((1..5).map(|i| windows.get(&id(i)).copied()).collect::<Vec<_>>(), [1, 2, 3, 4].map(Some));
+        // Sent again it is the last one; known ones keep their place.
+        windows.keep(id(1), KEPT / 4, 1);
+        windows.keep(id(0), KEPT / 4, 0);
+        assert_eq!(windows.get(&id(1)), None);
+        assert_eq!(windows.bytes, KEPT);
+    }
+
+    #[test]
+    fn a_window_larger_than_all_that_is_kept_is_kept_alone() {
+        let mut windows = Windows::default();
+        windows.keep(id(0), 10, ());
+        windows.keep(id(1), KEPT + 1, ());
+        assert_eq!((windows.get(&id(0)), windows.get(&id(1))), (None, Some(&())));
+        windows.keep(id(2), 10, ());
+        assert_eq!((windows.get(&id(1)), windows.get(&id(2))), (None, Some(&())));
+    }
+}
