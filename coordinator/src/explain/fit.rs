@@ -35,7 +35,7 @@ pub struct Fitted<'c> {
     /// held-out record depend on the fitted records by the mean that it is run with.
     pub jacobian: Influences,
     /// d prediction over the noise for one standard deviation of each value that a held-out record has of its own, all rows ×
-    /// values; without columns until it was measured.
+    /// values that a record has; without columns until it was measured. The values of one record are not those of another.
     pub own_values: DMatrix<f64>,
 }
 
