@@ -5,6 +5,7 @@
 
 pub mod adequacy;
 mod again;
+mod allowance;
 mod answer;
 pub mod background;
 mod bent;

@@ -3,18 +3,18 @@
 //! Levenberg (1944) and Marquardt (1963) with the secant update of Broyden (1965) between Jacobians, for models whose runs
 //! are the only cost: a Jacobian is asked for at the start, where the secant no longer foretells the cost, and once at the
 //! end. Deliberately in scaled parameters z of the caller's choice, with an independent Gaussian prior and bounds on each.
-//! Read next: `score.rs`, which asks what another parameter would add at the end of a fit.
+//! Read next: `block_angular.rs`, what a Jacobian is, and `score.rs`, which asks what another parameter would add in the end.
 
 mod damped;
 mod need;
 #[cfg(test)]
 mod tests;
 
-use std::sync::Arc;
-
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 pub use need::{End, Need, Scaled};
+
+use crate::block_angular::BlockAngular;
 
 /// Damping after the first rejected step.
 const REJECTED_DAMPING: f64 = 1e-2;
@@ -34,10 +34,10 @@ pub struct LeastSquares {
     z: DVector<f64>,
     residual: DVector<f64>,
     cost: f64,
-    jacobian: Arc<DMatrix<f64>>,
+    jacobian: BlockAngular,
     fresh: bool,
     /// The Jacobian that was measured at this point, while the secant changes `jacobian`.
-    measured: Option<Arc<DMatrix<f64>>>,
+    measured: Option<BlockAngular>,
     damping: f64,
     rejected: usize,
     predicted: f64,
@@ -57,7 +57,7 @@ impl LeastSquares {
             z: start,
             residual: DVector::zeros(0),
             cost: f64::INFINITY,
-            jacobian: Arc::new(DMatrix::zeros(0, 0)),
+            jacobian: BlockAngular::default(),
             fresh: false,
             measured: None,
             damping: 0.0,
@@ -72,7 +72,7 @@ impl LeastSquares {
     pub fn from_known(
         z: DVector<f64>,
         residual: DVector<f64>,
-        jacobian: Arc<DMatrix<f64>>,
+        jacobian: BlockAngular,
         prior: Scaled,
         tolerance: f64,
         trials: usize,
@@ -107,7 +107,7 @@ impl LeastSquares {
     }
 
     /// The best point so far, its whitened residual, and the Jacobian there, measured or by the secant.
-    pub fn best(&self) -> (&DVector<f64>, &DVector<f64>, &DMatrix<f64>) {
+    pub fn best(&self) -> (&DVector<f64>, &DVector<f64>, &BlockAngular) {
         (&self.z, &self.residual, &self.jacobian)
     }
 
@@ -160,9 +160,8 @@ impl LeastSquares {
         let ratio = (self.cost - cost) / self.predicted.max(f64::MIN_POSITIVE);
         if let Some(new) = &residual {
             // Broyden's update: the change of the prediction is minus that of the residual.
-            let surprise = &self.residual - new - &*self.jacobian * &step;
-            let change = surprise * step.transpose() / step.norm_squared().max(f64::MIN_POSITIVE);
-            *Arc::make_mut(&mut self.jacobian) += change;
+            let surprise = &self.residual - new - self.jacobian.times(&step);
+            self.jacobian.learn(&surprise, &step);
         }
         if let Some(residual) = residual.filter(|_| cost < self.cost) {
             self.accept(trial, residual, cost, ratio, was_fresh);
@@ -173,10 +172,10 @@ impl LeastSquares {
 
     /// Takes the Jacobian (m x p) that was asked for, which is not copied until the secant changes it; `None` when one of its runs
     /// failed.
-    pub fn give_jacobian(&mut self, jacobian: Option<Arc<DMatrix<f64>>>) {
-        match jacobian.filter(|j| j.iter().all(|v| v.is_finite())) {
+    pub fn give_jacobian(&mut self, jacobian: Option<BlockAngular>) {
+        match jacobian.filter(BlockAngular::is_finite) {
             Some(jacobian) => {
-                self.measured = Some(Arc::clone(&jacobian));
+                self.measured = Some(jacobian.clone());
                 self.jacobian = jacobian;
                 self.fresh = true;
                 self.plan();
@@ -238,7 +237,7 @@ impl LeastSquares {
     /// Back to the Jacobian that was measured at this point, if one was.
     fn restore(&mut self) -> bool {
         let Some(measured) = &self.measured else { return false };
-        self.jacobian = Arc::clone(measured);
+        self.jacobian = measured.clone();
         self.fresh = true;
         true
     }
@@ -268,8 +267,8 @@ impl LeastSquares {
         let p = self.z.len();
         let precision = &self.prior.precision;
         let pull = &self.prior.mean - &self.z;
-        let gradient = self.jacobian.tr_mul(&self.residual) + precision.component_mul(&pull);
-        let curvature = DVector::from_fn(p, |j, _| self.jacobian.column(j).norm_squared() + precision[j]);
+        let gradient = self.jacobian.tr_times(&self.residual) + precision.component_mul(&pull);
+        let curvature = self.jacobian.squares() + precision;
         let held = |j: usize| {
             let [lo, hi] = self.prior.bounds[j];
             (self.z[j] <= lo && gradient[j] < 0.0) || (self.z[j] >= hi && gradient[j] > 0.0)
@@ -283,7 +282,7 @@ impl LeastSquares {
             step[*j] = (self.z[*j] + solved[k] * shrink).clamp(lo, hi) - self.z[*j];
         }
         let prior = precision.component_mul(&step).dot(&step);
-        self.predicted = 2.0 * gradient.dot(&step) - (&*self.jacobian * &step).norm_squared() - prior;
+        self.predicted = 2.0 * gradient.dot(&step) - self.jacobian.times(&step).norm_squared() - prior;
         Some(step)
     }
 

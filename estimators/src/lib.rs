@@ -9,6 +9,7 @@
 
 mod analysis;
 mod batch;
+mod block_angular;
 mod blocks;
 mod data;
 mod diagnostics;
@@ -38,6 +39,7 @@ mod whiteness;
 
 pub use analysis::Analysis;
 pub use batch::{Batch, BatchState, BatchStep};
+pub use block_angular::{BlockAngular, BlockRow};
 pub use blocks::Block;
 pub use data::{Data, Noise};
 pub use diagnostics::{

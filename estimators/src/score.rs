@@ -6,17 +6,16 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, DVectorView};
 
+use crate::block_angular::{BlockAngular, Subspace};
 use crate::error::EstimatorError;
-use crate::{qr, spectral};
+use crate::spectral;
 
 /// A fit at its optimum, its prior as further rows.
 #[derive(Debug, Clone)]
 pub struct Optimum {
-    /// Orthonormal basis of what the parameters can imitate, (m + p) x rank.
-    basis: DMatrix<f64>,
-    /// (J^T J + P) inverse, p x p.
-    covariance: DMatrix<f64>,
-    jacobian: DMatrix<f64>,
+    /// What the parameters can imitate, and their covariance.
+    range: Subspace,
+    jacobian: BlockAngular,
     /// Residuals with the prior's, m + p.
     residual: DVector<f64>,
 }
@@ -46,7 +45,20 @@ impl Optimum {
         precision: &DVector<f64>,
         pull: &DVector<f64>,
     ) -> Result<Self, EstimatorError> {
-        let (m, p) = jacobian.shape();
+        Self::in_blocks(residual, &BlockAngular::from(jacobian.clone()), precision, pull)
+    }
+
+    /// As [`Optimum::new`], for rows that answer to some of the parameters only. The Jacobian is shared with it.
+    ///
+    /// # Errors
+    /// As [`Optimum::new`].
+    pub fn in_blocks(
+        residual: &DVector<f64>,
+        jacobian: &BlockAngular,
+        precision: &DVector<f64>,
+        pull: &DVector<f64>,
+    ) -> Result<Self, EstimatorError> {
+        let (m, p) = (jacobian.nrows(), jacobian.ncols());
         let shape = |what, expected, got| EstimatorError::Shape { what, expected, got };
         if residual.len() != m {
             return Err(shape("residuals of the fit", m, residual.len()));
@@ -55,37 +67,28 @@ impl Optimum {
             return Err(shape("prior of the fit", p, precision.len().min(pull.len())));
         }
         let root = precision.map(f64::sqrt);
-        let mut rows = jacobian.clone().resize(m + p, p, 0.0);
-        rows.view_mut((m, 0), (p, p)).set_diagonal(&root);
         let mut all = residual.clone().resize_vertically(m + p, 0.0);
         all.rows_mut(m, p).copy_from(&root.component_mul(pull));
         // From the triangle of the rows: their square would lose what a wide prior leaves of an informed direction.
-        let largest = rows.column_iter().map(|c| c.norm()).fold(0.0, f64::max);
-        let (basis, triangle) = qr::factors(rows);
-        let free = triangle.diagonal().iter().any(|v| v.is_nan() || v.abs() <= f64::EPSILON * largest);
-        let inverse = triangle.solve_upper_triangular(&DMatrix::identity(p, p)).filter(|_| !free);
-        let inverse = inverse.ok_or(EstimatorError::NotPositiveDefinite { what: "posterior" })?;
-        let covariance = &inverse * inverse.transpose();
-        Ok(Self { basis, covariance, jacobian: jacobian.clone(), residual: all })
+        let range = Subspace::new(jacobian, &root)?;
+        Ok(Self { range, jacobian: jacobian.clone(), residual: all })
     }
 
     /// Covariance of the fitted parameters, p x p.
     pub fn covariance(&self) -> &DMatrix<f64> {
-        &self.covariance
+        self.range.covariance()
     }
 
     /// The part of a sensitivity (m) that the fitted parameters cannot imitate, with the prior's rows, m + p.
     pub fn unimitated(&self, sensitivity: &DVector<f64>) -> DVector<f64> {
-        let (m, p) = self.jacobian.shape();
-        let s = sensitivity.clone().resize_vertically(m + p, 0.0);
+        let s = sensitivity.clone().resize_vertically(self.residual.len(), 0.0);
         // Twice, since one projection leaves what rounding left of the first.
-        let once = &s - &self.basis * self.basis.tr_mul(&s);
-        &once - &self.basis * self.basis.tr_mul(&once)
+        self.range.outside(&self.range.outside(&s))
     }
 
     /// How the fitted parameters move when one more parameter moves by one: minus this, p.
     pub fn response(&self, sensitivity: &DVector<f64>) -> DVector<f64> {
-        &self.covariance * self.jacobian.tr_mul(sensitivity)
+        self.range.covariance() * self.jacobian.tr_times(sensitivity)
     }
 
     /// The residuals with the prior's, m + p.

@@ -2,8 +2,8 @@
 //!
 //! Nothing is decided here. Next file to read: [`super::run`].
 
-use nalgebra::DMatrix;
-use starlings_estimators::{Gaussian, Optimum};
+use nalgebra::{DMatrix, DVector};
+use starlings_estimators::{BlockRow, Gaussian, Optimum};
 
 use super::candidate::Candidate;
 use super::figures::Curve;
@@ -33,12 +33,16 @@ fn estimates(judged: &Judged<'_>) -> Vec<Estimate> {
 /// of its own, in the channel's unit; zero where the fit leaves a direction free.
 pub(super) fn prediction_sd(laboratory: &Laboratory<'_>, fit: &Fitted<'_>) -> Vec<f64> {
     let Ok(optimum) = fit.optimum() else { return vec![0.0; laboratory.rows.rows.len()] };
-    let jacobian = fit.jacobian.whole(&laboratory.rows);
-    let spread = &jacobian * optimum.covariance();
-    let own = |i: usize| fit.own_values.row(i).norm_squared();
-    let own = |i: usize| if fit.own_values.is_empty() { 0.0 } else { own(i) };
-    let variance = |i: usize| spread.row(i).dot(&jacobian.row(i)).max(0.0) + own(i);
-    laboratory.rows.rows.iter().enumerate().map(|(i, row)| row.noise * variance(i).sqrt()).collect()
+    let mut variance = DVector::zeros(laboratory.rows.rows.len());
+    for BlockRow { rows, columns, values } in fit.jacobian.in_blocks(&laboratory.rows).blocks() {
+        let spread = values * optimum.covariance().select_rows(columns).select_columns(columns);
+        for (k, i) in rows.clone().enumerate() {
+            variance[i] = spread.row(k).dot(&values.row(k)).max(0.0);
+        }
+    }
+    let own = |i: usize| if fit.own_values.is_empty() { 0.0 } else { fit.own_values.row(i).norm_squared() };
+    let sd = |(i, row): (usize, &Row)| row.noise * (variance[i] + own(i)).sqrt();
+    laboratory.rows.rows.iter().enumerate().map(sd).collect()
 }
 
 /// The effects of a version with their coefficients.

@@ -5,8 +5,8 @@
 
 use std::borrow::Cow;
 
-use nalgebra::{DMatrix, DVector};
-use starlings_estimators::Optimum;
+use nalgebra::DVector;
+use starlings_estimators::{BlockAngular, Optimum};
 
 use super::ExplainError;
 use super::fit::Fitted;
@@ -41,7 +41,7 @@ impl Column {
 /// All of them.
 pub(super) struct Columns<'f, 'l> {
     laboratory: &'f Laboratory<'l>,
-    jacobian: DMatrix<f64>,
+    jacobian: BlockAngular,
     optimum: &'f Optimum,
     hits: Vec<&'f Hit>,
     /// The columns of all hits, or none.
@@ -59,7 +59,7 @@ impl<'f, 'l> Columns<'f, 'l> {
         optimum: &'f Optimum,
         hits: Vec<&'f Hit>,
     ) -> Result<Self, ExplainError> {
-        let jacobian = fit.jacobian.whole(&laboratory.rows);
+        let jacobian = fit.jacobian.in_blocks(&laboratory.rows);
         let is_held = laboratory.holds(2 * hits.len());
         let mut columns = Self { laboratory, jacobian, optimum, hits: Vec::new(), held: Vec::new() };
         for hit in hits {
@@ -81,7 +81,7 @@ impl<'f, 'l> Columns<'f, 'l> {
         let of_train = sensitivity.select_rows(&self.laboratory.rows.train);
         let own = self.optimum.unimitated(&of_train);
         let size = own.norm();
-        let all = || &*sensitivity - &self.jacobian * self.optimum.response(&of_train);
+        let all = || &*sensitivity - self.jacobian.times(&self.optimum.response(&of_train));
         Ok((size > 0.0).then(|| Column { own: own / size, all: all() / size }))
     }
 

@@ -5,10 +5,12 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
+use starlings_estimators::BlockAngular;
 
 use super::ExplainError;
 use super::fit::{Fitted, point};
+use super::influences::places;
 use super::laboratory::{Answer, Laboratory, Point};
 
 /// Distance of the differences, in z.
@@ -35,7 +37,7 @@ impl Fitted<'_> {
         laboratory: &mut Laboratory<'_>,
         z: &DVector<f64>,
         answers: Vec<Answer>,
-    ) -> Result<Option<DMatrix<f64>>, ExplainError> {
+    ) -> Result<Option<BlockAngular>, ExplainError> {
         let mut steps = vec![STEP; answers.len()];
         let mut found: Vec<Option<Arc<Vec<f64>>>> = answers.into_iter().map(Result::ok).collect();
         let failed: Vec<usize> = (0..found.len()).filter(|k| found[*k].is_none()).collect();
@@ -47,26 +49,25 @@ impl Fitted<'_> {
                 steps[*k] = -STEP;
             }
         }
-        let rows = &laboratory.rows.rows;
+        let Some(found) = found.into_iter().collect::<Option<Vec<_>>>() else { return Ok(None) };
+        let rows = &laboratory.rows;
         let study = &self.version.study;
         let distance = |j: usize| steps[study.theta[j].parameter] * z[j].abs().max(1.0);
-        let mut jacobian = DMatrix::zeros(rows.len(), self.version.n_param());
+        // A held-out record is run with the mean of the entries, which moved by the mean of their distances: per entry that mean
+        // changes by one in their number.
+        let mut together = vec![0.0; study.parameters.len()];
         for (j, entry) in study.theta.iter().enumerate() {
-            let Some(moved) = &found[entry.parameter] else { return Ok(None) };
-            // A held-out record is run with the mean of the entries, which moved by the mean of their distances: per entry that
-            // mean changes by one in their number.
-            let of_all = || (0..study.theta.len()).filter(|k| study.theta[*k].parameter == entry.parameter);
-            let together: f64 = of_all().map(distance).sum();
-            for (i, row) in rows.iter().enumerate() {
-                let h = match entry.record {
-                    Some(r) if r == row.record => distance(j),
-                    Some(_) if !study.records[row.record].is_trained() => together,
-                    Some(_) => continue,
-                    None => distance(j),
-                };
-                jacobian[(i, j)] = (moved[i] - self.predicted[i]) / (h * row.noise);
-            }
+            together[entry.parameter] += distance(j);
         }
-        Ok(Some(jacobian))
+        let influence = |i: usize, j: usize| {
+            let (row, entry) = (&rows.rows[i], &study.theta[j]);
+            let h = match entry.record {
+                Some(r) if r != row.record => together[entry.parameter],
+                _ => distance(j),
+            };
+            (found[entry.parameter][i] - self.predicted[i]) / (h * row.noise)
+        };
+        let places = places(study, rows);
+        Ok(Some(BlockAngular::from_fn(rows.rows.len(), self.version.n_param(), places, influence)))
     }
 }

@@ -35,7 +35,7 @@ pub struct Fitted<'c> {
     /// held-out record depend on the fitted records by the mean that it is run with.
     pub jacobian: Influences,
     /// d prediction over the noise for one standard deviation of each value that a held-out record has of its own, all rows ×
-    /// values; without columns until it was measured.
+    /// values that a record has; without columns until it was measured. The values of one record are not those of another.
     pub own_values: DMatrix<f64>,
 }
 
@@ -64,19 +64,16 @@ impl<'c> Fitted<'c> {
         rows: &Rows,
     ) -> Self {
         let z = version.continue_from(&parent.version, parent.z(), point);
-        let known = parent.jacobian.whole(rows);
-        let mut jacobian = DMatrix::zeros(known.nrows(), version.n_param());
-        for (j, entry) in version.study.theta.iter().enumerate() {
-            if let Some(i) = parent.version.study.theta.iter().position(|e| e.name == entry.name) {
-                let ratio = version.unit()[j] / parent.version.unit()[i];
-                jacobian.set_column(j, &(known.column(i) * ratio));
-            }
-        }
-        let amplitude = version.first_of(version.members.len() - 1);
-        jacobian.set_column(amplitude, sensitivity);
+        let source = |j: usize| {
+            let name = &version.study.theta[j].name;
+            let i = parent.version.study.theta.iter().position(|entry| entry.name == *name)?;
+            Some((i, version.unit()[j] / parent.version.unit()[i]))
+        };
+        let sources: Vec<Option<(usize, f64)>> = (0..version.n_param()).map(source).collect();
+        let mut jacobian = parent.jacobian.map_columns(version.n_param(), |j| sources[j]);
+        jacobian.set_column(version.first_of(version.members.len() - 1), sensitivity, rows);
         let residual = parent.residual().clone();
-        let jacobian = Influences::of(&jacobian, rows);
-        let (of_train, scaled) = (Arc::clone(&jacobian.of_train), version.scaled.clone());
+        let (of_train, scaled) = (jacobian.of_train.clone(), version.scaled.clone());
         let solver = LeastSquares::from_known(z, residual, of_train, scaled, ROUGH, TRIALS);
         let (predicted, own_values) = (Arc::clone(&parent.predicted), DMatrix::zeros(0, 0));
         Self { version, solver, predicted, jacobian, own_values }
@@ -158,7 +155,7 @@ impl<'c> Fitted<'c> {
         let (z, residual, jacobian) = self.solver.best();
         // A flat amplitude without influence must not make the system singular.
         let precision = self.version.scaled.precision.map(|p| p.max(1e-9));
-        Optimum::new(residual, jacobian, &precision, &(&self.version.scaled.mean - z))
+        Optimum::in_blocks(residual, jacobian, &precision, &(&self.version.scaled.mean - z))
     }
 
     /// Points that answer the present need.
@@ -237,7 +234,7 @@ impl Fitted<'_> {
                 }
                 let jacobian = self.differences(laboratory, &z, answers)?;
                 let jacobian = jacobian.map(|whole| Influences::of(&whole, &laboratory.rows));
-                self.solver.give_jacobian(jacobian.as_ref().map(|j| Arc::clone(&j.of_train)));
+                self.solver.give_jacobian(jacobian.as_ref().map(|j| j.of_train.clone()));
                 self.jacobian = jacobian.unwrap_or_else(|| std::mem::take(&mut self.jacobian));
             }
             Need::Nothing(_) => {}

@@ -2,13 +2,13 @@
 //!
 //! Held-out data *fail* where their error is larger than the noise, the scatter of so many values, and the uncertainty of what was
 //! estimated explain together. No name is given while one fails that the version should have mended: see [`withheld`].
-//! Next files to read: [`super::judge`] for the gates, [`super::own_values`] for what a held-out record adds to the uncertainty.
+//! Next files to read: [`super::judge`] for the gates, [`super::allowance`] for what the uncertainty explains.
 
-use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use starlings_estimators::nis_band;
 
 use super::adequacy::{Adequacy, times};
+use super::allowance::Uncertainty;
 use super::fit::Fitted;
 use super::laboratory::Laboratory;
 use super::rows::{Row, Usage};
@@ -74,12 +74,13 @@ pub(super) fn held_out(laboratory: &Laboratory<'_>, base: &Fitted<'_>, fit: &Fit
     }
     let level = Adequacy::of(laboratory, fit).level();
     let (before, after) = (rows.whitened(&base.predicted), rows.whitened(&fit.predicted));
+    let uncertainty = Uncertainty::of(laboratory, fit);
     let one = |at: Vec<usize>| {
         let row: &Row = &rows.rows[at[0]];
         let n = at.len() as f64;
         let squares = |e: &[f64]| at.iter().map(|i| e[*i].powi(2)).sum::<f64>();
         let (was, is) = (squares(&before), squares(&after));
-        let explained = allowance(laboratory, fit, &at);
+        let explained = uncertainty.as_ref().map_or(0.0, |of| of.allowance(&at));
         let record = &laboratory.study.records[row.record];
         let beyond = (is - explained).max(0.0) / (n * level * level);
         HeldOut {
@@ -129,45 +130,6 @@ pub(super) fn listed(of: &[&HeldOut]) -> String {
         words.push(format!("{} more", of.len() - NAMED));
     }
     words.join("; ")
-}
-
-/// bᵀ (C⁻¹ + JᵀJ)⁻¹ b with b = Jᵀ e: the fall of χ² from these rows (residuals e, Jacobian J) to a joint fit, for an estimate of
-/// covariance C and values of a held-out record's own of unit variance. χ² less this is eᵀ (1 + J C Jᵀ)⁻¹ e, the squared distance
-/// of the rows from their prediction (Mahalanobis 1936). Nothing where the fit leaves a direction free or its
-/// Jacobian is of another point.
-pub(super) fn allowance(laboratory: &Laboratory<'_>, fit: &Fitted<'_>, rows: &[usize]) -> f64 {
-    let known = || {
-        let optimum = fit.optimum().ok().filter(|_| fit.is_fresh() && !rows.is_empty())?;
-        let whitened = laboratory.rows.whitened(&fit.predicted);
-        let residual = DVector::from_iterator(rows.len(), rows.iter().map(|i| whitened[*i]));
-        let all = fit.jacobian.whole(&laboratory.rows);
-        let (jacobian, prior) = with_own_values(fit, &all, rows, optimum.covariance())?;
-        let along = jacobian.tr_mul(&residual);
-        let information = prior + jacobian.tr_mul(&jacobian);
-        Some(along.dot(&information.cholesky()?.solve(&along)))
-    };
-    known().filter(|fall| fall.is_finite()).unwrap_or(0.0)
-}
-
-/// The Jacobian of some of all rows to the estimated and the unknown values, and the information on these before the rows are seen.
-fn with_own_values(
-    fit: &Fitted<'_>,
-    all: &DMatrix<f64>,
-    rows: &[usize],
-    covariance: &DMatrix<f64>,
-) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
-    let p = covariance.nrows();
-    let of = |column: usize| rows.iter().any(|i| fit.own_values[(*i, column)] != 0.0);
-    let own: Vec<usize> = (0..fit.own_values.ncols()).filter(|c| of(*c)).collect();
-    let mut jacobian = all.select_rows(rows).resize_horizontally(p + own.len(), 0.0);
-    let mut prior = DMatrix::identity(p + own.len(), p + own.len());
-    prior.view_mut((0, 0), (p, p)).copy_from(&covariance.clone().cholesky()?.inverse());
-    for (k, column) in own.into_iter().enumerate() {
-        for (r, i) in rows.iter().enumerate() {
-            jacobian[(r, p + k)] = fit.own_values[(*i, column)];
-        }
-    }
-    Some((jacobian, prior))
 }
 
 #[cfg(test)]

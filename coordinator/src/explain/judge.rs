@@ -7,10 +7,11 @@
 use starlings_estimators::End;
 
 use super::adequacy::{Adequacy, times};
+use super::allowance::Uncertainty;
 use super::doubt::too_weak;
 use super::fit::Fitted;
 use super::form::Leftover;
-use super::held_out::{HeldOut, allowance, held_out};
+use super::held_out::{HeldOut, held_out};
 use super::laboratory::Laboratory;
 use super::locate::number::three;
 use super::rows::{Row, Usage, unit};
@@ -131,7 +132,8 @@ pub fn judge<'c>(
         (misfit.n_held_out > 0 && has_excess).then(|| ratio(gain_held_out, before.held_out - n_held));
     let rows = &laboratory.rows.rows;
     let held: Vec<usize> = (0..rows.len()).filter(|i| rows[*i].usage == Usage::HeldOut).collect();
-    let allowance = allowance(laboratory, &fit, &held);
+    let uncertainty = if held.is_empty() { None } else { Uncertainty::of(laboratory, &fit) };
+    let allowance = uncertainty.map_or(0.0, |of| of.allowance(&held));
     let held_out = held_out(laboratory, base, &fit);
     let beyond = misfit.held_out - allowance - n_held - 2.0 * (2.0 * n_held).sqrt();
     let unaccounted = if has_excess { ratio(beyond.max(0.0), before.held_out - n_held) } else { 0.0 };

@@ -101,6 +101,12 @@ impl Rows {
         (0..self.rows.len()).filter(|i| self.rows[*i].usage != Usage::Train)
     }
 
+    /// The rows of a record.
+    pub fn of_record(&self, record: usize) -> std::ops::Range<usize> {
+        let first = |record| self.rows.partition_point(|row| row.record < record);
+        first(record)..first(record + 1)
+    }
+
     /// Runs of consecutive rows of one record, channel and use: (first, one past the last).
     pub fn stretches(&self) -> Vec<std::ops::Range<usize>> {
         let key = |row: &Row| (row.record, row.channel, row.usage);

@@ -195,7 +195,7 @@ impl<'c> Searcher<'_, '_, 'c> {
     fn fits_held(&mut self, parent: &Fitted<'c>) -> usize {
         let slots = self.laboratory.fleet().slots();
         // Two Jacobians, the predictions and the residuals.
-        let series = 2 * (parent.version.n_param() + 2);
+        let series = 2 * (parent.jacobian.n_series(&self.laboratory.rows) + 2);
         (self.laboratory.series_held() / series).max(2 * slots).max(1)
     }
 

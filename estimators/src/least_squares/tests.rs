@@ -1,5 +1,7 @@
 //! Small problems with known ends.
 
+use nalgebra::DMatrix;
+
 use super::*;
 
 /// y = a exp(-b t), observed without noise at a = 2, b = 0.7.
