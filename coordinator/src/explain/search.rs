@@ -191,12 +191,12 @@ impl<'c> Searcher<'_, '_, 'c> {
         Ok(fits)
     }
 
-    /// Fits with one effect more than `parent` that are held at a time, at least two for each slot of the fleet: with fewer it waits.
+    /// Fits with one effect more than `parent` that are held at a time, at least one for each slot of the fleet: with fewer it waits.
     fn fits_held(&mut self, parent: &Fitted<'c>) -> usize {
         let slots = self.laboratory.fleet().slots();
         // Two Jacobians, the predictions and the residuals.
         let series = 2 * (parent.jacobian.n_series(&self.laboratory.rows) + 2);
-        (self.laboratory.series_held() / series).max(2 * slots).max(1)
+        (self.laboratory.series_held() / series).max(slots).max(1)
     }
 
     /// Positions of the best that go on after a race, the one that promises most first.
