@@ -1,6 +1,6 @@
 //! `starlings spectrum`: the poles of a study's model under every observer that it can host, and which gain to choose.
 //!
-//! Next file to read: [`mod@print`]; what is found is found in `coordinator/src/study/spectrum.rs`.
+//! Next file to read: [`mod@print`]; what is found is found in `coordinator/study/src/spectrum.rs`.
 
 mod print;
 

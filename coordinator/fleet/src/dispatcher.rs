@@ -1,0 +1,233 @@
+//! Decides which worker runs which job: events in, commands out. No socket, clock or lock; time is only what events bring.
+//!
+//! Rules. A job is given under a lease (stream, job, attempt); an answer without a valid lease is ignored. Jobs go to the
+//! least loaded worker, so that few jobs spread over all slots. A worker holds two jobs per slot when they are long, up to
+//! 64 when they are shorter than a message's way. At the end of a batch, jobs that wait behind a busy slot are recalled for
+//! an idle one. A lost worker's leases go back to the queue; the jobs it was running count an attempt. The order of outcomes is the
+//! order of jobs, whatever happened.
+//!
+//! A model failure and a timeout are tried once more on another worker, if there is one; then they are the outcome. An
+//! infrastructure failure is none: it sets the worker aside (`aside`) and the job runs elsewhere or waits. An abnormal end is decided by
+//! a control run (`doubt`), made of a run that is known to work (`proven`).
+//!
+//! The jobs of a batch may need different setups: all of them are sent at once, and a job goes only to a worker that has built
+//! its own, while others are still being built. A worker that forgets a setup is sent it again.
+//!
+//! Not here: what a job contains, the wire, other parameters for a failed particle. Next files to read: [`message`] for
+//! events and commands, [`roster`] for workers, [`batch`] for jobs, `hand_out` for what follows from any event.
+
+mod answers;
+mod aside;
+pub mod batch;
+mod doubt;
+mod hand_out;
+pub mod message;
+mod proven;
+mod queue;
+pub mod roster;
+mod run_times;
+#[cfg(test)]
+mod tests;
+mod watch;
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use starlings_proto::SetupId;
+
+use super::FleetEvent;
+use super::job_name::JobName;
+use batch::{Batch, Lost};
+pub(crate) use doubt::Asked;
+pub use message::{BatchError, Command, ControlId, Event, Joining, WorkerId};
+use proven::Proven;
+use roster::{SetupState, Worker};
+use run_times::RunTimes;
+use watch::{Overdue, Starved};
+
+/// The numbers that the rules need.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rules {
+    /// Time between heartbeats; a worker silent for twice as long is lost.
+    pub heartbeat: Duration,
+    /// How long a batch may wait without any worker that can take a job.
+    pub patience: Duration,
+    /// How many workers may be lost under one job before it is given up.
+    pub max_attempts: u32,
+}
+
+/// The decisions of a fleet. One batch at a time.
+#[derive(Debug)]
+pub struct Dispatcher {
+    rules: Rules,
+    workers: BTreeMap<WorkerId, Worker>,
+    batch: Option<Batch>,
+    next_job: u64,
+    last_setups: Vec<SetupId>,
+    last_tick: Option<Duration>,
+    starved: Option<Starved>,
+    overdue: Option<Overdue>,
+    run_times: RunTimes,
+    proven: Proven,
+    local_only: bool,
+    out: Vec<Command>,
+}
+
+impl Dispatcher {
+    /// A dispatcher without workers or jobs.
+    pub fn new(rules: Rules) -> Self {
+        Self {
+            rules,
+            workers: BTreeMap::new(),
+            batch: None,
+            next_job: 1,
+            last_setups: Vec::new(),
+            last_tick: None,
+            starved: None,
+            overdue: None,
+            run_times: RunTimes::default(),
+            proven: Proven::default(),
+            local_only: false,
+            out: Vec::new(),
+        }
+    }
+
+    /// Number of workers.
+    pub fn n_workers(&self) -> usize {
+        self.workers.len()
+    }
+
+    /// Number of slots of all workers.
+    pub fn slots(&self) -> usize {
+        self.workers.values().map(|w| w.slots).sum()
+    }
+
+    /// Number of leases that a worker holds.
+    pub fn in_flight(&self, worker: WorkerId) -> usize {
+        self.workers.get(&worker).map_or(0, Worker::load)
+    }
+
+    /// Takes one event at time `now` (any fixed origin) and returns what has to be done about it.
+    pub fn step(&mut self, now: Duration, event: Event) -> Vec<Command> {
+        match event {
+            Event::Joined(joining) => self.joined(now, &joining),
+            Event::Left { worker, reason, clean } => self.lose(worker, &reason, clean),
+            Event::Heard { worker } => self.heard(now, worker),
+            Event::SetupDone { worker, setup } => self.setup_answered(now, worker, setup, SetupState::Ready),
+            Event::SetupFailed { worker, setup, reason } => {
+                self.setup_answered(now, worker, setup, SetupState::Failed(reason));
+            }
+            Event::Submit { jobs } => self.submit(now, jobs),
+            Event::Answered { worker, lease, answer, cost } => {
+                self.answered(now, worker, lease, answer, cost);
+            }
+            Event::LocalOnly => self.local_only = true,
+            Event::Tick => self.tick(now),
+            Event::Abort(error) => self.abort(error),
+        }
+        self.proceed();
+        std::mem::take(&mut self.out)
+    }
+
+    fn joined(&mut self, now: Duration, joining: &Joining) {
+        let twin = self.workers.values().find(|w| w.nonce == joining.nonce).map(|w| w.id);
+        if let Some(id) = twin {
+            self.out.push(Command::Close { worker: id });
+            self.lose(id, "its process connected again", true);
+        }
+        let mut worker = Worker::new(joining, now);
+        self.out.push(Command::Notice(joining.notice()));
+        if let Some(batch) = &self.batch {
+            for &setup in batch.open_setups().filter(|setup| worker.wants(**setup, now)) {
+                self.out.push(Command::SendSetup { worker: joining.id, setup });
+            }
+        }
+        self.workers.insert(worker.id, worker);
+    }
+
+    fn heard(&mut self, now: Duration, worker: WorkerId) {
+        if let Some(worker) = self.workers.get_mut(&worker) {
+            worker.last_heard = now;
+        }
+    }
+
+    /// Takes a worker out and returns its leases to the queue. A clean leave counts no attempt.
+    fn lose(&mut self, id: WorkerId, reason: &str, clean: bool) {
+        let Some(worker) = self.workers.remove(&id) else { return };
+        let (mut requeued, mut given_up) = (0, None);
+        let leases = worker.leases_in_order();
+        for (position, job) in leases.into_iter().enumerate() {
+            let Some(batch) = &mut self.batch else { break };
+            let Some(index) = batch.index_of(job) else { continue };
+            let counted = !clean && position < worker.slots;
+            let why = format!("{} was lost: {reason}", worker.name);
+            match batch.lost(index, counted, self.rules.max_attempts) {
+                Lost::Requeued => {
+                    requeued += 1;
+                    if counted {
+                        self.out.push(Command::Notice(batch.retried(index, &worker.name, &why)));
+                    }
+                }
+                Lost::GivenUp => given_up = Some((index, batch.attempts(index), why)),
+            }
+        }
+        let notice = FleetEvent::WorkerLeft { worker: worker.name, reason: reason.to_owned(), requeued };
+        self.out.push(Command::Notice(notice));
+        if let Some((index, attempts, why)) = given_up {
+            self.unanswered(index, attempts, &why);
+        }
+    }
+
+    fn setup_answered(&mut self, now: Duration, id: WorkerId, setup: SetupId, state: SetupState) {
+        let Some(worker) = self.workers.get_mut(&id) else { return };
+        worker.last_heard = now;
+        let needed = self.batch.as_ref().is_some_and(|batch| batch.needs(&setup));
+        if let SetupState::Failed(reason) = &state {
+            if worker.is_ready(&setup) {
+                // It had built it: its cache was full.
+                worker.setups.remove(&setup);
+                if needed && worker.wants(setup, now) {
+                    self.out.push(Command::SendSetup { worker: id, setup });
+                }
+                return;
+            }
+            let notice = FleetEvent::SetupFailed { worker: worker.name.clone(), reason: reason.clone() };
+            self.out.push(Command::Notice(notice));
+        }
+        worker.setup_answered(setup, state, now);
+    }
+
+    fn submit(&mut self, now: Duration, jobs: Vec<(SetupId, JobName)>) {
+        self.abort(BatchError::Cancelled);
+        let n = jobs.len() as u64;
+        let batch = Batch::new(self.next_job, jobs);
+        if !batch.shares(&self.last_setups) {
+            self.workers.values_mut().for_each(Worker::forget_cost);
+            self.run_times = RunTimes::default();
+        }
+        self.last_setups = batch.setups().to_vec();
+        for worker in self.workers.values_mut() {
+            for &setup in batch.setups() {
+                if worker.wants(setup, now) {
+                    self.out.push(Command::SendSetup { worker: worker.id, setup });
+                }
+            }
+        }
+        self.proven.keep_only(batch.names(), &mut self.out);
+        self.batch = Some(batch);
+        self.next_job += n;
+    }
+
+    fn abort(&mut self, error: BatchError) {
+        let Some(batch) = self.batch.take() else { return };
+        for worker in self.workers.values() {
+            let leases = worker.leases().filter(|l| batch.index_of(l.job).is_some()).collect::<Vec<_>>();
+            if !leases.is_empty() {
+                self.out.push(Command::Cancel { worker: worker.id, leases });
+            }
+        }
+        self.starved = None;
+        self.overdue = None;
+        self.out.push(Command::BatchFailed(error));
+    }
+}

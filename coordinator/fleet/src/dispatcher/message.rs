@@ -1,0 +1,240 @@
+//! What the dispatcher hears and what it asks for.
+
+use std::fmt::Write as _;
+use std::time::Duration;
+
+use starlings_proto::{Answer, Lease, SetupId};
+
+use crate::job_name::JobName;
+use crate::{FleetEvent, Outcome};
+
+/// Number of a worker's stream: the epoch of its leases. A process that connects again gets a new one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct WorkerId(pub u64);
+
+/// A worker at the door.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Joining {
+    /// Number of its stream.
+    pub id: WorkerId,
+    /// Its name in events and outcomes.
+    pub name: String,
+    /// Host name.
+    pub host: String,
+    /// Process number on that host.
+    pub pid: u32,
+    /// Jobs at the same time, at least 1.
+    pub slots: u32,
+    /// Cores that it sees.
+    pub cores: u32,
+    /// Drawn once per process.
+    pub nonce: u64,
+    /// BLAKE3 of its executable.
+    pub build: Option<[u8; 32]>,
+}
+
+impl Joining {
+    pub(super) fn notice(&self) -> FleetEvent {
+        let build = self.build.map_or_else(String::new, |hash| hex(&hash));
+        FleetEvent::WorkerJoined {
+            worker: self.name.clone(),
+            host: self.host.clone(),
+            pid: self.pid,
+            slots: self.slots,
+            cores: self.cores,
+            build,
+        }
+    }
+}
+
+/// A hash in hexadecimal.
+pub(crate) fn hex(hash: &[u8; 32]) -> String {
+    hash.iter().fold(String::new(), |mut text, byte| {
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}
+
+/// Something that happened.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Event {
+    /// A worker connected and was taken.
+    Joined(Joining),
+    /// A worker's stream ended. Clean: it said goodbye.
+    Left {
+        /// Which.
+        worker: WorkerId,
+        /// Why.
+        reason: String,
+        /// Whether it left on purpose.
+        clean: bool,
+    },
+    /// A sign of life.
+    Heard {
+        /// From whom.
+        worker: WorkerId,
+    },
+    /// A worker built a setup.
+    SetupDone {
+        /// Which worker.
+        worker: WorkerId,
+        /// Which setup.
+        setup: SetupId,
+    },
+    /// A worker could not build a setup, or has forgotten one that it had built.
+    SetupFailed {
+        /// Which worker.
+        worker: WorkerId,
+        /// Which setup.
+        setup: SetupId,
+        /// Its words.
+        reason: String,
+    },
+    /// A batch to run; one still running is cancelled.
+    Submit {
+        /// The setup that each job needs, and what it is called.
+        jobs: Vec<(SetupId, JobName)>,
+    },
+    /// A worker answered a lease.
+    Answered {
+        /// Which worker.
+        worker: WorkerId,
+        /// Under which lease.
+        lease: Lease,
+        /// What.
+        answer: Answer,
+        /// Wall time of the run, seconds.
+        cost: f64,
+    },
+    /// All workers are processes of this machine, started from one program: what one of them cannot build, none can.
+    LocalOnly,
+    /// Time passed.
+    Tick,
+    /// The batch must end with this error.
+    Abort(BatchError),
+}
+
+/// Why a batch ended without outcomes.
+#[derive(Clone, Debug, PartialEq)]
+pub enum BatchError {
+    /// Nobody wants it any more.
+    Cancelled,
+    /// No worker could take a job for too long.
+    NoWorkers {
+        /// How long.
+        waited: Duration,
+        /// What is missing.
+        missing: String,
+    },
+    /// No worker can build the setup.
+    SetupFailed {
+        /// The workers' words.
+        reason: String,
+    },
+    /// The worker processes on this machine cannot run.
+    LocalWorkers(String),
+    /// The network ended although nobody closed the fleet.
+    Stopped(String),
+    /// Every worker that could take a job was set aside for too long.
+    Unavailable {
+        /// How long.
+        waited: Duration,
+        /// Each with its reason.
+        reasons: String,
+    },
+    /// A program ends abnormally again and again, and no run is known to work that could tell whose doing it is.
+    NoControl {
+        /// Index of the job in the batch.
+        index: usize,
+        /// Index of the sigma point.
+        particle: u32,
+        /// Index of the record.
+        record: u32,
+        /// Its parameters as a list, for whoever holds the jobs to fill in.
+        parameters: String,
+        /// How it ended last.
+        reason: String,
+    },
+    /// A job has no answer, and not by the model's doing: it was lost with worker after worker, or does not fit the model.
+    NoAnswer {
+        /// Index of the job in the batch.
+        index: usize,
+        /// Index of the sigma point.
+        particle: u32,
+        /// Index of the record.
+        record: u32,
+        /// What happened.
+        reason: String,
+    },
+}
+
+/// A run that is known to work, by the place in which it is kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ControlId(pub u64);
+
+/// Something to do.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Command {
+    /// Send a setup.
+    SendSetup {
+        /// To whom.
+        worker: WorkerId,
+        /// Which.
+        setup: SetupId,
+    },
+    /// Send a job of the running batch.
+    SendJob {
+        /// To whom.
+        worker: WorkerId,
+        /// Under which lease.
+        lease: Lease,
+        /// Index of the job in the batch.
+        index: usize,
+    },
+    /// Keep a copy of a job of the running batch: it is known to work.
+    Keep {
+        /// As what.
+        control: ControlId,
+        /// Index of the job in the batch.
+        index: usize,
+    },
+    /// A kept job is of no more use.
+    Forget {
+        /// Which.
+        control: ControlId,
+    },
+    /// Send a kept job, under the lease of the job that failed.
+    SendControl {
+        /// To whom.
+        worker: WorkerId,
+        /// Under which lease.
+        lease: Lease,
+        /// Which.
+        control: ControlId,
+    },
+    /// Withdraw jobs that have not started.
+    Cancel {
+        /// From whom.
+        worker: WorkerId,
+        /// Which.
+        leases: Vec<Lease>,
+    },
+    /// End a worker's stream.
+    Close {
+        /// Whose.
+        worker: WorkerId,
+    },
+    /// The batch ended: one outcome per job, in job order.
+    BatchDone(Vec<Outcome>),
+    /// The batch ended without outcomes.
+    BatchFailed(BatchError),
+    /// Something worth telling.
+    Notice(FleetEvent),
+    /// A job is given up, which is worth telling together with its parameters.
+    GivenUp {
+        /// Index of the job in the batch.
+        index: usize,
+        /// [`FleetEvent::JobFailed`] without parameters.
+        notice: FleetEvent,
+    },
+}

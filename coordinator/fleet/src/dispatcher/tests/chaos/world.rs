@@ -1,0 +1,254 @@
+//! A world of workers around a dispatcher, and what can happen in it.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
+
+use proptest::prelude::*;
+use starlings_models::{ParticleError, Prediction, Timeout};
+use starlings_proto::{Answer, Lease, SetupId};
+
+use super::super::{RULES, answered, crash, joining, left, place, prediction, setup, solver, submit_mixed};
+use crate::Outcome;
+use crate::dispatcher::{BatchError, Command, ControlId, Dispatcher, Event, WorkerId};
+
+/// One thing that the world does; numbers choose among what is possible then.
+#[derive(Clone, Debug)]
+pub(super) enum Act {
+    Join(u32),
+    Reconnect(usize),
+    Lose(usize, bool),
+    BuildSetup(usize, bool),
+    ForgetSetup(usize),
+    Answer(usize, f64),
+    Fail(usize),
+    Crash(usize),
+    Place(usize),
+    Late(usize),
+    Repeat(usize),
+    Wait(u64),
+}
+
+pub(super) fn act() -> impl Strategy<Value = Act> {
+    prop_oneof![
+        2 => (1_u32..4).prop_map(Act::Join),
+        1 => any::<usize>().prop_map(Act::Reconnect),
+        2 => (any::<usize>(), any::<bool>()).prop_map(|(who, clean)| Act::Lose(who, clean)),
+        4 => (any::<usize>(), prop::bool::weighted(0.8)).prop_map(|(who, ok)| Act::BuildSetup(who, ok)),
+        1 => any::<usize>().prop_map(Act::ForgetSetup),
+        12 => (any::<usize>(), prop::sample::select(vec![1e-6, 1e-3, 1.0])).prop_map(|(which, cost)| Act::Answer(which, cost)),
+        3 => any::<usize>().prop_map(Act::Fail),
+        3 => any::<usize>().prop_map(Act::Crash),
+        2 => any::<usize>().prop_map(Act::Place),
+        1 => any::<usize>().prop_map(Act::Late),
+        2 => any::<usize>().prop_map(Act::Repeat),
+        1 => (1_u64..30).prop_map(Act::Wait),
+    ]
+}
+
+/// Workers as the dispatcher's commands make them: what each was sent and has not answered.
+pub(super) struct World {
+    pub(super) dispatcher: Dispatcher,
+    pub(super) now: Duration,
+    pub(super) next_id: u64,
+    pub(super) alive: BTreeSet<u64>,
+    pub(super) setups: Vec<u8>,
+    pub(super) to_build: BTreeSet<(u64, SetupId)>,
+    pub(super) built: BTreeSet<(u64, SetupId)>,
+    pub(super) open: BTreeMap<(u64, u64), (Lease, usize)>,
+    pub(super) withdrawn: Vec<Lease>,
+    pub(super) past: Vec<Lease>,
+    pub(super) kept: BTreeSet<ControlId>,
+    /// Which of the open leases are control runs.
+    pub(super) controls: BTreeSet<(u64, u64)>,
+    pub(super) ended: Option<Result<Vec<Outcome>, BatchError>>,
+}
+
+impl World {
+    /// One job per setup number.
+    pub(super) fn new(setups: &[u8], local: bool) -> Self {
+        let mut world = Self {
+            dispatcher: Dispatcher::new(RULES),
+            now: Duration::ZERO,
+            next_id: 0,
+            alive: BTreeSet::new(),
+            setups: setups.to_vec(),
+            to_build: BTreeSet::new(),
+            built: BTreeSet::new(),
+            open: BTreeMap::new(),
+            withdrawn: vec![],
+            past: vec![],
+            kept: BTreeSet::new(),
+            controls: BTreeSet::new(),
+            ended: None,
+        };
+        if local {
+            world.event(Event::LocalOnly);
+        }
+        world.event(submit_mixed(setups));
+        world
+    }
+
+    pub(super) fn event(&mut self, event: Event) {
+        for command in self.dispatcher.step(self.now, event) {
+            self.obey(command);
+        }
+    }
+
+    pub(super) fn obey(&mut self, command: Command) {
+        match command {
+            Command::SendSetup { worker, setup } => {
+                assert!(self.alive.contains(&worker.0), "a setup is sent only to a live worker");
+                assert!(self.to_build.insert((worker.0, setup)), "a setup is sent once while it is built");
+            }
+            Command::SendJob { worker, lease, index } => {
+                let needed = (worker.0, setup(self.setups[index]));
+                assert!(self.built.contains(&needed), "a job is sent only to a worker with its setup");
+                assert!(self.alive.contains(&worker.0), "a job is sent only to a live worker");
+                let twice = self.open.values().any(|(_, open)| *open == index);
+                assert!(!twice, "a job has one lease at a time");
+                self.open.insert((worker.0, lease.job), (lease, index));
+            }
+            Command::SendControl { worker, lease, control } => {
+                assert!(self.kept.contains(&control), "a control run is one that is kept");
+                assert!(self.alive.contains(&worker.0), "a control run is made by a live worker");
+                let index = (lease.job - 1) as usize;
+                assert!(self.open.values().all(|(_, open)| *open != index), "a job has one lease at a time");
+                self.controls.insert((worker.0, lease.job));
+                self.open.insert((worker.0, lease.job), (lease, index));
+            }
+            Command::Keep { control, .. } => assert!(self.kept.insert(control), "it is kept once"),
+            Command::Forget { control } => assert!(self.kept.remove(&control), "it was kept"),
+            Command::Cancel { leases, .. } => self.withdrawn.extend(leases),
+            Command::Close { worker } => self.forget(worker.0),
+            Command::BatchDone(outcomes) => {
+                assert!(self.ended.replace(Ok(outcomes)).is_none(), "a batch ends once");
+            }
+            Command::BatchFailed(error) => {
+                assert!(self.ended.replace(Err(error)).is_none(), "a batch ends once");
+            }
+            Command::Notice(_) | Command::GivenUp { .. } => {}
+        }
+    }
+
+    pub(super) fn forget(&mut self, worker: u64) {
+        self.alive.remove(&worker);
+        self.to_build.retain(|(of, _)| *of != worker);
+        self.built.retain(|(of, _)| *of != worker);
+        self.past.extend(self.open.values().map(|(lease, _)| *lease).filter(|lease| lease.epoch == worker));
+        self.open.retain(|(of, _), _| *of != worker);
+        self.controls.retain(|(of, _)| *of != worker);
+        self.withdrawn.retain(|lease| lease.epoch != worker);
+    }
+
+    pub(super) fn join(&mut self, slots: u32) {
+        self.next_id += 1;
+        self.alive.insert(self.next_id);
+        self.event(Event::Joined(joining(self.next_id, slots)));
+    }
+
+    pub(super) fn answer(&mut self, which: usize, answer: impl FnOnce(usize) -> Answer, cost: f64) {
+        let Some((&key, &(lease, index))) = pick(&self.open, which) else { return };
+        self.open.remove(&key);
+        self.controls.remove(&key);
+        self.withdrawn.retain(|other| *other != lease);
+        self.past.push(lease);
+        self.event(answered(lease, answer(index), cost));
+    }
+
+    pub(super) fn act(&mut self, act: &Act) {
+        match *act {
+            Act::Join(slots) => self.join(slots),
+            Act::Reconnect(which) => {
+                let Some(old) = choose(&self.alive, which) else { return };
+                self.next_id += 1;
+                self.alive.insert(self.next_id);
+                let mut twin = joining(self.next_id, 1);
+                twin.nonce = old;
+                self.event(Event::Joined(twin));
+            }
+            Act::Lose(which, clean) => {
+                let Some(worker) = choose(&self.alive, which) else { return };
+                self.forget(worker);
+                self.event(left(worker, clean));
+            }
+            Act::BuildSetup(which, ok) => {
+                let Some(key) = choose(&self.to_build, which) else { return };
+                self.to_build.remove(&key);
+                if ok {
+                    self.built.insert(key);
+                }
+                let (worker, setup) = (WorkerId(key.0), key.1);
+                let reason = "cannot".to_owned();
+                self.event(if ok {
+                    Event::SetupDone { worker, setup }
+                } else {
+                    Event::SetupFailed { worker, setup, reason }
+                });
+            }
+            Act::ForgetSetup(which) => {
+                let Some(key) = choose(&self.built, which) else { return };
+                self.built.remove(&key);
+                let reason = "forgotten".to_owned();
+                self.event(Event::SetupFailed { worker: WorkerId(key.0), setup: key.1, reason });
+            }
+            Act::Answer(which, cost) => match pick(&self.open, which) {
+                // A called-back job may come back unstarted.
+                Some((_, (lease, _))) if self.withdrawn.contains(lease) && which % 2 == 0 => {
+                    self.answer(which, |_| Answer::Withdrawn, 0.0);
+                }
+                _ => self.answer(which, |index| Answer::Ran(Ok(prediction(index))), cost),
+            },
+            Act::Fail(which) => self.answer(which, |_| Answer::Ran(Err(solver("no"))), 1.0),
+            Act::Crash(which) => self.answer(which, |_| Answer::Ran(Err(crash("crash"))), 1.0),
+            Act::Place(which) => self.answer(which, |_| Answer::Ran(Err(place("disk full"))), 1.0),
+            Act::Late(which) => self.answer(which, |_| Answer::Ran(Err(late().into())), 1.0),
+            Act::Repeat(which) => {
+                if !self.past.is_empty() {
+                    let lease = self.past[which % self.past.len()];
+                    self.event(answered(lease, Answer::Ran(Ok(prediction(usize::MAX))), 1.0));
+                }
+            }
+            Act::Wait(seconds) => {
+                self.now += Duration::from_secs(seconds);
+                self.event(Event::Tick);
+            }
+        }
+        for &worker in &self.alive {
+            let open = self.open.keys().filter(|(of, _)| *of == worker).count();
+            assert_eq!(self.dispatcher.in_flight(WorkerId(worker)), open, "credit follows the open leases");
+        }
+    }
+
+    /// Answers a lease as what it asks for ends: a control run works.
+    pub(super) fn truly(&mut self, which: usize, ends: impl Fn(usize) -> Result<Prediction, ParticleError>) {
+        let Some((&key, _)) = pick(&self.open, which) else { return };
+        let is_control = self.controls.contains(&key);
+        let end = |index: usize| if is_control { Ok(prediction(index)) } else { ends(index) };
+        self.answer(which, |index| Answer::Ran(end(index)), 1.0);
+    }
+
+    /// From here on the world is kind: one good worker, prompt answers.
+    pub(super) fn finish(&mut self) {
+        self.join(2);
+        for _ in 0..20 * self.setups.len() + 50 {
+            if self.ended.is_some() {
+                return;
+            }
+            self.act(&Act::BuildSetup(0, true));
+            self.act(&Act::Answer(1, 1e-3));
+        }
+        panic!("a batch with a good worker ends within a few events per job");
+    }
+}
+
+pub(super) fn late() -> Timeout {
+    Timeout { limit: 1.0, says: "too late".to_owned() }
+}
+
+pub(super) fn choose<T: Ord + Copy>(from: &BTreeSet<T>, which: usize) -> Option<T> {
+    (!from.is_empty()).then(|| *from.iter().nth(which % from.len()).expect("within the length"))
+}
+
+pub(super) fn pick<K: Ord, V>(from: &BTreeMap<K, V>, which: usize) -> Option<(&K, &V)> {
+    (!from.is_empty()).then(|| from.iter().nth(which % from.len()).expect("within the length"))
+}

@@ -1,0 +1,230 @@
+//! What the fleet is at one moment: the dispatcher, the links, the batch that somebody waits for.
+//!
+//! Commands become messages here. The lock around it is [`super::Hub`]'s.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::mpsc::Sender;
+use std::time::Duration;
+
+use starlings_models::Job;
+use starlings_proto::{
+    Bytes, Hello, JobEncoder, Lease, PROTOCOL, SentWindows, SetupId, ToWorker, VERSION, wire,
+};
+use tokio::sync::mpsc::UnboundedSender;
+
+use super::{Outgoing, Reply};
+use crate::FleetEvent;
+use crate::dispatcher::{BatchError, Command, ControlId, Dispatcher, Event, Rules, WorkerId};
+
+/// Guarded by the hub's lock.
+pub(super) struct State {
+    pub(super) dispatcher: Dispatcher,
+    pub(super) links: BTreeMap<WorkerId, Link>,
+    pub(super) setups: BTreeMap<SetupId, Bytes>,
+    pub(super) known: BTreeMap<SetupId, Known>,
+    pub(super) running: Option<Submission>,
+    /// Jobs that are known to work, for control runs.
+    pub(super) kept: BTreeMap<ControlId, (SetupId, Job)>,
+    pub(super) events: Sender<FleetEvent>,
+    pub(super) first_epoch: u64,
+    pub(super) joined: u64,
+    pub(super) draining: bool,
+    pub(super) given_up: Option<String>,
+    pub(super) stopped: Option<String>,
+    pub(super) other_builds: BTreeSet<[u8; 32]>,
+}
+
+/// What is known of a setup without building it.
+pub(super) struct Known {
+    /// Names of its parameters, in the order of a job's.
+    pub(super) parameters: Vec<String>,
+    /// Length of a state, where it is known.
+    pub(super) n_state: Option<usize>,
+}
+
+/// The way to one worker.
+pub(super) struct Link {
+    pub(super) sender: UnboundedSender<Outgoing>,
+    pub(super) pid: u32,
+    /// Windows that were sent on it.
+    pub(super) windows: SentWindows,
+}
+
+impl Link {
+    pub(super) fn new(sender: UnboundedSender<Outgoing>, pid: u32) -> Self {
+        Self { sender, pid, windows: SentWindows::default() }
+    }
+
+    fn give(&mut self, encoder: &mut JobEncoder, lease: Lease, (setup, job): &(SetupId, Job)) {
+        let (window, job) = encoder.encode(lease, setup, job, &mut self.windows);
+        for message in window.into_iter().chain([job]) {
+            self.send(message);
+        }
+    }
+
+    /// A link that is closing ends in `leave`, which returns its leases.
+    fn send(&self, message: wire::ToWorker) {
+        let _ = self.sender.send(Ok(message));
+    }
+}
+
+/// Why a worker is not taken.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Closed {
+    /// It does not fit: dialling again would not help.
+    Refused(String),
+    /// There is no more work: it may leave.
+    Over(String),
+}
+
+/// A batch and who waits for it.
+pub(crate) struct Submission {
+    pub(crate) jobs: Vec<(SetupId, Job)>,
+    /// Holds the windows of the jobs as they travel.
+    pub(crate) encoder: JobEncoder,
+    pub(crate) reply: Sender<Reply>,
+}
+
+impl State {
+    pub(super) fn new(first_epoch: u64, rules: Rules, events: Sender<FleetEvent>) -> Self {
+        Self {
+            dispatcher: Dispatcher::new(rules),
+            links: BTreeMap::new(),
+            setups: BTreeMap::new(),
+            known: BTreeMap::new(),
+            running: None,
+            kept: BTreeMap::new(),
+            events,
+            first_epoch,
+            joined: 0,
+            draining: false,
+            given_up: None,
+            stopped: None,
+            other_builds: BTreeSet::new(),
+        }
+    }
+
+    pub(super) fn admit(&self, hello: &Hello) -> Result<(), Closed> {
+        if hello.protocol != PROTOCOL || hello.version != VERSION {
+            return Err(Closed::Refused(format!(
+                "the worker on {} is starlings {} (protocol {}), the coordinator {VERSION} (protocol {PROTOCOL}): start the \
+                 worker from the coordinator's release",
+                hello.host, hello.version, hello.protocol
+            )));
+        }
+        if self.draining {
+            return Err(Closed::Over("the run is over".to_owned()));
+        }
+        Ok(())
+    }
+
+    pub(super) fn handle(&mut self, now: Duration, event: Event) {
+        let event = match event {
+            Event::Answered { worker, lease, answer, cost } => {
+                let answer = self.checked(&lease, answer);
+                Event::Answered { worker, lease, answer, cost }
+            }
+            other => other,
+        };
+        for command in self.dispatcher.step(now, event) {
+            self.carry_out(command);
+        }
+        self.end_if_abandoned(now);
+    }
+
+    /// Ends the batch when the local workers are given up and the last link is gone, whichever came first.
+    pub(super) fn end_if_abandoned(&mut self, now: Duration) {
+        if !self.links.is_empty() || self.running.is_none() {
+            return;
+        }
+        let Some(reason) = self.given_up.clone() else { return };
+        for command in self.dispatcher.step(now, Event::Abort(BatchError::LocalWorkers(reason))) {
+            self.carry_out(command);
+        }
+    }
+
+    /// The coordinator's build and a worker's, when they differ and this one was not seen before.
+    pub(super) fn other_build(
+        &mut self,
+        own: Option<[u8; 32]>,
+        build: Option<[u8; 32]>,
+    ) -> Option<([u8; 32], [u8; 32])> {
+        let pair = own.zip(build).filter(|(own, build)| own != build)?;
+        self.other_builds.insert(pair.1).then_some(pair)
+    }
+
+    fn carry_out(&mut self, command: Command) {
+        match command {
+            Command::SendSetup { worker, setup } => {
+                if let Some(json) = self.setups.get(&setup) {
+                    self.send(worker, ToWorker::setup(&setup, json.clone()));
+                }
+            }
+            Command::SendJob { worker, lease, index } => {
+                let Some(Submission { jobs, encoder, .. }) = &mut self.running else { return };
+                let (Some(job), Some(link)) = (jobs.get(index), self.links.get_mut(&worker)) else { return };
+                link.give(encoder, lease, job);
+            }
+            Command::SendControl { worker, lease, control } => {
+                let Some(Submission { encoder, .. }) = &mut self.running else { return };
+                let (Some(job), Some(link)) = (self.kept.get(&control), self.links.get_mut(&worker)) else {
+                    return;
+                };
+                link.give(encoder, lease, job);
+            }
+            Command::Keep { control, index } => {
+                let job = self.running.as_ref().and_then(|running| running.jobs.get(index));
+                self.kept.extend(job.map(|job| (control, job.clone())));
+            }
+            Command::Forget { control } => {
+                self.kept.remove(&control);
+            }
+            Command::Cancel { worker, leases } => self.send(worker, ToWorker::cancel(&leases)),
+            // Its stream ends without a word: a worker that still lives dials again.
+            Command::Close { worker } => {
+                self.links.remove(&worker);
+            }
+            Command::BatchDone(outcomes) => self.reply(Ok(outcomes)),
+            Command::BatchFailed(mut error) => {
+                if let BatchError::NoControl { index, parameters, .. } = &mut error {
+                    let named = self.parameters(*index);
+                    let listed = named.iter().map(|(name, value)| format!("{name} = {value}"));
+                    *parameters = listed.collect::<Vec<_>>().join(", ");
+                }
+                self.reply(Err(error));
+            }
+            Command::Notice(event) => self.tell(event),
+            Command::GivenUp { index, mut notice } => {
+                if let FleetEvent::JobFailed { parameters, .. } = &mut notice {
+                    *parameters = self.parameters(index);
+                }
+                self.tell(notice);
+            }
+        }
+    }
+
+    fn tell(&self, event: FleetEvent) {
+        tracing::debug!(?event, "fleet");
+        let _ = self.events.send(event);
+    }
+
+    /// Names and values of the parameters of a job of the running batch.
+    fn parameters(&self, index: usize) -> Vec<(String, f64)> {
+        let job = self.running.as_ref().and_then(|running| running.jobs.get(index));
+        let Some((setup, job)) = job else { return Vec::new() };
+        let names = self.known.get(setup).map(|known| &known.parameters).into_iter().flatten();
+        names.cloned().zip(job.theta.iter().copied()).collect()
+    }
+
+    fn send(&self, worker: WorkerId, message: wire::ToWorker) {
+        if let Some(link) = self.links.get(&worker) {
+            link.send(message);
+        }
+    }
+
+    pub(super) fn reply(&mut self, reply: Reply) {
+        if let Some(running) = self.running.take() {
+            let _ = running.reply.send(reply);
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! The corners between threads, without a network: who is told when the last worker goes, and what a panic does.
+
+use std::sync::mpsc::{self, Receiver};
+
+use starlings_models::{ModelFailure, Setup, Window};
+use starlings_proto::{Answer, JobEncoder, ReceivedWindows, encode_setup};
+use tokio::sync::mpsc::unbounded_channel;
+
+use super::*;
+
+impl Hub {
+    /// Leaves the state as a panic in the middle of a decision does.
+    pub(crate) fn panic_inside(&self) {
+        let _ = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+            let _state = self.state.lock();
+            panic!("in the middle of a decision");
+        }));
+    }
+}
+
+fn hello(pid: u32, build: Option<[u8; 32]>) -> Hello {
+    Hello {
+        protocol: PROTOCOL,
+        version: starlings_proto::VERSION.to_owned(),
+        cores: 1,
+        slots: 1,
+        host: "here".to_owned(),
+        pid,
+        nonce: u64::from(pid),
+        build,
+        solver: None,
+    }
+}
+
+fn hub(build: Option<[u8; 32]>) -> (Hub, Receiver<FleetEvent>) {
+    let (sender, events) = mpsc::channel();
+    let (heartbeat, patience) = (Duration::from_secs(8), Duration::from_secs(300));
+    (Hub::new("test".to_owned(), build, Rules { heartbeat, patience, max_attempts: 5 }, sender), events)
+}
+
+fn batch(hub: &Hub) -> (Submission, Receiver<Reply>) {
+    let (setup, json) = encode_setup(&Setup::default()).expect("it travels");
+    hub.install(setup, json, vec!["k".to_owned()], None);
+    let window = Window { start: 0.0, times: vec![1.0], observed: vec![0.0], inputs: vec![] };
+    let job = starlings_models::Job {
+        particle: 0,
+        record: 0,
+        window: window.into(),
+        theta: vec![2.5],
+        state: None,
+    };
+    let (reply, replies) = mpsc::channel();
+    (Submission { jobs: vec![(setup, job)], encoder: JobEncoder::default(), reply }, replies)
+}
+
+#[test]
+fn a_fleet_given_up_while_its_last_worker_was_still_linked_ends_when_it_leaves() {
+    let (hub, _events) = hub(None);
+    let (link, _outgoing) = unbounded_channel();
+    let worker = hub.join(hello(1, None), link).expect("it fits");
+    let (batch, replies) = batch(&hub);
+    hub.submit(batch);
+    hub.give_up("each died".to_owned());
+    assert!(replies.try_recv().is_err(), "a worker is there");
+    hub.leave(worker, "it died too".to_owned(), false);
+    assert_eq!(replies.try_recv(), Ok(Err(BatchError::LocalWorkers("each died".to_owned()))));
+}
+
+#[test]
+fn a_run_that_is_given_up_is_told_with_the_values_of_its_parameters() {
+    let (hub, events) = hub(None);
+    let (link, mut outgoing) = unbounded_channel();
+    let worker = hub.join(hello(1, None), link).expect("it fits");
+    let (batch, replies) = batch(&hub);
+    let setup = batch.jobs[0].0;
+    hub.submit(batch);
+    hub.handle(Event::SetupDone { worker, setup });
+    let sent = std::iter::from_fn(|| outgoing.try_recv().ok());
+    let lease =
+        sent.flatten().find_map(|message| match ToWorker::decode(message, &mut ReceivedWindows::default()) {
+            Ok(ToWorker::Job { lease, .. }) => Some(lease),
+            _ => None,
+        });
+    let answer = Answer::Ran(Err(ModelFailure::Solver("diverged".to_owned()).into()));
+    hub.handle(Event::Answered { worker, lease: lease.expect("it is sent"), answer, cost: 0.1 });
+    assert!(replies.try_recv().is_ok(), "the batch has ended");
+    let told = events.try_iter().filter(FleetEvent::is_notable).map(|e| e.to_string()).collect::<Vec<_>>();
+    assert_eq!(
+        told,
+        ["particle 0, record 0 (k = 2.5): given up after 1 attempt: the solver failed: diverged"]
+    );
+}
+
+#[test]
+fn another_build_of_the_same_version_is_told_once() {
+    let (hub, events) = hub(Some([1; 32]));
+    let (link, _outgoing) = unbounded_channel();
+    for (pid, build) in [(1, Some([1; 32])), (2, None), (3, Some([2; 32])), (4, Some([2; 32]))] {
+        hub.join(hello(pid, build), link.clone()).expect("it fits");
+    }
+    let told = events.try_iter().filter(|e| matches!(e, FleetEvent::OtherBuild { .. })).collect::<Vec<_>>();
+    assert!(matches!(&told[..], [FleetEvent::OtherBuild { worker, .. }] if worker == "3@here/3"), "{told:?}");
+    assert!(told[0].is_notable() && told[0].to_string().contains("last digits"), "{}", told[0]);
+}
+
+#[test]
+fn a_draining_fleet_says_that_the_run_is_over_and_not_that_the_worker_is_wrong() {
+    let (hub, events) = hub(None);
+    hub.drain("the run is over");
+    let (link, _outgoing) = unbounded_channel();
+    assert_eq!(hub.join(hello(1, None), link.clone()), Err(Closed::Over("the run is over".to_owned())));
+    assert_eq!(events.try_iter().count(), 0);
+    let old = Hello { version: "0.0.1".to_owned(), ..hello(2, None) };
+    assert!(matches!(hub.join(old, link), Err(Closed::Refused(_))));
+}

@@ -1,0 +1,148 @@
+//! The page of an explanation: what the model lacks, where that shows, and the gap before and after.
+//!
+//! Made from the explanation and the data of its figures alone; nothing is fitted or judged here. The verdict and the warnings come
+//! before any number. Next files to read: [`effect`], [`gap`], [`places`], [`candidates`], and the template `explain/explain.html`.
+
+mod candidates;
+mod effect;
+mod gap;
+mod places;
+#[cfg(test)]
+mod sample;
+#[cfg(test)]
+mod tests;
+
+use serde::{Deserialize, Serialize};
+
+use super::{ReportError, layout, number};
+use candidates::Candidates;
+use effect::EffectView;
+use gap::Gap;
+use places::Places;
+use starlings_explain::figures::Figures;
+use starlings_explain::result::{Experiment, Explanation, Verdict};
+
+/// What the page says of the study besides the explanation. Empty texts are left out.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StudyAbout {
+    /// What the study is about.
+    pub says: String,
+    /// The command that makes this explanation again.
+    pub command: String,
+    /// When it was started.
+    pub started: String,
+    /// Version of the program.
+    pub version: String,
+    /// Names of the model's states: a term added to one of them is written as a rate of change.
+    pub states: Vec<String>,
+}
+
+/// Makes the page of an explanation: one HTML document that refers to nothing outside itself.
+///
+/// # Errors
+///
+/// [`ReportError`] when a figure or the page cannot be made; data that are missing are shown as missing.
+pub fn explain_page(
+    explanation: &Explanation,
+    figures: &Figures,
+    about: &StudyAbout,
+) -> Result<String, ReportError> {
+    layout::document(include_str!("explain/explain.html"), Page::new(explanation, figures, about)?)
+}
+
+/// The page, ready to be arranged.
+#[derive(Debug, Serialize)]
+struct Page<'a> {
+    found: &'a Explanation,
+    about: &'a StudyAbout,
+    verdict: &'static str,
+    verdict_words: &'static str,
+    facts: Vec<(&'static str, String)>,
+    gap: Gap,
+    failing: Vec<String>,
+    effect_title: &'static str,
+    effects: Vec<EffectView>,
+    ties: Vec<String>,
+    separation: String,
+    experiments: Vec<[String; 2]>,
+    places: Places,
+    candidates: Candidates,
+    shifts: Vec<gap::ShiftRow>,
+    remaining: Vec<(&'static str, String)>,
+    stages: Vec<(String, String)>,
+}
+
+impl<'a> Page<'a> {
+    fn new(found: &'a Explanation, figures: &'a Figures, about: &'a StudyAbout) -> Result<Self, ReportError> {
+        let (verdict, verdict_words) = match found.verdict {
+            Verdict::Named => ("named", "Named"),
+            Verdict::Tie => ("tie", "Tie"),
+            Verdict::Unexplained => ("unexplained", "Unexplained"),
+            Verdict::NoGap => ("no-gap", "No gap"),
+        };
+        let nearest = found.effects.is_empty() && found.closest.is_some();
+        let shown = if nearest { found.closest.as_slice() } else { &found.effects };
+        let experiment = found.experiment.as_ref();
+        Ok(Self {
+            found,
+            about,
+            verdict,
+            verdict_words,
+            facts: facts(found, about),
+            gap: Gap::new(found, figures)?,
+            failing: failing(found),
+            effect_title: match found.verdict {
+                _ if nearest => "What came nearest",
+                Verdict::Tie => "The best of the tied effects",
+                _ => "The missing effect",
+            },
+            effects: shown.iter().map(|effect| EffectView::new(effect, &about.states)).collect(),
+            ties: found.tied_with.iter().map(|set| set.join(" + ")).collect(),
+            separation: experiment.map_or_else(String::new, Experiment::sentence),
+            experiments: experiment.map_or(Vec::new(), effect::experiments),
+            places: Places::new(found, figures)?,
+            candidates: Candidates::new(found, figures)?,
+            shifts: found.parameter_shifts.iter().map(gap::ShiftRow::new).collect::<Result<_, _>>()?,
+            remaining: remaining(found),
+            stages: found.runs_by_stage.iter().map(|(stage, n)| (stage.clone(), n.to_string())).collect(),
+        })
+    }
+}
+
+/// The held-out data that fail, in words.
+fn failing(found: &Explanation) -> Vec<String> {
+    let several = found.held_out.iter().any(|h| h.record != found.held_out[0].record);
+    found.held_out.iter().filter(|h| h.fails).map(|h| h.says(several)).collect()
+}
+
+fn facts(found: &Explanation, about: &StudyAbout) -> Vec<(&'static str, String)> {
+    let mut facts = vec![
+        ("Model", found.model.clone()),
+        ("Model runs", found.runs.to_string()),
+        ("Workers", found.workers.to_string()),
+        ("Wall time", number::duration(found.wall_s)),
+        ("Started", about.started.clone()),
+    ];
+    facts.retain(|(_, text)| !text.is_empty());
+    facts
+}
+
+fn remaining(found: &Explanation) -> Vec<(&'static str, String)> {
+    let left = &found.remaining;
+    vec![
+        ("Training RMSE over noise (1 expected)", number::significant(left.rmse_over_noise, 3)),
+        (
+            "Probability of such autocorrelation in white residuals",
+            if left.whiteness_tested {
+                probability(left.whiteness_p)
+            } else {
+                "too few values to tell".to_owned()
+            },
+        ),
+    ]
+}
+
+/// A probability; below a thousandth only its order matters.
+fn probability(p: f64) -> String {
+    if p.is_finite() && p < 1e-3 { "< 0.001".to_owned() } else { number::with_sd(p, 0.01) }
+}

@@ -1,0 +1,223 @@
+//! The gap before and after: errors by channel and use, the curves, and what became of the model's own parameters.
+//!
+//! Where nothing was added there is only a before, which is shown. Next file to read: `places.rs`.
+
+use serde::Serialize;
+
+use crate::ReportError;
+use crate::number::{self, quantity};
+use crate::plot::course;
+use crate::plot::figure::Figure;
+use crate::plot::meter::{Bar, meter};
+use crate::plot::palette::{BLUE, GREY, INK, VERMILION};
+use starlings_explain::figures::{Curve, Figures};
+use starlings_explain::result::{Explanation, GapRow, ParameterShift};
+use starlings_study::field::component_of;
+
+/// Curves drawn at most.
+const CURVES: usize = 24;
+/// Rows of the table at most.
+const ROWS: usize = 80;
+/// Observed components up to which every one of a field is drawn by itself.
+const FEW: usize = 3;
+
+/// The gap, ready to be arranged.
+#[derive(Debug, Serialize)]
+pub(super) struct Gap {
+    rows: Vec<GapView>,
+    rows_left_out: usize,
+    compared: bool,
+    curves: Vec<Figure>,
+    curves_left_out: usize,
+}
+
+#[derive(Debug, Serialize)]
+struct GapView {
+    channel: String,
+    record: String,
+    usage: &'static str,
+    before: String,
+    after: String,
+    change: String,
+    noise: String,
+    unit: String,
+    meter: String,
+}
+
+impl Gap {
+    /// Formats the errors and draws the curves.
+    ///
+    /// # Errors
+    ///
+    /// A figure cannot be drawn.
+    pub(super) fn new(found: &Explanation, figures: &Figures) -> Result<Self, ReportError> {
+        let rows = if found.gap.is_empty() { as_it_is(figures) } else { found.gap.clone() };
+        let shown = shown(&figures.curves);
+        let mut curves = Vec::new();
+        for curve in shown.iter().take(CURVES) {
+            let numbers = numbers(curve, &rows);
+            curves.push(course::values(curve, &figures.time_unit, &numbers)?);
+            curves.push(course::residuals(curve, &figures.time_unit)?);
+        }
+        let view = |row: &GapRow| GapView::new(row, &rows, unit_of(&row.channel, figures));
+        Ok(Self {
+            rows: rows.iter().take(ROWS).map(view).collect::<Result<_, _>>()?,
+            rows_left_out: rows.len().saturating_sub(ROWS),
+            compared: !found.gap.is_empty(),
+            curves,
+            curves_left_out: figures.curves.len().saturating_sub(shown.len().min(CURVES)),
+        })
+    }
+}
+
+impl GapView {
+    fn new(row: &GapRow, rows: &[GapRow], unit: &str) -> Result<Self, ReportError> {
+        let same = rows.iter().filter(|other| other.channel == row.channel);
+        let reach = same.flat_map(|other| [other.before, other.after, other.noise]);
+        let longest = reach.filter(|v| v.is_finite()).fold(0.0, f64::max);
+        let bar = |to, lane, colour| Bar { from: 0.0, to, lane, colour };
+        let bars =
+            [bar(row.before, (4, 11), VERMILION), bar(row.after, (13, 20), BLUE), Bar::tick(row.noise, INK)];
+        let after = if row.after.is_finite() {
+            format!("after {}", quantity(row.after, unit))
+        } else {
+            "nothing after".to_owned()
+        };
+        let title = format!(
+            "{}, {}: before {}, {after}, noise {}",
+            row.channel,
+            words(&row.usage),
+            quantity(row.before, unit),
+            quantity(row.noise, unit)
+        );
+        let ratio = row.after / row.before;
+        Ok(Self {
+            channel: row.channel.clone(),
+            record: row.record.clone(),
+            usage: words(&row.usage),
+            before: number::significant(row.before, 3),
+            after: number::significant(row.after, 3),
+            change: if ratio.is_finite() { format!("× {ratio:.2}") } else { number::ABSENT.to_owned() },
+            noise: number::significant(row.noise, 3),
+            unit: unit.to_owned(),
+            meter: meter(
+                &title,
+                "Upper bar: before. Lower bar: after. Stroke: noise.",
+                (0.0, longest),
+                &bars,
+            )?,
+        })
+    }
+}
+
+fn words(usage: &str) -> &'static str {
+    match usage {
+        "train" => "training",
+        "held-out" => "held-out span",
+        "held-out-channel" => "held-out channel",
+        _ => "other",
+    }
+}
+
+/// The errors of the model as it is.
+fn as_it_is(figures: &Figures) -> Vec<GapRow> {
+    let row = |c: &starlings_explain::locate::ChannelGap| GapRow {
+        record: c.record.clone(),
+        channel: c.channel.clone(),
+        usage: c.usage.clone(),
+        before: c.rmse,
+        after: f64::NAN,
+        noise: c.noise,
+    };
+    figures.before.channels.iter().map(row).collect()
+}
+
+fn unit_of<'a>(channel: &str, figures: &'a Figures) -> &'a str {
+    let of_curve = figures.curves.iter().find(|c| c.channel == channel).map(|c| c.unit.as_str());
+    let of_gap = || figures.before.channels.iter().find(|c| c.channel == channel).map(|c| c.unit.as_str());
+    of_curve.or_else(of_gap).unwrap_or("")
+}
+
+/// The errors of one curve, as a sentence.
+fn numbers(curve: &Curve, rows: &[GapRow]) -> String {
+    let own = rows.iter().filter(|row| row.channel == curve.channel && row.record == curve.record);
+    let mut parts: Vec<String> = own
+        .map(|row| {
+            let before = quantity(row.before, &curve.unit);
+            if row.after.is_finite() {
+                format!(
+                    "{} RMSE {before} before, {} after",
+                    words(&row.usage),
+                    quantity(row.after, &curve.unit)
+                )
+            } else {
+                format!("{} RMSE {before}", words(&row.usage))
+            }
+        })
+        .collect();
+    parts.push(format!("noise sd {}", quantity(curve.noise, &curve.unit)));
+    let mut letters = parts.join("; ");
+    if let Some(first) = letters.get(..1).map(str::to_uppercase) {
+        letters.replace_range(..1, &first);
+    }
+    format!("{letters}.")
+}
+
+/// The curves that are drawn: of a field its first, middle and last component.
+fn shown(curves: &[Curve]) -> Vec<&Curve> {
+    let field = |c: &Curve| component_of(&c.channel).map(|(field, _)| field.to_owned());
+    let groups = curves.chunk_by(|a, b| a.record == b.record && field(a).is_some() && field(a) == field(b));
+    let pick = |group: &'_ [Curve]| -> Vec<usize> {
+        let n = group.len();
+        if n > FEW { vec![0, n / 2, n - 1] } else { (0..n).collect() }
+    };
+    groups.flat_map(|group| pick(group).into_iter().map(move |k| &group[k])).collect()
+}
+
+/// What happened to one parameter, ready to be arranged.
+#[derive(Debug, Serialize)]
+pub(super) struct ShiftRow {
+    name: String,
+    before: String,
+    after: String,
+    sd: String,
+    shift: String,
+    unit: String,
+    meter: String,
+}
+
+impl ShiftRow {
+    /// Formats one shift.
+    ///
+    /// # Errors
+    ///
+    /// Its graphic cannot be drawn.
+    pub(super) fn new(p: &ParameterShift) -> Result<Self, ReportError> {
+        let shift = (p.after - p.before) / p.sd;
+        let (lo, hi) = (p.after - 2.0 * p.sd, p.after + 2.0 * p.sd);
+        let all = [lo, hi, p.before, p.after];
+        let ends = all.into_iter().filter(|v| v.is_finite());
+        let ends = ends.fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(v), b.max(v)));
+        let bars = [
+            Bar { from: p.before, to: p.after, lane: (11, 13), colour: GREY },
+            Bar { from: lo, to: hi, lane: (7, 17), colour: BLUE },
+            Bar::tick(p.before, VERMILION),
+        ];
+        let shift_text = if shift.is_finite() {
+            let sign = if shift > 0.0 { "+" } else { "" };
+            format!("{sign}{} sd", number::with_sd(shift, 1.0))
+        } else {
+            number::ABSENT.to_owned()
+        };
+        let title = format!("{}: shifted by {shift_text}", p.name);
+        Ok(Self {
+            name: p.name.clone(),
+            before: number::with_sd(p.before, p.sd),
+            after: number::with_sd(p.after, p.sd),
+            sd: number::significant(p.sd, 2),
+            shift: shift_text,
+            unit: p.unit.clone(),
+            meter: meter(&title, "Stroke: before. Bar: after, ± 2 sd.", ends, &bars)?,
+        })
+    }
+}

@@ -1,0 +1,65 @@
+//! The report of a run: one self-contained HTML page and one overview picture, made from plain data.
+//!
+//! [`reader`] fills [`ReportData`] from the store; [`render`] and [`overview_svg`] turn it into text and know neither the
+//! store nor the study. The page needs no script, no network and no font, works on a phone and in print, and states warnings before
+//! numbers. Deliberately absent: computing anything that was not stored. Next file to read: [`data`].
+
+pub mod data;
+mod explain;
+mod explained;
+mod files;
+mod hangs_on;
+mod headline;
+mod identify;
+mod layout;
+pub mod locus;
+mod number;
+mod outputs;
+mod overview;
+mod page;
+mod plot;
+pub mod reader;
+#[cfg(test)]
+mod sample;
+#[cfg(test)]
+mod tests;
+
+pub use data::ReportData;
+pub use explain::{StudyAbout, explain_page};
+pub use explained::{state_names, write_explanation};
+pub use files::{FilesError, write_files, write_page};
+pub use identify::identify_page;
+pub use overview::overview_svg;
+
+/// Why a report could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// A figure could not be drawn.
+    #[error("a figure of the report could not be drawn: {0}")]
+    Drawing(String),
+    /// The page could not be put together.
+    #[error("the page of the report could not be put together: {0}")]
+    Template(#[from] minijinja::Error),
+}
+
+impl ReportError {
+    fn drawing(cause: impl std::fmt::Display) -> Self {
+        Self::Drawing(cause.to_string())
+    }
+}
+
+/// Makes the page: one HTML document that refers to nothing outside itself.
+///
+/// # Errors
+///
+/// [`ReportError`] when a figure or the page cannot be made; data that are missing are shown as missing.
+pub fn render(data: &ReportData) -> Result<String, ReportError> {
+    layout::document(include_str!("report.html"), page::Page::new(data)?)
+}
+
+impl ReportData {
+    /// Whether the values of a parameter belong on a logarithmic axis.
+    fn log_axis(&self, parameter: &str) -> bool {
+        self.tracks.iter().any(|track| track.name == parameter && track.log_axis)
+    }
+}

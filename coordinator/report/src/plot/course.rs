@@ -1,0 +1,103 @@
+//! Measured against simulated without and with the added effects, and the residuals of both.
+//!
+//! What an effect is worth is seen where the fit never looked. Next file to read: `region.rs`.
+
+use super::super::ReportError;
+use super::axis::Axis;
+use super::figure::{Figure, with_unit};
+use super::fit::{drawn_as_dots, measured, measured_key, spans};
+use super::mark::Mark;
+use super::palette::{BLUE, GREEN, INK, MUTED, VERMILION};
+use super::scene::Scene;
+use starlings_explain::figures::Curve;
+
+/// Draws one channel of one record; `numbers` is the sentence with its errors.
+///
+/// # Errors
+///
+/// The figure cannot be drawn.
+pub(crate) fn values(curve: &Curve, time_unit: &str, numbers: &str) -> Result<Figure, ReportError> {
+    let series = [&curve.observed, &curve.before, &curve.after];
+    let label = with_unit(&curve.channel, &curve.unit);
+    let y = Axis::around(&label, series.into_iter().flatten().copied()).with_headroom();
+    let x = time_axis(curve, time_unit);
+    let mut marks = background(curve, &x);
+    marks.extend(measured(&curve.time, &curve.observed, INK));
+    marks.extend(Mark::curve(&curve.time, &curve.before, VERMILION, 1.75));
+    marks.extend(Mark::curve(&curve.time, &curve.after, BLUE, 2.0));
+    let mut keys =
+        vec![(measured_key(&curve.time), "measured"), ("line vermilion", "simulated by the model as it is")];
+    if !curve.after.is_empty() {
+        keys.push(("line blue", "simulated with the effect"));
+    }
+    keys.extend(shade_key(curve));
+    let see = if curve.after.is_empty() {
+        "The gap is what lies between the measured values and the curve."
+    } else {
+        "An effect that belongs there brings the blue curve to the measured values beyond the shade as well."
+    };
+    let title = format!("{}, record {}: measured and simulated", curve.channel, curve.record);
+    let caption = format!("{numbers} {see}");
+    let scene = Scene { title, description: caption.clone(), x, y, marks };
+    Figure::new(&scene, &keys, caption)
+}
+
+/// Draws the residuals of one channel of one record.
+///
+/// # Errors
+///
+/// The figure cannot be drawn.
+pub(crate) fn residuals(curve: &Curve, time_unit: &str) -> Result<Figure, ReportError> {
+    let of =
+        |simulated: &[f64]| curve.observed.iter().zip(simulated).map(|(o, s)| o - s).collect::<Vec<f64>>();
+    let (before, after) = (of(&curve.before), of(&curve.after));
+    let margin = if curve.noise.is_finite() { 2.0 * curve.noise.abs() } else { 0.0 };
+    let label = with_unit(&format!("{}, observed − predicted", curve.channel), &curve.unit);
+    let reach = before.iter().chain(&after).copied().chain([-margin, margin]);
+    let y = Axis::around(&label, reach).with_headroom();
+    let x = time_axis(curve, time_unit);
+    let ends = (x.lo, x.hi);
+    let mut marks = background(curve, &x);
+    marks.push(Mark::flat_band(ends, (-margin, margin), GREEN, 0.16));
+    marks.push(Mark::level(ends, 0.0, MUTED));
+    marks.extend(measured(&curve.time, &before, VERMILION));
+    marks.extend(measured(&curve.time, &after, BLUE));
+    let dots = drawn_as_dots(&curve.time);
+    let mut keys = vec![(if dots { "dot vermilion" } else { "line vermilion" }, "residual before")];
+    if !after.is_empty() {
+        keys.push((if dots { "dot blue" } else { "line blue" }, "residual after"));
+    }
+    keys.push(("area green", "± 2 noise sd"));
+    keys.extend(shade_key(curve));
+    let caption = if after.is_empty() {
+        "What stays outside the band is the gap; a pattern that repeats is an effect that the model lacks."
+            .to_owned()
+    } else {
+        "Where blue lies in the band and vermilion does not, the effect closes the gap; what blue still shows outside is left."
+            .to_owned()
+    };
+    let title = format!("{}, record {}: residuals", curve.channel, curve.record);
+    let scene = Scene { title, description: caption.clone(), x, y, marks };
+    Figure::new(&scene, &keys, caption)
+}
+
+fn time_axis(curve: &Curve, time_unit: &str) -> Axis {
+    Axis::tight(&with_unit("time", time_unit), curve.time.iter().copied())
+}
+
+fn trained(curve: &Curve) -> Option<[f64; 2]> {
+    curve.train.filter(|span| !curve.held_out && span.iter().all(|end| end.is_finite()))
+}
+
+/// The spans, their words in the colour of secondary text: vermilion and blue mean before and after here.
+fn background(curve: &Curve, x: &Axis) -> Vec<Mark> {
+    let plain = |mark| match mark {
+        Mark::Heading { x, text, .. } => Mark::Heading { x, text, colour: MUTED },
+        other => other,
+    };
+    spans(trained(curve), x).into_iter().map(plain).collect()
+}
+
+fn shade_key(curve: &Curve) -> Option<(&'static str, &'static str)> {
+    trained(curve).map(|_| ("area shade", "training span"))
+}

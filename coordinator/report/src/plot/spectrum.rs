@@ -1,0 +1,40 @@
+//! Residuals by frequency, against white noise of the channel's standard deviation.
+//!
+//! Next file to read: `alarm.rs`.
+
+use super::super::{ReportError, number};
+use super::axis::Axis;
+use super::figure::{Figure, with_unit};
+use super::mark::Mark;
+use super::palette::{BLUE, MUTED};
+use super::scene::Scene;
+use starlings_explain::locate::ResidualSpectrum;
+
+/// Draws one spectrum; `None` when it has no positive frequency with power.
+///
+/// # Errors
+///
+/// The figure cannot be drawn.
+pub(crate) fn figure(spectrum: &ResidualSpectrum, time_unit: &str) -> Result<Option<Figure>, ReportError> {
+    let pairs = spectrum.frequency.iter().zip(&spectrum.power_over_noise);
+    let (frequency, power): (Vec<f64>, Vec<f64>) =
+        pairs.filter(|(f, p)| **f > 0.0 && **p > 0.0 && f.is_finite() && p.is_finite()).unzip();
+    if frequency.is_empty() {
+        return Ok(None);
+    }
+    let per = if time_unit.is_empty() { String::new() } else { format!("1/{time_unit}") };
+    let x = Axis::log_around(&with_unit("frequency", &per), frequency.iter().copied());
+    let y = Axis::log_around("power over that of the noise", power.iter().copied().chain([1.0]));
+    let mut marks = vec![Mark::dashed_level((x.lo, x.hi), 1.0, MUTED)];
+    marks.extend(Mark::curve(&frequency, &power, BLUE, 1.75));
+    let largest = power.iter().copied().fold(0.0, f64::max);
+    let caption = format!(
+        "Largest at {} {per}: {} times the noise. Noise alone stays around the dashed line; a narrow peak is a period that the \
+         model lacks, a rise to the left is a slow drift.",
+        number::significant(spectrum.peak, 3),
+        number::significant(largest, 3)
+    );
+    let title = format!("{}, record {}: residuals by frequency", spectrum.channel, spectrum.record);
+    let scene = Scene { title, description: caption.clone(), x, y, marks };
+    Figure::new(&scene, &[("line blue", "residuals"), ("dash muted", "noise")], caption).map(Some)
+}

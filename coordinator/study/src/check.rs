@@ -1,0 +1,249 @@
+//! From a study as written to a [`Study`]: names against the model, numbers against sense, recordings against both.
+//!
+//! Checks go on after a fault as long as their answer can be trusted, so that one look shows as much as possible. Next file
+//! to read: [`self::model`].
+
+mod blame;
+mod defs;
+mod explain;
+mod initial;
+mod limits;
+mod model;
+mod observer;
+mod parameters;
+mod prior;
+pub(crate) mod scales;
+mod settings;
+mod solver;
+mod spectrum;
+mod survey;
+mod units;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use starlings_models::Setup;
+
+use self::model::CheckedModel;
+use self::parameters::initial_medians;
+use self::settings::{estimator, fleet};
+use self::solver::Known;
+use super::checked::{Record, Study};
+use super::expand;
+use super::field::field_of;
+use super::file::{RecordSection, StudyFile};
+use super::problem::{Problem, Source, StudyError};
+use super::record::{Context, Recordings};
+use super::surroundings::Surroundings;
+use crate::file::read::read;
+
+impl Study {
+    /// Reads and checks a study file and its recordings, which stand relative to it.
+    ///
+    /// # Errors
+    /// Everything that is wrong, each with its place and remedy.
+    pub fn load(path: &Path) -> Result<Self, StudyError> {
+        Self::load_with(path, &Surroundings::default())
+    }
+
+    /// Reads and checks a study file where solvers can be started.
+    ///
+    /// # Errors
+    /// As [`Study::load`].
+    pub fn load_with(path: &Path, surroundings: &Surroundings) -> Result<Self, StudyError> {
+        match std::fs::read_to_string(path) {
+            Ok(text) => Self::from_text_with(path, &text, surroundings),
+            Err(error) => {
+                let problem = Problem {
+                    message: format!("cannot read the study: {error}"),
+                    help: Some("give the path of a study file (TOML)".to_owned()),
+                    file: path.to_owned(),
+                    source_text: None,
+                    span: None,
+                };
+                Err(StudyError { problems: vec![problem] })
+            }
+        }
+    }
+
+    /// Checks the text of a study file that stands, or stood, at `file`.
+    ///
+    /// # Errors
+    /// As [`Study::load`].
+    pub fn from_text(file: &Path, text: &str) -> Result<Self, StudyError> {
+        Self::from_text_with(file, text, &Surroundings::default())
+    }
+
+    /// Checks the text of a study file that stands, or stood, at `file`, where solvers can be started.
+    ///
+    /// # Errors
+    /// As [`Study::load`].
+    pub fn from_text_with(file: &Path, text: &str, surroundings: &Surroundings) -> Result<Self, StudyError> {
+        check(file, text, surroundings)
+    }
+}
+
+fn check(path: &Path, text: &str, surroundings: &Surroundings) -> Result<Study, StudyError> {
+    let source = Source::new(path, text);
+    let file = read(&source)?;
+    if source.count() > 0 {
+        // What is written in a wrong form would be judged wrongly; what stands in the files can be told.
+        survey::survey(&source, &file);
+        source.verdict()?;
+    }
+    check_name(&source, &file);
+    let solver = solver::solver(&source, &file, surroundings);
+    let described = solver.as_ref().and_then(Known::description);
+    let estimator = estimator(&source, &file.estimator, described);
+    let fleet = fleet(&source, &file.fleet);
+    let explain = explain::explain(&source, &file);
+    let spectrum = spectrum::spectrum(&source, &file.spectrum);
+    let observer = settings::observer(&source, &file.observer, described);
+    let model = model::model(&source, &file, solver.as_ref());
+    // Everything that follows is judged against the model.
+    let Some(mut model) = model else { return Err(survey::without_model(&source, &file)) };
+    model.setup.observer = observer;
+    explain::check_names(&source, &file, &model.setup.model);
+    let mut warnings = solver::check(&source, &file, solver.as_ref());
+    let relative: Vec<String> = scales::relative(&model.setup.effects).map(|p| p.name.clone()).collect();
+    model::check_values(&source, &file, &model, &|name| !relative.iter().any(|known| known == name));
+    let initial = initial::constants(&source, &file, &model.spec, &mut warnings);
+    model.setup.model.constants.extend(initial);
+    let priors = parameters::priors(&source, &file, &model, &mut warnings);
+    let records = records(&source, &file, &mut model, &explain.hold_out_channels, &mut warnings);
+    explain::check_held_out(&source, &file, &records);
+    source.verdict()?;
+    model.setup.parameters = file.parameters.iter().map(|p| p.name.get_ref().clone()).collect();
+    let parameters = initial_medians(&source, &file, &model.spec, &priors, &records);
+    source.verdict()?;
+    scales::check(&source, &file, &mut model, (&parameters, &records), surroundings, &mut warnings);
+    source.verdict()?;
+    check_setup(&source, &file, &model.setup, &records)?;
+    warnings.extend(units::warnings(&file, &model, &records));
+    let theta = expand::theta(&parameters, &records);
+    Ok(Study {
+        file: path.to_owned(),
+        text: Arc::clone(&source.text),
+        name: file.study.name.into_inner(),
+        says: file.study.says,
+        seed: file.study.seed,
+        time_unit: file.study.time_unit,
+        setup: model.setup,
+        spec: model.spec,
+        candidates: Arc::new(model.candidates),
+        parameters,
+        theta,
+        records: Arc::new(records),
+        estimator,
+        fleet,
+        explain,
+        spectrum,
+        delays: model.delays,
+        runs_here: solver.is_none_or(|known| known.is_here),
+        whole_answers: false,
+        surroundings: surroundings.clone(),
+        warnings,
+    })
+}
+
+/// What only the finished setup can tell: whether it builds, what a run of it costs, whether its observer fits.
+fn check_setup(
+    source: &Source,
+    file: &StudyFile,
+    setup: &Setup,
+    records: &[Record],
+) -> Result<(), StudyError> {
+    model::check_build(source, file, setup);
+    source.verdict()?;
+    limits::check_delays(source, file, setup, records);
+    observer::check(source, file, setup, records);
+    source.verdict()
+}
+
+/// The name becomes a folder's.
+fn check_name(source: &Source, file: &StudyFile) {
+    let name = file.study.name.get_ref();
+    if name.is_empty()
+        || name.starts_with('.')
+        || name.contains(['/', '\\', ':'])
+        || name.contains(char::is_control)
+    {
+        source.report_with(
+            file.study.name.span(),
+            format!("`{name}` cannot name a study: its run folder takes the name"),
+            "use letters, digits, `-` and `_`",
+        );
+    }
+}
+
+/// Reads all records; their outputs become those of the setup.
+fn records(
+    source: &Source,
+    file: &StudyFile,
+    model: &mut CheckedModel,
+    hold_out: &[String],
+    warnings: &mut Vec<String>,
+) -> Vec<Record> {
+    check_record_list(source, file);
+    let mut files = Recordings::new(source);
+    let mut context = Context { outputs: &mut model.setup.outputs, hold_out, warnings };
+    let read = |section: &RecordSection| files.record(section, &model.spec, &mut context);
+    let records: Vec<Record> = file.records.iter().filter_map(read).collect();
+    check_held_out_components(source, file, &records);
+    records
+}
+
+fn check_record_list(source: &Source, file: &StudyFile) {
+    let end = source.text.len();
+    if file.records.is_empty() {
+        source.report_with(
+            end..end,
+            "the study has no record",
+            "add `[[records]]` with `name`, `file` and `channels`",
+        );
+    } else if file.records.iter().all(|r| r.held_out) {
+        let help = "remove `use = \"held-out\"` from at least one";
+        source.report_with(
+            file.records[0].span.clone(),
+            "every record is held out: nothing is left to fit",
+            help,
+        );
+    }
+    for (i, record) in file.records.iter().enumerate() {
+        if file.records[..i].iter().any(|r| r.name.get_ref() == record.name.get_ref()) {
+            let message = format!("two records are named `{}`", record.name.get_ref());
+            source.report_with(record.name.span(), message, "names of records are unique in a study");
+        }
+    }
+    // A name that no channel measures is nowhere: a typing error would fit what should stay unseen.
+    let measured: Vec<String> =
+        file.records.iter().flat_map(|r| &r.channels).map(|c| c.output.get_ref().clone()).collect();
+    let found = |name: &str| measured.iter().any(|m| field_of(m) == field_of(name));
+    report_unmeasured(source, file, &measured, &found);
+}
+
+/// A component that its field's channel has no column for is told only once the files are read.
+fn check_held_out_components(source: &Source, file: &StudyFile, records: &[Record]) {
+    let measured: Vec<String> = records.iter().flat_map(|r| &r.channels).map(|c| c.output.clone()).collect();
+    let found = |name: &str| measured.iter().any(|m| m == name || field_of(m) == name);
+    if records.len() == file.records.len() {
+        report_unmeasured(source, file, &measured, &found);
+    }
+}
+
+fn report_unmeasured(source: &Source, file: &StudyFile, measured: &[String], found: &dyn Fn(&str) -> bool) {
+    for name in file.explain.hold_out_channels.iter().filter(|n| !found(n.get_ref())) {
+        let message = format!("no channel measures `{}`, so it cannot be held out", name.get_ref());
+        source.report_unknown(name.span(), message, &unique(measured));
+    }
+}
+
+fn unique(names: &[String]) -> Vec<String> {
+    let mut list: Vec<String> = Vec::new();
+    for name in names {
+        if !list.contains(name) {
+            list.push(name.clone());
+        }
+    }
+    list
+}

@@ -1,0 +1,250 @@
+//! The study file as it is written: every section and key, with its place, before any check of meaning.
+//!
+//! Types, missing and unknown keys are settled here; whether names exist and numbers make sense is [`super::check`]'s
+//! business. Next file to read: [`crate::file::read`], which fills these.
+
+mod brackets;
+pub(super) mod layout;
+pub(super) mod locate;
+mod memory;
+mod model;
+pub(super) mod read;
+mod settings;
+pub(super) mod solver;
+pub(super) mod spectrum;
+mod table;
+
+use std::ops::Range;
+
+use starlings_models::Role;
+use toml::Spanned;
+
+/// Name and value, in the order of the file.
+pub(super) type Named<T> = Vec<(Spanned<String>, Spanned<T>)>;
+
+/// The whole file.
+#[derive(Debug)]
+pub(super) struct StudyFile {
+    pub(super) study: StudySection,
+    pub(super) model: ModelSection,
+    pub(super) parameters: Vec<ParameterSection>,
+    pub(super) observer: ObserverSection,
+    pub(super) records: Vec<RecordSection>,
+    pub(super) effects: Vec<EffectSection>,
+    pub(super) explain: ExplainSection,
+    pub(super) spectrum: spectrum::SpectrumSection,
+    pub(super) estimator: EstimatorSection,
+    pub(super) fleet: FleetSection,
+}
+
+/// `[study]`.
+#[derive(Debug)]
+pub(super) struct StudySection {
+    pub(super) name: Spanned<String>,
+    pub(super) says: String,
+    pub(super) seed: u64,
+    pub(super) time_unit: String,
+}
+
+/// `[model]`.
+#[derive(Debug)]
+pub(super) struct ModelSection {
+    pub(super) kind: Spanned<String>,
+    pub(super) constants: Named<f64>,
+    /// File of initial values.
+    pub(super) initial: Option<Spanned<String>>,
+    /// How the model is put together, with the places of its parts.
+    pub(super) layout: Option<layout::Layout>,
+    /// Present when `kind` is `equations`.
+    pub(super) equations: Option<EquationsSection>,
+    /// Steps that one run may take.
+    pub(super) max_steps: Option<Spanned<u64>>,
+    /// Seconds; a solver's stand in its own section.
+    pub(super) timeout: Option<Spanned<f64>>,
+    /// Present when `kind` is `solver`.
+    pub(super) solver: Option<solver::ProgramSection>,
+}
+
+/// The keys of `[model]` that write a model.
+#[derive(Debug)]
+pub(super) struct EquationsSection {
+    pub(super) states: Vec<StateSection>,
+    pub(super) outputs: Vec<QuantitySection>,
+    pub(super) inputs: Vec<QuantitySection>,
+    pub(super) replaceable: Vec<Spanned<String>>,
+    /// Meanings of parameters.
+    pub(super) roles: Vec<(Spanned<String>, Role)>,
+    pub(super) solver: SolverSection,
+}
+
+/// `solver = { ... }` of a model.
+#[derive(Debug, Default)]
+pub(super) struct SolverSection {
+    pub(super) span: Range<usize>,
+    pub(super) method: Option<Spanned<String>>,
+    pub(super) rtol: Option<Spanned<f64>>,
+    pub(super) atol: Option<Spanned<f64>>,
+    pub(super) step: Option<Spanned<f64>>,
+}
+
+/// An output or an input of a model.
+#[derive(Debug)]
+pub(super) struct QuantitySection {
+    pub(super) name: Spanned<String>,
+    pub(super) unit: String,
+    pub(super) role: Role,
+    /// The expression of an output; empty for an input.
+    pub(super) value: Spanned<String>,
+}
+
+/// `[[model.states]]`, or a state of an effect.
+#[derive(Debug)]
+pub(super) struct StateSection {
+    pub(super) name: Spanned<String>,
+    pub(super) unit: String,
+    pub(super) role: Role,
+    /// A number or an expression, as text.
+    pub(super) initial: Spanned<String>,
+    /// Terms of the rate by name; a single text has the empty name.
+    pub(super) rate: Named<String>,
+}
+
+/// `[[parameters]]`.
+#[derive(Debug)]
+pub(super) struct ParameterSection {
+    pub(super) name: Spanned<String>,
+    pub(super) unit: Option<Spanned<String>>,
+    pub(super) prior: PriorSection,
+    pub(super) process: ProcessSection,
+    pub(super) per_record: Option<bool>,
+}
+
+/// `prior = { ... }`.
+#[derive(Debug, Default)]
+pub(super) struct PriorSection {
+    pub(super) span: Range<usize>,
+    pub(super) transform: Option<Spanned<String>>,
+    pub(super) median: Option<Spanned<f64>>,
+    pub(super) median_from: Option<Spanned<String>>,
+    pub(super) factor: Option<Spanned<f64>>,
+    pub(super) sd: Option<Spanned<f64>>,
+    pub(super) lo: Option<Spanned<f64>>,
+    pub(super) hi: Option<Spanned<f64>>,
+}
+
+/// `process = { ... }`.
+#[derive(Debug, Default)]
+pub(super) struct ProcessSection {
+    pub(super) forgetting: Option<Spanned<f64>>,
+    pub(super) walk: Option<Spanned<f64>>,
+}
+
+/// `[observer]`.
+#[derive(Debug)]
+pub(super) struct ObserverSection {
+    pub(super) kind: Spanned<String>,
+    pub(super) gain: Spanned<f64>,
+    /// Output → state.
+    pub(super) corrects: Named<String>,
+}
+
+/// `[[records]]`.
+#[derive(Debug)]
+pub(super) struct RecordSection {
+    pub(super) span: Range<usize>,
+    pub(super) name: Spanned<String>,
+    pub(super) file: Spanned<String>,
+    pub(super) time: Spanned<String>,
+    /// Model input → column, or `file:column`.
+    pub(super) inputs: Named<String>,
+    pub(super) channels: Vec<ChannelSection>,
+    pub(super) train: Option<Spanned<[f64; 2]>>,
+    pub(super) held_out: bool,
+    pub(super) every: Spanned<u64>,
+}
+
+/// One entry of `channels`.
+#[derive(Debug)]
+pub(super) struct ChannelSection {
+    pub(super) column: Spanned<String>,
+    pub(super) output: Spanned<String>,
+    /// Label of the column's values; the model's where it is not given.
+    pub(super) unit: Option<Spanned<String>>,
+    /// What the column holds of the output, where not the output itself.
+    pub(super) from: Option<Spanned<String>>,
+    /// Value at which the integral of a rate begins.
+    pub(super) start: Option<Spanned<f64>>,
+    /// Standard deviation in the channel's unit; `None` for `"auto"`.
+    pub(super) noise: Spanned<Option<f64>>,
+    /// The surfaces that were measured, in the place of a column.
+    pub(super) surface: Option<SurfaceSection>,
+}
+
+/// The surface part of a channel.
+#[derive(Debug)]
+pub(super) struct SurfaceSection {
+    /// Profiles `time,z,r`, or meshes by `time,file`.
+    pub(super) file: Spanned<String>,
+    /// The nodes without displacement.
+    pub(super) rest: Spanned<String>,
+    /// Open ends of every mesh.
+    pub(super) open_ends: usize,
+}
+
+/// `[[effects]]`.
+#[derive(Debug)]
+pub(super) struct EffectSection {
+    pub(super) name: Spanned<String>,
+    pub(super) says: String,
+    pub(super) source: String,
+    pub(super) built_in: Option<Spanned<String>>,
+    /// To what, and the term.
+    pub(super) adds: Named<String>,
+    pub(super) parameters: Vec<EffectParameterSection>,
+    pub(super) states: Vec<StateSection>,
+    pub(super) confounders: Vec<String>,
+}
+
+/// A parameter of an effect.
+#[derive(Debug)]
+pub(super) struct EffectParameterSection {
+    pub(super) name: Spanned<String>,
+    pub(super) unit: String,
+    pub(super) range: Option<[f64; 2]>,
+    pub(super) grid: Vec<f64>,
+}
+
+/// `[explain]`.
+#[derive(Debug, Default)]
+pub(super) struct ExplainSection {
+    pub(super) hold_out_channels: Vec<Spanned<String>>,
+    pub(super) budget: Option<Spanned<u64>>,
+    pub(super) library: Option<Spanned<String>>,
+    pub(super) without: Vec<Spanned<String>>,
+    pub(super) only: Vec<Spanned<String>>,
+    pub(super) max_effects: Option<Spanned<u64>>,
+}
+
+/// `[estimator]`.
+#[derive(Debug, Default)]
+pub(super) struct EstimatorSection {
+    pub(super) kind: Option<Spanned<String>>,
+    pub(super) points: Option<Spanned<String>>,
+    pub(super) kappa: Option<Spanned<f64>>,
+    pub(super) root: Option<Spanned<String>>,
+    pub(super) passes: Option<Spanned<u64>>,
+    pub(super) anneal: Option<Spanned<f64>>,
+    pub(super) spread: Option<Spanned<f64>>,
+    pub(super) resample: Option<Spanned<String>>,
+    pub(super) max_iterations: Option<Spanned<u64>>,
+    pub(super) tolerance: Option<Spanned<f64>>,
+}
+
+/// `[fleet]`.
+#[derive(Debug, Default)]
+pub(super) struct FleetSection {
+    pub(super) workers: Option<Spanned<u64>>,
+    pub(super) slots: Option<Spanned<u64>>,
+    pub(super) patience: Option<Spanned<f64>>,
+    pub(super) max_attempts: Option<Spanned<u64>>,
+}

@@ -1,0 +1,279 @@
+//! Reading the model and the effects of a study file.
+//!
+//! A rate is one expression or a table of named terms, an initial value a number or an expression; both end as text with a
+//! place. Next file to read: [`crate::check::model`], which asks the model whether they make sense.
+
+use serde::Deserialize;
+use serde::de::IntoDeserializer;
+use serde::de::value::StrDeserializer;
+use starlings_models::{Role, SOLVER};
+use toml::Spanned;
+
+use super::layout::Layout;
+use super::read::named_texts;
+use super::solver::{self, program};
+use super::table::{Node, Table, number, text, wrong_type};
+use super::{
+    EffectParameterSection, EffectSection, EquationsSection, ModelSection, Named, QuantitySection,
+    SolverSection, StateSection,
+};
+use crate::problem::Source;
+
+/// Keys of `[model]` that only a model of equations has.
+const EQUATIONS: [&str; 6] = ["outputs", "inputs", "replaceable", "roles", "solver", "states"];
+const ROLES: [&str; 18] = [
+    "displacement",
+    "velocity",
+    "level",
+    "pressure",
+    "flow",
+    "temperature",
+    "force",
+    "resistance",
+    "compliance",
+    "inertia",
+    "stiffness",
+    "damping",
+    "throat-area",
+    "burn-rate",
+    "burn-area",
+    "web",
+    "thrust",
+    "other",
+];
+
+/// Reads `[model]`.
+pub(crate) fn model(source: &Source, root: &Table<'_>) -> ModelSection {
+    let mut keys = [
+        &["kind", "constants", "initial", "layout", "max_steps", "timeout"],
+        &EQUATIONS[..],
+        &solver::KEYS[..],
+    ]
+    .concat();
+    keys.sort_unstable();
+    keys.dedup();
+    if root.get("model").is_none() {
+        root.missing("model", "a section `[model]` with a `kind`");
+    }
+    let Some(t) = root.table("model", "[model]", &keys) else {
+        let kind = Spanned::new(0..0, String::new());
+        return ModelSection {
+            kind,
+            constants: Vec::new(),
+            initial: None,
+            layout: None,
+            max_steps: None,
+            timeout: None,
+            equations: None,
+            solver: None,
+        };
+    };
+    let kind = t
+        .required_text("kind", "a model's name (`starlings models` lists them), \"equations\" or \"solver\"");
+    let of_kind = kind.get_ref().as_str();
+    let equations = (of_kind == "equations").then(|| equations(source, &t));
+    let solver = (of_kind == SOLVER).then(|| program(source, &t, kind.span()));
+    refuse_foreign(source, &t, of_kind);
+    let timeout = if of_kind == SOLVER { None } else { t.number("timeout") };
+    let layout = t.get("layout").map(|node| Layout::read(source, node));
+    ModelSection {
+        constants: constants(source, &t),
+        initial: t.text("initial"),
+        kind,
+        layout,
+        max_steps: t.count("max_steps"),
+        timeout,
+        equations,
+        solver,
+    }
+}
+
+/// Keys of another kind of model.
+fn refuse_foreign(source: &Source, model: &Table<'_>, kind: &str) {
+    let kinds = [("equations", &EQUATIONS[..]), (SOLVER, &solver::KEYS[..])];
+    for (key, _) in model.entries() {
+        let owners: Vec<&str> = kinds
+            .iter()
+            .filter(|(_, keys)| keys.contains(&key.get_ref().as_str()) && key.get_ref() != "timeout")
+            .map(|(owner, _)| *owner)
+            .collect();
+        if !owners.is_empty() && !owners.contains(&kind) {
+            let owners = owners.join("\" or \"");
+            let message =
+                format!("`{}` belongs to models of kind \"{owners}\", this one is \"{kind}\"", key.get_ref());
+            source.report(key.span(), message);
+        }
+    }
+}
+
+fn constants(source: &Source, model: &Table<'_>) -> Named<f64> {
+    let read = |(key, node): (Spanned<String>, &Node<'_>)| {
+        number(source, node, &format!("constant `{}`", key.get_ref())).map(|value| (key, value))
+    };
+    model.free_entries("constants").into_iter().filter_map(read).collect()
+}
+
+fn equations(source: &Source, model: &Table<'_>) -> EquationsSection {
+    let keys = ["name", "unit", "role", "initial", "rate"];
+    let states = model.tables("states", "[[model.states]]", &keys);
+    if model.get("states").is_none() {
+        model.missing("states", "at least one `[[model.states]]` with `name`, `initial` and `rate`");
+    }
+    if model.get("outputs").is_none() {
+        model.missing("outputs", "such as `[ { name = \"position\", unit = \"m\", value = \"x\" } ]`");
+    }
+    EquationsSection {
+        states: states.iter().map(|t| state(source, t)).collect(),
+        outputs: quantities(source, model, "outputs", "an output", true),
+        inputs: quantities(source, model, "inputs", "an input", false),
+        replaceable: model.texts("replaceable"),
+        roles: roles(source, model),
+        solver: solver(model),
+    }
+}
+
+fn quantities(
+    source: &Source,
+    model: &Table<'_>,
+    key: &str,
+    name: &str,
+    with_value: bool,
+) -> Vec<QuantitySection> {
+    let keys: &[&str] =
+        if with_value { &["name", "unit", "role", "value"] } else { &["name", "unit", "role"] };
+    let read = |t: Table<'_>| QuantitySection {
+        name: t.required_text("name", "how other parts of the study call it"),
+        unit: unit(&t),
+        role: role(source, &t),
+        value: if with_value {
+            t.required_text("value", "an expression such as \"x\"")
+        } else {
+            Spanned::new(t.span.clone(), String::new())
+        },
+    };
+    model.tables(key, name, keys).into_iter().map(read).collect()
+}
+
+fn solver(model: &Table<'_>) -> SolverSection {
+    let Some(t) = model.table("solver", "`solver`", &["method", "rtol", "atol", "step"]) else {
+        return SolverSection::default();
+    };
+    SolverSection {
+        span: t.span.clone(),
+        method: t.text("method"),
+        rtol: t.number("rtol"),
+        atol: t.number("atol"),
+        step: t.number("step"),
+    }
+}
+
+fn state(source: &Source, t: &Table<'_>) -> StateSection {
+    if t.get("rate").is_none() {
+        t.missing("rate", "an expression, or named terms `{ spring = \"-k*x/m\" }`");
+    }
+    let zero = Spanned::new(t.span.clone(), "0".to_owned());
+    StateSection {
+        name: t.required_text("name", "how expressions call the state"),
+        unit: unit(t),
+        role: role(source, t),
+        initial: t.get("initial").and_then(|node| initial(source, node)).unwrap_or(zero),
+        rate: t.get("rate").map(|node| rate(source, t, node)).unwrap_or_default(),
+    }
+}
+
+/// A number or an expression, as text.
+fn initial(source: &Source, node: &Node<'_>) -> Option<Spanned<String>> {
+    if node.get_ref().is_str() {
+        return text(source, node, "`initial`");
+    }
+    if node.get_ref().is_float() || node.get_ref().is_integer() {
+        return number(source, node, "`initial`")
+            .map(|n| Spanned::new(n.span(), format!("{:?}", n.get_ref())));
+    }
+    wrong_type(source, node, "`initial`", "a number or an expression in quotes");
+    None
+}
+
+/// One expression, or a table of named terms.
+fn rate(source: &Source, state: &Table<'_>, node: &Node<'_>) -> Named<String> {
+    if node.get_ref().is_table() {
+        return named_texts(source, &state.free_entries("rate"));
+    }
+    if node.get_ref().is_str() {
+        let unnamed = Spanned::new(node.span(), String::new());
+        return text(source, node, "`rate`").map(|value| (unnamed, value)).into_iter().collect();
+    }
+    wrong_type(source, node, "`rate`", "an expression in quotes or a table of named terms");
+    Vec::new()
+}
+
+pub(super) fn unit(t: &Table<'_>) -> String {
+    t.text("unit").map(Spanned::into_inner).unwrap_or_default()
+}
+
+pub(super) fn role(source: &Source, t: &Table<'_>) -> Role {
+    t.text("role").map_or(Role::Other, |name| named_role(source, &name))
+}
+
+/// The meanings of parameters, by name.
+fn roles(source: &Source, model: &Table<'_>) -> Vec<(Spanned<String>, Role)> {
+    let named = named_texts(source, &model.free_entries("roles"));
+    named.into_iter().map(|(parameter, name)| (parameter, named_role(source, &name))).collect()
+}
+
+fn named_role(source: &Source, name: &Spanned<String>) -> Role {
+    let deserializer: StrDeserializer<'_, serde::de::value::Error> =
+        name.get_ref().as_str().into_deserializer();
+    Role::deserialize(deserializer).unwrap_or_else(|_| {
+        let valid: Vec<String> = ROLES.iter().map(|r| (*r).to_owned()).collect();
+        source.report_unknown(name.span(), format!("unknown role `{}`", name.get_ref()), &valid);
+        Role::Other
+    })
+}
+
+/// Reads `[[effects]]`.
+pub(crate) fn effects(source: &Source, root: &Table<'_>) -> Vec<EffectSection> {
+    let keys = ["name", "says", "source", "built_in", "adds", "parameters", "states", "confounders"];
+    root.tables("effects", "[[effects]]", &keys).iter().map(|t| effect(source, t)).collect()
+}
+
+fn effect(source: &Source, t: &Table<'_>) -> EffectSection {
+    let built_in = t.text("built_in");
+    if built_in.is_none() {
+        if t.get("adds").is_none() {
+            t.missing(
+                "adds",
+                "such as `[ { to = \"x\", term = \"-q*x\" } ]`, or `built_in` with an effect's name",
+            );
+        }
+        if t.get("parameters").is_none() {
+            t.missing("parameters", "at least the amplitude, such as `[ { name = \"q\", range = [0, 5] } ]`");
+        }
+    }
+    let add = |a: &Table<'_>| {
+        let to = a.required_text("to", "a state, an output, an input or a parameter of the model");
+        (to, a.required_text("term", "an expression"))
+    };
+    let states = t.tables("states", "a state of an effect", &["name", "unit", "initial", "rate"]);
+    EffectSection {
+        name: t.required_text("name", "how the study and the report call it"),
+        says: t.text("says").map(Spanned::into_inner).unwrap_or_default(),
+        source: t.text("source").map(Spanned::into_inner).unwrap_or_default(),
+        built_in,
+        adds: t.tables("adds", "an entry of `adds`", &["to", "term"]).iter().map(add).collect(),
+        parameters: effect_parameters(t),
+        states: states.iter().map(|s| state(source, s)).collect(),
+        confounders: t.texts("confounders").into_iter().map(Spanned::into_inner).collect(),
+    }
+}
+
+fn effect_parameters(effect: &Table<'_>) -> Vec<EffectParameterSection> {
+    let read = |t: Table<'_>| EffectParameterSection {
+        name: t.required_text("name", "how the terms call it"),
+        unit: unit(&t),
+        range: t.interval("range").map(Spanned::into_inner),
+        grid: t.numbers("grid").into_iter().map(Spanned::into_inner).collect(),
+    };
+    let keys = ["name", "unit", "range", "grid"];
+    effect.tables("parameters", "a parameter of an effect", &keys).into_iter().map(read).collect()
+}

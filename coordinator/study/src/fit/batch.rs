@@ -1,0 +1,213 @@
+//! The batch fit: iterated sigma-point Gauss–Newton over whole-record runs, one iteration = one ensemble.
+//!
+//! For solvers that cannot restart from a state, and as a reference for the filter: every run starts at its record's start,
+//! so no linear mixture of states is ever used. Next file to read: the `batch` module of `starlings-estimators`.
+
+use std::sync::Arc;
+
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+use starlings_estimators::{Batch, BatchState, BatchStep, Block, Data, EstimatorError, Gaussian, SigmaSet};
+use starlings_models::Window;
+
+use super::ensemble::noise;
+use super::flight::{Flight, Place, Results, StepWindows};
+use super::stack::stack_outputs;
+use crate::store::snapshot::{Head, Snapshot};
+use crate::store::{AnalysisRow, Store};
+use crate::{Fit, Progress, RunContext, RunError, Study, posterior};
+
+/// Iterates to the posterior mode, continuing from `resumed` if there is one.
+///
+/// # Errors
+/// When the fleet or the store fails, or no run around the estimate succeeds.
+pub fn fit(
+    flight: &mut Flight<'_>,
+    store: &Store,
+    context: &mut RunContext<'_>,
+    resumed: Option<Snapshot>,
+) -> Result<Fit, RunError> {
+    let study = flight.study();
+    let windows: StepWindows = (0..study.records.len())
+        .filter(|record| study.records[*record].is_trained())
+        .map(|record| (record, Arc::new(study.whole(record, true))))
+        .collect();
+    let blocks = blocks(study, &windows);
+    let n_point_param = blocks.first().map_or(study.theta.len(), |block| block.parameters.len());
+    let batch = Batch {
+        set: SigmaSet::new(study.estimator.points, n_point_param)?,
+        blocks,
+        max_iterations: study.estimator.max_iterations,
+        tolerance: study.estimator.tolerance,
+        spread: study.estimator.spread,
+    };
+    let values: Vec<f64> = windows.iter().flat_map(|(_, w)| w.observed.iter().copied()).collect();
+    let noise = noise(study, &windows, 1.0);
+    let (mut known, mut now) = match resumed {
+        Some(snapshot) => (restore(store, &snapshot)?, snapshot),
+        None => begin(&batch, study),
+    };
+    while !known.state.converged && now.head.step < batch.max_iterations {
+        let place = Place { pass: 1, step: now.head.step };
+        let theta = batch.sample(&known.state);
+        let results = fly(flight, &mut now, place, &theta, &windows)?;
+        let (predictions, failed) = gathered(&batch, &results, &windows);
+        let (next, step) =
+            batch.step(&known.state, &predictions, &failed, &Data { values: &values, noise: &noise })?;
+        known = Known { state: next, posterior: step.posterior.clone() };
+        keep(&mut now, &known, &step)?;
+        let mut row = row(study, place, &step);
+        row.jobs = flight.take_rows();
+        store.analysis(&row, &now)?;
+        context.after_step(store, &progress(&now, &batch, flight))?;
+    }
+    if now.head.n_used == 0 {
+        return Err(EstimatorError::StartFailed { attempt: now.head.step }.into());
+    }
+    Ok(finish(&now, known))
+}
+
+/// The rows of each record with what all records share and the values of its own, where there are such: a record's own values
+/// need no runs of the others. None for a study that shares everything, or has one record to fit.
+fn blocks(study: &Study, windows: &StepWindows) -> Vec<Block> {
+    if windows.len() < 2 || study.theta.iter().all(|entry| entry.record.is_none()) {
+        return Vec::new();
+    }
+    let of = |record: Option<usize>| {
+        let entries = study.theta.iter().enumerate();
+        entries.filter(move |(_, entry)| entry.record == record).map(|(j, _)| j)
+    };
+    let mut end = 0;
+    let block = |(record, window): &(usize, Arc<Window>)| {
+        let first = end;
+        end += window.observed.len();
+        Block { rows: first..end, parameters: of(None).chain(of(Some(*record))).collect() }
+    };
+    windows.iter().map(block).collect()
+}
+
+/// Predictions and which points failed. In blocks a run that failed counts against its own record alone: its values are no
+/// numbers, and no point has failed as a whole.
+fn gathered(batch: &Batch, results: &Results, windows: &StepWindows) -> (DMatrix<f64>, Vec<bool>) {
+    if batch.blocks.is_empty() {
+        let failed = results.iter().map(|of| of.iter().any(Result::is_err)).collect();
+        return (stack_outputs(results, windows), failed);
+    }
+    let m = batch.blocks.last().map_or(0, |block| block.rows.end);
+    let mut predictions = DMatrix::from_element(m, results.len(), f64::NAN);
+    for (column, of_point) in results.iter().enumerate() {
+        for (block, result) in batch.blocks.iter().zip(of_point) {
+            if let Ok(prediction) = result {
+                predictions
+                    .view_mut((block.rows.start, column), (block.rows.len(), 1))
+                    .copy_from_slice(&prediction.outputs);
+            }
+        }
+    }
+    (predictions, vec![false; results.len()])
+}
+
+/// All that is known after an ensemble; what a killed run continues from, or ends with if it was the last one.
+#[derive(Serialize, Deserialize)]
+struct Known {
+    state: BatchState,
+    posterior: Gaussian,
+}
+
+fn begin(batch: &Batch, study: &Study) -> (Known, Snapshot) {
+    let prior = posterior::prior(study);
+    let state = batch.init(&prior);
+    let head = Head {
+        pass: 0,
+        step: 0,
+        theta: crate::store::snapshot::Matrix::default(),
+        centre: prior.mean.iter().copied().collect(),
+        scale: posterior::standard_deviations(&prior),
+        batch: String::new(),
+        nis: 0.0,
+        n_used: 0,
+        log_likelihood: 0.0,
+        information_lost: 0.0,
+        dropped: 0.0,
+        counts: crate::store::snapshot::Counts::default(),
+        cost: None,
+        narrow: 1.0,
+    };
+    (Known { state, posterior: prior }, Snapshot { head, states: vec![None; study.records.len()] })
+}
+
+fn restore(store: &Store, snapshot: &Snapshot) -> Result<Known, RunError> {
+    Ok(serde_json::from_str(&snapshot.head.batch).map_err(|e| store.damaged("snapshot", e))?)
+}
+
+/// Runs the whole ensemble; a failed particle is left to the estimator, which can do without it.
+fn fly(
+    flight: &mut Flight<'_>,
+    now: &mut Snapshot,
+    place: Place,
+    theta: &DMatrix<f64>,
+    windows: &StepWindows,
+) -> Result<Results, RunError> {
+    let before = (flight.total, flight.failed, flight.retried);
+    let everyone: Vec<usize> = (0..theta.ncols()).collect();
+    let states = vec![None; now.states.len()];
+    let results = flight.run(place, &everyone, theta, &states, windows)?;
+    now.head.counts.total += flight.total - before.0;
+    now.head.counts.failed += flight.failed - before.1;
+    now.head.counts.retried += flight.retried - before.2;
+    Ok(results)
+}
+
+fn keep(now: &mut Snapshot, known: &Known, step: &BatchStep) -> Result<(), RunError> {
+    now.head.batch = serde_json::to_string(known).map_err(|e| RunError::Internal(e.to_string()))?;
+    now.head.step += 1;
+    // Before the first ensemble that could be linearised the figures are infinite, which a snapshot cannot hold.
+    if step.n_used > 0 {
+        now.head.nis = step.misfit;
+        now.head.n_used = step.n_used;
+        now.head.log_likelihood = step.evidence;
+    }
+    Ok(())
+}
+
+fn row(study: &Study, place: Place, step: &BatchStep) -> AnalysisRow {
+    AnalysisRow {
+        pass: place.pass,
+        step: place.step,
+        time: (place.step + 1) as f64,
+        n_used: step.n_used,
+        nis: step.misfit,
+        log_likelihood: step.log_likelihood,
+        information_lost: 0.0,
+        estimates: posterior::rows(study, &step.posterior),
+        innovations: Vec::new(),
+        jobs: Vec::new(),
+    }
+}
+
+fn finish(now: &Snapshot, known: Known) -> Fit {
+    Fit {
+        posterior: known.posterior,
+        log_likelihood: now.head.log_likelihood,
+        nis: now.head.nis,
+        n_used: now.head.n_used,
+        information_lost: 0.0,
+        dropped: 0.0,
+        counts: now.head.counts,
+        passes: 1,
+        converged: known.state.converged,
+        last_move: None,
+    }
+}
+
+fn progress(now: &Snapshot, batch: &Batch, flight: &Flight<'_>) -> Progress {
+    Progress {
+        stage: "batch",
+        pass: 1,
+        passes: Some(1),
+        step: now.head.step,
+        steps: batch.max_iterations,
+        runs: now.head.counts.total,
+        workers: flight.n_workers(),
+    }
+}

@@ -1,0 +1,164 @@
+//! The sequential fit: passes of the reduced-order UKF over the training windows, one ensemble per step.
+//!
+//! What differs from pass to pass is in [`super::schedule`], when they end in [`super::settle`]; the sigma-point arithmetic lives in `starlings-estimators`; model
+//! states are only recombined here. Next file to read: [`super::schedule`], then [`super::rescue`].
+
+use starlings_estimators::{Analysis, Data, Particles};
+
+use super::ensemble::{noise, recombine};
+use super::flight::{Flight, Place, StepWindows};
+use super::resample;
+use super::rescue::{Flown, fly};
+use super::schedule::{Reported, Schedule, particles};
+use super::settle;
+use super::stack::{stack_outputs, stack_states};
+use crate::store::snapshot::Snapshot;
+use crate::store::{AnalysisRow, InnovationRow, Store};
+use crate::{Fit, RunContext, RunError, Study, posterior};
+
+/// Runs every pass, continuing from `resumed` if there is one.
+///
+/// # Errors
+/// When the fleet or the store fails, or too few sigma points can be run.
+pub fn fit(
+    flight: &mut Flight<'_>,
+    store: &Store,
+    context: &mut RunContext<'_>,
+    resumed: Option<Snapshot>,
+) -> Result<Fit, RunError> {
+    let study = flight.study();
+    let schedule = Schedule::new(study)?;
+    let mut now = match resumed {
+        Some(snapshot) => snapshot,
+        None => schedule.start(0, &posterior::prior(study)),
+    };
+    let mut reported = schedule.reported(&now)?;
+    loop {
+        while now.head.step < schedule.n_step() {
+            let (row, next) = step(flight, &schedule, &mut now, &reported)?;
+            reported = next;
+            store.analysis(&row, &now)?;
+            context.after_step(store, &schedule.progress(&now, flight))?;
+        }
+        let counted = (flight.total, flight.failed, flight.retried);
+        let next = settle::next(flight, &schedule, &now, &reported)?;
+        let counts = &mut now.head.counts;
+        counts.total += flight.total - counted.0;
+        counts.failed += flight.failed - counted.1;
+        counts.retried += flight.retried - counted.2;
+        let Some(mut next) = next else { return Ok(schedule.finish(&now, reported)) };
+        next.head.counts = now.head.counts;
+        next.head.information_lost = now.head.information_lost;
+        next.head.dropped = now.head.dropped;
+        now = next;
+        reported = schedule.reported(&now)?;
+    }
+}
+
+/// Predict, observe, analyse, recombine: one step of the filter over every record that still has data. Returns what the
+/// store keeps of it and what is known after it; `before` is what was known before.
+fn step(
+    flight: &mut Flight<'_>,
+    schedule: &Schedule<'_>,
+    now: &mut Snapshot,
+    before: &Reported,
+) -> Result<(AnalysisRow, Reported), RunError> {
+    let windows = schedule.step_windows(now.head.step);
+    let place = Place { pass: now.head.pass + 1, step: now.head.step };
+    let roukf = schedule.roukf(now.head.pass);
+    let counted = (flight.total, flight.failed, flight.retried);
+    let Flown { mut particles, results, rescued } =
+        fly(flight, roukf, particles(now), &mut now.states, &windows, place)?;
+    for (index, (record, _)) in windows.iter().enumerate() {
+        now.states[*record] = Some(stack_states(&results, index));
+    }
+    let mut predictions = stack_outputs(&results, &windows);
+    if schedule.resample && rescued == 0 {
+        let states = &mut now.states;
+        let drawn = resample::redraw(flight, roukf, place, &windows, &particles, &predictions, states)?;
+        if let Some(redrawn) = drawn {
+            (particles, predictions) = (redrawn.particles, redrawn.predictions);
+            now.head.dropped = now.head.dropped.max(redrawn.dropped);
+        }
+    }
+    let values: Vec<f64> = windows.iter().flat_map(|(_, w)| w.observed.iter().copied()).collect();
+    let noise = noise(schedule.study, &windows, schedule.anneal(now.head.pass));
+    let (particles, analysis) =
+        roukf.analysis(&particles, &predictions, &Data { values: &values, noise: &noise })?;
+    recombine(&mut now.states, &analysis.transform, flight.threads);
+    for (record, states) in now.states.iter_mut().enumerate() {
+        if schedule.windows[record].len() <= place.step + 1 {
+            *states = None;
+        }
+    }
+    advance(now, &particles, &analysis);
+    now.head.counts.total += flight.total - counted.0;
+    now.head.counts.failed += flight.failed - counted.1;
+    now.head.counts.retried += flight.retried - counted.2;
+    now.head.counts.rescued += rescued;
+    let after = schedule.reported(now)?;
+    let mut row = row(schedule.study, place, &windows, &analysis, before, &after);
+    row.jobs = flight.take_rows();
+    Ok((row, after))
+}
+
+fn advance(now: &mut Snapshot, particles: &Particles, analysis: &Analysis) {
+    now.head.theta = (&particles.theta).into();
+    now.head.step += 1;
+    now.head.nis += analysis.nis;
+    now.head.n_used += analysis.n_used;
+    now.head.log_likelihood += analysis.log_likelihood;
+    now.head.information_lost = now.head.information_lost.max(analysis.information_lost);
+}
+
+fn row(
+    study: &Study,
+    place: Place,
+    windows: &StepWindows,
+    analysis: &Analysis,
+    before: &Reported,
+    after: &Reported,
+) -> AnalysisRow {
+    AnalysisRow {
+        pass: place.pass,
+        step: place.step,
+        time: elapsed(study, windows),
+        n_used: analysis.n_used,
+        nis: after.nis - before.nis,
+        log_likelihood: after.log_likelihood - before.log_likelihood,
+        information_lost: analysis.information_lost,
+        estimates: posterior::rows(study, &after.posterior),
+        innovations: innovations(study, windows, analysis),
+        jobs: Vec::new(),
+    }
+}
+
+/// Longest time since a record's start among the step's windows.
+fn elapsed(study: &Study, windows: &StepWindows) -> f64 {
+    windows
+        .iter()
+        .filter_map(|(record, w)| Some(w.times.last()? - study.records[*record].times.first()?))
+        .fold(0.0, f64::max)
+}
+
+fn innovations(study: &Study, windows: &StepWindows, analysis: &Analysis) -> Vec<InnovationRow> {
+    let mut rows = Vec::new();
+    let mut at = 0;
+    for (record, window) in windows {
+        for time in &window.times {
+            for output in &study.setup.outputs {
+                if analysis.innovation[at].is_finite() {
+                    rows.push(InnovationRow {
+                        record: study.records[*record].name.clone(),
+                        output: output.clone(),
+                        time: *time,
+                        innovation: analysis.innovation[at],
+                        sd: analysis.innovation_sd[at],
+                    });
+                }
+                at += 1;
+            }
+        }
+    }
+    rows
+}

@@ -1,0 +1,134 @@
+//! Resampling for sigma sets with more points than an affine map needs: keep the leading directions of the whole spread.
+//!
+//! Only the r × r Gram matrix of the particles reaches the estimator. Predictions at a window's end are taken again at the
+//! redrawn points by runs of zero length; the earlier ones of its times, and all of them where an observer has already
+//! brought the datum into the state, are mixed as the states are. Source: Moireau & Chapelle (2011), Verdandi's treatment of
+//! the canonical and star sets.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+use starlings_estimators::{Particles, Resampled, Roukf};
+use starlings_models::Window;
+
+use super::ensemble::recombine;
+use super::flight::{Flight, Place, StepWindows};
+use super::stack::stack_outputs;
+use crate::expand::INITIAL;
+use crate::{RunError, Study};
+
+/// Weight of an initial value beside the states that carry it on.
+const FORGOTTEN: f64 = 1e-3;
+
+/// Gram matrix (r × r) of the √α-weighted deviations of the augmented particles.
+///
+/// Rows are made commensurable: each state quantity by its size in the ensemble mean, each parameter by its prior sd.
+/// Initial values have done their work through the states and hardly count again while their record runs; without any
+/// weight, one that its state has forgotten would be mixed at random.
+fn gram(
+    study: &Study,
+    weights: &DVector<f64>,
+    particles: &Particles,
+    states: &[Option<DMatrix<f64>>],
+) -> DMatrix<f64> {
+    let mut gram = DMatrix::zeros(weights.len(), weights.len());
+    for x in states.iter().flatten() {
+        let mut first = 0;
+        for quantity in &study.spec.states {
+            let block = x.rows(first, quantity.size).into_owned();
+            let mean = &block * weights;
+            let size = (mean.norm_squared() / quantity.size as f64).sqrt();
+            add(&mut gram, &block, weights, if size > 0.0 { size } else { 1.0 });
+            first += quantity.size;
+        }
+    }
+    for (j, entry) in study.theta.iter().enumerate() {
+        let initial = study.parameters[entry.parameter].name.starts_with(INITIAL);
+        let running = entry.record.map_or(states.iter().any(Option::is_some), |r| states[r].is_some());
+        let share = if initial && running { FORGOTTEN } else { 1.0 };
+        add(&mut gram, &particles.theta.rows(j, 1).into_owned(), weights, entry.prior_sd / share);
+    }
+    gram
+}
+
+fn add(gram: &mut DMatrix<f64>, rows: &DMatrix<f64>, weights: &DVector<f64>, scale: f64) {
+    let mean = rows * weights;
+    let mut deviation = rows.clone();
+    for (mut column, weight) in deviation.column_iter_mut().zip(weights.iter()) {
+        column -= &mean;
+        column *= weight.sqrt() / scale;
+    }
+    gram.gemm_tr(1.0, &deviation, &deviation, 1.0);
+}
+
+/// An ensemble after resampling.
+pub struct Redrawn {
+    /// The redrawn particles.
+    pub particles: Particles,
+    /// Their predictions, m × r.
+    pub predictions: DMatrix<f64>,
+    /// Share of the spread, in the norm of the Gram matrix, that they leave out.
+    pub dropped: f64,
+}
+
+/// Redraws particles and states around the leading directions and observes them again: the new
+/// ensemble. `None`, and nothing changed, when a redrawn particle cannot be observed.
+///
+/// # Errors
+/// When the fleet or the estimator fails.
+pub fn redraw(
+    flight: &mut Flight<'_>,
+    roukf: &Roukf,
+    place: Place,
+    windows: &StepWindows,
+    particles: &Particles,
+    predictions: &DMatrix<f64>,
+    states: &mut Vec<Option<DMatrix<f64>>>,
+) -> Result<Option<Redrawn>, RunError> {
+    let study = flight.study();
+    let Resampled { particles: redrawn, transform, dropped } =
+        roukf.resample(particles, &gram(study, &roukf.set.weights, particles, states))?;
+    let mut mixed = states.clone();
+    recombine(&mut mixed, &transform, flight.threads);
+    let mut observed = predictions * transform;
+    // Where an observer has brought the datum into the state, an output of that state is no prediction of it.
+    if study.observer_is_off()
+        && !observe_again(flight, place, &redrawn.theta, &mixed, windows, &mut observed)?
+    {
+        return Ok(None);
+    }
+    *states = mixed;
+    Ok(Some(Redrawn { particles: redrawn, predictions: observed, dropped }))
+}
+
+/// Puts the outputs at the windows' ends, by runs of zero length, into the predictions; `false` when a run fails.
+fn observe_again(
+    flight: &mut Flight<'_>,
+    place: Place,
+    theta: &DMatrix<f64>,
+    states: &[Option<DMatrix<f64>>],
+    windows: &StepWindows,
+    predictions: &mut DMatrix<f64>,
+) -> Result<bool, RunError> {
+    let instants: StepWindows = windows.iter().map(|(record, w)| (*record, Arc::new(instant(w)))).collect();
+    let everyone: Vec<usize> = (0..theta.ncols()).collect();
+    let results = flight.run(place, &everyone, theta, states, &instants)?;
+    if results.iter().flatten().any(Result::is_err) {
+        return Ok(false);
+    }
+    let ends = stack_outputs(&results, &instants);
+    let n_obs = flight.study().setup.outputs.len();
+    let mut after = 0;
+    for (index, (_, window)) in windows.iter().enumerate() {
+        after += window.observed.len();
+        predictions.rows_mut(after - n_obs, n_obs).copy_from(&ends.rows(index * n_obs, n_obs));
+    }
+    Ok(true)
+}
+
+/// The last instant of a window, as a window of its own.
+fn instant(window: &Window) -> Window {
+    let end = window.times.last().copied().unwrap_or(window.start);
+    let n_obs = window.observed.len() / window.times.len().max(1);
+    Window { start: end, times: vec![end], observed: vec![f64::NAN; n_obs], inputs: window.inputs.clone() }
+}

@@ -1,0 +1,115 @@
+//! What happens to a sigma point whose run failed on every worker: it is pulled towards the mean and run again.
+//!
+//! A pulled point is a real run at a nearer place, never a guess; the analysis knows its distance and stays exact for a
+//! linear model. A point that fails even close to the mean is dropped where the others still span the parameters. Both are
+//! reported as lost information. Next file to read: [`super::filter`].
+
+use nalgebra::DMatrix;
+use starlings_estimators::{Particles, Roukf};
+
+use super::flight::{Flight, Place, Results, StepWindows};
+use crate::RunError;
+
+/// Distances from the mean at which a failed sigma point is tried again, as fractions of its own.
+const DISTANCES: [f64; 5] = [0.5, 0.25, 0.125, 0.0625, 0.03125];
+
+/// An ensemble that ran over one step: every column is a prediction, or dropped.
+pub struct Flown {
+    /// The particles, with their pulls.
+    pub particles: Particles,
+    /// Predictions and end states by particle and window; a dropped particle keeps its error.
+    pub results: Results,
+    /// Sigma points that were pulled or dropped.
+    pub rescued: u64,
+}
+
+/// Runs all particles over the step's windows and rescues those that fail.
+///
+/// `states[record]` (n × r, at the windows' start) is pulled along with the parameters.
+///
+/// # Errors
+/// When the fleet fails, or too few particles survive for an analysis; the message says which parameters could not be run.
+pub fn fly(
+    flight: &mut Flight<'_>,
+    roukf: &Roukf,
+    particles: Particles,
+    states: &mut [Option<DMatrix<f64>>],
+    windows: &StepWindows,
+    place: Place,
+) -> Result<Flown, RunError> {
+    let everyone: Vec<usize> = (0..particles.theta.ncols()).collect();
+    let results = flight.run(place, &everyone, &particles.theta, states, windows)?;
+    let mut flown = Flown { particles, results, rescued: 0 };
+    for particle in everyone {
+        if failure(&flown.results[particle]).is_some() {
+            rescue(flight, roukf, &mut flown, states, windows, place, particle)?;
+            flown.rescued += 1;
+        }
+    }
+    Ok(flown)
+}
+
+fn rescue(
+    flight: &mut Flight<'_>,
+    roukf: &Roukf,
+    flown: &mut Flown,
+    states: &mut [Option<DMatrix<f64>>],
+    windows: &StepWindows,
+    place: Place,
+    particle: usize,
+) -> Result<(), RunError> {
+    let cause = cause(flight, windows, &flown.results[particle]);
+    for distance in DISTANCES {
+        let (pulled, transform) = roukf.pull(&flown.particles, particle, distance);
+        for x in states.iter_mut().flatten() {
+            *x = &*x * &transform;
+        }
+        flown.particles = pulled;
+        let mut again = flight.run(place, &[particle], &flown.particles.theta, states, windows)?;
+        let of_particle = again.swap_remove(0);
+        let failed = failure(&of_particle).is_some();
+        flown.results[particle] = of_particle;
+        if !failed {
+            return Ok(());
+        }
+    }
+    flown.particles = roukf.drop(&flown.particles, particle).map_err(|source| RunError::SigmaPointLost {
+        particle,
+        pass: place.pass,
+        step: place.step,
+        values: describe(flight, &flown.particles, particle),
+        cause,
+        source,
+    })?;
+    Ok(())
+}
+
+fn failure(
+    of_particle: &[Result<starlings_models::Prediction, starlings_models::Failure>],
+) -> Option<String> {
+    of_particle.iter().find_map(|r| r.as_ref().err().map(ToString::to_string))
+}
+
+/// The first failure among a particle's windows, with its record.
+fn cause(
+    flight: &Flight<'_>,
+    windows: &StepWindows,
+    of_particle: &[Result<starlings_models::Prediction, starlings_models::Failure>],
+) -> String {
+    let mut failed =
+        windows.iter().zip(of_particle).filter_map(|((record, _), r)| Some((*record, r.as_ref().err()?)));
+    let Some((record, error)) = failed.next() else { return String::new() };
+    format!("over record `{}`, {error}", flight.study().records[record].name)
+}
+
+fn describe(flight: &Flight<'_>, particles: &Particles, particle: usize) -> String {
+    let theta = particles.theta.column(particle);
+    flight
+        .study()
+        .theta
+        .iter()
+        .zip(theta.iter())
+        .map(|(entry, value)| format!("{} = {:.6}", entry.name, entry.transform.to_physical(*value)))
+        .collect::<Vec<_>>()
+        .join(", ")
+}

@@ -1,0 +1,193 @@
+//! What differs from pass to pass of the filter: noise, spread, drift, and what is reported.
+//!
+//! Pass 1 of several runs with the noise annealed (its sd multiplied), so that early data do not trap the ensemble while the
+//! particles are still far apart; it only chooses where the later passes linearise. These start from tight sigma points
+//! around the previous estimate, and the study's real prior is put back exactly at every report ([`exchange_prior`]): no
+//! datum counts twice. Such a pass is a step of Gauss and Newton; where the study does not fix their number, [`super::settle`]
+//! says how far along it the next pass starts, and when the passes end.
+//!
+//! A parameter that drifts has no single value to linearise around, and exchanging priors is not exact for it. A study with
+//! one has two passes at most: the annealed one without drift, and one with drift that starts from the annealed posterior,
+//! in which the data count with 1/anneal² of their weight. Next file to read: [`super::settle`].
+
+use std::sync::Arc;
+
+use starlings_estimators::{Drift, Gaussian, Particles, Roukf, SigmaSet, exchange_prior};
+use starlings_models::Window;
+
+use super::flight::{Flight, StepWindows};
+use crate::store::snapshot::{Counts, Head, Snapshot};
+use crate::{Fit, Move, Progress, RunError, Study, ThetaEntry, posterior};
+
+/// Least width of the points in prior sd: closer, rounding inside the model would show.
+const CLOSEST: f64 = 1e-6;
+
+/// Everything about the fit that does not change from step to step.
+pub(super) struct Schedule<'a> {
+    pub(super) study: &'a Study,
+    still: Roukf,
+    drifting: Option<Roukf>,
+    /// Number of passes where it is fixed; `None` for as many as it takes.
+    pub(super) passes: Option<usize>,
+    pub(super) resample: bool,
+    prior: Gaussian,
+    /// Training windows by record.
+    pub(super) windows: Vec<Vec<Arc<Window>>>,
+}
+
+/// What is known under the study's own prior, and the figures of the pass so far that belong to it.
+pub(super) struct Reported {
+    pub(super) posterior: Gaussian,
+    pub(super) log_likelihood: f64,
+    pub(super) nis: f64,
+}
+
+impl<'a> Schedule<'a> {
+    pub(super) fn new(study: &'a Study) -> Result<Self, RunError> {
+        let e = &study.estimator;
+        let set = SigmaSet::new(e.points, study.theta.len())?;
+        let drift: Vec<Drift> = study.theta.iter().map(|t| t.drift).collect();
+        let still = Roukf { set: set.clone(), root: e.root, drift: Vec::new() };
+        Ok(Self {
+            study,
+            resample: e.resample && set.n_particle() > set.n_param() + 1,
+            drifting: study.drifts().then_some(Roukf { set, root: e.root, drift }),
+            still,
+            passes: study.passes(),
+            prior: posterior::prior(study),
+            windows: (0..study.records.len()).map(|record| study.windows(record)).collect(),
+        })
+    }
+
+    /// The filter of one pass: drift belongs to the last.
+    pub(super) fn roukf(&self, pass: usize) -> &Roukf {
+        self.drifting.as_ref().filter(|_| self.is_last(pass)).unwrap_or(&self.still)
+    }
+
+    /// Whether a fixed number of passes ends with this one.
+    pub(super) fn is_last(&self, pass: usize) -> bool {
+        self.passes == Some(pass + 1)
+    }
+
+    pub(super) fn n_step(&self) -> usize {
+        self.windows.iter().map(Vec::len).max().unwrap_or(0)
+    }
+
+    /// Factor on the noise sd in this pass.
+    pub(super) fn anneal(&self, pass: usize) -> f64 {
+        if pass == 0 && self.passes != Some(1) { self.study.estimator.anneal } else { 1.0 }
+    }
+
+    /// Standard deviations of the points at the start of a pass, transformed units.
+    ///
+    /// Where the number of passes is open, no point starts further out than one posterior sd: with data that know a parameter
+    /// to less than `spread` of its prior, a wider ensemble would bend on its way to the estimate.
+    fn scale(&self, pass: usize, around: &Gaussian, narrow: f64) -> Vec<f64> {
+        let sd = posterior::standard_deviations(around);
+        if pass > 0 && self.drifting.is_some() {
+            return sd;
+        }
+        let spread = if pass == 0 { 1.0 } else { self.study.estimator.spread };
+        let closest = |prior: f64, sd: f64| narrow * sd.max(CLOSEST * prior).min(spread * prior);
+        let open = pass > 0 && self.passes.is_none();
+        let scale =
+            |(t, sd): (&ThetaEntry, f64)| if open { closest(t.prior_sd, sd) } else { spread * t.prior_sd };
+        self.study.theta.iter().zip(sd).map(scale).collect()
+    }
+
+    /// The ensemble at the start of a pass, around the given estimate.
+    pub(super) fn start(&self, pass: usize, around: &Gaussian) -> Snapshot {
+        self.start_at(pass, around, around.mean.iter().copied().collect(), 1.0)
+    }
+
+    /// The ensemble at the start of a pass around `centre`, no wider than `around`; `narrow` draws it together.
+    pub(super) fn start_at(&self, pass: usize, around: &Gaussian, centre: Vec<f64>, narrow: f64) -> Snapshot {
+        let scale = self.scale(pass, around, narrow);
+        let particles = self.still.init(&posterior::independent(&centre, &scale));
+        Snapshot {
+            head: Head {
+                pass,
+                step: 0,
+                theta: (&particles.theta).into(),
+                centre,
+                scale,
+                batch: String::new(),
+                nis: 0.0,
+                n_used: 0,
+                log_likelihood: 0.0,
+                information_lost: 0.0,
+                dropped: 0.0,
+                counts: Counts::default(),
+                cost: None,
+                narrow,
+            },
+            states: vec![None; self.study.records.len()],
+        }
+    }
+
+    /// The windows of one step, one for each record that still has data.
+    pub(super) fn step_windows(&self, step: usize) -> StepWindows {
+        self.windows.iter().enumerate().filter_map(|(r, w)| w.get(step).map(|w| (r, Arc::clone(w)))).collect()
+    }
+
+    /// What is known now under the study's own prior, whatever spread this pass started with.
+    pub(super) fn reported(&self, now: &Snapshot) -> Result<Reported, RunError> {
+        let posterior = self.still.gaussian(&particles(now));
+        if now.head.pass == 0 || self.drifting.is_some() {
+            return Ok(Reported { posterior, log_likelihood: now.head.log_likelihood, nis: now.head.nis });
+        }
+        let used = posterior::independent(&now.head.centre, &now.head.scale);
+        let exchanged = exchange_prior(&posterior, &used, &self.prior)?;
+        Ok(Reported {
+            nis: exchanged.corrected_nis(now.head.nis),
+            log_likelihood: now.head.log_likelihood + exchanged.log_likelihood,
+            posterior: exchanged.posterior,
+        })
+    }
+
+    /// How far the pass moved the estimate from where it started: the entry that moved most, in posterior standard deviations.
+    /// `None` for a first pass, which starts at the prior, and for parameters that drift.
+    pub(super) fn last_move(&self, now: &Snapshot, reported: &Reported) -> Option<Move> {
+        if now.head.pass == 0 || self.drifting.is_some() {
+            return None;
+        }
+        let sd = posterior::standard_deviations(&reported.posterior);
+        let moved = reported.posterior.mean.iter().zip(&now.head.centre).zip(sd);
+        let moves = moved.enumerate().map(|(entry, ((m, c), sd))| Move { entry, size: (m - c).abs() / sd });
+        moves.max_by(|a, b| a.size.total_cmp(&b.size))
+    }
+
+    pub(super) fn finish(&self, now: &Snapshot, reported: Reported) -> Fit {
+        Fit {
+            last_move: self.last_move(now, &reported),
+            posterior: reported.posterior,
+            log_likelihood: reported.log_likelihood,
+            nis: reported.nis,
+            n_used: now.head.n_used,
+            information_lost: now.head.information_lost,
+            dropped: now.head.dropped,
+            counts: now.head.counts,
+            passes: now.head.pass + 1,
+            converged: true,
+        }
+    }
+
+    pub(super) fn progress(&self, now: &Snapshot, flight: &Flight<'_>) -> Progress {
+        Progress {
+            stage: "filter",
+            pass: now.head.pass + 1,
+            passes: self.passes,
+            step: now.head.step,
+            steps: self.n_step(),
+            runs: now.head.counts.total,
+            workers: flight.n_workers(),
+        }
+    }
+}
+
+/// The ensemble between two analyses, every point in its place.
+pub(super) fn particles(now: &Snapshot) -> Particles {
+    let theta = now.head.theta.to_dense();
+    let pull = vec![1.0; theta.ncols()];
+    Particles { theta, pull }
+}

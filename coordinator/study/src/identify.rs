@@ -1,0 +1,102 @@
+//! Is the estimation reasonable, before it is made? One ensemble around a point tells what these data could determine.
+//!
+//! Every record runs freely from its start with sigma points close to the prior median (or to the estimate of a finished
+//! run), so the sensitivities are those that the batch fit sees: no observer, no analysis in between. What was observed is
+//! used only to know where a value counts; its size plays no role. Deliberately without any change of the study. Next
+//! files to read: [`ensemble`], then [`result`]; the arithmetic is `identifiability` in `starlings-estimators`.
+
+pub mod advice;
+pub mod at;
+pub mod ensemble;
+pub mod gather;
+pub mod result;
+pub mod series;
+pub mod words;
+
+pub use at::At;
+pub use result::Identification;
+
+use starlings_estimators::{EstimatorError, Sensitivities};
+use starlings_models::Failure;
+
+use super::fit::flight::Flight;
+use super::store::StoreError;
+use super::{FolderError, RunError, Study, constants};
+use starlings_fleet::Fleet;
+
+/// Why the sensitivities could not be had.
+#[derive(Debug, thiserror::Error)]
+pub enum IdentifyError {
+    /// The fleet failed, or a run has no usable answer.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// The figures cannot be computed.
+    #[error(transparent)]
+    Estimator(#[from] EstimatorError),
+    /// The model fails next to the point of the analysis.
+    #[error(
+        "the model fails on record `{record}` at {place}: {source}; bound the parameter with a logit transform, move its \
+         prior, or set a smaller [estimator] spread"
+    )]
+    Particle {
+        /// Record name.
+        record: String,
+        /// Which parameter was moved, which way and to what value.
+        place: String,
+        /// Why it failed.
+        source: Failure,
+    },
+    /// A prediction is no finite number.
+    #[error(
+        "`{output}` of record `{record}` is {value} at time {time}, {place}: check constants, priors and inputs"
+    )]
+    Prediction {
+        /// Output name.
+        output: String,
+        /// Record name.
+        record: String,
+        /// Time of the prediction.
+        time: f64,
+        /// The prediction.
+        value: f64,
+        /// Which parameter was moved, which way and to what value.
+        place: String,
+    },
+    /// The folder given as the point of the analysis cannot be read.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// Its store cannot be read.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// The run in it is no point of this study.
+    #[error("{0}")]
+    Point(String),
+}
+
+impl IdentifyError {
+    /// Whether the input is wrong, rather than the run.
+    pub fn is_input(&self) -> bool {
+        matches!(self, Self::Folder(_) | Self::Store(_) | Self::Point(_))
+    }
+}
+
+/// Runs one ensemble of the study around a point and says what its data could determine.
+///
+/// # Errors
+/// When the point is no point of this study, the fleet fails, or the model fails next to the point.
+pub fn identify(study: &Study, fleet: &mut dyn Fleet, at: &At) -> Result<Identification, IdentifyError> {
+    let centre = at.centre(study)?;
+    let mut flight = Flight::new(study, fleet)?;
+    let response = ensemble::run(&mut flight, &centre)?;
+    let prior_sd: Vec<f64> = study.theta.iter().map(|t| t.prior_sd).collect();
+    let spread = ensemble::spread(study);
+    let sensitivities = Sensitivities::new(&response.whitened, &prior_sd, ensemble::accuracy(spread))?;
+    let hangs_on = constants::of_ensemble(&mut flight, &centre, &response, &sensitivities)?;
+    let mut result = gather::make(study, at, &centre, response, &sensitivities)?;
+    result.hangs_on = hangs_on;
+    result.workers = flight.n_answered();
+    result.spread = spread;
+    result.warnings = advice::warnings(study, &result);
+    result.advice = advice::advice(&result);
+    Ok(result)
+}

@@ -1,0 +1,38 @@
+//! The study: what is asked, the loop that answers it, and the store that keeps every step.
+//!
+//! The data path: a study file becomes a checked [`Study`]; [`run::run`] sends its windows to a fleet and its
+//! predictions to an estimator; every step goes to the [`store`], from which the summary and the report are made. Next
+//! files to read: [`mod@run`], then [`fit`].
+
+mod check;
+pub mod checked;
+pub mod constants;
+mod expand;
+pub mod field;
+mod file;
+pub mod fit;
+pub mod given_residuals;
+pub mod identify;
+pub mod observer_gain;
+mod plan;
+pub mod posterior;
+pub mod problem;
+mod record;
+pub mod run;
+pub mod run_key;
+pub mod spectrum;
+pub mod store;
+pub mod summary;
+pub mod surfaces;
+mod surroundings;
+pub mod trial;
+pub mod twin;
+pub mod variant;
+pub mod warnings;
+
+pub use checked::{EstimatorChoice, EstimatorKind, FleetChoice, Record, Study, ThetaEntry};
+pub use problem::{Problem, StudyError};
+pub use run::{Fit, Move, Progress, RunContext, RunError};
+pub use store::folder::{FolderError, RunFolder};
+pub use summary::Summary;
+pub use surroundings::{Surroundings, Undescribed};

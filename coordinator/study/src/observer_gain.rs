@@ -1,0 +1,183 @@
+//! What the observer does for the state: one run with it at the estimate, beside the free run without it.
+//!
+//! Both runs predict the same observations; with the observer each prediction follows the corrections of all earlier ones, at
+//! the spacings at which the filter's own runs are corrected.
+//! Nothing of this reaches the posterior. Next file to read: [`crate::fit::forecast`].
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+use starlings_estimators::Gaussian;
+use starlings_models::{Failure, Window};
+
+use super::fit::flight::{Flight, Place, StepWindows};
+use super::store::PredictionRow;
+use super::{RunError, Study};
+
+/// The root mean square innovations over the training spans, in noise standard deviations.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ObserverFit {
+    /// The observer.
+    pub kind: String,
+    /// Its gain, in 1/time unit; that of `windkessel` counts in 1/(R_d C) and has no unit.
+    pub gain: f64,
+    /// With the observer: every observation predicted from a state corrected by the earlier ones.
+    pub innovation_rms_with: f64,
+    /// Without it: predicted by a free run.
+    pub innovation_rms_without: f64,
+}
+
+/// One record's innovations over time, pooled over its channels.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ObserverCourse {
+    /// Record name.
+    pub record: String,
+    /// Observation times of the training span.
+    pub time: Vec<f64>,
+    /// Root mean square over the channels with the observer, in noise standard deviations.
+    pub with: Vec<f64>,
+    /// The same without it.
+    pub without: Vec<f64>,
+}
+
+/// A comparison of both runs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Comparison {
+    /// The figures.
+    pub fit: ObserverFit,
+    /// Their course, one entry per record.
+    pub courses: Vec<ObserverCourse>,
+}
+
+/// What came of the comparison.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Compared {
+    /// The study has no observer.
+    NoObserver,
+    /// Both runs, side by side.
+    Both(Comparison),
+    /// The run with the observer gave nothing to compare; a sentence that says why.
+    Failed(String),
+}
+
+/// Runs the trained records once more, with the observer, and compares. `free` is the free run at the same estimate.
+///
+/// # Errors
+/// When the fleet fails. A model that fails under its observer at the estimate is no error: see [`Compared::Failed`].
+pub fn compare(
+    flight: &mut Flight<'_>,
+    posterior: &Gaussian,
+    free: &[PredictionRow],
+) -> Result<Compared, RunError> {
+    let study = flight.study();
+    if study.observer_is_off() {
+        return Ok(Compared::NoObserver);
+    }
+    let trained = (0..study.records.len()).filter(|record| study.records[*record].is_trained());
+    let windows: StepWindows = trained.map(|record| (record, Arc::new(study.whole(record, true)))).collect();
+    let theta = DMatrix::from_column_slice(posterior.mean.len(), 1, posterior.mean.as_slice());
+    let states = vec![None; study.records.len()];
+    let results = flight.run(Place { pass: 0, step: 1 }, &[0], &theta, &states, &windows)?;
+    let mut courses = Vec::new();
+    let mut sums = Sums::default();
+    for ((record, window), result) in windows.iter().zip(results.into_iter().flatten()) {
+        let prediction = match result {
+            Ok(prediction) => prediction,
+            Err(error) => return Ok(Compared::Failed(failed(study, *record, &error))),
+        };
+        courses.push(course(study, *record, window, &prediction.outputs, free, &mut sums));
+    }
+    let fit = ObserverFit {
+        kind: study.setup.observer.kind.clone(),
+        gain: study.setup.observer.gain,
+        innovation_rms_with: sums.with(),
+        innovation_rms_without: sums.without(),
+    };
+    if !(fit.innovation_rms_with.is_finite() && fit.innovation_rms_without.is_finite()) {
+        return Ok(Compared::Failed(endless(study)));
+    }
+    Ok(Compared::Both(Comparison { fit, courses }))
+}
+
+/// What a reader does not learn, and why.
+fn failed(study: &Study, record: usize, error: &Failure) -> String {
+    format!(
+        "with the estimated parameters the model fails under the observer `{}` on record `{}` ({error}): what the observer \
+         does for the state is not known. Lower its gain.",
+        study.setup.observer.kind, study.records[record].name
+    )
+}
+
+fn endless(study: &Study) -> String {
+    format!(
+        "the innovations under the observer `{}` are no finite numbers: what it does for the state is not known. Lower its \
+         gain.",
+        study.setup.observer.kind
+    )
+}
+
+/// Sums of squared whitened innovations.
+#[derive(Default)]
+struct Sums {
+    with: f64,
+    without: f64,
+    n: u32,
+}
+
+impl Sums {
+    fn add(&mut self, other: &Self) {
+        self.with += other.with;
+        self.without += other.without;
+        self.n += other.n;
+    }
+
+    fn with(&self) -> f64 {
+        (self.with / f64::from(self.n)).sqrt()
+    }
+
+    fn without(&self) -> f64 {
+        (self.without / f64::from(self.n)).sqrt()
+    }
+}
+
+fn course(
+    study: &Study,
+    record: usize,
+    window: &Window,
+    outputs: &[f64],
+    free: &[PredictionRow],
+    sums: &mut Sums,
+) -> ObserverCourse {
+    let of_record = &study.records[record];
+    let n_obs = study.setup.outputs.len();
+    let mut course = ObserverCourse { record: of_record.name.clone(), ..ObserverCourse::default() };
+    let free = free_run(free, &of_record.name);
+    for (j, &time) in window.times.iter().enumerate() {
+        let mut here = Sums::default();
+        for channel in &of_record.channels {
+            let at = j * n_obs + channel.row;
+            let observed = window.observed[at];
+            let Some(without) = free.get(&(channel.output.as_str(), time.to_bits())) else { continue };
+            if observed.is_finite() {
+                here.with += ((observed - outputs[at]) / channel.noise).powi(2);
+                here.without += ((observed - without) / channel.noise).powi(2);
+                here.n += 1;
+            }
+        }
+        if here.n > 0 {
+            course.time.push(time);
+            course.with.push(here.with());
+            course.without.push(here.without());
+            sums.add(&here);
+        }
+    }
+    course
+}
+
+/// Predicted values of a record by output and bits of the time.
+fn free_run<'a>(rows: &'a [PredictionRow], record: &str) -> HashMap<(&'a str, u64), f64> {
+    let of_record = rows.iter().filter(|row| row.record == record);
+    of_record.map(|row| ((row.output.as_str(), row.time.to_bits()), row.predicted)).collect()
+}

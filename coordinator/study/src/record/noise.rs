@@ -1,0 +1,75 @@
+//! The noise of a channel: as the study gives it, or from the data.
+//!
+//! The components of a field are measured by one instrument: they share one standard deviation. Next file to read:
+//! [`super::channel`].
+
+use starlings_estimators::noise_from_third_differences;
+
+use super::channel::ChannelReader;
+use crate::file::ChannelSection;
+
+/// A standard deviation and how it was found.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Noise {
+    pub(super) sd: f64,
+    pub(super) how: String,
+}
+
+impl ChannelReader<'_> {
+    /// The noise of a channel whose components have these values. Held-out rows of a trained record take no part.
+    pub(super) fn noise(&self, section: &ChannelSection, parts: &[&[f64]], unit: &str) -> Option<Noise> {
+        if let Some(sd) = *section.noise.get_ref() {
+            if sd > 0.0 {
+                return Some(Noise { sd, how: "given in the study".to_owned() });
+            }
+            let message = format!("`noise` must be above zero, found {sd}");
+            let help =
+                "give the standard deviation of the measurement error in the channel's unit, or \"auto\"";
+            self.source.report_with(section.noise.span(), message, help);
+            return None;
+        }
+        let sds: Vec<f64> =
+            parts.iter().map(|values| noise_from_third_differences(&self.used(values))).collect();
+        let known: Vec<f64> = sds.iter().copied().filter(|sd| !sd.is_nan()).collect();
+        let sd = root_mean_square(&known);
+        if sd > 0.0 && sd.is_finite() {
+            return Some(Noise { sd, how: self.found(parts) });
+        }
+        let why = if known.is_empty() {
+            "there are no four samples in a row"
+        } else {
+            "the samples do not scatter"
+        };
+        let unit = if unit.is_empty() { String::new() } else { format!(" in {unit}") };
+        let message = format!(
+            "the noise of column `{}` cannot be found from the data: {why}",
+            section.column.get_ref()
+        );
+        self.source.report_with(section.noise.span(), message, format!("give its standard deviation{unit}"));
+        None
+    }
+
+    fn found(&self, parts: &[&[f64]]) -> String {
+        let n = parts.first().map_or(0, |values| self.used(values).len());
+        let uneven = if self.is_even() { "" } else { " (which are not evenly spaced: it may be too large)" };
+        match parts.len() {
+            1 => format!("from the third differences of its {n} samples{uneven}"),
+            of => {
+                format!(
+                    "from the third differences of the {n} samples of its {of} components, pooled{uneven}"
+                )
+            }
+        }
+    }
+
+    /// The values at the rows that count.
+    pub(super) fn used(&self, values: &[f64]) -> Vec<f64> {
+        let rows = values.iter().zip(&self.table.times);
+        rows.filter(|(_, t)| self.is_used(**t)).map(|(v, _)| *v).collect()
+    }
+}
+
+fn root_mean_square(values: &[f64]) -> f64 {
+    let sum: f64 = values.iter().map(|v| v * v).sum();
+    (sum / values.len().max(1) as f64).sqrt()
+}

@@ -1,0 +1,194 @@
+//! Channels that were measured as registered surfaces: a surface per time, and where the model's nodes are without displacement.
+//!
+//! What is compared is in [`crate::surfaces`]. Next file to read: [`super::shapes`].
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::rc::Rc;
+use std::sync::Arc;
+
+use starlings_models::{Role, Spec};
+
+use super::channel::{ChannelReader, measured_somewhere};
+use super::shapes::Surfaces;
+use super::{Context, Csv, Recordings};
+use crate::checked::Channel;
+use crate::file::{ChannelSection, RecordSection, SurfaceSection};
+use crate::problem::quoted_list;
+use crate::surfaces::Node;
+
+/// The files of one surface channel.
+pub(super) struct SurfaceFiles {
+    surface: Rc<Csv>,
+    rest: Rc<Csv>,
+    /// Texts of the meshes that the surface file names, by name.
+    meshes: BTreeMap<String, (PathBuf, String)>,
+}
+
+impl Recordings<'_> {
+    /// The files of every channel of a record, none where it is no surface; nothing after a complaint.
+    pub(super) fn surfaces(&mut self, section: &RecordSection) -> Option<Vec<Option<SurfaceFiles>>> {
+        let found: Vec<Option<Option<SurfaceFiles>>> = section
+            .channels
+            .iter()
+            .map(|channel| channel.surface.as_ref().map_or(Some(None), |s| self.files(s).map(Some)))
+            .collect();
+        found.into_iter().collect()
+    }
+
+    fn files(&mut self, section: &SurfaceSection) -> Option<SurfaceFiles> {
+        let surface = self.open(section.file.get_ref(), &section.file);
+        let rest = self.open(section.rest.get_ref(), &section.rest);
+        let (surface, rest) = (surface?, rest?);
+        let mut meshes = BTreeMap::new();
+        let before = self.source.count();
+        if let Ok(column) = surface.index("file") {
+            for (row, name) in surface.texts(column).enumerate() {
+                let path = self.folder.join(name);
+                match std::fs::read_to_string(&path) {
+                    Ok(text) => {
+                        meshes.insert(name.to_owned(), (path, text));
+                    }
+                    Err(error) => {
+                        let message = format!("cannot read `{}`: {}", path.display(), super::plain(&error));
+                        let help = "name a mesh in the Object File Format (OFF), relative to the study file";
+                        self.source.adopt(surface.problem(row, column, message, help));
+                    }
+                }
+            }
+        }
+        (self.source.count() == before).then_some(SurfaceFiles { surface, rest, meshes })
+    }
+}
+
+impl ChannelReader<'_> {
+    /// The channels of a surface, one per node; nothing after a complaint.
+    pub(super) fn surface(
+        &self,
+        section: &ChannelSection,
+        surface: &SurfaceSection,
+        files: &SurfaceFiles,
+        context: &mut Context<'_>,
+    ) -> Option<Vec<Channel>> {
+        self.displacement(section)?;
+        let noise = self.surface_noise(section)?;
+        let output = section.output.get_ref();
+        let n = Spec::range_of(&self.spec.outputs, output).map_or(1, |range| range.len());
+        let with_ends = Surfaces {
+            csv: &files.surface,
+            meshes: &files.meshes,
+            open_ends: surface.open_ends,
+            source: self.source,
+            table: self.table,
+        };
+        let shapes = Arc::new(with_ends.read()?);
+        let places = with_ends.rest(&files.rest, n, output)?;
+        let mut channels = Vec::with_capacity(n);
+        for (i, (rest, normal)) in places.into_iter().enumerate() {
+            let node = Node { rest, normal, seen: Arc::clone(&shapes) };
+            let at = |time: &f64| if node.is_shown(*time) { 0.0 } else { f64::NAN };
+            let values: Vec<f64> = self.table.times.iter().map(at).collect();
+            // A node that no surface shows is one that was not measured.
+            if !measured_somewhere(&values) {
+                continue;
+            }
+            let output = if n == 1 { output.clone() } else { format!("{output}[{i}]") };
+            channels.push(Channel {
+                row: context.row(&output),
+                held_out: context.is_held_out(&output),
+                output,
+                column: surface.file.get_ref().clone(),
+                unit: section.unit.as_ref().map(|u| u.get_ref().clone()).filter(|u| !u.is_empty()),
+                noise,
+                noise_how: "given in the study".to_owned(),
+                values,
+                node: Some(node),
+            });
+        }
+        if !channels.iter().any(|c| self.has_value(&c.values)) {
+            let message = format!(
+                "no node of `{}` is shown by a surface of record `{}` where it is fitted",
+                surface.rest.get_ref(),
+                self.section.name.get_ref()
+            );
+            let help =
+                "surfaces and nodes at rest must lie in the same place, in the same unit; or move `train`";
+            self.source.report_with(surface.file.span(), message, help);
+            return None;
+        }
+        context.warnings.push(self.what_is_compared(section, surface, [channels.len(), n]));
+        Some(channels)
+    }
+
+    /// What stands under the output's name in figures and tables.
+    fn what_is_compared(
+        &self,
+        section: &ChannelSection,
+        surface: &SurfaceSection,
+        [shown, of]: [usize; 2],
+    ) -> String {
+        let (output, record) = (section.output.get_ref(), self.section.name.get_ref());
+        let file = surface.file.get_ref();
+        let lost = match of - shown {
+            0 => String::new(),
+            lost => format!(" No surface shows {lost} of its {of} nodes."),
+        };
+        format!(
+            "`{output}` in record `{record}` is compared with the surfaces of `{file}`: its predictions are signed distances, \
+             zero is observed.{lost}"
+        )
+    }
+
+    /// Only what moves a wall can be compared with a surface; an output that says nothing of itself may. Nothing after a complaint.
+    fn displacement(&self, section: &ChannelSection) -> Option<()> {
+        let quantity = self.quantity(section)?;
+        if matches!(quantity.role, Role::Displacement | Role::Other) {
+            return Some(());
+        }
+        let wanted = self.spec.outputs.iter().filter(|q| q.role == Role::Displacement);
+        let names: Vec<&str> = wanted.map(|q| q.name.as_str()).collect();
+        let message = format!("`{}` is no displacement of a wall that a surface could show", quantity.name);
+        let help = match names[..] {
+            [] => format!("model `{}` has no such output: measure it by a `column`", self.spec.kind),
+            _ => format!("its outputs of that kind: {}", quoted_list(&names)),
+        };
+        self.source.report_with(section.output.span(), message, help);
+        None
+    }
+
+    /// The noise of a surface is the scatter of its points along the normal, which only its maker knows.
+    fn surface_noise(&self, section: &ChannelSection) -> Option<f64> {
+        match *section.noise.get_ref() {
+            Some(sd) if sd > 0.0 => return Some(sd),
+            Some(sd) => {
+                let message = format!("`noise` must be above zero, found {sd}");
+                let help =
+                    "give the standard deviation of the surface along its normal, in the unit of its points";
+                self.source.report_with(section.noise.span(), message, help);
+            }
+            None => self.source.report_with(
+                section.noise.span(),
+                "the noise of a surface cannot be found from the data",
+                "give the standard deviation of the surface along its normal, in the unit of its points",
+            ),
+        }
+        None
+    }
+}
+
+/// Position of each of these columns; nothing where one is missing.
+pub(super) fn columns<const N: usize>(csv: &Csv, names: [&str; N]) -> Option<[usize; N]> {
+    let mut found = [0; N];
+    for (at, name) in found.iter_mut().zip(names) {
+        *at = csv.index(name).ok()?;
+    }
+    Some(found)
+}
+
+/// What a file has instead of the columns that were looked for.
+pub(super) fn lacks(csv: &Csv, wanted: &str) -> (String, String) {
+    (
+        format!("`{}` has not the columns {wanted}", csv.path.display()),
+        format!("its columns are {}", quoted_list(&csv.headers)),
+    )
+}

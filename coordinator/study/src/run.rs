@@ -1,0 +1,293 @@
+//! The whole loop: fit, forward run, summary, artefacts. Everything between a checked study and a finished run folder.
+//!
+//! The same code starts a run and continues a killed one: what is already in the store is not done again. Next files to
+//! read: [`crate::fit::filter`] and [`crate::fit::batch`].
+
+use std::sync::mpsc::Receiver;
+
+use starlings_estimators::{EstimatorError, Gaussian};
+use starlings_models::Failure;
+
+use super::constants::{self, HangsOn};
+use super::fit::{batch, filter, forecast};
+use super::given_residuals::{self, GivenResiduals};
+use super::identify::IdentifyError;
+use super::store::{Store, StoreError};
+use super::summary::Summary;
+use super::{EstimatorKind, Study, observer_gain, summary, warnings};
+use crate::fit::flight::Flight;
+use crate::observer_gain::Compared;
+use crate::store::folder::{self, OBSERVER, RunFolder};
+use crate::store::snapshot::{Counts, Snapshot};
+use starlings_fleet::{Fleet, FleetError, FleetEvent};
+
+/// Why a run ended without a result.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The fleet failed as a whole.
+    #[error(transparent)]
+    Fleet(#[from] FleetError),
+    /// The store failed.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// The estimator could not go on.
+    #[error(transparent)]
+    Estimator(#[from] EstimatorError),
+    /// A sigma point failed at every distance from the mean and the others do not span the parameters.
+    #[error(
+        "sigma point {particle} of pass {pass}, step {step} failed even next to the mean ({values}): {cause}; {source}"
+    )]
+    SigmaPointLost {
+        /// Index of the sigma point.
+        particle: usize,
+        /// Pass, from 1.
+        pass: usize,
+        /// Step within the pass.
+        step: usize,
+        /// Its parameters in physical units.
+        values: String,
+        /// Why its run failed.
+        cause: String,
+        /// What the estimator advises.
+        source: EstimatorError,
+    },
+    /// A run has no answer, and that is not the model's doing.
+    #[error(
+        "the run of particle {particle} over record `{record}`{} has no usable answer: {reason}",
+        in_brackets(values)
+    )]
+    NoAnswer {
+        /// Index of the sigma point.
+        particle: usize,
+        /// Record name.
+        record: String,
+        /// Its parameters in physical units; empty where they are not known.
+        values: String,
+        /// What came instead.
+        reason: String,
+    },
+    /// A figure of the result is no finite number.
+    #[error(
+        "the {0} of the result is not a finite number: the priors or the noise are out of all proportion to the data"
+    )]
+    NotFinite(String),
+    /// The model fails at the estimate itself.
+    #[error("the model fails with the estimated parameters on record `{record}`: {source}")]
+    FinalRun {
+        /// Record name.
+        record: String,
+        /// Why.
+        source: Failure,
+    },
+    /// A value that must serialise did not.
+    #[error("internal: {0}")]
+    Internal(String),
+}
+
+impl RunError {
+    /// Whether somebody cancelled the work, rather than that it failed.
+    pub fn is_cancelled(&self) -> bool {
+        matches!(self, Self::Fleet(FleetError::Cancelled))
+    }
+}
+
+fn in_brackets(values: &str) -> String {
+    if values.is_empty() { String::new() } else { format!(" ({values})") }
+}
+
+/// What a fit leaves behind.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// Posterior in transformed units, under the study's own prior.
+    pub posterior: Gaussian,
+    /// Evidence: log-likelihood with the parameters integrated out.
+    pub log_likelihood: f64,
+    /// Normalised innovation squared of the last pass, summed.
+    pub nis: f64,
+    /// Observations used in the last pass.
+    pub n_used: usize,
+    /// Largest share of the spread lost at one analysis.
+    pub information_lost: f64,
+    /// Largest share of the spread that a resampling left out.
+    pub dropped: f64,
+    /// Runs.
+    pub counts: Counts,
+    /// Passes done.
+    pub passes: usize,
+    /// False when the iteration limit came first.
+    pub converged: bool,
+    /// How far the last pass moved the estimate; `None` for one pass, which has nothing to be compared with.
+    pub last_move: Option<Move>,
+}
+
+/// The entry of the estimated vector that a pass moved most.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Move {
+    /// Its position.
+    pub entry: usize,
+    /// How far, in its posterior standard deviations.
+    pub size: f64,
+}
+
+impl Move {
+    /// Below this many posterior standard deviations an estimate counts as settled.
+    pub const SETTLED: f64 = 0.1;
+
+    /// Whether no entry moved further.
+    pub fn is_settled(&self) -> bool {
+        self.size < Self::SETTLED
+    }
+}
+
+impl Fit {
+    /// Normalised innovation squared per observation of the last pass.
+    pub fn nis_per_observation(&self) -> f64 {
+        self.nis / (self.n_used.max(1)) as f64
+    }
+}
+
+/// Where a run stands.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// `filter`, `batch` or `forward run`.
+    pub stage: &'static str,
+    /// Pass, from 1.
+    pub pass: usize,
+    /// Passes in all; `None` when they go on until the estimate has settled.
+    pub passes: Option<usize>,
+    /// Analyses done in this pass.
+    pub step: usize,
+    /// Analyses of a pass, at most.
+    pub steps: usize,
+    /// Runs so far.
+    pub runs: u64,
+    /// Workers now.
+    pub workers: usize,
+}
+
+/// What the run needs from the outside: time, somebody who watches, and the fleet's events.
+pub struct RunContext<'a> {
+    /// Seconds since the program started.
+    pub clock: &'a dyn Fn() -> f64,
+    /// Called after every analysis.
+    pub watch: &'a mut dyn FnMut(&Progress),
+    /// Events of the fleet, kept in the store.
+    pub events: Option<&'a Receiver<FleetEvent>>,
+    /// Wall time of the earlier parts of a resumed run, in s.
+    pub earlier_s: f64,
+    /// Threads for the recombination of states, which happens here and not on the fleet; no result depends on them.
+    pub threads: usize,
+}
+
+impl RunContext<'_> {
+    /// Wall time of the run so far, earlier parts included, in s.
+    pub fn elapsed(&self) -> f64 {
+        self.earlier_s + (self.clock)()
+    }
+
+    /// Stores the fleet's events and tells the watcher.
+    pub(super) fn after_step(&mut self, store: &Store, progress: &Progress) -> Result<(), StoreError> {
+        self.keep_events(store)?;
+        store.commit_if_due(self.elapsed())?;
+        (self.watch)(progress);
+        Ok(())
+    }
+
+    fn keep_events(&self, store: &Store) -> Result<(), StoreError> {
+        for event in self.events.iter().flat_map(|events| events.try_iter()) {
+            store.event(self.elapsed(), event.kind(), &event.to_string())?;
+        }
+        Ok(())
+    }
+}
+
+/// Runs or continues a study in its folder and writes the result.
+///
+/// # Errors
+/// When the fleet, the estimator or the store fails; what was done until then stays in the store, with what the fleet told.
+pub fn run(
+    study: &Study,
+    fleet: &mut dyn Fleet,
+    folder: &mut RunFolder,
+    context: &mut RunContext<'_>,
+) -> Result<Summary, RunError> {
+    let result = from_start_to_end(study, fleet, folder, context);
+    if result.is_err() {
+        // The error itself is what counts, also where the store is why.
+        let _ = context.keep_events(&folder.store);
+    }
+    result
+}
+
+fn from_start_to_end(
+    study: &Study,
+    fleet: &mut dyn Fleet,
+    folder: &mut RunFolder,
+    context: &mut RunContext<'_>,
+) -> Result<Summary, RunError> {
+    let resumed = Snapshot::read(&folder.store, study.records.len())?;
+    context.earlier_s = folder.store.elapsed_s()?;
+    folder.store.event(
+        context.elapsed(),
+        "run",
+        if resumed.is_some() { "run resumed" } else { "run started" },
+    )?;
+    let mut flight = Flight::new(study, fleet)?.deciding(&folder.store)?;
+    flight.threads = context.threads.max(1);
+    let fit = match study.estimator.kind {
+        EstimatorKind::Roukf => filter::fit(&mut flight, &folder.store, context, resumed)?,
+        EstimatorKind::Batch => batch::fit(&mut flight, &folder.store, context, resumed)?,
+    };
+    let predictions = forecast::run(&mut flight, &fit.posterior)?;
+    let observer = observer_gain::compare(&mut flight, &fit.posterior, &predictions)?;
+    let (hangs_on, given_residuals) = match &observer {
+        // What fails at the estimate itself need not be tried beside it.
+        Compared::Failed(_) => {
+            let why = "the model fails under its observer".to_owned();
+            (Ok(HangsOn::default()), GivenResiduals::Unknown(why))
+        }
+        Compared::NoObserver | Compared::Both(_) => {
+            (hangs_on(&mut flight, &fit)?, given_residuals::compare(&mut flight, &fit.posterior)?)
+        }
+    };
+    let jobs = flight.take_rows();
+    folder.store.predictions(&predictions, &jobs)?;
+    context.keep_events(&folder.store)?;
+    let mut result = summary::make(study, &fit, &predictions, flight.n_answered(), context.elapsed());
+    result.add_residuals(study, &fit, &given_residuals);
+    let mut unknown = None;
+    match observer {
+        Compared::NoObserver => {}
+        Compared::Both(observer) => {
+            folder.store.set_meta(OBSERVER, &folder::json(&observer.courses))?;
+            result.observer = Some(observer.fit);
+        }
+        Compared::Failed(why) => unknown = Some(why),
+    }
+    let residuals = warnings::residuals::residuals(study, &fit, &folder.store, &predictions)?;
+    result.warnings = warnings::collect(study, &fit, &result, &predictions, &residuals);
+    result.warnings.extend(unknown);
+    result.warnings.extend(folder.mixed()?);
+    result.warnings.extend(flight.timeouts());
+    match hangs_on {
+        Ok(found) => result.hangs_on = (found.runs > 0).then_some(found),
+        Err(why) => result.warnings.push(why),
+    }
+    result.check_finite().map_err(RunError::NotFinite)?;
+    folder.store.event(context.elapsed(), "run", "run finished")?;
+    folder.finish(study, &fit, &result)?;
+    Ok(result)
+}
+
+/// Which constants the answer hangs on, or why that is not known. Nothing is said of parameters that drift: they follow
+/// whatever is wrong.
+fn hangs_on(flight: &mut Flight<'_>, fit: &Fit) -> Result<Result<HangsOn, String>, RunError> {
+    if flight.study().drifts() {
+        return Ok(Ok(HangsOn::default()));
+    }
+    match constants::of_fit(flight, fit.posterior.mean.as_slice()) {
+        Ok(found) => Ok(Ok(found)),
+        Err(IdentifyError::Run(error)) => Err(error),
+        Err(error) => Ok(Err(format!("which constants the answer hangs on is not known: {error}"))),
+    }
+}

@@ -1,0 +1,45 @@
+//! The key of a run: everything that its answer depends on, as one hash.
+//!
+//! Next file to read: [`crate::store`], which keeps answers by it.
+
+use starlings_models::Job;
+
+use crate::store::RunKey;
+use starlings_fleet::SetupId;
+
+/// The key of a run that nothing pulls: the programs that make it (a digest), the setup and the job, without what was observed.
+pub fn free(programs: &[u8; 32], setup: &SetupId, job: &Job) -> RunKey {
+    let mut hasher = blake3::Hasher::new();
+    hash(&mut hasher, programs, setup, job);
+    *hasher.finalize().as_bytes()
+}
+
+/// The key of a run that an observer may pull to what was observed.
+pub(crate) fn observed(programs: &[u8; 32], setup: &SetupId, job: &Job) -> RunKey {
+    let mut hasher = blake3::Hasher::new();
+    hash(&mut hasher, programs, setup, job);
+    numbers(&mut hasher, &job.window.observed);
+    *hasher.finalize().as_bytes()
+}
+
+fn hash(hasher: &mut blake3::Hasher, programs: &[u8; 32], setup: &SetupId, job: &Job) {
+    hasher.update(programs);
+    hasher.update(setup);
+    hasher.update(&u64::from(job.record).to_le_bytes());
+    numbers(hasher, &job.theta);
+    numbers(hasher, job.state.as_deref().unwrap_or_default());
+    numbers(hasher, &[job.window.start]);
+    numbers(hasher, &job.window.times);
+    for signal in &job.window.inputs {
+        numbers(hasher, &signal.times);
+        numbers(hasher, &signal.values);
+    }
+}
+
+fn numbers(hasher: &mut blake3::Hasher, values: &[f64]) {
+    // Lengths keep neighbouring lists apart.
+    hasher.update(&(values.len() as u64).to_le_bytes());
+    for value in values {
+        hasher.update(&value.to_le_bytes());
+    }
+}

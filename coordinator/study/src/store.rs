@@ -1,0 +1,300 @@
+//! The run's one file: a SQLite database with one row per event, job and analysis.
+//!
+//! Whatever is shown later — summary, report, export, resume — is read from here and from nowhere else. Each analysis is
+//! written in one piece with the snapshot that a resumed run starts from, and a few quick ones are committed together, so a
+//! run killed at any instant continues from a whole analysis at most [`HOLD_S`] before. Nothing here computes. Next file to read: [`crate::store::snapshot`].
+
+mod changes;
+mod error;
+pub mod folder;
+mod folder_error;
+mod info;
+mod make;
+mod meaning;
+mod program;
+mod purpose;
+mod remembered;
+mod resume;
+mod rows;
+mod schema;
+pub mod snapshot;
+mod table;
+#[cfg(test)]
+mod tests;
+
+use std::cell::Cell;
+use std::path::{Path, PathBuf};
+
+use rusqlite::{Connection, OptionalExtension, Row, params};
+
+use schema::{SCHEMA_VERSION, insert_analysis, insert_jobs, insert_predictions};
+use snapshot::Snapshot;
+
+pub use error::StoreError;
+pub use program::Program;
+pub use purpose::{EXPLANATION, Purpose};
+pub use remembered::RunKey;
+pub use rows::{AnalysisRow, EstimateRow, InnovationRow, JobRow, PredictionRow};
+pub use table::table;
+
+/// Analyses are committed together for at most so long, in s: a commit costs about as much as the rows of an analysis.
+pub const HOLD_S: f64 = 0.05;
+
+/// Name under which the store keeps how far the run has come.
+const ELAPSED: &str = "elapsed_s";
+
+/// An open run database.
+pub struct Store {
+    path: PathBuf,
+    connection: Connection,
+    /// Time of the last commit, in s of the run's wall time.
+    committed_s: Cell<f64>,
+}
+
+impl Drop for Store {
+    fn drop(&mut self) {
+        // Nobody is left to be told; what was committed before stays.
+        let _ = self.commit();
+    }
+}
+
+impl Store {
+    /// Opens the database of an existing run to continue it.
+    ///
+    /// # Errors
+    /// When there is none or it was written by another version.
+    pub fn open(path: &Path) -> Result<Self, StoreError> {
+        let store = Self::existing(path, rusqlite::OpenFlags::SQLITE_OPEN_READ_WRITE)?;
+        store.keep_a_log()?;
+        store.guard(store.connection.execute_batch(remembered::TABLE))?;
+        Ok(store)
+    }
+
+    /// Opens the database of an existing run to read it; the folder may be read-only.
+    ///
+    /// # Errors
+    /// When there is none or it was written by another version.
+    pub fn open_to_read(path: &Path) -> Result<Self, StoreError> {
+        Self::existing(path, rusqlite::OpenFlags::SQLITE_OPEN_READ_ONLY)
+    }
+
+    fn existing(path: &Path, flags: rusqlite::OpenFlags) -> Result<Self, StoreError> {
+        if !path.is_file() {
+            return Err(StoreError::Unusable(format!(
+                "no run in {}: expected the file {}",
+                folder_of(path),
+                path.display()
+            )));
+        }
+        let store = Self::connect(path, flags)?;
+        let version: i64 =
+            store.guard(store.connection.pragma_query_value(None, "user_version", |row| row.get(0)))?;
+        if version == 0 {
+            return Err(StoreError::Unusable(format!(
+                "{} holds nothing: the program was ended while it was made; remove the file and start again",
+                path.display()
+            )));
+        }
+        if version != SCHEMA_VERSION {
+            return Err(StoreError::Unusable(format!(
+                "{} has store version {version}, this program reads version {SCHEMA_VERSION}",
+                path.display()
+            )));
+        }
+        Ok(store)
+    }
+
+    fn connect(path: &Path, flags: rusqlite::OpenFlags) -> Result<Self, StoreError> {
+        let connection = Connection::open_with_flags(path, flags)
+            .map_err(|source| StoreError::Database { path: path.to_owned(), source })?;
+        Ok(Self { path: path.to_owned(), connection, committed_s: Cell::new(f64::NEG_INFINITY) })
+    }
+
+    /// WAL with NORMAL keeps every committed transaction through a killed process at the price of one write each.
+    fn keep_a_log(&self) -> Result<(), StoreError> {
+        self.guard(self.connection.pragma_update(None, "journal_mode", "WAL"))?;
+        self.guard(self.connection.pragma_update(None, "synchronous", "NORMAL"))?;
+        // KiB of pages in memory: rows are written once and hardly read again.
+        self.guard(self.connection.pragma_update(None, "cache_size", -1024))
+    }
+
+    /// Folds the log into the one file, so that a finished run can be read from a read-only folder.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub fn close_log(&self) -> Result<(), StoreError> {
+        self.commit()?;
+        self.guard(self.connection.pragma_update(None, "journal_mode", "DELETE"))
+    }
+
+    /// The folder that the database stands in.
+    pub fn folder(&self) -> &Path {
+        self.path.parent().unwrap_or(Path::new(""))
+    }
+
+    pub(super) fn guard<T>(&self, result: rusqlite::Result<T>) -> Result<T, StoreError> {
+        result.map_err(|source| StoreError::Database { path: self.path.clone(), source })
+    }
+
+    pub(super) fn connection(&self) -> &Connection {
+        &self.connection
+    }
+
+    /// That something it holds cannot be read: which, and why.
+    pub fn damaged(&self, what: &'static str, reason: impl std::fmt::Display) -> StoreError {
+        StoreError::Damaged { path: self.path.clone(), what, reason: reason.to_string() }
+    }
+
+    /// Sets a named value of the run.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub fn set_meta(&self, key: &str, value: &str) -> Result<(), StoreError> {
+        self.guard(
+            self.connection.execute("INSERT OR REPLACE INTO meta (key, value) VALUES (?1, ?2)", [key, value]),
+        )?;
+        Ok(())
+    }
+
+    /// A named value of the run.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub fn meta(&self, key: &str) -> Result<Option<String>, StoreError> {
+        self.guard(
+            self.connection
+                .query_row("SELECT value FROM meta WHERE key = ?1", [key], |row| row.get(0))
+                .optional(),
+        )
+    }
+
+    /// Appends an event.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub fn event(&self, at_s: f64, kind: &str, text: &str) -> Result<(), StoreError> {
+        let mut insert = self.guard(
+            self.connection.prepare_cached("INSERT INTO events (at_s, kind, text) VALUES (?1, ?2, ?3)"),
+        )?;
+        self.guard(insert.execute(params![at_s, kind, text]))?;
+        Ok(())
+    }
+
+    /// Writes one analysis and the snapshot after it, in one piece; [`Store::commit`] or the end of the store makes it last.
+    ///
+    /// # Errors
+    /// When the database refuses; nothing of the analysis is then kept, and those before are committed.
+    pub fn analysis(&self, row: &AnalysisRow, snapshot: &Snapshot) -> Result<(), StoreError> {
+        let connection = &self.connection;
+        let insert = || -> rusqlite::Result<()> {
+            insert_analysis(connection, row)?;
+            insert_jobs(connection, &row.jobs)?;
+            snapshot.write(connection)?;
+            connection.execute_batch("RELEASE analysis")
+        };
+        let write = || -> rusqlite::Result<()> {
+            if connection.is_autocommit() {
+                connection.execute_batch("BEGIN IMMEDIATE")?;
+            }
+            connection.execute_batch("SAVEPOINT analysis")?;
+            insert().inspect_err(|_| {
+                // The failure before is the one to tell; a full disk may have ended the transaction already.
+                let _ = connection.execute_batch("ROLLBACK TO analysis; RELEASE analysis");
+            })
+        };
+        let written = write();
+        if written.is_err() {
+            // The first failure is the one to tell.
+            let _ = self.commit();
+        }
+        self.guard(written)
+    }
+
+    /// Makes everything written so far last.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub fn commit(&self) -> Result<(), StoreError> {
+        if self.connection.is_autocommit() {
+            return Ok(());
+        }
+        self.guard(self.connection.execute_batch("COMMIT"))
+    }
+
+    /// [`Store::commit`], if the last one was [`HOLD_S`] or longer ago; `now_s` is the run's wall time.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub fn commit_if_due(&self, now_s: f64) -> Result<(), StoreError> {
+        if now_s - self.committed_s.get() >= HOLD_S {
+            self.note_elapsed(now_s)?;
+            self.commit()?;
+            self.committed_s.set(now_s);
+        }
+        Ok(())
+    }
+
+    /// Writes the final forward run, replacing an earlier one.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub fn predictions(&self, rows: &[PredictionRow], jobs: &[JobRow]) -> Result<(), StoreError> {
+        self.commit()?;
+        let write = || -> rusqlite::Result<()> {
+            let transaction = self.connection.unchecked_transaction()?;
+            transaction.execute("DELETE FROM predictions", [])?;
+            transaction.execute("DELETE FROM jobs WHERE pass = 0", [])?;
+            insert_predictions(&transaction, rows)?;
+            insert_jobs(&transaction, jobs)?;
+            transaction.commit()
+        };
+        self.guard(write())
+    }
+
+    /// How far the run had come, in s of its wall time: the last commit or the last event, whichever is later; zero for a
+    /// new run.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub fn elapsed_s(&self) -> Result<f64, StoreError> {
+        let of_events = "SELECT coalesce(max(at_s), 0.0) FROM events";
+        let told: f64 = self.guard(self.connection.query_row(of_events, [], |row| row.get(0)))?;
+        let kept = self.meta(ELAPSED)?.and_then(|text| text.parse().ok());
+        Ok(kept.unwrap_or(0.0_f64).max(told))
+    }
+
+    /// Notes how far the run has come.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub fn note_elapsed(&self, now_s: f64) -> Result<(), StoreError> {
+        self.set_meta(ELAPSED, &now_s.to_string())
+    }
+
+    /// The programs that the run's numbers come from; empty where the store does not say.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub fn program(&self) -> Result<Program, StoreError> {
+        let text = self.meta(Program::KEY)?;
+        Ok(text.and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default())
+    }
+
+    /// All rows of a query, each mapped by `map`. The tables are those of `schema.rs`.
+    ///
+    /// # Errors
+    /// When the database refuses, or a row cannot be mapped.
+    pub fn rows<T>(
+        &self,
+        sql: &str,
+        map: impl FnMut(&Row<'_>) -> rusqlite::Result<T>,
+    ) -> Result<Vec<T>, StoreError> {
+        let mut statement = self.guard(self.connection().prepare(sql))?;
+        let rows = self.guard(statement.query_map([], map))?;
+        self.guard(rows.collect())
+    }
+}
+
+fn folder_of(path: &Path) -> String {
+    path.parent().map(|p| p.display().to_string()).unwrap_or_default()
+}

@@ -1,0 +1,153 @@
+//! The run folder: a frozen study, the store, and the files made from it.
+//!
+//! A folder holds a run once its database stands under its name; whatever a killed start left before that is removed by the
+//! next one. Result files are written beside their place and renamed into it, so a reader never sees half of one. Next files
+//! to read: [`crate::store`], and [`super::resume`] for what a run may be continued with.
+
+use std::fs::{File, TryLockError};
+use std::io;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use crate::store::{Program, Purpose, Store, StoreError};
+use crate::summary::Summary;
+use crate::{Fit, Study, posterior};
+
+pub use super::folder_error::FolderError;
+pub use super::info::StudyInfo;
+use super::info::info;
+use super::make;
+use super::meaning::Meaning;
+pub use super::resume::Call;
+
+/// An open run folder.
+pub struct RunFolder {
+    /// The folder.
+    pub path: PathBuf,
+    /// Its database.
+    pub store: Store,
+    /// Held for as long as this process runs in the folder.
+    pub(super) _lock: Option<File>,
+}
+
+/// Name under which the store keeps the course of the innovations with and without the observer.
+pub const OBSERVER: &str = "observer";
+
+/// The database of a run, and the study as it was run.
+pub(super) const DATABASE: &str = "run.db";
+const FROZEN: &str = "study.toml";
+
+impl RunFolder {
+    /// Makes the folder of a new run and freezes the study into it.
+    ///
+    /// # Errors
+    /// When the folder holds a run or one of its files already, or cannot be written; nothing is left then.
+    pub fn create(
+        purpose: Purpose,
+        path: &Path,
+        study: &Study,
+        command: &str,
+        started: &str,
+    ) -> Result<Self, FolderError> {
+        let database = path.join(DATABASE);
+        let free = || {
+            if database.exists() {
+                return Err(FolderError::Occupied(path.to_owned()));
+            }
+            let mut files = purpose.files().iter().map(|name| path.join(name));
+            files.find(|file| file.exists()).map_or(Ok(()), |taken| Err(FolderError::InTheWay(taken)))
+        };
+        free()?;
+        std::fs::create_dir_all(path)
+            .map_err(|source| FolderError::Unwritable { path: path.to_owned(), source })?;
+        let lock = lock(path)?;
+        // Somebody else may have been here before the lock.
+        free()?;
+        let info = json(&info(study, command, started));
+        let (meaning, program) = (json(&Meaning::of(study, purpose)), json(&Program::of(study)));
+        let meta = [
+            ("study", &*study.text),
+            (Meaning::KEY, &meaning),
+            (Program::KEY, &program),
+            ("info", &info),
+            (Purpose::KEY, purpose.name()),
+        ];
+        let store = Store::create(&database, &meta)?;
+        freeze(path, &study.text).inspect_err(|_| make::remove(&database))?;
+        Ok(Self { path: path.to_owned(), store, _lock: Some(lock) })
+    }
+
+    /// Opens the folder of any run for reading.
+    ///
+    /// # Errors
+    /// When there is no run.
+    pub fn open(path: &Path) -> Result<Self, FolderError> {
+        Ok(Self { path: path.to_owned(), store: Store::open_to_read(&path.join(DATABASE))?, _lock: None })
+    }
+
+    /// What the folder is for.
+    ///
+    /// # Errors
+    /// When the store fails.
+    pub fn purpose(&self) -> Result<Purpose, StoreError> {
+        Purpose::of(&self.store)
+    }
+
+    /// The summary, once the run is finished.
+    ///
+    /// # Errors
+    /// When the store fails or its content is damaged.
+    pub fn summary(&self) -> Result<Option<Summary>, StoreError> {
+        let text = self.store.meta("summary")?;
+        text.map(|t| serde_json::from_str(&t).map_err(|e| self.store.damaged("summary", e))).transpose()
+    }
+
+    pub(crate) fn finish(&mut self, study: &Study, fit: &Fit, summary: &Summary) -> Result<(), StoreError> {
+        let posterior =
+            posterior::to_csv(study, &fit.posterior).map_err(|e| self.store.damaged("posterior", e))?;
+        self.store.set_meta("posterior", &posterior)?;
+        self.store.set_meta("summary", &json(summary))?;
+        // Somebody who reads the database right now keeps its log open; the run is finished all the same.
+        let _ = self.store.close_log();
+        Ok(())
+    }
+}
+
+/// Writes the study as it is run.
+pub(super) fn freeze(path: &Path, text: &str) -> Result<(), FolderError> {
+    let frozen = path.join(FROZEN);
+    write(&frozen, text).map_err(|source| FolderError::Unwritable { path: frozen, source })
+}
+
+/// Whether a folder has its study.
+pub(super) fn is_frozen(path: &Path) -> bool {
+    path.join(FROZEN).exists()
+}
+
+/// Locks the folder until the file is dropped.
+pub(super) fn lock(path: &Path) -> Result<File, FolderError> {
+    let file =
+        File::open(path).map_err(|source| FolderError::Unwritable { path: path.to_owned(), source })?;
+    match file.try_lock() {
+        Err(TryLockError::WouldBlock) => Err(FolderError::Locked(path.to_owned())),
+        // Some network file systems know no locks; a run there is better than none.
+        Ok(()) | Err(TryLockError::Error(_)) => Ok(file),
+    }
+}
+
+/// Writes a file beside its place and renames it into it.
+///
+/// # Errors
+/// When the file cannot be written or renamed.
+pub fn write(path: &Path, text: &str) -> io::Result<()> {
+    let partial = path.with_extension("partial");
+    std::fs::write(&partial, text).and_then(|()| std::fs::rename(&partial, path)).inspect_err(|_| {
+        // Already failing: what cannot be removed either stays.
+        let _ = std::fs::remove_file(&partial);
+    })
+}
+
+pub(crate) fn json(value: &impl Serialize) -> String {
+    serde_json::to_string(value).unwrap_or_default()
+}

@@ -1,0 +1,181 @@
+//! What an interrupted run may be continued with: the same study, the same recordings, the same programs.
+//!
+//! Changes that change no number are taken, the others are told; another build goes on only where that was asked for, and
+//! then the result says so. Next file to read: [`super::meaning`].
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use super::changes::changes;
+use super::folder::{DATABASE, FolderError, RunFolder, StudyInfo, freeze, is_frozen, json, lock};
+use super::make::is_left_over;
+use super::meaning::{Meaning, Part};
+use super::{Program, Purpose, Store, StoreError};
+use crate::Study;
+
+/// How a run is continued.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Call<'a> {
+    /// The command line.
+    pub command: &'a str,
+    /// When it was given, as text.
+    pub started: &'a str,
+    /// Go on with another build of this program or another solver than those that began.
+    pub other_build: bool,
+}
+
+/// Name under which the store keeps that its numbers come from more than one program.
+const MIXED: &str = "mixed";
+
+impl RunFolder {
+    /// Opens the folder of a run that was interrupted; one that was killed before its first step begins again.
+    ///
+    /// # Errors
+    /// When there is no run, another process runs in it, it serves another purpose, or it was started from another study,
+    /// other recordings, by another version or, unless that is accepted, by another build or with another solver.
+    pub fn resume(
+        purpose: Purpose,
+        path: &Path,
+        study: &Study,
+        call: &Call<'_>,
+    ) -> Result<Self, FolderError> {
+        let database = path.join(DATABASE);
+        if !database.exists() && was_begun(path, &database) {
+            return Self::create(purpose, path, study, call.command, call.started);
+        }
+        if !database.is_file() {
+            return Err(Store::open(&database)
+                .err()
+                .map_or(FolderError::NeverStarted(path.to_owned()), Into::into));
+        }
+        let lock = lock(path)?;
+        let store = Store::open(&database)?;
+        let found = Purpose::of(&store)?;
+        if found != purpose {
+            let (folder, holds, command) = (path.to_owned(), found.with_article(), found.command());
+            return Err(FolderError::OtherPurpose { folder, holds, command });
+        }
+        let text = store.meta("study")?.ok_or_else(|| FolderError::NeverStarted(path.to_owned()))?;
+        same_study(&store, path, &text, study, purpose)?;
+        if !is_frozen(path) {
+            freeze(path, &text)?;
+        }
+        let folder = Self { path: path.to_owned(), store, _lock: Some(lock) };
+        if !folder.is_finished(purpose)? {
+            folder.same_programs(study, purpose, call)?;
+            folder.told(&text, study, purpose, call)?;
+        }
+        Ok(folder)
+    }
+
+    /// Whether only its files are to be written again.
+    fn is_finished(&self, purpose: Purpose) -> Result<bool, StoreError> {
+        Ok(self.store.meta(purpose.result())?.is_some())
+    }
+
+    /// Whether its numbers come from more than one program, and what that means; nothing where they do not.
+    ///
+    /// # Errors
+    /// When the store fails.
+    pub fn mixed(&self) -> Result<Option<String>, StoreError> {
+        self.store.meta(MIXED)
+    }
+
+    fn same_programs(&self, study: &Study, purpose: Purpose, call: &Call<'_>) -> Result<(), FolderError> {
+        let (before, now) = (self.store.program()?, Program::of(study));
+        let folder = self.path.clone();
+        if before.version() != now.version() {
+            let (version, this) = (before.version().to_owned(), now.version().to_owned());
+            return Err(FolderError::OtherVersion { folder, version, this });
+        }
+        let (is_other, solver) = (before.is_other_build(&now), before.solver_changes(&now));
+        if !is_other && solver.is_empty() {
+            return Ok(());
+        }
+        if !call.other_build {
+            return Err(if is_other {
+                let (version, build, this) =
+                    (now.version().to_owned(), before.build().to_owned(), now.build().to_owned());
+                FolderError::OtherBuild { folder, version, build, this, kept: kept(purpose) }
+            } else {
+                FolderError::OtherSolver { folder, what: solver.join(", "), kept: kept(purpose) }
+            });
+        }
+        self.store.set_meta(Program::KEY, &json(&now))?;
+        if purpose == Purpose::Run {
+            self.store.set_meta(MIXED, &mixed(&before, &now, is_other, &solver))?;
+        }
+        Ok(())
+    }
+
+    /// Notes how the run goes on.
+    fn told(&self, text: &str, study: &Study, purpose: Purpose, call: &Call<'_>) -> Result<(), FolderError> {
+        if *text != *study.text {
+            let at = self.store.elapsed_s()?;
+            self.store.event(at, "study", "continued with a study file whose changes change no number")?;
+        }
+        // What an explanation answers depends on its command line as well.
+        if purpose == Purpose::Explanation && !call.command.is_empty() {
+            let info = self.store.meta("info")?.unwrap_or_default();
+            if let Ok(info) = serde_json::from_str::<StudyInfo>(&info) {
+                let info = StudyInfo { command: call.command.to_owned(), ..info };
+                self.store.set_meta("info", &json(&info))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether a start was killed here before there was a run: an empty folder, or what [`Store::create`] leaves in one.
+fn was_begun(path: &Path, database: &Path) -> bool {
+    std::fs::read_dir(path)
+        .is_ok_and(|mut entries| entries.all(|entry| entry.is_ok_and(|e| is_left_over(&e.path(), database))))
+}
+
+fn same_study(
+    store: &Store,
+    path: &Path,
+    text: &str,
+    study: &Study,
+    purpose: Purpose,
+) -> Result<(), FolderError> {
+    let kept = store.meta(Meaning::KEY)?.unwrap_or_default();
+    let kept: Meaning = serde_json::from_str(&kept).unwrap_or_default();
+    let (parts, records) = kept.differences(&Meaning::of(study, purpose));
+    let told = changes(text, &study.text);
+    let Some(part) = first(&parts, &told) else { return Ok(()) };
+    let (what, which) = match part {
+        Part::StudyFile => ("the study file", told),
+        Part::Recordings => ("the recordings", records.iter().map(|name| format!("`{name}`")).collect()),
+        Part::Solver => ("the solver or one of its files", Vec::new()),
+    };
+    let which = if which.is_empty() { String::new() } else { format!(": {}", which.join(", ")) };
+    Err(FolderError::OtherStudy { folder: path.to_owned(), what, which })
+}
+
+/// The part to tell of. A change of the study file may change what is read of the others; where the file says the same, it is what a
+/// solver says of itself that gave its words another meaning.
+fn first(parts: &BTreeSet<Part>, told: &[String]) -> Option<Part> {
+    let by_itself = parts.contains(&Part::Solver) && told.is_empty();
+    parts.iter().copied().find(|part| !(by_itself && *part == Part::StudyFile))
+}
+
+/// What becomes of what is stored, where a run goes on with another program.
+fn kept(purpose: Purpose) -> &'static str {
+    match purpose {
+        Purpose::Run => "what is stored stays, the rest is computed anew, and the result says so",
+        Purpose::Explanation => "runs that were made are made again",
+    }
+}
+
+fn mixed(before: &Program, now: &Program, is_other: bool, solver: &[String]) -> String {
+    let how = if is_other {
+        format!("begun by build {} of this program and continued by build {}", before.build(), now.build())
+    } else {
+        format!("continued with another solver ({})", solver.join(", "))
+    };
+    format!(
+        "the run was {how} (--other-build): its numbers are those of neither alone; start a new run for numbers that can be \
+         reproduced"
+    )
+}

@@ -1,0 +1,165 @@
+//! What a killed run continues from: the state of the estimator and of every particle after the last analysis.
+//!
+//! Small values are one JSON text, states are little-endian f64 blobs, so a resumed run sees the same bits. Next file to
+//! read: [`crate::run`].
+
+use nalgebra::DMatrix;
+use rusqlite::{Connection, OptionalExtension, params};
+use serde::{Deserialize, Serialize};
+
+use crate::store::{Store, StoreError};
+
+/// A column-major matrix as plain data.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Matrix {
+    /// Number of rows.
+    pub rows: usize,
+    /// Number of columns.
+    pub columns: usize,
+    /// Entries, column by column.
+    pub values: Vec<f64>,
+}
+
+impl From<&DMatrix<f64>> for Matrix {
+    fn from(m: &DMatrix<f64>) -> Self {
+        Self { rows: m.nrows(), columns: m.ncols(), values: m.as_slice().to_vec() }
+    }
+}
+
+impl Matrix {
+    /// The matrix as a nalgebra matrix.
+    pub fn to_dense(&self) -> DMatrix<f64> {
+        DMatrix::from_column_slice(self.rows, self.columns, &self.values)
+    }
+}
+
+/// Counts that the summary reports, carried over a resume.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Counts {
+    /// Runs asked of the fleet.
+    pub total: u64,
+    /// Runs that failed for good.
+    pub failed: u64,
+    /// Extra attempts.
+    pub retried: u64,
+    /// Sigma points that were pulled towards the mean, or dropped, and so rescued their analysis.
+    pub rescued: u64,
+}
+
+/// The sequential estimator between two analyses.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Head {
+    /// Pass, from 0.
+    pub pass: usize,
+    /// Analyses done in this pass, or iterations of the batch estimator.
+    pub step: usize,
+    /// Transformed parameters, p × r; for the batch estimator its own state.
+    pub theta: Matrix,
+    /// Mean of the prior that this pass started from, transformed units.
+    pub centre: Vec<f64>,
+    /// Its standard deviations.
+    pub scale: Vec<f64>,
+    /// State of the batch estimator, empty for the filter.
+    pub batch: String,
+    /// Sum of NIS over this pass.
+    pub nis: f64,
+    /// Observations used in this pass.
+    pub n_used: usize,
+    /// Log-likelihood of this pass.
+    pub log_likelihood: f64,
+    /// Largest share of the spread lost at one analysis, over all passes.
+    pub information_lost: f64,
+    /// Largest share of the spread that a resampling left out, over all passes.
+    pub dropped: f64,
+    /// Runs so far.
+    pub counts: Counts,
+    /// Cost of a run at `centre`, where it is known: squared misfit plus squared distance from the prior.
+    #[serde(default)]
+    pub cost: Option<f64>,
+    /// Factor on the width of the points of this pass.
+    #[serde(default = "whole")]
+    pub narrow: f64,
+}
+
+fn whole() -> f64 {
+    1.0
+}
+
+/// Head and states.
+#[derive(Clone, Debug)]
+pub struct Snapshot {
+    /// The small values.
+    pub head: Head,
+    /// One n_state × r matrix per record; `None` before its first window and after its last.
+    pub states: Vec<Option<DMatrix<f64>>>,
+}
+
+impl Snapshot {
+    pub(crate) fn write(&self, connection: &Connection) -> rusqlite::Result<()> {
+        let head = serde_json::to_string(&self.head)
+            .map_err(|e| rusqlite::Error::ToSqlConversionFailure(Box::new(e)))?;
+        connection
+            .prepare_cached("INSERT OR REPLACE INTO snapshot (id, head) VALUES (1, ?1)")?
+            .execute(params![head])?;
+        connection.prepare_cached("DELETE FROM snapshot_states")?.execute([])?;
+        for (record, states) in self.states.iter().enumerate() {
+            if let Some(x) = states {
+                connection
+                    .prepare_cached("INSERT INTO snapshot_states VALUES (?1, ?2, ?3, ?4)")?
+                    .execute(params![record, x.nrows(), x.ncols(), to_bytes(x.as_slice())])?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The last snapshot of a run, if an analysis was stored; `n_record` is the number of records of the study.
+    ///
+    /// # Errors
+    /// When the database refuses or its content is damaged.
+    pub fn read(store: &Store, n_record: usize) -> Result<Option<Self>, StoreError> {
+        let head: Option<String> = store.guard(
+            store.connection().query_row("SELECT head FROM snapshot", [], |row| row.get(0)).optional(),
+        )?;
+        let Some(head) = head else { return Ok(None) };
+        let head: Head = serde_json::from_str(&head).map_err(|e| store.damaged("snapshot", e))?;
+        let mut states = vec![None; n_record];
+        let mut select = store
+            .guard(store.connection().prepare("SELECT record, rows, columns, body FROM snapshot_states"))?;
+        let rows = store.guard(select.query_map([], |row| {
+            Ok((
+                row.get::<_, usize>(0)?,
+                row.get::<_, usize>(1)?,
+                row.get::<_, usize>(2)?,
+                row.get::<_, Vec<u8>>(3)?,
+            ))
+        }))?;
+        for row in rows {
+            let (record, n, r, body) = store.guard(row)?;
+            let values = from_bytes(&body);
+            let slot =
+                states.get_mut(record).ok_or_else(|| store.damaged("snapshot", "an unknown record"))?;
+            if values.len() != n * r {
+                return Err(store.damaged("snapshot", "a state of the wrong length"));
+            }
+            *slot = Some(DMatrix::from_column_slice(n, r, &values));
+        }
+        Ok(Some(Self { head, states }))
+    }
+}
+
+/// Little-endian bytes of a slice.
+pub(crate) fn to_bytes(values: &[f64]) -> Vec<u8> {
+    values.iter().flat_map(|v| v.to_le_bytes()).collect()
+}
+
+/// The inverse of [`to_bytes`]; a trailing fragment is ignored.
+pub(crate) fn from_bytes(bytes: &[u8]) -> Vec<f64> {
+    bytes
+        .chunks_exact(8)
+        .map(|chunk| {
+            let mut word = [0; 8];
+            word.copy_from_slice(chunk);
+            f64::from_le_bytes(word)
+        })
+        .collect()
+}

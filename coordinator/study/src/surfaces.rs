@@ -1,0 +1,153 @@
+//! Walls that were measured as registered surfaces: what a predicted displacement is compared with.
+//!
+//! A channel of this kind has a node of the model's wall and one surface per time. Its observed value is zero, its predicted
+//! one the signed distance of the displaced node to the surface of the time, positive outside (Moireau et al. 2013). Models,
+//! workers and estimators know displacements and numbers only: predictions are turned into distances where they come back
+//! from the fleet, by [`Study::measure`], and a job carries for an observer the displacement with which the node would be on
+//! the surface, by [`Study::sendable`]. How surfaces are read is in [`crate::record`].
+
+use std::sync::Arc;
+
+use starlings_models::Window;
+use starlings_models::surface::{Foot, Mesh, Profile};
+
+use super::Study;
+use super::checked::{Channel, Record};
+
+/// Distance at which a node is on a surface, relative to one unit of length and to its displacement.
+const CLOSE: f64 = 1e-12;
+
+/// Steps after which the search along a node's line gives up.
+const MOST_STEPS: usize = 50;
+
+/// The surface of one time.
+#[derive(Clone, Debug)]
+pub enum Shape {
+    /// The wall of an axisymmetric vessel, points (z, r).
+    Profile(Profile),
+    /// Triangles, points (x, y, z).
+    Mesh(Mesh),
+}
+
+impl Shape {
+    /// The nearest place. The third coordinate of a profile is zero.
+    fn foot(&self, [a, b, c]: [f64; 3]) -> Option<Foot<3>> {
+        match self {
+            Self::Profile(profile) => profile.foot([a, b]).map(|foot| {
+                let ([z, r], [nz, nr]) = (foot.point, foot.normal);
+                let Foot { distance, facet, past_end, .. } = foot;
+                Foot { distance, point: [z, r, 0.0], normal: [nz, nr, 0.0], facet, past_end }
+            }),
+            Self::Mesh(mesh) => mesh.foot([a, b, c]),
+        }
+    }
+}
+
+/// The surfaces of a channel, in the order of time.
+#[derive(Clone, Debug, Default)]
+pub struct Shapes {
+    /// Times among those of the record.
+    pub times: Vec<f64>,
+    /// One surface for each.
+    pub shapes: Vec<Shape>,
+    /// Every coordinate that they were read from, by which a change of the files is seen.
+    pub numbers: Vec<f64>,
+}
+
+impl Shapes {
+    fn at(&self, time: f64) -> Option<&Shape> {
+        self.shapes.get(self.times.binary_search_by(|t| t.total_cmp(&time)).ok()?)
+    }
+}
+
+/// A node of the model's wall and the surfaces that it is compared with.
+#[derive(Clone, Debug)]
+pub struct Node {
+    /// Where the node is without displacement: (z, r, 0) or (x, y, z).
+    pub rest: [f64; 3],
+    /// The unit vector along which it is displaced.
+    pub normal: [f64; 3],
+    /// The surfaces.
+    pub seen: Arc<Shapes>,
+}
+
+impl PartialEq for Node {
+    fn eq(&self, other: &Self) -> bool {
+        let bits = |node: &Self| [node.rest, node.normal].map(|x| x.map(f64::to_bits));
+        bits(self) == bits(other) && Arc::ptr_eq(&self.seen, &other.seen)
+    }
+}
+
+impl Node {
+    /// Whether the surface of this time shows the node: there is one, and the node at rest is not past an open end.
+    ///
+    /// The place at rest decides and not that of a particle, so that all particles are compared with the same data.
+    pub fn is_shown(&self, time: f64) -> bool {
+        self.foot(time, 0.0).is_some_and(|foot| foot.past_end <= 0.0)
+    }
+
+    /// Signed distance of the node, displaced, to the surface of this time; `None` without one.
+    pub fn distance(&self, time: f64, displacement: f64) -> Option<f64> {
+        self.foot(time, displacement).map(|foot| foot.distance)
+    }
+
+    /// The displacement with which the node is on the surface of this time, by Newton's method; `None` without one, and where
+    /// its line does not meet the surface.
+    pub fn crossing(&self, time: f64) -> Option<f64> {
+        let mut displacement = 0.0;
+        for _ in 0..MOST_STEPS {
+            let foot = self.foot(time, displacement)?;
+            if foot.distance.abs() <= CLOSE * (1.0 + f64::abs(displacement)) {
+                return Some(displacement);
+            }
+            let slope: f64 = foot.normal.iter().zip(&self.normal).map(|(a, b)| a * b).sum();
+            displacement -= foot.distance / slope;
+        }
+        None
+    }
+
+    fn foot(&self, time: f64, displacement: f64) -> Option<Foot<3>> {
+        let displaced = std::array::from_fn(|i| displacement.mul_add(self.normal[i], self.rest[i]));
+        self.seen.at(time)?.foot(displaced)
+    }
+}
+
+impl Record {
+    /// The channels that were measured as surfaces.
+    fn surfaces(&self) -> impl Iterator<Item = (&Channel, &Node)> {
+        self.channels.iter().filter_map(|channel| Some((channel, channel.node.as_ref()?)))
+    }
+}
+
+impl Study {
+    /// Turns the outputs that a model predicted at these times of a record into what its channels measure, in place.
+    pub fn measure(&self, record: usize, times: &[f64], outputs: &mut [f64]) {
+        let n_obs = self.setup.outputs.len();
+        for (channel, node) in self.records[record].surfaces() {
+            for (values, &time) in outputs.chunks_mut(n_obs.max(1)).zip(times) {
+                // A value that is none must stay none.
+                if let Some(distance) = node.distance(time, values[channel.row]) {
+                    values[channel.row] = distance;
+                }
+            }
+        }
+    }
+
+    /// The window as a job carries it, for an observer that knows displacements only: in the place of an observed distance, the
+    /// displacement that has none.
+    pub fn sendable(&self, record: usize, window: &Arc<Window>) -> Arc<Window> {
+        if self.observer_is_off() || self.records[record].surfaces().next().is_none() {
+            return Arc::clone(window);
+        }
+        let mut sent = Window::clone(window);
+        let n_obs = self.setup.outputs.len();
+        for (channel, node) in self.records[record].surfaces() {
+            for (values, &time) in sent.observed.chunks_mut(n_obs.max(1)).zip(&window.times) {
+                if values[channel.row].is_finite() {
+                    values[channel.row] = node.crossing(time).unwrap_or(f64::NAN);
+                }
+            }
+        }
+        Arc::new(sent)
+    }
+}

@@ -1,0 +1,109 @@
+//! What a study needs from the outside where its model runs in a program of its own: somebody who starts it.
+//!
+//! The study itself starts no process. It is loaded with two functions, one that asks a solver what it is and one that makes
+//! what runs jobs, and keeps them for its trial runs. Next file to read: [`super::check`].
+
+use std::fmt;
+use std::sync::Arc;
+
+use starlings_models::{Description, Forward, Setup, SetupError, SolverDef, SolverFault};
+
+use starlings_fleet::Factory;
+
+/// Why a solver does not say what it is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Undescribed {
+    /// One sentence, with the end of the program's output where there is one.
+    pub reason: String,
+    /// The last that the program itself said before it ended.
+    pub last_words: Option<String>,
+    /// Whether the program is not on this machine, so that somebody elsewhere has to describe it.
+    pub is_absent: bool,
+}
+
+impl From<String> for Undescribed {
+    fn from(reason: String) -> Self {
+        Self { reason, last_words: None, is_absent: true }
+    }
+}
+
+/// Asks a solver what it is.
+type Describe = Arc<dyn Fn(&SolverDef) -> Result<Description, Undescribed> + Send + Sync>;
+
+/// Looks at the files of a solver without starting it.
+type Inspect = Arc<dyn Fn(&SolverDef) -> Vec<SolverFault> + Send + Sync>;
+
+/// Who starts solvers. The default starts none: built-in models and equations need nobody.
+#[derive(Clone)]
+pub struct Surroundings {
+    describe: Describe,
+    inspect: Inspect,
+    factory: Factory,
+}
+
+impl Surroundings {
+    /// Surroundings in which solvers can be asked for their description and setups be built.
+    pub fn new(
+        describe: impl Fn(&SolverDef) -> Result<Description, String> + Send + Sync + 'static,
+        factory: Factory,
+    ) -> Self {
+        Self::asking(move |def| describe(def).map_err(Undescribed::from), factory)
+    }
+
+    /// The same where it is known why a solver does not describe itself.
+    pub fn asking(
+        describe: impl Fn(&SolverDef) -> Result<Description, Undescribed> + Send + Sync + 'static,
+        factory: Factory,
+    ) -> Self {
+        Self { describe: Arc::new(describe), inspect: Arc::new(|_| Vec::new()), factory }
+    }
+
+    /// The same surroundings, in which somebody looks at the files of a solver while the study is read.
+    #[must_use]
+    pub fn inspecting(
+        self,
+        inspect: impl Fn(&SolverDef) -> Vec<SolverFault> + Send + Sync + 'static,
+    ) -> Self {
+        Self { inspect: Arc::new(inspect), ..self }
+    }
+
+    /// The same surroundings, in which every solver is known to be this one.
+    #[must_use]
+    pub fn knowing(&self, description: &Description) -> Self {
+        let known = description.clone();
+        Self { describe: Arc::new(move |_| Ok(known.clone())), ..self.clone() }
+    }
+
+    /// What a solver says of itself.
+    ///
+    /// # Errors
+    /// Why it does not.
+    pub fn describe(&self, solver: &SolverDef) -> Result<Description, Undescribed> {
+        (self.describe)(solver)
+    }
+
+    /// What is wrong with the files of a solver; nothing is started.
+    pub fn inspect(&self, solver: &SolverDef) -> Vec<SolverFault> {
+        (self.inspect)(solver)
+    }
+
+    /// What runs the jobs of a setup.
+    ///
+    /// # Errors
+    /// When the setup does not build.
+    pub fn build(&self, setup: &Setup) -> Result<Box<dyn Forward>, SetupError> {
+        (self.factory)(setup)
+    }
+}
+
+impl Default for Surroundings {
+    fn default() -> Self {
+        Self::new(|_| Err("no solver can be started here".to_owned()), Arc::new(Setup::build))
+    }
+}
+
+impl fmt::Debug for Surroundings {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Surroundings").finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,205 @@
+//! One trial run of every record at the prior median, in this process: does the model run at all where the study starts?
+//!
+//! Next file to read: [`mod@dry_run`], which makes the runs of a fit.
+
+pub mod dry_run;
+
+use std::sync::Arc;
+
+use starlings_models::external::table::foreign_bytes;
+use starlings_models::{Forward, Job, ModelFailure, ParticleError, Prediction, SOLVER, SetupError, Window};
+use starlings_proto::spent::spent;
+
+use super::{Study, posterior};
+pub use dry_run::{Depth, dry_run};
+use starlings_fleet::{WireError, travels};
+
+/// What the trial showed about one channel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrialChannel {
+    /// Record name.
+    pub record: String,
+    /// Output name.
+    pub output: String,
+    /// Number of observed values.
+    pub n_obs: usize,
+    /// Root mean square of observed − predicted at the prior median.
+    pub rmse: f64,
+    /// Noise sd.
+    pub noise: f64,
+}
+
+/// Why the trial failed.
+#[derive(Debug, thiserror::Error)]
+pub enum TrialError {
+    /// The setup does not build.
+    #[error(transparent)]
+    Setup(#[from] SetupError),
+    /// The model fails at the prior median.
+    #[error("the model fails at the prior median on record `{record}` ({values}): {source}; {remedy}")]
+    Model {
+        /// Record name.
+        record: String,
+        /// The values it was run with.
+        values: String,
+        /// Why it failed.
+        source: ParticleError,
+        /// What to do.
+        remedy: String,
+    },
+    /// The whole record runs, and a run of the fit does not.
+    #[error(
+        "the model fails at the prior median on record `{record}` in a run of the fit, {span} ({values}): {source}"
+    )]
+    Fit {
+        /// Record name.
+        record: String,
+        /// What is run, such as `over the training span alone, 0 to 48`.
+        span: String,
+        /// The values it was run with.
+        values: String,
+        /// Why it failed.
+        source: ParticleError,
+    },
+    /// The numbers are no table of 64-bit floats with a row per time.
+    #[error(
+        "the answer of the model on record `{record}` is no table with a row per time: {what}; `starlings conformance` tells more"
+    )]
+    Table {
+        /// Record name.
+        record: String,
+        /// What it is instead.
+        what: String,
+    },
+    /// Coordinator and workers could not send it to each other.
+    #[error(
+        "a run of record `{record}` cannot travel between coordinator and workers: {source}; a coarser model has a smaller state, and \
+         a solver that declares no states keeps them to itself (estimator kind \"batch\")"
+    )]
+    Travel {
+        /// Record name.
+        record: String,
+        /// What is too large.
+        source: WireError,
+    },
+    /// Model and data are so far apart that the square of their difference is no number.
+    #[error(
+        "`{output}` of record `{record}` and its prediction at the prior median are out of all proportion: check units, and values that are codes for missing ones"
+    )]
+    Misfit {
+        /// Record name.
+        record: String,
+        /// Output name.
+        output: String,
+    },
+}
+
+/// Runs every record once, free, at the prior median; none where the model cannot be run in this process.
+///
+/// # Errors
+/// When the setup does not build or the model fails.
+pub fn trial(study: &Study) -> Result<Vec<TrialChannel>, TrialError> {
+    if !study.runs_here {
+        return Ok(Vec::new());
+    }
+    let model = study.surroundings.build(&study.setup)?;
+    let prior = posterior::prior(study);
+    let mut channels = Vec::new();
+    for (index, record) in study.records.iter().enumerate() {
+        let window = Arc::new(study.whole(index, false));
+        let theta = study.theta_for(index, prior.mean.as_slice());
+        let ran = run(&*model, index, &window, &theta, None);
+        let mut prediction = ran.map_err(|fault| match fault {
+            Fault::Run(source) => {
+                let (values, remedy) = (named(study, &theta), remedy(&source, &window));
+                TrialError::Model { record: record.name.clone(), values, source, remedy }
+            }
+            Fault::Travel(source) => TrialError::Travel { record: record.name.clone(), source },
+        })?;
+        check_bytes(study, &record.name, &prediction)?;
+        study.measure(index, &window.times, &mut prediction.outputs);
+        let n_obs = study.setup.outputs.len();
+        for channel in &record.channels {
+            let residuals: Vec<f64> = window
+                .times
+                .iter()
+                .enumerate()
+                .filter_map(|(j, t)| {
+                    Some(record.observed(channel, *t)? - prediction.outputs[j * n_obs + channel.row])
+                })
+                .collect();
+            let sum: f64 = residuals.iter().map(|r| r * r).sum();
+            if !sum.is_finite() {
+                let (record, output) = (record.name.clone(), channel.output.clone());
+                return Err(TrialError::Misfit { record, output });
+            }
+            channels.push(TrialChannel {
+                record: record.name.clone(),
+                output: channel.output.clone(),
+                n_obs: residuals.len(),
+                rmse: (sum / residuals.len().max(1) as f64).sqrt(),
+                noise: channel.noise,
+            });
+        }
+    }
+    Ok(channels)
+}
+
+/// Why a run of a trial is none.
+enum Fault {
+    Run(ParticleError),
+    Travel(WireError),
+}
+
+/// One run, here as on a worker, that could also have been sent there.
+fn run(
+    model: &dyn Forward,
+    record: usize,
+    window: &Arc<Window>,
+    theta: &[f64],
+    state: Option<Vec<f64>>,
+) -> Result<Prediction, Fault> {
+    let job =
+        Job { particle: 0, record: record as u32, window: Arc::clone(window), theta: theta.to_vec(), state };
+    let prediction = model.run_within(&job, &spent()).map_err(Fault::Run)?;
+    travels(&job, &prediction).map_err(Fault::Travel)?;
+    Ok(prediction)
+}
+
+/// Refuses what a program of its own sent in other bytes than those of 64-bit floats.
+fn check_bytes(study: &Study, record: &str, prediction: &Prediction) -> Result<(), TrialError> {
+    if study.setup.model.kind != SOLVER {
+        return Ok(());
+    }
+    foreign_bytes(&prediction.outputs).map_or(Ok(()), |value| {
+        let what = format!("values such as {value:e} are the bytes of integers, or in another byte order");
+        Err(TrialError::Table { record: record.to_owned(), what })
+    })
+}
+
+/// Names and values of a job's parameters.
+pub(super) fn named(study: &Study, theta: &[f64]) -> String {
+    // A median that went through a logarithm and back is itself but for the last digits.
+    let short = |value: &f64| format!("{value:.12e}").parse::<f64>().unwrap_or(*value);
+    let pairs =
+        study.setup.parameters.iter().zip(theta).map(|(name, value)| format!("{name} = {}", short(value)));
+    pairs.collect::<Vec<_>>().join(", ")
+}
+
+/// What to do about a failure; where steps were too many, with how many there would be.
+fn remedy(error: &ParticleError, window: &Window) -> String {
+    let ParticleError::Model(ModelFailure::TooManySteps { time, limit }) = error else {
+        return "check constants, priors and inputs".to_owned();
+    };
+    let end = window.times.last().copied().unwrap_or(window.start);
+    let done = (time - window.start) / (end - window.start);
+    let all = if done > 0.0 {
+        format!("to t = {end} there would be about {:.0e}", *limit as f64 / done)
+    } else {
+        format!("to t = {end} there would be many times as many")
+    };
+    format!(
+        "{all}: a `step` of the model, a time constant or a tolerance is too short for the record; change it, or allow more \
+         with `max_steps` in `[model]`"
+    )
+}

@@ -1,0 +1,163 @@
+//! The runs of a fit, made once at the prior median before there is a fleet: the same windows, spans and adapters.
+//!
+//! The filter's windows run one after the other from the state in which the one before ended; the batch fit runs the training
+//! span. A program that is started anew for every run and answers for the times of a whole record only, whatever it was asked,
+//! is served: the study then runs whole records and takes the rows that train. Next file to read: [`crate::plan`].
+
+use std::sync::Arc;
+
+use starlings_models::external::table::is_transposed;
+use starlings_models::{Forward, Prediction, Window};
+
+use super::{Fault, TrialChannel, TrialError, named, run, trial};
+use crate::{EstimatorKind, Study, posterior};
+
+/// Adapters whose programs cannot say of themselves which times they answer for.
+const STARTS_ANEW: [&str; 2] = ["command", "um-bridge"];
+
+/// Windows of a record that are run where not all are.
+const FIRST: usize = 3;
+
+/// How many of the filter's windows are run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Depth {
+    /// All, as in one pass for one particle.
+    All,
+    /// The first of every record: before a run, which makes the others anyway.
+    First,
+}
+
+/// The trial of [`trial`] and then the runs of a fit by `kind`; notes in the study whether whole records must be run. None
+/// where the model cannot be run in this process.
+///
+/// # Errors
+/// As [`trial`], and when a run of the fit fails though the whole record does not.
+pub fn dry_run(
+    study: &mut Study,
+    kind: EstimatorKind,
+    depth: Depth,
+) -> Result<Vec<TrialChannel>, TrialError> {
+    let channels = trial(study)?;
+    if !study.runs_here {
+        return Ok(channels);
+    }
+    let model = study.surroundings.build(&study.setup)?;
+    for record in 0..study.records.len() {
+        if !study.records[record].is_trained() {
+            continue;
+        }
+        let of_record = DryRun::new(study, &*model, record);
+        let told = match kind {
+            EstimatorKind::Roukf => of_record.windows(depth).map(|()| None)?,
+            EstimatorKind::Batch => of_record.training_span()?,
+        };
+        if let Some(why) = told.filter(|_| !study.whole_answers) {
+            study.whole_answers = true;
+            // Where the run can be looked at is of no interest: it did what it always does.
+            let why = why.split("; the folder of the run").next().unwrap_or_default();
+            study.warnings.push(format!(
+                "the solver answers for the times of a whole record, not for the training span alone: every run of the fit covers \
+                 whole records, of which it takes the rows that train. Asked for less: {why}"
+            ));
+        }
+    }
+    Ok(channels)
+}
+
+/// The runs of one record.
+struct DryRun<'a> {
+    study: &'a Study,
+    model: &'a dyn Forward,
+    record: usize,
+    theta: Vec<f64>,
+}
+
+impl<'a> DryRun<'a> {
+    fn new(study: &'a Study, model: &'a dyn Forward, record: usize) -> Self {
+        let prior = posterior::prior(study);
+        Self { study, model, record, theta: study.theta_for(record, prior.mean.as_slice()) }
+    }
+
+    fn name(&self) -> String {
+        self.study.records[self.record].name.clone()
+    }
+
+    fn run(&self, window: &Arc<Window>, state: Option<Vec<f64>>) -> Result<Prediction, Fault> {
+        let sent = self.study.sendable(self.record, window);
+        run(self.model, self.record, &sent, &self.theta, state)
+    }
+
+    fn failed(&self, fault: Fault, span: String) -> TrialError {
+        let record = self.name();
+        match fault {
+            Fault::Run(source) => {
+                TrialError::Fit { record, span, values: named(self.study, &self.theta), source }
+            }
+            Fault::Travel(source) => TrialError::Travel { record, source },
+        }
+    }
+
+    /// The filter's windows, each from the end of the one before.
+    fn windows(&self, depth: Depth) -> Result<(), TrialError> {
+        let most = if depth == Depth::First { FIRST } else { usize::MAX };
+        let mut state = None;
+        for window in self.study.windows(self.record).into_iter().take(most) {
+            let span = || format!("in the window from {} to {}", window.start, end(&window));
+            let prediction = self.run(&window, state).map_err(|fault| self.failed(fault, span()))?;
+            state = Some(prediction.state);
+        }
+        Ok(())
+    }
+
+    /// The training span; why it fails where the whole record is to be run instead.
+    fn training_span(&self) -> Result<Option<String>, TrialError> {
+        let window = Arc::new(self.study.whole(self.record, true));
+        let is_part = window.times.len() < self.study.records[self.record].times.len();
+        let solver = self.study.setup.model.solver.as_ref();
+        let anew = solver.map(|solver| STARTS_ANEW.contains(&solver.adapter.as_str()));
+        let prediction = match self.run(&window, None) {
+            Ok(prediction) => prediction,
+            Err(Fault::Run(source)) if is_part && anew == Some(true) => return Ok(Some(source.to_string())),
+            Err(fault) => {
+                let n = window.times.len();
+                let span =
+                    format!("over its training span, {n} times from {} to {}", window.start, end(&window));
+                return Err(self.failed(fault, span));
+            }
+        };
+        if anew == Some(false) {
+            self.check_layout(&window, &prediction)?;
+        }
+        Ok(None)
+    }
+
+    /// A run over the first time alone has its outputs where a longer one must have them too.
+    fn check_layout(&self, window: &Arc<Window>, prediction: &Prediction) -> Result<(), TrialError> {
+        let (n, n_times) = (self.study.setup.outputs.len(), window.times.len());
+        if n < 2 || n_times < 2 {
+            return Ok(());
+        }
+        let first = Window {
+            times: window.times[..1].to_vec(),
+            observed: window.observed[..n].to_vec(),
+            ..Window::clone(window)
+        };
+        let alone = match self.run(&Arc::new(first), None) {
+            Ok(alone) => alone,
+            // Where times and outputs are as many, only now can the solver see it.
+            Err(Fault::Run(source)) if source.to_string().contains("is transposed") => {
+                return Err(self.failed(Fault::Run(source), "over its first time alone".to_owned()));
+            }
+            Err(_) => return Ok(()),
+        };
+        if !is_transposed((&prediction.outputs, n_times), (&alone.outputs, 1), n) {
+            return Ok(());
+        }
+        let what = "it is transposed: all times of the first output come first, where all outputs of the first time belong";
+        Err(TrialError::Table { record: self.name(), what: what.to_owned() })
+    }
+}
+
+fn end(window: &Window) -> f64 {
+    window.times.last().copied().unwrap_or(window.start)
+}
