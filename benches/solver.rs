@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 use starlings_models::{
     Description, FilesDef, Forward, Job, ModelDef, Quantity, SOLVER, Setup, Signal, SolverDef, Spec, Window,
 };
-use starlings_worker::{SiteOptions, Solvers};
+use starlings_solver::{SiteOptions, Solvers};
 
 type Failure = Box<dyn std::error::Error>;
 

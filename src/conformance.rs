@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use clap::Parser;
 use starlings_models::SolverDef;
-use starlings_worker::solver::conformance::{Conformance, Trial, conformance};
+use starlings_solver::conformance::{Conformance, Trial, conformance};
 
 use crate::console::{line, text};
 use crate::failure::Failure;

@@ -2,5 +2,5 @@
 
 /// Watches over the process groups named on standard input.
 pub(crate) fn run() {
-    starlings_worker::solver::guard(std::io::stdin().lock());
+    starlings_solver::guard(std::io::stdin().lock());
 }

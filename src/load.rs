@@ -8,8 +8,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use starlings_coordinator::study::{Study, Surroundings, Undescribed};
 use starlings_models::SetupError;
-use starlings_worker::Solvers;
-use starlings_worker::solver::faults;
+use starlings_solver::Solvers;
+use starlings_solver::faults;
 
 use crate::failure::Failure;
 use crate::solvers::solvers;

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Parser;
 use starlings_coordinator::study::Study;
-use starlings_worker::solver::instance::SOCKET;
-use starlings_worker::solver::serve::{Served, serve};
+use starlings_solver::instance::SOCKET;
+use starlings_solver::serve::{Served, serve};
 
 use crate::failure::Failure;
 

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::builder::{PossibleValue, PossibleValuesParser};
-use starlings_worker::solver::adapters;
-use starlings_worker::{SiteOptions, Solvers};
+use starlings_solver::adapters;
+use starlings_solver::{SiteOptions, Solvers};
 
 use crate::failure::Failure;
 

@@ -10,7 +10,7 @@ use std::process::Stdio;
 
 use common::{output, starlings};
 use kit::{Folder, groups_of};
-use starlings_worker::solver::adapters;
+use starlings_solver::adapters;
 
 /// Whether a text names every adapter that a worker has.
 fn names_all(text: &str) -> bool {

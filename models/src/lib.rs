@@ -44,7 +44,7 @@ pub use memory::Memory;
 pub use model::{Drive, Model};
 pub use nearest::nearest;
 pub use observer::Observer;
-pub use setup::{ModelDef, ObserverDef, Setup, SetupError};
+pub use setup::{Factory, ModelDef, ObserverDef, Setup, SetupError};
 pub use simulator::Simulator;
 pub use solver::{Description, FaultPlace, FilesDef, SOLVER, SolverDef, SolverFault};
 pub use spec::{Quantity, Role, Spec};

@@ -3,6 +3,7 @@
 //! These types are plain data (serde); building checks that they fit together. Next file to read: [`crate::catalogue`].
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
@@ -36,6 +37,9 @@ impl ModelDef {
         self.solver.as_ref()?.described.as_ref()
     }
 }
+
+/// Makes what runs the jobs of a setup.
+pub type Factory = Arc<dyn Fn(&Setup) -> Result<Box<dyn Forward>, SetupError> + Send + Sync>;
 
 /// The observer by kind.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

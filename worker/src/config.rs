@@ -4,12 +4,9 @@ use std::hash::{BuildHasher, Hasher};
 use std::sync::Arc;
 use std::time::Duration;
 
-use starlings_models::{Forward, Setup, SetupError};
+use starlings_models::{Factory, Setup};
 use starlings_proto::{Hello, PROTOCOL, VERSION, own_build};
 use tokio_util::sync::CancellationToken;
-
-/// Makes what runs the jobs of a setup.
-pub type Factory = Arc<dyn Fn(&Setup) -> Result<Box<dyn Forward>, SetupError> + Send + Sync>;
 
 /// What a worker is told when it starts.
 #[derive(Clone)]

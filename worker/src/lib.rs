@@ -11,16 +11,15 @@ mod lifeline;
 mod session;
 mod setups;
 mod slots;
-pub mod solver;
 
 use std::sync::Arc;
 use std::time::Instant;
 
-pub use config::{Factory, WorkerConfig};
+pub use config::WorkerConfig;
 use dial::Dialled;
 use session::Ended;
 use slots::Slots;
-pub use solver::{SiteOptions, SolverError, Solvers};
+pub use starlings_models::Factory;
 pub use starlings_proto::{LIFELINE, MAX_SLOTS};
 
 /// What a worker did until it ended.

@@ -8,11 +8,9 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use starlings_models::{Forward, Setup};
+use starlings_models::{Factory, Forward, Setup};
 use starlings_proto::words::panic_text;
 use starlings_proto::{SetupId, WireError};
-
-use crate::config::Factory;
 
 /// Setups kept built: a screening sends some dozens, each of a few kilobytes.
 pub(crate) const KEPT: usize = 512;

@@ -2,6 +2,8 @@
 //!
 //! Next files to read: [`super::form`], then [`super::verdict`].
 
+use starlings_study::{Record, Study};
+
 use super::bent::{bent, constants};
 use super::candidate::Candidate;
 use super::carried::carried;
@@ -12,7 +14,6 @@ use super::screen::{Hit, screen};
 use super::search::{Found, Searcher};
 use super::version::{Member, Version};
 use super::{ExplainError, Options};
-use starlings_study::{Record, Study};
 
 impl<'c> Searcher<'_, '_, 'c> {
     /// Scores the candidates again at the best version: what is left, and which replacements and pairs to try. The version that

@@ -4,6 +4,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use starlings_estimators::{BlockRow, Gaussian, Optimum};
+use starlings_study::posterior::{self, Estimate, Z95};
 
 use super::candidate::Candidate;
 use super::figures::Curve;
@@ -16,7 +17,6 @@ use super::rows::{Row, Usage, unit};
 use super::screen::Hit;
 use super::search::Found;
 use super::verdict::Decision;
-use starlings_study::posterior::{self, Estimate, Z95};
 
 /// The parameters of a version in physical units, in the order of its estimated vector; their covariance is widened by the
 /// inflation of the residuals, and zero where a direction is free.

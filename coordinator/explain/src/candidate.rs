@@ -7,12 +7,12 @@ use std::collections::HashSet;
 
 use starlings_estimators::Transform;
 use starlings_models::effect::{EffectDef, EffectParameter, Scale, scale};
+use starlings_study::variant::EffectPrior;
+use starlings_study::{Record, Study};
 
 use super::candidates::candidates;
 use super::locate::Track;
 use super::{ExplainError, Options};
-use starlings_study::variant::EffectPrior;
-use starlings_study::{Record, Study};
 
 /// Grid points of one candidate at most.
 const MOST_POINTS: usize = 9;

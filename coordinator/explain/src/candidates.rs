@@ -4,10 +4,10 @@
 
 use starlings_models::effect::library::{library_in, shows_in};
 use starlings_models::{EffectDef, Setup, nearest};
+use starlings_study::{Study, checked::Library};
 
 use super::locate::number::three;
 use super::{ExplainError, Options};
-use starlings_study::{Study, checked::Library};
 
 /// The effects to try, the study's own first.
 ///

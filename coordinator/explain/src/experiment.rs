@@ -7,6 +7,7 @@
 use std::sync::Arc;
 
 use starlings_models::{Job, Signal, Window};
+use starlings_study::{Record, Study};
 
 use super::ExplainError;
 use super::judge::Judged;
@@ -14,7 +15,6 @@ use super::laboratory::Laboratory;
 use super::locate::Track;
 use super::locate::number::three;
 use super::result::Experiment;
-use starlings_study::{Record, Study};
 
 /// Noise of a quantity that was never measured, as a share of its spread.
 const NEW_CHANNEL: f64 = 0.03;

@@ -6,11 +6,11 @@
 use std::sync::Arc;
 
 use nalgebra::DVector;
+use starlings_study::store::RunKey;
 
 use super::ExplainError;
 use super::laboratory::Laboratory;
 use super::rows::Row;
-use starlings_study::store::RunKey;
 
 /// d prediction / d amplitude over the noise, all rows.
 #[derive(Clone, Debug)]

@@ -8,9 +8,9 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 use starlings_estimators::{BlockAngular, BlockRow};
+use starlings_study::Study;
 
 use super::rows::Rows;
-use starlings_study::Study;
 
 /// d prediction / d z over the noise, rows × parameters.
 #[derive(Clone, Debug, Default)]

@@ -4,10 +4,10 @@
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-
-use super::{Explanation, Figures, Findings};
 use starlings_study::RunFolder;
 use starlings_study::store::{EXPLANATION, Store, StoreError};
+
+use super::{Explanation, Figures, Findings};
 
 /// Names under which the store keeps the parts.
 const FIGURES: &str = "figures";

@@ -12,13 +12,13 @@ use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 
 use nalgebra::DVector;
+use starlings_fleet::{Fleet, FleetEvent};
 use starlings_models::Window;
+use starlings_study::Study;
+use starlings_study::store::{RunKey, Store};
 
 use super::recent::Recent;
 use super::{Context, ExplainError, Rows, Stage};
-use starlings_fleet::{Fleet, FleetEvent};
-use starlings_study::Study;
-use starlings_study::store::{RunKey, Store};
 
 /// A version of the model and a parameter vector (transformed units) to run it with.
 pub struct Point<'v> {

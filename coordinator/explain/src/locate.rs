@@ -21,10 +21,10 @@ pub mod unknown_input;
 pub use bootstrap::{block_bootstrap_rms, block_length};
 pub use maps::map_again;
 pub use result::{ChannelGap, Correlated, Located, RegionMap, ResidualSpectrum, Track, UnknownInput};
+use starlings_study::Study;
 pub use unknown_input::{MOST_RUNS, unknown_inputs};
 
 use super::Rows;
-use starlings_study::Study;
 
 /// Finished runs of one model, to be looked at.
 #[derive(Clone, Copy, Debug)]

@@ -5,9 +5,10 @@
 
 use std::sync::Arc;
 
-use super::ExplainError;
 use starlings_fleet::{FleetError, Outcome};
 use starlings_study::{RunError, Study};
+
+use super::ExplainError;
 
 /// The outputs of one run, or why there are none.
 pub(super) type Known = Result<Arc<Vec<f64>>, String>;

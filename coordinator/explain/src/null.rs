@@ -8,15 +8,15 @@ use std::sync::Arc;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+use starlings_fleet::Fleet;
+use starlings_study::Study;
+use starlings_study::store::Store;
 
 use super::laboratory::Laboratory;
 use super::result::Nulls;
 use super::rows::Rows;
 use super::run::answered;
 use super::{Context, ExplainError, Options, Stage, Verdict, answer};
-use starlings_fleet::Fleet;
-use starlings_study::Study;
-use starlings_study::store::Store;
 
 /// Searches `options.nulls` simulated recordings. `predicted` is what the fitted model as it is predicts, by row.
 ///

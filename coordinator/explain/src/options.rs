@@ -5,13 +5,13 @@
 use std::sync::mpsc::Receiver;
 
 use starlings_estimators::EstimatorError;
+use starlings_fleet::{FleetError, FleetEvent};
 use starlings_models::SetupError;
+use starlings_study::store::StoreError;
+use starlings_study::{RunError, Study};
 
 use super::laboratory::HOLD;
 use super::{Explanation, Figures};
-use starlings_fleet::{FleetError, FleetEvent};
-use starlings_study::store::StoreError;
-use starlings_study::{RunError, Study};
 
 /// What was asked for besides the study.
 #[derive(Clone, Debug, PartialEq)]

@@ -9,11 +9,11 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 use starlings_estimators::BlockRow;
+use starlings_study::Study;
 
 use super::ExplainError;
 use super::fit::Fitted;
 use super::laboratory::{Laboratory, Point};
-use starlings_study::Study;
 
 /// Distance of a difference, in prior standard deviations.
 const STEP: f64 = 1e-3;

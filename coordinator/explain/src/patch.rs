@@ -12,10 +12,10 @@ mod remove;
 use std::path::Path;
 
 use starlings_models::EffectDef;
+use starlings_study::{Study, StudyError};
 use toml_edit::{Array, DocumentMut, Item, TableLike, Value};
 
 use super::result::Coefficient;
-use starlings_study::{Study, StudyError};
 
 /// An effect to write into a study, with the values of its parameters.
 #[derive(Clone, Debug, PartialEq)]

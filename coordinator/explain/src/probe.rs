@@ -6,10 +6,10 @@
 use starlings_models::effect::Addition;
 use starlings_models::equations::{At, Expression, Slot};
 use starlings_models::{Drive, Quantity};
+use starlings_study::Study;
 
 use super::candidate::Candidate;
 use super::locate::Track;
-use starlings_study::Study;
 
 /// The times and courses of a run.
 pub(super) struct Along<'a> {

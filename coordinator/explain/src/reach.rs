@@ -6,10 +6,10 @@
 use serde::{Deserialize, Serialize};
 use starlings_models::effect::library::{FAMILIES, shows_in};
 use starlings_models::{EffectDef, Quantity, Role, Setup, Spec};
+use starlings_study::{Study, checked::Library};
 
 use super::candidate::Candidate;
 use super::candidates::fitted;
-use starlings_study::{Study, checked::Library};
 
 /// States that a sentence names at most.
 const MOST: usize = 6;

@@ -5,8 +5,9 @@
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
-use super::memory::Known;
 use starlings_study::store::RunKey;
+
+use super::memory::Known;
 
 /// Answers by key, the one that was not asked for longest leaving first.
 pub(super) struct Recent {

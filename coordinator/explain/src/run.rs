@@ -6,7 +6,11 @@
 use std::sync::Arc;
 
 use starlings_estimators::End;
+use starlings_fleet::Fleet;
 use starlings_models::ObserverDef;
+use starlings_study::Study;
+use starlings_study::posterior;
+use starlings_study::store::Store;
 
 use super::answer;
 use super::background::inflation;
@@ -26,10 +30,6 @@ use super::version::Version;
 use super::warnings;
 use super::words;
 use super::{Context, ExplainError, Explanation, Figures, Findings, Options, Verdict, null};
-use starlings_fleet::Fleet;
-use starlings_study::Study;
-use starlings_study::posterior;
-use starlings_study::store::Store;
 
 /// Explains a study's misfit.
 ///

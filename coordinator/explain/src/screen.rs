@@ -12,6 +12,7 @@ use starlings_estimators::Score;
 use starlings_models::SetupError;
 
 use response::{Next, Response, Scale};
+use starlings_study::Record;
 
 use super::ExplainError;
 use super::candidate::Candidate;
@@ -21,7 +22,6 @@ use super::laboratory::{Laboratory, Point};
 use super::locate::Track;
 use super::probe::{Along, natural_amplitude};
 use super::version::{Member, Version};
-use starlings_study::Record;
 
 /// Probe, as a share of what the term is added to.
 const PROBE: f64 = 3e-3;

@@ -6,9 +6,9 @@
 use nalgebra::DVector;
 use starlings_estimators::Scaled;
 use starlings_models::SetupError;
+use starlings_study::Study;
 
 use super::candidate::Candidate;
-use starlings_study::Study;
 
 /// An effect in a version, and the unit of its amplitude.
 #[derive(Clone, Debug)]

@@ -11,16 +11,13 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use starlings_models::{Forward, Job, ModelFailure, ParticleError, Prediction, Setup, SetupError};
+use starlings_models::{Factory, Forward, Job, ModelFailure, ParticleError, Prediction, Setup};
 use starlings_proto::spent::spent;
 use starlings_proto::words::panic_text;
 use starlings_proto::{SetupId, encode_setup};
 use tokio_util::sync::CancellationToken;
 
 use super::{Fleet, FleetError, Outcome};
-
-/// Makes what runs the jobs of a setup.
-pub type Factory = Arc<dyn Fn(&Setup) -> Result<Box<dyn Forward>, SetupError> + Send + Sync>;
 
 /// Threads of this process as a fleet.
 pub struct InProcess {

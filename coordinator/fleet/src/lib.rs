@@ -22,8 +22,9 @@ mod travel;
 pub use error::FleetError;
 pub use event::FleetEvent;
 pub use grpc::{FleetConfig, FleetHandle, GrpcFleet};
-pub use in_process::{Factory, InProcess};
+pub use in_process::InProcess;
 pub use local_workers::{LocalConfig, LocalWorkers};
+pub use starlings_models::Factory;
 pub use starlings_proto::{SetupId, WireError};
 pub use travel::travels;
 

@@ -13,14 +13,14 @@ mod sample;
 mod tests;
 
 use serde::{Deserialize, Serialize};
+use starlings_explain::figures::Figures;
+use starlings_explain::result::{Experiment, Explanation, Verdict};
 
 use super::{ReportError, layout, number};
 use candidates::Candidates;
 use effect::EffectView;
 use gap::Gap;
 use places::Places;
-use starlings_explain::figures::Figures;
-use starlings_explain::result::{Experiment, Explanation, Verdict};
 
 /// What the page says of the study besides the explanation. Empty texts are left out.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -2,13 +2,14 @@
 //!
 //! Next file to read: [`super::explain`].
 
-use super::explain::{StudyAbout, explain_page};
-use super::files::{FilesError, place};
 use starlings_explain::Findings;
 use starlings_explain::keep::kept;
 use starlings_study::RunFolder;
 use starlings_study::store::StoreError;
 use starlings_study::store::folder::StudyInfo;
+
+use super::explain::{StudyAbout, explain_page};
+use super::files::{FilesError, place};
 
 /// Writes the files into the run folder and gives back what they hold.
 ///

@@ -3,10 +3,11 @@
 use std::io;
 use std::path::PathBuf;
 
-use super::{ReportError, reader, render};
 use starlings_study::RunFolder;
 use starlings_study::store::StoreError;
 use starlings_study::store::folder::write;
+
+use super::{ReportError, reader, render};
 
 /// Why the files could not be written.
 #[derive(Debug, thiserror::Error)]

@@ -3,9 +3,9 @@
 //! Next file to read: [`starlings_study::constants`].
 
 use serde::Serialize;
+use starlings_study::constants::{ConstantEffect, HangsOn};
 
 use super::number;
-use starlings_study::constants::{ConstantEffect, HangsOn};
 
 /// Rows of the table at most.
 const ROWS: usize = 15;

@@ -6,14 +6,14 @@
 mod figures;
 
 use serde::Serialize;
+use starlings_study::identify::Identification;
+use starlings_study::identify::result::{ParameterInfo, SubsetInfo};
 
 use super::data::ParameterRow;
 use super::hangs_on::{self, HangsOnView};
 use super::plot::figure::Figure;
 use super::plot::interval;
 use super::{ReportError, layout, number};
-use starlings_study::identify::Identification;
-use starlings_study::identify::result::{ParameterInfo, SubsetInfo};
 
 /// At most this many subsets are listed.
 const SUBSETS: usize = 12;

@@ -2,11 +2,12 @@
 //!
 //! Next file to read: `plot/field_map.rs`.
 
+use starlings_study::field::component_of;
+
 use super::ReportError;
 use super::data::{Autocorrelation, ChannelPlot, ReportData};
 use super::plot::figure::Figure;
 use super::plot::{autocorrelation, field_map, fit, residual};
-use starlings_study::field::component_of;
 
 /// Observed components up to which every one of a field is drawn by itself.
 const FEW: usize = 3;

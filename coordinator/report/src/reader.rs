@@ -10,16 +10,16 @@ mod tests;
 use std::collections::BTreeMap;
 
 use starlings_estimators::{autocorrelation, nis_band};
-
-use super::data::{
-    Autocorrelation, ChannelPlot, Family, NisSeries, ObserverPlot, ObserverRow, ParameterRow, PassTrack,
-    ReportData, Track,
-};
 use starlings_study::observer_gain::ObserverCourse;
 use starlings_study::posterior::Estimate;
 use starlings_study::store::folder::{OBSERVER, StudyInfo};
 use starlings_study::store::{Store, StoreError};
 use starlings_study::summary::Summary;
+
+use super::data::{
+    Autocorrelation, ChannelPlot, Family, NisSeries, ObserverPlot, ObserverRow, ParameterRow, PassTrack,
+    ReportData, Track,
+};
 
 /// Lags shown in an autocorrelation plot.
 const MAX_LAG: usize = 60;

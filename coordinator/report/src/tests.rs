@@ -2,9 +2,10 @@
 
 mod extremes;
 
+use starlings_study::constants::{ConstantEffect, Follows, HangsOn};
+
 use super::data::{ChannelPlot, Family, ObserverPlot, ObserverRow, ParameterRow, ReportData};
 use super::{overview_svg, render, sample};
-use starlings_study::constants::{ConstantEffect, Follows, HangsOn};
 
 /// The order in which a reader meets the sections.
 const SECTIONS: [&str; 11] = [

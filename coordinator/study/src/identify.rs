@@ -17,12 +17,12 @@ pub use at::At;
 pub use result::Identification;
 
 use starlings_estimators::{EstimatorError, Sensitivities};
+use starlings_fleet::Fleet;
 use starlings_models::Failure;
 
 use super::fit::flight::Flight;
 use super::store::StoreError;
 use super::{FolderError, RunError, Study, constants};
-use starlings_fleet::Fleet;
 
 /// Why the sensitivities could not be had.
 #[derive(Debug, thiserror::Error)]

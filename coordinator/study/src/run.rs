@@ -6,6 +6,7 @@
 use std::sync::mpsc::Receiver;
 
 use starlings_estimators::{EstimatorError, Gaussian};
+use starlings_fleet::{Fleet, FleetError, FleetEvent};
 use starlings_models::Failure;
 
 use super::constants::{self, HangsOn};
@@ -19,7 +20,6 @@ use crate::fit::flight::Flight;
 use crate::observer_gain::Compared;
 use crate::store::folder::{self, OBSERVER, RunFolder};
 use crate::store::snapshot::{Counts, Snapshot};
-use starlings_fleet::{Fleet, FleetError, FleetEvent};
 
 /// Why a run ended without a result.
 #[derive(Debug, thiserror::Error)]

@@ -2,10 +2,10 @@
 //!
 //! Next file to read: [`crate::store`], which keeps answers by it.
 
+use starlings_fleet::SetupId;
 use starlings_models::Job;
 
 use crate::store::RunKey;
-use starlings_fleet::SetupId;
 
 /// The key of a run that nothing pulls: the programs that make it (a digest), the setup and the job, without what was observed.
 pub fn free(programs: &[u8; 32], setup: &SetupId, job: &Job) -> RunKey {

@@ -6,13 +6,13 @@ pub mod dry_run;
 
 use std::sync::Arc;
 
+use starlings_fleet::{WireError, travels};
 use starlings_models::external::table::foreign_bytes;
 use starlings_models::{Forward, Job, ModelFailure, ParticleError, Prediction, SOLVER, SetupError, Window};
 use starlings_proto::spent::spent;
 
 use super::{Study, posterior};
 pub use dry_run::{Depth, dry_run};
-use starlings_fleet::{WireError, travels};
 
 /// What the trial showed about one channel.
 #[derive(Clone, Debug, PartialEq)]

@@ -5,14 +5,14 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
+use starlings_fleet::{Outcome, SetupId};
 use starlings_models::Job;
+use starlings_study::store::{JobRow, RunKey, StoreError};
+use starlings_study::{Study, run_key};
 
 use super::{Answer, Laboratory, Point};
 use crate::memory::{Known, decode, encode, taken, told};
 use crate::{ExplainError, Row};
-use starlings_fleet::{Outcome, SetupId};
-use starlings_study::store::{JobRow, RunKey, StoreError};
-use starlings_study::{Study, run_key};
 
 /// Bytes of outputs that one batch brings, about.
 const PORTION: usize = 2 << 20;

@@ -2,11 +2,12 @@
 //!
 //! Rates are differences of simulated signals and inputs, never of measured values. Next file to read: [`super::signal`].
 
+use starlings_study::posterior::Z95;
+use starlings_study::{Record, Study};
+
 use super::residuals::{Residuals, primary};
 use super::signal::{MOST_TRACKS, along};
 use super::{Correlated, Track, View};
-use starlings_study::posterior::Z95;
-use starlings_study::{Record, Study};
 
 /// Correlations told at most.
 const MOST: usize = 12;

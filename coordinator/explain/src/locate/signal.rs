@@ -2,10 +2,11 @@
 //!
 //! Next file to read: [`super::scan`].
 
+use starlings_study::Study;
+
 use super::Track;
 use super::residuals::Residuals;
 use super::result::ends;
-use starlings_study::Study;
 
 /// Signals of the simulation that are looked at, at most: a field of many components must not take all the time.
 pub(super) const MOST_TRACKS: usize = 24;

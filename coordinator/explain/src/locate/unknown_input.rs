@@ -15,14 +15,14 @@ mod walk;
 
 use std::sync::Arc;
 
+use starlings_fleet::Fleet;
 use starlings_models::ObserverDef;
+use starlings_study::Study;
 
 use self::candidate::{Candidate, candidates};
 use self::walk::{DIRECTIONS, Estimate, Walk};
 use super::UnknownInput;
 use crate::ExplainError;
-use starlings_fleet::Fleet;
-use starlings_study::Study;
 
 /// Windows of the record at most: neighbouring ones are joined.
 const WINDOWS: usize = 200;

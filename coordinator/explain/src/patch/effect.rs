@@ -5,11 +5,11 @@
 
 use starlings_models::EffectDef;
 use starlings_models::effect::{Addition, EffectParameter, EffectState};
+use starlings_study::Study;
 use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value, value};
 
 use super::{PatchEffect, PatchError, prior};
 use crate::result::Coefficient;
-use starlings_study::Study;
 
 /// Puts an effect into the model of the study.
 pub(super) fn add(document: &mut DocumentMut, study: &Study, found: &PatchEffect) -> Result<(), PatchError> {

@@ -5,11 +5,11 @@
 use std::sync::Arc;
 
 use starlings_estimators::Optimum;
+use starlings_study::store::RunKey;
 
 use super::{Felt, Probe};
 use crate::influence::{Influence, difference};
 use crate::laboratory::{Answer, Laboratory};
-use starlings_study::store::RunKey;
 
 /// Response that a derivative is taken from: root mean square over the spread of the channel.
 const WANTED: f64 = 3e-3;

@@ -1,6 +1,8 @@
 //! What was tried and what became of it, and how often chance would have given a name.
 
 use serde::Serialize;
+use starlings_explain::figures::Figures;
+use starlings_explain::result::{Explanation, FalseAlarm, Nulls, Screened};
 
 use crate::ReportError;
 use crate::number::{self, quantity};
@@ -8,8 +10,6 @@ use crate::plot::alarm::{self, Gains};
 use crate::plot::figure::Figure;
 use crate::plot::meter::{Bar, meter};
 use crate::plot::palette::{BLUE, GREY};
-use starlings_explain::figures::Figures;
-use starlings_explain::result::{Explanation, FalseAlarm, Nulls, Screened};
 
 /// Candidates listed at most.
 const LISTED: usize = 80;

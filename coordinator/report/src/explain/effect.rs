@@ -1,9 +1,9 @@
 //! A named effect in words: its sentence, its equations, its coefficients, and the experiment that would decide a tie.
 
 use serde::Serialize;
+use starlings_explain::result::{Coefficient, Experiment, NamedEffect};
 
 use crate::number::{self, quantity};
-use starlings_explain::result::{Coefficient, Experiment, NamedEffect};
 
 /// An effect, ready to be arranged.
 #[derive(Debug, Serialize)]

@@ -3,6 +3,9 @@
 //! Where nothing was added there is only a before, which is shown. Next file to read: `places.rs`.
 
 use serde::Serialize;
+use starlings_explain::figures::{Curve, Figures};
+use starlings_explain::result::{Explanation, GapRow, ParameterShift};
+use starlings_study::field::component_of;
 
 use crate::ReportError;
 use crate::number::{self, quantity};
@@ -10,9 +13,6 @@ use crate::plot::course;
 use crate::plot::figure::Figure;
 use crate::plot::meter::{Bar, meter};
 use crate::plot::palette::{BLUE, GREY, INK, VERMILION};
-use starlings_explain::figures::{Curve, Figures};
-use starlings_explain::result::{Explanation, GapRow, ParameterShift};
-use starlings_study::field::component_of;
 
 /// Curves drawn at most.
 const CURVES: usize = 24;

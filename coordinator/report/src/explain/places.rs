@@ -3,6 +3,9 @@
 //! Next file to read: `candidates.rs`.
 
 use serde::Serialize;
+use starlings_explain::figures::Figures;
+use starlings_explain::locate::{ChannelGap, Correlated, Located, RegionMap, UnknownInput};
+use starlings_explain::result::Explanation;
 
 use super::probability;
 use crate::ReportError;
@@ -11,9 +14,6 @@ use crate::plot::figure::Figure;
 use crate::plot::meter::{Bar, meter};
 use crate::plot::palette::{BLUE, INK, MUTED, VERMILION};
 use crate::plot::{force, region, spectrum};
-use starlings_explain::figures::Figures;
-use starlings_explain::locate::{ChannelGap, Correlated, Located, RegionMap, UnknownInput};
-use starlings_explain::result::Explanation;
 
 /// Maps, spectra and unknown inputs drawn at most.
 const MAPS: usize = 10;

@@ -2,7 +2,6 @@
 
 mod figures;
 
-use super::StudyAbout;
 use starlings_explain::figures::Figures;
 use starlings_explain::held_out::HeldOut;
 use starlings_explain::reach::NotTried;
@@ -10,6 +9,8 @@ use starlings_explain::result::{
     Coefficient, Experiment, Explanation, FalseAlarm, GapRow, NamedEffect, ParameterShift, Place, Rejected,
     Remaining, Screened, Verdict,
 };
+
+use super::StudyAbout;
 
 /// An explanation with the given verdict, of `records` recordings with `n` times each.
 pub(super) fn found(verdict: Verdict, records: usize, n: usize) -> (Explanation, Figures) {

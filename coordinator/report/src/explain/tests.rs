@@ -1,9 +1,10 @@
 //! Tests of the whole page.
 
-use super::sample::{about, found};
-use super::{StudyAbout, explain_page};
 use starlings_explain::figures::{Curve, Figures};
 use starlings_explain::result::{Explanation, Nulls, Verdict};
+
+use super::sample::{about, found};
+use super::{StudyAbout, explain_page};
 
 const VERDICTS: [Verdict; 4] = [Verdict::Named, Verdict::Tie, Verdict::Unexplained, Verdict::NoGap];
 /// The order in which a reader meets the sections.

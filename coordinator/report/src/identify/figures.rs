@@ -1,6 +1,7 @@
 //! The curves of an identifiability analysis: sensitivities, generalised sensitivities, collinearity.
 
 use plotters::style::RGBColor;
+use starlings_study::identify::Identification;
 
 use crate::ReportError;
 use crate::number;
@@ -9,7 +10,6 @@ use crate::plot::figure::{Figure, with_unit};
 use crate::plot::mark::Mark;
 use crate::plot::palette::{BLUE, GREEN, GREY, INK, MUTED, VERMILION};
 use crate::plot::scene::Scene;
-use starlings_study::identify::Identification;
 
 /// Colours of the records, and their names in a caption.
 const RECORDS: [(RGBColor, &str); 4] =

@@ -7,6 +7,7 @@ use plotters::style::RGBColor;
 use serde::Serialize;
 use serde_json::json;
 use starlings_models::spectrum::{Beyond, ObserverSpectrum, SpectrumError};
+use starlings_study::field::observed_fields;
 
 use super::Locus;
 use super::gains::{Ways, frames, shown, ways};
@@ -14,7 +15,6 @@ use super::{decay, plane};
 use crate::ReportError;
 use crate::number::{ABSENT, significant};
 use crate::plot::palette::{BLUE, GREEN, INK, VERMILION};
-use starlings_study::field::observed_fields;
 
 /// One colour per observer, safe for colour-blind readers (Okabe & Ito 2008).
 const COLOURS: [RGBColor; 7] = [

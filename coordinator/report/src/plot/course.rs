@@ -2,6 +2,8 @@
 //!
 //! What an effect is worth is seen where the fit never looked. Next file to read: `region.rs`.
 
+use starlings_explain::figures::Curve;
+
 use super::super::ReportError;
 use super::axis::Axis;
 use super::figure::{Figure, with_unit};
@@ -9,7 +11,6 @@ use super::fit::{drawn_as_dots, measured, measured_key, spans};
 use super::mark::Mark;
 use super::palette::{BLUE, GREEN, INK, MUTED, VERMILION};
 use super::scene::Scene;
-use starlings_explain::figures::Curve;
 
 /// Draws one channel of one record; `numbers` is the sentence with its errors.
 ///

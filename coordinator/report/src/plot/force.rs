@@ -3,6 +3,8 @@
 //! A force that is one curve over the state depends on that state; one that is a cloud there depends on something else. Next
 //! file to read: `spectrum.rs`.
 
+use starlings_explain::locate::UnknownInput;
+
 use super::super::{ReportError, number};
 use super::axis::Axis;
 use super::figure::{Figure, with_unit};
@@ -10,7 +12,6 @@ use super::mark::Mark;
 use super::palette::{BLUE, MUTED};
 use super::scene::Scene;
 use super::thin;
-use starlings_explain::locate::UnknownInput;
 
 /// Dots against the state at most.
 const DOTS: usize = 240;

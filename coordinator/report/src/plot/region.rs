@@ -3,6 +3,8 @@
 //! The same map before and after the effects is drawn on the same scale, so that the eye may compare. Next file to read:
 //! `force.rs`.
 
+use starlings_explain::locate::RegionMap;
+
 use super::super::ReportError;
 use super::super::number::{self, quantity};
 use super::axis::Axis;
@@ -10,7 +12,6 @@ use super::figure::{Figure, with_unit};
 use super::mark::Mark;
 use super::palette::{BLUE, GREEN, GREY, INK, MUTED, VERMILION};
 use super::scene::Scene;
-use starlings_explain::locate::RegionMap;
 
 /// One bin with values.
 #[derive(Debug, Clone, Copy)]

@@ -2,13 +2,14 @@
 //!
 //! Next file to read: `alarm.rs`.
 
+use starlings_explain::locate::ResidualSpectrum;
+
 use super::super::{ReportError, number};
 use super::axis::Axis;
 use super::figure::{Figure, with_unit};
 use super::mark::Mark;
 use super::palette::{BLUE, MUTED};
 use super::scene::Scene;
-use starlings_explain::locate::ResidualSpectrum;
 
 /// Draws one spectrum; `None` when it has no positive frequency with power.
 ///

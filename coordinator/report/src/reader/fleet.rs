@@ -5,10 +5,11 @@
 
 use std::collections::BTreeMap;
 
-use crate::data::{FleetEvent, FleetTable, RunTimeBin, RunTimes, WorkerRow};
 use starlings_study::store::snapshot::{Counts, Head};
 use starlings_study::store::{Store, StoreError};
 use starlings_study::summary::Summary;
+
+use crate::data::{FleetEvent, FleetTable, RunTimeBin, RunTimes, WorkerRow};
 
 /// Bins of the histogram of run times.
 const BINS: usize = 24;

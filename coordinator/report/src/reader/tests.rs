@@ -3,11 +3,11 @@
 #![allow(clippy::float_cmp, clippy::unwrap_used)] // the compared numbers are copies; a failed unwrap is a failed test
 
 use starlings_estimators::nis_band;
-
-use super::*;
 use starlings_fleet::FleetEvent;
 use starlings_study::store::snapshot::{Counts, Head, Matrix, Snapshot};
 use starlings_study::store::{AnalysisRow, JobRow};
+
+use super::*;
 
 fn job(step: usize, particle: u32, attempts: u32, error: Option<&str>) -> JobRow {
     JobRow {

@@ -7,13 +7,13 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
+use starlings_fleet::{Fleet, FleetError, Outcome, SetupId};
 use starlings_models::{Failure, Job, Prediction, Setup, Window};
 
 use super::timeouts::Timeouts;
 use crate::store::{JobRow, Store};
 use crate::trial::named;
 use crate::{RunError, Study};
-use starlings_fleet::{Fleet, FleetError, Outcome, SetupId};
 
 /// The windows of one step, one per record that still has data: (record, window).
 pub type StepWindows = Vec<(usize, Arc<Window>)>;

@@ -5,11 +5,11 @@
 
 use std::collections::HashMap;
 
+use starlings_fleet::{Outcome, SetupId};
 use starlings_models::{Job, Timeout};
 
 use crate::run_key;
 use crate::store::{RunKey, Store, StoreError};
-use starlings_fleet::{Outcome, SetupId};
 
 /// Timeouts by the keys of their runs.
 pub(super) struct Timeouts<'a> {

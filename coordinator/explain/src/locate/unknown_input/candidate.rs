@@ -4,13 +4,13 @@
 
 use std::sync::Arc;
 
+use starlings_fleet::{Fleet, Outcome, SetupId};
 use starlings_models::effect::{Addition, EffectParameter};
 use starlings_models::{EffectDef, Job, Prediction, Quantity, SOLVER, Setup, Spec, Window};
+use starlings_study::Study;
 
 use crate::ExplainError;
 use crate::memory::told;
-use starlings_fleet::{Fleet, Outcome, SetupId};
-use starlings_study::Study;
 
 /// Change of the outputs, in noise sd, below which an input is not felt.
 const FELT: f64 = 1e-6;

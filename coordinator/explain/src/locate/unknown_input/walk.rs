@@ -10,13 +10,13 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 use starlings_estimators::{Data, Gaussian, Noise, Particles, Points, Root, Roukf, SigmaSet};
+use starlings_fleet::Fleet;
 use starlings_models::{Job, Prediction, Window};
+use starlings_study::Study;
 
 use super::candidate::{Candidate, predictions};
 use crate::ExplainError;
 use crate::memory::told;
-use starlings_fleet::Fleet;
-use starlings_study::Study;
 
 /// Coordinates at most.
 pub(super) const DIRECTIONS: usize = 4;

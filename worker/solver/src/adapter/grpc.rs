@@ -1,0 +1,155 @@
+//! A solver that serves `solver.proto`: one program per slot, started when first needed, or one that somebody else started.
+//!
+//! A program that dies under a run is started anew and the run is made again, since a run changes nothing outside its folder;
+//! what the solver itself reports is an answer and is not asked twice. Next files to read: [`super::super::instance`] for one
+//! program, [`super::super::backoff`] for how fast it may be started again.
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use starlings_models::{Description, ParticleError, Run, Solved, SolverDef, Timeout};
+
+use super::{Adapter, Kind};
+use crate::SolverError;
+use crate::backoff::Backoff;
+use crate::instance::{How, Instance};
+use crate::losses::Losses;
+use crate::seats::{Seat, Seats};
+use crate::site::Site;
+
+pub(crate) const KIND: Kind = Kind {
+    name: "grpc",
+    says: "a program that serves solver.proto, or an address where one does",
+    asks: true,
+    open: |def, site| Ok(Box::new(Grpc::new(def, site, def.command.clone())?)),
+};
+
+/// Programs that serve `solver.proto`.
+pub(crate) struct Grpc {
+    def: SolverDef,
+    command: Vec<String>,
+    site: Arc<Site>,
+    idle: Mutex<Vec<Seated>>,
+    backoff: Mutex<Backoff>,
+    seats: Seats,
+}
+
+/// A program and the number by which it found its cores, which is free again after its end.
+struct Seated {
+    instance: Instance,
+    _seat: Seat,
+}
+
+impl Grpc {
+    /// Programs that `command` starts, or one at the address of the definition.
+    ///
+    /// # Errors
+    /// When there is neither.
+    pub(crate) fn new(def: &SolverDef, site: &Arc<Site>, command: Vec<String>) -> Result<Self, SolverError> {
+        if command.is_empty() && def.address.is_none() {
+            let message = "a solver needs a `command` that starts it, or an `address` where it listens";
+            return Err(SolverError::Incomplete(message.to_owned()));
+        }
+        let (idle, backoff, seats) = (Mutex::default(), Mutex::default(), Seats::default());
+        Ok(Self { def: def.clone(), command, site: Arc::clone(site), idle, backoff, seats })
+    }
+
+    /// An idle program, or a new one.
+    fn take(&self) -> Result<Seated, SolverError> {
+        while let Some(idle) = self.idle() {
+            // A program whose folder was taken away would fail: it ends here.
+            if !idle.instance.is_homeless() {
+                return Ok(idle);
+            }
+        }
+        let pause = self.backoff.lock().unwrap_or_else(PoisonError::into_inner).pause();
+        std::thread::sleep(pause);
+        let seat = self.seats.take();
+        let instance = Instance::start(&self.def, &self.command, &self.site, seat.number());
+        let mut backoff = self.backoff.lock().unwrap_or_else(PoisonError::into_inner);
+        if instance.is_ok() {
+            backoff.worked();
+        } else {
+            backoff.failed();
+        }
+        Ok(Seated { instance: instance?, _seat: seat })
+    }
+
+    fn idle(&self) -> Option<Seated> {
+        self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop()
+    }
+
+    fn give_back(&self, seated: Seated) {
+        self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(seated);
+    }
+}
+
+impl Adapter for Grpc {
+    fn describe(&self) -> Result<Description, SolverError> {
+        let mut losses = Losses::default();
+        let mut seated = loop {
+            match self.take() {
+                Err(SolverError::NotReady { killed: true, .. }) if losses.killed() => {}
+                taken => break taken?,
+            }
+        };
+        let description = seated.instance.describe()?;
+        self.give_back(seated);
+        Ok(description)
+    }
+
+    fn run(&self, run: &Run<'_>) -> Result<Solved, ParticleError> {
+        let patience = Duration::try_from_secs_f64(self.def.timeout).unwrap_or(Duration::MAX);
+        let mut losses = Losses::default();
+        loop {
+            let mut seated = match self.take() {
+                Ok(seated) => seated,
+                Err(error) => {
+                    let killed = matches!(error, SolverError::NotReady { killed: true, .. });
+                    let again = if killed { losses.killed() } else { losses.fell() };
+                    // A program that is not even ready has not seen the parameters.
+                    if !again {
+                        return Err(ParticleError::Infrastructure(error.to_string()));
+                    }
+                    continue;
+                }
+            };
+            match seated.instance.run(run, patience) {
+                Ok(answer) => {
+                    let homeless = answer.is_err() && seated.instance.is_homeless();
+                    if homeless && losses.killed() {
+                        continue;
+                    }
+                    self.give_back(seated);
+                    return answer;
+                }
+                // The program is gone or of no more use: dropping it ends its whole group.
+                Err(lost) => {
+                    let again = match lost.how {
+                        How::Silent | How::Stopped => false,
+                        How::Fell => losses.fell(),
+                        How::Killed => losses.killed(),
+                    };
+                    let times = losses.total() + u32::from(matches!(lost.how, How::Silent | How::Stopped));
+                    let text = lost.text(times);
+                    drop(seated);
+                    tracing::warn!(particle = run.particle, record = run.record, times, "{text}");
+                    if !again {
+                        return Err(match lost.how {
+                            How::Silent => Timeout { limit: self.def.timeout, says: text }.into(),
+                            How::Fell => ParticleError::Undecided(text),
+                            How::Killed | How::Stopped => ParticleError::Infrastructure(text),
+                        });
+                    }
+                }
+            }
+        }
+    }
+
+    fn run_and_leave(&self, run: &Run<'_>) -> bool {
+        let Ok(mut seated) = self.take() else { return false };
+        seated.instance.leave(run);
+        self.give_back(seated);
+        true
+    }
+}
