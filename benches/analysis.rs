@@ -15,9 +15,9 @@ use nalgebra::DMatrix;
 use serde_json::{Map, Value, json};
 use starlings_estimators::{Data, Drift, Noise, Particles, Points, Root, Roukf, SigmaSet, recombine};
 use starlings_models::equations::{EquationsDef, EquationsModel};
-use starlings_models::integrate::{Tolerance, dopri5};
+use starlings_models::integrate::{self, Solver, Tolerance};
 use starlings_models::limits::Limits;
-use starlings_models::model::{History, Segment};
+use starlings_models::segment::{History, Segment};
 use starlings_models::{Drive, Job, Model, ModelDef, Setup, Signal, Spec, Window};
 
 type Failure = Box<dyn std::error::Error>;
@@ -214,10 +214,19 @@ fn equations_against_rust(figures: &mut Map<String, Value>) -> Result<(), Failur
     let segment =
         Segment { t0: 0.0, t1: 50.0, u0: &[], slope: &[], history: &NoHistory, limits: &Limits::none() };
     let mut x = [0.1, 0.0];
-    dopri5::advance(&rust, segment, &[1.0, 0.1, 0.5], &mut x, Tolerance::default())?;
+    integrate::advance(&rust, Solver::Dopri5(Tolerance::default()), segment, &[1.0, 0.1, 0.5], &mut x)?;
     let native = best(20, || {
         x = [0.1, 0.0];
-        black_box(dopri5::advance(&rust, segment, &[1.0, 0.1, 0.5], &mut x, Tolerance::default()).is_ok());
+        black_box(
+            integrate::advance(
+                &rust,
+                Solver::Dopri5(Tolerance::default()),
+                segment,
+                &[1.0, 0.1, 0.5],
+                &mut x,
+            )
+            .is_ok(),
+        );
     });
     let by_rust = x;
     x = [0.1, 0.0];

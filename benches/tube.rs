@@ -22,7 +22,7 @@ use serde_json::{Map, Value, json};
 use starlings_coordinator::study::store::Purpose;
 use starlings_coordinator::study::{RunContext, RunFolder, Study, Summary, run::run};
 use starlings_models::limits::Limits;
-use starlings_models::model::{History, Segment};
+use starlings_models::segment::{History, Segment};
 use starlings_models::{Job, Model, ModelDef, Setup, Signal, Window};
 use starlings_worker::WorkerConfig;
 

@@ -9,6 +9,7 @@ use std::io::{self, ErrorKind, IsTerminal, Write};
 use tracing_subscriber::filter::LevelFilter;
 
 use crate::failure::Failure;
+pub(crate) use crate::note::note;
 
 /// Sends log lines to standard error: warnings, or more with each `-v`.
 pub(crate) fn log_to_stderr(verbose: u8) {
@@ -35,11 +36,6 @@ pub(crate) fn line(content: impl Display) -> Result<(), Failure> {
 pub(crate) fn text(content: impl Display) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
     write!(out, "{content}").and_then(|()| out.flush()).map_err(|e| lost(&e))
-}
-
-/// Writes a line to standard error; when nobody reads it, the work goes on.
-pub(crate) fn note(content: impl Display) {
-    let _ = writeln!(io::stderr().lock(), "{content}");
 }
 
 /// What a failed write to standard output means.

@@ -7,7 +7,7 @@ use miette::{Diagnostic, LabeledSpan, NamedSource, Report, Severity, SourceCode}
 use serde_json::{Value, json};
 use starlings_coordinator::study::{Problem, StudyError};
 
-use crate::console::note;
+use crate::note::note;
 
 /// Why a command ended without doing what was asked.
 pub(crate) enum Failure {

@@ -19,6 +19,7 @@ mod identify;
 mod interrupt;
 mod load;
 mod models;
+mod note;
 mod progress;
 mod report;
 mod run;

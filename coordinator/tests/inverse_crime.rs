@@ -6,8 +6,8 @@ use std::f64::consts::PI;
 
 use starlings_models::Model;
 use starlings_models::limits::Limits;
-use starlings_models::model::{History, Segment};
 use starlings_models::native::Artery1d;
+use starlings_models::segment::{History, Segment};
 use study_kit::{Done, csv, grid, normals, run_once};
 
 /// Stiffness of the regions in octaves above the reference.

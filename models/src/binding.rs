@@ -2,7 +2,8 @@
 //!
 //! Names are resolved once, when a setup is built; a run only follows indices. Next file to read: [`crate::simulator`].
 
-use crate::setup::{Setup, SetupError};
+use crate::SetupError;
+use crate::setup::Setup;
 use crate::{ModelFailure, Quantity, Spec, nearest};
 
 /// Prefix of a name that gives a state its initial value.

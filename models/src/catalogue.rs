@@ -5,9 +5,10 @@
 
 use std::collections::HashSet;
 
+use crate::SetupError;
 use crate::equations::EquationsModel;
 use crate::external::Outline;
-use crate::setup::{ModelDef, SetupError};
+use crate::setup::ModelDef;
 use crate::solver::SOLVER;
 use crate::{Model, Spec, equations, layout, native, nearest};
 

@@ -10,6 +10,7 @@ pub const KIND: &str = "equations";
 pub(crate) const SAYS: &str = "States, rates and outputs as the study writes them.";
 
 mod affine;
+pub mod at;
 mod build;
 mod calculus;
 pub(crate) mod check;
@@ -18,6 +19,7 @@ pub mod def;
 pub(crate) mod dimension;
 mod dual;
 pub mod expression;
+pub mod expression_error;
 mod inline;
 pub mod model;
 mod node;
@@ -25,7 +27,11 @@ mod parse;
 mod parsed;
 mod program;
 mod reach;
+mod values;
 
+pub use at::{At, Direction, Slot};
 pub use def::{EquationsDef, InputDef, Method, OutputDef, SolverDef, StateDef};
-pub use expression::{At, Direction, Expression, ExpressionError, Program, Slot};
+pub use expression::Expression;
+pub use expression_error::ExpressionError;
 pub use model::EquationsModel;
+pub use program::Program;

@@ -12,9 +12,10 @@ mod rows;
 mod split;
 pub mod table;
 
+use crate::SetupError;
 use crate::binding::Binding;
 use crate::effect::Addition;
-use crate::setup::{Setup, SetupError};
+use crate::setup::Setup;
 use crate::simulator::{check_job, free_names};
 use crate::solver::Description;
 use crate::{Forward, Job, ModelFailure, ObserverDef, ParticleError, Prediction, Signal, Spec, Window};

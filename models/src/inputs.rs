@@ -3,7 +3,7 @@
 //! Walks forward only; the walk costs no search and no allocation per step. Next file to read: [`crate::simulator`].
 
 use crate::limits::Limits;
-use crate::model::{Drive, History, Segment};
+use crate::segment::{Drive, History, Segment};
 use crate::{Signal, Window};
 
 impl Signal {

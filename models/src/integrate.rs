@@ -6,14 +6,19 @@
 
 pub mod auto;
 mod control;
-pub mod dopri5;
+mod dopri5;
 mod events;
 pub mod fixed;
-pub mod rosenbrock;
+mod rosenbrock;
 mod sliding;
+mod span;
+mod stepper;
 mod system;
 
-use crate::model::Segment;
+use dopri5::Dopri5;
+use rosenbrock::Rosenbrock;
+
+use crate::segment::Segment;
 use crate::{Model, ModelFailure};
 
 /// How exact a step must be: its error estimate stays below `absolute + relative · |x|` in the root mean square.
@@ -66,8 +71,14 @@ pub fn advance<M: Model + ?Sized>(
 ) -> Result<(), ModelFailure> {
     match solver {
         Solver::Auto(tolerance) => auto::advance(model, segment, theta, x, tolerance),
-        Solver::Dopri5(tolerance) => dopri5::advance(model, segment, theta, x, tolerance),
-        Solver::Rosenbrock(tolerance) => rosenbrock::advance(model, segment, theta, x, tolerance),
+        Solver::Dopri5(tolerance) => {
+            let mut stepper = Dopri5::new(x.len(), false);
+            span::advance(model, segment, theta, x, tolerance, &mut stepper)
+        }
+        Solver::Rosenbrock(tolerance) => {
+            let mut stepper = Rosenbrock::new(x.len());
+            span::advance(model, segment, theta, x, tolerance, &mut stepper)
+        }
         Solver::Fixed { step } => fixed::advance(model, segment, theta, x, step),
     }
 }

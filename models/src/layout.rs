@@ -6,8 +6,9 @@
 
 use serde::de::DeserializeOwned;
 
+use crate::SetupError;
 use crate::nearest;
-use crate::setup::{ModelDef, SetupError};
+use crate::setup::ModelDef;
 
 /// The layout of a definition as a model's own type; the type's default where the definition has none.
 ///

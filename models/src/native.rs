@@ -16,7 +16,8 @@ pub mod windkessel2;
 pub mod windkessel3;
 pub mod windkessel4;
 
-use crate::setup::{ModelDef, SetupError};
+use crate::SetupError;
+use crate::setup::ModelDef;
 use crate::{Model, layout};
 
 pub use artery_1d::Artery1d;

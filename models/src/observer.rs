@@ -18,7 +18,8 @@ pub mod windkessel;
 
 use nalgebra::DMatrix;
 
-use crate::setup::{ObserverDef, SetupError};
+use crate::SetupError;
+use crate::setup::ObserverDef;
 use crate::{Model, Spec, nearest};
 
 pub use dvf::VelocityFeedback;

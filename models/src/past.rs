@@ -9,7 +9,7 @@ mod track;
 use std::cell::Cell;
 
 use crate::memory::SAMPLES;
-use crate::model::{Drive, History};
+use crate::segment::{Drive, History};
 use crate::{Model, Window};
 use track::Track;
 

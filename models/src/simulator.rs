@@ -4,15 +4,16 @@
 //! the observer see the observed values of that same time. No clock and no randomness: same job, same bits. A run over
 //! consecutive windows equals one run over the whole. Next file to read: `inputs`, then `binding`.
 
+use crate::SetupError;
 use crate::binding::Binding;
 use crate::effect;
 use crate::inputs::Inputs;
 use crate::limits::{Limits, MAX_STEPS, TIMEOUT};
 use crate::memory::with_memories;
-use crate::model::Segment;
 use crate::observer::{self, Correction, Observer, Wiring};
 use crate::past::Past;
-use crate::setup::{Setup, SetupError};
+use crate::segment::Segment;
+use crate::setup::Setup;
 use crate::{
     Drive, Forward, Job, Model, ModelFailure, ParticleError, Prediction, Spec, Timeout, Window, nearest,
 };

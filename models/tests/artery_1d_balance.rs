@@ -7,8 +7,8 @@ use std::f64::consts::PI;
 
 use artery_1d_kit::{artery, bifurcation, drive, output, outputs, rate, run, start, theta, tube};
 use starlings_models::limits::Limits;
-use starlings_models::model::Segment;
 use starlings_models::native::Artery1d;
+use starlings_models::segment::Segment;
 use starlings_models::{Model, ModelDef, ModelFailure, SetupError, native};
 
 /// A half sine of 0.3 s in every beat of 0.8 s.

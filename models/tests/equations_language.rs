@@ -4,7 +4,7 @@
 
 use proptest::prelude::*;
 use starlings_models::equations::{At, Direction, Expression, ExpressionError, Program, Slot};
-use starlings_models::model::{Drive, History};
+use starlings_models::segment::{Drive, History};
 
 /// Input 0 is t², so that a delay is recognised.
 struct Square;

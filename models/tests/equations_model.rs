@@ -4,7 +4,7 @@
 
 use starlings_models::equations::{EquationsDef, EquationsModel, InputDef, Method, OutputDef, StateDef};
 use starlings_models::limits::Limits;
-use starlings_models::model::{Drive, History, Segment};
+use starlings_models::segment::{Drive, History, Segment};
 use starlings_models::{Model, Role, SetupError};
 
 /// Every input is t² in its past.

@@ -6,7 +6,7 @@ mod common;
 use common::{job, kinds, largest_difference, plausible, run, run_in_pieces, setup, window};
 use starlings_models::integrate::{self, Solver, Tolerance};
 use starlings_models::limits::Limits;
-use starlings_models::model::Segment;
+use starlings_models::segment::Segment;
 use starlings_models::{Forward, Model, ModelFailure, ParticleError, Simulator, Spec, catalogue, native};
 
 #[test]
@@ -170,7 +170,7 @@ fn closed_step_tolerance(kind: &str) -> Option<f64> {
 #[test]
 fn every_closed_step_agrees_with_the_integrated_rate() {
     struct NoHistory;
-    impl starlings_models::model::History for NoHistory {
+    impl starlings_models::segment::History for NoHistory {
         fn at(&self, _: usize, _: f64) -> f64 {
             f64::NAN
         }

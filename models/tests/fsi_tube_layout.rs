@@ -6,7 +6,7 @@ mod fsi_tube_kit;
 use fsi_tube_kit::NoHistory;
 use serde_json::{Value, json};
 use starlings_models::limits::Limits;
-use starlings_models::model::Segment;
+use starlings_models::segment::Segment;
 use starlings_models::{Model, ModelDef, ModelFailure, Setup};
 
 fn built(layout: Value) -> Result<Box<dyn Model>, String> {

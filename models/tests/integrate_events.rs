@@ -2,7 +2,7 @@
 
 use starlings_models::equations::{EquationsDef, EquationsModel, InputDef, Method, StateDef};
 use starlings_models::limits::Limits;
-use starlings_models::model::{History, Segment};
+use starlings_models::segment::{History, Segment};
 use starlings_models::{Model, ModelFailure};
 
 struct Ramp;

@@ -2,7 +2,7 @@
 
 use starlings_models::integrate::{Solver, Tolerance, advance};
 use starlings_models::limits::Limits;
-use starlings_models::model::{Drive, History, Segment};
+use starlings_models::segment::{Drive, History, Segment};
 use starlings_models::{Model, ModelFailure, Quantity, Spec};
 
 type Rate = fn(f64, &[f64], &[f64], &mut [f64]);

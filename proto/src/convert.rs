@@ -8,6 +8,7 @@ pub mod from_worker;
 pub mod job;
 pub mod solver;
 pub mod to_worker;
+mod window;
 pub mod windows;
 
 use starlings_models::Setup;

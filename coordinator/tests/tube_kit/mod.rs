@@ -7,10 +7,10 @@ use std::fmt::Write as _;
 use nalgebra::{DMatrix, DVector};
 use starlings_models::Model;
 use starlings_models::limits::Limits;
-use starlings_models::model::{History, Segment};
 use starlings_models::native::FsiTube;
 use starlings_models::native::fsi_tube::Layout;
 use starlings_models::native::fsi_tube::layout::Regions;
+use starlings_models::segment::{History, Segment};
 
 use crate::study_kit::{Case, Done, csv, grid, normals};
 

@@ -15,11 +15,11 @@ use std::collections::BTreeMap;
 use super::scope::{Reach, Scope, note_memories};
 use super::scratch::Scratch;
 use super::{Effect, EffectDef, EffectParameter, Moment, Scale, TermEffect, Touches};
+use crate::SetupError;
 use crate::bounds::unbounded;
 use crate::equations::{Slot, check};
 use crate::integrate::{self, Solver};
-use crate::model::{Drive, Segment};
-use crate::setup::SetupError;
+use crate::segment::{Drive, Segment};
 use crate::{Blocks, Memory, Model, ModelFailure, Quantity, Spec};
 
 /// A model and the effects added to it.

@@ -19,7 +19,7 @@ mod thermal;
 mod unit;
 
 use super::{EffectDef, Target};
-use crate::setup::SetupError;
+use crate::SetupError;
 use crate::{Spec, nearest};
 
 use place::Host;

@@ -6,10 +6,10 @@
 use std::collections::BTreeMap;
 
 use super::EffectDef;
+use crate::SetupError;
 use crate::bounds::unbounded;
-use crate::equations::expression::{Expression, ExpressionError, Program, Slot};
+use crate::equations::{Expression, ExpressionError, Program, Slot};
 use crate::memory::note;
-use crate::setup::SetupError;
 use crate::{Memory, Quantity, Spec, nearest};
 
 /// What the expressions of an effect may name.

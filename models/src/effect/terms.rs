@@ -4,9 +4,9 @@
 
 use super::scope::{Reach, Scope, names};
 use super::{Addition, Effect, EffectDef, Moment, Target, Touches};
-use crate::equations::expression::{At, Direction, Program, Slot};
-use crate::model::Drive;
-use crate::setup::SetupError;
+use crate::SetupError;
+use crate::equations::{At, Direction, Program, Slot};
+use crate::segment::Drive;
 use crate::{Quantity, Spec, nearest};
 
 /// One effect, made of expressions.

@@ -6,12 +6,14 @@ use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::affine;
+use super::at::Slot;
 use super::check;
 use super::def::EquationsDef;
-use super::expression::{Expression, Program, Slot};
+use super::expression::Expression;
 use super::inline::Names;
 use super::node::Node;
 use super::parsed::{Parsed, Placed, fault};
+use super::program::Program;
 use crate::bounds::unbounded;
 use crate::integrate::Solver;
 use crate::memory::{self, Memory};

@@ -2,9 +2,11 @@
 //!
 //! Next file to read: [`super::program`], which runs the code.
 
-use super::expression::{ExpressionError, Slot};
+use super::at::Slot;
+use super::expression_error::ExpressionError;
 use super::node::{Name, Node, Operation};
-use super::program::{self, MAX_STACK, Op, Program, Source};
+use super::program::{MAX_STACK, Op, Program};
+use super::values::{self, Source};
 
 /// Largest whole exponent that is worked out by multiplication.
 const MAX_POWER: f64 = 64.0;
@@ -78,7 +80,7 @@ impl Compiler<'_> {
             Node::Call(function, a) => {
                 let a = self.resolved(a)?;
                 match number(&a) {
-                    Some(value) => constant(program::call(*function, value)),
+                    Some(value) => constant(values::call(*function, value)),
                     None => Tree::Call(*function, Box::new(a)),
                 }
             }
@@ -201,8 +203,8 @@ impl Compiler<'_> {
 fn fold(operation: Operation, a: Tree, b: Tree) -> Tree {
     if let (Some(x), Some(y)) = (number(&a), number(&b)) {
         return constant(match whole(y) {
-            Some(n) if operation == Operation::Pow => program::power(x, n),
-            _ => program::pair(operation, x, y),
+            Some(n) if operation == Operation::Pow => values::power(x, n),
+            _ => values::pair(operation, x, y),
         });
     }
     if operation == Operation::Pow

@@ -2,9 +2,9 @@
 //!
 //! At a kink the derivative is that of one side. Next file to read: [`super::model`].
 
-use super::expression::{At, Direction};
+use super::at::{At, Direction};
 use super::node::{Function, Operation};
-use super::program::{Reader, Source, Values, call, delayed_slope, pair, power, sign};
+use super::values::{Reader, Source, Values, call, delayed_slope, pair, power, sign};
 
 /// A value and its derivative.
 #[derive(Clone, Copy, Default)]

@@ -2,72 +2,12 @@
 //!
 //! It does not know models: whoever compiles it says where each name's value is. Next file to read: [`super::def`].
 
+use super::at::Slot;
+use super::expression_error::ExpressionError;
 use super::node::{Node, Operation};
 use super::{calculus, compile, node, parse};
-use crate::model::Drive;
 
-pub use super::program::Program;
-
-/// Why an expression is refused.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("at column {column}: {message}")]
-pub struct ExpressionError {
-    /// Position of the fault in characters, from 1.
-    pub column: usize,
-    /// What is wrong and what was expected.
-    pub message: String,
-}
-
-impl ExpressionError {
-    pub(super) fn new(column: usize, message: impl Into<String>) -> Self {
-        Self { column, message: message.into() }
-    }
-}
-
-/// Where a name's value is found.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Slot {
-    /// Component of [`At::x`].
-    State(usize),
-    /// Component of [`At::theta`].
-    Parameter(usize),
-    /// Component of the inputs in [`At::u`].
-    Input(usize),
-    /// Component of [`At::y`].
-    Output(usize),
-    /// A number.
-    Constant(f64),
-}
-
-/// The values at which an expression is evaluated.
-#[derive(Clone, Copy)]
-pub struct At<'a> {
-    /// Time.
-    pub t: f64,
-    /// States.
-    pub x: &'a [f64],
-    /// Parameters.
-    pub theta: &'a [f64],
-    /// Inputs.
-    pub u: Drive<'a>,
-    /// Outputs; may be empty when no name was resolved to one.
-    pub y: &'a [f64],
-}
-
-/// A direction of differentiation: one component per component of [`At`]; a slice that is too short counts as zero.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Direction<'a> {
-    /// Along time.
-    pub t: f64,
-    /// Along the states.
-    pub x: &'a [f64],
-    /// Along the parameters.
-    pub theta: &'a [f64],
-    /// Along the inputs.
-    pub u: &'a [f64],
-    /// Along the outputs.
-    pub y: &'a [f64],
-}
+use super::program::Program;
 
 /// A parsed expression and its text.
 ///
@@ -118,7 +58,7 @@ impl Expression {
     ///
     /// `resolve` says where a name's value is, `nearest` offers a valid name for an unknown one. `ddt` of a name that is not
     /// an input asks `resolve` for `ddt:<name>`, and `delay` of one for `delay:<name>`, so that a model which keeps those
-    /// values can offer them: the past as an input of [`At::u`]'s history, behind those that have a value.
+    /// values can offer them: the past as an input of [`super::At::u`]'s history, behind those that have a value.
     ///
     /// # Errors
     /// At the column of an unknown name, of a `ddt` or `delay` without value, and for expressions that nest too deep.

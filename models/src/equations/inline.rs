@@ -6,7 +6,7 @@
 use std::cell::RefCell;
 
 use super::calculus;
-use super::expression::ExpressionError;
+use super::expression_error::ExpressionError;
 use super::node::{Name, Node};
 
 /// Largest expression after rewriting.

@@ -4,11 +4,12 @@
 
 use std::collections::BTreeMap;
 
+use super::at::{At, Direction, Slot};
 use super::build::{self, Built};
 use super::def::EquationsDef;
-use super::expression::{At, Direction, Program, Slot};
+use super::program::Program;
 use crate::integrate::Solver;
-use crate::model::Drive;
+use crate::segment::Drive;
 use crate::{Memory, Model, SetupError, Spec};
 
 /// A model whose equations a study states.

@@ -5,7 +5,7 @@
 
 mod call;
 
-use super::expression::ExpressionError;
+use super::expression_error::ExpressionError;
 use super::node::{Function, Name, Node, Operation};
 
 /// Parts nested deeper than this are refused, so that no expression can exhaust the stack.

@@ -4,11 +4,14 @@
 
 use std::cell::RefCell;
 
+use super::at::Slot;
 use super::def::EquationsDef;
-use super::expression::{Expression, ExpressionError, Program, Slot};
+use super::expression::Expression;
+use super::expression_error::ExpressionError;
 use super::inline::Names;
 use super::node::{Node, Operation};
 use super::parse;
+use super::program::Program;
 use crate::SetupError;
 
 /// An expression with its place, for messages.

@@ -2,7 +2,8 @@
 //!
 //! Next file to read: [`crate::memory`].
 
-use super::expression::{Expression, ExpressionError};
+use super::expression::Expression;
+use super::expression_error::ExpressionError;
 use super::node::{Function, Name, Node, Operation};
 
 /// Where nothing is known.

@@ -7,8 +7,9 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::replay::Replay;
+use crate::SetupError;
 use crate::effect::Extended;
-use crate::setup::{Setup, SetupError};
+use crate::setup::Setup;
 use crate::{EffectDef, Forward, Job, Model, ParticleError, Prediction, Simulator, Spec, Window};
 
 /// Effects on signals, ready to run.

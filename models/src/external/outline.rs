@@ -3,7 +3,8 @@
 //! Enough to check a setup against; it cannot be run. Next file to read: [`super::split`].
 
 use super::split::Split;
-use crate::setup::{Setup, SetupError};
+use crate::SetupError;
+use crate::setup::Setup;
 use crate::solver::Description;
 use crate::{Drive, Model, Spec};
 

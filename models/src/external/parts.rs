@@ -6,8 +6,9 @@ use super::applied::Applied;
 use super::outline::Outline;
 use super::replay::Replay;
 use super::split::Split;
+use crate::SetupError;
 use crate::effect::Extended;
-use crate::setup::{Setup, SetupError};
+use crate::setup::Setup;
 use crate::solver::Description;
 use crate::{EffectDef, Model, ObserverDef, Quantity, Spec, nearest};
 

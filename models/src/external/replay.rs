@@ -2,7 +2,7 @@
 //!
 //! It has the parameters of that program, so that terms may name them, and no state. Next file to read: [`super::split`].
 
-use crate::model::Segment;
+use crate::segment::Segment;
 use crate::{Drive, Model, ModelFailure, Quantity, Spec};
 
 /// Shows the inputs from `first` on.

@@ -2,7 +2,7 @@
 //!
 //! A field is asked for as a whole, whichever of its components is observed. Next file to read: [`crate::external`].
 
-use crate::setup::SetupError;
+use crate::SetupError;
 use crate::{Quantity, Spec, Window, nearest};
 
 /// Outputs asked for, and the place of each predicted row among theirs.

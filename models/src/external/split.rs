@@ -4,8 +4,8 @@
 //! output the prediction after it. An effect does one of these. Next file to read: [`mod@super::applied`].
 
 use crate::EffectDef;
+use crate::SetupError;
 use crate::effect::target::Target;
-use crate::setup::SetupError;
 use crate::solver::Description;
 
 /// The effects of a setup by who adds them, each in its order.

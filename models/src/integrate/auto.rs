@@ -3,11 +3,11 @@
 //! Each segment is judged anew, so that a run depends on its job only. Next file to read: `control.rs`.
 
 use super::Tolerance;
-use super::control::{Reached, integrate};
 use super::dopri5::Dopri5;
 use super::rosenbrock::Rosenbrock;
+use super::span::{Reached, integrate};
 use super::system::OnSegment;
-use crate::model::Segment;
+use crate::segment::Segment;
 use crate::{Model, ModelFailure};
 
 /// Advances `x` over the segment within the tolerance.

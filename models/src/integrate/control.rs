@@ -7,57 +7,15 @@ mod crossing;
 
 use super::Tolerance;
 use super::events::Events;
+use super::stepper::{MAX_STEPS, Stepper, scaled};
 use super::system::{System, not_finite};
 use crate::ModelFailure;
 
-/// Most steps, accepted or not, within one segment of a run without limits.
-pub(super) const MAX_STEPS: u64 = 1_000_000;
 const SAFETY: f64 = 0.9;
 /// Weight of the integral part.
 const BETA: f64 = 0.04;
 /// Smallest and largest factor between two steps.
 const FACTOR: [f64; 2] = [0.1, 8.0];
-
-/// A one-step method with an error estimate.
-pub(super) trait Stepper {
-    /// Order at which the error estimate falls with the step.
-    const ORDER: f64;
-
-    /// Prepares for a step from a point that no accepted step led to.
-    fn restart<S: System>(&mut self, system: &mut S, t: f64, x: &[f64]);
-
-    /// The rate at the current point.
-    fn rate(&self) -> &[f64];
-
-    /// Writes the state after a step of length `h` and returns the scaled norm of its error estimate.
-    fn attempt<S: System>(
-        &mut self,
-        system: &mut S,
-        t: f64,
-        x: &[f64],
-        h: f64,
-        new: &mut [f64],
-        tolerance: Tolerance,
-    ) -> f64;
-
-    /// Makes the last attempt, which ended at `(t, new)`, the current point; says whether to give up for stiffness.
-    fn accept<S: System>(&mut self, system: &mut S, t: f64, h: f64, new: &[f64]) -> bool;
-}
-
-/// An error in units of the tolerance.
-#[inline]
-pub(super) fn scaled(error: f64, before: f64, after: f64, tolerance: Tolerance) -> f64 {
-    error / (tolerance.absolute + tolerance.relative * before.abs().max(after.abs()))
-}
-
-/// How an integration ended.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Reached {
-    /// At the end of the span.
-    End,
-    /// At this time the method gave up for stiffness.
-    Stiff(f64),
-}
 
 /// What one attempt at a step came to.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,37 +28,6 @@ pub(super) enum Step {
     Refused,
     /// Accepted, and the method gives up for stiffness.
     Stiff,
-}
-
-/// Integrates over a span, restarting at switching points and sliding along them where both sides lead back.
-pub(super) fn integrate<S: System, P: Stepper>(
-    system: &mut S,
-    stepper: &mut P,
-    span: [f64; 2],
-    x: &mut [f64],
-    tolerance: Tolerance,
-) -> Result<Reached, ModelFailure> {
-    if x.is_empty() {
-        return Ok(Reached::End);
-    }
-    let mut run = Run::new(system, stepper, span, x, tolerance);
-    run.start()?;
-    while run.t < run.end {
-        match run.step()? {
-            Step::Stiff => return Ok(Reached::Stiff(run.t)),
-            Step::Crossed => {
-                let index = run.events.tracked();
-                super::sliding::slide(&mut run, index..index + 1)?;
-            }
-            // A span may start where the one before it left the state sliding.
-            Step::Refused if run.fresh => {
-                let all = 0..run.system.n_switch();
-                super::sliding::slide(&mut run, all)?;
-            }
-            Step::Passed | Step::Refused => {}
-        }
-    }
-    Ok(Reached::End)
 }
 
 /// One integration under way.

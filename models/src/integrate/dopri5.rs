@@ -4,26 +4,8 @@
 //! Next file to read: `control.rs`, which chooses the steps.
 
 use super::Tolerance;
-use super::control::{self, Stepper};
-use super::system::{OnSegment, System};
-use crate::model::Segment;
-use crate::{Model, ModelFailure};
-
-/// Advances `x` over the segment within the tolerance.
-///
-/// # Errors
-/// [`ModelFailure::TooManySteps`], [`ModelFailure::StepTooSmall`] or [`ModelFailure::NotFinite`], with the time reached.
-pub fn advance<M: Model + ?Sized>(
-    model: &M,
-    segment: Segment<'_>,
-    theta: &[f64],
-    x: &mut [f64],
-    tolerance: Tolerance,
-) -> Result<(), ModelFailure> {
-    let mut system = OnSegment::new(model, segment, theta, x.len());
-    let mut stepper = Dopri5::new(x.len(), false);
-    control::integrate(&mut system, &mut stepper, [segment.t0, segment.t1], x, tolerance).map(|_| ())
-}
+use super::stepper::{Stepper, scaled};
+use super::system::System;
 
 /// The pair's working memory: seven rates and one stage.
 pub(super) struct Dopri5 {
@@ -114,7 +96,7 @@ impl Stepper for Dopri5 {
         let mut sum = 0.0;
         for i in 0..n {
             let e = E[0] * k1[i] + E[1] * k3[i] + E[2] * k4[i] + E[3] * k5[i] + E[4] * k6[i] + E[5] * k7[i];
-            sum += control::scaled(h * e, x[i], new[i], tolerance).powi(2);
+            sum += scaled(h * e, x[i], new[i], tolerance).powi(2);
         }
         (sum / n as f64).sqrt()
     }

@@ -2,9 +2,9 @@
 //!
 //! It estimates no error and locates no switching points: its cost is known in advance. Next file to read: [`super::dopri5`].
 
-use super::control::MAX_STEPS;
+use super::stepper::MAX_STEPS;
 use super::system::{OnSegment, System, not_finite};
-use crate::model::Segment;
+use crate::segment::Segment;
 use crate::{Model, ModelFailure};
 
 /// Advances `x` over the segment in equal steps no longer than `step`.

@@ -6,26 +6,8 @@
 use nalgebra::{DMatrix, DVectorViewMut, Dyn, LU};
 
 use super::Tolerance;
-use super::control::{self, Stepper};
-use super::system::{OnSegment, System};
-use crate::model::Segment;
-use crate::{Model, ModelFailure};
-
-/// Advances `x` over the segment within the tolerance.
-///
-/// # Errors
-/// [`ModelFailure::TooManySteps`], [`ModelFailure::StepTooSmall`] or [`ModelFailure::NotFinite`], with the time reached.
-pub fn advance<M: Model + ?Sized>(
-    model: &M,
-    segment: Segment<'_>,
-    theta: &[f64],
-    x: &mut [f64],
-    tolerance: Tolerance,
-) -> Result<(), ModelFailure> {
-    let mut system = OnSegment::new(model, segment, theta, x.len());
-    let mut stepper = Rosenbrock::new(x.len());
-    control::integrate(&mut system, &mut stepper, [segment.t0, segment.t1], x, tolerance).map(|_| ())
-}
+use super::stepper::{Stepper, scaled};
+use super::system::System;
 
 const STAGES: usize = 6;
 const GAMMA: f64 = 0.25;
@@ -143,7 +125,7 @@ impl Stepper for Rosenbrock {
         let mut sum = 0.0;
         for ((new, e), x) in new.iter_mut().zip(error).zip(x) {
             *new += e;
-            sum += control::scaled(*e, *x, *new, tolerance).powi(2);
+            sum += scaled(*e, *x, *new, tolerance).powi(2);
         }
         (sum / n as f64).sqrt()
     }

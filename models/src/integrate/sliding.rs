@@ -6,8 +6,9 @@
 use std::ops::Range;
 
 use super::Tolerance;
-use super::control::{Run, Stepper};
+use super::control::Run;
 use super::dopri5::Dopri5;
+use super::stepper::Stepper;
 use super::system::System;
 use crate::ModelFailure;
 use crate::limits::Limits;

@@ -3,7 +3,7 @@
 //! Parameters and inputs are bound here and appear no further. Next file to read: [`super::control`].
 
 use crate::limits::Limits;
-use crate::model::{Drive, Segment};
+use crate::segment::{Drive, Segment};
 use crate::{Model, ModelFailure, Spec};
 
 /// A system of ordinary differential equations.

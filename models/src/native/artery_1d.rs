@@ -17,8 +17,9 @@ mod viscous;
 mod wall;
 
 use super::MOST_STEPS;
-use crate::model::Segment;
-use crate::setup::{ModelDef, SetupError};
+use crate::SetupError;
+use crate::segment::Segment;
+use crate::setup::ModelDef;
 use crate::{Drive, Model, ModelFailure, Spec};
 
 pub use layout::Layout;

@@ -3,7 +3,7 @@
 //! Next file to read: [`crate::catalogue`].
 
 use super::oscillator::{INITIAL_POSITION, blocks, free_motion, measures, outputs, parameters, states};
-use crate::model::Segment;
+use crate::segment::Segment;
 use crate::{Blocks, Drive, Model, ModelFailure, Quantity, Role, Spec};
 
 /// m d²x/dt² + c dx/dt + k x = F(t), with position x and velocity v as states and outputs.

@@ -13,9 +13,10 @@ mod quantities;
 mod state;
 
 use super::MOST_STEPS;
-use crate::model::Segment;
+use crate::SetupError;
 use crate::prestress::Rings;
-use crate::setup::{ModelDef, SetupError};
+use crate::segment::Segment;
+use crate::setup::ModelDef;
 use crate::{Blocks, Drive, Model, ModelFailure, Spec};
 use chain::Chain;
 use coefficients::Coefficients;

@@ -5,7 +5,7 @@
 use nalgebra::DMatrix;
 
 use crate::blocks::WallOutputs;
-use crate::model::Segment;
+use crate::segment::Segment;
 use crate::{Blocks, Drive, Model, ModelFailure, Quantity, Role, Spec};
 
 /// m d²x/dt² + c dx/dt + k x = 0, with position x and velocity v as states and outputs.

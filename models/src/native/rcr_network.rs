@@ -19,7 +19,7 @@ mod topology;
 mod units;
 
 use crate::integrate::{self, Solver, Tolerance};
-use crate::model::Segment;
+use crate::segment::Segment;
 use crate::{Drive, Model, ModelDef, ModelFailure, Quantity, SetupError, Spec, layout};
 
 use assembly::Assembly;

@@ -16,9 +16,10 @@ mod vibration;
 
 use std::sync::Arc;
 
+use crate::SetupError;
 use crate::blocks::{Blocks, WallOutputs};
-use crate::model::Segment;
-use crate::setup::{ModelDef, SetupError};
+use crate::segment::Segment;
+use crate::setup::ModelDef;
 use crate::{Drive, Model, ModelFailure, Spec};
 
 use cache::Cache;

@@ -19,9 +19,10 @@ use super::toy_fsi::propagator::Propagator;
 use super::toy_fsi::spectral::Spectral;
 use super::toy_fsi::vessel::{self, Vessel, wall_fields};
 use super::toy_fsi::{WALL, bump, modal_matrices};
+use crate::SetupError;
 use crate::blocks::Blocks;
-use crate::model::Segment;
-use crate::setup::{ModelDef, SetupError};
+use crate::segment::Segment;
+use crate::setup::ModelDef;
 use crate::{Drive, Model, ModelFailure, Quantity, Role, Spec};
 
 /// A Stokes flow under a generalised string.

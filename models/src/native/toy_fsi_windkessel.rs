@@ -17,9 +17,10 @@ use super::toy_fsi::propagator::Propagator;
 use super::toy_fsi::spectral::Spectral;
 use super::toy_fsi::vessel::{Vessel, wall_fields};
 use super::toy_fsi::{WALL, modal_matrices};
+use crate::SetupError;
 use crate::blocks::{Blocks, WallOutputs, WindkesselBlock};
-use crate::model::Segment;
-use crate::setup::{ModelDef, SetupError};
+use crate::segment::Segment;
+use crate::setup::ModelDef;
 use crate::{Drive, Model, ModelFailure, Quantity, Role, Spec};
 
 /// A channel under an elastic wall, from a known inflow to a Windkessel.

@@ -3,7 +3,7 @@
 //! Next file to read: [`super::windkessel3`].
 
 use super::relaxation;
-use crate::model::Segment;
+use crate::segment::Segment;
 use crate::{Drive, Model, ModelFailure, Quantity, Role, Spec};
 
 /// C dp/dt = q − p/R; the pressure is p.

@@ -5,7 +5,7 @@
 use super::windkessel2::{
     INITIAL_PRESSURE, advance_stored, compliance, flow, pressure, resistance, stored_pressure,
 };
-use crate::model::Segment;
+use crate::segment::Segment;
 use crate::{Drive, Model, ModelFailure, Quantity, Role, Spec};
 
 /// C dp/dt = q − p/R; the inlet pressure is p + Zc q.

@@ -10,7 +10,7 @@ use super::windkessel2::{
     INITIAL_PRESSURE, advance_stored, compliance, flow, pressure, resistance, stored_pressure,
 };
 use super::windkessel3::characteristic_impedance;
-use crate::model::Segment;
+use crate::segment::Segment;
 use crate::{Drive, Model, ModelFailure, Quantity, Role, Spec};
 
 /// C dp/dt = q − p/R and L diL/dt = Zc (q − iL); the inlet pressure is p + Zc (q − iL).

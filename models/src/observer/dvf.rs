@@ -9,7 +9,8 @@ use nalgebra::DMatrix;
 
 use super::wall::{Shown, Wall, add, feedback, of_velocity, on_velocity, restricted, solve};
 use super::{Correction, Kind, Observer, Wiring};
-use crate::setup::{ObserverDef, SetupError};
+use crate::SetupError;
+use crate::setup::ObserverDef;
 use crate::{Blocks, Model};
 
 /// The entry of the observer list.

@@ -10,7 +10,8 @@ use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
 use super::wall::{Shown, Wall, add, feedback, of_velocity, on_velocity, restricted, solve};
 use super::{Correction, Kind, Observer, Wiring};
 use crate::Model;
-use crate::setup::{ObserverDef, SetupError};
+use crate::SetupError;
+use crate::setup::ObserverDef;
 
 /// The entry of the observer list.
 pub(super) const KIND: Kind = Kind {

@@ -5,7 +5,8 @@
 use std::ops::Range;
 
 use super::{Correction, Wiring};
-use crate::setup::{ObserverDef, SetupError};
+use crate::SetupError;
+use crate::setup::ObserverDef;
 use crate::{Quantity, Spec, nearest};
 
 /// One observed row and the state component that it measures.

@@ -14,7 +14,8 @@ use nalgebra::DMatrix;
 use super::measured::{Measured, mean_innovation, measured};
 use super::{Correction, Kind, Observer, Wiring};
 use crate::Model;
-use crate::setup::{ObserverDef, SetupError};
+use crate::SetupError;
+use crate::setup::ObserverDef;
 
 /// Pulls measured states towards the data.
 #[derive(Debug)]

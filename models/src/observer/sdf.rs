@@ -12,7 +12,8 @@ use super::extension::{extension, onto_all, seen};
 use super::wall::{Shown, Wall, add, feedback};
 use super::{Correction, Kind, Observer, Wiring};
 use crate::Model;
-use crate::setup::{ObserverDef, SetupError};
+use crate::SetupError;
+use crate::setup::ObserverDef;
 
 /// The entry of the observer list.
 pub(super) const KIND: Kind = Kind {

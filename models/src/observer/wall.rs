@@ -6,7 +6,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::measured::{mean_innovation, shown};
 use super::{Correction, Wiring};
-use crate::setup::{ObserverDef, SetupError};
+use crate::SetupError;
+use crate::setup::ObserverDef;
 use crate::{Blocks, Model, Spec, native};
 
 /// Which of the wall's outputs an observer takes.

@@ -11,7 +11,8 @@ use nalgebra::DMatrix;
 use super::measured::mean_innovation;
 use super::wall::{components, hosted};
 use super::{Correction, Kind, Observer, Wiring};
-use crate::setup::{ObserverDef, SetupError};
+use crate::SetupError;
+use crate::setup::ObserverDef;
 use crate::{Drive, Model, Spec};
 
 /// The entry of the observer list.

@@ -6,7 +6,7 @@
 
 use super::Past;
 use super::track::{Piece, Track};
-use crate::model::{Drive, Segment};
+use crate::segment::{Drive, Segment};
 use crate::{Model, ModelFailure};
 
 /// Most runs of one stretch that reads itself, before it is halved.

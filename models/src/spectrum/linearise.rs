@@ -6,7 +6,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::SpectrumError;
-use crate::model::History;
+use crate::segment::History;
 use crate::{Drive, Model, Spec};
 
 /// A, n_state × n_state, at the model's initial state.

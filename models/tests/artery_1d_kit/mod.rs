@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, dead_code, reason = "test helpers; each test binary uses its part")]
 
 use starlings_models::limits::Limits;
-use starlings_models::model::{Drive, History, Segment};
 use starlings_models::native::Artery1d;
+use starlings_models::segment::{Drive, History, Segment};
 use starlings_models::{Model, Spec};
 
 struct NoHistory;

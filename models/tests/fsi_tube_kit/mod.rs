@@ -5,10 +5,10 @@ use std::f64::consts::PI;
 
 use nalgebra::{DMatrix, DVector};
 use starlings_models::limits::Limits;
-use starlings_models::model::{History, Segment};
 use starlings_models::native::FsiTube;
 use starlings_models::native::fsi_tube::Layout;
 use starlings_models::native::fsi_tube::layout::Regions;
+use starlings_models::segment::{History, Segment};
 use starlings_models::{Drive, Model};
 
 pub(crate) const MM_HG: f64 = 1333.22;

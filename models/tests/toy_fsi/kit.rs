@@ -3,12 +3,12 @@
 use nalgebra::{Complex, DMatrix, SymmetricEigen};
 use serde_json::Value;
 use starlings_models::observer::{self, Wiring};
-use starlings_models::setup::{ModelDef, ObserverDef, SetupError};
 use starlings_models::spectrum::component::ROUNDING;
 use starlings_models::spectrum::{
     Best, Feedback, GainCurve, ObservedSystem, linearisation, natural, poles, slopes,
 };
 use starlings_models::{Blocks, Model, Observer, catalogue};
+use starlings_models::{ModelDef, ObserverDef, SetupError};
 
 /// Set A of the tables, a large artery, is the default of all models; set B is softer, thinner and shorter.
 pub(crate) const SOFT: [(&str, f64); 5] = [("L", 5.0), ("R", 0.5), ("h", 0.1), ("E", 7.5e5), ("rho_f", 1.0)];

@@ -2,7 +2,7 @@
 
 use serde_json::json;
 use starlings_models::limits::Limits;
-use starlings_models::model::{History, Segment};
+use starlings_models::segment::{History, Segment};
 
 use crate::kit::Toy;
 

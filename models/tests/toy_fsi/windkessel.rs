@@ -4,8 +4,8 @@ use nalgebra::{Complex, DVector};
 use serde_json::json;
 use starlings_models::Drive;
 use starlings_models::limits::Limits;
-use starlings_models::model::Segment;
 use starlings_models::observer::Correction;
+use starlings_models::segment::Segment;
 use starlings_models::spectrum::poles;
 
 use crate::kit::{STORED_PRESSURE, Toy, close, close_relative, nearest};

@@ -1,10 +1,11 @@
-//! Jobs and windows, both ways.
+//! Jobs, both ways. Next file to read: [`super::windows`], for the windows that they share.
 
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use starlings_models::{Job, Signal, Window};
+use starlings_models::{Job, Window};
 
+use super::window;
 use super::windows::{self, ReceivedWindows, SentWindows, WindowId};
 use super::{Lease, SetupId, WireError, floats, required};
 use crate::{MAX_INLINE_STATE, MAX_MESSAGE, wire};
@@ -69,7 +70,7 @@ impl JobEncoder {
 
     fn window(&mut self, window: &Arc<Window>) -> &Encoded {
         self.windows.entry(Arc::as_ptr(window) as usize).or_insert_with(|| {
-            let wire = encode_window(window);
+            let wire = window::encode(window);
             Encoded { _window: Arc::clone(window), name: windows::name(&wire), wire }
         })
     }
@@ -83,7 +84,7 @@ impl JobEncoder {
 pub fn check_size(job: &Job) -> Result<(), WireError> {
     check_state(job.state.as_deref().unwrap_or_default())?;
     let window = &job.window;
-    check_window(window)?;
+    window::check(window)?;
     let signals: usize = window.inputs.iter().map(|s| s.times.len() + s.values.len()).sum();
     let bytes = 8 * (window.times.len() + window.observed.len() + signals + job.theta.len());
     if bytes + MAX_INLINE_STATE + MESSAGE_MARGIN > MAX_MESSAGE {
@@ -104,19 +105,6 @@ pub(super) fn check_state(state: &[f64]) -> Result<(), WireError> {
     Ok(())
 }
 
-fn encode_window(window: &Window) -> wire::Window {
-    wire::Window {
-        start: Some(window.start),
-        times: floats::encode(&window.times),
-        observed: floats::encode(&window.observed),
-        inputs: window
-            .inputs
-            .iter()
-            .map(|s| wire::Signal { times: floats::encode(&s.times), values: floats::encode(&s.values) })
-            .collect(),
-    }
-}
-
 pub(super) fn decode_job(job: &wire::Job, received: &ReceivedWindows) -> Result<Job, WireError> {
     let state = job.state.as_ref().map(|bytes| floats::decode(bytes, "state")).transpose()?;
     check_state(state.as_deref().unwrap_or_default())?;
@@ -124,7 +112,7 @@ pub(super) fn decode_job(job: &wire::Job, received: &ReceivedWindows) -> Result<
         particle: job.particle,
         record: job.record,
         window: match required(job.over.as_ref(), "window")? {
-            wire::job::Over::Window(window) => Arc::new(decode_window(window)?),
+            wire::job::Over::Window(window) => Arc::new(window::decode(window)?),
             wire::job::Over::WindowId(id) => Arc::clone(named(id, received).ok_or(WireError::UnknownWindow)?),
         },
         theta: floats::decode(&job.theta, "theta")?,
@@ -134,35 +122,4 @@ pub(super) fn decode_job(job: &wire::Job, received: &ReceivedWindows) -> Result<
 
 fn named<'a>(id: &[u8], received: &'a ReceivedWindows) -> Option<&'a Arc<Window>> {
     received.get(id.try_into().ok()?)
-}
-
-pub(super) fn decode_window(window: &wire::Window) -> Result<Window, WireError> {
-    let times = floats::decode(&window.times, "times")?;
-    let observed = floats::decode(&window.observed, "observed")?;
-    let inputs = window.inputs.iter().map(decode_signal).collect::<Result<_, _>>()?;
-    let window = Window { start: required(window.start, "start")?, times, observed, inputs };
-    check_window(&window)?;
-    Ok(window)
-}
-
-fn check_window(window: &Window) -> Result<(), WireError> {
-    let Window { times, observed, inputs, .. } = window;
-    if times.is_empty() {
-        return Err(WireError::Shape { field: "times", message: "a window needs at least one".to_owned() });
-    }
-    if observed.len() % times.len() != 0 {
-        let message = format!("{} values for {} times", observed.len(), times.len());
-        return Err(WireError::Shape { field: "observed", message });
-    }
-    if let Some(signal) = inputs.iter().find(|signal| signal.times.len() != signal.values.len()) {
-        let message = format!("{} values for {} times", signal.values.len(), signal.times.len());
-        return Err(WireError::Shape { field: "input", message });
-    }
-    Ok(())
-}
-
-fn decode_signal(signal: &wire::Signal) -> Result<Signal, WireError> {
-    let times = floats::decode(&signal.times, "input times")?;
-    let values = floats::decode(&signal.values, "input values")?;
-    Ok(Signal { times, values })
 }

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use prost::Message;
 use starlings_models::Window;
 
-use super::{WireError, job};
+use super::{WireError, window};
 use crate::wire;
 
 /// Name of a window: BLAKE3 of its arrays with their lengths.
@@ -81,13 +81,13 @@ pub(super) fn ahead(id: &WindowId, window: &wire::Window, sent: &mut SentWindows
 
 /// Checks a window that arrived ahead of its jobs, and keeps it.
 pub(super) fn receive(message: &wire::WindowMsg, received: &mut ReceivedWindows) -> Result<(), WireError> {
-    let window = super::required(message.window.as_ref(), "window")?;
-    let id = digest(window);
+    let found = super::required(message.window.as_ref(), "window")?;
+    let id = digest(found);
     if *message.id != id {
         let message = "does not hash to its name".to_owned();
         return Err(WireError::Shape { field: "window", message });
     }
-    received.keep(id, window.encoded_len(), Arc::new(job::decode_window(window)?));
+    received.keep(id, found.encoded_len(), Arc::new(window::decode(found)?));
     Ok(())
 }
 

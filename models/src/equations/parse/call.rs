@@ -3,7 +3,7 @@
 //! Next file to read: [`super::super::compile`].
 
 use super::{FUNCTIONS, Parser};
-use crate::equations::expression::ExpressionError;
+use crate::equations::ExpressionError;
 use crate::equations::node::{Function, Name, Node, Operation};
 use crate::nearest;
 

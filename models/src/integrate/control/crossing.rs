@@ -2,8 +2,9 @@
 //!
 //! Next file to read: [`super::super::events`].
 
-use super::{Run, Step, Stepper};
+use super::{Run, Step};
 use crate::ModelFailure;
+use crate::integrate::stepper::Stepper;
 use crate::integrate::system::System;
 
 impl<S: System, P: Stepper> Run<'_, S, P> {

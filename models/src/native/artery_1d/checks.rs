@@ -4,11 +4,10 @@
 
 use std::collections::HashSet;
 
-use super::layout::Segment;
-use super::network::young;
+use super::layout::{Segment, young};
+use crate::SetupError;
 use crate::layout::fault;
 use crate::native::MOST_CELLS;
-use crate::setup::SetupError;
 
 /// Regions of all vessels together at most: the pressures of their ends are one full system of equations in every step.
 const MOST_REGIONS: usize = 1000;

@@ -92,3 +92,14 @@ impl Default for Layout {
         }
     }
 }
+
+/// Name and description of one region's Young's modulus.
+pub(super) fn young(segment: &Segment, region: usize, alone: bool) -> (String, String) {
+    let name = &segment.name;
+    let number = region + 1;
+    match (alone, segment.regions) {
+        (true, _) => (format!("E{number}"), format!("region {number} of `{name}`")),
+        (false, 1) => (format!("E_{name}"), format!("`{name}`")),
+        (false, _) => (format!("E_{name}_{number}"), format!("region {number} of `{name}`")),
+    }
+}

@@ -5,9 +5,9 @@
 //! network the values of the parameters.
 
 use super::checks;
-use super::layout::{Layout, NodeKind, Segment};
+use super::layout::{Layout, NodeKind, Segment, young};
+use crate::SetupError;
 use crate::layout::fault;
-use crate::setup::SetupError;
 
 /// A tube of one Young's modulus.
 #[derive(Debug)]
@@ -209,16 +209,5 @@ impl Network {
                 Err(fault(&format!("segments[{i}]"), message))
             }
         }
-    }
-}
-
-/// Name and description of one region's Young's modulus.
-pub(super) fn young(segment: &Segment, region: usize, alone: bool) -> (String, String) {
-    let name = &segment.name;
-    let number = region + 1;
-    match (alone, segment.regions) {
-        (true, _) => (format!("E{number}"), format!("region {number} of `{name}`")),
-        (false, 1) => (format!("E_{name}"), format!("`{name}`")),
-        (false, _) => (format!("E_{name}_{number}"), format!("region {number} of `{name}`")),
     }
 }

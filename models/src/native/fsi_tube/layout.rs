@@ -8,9 +8,9 @@ use serde::Deserialize;
 use serde::de::value::SeqAccessDeserializer;
 use serde::de::{Deserializer, SeqAccess, Visitor};
 
+use crate::SetupError;
 use crate::layout::fault;
 use crate::native::MOST_CELLS;
-use crate::setup::SetupError;
 
 /// Shortest accepted step in s: in it a wave of 10 m/s passes 10 µm, less than any cell that the model is meant for, and a
 /// second of recording takes a million steps; shorter ones would keep a long recording running without end.

@@ -9,7 +9,7 @@ use super::chain::Chain;
 use super::coefficients::Coefficients;
 use super::state::State;
 use crate::ModelFailure;
-use crate::model::Segment;
+use crate::segment::Segment;
 
 /// Work arrays of one call, an entry per cell each.
 struct Scratch<'a> {

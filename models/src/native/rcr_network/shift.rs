@@ -5,7 +5,7 @@
 //! found where the lines through a span's two ends meet. Next file to read: [`super::super::rcr_network`].
 
 use crate::Drive;
-use crate::model::{History, Segment};
+use crate::segment::{History, Segment};
 
 /// Where a signal comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

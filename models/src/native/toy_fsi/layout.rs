@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use super::elements::Elements;
 use super::spectral::Spectral;
+use crate::SetupError;
 use crate::layout::fault;
-use crate::setup::SetupError;
 
 /// Most unknowns of a dense system.
 const MOST: usize = 1000;

@@ -22,6 +22,8 @@ const PORT: &str = "PORT";
 const HERE: &str = "http://127.0.0.1:{port}";
 /// How often a server that starts is asked whether it is ready.
 const LOOK: Duration = Duration::from_millis(10);
+/// Least time for a question but the first: a busy machine may take some of it.
+const QUESTION: Duration = Duration::from_millis(100);
 /// How long a server that broke its connection may take to end, so that its ending can be told.
 const LAST_WORDS: Duration = Duration::from_millis(500);
 
@@ -161,8 +163,9 @@ fn ready(
 ) -> Result<Value, SolverError> {
     let since = Instant::now();
     let program = client.url().to_owned();
+    // The first question may take all the time there is; later ones what is left.
+    let mut left = patience.max(QUESTION);
     loop {
-        let left = patience.saturating_sub(since.elapsed()).max(LOOK);
         let trouble = match client.info(left) {
             Ok(info) => return Ok(info),
             Err(trouble) => trouble,
@@ -174,7 +177,10 @@ fn ready(
             let what = format!("{} before it was ready", ending(status));
             return Err(SolverError::NotReady { program, what, tail, killed: is_killed(status) });
         }
-        if since.elapsed() >= patience {
+        std::thread::sleep(LOOK);
+        left = patience.saturating_sub(since.elapsed());
+        // A question with too little time would only be told as one without answer.
+        if left < QUESTION {
             let tail = started.map(|(_, process)| process.tail()).unwrap_or_default();
             let seconds = patience.as_secs_f64();
             let what = format!(
@@ -183,7 +189,6 @@ fn ready(
             );
             return Err(SolverError::NotReady { program, what, tail, killed: false });
         }
-        std::thread::sleep(LOOK);
     }
 }
 

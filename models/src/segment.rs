@@ -1,0 +1,54 @@
+//! What drives a model: its inputs at one time, over a span on which they are linear, and at earlier times.
+//!
+//! Next file to read: [`crate::model`].
+
+use crate::limits::Limits;
+
+/// Access to input signals, and to what the model remembers of itself, at other times than now.
+pub trait History {
+    /// Value of input `index` at time `t`; before the first sample, the first sample's value. Indices beyond the inputs are
+    /// the model's memories; NaN for a time that they do not reach.
+    fn at(&self, index: usize, t: f64) -> f64;
+}
+
+/// The inputs of a model at one time.
+#[derive(Clone, Copy)]
+pub struct Drive<'a> {
+    /// Values, in the order of [`crate::Spec::inputs`].
+    pub value: &'a [f64],
+    /// Time derivatives of the inputs on the current segment.
+    pub slope: &'a [f64],
+    /// The inputs at earlier times.
+    pub history: &'a dyn History,
+}
+
+impl Drive<'_> {
+    /// No inputs, for what may not use any.
+    pub const NONE: Drive<'static> = Drive { value: &[], slope: &[], history: &NoInputs };
+}
+
+/// The past of no inputs: nothing that may ask for it has any.
+struct NoInputs;
+
+impl History for NoInputs {
+    fn at(&self, _index: usize, _t: f64) -> f64 {
+        f64::NAN
+    }
+}
+
+/// A span of time on which every input is linear.
+#[derive(Clone, Copy)]
+pub struct Segment<'a> {
+    /// Start time.
+    pub t0: f64,
+    /// End time, `t1 > t0`.
+    pub t1: f64,
+    /// Input values at `t0`.
+    pub u0: &'a [f64],
+    /// Input slopes on the segment.
+    pub slope: &'a [f64],
+    /// The inputs at earlier times.
+    pub history: &'a dyn History,
+    /// What the run may cost; a step that takes time counts itself.
+    pub limits: &'a Limits<'a>,
+}

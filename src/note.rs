@@ -1,0 +1,9 @@
+//! What is for people only, on standard error. Next file to read: [`crate::console`], for what programs read as well.
+
+use std::fmt::Display;
+use std::io::{self, Write};
+
+/// Writes a line to standard error; when nobody reads it, the work goes on.
+pub(crate) fn note(content: impl Display) {
+    let _ = writeln!(io::stderr().lock(), "{content}");
+}
