@@ -112,7 +112,7 @@ pub(super) fn screened(
 }
 
 fn fate(found: &Found<'_>, decision: &Decision, index: usize, candidate: &Candidate, best: &Hit) -> String {
-    let named = decision.best.map(|i| super::verdict::names(&found.judged[i])).unwrap_or_default();
+    let named = decision.best.map(|i| found.judged[i].names()).unwrap_or_default();
     let is = |names: &[String]| names.iter().any(|n| n == candidate.name());
     let answered = matches!(decision.verdict, super::Verdict::Named | super::Verdict::Tie);
     let text = if answered && is(&named) {

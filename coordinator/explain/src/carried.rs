@@ -1,12 +1,13 @@
 //! Whether every effect of a version carries its share of the gap: one that does not is no effect, but shows that its partner is
 //! not quite right, or that a discrepancy of another kind remains. Next file to read: [`super::verdict`].
 
-use super::judge::Misfit;
+use super::misfit::Misfit;
 use super::search::Found;
-use super::verdict::{DISCREPANT, names};
 
 /// A further effect must carry this share of the gap.
 const SECOND_SHARE: f64 = 0.1;
+/// Effective variance of the residuals above which what remains is a discrepancy of its own, not the form of an effect.
+pub(super) const DISCREPANT: f64 = 20.0;
 
 /// What came first.
 pub(super) struct Carried {
@@ -29,7 +30,7 @@ pub(super) fn carried(found: &Found<'_>, passing: &[usize]) -> Carried {
     let alone = passing.iter().copied().find(|i| {
         let judged = &found.judged[*i];
         judged.fit.version.members.len() + 1 == whole.fit.version.members.len()
-            && names(judged).iter().all(|name| names(whole).contains(name))
+            && judged.names().iter().all(|name| whole.names().contains(name))
     });
     let Some(alone) = alone else { return all };
     let part = &found.judged[alone];

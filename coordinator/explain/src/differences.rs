@@ -9,7 +9,7 @@ use nalgebra::DVector;
 use starlings_estimators::BlockAngular;
 
 use super::ExplainError;
-use super::fit::{Fitted, point};
+use super::fitted::{Fitted, point};
 use super::influences::places;
 use super::laboratory::{Answer, Laboratory, Point};
 

@@ -110,20 +110,6 @@ fn too_little(judged: &Judged<'_>, name: &str) -> Option<String> {
     })
 }
 
-/// That the fall of χ² is not more than chance reaches, in words.
-pub(super) fn too_weak(judged: &Judged<'_>, threshold: f64) -> String {
-    if judged.gain <= 0.0 {
-        return "χ² less the price of its parameters does not fall".to_owned();
-    }
-    format!(
-        "χ² falls by {:.1}, which in units of the effective noise ({:.1}) is {:.1}; a search like this one reaches {threshold:.1} \
-         by chance",
-        judged.gain,
-        judged.inflation,
-        judged.evidence()
-    )
-}
-
 /// What speaks against naming a version whose training residuals are correlated.
 fn correlated(laboratory: &Laboratory<'_>, found: &Found<'_>, judged: &Judged<'_>) -> Option<String> {
     let name = judged.fit.version.name();

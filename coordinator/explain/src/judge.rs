@@ -8,12 +8,12 @@ use starlings_estimators::End;
 
 use super::adequacy::{Adequacy, times};
 use super::allowance::Uncertainty;
-use super::doubt::too_weak;
 use super::fit::Fitted;
 use super::form::Leftover;
 use super::held_out::{HeldOut, held_out};
 use super::laboratory::Laboratory;
 use super::locate::number::three;
+use super::misfit::Misfit;
 use super::rows::{Row, Usage, unit};
 use super::version::Member;
 
@@ -21,32 +21,6 @@ use super::version::Member;
 const WORSE: f64 = 1.02;
 /// Distance from the end of a range, as a share of it, at which an estimate counts as at its edge.
 const EDGE: f64 = 0.005;
-
-/// Squares of the whitened residuals of one version.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Misfit {
-    /// χ² of the training rows plus prior.
-    pub train: f64,
-    /// χ² of the held-out rows of the fitted channels.
-    pub held_out: f64,
-    /// Their number.
-    pub n_held_out: usize,
-    /// χ² of the channels that are never fitted.
-    pub channels: f64,
-}
-
-impl Misfit {
-    /// The misfit of a fit.
-    pub fn of(laboratory: &Laboratory<'_>, fit: &Fitted<'_>) -> Self {
-        let whitened = laboratory.rows.whitened(&fit.predicted);
-        let sum = |usage| {
-            let rows = laboratory.rows.rows.iter().zip(&whitened).filter(|(row, _)| row.usage == usage);
-            rows.fold((0, 0.0), |(n, sum), (_, e)| (n + 1, sum + e * e))
-        };
-        let (n_held_out, held_out) = sum(Usage::HeldOut);
-        Self { train: fit.cost(), held_out, n_held_out, channels: sum(Usage::HeldOutChannel).1 }
-    }
-}
 
 /// Why a version may not be named.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -94,6 +68,11 @@ pub struct Judged<'c> {
 }
 
 impl Judged<'_> {
+    /// Names of its effects.
+    pub fn names(&self) -> Vec<String> {
+        self.fit.version.members.iter().map(|m| m.candidate.name().to_owned()).collect()
+    }
+
     /// Fall of χ² in units of its own effective noise.
     pub fn evidence(&self) -> f64 {
         self.gain / self.inflation
@@ -179,6 +158,20 @@ fn refusal(
             (judged.evidence() <= threshold)
                 .then(|| Refusal { gate: "evidence", reason: too_weak(judged, threshold) })
         })
+}
+
+/// That the fall of χ² is not more than chance reaches, in words.
+fn too_weak(judged: &Judged<'_>, threshold: f64) -> String {
+    if judged.gain <= 0.0 {
+        return "χ² less the price of its parameters does not fall".to_owned();
+    }
+    format!(
+        "χ² falls by {:.1}, which in units of the effective noise ({:.1}) is {:.1}; a search like this one reaches {threshold:.1} \
+         by chance",
+        judged.gain,
+        judged.inflation,
+        judged.evidence()
+    )
 }
 
 /// A unit label as it follows a number.

@@ -1,7 +1,8 @@
 //! The false-alarm rate of a study, measured: the whole search on recordings in which nothing is missing.
 //!
 //! Each recording is the fitted model as it is plus noise of the stated sd, with the gaps and spans of the measured one. Runs
-//! that the search has made already cost nothing, since what they depend on is not the data. Next file to read: [`super::run`].
+//! that the search has made already cost nothing, since what they depend on is not the data. Next file to read:
+//! [`super::inquiry`].
 
 use std::sync::Arc;
 
@@ -12,10 +13,10 @@ use starlings_fleet::Fleet;
 use starlings_study::Study;
 use starlings_study::store::Store;
 
+use super::inquiry::answered;
 use super::laboratory::Laboratory;
 use super::result::Nulls;
 use super::rows::Rows;
-use super::run::answered;
 use super::{Context, ExplainError, Options, Stage, Verdict, answer};
 
 /// Searches `options.nulls` simulated recordings. `predicted` is what the fitted model as it is predicts, by row.

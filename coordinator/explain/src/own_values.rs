@@ -1,9 +1,9 @@
 //! What is not known of a record that no fit sees: the values that it has of its own.
 //!
 //! Such a record is run with the mean of the fitted records, or for an initial value with its own prior median
-//! ([`starlings_study::Study::theta_for`]). That mean depends on what was fitted, which the Jacobian of [`super::fit`] holds. The
-//! record's own value lies beside it: by the scatter of the fitted ones, or where there is only one by the prior. Next file to
-//! read: [`super::held_out`].
+//! ([`starlings_study::Study::theta_for`]). That mean depends on what was fitted, which the Jacobian of [`super::fitted`] holds.
+//! The record's own value lies beside it: by the scatter of the fitted ones, or where there is only one by the prior. Next file
+//! to read: [`super::held_out`].
 
 use std::sync::Arc;
 
@@ -12,21 +12,31 @@ use starlings_estimators::BlockRow;
 use starlings_study::Study;
 
 use super::ExplainError;
-use super::fit::Fitted;
+use super::fitted::Fitted;
 use super::laboratory::{Laboratory, Point};
 
 /// Distance of a difference, in prior standard deviations.
 const STEP: f64 = 1e-3;
+
+impl Fitted<'_> {
+    /// Measures what the values that a held-out record has of its own would change, at the best point.
+    ///
+    /// # Errors
+    /// When the fleet or the store fails.
+    pub fn measure_own_values(&mut self, laboratory: &mut Laboratory<'_>) -> Result<(), ExplainError> {
+        if !self.predicted.is_empty() {
+            self.own_values = own_values(laboratory, self)?;
+        }
+        Ok(())
+    }
+}
 
 /// d prediction over the noise for one standard deviation of each value that a held-out record has of its own: rows × values,
 /// column k that of the k-th such parameter in the rows of each held-out record. Nothing in the rows of the others.
 ///
 /// # Errors
 /// When the fleet or the store fails. A budget that does not suffice for the runs leaves initial values out.
-pub(super) fn own_values(
-    laboratory: &mut Laboratory<'_>,
-    fit: &Fitted<'_>,
-) -> Result<DMatrix<f64>, ExplainError> {
+fn own_values(laboratory: &mut Laboratory<'_>, fit: &Fitted<'_>) -> Result<DMatrix<f64>, ExplainError> {
     let study = &fit.version.study;
     let n = laboratory.rows.rows.len();
     let own: Vec<usize> = (0..study.parameters.len()).filter(|k| study.parameters[*k].per_record).collect();

@@ -3,8 +3,9 @@
 //! Nothing is decided here: the gates and the verdict have spoken. Next file to read: [`super::judge`].
 
 use super::candidate::Candidate;
-use super::judge::{Misfit, spaced};
+use super::judge::spaced;
 use super::locate::number::three;
+use super::misfit::Misfit;
 use super::result::Rejected;
 use super::screen::Hit;
 use super::search::Found;

@@ -1,32 +1,29 @@
 //! The whole explanation on a page: fit, locate, screen, refit, gates, verdict, add, show.
 //!
 //! Every stage runs the model on the fleet through one [`Laboratory`], which remembers each run; an explanation that was killed
-//! is continued by doing the same again. Next file to read: [`super::search`].
+//! is continued by doing the same again. Next file to read: [`super::inquiry`].
 
 use std::sync::Arc;
 
-use starlings_estimators::End;
 use starlings_fleet::Fleet;
 use starlings_models::ObserverDef;
 use starlings_study::Study;
-use starlings_study::posterior;
 use starlings_study::store::Store;
 
 use super::answer;
 use super::background::inflation;
-use super::candidate::{self, Candidate};
+use super::candidate::Candidate;
 use super::experiment::propose;
-use super::fit::{Fitted, drive};
+use super::fit::Fitted;
+use super::inquiry::{Answer, answered};
 use super::judge::Judged;
 use super::laboratory::{Laboratory, Point};
 use super::locate::{self, Located, Track, View};
 use super::patch::explained_study;
 use super::reach;
 use super::refused;
-use super::rhythm::{jumps, rhythms};
-use super::search::{Found, search};
-use super::verdict::{Decision, decide};
-use super::version::Version;
+use super::search::Found;
+use super::verdict::Decision;
 use super::warnings;
 use super::words;
 use super::{Context, ExplainError, Explanation, Figures, Findings, Options, Verdict, null};
@@ -62,60 +59,6 @@ pub fn explain(
         findings.explanation.wall_s = context.earlier_s + (context.clock)();
     }
     Ok(findings)
-}
-
-/// A search with its verdict.
-pub(super) struct Answer<'a, 'c> {
-    pub(super) found: Found<'c>,
-    pub(super) candidates: &'a [Candidate],
-    pub(super) decision: Decision,
-    pub(super) tracks: &'a [Track],
-}
-
-/// Fits the model as it is, searches and decides; `then` makes of it what is wanted.
-///
-/// # Errors
-/// As [`explain`].
-pub(super) fn answered<R>(
-    laboratory: &mut Laboratory<'_>,
-    study: &Study,
-    options: &Options,
-    then: impl FnOnce(&mut Laboratory<'_>, Answer<'_, '_>) -> Result<R, ExplainError>,
-) -> Result<R, ExplainError> {
-    let base = fit_as_it_is(laboratory, study, options)?;
-    laboratory.stage("locate", "where simulation and data disagree");
-    let tracks = laboratory.tracks(&Point { study, theta: base.theta() })?;
-    let (rhythms, jumps) =
-        (rhythms(&laboratory.rows, &base.predicted), jumps(&laboratory.rows, &base.predicted));
-    let candidates = candidate::all(study, &tracks, &rhythms, &jumps, options)?;
-    let found = search(laboratory, base, &candidates, &tracks, options)?;
-    laboratory.stage("verdict", "");
-    let decision = decide(laboratory, &found, &candidates)?;
-    then(laboratory, Answer { found, candidates: &candidates, decision, tracks: &tracks })
-}
-
-/// The fit of the model as it is, on the training rows.
-fn fit_as_it_is<'c>(
-    laboratory: &mut Laboratory<'_>,
-    study: &'c Study,
-    options: &Options,
-) -> Result<Fitted<'c>, ExplainError> {
-    laboratory.stage("fit", "the model as it is");
-    let version = Version::new(study, Vec::new(), &[])?;
-    let mut fits = [Fitted::from_prior(version)];
-    if !drive(laboratory, &mut fits)? {
-        return Err(laboratory.beyond_budget(study.parameters.len()));
-    }
-    let [mut fit] = fits;
-    if fit.end() == Some(End::NoStart) {
-        let reason = "no run succeeds at the prior median or next to it".to_owned();
-        return Err(ExplainError::Baseline(reason));
-    }
-    if !fit.has_converged() && !options.force {
-        return Err(ExplainError::NotConverged { iterations: fit.trials(), stand: words::stand(&fit) });
-    }
-    fit.measure_own_values(laboratory)?;
-    Ok(fit)
 }
 
 /// Where a fit disagrees with the data.
@@ -272,13 +215,4 @@ fn explanation(
         wall_s: laboratory.elapsed(),
         warnings: [study.warnings.clone(), warnings].concat(),
     }
-}
-
-/// The posterior's names and values in words, for a fit that has not converged.
-pub(super) fn values(fit: &Fitted<'_>) -> String {
-    let theta = fit.theta();
-    let zero = vec![0.0; theta.len()];
-    let gaussian = posterior::independent(theta.as_slice(), &zero);
-    let estimates = posterior::estimates(&fit.version.study, &gaussian);
-    estimates.iter().map(|e| format!("{} = {:.5}", e.name, e.estimate)).collect::<Vec<_>>().join(", ")
 }

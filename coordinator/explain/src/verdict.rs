@@ -7,7 +7,7 @@ use starlings_estimators::effective_sample_size;
 use starlings_models::equations::{Expression, Slot};
 
 use super::candidate::Candidate;
-use super::carried::{Carried, carried};
+use super::carried::{Carried, DISCREPANT, carried};
 use super::doubt::{doubt, nearest_refused};
 use super::judge::Judged;
 use super::laboratory::Laboratory;
@@ -21,8 +21,6 @@ const MARGIN: f64 = 6.0;
 const ALIKE: f64 = 0.995;
 /// A rival is tied where the difference in χ² is less than so many of its standard deviations.
 const VUONG: f64 = 1.64;
-/// Effective variance of the residuals above which what remains is a discrepancy of its own, not the form of an effect.
-pub(super) const DISCREPANT: f64 = 20.0;
 /// Fall of χ² by a fully bent form from which on a form bent by half, which makes a quarter of it, passes the 12 units of the
 /// check of the form nine times in ten: 4 (√12 + 1.28)².
 const POWER: f64 = 90.0;
@@ -90,7 +88,7 @@ pub fn decide(
         }
     }
     let judged = &found.judged[best];
-    let mut tied: Vec<Vec<String>> = rivals.iter().map(|i| names(&found.judged[*i])).collect();
+    let mut tied: Vec<Vec<String>> = rivals.iter().map(|i| found.judged[*i].names()).collect();
     for twin in twins(laboratory, found, judged, candidates)? {
         if !tied.contains(&twin) {
             tied.push(twin);
@@ -122,11 +120,6 @@ fn limits(judged: &Judged<'_>) -> Vec<String> {
     limits
 }
 
-/// Names of the effects of a version.
-pub fn names(judged: &Judged<'_>) -> Vec<String> {
-    judged.fit.version.members.iter().map(|m| m.candidate.name().to_owned()).collect()
-}
-
 /// Other versions that pass the gates and come as close as chance allows: by the fall of χ², or, up to twice that margin,
 /// because the difference of their residuals is not clearly of one sign (Vuong 1989, with the autocorrelation of that
 /// difference).
@@ -138,7 +131,7 @@ fn rivals(laboratory: &Laboratory<'_>, found: &Found<'_>, passing: &[usize], bes
         let apart = of_best.rank() - judged.rank();
         *i != best
             && judged.fit.version.members.len() == size
-            && names(judged) != names(of_best)
+            && judged.names() != of_best.names()
             && (apart < MARGIN * of_best.inflation
                 || (apart < 2.0 * MARGIN * of_best.inflation
                     && apart < VUONG * scatter(laboratory, of_best, judged)))

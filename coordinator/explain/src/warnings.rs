@@ -6,13 +6,14 @@ use starlings_models::SOLVER;
 
 use super::Verdict;
 use super::adequacy::{Nature, times};
+use super::carried::DISCREPANT;
 use super::fit::Fitted;
 use super::held_out::{HeldOut, listed};
 use super::judge::Judged;
 use super::laboratory::Laboratory;
 use super::rows::Usage;
 use super::search::Found;
-use super::verdict::{DISCREPANT, Decision};
+use super::verdict::Decision;
 
 /// Distance in noise sd within which two simulated values are the same.
 const SAME: f64 = 0.01;

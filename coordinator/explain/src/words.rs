@@ -5,6 +5,8 @@
 
 use std::fmt::Write as _;
 
+use starlings_study::posterior;
+
 use super::Verdict;
 use super::adequacy::{Nature, factor, times};
 use super::candidate::Candidate;
@@ -23,7 +25,16 @@ use super::verdict::Decision;
 pub(super) fn stand(fit: &Fitted<'_>) -> String {
     let n = fit.residual().len().max(1) as f64;
     let rms = (fit.residual().norm_squared() / n).sqrt();
-    format!("{} (root mean square residual {} noise sd)", super::run::values(fit), factor(rms))
+    format!("{} (root mean square residual {} noise sd)", values(fit), factor(rms))
+}
+
+/// The posterior's names and values in words, for a fit that has not converged.
+fn values(fit: &Fitted<'_>) -> String {
+    let theta = fit.theta();
+    let zero = vec![0.0; theta.len()];
+    let gaussian = posterior::independent(theta.as_slice(), &zero);
+    let estimates = posterior::estimates(&fit.version.study, &gaussian);
+    estimates.iter().map(|e| format!("{} = {:.5}", e.name, e.estimate)).collect::<Vec<_>>().join(", ")
 }
 
 /// The verdict in a few sentences.

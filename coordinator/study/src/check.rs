@@ -4,6 +4,7 @@
 //! to read: [`self::model`].
 
 mod blame;
+mod built;
 mod defs;
 mod explain;
 mod initial;
@@ -12,6 +13,7 @@ mod model;
 mod observer;
 mod parameters;
 mod prior;
+pub(crate) mod relative;
 pub(crate) mod scales;
 mod settings;
 mod solver;
@@ -24,7 +26,7 @@ use std::sync::Arc;
 
 use starlings_models::Setup;
 
-use self::model::CheckedModel;
+use self::built::CheckedModel;
 use self::parameters::initial_medians;
 use self::settings::{estimator, fleet};
 use self::solver::Known;
@@ -105,7 +107,7 @@ fn check(path: &Path, text: &str, surroundings: &Surroundings) -> Result<Study, 
     model.setup.observer = observer;
     explain::check_names(&source, &file, &model.setup.model);
     let mut warnings = solver::check(&source, &file, solver.as_ref());
-    let relative: Vec<String> = scales::relative(&model.setup.effects).map(|p| p.name.clone()).collect();
+    let relative: Vec<String> = relative::relative(&model.setup.effects).map(|p| p.name.clone()).collect();
     model::check_values(&source, &file, &model, &|name| !relative.iter().any(|known| known == name));
     let initial = initial::constants(&source, &file, &model.spec, &mut warnings);
     model.setup.model.constants.extend(initial);

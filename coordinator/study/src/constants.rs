@@ -13,8 +13,8 @@ use starlings_estimators::{Points, Sensitivities};
 use self::moved::Moved;
 use super::Study;
 use super::fit::flight::{Flight, Place};
-use super::identify::IdentifyError;
 use super::identify::ensemble::{self, Response, Seen};
+use super::identify::error::IdentifyError;
 
 /// How one estimate follows one constant.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -8,6 +8,7 @@ pub(super) mod layout;
 pub(super) mod locate;
 mod memory;
 mod model;
+mod quantity;
 pub(super) mod read;
 mod settings;
 pub(super) mod solver;

@@ -8,77 +8,21 @@
 pub mod advice;
 pub mod at;
 pub mod ensemble;
+pub(super) mod error;
 pub mod gather;
 pub mod result;
 pub mod series;
 pub mod words;
 
 pub use at::At;
+pub use error::IdentifyError;
 pub use result::Identification;
 
-use starlings_estimators::{EstimatorError, Sensitivities};
+use starlings_estimators::Sensitivities;
 use starlings_fleet::Fleet;
-use starlings_models::Failure;
 
 use super::fit::flight::Flight;
-use super::store::StoreError;
-use super::{FolderError, RunError, Study, constants};
-
-/// Why the sensitivities could not be had.
-#[derive(Debug, thiserror::Error)]
-pub enum IdentifyError {
-    /// The fleet failed, or a run has no usable answer.
-    #[error(transparent)]
-    Run(#[from] RunError),
-    /// The figures cannot be computed.
-    #[error(transparent)]
-    Estimator(#[from] EstimatorError),
-    /// The model fails next to the point of the analysis.
-    #[error(
-        "the model fails on record `{record}` at {place}: {source}; bound the parameter with a logit transform, move its \
-         prior, or set a smaller [estimator] spread"
-    )]
-    Particle {
-        /// Record name.
-        record: String,
-        /// Which parameter was moved, which way and to what value.
-        place: String,
-        /// Why it failed.
-        source: Failure,
-    },
-    /// A prediction is no finite number.
-    #[error(
-        "`{output}` of record `{record}` is {value} at time {time}, {place}: check constants, priors and inputs"
-    )]
-    Prediction {
-        /// Output name.
-        output: String,
-        /// Record name.
-        record: String,
-        /// Time of the prediction.
-        time: f64,
-        /// The prediction.
-        value: f64,
-        /// Which parameter was moved, which way and to what value.
-        place: String,
-    },
-    /// The folder given as the point of the analysis cannot be read.
-    #[error(transparent)]
-    Folder(#[from] FolderError),
-    /// Its store cannot be read.
-    #[error(transparent)]
-    Store(#[from] StoreError),
-    /// The run in it is no point of this study.
-    #[error("{0}")]
-    Point(String),
-}
-
-impl IdentifyError {
-    /// Whether the input is wrong, rather than the run.
-    pub fn is_input(&self) -> bool {
-        matches!(self, Self::Folder(_) | Self::Store(_) | Self::Point(_))
-    }
-}
+use super::{Study, constants};
 
 /// Runs one ensemble of the study around a point and says what its data could determine.
 ///

@@ -7,6 +7,7 @@
 mod check;
 pub mod checked;
 pub mod constants;
+mod distances;
 mod expand;
 pub mod field;
 mod file;

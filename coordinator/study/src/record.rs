@@ -9,9 +9,11 @@ mod input;
 mod noise;
 mod off;
 mod part;
+mod reader;
 mod separator;
 mod shapes;
 mod surface;
+mod surface_files;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -24,9 +26,9 @@ use super::checked::Record;
 use super::field::field_of;
 use super::file::RecordSection;
 use super::problem::{Source, suggestion};
-use crate::record::channel::ChannelReader;
 pub(super) use crate::record::csv::Csv;
 use crate::record::input::inputs;
+use crate::record::reader::ChannelReader;
 
 /// Reads the CSV files of a study, each once.
 pub(super) struct Recordings<'a> {

@@ -18,7 +18,8 @@ use super::summary::Summary;
 use super::{EstimatorKind, Study, observer_gain, summary, warnings};
 use crate::fit::flight::Flight;
 use crate::observer_gain::Compared;
-use crate::store::folder::{self, OBSERVER, RunFolder};
+use crate::store::folder::{OBSERVER, RunFolder};
+use crate::store::json::json;
 use crate::store::snapshot::{Counts, Snapshot};
 
 /// Why a run ended without a result.
@@ -259,7 +260,7 @@ fn from_start_to_end(
     match observer {
         Compared::NoObserver => {}
         Compared::Both(observer) => {
-            folder.store.set_meta(OBSERVER, &folder::json(&observer.courses))?;
+            folder.store.set_meta(OBSERVER, &json(&observer.courses))?;
             result.observer = Some(observer.fit);
         }
         Compared::Failed(why) => unknown = Some(why),

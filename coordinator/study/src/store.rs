@@ -4,11 +4,13 @@
 //! written in one piece with the snapshot that a resumed run starts from, and a few quick ones are committed together, so a
 //! run killed at any instant continues from a whole analysis at most [`HOLD_S`] before. Nothing here computes. Next file to read: [`crate::store::snapshot`].
 
+mod call;
 mod changes;
 mod error;
 pub mod folder;
 mod folder_error;
 mod info;
+pub(super) mod json;
 mod make;
 mod meaning;
 mod program;
@@ -269,15 +271,6 @@ impl Store {
     /// When the database refuses.
     pub fn note_elapsed(&self, now_s: f64) -> Result<(), StoreError> {
         self.set_meta(ELAPSED, &now_s.to_string())
-    }
-
-    /// The programs that the run's numbers come from; empty where the store does not say.
-    ///
-    /// # Errors
-    /// When the database refuses.
-    pub fn program(&self) -> Result<Program, StoreError> {
-        let text = self.meta(Program::KEY)?;
-        Ok(text.and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default())
     }
 
     /// All rows of a query, each mapped by `map`. The tables are those of `schema.rs`.

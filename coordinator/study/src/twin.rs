@@ -15,7 +15,8 @@ use rand_distr::{Distribution, StandardNormal};
 use starlings_models::effect::library::library_in;
 use starlings_models::{ObserverDef, ParticleError, Setup, SetupError, Window, nearest};
 
-use super::check::scales::{self, CourseError, Ruler, Trial};
+use super::check::relative::relative;
+use super::check::scales::{CourseError, Ruler, Trial};
 use super::field::components;
 use super::{Study, posterior};
 use crate::twin::run::Run;
@@ -144,7 +145,7 @@ fn place(study: &Study, twin: &Twin) -> Result<(Setup, Vec<f64>), TwinError> {
 
 /// Brings the effects into the model's units, as far as the twin without them tells how.
 fn in_units(study: &Study, twin: &Twin, setup: &mut Setup, theta: &[f64]) -> Result<(), TwinError> {
-    if scales::relative(&setup.effects).next().is_none() {
+    if relative(&setup.effects).next().is_none() {
         return Ok(());
     }
     let record = &study.records[twin.record];

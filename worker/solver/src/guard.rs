@@ -3,7 +3,7 @@
 //! The worker holds the writing end of the guard's standard input. A line `+N` puts a process group under guard, `-N` takes it
 //! out; `+/folder` and `-/folder` do so with a folder that the worker made, and `=/folder/inner` says that a folder in it stays.
 //! When the input ends, however the worker died, every group still under guard is killed and every folder removed. Next files
-//! to read: [`super::process`], [`super::scratch`].
+//! to read: [`super::process`], [`super::clear`].
 
 use std::collections::BTreeSet;
 use std::io::{self, BufRead, Write};
@@ -14,7 +14,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use rustix::process::{Pid, Signal, kill_process_group};
 
-use super::scratch::clear;
+use super::clear::clear;
 
 /// The guard of this process.
 pub(crate) struct Guard {

@@ -7,6 +7,7 @@
 
 mod adapter;
 mod backoff;
+mod clear;
 pub mod conformance;
 mod error;
 mod guard;

@@ -1,26 +1,22 @@
 //! Scratch folders: one for every program or run, removed when it is done; of runs that failed alike one is kept, up to a limit.
 //!
 //! All of a process lie in one root, which goes with the last of them. A process that ends without dropping anything leaves
-//! its root to the guard, through [`clear`]. Next file to read: [`super::guard`].
+//! its root to the guard. Next files to read: [`super::guard`], [`super::clear`].
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fs;
 use std::io;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
 
 use tempfile::Builder;
 
+use super::clear::{patiently, remove};
 use super::guard::Notice;
 
 /// Folders of failed runs that one worker keeps.
 const KEPT: usize = 8;
-
-/// How often a folder is tried to be removed while a program that was just killed still writes into it, and the wait between.
-const TRIES: usize = 40;
-const BETWEEN: Duration = Duration::from_millis(5);
 
 /// The folder of this process.
 pub(crate) struct ScratchRoot(Arc<Root>);
@@ -127,46 +123,6 @@ impl Drop for Scratch {
     }
 }
 
-/// Removes a root that its process left behind, except the kept folders in it.
-pub(super) fn clear(root: &Path, kept: &BTreeSet<PathBuf>) {
-    // A link in its place is not the folder that was made.
-    if !fs::symlink_metadata(root).is_ok_and(|about| about.is_dir()) {
-        return;
-    }
-    patiently(|| {
-        let mut stays = false;
-        for entry in fs::read_dir(root)? {
-            let entry = entry?;
-            if kept.contains(&entry.path()) {
-                stays = true;
-            } else if entry.file_type()?.is_dir() {
-                remove(&entry.path())?;
-            } else {
-                fs::remove_file(entry.path())?;
-            }
-        }
-        if stays { Ok(()) } else { fs::remove_dir(root) }
-    });
-}
-
-/// Removes a folder; links in it are removed and not followed.
-fn remove(folder: &Path) -> io::Result<()> {
-    match fs::remove_dir_all(folder) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-        removed => removed,
-    }
-}
-
-/// Tries until it works, or somebody writes for too long.
-fn patiently(mut attempt: impl FnMut() -> io::Result<()>) {
-    for _ in 0..TRIES {
-        if attempt().is_ok() {
-            return;
-        }
-        std::thread::sleep(BETWEEN);
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -209,27 +165,5 @@ mod tests {
         let top = first.parent().expect("the root").to_path_buf();
         drop(root);
         assert_eq!(fs::read_dir(top).expect("it stays").count(), KEPT);
-    }
-
-    #[test]
-    fn what_is_cleared_are_the_folders_of_the_root_and_never_what_links_lead_to() {
-        let base = tempfile::tempdir().expect("a folder");
-        let (root, other) = (base.path().join("root"), base.path().join("other"));
-        for folder in ["run-1", "run-2"] {
-            fs::create_dir_all(root.join(folder)).expect("made");
-        }
-        fs::create_dir(&other).expect("made");
-        fs::write(other.join("precious"), "1").expect("written");
-        std::os::unix::fs::symlink(&other, root.join("link")).expect("linked");
-        std::os::unix::fs::symlink(&other, root.join("run-1").join("link")).expect("linked");
-        std::os::unix::fs::symlink(&other, base.path().join("posing")).expect("linked");
-        clear(&root, &BTreeSet::from([root.join("run-2")]));
-        clear(&base.path().join("posing"), &BTreeSet::new());
-        let left: Vec<_> =
-            fs::read_dir(&root).expect("it stays").flatten().map(|entry| entry.file_name()).collect();
-        assert_eq!(left, ["run-2"]);
-        assert!(other.join("precious").exists());
-        clear(&root, &BTreeSet::new());
-        assert!(!root.exists());
     }
 }

@@ -8,8 +8,7 @@ use starlings_models::{Failure, ParticleError, Prediction};
 use starlings_proto::{Answer, Lease};
 
 use super::Dispatcher;
-use super::batch::Ended;
-use super::doubt::Doubt;
+use super::batch::{Doubt, Ended};
 use super::message::{BatchError, Command, WorkerId};
 use crate::FleetEvent;
 

@@ -6,7 +6,6 @@ use std::time::Duration;
 
 use super::Dispatcher;
 use super::message::{Command, WorkerId};
-use super::roster::Worker;
 use crate::FleetEvent;
 
 /// How long a worker is set aside at first; doubled each time that it fails again, up to [`LONGEST`].
@@ -23,23 +22,21 @@ pub(super) struct Aside {
     pub(super) is_due: bool,
 }
 
-impl Worker {
-    /// Sets it aside; for how long. Failures of jobs that it had before do not count again.
-    fn put_aside(&mut self, now: Duration, reason: &str) -> Option<Duration> {
-        let pause = match &self.aside {
+impl Aside {
+    /// What becomes of a worker that fails, after what it was `before`: nothing new while that lasts, since failures of jobs that
+    /// it had before do not count again.
+    fn after(before: Option<&Self>, now: Duration, reason: &str) -> Option<Self> {
+        let pause = match before {
             None => FIRST,
             Some(aside) if aside.is_due => (aside.pause * 2).min(LONGEST),
             Some(_) => return None,
         };
-        self.aside = Some(Aside { reason: reason.to_owned(), until: now + pause, pause, is_due: false });
-        Some(pause)
+        Some(Self { reason: reason.to_owned(), until: now + pause, pause, is_due: false })
     }
 
     /// Takes note of the time: one that has waited long enough may be tried.
     pub(super) fn look_again(&mut self, now: Duration) {
-        if let Some(aside) = self.aside.as_mut().filter(|aside| aside.until <= now) {
-            aside.is_due = true;
-        }
+        self.is_due |= self.until <= now;
     }
 }
 
@@ -47,8 +44,9 @@ impl Dispatcher {
     /// The place of a worker cannot make runs: what waits there comes back.
     pub(super) fn set_aside(&mut self, now: Duration, id: WorkerId, reason: &str) {
         let Some(worker) = self.workers.get_mut(&id) else { return };
-        let Some(pause) = worker.put_aside(now, reason) else { return };
-        let (name, seconds) = (worker.name.clone(), pause.as_secs_f64());
+        let Some(aside) = Aside::after(worker.aside.as_ref(), now, reason) else { return };
+        let (name, seconds) = (worker.name.clone(), aside.pause.as_secs_f64());
+        worker.aside = Some(aside);
         let notice = FleetEvent::WorkerSetAside { worker: name, reason: reason.to_owned(), seconds };
         self.out.push(Command::Notice(notice));
         let leases: Vec<_> = worker.leases().collect();

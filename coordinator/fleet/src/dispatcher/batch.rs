@@ -9,8 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use starlings_models::{Failure, Prediction};
 use starlings_proto::SetupId;
 
-use super::doubt::Doubt;
-use super::message::WorkerId;
+use super::message::{ControlId, WorkerId};
 use super::queue::{Again, Queue};
 use crate::Outcome;
 use crate::job_name::JobName;
@@ -69,6 +68,15 @@ pub(super) enum Ended {
     Decided(Failure),
     /// Abnormally: nobody knows yet whose doing it is.
     Undecided(String),
+}
+
+/// What the lease of a doubtful job stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Doubt {
+    /// A run that is known to work.
+    Control(ControlId),
+    /// The job itself, in the place where a known run has just worked.
+    Confirmed,
 }
 
 impl Batch {

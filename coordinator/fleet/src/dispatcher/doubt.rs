@@ -12,17 +12,9 @@ use starlings_models::{Failure, ModelFailure, ParticleError, Prediction};
 use starlings_proto::Lease;
 
 use super::Dispatcher;
-use super::batch::{Batch, Ended};
+use super::batch::{Batch, Doubt, Ended};
+use super::hand_out::lease;
 use super::message::{BatchError, Command, ControlId, WorkerId};
-
-/// What the lease of a doubtful job stands for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Doubt {
-    /// A run that is known to work.
-    Control(ControlId),
-    /// The job itself, in the place where a known run has just worked.
-    Confirmed,
-}
 
 impl Dispatcher {
     /// An abnormal end: tried once more, and then decided by a control run in the same place.
@@ -106,7 +98,7 @@ impl Dispatcher {
             }
             None => {
                 batch.set_doubt(index, Some(Doubt::Confirmed));
-                self.out.push(super::hand_out::lease(worker, batch, index));
+                self.out.push(lease(worker, batch, index));
                 self.works(id);
             }
             Some(fault) => {

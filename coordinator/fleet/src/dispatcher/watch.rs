@@ -47,7 +47,10 @@ impl Dispatcher {
             self.out.push(Command::Close { worker: id });
             self.lose(id, &reason, false);
         }
-        self.workers.values_mut().for_each(|worker| worker.look_again(now));
+        self.workers
+            .values_mut()
+            .filter_map(|worker| worker.aside.as_mut())
+            .for_each(|aside| aside.look_again(now));
         if let Some(progress) = self.batch.as_mut().and_then(Batch::progress) {
             self.out.push(Command::Notice(progress));
         }

@@ -10,28 +10,16 @@ use starlings_models::equations::Expression;
 use starlings_models::{EffectDef, ModelDef, Role, Setup, Spec};
 
 use super::blame::{blame, expressions, report_missing};
+use super::built::{CheckedModel, quantity, valid_names};
 use super::defs::{effect, equations};
 use super::limits;
-use super::parameters::{quantity, valid_names};
-use super::scales;
+use super::relative;
 use super::solver::{Known, fits};
 use crate::expand::INITIAL;
 use crate::file::locate::character;
 use crate::file::{EffectSection, StudyFile};
 use crate::problem::Source;
 use crate::variant::{has_delay, reads_past};
-
-/// A model that builds, with the effects that belong to it.
-pub(crate) struct CheckedModel {
-    /// Without parameters, outputs and observer.
-    pub(crate) setup: Setup,
-    pub(crate) spec: Spec,
-    /// Effects that are described but not part of the model.
-    pub(crate) candidates: Vec<EffectDef>,
-    /// Names of parameters and initial values, those of the candidates included.
-    pub(crate) valid_names: Vec<String>,
-    pub(crate) delays: bool,
-}
 
 /// Builds the model of a study; nothing after a complaint.
 pub(crate) fn model(source: &Source, file: &StudyFile, solver: Option<&Known>) -> Option<CheckedModel> {
@@ -55,7 +43,7 @@ pub(crate) fn model(source: &Source, file: &StudyFile, solver: Option<&Known>) -
     check_roles(source, file, &bare);
     let candidates = sort_effects(source, file, &mut setup, &bare)?;
     let mut spec = spec(source, file, &setup)?;
-    scales::open(&mut spec, &setup.effects);
+    relative::open(&mut spec, &setup.effects);
     let mut valid_names = valid_names(&spec);
     valid_names.extend(candidates.iter().flat_map(|e| &e.parameters).map(|p| p.name.clone()));
     let delays = expressions(file).iter().any(|e| reads_past(e.get_ref()))

@@ -2,31 +2,15 @@
 //!
 //! Next file to read: [`super::prior`].
 
-use starlings_models::{Quantity, Spec};
+use starlings_models::Spec;
 use toml::Spanned;
 
-use super::model::CheckedModel;
+use super::built::{CheckedModel, quantity, valid_names};
 use super::prior::{self, Prior};
 use crate::checked::{Record, StudyParameter};
 use crate::expand::INITIAL;
-use crate::field::quantity_of;
 use crate::file::{ParameterSection, StudyFile};
 use crate::problem::Source;
-
-/// What the model says of a parameter or of the state behind an initial value.
-pub(crate) fn quantity<'a>(spec: &'a Spec, name: &str) -> Option<&'a Quantity> {
-    match name.strip_prefix(INITIAL) {
-        Some(state) => quantity_of(&spec.states, state),
-        None => spec.parameters.iter().find(|q| q.name == name),
-    }
-}
-
-/// Every name that a parameter or constant may have.
-pub(crate) fn valid_names(spec: &Spec) -> Vec<String> {
-    let first = |q: &Quantity| if q.size == 1 { q.name.clone() } else { format!("{}[0]", q.name) };
-    let states = spec.states.iter().map(|q| format!("{INITIAL}{}", first(q)));
-    spec.parameters.iter().map(|q| q.name.clone()).chain(states).collect()
-}
 
 /// The priors in the order of the file, nothing in the place of one that was refused.
 pub(crate) fn priors(

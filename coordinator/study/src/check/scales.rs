@@ -13,8 +13,10 @@ use starlings_models::effect::{EffectParameter, Scale, names, scale};
 use starlings_models::{EffectDef, Job, ObserverDef, ParticleError, SOLVER, Setup, SetupError, Spec, Window};
 use starlings_proto::spent::spent;
 
-use super::model::{self, CheckedModel};
+use super::built::CheckedModel;
+use super::model;
 use super::prior;
+use super::relative::{OPEN, relative};
 use crate::checked::{Record, StudyParameter};
 use crate::expand::INITIAL;
 use crate::field::quantity_of;
@@ -22,9 +24,6 @@ use crate::file::StudyFile;
 use crate::plan::training_rows;
 use crate::problem::Source;
 use crate::surroundings::Surroundings;
-
-/// A range without bounds.
-const OPEN: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
 /// What the numbers of effects are measured with.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -51,20 +50,6 @@ pub(crate) enum CourseError {
     Setup(#[from] SetupError),
     #[error(transparent)]
     Run(#[from] ParticleError),
-}
-
-/// The parameters of effects that do not count in the model's units.
-pub(crate) fn relative(effects: &[EffectDef]) -> impl Iterator<Item = &EffectParameter> {
-    effects.iter().flat_map(|effect| &effect.parameters).filter(|p| p.scale != Scale::Absolute)
-}
-
-/// Opens the ranges of parameters that do not count in the model's units: they bound nothing yet.
-pub(crate) fn open(spec: &mut Spec, effects: &[EffectDef]) {
-    for parameter in relative(effects) {
-        if let Some(quantity) = spec.parameters.iter_mut().find(|q| q.name == parameter.name) {
-            quantity.range = OPEN;
-        }
-    }
 }
 
 impl Ruler {

@@ -6,8 +6,7 @@
 
 use starlings_models::units::{Labels, Unit, consistent};
 
-use super::model::CheckedModel;
-use super::parameters::quantity;
+use super::built::{CheckedModel, quantity};
 use crate::checked::Record;
 use crate::field::quantity_of;
 use crate::file::StudyFile;

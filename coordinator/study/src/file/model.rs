@@ -3,16 +3,13 @@
 //! A rate is one expression or a table of named terms, an initial value a number or an expression; both end as text with a
 //! place. Next file to read: [`crate::check::model`], which asks the model whether they make sense.
 
-use serde::Deserialize;
-use serde::de::IntoDeserializer;
-use serde::de::value::StrDeserializer;
 use starlings_models::{Role, SOLVER};
 use toml::Spanned;
 
 use super::layout::Layout;
-use super::read::named_texts;
+use super::quantity::{named_role, role, unit};
 use super::solver::{self, program};
-use super::table::{Node, Table, number, text, wrong_type};
+use super::table::{Node, Table, named_texts, number, text, wrong_type};
 use super::{
     EffectParameterSection, EffectSection, EquationsSection, ModelSection, Named, QuantitySection,
     SolverSection, StateSection,
@@ -21,26 +18,6 @@ use crate::problem::Source;
 
 /// Keys of `[model]` that only a model of equations has.
 const EQUATIONS: [&str; 6] = ["outputs", "inputs", "replaceable", "roles", "solver", "states"];
-const ROLES: [&str; 18] = [
-    "displacement",
-    "velocity",
-    "level",
-    "pressure",
-    "flow",
-    "temperature",
-    "force",
-    "resistance",
-    "compliance",
-    "inertia",
-    "stiffness",
-    "damping",
-    "throat-area",
-    "burn-rate",
-    "burn-area",
-    "web",
-    "thrust",
-    "other",
-];
 
 /// Reads `[model]`.
 pub(crate) fn model(source: &Source, root: &Table<'_>) -> ModelSection {
@@ -207,28 +184,10 @@ fn rate(source: &Source, state: &Table<'_>, node: &Node<'_>) -> Named<String> {
     Vec::new()
 }
 
-pub(super) fn unit(t: &Table<'_>) -> String {
-    t.text("unit").map(Spanned::into_inner).unwrap_or_default()
-}
-
-pub(super) fn role(source: &Source, t: &Table<'_>) -> Role {
-    t.text("role").map_or(Role::Other, |name| named_role(source, &name))
-}
-
 /// The meanings of parameters, by name.
 fn roles(source: &Source, model: &Table<'_>) -> Vec<(Spanned<String>, Role)> {
     let named = named_texts(source, &model.free_entries("roles"));
     named.into_iter().map(|(parameter, name)| (parameter, named_role(source, &name))).collect()
-}
-
-fn named_role(source: &Source, name: &Spanned<String>) -> Role {
-    let deserializer: StrDeserializer<'_, serde::de::value::Error> =
-        name.get_ref().as_str().into_deserializer();
-    Role::deserialize(deserializer).unwrap_or_else(|_| {
-        let valid: Vec<String> = ROLES.iter().map(|r| (*r).to_owned()).collect();
-        source.report_unknown(name.span(), format!("unknown role `{}`", name.get_ref()), &valid);
-        Role::Other
-    })
 }
 
 /// Reads `[[effects]]`.

@@ -8,9 +8,9 @@ use toml::de::DeTable;
 
 use super::model::{effects, model};
 use super::settings::{estimator, explain, fleet};
-use super::table::{Node, Table, number, text, wrong_type};
+use super::table::{Node, Table, named_texts, number, wrong_type};
 use super::{
-    ChannelSection, Named, ObserverSection, ParameterSection, PriorSection, ProcessSection, RecordSection,
+    ChannelSection, ObserverSection, ParameterSection, PriorSection, ProcessSection, RecordSection,
     StudyFile, StudySection, SurfaceSection,
 };
 use crate::problem::{Source, StudyError};
@@ -237,12 +237,4 @@ fn noise(source: &Source, node: &Node<'_>) -> Option<Spanned<Option<f64>>> {
         }
         None => number(source, node, "`noise`").map(|n| Spanned::new(n.span(), Some(n.into_inner()))),
     }
-}
-
-/// Texts by name; a value that is no text is reported.
-pub(crate) fn named_texts(source: &Source, entries: &[(Spanned<String>, &Node<'_>)]) -> Named<String> {
-    let read = |(key, node): &(Spanned<String>, &Node<'_>)| {
-        text(source, node, &format!("`{}`", key.get_ref())).map(|value| (key.clone(), value))
-    };
-    entries.iter().filter_map(read).collect()
 }

@@ -10,9 +10,8 @@ use toml::Spanned;
 
 use super::Named;
 use super::memory::memory;
-use super::model::{role, unit};
-use super::read::named_texts;
-use super::table::{Node, Table, text, wrong_type};
+use super::quantity::{role, unit};
+use super::table::{Node, Table, named_texts, text, wrong_type};
 use crate::problem::{Source, quoted_list};
 
 /// Keys of `[model]` that only a solver has.

@@ -9,6 +9,7 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use super::Named;
 use crate::problem::{Source, suggestion};
 
 /// A value of the file with its place.
@@ -223,4 +224,12 @@ pub(crate) fn wrong_type(source: &Source, node: &Node<'_>, what: &str, expected:
         DeValue::Table(_) => "a table".to_owned(),
     };
     source.report(node.span(), format!("{what} must be {expected}, found {found}"));
+}
+
+/// Texts by name; a value that is no text is reported.
+pub(crate) fn named_texts(source: &Source, entries: &[(Spanned<String>, &Node<'_>)]) -> Named<String> {
+    let read = |(key, node): &(Spanned<String>, &Node<'_>)| {
+        text(source, node, &format!("`{}`", key.get_ref())).map(|value| (key.clone(), value))
+    };
+    entries.iter().filter_map(read).collect()
 }

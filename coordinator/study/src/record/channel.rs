@@ -2,28 +2,14 @@
 //!
 //! Next files to read: [`super::part`] for fields, [`super::noise`], [`super::input`].
 
-use starlings_models::Spec;
-
+use super::Context;
 use super::derived::Derived;
 use super::noise::Noise;
 use super::part::Part;
-use super::surface::SurfaceFiles;
-use super::{Context, Table};
+use super::reader::{ChannelReader, measured_somewhere};
 use crate::checked::Channel;
-use crate::file::{ChannelSection, RecordSection};
-use crate::problem::{Source, quoted_list};
-
-/// Reads the channels of one record.
-pub(crate) struct ChannelReader<'a> {
-    pub(crate) source: &'a Source,
-    pub(crate) section: &'a RecordSection,
-    pub(crate) table: &'a Table,
-    /// The training span; `None` when the whole record is held out.
-    pub(crate) train: Option<[f64; 2]>,
-    pub(crate) spec: &'a Spec,
-    /// The files of every channel that was measured as a surface.
-    pub(super) surfaces: &'a [Option<SurfaceFiles>],
-}
+use crate::file::ChannelSection;
+use crate::problem::quoted_list;
 
 impl ChannelReader<'_> {
     /// All channels, their values still at every row of the file; nothing after a complaint.
@@ -57,10 +43,6 @@ impl ChannelReader<'_> {
             );
         }
         (self.source.count() == before).then_some(channels)
-    }
-
-    fn name(&self) -> &str {
-        self.section.name.get_ref()
     }
 
     /// The scalar channels of one that is written: one, or those of a field's components that the file has.
@@ -179,11 +161,6 @@ impl ChannelReader<'_> {
         self.table.csv.numbers(column).map_err(|problem| self.source.adopt(problem)).ok()
     }
 
-    /// Whether one of the values was measured where the record is used.
-    pub(super) fn has_value(&self, values: &[f64]) -> bool {
-        values.iter().zip(&self.table.times).any(|(v, t)| v.is_finite() && self.is_used(*t))
-    }
-
     /// Says that a channel has no value, at all or where it is fitted.
     fn no_value(&self, section: &ChannelSection, at_all: bool) {
         let place = if at_all { "no value" } else { "no value in the training span" };
@@ -193,23 +170,6 @@ impl ChannelReader<'_> {
             if at_all { "remove the channel" } else { "remove the channel, or move `train`" },
         );
     }
-
-    /// Whether a row counts for the channel: the training span, or everything for a record that is held out.
-    pub(super) fn is_used(&self, time: f64) -> bool {
-        self.train.is_none_or(|[from, to]| from <= time && time <= to)
-    }
-
-    /// Whether the rows that count are evenly spaced, to a percent of their mean distance.
-    pub(super) fn is_even(&self) -> bool {
-        let times: Vec<f64> = self.table.times.iter().copied().filter(|t| self.is_used(*t)).collect();
-        let (Some(first), Some(last)) = (times.first(), times.last()) else { return true };
-        let mean = (last - first) / (times.len() - 1).max(1) as f64;
-        times.windows(2).all(|w| (w[1] - w[0] - mean).abs() <= 0.01 * mean)
-    }
-}
-
-pub(super) fn measured_somewhere(values: &[f64]) -> bool {
-    values.iter().any(|v| v.is_finite())
 }
 
 fn with_unit(value: f64, unit: &str) -> String {

@@ -4,7 +4,7 @@
 //! A value that is fitted is made of values of the training span alone: what is held out stays unseen. Either way the errors
 //! of neighbouring values are no longer independent, which a warning says. Next file to read: [`super::channel`].
 
-use super::channel::ChannelReader;
+use super::reader::ChannelReader;
 use crate::file::ChannelSection;
 
 /// What a column holds of the output.

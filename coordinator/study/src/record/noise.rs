@@ -5,7 +5,7 @@
 
 use starlings_estimators::noise_from_third_differences;
 
-use super::channel::ChannelReader;
+use super::reader::ChannelReader;
 use crate::file::ChannelSection;
 
 /// A standard deviation and how it was found.

@@ -5,7 +5,7 @@
 
 use starlings_models::{Quantity, Spec};
 
-use super::channel::ChannelReader;
+use super::reader::ChannelReader;
 use crate::field::{component_of, quantity_of};
 use crate::file::ChannelSection;
 use crate::problem::Source;

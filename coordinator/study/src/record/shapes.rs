@@ -8,9 +8,8 @@ use std::sync::Arc;
 
 use starlings_models::surface::{Mesh, Profile};
 
-use super::surface::{columns, lacks};
 use super::{Csv, Table, off};
-use crate::problem::{Problem, Source};
+use crate::problem::{Problem, Source, quoted_list};
 use crate::surfaces::{Shape, Shapes};
 
 /// Times closer than this, relative to their size, are one.
@@ -235,4 +234,21 @@ fn unit(csv: &Csv, row: usize, n: [f64; 3]) -> Result<[f64; 3], Problem> {
         "a node without a direction".to_owned(),
         "give the outward normal of the wall there",
     ))
+}
+
+/// Position of each of these columns; nothing where one is missing.
+fn columns<const N: usize>(csv: &Csv, names: [&str; N]) -> Option<[usize; N]> {
+    let mut found = [0; N];
+    for (at, name) in found.iter_mut().zip(names) {
+        *at = csv.index(name).ok()?;
+    }
+    Some(found)
+}
+
+/// What a file has instead of the columns that were looked for.
+fn lacks(csv: &Csv, wanted: &str) -> (String, String) {
+    (
+        format!("`{}` has not the columns {wanted}", csv.path.display()),
+        format!("its columns are {}", quoted_list(&csv.headers)),
+    )
 }

@@ -1,65 +1,19 @@
 //! Channels that were measured as registered surfaces: a surface per time, and where the model's nodes are without displacement.
 //!
-//! What is compared is in [`crate::surfaces`]. Next file to read: [`super::shapes`].
+//! What is compared is in [`crate::surfaces`]. Next files to read: [`super::surface_files`], [`super::shapes`].
 
-use std::collections::BTreeMap;
-use std::path::PathBuf;
-use std::rc::Rc;
 use std::sync::Arc;
 
 use starlings_models::{Role, Spec};
 
-use super::channel::{ChannelReader, measured_somewhere};
+use super::Context;
+use super::reader::{ChannelReader, measured_somewhere};
 use super::shapes::Surfaces;
-use super::{Context, Csv, Recordings};
+use super::surface_files::SurfaceFiles;
 use crate::checked::Channel;
-use crate::file::{ChannelSection, RecordSection, SurfaceSection};
+use crate::file::{ChannelSection, SurfaceSection};
 use crate::problem::quoted_list;
 use crate::surfaces::Node;
-
-/// The files of one surface channel.
-pub(super) struct SurfaceFiles {
-    surface: Rc<Csv>,
-    rest: Rc<Csv>,
-    /// Texts of the meshes that the surface file names, by name.
-    meshes: BTreeMap<String, (PathBuf, String)>,
-}
-
-impl Recordings<'_> {
-    /// The files of every channel of a record, none where it is no surface; nothing after a complaint.
-    pub(super) fn surfaces(&mut self, section: &RecordSection) -> Option<Vec<Option<SurfaceFiles>>> {
-        let found: Vec<Option<Option<SurfaceFiles>>> = section
-            .channels
-            .iter()
-            .map(|channel| channel.surface.as_ref().map_or(Some(None), |s| self.files(s).map(Some)))
-            .collect();
-        found.into_iter().collect()
-    }
-
-    fn files(&mut self, section: &SurfaceSection) -> Option<SurfaceFiles> {
-        let surface = self.open(section.file.get_ref(), &section.file);
-        let rest = self.open(section.rest.get_ref(), &section.rest);
-        let (surface, rest) = (surface?, rest?);
-        let mut meshes = BTreeMap::new();
-        let before = self.source.count();
-        if let Ok(column) = surface.index("file") {
-            for (row, name) in surface.texts(column).enumerate() {
-                let path = self.folder.join(name);
-                match std::fs::read_to_string(&path) {
-                    Ok(text) => {
-                        meshes.insert(name.to_owned(), (path, text));
-                    }
-                    Err(error) => {
-                        let message = format!("cannot read `{}`: {}", path.display(), super::plain(&error));
-                        let help = "name a mesh in the Object File Format (OFF), relative to the study file";
-                        self.source.adopt(surface.problem(row, column, message, help));
-                    }
-                }
-            }
-        }
-        (self.source.count() == before).then_some(SurfaceFiles { surface, rest, meshes })
-    }
-}
 
 impl ChannelReader<'_> {
     /// The channels of a surface, one per node; nothing after a complaint.
@@ -174,21 +128,4 @@ impl ChannelReader<'_> {
         }
         None
     }
-}
-
-/// Position of each of these columns; nothing where one is missing.
-pub(super) fn columns<const N: usize>(csv: &Csv, names: [&str; N]) -> Option<[usize; N]> {
-    let mut found = [0; N];
-    for (at, name) in found.iter_mut().zip(names) {
-        *at = csv.index(name).ok()?;
-    }
-    Some(found)
-}
-
-/// What a file has instead of the columns that were looked for.
-pub(super) fn lacks(csv: &Csv, wanted: &str) -> (String, String) {
-    (
-        format!("`{}` has not the columns {wanted}", csv.path.display()),
-        format!("its columns are {}", quoted_list(&csv.headers)),
-    )
 }

@@ -8,18 +8,17 @@ use std::fs::{File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
-
 use crate::store::{Program, Purpose, Store, StoreError};
 use crate::summary::Summary;
 use crate::{Fit, Study, posterior};
 
+pub use super::call::Call;
 pub use super::folder_error::FolderError;
 pub use super::info::StudyInfo;
 use super::info::info;
+use super::json::json;
 use super::make;
 use super::meaning::Meaning;
-pub use super::resume::Call;
 
 /// An open run folder.
 pub struct RunFolder {
@@ -146,8 +145,4 @@ pub fn write(path: &Path, text: &str) -> io::Result<()> {
         // Already failing: what cannot be removed either stays.
         let _ = std::fs::remove_file(&partial);
     })
-}
-
-pub(crate) fn json(value: &impl Serialize) -> String {
-    serde_json::to_string(value).unwrap_or_default()
 }

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use starlings_models::SolverDef;
 
 use super::Purpose;
-use super::folder::json;
+use super::json::json;
 use crate::expand::INITIAL;
 use crate::{Record, Study};
 

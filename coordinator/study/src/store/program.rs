@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use starlings_models::SolverDef;
 use starlings_proto::{VERSION, own_build};
 
+use super::{Store, StoreError};
 use crate::Study;
 
 /// This program and the solver of a study, part by part.
@@ -114,4 +115,15 @@ fn solver_parts(solver: &SolverDef) -> Vec<(String, String)> {
         }
     }
     parts
+}
+
+impl Store {
+    /// The programs that the run's numbers come from; empty where the store does not say.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub fn program(&self) -> Result<Program, StoreError> {
+        let text = self.meta(Program::KEY)?;
+        Ok(text.and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default())
+    }
 }

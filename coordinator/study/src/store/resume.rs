@@ -6,23 +6,14 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
+use super::call::Call;
 use super::changes::changes;
-use super::folder::{DATABASE, FolderError, RunFolder, StudyInfo, freeze, is_frozen, json, lock};
+use super::folder::{DATABASE, FolderError, RunFolder, StudyInfo, freeze, is_frozen, lock};
+use super::json::json;
 use super::make::is_left_over;
 use super::meaning::{Meaning, Part};
 use super::{Program, Purpose, Store, StoreError};
 use crate::Study;
-
-/// How a run is continued.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Call<'a> {
-    /// The command line.
-    pub command: &'a str,
-    /// When it was given, as text.
-    pub started: &'a str,
-    /// Go on with another build of this program or another solver than those that began.
-    pub other_build: bool,
-}
 
 /// Name under which the store keeps that its numbers come from more than one program.
 const MIXED: &str = "mixed";

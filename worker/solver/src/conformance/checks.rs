@@ -7,12 +7,8 @@ use starlings_models::{ObserverDef, Run, Window};
 use super::hosted::{gain_zero, predict_then_correct, zero_term};
 use super::refusals::{cancelled, not_a_number, refuses};
 use super::rows::{at_start, begins, rows};
-use super::subject::{Subject, Verdict, distance, failed, got, same, same_bits};
+use super::subject::{SAME, Subject, Verdict, distance, failed, got, same, same_bits};
 use super::trial::all_outputs;
-
-/// Difference between a run in one piece and in two, relative to the largest value: what a solver may lose by writing its
-/// state down with fewer digits is already too much.
-pub(super) const SAME: f64 = 1e-9;
 
 type Check = fn(&Subject<'_>) -> Verdict;
 

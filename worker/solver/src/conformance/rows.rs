@@ -6,8 +6,7 @@
 use starlings_models::external::table::{foreign_bytes, is_transposed};
 use starlings_models::{ParticleError, Run, Solved, Window};
 
-use super::checks::SAME;
-use super::subject::{Subject, Verdict, failed, got};
+use super::subject::{SAME, Subject, Verdict, failed, got};
 use super::trial::all_outputs;
 
 /// Runs over the first times of the trial, as many as there are outputs among them.

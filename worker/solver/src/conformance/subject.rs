@@ -6,6 +6,10 @@ use super::trial::{Trial, all_outputs};
 use crate::Solvers;
 use crate::adapter::Adapter;
 
+/// Difference between a run in one piece and in two, relative to the largest value: what a solver may lose by writing its
+/// state down with fewer digits is already too much.
+pub(super) const SAME: f64 = 1e-9;
+
 /// What is tried out.
 pub(super) struct Subject<'a> {
     pub(super) solvers: &'a Solvers,
