@@ -57,7 +57,7 @@ pub use least_squares::{End, LeastSquares, Need, Scaled};
 pub use linearisation::Linearisation;
 pub use particles::Particles;
 pub use pooled::Pooled;
-pub use recombine::recombine;
+pub use recombine::{Recombination, recombine};
 pub use roukf::{Resampled, Root, Roukf};
 pub use sandwich::{Place, Residuals};
 pub use score::{Optimum, Score, null_maxima, score_correlation};
