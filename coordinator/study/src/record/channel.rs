@@ -3,6 +3,7 @@
 //! Next files to read: [`super::part`] for fields, [`super::noise`], [`super::input`].
 
 use starlings_models::Spec;
+use starlings_models::units::rounded;
 
 use super::derived::Derived;
 use super::noise::Noise;
@@ -213,6 +214,6 @@ pub(super) fn measured_somewhere(values: &[f64]) -> bool {
 }
 
 fn with_unit(value: f64, unit: &str) -> String {
-    let text = format!("{value:.3e}").parse::<f64>().map_or_else(|_| value.to_string(), |v| v.to_string());
+    let text = rounded(value, 4).to_string();
     if unit.is_empty() { text } else { format!("{text} {unit}") }
 }
