@@ -13,7 +13,8 @@ use std::time::Instant;
 
 use nalgebra::DMatrix;
 use serde_json::{Map, Value, json};
-use starlings_estimators::{Data, Drift, Noise, Particles, Points, Root, Roukf, SigmaSet, recombine};
+use starlings_coordinator::study::fit::recombine_by;
+use starlings_estimators::{Data, Drift, Noise, Particles, Points, Root, Roukf, SigmaSet};
 use starlings_models::equations::{EquationsDef, EquationsModel};
 use starlings_models::integrate::{self, Solver, Tolerance};
 use starlings_models::limits::Limits;
@@ -105,7 +106,7 @@ fn recombination(figures: &mut Map<String, Value>) -> Result<(), Failure> {
     let t = DMatrix::from_fn(r, r, |i, j| if i == j { 0.9 } else { 0.1 / 21.0 });
     let mut out = x.clone();
     let expected = (x.row(n - 1) * t.column(r - 1))[0];
-    recombine(&mut out, &t, 2);
+    recombine_by(&mut out, &t, 2);
     if (out[(n - 1, r - 1)] - expected).abs() > 1e-9 {
         return Err(format!("the recombination gives {} instead of {expected}", out[(n - 1, r - 1)]).into());
     }
@@ -113,7 +114,7 @@ fn recombination(figures: &mut Map<String, Value>) -> Result<(), Failure> {
     let copy = best(10, || black_box(&mut out).as_mut_slice().copy_from_slice(black_box(&x).as_slice()));
     let halves = best(10, || copy_in_halves(&x, &mut out));
     for (threads, name, copy) in [(1, "one_thread", copy), (2, "two_threads", halves)] {
-        let product = best(10, || recombine(black_box(&mut x), &t, threads));
+        let product = best(10, || recombine_by(black_box(&mut x), &t, threads));
         figures.insert(format!("memcpy_{name}_gb_per_s"), round(bytes / copy / 1e9));
         figures.insert(format!("recombine_n1e6_r22_{name}_ms"), round(1e3 * product));
         figures.insert(format!("recombine_{name}_share_of_memcpy"), round(copy / product));

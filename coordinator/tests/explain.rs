@@ -194,7 +194,7 @@ fn a_killed_explanation_is_continued_without_a_run_made_twice() {
         let folder = case.fresh();
         let killed = go(&case, &folder, &mut Mortal::new(left), &Options::default());
         assert!(killed.is_err(), "killed after {left} batches");
-        let before = Store::open(&folder.join("run.db")).unwrap().n_remembered_run().unwrap();
+        let before = Store::open(&folder.join("run.db")).unwrap().remembered_runs().unwrap().len();
         assert!(before > 0);
         let mut again = Mortal::new(usize::MAX);
         let mut found = go(&case, &folder, &mut again, &Options::default()).unwrap().explanation;

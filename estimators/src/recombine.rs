@@ -4,7 +4,7 @@
 //! they came from, which are still in the first cache. A second matrix would cost half as much traffic again, since memory
 //! reads a line before it writes one. While a block is multiplied, the one after the next is fetched. Every register
 //! holds a piece of the result until it is complete; the vector instructions are chosen when the program runs. Matrices
-//! far beyond the caches are shared out by rows over the caller's threads; every row is made the same way whoever makes
+//! far beyond the caches are cut by rows into shares for the caller's threads; every row is made the same way whoever makes
 //! it, so the bits do not know how many there were.
 //! Read next: `roukf.rs`, which makes T.
 
@@ -29,41 +29,52 @@ const SHARED: usize = 4 * 1024 * 1024;
 /// Threads at most: more do not move the memory bus.
 const THREADS: usize = 4;
 
-/// Replaces X by X T: `x` is n x r, a particle per column, `t` is r x r; over up to `threads` threads when X is large.
+/// Replaces X by X T: `x` is n x r, a particle per column, `t` is r x r.
 ///
 /// A column of X whose row in T is zero (a dropped particle) is not read as a number: it may hold NaN.
 ///
 /// # Panics
 /// When the shapes do not match.
-pub fn recombine(x: &mut DMatrix<f64>, t: &DMatrix<f64>, threads: usize) {
-    assert_eq!((x.ncols(), x.ncols()), t.shape(), "one row and one column of the transform per particle");
-    if x.is_empty() {
-        return;
-    }
-    let used: Vec<usize> = (0..t.nrows()).filter(|&i| t.row(i).iter().any(|v| v.abs() > 0.0)).collect();
-    let n = x.nrows();
-    let threads = if x.len() < SHARED { 1 } else { threads.clamp(1, THREADS) };
-    let mut rest: Vec<&mut [f64]> = x.as_mut_slice().chunks_exact_mut(n).collect();
-    std::thread::scope(|scope| {
-        for k in 0..threads {
-            let rows = n * (k + 1) / threads - n * k / threads;
-            let x = rest.iter_mut().filter_map(|column| column.split_off_mut(..rows)).collect();
-            let part = Recombination { x, t, used: &used };
-            if k + 1 == threads {
-                Arch::new().dispatch(part);
-            } else {
-                scope.spawn(move || Arch::new().dispatch(part));
-            }
-        }
-    });
+pub fn recombine(x: &mut DMatrix<f64>, t: &DMatrix<f64>) {
+    Recombination::shares(x, t, 1).into_iter().for_each(Recombination::run);
 }
 
-struct Recombination<'a> {
+/// Some rows of X, to be replaced by those of X T.
+pub struct Recombination<'a> {
     /// Some rows of X, a column per particle.
     x: Vec<&'a mut [f64]>,
     t: &'a DMatrix<f64>,
     /// Particles that take part.
-    used: &'a [usize],
+    used: Vec<usize>,
+}
+
+impl<'a> Recombination<'a> {
+    /// [`recombine`] in pieces that may be made at the same time: up to `threads` of them when X is large, else one, none
+    /// when X is empty.
+    ///
+    /// # Panics
+    /// When the shapes do not match.
+    pub fn shares(x: &'a mut DMatrix<f64>, t: &'a DMatrix<f64>, threads: usize) -> Vec<Self> {
+        assert_eq!((x.ncols(), x.ncols()), t.shape(), "one row and one column of the transform per particle");
+        if x.is_empty() {
+            return Vec::new();
+        }
+        let used: Vec<usize> = (0..t.nrows()).filter(|&i| t.row(i).iter().any(|v| v.abs() > 0.0)).collect();
+        let n = x.nrows();
+        let threads = if x.len() < SHARED { 1 } else { threads.clamp(1, THREADS) };
+        let mut rest: Vec<&mut [f64]> = x.as_mut_slice().chunks_exact_mut(n).collect();
+        let share = |k| {
+            let rows = n * (k + 1) / threads - n * k / threads;
+            let x = rest.iter_mut().filter_map(|column| column.split_off_mut(..rows)).collect();
+            Self { x, t, used: used.clone() }
+        };
+        (0..threads).map(share).collect()
+    }
+
+    /// Replaces the rows.
+    pub fn run(self) {
+        Arch::new().dispatch(self);
+    }
 }
 
 impl Recombination<'_> {
@@ -71,7 +82,7 @@ impl Recombination<'_> {
     fn packed_transform(&self) -> Vec<f64> {
         let mut packed = Vec::with_capacity(self.used.len() * (self.t.ncols() + GROUP));
         for first in (0..self.t.ncols()).step_by(GROUP) {
-            for &i in self.used {
+            for &i in &self.used {
                 packed.extend(
                     (first..first + GROUP).map(|j| if j < self.t.ncols() { self.t[(i, j)] } else { 0.0 }),
                 );

@@ -4,9 +4,7 @@ mod common;
 
 use common::{around, difference, filter, gauss, kalman, linear, mean_factor, normal, rng, uniform};
 use nalgebra::{DMatrix, DVector};
-use starlings_estimators::{
-    Analysis, Data, Gaussian, Noise, Particles, Points, Root, Roukf, SigmaSet, smooth,
-};
+use starlings_estimators::{Analysis, Data, Gaussian, Noise, Particles, Points, Root, Roukf, SigmaSet};
 
 struct Run {
     x: DMatrix<f64>,
@@ -271,10 +269,11 @@ fn the_product_of_transforms_smooths_like_rauch_tung_and_striebel() {
     let exact = kalman(&problem);
     let roukf = filter(Points::Simplex, problem.p, Root::Symmetric);
     let run = reduced(&problem, &roukf);
-    let smoothed = smooth(&run.ensembles, &run.transforms);
+    // Smoothed particles X_{k|K} = X_{k|k} T_{k+1} ... T_K.
+    let mut later = DMatrix::identity(run.transforms[0].nrows(), run.transforms[0].ncols());
     let (mut mean, mut covariance) = exact.analysis.last().unwrap().clone();
-    for k in (0..smoothed.len()).rev() {
-        if k + 1 < smoothed.len() {
+    for k in (0..run.ensembles.len()).rev() {
+        if k + 1 < run.ensembles.len() {
             let ((xm, pm), (xp, pp)) = (&exact.forecast[k + 1], &exact.analysis[k]);
             let eigen = pm.clone().symmetric_eigen();
             let limit = 1e-11 * eigen.eigenvalues.amax();
@@ -285,9 +284,10 @@ fn the_product_of_transforms_smooths_like_rauch_tung_and_striebel() {
             mean = xp + &gain * (&mean - xm);
             covariance = pp + &gain * (&covariance - pm) * gain.transpose();
         }
-        let (m, l) = mean_factor(&smoothed[k], &roukf.set);
+        let (m, l) = mean_factor(&(&run.ensembles[k] * &later), &roukf.set);
         // The pseudo-inverse of a covariance of rank p limits the comparison: 1e-13 measured.
         assert!((m - &mean).amax() < 1e-9, "mean at {k}");
         assert!(difference(&(&l * l.transpose()), &covariance) < 1e-9, "covariance at {k}");
+        later = &run.transforms[k] * later;
     }
 }

@@ -109,13 +109,13 @@ fn recombination_equals_the_matrix_product_and_ignores_a_dropped_column() {
     let mut g = rng(22);
     let (x, mut t) = (normal(&mut g, 10_001, 7), normal(&mut g, 7, 7));
     let mut out = x.clone();
-    recombine(&mut out, &t, 1);
+    recombine(&mut out, &t);
     assert!(difference(&out, &(&x * &t)) < 1e-13, "sums of seven products");
     t.row_mut(3).fill(0.0);
     let expected = &x * &t;
     let mut lost = x.clone();
     lost.column_mut(3).fill(f64::NAN);
-    recombine(&mut lost, &t, 1);
+    recombine(&mut lost, &t);
     assert!(difference(&lost, &expected) < 1e-13, "sums of seven products");
 }
 
@@ -126,7 +126,7 @@ fn recombination_is_the_matrix_product_for_any_number_of_particles_and_rows() {
         for n in [1, 15, 16, 4097, 9000] {
             let (x, t) = (normal(&mut g, n, r), normal(&mut g, r, r));
             let mut out = x.clone();
-            recombine(&mut out, &t, 1);
+            recombine(&mut out, &t);
             assert!(difference(&out, &(&x * &t)) < 1e-12, "sums of {r} products, {n} rows");
         }
     }
@@ -166,20 +166,4 @@ fn the_same_input_gives_the_same_bits() {
     let (b, ..) = problem(Points::Star, 1.0);
     assert_eq!(a.transform, b.transform);
     assert_eq!(a.log_likelihood.to_bits(), b.log_likelihood.to_bits());
-}
-
-#[test]
-fn rows_shared_out_over_threads_have_the_bits_of_rows_made_alone() {
-    // Just past the size from which threads share the work, and no multiple of any block.
-    let (n, r) = (200_003, 22);
-    let x = DMatrix::from_fn(n, r, |i, j| ((i * 31 + j * 17) % 1009) as f64 / 7.0);
-    let t = DMatrix::from_fn(r, r, |i, j| 1.0 / (1 + i + 2 * j) as f64);
-    let mut whole = x.clone();
-    recombine(&mut whole, &t, 3);
-    for first in (0..n).step_by(50_021) {
-        let rows = 50_021.min(n - first);
-        let mut part = x.rows(first, rows).into_owned();
-        recombine(&mut part, &t, 1);
-        assert!(part == whole.rows(first, rows), "rows from {first}");
-    }
 }

@@ -119,8 +119,7 @@ impl Unit {
         let (mut above, below) = (part(1.0), part(-1.0));
         let scaled = (self.factor - 1.0).abs() >= FACTOR;
         if scaled {
-            let digits = format!("{:.5e}", self.factor).parse::<f64>().unwrap_or(self.factor);
-            above.insert(0, digits.to_string());
+            above.insert(0, rounded(self.factor, 6).to_string());
         }
         match (above.is_empty(), below.as_slice()) {
             (true, []) => "a plain number".to_owned(),
@@ -131,4 +130,10 @@ impl Unit {
             (false, many) => format!("{}/({})", above.join(" "), many.join(" ")),
         }
     }
+}
+
+/// `value` to so many significant digits, at least one: what is then written has no more of them.
+pub fn rounded(value: f64, digits: usize) -> f64 {
+    // Written and read again, so that 0.30000000000000004 is 0.3.
+    format!("{value:.*e}", digits.saturating_sub(1)).parse().unwrap_or(value)
 }

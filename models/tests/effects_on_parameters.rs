@@ -3,7 +3,7 @@
 
 mod common;
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use common::{job, kinds, largest_difference, run, run_in_pieces, setup, window};
 use starlings_models::equations::{EquationsDef, InputDef, OutputDef, StateDef};
@@ -165,8 +165,13 @@ fn two_shifts_of_one_parameter_add_up_and_go_with_terms_elsewhere() {
 }
 
 #[test]
+#[expect(
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    reason = "a run that does not end is told by a clock"
+)]
 fn a_parameter_driven_out_of_its_range_fails_the_run_and_ends() {
-    let started = Instant::now();
+    let started = std::time::Instant::now();
     let (native, theta) = setup("windkessel-2");
     let failure = |term: &str, flow: f64, start: f64| {
         let mut setup = with(&native, &[("C", term)], &[1.0]);

@@ -103,16 +103,9 @@ fn answer() -> impl Strategy<Value = Answer> {
 }
 
 fn from_worker() -> impl Strategy<Value = FromWorker> {
-    let hello = (
-        any::<u32>(),
-        ".*",
-        1..=MAX_SLOTS as u32,
-        any::<u64>(),
-        any::<Option<[u8; 32]>>(),
-        any::<Option<Vec<u8>>>(),
-    );
+    let hello = (any::<u32>(), ".*", 1..=MAX_SLOTS as u32, any::<u64>(), any::<Option<[u8; 32]>>());
     prop_oneof![
-        hello.prop_map(|(protocol, text, slots, nonce, build, solver)| {
+        hello.prop_map(|(protocol, text, slots, nonce, build)| {
             FromWorker::Hello(Hello {
                 protocol,
                 version: text.clone(),
@@ -122,7 +115,6 @@ fn from_worker() -> impl Strategy<Value = FromWorker> {
                 pid: protocol,
                 nonce,
                 build,
-                solver,
             })
         }),
         (any::<[u8; 32]>(), prop::option::of(".*"))

@@ -59,7 +59,6 @@ impl WorkerConfig {
             pid: std::process::id(),
             nonce: std::hash::RandomState::new().build_hasher().finish(),
             build: self.build,
-            solver: None,
         }
     }
 }

@@ -102,11 +102,6 @@ impl Dispatcher {
         self.workers.values().map(|w| w.slots).sum()
     }
 
-    /// Number of leases that a worker holds.
-    pub fn in_flight(&self, worker: WorkerId) -> usize {
-        self.workers.get(&worker).map_or(0, Worker::load)
-    }
-
     /// Takes one event at time `now` (any fixed origin) and returns what has to be done about it.
     pub fn step(&mut self, now: Duration, event: Event) -> Vec<Command> {
         match event {

@@ -15,14 +15,12 @@ use starlings_models::{Factory, Forward, Job, ModelFailure, ParticleError, Predi
 use starlings_proto::spent::spent;
 use starlings_proto::words::panic_text;
 use starlings_proto::{SetupId, encode_setup};
-use tokio_util::sync::CancellationToken;
 
 use super::{Fleet, FleetError, Outcome};
 
 /// Threads of this process as a fleet.
 pub struct InProcess {
     threads: usize,
-    cancel: CancellationToken,
     forwards: BTreeMap<SetupId, Box<dyn Forward>>,
     factory: Factory,
 }
@@ -30,19 +28,7 @@ pub struct InProcess {
 impl InProcess {
     /// A fleet of so many threads, at least one.
     pub fn new(threads: usize) -> Self {
-        Self {
-            threads: threads.max(1),
-            cancel: CancellationToken::new(),
-            forwards: BTreeMap::new(),
-            factory: Arc::new(Setup::build),
-        }
-    }
-
-    /// The same fleet, ended by this token: [`Fleet::run`] returns [`FleetError::Cancelled`] after the jobs being computed.
-    #[must_use]
-    pub fn with_cancel(mut self, cancel: CancellationToken) -> Self {
-        self.cancel = cancel;
-        self
+        Self { threads: threads.max(1), forwards: BTreeMap::new(), factory: Arc::new(Setup::build) }
     }
 
     /// The same fleet with another maker of what runs jobs than [`Setup::build`], which starts no solver.
@@ -70,9 +56,9 @@ impl Fleet for InProcess {
         let outcomes = Mutex::new(Vec::with_capacity(tasks.len()));
         std::thread::scope(|scope| {
             for thread in 0..self.threads.min(tasks.len()) {
-                let (tasks, next, outcomes, cancel) = (&tasks, &next, &outcomes, &self.cancel);
+                let (tasks, next, outcomes) = (&tasks, &next, &outcomes);
                 scope.spawn(move || {
-                    while !cancel.is_cancelled() {
+                    loop {
                         let index = next.fetch_add(1, Ordering::Relaxed);
                         let Some(&(forward, job)) = tasks.get(index) else { break };
                         let result = run_one(forward, job);
@@ -81,9 +67,6 @@ impl Fleet for InProcess {
                 });
             }
         });
-        if self.cancel.is_cancelled() {
-            return Err(FleetError::Cancelled);
-        }
         let mut ran = outcomes.into_inner().unwrap_or_else(PoisonError::into_inner);
         ran.sort_unstable_by_key(|(index, _, _)| *index);
         let (results, threads) = ran.into_iter().map(|(_, result, thread)| (result, thread)).unzip();

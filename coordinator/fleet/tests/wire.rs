@@ -80,7 +80,6 @@ fn hello() -> Hello {
         pid: 1,
         nonce: 42,
         build: None,
-        solver: None,
     }
 }
 

@@ -13,7 +13,7 @@ use super::data::ParameterRow;
 use super::hangs_on::{self, HangsOnView};
 use super::plot::figure::Figure;
 use super::plot::interval;
-use super::{ReportError, layout, number};
+use super::{ReportError, correlation, layout, number};
 
 /// At most this many subsets are listed.
 const SUBSETS: usize = 12;
@@ -25,7 +25,7 @@ struct Page<'a> {
     facts: Vec<(&'static str, String)>,
     parameters: Vec<ParameterView>,
     directions: Vec<[String; 3]>,
-    correlation: Vec<Vec<Cell>>,
+    correlation: Vec<Vec<correlation::Cell>>,
     sensitivity: Vec<Figure>,
     gsf: Vec<Figure>,
     collinearity: Option<Figure>,
@@ -44,14 +44,6 @@ struct ParameterView {
     left: String,
     bits: String,
     strip: String,
-}
-
-/// One cell of the correlation table: its text and the share of colour behind it.
-#[derive(Debug, Serialize)]
-struct Cell {
-    text: String,
-    class: &'static str,
-    share: String,
 }
 
 /// Makes the page: one HTML document that refers to nothing outside itself.
@@ -129,17 +121,9 @@ fn directions(found: &Identification) -> Vec<[String; 3]> {
     found.directions.iter().map(row).collect()
 }
 
-fn cells(diagonal: usize, row: &[Option<f64>]) -> Vec<Cell> {
-    let cell = |(k, value): (usize, &Option<f64>)| Cell {
-        text: value.map_or_else(|| number::ABSENT.to_owned(), |v| number::with_sd(v, 0.1)),
-        class: match value {
-            _ if k == diagonal => "diagonal",
-            Some(v) if *v < 0.0 => "negative",
-            _ => "positive",
-        },
-        share: format!("{:.0}%", value.map_or(0.0, |v| 60.0 * v.abs().min(1.0))),
-    };
-    row.iter().enumerate().map(cell).collect()
+fn cells(diagonal: usize, row: &[Option<f64>]) -> Vec<correlation::Cell> {
+    let known = |value: &Option<f64>| value.unwrap_or(f64::NAN);
+    correlation::row(diagonal, &row.iter().map(known).collect::<Vec<_>>())
 }
 
 fn subset(subset: &SubsetInfo) -> [String; 2] {

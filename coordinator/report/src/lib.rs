@@ -4,6 +4,7 @@
 //! store nor the study. The page needs no script, no network and no font, works on a phone and in print, and states warnings before
 //! numbers. Deliberately absent: computing anything that was not stored. Next file to read: [`data`].
 
+mod correlation;
 pub mod data;
 mod explain;
 mod explained;

@@ -9,7 +9,7 @@ use super::data::{ObserverRow, ParameterRow, ReportData};
 use super::hangs_on::{self, HangsOnView};
 use super::plot::figure::Figure;
 use super::plot::{along, interval, nis, observer as observer_plot, run_times, track};
-use super::{ReportError, headline, number, outputs};
+use super::{ReportError, correlation, headline, number, outputs};
 
 /// At most this many events of the fleet are listed.
 const EVENTS: usize = 60;
@@ -36,7 +36,7 @@ pub(crate) struct Page<'a> {
     hangs_on: Option<HangsOnView>,
     nis_mean: String,
     log_likelihood: String,
-    correlation: Vec<Vec<CorrelationCell>>,
+    correlation: Vec<Vec<correlation::Cell>>,
     fleet: FleetView,
 }
 
@@ -57,14 +57,6 @@ struct ParameterView {
 struct ObserverView {
     says: String,
     figures: Vec<Figure>,
-}
-
-/// One cell of the correlation table: its text and the share of colour behind it.
-#[derive(Debug, Serialize)]
-struct CorrelationCell {
-    text: String,
-    class: &'static str,
-    share: String,
 }
 
 #[derive(Debug, Serialize)]
@@ -108,7 +100,7 @@ impl<'a> Page<'a> {
                 .correlation
                 .iter()
                 .enumerate()
-                .map(|(k, row)| correlation_row(k, row))
+                .map(|(k, row)| correlation::row(k, row))
                 .collect(),
             fleet: fleet(data)?,
         })
@@ -160,21 +152,6 @@ fn parameter(row: &ParameterRow, data: &ReportData) -> Result<ParameterView, Rep
         prior_median: number::significant(row.prior_median, 3),
         strip: interval::strip(row, data.log_axis(&row.name))?,
     })
-}
-
-fn correlation_row(diagonal: usize, row: &[f64]) -> Vec<CorrelationCell> {
-    let cell = |(k, &value): (usize, &f64)| CorrelationCell {
-        text: number::with_sd(value, 0.1),
-        class: if k == diagonal {
-            "diagonal"
-        } else if value < 0.0 {
-            "negative"
-        } else {
-            "positive"
-        },
-        share: format!("{:.0}%", if value.is_finite() { 60.0 * value.abs().min(1.0) } else { 0.0 }),
-    };
-    row.iter().enumerate().map(cell).collect()
 }
 
 fn fleet(data: &ReportData) -> Result<FleetView, ReportError> {

@@ -51,10 +51,14 @@ impl ConstantEffect {
             (None, name) => name.to_owned(),
         };
         let Some(most) = self.moves.first() else { return String::new() };
-        let size = most.sd_per_percent.abs();
-        let size = if size < 10.0 { format!("{size:.1}") } else { format!("{size:.0}") };
+        let size = in_sds(most.sd_per_percent.abs());
         format!("{} moves by {size} posterior sd when {constant} is 1 % off", most.parameter)
     }
+}
+
+/// A distance in posterior standard deviations, with the digits that it needs.
+pub(crate) fn in_sds(size: f64) -> String {
+    if size < 10.0 { format!("{size:.1}") } else { format!("{size:.0}") }
 }
 
 /// What the answer hangs on.

@@ -16,3 +16,5 @@ mod schedule;
 pub mod settle;
 pub mod stack;
 mod timeouts;
+
+pub use ensemble::recombine_by;

@@ -36,7 +36,8 @@ fn hash(hasher: &mut blake3::Hasher, programs: &[u8; 32], setup: &SetupId, job: 
     }
 }
 
-fn numbers(hasher: &mut blake3::Hasher, values: &[f64]) {
+/// Numbers in every bit, as keys and comparisons of studies take them in.
+pub(crate) fn numbers(hasher: &mut blake3::Hasher, values: &[f64]) {
     // Lengths keep neighbouring lists apart.
     hasher.update(&(values.len() as u64).to_le_bytes());
     for value in values {

@@ -40,7 +40,7 @@ pub use rows::{AnalysisRow, EstimateRow, InnovationRow, JobRow, PredictionRow};
 pub use table::table;
 
 /// Analyses are committed together for at most so long, in s: a commit costs about as much as the rows of an analysis.
-pub const HOLD_S: f64 = 0.05;
+const HOLD_S: f64 = 0.05;
 
 /// Name under which the store keeps how far the run has come.
 const ELAPSED: &str = "elapsed_s";

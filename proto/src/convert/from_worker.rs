@@ -26,8 +26,6 @@ pub struct Hello {
     pub nonce: u64,
     /// BLAKE3 of the executable; `None` when it could not be read.
     pub build: Option<[u8; 32]>,
-    /// What an external solver says of itself, JSON.
-    pub solver: Option<Vec<u8>>,
 }
 
 /// How one lease ended on a worker.
@@ -108,19 +106,19 @@ impl FromWorker {
 }
 
 fn encode_hello(hello: Hello) -> wire::Hello {
-    let Hello { protocol, version, cores, slots, host, pid, nonce, build, solver } = hello;
+    let Hello { protocol, version, cores, slots, host, pid, nonce, build } = hello;
     let build = build.map_or_else(Bytes::new, |hash| Bytes::copy_from_slice(&hash));
-    wire::Hello { protocol, version, cores, slots, host, pid, nonce, build, solver: solver.map(Into::into) }
+    wire::Hello { protocol, version, cores, slots, host, pid, nonce, build }
 }
 
 fn decode_hello(hello: wire::Hello) -> Result<Hello, WireError> {
-    let wire::Hello { protocol, version, cores, slots, host, pid, nonce, build, solver } = hello;
+    let wire::Hello { protocol, version, cores, slots, host, pid, nonce, build } = hello;
     if slots == 0 || slots as usize > MAX_SLOTS {
         let message = format!("{slots}, expected 1 to {MAX_SLOTS}");
         return Err(WireError::Shape { field: "slots", message });
     }
     let build = if build.is_empty() { None } else { Some(setup_id(&build)?) };
-    Ok(Hello { protocol, version, cores, slots, host, pid, nonce, build, solver: solver.map(Into::into) })
+    Ok(Hello { protocol, version, cores, slots, host, pid, nonce, build })
 }
 
 fn encode_answer(answer: Answer) -> Result<Outcome, WireError> {

@@ -3,6 +3,7 @@
 //! The estimate comes from the same recordings that the new study will fit: a narrow prior would count them twice.
 
 use starlings_estimators::Transform;
+use starlings_models::units::rounded;
 use toml_edit::{InlineTable, Value};
 
 use crate::result::Coefficient;
@@ -49,9 +50,7 @@ fn rounded_up(value: f64) -> f64 {
         return value;
     }
     let unit = 10_f64.powi(value.log10().floor() as i32 - 1);
-    // Written and read again, so that 0.30000000000000004 is 0.3.
-    let rounded = (value / unit - 1e-9).ceil() * unit;
-    format!("{rounded:.1e}").parse().unwrap_or(rounded)
+    rounded((value / unit - 1e-9).ceil() * unit, 2)
 }
 
 #[cfg(test)]

@@ -14,11 +14,18 @@ use std::time::Duration;
 use starlings_models::{ModelFailure, ParticleError, Prediction};
 use starlings_proto::{Answer, Lease, SetupId};
 
-use super::{BatchError, Command, ControlId, Dispatcher, Event, Joining, Rules, WorkerId};
+use super::{BatchError, Command, ControlId, Dispatcher, Event, Joining, Rules, Worker, WorkerId};
 use crate::job_name::JobName;
 use crate::{FleetEvent, Outcome};
 
 const SETUP: SetupId = [7; 32];
+
+impl Dispatcher {
+    /// Number of leases that a worker holds.
+    fn in_flight(&self, worker: WorkerId) -> usize {
+        self.workers.get(&worker).map_or(0, Worker::load)
+    }
+}
 
 const RULES: Rules =
     Rules { heartbeat: Duration::from_secs(8), patience: Duration::from_secs(60), max_attempts: 3 };

@@ -28,7 +28,6 @@ fn hello(pid: u32, build: Option<[u8; 32]>) -> Hello {
         pid,
         nonce: u64::from(pid),
         build,
-        solver: None,
     }
 }
 

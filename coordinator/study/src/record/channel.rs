@@ -2,6 +2,8 @@
 //!
 //! Next files to read: [`super::part`] for fields, [`super::noise`], [`super::input`].
 
+use starlings_models::units::rounded;
+
 use super::Context;
 use super::derived::Derived;
 use super::noise::Noise;
@@ -173,6 +175,6 @@ impl ChannelReader<'_> {
 }
 
 fn with_unit(value: f64, unit: &str) -> String {
-    let text = format!("{value:.3e}").parse::<f64>().map_or_else(|_| value.to_string(), |v| v.to_string());
+    let text = rounded(value, 4).to_string();
     if unit.is_empty() { text } else { format!("{text} {unit}") }
 }

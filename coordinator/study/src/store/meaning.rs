@@ -13,7 +13,7 @@ use starlings_models::SolverDef;
 use super::Purpose;
 use super::json::json;
 use crate::expand::INITIAL;
-use crate::{Record, Study};
+use crate::{Record, Study, run_key};
 
 /// A part of a study.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -100,13 +100,7 @@ fn channels(record: &Record) -> Vec<impl Debug + '_> {
 /// Every number of a record.
 fn numbers(record: &Record) -> String {
     let mut hasher = blake3::Hasher::new();
-    let mut feed = |values: &[f64]| {
-        // Lengths keep neighbouring lists apart.
-        hasher.update(&(values.len() as u64).to_le_bytes());
-        for value in values {
-            hasher.update(&value.to_le_bytes());
-        }
-    };
+    let mut feed = |values: &[f64]| run_key::numbers(&mut hasher, values);
     feed(&record.times);
     for channel in &record.channels {
         feed(&channel.values);

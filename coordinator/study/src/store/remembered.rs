@@ -77,13 +77,4 @@ impl Store {
     pub fn remembered_runs(&self) -> Result<Vec<(RunKey, Vec<u8>)>, StoreError> {
         self.rows("SELECT key, body FROM remembered_runs", |row| Ok((row.get(0)?, row.get(1)?)))
     }
-
-    /// Number of runs whose answers are kept.
-    ///
-    /// # Errors
-    /// When the database refuses.
-    pub fn n_remembered_run(&self) -> Result<u64, StoreError> {
-        let count = self.connection.query_row("SELECT count(*) FROM remembered_runs", [], |row| row.get(0));
-        self.guard(count)
-    }
 }

@@ -6,6 +6,7 @@
 use nalgebra::DMatrix;
 use rusqlite::{Connection, OptionalExtension, params};
 use serde::{Deserialize, Serialize};
+use starlings_proto::convert::floats;
 
 use crate::store::{Store, StoreError};
 
@@ -106,7 +107,7 @@ impl Snapshot {
             if let Some(x) = states {
                 connection
                     .prepare_cached("INSERT INTO snapshot_states VALUES (?1, ?2, ?3, ?4)")?
-                    .execute(params![record, x.nrows(), x.ncols(), to_bytes(x.as_slice())])?;
+                    .execute(params![record, x.nrows(), x.ncols(), &floats::encode(x.as_slice())[..]])?;
             }
         }
         Ok(())
@@ -135,31 +136,12 @@ impl Snapshot {
         }))?;
         for row in rows {
             let (record, n, r, body) = store.guard(row)?;
-            let values = from_bytes(&body);
+            let values = floats::decode(&body, "states").ok().filter(|values| values.len() == n * r);
             let slot =
                 states.get_mut(record).ok_or_else(|| store.damaged("snapshot", "an unknown record"))?;
-            if values.len() != n * r {
-                return Err(store.damaged("snapshot", "a state of the wrong length"));
-            }
+            let values = values.ok_or_else(|| store.damaged("snapshot", "a state of the wrong length"))?;
             *slot = Some(DMatrix::from_column_slice(n, r, &values));
         }
         Ok(Some(Self { head, states }))
     }
-}
-
-/// Little-endian bytes of a slice.
-pub(crate) fn to_bytes(values: &[f64]) -> Vec<u8> {
-    values.iter().flat_map(|v| v.to_le_bytes()).collect()
-}
-
-/// The inverse of [`to_bytes`]; a trailing fragment is ignored.
-pub(crate) fn from_bytes(bytes: &[u8]) -> Vec<f64> {
-    bytes
-        .chunks_exact(8)
-        .map(|chunk| {
-            let mut word = [0; 8];
-            word.copy_from_slice(chunk);
-            f64::from_le_bytes(word)
-        })
-        .collect()
 }

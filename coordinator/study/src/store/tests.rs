@@ -116,7 +116,7 @@ fn answers_of_runs_are_remembered_by_their_key_and_over_a_kill() {
     assert_eq!(store.remembered_run(&a).unwrap().as_deref(), Some(b"again".as_slice()));
     assert_eq!(store.remembered_run(&b).unwrap().as_deref(), Some(b"".as_slice()));
     assert_eq!(store.remembered_run(&c).unwrap(), None);
-    assert_eq!(store.n_remembered_run().unwrap(), 2);
+    assert_eq!(store.remembered_runs().unwrap().len(), 2);
 }
 
 #[test]
@@ -127,7 +127,7 @@ fn forgotten_answers_give_their_space_back() {
     store.remember_runs([(&[1_u8; 32], body.as_slice())], &[]).unwrap();
     assert!(store.has_remembered_run(&[1; 32]).unwrap() && !store.has_remembered_run(&[2; 32]).unwrap());
     store.forget_runs().unwrap();
-    assert_eq!(store.n_remembered_run().unwrap(), 0);
+    assert_eq!(store.remembered_runs().unwrap().len(), 0);
     store.close_log().unwrap();
     let size = std::fs::metadata(path).unwrap().len();
     assert!(size < 1 << 18, "{size} bytes: what was forgotten is gone from the file");
@@ -140,7 +140,7 @@ fn a_store_without_a_table_of_remembered_runs_gets_one_when_it_is_opened() {
     store.connection.execute_batch("DROP TABLE remembered_runs").unwrap();
     drop(store);
     let store = Store::open(&folder.path().join("run.db")).unwrap();
-    assert_eq!(store.n_remembered_run().unwrap(), 0);
+    assert_eq!(store.remembered_runs().unwrap().len(), 0);
     assert_eq!(store.folder(), folder.path());
 }
 

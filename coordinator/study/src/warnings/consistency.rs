@@ -6,8 +6,9 @@
 use starlings_estimators::{Drift, autocorrelation, effective_nis_band};
 
 use super::residuals::Residuals;
+use crate::constants::in_sds;
 use crate::store::PredictionRow;
-use crate::{EstimatorKind, Fit, Move, Study, fit::settle, posterior};
+use crate::{EstimatorKind, Fit, Study, fit::settle, posterior};
 
 /// Probability with which NIS of a right model stays within its band.
 const LEVEL: f64 = 0.998;
@@ -86,7 +87,7 @@ fn correlated_in_time(residuals: &Residuals, n_series: usize) -> Option<String> 
 /// The last pass moved the estimate further than an estimate that has settled is moved.
 pub(super) fn still_moving(study: &Study, fit: &Fit) -> Option<String> {
     let moved = fit.last_move.filter(|m| !m.is_settled())?;
-    Some(moving(&study.theta[moved.entry].name, &size(moved), fit.passes, study.passes().is_some()))
+    Some(moving(&study.theta[moved.entry].name, &in_sds(moved.size), fit.passes, study.passes().is_some()))
 }
 
 /// That the last of so many passes, fixed in the study or not, moved an estimate so far.
@@ -107,10 +108,6 @@ fn moving(name: &str, size: &str, passes: usize, are_fixed: bool) -> String {
              that step lowers the misfit: the estimate has not settled. Use kind = \"batch\"."
         )
     }
-}
-
-fn size(moved: Move) -> String {
-    if moved.size < 10.0 { format!("{:.1}", moved.size) } else { format!("{:.0}", moved.size) }
 }
 
 /// Particles are linear mixtures of states after an analysis; a free run with the estimate shows what that cost.
