@@ -11,7 +11,7 @@ use super::laboratory::Laboratory;
 use super::locate::number::three;
 
 /// Probability of residuals as autocorrelated as these below which they are not white.
-pub const NOT_WHITE: f64 = 1e-3;
+pub(crate) const NOT_WHITE: f64 = 1e-3;
 /// Mean squares over the noise variance that count as the stated noise, where chance does not allow more or less.
 const AS_STATED: [f64; 2] = [0.5, 1.5];
 /// Level of the band that chance allows a mean square.
@@ -21,7 +21,7 @@ const NUMERICAL: f64 = 1e-6;
 
 /// The training residuals of a fit against the stated noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Adequacy {
+pub(crate) struct Adequacy {
     /// Values.
     pub n: usize,
     /// Root mean square over the stated noise.
@@ -36,7 +36,7 @@ pub struct Adequacy {
 
 /// What the residuals are, as far as their figures tell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Nature {
+pub(crate) enum Nature {
     /// Nothing is fitted.
     Nothing,
     /// Of the size of the noise, and nothing speaks against white.
@@ -53,7 +53,7 @@ pub enum Nature {
 
 impl Adequacy {
     /// The figures of a fit.
-    pub fn of(laboratory: &Laboratory<'_>, fit: &Fitted<'_>) -> Self {
+    pub(crate) fn of(laboratory: &Laboratory<'_>, fit: &Fitted<'_>) -> Self {
         let (rows, residual) = (&laboratory.rows, fit.residual());
         let n = rows.train.len();
         let observed: Vec<(f64, f64)> = rows.stretches().into_iter().fold(Vec::new(), |mut all, stretch| {
@@ -74,7 +74,7 @@ impl Adequacy {
     }
 
     /// What the residuals are. A size is only told where chance does not make it and it is worth telling.
-    pub fn nature(&self) -> Nature {
+    pub(crate) fn nature(&self) -> Nature {
         if self.n == 0 {
             return Nature::Nothing;
         }
@@ -94,27 +94,27 @@ impl Adequacy {
     }
 
     /// Whether nothing that counts beside the stated noise speaks against white residuals.
-    pub fn could_be_white(&self) -> bool {
+    pub(crate) fn could_be_white(&self) -> bool {
         self.nature() != Nature::Correlated
     }
 
     /// Whether the recorded values of every fitted channel of every record are one number.
-    pub fn is_at_rest(&self) -> bool {
+    pub(crate) fn is_at_rest(&self) -> bool {
         self.n > 1 && self.over_spread.is_infinite()
     }
 
     /// Whether the residuals show that something is missing: more than white noise of the stated size or less.
-    pub fn is_gap(&self) -> bool {
+    pub(crate) fn is_gap(&self) -> bool {
         matches!(self.nature(), Nature::Correlated | Nature::Larger)
     }
 
     /// The size of the noise that the residuals are compared with: the stated one, or their own where it is larger and white.
-    pub fn level(&self) -> f64 {
+    pub(crate) fn level(&self) -> f64 {
         if self.could_be_white() { self.rmse_over_noise.max(1.0) } else { 1.0 }
     }
 
     /// What is left, as a sentence without its first capital and full stop.
-    pub fn says(&self) -> String {
+    pub(crate) fn says(&self) -> String {
         let size = times(self.rmse_over_noise);
         let at_rest = if self.is_at_rest() {
             "; the recorded values do not vary, and data at rest tell little"
@@ -161,7 +161,7 @@ impl Adequacy {
     }
 
     /// Whether the residuals are no larger than what the simulation itself or the digits of a file leave.
-    pub fn is_numerical(&self) -> bool {
+    pub(crate) fn is_numerical(&self) -> bool {
         self.over_spread < NUMERICAL && self.rmse_over_noise > 1.0 && self.is_gap()
     }
 }

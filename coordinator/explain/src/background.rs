@@ -18,7 +18,7 @@ use super::screen::Hit;
 /// Simulations without a gap that the threshold is taken from, and as many again that tell how often it is exceeded.
 const SIMULATIONS: usize = 4000;
 /// Rate of false alarms of the search that the threshold is set for.
-pub const ALARM_RATE: f64 = 0.005;
+pub(crate) const ALARM_RATE: f64 = 0.005;
 /// Least fall of χ² that counts, whatever the simulations say.
 const LEAST: f64 = 10.0;
 /// A decoy that resembles its candidate more than this is none.
@@ -28,7 +28,7 @@ const SHIFTS: [f64; 3] = [0.21, 0.47, 0.73];
 
 /// The distribution of the search's best score where nothing is missing.
 #[derive(Clone, Debug, Default)]
-pub struct Background {
+pub(crate) struct Background {
     /// Largest gain of each of the simulations that the threshold was not taken from, sorted.
     pub maxima: Vec<f64>,
     /// What a gain must exceed, in units of the effective noise.
@@ -43,7 +43,7 @@ impl Background {
     ///
     /// # Errors
     /// Those of `sensitivity`.
-    pub fn new(
+    pub(crate) fn new(
         optimum: &Optimum,
         rows: &Rows,
         hits: &[Hit],
@@ -77,13 +77,13 @@ impl Background {
     }
 
     /// Share of the simulations whose best gain exceeds the threshold.
-    pub fn exceeding(&self) -> f64 {
+    pub(crate) fn exceeding(&self) -> f64 {
         let above = self.maxima.iter().filter(|m| **m > self.threshold).count();
         above as f64 / self.maxima.len().max(1) as f64
     }
 
     /// Share of the decoys that gain at least so much.
-    pub fn decoys_above(&self, gain: f64) -> f64 {
+    pub(crate) fn decoys_above(&self, gain: f64) -> f64 {
         let above = self.decoys.iter().filter(|d| **d >= gain).count();
         above as f64 / self.decoys.len().max(1) as f64
     }
@@ -124,7 +124,7 @@ fn moved(
 }
 
 /// Ranges of positions among the training rows that belong to one channel of one record.
-pub fn training_stretches(rows: &Rows) -> Vec<std::ops::Range<usize>> {
+pub(crate) fn training_stretches(rows: &Rows) -> Vec<std::ops::Range<usize>> {
     let mut at = 0;
     let mut ranges = Vec::new();
     for stretch in rows.stretches().into_iter().filter(|s| rows.rows[s.start].usage == Usage::Train) {
@@ -136,7 +136,7 @@ pub fn training_stretches(rows: &Rows) -> Vec<std::ops::Range<usize>> {
 
 /// Factor on the variance of a smooth sum of residuals that their size and correlation make, at least 1: mean square times
 /// n over the effective sample size (Geyer 1992), pooled over the stretches by their length.
-pub fn inflation(rows: &Rows, residual: &DVector<f64>) -> f64 {
+pub(crate) fn inflation(rows: &Rows, residual: &DVector<f64>) -> f64 {
     let mut sum = 0.0;
     let mut n = 0.0;
     for stretch in training_stretches(rows) {
@@ -153,7 +153,7 @@ pub fn inflation(rows: &Rows, residual: &DVector<f64>) -> f64 {
 
 /// Probability of residuals at least as autocorrelated if they were white: the smallest of the stretches, Bonferroni. `None`
 /// where no stretch has twenty values that vary.
-pub fn whiteness(rows: &Rows, residual: &DVector<f64>) -> Option<f64> {
+pub(crate) fn whiteness(rows: &Rows, residual: &DVector<f64>) -> Option<f64> {
     let stretches: Vec<_> = training_stretches(rows).into_iter().filter(|s| s.len() >= 20).collect();
     let p = |stretch: &std::ops::Range<usize>| {
         let values = &residual.as_slice()[stretch.clone()];

@@ -126,7 +126,7 @@ fn inner_prior(parameter: &EffectParameter) -> EffectPrior {
 ///
 /// # Errors
 /// As [`candidates`].
-pub fn all(
+pub(crate) fn all(
     study: &Study,
     tracks: &[Track],
     rhythms: &[f64],
@@ -172,7 +172,7 @@ fn resolved(
 }
 
 /// The median interval between observations of the first trained record.
-pub fn sampling(study: &Study) -> f64 {
+pub(crate) fn sampling(study: &Study) -> f64 {
     let record = study.records.iter().find(|r| r.is_trained());
     let mut steps: Vec<f64> =
         record.map(|r| r.times.windows(2).map(|w| w[1] - w[0]).collect()).unwrap_or_default();

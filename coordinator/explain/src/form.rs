@@ -28,7 +28,7 @@ const AGAIN: f64 = 0.15;
 
 /// What candidates and bent forms could still take away.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Leftover {
+pub(crate) struct Leftover {
     /// Fall of χ² of the training rows, in units of the effective noise.
     pub gain: f64,
     /// Fall of χ² of the held-out rows that they bring, in the same units.
@@ -43,7 +43,7 @@ pub struct Leftover {
 }
 
 /// What was measured at a fit for the check of its form.
-pub struct Measured<'h> {
+pub(crate) struct Measured<'h> {
     /// The candidates.
     pub library: &'h [Hit],
     /// The bent forms of the effect.
@@ -56,7 +56,7 @@ pub struct Measured<'h> {
 ///
 /// # Errors
 /// When the fit leaves a direction free.
-pub fn leftover(
+pub(crate) fn leftover(
     laboratory: &Laboratory<'_>,
     fit: &Fitted<'_>,
     measured: &Measured<'_>,
@@ -119,6 +119,6 @@ fn noise_floor(rows: &Rows, residual: &DVector<f64>) -> f64 {
 }
 
 /// Share of the residuals' squares that white noise makes, from their third differences.
-pub fn white_share(rows: &Rows, residual: &DVector<f64>) -> f64 {
+pub(crate) fn white_share(rows: &Rows, residual: &DVector<f64>) -> f64 {
     noise_floor(rows, residual) / residual.norm_squared().max(f64::MIN_POSITIVE)
 }

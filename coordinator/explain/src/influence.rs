@@ -14,7 +14,7 @@ use super::rows::Row;
 
 /// d prediction / d amplitude over the noise, all rows.
 #[derive(Clone, Debug)]
-pub enum Influence {
+pub(crate) enum Influence {
     /// It is held.
     Held(Arc<DVector<f64>>),
     /// It is worked out when it is asked for.
@@ -30,7 +30,7 @@ pub enum Influence {
 
 impl Influence {
     /// Of what has none.
-    pub fn none() -> Self {
+    pub(crate) fn none() -> Self {
         Self::Held(Arc::new(DVector::zeros(0)))
     }
 
@@ -38,7 +38,7 @@ impl Influence {
     ///
     /// # Errors
     /// When the store fails.
-    pub fn sensitivity(&self, laboratory: &Laboratory<'_>) -> Result<Arc<DVector<f64>>, ExplainError> {
+    pub(crate) fn sensitivity(&self, laboratory: &Laboratory<'_>) -> Result<Arc<DVector<f64>>, ExplainError> {
         match self {
             Self::Held(sensitivity) => Ok(Arc::clone(sensitivity)),
             Self::Remembered { runs, amplitude, base } => {
@@ -52,7 +52,7 @@ impl Influence {
     ///
     /// # Errors
     /// When the store fails.
-    pub fn of_train(&self, laboratory: &Laboratory<'_>) -> Result<DVector<f64>, ExplainError> {
+    pub(crate) fn of_train(&self, laboratory: &Laboratory<'_>) -> Result<DVector<f64>, ExplainError> {
         Ok(self.sensitivity(laboratory)?.select_rows(&laboratory.rows.train))
     }
 }

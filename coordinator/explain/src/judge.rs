@@ -24,7 +24,7 @@ const EDGE: f64 = 0.005;
 
 /// Why a version may not be named.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Refusal {
+pub(crate) struct Refusal {
     /// The gate.
     pub gate: &'static str,
     /// Why, in words with numbers.
@@ -33,7 +33,7 @@ pub struct Refusal {
 
 /// A refitted version with everything that speaks for and against it.
 #[derive(Clone, Debug)]
-pub struct Judged<'c> {
+pub(crate) struct Judged<'c> {
     /// The fit.
     pub fit: Fitted<'c>,
     /// Its misfit.
@@ -69,24 +69,24 @@ pub struct Judged<'c> {
 
 impl Judged<'_> {
     /// Names of its effects.
-    pub fn names(&self) -> Vec<String> {
+    pub(crate) fn names(&self) -> Vec<String> {
         self.fit.version.members.iter().map(|m| m.candidate.name().to_owned()).collect()
     }
 
     /// Fall of χ² in units of its own effective noise.
-    pub fn evidence(&self) -> f64 {
+    pub(crate) fn evidence(&self) -> f64 {
         self.gain / self.inflation
     }
 
     /// Fall of χ² on the training rows, the held-out span and the held-out channels, for ranking. An estimate that the held-out
     /// span would move within its uncertainty is no worse for it.
-    pub fn rank(&self) -> f64 {
+    pub(crate) fn rank(&self) -> f64 {
         self.gain + self.gain_held_out + self.allowance + self.gain_channels
     }
 }
 
 /// Judges a version against the model as it is. `threshold` is what chance alone reaches in a search.
-pub fn judge<'c>(
+pub(crate) fn judge<'c>(
     laboratory: &Laboratory<'_>,
     base: &Fitted<'_>,
     before: Misfit,

@@ -3,13 +3,13 @@
 //! Every decision is made by running the model again, never by differentiating data: one candidate effect is one run, so the
 //! screening is what the fleet is for. Next files to read: [`result`] for what comes out, [`rows`] for the common language.
 
-pub mod adequacy;
+mod adequacy;
 mod again;
 mod allowance;
 mod answer;
-pub mod background;
+mod background;
 mod bent;
-pub mod candidate;
+mod candidate;
 pub mod candidates;
 mod carried;
 mod column;
@@ -20,12 +20,12 @@ mod experiment;
 pub mod figures;
 pub mod fit;
 mod fitted;
-pub mod form;
+mod form;
 pub mod held_out;
-pub mod influence;
-pub mod influences;
+mod influence;
+mod influences;
 mod inquiry;
-pub mod judge;
+mod judge;
 pub mod keep;
 pub mod laboratory;
 pub mod locate;
@@ -43,9 +43,9 @@ pub mod result;
 mod rhythm;
 pub mod rows;
 mod run;
-pub mod screen;
-pub mod search;
-pub mod verdict;
+mod screen;
+mod search;
+mod verdict;
 pub mod version;
 mod warnings;
 mod words;

@@ -28,7 +28,7 @@ const PROBE: f64 = 3e-3;
 /// Times that a candidate is measured again.
 const AGAIN: usize = 2;
 /// Part of its own below which a candidate's influence counts as imitated by the parameters.
-pub const ABSORBED: f64 = 0.05;
+pub(crate) const ABSORBED: f64 = 0.05;
 
 /// Why a probe has no answer that the budget did not suffice for.
 const UNAFFORDED: &str = "the budget ended before its influence was measured";
@@ -37,7 +37,7 @@ const NO_SCORE: Score = Score { gain: 0.0, amplitude: 0.0, sd: f64::INFINITY, id
 
 /// A candidate at one point of its grid, measured at a fit.
 #[derive(Clone, Debug)]
-pub struct Hit {
+pub(crate) struct Hit {
     /// Position among the candidates.
     pub candidate: usize,
     /// Values of its parameters after the amplitude.
@@ -52,12 +52,12 @@ pub struct Hit {
 
 impl Hit {
     /// Fall of χ² with an amplitude of a sign that physics allows.
-    pub fn allowed_gain(&self, sign: f64) -> f64 {
+    pub(crate) fn allowed_gain(&self, sign: f64) -> f64 {
         if self.score.amplitude * sign >= 0.0 { self.score.gain } else { 0.0 }
     }
 
     /// Whether the parameters imitate it.
-    pub fn is_absorbed(&self) -> bool {
+    pub(crate) fn is_absorbed(&self) -> bool {
         self.failure.is_none() && self.score.identifiable < ABSORBED
     }
 }
@@ -85,7 +85,7 @@ struct Felt {
 ///
 /// # Errors
 /// When the fleet or the store fails, or the fit leaves a direction free.
-pub fn screen<'c>(
+pub(crate) fn screen<'c>(
     laboratory: &mut Laboratory<'_>,
     fit: &Fitted<'c>,
     candidates: &'c [Candidate],

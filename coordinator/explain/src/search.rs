@@ -34,7 +34,7 @@ const SMALL: usize = 6;
 const CLOSE: f64 = 12.0;
 
 /// Everything that the search found.
-pub struct Found<'c> {
+pub(crate) struct Found<'c> {
     /// The model as it is.
     pub base: Fitted<'c>,
     /// Its misfit.
@@ -74,7 +74,7 @@ pub(super) struct Searcher<'s, 'l, 'c> {
 ///
 /// # Errors
 /// When the fleet or the store fails, or the fit leaves a direction free.
-pub fn search<'c>(
+pub(crate) fn search<'c>(
     laboratory: &mut Laboratory<'_>,
     base: Fitted<'c>,
     candidates: &'c [Candidate],

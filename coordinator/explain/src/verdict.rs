@@ -29,7 +29,7 @@ const UNINFORMED: f64 = 0.5;
 
 /// The verdict, with positions in [`Found::judged`].
 #[derive(Clone, Debug, PartialEq)]
-pub struct Decision {
+pub(crate) struct Decision {
     /// The verdict.
     pub verdict: Verdict,
     /// What is named, or the best of the tied, or what came nearest.
@@ -48,7 +48,7 @@ pub struct Decision {
 ///
 /// # Errors
 /// When the store fails.
-pub fn decide(
+pub(crate) fn decide(
     laboratory: &Laboratory<'_>,
     found: &Found<'_>,
     candidates: &[Candidate],

@@ -18,13 +18,13 @@
 
 mod answers;
 mod aside;
-pub mod batch;
+pub(crate) mod batch;
 mod doubt;
 mod hand_out;
-pub mod message;
+pub(crate) mod message;
 mod proven;
 mod queue;
-pub mod roster;
+pub(crate) mod roster;
 mod run_times;
 #[cfg(test)]
 mod tests;
@@ -39,7 +39,7 @@ use super::FleetEvent;
 use super::job_name::JobName;
 use batch::{Batch, Lost};
 pub(crate) use doubt::Asked;
-pub use message::{BatchError, Command, ControlId, Event, Joining, WorkerId};
+pub(crate) use message::{BatchError, Command, ControlId, Event, Joining, WorkerId};
 use proven::Proven;
 use roster::{SetupState, Worker};
 use run_times::RunTimes;
@@ -47,7 +47,7 @@ use watch::{Overdue, Starved};
 
 /// The numbers that the rules need.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rules {
+pub(crate) struct Rules {
     /// Time between heartbeats; a worker silent for twice as long is lost.
     pub heartbeat: Duration,
     /// How long a batch may wait without any worker that can take a job.
@@ -58,7 +58,7 @@ pub struct Rules {
 
 /// The decisions of a fleet. One batch at a time.
 #[derive(Debug)]
-pub struct Dispatcher {
+pub(crate) struct Dispatcher {
     rules: Rules,
     workers: BTreeMap<WorkerId, Worker>,
     batch: Option<Batch>,
@@ -75,7 +75,7 @@ pub struct Dispatcher {
 
 impl Dispatcher {
     /// A dispatcher without workers or jobs.
-    pub fn new(rules: Rules) -> Self {
+    pub(crate) fn new(rules: Rules) -> Self {
         Self {
             rules,
             workers: BTreeMap::new(),
@@ -93,17 +93,17 @@ impl Dispatcher {
     }
 
     /// Number of workers.
-    pub fn n_workers(&self) -> usize {
+    pub(crate) fn n_workers(&self) -> usize {
         self.workers.len()
     }
 
     /// Number of slots of all workers.
-    pub fn slots(&self) -> usize {
+    pub(crate) fn slots(&self) -> usize {
         self.workers.values().map(|w| w.slots).sum()
     }
 
     /// Takes one event at time `now` (any fixed origin) and returns what has to be done about it.
-    pub fn step(&mut self, now: Duration, event: Event) -> Vec<Command> {
+    pub(crate) fn step(&mut self, now: Duration, event: Event) -> Vec<Command> {
         match event {
             Event::Joined(joining) => self.joined(now, &joining),
             Event::Left { worker, reason, clean } => self.lose(worker, &reason, clean),

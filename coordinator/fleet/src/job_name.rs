@@ -4,7 +4,7 @@ use starlings_models::Job;
 
 /// What a job is called in events, and over which window it runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct JobName {
+pub(crate) struct JobName {
     /// Index of the sigma point.
     pub particle: u32,
     /// Index of the record.
@@ -15,7 +15,7 @@ pub struct JobName {
 
 impl JobName {
     /// The name of a job.
-    pub fn of(job: &Job) -> Self {
+    pub(crate) fn of(job: &Job) -> Self {
         let window = &job.window;
         let end = window.times.last().copied().unwrap_or(window.start);
         Self { particle: job.particle, record: job.record, span: [window.start, end].map(f64::to_bits) }

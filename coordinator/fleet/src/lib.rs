@@ -6,7 +6,7 @@
 //! model fails is an [`Outcome`] whose result is an error. A failure of a place sets a worker aside; when none is left the batch
 //! ends with a [`FleetError`]. Next file to read: [`dispatcher`].
 
-pub mod dispatcher;
+mod dispatcher;
 mod error;
 mod event;
 mod event_text;

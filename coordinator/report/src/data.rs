@@ -7,7 +7,7 @@ mod parameter;
 
 use serde::{Deserialize, Serialize};
 
-pub use parameter::ParameterRow;
+pub(crate) use parameter::ParameterRow;
 
 /// Everything one report shows.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]

@@ -5,7 +5,7 @@
 //! numbers. Deliberately absent: computing anything that was not stored. Next file to read: [`data`].
 
 mod correlation;
-pub mod data;
+mod data;
 mod explain;
 mod explained;
 mod files;

@@ -19,7 +19,7 @@ const DISTANCE: f64 = 0.1;
 
 /// What the residuals say of the intervals.
 #[derive(Clone, Debug, PartialEq)]
-pub enum GivenResiduals {
+pub(crate) enum GivenResiduals {
     /// Factor on the sd of each entry of the estimated vector, at least one.
     Wider(Vec<f64>),
     /// Nothing; a clause that says why.
@@ -30,7 +30,7 @@ pub enum GivenResiduals {
 ///
 /// # Errors
 /// When the fleet fails. A model that fails beside the estimate is no error: see [`GivenResiduals::Unknown`].
-pub fn compare(flight: &mut Flight<'_>, posterior: &Gaussian) -> Result<GivenResiduals, RunError> {
+pub(crate) fn compare(flight: &mut Flight<'_>, posterior: &Gaussian) -> Result<GivenResiduals, RunError> {
     let study = flight.study();
     if study.drifts() && study.estimator.kind == EstimatorKind::Roukf {
         let why = "a parameter drifts, and its value at the end is no parameter of the whole record";

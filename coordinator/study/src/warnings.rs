@@ -4,7 +4,7 @@
 //! read: [`consistency`].
 
 mod consistency;
-pub mod residuals;
+pub(crate) mod residuals;
 
 use starlings_estimators::{Drift, Transform, weak_directions};
 
@@ -27,7 +27,7 @@ const FAR_FROM_PRIOR: f64 = 4.0;
 const AT_BOUND: f64 = 0.01;
 
 /// All warnings of a finished fit, the study's own first.
-pub fn collect(
+pub(crate) fn collect(
     study: &Study,
     fit: &Fit,
     summary: &Summary,

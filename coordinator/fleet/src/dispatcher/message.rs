@@ -10,11 +10,11 @@ use crate::{FleetEvent, Outcome};
 
 /// Number of a worker's stream: the epoch of its leases. A process that connects again gets a new one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct WorkerId(pub u64);
+pub(crate) struct WorkerId(pub u64);
 
 /// A worker at the door.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Joining {
+pub(crate) struct Joining {
     /// Number of its stream.
     pub id: WorkerId,
     /// Its name in events and outcomes.
@@ -57,7 +57,7 @@ pub(crate) fn hex(hash: &[u8; 32]) -> String {
 
 /// Something that happened.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Event {
+pub(crate) enum Event {
     /// A worker connected and was taken.
     Joined(Joining),
     /// A worker's stream ended. Clean: it said goodbye.
@@ -116,7 +116,7 @@ pub enum Event {
 
 /// Why a batch ended without outcomes.
 #[derive(Clone, Debug, PartialEq)]
-pub enum BatchError {
+pub(crate) enum BatchError {
     /// Nobody wants it any more.
     Cancelled,
     /// No worker could take a job for too long.
@@ -170,11 +170,11 @@ pub enum BatchError {
 
 /// A run that is known to work, by the place in which it is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct ControlId(pub u64);
+pub(crate) struct ControlId(pub u64);
 
 /// Something to do.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Command {
+pub(crate) enum Command {
     /// Send a setup.
     SendSetup {
         /// To whom.

@@ -11,7 +11,7 @@ use super::super::store::{PredictionRow, Store, StoreError, table};
 use super::super::{EstimatorKind, Fit, Study};
 
 /// Residuals of one output, or of all components of a field, in one record.
-pub struct Residuals {
+pub(crate) struct Residuals {
     /// Record name.
     pub record: String,
     /// Output or field.
@@ -22,19 +22,19 @@ pub struct Residuals {
 
 impl Residuals {
     /// Number of values.
-    pub fn n(&self) -> usize {
+    pub(crate) fn n(&self) -> usize {
         self.components.iter().map(Vec::len).sum()
     }
 
     /// All components together.
-    pub fn pooled(&self) -> Pooled {
+    pub(crate) fn pooled(&self) -> Pooled {
         let mut pooled = Pooled::new();
         self.components.iter().for_each(|c| pooled.add(c.clone()));
         pooled
     }
 
     /// Number of independent values among the squares: as many as their correlation in time leaves (Geyer 1992).
-    pub fn independent_squares(&self) -> f64 {
+    pub(crate) fn independent_squares(&self) -> f64 {
         let of_component = |c: &Vec<f64>| {
             let squares: Vec<f64> = c.iter().map(|e| e * e).collect();
             let n = effective_sample_size(&squares);
@@ -48,7 +48,7 @@ impl Residuals {
 ///
 /// # Errors
 /// When the store cannot be read.
-pub fn residuals(
+pub(crate) fn residuals(
     study: &Study,
     fit: &Fit,
     store: &Store,
