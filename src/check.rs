@@ -7,7 +7,7 @@ use serde_json::json;
 use starlings_coordinator::study::field::{field_of, observed_fields};
 use starlings_coordinator::study::fit::settle;
 use starlings_coordinator::study::trial::{Depth, TrialChannel, dry_run};
-use starlings_coordinator::study::{EstimatorKind, Study, posterior};
+use starlings_coordinator::study::{Study, posterior};
 use starlings_estimators::SigmaSet;
 
 use crate::console::{line, number, table, text};
@@ -46,7 +46,7 @@ fn n_particle(study: &Study) -> Result<usize, Failure> {
 /// Runs of one pass of the filter, or of one ensemble of the batch fit.
 fn runs_per_pass(study: &Study, n_particle: usize) -> usize {
     let windows: Vec<usize> = (0..study.records.len()).map(|r| study.windows(r).len()).collect();
-    if study.estimator.kind == EstimatorKind::Batch {
+    if !study.estimator.kind.is_filter() {
         // The centre is run beside the sigma points.
         return (n_particle + 1) * windows.iter().filter(|n| **n > 0).count();
     }
@@ -57,7 +57,7 @@ fn runs_per_pass(study: &Study, n_particle: usize) -> usize {
 
 /// Passes of the filter at least and at most; none of the batch fit.
 fn passes(study: &Study) -> Option<(usize, usize)> {
-    let of_filter = study.estimator.kind == EstimatorKind::Roukf;
+    let of_filter = study.estimator.kind.is_filter();
     of_filter.then(|| study.passes().map_or((2, settle::LIMIT), |n| (n, n)))
 }
 

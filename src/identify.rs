@@ -5,9 +5,10 @@ use std::sync::Arc;
 
 use clap::Parser;
 use starlings_coordinator::report::identify_page;
+use starlings_coordinator::study::Study;
 use starlings_coordinator::study::identify::{At, Identification, IdentifyError, identify};
 use starlings_coordinator::study::trial::{Depth, dry_run};
-use starlings_coordinator::study::{EstimatorKind, Study};
+use starlings_estimators::BATCH;
 
 use crate::console::{line, note, number, table, text};
 use crate::crew::{Crew, FleetArgs};
@@ -53,7 +54,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     csv_file::check_outputs(&outputs, &study.text, &Place::Known(&study.file))?;
     let at = At::from_argument(&args.at);
     at.centre(&study).map_err(Failure::input)?;
-    dry_run(&mut study, EstimatorKind::Batch, Depth::First).map_err(Failure::input)?;
+    dry_run(&mut study, &BATCH, Depth::First).map_err(Failure::input)?;
     let display = Arc::new(Display::new(args.json));
     let mut crew = Crew::listen(&study, &plan, &display)?;
     crew.gather(&study, &plan)?;

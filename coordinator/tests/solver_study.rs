@@ -17,7 +17,8 @@ use starlings_coordinator::fleet::InProcess;
 use starlings_coordinator::study::identify::{At, identify};
 use starlings_coordinator::study::trial::trial;
 use starlings_coordinator::study::twin::{Twin, simulate};
-use starlings_coordinator::study::{EstimatorKind, Study, Summary, Surroundings};
+use starlings_coordinator::study::{Study, Summary, Surroundings};
+use starlings_estimators::{Kind, ROUKF};
 use study_kit::off;
 use swing::{native, recording, solver};
 
@@ -45,7 +46,7 @@ fn apart(a: &Summary, b: &Summary) -> f64 {
 
 /// Runs both and compares. The arithmetic behind the wall is that of this process: only the order in which names are
 /// resolved could differ, and a posterior that it moved would not be the same study's.
-fn assert_the_same(more: &str, change: fn(&mut starlings_models::Description), kind: EstimatorKind) {
+fn assert_the_same(more: &str, change: fn(&mut starlings_models::Description), kind: &Kind) {
     let (here, study, there, outside, inside) = both(more, change);
     assert_eq!(outside.estimator.kind, kind);
     let want = here.run(&study, &mut InProcess::new(2), "run").unwrap();
@@ -56,16 +57,16 @@ fn assert_the_same(more: &str, change: fn(&mut starlings_models::Description), k
 
 #[test]
 fn a_solver_that_restarts_gives_the_posterior_of_the_same_model_in_this_process() {
-    assert_the_same("", |_| {}, EstimatorKind::Roukf);
-    assert_the_same(NUDGED, |_| {}, EstimatorKind::Roukf);
-    assert_the_same(BATCH, |_| {}, EstimatorKind::Batch);
+    assert_the_same("", |_| {}, &ROUKF);
+    assert_the_same(NUDGED, |_| {}, &ROUKF);
+    assert_the_same(BATCH, |_| {}, &starlings_estimators::BATCH);
 }
 
 #[test]
 fn a_solver_that_cannot_restart_is_fitted_as_a_whole_without_being_told() {
     let once: fn(&mut starlings_models::Description) = |d| d.spec.restart = false;
     let (_, _, there, outside, inside) = both("", once);
-    assert_eq!(outside.estimator.kind, EstimatorKind::Batch);
+    assert_eq!(outside.estimator.kind, &starlings_estimators::BATCH);
     assert!(
         outside.warnings.iter().any(|w| w.contains("cannot restart from a state")),
         "{:?}",

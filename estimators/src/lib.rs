@@ -5,7 +5,8 @@
 //! states are (`recombine`). Everything here is in transformed parameters (see [`Transform`]), a particle is a column,
 //! and every reduction runs in a fixed order, so the same input gives the same bits.
 //!
-//! Read next: `sigma_set.rs` (where the particles are), then `roukf.rs` (what an analysis does with them).
+//! Read next: `kind.rs` (which estimators there are), then `sigma_set.rs` (where the particles are) and `roukf.rs` (what an
+//! analysis does with them).
 
 mod analysis;
 mod batch;
@@ -16,10 +17,12 @@ mod diagnostics;
 mod drift;
 mod error;
 mod exchange;
+mod filter;
 mod gaussian;
 mod gram;
 mod identifiability;
 mod information;
+mod kind;
 mod least_squares;
 mod linearisation;
 mod particles;
@@ -37,7 +40,7 @@ mod whiten;
 mod whiteness;
 
 pub use analysis::Analysis;
-pub use batch::{Batch, BatchState, BatchStep};
+pub use batch::{BATCH, Batch, BatchState, BatchStep};
 pub use block_angular::{BlockAngular, BlockRow};
 pub use blocks::Block;
 pub use data::{Data, Noise};
@@ -48,18 +51,23 @@ pub use diagnostics::{
 pub use drift::Drift;
 pub use error::EstimatorError;
 pub use exchange::{Exchanged, exchange_prior};
+pub use filter::{Filter, Resampled};
 pub use gaussian::Gaussian;
 pub use identifiability::{
     Collinearity, Direction, Fisher, Sensitivities, Subset, sigma_point_sensitivities, weak_directions,
 };
+pub use kind::{Form, Kind, MakeFilter, Options};
 pub use least_squares::{End, LeastSquares, Need, Scaled};
 pub use linearisation::Linearisation;
 pub use particles::Particles;
 pub use pooled::Pooled;
 pub use recombine::{Recombination, recombine};
-pub use roukf::{Resampled, Root, Roukf};
+pub use roukf::{ROUKF, Root, Roukf};
 pub use sandwich::{Place, Residuals};
 pub use score::{Optimum, Score, null_maxima, score_correlation};
 pub use sigma_set::{Points, SigmaSet};
 pub use transform::Transform;
 pub use whiteness::ljung_box;
+
+/// All estimators, the default first.
+pub const KINDS: &[&Kind] = &[&ROUKF, &BATCH];

@@ -1,15 +1,28 @@
 //! The reduced-order unscented Kalman filter as pure steps on particles (Moireau & Chapelle 2011).
 //!
-//! A study samples particles, runs the model on each up to the next observation, hands in their predictions and gets
-//! new particles and the transform T to apply to the states. It deliberately never sees a state: an uncertain initial
-//! value is one more parameter, whose direction stays in the particles. Read next: `analysis.rs`.
+//! The steps are those of [`Filter`]; what they have in common with one another is the geometry of the sigma points
+//! (`particles.rs`). Deliberately no loop: the caller runs the model between two steps. Read next: `analysis.rs`.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::analysis::analyse;
 use crate::data::same;
 use crate::particles::{Geometry, SPANNED};
-use crate::{Analysis, Data, Drift, EstimatorError, Gaussian, Particles, SigmaSet, drift, spectral};
+use crate::{
+    Analysis, Data, Drift, EstimatorError, Filter, Form, Gaussian, Kind, Particles, Resampled, SigmaSet,
+    drift, spectral,
+};
+
+/// The reduced-order unscented Kalman filter.
+pub static ROUKF: Kind = Kind {
+    name: "roukf",
+    keys: &["passes", "anneal", "root", "resample"],
+    spread: 0.001,
+    form: Form::Windows(|o| {
+        let set = SigmaSet::new(o.points, o.n_param)?;
+        Ok(Box::new(Roukf { set, root: o.root, drift: o.drift.clone() }))
+    }),
+};
 
 /// Which root C of the posterior covariance U^{-1} moves the particles; mean and covariance do not depend on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -19,18 +32,6 @@ pub enum Root {
     Symmetric,
     /// Lower Cholesky factor (Moireau & Chapelle 2011).
     Cholesky,
-}
-
-/// Particles drawn again by [`Roukf::resample`].
-#[derive(Debug, Clone, PartialEq)]
-pub struct Resampled {
-    /// The new particles.
-    pub particles: Particles,
-    /// The r x r matrix R of X <- X R.
-    pub transform: DMatrix<f64>,
-    /// Share of the whole spread that lay outside the directions that were kept, in [0, 1]: 0 when p directions hold
-    /// everything, or when nothing was drawn again.
-    pub dropped: f64,
 }
 
 /// The reduced-order unscented Kalman filter of p parameters with r particles.
@@ -44,40 +45,28 @@ pub struct Roukf {
     pub drift: Vec<Drift>,
 }
 
-impl Roukf {
+impl Filter for Roukf {
+    fn n_particle(&self) -> usize {
+        self.set.n_particle()
+    }
+
+    fn weights(&self) -> &DVector<f64> {
+        &self.set.weights
+    }
+
     /// Particles that represent the prior exactly: mean + L I with L L^T its covariance.
-    ///
-    /// # Panics
-    /// When the prior has not the p parameters of the sigma points.
-    pub fn init(&self, prior: &Gaussian) -> Particles {
+    fn init(&self, prior: &Gaussian) -> Particles {
         assert_eq!(prior.n_param(), self.set.n_param(), "prior and sigma points differ in parameters");
         Particles::whole(around(&prior.mean, &(prior.factor() * &self.set.points)))
     }
 
-    /// Mean of the parameters, length p.
-    ///
-    /// # Panics
-    /// When the particles do not match the sigma points in number.
-    pub fn mean(&self, p: &Particles) -> DVector<f64> {
-        &p.theta * Geometry::new(&self.set, &p.pull).mean
-    }
-
-    /// Mean and covariance of the parameters.
-    ///
-    /// # Panics
-    /// When the particles do not match the sigma points in number.
-    pub fn gaussian(&self, p: &Particles) -> Gaussian {
+    fn gaussian(&self, p: &Particles) -> Gaussian {
         let geometry = Geometry::new(&self.set, &p.pull);
         let l = &p.theta * &geometry.slope;
         Gaussian { mean: &p.theta * &geometry.mean, covariance: &l * l.transpose() }
     }
 
-    /// Pulls particle `i` to the distance `s` (0 < s <= 1) of its sigma point from the mean: the new particles, and the
-    /// r x r matrix that does the same to the states, X <- X M. The other particles do not move.
-    ///
-    /// # Panics
-    /// When there is no particle `i` or `s` lies outside (0, 1].
-    pub fn pull(&self, p: &Particles, i: usize, s: f64) -> (Particles, DMatrix<f64>) {
+    fn pull(&self, p: &Particles, i: usize, s: f64) -> (Particles, DMatrix<f64>) {
         assert!(s > 0.0 && s <= 1.0, "a particle is pulled to a distance in (0, 1], got {s}");
         let geometry = Geometry::new(&self.set, &p.pull);
         let r = self.set.n_particle();
@@ -95,32 +84,24 @@ impl Roukf {
         (Particles { theta: &p.theta * &m, pull }, m)
     }
 
-    /// Drops particle `i`, which could not be run anywhere: the others keep their places, its weight is shared out.
-    ///
-    /// # Errors
-    /// `NotSpanned` when the others no longer span the parameters, always so for the simplex.
-    ///
-    /// # Panics
-    /// When there is no particle `i`.
-    pub fn drop(&self, p: &Particles, i: usize) -> Result<Particles, EstimatorError> {
+    fn drop(&self, p: &Particles, i: usize) -> Result<Particles, EstimatorError> {
         let mut pull = p.pull.clone();
         pull[i] = 0.0;
         self.spanned(p, &Geometry::new(&self.set, &pull))?;
         Ok(Particles { theta: p.theta.clone(), pull })
     }
 
-    /// Resampling before an analysis of more than p + 1 particles: keeps the p leading directions of the whole spread of
+    fn resamples(&self) -> bool {
+        self.set.n_particle() > self.set.n_param() + 1
+    }
+
+    /// Keeps the p leading directions of the whole spread of
     /// the augmented particles, its even part included, so that with as many parameters as states the filter is the
     /// plain unscented one.
     ///
-    /// `gram` (r x r) holds the products sqrt(a_i a_j) <x_i - x, x_j - x> of deviations from the weighted mean x, in a
-    /// norm that makes state and parameters commensurable. After X <- X R the predictions must be evaluated
-    /// again. Up to 2 p directions spread, of which p are kept; what the others held is reported. Particles that were pulled or dropped, and the
-    /// simplex, are left as they are (R = 1): a pulled set has no even part that could be trusted.
-    ///
-    /// # Errors
-    /// `Shape`, `NotFinite`, `NotDecomposed` for a bad Gram matrix.
-    pub fn resample(&self, p: &Particles, gram: &DMatrix<f64>) -> Result<Resampled, EstimatorError> {
+    /// Up to 2 p directions spread, of which p are kept; what the others held is reported. Particles that were pulled or
+    /// dropped, and the simplex, are left as they are (R = 1): a pulled set has no even part that could be trusted.
+    fn resample(&self, p: &Particles, gram: &DMatrix<f64>) -> Result<Resampled, EstimatorError> {
         let (n_param, r) = (self.set.n_param(), self.set.n_particle());
         self.check(p)?;
         same("rows of the Gram matrix", r, gram.nrows())?;
@@ -129,7 +110,7 @@ impl Roukf {
             return Err(EstimatorError::NotFinite { what: "the Gram matrix of the particles" });
         }
         if r == n_param + 1 || p.pull.iter().any(|s| *s < 1.0) {
-            return Ok(Resampled { particles: p.clone(), transform: DMatrix::identity(r, r), dropped: 0.0 });
+            return Ok(Resampled::unchanged(p, r));
         }
         let eigen = spectral::eigen((gram + gram.transpose()) * 0.5, "Gram")?;
         let mut order: Vec<usize> = (0..r).collect();
@@ -148,16 +129,9 @@ impl Roukf {
         Ok(Resampled { particles: Particles::whole(&p.theta * &t), transform: t, dropped })
     }
 
-    /// One analysis. `predictions` is m x r, rows as in `data`; the column of a dropped particle is ignored, and so is
-    /// every row that is missing. Afterwards all particles are at their sigma points again.
-    ///
     /// Without any observation a simplex stays where it is; other sets lose the even part of their spread (they are
     /// projected on the linear relation, w = 0 and C = 1). Random walks go on, forgetting waits for data.
-    ///
-    /// # Errors
-    /// Wrong lengths, non-finite predictions or data, noise that is not positive, particles that do not span the
-    /// parameters or have no spread for the drift.
-    pub fn analysis(
+    fn analysis(
         &self,
         p: &Particles,
         predictions: &DMatrix<f64>,
@@ -176,6 +150,16 @@ impl Roukf {
             analysis.transform *= moved;
         }
         Ok((Particles::whole(theta), analysis))
+    }
+}
+
+impl Roukf {
+    /// Mean of the parameters, length p.
+    ///
+    /// # Panics
+    /// When the particles do not match the sigma points in number.
+    pub fn mean(&self, p: &Particles) -> DVector<f64> {
+        &p.theta * Geometry::new(&self.set, &p.pull).mean
     }
 
     fn check(&self, p: &Particles) -> Result<(), EstimatorError> {

@@ -6,7 +6,9 @@ use common::batch::{Model, compartments, fit};
 use common::rcr::{MM_HG, pressure, prior, truth};
 use common::{difference, gauss, normal, rng, uniform};
 use nalgebra::{DMatrix, DVector};
-use starlings_estimators::{BatchState, BatchStep, Data, Gaussian, Noise, Points, Root, Roukf, SigmaSet};
+use starlings_estimators::{
+    BatchState, BatchStep, Data, Filter, Gaussian, Noise, Points, Root, Roukf, SigmaSet,
+};
 
 /// Minimum of the cost by a slow and safe search: coordinate steps that shrink when none improves.
 fn minimum(model: &Model<'_>, prior: &Gaussian, data: &Data<'_>, start: &DVector<f64>) -> DVector<f64> {

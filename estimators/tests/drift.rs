@@ -4,7 +4,9 @@ mod common;
 
 use common::{difference, filter, mean_factor, normal, rng};
 use nalgebra::DMatrix;
-use starlings_estimators::{Analysis, Data, Drift, EstimatorError, Gaussian, Noise, Points, Root, Roukf};
+use starlings_estimators::{
+    Analysis, Data, Drift, EstimatorError, Filter, Gaussian, Noise, Points, Root, Roukf,
+};
 
 const SD: [f64; 3] = [0.5, 1.0, 2.0];
 

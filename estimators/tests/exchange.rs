@@ -4,7 +4,9 @@ mod common;
 
 use common::{difference, filter, gauss, normal, rng};
 use nalgebra::DMatrix;
-use starlings_estimators::{Data, EstimatorError, Exchanged, Gaussian, Noise, Points, Root, exchange_prior};
+use starlings_estimators::{
+    Data, EstimatorError, Exchanged, Filter, Gaussian, Noise, Points, Root, exchange_prior,
+};
 
 /// Posterior, log-likelihood and NIS of 50 linear observations filtered one by one.
 fn filtered(prior: &Gaussian, n_seen: usize) -> (Gaussian, f64, f64) {

@@ -4,7 +4,9 @@ mod common;
 
 use common::{around, difference, filter, gauss, kalman, linear, mean_factor, normal, rng, uniform};
 use nalgebra::{DMatrix, DVector};
-use starlings_estimators::{Analysis, Data, Gaussian, Noise, Particles, Points, Root, Roukf, SigmaSet};
+use starlings_estimators::{
+    Analysis, Data, Filter, Gaussian, Noise, Particles, Points, Root, Roukf, SigmaSet,
+};
 
 struct Run {
     x: DMatrix<f64>,

@@ -4,7 +4,9 @@ mod common;
 
 use common::{difference, filter, gauss, normal, rng, uniform};
 use nalgebra::{DMatrix, DVector};
-use starlings_estimators::{Analysis, Data, EstimatorError, Gaussian, Noise, Points, Root, recombine};
+use starlings_estimators::{
+    Analysis, Data, EstimatorError, Filter, Gaussian, Noise, Points, Root, recombine,
+};
 
 /// 700 rows in two blocks, a quarter missing, the first rows complete.
 fn problem(points: Points, scale: f64) -> (Analysis, Analysis, Analysis) {

@@ -4,7 +4,7 @@ mod common;
 
 use common::filter;
 use nalgebra::DMatrix;
-use starlings_estimators::{Analysis, Data, Gaussian, Noise, Points, Root};
+use starlings_estimators::{Analysis, Data, Filter, Gaussian, Noise, Points, Root};
 
 /// 3 x 3, row by row.
 fn square(rows: [f64; 9]) -> DMatrix<f64> {

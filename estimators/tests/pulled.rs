@@ -4,7 +4,9 @@ mod common;
 
 use common::{difference, filter, mean_factor, normal, rng};
 use nalgebra::{DMatrix, DVector};
-use starlings_estimators::{Analysis, Data, EstimatorError, Gaussian, Noise, Particles, Points, Root, Roukf};
+use starlings_estimators::{
+    Analysis, Data, EstimatorError, Filter, Gaussian, Noise, Particles, Points, Root, Roukf,
+};
 
 /// A linear model of two parameters more than it has rows, or many more rows.
 struct Linear {

@@ -6,7 +6,7 @@ use common::rcr::{MM_HG, TRUTH, forecast, physical, predict, pressure, prior, tr
 use common::{filter, gauss, rng};
 use nalgebra::{DMatrix, DVector};
 use starlings_estimators::{
-    Data, Gaussian, Noise, Particles, Points, Resampled, Root, Roukf, SigmaSet, exchange_prior,
+    Data, Filter, Gaussian, Noise, Particles, Points, Resampled, Root, Roukf, SigmaSet, exchange_prior,
 };
 
 /// Filters all pressures; particles after each analysis and the log-likelihood.

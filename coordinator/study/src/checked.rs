@@ -6,7 +6,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use starlings_estimators::{Drift, Points, Root, Transform};
+use starlings_estimators::{Drift, Kind, Points, Root, Transform};
 use starlings_models::spectrum::Decay;
 use starlings_models::{EffectDef, Setup, Signal, Spec};
 
@@ -138,20 +138,11 @@ pub struct Channel {
     pub node: Option<Node>,
 }
 
-/// Which estimator fits.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum EstimatorKind {
-    /// The reduced-order unscented Kalman filter.
-    Roukf,
-    /// Iterated sigma-point Gauss–Newton over whole records.
-    Batch,
-}
-
 /// The estimator and its settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EstimatorChoice {
     /// Which one.
-    pub kind: EstimatorKind,
+    pub kind: &'static Kind,
     /// Sigma points.
     pub points: Points,
     /// Root of the covariance that moves the particles.
@@ -253,14 +244,13 @@ impl Study {
             Points::Star => "star",
             Points::JulierUhlmann { .. } => "julier-uhlmann",
         };
-        match (self.estimator.kind, passes) {
-            (EstimatorKind::Batch, _) => format!("batch, {points} points"),
-            (EstimatorKind::Roukf, None) => {
-                format!("roukf, {points} points, passes until the estimate has settled")
-            }
-            (EstimatorKind::Roukf, Some(1)) => format!("roukf, {points} points, 1 pass"),
-            (EstimatorKind::Roukf, Some(n)) => format!("roukf, {points} points, {n} passes"),
-        }
+        let passes = match passes {
+            _ if !self.estimator.kind.is_filter() => String::new(),
+            None => ", passes until the estimate has settled".to_owned(),
+            Some(1) => ", 1 pass".to_owned(),
+            Some(n) => format!(", {n} passes"),
+        };
+        format!("{}, {points} points{passes}", self.estimator.kind.name)
     }
 
     /// Noise sd of each of [`Setup::outputs`] in a record; 1 for an output that the record does not measure, whose rows

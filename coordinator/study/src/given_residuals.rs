@@ -12,7 +12,7 @@ use starlings_estimators::{Gaussian, Place, Residuals};
 
 use super::fit::flight::{self, Flight, StepWindows};
 use super::fit::stack::stack_outputs;
-use super::{EstimatorKind, RunError, Study, posterior};
+use super::{RunError, Study, posterior};
 
 /// Distance of the points from the estimate, in posterior sd: close enough for a model that is nearly linear within one.
 const DISTANCE: f64 = 0.1;
@@ -32,7 +32,7 @@ pub(crate) enum GivenResiduals {
 /// When the fleet fails. A model that fails beside the estimate is no error: see [`GivenResiduals::Unknown`].
 pub(crate) fn compare(flight: &mut Flight<'_>, posterior: &Gaussian) -> Result<GivenResiduals, RunError> {
     let study = flight.study();
-    if study.drifts() && study.estimator.kind == EstimatorKind::Roukf {
+    if study.drifts() && study.estimator.kind.is_filter() {
         let why = "a parameter drifts, and its value at the end is no parameter of the whole record";
         return Ok(GivenResiduals::Unknown(why.to_owned()));
     }

@@ -31,7 +31,7 @@ pub mod twin;
 pub mod variant;
 mod warnings;
 
-pub use checked::{EstimatorChoice, EstimatorKind, FleetChoice, Record, Study, ThetaEntry};
+pub use checked::{EstimatorChoice, FleetChoice, Record, Study, ThetaEntry};
 pub use problem::{Problem, StudyError};
 pub use run::{Fit, Move, Progress, RunContext, RunError};
 pub use store::folder::{FolderError, RunFolder};

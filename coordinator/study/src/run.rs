@@ -5,7 +5,7 @@
 
 use std::sync::mpsc::Receiver;
 
-use starlings_estimators::{EstimatorError, Gaussian};
+use starlings_estimators::{EstimatorError, Form, Gaussian};
 use starlings_fleet::{Fleet, FleetError, FleetEvent};
 use starlings_models::Failure;
 
@@ -15,7 +15,7 @@ use super::given_residuals::{self, GivenResiduals};
 use super::identify::IdentifyError;
 use super::store::{Store, StoreError};
 use super::summary::Summary;
-use super::{EstimatorKind, Study, observer_gain, summary, warnings};
+use super::{Study, observer_gain, summary, warnings};
 use crate::fit::flight::Flight;
 use crate::observer_gain::Compared;
 use crate::store::folder::{OBSERVER, RunFolder};
@@ -235,9 +235,9 @@ fn from_start_to_end(
     )?;
     let mut flight = Flight::new(study, fleet)?.deciding(&folder.store)?;
     flight.threads = context.threads.max(1);
-    let fit = match study.estimator.kind {
-        EstimatorKind::Roukf => filter::fit(&mut flight, &folder.store, context, resumed)?,
-        EstimatorKind::Batch => batch::fit(&mut flight, &folder.store, context, resumed)?,
+    let fit = match study.estimator.kind.form {
+        Form::Windows(make) => filter::fit(make, &mut flight, &folder.store, context, resumed)?,
+        Form::WholeRecords => batch::fit(&mut flight, &folder.store, context, resumed)?,
     };
     let predictions = forecast::run(&mut flight, &fit.posterior)?;
     let observer = observer_gain::compare(&mut flight, &fit.posterior, &predictions)?;

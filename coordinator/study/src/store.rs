@@ -30,7 +30,7 @@ use std::path::{Path, PathBuf};
 use rusqlite::{Connection, OptionalExtension, Row, params};
 
 use schema::{SCHEMA_VERSION, insert_analysis, insert_jobs, insert_predictions};
-use snapshot::Snapshot;
+use snapshot::{Estimate, Snapshot};
 
 pub use error::StoreError;
 pub use program::Program;
@@ -186,7 +186,11 @@ impl Store {
     ///
     /// # Errors
     /// When the database refuses; nothing of the analysis is then kept, and those before are committed.
-    pub fn analysis(&self, row: &AnalysisRow, snapshot: &Snapshot) -> Result<(), StoreError> {
+    pub fn analysis<E: Clone + Into<Estimate>>(
+        &self,
+        row: &AnalysisRow,
+        snapshot: &Snapshot<E>,
+    ) -> Result<(), StoreError> {
         let connection = &self.connection;
         let insert = || -> rusqlite::Result<()> {
             insert_analysis(connection, row)?;

@@ -13,7 +13,7 @@ use super::identify::words::{combination, members};
 use super::posterior::{prior, standard_deviations};
 use super::store::PredictionRow;
 use super::summary::Summary;
-use super::{EstimatorKind, Fit, Study};
+use super::{Fit, Study};
 
 /// Correlation above which two parameters are reported as one combination.
 pub(super) const CORRELATED: f64 = 0.95;
@@ -58,7 +58,7 @@ fn not_converged(fit: &Fit) -> Option<String> {
 
 /// A whole-record run has one value of each parameter, however much it may drift.
 fn drift_ignored(study: &Study) -> Vec<String> {
-    let batch = study.estimator.kind == EstimatorKind::Batch;
+    let batch = !study.estimator.kind.is_filter();
     let drifting = study.theta.iter().filter(|t| batch && !matches!(t.drift, Drift::None));
     drifting
         .map(|t| {

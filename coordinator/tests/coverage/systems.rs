@@ -3,8 +3,9 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use starlings_coordinator::study::Study;
 use starlings_coordinator::study::twin::{Twin, simulate};
-use starlings_coordinator::study::{EstimatorKind, Study};
+use starlings_estimators::BATCH;
 
 use crate::study_kit::normals;
 
@@ -52,7 +53,7 @@ pub(crate) fn fill(study: &mut Study, truth: &[(&str, f64)]) {
 /// The same study, estimated by the batch fit.
 pub(crate) fn by_batch(study: &Study) -> Study {
     let mut study = study.clone();
-    study.estimator.kind = EstimatorKind::Batch;
+    study.estimator.kind = &BATCH;
     study.estimator.spread = 0.1;
     study
 }

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use starlings_study::store::snapshot::{Counts, Head};
+use starlings_study::store::snapshot::{Counts, Snapshot};
 use starlings_study::store::{Store, StoreError};
 use starlings_study::summary::Summary;
 
@@ -53,7 +53,7 @@ pub(super) fn table(store: &Store, summary: Option<&Summary>) -> Result<FleetTab
             retried: s.runs.retried,
             rescued: s.runs.rescued,
         },
-        None => Counts { rescued: rescued(store)?, ..counted(&jobs) },
+        None => Counts { rescued: Snapshot::rescued(store)?, ..counted(&jobs) },
     };
     let costs = jobs.iter().filter(|(_, done, ..)| *done).map(|(_, _, cost, ..)| *cost).collect();
     Ok(FleetTable {
@@ -76,14 +76,6 @@ fn counted(jobs: &[Job]) -> Counts {
         counts.retried += attempts.saturating_sub(1);
     }
     counts
-}
-
-/// Sigma points rescued up to the last stored analysis.
-fn rescued(store: &Store) -> Result<u64, StoreError> {
-    let heads: Vec<String> = store.rows("SELECT head FROM snapshot", |r| r.get(0))?;
-    let Some(head) = heads.first() else { return Ok(0) };
-    let head: Head = serde_json::from_str(head).map_err(|e| store.damaged("snapshot", e))?;
-    Ok(head.counts.rescued)
 }
 
 /// Slots by worker, as the events tell: `worker NAME joined from HOST (process P, S slots, C cores)`.

@@ -4,7 +4,7 @@
 
 use starlings_estimators::nis_band;
 use starlings_fleet::FleetEvent;
-use starlings_study::store::snapshot::{Counts, Head, Matrix, Snapshot};
+use starlings_study::store::snapshot::{Counts, Ensemble, Figures, Matrix, Snapshot};
 use starlings_study::store::{AnalysisRow, JobRow};
 
 use super::*;
@@ -38,23 +38,11 @@ fn analysis(step: usize, n_used: usize, jobs: Vec<JobRow>) -> AnalysisRow {
 }
 
 fn snapshot(rescued: u64) -> Snapshot {
-    let head = Head {
-        pass: 0,
-        step: 1,
-        theta: Matrix::default(),
-        centre: Vec::new(),
-        scale: Vec::new(),
-        batch: String::new(),
-        nis: 0.0,
-        n_used: 1,
-        log_likelihood: 0.0,
-        information_lost: 0.0,
-        dropped: 0.0,
-        cost: None,
-        narrow: 1.0,
-        counts: Counts { rescued, ..Counts::default() },
-    };
-    Snapshot { head, states: Vec::new() }
+    let counts = Counts { rescued, ..Counts::default() };
+    let figures = Figures { step: 1, n_used: 1, counts, ..Figures::default() };
+    let (centre, scale) = (Vec::new(), Vec::new());
+    let estimate = Ensemble { theta: Matrix::default(), centre, scale, cost: None, narrow: 1.0 }.into();
+    Snapshot { figures, estimate, states: Vec::new() }
 }
 
 #[test]

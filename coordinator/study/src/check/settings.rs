@@ -2,11 +2,11 @@
 //!
 //! Next file to read: [`super::model`].
 
-use starlings_estimators::{Batch, Points, Root};
+use starlings_estimators::{BATCH, Batch, KINDS, Kind, Points, Root};
 use starlings_models::{Description, ObserverDef};
 use toml::Spanned;
 
-use crate::checked::{EstimatorChoice, EstimatorKind, FleetChoice};
+use crate::checked::{EstimatorChoice, FleetChoice};
 use crate::file::{EstimatorSection, FleetSection, ObserverSection};
 use crate::problem::Source;
 
@@ -44,23 +44,19 @@ pub(crate) fn estimator(
     section: &EstimatorSection,
     solver: Option<&Description>,
 ) -> EstimatorChoice {
-    let kinds = [("roukf", EstimatorKind::Roukf), ("batch", EstimatorKind::Batch)];
+    let kinds: Vec<(&str, &'static Kind)> = KINDS.iter().map(|kind| (kind.name, *kind)).collect();
     let once = solver.filter(|solver| !solver.spec.restart);
-    let default = if once.is_some() { EstimatorKind::Batch } else { EstimatorKind::Roukf };
+    let default = if once.is_some() { &BATCH } else { KINDS[0] };
     let kind = choose(source, section.kind.as_ref(), "estimator", &kinds).unwrap_or(default);
-    if let (Some(solver), Some(given), EstimatorKind::Roukf) = (once, &section.kind, kind) {
+    if let (Some(solver), Some(given), true) = (once, &section.kind, kind.is_filter()) {
         let message = format!(
-            "kind = \"roukf\" goes on from the state of each analysis, and the solver `{}` cannot restart from a state",
-            solver.name
+            "kind = \"{}\" goes on from the state of each analysis, and the solver `{}` cannot restart from a state",
+            kind.name, solver.name
         );
         source.report_with(given.span(), message, "use kind = \"batch\", which runs whole records");
     }
     let roots = [("symmetric", Root::Symmetric), ("cholesky", Root::Cholesky)];
     let resample = [("svd", true), ("none", false)];
-    let default_spread = match kind {
-        EstimatorKind::Roukf => 0.001,
-        EstimatorKind::Batch => 0.1,
-    };
     foreign_keys(source, section, kind, once);
     EstimatorChoice {
         kind,
@@ -68,7 +64,7 @@ pub(crate) fn estimator(
         root: choose(source, section.root.as_ref(), "root", &roots).unwrap_or(Root::Symmetric),
         passes: counted(source, section.passes.as_ref(), "passes", 1000),
         anneal: anneal(source, section.anneal.as_ref()),
-        spread: positive(source, section.spread.as_ref(), "spread", default_spread),
+        spread: positive(source, section.spread.as_ref(), "spread", kind.spread),
         resample: choose(source, section.resample.as_ref(), "resampling", &resample).unwrap_or(true),
         max_iterations: counted(source, section.max_iterations.as_ref(), "max_iterations", 100_000)
             .unwrap_or(Batch::MAX_ITERATIONS),
@@ -157,36 +153,26 @@ fn patience(source: &Source, value: &Spanned<f64>) -> f64 {
     seconds
 }
 
-/// Keys of the estimator that was not chosen: they would be ignored, which nobody expects.
-fn foreign_keys(
-    source: &Source,
-    section: &EstimatorSection,
-    kind: EstimatorKind,
-    once: Option<&Description>,
-) {
-    let of_roukf = [
+/// Keys that belong to other estimators than the chosen one: they would be ignored, which nobody expects.
+fn foreign_keys(source: &Source, section: &EstimatorSection, kind: &Kind, once: Option<&Description>) {
+    let given = [
         ("passes", section.passes.as_ref().map(Spanned::span)),
         ("anneal", section.anneal.as_ref().map(Spanned::span)),
         ("root", section.root.as_ref().map(Spanned::span)),
         ("resample", section.resample.as_ref().map(Spanned::span)),
-    ];
-    let of_batch = [
         ("max_iterations", section.max_iterations.as_ref().map(Spanned::span)),
         ("tolerance", section.tolerance.as_ref().map(Spanned::span)),
     ];
-    let (foreign, owner): (&[_], _) = match kind {
-        EstimatorKind::Roukf => (&of_batch, "batch"),
-        EstimatorKind::Batch => (&of_roukf, "roukf"),
-    };
-    for (key, span) in foreign {
-        if let Some(span) = span {
+    for (key, span) in given {
+        let owner = KINDS.iter().find(|other| other.keys.contains(&key));
+        if let (Some(span), Some(owner), false) = (span, owner, kind.keys.contains(&key)) {
             let help = match once {
                 Some(solver) => {
                     format!("remove it: the solver `{}` cannot restart from a state", solver.name)
                 }
-                None => format!("remove it, or use kind = \"{owner}\""),
+                None => format!("remove it, or use kind = \"{}\"", owner.name),
             };
-            source.report_with(span.clone(), format!("`{key}` belongs to kind = \"{owner}\""), help);
+            source.report_with(span, format!("`{key}` belongs to kind = \"{}\"", owner.name), help);
         }
     }
 }

@@ -6,14 +6,13 @@
 use std::sync::Arc;
 
 use nalgebra::DMatrix;
-use serde::{Deserialize, Serialize};
-use starlings_estimators::{Batch, BatchState, BatchStep, Block, Data, EstimatorError, Gaussian, SigmaSet};
+use starlings_estimators::{Batch, BatchStep, Block, Data, EstimatorError, SigmaSet};
 use starlings_models::Window;
 
 use super::ensemble::noise;
 use super::flight::{Flight, Place, Results, StepWindows};
 use super::stack::stack_outputs;
-use crate::store::snapshot::{Head, Snapshot};
+use crate::store::snapshot::{Figures, Iteration, Snapshot};
 use crate::store::{AnalysisRow, Store};
 use crate::{Fit, Progress, RunContext, RunError, Study, posterior};
 
@@ -43,28 +42,32 @@ pub fn fit(
     };
     let values: Vec<f64> = windows.iter().flat_map(|(_, w)| w.observed.iter().copied()).collect();
     let noise = noise(study, &windows, 1.0);
-    let (mut known, mut now) = match resumed {
-        Some(snapshot) => (restore(store, &snapshot)?, snapshot),
+    let mut now = match resumed {
+        Some(snapshot) => snapshot.of_batch(store)?,
         None => begin(&batch, study),
     };
-    while !known.state.converged && now.head.step < batch.max_iterations {
-        let place = Place { pass: 1, step: now.head.step };
-        let theta = batch.sample(&known.state);
+    while !now.estimate.state.converged && now.figures.step < batch.max_iterations {
+        let place = Place { pass: 1, step: now.figures.step };
+        let theta = batch.sample(&now.estimate.state);
         let results = fly(flight, &mut now, place, &theta, &windows)?;
         let (predictions, failed) = gathered(&batch, &results, &windows);
-        let (next, step) =
-            batch.step(&known.state, &predictions, &failed, &Data { values: &values, noise: &noise })?;
-        known = Known { state: next, posterior: step.posterior.clone() };
-        keep(&mut now, &known, &step)?;
+        let (next, step) = batch.step(
+            &now.estimate.state,
+            &predictions,
+            &failed,
+            &Data { values: &values, noise: &noise },
+        )?;
+        now.estimate = Iteration { state: next, posterior: step.posterior.clone() };
+        advance(&mut now.figures, &step);
         let mut row = row(study, place, &step);
         row.jobs = flight.take_rows();
         store.analysis(&row, &now)?;
         context.after_step(store, &progress(&now, &batch, flight))?;
     }
-    if now.head.n_used == 0 {
-        return Err(EstimatorError::StartFailed { attempt: now.head.step }.into());
+    if now.figures.n_used == 0 {
+        return Err(EstimatorError::StartFailed { attempt: now.figures.step }.into());
     }
-    Ok(finish(&now, known))
+    Ok(finish(now))
 }
 
 /// The rows of each record with what all records share and the values of its own, where there are such: a record's own values
@@ -107,43 +110,16 @@ fn gathered(batch: &Batch, results: &Results, windows: &StepWindows) -> (DMatrix
     (predictions, vec![false; results.len()])
 }
 
-/// All that is known after an ensemble; what a killed run continues from, or ends with if it was the last one.
-#[derive(Serialize, Deserialize)]
-struct Known {
-    state: BatchState,
-    posterior: Gaussian,
-}
-
-fn begin(batch: &Batch, study: &Study) -> (Known, Snapshot) {
+fn begin(batch: &Batch, study: &Study) -> Snapshot<Iteration> {
     let prior = posterior::prior(study);
-    let state = batch.init(&prior);
-    let head = Head {
-        pass: 0,
-        step: 0,
-        theta: crate::store::snapshot::Matrix::default(),
-        centre: prior.mean.iter().copied().collect(),
-        scale: posterior::standard_deviations(&prior),
-        batch: String::new(),
-        nis: 0.0,
-        n_used: 0,
-        log_likelihood: 0.0,
-        information_lost: 0.0,
-        dropped: 0.0,
-        counts: crate::store::snapshot::Counts::default(),
-        cost: None,
-        narrow: 1.0,
-    };
-    (Known { state, posterior: prior }, Snapshot { head, states: vec![None; study.records.len()] })
-}
-
-fn restore(store: &Store, snapshot: &Snapshot) -> Result<Known, RunError> {
-    Ok(serde_json::from_str(&snapshot.head.batch).map_err(|e| store.damaged("snapshot", e))?)
+    let estimate = Iteration { state: batch.init(&prior), posterior: prior };
+    Snapshot { figures: Figures::default(), estimate, states: vec![None; study.records.len()] }
 }
 
 /// Runs the whole ensemble; a failed particle is left to the estimator, which can do without it.
 fn fly(
     flight: &mut Flight<'_>,
-    now: &mut Snapshot,
+    now: &mut Snapshot<Iteration>,
     place: Place,
     theta: &DMatrix<f64>,
     windows: &StepWindows,
@@ -152,22 +128,20 @@ fn fly(
     let everyone: Vec<usize> = (0..theta.ncols()).collect();
     let states = vec![None; now.states.len()];
     let results = flight.run(place, &everyone, theta, &states, windows)?;
-    now.head.counts.total += flight.total - before.0;
-    now.head.counts.failed += flight.failed - before.1;
-    now.head.counts.retried += flight.retried - before.2;
+    now.figures.counts.total += flight.total - before.0;
+    now.figures.counts.failed += flight.failed - before.1;
+    now.figures.counts.retried += flight.retried - before.2;
     Ok(results)
 }
 
-fn keep(now: &mut Snapshot, known: &Known, step: &BatchStep) -> Result<(), RunError> {
-    now.head.batch = serde_json::to_string(known).map_err(|e| RunError::Internal(e.to_string()))?;
-    now.head.step += 1;
+fn advance(figures: &mut Figures, step: &BatchStep) {
+    figures.step += 1;
     // Before the first ensemble that could be linearised the figures are infinite, which a snapshot cannot hold.
     if step.n_used > 0 {
-        now.head.nis = step.misfit;
-        now.head.n_used = step.n_used;
-        now.head.log_likelihood = step.evidence;
+        figures.nis = step.misfit;
+        figures.n_used = step.n_used;
+        figures.log_likelihood = step.evidence;
     }
-    Ok(())
 }
 
 fn row(study: &Study, place: Place, step: &BatchStep) -> AnalysisRow {
@@ -185,29 +159,29 @@ fn row(study: &Study, place: Place, step: &BatchStep) -> AnalysisRow {
     }
 }
 
-fn finish(now: &Snapshot, known: Known) -> Fit {
+fn finish(now: Snapshot<Iteration>) -> Fit {
     Fit {
-        posterior: known.posterior,
-        log_likelihood: now.head.log_likelihood,
-        nis: now.head.nis,
-        n_used: now.head.n_used,
+        converged: now.estimate.state.converged,
+        posterior: now.estimate.posterior,
+        log_likelihood: now.figures.log_likelihood,
+        nis: now.figures.nis,
+        n_used: now.figures.n_used,
         information_lost: 0.0,
         dropped: 0.0,
-        counts: now.head.counts,
+        counts: now.figures.counts,
         passes: 1,
-        converged: known.state.converged,
         last_move: None,
     }
 }
 
-fn progress(now: &Snapshot, batch: &Batch, flight: &Flight<'_>) -> Progress {
+fn progress(now: &Snapshot<Iteration>, batch: &Batch, flight: &Flight<'_>) -> Progress {
     Progress {
         stage: "batch",
         pass: 1,
         passes: Some(1),
-        step: now.head.step,
+        step: now.figures.step,
         steps: batch.max_iterations,
-        runs: now.head.counts.total,
+        runs: now.figures.counts.total,
         workers: flight.n_workers(),
     }
 }

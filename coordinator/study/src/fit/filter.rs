@@ -1,9 +1,9 @@
-//! The sequential fit: passes of the reduced-order UKF over the training windows, one ensemble per step.
+//! The sequential fit: passes of a filter over the training windows, one ensemble per step.
 //!
 //! What differs from pass to pass is in [`super::schedule`], when they end in [`super::settle`]; the sigma-point arithmetic lives in `starlings-estimators`; model
 //! states are only recombined here. Next file to read: [`super::schedule`], then [`super::rescue`].
 
-use starlings_estimators::{Analysis, Data, Particles};
+use starlings_estimators::{Analysis, Data, MakeFilter, Particles};
 
 use super::ensemble::{noise, recombine};
 use super::flight::{Flight, Place, StepWindows};
@@ -12,29 +12,30 @@ use super::rescue::{Flown, fly};
 use super::schedule::{Reported, Schedule, particles};
 use super::settle;
 use super::stack::{stack_outputs, stack_states};
-use crate::store::snapshot::Snapshot;
+use crate::store::snapshot::{Ensemble, Snapshot};
 use crate::store::{AnalysisRow, InnovationRow, Store};
 use crate::{Fit, RunContext, RunError, Study, posterior};
 
-/// Runs every pass, continuing from `resumed` if there is one.
+/// Runs every pass of the filter that `make` gives, continuing from `resumed` if there is one.
 ///
 /// # Errors
 /// When the fleet or the store fails, or too few sigma points can be run.
 pub fn fit(
+    make: MakeFilter,
     flight: &mut Flight<'_>,
     store: &Store,
     context: &mut RunContext<'_>,
     resumed: Option<Snapshot>,
 ) -> Result<Fit, RunError> {
     let study = flight.study();
-    let schedule = Schedule::new(study)?;
+    let schedule = Schedule::new(study, make)?;
     let mut now = match resumed {
-        Some(snapshot) => snapshot,
+        Some(snapshot) => snapshot.of_filter(store)?,
         None => schedule.start(0, &posterior::prior(study)),
     };
     let mut reported = schedule.reported(&now)?;
     loop {
-        while now.head.step < schedule.n_step() {
+        while now.figures.step < schedule.n_step() {
             let (row, next) = step(flight, &schedule, &mut now, &reported)?;
             reported = next;
             store.analysis(&row, &now)?;
@@ -42,14 +43,14 @@ pub fn fit(
         }
         let counted = (flight.total, flight.failed, flight.retried);
         let next = settle::next(flight, &schedule, &now, &reported)?;
-        let counts = &mut now.head.counts;
+        let counts = &mut now.figures.counts;
         counts.total += flight.total - counted.0;
         counts.failed += flight.failed - counted.1;
         counts.retried += flight.retried - counted.2;
         let Some(mut next) = next else { return Ok(schedule.finish(&now, reported)) };
-        next.head.counts = now.head.counts;
-        next.head.information_lost = now.head.information_lost;
-        next.head.dropped = now.head.dropped;
+        next.figures.counts = now.figures.counts;
+        next.figures.information_lost = now.figures.information_lost;
+        next.figures.dropped = now.figures.dropped;
         now = next;
         reported = schedule.reported(&now)?;
     }
@@ -60,31 +61,31 @@ pub fn fit(
 fn step(
     flight: &mut Flight<'_>,
     schedule: &Schedule<'_>,
-    now: &mut Snapshot,
+    now: &mut Snapshot<Ensemble>,
     before: &Reported,
 ) -> Result<(AnalysisRow, Reported), RunError> {
-    let windows = schedule.step_windows(now.head.step);
-    let place = Place { pass: now.head.pass + 1, step: now.head.step };
-    let roukf = schedule.roukf(now.head.pass);
+    let windows = schedule.step_windows(now.figures.step);
+    let place = Place { pass: now.figures.pass + 1, step: now.figures.step };
+    let filter = schedule.filter(now.figures.pass);
     let counted = (flight.total, flight.failed, flight.retried);
     let Flown { mut particles, results, rescued } =
-        fly(flight, roukf, particles(now), &mut now.states, &windows, place)?;
+        fly(flight, filter, particles(now), &mut now.states, &windows, place)?;
     for (index, (record, _)) in windows.iter().enumerate() {
         now.states[*record] = Some(stack_states(&results, index));
     }
     let mut predictions = stack_outputs(&results, &windows);
     if schedule.resample && rescued == 0 {
         let states = &mut now.states;
-        let drawn = resample::redraw(flight, roukf, place, &windows, &particles, &predictions, states)?;
+        let drawn = resample::redraw(flight, filter, place, &windows, &particles, &predictions, states)?;
         if let Some(redrawn) = drawn {
             (particles, predictions) = (redrawn.particles, redrawn.predictions);
-            now.head.dropped = now.head.dropped.max(redrawn.dropped);
+            now.figures.dropped = now.figures.dropped.max(redrawn.dropped);
         }
     }
     let values: Vec<f64> = windows.iter().flat_map(|(_, w)| w.observed.iter().copied()).collect();
-    let noise = noise(schedule.study, &windows, schedule.anneal(now.head.pass));
+    let noise = noise(schedule.study, &windows, schedule.anneal(now.figures.pass));
     let (particles, analysis) =
-        roukf.analysis(&particles, &predictions, &Data { values: &values, noise: &noise })?;
+        filter.analysis(&particles, &predictions, &Data { values: &values, noise: &noise })?;
     recombine(&mut now.states, &analysis.transform, flight.threads);
     for (record, states) in now.states.iter_mut().enumerate() {
         if schedule.windows[record].len() <= place.step + 1 {
@@ -92,23 +93,23 @@ fn step(
         }
     }
     advance(now, &particles, &analysis);
-    now.head.counts.total += flight.total - counted.0;
-    now.head.counts.failed += flight.failed - counted.1;
-    now.head.counts.retried += flight.retried - counted.2;
-    now.head.counts.rescued += rescued;
+    now.figures.counts.total += flight.total - counted.0;
+    now.figures.counts.failed += flight.failed - counted.1;
+    now.figures.counts.retried += flight.retried - counted.2;
+    now.figures.counts.rescued += rescued;
     let after = schedule.reported(now)?;
     let mut row = row(schedule.study, place, &windows, &analysis, before, &after);
     row.jobs = flight.take_rows();
     Ok((row, after))
 }
 
-fn advance(now: &mut Snapshot, particles: &Particles, analysis: &Analysis) {
-    now.head.theta = (&particles.theta).into();
-    now.head.step += 1;
-    now.head.nis += analysis.nis;
-    now.head.n_used += analysis.n_used;
-    now.head.log_likelihood += analysis.log_likelihood;
-    now.head.information_lost = now.head.information_lost.max(analysis.information_lost);
+fn advance(now: &mut Snapshot<Ensemble>, particles: &Particles, analysis: &Analysis) {
+    now.estimate.theta = (&particles.theta).into();
+    now.figures.step += 1;
+    now.figures.nis += analysis.nis;
+    now.figures.n_used += analysis.n_used;
+    now.figures.log_likelihood += analysis.log_likelihood;
+    now.figures.information_lost = now.figures.information_lost.max(analysis.information_lost);
 }
 
 fn row(

@@ -8,7 +8,7 @@
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
-use starlings_estimators::{Particles, Resampled, Roukf};
+use starlings_estimators::{Filter, Particles, Resampled};
 use starlings_models::Window;
 
 use super::ensemble::recombine;
@@ -78,7 +78,7 @@ pub struct Redrawn {
 /// When the fleet or the estimator fails.
 pub fn redraw(
     flight: &mut Flight<'_>,
-    roukf: &Roukf,
+    filter: &dyn Filter,
     place: Place,
     windows: &StepWindows,
     particles: &Particles,
@@ -87,7 +87,7 @@ pub fn redraw(
 ) -> Result<Option<Redrawn>, RunError> {
     let study = flight.study();
     let Resampled { particles: redrawn, transform, dropped } =
-        roukf.resample(particles, &gram(study, &roukf.set.weights, particles, states))?;
+        filter.resample(particles, &gram(study, filter.weights(), particles, states))?;
     let mut mixed = states.clone();
     recombine(&mut mixed, &transform, flight.threads);
     let mut observed = predictions * transform;

@@ -5,7 +5,7 @@
 //! reported as lost information. Next file to read: [`super::filter`].
 
 use nalgebra::DMatrix;
-use starlings_estimators::{Particles, Roukf};
+use starlings_estimators::{Filter, Particles};
 
 use super::flight::{Flight, Place, Results, StepWindows};
 use crate::RunError;
@@ -31,7 +31,7 @@ pub struct Flown {
 /// When the fleet fails, or too few particles survive for an analysis; the message says which parameters could not be run.
 pub fn fly(
     flight: &mut Flight<'_>,
-    roukf: &Roukf,
+    filter: &dyn Filter,
     particles: Particles,
     states: &mut [Option<DMatrix<f64>>],
     windows: &StepWindows,
@@ -42,7 +42,7 @@ pub fn fly(
     let mut flown = Flown { particles, results, rescued: 0 };
     for particle in everyone {
         if failure(&flown.results[particle]).is_some() {
-            rescue(flight, roukf, &mut flown, states, windows, place, particle)?;
+            rescue(flight, filter, &mut flown, states, windows, place, particle)?;
             flown.rescued += 1;
         }
     }
@@ -51,7 +51,7 @@ pub fn fly(
 
 fn rescue(
     flight: &mut Flight<'_>,
-    roukf: &Roukf,
+    filter: &dyn Filter,
     flown: &mut Flown,
     states: &mut [Option<DMatrix<f64>>],
     windows: &StepWindows,
@@ -60,7 +60,7 @@ fn rescue(
 ) -> Result<(), RunError> {
     let cause = cause(flight, windows, &flown.results[particle]);
     for distance in DISTANCES {
-        let (pulled, transform) = roukf.pull(&flown.particles, particle, distance);
+        let (pulled, transform) = filter.pull(&flown.particles, particle, distance);
         for x in states.iter_mut().flatten() {
             *x = &*x * &transform;
         }
@@ -73,7 +73,7 @@ fn rescue(
             return Ok(());
         }
     }
-    flown.particles = roukf.drop(&flown.particles, particle).map_err(|source| RunError::SigmaPointLost {
+    flown.particles = filter.drop(&flown.particles, particle).map_err(|source| RunError::SigmaPointLost {
         particle,
         pass: place.pass,
         step: place.step,

@@ -12,11 +12,11 @@
 
 use std::sync::Arc;
 
-use starlings_estimators::{Drift, Gaussian, Particles, Roukf, SigmaSet, exchange_prior};
+use starlings_estimators::{Drift, Filter, Gaussian, MakeFilter, Options, Particles, exchange_prior};
 use starlings_models::Window;
 
 use super::flight::{Flight, StepWindows};
-use crate::store::snapshot::{Counts, Head, Snapshot};
+use crate::store::snapshot::{Ensemble, Figures, Snapshot};
 use crate::{Fit, Move, Progress, RunError, Study, ThetaEntry, posterior};
 
 /// Least width of the points in prior sd: closer, rounding inside the model would show.
@@ -25,8 +25,8 @@ const CLOSEST: f64 = 1e-6;
 /// Everything about the fit that does not change from step to step.
 pub(super) struct Schedule<'a> {
     pub(super) study: &'a Study,
-    still: Roukf,
-    drifting: Option<Roukf>,
+    still: Box<dyn Filter>,
+    drifting: Option<Box<dyn Filter>>,
     /// Number of passes where it is fixed; `None` for as many as it takes.
     pub(super) passes: Option<usize>,
     pub(super) resample: bool,
@@ -43,15 +43,18 @@ pub(super) struct Reported {
 }
 
 impl<'a> Schedule<'a> {
-    pub(super) fn new(study: &'a Study) -> Result<Self, RunError> {
+    pub(super) fn new(study: &'a Study, make: MakeFilter) -> Result<Self, RunError> {
         let e = &study.estimator;
-        let set = SigmaSet::new(e.points, study.theta.len())?;
+        let n_param = study.theta.len();
+        let options =
+            Options { n_param, points: e.points, root: e.root, drift: Vec::new(), seed: study.seed };
         let drift: Vec<Drift> = study.theta.iter().map(|t| t.drift).collect();
-        let still = Roukf { set: set.clone(), root: e.root, drift: Vec::new() };
+        let still = make(&options)?;
+        let drifting = study.drifts().then(|| make(&Options { drift, ..options })).transpose()?;
         Ok(Self {
             study,
-            resample: e.resample && set.n_particle() > set.n_param() + 1,
-            drifting: study.drifts().then_some(Roukf { set, root: e.root, drift }),
+            resample: e.resample && still.resamples(),
+            drifting,
             still,
             passes: study.passes(),
             prior: posterior::prior(study),
@@ -60,8 +63,8 @@ impl<'a> Schedule<'a> {
     }
 
     /// The filter of one pass: drift belongs to the last.
-    pub(super) fn roukf(&self, pass: usize) -> &Roukf {
-        self.drifting.as_ref().filter(|_| self.is_last(pass)).unwrap_or(&self.still)
+    pub(super) fn filter(&self, pass: usize) -> &dyn Filter {
+        self.drifting.as_deref().filter(|_| self.is_last(pass)).unwrap_or(&*self.still)
     }
 
     /// Whether a fixed number of passes ends with this one.
@@ -96,31 +99,23 @@ impl<'a> Schedule<'a> {
     }
 
     /// The ensemble at the start of a pass, around the given estimate.
-    pub(super) fn start(&self, pass: usize, around: &Gaussian) -> Snapshot {
+    pub(super) fn start(&self, pass: usize, around: &Gaussian) -> Snapshot<Ensemble> {
         self.start_at(pass, around, around.mean.iter().copied().collect(), 1.0)
     }
 
     /// The ensemble at the start of a pass around `centre`, no wider than `around`; `narrow` draws it together.
-    pub(super) fn start_at(&self, pass: usize, around: &Gaussian, centre: Vec<f64>, narrow: f64) -> Snapshot {
+    pub(super) fn start_at(
+        &self,
+        pass: usize,
+        around: &Gaussian,
+        centre: Vec<f64>,
+        narrow: f64,
+    ) -> Snapshot<Ensemble> {
         let scale = self.scale(pass, around, narrow);
         let particles = self.still.init(&posterior::independent(&centre, &scale));
         Snapshot {
-            head: Head {
-                pass,
-                step: 0,
-                theta: (&particles.theta).into(),
-                centre,
-                scale,
-                batch: String::new(),
-                nis: 0.0,
-                n_used: 0,
-                log_likelihood: 0.0,
-                information_lost: 0.0,
-                dropped: 0.0,
-                counts: Counts::default(),
-                cost: None,
-                narrow,
-            },
+            figures: Figures { pass, ..Figures::default() },
+            estimate: Ensemble { theta: (&particles.theta).into(), centre, scale, cost: None, narrow },
             states: vec![None; self.study.records.len()],
         }
     }
@@ -131,63 +126,67 @@ impl<'a> Schedule<'a> {
     }
 
     /// What is known now under the study's own prior, whatever spread this pass started with.
-    pub(super) fn reported(&self, now: &Snapshot) -> Result<Reported, RunError> {
+    pub(super) fn reported(&self, now: &Snapshot<Ensemble>) -> Result<Reported, RunError> {
         let posterior = self.still.gaussian(&particles(now));
-        if now.head.pass == 0 || self.drifting.is_some() {
-            return Ok(Reported { posterior, log_likelihood: now.head.log_likelihood, nis: now.head.nis });
+        if now.figures.pass == 0 || self.drifting.is_some() {
+            return Ok(Reported {
+                posterior,
+                log_likelihood: now.figures.log_likelihood,
+                nis: now.figures.nis,
+            });
         }
-        let used = posterior::independent(&now.head.centre, &now.head.scale);
+        let used = posterior::independent(&now.estimate.centre, &now.estimate.scale);
         let exchanged = exchange_prior(&posterior, &used, &self.prior)?;
         Ok(Reported {
-            nis: exchanged.corrected_nis(now.head.nis),
-            log_likelihood: now.head.log_likelihood + exchanged.log_likelihood,
+            nis: exchanged.corrected_nis(now.figures.nis),
+            log_likelihood: now.figures.log_likelihood + exchanged.log_likelihood,
             posterior: exchanged.posterior,
         })
     }
 
     /// How far the pass moved the estimate from where it started: the entry that moved most, in posterior standard deviations.
     /// `None` for a first pass, which starts at the prior, and for parameters that drift.
-    pub(super) fn last_move(&self, now: &Snapshot, reported: &Reported) -> Option<Move> {
-        if now.head.pass == 0 || self.drifting.is_some() {
+    pub(super) fn last_move(&self, now: &Snapshot<Ensemble>, reported: &Reported) -> Option<Move> {
+        if now.figures.pass == 0 || self.drifting.is_some() {
             return None;
         }
         let sd = posterior::standard_deviations(&reported.posterior);
-        let moved = reported.posterior.mean.iter().zip(&now.head.centre).zip(sd);
+        let moved = reported.posterior.mean.iter().zip(&now.estimate.centre).zip(sd);
         let moves = moved.enumerate().map(|(entry, ((m, c), sd))| Move { entry, size: (m - c).abs() / sd });
         moves.max_by(|a, b| a.size.total_cmp(&b.size))
     }
 
-    pub(super) fn finish(&self, now: &Snapshot, reported: Reported) -> Fit {
+    pub(super) fn finish(&self, now: &Snapshot<Ensemble>, reported: Reported) -> Fit {
         Fit {
             last_move: self.last_move(now, &reported),
             posterior: reported.posterior,
             log_likelihood: reported.log_likelihood,
             nis: reported.nis,
-            n_used: now.head.n_used,
-            information_lost: now.head.information_lost,
-            dropped: now.head.dropped,
-            counts: now.head.counts,
-            passes: now.head.pass + 1,
+            n_used: now.figures.n_used,
+            information_lost: now.figures.information_lost,
+            dropped: now.figures.dropped,
+            counts: now.figures.counts,
+            passes: now.figures.pass + 1,
             converged: true,
         }
     }
 
-    pub(super) fn progress(&self, now: &Snapshot, flight: &Flight<'_>) -> Progress {
+    pub(super) fn progress(&self, now: &Snapshot<Ensemble>, flight: &Flight<'_>) -> Progress {
         Progress {
             stage: "filter",
-            pass: now.head.pass + 1,
+            pass: now.figures.pass + 1,
             passes: self.passes,
-            step: now.head.step,
+            step: now.figures.step,
             steps: self.n_step(),
-            runs: now.head.counts.total,
+            runs: now.figures.counts.total,
             workers: flight.n_workers(),
         }
     }
 }
 
 /// The ensemble between two analyses, every point in its place.
-pub(super) fn particles(now: &Snapshot) -> Particles {
-    let theta = now.head.theta.to_dense();
+pub(super) fn particles(now: &Snapshot<Ensemble>) -> Particles {
+    let theta = now.estimate.theta.to_dense();
     let pull = vec![1.0; theta.ncols()];
     Particles { theta, pull }
 }

@@ -13,7 +13,7 @@ use nalgebra::DMatrix;
 
 use super::flight::{Flight, Place, StepWindows};
 use super::schedule::{Reported, Schedule};
-use crate::store::snapshot::Snapshot;
+use crate::store::snapshot::{Ensemble, Snapshot};
 use crate::{Move, RunError, posterior};
 
 /// Passes at most.
@@ -34,30 +34,31 @@ const NARROWEST: f64 = 0.01;
 pub(super) fn next(
     flight: &mut Flight<'_>,
     schedule: &Schedule<'_>,
-    now: &Snapshot,
+    now: &Snapshot<Ensemble>,
     reported: &Reported,
-) -> Result<Option<Snapshot>, RunError> {
+) -> Result<Option<Snapshot<Ensemble>>, RunError> {
     if schedule.passes.is_some() {
-        let more = !schedule.is_last(now.head.pass);
-        return Ok(more.then(|| schedule.start(now.head.pass + 1, &reported.posterior)));
+        let more = !schedule.is_last(now.figures.pass);
+        return Ok(more.then(|| schedule.start(now.figures.pass + 1, &reported.posterior)));
     }
     let settled = schedule.last_move(now, reported).is_some_and(|m| m.is_settled());
-    if settled || now.head.pass + 1 == LIMIT {
+    if settled || now.figures.pass + 1 == LIMIT {
         return Ok(None);
     }
     let search = Search::new(schedule, now, reported);
     let Some(found) = search.run(flight)? else {
-        let narrow = now.head.narrow * NARROWER;
+        let narrow = now.estimate.narrow * NARROWER;
         if narrow < NARROWEST {
             return Ok(None);
         }
         let mut again =
-            schedule.start_at(now.head.pass + 1, &reported.posterior, now.head.centre.clone(), narrow);
-        again.head.cost = now.head.cost;
+            schedule.start_at(now.figures.pass + 1, &reported.posterior, now.estimate.centre.clone(), narrow);
+        again.estimate.cost = now.estimate.cost;
         return Ok(Some(again));
     };
-    let mut next = schedule.start_at(now.head.pass + 1, &reported.posterior, found.point, now.head.narrow);
-    next.head.cost = found.cost.is_finite().then_some(found.cost);
+    let mut next =
+        schedule.start_at(now.figures.pass + 1, &reported.posterior, found.point, now.estimate.narrow);
+    next.estimate.cost = found.cost.is_finite().then_some(found.cost);
     Ok(Some(next))
 }
 
@@ -70,13 +71,13 @@ struct Point {
 /// From where a pass started towards what it found.
 struct Search<'a> {
     schedule: &'a Schedule<'a>,
-    now: &'a Snapshot,
+    now: &'a Snapshot<Ensemble>,
     found: Vec<f64>,
     windows: StepWindows,
 }
 
 impl<'a> Search<'a> {
-    fn new(schedule: &'a Schedule<'a>, now: &'a Snapshot, reported: &Reported) -> Self {
+    fn new(schedule: &'a Schedule<'a>, now: &'a Snapshot<Ensemble>, reported: &Reported) -> Self {
         let study = schedule.study;
         let trained = (0..study.records.len()).filter(|record| study.records[*record].is_trained());
         Self {
@@ -91,8 +92,8 @@ impl<'a> Search<'a> {
     ///
     /// A first pass only chooses a place: where no part of its step is better than the prior median, that is it.
     fn run(&self, flight: &mut Flight<'_>) -> Result<Option<Point>, RunError> {
-        let first = self.now.head.pass == 0;
-        let start = self.now.head.cost;
+        let first = self.now.figures.pass == 0;
+        let start = self.now.estimate.cost;
         let lengths: &[f64] = if start.is_some() { &[1.0] } else { &[1.0, 0.0] };
         let mut points = self.points(flight, lengths)?;
         let stay = if start.is_none() { points.pop() } else { None };
@@ -108,12 +109,12 @@ impl<'a> Search<'a> {
 
     /// Runs every trained record at these shares of the step.
     fn points(&self, flight: &mut Flight<'_>, lengths: &[f64]) -> Result<Vec<Point>, RunError> {
-        let from = &self.now.head.centre;
+        let from = &self.now.estimate.centre;
         let theta = DMatrix::from_fn(from.len(), lengths.len(), |j, k| {
             // The whole step ends exactly at what was found.
             if lengths[k] >= 1.0 { self.found[j] } else { from[j] + lengths[k] * (self.found[j] - from[j]) }
         });
-        let place = Place { pass: self.now.head.pass + 1, step: self.now.head.step };
+        let place = Place { pass: self.now.figures.pass + 1, step: self.now.figures.step };
         let everyone: Vec<usize> = (0..lengths.len()).collect();
         let states = vec![None; self.schedule.study.records.len()];
         let results = flight.run(place, &everyone, &theta, &states, &self.windows)?;

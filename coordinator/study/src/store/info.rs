@@ -66,7 +66,7 @@ pub(super) fn info(study: &Study, command: &str, started: &str) -> StudyInfo {
         says: Some(study.says.clone()).filter(|s| !s.is_empty()),
         model: study.setup.model.kind.clone(),
         estimator: study.describe_estimator(),
-        batch: study.estimator.kind == crate::EstimatorKind::Batch,
+        batch: !study.estimator.kind.is_filter(),
         seed: study.seed,
         time_unit: study.time_unit.clone(),
         outputs: study.setup.outputs.iter().map(|o| (o.clone(), unit(o))).collect(),

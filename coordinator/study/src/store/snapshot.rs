@@ -6,6 +6,7 @@
 use nalgebra::DMatrix;
 use rusqlite::{Connection, OptionalExtension, params};
 use serde::{Deserialize, Serialize};
+use starlings_estimators::{BatchState, Gaussian};
 use starlings_proto::convert::floats;
 
 use crate::store::{Store, StoreError};
@@ -47,21 +48,13 @@ pub struct Counts {
     pub rescued: u64,
 }
 
-/// The sequential estimator between two analyses.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Head {
+/// What every estimator keeps between two analyses: where it stands, and the figures of the pass.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Figures {
     /// Pass, from 0.
     pub pass: usize,
     /// Analyses done in this pass, or iterations of the batch estimator.
     pub step: usize,
-    /// Transformed parameters, p × r; for the batch estimator its own state.
-    pub theta: Matrix,
-    /// Mean of the prior that this pass started from, transformed units.
-    pub centre: Vec<f64>,
-    /// Its standard deviations.
-    pub scale: Vec<f64>,
-    /// State of the batch estimator, empty for the filter.
-    pub batch: String,
     /// Sum of NIS over this pass.
     pub nis: f64,
     /// Observations used in this pass.
@@ -74,31 +67,78 @@ pub struct Head {
     pub dropped: f64,
     /// Runs so far.
     pub counts: Counts,
+}
+
+/// The particles of a filter, and where its pass started.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Ensemble {
+    /// Transformed parameters, p × r.
+    pub theta: Matrix,
+    /// Mean of the prior that this pass started from, transformed units.
+    pub centre: Vec<f64>,
+    /// Its standard deviations.
+    pub scale: Vec<f64>,
     /// Cost of a run at `centre`, where it is known: squared misfit plus squared distance from the prior.
-    #[serde(default)]
     pub cost: Option<f64>,
     /// Factor on the width of the points of this pass.
-    #[serde(default = "whole")]
     pub narrow: f64,
 }
 
-fn whole() -> f64 {
-    1.0
+/// All that a batch fit knows after an ensemble; what a killed run continues from, or ends with if it was the last one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Iteration {
+    /// What the next ensemble is made from.
+    pub state: BatchState,
+    /// The posterior around the best centre.
+    pub posterior: Gaussian,
 }
 
-/// Head and states.
+/// What an estimator continues from, by the form of the estimator.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Estimate {
+    /// A filter, whatever its kind.
+    Filter(Ensemble),
+    /// A batch fit.
+    Batch(Box<Iteration>),
+}
+
+impl From<Ensemble> for Estimate {
+    fn from(ensemble: Ensemble) -> Self {
+        Self::Filter(ensemble)
+    }
+}
+
+impl From<Iteration> for Estimate {
+    fn from(iteration: Iteration) -> Self {
+        Self::Batch(Box::new(iteration))
+    }
+}
+
+/// The row of the store beside the states.
+#[derive(Serialize, Deserialize)]
+struct Head {
+    #[serde(flatten)]
+    figures: Figures,
+    estimate: Estimate,
+}
+
+/// An estimator between two analyses, with the states of its particles.
 #[derive(Clone, Debug)]
-pub struct Snapshot {
-    /// The small values.
-    pub head: Head,
+pub struct Snapshot<E = Estimate> {
+    /// Where it stands.
+    pub figures: Figures,
+    /// What it continues from.
+    pub estimate: E,
     /// One n_state × r matrix per record; `None` before its first window and after its last.
     pub states: Vec<Option<DMatrix<f64>>>,
 }
 
-impl Snapshot {
+impl<E: Clone + Into<Estimate>> Snapshot<E> {
     pub(crate) fn write(&self, connection: &Connection) -> rusqlite::Result<()> {
-        let head = serde_json::to_string(&self.head)
-            .map_err(|e| rusqlite::Error::ToSqlConversionFailure(Box::new(e)))?;
+        let head = Head { figures: self.figures.clone(), estimate: self.estimate.clone().into() };
+        let head =
+            serde_json::to_string(&head).map_err(|e| rusqlite::Error::ToSqlConversionFailure(Box::new(e)))?;
         connection
             .prepare_cached("INSERT OR REPLACE INTO snapshot (id, head) VALUES (1, ?1)")?
             .execute(params![head])?;
@@ -111,6 +151,23 @@ impl Snapshot {
             }
         }
         Ok(())
+    }
+}
+
+impl Snapshot {
+    /// Sigma points that were rescued up to the last stored analysis, whichever program stored it.
+    ///
+    /// # Errors
+    /// When the database refuses or its content is damaged.
+    pub fn rescued(store: &Store) -> Result<u64, StoreError> {
+        #[derive(Deserialize)]
+        struct Counted {
+            counts: Counts,
+        }
+        let heads: Vec<String> = store.rows("SELECT head FROM snapshot", |r| r.get(0))?;
+        let Some(head) = heads.first() else { return Ok(0) };
+        let counted: Counted = serde_json::from_str(head).map_err(|e| store.damaged("snapshot", e))?;
+        Ok(counted.counts.rescued)
     }
 
     /// The last snapshot of a run, if an analysis was stored; `n_record` is the number of records of the study.
@@ -142,6 +199,32 @@ impl Snapshot {
             let values = values.ok_or_else(|| store.damaged("snapshot", "a state of the wrong length"))?;
             *slot = Some(DMatrix::from_column_slice(n, r, &values));
         }
-        Ok(Some(Self { head, states }))
+        Ok(Some(Self { figures: head.figures, estimate: head.estimate, states }))
+    }
+
+    /// The same of a filter.
+    ///
+    /// # Errors
+    /// When it is of a batch fit.
+    pub(crate) fn of_filter(self, store: &Store) -> Result<Snapshot<Ensemble>, StoreError> {
+        match self.estimate {
+            Estimate::Filter(estimate) => {
+                Ok(Snapshot { figures: self.figures, estimate, states: self.states })
+            }
+            Estimate::Batch(_) => Err(store.damaged("snapshot", "of a batch fit, and a filter continues")),
+        }
+    }
+
+    /// The same of a batch fit.
+    ///
+    /// # Errors
+    /// When it is of a filter.
+    pub(crate) fn of_batch(self, store: &Store) -> Result<Snapshot<Iteration>, StoreError> {
+        match self.estimate {
+            Estimate::Batch(estimate) => {
+                Ok(Snapshot { figures: self.figures, estimate: *estimate, states: self.states })
+            }
+            Estimate::Filter(_) => Err(store.damaged("snapshot", "of a filter, and a batch fit continues")),
+        }
     }
 }

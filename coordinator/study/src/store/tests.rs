@@ -4,7 +4,7 @@
 use nalgebra::DMatrix;
 
 use super::*;
-use crate::store::snapshot::{Counts, Head, Matrix};
+use crate::store::snapshot::{Ensemble, Figures, Matrix};
 
 fn row(step: usize) -> AnalysisRow {
     let (record, output) = ("one".to_owned(), "y".to_owned());
@@ -24,23 +24,10 @@ fn row(step: usize) -> AnalysisRow {
 }
 
 fn snapshot(step: usize) -> Snapshot {
-    let head = Head {
-        pass: 0,
-        step,
-        theta: Matrix::default(),
-        centre: Vec::new(),
-        scale: Vec::new(),
-        batch: String::new(),
-        nis: 0.0,
-        n_used: step,
-        log_likelihood: 0.0,
-        information_lost: 0.0,
-        dropped: 0.0,
-        cost: None,
-        narrow: 1.0,
-        counts: Counts::default(),
-    };
-    Snapshot { head, states: vec![Some(DMatrix::from_element(8, 3, step as f64))] }
+    let figures = Figures { step, n_used: step, ..Figures::default() };
+    let (centre, scale) = (Vec::new(), Vec::new());
+    let estimate = Ensemble { theta: Matrix::default(), centre, scale, cost: None, narrow: 1.0 }.into();
+    Snapshot { figures, estimate, states: vec![Some(DMatrix::from_element(8, 3, step as f64))] }
 }
 
 /// One analysis, committed as those of a slow run are.
@@ -92,7 +79,7 @@ fn a_full_disk_is_told_with_its_remedy_and_keeps_every_committed_analysis() {
     drop(store);
     let store = Store::open(&path).expect("the store opens again");
     let kept = Snapshot::read(&store, 1).expect("readable").expect("a snapshot");
-    assert_eq!(kept.head.step, step, "the snapshot is that of the last finished analysis");
+    assert_eq!(kept.figures.step, step, "the snapshot is that of the last finished analysis");
     assert_eq!(table(&store, "analyses", "step").expect("rows").len(), step);
     store.analysis(&row(step), &snapshot(step + 1)).expect("with room again it goes on");
 }

@@ -6,11 +6,12 @@
 
 use std::sync::Arc;
 
+use starlings_estimators::{Form, Kind};
 use starlings_models::external::table::is_transposed;
 use starlings_models::{Forward, Prediction, Window};
 
 use super::{Fault, TrialChannel, TrialError, named, run, trial};
-use crate::{EstimatorKind, Study, posterior};
+use crate::{Study, posterior};
 
 /// Adapters whose programs cannot say of themselves which times they answer for.
 const STARTS_ANEW: [&str; 2] = ["command", "um-bridge"];
@@ -32,11 +33,7 @@ pub enum Depth {
 ///
 /// # Errors
 /// As [`trial`], and when a run of the fit fails though the whole record does not.
-pub fn dry_run(
-    study: &mut Study,
-    kind: EstimatorKind,
-    depth: Depth,
-) -> Result<Vec<TrialChannel>, TrialError> {
+pub fn dry_run(study: &mut Study, kind: &Kind, depth: Depth) -> Result<Vec<TrialChannel>, TrialError> {
     let channels = trial(study)?;
     if !study.runs_here {
         return Ok(channels);
@@ -47,9 +44,9 @@ pub fn dry_run(
             continue;
         }
         let of_record = DryRun::new(study, &*model, record);
-        let told = match kind {
-            EstimatorKind::Roukf => of_record.windows(depth).map(|()| None)?,
-            EstimatorKind::Batch => of_record.training_span()?,
+        let told = match kind.form {
+            Form::Windows(_) => of_record.windows(depth).map(|()| None)?,
+            Form::WholeRecords => of_record.training_span()?,
         };
         if let Some(why) = told.filter(|_| !study.whole_answers) {
             study.whole_answers = true;

@@ -8,7 +8,7 @@ use starlings_estimators::{Drift, autocorrelation, effective_nis_band};
 use super::residuals::Residuals;
 use crate::constants::in_sds;
 use crate::store::PredictionRow;
-use crate::{EstimatorKind, Fit, Study, fit::settle, posterior};
+use crate::{Fit, Study, fit::settle, posterior};
 
 /// Probability with which NIS of a right model stays within its band.
 const LEVEL: f64 = 0.998;
@@ -116,7 +116,7 @@ fn moving(name: &str, size: &str, passes: usize, are_fixed: bool) -> String {
 /// with the estimate has more than that is the square of its distance from the best, in posterior standard deviations.
 pub(super) fn free_run(fit: &Fit, study: &Study, predictions: &[PredictionRow]) -> Option<String> {
     let drifting = study.theta.iter().any(|t| !matches!(t.drift, Drift::None));
-    if study.estimator.kind == EstimatorKind::Batch || drifting || !study.observer_is_off() {
+    if !study.estimator.kind.is_filter() || drifting || !study.observer_is_off() {
         return None;
     }
     let train = predictions.iter().filter(|p| p.usage == "train");

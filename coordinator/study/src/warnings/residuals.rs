@@ -8,7 +8,7 @@ use starlings_estimators::{Pooled, effective_sample_size};
 
 use super::super::field::field_of;
 use super::super::store::{PredictionRow, Store, StoreError, table};
-use super::super::{EstimatorKind, Fit, Study};
+use super::super::{Fit, Study};
 
 /// Residuals of one output, or of all components of a field, in one record.
 pub(crate) struct Residuals {
@@ -54,8 +54,7 @@ pub(crate) fn residuals(
     store: &Store,
     predictions: &[PredictionRow],
 ) -> Result<Vec<Residuals>, StoreError> {
-    let filtered =
-        study.estimator.kind == EstimatorKind::Roukf && (study.drifts() || !study.observer_is_off());
+    let filtered = study.estimator.kind.is_filter() && (study.drifts() || !study.observer_is_off());
     let mut all = Vec::new();
     if filtered {
         let last = fit.passes.to_string();

@@ -9,7 +9,7 @@
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
-use starlings_estimators::{Data, Gaussian, Noise, Particles, Points, Root, Roukf, SigmaSet};
+use starlings_estimators::{Data, Filter, Gaussian, Noise, Particles, Points, Root, Roukf, SigmaSet};
 use starlings_fleet::Fleet;
 use starlings_models::{Job, Prediction, Window};
 use starlings_study::Study;

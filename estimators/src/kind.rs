@@ -1,0 +1,61 @@
+//! What an estimator says of itself: its name in a study file, the settings that it reads, and how it goes through the data.
+//!
+//! Being in the list [`crate::KINDS`] is all that a filter needs: its name becomes valid in a study file, and the loop over
+//! windows runs it. Deliberately no arithmetic. Read next: `filter.rs`, then `roukf.rs`.
+
+use crate::{Drift, EstimatorError, Filter, Points, Root};
+
+/// An estimator as a study file names it.
+#[derive(Debug)]
+pub struct Kind {
+    /// Its `kind` in a study file.
+    pub name: &'static str,
+    /// Keys of the section that it reads beside those that all share (`points`, `kappa`, `spread`).
+    pub keys: &'static [&'static str],
+    /// Width of its points unless the study says otherwise.
+    pub spread: f64,
+    /// How it goes through the data.
+    pub form: Form,
+}
+
+/// How an estimator goes through the data.
+#[derive(Debug)]
+pub enum Form {
+    /// From window to window, on particles that go on from the states of the last analysis.
+    Windows(MakeFilter),
+    /// Over whole records, each run from its start.
+    WholeRecords,
+}
+
+/// Makes a filter.
+pub type MakeFilter = fn(&Options) -> Result<Box<dyn Filter>, EstimatorError>;
+
+/// What a filter is made from.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Number of parameters p.
+    pub n_param: usize,
+    /// Which points.
+    pub points: Points,
+    /// Root of the posterior covariance.
+    pub root: Root,
+    /// Drift of each parameter, length p; empty = none drifts.
+    pub drift: Vec<Drift>,
+    /// The study's seed, for a filter that draws its particles.
+    pub seed: u64,
+}
+
+impl Kind {
+    /// Whether it goes from window to window, on states that the model restarts from.
+    pub fn is_filter(&self) -> bool {
+        matches!(self.form, Form::Windows(_))
+    }
+}
+
+impl PartialEq for Kind {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
+impl Eq for Kind {}
