@@ -6,7 +6,7 @@
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use starlings_coordinator::study::{Study, Surroundings, Undescribed};
+use starlings_coordinator::study::{SolverHost, Study, Undescribed};
 use starlings_models::SetupError;
 use starlings_solver::Solvers;
 use starlings_solver::faults;
@@ -27,7 +27,7 @@ pub(crate) fn load(path: &Path) -> Result<Study, Failure> {
         })
     };
     let factory = Arc::new(|setup: &_| here().map_err(SetupError::Invalid)?.build(setup));
-    Ok(Study::load_with(path, &Surroundings::asking(describe, factory).inspecting(faults))?)
+    Ok(Study::load_with(path, &SolverHost::asking(describe, factory).inspecting(faults))?)
 }
 
 /// Ends the solvers of this process; one that is needed again starts again.

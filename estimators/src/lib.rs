@@ -63,7 +63,7 @@ pub use particles::Particles;
 pub use pooled::Pooled;
 pub use recombine::{Recombination, recombine};
 pub use roukf::{ROUKF, Root, Roukf};
-pub use sandwich::{Place, Residuals};
+pub use sandwich::{DataPoint, Residuals};
 pub use score::{Optimum, Score, null_maxima, score_correlation};
 pub use sigma_set::{Points, SigmaSet};
 pub use transform::Transform;

@@ -29,7 +29,7 @@ const FEWEST: usize = 8;
 
 /// Where an observed value stands.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
+pub struct DataPoint {
     /// Number of its record; records are independent.
     pub record: usize,
     /// Its time.
@@ -46,7 +46,7 @@ pub struct Residuals<'a> {
     /// Observed minus predicted over the noise sd, length m.
     pub values: &'a DVector<f64>,
     /// Where they stand, length m: records one after the other, times increasing within each.
-    pub places: &'a [Place],
+    pub places: &'a [DataPoint],
 }
 
 impl Residuals<'_> {

@@ -4,7 +4,7 @@ mod common;
 
 use common::{gauss, rng};
 use nalgebra::{DMatrix, DVector};
-use starlings_estimators::{EstimatorError, Place, Residuals};
+use starlings_estimators::{DataPoint, EstimatorError, Residuals};
 
 /// Sensitivities like those of a stiffness, a damping and an offset.
 fn design(n: usize) -> DMatrix<f64> {
@@ -14,8 +14,8 @@ fn design(n: usize) -> DMatrix<f64> {
     })
 }
 
-fn places(n: usize) -> Vec<Place> {
-    (0..n).map(|k| Place { record: 0, time: k as f64, channel: 0 }).collect()
+fn places(n: usize) -> Vec<DataPoint> {
+    (0..n).map(|k| DataPoint { record: 0, time: k as f64, channel: 0 }).collect()
 }
 
 /// Errors of an autoregression of first order of the given sd, with white noise of sd one.
@@ -29,7 +29,7 @@ fn errors(n: usize, rho: f64, sd: f64, seed: u64) -> DVector<f64> {
 }
 
 /// Errors of the estimate in sd at the stated noise, the residuals that it leaves, and what those widen the interval by.
-fn fitted(jacobian: &DMatrix<f64>, errors: &DVector<f64>, places: &[Place]) -> (DVector<f64>, Vec<f64>) {
+fn fitted(jacobian: &DMatrix<f64>, errors: &DVector<f64>, places: &[DataPoint]) -> (DVector<f64>, Vec<f64>) {
     let p = jacobian.ncols();
     let inverse = (DMatrix::identity(p, p) + jacobian.tr_mul(jacobian)).try_inverse().unwrap();
     let off = &inverse * jacobian.tr_mul(errors);
@@ -81,15 +81,15 @@ fn channels_that_err_together_count_once_and_records_by_their_own_errors() {
     let n = 300;
     let one = design(n);
     let e = errors(n, 0.0, 0.0, 9);
-    let twice = |f: &dyn Fn(usize) -> Place| (0..2 * n).map(f).collect::<Vec<_>>();
+    let twice = |f: &dyn Fn(usize) -> DataPoint| (0..2 * n).map(f).collect::<Vec<_>>();
     let jacobian = DMatrix::from_fn(2 * n, 3, |k, j| one[(k / 2, j)]);
     let same = DVector::from_fn(2 * n, |k, _| e[k / 2]);
-    let channels = twice(&|k| Place { record: 0, time: (k / 2) as f64, channel: k % 2 });
+    let channels = twice(&|k| DataPoint { record: 0, time: (k / 2) as f64, channel: k % 2 });
     let (_, inflation) = fitted(&jacobian, &same, &channels);
     // Two copies of one channel say what one says: sqrt 2, known as well as the size of 300 numbers, and a few percent of t.
     assert!(inflation.iter().all(|f| (1.30..1.75).contains(f)), "{inflation:?}");
     let stacked = DMatrix::from_fn(2 * n, 3, |k, j| one[(k % n, j)]);
-    let records = twice(&|k| Place { record: k / n, time: (k % n) as f64, channel: 0 });
+    let records = twice(&|k| DataPoint { record: k / n, time: (k % n) as f64, channel: 0 });
     let (_, inflation) = fitted(&stacked, &errors(2 * n, 0.0, 0.0, 11), &records);
     assert!(inflation.iter().all(|f| *f < 1.3), "{inflation:?}");
 }
@@ -103,8 +103,8 @@ fn a_record_that_errs_as_a_whole_is_an_error_of_its_own() {
     let offset: Vec<f64> = (0..n_record).map(|_| 3.0 * gauss(&mut g)).collect();
     let noise = errors(n_record * n, 0.0, 0.0, 4);
     let all = DVector::from_fn(n_record * n, |k, _| offset[k / n] + noise[k]);
-    let places: Vec<Place> =
-        (0..n_record * n).map(|k| Place { record: k / n, time: (k % n) as f64, channel: 0 }).collect();
+    let places: Vec<DataPoint> =
+        (0..n_record * n).map(|k| DataPoint { record: k / n, time: (k % n) as f64, channel: 0 }).collect();
     let (_, inflation) = fitted(&jacobian, &all, &places);
     // The level is known to 3 / sqrt 6 instead of 1 / sqrt 240: nineteen times; six numbers know that to a third.
     assert!((9.0..40.0).contains(&inflation[0]), "{inflation:?}");
@@ -154,7 +154,8 @@ fn times_that_are_uneven_or_missing_are_taken_as_they_are() {
     let (jacobian, e) = (design(n), errors(n, 0.97, 2.0, 21));
     let kept: Vec<usize> = (0..n).filter(|k| (k * k) % 7 < 3).collect();
     let thin = jacobian.select_rows(&kept);
-    let at: Vec<Place> = kept.iter().map(|k| Place { record: 0, time: *k as f64, channel: 0 }).collect();
+    let at: Vec<DataPoint> =
+        kept.iter().map(|k| DataPoint { record: 0, time: *k as f64, channel: 0 }).collect();
     let (_, whole) = fitted(&jacobian, &e, &places(n));
     let (_, part) = fitted(&thin, &DVector::from_fn(kept.len(), |i, _| e[kept[i]]), &at);
     // A third of the rows are a third of the stated information; the errors hardly say less for it.

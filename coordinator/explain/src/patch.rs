@@ -68,11 +68,11 @@ pub fn explained_study(
     }
     let text = document.to_string();
     // The solver has said already what it is.
-    let surroundings = match study.setup.model.description() {
-        Some(description) => study.surroundings.knowing(description),
-        None => study.surroundings.clone(),
+    let solver_host = match study.setup.model.description() {
+        Some(description) => study.solver_host.knowing(description),
+        None => study.solver_host.clone(),
     };
-    Study::from_text_with(&to.join("explained.toml"), &text, &surroundings)?;
+    Study::from_text_with(&to.join("explained.toml"), &text, &solver_host)?;
     Ok(text)
 }
 

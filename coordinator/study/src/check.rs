@@ -29,14 +29,14 @@ use starlings_models::Setup;
 use self::built::CheckedModel;
 use self::parameters::initial_medians;
 use self::settings::{estimator, fleet};
-use self::solver::Known;
+use self::solver::DescribedSolver;
 use super::checked::{Record, Study};
 use super::expand;
 use super::field::field_of;
 use super::file::{RecordSection, StudyFile};
 use super::problem::{Problem, Source, StudyError};
 use super::record::{Context, Recordings};
-use super::surroundings::Surroundings;
+use super::solver_host::SolverHost;
 use crate::file::read::read;
 
 impl Study {
@@ -45,16 +45,16 @@ impl Study {
     /// # Errors
     /// Everything that is wrong, each with its place and remedy.
     pub fn load(path: &Path) -> Result<Self, StudyError> {
-        Self::load_with(path, &Surroundings::default())
+        Self::load_with(path, &SolverHost::default())
     }
 
     /// Reads and checks a study file where solvers can be started.
     ///
     /// # Errors
     /// As [`Study::load`].
-    pub fn load_with(path: &Path, surroundings: &Surroundings) -> Result<Self, StudyError> {
+    pub fn load_with(path: &Path, solver_host: &SolverHost) -> Result<Self, StudyError> {
         match std::fs::read_to_string(path) {
-            Ok(text) => Self::from_text_with(path, &text, surroundings),
+            Ok(text) => Self::from_text_with(path, &text, solver_host),
             Err(error) => {
                 let problem = Problem {
                     message: format!("cannot read the study: {error}"),
@@ -73,19 +73,19 @@ impl Study {
     /// # Errors
     /// As [`Study::load`].
     pub fn from_text(file: &Path, text: &str) -> Result<Self, StudyError> {
-        Self::from_text_with(file, text, &Surroundings::default())
+        Self::from_text_with(file, text, &SolverHost::default())
     }
 
     /// Checks the text of a study file that stands, or stood, at `file`, where solvers can be started.
     ///
     /// # Errors
     /// As [`Study::load`].
-    pub fn from_text_with(file: &Path, text: &str, surroundings: &Surroundings) -> Result<Self, StudyError> {
-        check(file, text, surroundings)
+    pub fn from_text_with(file: &Path, text: &str, solver_host: &SolverHost) -> Result<Self, StudyError> {
+        check(file, text, solver_host)
     }
 }
 
-fn check(path: &Path, text: &str, surroundings: &Surroundings) -> Result<Study, StudyError> {
+fn check(path: &Path, text: &str, solver_host: &SolverHost) -> Result<Study, StudyError> {
     let source = Source::new(path, text);
     let file = read(&source)?;
     if source.count() > 0 {
@@ -94,8 +94,8 @@ fn check(path: &Path, text: &str, surroundings: &Surroundings) -> Result<Study, 
         source.verdict()?;
     }
     check_name(&source, &file);
-    let solver = solver::solver(&source, &file, surroundings);
-    let described = solver.as_ref().and_then(Known::description);
+    let solver = solver::solver(&source, &file, solver_host);
+    let described = solver.as_ref().and_then(DescribedSolver::description);
     let estimator = estimator(&source, &file.estimator, described);
     let fleet = fleet(&source, &file.fleet);
     let explain = explain::explain(&source, &file);
@@ -118,7 +118,7 @@ fn check(path: &Path, text: &str, surroundings: &Surroundings) -> Result<Study, 
     model.setup.parameters = file.parameters.iter().map(|p| p.name.get_ref().clone()).collect();
     let parameters = initial_medians(&source, &file, &model.spec, &priors, &records);
     source.verdict()?;
-    scales::check(&source, &file, &mut model, (&parameters, &records), surroundings, &mut warnings);
+    scales::check(&source, &file, &mut model, (&parameters, &records), solver_host, &mut warnings);
     source.verdict()?;
     check_setup(&source, &file, &model.setup, &records)?;
     warnings.extend(units::warnings(&file, &model, &records));
@@ -143,7 +143,7 @@ fn check(path: &Path, text: &str, surroundings: &Surroundings) -> Result<Study, 
         delays: model.delays,
         runs_here: solver.is_none_or(|known| known.is_here),
         whole_answers: false,
-        surroundings: surroundings.clone(),
+        solver_host: solver_host.clone(),
         warnings,
     })
 }

@@ -10,8 +10,8 @@ use starlings_estimators::{Drift, Kind, Points, Root, Transform};
 use starlings_models::spectrum::Decay;
 use starlings_models::{EffectDef, Setup, Signal, Spec};
 
+use super::solver_host::SolverHost;
 use super::surfaces::Node;
-use super::surroundings::Surroundings;
 
 /// A study whose names exist, whose numbers make sense and whose recordings were read.
 #[derive(Clone, Debug)]
@@ -55,7 +55,7 @@ pub struct Study {
     /// Whether every run covers a whole record, since the solver answers for nothing less; found by a dry run.
     pub whole_answers: bool,
     /// Who starts its solver, where the model is one.
-    pub surroundings: Surroundings,
+    pub solver_host: SolverHost,
     /// What is doubtful but no error.
     pub warnings: Vec<String>,
 }

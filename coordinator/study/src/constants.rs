@@ -12,7 +12,7 @@ use starlings_estimators::{Points, Sensitivities};
 
 use self::moved::Moved;
 use super::Study;
-use super::fit::flight::{Flight, Place};
+use super::fit::runner::{AnalysisIndex, EnsembleRunner};
 use super::identify::ensemble::{self, Response, Seen};
 use super::identify::error::IdentifyError;
 
@@ -87,16 +87,16 @@ impl HangsOn {
 ///
 /// # Errors
 /// When the fleet fails, or the model fails next to the estimate.
-pub fn of_fit(flight: &mut Flight<'_>, centre: &[f64]) -> Result<HangsOn, IdentifyError> {
-    let study = flight.study();
+pub fn of_fit(runner: &mut EnsembleRunner<'_>, centre: &[f64]) -> Result<HangsOn, IdentifyError> {
+    let study = runner.study();
     let moved = moved::all(study);
     if let Some(nothing) = none_of(&moved) {
         return Ok(nothing);
     }
     // One point more than parameters: to first order the same as pairs, at half the price.
-    let response = ensemble::run_with(flight, centre, Points::Simplex, Seen::AsFitted)?;
+    let response = ensemble::run_with(runner, centre, Points::Simplex, Seen::AsFitted)?;
     let sensitivities = Sensitivities::new(&response.whitened, &prior_sd(study), ensemble::spread(study))?;
-    around(flight, centre, &response, &sensitivities, &moved, Seen::AsFitted)
+    around(runner, centre, &response, &sensitivities, &moved, Seen::AsFitted)
 }
 
 /// The same with an ensemble that was run already.
@@ -104,16 +104,16 @@ pub fn of_fit(flight: &mut Flight<'_>, centre: &[f64]) -> Result<HangsOn, Identi
 /// # Errors
 /// When the fleet fails.
 pub fn of_ensemble(
-    flight: &mut Flight<'_>,
+    runner: &mut EnsembleRunner<'_>,
     centre: &[f64],
     response: &Response,
     sensitivities: &Sensitivities,
 ) -> Result<HangsOn, IdentifyError> {
-    let moved = moved::all(flight.study());
+    let moved = moved::all(runner.study());
     if let Some(nothing) = none_of(&moved) {
         return Ok(nothing);
     }
-    let mut found = around(flight, centre, response, sensitivities, &moved, Seen::Freely)?;
+    let mut found = around(runner, centre, response, sensitivities, &moved, Seen::Freely)?;
     found.runs -= response.runs;
     Ok(found)
 }
@@ -129,21 +129,21 @@ fn prior_sd(study: &Study) -> Vec<f64> {
 }
 
 fn around(
-    flight: &mut Flight<'_>,
+    runner: &mut EnsembleRunner<'_>,
     centre: &[f64],
     response: &Response,
     sensitivities: &Sensitivities,
     moved: &[Moved],
     seen: Seen,
 ) -> Result<HangsOn, IdentifyError> {
-    let study = flight.study();
+    let study = runner.study();
     let windows = ensemble::windows(study, seen);
     let theta = DMatrix::from_column_slice(centre.len(), 1, centre);
     let tried = moved.iter().filter_map(|m| m.setup.as_ref().map(|(_, setup)| setup));
     let setups: Vec<_> = std::iter::once(&study.setup).chain(tried).cloned().collect();
-    let place = Place { pass: 0, step: 2 };
-    let results = flight.run_setups(place, &setups, &theta, &windows)?;
-    let answer = Answer::new(study, response, sensitivities)?;
+    let place = AnalysisIndex { pass: 0, step: 2 };
+    let results = runner.run_setups(place, &setups, &theta, &windows)?;
+    let answer = EstimateResponse::new(study, response, sensitivities)?;
     let mut found =
         HangsOn { runs: response.runs + (setups.len() * windows.len()) as u64, ..HangsOn::default() };
     let mut results = results.iter();
@@ -169,13 +169,13 @@ fn around(
 }
 
 /// How the estimate answers to a change of the predictions.
-struct Answer<'a> {
+struct EstimateResponse<'a> {
     study: &'a Study,
     response: &'a Response,
     covariance: DMatrix<f64>,
 }
 
-impl<'a> Answer<'a> {
+impl<'a> EstimateResponse<'a> {
     fn new(study: &'a Study, response: &'a Response, s: &Sensitivities) -> Result<Self, IdentifyError> {
         Ok(Self { study, response, covariance: s.fisher()?.posterior_covariance() })
     }

@@ -8,9 +8,9 @@
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
-use starlings_estimators::{Gaussian, Place, Residuals};
+use starlings_estimators::{DataPoint, Gaussian, Residuals};
 
-use super::fit::flight::{self, Flight, StepWindows};
+use super::fit::runner::{self, EnsembleRunner, StepWindows};
 use super::fit::stack::stack_outputs;
 use super::{RunError, Study, posterior};
 
@@ -30,8 +30,11 @@ pub(crate) enum GivenResiduals {
 ///
 /// # Errors
 /// When the fleet fails. A model that fails beside the estimate is no error: see [`GivenResiduals::Unknown`].
-pub(crate) fn compare(flight: &mut Flight<'_>, posterior: &Gaussian) -> Result<GivenResiduals, RunError> {
-    let study = flight.study();
+pub(crate) fn compare(
+    runner: &mut EnsembleRunner<'_>,
+    posterior: &Gaussian,
+) -> Result<GivenResiduals, RunError> {
+    let study = runner.study();
     if study.drifts() && study.estimator.kind.is_filter() {
         let why = "a parameter drifts, and its value at the end is no parameter of the whole record";
         return Ok(GivenResiduals::Unknown(why.to_owned()));
@@ -46,7 +49,7 @@ pub(crate) fn compare(flight: &mut Flight<'_>, posterior: &Gaussian) -> Result<G
             let moved = particle == study.theta[j].parameter + 1;
             posterior.mean[j] + if moved { side * DISTANCE * sd[j] } else { 0.0 }
         });
-        if let Some(outputs) = run(flight, &theta, &windows)? {
+        if let Some(outputs) = run(runner, &theta, &windows)? {
             let slopes = Slopes { study, windows: &windows, outputs: &outputs, theta: &theta };
             return slopes.compare();
         }
@@ -56,13 +59,14 @@ pub(crate) fn compare(flight: &mut Flight<'_>, posterior: &Gaussian) -> Result<G
 
 /// The predictions, m x (q + 1); `None` when a run failed or predicted what is no finite number.
 fn run(
-    flight: &mut Flight<'_>,
+    runner: &mut EnsembleRunner<'_>,
     theta: &DMatrix<f64>,
     windows: &StepWindows,
 ) -> Result<Option<DMatrix<f64>>, RunError> {
     let particles: Vec<usize> = (0..theta.ncols()).collect();
-    let states = vec![None; flight.study().records.len()];
-    let results = flight.run(flight::Place { pass: 0, step: 3 }, &particles, theta, &states, windows)?;
+    let states = vec![None; runner.study().records.len()];
+    let results =
+        runner.run(runner::AnalysisIndex { pass: 0, step: 3 }, &particles, theta, &states, windows)?;
     if results.iter().flatten().any(Result::is_err) {
         return Ok(None);
     }
@@ -86,7 +90,7 @@ impl Slopes<'_> {
         }
         let jacobian = DMatrix::from_fn(rows.len(), self.study.theta.len(), |k, j| self.slope(&rows[k], j));
         let values = DVector::from_iterator(rows.len(), rows.iter().map(|row| row.residual(self.outputs)));
-        let places: Vec<Place> = rows.iter().map(|row| row.place).collect();
+        let places: Vec<DataPoint> = rows.iter().map(|row| row.place).collect();
         let inflation = Residuals { jacobian: &jacobian, values: &values, places: &places }.inflation()?;
         Ok(inflation.map_or_else(
             || {
@@ -112,7 +116,7 @@ impl Slopes<'_> {
                     at: first + k,
                     observed: *observed,
                     noise: noise[channel],
-                    place: Place { record: *record, time, channel },
+                    place: DataPoint { record: *record, time, channel },
                 });
             }
             first += window.observed.len();
@@ -142,7 +146,7 @@ struct Row {
     at: usize,
     observed: f64,
     noise: f64,
-    place: Place,
+    place: DataPoint,
 }
 
 impl Row {

@@ -21,7 +21,7 @@ pub use result::Identification;
 use starlings_estimators::Sensitivities;
 use starlings_fleet::Fleet;
 
-use super::fit::flight::Flight;
+use super::fit::runner::EnsembleRunner;
 use super::{Study, constants};
 
 /// Runs one ensemble of the study around a point and says what its data could determine.
@@ -30,15 +30,15 @@ use super::{Study, constants};
 /// When the point is no point of this study, the fleet fails, or the model fails next to the point.
 pub fn identify(study: &Study, fleet: &mut dyn Fleet, at: &At) -> Result<Identification, IdentifyError> {
     let centre = at.centre(study)?;
-    let mut flight = Flight::new(study, fleet)?;
-    let response = ensemble::run(&mut flight, &centre)?;
+    let mut runner = EnsembleRunner::new(study, fleet)?;
+    let response = ensemble::run(&mut runner, &centre)?;
     let prior_sd: Vec<f64> = study.theta.iter().map(|t| t.prior_sd).collect();
     let spread = ensemble::spread(study);
     let sensitivities = Sensitivities::new(&response.whitened, &prior_sd, ensemble::accuracy(spread))?;
-    let hangs_on = constants::of_ensemble(&mut flight, &centre, &response, &sensitivities)?;
+    let hangs_on = constants::of_ensemble(&mut runner, &centre, &response, &sensitivities)?;
     let mut result = gather::make(study, at, &centre, response, &sensitivities)?;
     result.hangs_on = hangs_on;
-    result.workers = flight.n_answered();
+    result.workers = runner.n_answered();
     result.spread = spread;
     result.warnings = advice::warnings(study, &result);
     result.advice = advice::advice(&result);

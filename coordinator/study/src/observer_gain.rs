@@ -2,7 +2,7 @@
 //!
 //! Both runs predict the same observations; with the observer each prediction follows the corrections of all earlier ones, at
 //! the spacings at which the filter's own runs are corrected.
-//! Nothing of this reaches the posterior. Next file to read: [`crate::fit::forecast`].
+//! Nothing of this reaches the posterior. Next file to read: [`crate::fit::free_run`].
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use starlings_estimators::Gaussian;
 use starlings_models::{Failure, Window};
 
-use super::fit::flight::{Flight, Place, StepWindows};
+use super::fit::runner::{AnalysisIndex, EnsembleRunner, StepWindows};
 use super::store::PredictionRow;
 use super::{RunError, Study};
 
@@ -67,11 +67,11 @@ pub enum Compared {
 /// # Errors
 /// When the fleet fails. A model that fails under its observer at the estimate is no error: see [`Compared::Failed`].
 pub fn compare(
-    flight: &mut Flight<'_>,
+    runner: &mut EnsembleRunner<'_>,
     posterior: &Gaussian,
     free: &[PredictionRow],
 ) -> Result<Compared, RunError> {
-    let study = flight.study();
+    let study = runner.study();
     if study.observer_is_off() {
         return Ok(Compared::NoObserver);
     }
@@ -79,7 +79,7 @@ pub fn compare(
     let windows: StepWindows = trained.map(|record| (record, Arc::new(study.whole(record, true)))).collect();
     let theta = DMatrix::from_column_slice(posterior.mean.len(), 1, posterior.mean.as_slice());
     let states = vec![None; study.records.len()];
-    let results = flight.run(Place { pass: 0, step: 1 }, &[0], &theta, &states, &windows)?;
+    let results = runner.run(AnalysisIndex { pass: 0, step: 1 }, &[0], &theta, &states, &windows)?;
     let mut courses = Vec::new();
     let mut sums = Sums::default();
     for ((record, window), result) in windows.iter().zip(results.into_iter().flatten()) {

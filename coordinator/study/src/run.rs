@@ -10,13 +10,13 @@ use starlings_fleet::{Fleet, FleetError, FleetEvent};
 use starlings_models::Failure;
 
 use super::constants::{self, HangsOn};
-use super::fit::{batch, filter, forecast};
+use super::fit::{batch, filter, free_run};
 use super::given_residuals::{self, GivenResiduals};
 use super::identify::IdentifyError;
 use super::store::{Store, StoreError};
 use super::summary::Summary;
 use super::{Study, observer_gain, summary, warnings};
-use crate::fit::flight::Flight;
+use crate::fit::runner::EnsembleRunner;
 use crate::observer_gain::Compared;
 use crate::store::folder::{OBSERVER, RunFolder};
 use crate::store::json::json;
@@ -233,14 +233,14 @@ fn from_start_to_end(
         "run",
         if resumed.is_some() { "run resumed" } else { "run started" },
     )?;
-    let mut flight = Flight::new(study, fleet)?.deciding(&folder.store)?;
-    flight.threads = context.threads.max(1);
+    let mut runner = EnsembleRunner::new(study, fleet)?.deciding(&folder.store)?;
+    runner.threads = context.threads.max(1);
     let fit = match study.estimator.kind.form {
-        Form::Windows(make) => filter::fit(make, &mut flight, &folder.store, context, resumed)?,
-        Form::WholeRecords => batch::fit(&mut flight, &folder.store, context, resumed)?,
+        Form::Windows(make) => filter::fit(make, &mut runner, &folder.store, context, resumed)?,
+        Form::WholeRecords => batch::fit(&mut runner, &folder.store, context, resumed)?,
     };
-    let predictions = forecast::run(&mut flight, &fit.posterior)?;
-    let observer = observer_gain::compare(&mut flight, &fit.posterior, &predictions)?;
+    let predictions = free_run::run(&mut runner, &fit.posterior)?;
+    let observer = observer_gain::compare(&mut runner, &fit.posterior, &predictions)?;
     let (hangs_on, given_residuals) = match &observer {
         // What fails at the estimate itself need not be tried beside it.
         Compared::Failed(_) => {
@@ -248,13 +248,13 @@ fn from_start_to_end(
             (Ok(HangsOn::default()), GivenResiduals::Unknown(why))
         }
         Compared::NoObserver | Compared::Both(_) => {
-            (hangs_on(&mut flight, &fit)?, given_residuals::compare(&mut flight, &fit.posterior)?)
+            (hangs_on(&mut runner, &fit)?, given_residuals::compare(&mut runner, &fit.posterior)?)
         }
     };
-    let jobs = flight.take_rows();
+    let jobs = runner.take_rows();
     folder.store.predictions(&predictions, &jobs)?;
     context.keep_events(&folder.store)?;
-    let mut result = summary::make(study, &fit, &predictions, flight.n_answered(), context.elapsed());
+    let mut result = summary::make(study, &fit, &predictions, runner.n_answered(), context.elapsed());
     result.add_residuals(study, &fit, &given_residuals);
     let mut unknown = None;
     match observer {
@@ -269,7 +269,7 @@ fn from_start_to_end(
     result.warnings = warnings::collect(study, &fit, &result, &predictions, &residuals);
     result.warnings.extend(unknown);
     result.warnings.extend(folder.mixed()?);
-    result.warnings.extend(flight.timeouts());
+    result.warnings.extend(runner.timeouts());
     match hangs_on {
         Ok(found) => result.hangs_on = (found.runs > 0).then_some(found),
         Err(why) => result.warnings.push(why),
@@ -282,11 +282,11 @@ fn from_start_to_end(
 
 /// Which constants the answer hangs on, or why that is not known. Nothing is said of parameters that drift: they follow
 /// whatever is wrong.
-fn hangs_on(flight: &mut Flight<'_>, fit: &Fit) -> Result<Result<HangsOn, String>, RunError> {
-    if flight.study().drifts() {
+fn hangs_on(runner: &mut EnsembleRunner<'_>, fit: &Fit) -> Result<Result<HangsOn, String>, RunError> {
+    if runner.study().drifts() {
         return Ok(Ok(HangsOn::default()));
     }
-    match constants::of_fit(flight, fit.posterior.mean.as_slice()) {
+    match constants::of_fit(runner, fit.posterior.mean.as_slice()) {
         Ok(found) => Ok(Ok(found)),
         Err(IdentifyError::Run(error)) => Err(error),
         Err(error) => Ok(Err(format!("which constants the answer hangs on is not known: {error}"))),

@@ -102,7 +102,7 @@ pub fn trial(study: &Study) -> Result<Vec<TrialChannel>, TrialError> {
     if !study.runs_here {
         return Ok(Vec::new());
     }
-    let model = study.surroundings.build(&study.setup)?;
+    let model = study.solver_host.build(&study.setup)?;
     let prior = posterior::prior(study);
     let mut channels = Vec::new();
     for (index, record) in study.records.iter().enumerate() {

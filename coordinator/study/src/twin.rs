@@ -86,7 +86,7 @@ pub fn simulate(study: &Study, twin: &Twin) -> Result<Recording, TwinError> {
         .get(twin.record)
         .ok_or_else(|| TwinError::Request(format!("the study has {} records", study.records.len())))?;
     let (setup, theta) = place(study, twin)?;
-    let model = study.surroundings.build(&setup)?;
+    let model = study.solver_host.build(&setup)?;
     let times = if twin.times.is_empty() { record.times.clone() } else { twin.times.clone() };
     let start = record.times.first().copied().unwrap_or_default();
     if times.first().is_some_and(|t| *t < start) || times.windows(2).any(|w| w[1] <= w[0]) {
@@ -151,7 +151,7 @@ fn in_units(study: &Study, twin: &Twin, setup: &mut Setup, theta: &[f64]) -> Res
     let record = &study.records[twin.record];
     let times = if twin.times.is_empty() { &record.times } else { &twin.times };
     let trial = Trial { record, times: times.clone(), theta: theta.to_vec() };
-    let ruler = Ruler::new(setup, &[trial], &study.surroundings).map_err(|error| match error {
+    let ruler = Ruler::new(setup, &[trial], &study.solver_host).map_err(|error| match error {
         CourseError::Setup(error) => TwinError::Setup(error),
         CourseError::Run(error) => TwinError::Model(error),
     })?;

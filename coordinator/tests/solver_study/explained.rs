@@ -3,7 +3,7 @@
 use starlings_coordinator::explain::patch::explained_study;
 use starlings_coordinator::explain::{Context, Explanation, Findings, Options, Verdict, explain};
 use starlings_coordinator::study::store::Store;
-use starlings_coordinator::study::{Study, Surroundings};
+use starlings_coordinator::study::{SolverHost, Study};
 
 use crate::inside::{Inside, Place, threads};
 use crate::messages;
@@ -23,9 +23,9 @@ fn explained(data: &str, hosts: &[&str]) -> Explanation {
 fn findings(data: &str, hosts: &[&str], text: &str) -> (Findings, Place, Inside) {
     let here = Place::new(&[("study.toml", &native("")), ("swing.csv", data)]);
     let there = Place::new(&[("study.toml", text), ("swing.csv", data)]);
-    let inside = Inside::of(&here.load(&Surroundings::default()).unwrap(), hosts);
+    let inside = Inside::of(&here.load(&SolverHost::default()).unwrap(), hosts);
     std::fs::create_dir(there.folder.path().join("out")).unwrap();
-    let study = there.load(&inside.surroundings()).unwrap();
+    let study = there.load(&inside.solver_host()).unwrap();
     let store = Store::create(&there.folder.path().join("out/run.db"), &[]).unwrap();
     let mut context = Context { clock: &|| 0.0, watch: &mut |_| {}, events: None, earlier_s: 0.0 };
     let found = explain(&study, &mut threads(&inside), &store, &mut context, &Options::default());
@@ -70,7 +70,7 @@ fn the_explained_study_finds_the_solver_from_the_folder_that_it_stands_in() {
     let file = out.join("explained.toml");
     std::fs::write(&file, &text).unwrap();
     let explained =
-        Study::load_with(&file, &inside.surroundings()).unwrap_or_else(|error| panic!("{error}\n{text}"));
+        Study::load_with(&file, &inside.solver_host()).unwrap_or_else(|error| panic!("{error}\n{text}"));
     let solver = explained.setup.model.solver.unwrap();
     assert_eq!(solver.folder, there.folder.path().canonicalize().unwrap().display().to_string());
     assert_eq!(explained.setup.effects.len(), 1);
@@ -79,7 +79,7 @@ fn the_explained_study_finds_the_solver_from_the_folder_that_it_stands_in() {
 #[test]
 fn the_files_of_a_program_are_found_from_another_folder() {
     let place = messages::place(&messages::command());
-    let study = place.load(&Surroundings::default()).unwrap();
+    let study = place.load(&SolverHost::default()).unwrap();
     let out = place.folder.path().join("runs/one");
     std::fs::create_dir_all(&out).unwrap();
     let text = explained_study(&study, &[], &[], &out).unwrap_or_else(|error| panic!("{error}"));

@@ -7,7 +7,7 @@ use starlings_coordinator::fleet::{Factory, Fleet, InProcess};
 use starlings_coordinator::study::store::Purpose;
 use starlings_coordinator::study::store::folder::Call;
 use starlings_coordinator::study::{
-    FolderError, RunContext, RunError, RunFolder, Study, StudyError, Summary, Surroundings, run::run,
+    FolderError, RunContext, RunError, RunFolder, SolverHost, Study, StudyError, Summary, run::run,
 };
 use starlings_models::{
     Addition, Description, EffectDef, EffectParameter, External, Job, ModelDef, ParticleError, Run, SOLVER,
@@ -44,9 +44,9 @@ impl Inside {
     }
 
     /// Who asks and runs it.
-    pub(crate) fn surroundings(&self) -> Surroundings {
+    pub(crate) fn solver_host(&self) -> SolverHost {
         let known = self.description.clone();
-        Surroundings::new(move |_| Ok(known.clone()), self.factory())
+        SolverHost::new(move |_| Ok(known.clone()), self.factory())
     }
 
     /// What a fleet makes setups with.
@@ -131,8 +131,8 @@ impl Place {
         self.folder.path().join("study.toml")
     }
 
-    pub(crate) fn load(&self, surroundings: &Surroundings) -> Result<Study, StudyError> {
-        Study::load_with(&self.file(), surroundings)
+    pub(crate) fn load(&self, solver_host: &SolverHost) -> Result<Study, StudyError> {
+        Study::load_with(&self.file(), solver_host)
     }
 
     /// Runs a study into a new folder.

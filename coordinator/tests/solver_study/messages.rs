@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use starlings_coordinator::study::{Problem, Study, Surroundings};
+use starlings_coordinator::study::{Problem, SolverHost, Study};
 use starlings_models::{Description, Setup};
 
 use crate::inside::{Inside, Place};
@@ -50,7 +50,7 @@ pub(crate) fn place(study: &str) -> Place {
 
 fn inside() -> Inside {
     let here = place(&native(""));
-    Inside::of(&here.load(&Surroundings::default()).unwrap(), &["v"])
+    Inside::of(&here.load(&SolverHost::default()).unwrap(), &["v"])
 }
 
 /// `line:column: message`, and the help where there is one, with the folder left out.
@@ -61,18 +61,18 @@ fn told(problem: &Problem, folder: &str) -> Vec<String> {
     lines.into_iter().map(|line| line.replace(&format!("{folder}/"), "").replace(folder, "FOLDER")).collect()
 }
 
-fn problems(study: &str, surroundings: &Surroundings) -> Vec<String> {
+fn problems(study: &str, solver_host: &SolverHost) -> Vec<String> {
     let place = place(study);
     let folder = place.folder.path().display().to_string();
-    match place.load(surroundings) {
+    match place.load(solver_host) {
         Ok(_) => Vec::new(),
         Err(error) => error.problems.iter().flat_map(|problem| told(problem, &folder)).collect(),
     }
 }
 
 /// Spoils a good study one place at a time: `- ` the place, `+ ` what is put there, then what is told.
-fn check(good: &str, surroundings: &Surroundings, cases: &str) {
-    assert_eq!(problems(good, surroundings), [""; 0]);
+fn check(good: &str, solver_host: &SolverHost, cases: &str) {
+    assert_eq!(problems(good, solver_host), [""; 0]);
     let mut wrong = String::new();
     for case in cases.trim_end().split("\n\n") {
         let part = |sign: char| {
@@ -83,7 +83,7 @@ fn check(good: &str, surroundings: &Surroundings, cases: &str) {
         let (from, to) = (part('-'), part('+'));
         assert_eq!(good.matches(&from).count(), 1, "`{from}` is not one place of the study");
         let expected: Vec<&str> = case.lines().filter(|l| !l.starts_with(['-', '+'])).collect();
-        let found = problems(&good.replace(&from, &to), surroundings);
+        let found = problems(&good.replace(&from, &to), solver_host);
         if found != expected {
             writeln!(wrong, "- {from}\n+ {to}\n{}\n", found.join("\n")).unwrap();
         }
@@ -94,24 +94,24 @@ fn check(good: &str, surroundings: &Surroundings, cases: &str) {
 #[test]
 fn keys_of_a_solver_are_told_with_place_and_remedy() {
     let good = solver("[observer]\nkind = \"nudging\"\ngain = 0.5\n\n[estimator]\nkind = \"roukf\"\n");
-    check(&good, &inside().surroundings(), include_str!("solver.txt"));
+    check(&good, &inside().solver_host(), include_str!("solver.txt"));
 }
 
 #[test]
 fn keys_of_a_program_that_is_started_for_every_run_are_told_with_place_and_remedy() {
-    check(&command(), &Surroundings::default(), include_str!("command.txt"));
+    check(&command(), &SolverHost::default(), include_str!("command.txt"));
 }
 
 #[test]
 fn what_a_program_is_started_with_travels_with_the_study() {
     let place = place(&command());
-    let study: Study = place.load(&Surroundings::default()).unwrap();
+    let study: Study = place.load(&SolverHost::default()).unwrap();
     let solver = study.setup.model.solver.as_ref().unwrap();
     assert_eq!(solver.folder, place.folder.path().display().to_string());
     let inner = place.folder.path().join("inner");
     std::fs::create_dir(&inner).unwrap();
     place.write("study.toml", &command().replace("timeout = 60", "timeout = 60\nfolder = \"inner\""));
-    let moved = place.load(&Surroundings::default()).unwrap().setup.model.solver.unwrap();
+    let moved = place.load(&SolverHost::default()).unwrap().setup.model.solver.unwrap();
     assert_eq!(moved.folder, inner.canonicalize().unwrap().display().to_string());
     assert_eq!(solver.command, ["./bin/swing", "{folder}"]);
     assert_eq!((solver.memory, solver.timeout.to_bits()), (Some(2 << 30), 60.0_f64.to_bits()));
@@ -128,7 +128,7 @@ fn what_a_program_is_started_with_travels_with_the_study() {
 #[test]
 fn a_template_that_changed_since_starts_another_run() {
     let place = place(&command());
-    let load = || place.load(&Surroundings::default()).unwrap();
+    let load = || place.load(&SolverHost::default()).unwrap();
     let created = starlings_coordinator::study::RunFolder::create(
         starlings_coordinator::study::store::Purpose::Run,
         &place.folder.path().join("run"),
@@ -151,7 +151,7 @@ fn a_template_that_changed_since_starts_another_run() {
 
 /// What is told of a solver that says this of itself.
 fn described(change: impl FnOnce(&mut Description)) -> Vec<String> {
-    problems(&solver(""), &inside().described(change).surroundings())
+    problems(&solver(""), &inside().described(change).solver_host())
 }
 
 #[test]
@@ -195,7 +195,7 @@ fn a_description_that_makes_no_sense_is_told_at_the_command() {
 #[test]
 fn a_solver_that_gives_other_bits_every_time_is_told_about() {
     let place = place(&solver(""));
-    let study = place.load(&inside().described(|d| d.deterministic = false).surroundings()).unwrap();
+    let study = place.load(&inside().described(|d| d.deterministic = false).solver_host()).unwrap();
     assert!(
         study.warnings.iter().any(|w| w.contains("equal requests need not give equal answers")),
         "{:?}",
@@ -206,17 +206,17 @@ fn a_solver_that_gives_other_bits_every_time_is_told_about() {
 #[test]
 fn a_solver_that_cannot_be_started_is_told_with_the_way_out() {
     let mute =
-        Surroundings::new(|_| Err("it exited with status 3".to_owned()), std::sync::Arc::new(Setup::build));
+        SolverHost::new(|_| Err("it exited with status 3".to_owned()), std::sync::Arc::new(Setup::build));
     let told = problems(&solver(""), &mute);
     assert_eq!(told[0], "7:11: the solver does not say what it is: it exited with status 3");
     assert!(told[1].contains("described = \"solver.json\""), "{told:?}");
-    let nobody = problems(&solver(""), &Surroundings::default());
+    let nobody = problems(&solver(""), &SolverHost::default());
     assert_eq!(nobody[0], "7:11: the solver does not say what it is: no solver can be started here");
 }
 
 #[test]
 fn the_estimator_of_a_solver_that_cannot_restart_is_batch() {
-    let once = inside().described(|d| d.spec.restart = false).surroundings();
+    let once = inside().described(|d| d.spec.restart = false).solver_host();
     let line = solver("").lines().count() + 3;
     assert_eq!(
         problems(&solver("\n[estimator]\nkind = \"roukf\"\n"), &once),

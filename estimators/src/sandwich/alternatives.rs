@@ -9,7 +9,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::{Influence, Place, Residuals, scores, working};
+use super::{DataPoint, Influence, Residuals, scores, working};
 
 /// Samples in a beat of the Windkessel's inflow, times the number of samples over the length of the record in beats.
 const BEATS: f64 = 10.0;
@@ -151,7 +151,8 @@ fn shares(windkessel: bool, n: usize, errors: Errors) -> [f64; 6] {
     let jacobian = design(windkessel, n);
     let p = jacobian.ncols();
     let influence = Influence::new(&jacobian).expect("finite");
-    let places: Vec<Place> = (0..n).map(|k| Place { record: 0, time: k as f64, channel: 0 }).collect();
+    let places: Vec<DataPoint> =
+        (0..n).map(|k| DataPoint { record: 0, time: k as f64, channel: 0 }).collect();
     let mut held = [0_u32; 6];
     for seed in 0..DRAWS {
         let e = errors.draw(n, seed);

@@ -14,7 +14,7 @@ use super::built::{CheckedModel, quantity, valid_names};
 use super::defs::{effect, equations};
 use super::limits;
 use super::relative;
-use super::solver::{Known, fits};
+use super::solver::{DescribedSolver, fits};
 use crate::expand::INITIAL;
 use crate::file::locate::character;
 use crate::file::{EffectSection, StudyFile};
@@ -22,7 +22,11 @@ use crate::problem::Source;
 use crate::variant::{has_delay, reads_past};
 
 /// Builds the model of a study; nothing after a complaint.
-pub(crate) fn model(source: &Source, file: &StudyFile, solver: Option<&Known>) -> Option<CheckedModel> {
+pub(crate) fn model(
+    source: &Source,
+    file: &StudyFile,
+    solver: Option<&DescribedSolver>,
+) -> Option<CheckedModel> {
     let before = source.count();
     check_expressions(source, file);
     if file.model.solver.is_some() && solver.is_none() {

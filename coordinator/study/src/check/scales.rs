@@ -23,7 +23,7 @@ use crate::field::quantity_of;
 use crate::file::StudyFile;
 use crate::plan::training_rows;
 use crate::problem::Source;
-use crate::surroundings::Surroundings;
+use crate::solver_host::SolverHost;
 
 /// What the numbers of effects are measured with.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -60,7 +60,7 @@ impl Ruler {
     pub(crate) fn new(
         setup: &Setup,
         trials: &[Trial<'_>],
-        surroundings: &Surroundings,
+        solver_host: &SolverHost,
     ) -> Result<Self, CourseError> {
         let times = || trials.iter().flat_map(|trial| trial.times.iter().copied());
         let record = [times().fold(f64::INFINITY, f64::min), times().fold(f64::NEG_INFINITY, f64::max)];
@@ -69,7 +69,7 @@ impl Ruler {
         steps.sort_by(f64::total_cmp);
         let sampling = steps.get(steps.len() / 2).copied().unwrap_or(1.0);
         let on_course = relative(&setup.effects).any(|p| is_on_course(&p.scale));
-        let courses = if on_course { courses(setup, trials, surroundings)? } else { BTreeMap::new() };
+        let courses = if on_course { courses(setup, trials, solver_host)? } else { BTreeMap::new() };
         Ok(Self { courses, record, sampling })
     }
 
@@ -123,10 +123,10 @@ fn scalars(spec: &Spec, is_solver: bool) -> Vec<String> {
 fn courses(
     setup: &Setup,
     trials: &[Trial<'_>],
-    surroundings: &Surroundings,
+    solver_host: &SolverHost,
 ) -> Result<BTreeMap<String, [f64; 2]>, CourseError> {
     let bare = bare(setup)?;
-    let model = surroundings.build(&bare)?;
+    let model = solver_host.build(&bare)?;
     let kept: Vec<bool> = setup.parameters.iter().map(|name| bare.parameters.contains(name)).collect();
     let mut courses: BTreeMap<String, [f64; 2]> = BTreeMap::new();
     let mut widen = |name: &str, value: f64| {
@@ -161,7 +161,7 @@ pub(crate) fn check(
     file: &StudyFile,
     model: &mut CheckedModel,
     (parameters, records): (&[StudyParameter], &[Record]),
-    surroundings: &Surroundings,
+    solver_host: &SolverHost,
     warnings: &mut Vec<String>,
 ) {
     let relative: Vec<EffectParameter> = relative(&model.setup.effects).cloned().collect();
@@ -179,9 +179,9 @@ pub(crate) fn check(
         })
         .collect();
     // Where the model fails no course is known, and a parameter that counts on one needs a value.
-    let ruler = Ruler::new(&model.setup, &trials, surroundings).unwrap_or_else(|error| {
+    let ruler = Ruler::new(&model.setup, &trials, solver_host).unwrap_or_else(|error| {
         warnings.push(format!("the model does not run at the prior medians: {error}"));
-        Ruler::new(&Setup::default(), &trials, surroundings).unwrap_or_default()
+        Ruler::new(&Setup::default(), &trials, solver_host).unwrap_or_default()
     });
     let searched: Vec<EffectDef> = model.setup.effects.iter().map(|e| ruler.as_searched(e)).collect();
     model.setup.effects = model.setup.effects.iter().map(|e| ruler.in_units(e)).collect();

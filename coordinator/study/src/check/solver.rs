@@ -1,6 +1,6 @@
 //! A model that runs in a program of its own: what it says of itself, and what a study may ask of it.
 //!
-//! Nothing is started here; whoever loads the study asks the solver ([`crate::Surroundings`]). What it says is not
+//! Nothing is started here; whoever loads the study asks the solver ([`crate::SolverHost`]). What it says is not
 //! trusted: names must be unique and ranges sensible before anything is judged against them. Next file to read:
 //! [`super::model`].
 
@@ -16,26 +16,26 @@ use starlings_models::{
 use self::files::{copies, described, templates};
 use super::limits;
 use super::settings::counted;
-use crate::Surroundings;
+use crate::SolverHost;
 use crate::file::StudyFile;
 use crate::file::solver::{ProgramQuantity, ProgramSection};
 use crate::problem::Source;
 
 /// A solver that has said what it is.
-pub(crate) struct Known {
+pub(crate) struct DescribedSolver {
     pub(crate) def: SolverDef,
     /// Whether it can be started in this process: one that a file describes may be elsewhere.
     pub(crate) is_here: bool,
 }
 
-impl Known {
+impl DescribedSolver {
     pub(crate) fn description(&self) -> Option<&Description> {
         self.def.described.as_ref()
     }
 }
 
 /// The solver of a study with its description; nothing after a complaint, or where the model is none.
-pub(crate) fn solver(source: &Source, file: &StudyFile, surroundings: &Surroundings) -> Option<Known> {
+pub(crate) fn solver(source: &Source, file: &StudyFile, solver_host: &SolverHost) -> Option<DescribedSolver> {
     let section = file.model.solver.as_ref()?;
     let before = source.count();
     let beside =
@@ -55,7 +55,7 @@ pub(crate) fn solver(source: &Source, file: &StudyFile, surroundings: &Surroundi
     }
     if let Some(written) = def.described.clone().filter(|_| section.adapter == "command") {
         let def = SolverDef { described: Some(written), ..def.clone() };
-        for fault in surroundings.inspect(&def) {
+        for fault in solver_host.inspect(&def) {
             files::report(source, section, &def, &folder, fault);
         }
     }
@@ -66,12 +66,12 @@ pub(crate) fn solver(source: &Source, file: &StudyFile, surroundings: &Surroundi
         Some(name) => described(source, name, &folder)?,
         None => match def.described.take_if(|_| section.adapter == "command") {
             Some(written) => written,
-            None => asked(source, section, &def, surroundings)?,
+            None => asked(source, section, &def, solver_host)?,
         },
     };
     check_description(source, section, &found);
     def.described = Some(Description { spec: Spec { kind: SOLVER.to_owned(), ..found.spec }, ..found });
-    (source.count() == before).then_some(Known { def, is_here: section.described.is_none() })
+    (source.count() == before).then_some(DescribedSolver { def, is_here: section.described.is_none() })
 }
 
 /// Where the program runs: the study's folder, or one that is named from there.
@@ -175,9 +175,9 @@ fn asked(
     source: &Source,
     section: &ProgramSection,
     def: &SolverDef,
-    surroundings: &Surroundings,
+    solver_host: &SolverHost,
 ) -> Option<Description> {
-    let told = surroundings.describe(def).map_err(|why| {
+    let told = solver_host.describe(def).map_err(|why| {
         let message = match &why.last_words {
             Some(words) => format!("{words}: {}", why.reason),
             None => format!("the solver does not say what it is: {}", why.reason),
@@ -215,7 +215,7 @@ fn check_description(source: &Source, section: &ProgramSection, description: &De
 }
 
 /// Refuses what no observer of a solver can be told, and returns what is worth a word.
-pub(crate) fn check(source: &Source, file: &StudyFile, known: Option<&Known>) -> Vec<String> {
+pub(crate) fn check(source: &Source, file: &StudyFile, known: Option<&DescribedSolver>) -> Vec<String> {
     let Some((known, description)) = known.and_then(|known| Some((known, known.description()?))) else {
         return Vec::new();
     };

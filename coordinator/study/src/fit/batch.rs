@@ -10,7 +10,7 @@ use starlings_estimators::{Batch, BatchStep, Block, Data, EstimatorError, SigmaS
 use starlings_models::Window;
 
 use super::ensemble::noise;
-use super::flight::{Flight, Place, Results, StepWindows};
+use super::runner::{AnalysisIndex, EnsembleRunner, Results, StepWindows};
 use super::stack::stack_outputs;
 use crate::store::snapshot::{Figures, Iteration, Snapshot};
 use crate::store::{AnalysisRow, Store};
@@ -21,12 +21,12 @@ use crate::{Fit, Progress, RunContext, RunError, Study, posterior};
 /// # Errors
 /// When the fleet or the store fails, or no run around the estimate succeeds.
 pub fn fit(
-    flight: &mut Flight<'_>,
+    runner: &mut EnsembleRunner<'_>,
     store: &Store,
     context: &mut RunContext<'_>,
     resumed: Option<Snapshot>,
 ) -> Result<Fit, RunError> {
-    let study = flight.study();
+    let study = runner.study();
     let windows: StepWindows = (0..study.records.len())
         .filter(|record| study.records[*record].is_trained())
         .map(|record| (record, Arc::new(study.whole(record, true))))
@@ -47,9 +47,9 @@ pub fn fit(
         None => begin(&batch, study),
     };
     while !now.estimate.state.converged && now.figures.step < batch.max_iterations {
-        let place = Place { pass: 1, step: now.figures.step };
+        let at = AnalysisIndex { pass: 1, step: now.figures.step };
         let theta = batch.sample(&now.estimate.state);
-        let results = fly(flight, &mut now, place, &theta, &windows)?;
+        let results = run_ensemble(runner, &mut now, at, &theta, &windows)?;
         let (predictions, failed) = gathered(&batch, &results, &windows);
         let (next, step) = batch.step(
             &now.estimate.state,
@@ -59,10 +59,10 @@ pub fn fit(
         )?;
         now.estimate = Iteration { state: next, posterior: step.posterior.clone() };
         advance(&mut now.figures, &step);
-        let mut row = row(study, place, &step);
-        row.jobs = flight.take_rows();
+        let mut row = row(study, at, &step);
+        row.jobs = runner.take_rows();
         store.analysis(&row, &now)?;
-        context.after_step(store, &progress(&now, &batch, flight))?;
+        context.after_step(store, &progress(&now, &batch, runner))?;
     }
     if now.figures.n_used == 0 {
         return Err(EstimatorError::StartFailed { attempt: now.figures.step }.into());
@@ -117,20 +117,20 @@ fn begin(batch: &Batch, study: &Study) -> Snapshot<Iteration> {
 }
 
 /// Runs the whole ensemble; a failed particle is left to the estimator, which can do without it.
-fn fly(
-    flight: &mut Flight<'_>,
+fn run_ensemble(
+    runner: &mut EnsembleRunner<'_>,
     now: &mut Snapshot<Iteration>,
-    place: Place,
+    at: AnalysisIndex,
     theta: &DMatrix<f64>,
     windows: &StepWindows,
 ) -> Result<Results, RunError> {
-    let before = (flight.total, flight.failed, flight.retried);
+    let before = (runner.total, runner.failed, runner.retried);
     let everyone: Vec<usize> = (0..theta.ncols()).collect();
     let states = vec![None; now.states.len()];
-    let results = flight.run(place, &everyone, theta, &states, windows)?;
-    now.figures.counts.total += flight.total - before.0;
-    now.figures.counts.failed += flight.failed - before.1;
-    now.figures.counts.retried += flight.retried - before.2;
+    let results = runner.run(at, &everyone, theta, &states, windows)?;
+    now.figures.counts.total += runner.total - before.0;
+    now.figures.counts.failed += runner.failed - before.1;
+    now.figures.counts.retried += runner.retried - before.2;
     Ok(results)
 }
 
@@ -144,11 +144,11 @@ fn advance(figures: &mut Figures, step: &BatchStep) {
     }
 }
 
-fn row(study: &Study, place: Place, step: &BatchStep) -> AnalysisRow {
+fn row(study: &Study, at: AnalysisIndex, step: &BatchStep) -> AnalysisRow {
     AnalysisRow {
-        pass: place.pass,
-        step: place.step,
-        time: (place.step + 1) as f64,
+        pass: at.pass,
+        step: at.step,
+        time: (at.step + 1) as f64,
         n_used: step.n_used,
         nis: step.misfit,
         log_likelihood: step.log_likelihood,
@@ -174,7 +174,7 @@ fn finish(now: Snapshot<Iteration>) -> Fit {
     }
 }
 
-fn progress(now: &Snapshot<Iteration>, batch: &Batch, flight: &Flight<'_>) -> Progress {
+fn progress(now: &Snapshot<Iteration>, batch: &Batch, runner: &EnsembleRunner<'_>) -> Progress {
     Progress {
         stage: "batch",
         pass: 1,
@@ -182,6 +182,6 @@ fn progress(now: &Snapshot<Iteration>, batch: &Batch, flight: &Flight<'_>) -> Pr
         step: now.figures.step,
         steps: batch.max_iterations,
         runs: now.figures.counts.total,
-        workers: flight.n_workers(),
+        workers: runner.n_workers(),
     }
 }

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use starlings_estimators::{Noise, Recombination};
 
-use super::flight::StepWindows;
+use super::runner::StepWindows;
 use crate::Study;
 
 /// X⁺ = X⁻T for the states of every record, by so many threads; the bits do not depend on them.

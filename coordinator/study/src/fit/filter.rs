@@ -6,9 +6,9 @@
 use starlings_estimators::{Analysis, Data, MakeFilter, Particles};
 
 use super::ensemble::{noise, recombine};
-use super::flight::{Flight, Place, StepWindows};
 use super::resample;
-use super::rescue::{Flown, fly};
+use super::rescue::{Forecast, forecast};
+use super::runner::{AnalysisIndex, EnsembleRunner, StepWindows};
 use super::schedule::{Reported, Schedule, particles};
 use super::settle;
 use super::stack::{stack_outputs, stack_states};
@@ -22,12 +22,12 @@ use crate::{Fit, RunContext, RunError, Study, posterior};
 /// When the fleet or the store fails, or too few sigma points can be run.
 pub fn fit(
     make: MakeFilter,
-    flight: &mut Flight<'_>,
+    runner: &mut EnsembleRunner<'_>,
     store: &Store,
     context: &mut RunContext<'_>,
     resumed: Option<Snapshot>,
 ) -> Result<Fit, RunError> {
-    let study = flight.study();
+    let study = runner.study();
     let schedule = Schedule::new(study, make)?;
     let mut now = match resumed {
         Some(snapshot) => snapshot.of_filter(store)?,
@@ -36,17 +36,17 @@ pub fn fit(
     let mut reported = schedule.reported(&now)?;
     loop {
         while now.figures.step < schedule.n_step() {
-            let (row, next) = step(flight, &schedule, &mut now, &reported)?;
+            let (row, next) = step(runner, &schedule, &mut now, &reported)?;
             reported = next;
             store.analysis(&row, &now)?;
-            context.after_step(store, &schedule.progress(&now, flight))?;
+            context.after_step(store, &schedule.progress(&now, runner))?;
         }
-        let counted = (flight.total, flight.failed, flight.retried);
-        let next = settle::next(flight, &schedule, &now, &reported)?;
+        let counted = (runner.total, runner.failed, runner.retried);
+        let next = settle::next(runner, &schedule, &now, &reported)?;
         let counts = &mut now.figures.counts;
-        counts.total += flight.total - counted.0;
-        counts.failed += flight.failed - counted.1;
-        counts.retried += flight.retried - counted.2;
+        counts.total += runner.total - counted.0;
+        counts.failed += runner.failed - counted.1;
+        counts.retried += runner.retried - counted.2;
         let Some(mut next) = next else { return Ok(schedule.finish(&now, reported)) };
         next.figures.counts = now.figures.counts;
         next.figures.information_lost = now.figures.information_lost;
@@ -59,24 +59,24 @@ pub fn fit(
 /// Predict, observe, analyse, recombine: one step of the filter over every record that still has data. Returns what the
 /// store keeps of it and what is known after it; `before` is what was known before.
 fn step(
-    flight: &mut Flight<'_>,
+    runner: &mut EnsembleRunner<'_>,
     schedule: &Schedule<'_>,
     now: &mut Snapshot<Ensemble>,
     before: &Reported,
 ) -> Result<(AnalysisRow, Reported), RunError> {
     let windows = schedule.step_windows(now.figures.step);
-    let place = Place { pass: now.figures.pass + 1, step: now.figures.step };
+    let at = AnalysisIndex { pass: now.figures.pass + 1, step: now.figures.step };
     let filter = schedule.filter(now.figures.pass);
-    let counted = (flight.total, flight.failed, flight.retried);
-    let Flown { mut particles, results, rescued } =
-        fly(flight, filter, particles(now), &mut now.states, &windows, place)?;
+    let counted = (runner.total, runner.failed, runner.retried);
+    let Forecast { mut particles, results, rescued } =
+        forecast(runner, filter, particles(now), &mut now.states, &windows, at)?;
     for (index, (record, _)) in windows.iter().enumerate() {
         now.states[*record] = Some(stack_states(&results, index));
     }
     let mut predictions = stack_outputs(&results, &windows);
     if schedule.resample && rescued == 0 {
         let states = &mut now.states;
-        let drawn = resample::redraw(flight, filter, place, &windows, &particles, &predictions, states)?;
+        let drawn = resample::redraw(runner, filter, at, &windows, &particles, &predictions, states)?;
         if let Some(redrawn) = drawn {
             (particles, predictions) = (redrawn.particles, redrawn.predictions);
             now.figures.dropped = now.figures.dropped.max(redrawn.dropped);
@@ -86,20 +86,20 @@ fn step(
     let noise = noise(schedule.study, &windows, schedule.anneal(now.figures.pass));
     let (particles, analysis) =
         filter.analysis(&particles, &predictions, &Data { values: &values, noise: &noise })?;
-    recombine(&mut now.states, &analysis.transform, flight.threads);
+    recombine(&mut now.states, &analysis.transform, runner.threads);
     for (record, states) in now.states.iter_mut().enumerate() {
-        if schedule.windows[record].len() <= place.step + 1 {
+        if schedule.windows[record].len() <= at.step + 1 {
             *states = None;
         }
     }
     advance(now, &particles, &analysis);
-    now.figures.counts.total += flight.total - counted.0;
-    now.figures.counts.failed += flight.failed - counted.1;
-    now.figures.counts.retried += flight.retried - counted.2;
+    now.figures.counts.total += runner.total - counted.0;
+    now.figures.counts.failed += runner.failed - counted.1;
+    now.figures.counts.retried += runner.retried - counted.2;
     now.figures.counts.rescued += rescued;
     let after = schedule.reported(now)?;
-    let mut row = row(schedule.study, place, &windows, &analysis, before, &after);
-    row.jobs = flight.take_rows();
+    let mut row = row(schedule.study, at, &windows, &analysis, before, &after);
+    row.jobs = runner.take_rows();
     Ok((row, after))
 }
 
@@ -114,15 +114,15 @@ fn advance(now: &mut Snapshot<Ensemble>, particles: &Particles, analysis: &Analy
 
 fn row(
     study: &Study,
-    place: Place,
+    at: AnalysisIndex,
     windows: &StepWindows,
     analysis: &Analysis,
     before: &Reported,
     after: &Reported,
 ) -> AnalysisRow {
     AnalysisRow {
-        pass: place.pass,
-        step: place.step,
+        pass: at.pass,
+        step: at.step,
         time: elapsed(study, windows),
         n_used: analysis.n_used,
         nis: after.nis - before.nis,

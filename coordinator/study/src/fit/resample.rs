@@ -12,7 +12,7 @@ use starlings_estimators::{Filter, Particles, Resampled};
 use starlings_models::Window;
 
 use super::ensemble::recombine;
-use super::flight::{Flight, Place, StepWindows};
+use super::runner::{AnalysisIndex, EnsembleRunner, StepWindows};
 use super::stack::stack_outputs;
 use crate::expand::INITIAL;
 use crate::{RunError, Study};
@@ -77,23 +77,22 @@ pub struct Redrawn {
 /// # Errors
 /// When the fleet or the estimator fails.
 pub fn redraw(
-    flight: &mut Flight<'_>,
+    runner: &mut EnsembleRunner<'_>,
     filter: &dyn Filter,
-    place: Place,
+    at: AnalysisIndex,
     windows: &StepWindows,
     particles: &Particles,
     predictions: &DMatrix<f64>,
     states: &mut Vec<Option<DMatrix<f64>>>,
 ) -> Result<Option<Redrawn>, RunError> {
-    let study = flight.study();
+    let study = runner.study();
     let Resampled { particles: redrawn, transform, dropped } =
         filter.resample(particles, &gram(study, filter.weights(), particles, states))?;
     let mut mixed = states.clone();
-    recombine(&mut mixed, &transform, flight.threads);
+    recombine(&mut mixed, &transform, runner.threads);
     let mut observed = predictions * transform;
     // Where an observer has brought the datum into the state, an output of that state is no prediction of it.
-    if study.observer_is_off()
-        && !observe_again(flight, place, &redrawn.theta, &mixed, windows, &mut observed)?
+    if study.observer_is_off() && !observe_again(runner, at, &redrawn.theta, &mixed, windows, &mut observed)?
     {
         return Ok(None);
     }
@@ -103,8 +102,8 @@ pub fn redraw(
 
 /// Puts the outputs at the windows' ends, by runs of zero length, into the predictions; `false` when a run fails.
 fn observe_again(
-    flight: &mut Flight<'_>,
-    place: Place,
+    runner: &mut EnsembleRunner<'_>,
+    at: AnalysisIndex,
     theta: &DMatrix<f64>,
     states: &[Option<DMatrix<f64>>],
     windows: &StepWindows,
@@ -112,12 +111,12 @@ fn observe_again(
 ) -> Result<bool, RunError> {
     let instants: StepWindows = windows.iter().map(|(record, w)| (*record, Arc::new(instant(w)))).collect();
     let everyone: Vec<usize> = (0..theta.ncols()).collect();
-    let results = flight.run(place, &everyone, theta, states, &instants)?;
+    let results = runner.run(at, &everyone, theta, states, &instants)?;
     if results.iter().flatten().any(Result::is_err) {
         return Ok(false);
     }
     let ends = stack_outputs(&results, &instants);
-    let n_obs = flight.study().setup.outputs.len();
+    let n_obs = runner.study().setup.outputs.len();
     let mut after = 0;
     for (index, (_, window)) in windows.iter().enumerate() {
         after += window.observed.len();

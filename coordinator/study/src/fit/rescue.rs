@@ -1,20 +1,20 @@
 //! What happens to a sigma point whose run failed on every worker: it is pulled towards the mean and run again.
 //!
-//! A pulled point is a real run at a nearer place, never a guess; the analysis knows its distance and stays exact for a
+//! A pulled point is a real run at a nearer point, never a guess; the analysis knows its distance and stays exact for a
 //! linear model. A point that fails even close to the mean is dropped where the others still span the parameters. Both are
 //! reported as lost information. Next file to read: [`super::filter`].
 
 use nalgebra::DMatrix;
 use starlings_estimators::{Filter, Particles};
 
-use super::flight::{Flight, Place, Results, StepWindows};
+use super::runner::{AnalysisIndex, EnsembleRunner, Results, StepWindows};
 use crate::RunError;
 
 /// Distances from the mean at which a failed sigma point is tried again, as fractions of its own.
 const DISTANCES: [f64; 5] = [0.5, 0.25, 0.125, 0.0625, 0.03125];
 
 /// An ensemble that ran over one step: every column is a prediction, or dropped.
-pub struct Flown {
+pub struct Forecast {
     /// The particles, with their pulls.
     pub particles: Particles,
     /// Predictions and end states by particle and window; a dropped particle keeps its error.
@@ -29,58 +29,59 @@ pub struct Flown {
 ///
 /// # Errors
 /// When the fleet fails, or too few particles survive for an analysis; the message says which parameters could not be run.
-pub fn fly(
-    flight: &mut Flight<'_>,
+pub fn forecast(
+    runner: &mut EnsembleRunner<'_>,
     filter: &dyn Filter,
     particles: Particles,
     states: &mut [Option<DMatrix<f64>>],
     windows: &StepWindows,
-    place: Place,
-) -> Result<Flown, RunError> {
+    at: AnalysisIndex,
+) -> Result<Forecast, RunError> {
     let everyone: Vec<usize> = (0..particles.theta.ncols()).collect();
-    let results = flight.run(place, &everyone, &particles.theta, states, windows)?;
-    let mut flown = Flown { particles, results, rescued: 0 };
+    let results = runner.run(at, &everyone, &particles.theta, states, windows)?;
+    let mut forecast = Forecast { particles, results, rescued: 0 };
     for particle in everyone {
-        if failure(&flown.results[particle]).is_some() {
-            rescue(flight, filter, &mut flown, states, windows, place, particle)?;
-            flown.rescued += 1;
+        if failure(&forecast.results[particle]).is_some() {
+            rescue(runner, filter, &mut forecast, states, windows, at, particle)?;
+            forecast.rescued += 1;
         }
     }
-    Ok(flown)
+    Ok(forecast)
 }
 
 fn rescue(
-    flight: &mut Flight<'_>,
+    runner: &mut EnsembleRunner<'_>,
     filter: &dyn Filter,
-    flown: &mut Flown,
+    forecast: &mut Forecast,
     states: &mut [Option<DMatrix<f64>>],
     windows: &StepWindows,
-    place: Place,
+    at: AnalysisIndex,
     particle: usize,
 ) -> Result<(), RunError> {
-    let cause = cause(flight, windows, &flown.results[particle]);
+    let cause = cause(runner, windows, &forecast.results[particle]);
     for distance in DISTANCES {
-        let (pulled, transform) = filter.pull(&flown.particles, particle, distance);
+        let (pulled, transform) = filter.pull(&forecast.particles, particle, distance);
         for x in states.iter_mut().flatten() {
             *x = &*x * &transform;
         }
-        flown.particles = pulled;
-        let mut again = flight.run(place, &[particle], &flown.particles.theta, states, windows)?;
-        let of_particle = again.swap_remove(0);
+        forecast.particles = pulled;
+        let mut retried = runner.run(at, &[particle], &forecast.particles.theta, states, windows)?;
+        let of_particle = retried.swap_remove(0);
         let failed = failure(&of_particle).is_some();
-        flown.results[particle] = of_particle;
+        forecast.results[particle] = of_particle;
         if !failed {
             return Ok(());
         }
     }
-    flown.particles = filter.drop(&flown.particles, particle).map_err(|source| RunError::SigmaPointLost {
-        particle,
-        pass: place.pass,
-        step: place.step,
-        values: describe(flight, &flown.particles, particle),
-        cause,
-        source,
-    })?;
+    forecast.particles =
+        filter.drop(&forecast.particles, particle).map_err(|source| RunError::SigmaPointLost {
+            particle,
+            pass: at.pass,
+            step: at.step,
+            values: describe(runner, &forecast.particles, particle),
+            cause,
+            source,
+        })?;
     Ok(())
 }
 
@@ -92,19 +93,19 @@ fn failure(
 
 /// The first failure among a particle's windows, with its record.
 fn cause(
-    flight: &Flight<'_>,
+    runner: &EnsembleRunner<'_>,
     windows: &StepWindows,
     of_particle: &[Result<starlings_models::Prediction, starlings_models::Failure>],
 ) -> String {
     let mut failed =
         windows.iter().zip(of_particle).filter_map(|((record, _), r)| Some((*record, r.as_ref().err()?)));
     let Some((record, error)) = failed.next() else { return String::new() };
-    format!("over record `{}`, {error}", flight.study().records[record].name)
+    format!("over record `{}`, {error}", runner.study().records[record].name)
 }
 
-fn describe(flight: &Flight<'_>, particles: &Particles, particle: usize) -> String {
+fn describe(runner: &EnsembleRunner<'_>, particles: &Particles, particle: usize) -> String {
     let theta = particles.theta.column(particle);
-    flight
+    runner
         .study()
         .theta
         .iter()

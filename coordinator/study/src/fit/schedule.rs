@@ -15,7 +15,7 @@ use std::sync::Arc;
 use starlings_estimators::{Drift, Filter, Gaussian, MakeFilter, Options, Particles, exchange_prior};
 use starlings_models::Window;
 
-use super::flight::{Flight, StepWindows};
+use super::runner::{EnsembleRunner, StepWindows};
 use crate::store::snapshot::{Ensemble, Figures, Snapshot};
 use crate::{Fit, Move, Progress, RunError, Study, ThetaEntry, posterior};
 
@@ -171,7 +171,7 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    pub(super) fn progress(&self, now: &Snapshot<Ensemble>, flight: &Flight<'_>) -> Progress {
+    pub(super) fn progress(&self, now: &Snapshot<Ensemble>, runner: &EnsembleRunner<'_>) -> Progress {
         Progress {
             stage: "filter",
             pass: now.figures.pass + 1,
@@ -179,7 +179,7 @@ impl<'a> Schedule<'a> {
             step: now.figures.step,
             steps: self.n_step(),
             runs: now.figures.counts.total,
-            workers: flight.n_workers(),
+            workers: runner.n_workers(),
         }
     }
 }

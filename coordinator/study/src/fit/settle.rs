@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
-use super::flight::{Flight, Place, StepWindows};
+use super::runner::{AnalysisIndex, EnsembleRunner, StepWindows};
 use super::schedule::{Reported, Schedule};
 use crate::store::snapshot::{Ensemble, Snapshot};
 use crate::{Move, RunError, posterior};
@@ -32,7 +32,7 @@ const NARROWEST: f64 = 0.01;
 /// # Errors
 /// When the fleet fails.
 pub(super) fn next(
-    flight: &mut Flight<'_>,
+    runner: &mut EnsembleRunner<'_>,
     schedule: &Schedule<'_>,
     now: &Snapshot<Ensemble>,
     reported: &Reported,
@@ -46,7 +46,7 @@ pub(super) fn next(
         return Ok(None);
     }
     let search = Search::new(schedule, now, reported);
-    let Some(found) = search.run(flight)? else {
+    let Some(found) = search.run(runner)? else {
         let narrow = now.estimate.narrow * NARROWER;
         if narrow < NARROWEST {
             return Ok(None);
@@ -90,16 +90,16 @@ impl<'a> Search<'a> {
 
     /// The longest step that does not raise the cost, or of the shorter ones the best; `None` when all raise it.
     ///
-    /// A first pass only chooses a place: where no part of its step is better than the prior median, that is it.
-    fn run(&self, flight: &mut Flight<'_>) -> Result<Option<Point>, RunError> {
+    /// A first pass only chooses a point: where no part of its step is better than the prior median, that is it.
+    fn run(&self, runner: &mut EnsembleRunner<'_>) -> Result<Option<Point>, RunError> {
         let first = self.now.figures.pass == 0;
         let start = self.now.estimate.cost;
         let lengths: &[f64] = if start.is_some() { &[1.0] } else { &[1.0, 0.0] };
-        let mut points = self.points(flight, lengths)?;
+        let mut points = self.points(runner, lengths)?;
         let stay = if start.is_none() { points.pop() } else { None };
         let level = start.or(stay.as_ref().map(|p| p.cost)).unwrap_or(f64::INFINITY);
         let Some(full) = points.pop().filter(|p| p.cost <= level + LEVEL) else {
-            let shorter = self.points(flight, &SHORTER)?;
+            let shorter = self.points(runner, &SHORTER)?;
             let best =
                 shorter.into_iter().filter(|p| p.cost < level).min_by(|a, b| a.cost.total_cmp(&b.cost));
             return Ok(best.or(stay.filter(|_| first)));
@@ -108,16 +108,16 @@ impl<'a> Search<'a> {
     }
 
     /// Runs every trained record at these shares of the step.
-    fn points(&self, flight: &mut Flight<'_>, lengths: &[f64]) -> Result<Vec<Point>, RunError> {
+    fn points(&self, runner: &mut EnsembleRunner<'_>, lengths: &[f64]) -> Result<Vec<Point>, RunError> {
         let from = &self.now.estimate.centre;
         let theta = DMatrix::from_fn(from.len(), lengths.len(), |j, k| {
             // The whole step ends exactly at what was found.
             if lengths[k] >= 1.0 { self.found[j] } else { from[j] + lengths[k] * (self.found[j] - from[j]) }
         });
-        let place = Place { pass: self.now.figures.pass + 1, step: self.now.figures.step };
+        let at = AnalysisIndex { pass: self.now.figures.pass + 1, step: self.now.figures.step };
         let everyone: Vec<usize> = (0..lengths.len()).collect();
         let states = vec![None; self.schedule.study.records.len()];
-        let results = flight.run(place, &everyone, &theta, &states, &self.windows)?;
+        let results = runner.run(at, &everyone, &theta, &states, &self.windows)?;
         let prior = posterior::prior(self.schedule.study);
         let point = |(k, of_point): (usize, &Vec<Result<_, _>>)| {
             let at = theta.column(k);

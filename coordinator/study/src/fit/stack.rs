@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::flight::{Results, StepWindows};
+use super::runner::{Results, StepWindows};
 
 /// Stacks the predictions of all particles: m × r, rows by window, then time, then output. A failed particle's column is
 /// zero and must be masked by the caller.

@@ -1,7 +1,7 @@
 //! Timeouts of a run, as decisions: kept in the store at once, and repeated without a run by a resume.
 //!
 //! A limit of wall time depends on the machine, so the same run may be in time once and late another time. What was decided once
-//! stays decided. Nothing else is kept here: a prediction is the same whenever it is made. Next file to read: [`super::flight`].
+//! stays decided. Nothing else is kept here: a prediction is the same whenever it is made. Next file to read: [`super::runner`].
 
 use std::collections::HashMap;
 

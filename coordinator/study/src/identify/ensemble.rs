@@ -11,7 +11,7 @@ use starlings_models::{Failure, Prediction, Window};
 
 use super::IdentifyError;
 use crate::Study;
-use crate::fit::flight::{Flight, Place, Results, StepWindows};
+use crate::fit::runner::{AnalysisIndex, EnsembleRunner, Results, StepWindows};
 
 /// Least distance of the points from their centre, in prior sd: closer, rounding inside the model would show.
 const CLOSEST: f64 = 1e-3;
@@ -67,8 +67,8 @@ pub enum Seen {
 ///
 /// # Errors
 /// When the fleet fails, or the model fails at one of the points.
-pub fn run(flight: &mut Flight<'_>, centre: &[f64]) -> Result<Response, IdentifyError> {
-    run_with(flight, centre, Points::Star, Seen::Freely)
+pub fn run(runner: &mut EnsembleRunner<'_>, centre: &[f64]) -> Result<Response, IdentifyError> {
+    run_with(runner, centre, Points::Star, Seen::Freely)
 }
 
 /// The same with other points.
@@ -76,12 +76,12 @@ pub fn run(flight: &mut Flight<'_>, centre: &[f64]) -> Result<Response, Identify
 /// # Errors
 /// When the fleet fails, or the model fails at one of the points.
 pub fn run_with(
-    flight: &mut Flight<'_>,
+    runner: &mut EnsembleRunner<'_>,
     centre: &[f64],
     points: Points,
     seen: Seen,
 ) -> Result<Response, IdentifyError> {
-    let study = flight.study();
+    let study = runner.study();
     let set = SigmaSet::new(points, study.parameters.len())?;
     let reach = set.points.amax();
     let points = Around { study, centre, set, scale: spread(study) / reach };
@@ -89,7 +89,8 @@ pub fn run_with(
     let sent = windows(study, seen);
     let everyone: Vec<usize> = (0..points.set.n_particle()).collect();
     let states = vec![None; study.records.len()];
-    let results = flight.run(Place { pass: 0, step: 2 }, &everyone, &points.theta(), &states, &sent)?;
+    let results =
+        runner.run(AnalysisIndex { pass: 0, step: 2 }, &everyone, &points.theta(), &states, &sent)?;
     points.check(&results, &sent)?;
     let (rows, predictions) = points.gather(&observed, &results)?;
     let whitened = points.whitened(&rows, &predictions)?;

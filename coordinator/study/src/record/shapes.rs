@@ -16,7 +16,7 @@ use crate::surfaces::{Shape, Shapes};
 const SAME: f64 = 1e-9;
 
 /// Where a node is without displacement and the unit vector along which it is displaced.
-pub(super) type Place = ([f64; 3], [f64; 3]);
+pub(super) type NodeAtRest = ([f64; 3], [f64; 3]);
 
 /// Reads the surfaces of one channel.
 pub(super) struct Surfaces<'a> {
@@ -137,7 +137,7 @@ impl Surfaces<'_> {
     }
 
     /// Where the `n` nodes of an output are at rest; nothing after a complaint.
-    pub(super) fn rest(&self, csv: &Csv, n: usize, output: &str) -> Option<Vec<Place>> {
+    pub(super) fn rest(&self, csv: &Csv, n: usize, output: &str) -> Option<Vec<NodeAtRest>> {
         let places = match columns(self.csv, ["time", "file"]) {
             Some(_) => mesh_places(csv),
             None => profile_places(csv),
@@ -178,7 +178,7 @@ fn vectors<const N: usize>(csv: &Csv, names: [&str; N]) -> Result<Option<Vec<[f6
 }
 
 /// Nodes (x, y, z) that move along (nx, ny, nz).
-fn mesh_places(csv: &Csv) -> Result<Vec<Place>, Problem> {
+fn mesh_places(csv: &Csv) -> Result<Vec<NodeAtRest>, Problem> {
     let (Some(rest), Some(normals)) = (vectors(csv, ["x", "y", "z"])?, vectors(csv, ["nx", "ny", "nz"])?)
     else {
         let (message, help) = lacks(csv, "`x`, `y`, `z` and `nx`, `ny`, `nz`, needed beside meshes");
@@ -188,7 +188,7 @@ fn mesh_places(csv: &Csv) -> Result<Vec<Place>, Problem> {
 }
 
 /// Nodes (z, r) that move along (nz, nr), or else along the outward normal of the line through them.
-fn profile_places(csv: &Csv) -> Result<Vec<Place>, Problem> {
+fn profile_places(csv: &Csv) -> Result<Vec<NodeAtRest>, Problem> {
     let Some(rest) = vectors(csv, ["z", "r"])? else {
         let (message, help) = lacks(csv, "`z` and `r`, needed beside profiles");
         return Err(csv.problem(0, 0, message, &help));

@@ -38,7 +38,7 @@ pub fn dry_run(study: &mut Study, kind: &Kind, depth: Depth) -> Result<Vec<Trial
     if !study.runs_here {
         return Ok(channels);
     }
-    let model = study.surroundings.build(&study.setup)?;
+    let model = study.solver_host.build(&study.setup)?;
     for record in 0..study.records.len() {
         if !study.records[record].is_trained() {
             continue;

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 use starlings_estimators::Gaussian;
 
-use super::flight::{Flight, Place, StepWindows};
+use super::runner::{AnalysisIndex, EnsembleRunner, StepWindows};
 use crate::store::PredictionRow;
 use crate::{RunError, Study};
 
@@ -16,13 +16,13 @@ use crate::{RunError, Study};
 ///
 /// # Errors
 /// When the fleet fails, or the model fails at the estimate.
-pub fn run(flight: &mut Flight<'_>, posterior: &Gaussian) -> Result<Vec<PredictionRow>, RunError> {
-    let study = flight.study();
+pub fn run(runner: &mut EnsembleRunner<'_>, posterior: &Gaussian) -> Result<Vec<PredictionRow>, RunError> {
+    let study = runner.study();
     let windows: StepWindows =
         (0..study.records.len()).map(|record| (record, Arc::new(study.whole(record, false)))).collect();
     let theta = DMatrix::from_column_slice(posterior.mean.len(), 1, posterior.mean.as_slice());
     let states = vec![None; study.records.len()];
-    let results = flight.run(Place { pass: 0, step: 0 }, &[0], &theta, &states, &windows)?;
+    let results = runner.run(AnalysisIndex { pass: 0, step: 0 }, &[0], &theta, &states, &windows)?;
     let mut rows = Vec::new();
     for ((record, window), result) in windows.iter().zip(results.into_iter().flatten()) {
         let prediction = result

@@ -35,14 +35,14 @@ type Inspect = Arc<dyn Fn(&SolverDef) -> Vec<SolverFault> + Send + Sync>;
 
 /// Who starts solvers. The default starts none: built-in models and equations need nobody.
 #[derive(Clone)]
-pub struct Surroundings {
+pub struct SolverHost {
     describe: Describe,
     inspect: Inspect,
     factory: Factory,
 }
 
-impl Surroundings {
-    /// Surroundings in which solvers can be asked for their description and setups be built.
+impl SolverHost {
+    /// A host with which solvers can be asked for their description and setups be built.
     pub fn new(
         describe: impl Fn(&SolverDef) -> Result<Description, String> + Send + Sync + 'static,
         factory: Factory,
@@ -58,7 +58,7 @@ impl Surroundings {
         Self { describe: Arc::new(describe), inspect: Arc::new(|_| Vec::new()), factory }
     }
 
-    /// The same surroundings, in which somebody looks at the files of a solver while the study is read.
+    /// The same host, in which somebody looks at the files of a solver while the study is read.
     #[must_use]
     pub fn inspecting(
         self,
@@ -67,7 +67,7 @@ impl Surroundings {
         Self { inspect: Arc::new(inspect), ..self }
     }
 
-    /// The same surroundings, in which every solver is known to be this one.
+    /// The same host, in which every solver is known to be this one.
     #[must_use]
     pub fn knowing(&self, description: &Description) -> Self {
         let known = description.clone();
@@ -96,14 +96,14 @@ impl Surroundings {
     }
 }
 
-impl Default for Surroundings {
+impl Default for SolverHost {
     fn default() -> Self {
         Self::new(|_| Err("no solver can be started here".to_owned()), Arc::new(Setup::build))
     }
 }
 
-impl fmt::Debug for Surroundings {
+impl fmt::Debug for SolverHost {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Surroundings").finish_non_exhaustive()
+        f.debug_struct("SolverHost").finish_non_exhaustive()
     }
 }

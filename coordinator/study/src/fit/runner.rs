@@ -18,9 +18,9 @@ use crate::{RunError, Study};
 /// The windows of one step, one per record that still has data: (record, window).
 pub type StepWindows = Vec<(usize, Arc<Window>)>;
 
-/// Where in the run a flight belongs; goes into the rows of the store.
+/// The analysis that an ensemble belongs to; goes into the rows of the store.
 #[derive(Clone, Copy, Debug)]
-pub struct Place {
+pub struct AnalysisIndex {
     /// Pass, from 1; 0 for the final forward run.
     pub pass: usize,
     /// Analysis within the pass, from 0.
@@ -31,11 +31,11 @@ pub struct Place {
 pub type Results = Vec<Vec<Result<Prediction, Failure>>>;
 
 /// Sends runs to a fleet and keeps the rows that the store will want.
-pub struct Flight<'a> {
+pub struct EnsembleRunner<'a> {
     study: &'a Study,
     fleet: &'a mut dyn Fleet,
     setup: SetupId,
-    /// One row per run since the last [`Flight::take_rows`].
+    /// One row per run since the last [`EnsembleRunner::take_rows`].
     rows: Vec<JobRow>,
     /// Runs asked for.
     pub total: u64,
@@ -53,7 +53,7 @@ pub struct Flight<'a> {
     timeouts: Option<Timeouts<'a>>,
 }
 
-impl<'a> Flight<'a> {
+impl<'a> EnsembleRunner<'a> {
     /// Installs the study's setup on the fleet.
     ///
     /// # Errors
@@ -98,7 +98,7 @@ impl<'a> Flight<'a> {
     /// When the fleet fails as a whole.
     pub fn run(
         &mut self,
-        place: Place,
+        at: AnalysisIndex,
         particles: &[usize],
         theta: &DMatrix<f64>,
         states: &[Option<DMatrix<f64>>],
@@ -120,12 +120,12 @@ impl<'a> Flight<'a> {
         };
         let n_job = particles.len() * sent.len();
         self.total += n_job as u64;
-        let mut outcomes = self.outcomes(place, n_job, job)?.into_iter();
+        let mut outcomes = self.outcomes(at, n_job, job)?.into_iter();
         let mut results = Vec::with_capacity(particles.len());
         for &particle in particles {
             let mut of_particle = Vec::with_capacity(windows.len());
             for ((record, window), outcome) in windows.iter().zip(outcomes.by_ref()) {
-                self.rows.push(self.row(place, *record, particle, &outcome));
+                self.rows.push(self.row(at, *record, particle, &outcome));
                 // A timeout that is repeated from the store has no worker.
                 if !outcome.worker.is_empty() && !self.workers.contains(&outcome.worker) {
                     self.workers.insert(outcome.worker.clone());
@@ -151,7 +151,7 @@ impl<'a> Flight<'a> {
     /// When the fleet fails as a whole, or refuses a setup.
     pub fn run_setups(
         &mut self,
-        place: Place,
+        at: AnalysisIndex,
         setups: &[Setup],
         theta: &DMatrix<f64>,
         windows: &StepWindows,
@@ -175,7 +175,7 @@ impl<'a> Flight<'a> {
         for particle in 0..setups.len() {
             let mut of_setup = Vec::with_capacity(windows.len());
             for ((record, window), outcome) in windows.iter().zip(outcomes.by_ref()) {
-                self.rows.push(self.row(place, *record, particle, &outcome));
+                self.rows.push(self.row(at, *record, particle, &outcome));
                 let mut result = outcome.result.map(|p| self.picked(*record, window, p));
                 if let Ok(prediction) = &mut result {
                     self.check(prediction, *record, 0, theta, window)?;
@@ -202,12 +202,12 @@ impl<'a> Flight<'a> {
     /// One outcome per job; those that are known to be timeouts are not run.
     fn outcomes(
         &mut self,
-        place: Place,
+        at: AnalysisIndex,
         n_job: usize,
         job: impl Fn(usize) -> Job,
     ) -> Result<Vec<Outcome>, RunError> {
         // The forward run with the estimate decides nothing about a sigma point: it is tried anew.
-        let mut timeouts = self.timeouts.as_mut().filter(|_| place.pass > 0);
+        let mut timeouts = self.timeouts.as_mut().filter(|_| at.pass > 0);
         let mut known: Vec<Option<Outcome>> = match &timeouts {
             Some(timeouts) if !timeouts.is_empty() => {
                 (0..n_job).map(|index| timeouts.known(&self.setup, &job(index))).collect()
@@ -251,10 +251,10 @@ impl<'a> Flight<'a> {
         Err(RunError::NoAnswer { particle, record: self.study.records[record].name.clone(), values, reason })
     }
 
-    fn row(&self, place: Place, record: usize, particle: usize, outcome: &Outcome) -> JobRow {
+    fn row(&self, at: AnalysisIndex, record: usize, particle: usize, outcome: &Outcome) -> JobRow {
         JobRow {
-            pass: place.pass,
-            step: place.step,
+            pass: at.pass,
+            step: at.step,
             record: self.study.records[record].name.clone(),
             particle: particle as u32,
             attempts: outcome.attempts,
