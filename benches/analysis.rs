@@ -13,7 +13,7 @@ use std::time::Instant;
 
 use nalgebra::DMatrix;
 use serde_json::{Map, Value, json};
-use starlings_coordinator::study::fit::recombine_by;
+use starlings_coordinator::study::recombine_by;
 use starlings_estimators::{Data, Drift, Filter, Noise, Particles, Points, Root, Roukf, SigmaSet};
 use starlings_models::equations::{EquationsDef, EquationsModel};
 use starlings_models::integrate::{self, Solver, Tolerance};

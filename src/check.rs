@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Parser;
 use serde_json::json;
+use starlings_coordinator::study::MAX_PASSES;
 use starlings_coordinator::study::field::{field_of, observed_fields};
-use starlings_coordinator::study::fit::settle;
 use starlings_coordinator::study::trial::{Depth, TrialChannel, dry_run};
 use starlings_coordinator::study::{Study, posterior};
 use starlings_estimators::SigmaSet;
@@ -58,7 +58,7 @@ fn runs_per_pass(study: &Study, n_particle: usize) -> usize {
 /// Passes of the filter at least and at most; none of the batch fit.
 fn passes(study: &Study) -> Option<(usize, usize)> {
     let of_filter = study.estimator.kind.is_filter();
-    of_filter.then(|| study.passes().map_or((2, settle::LIMIT), |n| (n, n)))
+    of_filter.then(|| study.passes().map_or((2, MAX_PASSES), |n| (n, n)))
 }
 
 fn as_json(study: &Study, channels: &[TrialChannel], n_particle: usize) -> serde_json::Value {

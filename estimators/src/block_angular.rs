@@ -135,7 +135,7 @@ impl BlockAngular {
     }
 
     /// Aᵀ y, length p, of y of length m.
-    pub fn tr_times(&self, y: &DVector<f64>) -> DVector<f64> {
+    pub(crate) fn tr_times(&self, y: &DVector<f64>) -> DVector<f64> {
         if let Some(dense) = self.dense() {
             return dense.tr_mul(y);
         }

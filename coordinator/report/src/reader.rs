@@ -10,7 +10,7 @@ mod tests;
 use std::collections::BTreeMap;
 
 use starlings_estimators::{autocorrelation, nis_band};
-use starlings_study::observer_gain::ObserverCourse;
+use starlings_study::ObserverCourse;
 use starlings_study::posterior::Estimate;
 use starlings_study::store::folder::{OBSERVER, StudyInfo};
 use starlings_study::store::{Store, StoreError};

@@ -237,7 +237,7 @@ impl Study {
     }
 
     /// The same with the number of passes that were made.
-    pub fn describe_with(&self, passes: Option<usize>) -> String {
+    pub(crate) fn describe_with(&self, passes: Option<usize>) -> String {
         let points = match self.estimator.points {
             Points::Simplex => "simplex",
             Points::Canonical => "canonical",

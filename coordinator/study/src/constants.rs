@@ -87,7 +87,7 @@ impl HangsOn {
 ///
 /// # Errors
 /// When the fleet fails, or the model fails next to the estimate.
-pub fn of_fit(runner: &mut EnsembleRunner<'_>, centre: &[f64]) -> Result<HangsOn, IdentifyError> {
+pub(crate) fn of_fit(runner: &mut EnsembleRunner<'_>, centre: &[f64]) -> Result<HangsOn, IdentifyError> {
     let study = runner.study();
     let moved = moved::all(study);
     if let Some(nothing) = none_of(&moved) {
@@ -103,7 +103,7 @@ pub fn of_fit(runner: &mut EnsembleRunner<'_>, centre: &[f64]) -> Result<HangsOn
 ///
 /// # Errors
 /// When the fleet fails.
-pub fn of_ensemble(
+pub(crate) fn of_ensemble(
     runner: &mut EnsembleRunner<'_>,
     centre: &[f64],
     response: &Response,

@@ -35,7 +35,7 @@ impl Study {
 
     /// The window as a job carries it, for an observer that knows displacements only: in the place of an observed distance, the
     /// displacement that has none.
-    pub fn sendable(&self, record: usize, window: &Arc<Window>) -> Arc<Window> {
+    pub(crate) fn sendable(&self, record: usize, window: &Arc<Window>) -> Arc<Window> {
         if self.observer_is_off() || self.records[record].surfaces().next().is_none() {
             return Arc::clone(window);
         }

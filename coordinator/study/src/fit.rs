@@ -5,16 +5,17 @@
 //! can; [`free_run`] runs the estimate freely at the end. The arithmetic is in `starlings-estimators`. Next file to read:
 //! [`filter`].
 
-pub mod batch;
+pub(crate) mod batch;
 mod ensemble;
-pub mod filter;
-pub mod free_run;
-pub mod resample;
-pub mod rescue;
-pub mod runner;
+pub(crate) mod filter;
+pub(crate) mod free_run;
+pub(crate) mod resample;
+pub(crate) mod rescue;
+pub(crate) mod runner;
 mod schedule;
-pub mod settle;
-pub mod stack;
+pub(crate) mod settle;
+pub(crate) mod stack;
 mod timeouts;
 
 pub use ensemble::recombine_by;
+pub use settle::LIMIT;

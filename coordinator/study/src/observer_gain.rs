@@ -44,7 +44,7 @@ pub struct ObserverCourse {
 
 /// A comparison of both runs.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Comparison {
+pub(crate) struct Comparison {
     /// The figures.
     pub fit: ObserverFit,
     /// Their course, one entry per record.
@@ -53,7 +53,7 @@ pub struct Comparison {
 
 /// What came of the comparison.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Compared {
+pub(crate) enum Compared {
     /// The study has no observer.
     NoObserver,
     /// Both runs, side by side.
@@ -66,7 +66,7 @@ pub enum Compared {
 ///
 /// # Errors
 /// When the fleet fails. A model that fails under its observer at the estimate is no error: see [`Compared::Failed`].
-pub fn compare(
+pub(crate) fn compare(
     runner: &mut EnsembleRunner<'_>,
     posterior: &Gaussian,
     free: &[PredictionRow],

@@ -105,7 +105,7 @@ pub fn rows(study: &Study, posterior: &Gaussian) -> Vec<EstimateRow> {
 }
 
 /// Square roots of the variances; a variance rounded below zero counts as zero.
-pub fn standard_deviations(gaussian: &Gaussian) -> Vec<f64> {
+pub(crate) fn standard_deviations(gaussian: &Gaussian) -> Vec<f64> {
     gaussian.covariance.diagonal().iter().map(|v| v.max(0.0).sqrt()).collect()
 }
 
@@ -126,7 +126,7 @@ impl ThetaEntry {
 ///
 /// # Errors
 /// Never in practice: the text is written to memory.
-pub fn to_csv(study: &Study, posterior: &Gaussian) -> Result<String, csv::Error> {
+pub(crate) fn to_csv(study: &Study, posterior: &Gaussian) -> Result<String, csv::Error> {
     let mut csv = csv::Writer::from_writer(Vec::new());
     let fixed = ["parameter", "unit", "transform", "estimate", "sd", "lo95", "hi95", "mean_transformed"];
     let covariances = study.theta.iter().map(|entry| format!("cov:{}", entry.name));

@@ -132,10 +132,10 @@ pub struct Move {
 
 impl Move {
     /// Below this many posterior standard deviations an estimate counts as settled.
-    pub const SETTLED: f64 = 0.1;
+    pub(crate) const SETTLED: f64 = 0.1;
 
     /// Whether no entry moved further.
-    pub fn is_settled(&self) -> bool {
+    pub(crate) fn is_settled(&self) -> bool {
         self.size < Self::SETTLED
     }
 }

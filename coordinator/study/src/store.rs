@@ -76,7 +76,7 @@ impl Store {
     ///
     /// # Errors
     /// When there is none or it was written by another version.
-    pub fn open_to_read(path: &Path) -> Result<Self, StoreError> {
+    pub(crate) fn open_to_read(path: &Path) -> Result<Self, StoreError> {
         Self::existing(path, rusqlite::OpenFlags::SQLITE_OPEN_READ_ONLY)
     }
 
@@ -220,7 +220,7 @@ impl Store {
     ///
     /// # Errors
     /// When the database refuses.
-    pub fn commit(&self) -> Result<(), StoreError> {
+    pub(crate) fn commit(&self) -> Result<(), StoreError> {
         if self.connection.is_autocommit() {
             return Ok(());
         }
@@ -231,7 +231,7 @@ impl Store {
     ///
     /// # Errors
     /// When the database refuses.
-    pub fn commit_if_due(&self, now_s: f64) -> Result<(), StoreError> {
+    pub(crate) fn commit_if_due(&self, now_s: f64) -> Result<(), StoreError> {
         if now_s - self.committed_s.get() >= HOLD_S {
             self.note_elapsed(now_s)?;
             self.commit()?;

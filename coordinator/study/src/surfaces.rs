@@ -77,7 +77,7 @@ impl Node {
     /// Whether the surface of this time shows the node: there is one, and the node at rest is not past an open end.
     ///
     /// The place at rest decides and not that of a particle, so that all particles are compared with the same data.
-    pub fn is_shown(&self, time: f64) -> bool {
+    pub(crate) fn is_shown(&self, time: f64) -> bool {
         self.foot(time, 0.0).is_some_and(|foot| foot.past_end <= 0.0)
     }
 

@@ -20,7 +20,7 @@ use crate::{Fit, Progress, RunContext, RunError, Study, posterior};
 ///
 /// # Errors
 /// When the fleet or the store fails, or no run around the estimate succeeds.
-pub fn fit(
+pub(crate) fn fit(
     runner: &mut EnsembleRunner<'_>,
     store: &Store,
     context: &mut RunContext<'_>,

@@ -20,7 +20,7 @@ use crate::{Fit, RunContext, RunError, Study, posterior};
 ///
 /// # Errors
 /// When the fleet or the store fails, or too few sigma points can be run.
-pub fn fit(
+pub(crate) fn fit(
     make: MakeFilter,
     runner: &mut EnsembleRunner<'_>,
     store: &Store,

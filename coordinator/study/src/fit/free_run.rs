@@ -16,7 +16,10 @@ use crate::{RunError, Study};
 ///
 /// # Errors
 /// When the fleet fails, or the model fails at the estimate.
-pub fn run(runner: &mut EnsembleRunner<'_>, posterior: &Gaussian) -> Result<Vec<PredictionRow>, RunError> {
+pub(crate) fn run(
+    runner: &mut EnsembleRunner<'_>,
+    posterior: &Gaussian,
+) -> Result<Vec<PredictionRow>, RunError> {
     let study = runner.study();
     let windows: StepWindows =
         (0..study.records.len()).map(|record| (record, Arc::new(study.whole(record, false)))).collect();

@@ -62,13 +62,13 @@ fn add(gram: &mut DMatrix<f64>, rows: &DMatrix<f64>, weights: &DVector<f64>, sca
 }
 
 /// An ensemble after resampling.
-pub struct Redrawn {
+pub(crate) struct Redrawn {
     /// The redrawn particles.
-    pub particles: Particles,
+    pub(crate) particles: Particles,
     /// Their predictions, m × r.
-    pub predictions: DMatrix<f64>,
+    pub(crate) predictions: DMatrix<f64>,
     /// Share of the spread, in the norm of the Gram matrix, that they leave out.
-    pub dropped: f64,
+    pub(crate) dropped: f64,
 }
 
 /// Redraws particles and states around the leading directions and observes them again: the new
@@ -76,7 +76,7 @@ pub struct Redrawn {
 ///
 /// # Errors
 /// When the fleet or the estimator fails.
-pub fn redraw(
+pub(crate) fn redraw(
     runner: &mut EnsembleRunner<'_>,
     filter: &dyn Filter,
     at: AnalysisIndex,

@@ -14,13 +14,13 @@ use crate::RunError;
 const DISTANCES: [f64; 5] = [0.5, 0.25, 0.125, 0.0625, 0.03125];
 
 /// An ensemble that ran over one step: every column is a prediction, or dropped.
-pub struct Forecast {
+pub(crate) struct Forecast {
     /// The particles, with their pulls.
-    pub particles: Particles,
+    pub(crate) particles: Particles,
     /// Predictions and end states by particle and window; a dropped particle keeps its error.
-    pub results: Results,
+    pub(crate) results: Results,
     /// Sigma points that were pulled or dropped.
-    pub rescued: u64,
+    pub(crate) rescued: u64,
 }
 
 /// Runs all particles over the step's windows and rescues those that fail.
@@ -29,7 +29,7 @@ pub struct Forecast {
 ///
 /// # Errors
 /// When the fleet fails, or too few particles survive for an analysis; the message says which parameters could not be run.
-pub fn forecast(
+pub(crate) fn forecast(
     runner: &mut EnsembleRunner<'_>,
     filter: &dyn Filter,
     particles: Particles,

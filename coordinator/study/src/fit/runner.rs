@@ -16,35 +16,35 @@ use crate::trial::named;
 use crate::{RunError, Study};
 
 /// The windows of one step, one per record that still has data: (record, window).
-pub type StepWindows = Vec<(usize, Arc<Window>)>;
+pub(crate) type StepWindows = Vec<(usize, Arc<Window>)>;
 
 /// The analysis that an ensemble belongs to; goes into the rows of the store.
 #[derive(Clone, Copy, Debug)]
-pub struct AnalysisIndex {
+pub(crate) struct AnalysisIndex {
     /// Pass, from 1; 0 for the final forward run.
-    pub pass: usize,
+    pub(crate) pass: usize,
     /// Analysis within the pass, from 0.
-    pub step: usize,
+    pub(crate) step: usize,
 }
 
 /// A prediction per particle and window, or why there is none: the model's doing, or the limit of wall time.
-pub type Results = Vec<Vec<Result<Prediction, Failure>>>;
+pub(crate) type Results = Vec<Vec<Result<Prediction, Failure>>>;
 
 /// Sends runs to a fleet and keeps the rows that the store will want.
-pub struct EnsembleRunner<'a> {
+pub(crate) struct EnsembleRunner<'a> {
     study: &'a Study,
     fleet: &'a mut dyn Fleet,
     setup: SetupId,
     /// One row per run since the last [`EnsembleRunner::take_rows`].
     rows: Vec<JobRow>,
     /// Runs asked for.
-    pub total: u64,
+    pub(crate) total: u64,
     /// Runs that failed for good.
-    pub failed: u64,
+    pub(crate) failed: u64,
     /// Extra attempts.
-    pub retried: u64,
+    pub(crate) retried: u64,
     /// Threads that recombine states; one unless somebody says more.
-    pub threads: usize,
+    pub(crate) threads: usize,
     /// Workers that answered.
     workers: BTreeSet<String>,
     /// Length of a state, where the model's specification says it.
@@ -58,7 +58,7 @@ impl<'a> EnsembleRunner<'a> {
     ///
     /// # Errors
     /// When the fleet refuses the setup.
-    pub fn new(study: &'a Study, fleet: &'a mut dyn Fleet) -> Result<Self, RunError> {
+    pub(crate) fn new(study: &'a Study, fleet: &'a mut dyn Fleet) -> Result<Self, RunError> {
         let setup = fleet.install(&study.setup)?;
         let spec = study.setup.spec().ok();
         let n_state = spec.filter(|spec| spec.restart).map(|spec| spec.n_state());
@@ -81,13 +81,13 @@ impl<'a> EnsembleRunner<'a> {
     ///
     /// # Errors
     /// When the store cannot be read.
-    pub fn deciding(mut self, store: &'a Store) -> Result<Self, RunError> {
+    pub(crate) fn deciding(mut self, store: &'a Store) -> Result<Self, RunError> {
         self.timeouts = Some(Timeouts::read(store)?);
         Ok(self)
     }
 
     /// A warning about the timeouts in the store, if there are any.
-    pub fn timeouts(&self) -> Option<String> {
+    pub(crate) fn timeouts(&self) -> Option<String> {
         self.timeouts.as_ref()?.warning()
     }
 
@@ -96,7 +96,7 @@ impl<'a> EnsembleRunner<'a> {
     ///
     /// # Errors
     /// When the fleet fails as a whole.
-    pub fn run(
+    pub(crate) fn run(
         &mut self,
         at: AnalysisIndex,
         particles: &[usize],
@@ -149,7 +149,7 @@ impl<'a> EnsembleRunner<'a> {
     ///
     /// # Errors
     /// When the fleet fails as a whole, or refuses a setup.
-    pub fn run_setups(
+    pub(crate) fn run_setups(
         &mut self,
         at: AnalysisIndex,
         setups: &[Setup],
@@ -265,22 +265,22 @@ impl<'a> EnsembleRunner<'a> {
     }
 
     /// The rows gathered since the last call.
-    pub fn take_rows(&mut self) -> Vec<JobRow> {
+    pub(crate) fn take_rows(&mut self) -> Vec<JobRow> {
         std::mem::take(&mut self.rows)
     }
 
     /// Workers that answered a run so far.
-    pub fn n_answered(&self) -> usize {
+    pub(crate) fn n_answered(&self) -> usize {
         self.workers.len()
     }
 
     /// Workers at the moment.
-    pub fn n_workers(&self) -> usize {
+    pub(crate) fn n_workers(&self) -> usize {
         self.fleet.n_workers()
     }
 
     /// The study that is run.
-    pub fn study(&self) -> &'a Study {
+    pub(crate) fn study(&self) -> &'a Study {
         self.study
     }
 }

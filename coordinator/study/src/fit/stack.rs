@@ -6,7 +6,7 @@ use super::runner::{Results, StepWindows};
 
 /// Stacks the predictions of all particles: m × r, rows by window, then time, then output. A failed particle's column is
 /// zero and must be masked by the caller.
-pub fn stack_outputs(results: &Results, windows: &StepWindows) -> DMatrix<f64> {
+pub(crate) fn stack_outputs(results: &Results, windows: &StepWindows) -> DMatrix<f64> {
     let columns: Vec<Vec<f64>> = results
         .iter()
         .map(|windows| windows.iter().flatten().flat_map(|p| p.outputs.iter().copied()).collect())
@@ -16,7 +16,7 @@ pub fn stack_outputs(results: &Results, windows: &StepWindows) -> DMatrix<f64> {
 }
 
 /// The states of all particles at the end of window `index`: n × r. A failed particle's column is zero.
-pub fn stack_states(results: &Results, index: usize) -> DMatrix<f64> {
+pub(crate) fn stack_states(results: &Results, index: usize) -> DMatrix<f64> {
     let n = results.iter().filter_map(|w| w[index].as_ref().ok()).map(|p| p.state.len()).max().unwrap_or(0);
     let mut x = DMatrix::zeros(n, results.len());
     for (column, windows) in results.iter().enumerate() {

@@ -67,7 +67,7 @@ pub enum Seen {
 ///
 /// # Errors
 /// When the fleet fails, or the model fails at one of the points.
-pub fn run(runner: &mut EnsembleRunner<'_>, centre: &[f64]) -> Result<Response, IdentifyError> {
+pub(crate) fn run(runner: &mut EnsembleRunner<'_>, centre: &[f64]) -> Result<Response, IdentifyError> {
     run_with(runner, centre, Points::Star, Seen::Freely)
 }
 
@@ -75,7 +75,7 @@ pub fn run(runner: &mut EnsembleRunner<'_>, centre: &[f64]) -> Result<Response, 
 ///
 /// # Errors
 /// When the fleet fails, or the model fails at one of the points.
-pub fn run_with(
+pub(crate) fn run_with(
     runner: &mut EnsembleRunner<'_>,
     centre: &[f64],
     points: Points,

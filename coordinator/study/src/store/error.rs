@@ -41,7 +41,7 @@ pub enum StoreError {
 
 impl StoreError {
     /// Whether the disk failed or has no room.
-    pub fn is_of_disk(&self) -> bool {
+    pub(crate) fn is_of_disk(&self) -> bool {
         let Self::Database { source, .. } = self else { return false };
         let code = source.sqlite_error_code();
         matches!(code, Some(rusqlite::ErrorCode::DiskFull | rusqlite::ErrorCode::SystemIoFailure))
