@@ -8,7 +8,7 @@ use starlings_coordinator::study::MAX_PASSES;
 use starlings_coordinator::study::field::{field_of, observed_fields};
 use starlings_coordinator::study::trial::{Depth, TrialChannel, dry_run};
 use starlings_coordinator::study::{Study, posterior};
-use starlings_estimators::SigmaSet;
+use starlings_estimators::{Form, SigmaSet};
 
 use crate::console::{line, number, table, text};
 use crate::failure::Failure;
@@ -29,29 +29,34 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let mut study = load(&args.study)?;
     let kind = study.estimator.kind;
     let channels = dry_run(&mut study, kind, Depth::All).map_err(Failure::input)?;
-    let n_particle = n_particle(&study)?;
+    let ensemble = ensemble(&study)?;
     if args.json {
-        line(format_args!("{:#}", as_json(&study, &channels, n_particle)))
+        line(format_args!("{:#}", as_json(&study, &channels, ensemble)))
     } else {
-        print(&study, &channels, n_particle)
+        print(&study, &channels, ensemble)
     }
 }
 
-/// Particles of one ensemble.
-fn n_particle(study: &Study) -> Result<usize, Failure> {
-    let set = SigmaSet::new(study.estimator.points, study.theta.len()).map_err(Failure::input)?;
-    Ok(set.n_particle())
+/// Particles of one ensemble, and whether a filter draws them again at every analysis.
+fn ensemble(study: &Study) -> Result<(usize, bool), Failure> {
+    let ensemble = match study.estimator.kind.form {
+        Form::Windows(make) => make(&study.filter_options()).map(|f| (f.n_particle(), f.resamples())),
+        Form::WholeRecords => {
+            SigmaSet::new(study.estimator.points, study.theta.len()).map(|set| (set.n_particle(), false))
+        }
+    };
+    ensemble.map_err(Failure::input)
 }
 
 /// Runs of one pass of the filter, or of one ensemble of the batch fit.
-fn runs_per_pass(study: &Study, n_particle: usize) -> usize {
+fn runs_per_pass(study: &Study, (n_particle, resamples): (usize, bool)) -> usize {
     let windows: Vec<usize> = (0..study.records.len()).map(|r| study.windows(r).len()).collect();
     if !study.estimator.kind.is_filter() {
         // The centre is run beside the sigma points.
         return (n_particle + 1) * windows.iter().filter(|n| **n > 0).count();
     }
     // Redrawn points are observed by runs of their own.
-    let redrawn = study.estimator.resample && n_particle > study.theta.len() + 1 && study.observer_is_off();
+    let redrawn = study.estimator.resample && resamples && study.observer_is_off();
     n_particle * windows.iter().sum::<usize>() * if redrawn { 2 } else { 1 }
 }
 
@@ -61,7 +66,7 @@ fn passes(study: &Study) -> Option<(usize, usize)> {
     of_filter.then(|| study.passes().map_or((2, MAX_PASSES), |n| (n, n)))
 }
 
-fn as_json(study: &Study, channels: &[TrialChannel], n_particle: usize) -> serde_json::Value {
+fn as_json(study: &Study, channels: &[TrialChannel], ensemble: (usize, bool)) -> serde_json::Value {
     let estimates = posterior::estimates(study, &posterior::prior(study));
     json!({
         "study": study.name,
@@ -70,8 +75,8 @@ fn as_json(study: &Study, channels: &[TrialChannel], n_particle: usize) -> serde
         "parameters": estimates.iter().map(|e| json!({
             "name": e.name, "unit": e.unit, "prior_median": e.prior_median, "prior_interval95": e.prior_interval95,
         })).collect::<Vec<_>>(),
-        "particles": n_particle,
-        "runs_per_pass": runs_per_pass(study, n_particle),
+        "particles": ensemble.0,
+        "runs_per_pass": runs_per_pass(study, ensemble),
         "passes": passes(study).map(|(least, most)| json!({ "at_least": least, "at_most": most })),
         "trial": channels.iter().map(|c| json!({
             "record": c.record, "output": c.output, "observations": c.n_obs, "rmse": c.rmse, "noise": c.noise,
@@ -107,7 +112,7 @@ fn pooled(study: &Study, channels: &[TrialChannel]) -> Vec<String> {
     vec![record, name, n_obs.to_string(), mean_square(|c| c.rmse), mean_square(|c| c.noise)]
 }
 
-fn print(study: &Study, channels: &[TrialChannel], n_particle: usize) -> Result<(), Failure> {
+fn print(study: &Study, channels: &[TrialChannel], ensemble: (usize, bool)) -> Result<(), Failure> {
     line(format_args!("{}: model {}, {}", study.name, study.setup.model.kind, study.describe_estimator()))?;
     line("\nparameters")?;
     let mut rows = vec![["name", "unit", "prior median", "prior 95 %"].map(str::to_owned).to_vec()];
@@ -119,7 +124,7 @@ fn print(study: &Study, channels: &[TrialChannel], n_particle: usize) -> Result<
     if !channels.is_empty() {
         print_trial(study, channels)?;
     }
-    let runs = runs_per_pass(study, n_particle);
+    let runs = runs_per_pass(study, ensemble);
     let per = match passes(study) {
         None => "iteration".to_owned(),
         Some((least, most)) if least == most => {
@@ -129,7 +134,7 @@ fn print(study: &Study, channels: &[TrialChannel], n_particle: usize) -> Result<
             format!("pass, {least} to {most} passes: as many as the estimate takes to settle")
         }
     };
-    line(format_args!("\n{n_particle} particles, {runs} runs of the model per {per}"))?;
+    line(format_args!("\n{} particles, {runs} runs of the model per {per}", ensemble.0))?;
     for warning in &study.warnings {
         line(format_args!("warning: {warning}"))?;
     }

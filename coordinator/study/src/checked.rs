@@ -6,7 +6,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use starlings_estimators::{Drift, Kind, Points, Root, Transform};
+use starlings_estimators::{Drift, Kind, Options, Points, Root, Transform};
 use starlings_models::spectrum::Decay;
 use starlings_models::{EffectDef, Setup, Signal, Spec};
 
@@ -251,6 +251,12 @@ impl Study {
             Some(n) => format!(", {n} passes"),
         };
         format!("{}, {points} points{passes}", self.estimator.kind.name)
+    }
+
+    /// What the study's filter is made from, without drift.
+    pub fn filter_options(&self) -> Options {
+        let (points, root) = (self.estimator.points, self.estimator.root);
+        Options { n_param: self.theta.len(), points, root, drift: Vec::new(), seed: self.seed }
     }
 
     /// Noise sd of each of [`Setup::outputs`] in a record; 1 for an output that the record does not measure, whose rows

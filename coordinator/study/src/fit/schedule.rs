@@ -44,16 +44,13 @@ pub(super) struct Reported {
 
 impl<'a> Schedule<'a> {
     pub(super) fn new(study: &'a Study, make: MakeFilter) -> Result<Self, RunError> {
-        let e = &study.estimator;
-        let n_param = study.theta.len();
-        let options =
-            Options { n_param, points: e.points, root: e.root, drift: Vec::new(), seed: study.seed };
+        let options = study.filter_options();
         let drift: Vec<Drift> = study.theta.iter().map(|t| t.drift).collect();
         let still = make(&options)?;
         let drifting = study.drifts().then(|| make(&Options { drift, ..options })).transpose()?;
         Ok(Self {
             study,
-            resample: e.resample && still.resamples(),
+            resample: study.estimator.resample && still.resamples(),
             drifting,
             still,
             passes: study.passes(),
