@@ -4,8 +4,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use starlings_coordinator::explain::patch::{PatchEffect, PatchError, explained_study};
 use starlings_coordinator::explain::result::Coefficient;
+use starlings_coordinator::explain::{PatchEffect, PatchError, explained_study};
 use starlings_coordinator::study::Study;
 use starlings_coordinator::study::trial::trial;
 use starlings_models::EffectDef;

@@ -6,8 +6,7 @@ mod reactor_kit;
 mod study_kit;
 
 use reactor_kit::{reactor, recorded};
-use starlings_coordinator::explain::candidates::check;
-use starlings_coordinator::explain::{Context, ExplainError, Explanation, Options, Verdict, explain};
+use starlings_coordinator::explain::{Context, ExplainError, Explanation, Options, Verdict, check, explain};
 use starlings_coordinator::fleet::InProcess;
 use starlings_coordinator::study::Study;
 use starlings_coordinator::study::store::Store;

@@ -7,7 +7,6 @@ mod bootstrap;
 mod channels;
 mod correlate;
 mod maps;
-pub(super) mod number;
 mod places;
 mod region;
 mod residuals;
@@ -20,11 +19,13 @@ pub mod unknown_input;
 
 pub use bootstrap::{block_bootstrap_rms, block_length};
 pub use maps::map_again;
-pub use result::{ChannelGap, Correlated, Located, RegionMap, ResidualSpectrum, Track, UnknownInput};
+pub use result::{
+    ChannelGap, Correlated, Located, MisfitPlace, RegionMap, ResidualSpectrum, Track, UnknownInput,
+};
 use starlings_study::Study;
 pub use unknown_input::{MOST_RUNS, unknown_inputs};
 
-use super::Rows;
+use crate::rows::Rows;
 
 /// Finished runs of one model, to be looked at.
 #[derive(Clone, Copy, Debug)]

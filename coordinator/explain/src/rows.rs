@@ -1,6 +1,6 @@
 //! Every measured value of a study as one row, in a fixed order: the common language of locating, screening and judging.
 //!
-//! Predictions and residuals are vectors aligned with these rows. Next file to read: [`super::laboratory`].
+//! Predictions and residuals are vectors aligned with these rows. Next file to read: [`crate::run_cache`].
 
 use starlings_study::Study;
 use starlings_study::field::quantity_of;

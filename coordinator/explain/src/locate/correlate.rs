@@ -127,7 +127,7 @@ fn lagged(study: &Study, track: &Track, group: &Residuals, now: &[f64]) -> Optio
     let span = longest.times.last()? - longest.times.first()?;
     let earlier = span * lag as f64 / (longest.times.len() - 1) as f64;
     let unit = if study.time_unit.is_empty() { String::new() } else { format!(" {}", study.time_unit) };
-    let words = format!("{} {}{unit} earlier", track.name, super::number::three(earlier));
+    let words = format!("{} {}{unit} earlier", track.name, crate::number::three(earlier));
     Some(Candidate { words, values, steps: 3.0 })
 }
 

@@ -10,10 +10,10 @@ use super::View;
 use super::bootstrap::{DRAWS, block_bootstrap_rms, block_length};
 use super::region::{Region, best};
 use super::residuals::Residuals;
+use super::result::MisfitPlace;
 use super::sentence::{Figures, region_words, sentence};
 use super::signal::{Signal, signals};
-use crate::Usage;
-use crate::result::Place;
+use crate::rows::Usage;
 
 /// Regions of one channel at most: where it trains, and where it is held out.
 const MOST: (usize, usize) = (3, 1);
@@ -33,14 +33,14 @@ const REST: f64 = 0.1;
 
 /// A place with what it is ranked by.
 struct Ranked {
-    place: Place,
+    place: MisfitPlace,
     usage: Usage,
     /// Sum over the values of squared residual over expected square, less one.
     excess: f64,
 }
 
 /// Places of all channels: training values first, then held-out ones, worst first.
-pub(super) fn places(view: &View<'_>, groups: &[Residuals]) -> Vec<Place> {
+pub(super) fn places(view: &View<'_>, groups: &[Residuals]) -> Vec<MisfitPlace> {
     let mut ranked: Vec<Ranked> = groups.iter().flat_map(|group| of_channel(view, group)).collect();
     let order = |usage: Usage| match usage {
         Usage::Train => 0,
@@ -108,7 +108,7 @@ fn ranked(
         None if elsewhere => "elsewhere".to_owned(),
         None => String::new(),
     };
-    let place = Place {
+    let place = MisfitPlace {
         channel: group.channel.clone(),
         unit: group.unit.clone(),
         from: times().fold(f64::INFINITY, f64::min),

@@ -2,9 +2,9 @@
 //!
 //! Next file to read: [`super::places`].
 
-use super::number::readable;
 use super::scan::scan;
 use super::signal::{Kind, Signal};
+use crate::number::readable;
 
 /// Bins per signal when two signals are looked at together.
 const GRID: usize = 8;

@@ -3,7 +3,7 @@
 //! Next file to read: [`super::signal`].
 
 use super::View;
-use crate::Usage;
+use crate::rows::Usage;
 use crate::rows::unit;
 
 /// Residuals of one channel in one use, in the order of the rows.

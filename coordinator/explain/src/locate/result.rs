@@ -4,8 +4,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::result::Place;
-
 /// A signal of the model along every record, at the record's times: an input, a state or an output of the fitted model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Track {
@@ -44,7 +42,7 @@ pub(super) fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Located {
     /// Where simulation and data disagree, worst first.
-    pub places: Vec<Place>,
+    pub places: Vec<MisfitPlace>,
     /// The misfit of every channel of every record.
     pub channels: Vec<ChannelGap>,
     /// Residuals over operating regions.
@@ -55,6 +53,29 @@ pub struct Located {
     pub spectra: Vec<ResidualSpectrum>,
     /// The unknown input of each equation that would remove the residuals.
     pub forces: Vec<UnknownInput>,
+}
+
+/// A place where simulation and data disagree.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MisfitPlace {
+    /// Output name.
+    pub channel: String,
+    /// Unit label of the channel.
+    pub unit: String,
+    /// Start of the span.
+    pub from: f64,
+    /// End of the span.
+    pub to: f64,
+    /// The operating region in words, such as `flow > 50 mL/s`; empty for all of the span.
+    pub region: String,
+    /// Root mean square of observed − predicted there.
+    pub rmse: f64,
+    /// Its block-bootstrap 95 % interval.
+    pub interval95: [f64; 2],
+    /// What noise and the uncertainty of the fit would leave there.
+    pub expected: f64,
+    /// One sentence with the numbers.
+    pub sentence: String,
 }
 
 /// The misfit of one channel of one record in one use.

@@ -22,7 +22,7 @@ use starlings_study::Study;
 use self::candidate::{Candidate, candidates};
 use self::walk::{DIRECTIONS, Estimate, Walk};
 use super::UnknownInput;
-use crate::ExplainError;
+use crate::error::ExplainError;
 
 /// Windows of the record at most: neighbouring ones are joined.
 const WINDOWS: usize = 200;

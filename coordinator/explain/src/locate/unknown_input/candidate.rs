@@ -9,8 +9,7 @@ use starlings_models::effect::{Addition, EffectParameter};
 use starlings_models::{EffectDef, Job, Prediction, Quantity, SOLVER, Setup, Spec, Window};
 use starlings_study::Study;
 
-use crate::ExplainError;
-use crate::memory::told;
+use crate::error::{ExplainError, fleet_failure};
 
 /// Change of the outputs, in noise sd, below which an input is not felt.
 const FELT: f64 = 1e-6;
@@ -67,7 +66,7 @@ pub(super) fn candidates(
             (setup, Job { particle, record, window, theta, state: None })
         };
         let jobs = inputs.into_iter().enumerate().map(job).collect();
-        let outcomes = fleet.run_mixed(jobs).map_err(|error| told(study, error))?;
+        let outcomes = fleet.run_mixed(jobs).map_err(|error| fleet_failure(study, error))?;
         Ok(predictions(study, record, &window, outcomes))
     };
     let equations = equations(study, fleet)?;

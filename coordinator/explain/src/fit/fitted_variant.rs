@@ -1,0 +1,150 @@
+//! A variant of the study with its fit: where it stands, what it predicts, and what the solver needs next.
+//!
+//! Nothing is run here. Next files to read: `least_squares.rs` of the estimators, then [`super::drive`], which drives several.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+use starlings_estimators::{End, EstimatorError, LeastSquares, Need, Optimum};
+
+use super::jacobian::SplitJacobian;
+use super::model_variant::ModelVariant;
+use crate::rows::Rows;
+use crate::run_cache::Point;
+
+/// Fall of χ² below which a fit has converged.
+const TOLERANCE: f64 = 0.02;
+/// Fall of χ² below which a tentative fit stops.
+const ROUGH: f64 = 0.3;
+/// Steps of a fit at most.
+const TRIALS: usize = 60;
+
+/// A variant and its fit.
+#[derive(Clone, Debug)]
+pub struct FittedVariant<'c> {
+    /// The variant.
+    pub variant: ModelVariant<'c>,
+    pub(crate) solver: LeastSquares,
+    /// Predictions of all rows at the best point.
+    pub predicted: Arc<Vec<f64>>,
+    /// d prediction / d z over the noise at the best point, all rows × parameters, from the last measured Jacobian. The rows of a
+    /// held-out record depend on the fitted records by the mean that it is run with.
+    pub jacobian: SplitJacobian,
+    /// d prediction over the noise for one standard deviation of each value that a held-out record has of its own, all rows ×
+    /// values that a record has; without columns until it was measured. The values of one record are not those of another.
+    pub own_values: DMatrix<f64>,
+}
+
+impl<'c> FittedVariant<'c> {
+    /// A fit of a variant from the prior mean.
+    pub fn from_prior(variant: ModelVariant<'c>) -> Self {
+        let start = DVector::zeros(variant.n_param());
+        Self::begin(variant, start)
+    }
+
+    /// A fit of a variant from a point that was not run.
+    pub fn begin(variant: ModelVariant<'c>, start: DVector<f64>) -> Self {
+        let solver = LeastSquares::new(start, variant.scaled.clone(), TOLERANCE, TRIALS);
+        let (jacobian, own_values) = (SplitJacobian::default(), DMatrix::zeros(0, 0));
+        Self { variant, solver, predicted: Arc::default(), jacobian, own_values }
+    }
+
+    /// A fit of a variant that adds one effect to a fitted one: at amplitude zero it is where that one is, and the effect's
+    /// sensitivity (all rows, per unit of z) completes the Jacobian. Parameters inside the new term stay until a Jacobian is
+    /// measured.
+    pub fn from_parent(
+        variant: ModelVariant<'c>,
+        parent: &FittedVariant<'_>,
+        point: &[f64],
+        sensitivity: &DVector<f64>,
+        rows: &Rows,
+    ) -> Self {
+        let z = variant.continue_from(&parent.variant, parent.z(), point);
+        let source = |j: usize| {
+            let name = &variant.study.theta[j].name;
+            let i = parent.variant.study.theta.iter().position(|entry| entry.name == *name)?;
+            Some((i, variant.unit()[j] / parent.variant.unit()[i]))
+        };
+        let sources: Vec<Option<(usize, f64)>> = (0..variant.n_param()).map(source).collect();
+        let mut jacobian = parent.jacobian.map_columns(variant.n_param(), |j| sources[j]);
+        jacobian.set_column(variant.first_entry_of(variant.effects.len() - 1), sensitivity, rows);
+        let residual = parent.residual().clone();
+        let (of_train, scaled) = (jacobian.of_train.clone(), variant.scaled.clone());
+        let solver = LeastSquares::from_known(z, residual, of_train, scaled, ROUGH, TRIALS);
+        let (predicted, own_values) = (Arc::clone(&parent.predicted), DMatrix::zeros(0, 0));
+        Self { variant, solver, predicted, jacobian, own_values }
+    }
+
+    /// Asks for measured Jacobians until it has converged.
+    pub fn polish(&mut self) {
+        self.solver.polish(TRIALS);
+    }
+
+    /// The best point, in z.
+    pub fn z(&self) -> &DVector<f64> {
+        self.solver.best().0
+    }
+
+    /// The whitened residuals of the training rows at the best point.
+    pub fn residual(&self) -> &DVector<f64> {
+        self.solver.best().1
+    }
+
+    /// χ² plus prior at the best point.
+    pub fn cost(&self) -> f64 {
+        self.solver.cost()
+    }
+
+    /// The cost that the linear model promises at its minimum.
+    pub fn promised(&self) -> f64 {
+        self.solver.promised()
+    }
+
+    /// How it ended; `None` while it needs runs.
+    pub fn end(&self) -> Option<End> {
+        match self.solver.need() {
+            Need::Nothing(end) => Some(*end),
+            _ => None,
+        }
+    }
+
+    /// Whether it stands where it should: converged, or so close that no step is found that lowers χ² by one.
+    pub fn has_converged(&self) -> bool {
+        match self.end() {
+            Some(End::Converged | End::Tentative) => true,
+            Some(End::Stalled) => self.solver.last_promise() < 1.0,
+            _ => false,
+        }
+    }
+
+    /// Steps that it has tried.
+    pub fn trials(&self) -> usize {
+        TRIALS.saturating_sub(self.solver.trials_left())
+    }
+
+    /// Whether the Jacobian was measured at the best point.
+    pub fn is_fresh(&self) -> bool {
+        self.solver.is_fresh()
+    }
+
+    /// The transformed parameters of the best point.
+    pub fn theta(&self) -> DVector<f64> {
+        self.variant.theta(self.z())
+    }
+
+    /// The fit as the start of a score test.
+    ///
+    /// # Errors
+    /// When data and prior leave a direction free.
+    pub fn optimum(&self) -> Result<Optimum, EstimatorError> {
+        let (z, residual, jacobian) = self.solver.best();
+        // A flat amplitude without influence must not make the system singular.
+        let precision = self.variant.scaled.precision.map(|p| p.max(1e-9));
+        Optimum::in_blocks(residual, jacobian, &precision, &(&self.variant.scaled.mean - z))
+    }
+}
+
+/// A point of a fitted variant, as it is run.
+pub(crate) fn point<'v>(fit: &'v FittedVariant<'_>, z: &DVector<f64>) -> Point<'v> {
+    Point { study: &fit.variant.study, theta: fit.variant.theta(z) }
+}
