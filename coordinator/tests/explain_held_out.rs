@@ -5,9 +5,7 @@
 mod study_kit;
 
 use nalgebra::{DMatrix, DVector};
-use starlings_coordinator::explain::{
-    Context, FittedVariant, HeldOut, ModelVariant, Options, RunCache, drive, explain,
-};
+use starlings_coordinator::explain::{Context, FittedVariant, HeldOut, Options, RunCache, drive, explain};
 use starlings_coordinator::fleet::InProcess;
 use starlings_coordinator::study::Study;
 use starlings_coordinator::study::store::Store;
@@ -132,13 +130,13 @@ fn the_band_of_a_held_out_record_is_that_of_the_means_and_priors_that_it_is_run_
     let mut fleet = InProcess::new(1);
     let mut context = Context { clock: &|| 0.0, watch: &mut |_| {}, events: None, earlier_s: 0.0 };
     let mut cache = RunCache::new(&study, &mut fleet, &store, &mut context, None);
-    let mut fits = [FittedVariant::from_prior(ModelVariant::new(&study, Vec::new(), &[]).unwrap())];
+    let mut fits = [FittedVariant::of_study(&study).unwrap()];
     assert!(drive(&mut cache, &mut fits).unwrap());
     let [mut fit] = fits;
     fit.measure_own_values(&mut cache).unwrap();
     let (predicted, covariance) = closed_form(&data[1], &data[2], &data[0]);
     let of_c: Vec<usize> = (0..cache.rows.rows.len()).filter(|i| cache.rows.rows[*i].record == 2).collect();
-    let jacobian = fit.jacobian.whole(&cache.rows).select_rows(&of_c);
+    let jacobian = fit.dense_jacobian(&cache.rows).select_rows(&of_c);
     let own = fit.own_values.select_rows(&of_c);
     let optimum = fit.optimum().unwrap();
     let band = &jacobian * optimum.covariance() * jacobian.transpose() + &own * own.transpose();

@@ -9,7 +9,6 @@ use crate::error::ExplainError;
 use crate::fit::candidate::Candidate;
 use crate::fit::drive::drive;
 use crate::fit::fitted_variant::FittedVariant;
-use crate::fit::model_variant::ModelVariant;
 use crate::judge::search_result::SearchResult;
 use crate::judge::verdict::{Decision, decide};
 use crate::locate::Track;
@@ -58,8 +57,7 @@ fn fit_as_it_is<'c>(
     options: &Options,
 ) -> Result<FittedVariant<'c>, ExplainError> {
     cache.stage("fit", "the model as it is");
-    let variant = ModelVariant::new(study, Vec::new(), &[])?;
-    let mut fits = [FittedVariant::from_prior(variant)];
+    let mut fits = [FittedVariant::of_study(study)?];
     if !drive(cache, &mut fits)? {
         return Err(cache.beyond_budget(study.parameters.len()));
     }

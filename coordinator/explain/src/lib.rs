@@ -36,7 +36,6 @@ mod tell;
 pub use error::ExplainError;
 pub use fit::drive::drive;
 pub use fit::fitted_variant::FittedVariant;
-pub use fit::model_variant::ModelVariant;
 pub use judge::held_out::HeldOut;
 pub use judge::verdict::Verdict;
 pub use options::{Context, Options, Stage};

@@ -10,14 +10,13 @@ mod maps;
 mod places;
 mod region;
 mod residuals;
-pub mod result;
+pub(crate) mod result;
 mod scan;
 mod sentence;
 mod signal;
 mod spectra;
-pub mod unknown_input;
+pub(crate) mod unknown_input;
 
-pub use bootstrap::{block_bootstrap_rms, block_length};
 pub use maps::map_again;
 pub use result::{
     ChannelGap, Correlated, Located, MisfitPlace, RegionMap, ResidualSpectrum, Track, UnknownInput,

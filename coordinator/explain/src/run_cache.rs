@@ -34,7 +34,7 @@ pub struct Point<'v> {
 }
 
 /// What a point predicts for every row, or why it could not be run.
-pub type RowPredictions = Result<Arc<Vec<f64>>, String>;
+pub(crate) type RowPredictions = Result<Arc<Vec<f64>>, String>;
 
 /// Runs points and keeps count.
 pub struct RunCache<'a> {
@@ -95,7 +95,7 @@ impl<'a> RunCache<'a> {
     }
 
     /// Holds so many bytes of every kind of intermediate results at most. Nothing that is found depends on it.
-    pub fn hold_at_most(&mut self, bytes: usize) {
+    pub(crate) fn hold_at_most(&mut self, bytes: usize) {
         (self.hold, self.recent) = (bytes, LruCache::new(bytes));
     }
 
@@ -110,7 +110,7 @@ impl<'a> RunCache<'a> {
     }
 
     /// A new stage begins.
-    pub fn stage(&mut self, name: &'static str, says: &str) {
+    pub(crate) fn stage(&mut self, name: &'static str, says: &str) {
         self.stage = name;
         self.tell(says);
     }
@@ -121,17 +121,17 @@ impl<'a> RunCache<'a> {
     }
 
     /// Runs so far: one particle over one record each.
-    pub fn runs(&self) -> u64 {
+    pub(crate) fn runs(&self) -> u64 {
         self.runs.iter().map(|(_, n)| n).sum()
     }
 
     /// Runs by stage.
-    pub fn runs_by_stage(&self) -> Vec<(String, u64)> {
+    pub(crate) fn runs_by_stage(&self) -> Vec<(String, u64)> {
         self.runs.iter().map(|(name, n)| ((*name).to_owned(), *n)).collect()
     }
 
     /// Counts runs that somebody else made on the fleet.
-    pub fn count(&mut self, n: u64) {
+    pub(crate) fn count(&mut self, n: u64) {
         match self.runs.iter_mut().find(|(name, _)| *name == self.stage) {
             Some((_, count)) => *count += n,
             None => self.runs.push((self.stage, n)),
@@ -139,47 +139,47 @@ impl<'a> RunCache<'a> {
     }
 
     /// Workers that answered.
-    pub fn n_answered(&self) -> usize {
+    pub(crate) fn n_answered(&self) -> usize {
         self.workers.len()
     }
 
     /// The fleet, for what is no whole-record run.
-    pub fn fleet(&mut self) -> &mut dyn Fleet {
+    pub(crate) fn fleet(&mut self) -> &mut dyn Fleet {
         self.fleet
     }
 
     /// The folder of the run.
-    pub fn folder(&self) -> &std::path::Path {
+    pub(crate) fn folder(&self) -> &std::path::Path {
         self.store.folder()
     }
 
     /// Wall time so far, in s.
-    pub fn elapsed(&self) -> f64 {
+    pub(crate) fn elapsed(&self) -> f64 {
         self.earlier_s + (self.clock)()
     }
 
     /// Whether so many more points keep within the budget.
-    pub fn affords(&self, n_point: usize) -> bool {
+    pub(crate) fn affords(&self, n_point: usize) -> bool {
         self.affords_runs(self.cost(n_point))
     }
 
     /// Whether so many more runs keep within the budget.
-    pub fn affords_runs(&self, n: u64) -> bool {
+    pub(crate) fn affords_runs(&self, n: u64) -> bool {
         self.budget.is_none_or(|budget| self.runs() + n <= budget)
     }
 
     /// Notes that something was left undone for want of budget.
-    pub fn cut_short(&mut self) {
+    pub(crate) fn cut_short(&mut self) {
         self.cut_short = true;
     }
 
     /// Whether something was left undone for want of budget.
-    pub fn was_cut_short(&self) -> bool {
+    pub(crate) fn was_cut_short(&self) -> bool {
         self.cut_short
     }
 
     /// The error of a budget that does not suffice for so many more points.
-    pub fn beyond_budget(&self, n_point: usize) -> ExplainError {
+    pub(crate) fn beyond_budget(&self, n_point: usize) -> ExplainError {
         let (budget, needed) = (self.budget.unwrap_or(0), self.cost(n_point));
         ExplainError::Budget { budget, stage: self.stage, needed }
     }

@@ -18,7 +18,7 @@ const LOG_SD: f64 = 1.0;
 
 /// An effect to try.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Candidate {
+pub(crate) struct Candidate {
     /// The effect, every number in the model's units.
     pub def: EffectDef,
     /// Values of the parameters after the amplitude at which it is screened, at least one point.
@@ -27,7 +27,7 @@ pub struct Candidate {
 
 impl Candidate {
     /// A candidate with its grid.
-    pub fn new(def: EffectDef) -> Self {
+    pub(crate) fn new(def: EffectDef) -> Self {
         let mut points: Vec<Vec<f64>> = vec![Vec::new()];
         for parameter in def.parameters.iter().skip(1) {
             let values = values(parameter);
@@ -40,12 +40,12 @@ impl Candidate {
     }
 
     /// Its name.
-    pub fn name(&self) -> &str {
+    pub(crate) fn name(&self) -> &str {
         &self.def.name
     }
 
     /// The sign that its amplitude must have; 0 when both are possible.
-    pub fn sign(&self) -> f64 {
+    pub(crate) fn sign(&self) -> f64 {
         match self.def.parameters.first().map(|p| p.range) {
             Some([lo, _]) if lo >= 0.0 => 1.0,
             Some([_, hi]) if hi <= 0.0 => -1.0,
@@ -55,7 +55,7 @@ impl Candidate {
 
     /// What is known of its parameters before the data: nothing of the amplitude (whose prior is flat in the search), little
     /// of the others.
-    pub fn priors(&self) -> Vec<EffectPrior> {
+    pub(crate) fn priors(&self) -> Vec<EffectPrior> {
         let amplitude = EffectPrior { transform: Transform::Linear, mean: 0.0, sd: 1.0 };
         let inner = self.def.parameters.iter().skip(1).map(inner_prior);
         std::iter::once(amplitude).chain(inner).collect()

@@ -8,7 +8,7 @@ use nalgebra::DVector;
 use starlings_estimators::Need;
 
 use super::differences::STEP;
-pub use super::fitted_variant::FittedVariant;
+use super::fitted_variant::FittedVariant;
 use super::fitted_variant::point;
 use super::jacobian::SplitJacobian;
 use crate::error::ExplainError;
@@ -26,7 +26,7 @@ pub fn drive(cache: &mut RunCache<'_>, fits: &mut [FittedVariant<'_>]) -> Result
 ///
 /// # Errors
 /// When the fleet or the store fails.
-pub fn drive_rounds(
+pub(crate) fn drive_rounds(
     cache: &mut RunCache<'_>,
     fits: &mut [FittedVariant<'_>],
     rounds: usize,
@@ -94,7 +94,7 @@ impl FittedVariant<'_> {
 }
 
 /// (observed − predicted) / noise of the training rows.
-pub fn train_residual(cache: &RunCache<'_>, predicted: &[f64]) -> DVector<f64> {
+pub(crate) fn train_residual(cache: &RunCache<'_>, predicted: &[f64]) -> DVector<f64> {
     let whitened = cache.rows.whitened(predicted);
     DVector::from_iterator(cache.rows.train.len(), cache.rows.train.iter().map(|i| whitened[*i]))
 }

@@ -6,6 +6,8 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 use starlings_estimators::{End, EstimatorError, LeastSquares, Need, Optimum};
+use starlings_models::SetupError;
+use starlings_study::Study;
 
 use super::jacobian::SplitJacobian;
 use super::model_variant::ModelVariant;
@@ -23,27 +25,31 @@ const TRIALS: usize = 60;
 #[derive(Clone, Debug)]
 pub struct FittedVariant<'c> {
     /// The variant.
-    pub variant: ModelVariant<'c>,
+    pub(crate) variant: ModelVariant<'c>,
     pub(crate) solver: LeastSquares,
     /// Predictions of all rows at the best point.
     pub predicted: Arc<Vec<f64>>,
     /// d prediction / d z over the noise at the best point, all rows × parameters, from the last measured Jacobian. The rows of a
     /// held-out record depend on the fitted records by the mean that it is run with.
-    pub jacobian: SplitJacobian,
+    pub(crate) jacobian: SplitJacobian,
     /// d prediction over the noise for one standard deviation of each value that a held-out record has of its own, all rows ×
     /// values that a record has; without columns until it was measured. The values of one record are not those of another.
     pub own_values: DMatrix<f64>,
 }
 
 impl<'c> FittedVariant<'c> {
-    /// A fit of a variant from the prior mean.
-    pub fn from_prior(variant: ModelVariant<'c>) -> Self {
+    /// A fit of the model as the study has it, from the prior mean.
+    ///
+    /// # Errors
+    /// When the model does not build.
+    pub fn of_study(study: &'c Study) -> Result<Self, SetupError> {
+        let variant = ModelVariant::new(study, Vec::new(), &[])?;
         let start = DVector::zeros(variant.n_param());
-        Self::begin(variant, start)
+        Ok(Self::begin(variant, start))
     }
 
     /// A fit of a variant from a point that was not run.
-    pub fn begin(variant: ModelVariant<'c>, start: DVector<f64>) -> Self {
+    pub(crate) fn begin(variant: ModelVariant<'c>, start: DVector<f64>) -> Self {
         let solver = LeastSquares::new(start, variant.scaled.clone(), TOLERANCE, TRIALS);
         let (jacobian, own_values) = (SplitJacobian::default(), DMatrix::zeros(0, 0));
         Self { variant, solver, predicted: Arc::default(), jacobian, own_values }
@@ -52,7 +58,7 @@ impl<'c> FittedVariant<'c> {
     /// A fit of a variant that adds one effect to a fitted one: at amplitude zero it is where that one is, and the effect's
     /// sensitivity (all rows, per unit of z) completes the Jacobian. Parameters inside the new term stay until a Jacobian is
     /// measured.
-    pub fn from_parent(
+    pub(crate) fn from_parent(
         variant: ModelVariant<'c>,
         parent: &FittedVariant<'_>,
         point: &[f64],
@@ -76,32 +82,32 @@ impl<'c> FittedVariant<'c> {
     }
 
     /// Asks for measured Jacobians until it has converged.
-    pub fn polish(&mut self) {
+    pub(crate) fn polish(&mut self) {
         self.solver.polish(TRIALS);
     }
 
     /// The best point, in z.
-    pub fn z(&self) -> &DVector<f64> {
+    pub(crate) fn z(&self) -> &DVector<f64> {
         self.solver.best().0
     }
 
     /// The whitened residuals of the training rows at the best point.
-    pub fn residual(&self) -> &DVector<f64> {
+    pub(crate) fn residual(&self) -> &DVector<f64> {
         self.solver.best().1
     }
 
     /// χ² plus prior at the best point.
-    pub fn cost(&self) -> f64 {
+    pub(crate) fn cost(&self) -> f64 {
         self.solver.cost()
     }
 
     /// The cost that the linear model promises at its minimum.
-    pub fn promised(&self) -> f64 {
+    pub(crate) fn promised(&self) -> f64 {
         self.solver.promised()
     }
 
     /// How it ended; `None` while it needs runs.
-    pub fn end(&self) -> Option<End> {
+    pub(crate) fn end(&self) -> Option<End> {
         match self.solver.need() {
             Need::Nothing(end) => Some(*end),
             _ => None,
@@ -109,7 +115,7 @@ impl<'c> FittedVariant<'c> {
     }
 
     /// Whether it stands where it should: converged, or so close that no step is found that lowers χ² by one.
-    pub fn has_converged(&self) -> bool {
+    pub(crate) fn has_converged(&self) -> bool {
         match self.end() {
             Some(End::Converged | End::Tentative) => true,
             Some(End::Stalled) => self.solver.last_promise() < 1.0,
@@ -118,18 +124,23 @@ impl<'c> FittedVariant<'c> {
     }
 
     /// Steps that it has tried.
-    pub fn trials(&self) -> usize {
+    pub(crate) fn trials(&self) -> usize {
         TRIALS.saturating_sub(self.solver.trials_left())
     }
 
     /// Whether the Jacobian was measured at the best point.
-    pub fn is_fresh(&self) -> bool {
+    pub(crate) fn is_fresh(&self) -> bool {
         self.solver.is_fresh()
     }
 
     /// The transformed parameters of the best point.
-    pub fn theta(&self) -> DVector<f64> {
+    pub(crate) fn theta(&self) -> DVector<f64> {
         self.variant.theta(self.z())
+    }
+
+    /// The Jacobian of all rows as a dense matrix, rows × parameters; without rows where none was measured.
+    pub fn dense_jacobian(&self, rows: &Rows) -> DMatrix<f64> {
+        self.jacobian.dense(rows)
     }
 
     /// The fit as the start of a score test.

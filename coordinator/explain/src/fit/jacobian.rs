@@ -14,7 +14,7 @@ use crate::rows::Rows;
 
 /// d prediction / d z over the noise, rows × parameters.
 #[derive(Clone, Debug, Default)]
-pub struct SplitJacobian {
+pub(crate) struct SplitJacobian {
     /// Those of the rows that train.
     pub of_train: BlockAngular,
     /// Those of the others.
@@ -25,7 +25,7 @@ pub struct SplitJacobian {
 
 impl SplitJacobian {
     /// Parts a Jacobian of all rows.
-    pub fn of(whole: &BlockAngular, rows: &Rows) -> Self {
+    pub(crate) fn of(whole: &BlockAngular, rows: &Rows) -> Self {
         let others: Vec<usize> = rows.others().collect();
         Self {
             of_train: whole.select_rows(&rows.train),
@@ -37,7 +37,7 @@ impl SplitJacobian {
     /// The Jacobian whose column j of `n_param` is column i of this one times a factor, `source` naming both; zeros where it
     /// names none.
     #[must_use]
-    pub fn map_columns(&self, n_param: usize, source: impl Fn(usize) -> Option<(usize, f64)>) -> Self {
+    pub(crate) fn map_columns(&self, n_param: usize, source: impl Fn(usize) -> Option<(usize, f64)>) -> Self {
         Self {
             of_train: self.of_train.map_columns(n_param, &source),
             of_others: self.of_others.map_columns(n_param, &source),
@@ -46,29 +46,29 @@ impl SplitJacobian {
     }
 
     /// Sets what one parameter changes, all rows.
-    pub fn set_column(&mut self, j: usize, influence: &DVector<f64>, rows: &Rows) {
+    pub(crate) fn set_column(&mut self, j: usize, influence: &DVector<f64>, rows: &Rows) {
         let others: Vec<usize> = rows.others().collect();
         self.of_train.set_column(j, &influence.select_rows(&rows.train));
         self.of_others.set_column(j, &influence.select_rows(&others));
     }
 
     /// Whether none was measured.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.of_train.is_empty() && self.of_others.is_empty()
     }
 
     /// Series of all rows that take as much room.
-    pub fn n_series(&self, rows: &Rows) -> usize {
+    pub(crate) fn n_series(&self, rows: &Rows) -> usize {
         (self.of_train.n_entry() + self.of_others.n_entry()).div_ceil(rows.rows.len().max(1))
     }
 
     /// The Jacobian of all rows as a dense matrix; without rows where none was measured.
-    pub fn whole(&self, rows: &Rows) -> DMatrix<f64> {
+    pub(crate) fn dense(&self, rows: &Rows) -> DMatrix<f64> {
         self.in_blocks(rows).to_dense()
     }
 
     /// The Jacobian of all rows; without rows where none was measured.
-    pub fn in_blocks(&self, rows: &Rows) -> BlockAngular {
+    pub(crate) fn in_blocks(&self, rows: &Rows) -> BlockAngular {
         if self.is_empty() {
             return BlockAngular::default();
         }
@@ -134,9 +134,9 @@ mod tests {
         let rows = Rows { rows, train };
         let whole = DMatrix::from_fn(11, 2, |i, j| (10 * i + j) as f64);
         let parts = SplitJacobian::of(&whole.clone().into(), &rows);
-        assert_eq!(parts.whole(&rows), whole);
+        assert_eq!(parts.dense(&rows), whole);
         assert_eq!(parts.of_train.to_dense(), whole.select_rows(&rows.train));
-        assert!(SplitJacobian::default().is_empty() && SplitJacobian::default().whole(&rows).is_empty());
+        assert!(SplitJacobian::default().is_empty() && SplitJacobian::default().dense(&rows).is_empty());
     }
 
     #[test]
@@ -170,6 +170,6 @@ mod tests {
         let mut wanted = whole.to_dense().insert_column(1, 0.0);
         wanted.column_mut(0).scale_mut(2.0);
         wanted.set_column(1, &new);
-        assert_eq!(parts.whole(&rows), wanted);
+        assert_eq!(parts.dense(&rows), wanted);
     }
 }

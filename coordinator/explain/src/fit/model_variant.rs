@@ -12,7 +12,7 @@ use super::candidate::Candidate;
 
 /// An effect in a variant, and the unit of its amplitude.
 #[derive(Clone, Debug)]
-pub struct AddedEffect<'c> {
+pub(crate) struct AddedEffect<'c> {
     /// The effect.
     pub candidate: &'c Candidate,
     /// Its position among the candidates.
@@ -23,7 +23,7 @@ pub struct AddedEffect<'c> {
 
 /// A variant of the study's model.
 #[derive(Clone, Debug)]
-pub struct ModelVariant<'c> {
+pub(crate) struct ModelVariant<'c> {
     /// The study as it is.
     pub base: &'c Study,
     /// The study with this model.
@@ -45,7 +45,7 @@ impl<'c> ModelVariant<'c> {
     ///
     /// # Errors
     /// When an effect does not fit the model.
-    pub fn new(
+    pub(crate) fn new(
         base: &'c Study,
         effects: Vec<AddedEffect<'c>>,
         left_out: &[String],
@@ -72,28 +72,28 @@ impl<'c> ModelVariant<'c> {
     }
 
     /// Transformed parameters from z.
-    pub fn theta(&self, z: &DVector<f64>) -> DVector<f64> {
+    pub(crate) fn theta(&self, z: &DVector<f64>) -> DVector<f64> {
         &self.centre + self.unit.component_mul(z)
     }
 
     /// The units of z, in transformed units.
-    pub fn unit(&self) -> &DVector<f64> {
+    pub(crate) fn unit(&self) -> &DVector<f64> {
         &self.unit
     }
 
     /// Number of estimated values.
-    pub fn n_param(&self) -> usize {
+    pub(crate) fn n_param(&self) -> usize {
         self.study.theta.len()
     }
 
     /// Position in the estimated vector of the first parameter of a member.
-    pub fn first_entry_of(&self, effect: usize) -> usize {
+    pub(crate) fn first_entry_of(&self, effect: usize) -> usize {
         self.n_own + self.effects[..effect].iter().map(|m| m.candidate.def.parameters.len()).sum::<usize>()
     }
 
     /// The z of this variant that continues `from` of another: values are taken by name, an amplitude that is new is zero, and
     /// the other parameters of a new effect stand at `point`.
-    pub fn continue_from(
+    pub(crate) fn continue_from(
         &self,
         other: &ModelVariant<'_>,
         from: &DVector<f64>,
@@ -116,12 +116,12 @@ impl<'c> ModelVariant<'c> {
     }
 
     /// Whether an entry of the estimated vector is the amplitude of a member.
-    pub fn is_amplitude(&self, entry: usize) -> bool {
+    pub(crate) fn is_amplitude(&self, entry: usize) -> bool {
         (0..self.effects.len()).any(|m| self.first_entry_of(m) == entry)
     }
 
     /// Names of its effects joined by ` + `, or of what it leaves out.
-    pub fn name(&self) -> String {
+    pub(crate) fn name(&self) -> String {
         let names: Vec<&str> = self.effects.iter().map(|m| m.candidate.name()).collect();
         let added = names.join(" + ");
         match self.left_out.as_slice() {

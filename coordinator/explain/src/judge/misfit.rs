@@ -8,7 +8,7 @@ use crate::run_cache::RunCache;
 
 /// Squares of the whitened residuals of one variant.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Misfit {
+pub(crate) struct Misfit {
     /// χ² of the training rows plus prior.
     pub train: f64,
     /// χ² of the held-out rows of the fitted channels.
@@ -21,7 +21,7 @@ pub struct Misfit {
 
 impl Misfit {
     /// The misfit of a fit.
-    pub fn of(cache: &RunCache<'_>, fit: &FittedVariant<'_>) -> Self {
+    pub(crate) fn of(cache: &RunCache<'_>, fit: &FittedVariant<'_>) -> Self {
         let whitened = cache.rows.whitened(&fit.predicted);
         let sum = |usage| {
             let rows = cache.rows.rows.iter().zip(&whitened).filter(|(row, _)| row.usage == usage);

@@ -17,12 +17,12 @@ pub struct Track {
 
 impl Track {
     /// Smallest and largest value over all records; infinite, the larger first, where there is none.
-    pub fn ends(&self) -> [f64; 2] {
+    pub(crate) fn ends(&self) -> [f64; 2] {
         ends(self.values.iter().flatten().copied())
     }
 
     /// Slope at a step of a record, from the neighbours in time, one-sided at the ends; `None` beyond them.
-    pub fn slope(&self, record: usize, step: usize, times: &[f64]) -> Option<f64> {
+    pub(crate) fn slope(&self, record: usize, step: usize, times: &[f64]) -> Option<f64> {
         let values = self.values.get(record)?;
         let last = values.len().min(times.len()).checked_sub(1)?;
         let (before, after) = (step.saturating_sub(1), (step + 1).min(last));

@@ -46,7 +46,7 @@ impl RunCache<'_> {
     ///
     /// # Errors
     /// As [`RunCache::run`].
-    pub fn run_each(
+    pub(crate) fn run_each(
         &mut self,
         points: &[Point<'_>],
         mut take: impl FnMut(&Self, usize, &[RunKey], RowPredictions),
@@ -103,7 +103,7 @@ impl RunCache<'_> {
     ///
     /// # Errors
     /// As [`RunCache::run`].
-    pub fn run_alone(
+    pub(crate) fn run_alone(
         &mut self,
         runs: Vec<(&Study, Job)>,
     ) -> Result<Vec<Option<Arc<Vec<f64>>>>, ExplainError> {
