@@ -1,4 +1,4 @@
-//! One inquiry of the recordings, measured or simulated: the fit of the model as it is, the search, the verdict.
+//! The diagnosis of one set of recordings, measured or simulated: the fit of the model as it is, the search, the verdict.
 //!
 //! Next files to read: [`crate::refit::search`], [`crate::judge::verdict`].
 
@@ -27,7 +27,7 @@ pub(super) struct Diagnosis<'a, 'c> {
     pub(super) tracks: &'a [Track],
 }
 
-/// Fits the model as it is, searches and decides; `then` makes of it what is wanted.
+/// Fits the model as it is, searches and decides, and returns what `then` makes of the diagnosis.
 ///
 /// # Errors
 /// When the fleet or the store fails, there is nothing to try, the model as it is cannot be fitted, or the budget ends before

@@ -17,10 +17,10 @@ pub enum ExplainError {
     /// The store failed.
     #[error(transparent)]
     Store(#[from] StoreError),
-    /// A run has no usable answer, and that is not the model's doing.
+    /// A run has no usable result, and the cause is not the model.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// A step of the arithmetic could not be done.
+    /// A step of the estimator failed.
     #[error(transparent)]
     Estimator(#[from] EstimatorError),
     /// The model with an effect does not build although it was checked.
@@ -43,7 +43,7 @@ pub enum ExplainError {
     /// The model as it is cannot be run at all.
     #[error("the model as it is fails at its prior median: {0}")]
     Baseline(String),
-    /// The budget does not even suffice for the fit and one run of what was fitted.
+    /// The budget does not suffice for the fit of the model as it is.
     #[error("the budget of {budget} runs ended during the {stage}: {needed} more would be needed")]
     Budget {
         /// The budget.
@@ -56,7 +56,7 @@ pub enum ExplainError {
     /// A name that is not among the candidates.
     #[error("{0}")]
     Name(String),
-    /// A noise that has nothing to do with the values it belongs to.
+    /// A noise whose size does not go with the recorded values.
     #[error("{0}")]
     Noise(String),
 }
@@ -85,7 +85,7 @@ impl ExplainError {
     }
 }
 
-/// A fleet's failure, with the name of the record where it is about one run.
+/// The error of a failure of the fleet, with the name of the record where it concerns one run.
 pub(crate) fn fleet_failure(study: &Study, error: FleetError) -> ExplainError {
     match error {
         FleetError::NoAnswer { particle, record, reason, .. } => {
@@ -95,6 +95,7 @@ pub(crate) fn fleet_failure(study: &Study, error: FleetError) -> ExplainError {
     }
 }
 
+/// The error of a run without a usable result.
 pub(crate) fn no_answer(study: &Study, particle: u32, record: usize, reason: String) -> ExplainError {
     let record = study.records[record].name.clone();
     RunError::NoAnswer { particle: particle as usize, record, values: String::new(), reason }.into()

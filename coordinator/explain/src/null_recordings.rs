@@ -1,7 +1,7 @@
-//! The false-alarm rate of a study, measured: the whole search on recordings in which nothing is missing.
+//! The measured false-alarm rate of a study: the whole search on simulated recordings in which no effect is missing.
 //!
 //! Each recording is the fitted model as it is plus noise of the stated sd, with the gaps and spans of the measured one. Runs
-//! that the search has made already cost nothing, since what they depend on is not the data. Next file to read:
+//! that the search has made already are not made again, since a run does not depend on the measured values. Next file to read:
 //! [`crate::diagnosis`].
 
 use std::sync::Arc;

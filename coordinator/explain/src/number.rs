@@ -1,6 +1,6 @@
-//! Numbers that a reader can take in: thresholds on a round grid, and figures of three digits.
+//! Numbers as they are printed: thresholds on a round grid, figures of three digits, sizes in units of the noise.
 //!
-//! Next file to read: [`super::sentence`].
+//! Next file to read: [`crate::locate`].
 
 /// The nearest multiple of 1, 2 or 5 times a power of ten that is at most 2 % of `range`: a threshold moves by 1 % at most.
 pub(crate) fn readable(value: f64, range: f64) -> f64 {
@@ -62,7 +62,7 @@ pub(crate) fn factor(ratio: f64) -> String {
     if (0.01..1000.0).contains(&ratio) { format!("{ratio:.2}") } else { three(ratio) }
 }
 
-/// A unit label as it follows a number.
+/// A unit label with a space before it, as it follows a number; empty where there is none.
 pub(crate) fn spaced(unit: &str) -> String {
     if unit.is_empty() { String::new() } else { format!(" {unit}") }
 }

@@ -7,10 +7,10 @@ use std::sync::mpsc::Receiver;
 use starlings_fleet::FleetEvent;
 use starlings_study::Study;
 
-/// Bytes of intermediate results of one kind that are held unless something else is asked for.
+/// Bytes of intermediate results of one kind that are held by default.
 pub(crate) const HOLD: usize = 1 << 20;
 
-/// What was asked for besides the study.
+/// What an explanation is asked for besides the study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// Runs of the model at most; `None` takes the study's own budget, or no limit.
@@ -19,7 +19,7 @@ pub struct Options {
     pub without: Vec<String>,
     /// Effects to try; empty for all.
     pub only: Vec<String>,
-    /// Go on although the fit of the model as it is has not converged.
+    /// Whether to continue although the fit of the model as it is has not converged.
     pub force: bool,
     /// Effects at most in one explanation.
     pub max_effects: usize,
@@ -45,7 +45,7 @@ impl Default for Options {
 }
 
 impl Options {
-    /// What the study itself asks for.
+    /// The options that the study file gives.
     pub fn of(study: &Study) -> Self {
         let asked = &study.explain;
         let default = Self::default();
@@ -72,7 +72,7 @@ pub struct Stage {
     pub workers: usize,
 }
 
-/// What an explanation needs from the outside: time, somebody who watches, and the fleet's events.
+/// What an explanation needs from outside: the time, an observer of its progress, and the fleet's events.
 pub struct Context<'a> {
     /// Seconds since the program started.
     pub clock: &'a dyn Fn() -> f64,

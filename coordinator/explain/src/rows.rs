@@ -1,4 +1,4 @@
-//! Every measured value of a study as one row, in a fixed order: the common language of locating, screening and judging.
+//! Every measured value of a study as one row, in a fixed order that all steps share.
 //!
 //! Predictions and residuals are vectors aligned with these rows. Next file to read: [`crate::run_cache`].
 
@@ -49,7 +49,7 @@ pub struct Row {
 }
 
 /// Unit label of a channel: its own where the study gives one, or that of its output, or of a state by that name.
-pub(super) fn unit(study: &Study, record: usize, channel: usize) -> String {
+pub(crate) fn unit(study: &Study, record: usize, channel: usize) -> String {
     let of = &study.records[record].channels[channel];
     let quantity = || {
         let output = quantity_of(&study.spec.outputs, &of.output);

@@ -1,7 +1,7 @@
 //! The whole explanation on a page: fit, locate, screen, refit, gates, verdict, add, show.
 //!
 //! Every stage runs the model on the fleet through one [`RunCache`], which remembers each run; an explanation that was killed
-//! is continued by doing the same again. Next file to read: [`crate::diagnosis`].
+//! is continued by the same workflow, which finds its earlier runs in the database. Next file to read: [`crate::diagnosis`].
 
 use std::sync::Arc;
 
@@ -48,7 +48,7 @@ pub fn explain(
     context: &mut Context<'_>,
     options: &Options,
 ) -> Result<Findings, ExplainError> {
-    // Every run is free: nothing may pull a simulation to the data that it is judged by.
+    // Every run is made without an observer, which would pull the simulation towards the data that it is compared with.
     let mut free = study.clone();
     free.setup.observer = ObserverDef::default();
     let budget = options.budget.or(study.explain.budget);
@@ -171,7 +171,7 @@ fn figures(
     })
 }
 
-/// Fall of χ² by what the decision rests on, or else the largest that the screening promised: what decoys are compared with.
+/// Fall of χ² by the variant on which the decision rests, or else the largest of the screening; decoys are compared with it.
 fn best_gain(found: &SearchResult<'_>, judged: Option<&JudgedFit<'_>>) -> f64 {
     judged.map_or(found.largest_gain, |j| j.gain)
 }

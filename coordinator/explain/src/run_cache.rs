@@ -1,8 +1,9 @@
-//! Runs variants of the model on the fleet: every record from its start, freely, over training and held-out spans alike.
+//! The run cache: runs variants of the model on the fleet and remembers the result of every run in the run's database.
 //!
-//! Points of different variants go in one batch, so that a screening is one round for the fleet. Every answer is remembered
-//! in the run's database: an explanation that was killed goes on by asking again, and what is known costs nothing. Only the
-//! rows that train are ever shown to a fit; that is for the callers to keep. Next files to read: [`batches`], then
+//! Every record is run from its start, without an observer, over training and held-out spans alike. Points of different variants
+//! go in one batch, so that a screening is one round for the fleet. An explanation that was killed requests the same runs again;
+//! those that are in the database are not made a second time. The cache also counts runs against the budget. It returns the
+//! predictions of all rows; its callers show a fit the training rows only. Next files to read: [`batches`], then
 //! [`crate::fit::model_variant`].
 
 mod batches;
@@ -36,7 +37,7 @@ pub struct Point<'v> {
 /// What a point predicts for every row, or why it could not be run.
 pub(crate) type RowPredictions = Result<Arc<Vec<f64>>, String>;
 
-/// Runs points and keeps count.
+/// Runs points, remembers the runs, and counts them against the budget.
 pub struct RunCache<'a> {
     /// The study as it is.
     pub study: &'a Study,
@@ -49,10 +50,10 @@ pub struct RunCache<'a> {
     watch: &'a mut dyn FnMut(&Stage),
     events: Option<&'a Receiver<FleetEvent>>,
     pub(super) windows: Vec<Arc<Window>>,
-    /// Every run that was asked for and counted; its answer is in the store.
+    /// Keys of the runs that were requested and counted; their results are in the store.
     counted: HashSet<RunKey>,
     recent: LruCache,
-    /// Bytes of one kind of intermediate results that are held at most; what is more is worked out again when it is needed.
+    /// Bytes of one kind of intermediate results that are held at most; what exceeds them is computed again when it is needed.
     pub(super) hold: usize,
     budget: Option<u64>,
     stage: &'static str,
@@ -109,13 +110,13 @@ impl<'a> RunCache<'a> {
         self.hold / (8 * self.rows.rows.len()).max(1)
     }
 
-    /// A new stage begins.
+    /// Begins a stage and reports it.
     pub(crate) fn stage(&mut self, name: &'static str, says: &str) {
         self.stage = name;
-        self.tell(says);
+        self.report_stage(says);
     }
 
-    fn tell(&mut self, says: &str) {
+    fn report_stage(&mut self, says: &str) {
         let (runs, workers) = (self.runs(), self.fleet.n_workers());
         (self.watch)(&Stage { name: self.stage, says: says.to_owned(), runs, workers });
     }
@@ -130,7 +131,7 @@ impl<'a> RunCache<'a> {
         self.runs.iter().map(|(name, n)| ((*name).to_owned(), *n)).collect()
     }
 
-    /// Counts runs that somebody else made on the fleet.
+    /// Counts runs that were made on the fleet without this cache.
     pub(crate) fn count(&mut self, n: u64) {
         match self.runs.iter_mut().find(|(name, _)| *name == self.stage) {
             Some((_, count)) => *count += n,
@@ -143,7 +144,7 @@ impl<'a> RunCache<'a> {
         self.workers.len()
     }
 
-    /// The fleet, for what is no whole-record run.
+    /// The fleet, for runs that are not over whole records.
     pub(crate) fn fleet(&mut self) -> &mut dyn Fleet {
         self.fleet
     }
@@ -168,12 +169,12 @@ impl<'a> RunCache<'a> {
         self.budget.is_none_or(|budget| self.runs() + n <= budget)
     }
 
-    /// Notes that something was left undone for want of budget.
+    /// Notes that something was not done because the budget did not suffice.
     pub(crate) fn cut_short(&mut self) {
         self.cut_short = true;
     }
 
-    /// Whether something was left undone for want of budget.
+    /// Whether something was not done because the budget did not suffice.
     pub(crate) fn was_cut_short(&self) -> bool {
         self.cut_short
     }

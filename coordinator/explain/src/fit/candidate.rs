@@ -1,7 +1,6 @@
-//! An effect to try, with the points at which it is screened and what is known of its parameters.
+//! An effect to try, with the points at which it is screened and the priors of its parameters.
 //!
-//! Parameters that count in the course of a quantity are turned into its unit first, and every grid of parameters inside a
-//! term becomes a list of points. Nothing is run here. Next file to read: [`super::model_variant`].
+//! The grids of the parameters inside a term become one list of points. Nothing is run here. Next file to read: [`super::model_variant`].
 
 use std::collections::HashSet;
 
@@ -53,8 +52,8 @@ impl Candidate {
         }
     }
 
-    /// What is known of its parameters before the data: nothing of the amplitude (whose prior is flat in the search), little
-    /// of the others.
+    /// Priors of its parameters. That of the amplitude is a placeholder, since the search fits the amplitude without a prior; those
+    /// of the others are wide.
     pub(crate) fn priors(&self) -> Vec<EffectPrior> {
         let amplitude = EffectPrior { transform: Transform::Linear, mean: 0.0, sd: 1.0 };
         let inner = self.def.parameters.iter().skip(1).map(inner_prior);
@@ -62,9 +61,9 @@ impl Candidate {
     }
 }
 
-/// As many of the points as there may be, the first among them: the middle of every grid. They lie a stride apart, round the
-/// end of the list, and the stride has no factor in common with its length: one that has returns to the same values of the
-/// last grids and never meets the others. Of such strides it is the shortest with which most values of the grids occur.
+/// At most [`MOST_POINTS`] of the points, among them the first, which is the middle of every grid. They lie a constant stride
+/// apart, modulo the length of the list. The stride is coprime to the length, because any other would visit only some values of
+/// the last grids. Of the coprime strides it is the shortest with which most values of the grids occur.
 fn thinned(points: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
     let n = points.len();
     if n <= MOST_POINTS {

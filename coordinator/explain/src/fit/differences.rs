@@ -1,4 +1,4 @@
-//! The Jacobian of a fit from differences: one run per parameter of the study and record.
+//! The Jacobian of a fit by finite differences: one run per parameter of the study and record.
 //!
 //! A parameter with one value per record is moved in all records at once, and each record answers to its own; a held-out record
 //! is run with their mean and answers to each of them. Next file to read: [`super::drive`].
@@ -9,11 +9,11 @@ use nalgebra::DVector;
 use starlings_estimators::BlockAngular;
 
 use super::fitted_variant::{FittedVariant, point};
-use super::jacobian::places;
+use super::jacobian::record_blocks;
 use crate::error::ExplainError;
 use crate::run_cache::{Point, RowPredictions, RunCache};
 
-/// Distance of the differences, in z.
+/// Step of the differences, in z.
 pub(crate) const STEP: f64 = 1e-3;
 
 impl FittedVariant<'_> {
@@ -53,8 +53,8 @@ impl FittedVariant<'_> {
         let rows = &cache.rows;
         let study = &self.variant.study;
         let distance = |j: usize| steps[study.theta[j].parameter] * z[j].abs().max(1.0);
-        // A held-out record is run with the mean of the entries, which moved by the mean of their distances: per entry that mean
-        // changes by one in their number.
+        // A held-out record is run with the mean of the entries, which moves by the mean of their steps. The derivative by one entry
+        // is that by the mean over the number of entries, hence the sum of the steps in the denominator.
         let mut together = vec![0.0; study.parameters.len()];
         for (j, entry) in study.theta.iter().enumerate() {
             together[entry.parameter] += distance(j);
@@ -67,7 +67,7 @@ impl FittedVariant<'_> {
             };
             (found[entry.parameter][i] - self.predicted[i]) / (h * row.noise)
         };
-        let places = places(study, rows);
-        Ok(Some(BlockAngular::from_fn(rows.rows.len(), self.variant.n_param(), places, influence)))
+        let blocks = record_blocks(study, rows);
+        Ok(Some(BlockAngular::from_fn(rows.rows.len(), self.variant.n_param(), blocks, influence)))
     }
 }

@@ -1,4 +1,4 @@
-//! Fits of several variants at a time: what they need next is asked of the fleet in one batch, round after round.
+//! Drives the fits of several variants at a time: in every round the runs that all of them need next go to the fleet in one batch.
 //!
 //! A Jacobian takes one run per parameter of the study: a parameter with one value per record is moved in all records at
 //! once, and each record answers to its own. Next files to read: [`super::fitted_variant`] for one of them, then
@@ -14,7 +14,7 @@ use super::jacobian::SplitJacobian;
 use crate::error::ExplainError;
 use crate::run_cache::{Point, RowPredictions, RunCache};
 
-/// Runs fits until none needs anything more. Returns whether the budget sufficed; a fit that it cut off stays where it is.
+/// Drives fits until none needs a run. Returns whether the budget sufficed; a fit that it cut off keeps its best point.
 ///
 /// # Errors
 /// When the fleet or the store fails.
@@ -22,7 +22,7 @@ pub fn drive(cache: &mut RunCache<'_>, fits: &mut [FittedVariant<'_>]) -> Result
     drive_rounds(cache, fits, usize::MAX)
 }
 
-/// As [`drive`], so many rounds at most.
+/// As [`drive`], with at most `rounds` rounds.
 ///
 /// # Errors
 /// When the fleet or the store fails.
@@ -58,7 +58,7 @@ pub(crate) fn drive_rounds(
 }
 
 impl FittedVariant<'_> {
-    /// Points that answer the present need.
+    /// The points to run for what the solver needs.
     fn points(&self) -> Vec<DVector<f64>> {
         match self.solver.need() {
             Need::Residual(z) => vec![z.clone()],
@@ -66,8 +66,8 @@ impl FittedVariant<'_> {
             Need::Nothing(_) => Vec::new(),
         }
     }
-    /// Hands the answers to the solver. Returns whether the budget sufficed for the runs that had to be made once more; if
-    /// not, the fit stays where it is.
+    /// Hands the predictions to the solver. Returns whether the budget sufficed for the backward differences where a forward one
+    /// failed; if not, the fit keeps its best point.
     fn take(&mut self, cache: &mut RunCache<'_>, answers: Vec<RowPredictions>) -> Result<bool, ExplainError> {
         match self.solver.need().clone() {
             Need::Residual(z) => {

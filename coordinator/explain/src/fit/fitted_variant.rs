@@ -1,6 +1,6 @@
-//! A variant of the study with its fit: where it stands, what it predicts, and what the solver needs next.
+//! A model variant with its least-squares fit: the best point, its predictions and Jacobian, and the state of the solver.
 //!
-//! Nothing is run here. Next files to read: `least_squares.rs` of the estimators, then [`super::drive`], which drives several.
+//! Nothing is run here. Next files to read: `least_squares.rs` of the estimators, then [`super::drive`].
 
 use std::sync::Arc;
 
@@ -30,10 +30,10 @@ pub struct FittedVariant<'c> {
     /// Predictions of all rows at the best point.
     pub predicted: Arc<Vec<f64>>,
     /// d prediction / d z over the noise at the best point, all rows × parameters, from the last measured Jacobian. The rows of a
-    /// held-out record depend on the fitted records by the mean that it is run with.
+    /// held-out record depend on the values of all fitted records, because it is run with their mean.
     pub(crate) jacobian: SplitJacobian,
     /// d prediction over the noise for one standard deviation of each value that a held-out record has of its own, all rows ×
-    /// values that a record has; without columns until it was measured. The values of one record are not those of another.
+    /// values that a record has; without columns until it was measured. Column k of one record and of another stand for different values.
     pub own_values: DMatrix<f64>,
 }
 

@@ -1,7 +1,7 @@
-//! The Jacobian of a fit: what each parameter changes, row by row, with the rows that train apart.
+//! The Jacobian of a fit, split into training rows and all other rows.
 //!
-//! A record's rows answer to its own values alone, so that it is a [`BlockAngular`] matrix. A solver holds the rows that train;
-//! they are shared with it. Next file to read: [`super::drive`].
+//! The rows of a record depend on the values of that record only, hence it is a [`BlockAngular`] matrix. The training rows are shared
+//! with the solver of the fit. Next file to read: [`super::drive`].
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -15,16 +15,16 @@ use crate::rows::Rows;
 /// d prediction / d z over the noise, rows × parameters.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SplitJacobian {
-    /// Those of the rows that train.
+    /// The training rows.
     pub of_train: BlockAngular,
-    /// Those of the others.
+    /// All other rows.
     of_others: BlockAngular,
-    /// The rows of each block of the whole.
+    /// The rows of each block of the Jacobian of all rows.
     places: Arc<[Range<usize>]>,
 }
 
 impl SplitJacobian {
-    /// Parts a Jacobian of all rows.
+    /// Splits a Jacobian of all rows.
     pub(crate) fn of(whole: &BlockAngular, rows: &Rows) -> Self {
         let others: Vec<usize> = rows.others().collect();
         Self {
@@ -45,7 +45,7 @@ impl SplitJacobian {
         }
     }
 
-    /// Sets what one parameter changes, all rows.
+    /// Sets the column of one parameter, all rows.
     pub(crate) fn set_column(&mut self, j: usize, influence: &DVector<f64>, rows: &Rows) {
         let others: Vec<usize> = rows.others().collect();
         self.of_train.set_column(j, &influence.select_rows(&rows.train));
@@ -57,7 +57,7 @@ impl SplitJacobian {
         self.of_train.is_empty() && self.of_others.is_empty()
     }
 
-    /// Series of all rows that take as much room.
+    /// Its size in memory, as a number of series over all rows.
     pub(crate) fn n_series(&self, rows: &Rows) -> usize {
         (self.of_train.n_entry() + self.of_others.n_entry()).div_ceil(rows.rows.len().max(1))
     }
@@ -97,11 +97,12 @@ impl SplitJacobian {
     }
 }
 
-/// The rows and the parameters that they answer to: record by record, or all together where no record has values of its own.
+/// Blocks of rows with the parameters on which they depend: one block per record, or one for all where no record has values of its
+/// own.
 ///
-/// A record that is held out is run with the mean of the fitted records' own values, and so answers to all of them; an initial
-/// value it has from its own prior.
-pub(crate) fn places(study: &Study, rows: &Rows) -> Vec<(Range<usize>, Vec<usize>)> {
+/// A held-out record is run with the mean of the fitted records' own values, and so depends on all of them; its initial values
+/// are those of its own prior.
+pub(crate) fn record_blocks(study: &Study, rows: &Rows) -> Vec<(Range<usize>, Vec<usize>)> {
     let n_param = study.theta.len();
     if study.theta.iter().all(|entry| entry.record.is_none()) {
         return vec![(0..rows.rows.len(), (0..n_param).collect())];

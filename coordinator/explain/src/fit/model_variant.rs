@@ -1,4 +1,6 @@
-//! A variant of the model: effects added, terms left out, and the units in which its parameters are fitted.
+//! A variant of the study's model: effects added, terms left out, and the units in which its parameters are fitted.
+//!
+//! [`starlings_study::Study::with_model`] makes a study of it, so that whatever runs a study runs a variant.
 //!
 //! A fit works in z: own parameters and parameters inside a term in prior standard deviations from their prior mean,
 //! amplitudes in a unit of their size without prior. Next file to read: [`super::drive`].
@@ -10,7 +12,7 @@ use starlings_study::Study;
 
 use super::candidate::Candidate;
 
-/// An effect in a variant, and the unit of its amplitude.
+/// An effect that a variant adds, and the unit of its amplitude.
 #[derive(Clone, Debug)]
 pub(crate) struct AddedEffect<'c> {
     /// The effect.
@@ -21,7 +23,7 @@ pub(crate) struct AddedEffect<'c> {
     pub unit: f64,
 }
 
-/// A variant of the study's model.
+/// The study's model with effects added and terms left out.
 #[derive(Clone, Debug)]
 pub(crate) struct ModelVariant<'c> {
     /// The study as it is.
@@ -86,12 +88,12 @@ impl<'c> ModelVariant<'c> {
         self.study.theta.len()
     }
 
-    /// Position in the estimated vector of the first parameter of a member.
+    /// Position in the estimated vector of the first parameter of an added effect.
     pub(crate) fn first_entry_of(&self, effect: usize) -> usize {
         self.n_own + self.effects[..effect].iter().map(|m| m.candidate.def.parameters.len()).sum::<usize>()
     }
 
-    /// The z of this variant that continues `from` of another: values are taken by name, an amplitude that is new is zero, and
+    /// The z of this variant that corresponds to `from` of another: values are taken by name, an amplitude that is new is zero, and
     /// the other parameters of a new effect stand at `point`.
     pub(crate) fn continue_from(
         &self,
@@ -115,7 +117,7 @@ impl<'c> ModelVariant<'c> {
         z
     }
 
-    /// Whether an entry of the estimated vector is the amplitude of a member.
+    /// Whether an entry of the estimated vector is the amplitude of an added effect.
     pub(crate) fn is_amplitude(&self, entry: usize) -> bool {
         (0..self.effects.len()).any(|m| self.first_entry_of(m) == entry)
     }

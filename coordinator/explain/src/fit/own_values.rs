@@ -1,9 +1,9 @@
-//! What is not known of a record that no fit sees: the values that it has of its own.
+//! The uncertainty of a held-out record's own values: parameters with one value per record, which no fit estimates for it.
 //!
-//! Such a record is run with the mean of the fitted records, or for an initial value with its own prior median
-//! ([`starlings_study::Study::theta_for`]). That mean depends on what was fitted, which the Jacobian of [`super::fitted_variant`] holds.
-//! The record's own value lies beside it: by the scatter of the fitted ones, or where there is only one by the prior. Next file
-//! to read: [`crate::judge::held_out`].
+//! Such a record is run with the mean of the fitted records' values, or for an initial value with its own prior median
+//! ([`starlings_study::Study::theta_for`]). The uncertainty of that mean is in the Jacobian of [`super::fitted_variant`]. The record's
+//! own value deviates from the mean, by as much as the fitted values scatter, or by its prior where only one is fitted. Next
+//! file to read: [`super::prediction_sd`].
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ use super::fitted_variant::FittedVariant;
 use crate::error::ExplainError;
 use crate::run_cache::{Point, RunCache};
 
-/// Distance of a difference, in prior standard deviations.
+/// Step of a difference, in prior standard deviations.
 const STEP: f64 = 1e-3;
 
 impl FittedVariant<'_> {

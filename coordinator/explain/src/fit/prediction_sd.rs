@@ -1,6 +1,6 @@
-//! How uncertain the predictions of a fit are, row by row.
+//! The standard deviation of the predictions of a fit, row by row.
 //!
-//! Next file to read: [`super::own_values`].
+//! Next file to read: [`crate::screen::screening`].
 
 use nalgebra::DVector;
 use starlings_estimators::BlockRow;

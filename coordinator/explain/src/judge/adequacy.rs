@@ -1,7 +1,6 @@
-//! How the training residuals of a fit compare with the stated noise, and how that is said.
+//! How the training residuals of a fit compare with the stated noise, in figures and in words.
 //!
-//! Every sentence of an explanation that speaks of noise is made here or in [`super::held_out`], from the figures that it stands
-//! beside. Next file to read: [`crate::tell::words`].
+//! Every sentence of an explanation about noise is made here or in [`super::held_out`], from the figures that it stands beside. Next file to read: [`crate::tell::words`].
 
 use starlings_estimators::nis_band;
 
@@ -10,44 +9,44 @@ use crate::fit::fitted_variant::FittedVariant;
 use crate::number::{three, times};
 use crate::run_cache::RunCache;
 
-/// Probability of residuals as autocorrelated as these below which they are not white.
+/// Residuals are not white if the probability of as large an autocorrelation in white ones is below this.
 pub(crate) const NOT_WHITE: f64 = 1e-3;
-/// Mean squares over the noise variance that count as the stated noise, where chance does not allow more or less.
+/// Mean squares over the noise variance that count as the stated noise; a wider interval where chance allows it.
 const AS_STATED: [f64; 2] = [0.5, 1.5];
-/// Level of the band that chance allows a mean square.
+/// Probability of the band in which chance leaves a mean square.
 const LEVEL: f64 = 0.999;
-/// Share of a signal's spread below which what is left is the simulation's own error.
+/// Share of a signal's spread below which residuals are attributed to the integration or to rounding.
 const NUMERICAL: f64 = 1e-6;
 
 /// The training residuals of a fit against the stated noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Adequacy {
-    /// Values.
+    /// Number of fitted values.
     pub n: usize,
     /// Root mean square over the stated noise.
     pub rmse_over_noise: f64,
     /// Probability of residuals at least as autocorrelated if they were white; `None` where no series is long enough to tell.
     pub whiteness: Option<f64>,
-    /// Factor that size and correlation make on the variance of a smooth signal's coefficient.
+    /// Factor on the variance of a smooth signal's coefficient by the size and correlation of the residuals.
     pub inflation: f64,
     /// Root mean square over the spread of the recorded values; infinite where these do not vary.
     pub over_spread: f64,
 }
 
-/// What the residuals are, as far as their figures tell.
+/// How the residuals compare with the stated noise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Nature {
     /// Nothing is fitted.
     Nothing,
-    /// Of the size of the noise, and nothing speaks against white.
+    /// Of the size of the noise, and not shown to be correlated.
     Noise,
     /// Correlated in time.
     Correlated,
-    /// Larger than the stated noise, and nothing speaks against white.
+    /// Larger than the stated noise, and not shown to be correlated.
     Larger,
-    /// Smaller than the stated noise, and nothing speaks against white.
+    /// Smaller than the stated noise, and not shown to be correlated.
     Smaller,
-    /// Correlated in time, but so small that the stated noise alone would hide as much.
+    /// Correlated in time, but smaller than what the stated noise would hide.
     Hidden,
 }
 
@@ -73,7 +72,8 @@ impl Adequacy {
         }
     }
 
-    /// What the residuals are. A size is only told where chance does not make it and it is worth telling.
+    /// How the residuals compare with the stated noise. Larger or smaller than it are residuals beyond both what chance leaves and
+    /// [`AS_STATED`].
     pub(crate) fn nature(&self) -> Nature {
         if self.n == 0 {
             return Nature::Nothing;
@@ -93,17 +93,17 @@ impl Adequacy {
         }
     }
 
-    /// Whether nothing that counts beside the stated noise speaks against white residuals.
+    /// Whether the residuals are white, or their correlation is hidden by the stated noise.
     pub(crate) fn could_be_white(&self) -> bool {
         self.nature() != Nature::Correlated
     }
 
-    /// Whether the recorded values of every fitted channel of every record are one number.
+    /// Whether the recorded values of every fitted channel of every record are constant.
     pub(crate) fn is_at_rest(&self) -> bool {
         self.n > 1 && self.over_spread.is_infinite()
     }
 
-    /// Whether the residuals show that something is missing: more than white noise of the stated size or less.
+    /// Whether the residuals show that something is missing: they are correlated or larger than the stated noise.
     pub(crate) fn is_gap(&self) -> bool {
         matches!(self.nature(), Nature::Correlated | Nature::Larger)
     }
@@ -113,7 +113,7 @@ impl Adequacy {
         if self.could_be_white() { self.rmse_over_noise.max(1.0) } else { 1.0 }
     }
 
-    /// What is left, as a sentence without its first capital and full stop.
+    /// The comparison as a sentence without capital and full stop.
     pub(crate) fn says(&self) -> String {
         let size = times(self.rmse_over_noise);
         let at_rest = if self.is_at_rest() {

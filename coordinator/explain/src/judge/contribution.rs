@@ -1,25 +1,27 @@
-//! Whether every effect of a variant carries its share of the gap: one that does not is no effect, but shows that its partner is
-//! not quite right, or that a discrepancy of another kind remains. Next file to read: [`super::verdict`].
+//! Whether every effect of a variant contributes its share to the narrowing of the gap.
+//!
+//! A further effect that contributes less is not named. It shows that the form of its partner is not quite right, or that a
+//! discrepancy of another kind remains. Next file to read: [`super::verdict`].
 
 use super::misfit::Misfit;
 use super::search_result::SearchResult;
 
-/// A further effect must carry this share of the gap.
+/// Share of the fall of χ² that a further effect must contribute.
 const SECOND_SHARE: f64 = 0.1;
-/// Effective variance of the residuals above which what remains is a discrepancy of its own, not the form of an effect.
+/// Effective variance of the residuals above which they count as a discrepancy of another kind, not as a wrong form of the effect.
 pub(crate) const DISCREPANT: f64 = 20.0;
 
-/// What came first.
+/// What the check of the contributions leaves.
 pub(crate) struct ContributionCheck {
-    /// The best variant whose every effect carries its share of the gap, on the training data and again on the held-out span.
+    /// The best variant each of whose effects contributes its share, on the training data and on the held-out span.
     pub(crate) best: usize,
-    /// The variant whose form is checked: with a further effect that takes away what is not of the form of the best.
+    /// The variant whose form is checked; it may have a further effect that accounts for a discrepancy of another kind.
     pub(crate) checked: usize,
-    /// Where a further effect carries too little of both, why its partner is not quite right.
+    /// Why nothing may be named, where a further effect contributes too little and so shows a wrong form of its partner.
     pub(crate) because: Option<String>,
 }
 
-/// Takes a further effect away that does not carry its share.
+/// Leaves out a further effect that does not contribute its share. `passing` are the positions of the variants that pass the gates.
 pub(crate) fn check_contributions(found: &SearchResult<'_>, passing: &[usize]) -> ContributionCheck {
     let first = passing[0];
     let whole = &found.judged[first];
@@ -43,7 +45,7 @@ pub(crate) fn check_contributions(found: &SearchResult<'_>, passing: &[usize]) -
     if train >= SECOND_SHARE && held_out.is_none_or(|h| h >= SECOND_SHARE) {
         return all;
     }
-    // What does not come again in the held-out span is not the effect's form.
+    // A contribution that does not recur in the held-out span does not come from the form of the effect.
     if held_out.is_some_and(|h| h < 0.3 * train) || found.judged[alone].inflation > DISCREPANT {
         return ContributionCheck { best: alone, ..all };
     }

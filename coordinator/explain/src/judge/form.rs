@@ -1,8 +1,9 @@
-//! Whether what is left after an effect is still of the library's making: then the effect has the wrong form.
+//! Whether an effect has the right form: whether candidates or modulated forms of it would still lower χ² beyond chance.
 //!
-//! All candidates and the bent forms of the effect ([`crate::refit::modulated_forms`]) are added to the fit one after the other, to first order, and judged by what
-//! that predicts of the held-out rows. A relative of the missing effect leaves something that they can still take away, and that comes again
-//! in data which no fit has seen; noise and disturbances of another kind do not. Next file to read: [`crate::refit::search`].
+//! All candidates and the modulated forms of the effect (`refit/modulated_forms.rs`; "bent forms" in the output) are added to the
+//! fit one after the other, to first order, and judged by what that predicts of the held-out rows. After an effect that only
+//! resembles the missing one they lower χ² again in data that no fit has seen. After the right effect, noise and disturbances of
+//! another kind remain, on which they do not. Next file to read: [`super::gates`].
 
 mod column;
 
@@ -19,42 +20,42 @@ use crate::screen::screening_result::ScreeningResult;
 
 /// Columns that are combined at most.
 const MOST: usize = 3;
-/// A first column must take away this much of χ², in units of the effective noise ...
+/// Least fall of χ² by the first column, in units of the effective noise ...
 const FIRST: f64 = 12.0;
-/// ... and each further one this much.
+/// ... and by each further one.
 const FURTHER: f64 = 8.0;
-/// Share of what is left above the noise that they must take away: of a discrepancy of another kind they take only a part.
+/// Least share of the χ² above the noise that the columns must take away; of a discrepancy of another kind they take less.
 const RESOLVED: f64 = 0.5;
-/// Share of the gain on the training rows that must come again, per row, on the held-out rows.
-const AGAIN: f64 = 0.15;
+/// Least gain per held-out row, as a share of the gain per training row.
+const RECURRENCE: f64 = 0.15;
 
-/// What candidates and bent forms could still take away.
+/// The fall of χ² that candidates and modulated forms would still bring.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Leftover {
     /// Fall of χ² of the training rows, in units of the effective noise.
     pub gain: f64,
     /// Fall of χ² of the held-out rows that they bring, in the same units.
     pub gain_held_out: f64,
-    /// Share of what is left above the noise that they take away.
+    /// Share of the χ² above the noise that they take away.
     pub share: f64,
-    /// Whether there is something left that the library, or a bent form of the effect, can take away.
+    /// Whether this is more than chance, so that the form of the effect is not right.
     pub is_systematic: bool,
-    /// Largest fall of χ² that a fully bent form would bring if it were the truth, in units of the effective noise; small
-    /// where the data do not tell forms.
+    /// Largest fall of χ² that a fully modulated form would bring if it were the truth, in units of the effective noise; small
+    /// where the data cannot tell one form from another.
     pub power: f64,
 }
 
-/// What was measured at a fit for the check of its form.
+/// The screening at a fit for the check of its form.
 pub(crate) struct Measured<'h> {
     /// The candidates.
     pub library: &'h [ScreeningResult],
-    /// The bent forms of the effect.
+    /// The modulated forms of the effect.
     pub modulated: &'h [ScreeningResult],
     /// Unknown constants in the equations.
     pub constants: &'h [ScreeningResult],
 }
 
-/// Looks at the residuals of a fit with the sensitivities that were measured there.
+/// Adds the columns one after the other to a fit, to first order.
 ///
 /// # Errors
 /// When the fit leaves a direction free.
@@ -69,9 +70,9 @@ pub(crate) fn leftover(
     let all =
         [measured.library, measured.modulated, measured.constants].into_iter().flatten().filter(is_usable);
     let columns = Columns::new(cache, fit, &optimum, all.collect())?;
-    // Held-out channels count as well: a better form must serve them too.
+    // Held-out channels count as well, since the right form must serve them too.
     let held: Vec<usize> = (0..rows.rows.len()).filter(|i| rows.rows[*i].usage != Usage::Train).collect();
-    // A bent form at amplitude one is the term itself times a signal between -1 and 1. One that the parameters imitate tells
+    // A modulated form of amplitude one is the term itself times a signal between -1 and 1. One that the parameters imitate tells
     // nothing of the form.
     let mut power = 0.0_f64;
     for result in measured.modulated.iter().filter(is_usable) {
@@ -90,14 +91,14 @@ pub(crate) fn leftover(
         residual -= &best.own * amplitude;
         correction += &best.all * amplitude;
         taken.push(best);
-        // What remains when it was taken away tells the noise that it is judged by.
+        // The noise is that of the residuals without the columns taken so far.
         let noise = inflation(rows, &residual.rows(0, rows.train.len()).into_owned());
         let fall = |i: &usize| whitened[*i].powi(2) - (whitened[*i] - correction[*i]).powi(2);
         let gain = (optimum.residual().norm_squared() - residual.norm_squared()) / noise;
         let gain_held_out = held.iter().map(fall).sum::<f64>() / noise;
-        let wanted = AGAIN * gain * held.len() as f64 / rows.train.len().max(1) as f64;
+        let wanted = RECURRENCE * gain * held.len() as f64 / rows.train.len().max(1) as f64;
         let above = |e: &DVector<f64>| e.norm_squared() - floor;
-        // Where nothing stands above the noise there is nothing to share out, and the quotient has no size.
+        // Where the residuals do not exceed the noise, the quotient is not defined and its bounds stand for it.
         let share =
             (1.0 - above(&residual) / above(optimum.residual()).max(f64::MIN_POSITIVE)).clamp(-1.0, 1.0);
         let is_systematic = gain > FIRST + FURTHER * (n_column - 1) as f64

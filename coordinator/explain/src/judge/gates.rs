@@ -1,8 +1,8 @@
-//! The gates: what a refitted variant must stand before it may be named.
+//! The gates: the tests that a refitted variant must pass before it may be named.
 //!
 //! Sign and range of its coefficients, the held-out span, the held-out channels, and evidence in units of the effective noise
 //! against what a search over the whole library finds by chance. A lower error alone is no reason to name an effect. Next
-//! file to read: [`crate::refit::search`].
+//! file to read: [`super::search_result`].
 
 use starlings_estimators::End;
 
@@ -18,9 +18,9 @@ use crate::number::{spaced, three};
 use crate::rows::{Row, Usage, unit};
 use crate::run_cache::RunCache;
 
-/// A held-out error may grow by this factor before it counts as worse.
+/// Factor by which a held-out error may grow without counting as worse.
 const WORSE: f64 = 1.02;
-/// Distance from the end of a range, as a share of it, at which an estimate counts as at its edge.
+/// Distance from the end of a range, as a share of its width, within which an estimate counts as at the end.
 const EDGE: f64 = 0.005;
 
 /// Why a variant may not be named.
@@ -32,7 +32,7 @@ pub(crate) struct Refusal {
     pub reason: String,
 }
 
-/// A refitted variant with everything that speaks for and against it.
+/// A refitted variant with the figures for and against it.
 #[derive(Clone, Debug)]
 pub(crate) struct JudgedFit<'c> {
     /// The fit.
@@ -43,7 +43,7 @@ pub(crate) struct JudgedFit<'c> {
     pub inflation: f64,
     /// Its training residuals against the stated noise.
     pub adequacy: Adequacy,
-    /// What the data say that no fit has seen, by record and channel.
+    /// Its errors on held-out data, by record and channel.
     pub held_out: Vec<HeldOut>,
     /// Fall of χ² against the model as it is, training rows, less the price of parameters inside its terms and of further
     /// effects.
@@ -64,7 +64,7 @@ pub(crate) struct JudgedFit<'c> {
     pub unaccounted: f64,
     /// Why it may not be named.
     pub refusal: Option<Refusal>,
-    /// What candidates and bent forms could still take away, where that was looked at.
+    /// The fall of χ² that candidates and modulated forms would still bring, where the second pass measured it.
     pub leftover: Option<Leftover>,
 }
 
@@ -79,14 +79,14 @@ impl JudgedFit<'_> {
         self.gain / self.inflation
     }
 
-    /// Fall of χ² on the training rows, the held-out span and the held-out channels, for ranking. An estimate that the held-out
-    /// span would move within its uncertainty is no worse for it.
+    /// Fall of χ² on the training rows, the held-out span and the held-out channels, for ranking. The part of the held-out χ² that
+    /// the uncertainty of the estimate explains does not count against it.
     pub(crate) fn rank(&self) -> f64 {
         self.gain + self.gain_held_out + self.allowance + self.gain_channels
     }
 }
 
-/// Judges a variant against the model as it is. `threshold` is what chance alone reaches in a search.
+/// Judges a variant against the model as it is. `threshold` is the gain that a search reaches by chance.
 pub(crate) fn judge<'c>(
     cache: &RunCache<'_>,
     base: &FittedVariant<'_>,
@@ -99,9 +99,9 @@ pub(crate) fn judge<'c>(
     let n_inner = fit.variant.n_param().saturating_sub(fit.variant.n_own + fit.variant.effects.len());
     let adequacy = Adequacy::of(cache, &fit);
     let inflation = adequacy.inflation;
-    // A parameter inside a term costs what its prior is worth (Schwarz 1978), counted in independent values.
+    // The price of a parameter inside a term is ln n (Schwarz 1978), with n the number of independent values.
     let price = n_inner as f64 * (m / inflation).max(3.0).ln();
-    // A further effect must win what a search finds by chance.
+    // The price of a further effect is the gain that a search reaches by chance.
     let further = fit.variant.effects.len().saturating_sub(1) as f64 * threshold * inflation;
     let gain = before.train - misfit.train - price - further;
     let gain_held_out = before.held_out - misfit.held_out;
@@ -175,7 +175,7 @@ fn too_weak(judged: &JudgedFit<'_>, threshold: f64) -> String {
     )
 }
 
-/// A coefficient at the end of its range: physics does not allow what the data ask for.
+/// The refusal for a coefficient at the end of its range.
 fn at_edge(fit: &FittedVariant<'_>) -> Option<Refusal> {
     let variant = &fit.variant;
     let theta = fit.theta();
@@ -200,8 +200,8 @@ fn at_edge(fit: &FittedVariant<'_>) -> Option<Refusal> {
     None
 }
 
-/// The end of the range of a member's parameter `k` at which a value lies. A range that is open at one side has no width: then
-/// the size of the amplitude takes its place, or that of the value at which an inner parameter was screened.
+/// The end of the range of an effect's parameter `k` at which a value lies. Where the range is open at one side, the unit of the
+/// amplitude takes the place of its width, or the value at which an inner parameter was screened.
 fn end_at(effect: &AddedEffect<'_>, k: usize, value: f64) -> Option<f64> {
     let candidate = effect.candidate;
     let [lo, hi] = candidate.def.parameters[k].range;
@@ -215,6 +215,7 @@ fn end_at(effect: &AddedEffect<'_>, k: usize, value: f64) -> Option<f64> {
     [lo, hi].into_iter().find(|end| end.is_finite() && (value - end).abs() <= EDGE * width)
 }
 
+/// The refusal for a held-out span that gets worse.
 fn held_out_span(before: Misfit, judged: &JudgedFit<'_>) -> Option<Refusal> {
     let after = judged.misfit;
     let n = after.n_held_out as f64;
@@ -233,7 +234,7 @@ fn held_out_span(before: Misfit, judged: &JudgedFit<'_>) -> Option<Refusal> {
     })
 }
 
-/// A held-out channel that gets worse.
+/// The refusal for a held-out channel that gets worse.
 fn held_out_channel(
     cache: &RunCache<'_>,
     base: &FittedVariant<'_>,

@@ -1,7 +1,7 @@
-//! What the data that no fit has seen say of a variant, one channel of one record at a time.
+//! The errors of a variant on data that no fit has seen, one channel of one record at a time.
 //!
-//! Held-out data *fail* where their error is larger than the noise, the scatter of so many values, and the uncertainty of what was
-//! estimated explain together. No name is given while one fails that the variant should have mended: see [`withheld`].
+//! Held-out data *fail* where their error is larger than noise, chance and the uncertainty of the estimate explain together.
+//! Which of those that fail forbid to name a variant, [`forbidding`] says.
 //! Next files to read: [`super::gates`] for the gates, [`super::uncertainty`] for what the uncertainty explains.
 
 use serde::{Deserialize, Serialize};
@@ -14,11 +14,11 @@ use crate::number::times;
 use crate::rows::{Row, Usage};
 use crate::run_cache::RunCache;
 
-/// Root mean square over what is expected from which held-out data fail ...
+/// Root mean square over its expectation above which held-out data fail ...
 const FAILS: f64 = 1.25;
-/// ... where chance does not reach it: level of the band of a mean square.
+/// ... and which must also lie outside the band of this probability.
 const LEVEL: f64 = 0.9998;
-/// What the uncertainty of the estimate takes up is known to first order: a rest below this share of it is no failure.
+/// What the uncertainty of the estimate explains is known to first order only: a rest below this share of it is no failure.
 const FIRST_ORDER: f64 = 0.05;
 /// Where the training residuals are no noise either, a variant must take away this share of the excess χ² of every held-out
 /// channel of every record that fails ...
@@ -44,16 +44,16 @@ pub struct HeldOut {
     pub before: f64,
     /// Error with the effects that were named or came nearest; that of the model as it is where there are none.
     pub after: f64,
-    /// What of the latter stays when the estimate takes up all that its uncertainty allows: one is expected of noise.
+    /// Part of the latter that the uncertainty of the estimate does not explain; one is expected of noise.
     pub beyond: f64,
-    /// Whether that is surely more than noise.
+    /// Whether that is more than noise explains.
     pub fails: bool,
     /// Share of the excess χ² that went away, with what the uncertainty of the estimate explains; 0 where there was no excess.
     pub mended: f64,
 }
 
 impl HeldOut {
-    /// Where it is and how large, in words: `product (never fitted) at 4.60 times its noise, 4.21 times beyond the uncertainty of
+    /// Channel and errors in words: `product (never fitted) at 4.60 times its noise, 4.21 times beyond the uncertainty of
     /// the estimate`.
     pub fn says(&self, several_records: bool) -> String {
         let what = if self.usage == Usage::HeldOutChannel.word() { "never fitted" } else { "held out" };
@@ -118,9 +118,10 @@ fn groups(rows: &[Row]) -> Vec<Vec<usize>> {
     groups
 }
 
-/// The held-out data that forbid to name a variant: all that fail where its training residuals are noise, for then nothing
-/// remains that they could have in common with them; else those that fail by far or of which it takes away too little.
-pub(crate) fn withheld<'h>(adequacy: &Adequacy, of: &'h [HeldOut]) -> Vec<&'h HeldOut> {
+/// The held-out data that forbid to name a variant. Where its training residuals are noise, these are all that fail, since no
+/// remaining discrepancy of the training data could be their cause; otherwise those with a large error and those that the
+/// variant improves too little.
+pub(crate) fn forbidding<'h>(adequacy: &Adequacy, of: &'h [HeldOut]) -> Vec<&'h HeldOut> {
     let strict = adequacy.could_be_white();
     of.iter().filter(|h| h.fails && (strict || h.mended < SHARE_OF_EACH || h.beyond > FAR)).collect()
 }
@@ -165,17 +166,17 @@ mod tests {
         let noise = residuals(1.0, 0.4);
         for (after, beyond, mended) in [(4.6, 4.2, 0.2), (4.6, 4.2, 0.95), (1.6, 1.5, 0.8)] {
             let all = [channel(after, beyond, mended)];
-            assert_eq!(withheld(&noise, &all).len(), 1, "{all:?}");
+            assert_eq!(forbidding(&noise, &all).len(), 1, "{all:?}");
         }
-        assert!(withheld(&noise, &[channel(3.0, 1.1, 0.0)]).is_empty(), "the uncertainty explains it");
+        assert!(forbidding(&noise, &[channel(3.0, 1.1, 0.0)]).is_empty(), "the uncertainty explains it");
     }
 
     #[test]
     fn where_the_training_residuals_are_no_noise_what_falls_enough_does_not_withhold_the_name() {
         let correlated = residuals(0.8, 1e-9);
-        assert!(withheld(&correlated, &[channel(1.9, 1.7, 0.42)]).is_empty());
-        assert_eq!(withheld(&correlated, &[channel(1.9, 1.7, 0.1)]).len(), 1, "nothing improved it");
-        assert_eq!(withheld(&correlated, &[channel(4.6, 4.2, 0.9)]).len(), 1, "far from its noise");
+        assert!(forbidding(&correlated, &[channel(1.9, 1.7, 0.42)]).is_empty());
+        assert_eq!(forbidding(&correlated, &[channel(1.9, 1.7, 0.1)]).len(), 1, "nothing improved it");
+        assert_eq!(forbidding(&correlated, &[channel(4.6, 4.2, 0.9)]).len(), 1, "far from its noise");
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! How far a fit is from the data, for each use that they have: what the gates compare.
+//! The misfit of a fit on training rows, held-out rows and held-out channels, which the gates compare.
 //!
 //! Next file to read: [`super::gates`].
 
@@ -13,7 +13,7 @@ pub(crate) struct Misfit {
     pub train: f64,
     /// χ² of the held-out rows of the fitted channels.
     pub held_out: f64,
-    /// Their number.
+    /// Number of the held-out rows of the fitted channels.
     pub n_held_out: usize,
     /// χ² of the channels that are never fitted.
     pub channels: f64,

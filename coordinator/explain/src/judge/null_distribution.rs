@@ -1,5 +1,5 @@
-//! What chance alone would give: the effective noise of correlated residuals, the largest score of a search without a missing
-//! effect, and decoys, which are candidates with their time reversed or shifted.
+//! What chance alone would give: the distribution of the largest score of a search where no effect is missing, and the scores of
+//! decoys, which are candidates with their time reversed or shifted.
 //!
 //! Nothing is run: scores are linear in the residuals, so their joint distribution without a gap follows from the
 //! sensitivities that the screening measured. Next file to read: [`super::gates`].
@@ -16,13 +16,13 @@ use crate::fit::candidate::Candidate;
 use crate::rows::Rows;
 use crate::screen::screening_result::ScreeningResult;
 
-/// Simulations without a gap that the threshold is taken from, and as many again that tell how often it is exceeded.
+/// Number of simulations without a gap from which the threshold is taken, and of those that measure how often it is exceeded.
 const SIMULATIONS: usize = 4000;
-/// Rate of false alarms of the search that the threshold is set for.
+/// Rate of false alarms for which the threshold of the search is set.
 pub(crate) const ALARM_RATE: f64 = 0.005;
-/// Least fall of χ² that counts, whatever the simulations say.
+/// Lowest threshold, even if the simulations give a lower one.
 const LEAST: f64 = 10.0;
-/// A decoy that resembles its candidate more than this is none.
+/// A decoy whose influence correlates with that of its candidate by more than this is not used.
 const RESEMBLANCE: f64 = 0.9;
 /// Shifts of a decoy, as shares of each stretch.
 const SHIFTS: [f64; 3] = [0.21, 0.47, 0.73];
@@ -30,17 +30,17 @@ const SHIFTS: [f64; 3] = [0.21, 0.47, 0.73];
 /// The distribution of the search's best score where nothing is missing.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct NullDistribution {
-    /// Largest gain of each of the simulations that the threshold was not taken from, sorted.
+    /// Largest gain in each simulation of the second half, from which the threshold was not taken, sorted.
     pub maxima: Vec<f64>,
-    /// What a gain must exceed, in units of the effective noise.
+    /// The gain that a candidate must exceed, in units of the effective noise.
     pub threshold: f64,
     /// Gain of each decoy on the residuals of the model as it is.
     pub decoys: Vec<f64>,
 }
 
 impl NullDistribution {
-    /// Simulates the search without a gap, and scores decoys. `sensitivity` gives the influence of a result on the rows that train;
-    /// about so many are held at a time.
+    /// Simulates the search without a gap, and scores decoys. `sensitivity` gives the influence of a candidate on the training rows;
+    /// about `at_a_time` of them are held at a time.
     ///
     /// # Errors
     /// Those of `sensitivity`.
@@ -69,7 +69,7 @@ impl NullDistribution {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut normal = || StandardNormal.sample(&mut random);
         let mut first = null_maxima(correlation, &signs, 2 * SIMULATIONS, &mut normal);
-        // A quantile is exceeded by as many of its own sample as it was set for, whatever the truth: others must tell the rate.
+        // The sample from which a quantile is taken exceeds it at exactly the nominal rate; only another sample measures the true one.
         let mut maxima = first.split_off(SIMULATIONS);
         first.sort_by(f64::total_cmp);
         maxima.sort_by(f64::total_cmp);
@@ -84,7 +84,7 @@ impl NullDistribution {
         above as f64 / self.maxima.len().max(1) as f64
     }
 
-    /// Share of the decoys that gain at least so much.
+    /// Share of the decoys whose gain is at least `gain`.
     pub(crate) fn decoys_above(&self, gain: f64) -> f64 {
         let above = self.decoys.iter().filter(|d| **d >= gain).count();
         above as f64 / self.decoys.len().max(1) as f64

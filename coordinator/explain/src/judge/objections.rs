@@ -1,19 +1,19 @@
-//! What speaks against a name although every gate was passed, and why nothing came as far as that, in words with numbers.
+//! Objections against naming a variant that passes every gate, and why no variant passes them, in words with numbers.
 //!
 //! Next file to read: [`super::held_out`].
 
 use super::form::{Leftover, white_share};
 use super::gates::JudgedFit;
-use super::held_out::withheld;
+use super::held_out::forbidding;
 use super::search_result::SearchResult;
 use crate::run_cache::RunCache;
 use crate::screen::screening_result::ScreeningResult;
 
-/// Share of white noise in the residuals from which on they must be white altogether.
+/// Share of white noise in the residuals above which the rest of them must be white too ...
 const AUDIBLE: f64 = 0.12;
-/// ... where their effective variance says that the structure matters.
+/// ... if their effective variance is above this.
 const STRUCTURED: f64 = 3.0;
-/// Share of the gap of the held-out span that may be left unaccounted for where the training residuals are noise.
+/// Share of the gap of the held-out span that may stay unaccounted for where the training residuals are noise.
 const UNACCOUNTED: f64 = 0.15;
 /// Where the residuals stay correlated, an effect must take away this share of the excess of the training rows ...
 const SHARE: f64 = 0.5;
@@ -54,7 +54,7 @@ fn nothing_refitted(found: &SearchResult<'_>) -> String {
     text.to_owned()
 }
 
-/// What speaks against naming a variant that passes the gates.
+/// The first objection against naming a variant that passes the gates.
 pub(crate) fn objection(
     cache: &RunCache<'_>,
     found: &SearchResult<'_>,
@@ -85,7 +85,7 @@ pub(crate) fn objection(
             100.0 * judged.unaccounted
         ));
     }
-    if !withheld(&judged.adequacy, &judged.held_out).is_empty() {
+    if !forbidding(&judged.adequacy, &judged.held_out).is_empty() {
         return Some(format!("`{name}` comes nearest, but what was held out still fails with it"));
     }
     if judged.adequacy.could_be_white() {
@@ -94,7 +94,7 @@ pub(crate) fn objection(
     correlated(cache, found, judged)
 }
 
-/// Why data of this kind cannot tell one effect from another, whatever their figures.
+/// The objection that the data are too few or constant, and so cannot tell one effect from another.
 fn too_little(judged: &JudgedFit<'_>, name: &str) -> Option<String> {
     let (n, p) = (judged.adequacy.n, judged.fit.variant.n_param());
     if n <= p {
@@ -110,7 +110,7 @@ fn too_little(judged: &JudgedFit<'_>, name: &str) -> Option<String> {
     })
 }
 
-/// What speaks against naming a variant whose training residuals are correlated.
+/// The objection against a variant whose training residuals are correlated.
 fn correlated(cache: &RunCache<'_>, found: &SearchResult<'_>, judged: &JudgedFit<'_>) -> Option<String> {
     let name = judged.fit.variant.name();
     let white = white_share(&cache.rows, judged.fit.residual());

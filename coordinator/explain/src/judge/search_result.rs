@@ -1,6 +1,6 @@
 //! What a search found: the model as it is, the screening, and every variant that was refitted.
 //!
-//! The search ([`crate::refit::search`]) fills it; the verdict and what is told of it read it. Next file to read:
+//! The search (`refit/search.rs`) fills it; the verdict and the result of the explanation are made from it. Next file to read:
 //! [`super::contribution`].
 
 use super::adequacy::Adequacy;
@@ -19,13 +19,13 @@ pub(crate) struct SearchResult<'c> {
     pub before: Misfit,
     /// Its training residuals against the stated noise.
     pub adequacy: Adequacy,
-    /// What the data say of it that no fit has seen.
+    /// Its errors on held-out data.
     pub held_out: Vec<HeldOut>,
-    /// What chance would give.
+    /// The scores that a search reaches by chance.
     pub null_distribution: NullDistribution,
     /// The screening at the model as it is, every candidate and grid point.
     pub screening: Vec<ScreeningResult>,
-    /// Largest fall of χ² in it, to first order, with an amplitude of a sign that physics allows.
+    /// Largest fall of χ² in the screening, to first order, with an amplitude of a sign that physics allows.
     pub largest_gain: f64,
     /// Every variant that was refitted, the best first.
     pub judged: Vec<JudgedFit<'c>>,

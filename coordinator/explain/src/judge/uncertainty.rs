@@ -1,6 +1,6 @@
-//! What the uncertainty of an estimate explains of the residuals that no fit has seen.
+//! The part of the held-out residuals that the uncertainty of an estimate explains, to first order.
 //!
-//! Deliberately to first order. Next file to read: [`crate::fit::own_values`] for what a held-out record adds to the uncertainty.
+//! Next file to read: [`crate::fit::own_values`] for what a held-out record adds to the uncertainty.
 
 use std::collections::BTreeSet;
 
@@ -10,8 +10,8 @@ use starlings_estimators::BlockAngular;
 use crate::fit::fitted_variant::FittedVariant;
 use crate::run_cache::RunCache;
 
-/// The uncertainty of a fit and what it changes in all rows.
-pub(crate) struct Uncertainty<'f> {
+/// The covariance of a fit and its influence on all rows.
+pub(super) struct Uncertainty<'f> {
     jacobian: BlockAngular,
     own_values: &'f DMatrix<f64>,
     covariance: DMatrix<f64>,
@@ -19,9 +19,9 @@ pub(crate) struct Uncertainty<'f> {
 }
 
 impl<'f> Uncertainty<'f> {
-    /// That of a fit. Nothing where nothing is held out, where the fit leaves a direction free, or where its Jacobian is of another
+    /// The uncertainty of a fit. `None` where nothing is held out, where the fit leaves a direction free, or where its Jacobian is of another
     /// point.
-    pub(crate) fn of(cache: &RunCache<'_>, fit: &'f FittedVariant<'_>) -> Option<Self> {
+    pub(super) fn of(cache: &RunCache<'_>, fit: &'f FittedVariant<'_>) -> Option<Self> {
         cache.rows.others().next()?;
         let optimum = fit.optimum().ok().filter(|_| fit.is_fresh())?;
         Some(Self {
@@ -34,16 +34,16 @@ impl<'f> Uncertainty<'f> {
 
     /// bᵀ (C⁻¹ + JᵀJ)⁻¹ b with b = Jᵀ e: the fall of χ² from these rows, increasing (residuals e, Jacobian J), to a joint fit, for
     /// an estimate of covariance C and values of a held-out record's own of unit variance. χ² less this is eᵀ (1 + J C Jᵀ)⁻¹ e,
-    /// the squared distance of the rows from their prediction (Mahalanobis 1936). Parameters that the rows do not answer to
-    /// are left out, which changes nothing.
-    pub(crate) fn allowance(&self, rows: &[usize]) -> f64 {
+    /// the squared distance of the rows from their prediction (Mahalanobis 1936). Parameters on which the rows do not depend
+    /// are left out, which does not change it.
+    pub(super) fn allowance(&self, rows: &[usize]) -> f64 {
         self.fall(rows).filter(|fall| fall.is_finite()).unwrap_or(0.0)
     }
 
     fn fall(&self, rows: &[usize]) -> Option<f64> {
         let residual = DVector::from_iterator(rows.len(), rows.iter().map(|i| self.whitened[*i]));
         let jacobian = self.jacobian.select_rows(rows);
-        let parameters = held(&jacobian);
+        let parameters = columns_of(&jacobian);
         let p = parameters.len();
         let covariance = self.covariance.select_rows(&parameters).select_columns(&parameters);
         let mut information = covariance.cholesky()?.inverse();
@@ -83,8 +83,8 @@ impl<'f> Uncertainty<'f> {
     }
 }
 
-/// The columns that any block with rows holds, increasing.
-fn held(of: &BlockAngular) -> Vec<usize> {
+/// The columns of all blocks that have rows, increasing.
+fn columns_of(of: &BlockAngular) -> Vec<usize> {
     let blocks = of.blocks().iter().filter(|block| !block.rows.is_empty());
     blocks.flat_map(|block| block.columns.iter().copied()).collect::<BTreeSet<usize>>().into_iter().collect()
 }

@@ -1,7 +1,7 @@
-//! From what the search found to a verdict: named, tie, unexplained or no gap.
+//! The verdict on the variants that a search found: named, tie, unexplained or no gap.
 //!
-//! A name says that one variant passes every gate, that no rival comes close, and that what it leaves is not of the library's
-//! making. Anything less is a tie or unexplained, with what came nearest. Next file to read: [`crate::tell::summary`].
+//! A variant is named if it passes every gate, no rival comes close, and neither candidates nor modulated forms would lower what
+//! it leaves beyond chance. Otherwise the verdict is a tie, or unexplained with the variant that came nearest. Next file to read: [`crate::tell::summary`].
 
 use starlings_estimators::effective_sample_size;
 use starlings_models::equations::{Expression, Slot};
@@ -16,16 +16,16 @@ use crate::run_cache::RunCache;
 use crate::screen::screening_result::ScreeningResult;
 use serde::{Deserialize, Serialize};
 
-/// A rival within this fall of χ², in units of the effective noise, is tied.
+/// A rival is tied within this difference in χ², in units of the effective noise.
 const MARGIN: f64 = 6.0;
-/// Candidates whose influence resembles each other this much cannot be told apart by any refit.
+/// Correlation of two influences above which no refit can tell their candidates apart.
 const ALIKE: f64 = 0.995;
 /// A rival is tied where the difference in χ² is less than so many of its standard deviations.
 const VUONG: f64 = 1.64;
-/// Fall of χ² by a fully bent form from which on a form bent by half, which makes a quarter of it, passes the 12 units of the
-/// check of the form nine times in ten: 4 (√12 + 1.28)².
+/// Fall of χ² by a fully modulated form that the data must allow before a form counts as tested. A form modulated by half makes a
+/// quarter of it, which exceeds the 12 units of the check of the form nine times in ten: 4 (√12 + 1.28)².
 const POWER: f64 = 90.0;
-/// Posterior over prior standard deviation of a parameter inside a term from which on the data do not tell it.
+/// Posterior over prior standard deviation above which the data do not determine a parameter inside a term.
 const UNINFORMED: f64 = 0.5;
 
 /// The verdict on a misfit.
@@ -47,9 +47,9 @@ pub enum Verdict {
 pub(crate) struct Decision {
     /// The verdict.
     pub verdict: Verdict,
-    /// What is named, or the best of the tied, or what came nearest.
+    /// What is named, or the simplest of the tied, or what came nearest.
     pub best: Option<usize>,
-    /// What came first by rank, whose form was checked: of a tie `best` is the simplest.
+    /// What came first by rank, and whose form was checked; in a tie it may differ from `best`.
     pub checked: Option<usize>,
     /// Names of the sets of effects tied with the best.
     pub tied: Vec<Vec<String>>,
@@ -59,7 +59,7 @@ pub(crate) struct Decision {
     pub because: String,
 }
 
-/// Decides.
+/// Decides on what a search found.
 ///
 /// # Errors
 /// When the store fails.
@@ -92,7 +92,7 @@ pub(crate) fn decide(
     if let Some(because) = because {
         return Ok(Decision { checked: Some(checked), ..none(Verdict::Unexplained, Some(best), &because) });
     }
-    // What remains beside a discrepancy of its own tells nothing of a form.
+    // Beside a discrepancy of another kind the check of the form says nothing.
     let is_tested = judged.inflation > DISCREPANT || leftover.power >= POWER;
     let mut rivals = rivals(cache, found, &passing, best);
     // Of forms that the data cannot tell apart the simplest is shown.
@@ -117,7 +117,7 @@ pub(crate) fn decide(
     Ok(Decision { verdict, best: Some(best), checked: Some(checked), tied, rivals, because: String::new() })
 }
 
-/// The limiting forms that the data do not exclude: a parameter inside a term of which they say little.
+/// The limiting forms that the data do not exclude: those of a parameter inside a term that they do not determine.
 fn limits(judged: &JudgedFit<'_>) -> Vec<String> {
     let variant = &judged.fit.variant;
     let Ok(optimum) = judged.fit.optimum() else { return Vec::new() };
@@ -169,7 +169,7 @@ fn scatter(cache: &RunCache<'_>, a: &JudgedFit<'_>, b: &JudgedFit<'_>) -> f64 {
     rows.stretches().into_iter().map(variance).sum::<f64>().sqrt()
 }
 
-/// Operations in the terms of a variant: of the tied, the simplest is shown.
+/// Number of operations in the terms of a variant; of tied variants the one with the fewest is shown.
 fn complexity(judged: &JudgedFit<'_>) -> usize {
     let terms = judged.fit.variant.effects.iter().flat_map(|m| &m.candidate.def.adds);
     let resolve = |_: &str| Some(Slot::Parameter(0));
@@ -177,7 +177,7 @@ fn complexity(judged: &JudgedFit<'_>) -> usize {
     terms.filter_map(|add| size(&add.term)).map(|program| program.n_operations()).sum()
 }
 
-/// Candidates that were not refitted but whose influence is that of the best.
+/// Candidates that were not refitted and whose influence cannot be told from that of the best.
 fn twins(
     cache: &RunCache<'_>,
     found: &SearchResult<'_>,

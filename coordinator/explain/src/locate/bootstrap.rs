@@ -1,6 +1,6 @@
-//! How sure a root mean square is: the bootstrap of moving blocks, for residuals that follow one another.
+//! The uncertainty of a root mean square: the bootstrap of moving blocks, for correlated residuals.
 //!
-//! Single values would be drawn as if they were independent; blocks keep what neighbours have in common. Next file to read:
+//! Drawing single values would treat them as independent; blocks keep the correlation of neighbours. Next file to read:
 //! [`super::places`].
 
 use rand::{RngExt, SeedableRng};

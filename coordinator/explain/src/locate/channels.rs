@@ -56,7 +56,7 @@ fn gap(view: &View<'_>, record: usize, channel: usize, usage: Usage) -> Option<C
     })
 }
 
-/// A figure, or what stands for it where the values are too few or all alike: then nothing speaks against white residuals.
+/// A figure, or its value for white residuals where the values are too few or constant.
 fn known(figure: f64, otherwise: f64) -> f64 {
     if figure.is_finite() { figure } else { otherwise }
 }

@@ -18,20 +18,20 @@ use crate::rows::Usage;
 /// Regions of one channel at most: where it trains, and where it is held out.
 const MOST: (usize, usize) = (3, 1);
 /// Log-likelihood ratio that a region must reach: the largest of the some ten thousand intervals that are tried reaches
-/// 10 by chance. Residuals that follow one another count as so many fewer, and then less is asked for.
+/// 10 by chance. Correlated residuals count as fewer values, and then a smaller ratio suffices.
 const LEAST_GAIN: (f64, f64) = (12.0, 1.5);
-/// Smallest part of the values that residuals which follow one another are taken to amount to.
+/// Smallest share of independent values that correlated residuals are taken to amount to.
 const LEAST_EFFECTIVE: f64 = 0.03;
 /// Share of the misfit that a region must hold beyond its share of the values.
 const CONCENTRATION: f64 = 0.15;
-/// Ratio to the expected, in root mean square, from which a place is worth a line.
+/// Ratio to the expected root mean square from which a place is listed.
 const WORSE: f64 = 1.06;
 /// How many sd of a chi-square the squares must exceed their expectation.
 const SURE: f64 = 4.0;
-/// Share of the channel's misfit below which what other places leave over is not told.
+/// Share of the channel's misfit below which the rest beside other places is not listed.
 const REST: f64 = 0.1;
 
-/// A place with what it is ranked by.
+/// A place with its rank.
 struct Ranked {
     place: MisfitPlace,
     usage: Usage,
@@ -81,7 +81,7 @@ fn of_channel(view: &View<'_>, group: &Residuals) -> Vec<Ranked> {
     found
 }
 
-/// The place of these values, `None` when they are not surely worse than expected.
+/// The place of these values; `None` where they are not significantly worse than expected.
 fn ranked(
     view: &View<'_>,
     group: &Residuals,

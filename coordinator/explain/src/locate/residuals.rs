@@ -1,4 +1,4 @@
-//! The residuals of one channel in one use, over all records, side by side with where they were measured.
+//! The residuals of one channel in one use, over all records, with the record and time of each.
 //!
 //! Next file to read: [`super::signal`].
 

@@ -47,7 +47,7 @@ pub struct Located {
     pub channels: Vec<ChannelGap>,
     /// Residuals over operating regions.
     pub maps: Vec<RegionMap>,
-    /// What the residuals go along with, strongest first.
+    /// Signals with which the residuals correlate, strongest first.
     pub correlations: Vec<Correlated>,
     /// Residuals by frequency.
     pub spectra: Vec<ResidualSpectrum>,
@@ -135,7 +135,7 @@ pub struct RegionMap {
     pub explained: f64,
 }
 
-/// A signal that the residuals of a channel go along with.
+/// A signal with which the residuals of a channel correlate.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Correlated {
     /// Output name.

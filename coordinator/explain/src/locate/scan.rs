@@ -2,12 +2,12 @@
 //!
 //! Every interval is compared with its outside by a log-likelihood ratio under Gaussian residuals (a scan statistic after
 //! Kulldorff, Communications in Statistics 26, 1997, with one of three alternatives: a larger variance inside, another mean
-//! inside, a mean that grows linearly from the interval's edge as behind a threshold). Nothing below the expected variance
-//! counts, so noise does not invite a cut. Next file to read: [`super::region`].
+//! inside, a mean that grows linearly from the interval's edge as behind a threshold). A variance below
+//! the expected one counts as the expected one, so that noise makes no cut. Next file to read: [`super::region`].
 
 /// Quantiles of the signal, and as many even steps of its range, at which cuts are tried first.
 const CUTS: usize = 28;
-/// What an interval with two ends must gain more than one with one end.
+/// Least gain by which an interval with two ends must exceed one with one end.
 const SECOND_END: f64 = 3.0;
 
 /// An interval of a signal's values.

@@ -1,9 +1,8 @@
-//! Bent forms of an effect: what its term would look like if its form were not quite right.
+//! Modulated forms of an effect, which ask whether its form is right. The output calls them bent forms.
 //!
-//! Each multiplies the term by something that varies along the record (a signal of the model, time, the term's own size), or
-//! lets it act late. An unknown constant in an equation is tried beside them. They are no candidates and have no names: a fit
-//! that can be improved by one of them has the wrong form, whatever the library offers instead. Next file to read:
-//! [`crate::judge::form`].
+//! Each multiplies the term of the effect by something that varies along the record (time, or a state or input of the model), or
+//! lets it act late. Unknown constants in the equations are tried beside them. They are not candidates and are never named: if
+//! one of them lowers χ² beyond chance, the form of the effect is wrong. Next file to read: [`crate::judge::form`].
 
 use starlings_models::EffectDef;
 use starlings_models::effect::{Addition, EffectParameter, EffectState};
@@ -19,10 +18,10 @@ const CONSTANTS: usize = 3;
 /// Time constants of a late effect, as shares of the record.
 const LATE: [f64; 2] = [0.01, 0.06];
 
-/// The bent forms of the effects of a variant. `tracks` are the courses of the model.
-pub(crate) fn modulated(judged: &JudgedFit<'_>, tracks: &[Track], span: [f64; 2]) -> Vec<Candidate> {
+/// The modulated forms of the effects of a variant. `tracks` are the courses of the model, `span` is that of the training data.
+pub(super) fn modulated_forms(judged: &JudgedFit<'_>, tracks: &[Track], span: [f64; 2]) -> Vec<Candidate> {
     let [from, to] = span;
-    // Beyond the training span time stands still: nothing there has seen how it goes on.
+    // Beyond the training span the time is held constant, since no fit has seen how the modulation would continue.
     let time = format!("(min(t, {to:?}) - {:?})/{:?}", 0.5 * (from + to), 0.5 * (to - from));
     // A term that adds to an input or a parameter may not read outputs, so states and inputs are taken.
     let spec = &judged.fit.variant.study.spec;
@@ -39,7 +38,7 @@ pub(crate) fn modulated(judged: &JudgedFit<'_>, tracks: &[Track], span: [f64; 2]
 }
 
 /// An unknown constant in each of the first equations of the model.
-pub(crate) fn constants(judged: &JudgedFit<'_>) -> Vec<Candidate> {
+pub(super) fn constants(judged: &JudgedFit<'_>) -> Vec<Candidate> {
     let scalar = judged.fit.variant.study.spec.states.iter().filter(|q| q.size == 1).take(CONSTANTS);
     scalar.map(|q| Candidate::new(constant(&q.name))).collect()
 }
@@ -66,7 +65,7 @@ fn normalised(track: &Track) -> String {
     format!("({} - {:?})/{:?}", track.name, 0.5 * (lo + hi), 0.5 * (hi - lo))
 }
 
-/// The name of the new coefficient.
+/// The name of the coefficient of a modulated form.
 fn coefficient(def: &EffectDef, what: &str) -> String {
     let letters = |c: char| if c.is_alphanumeric() { c } else { '_' };
     format!("bent_{}_by_{}", def.name, what).chars().map(letters).collect()
@@ -76,6 +75,7 @@ fn parameter(name: &str) -> EffectParameter {
     EffectParameter { name: name.to_owned(), ..EffectParameter::default() }
 }
 
+/// The term multiplied by an expression between −1 and 1.
 fn multiplied(def: &EffectDef, what: &str, by: &str) -> EffectDef {
     let name = coefficient(def, what);
     let bend =

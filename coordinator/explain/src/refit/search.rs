@@ -1,9 +1,10 @@
-//! The search: screen all candidates, refit the best, look again from there, add, replace, and pair.
+//! The search: screen all candidates, refit the best, and start a second pass from the best of these.
 //!
-//! The path of one explanation: [`crate::screen::screening`] scores every candidate at the fitted model; the best run a short race whose
-//! first step costs one run each; the last few are refitted with every parameter free and [`crate::judge::gates`]d. From the best the
-//! candidates are scored again, which shows whether something is left and which replacement or pair to try. Terms that the
-//! study calls replaceable are left out in turn and the same is done without them. Next file to read: [`crate::judge::verdict`].
+//! [`crate::screen::screening`] scores every candidate at the fitted model. The best run a short race, whose first step costs one
+//! run each; the first few of it are refitted with every parameter free and judged ([`crate::judge::gates`]). The second pass
+//! ([`super::second_pass`]) scores the candidates again at the best variant and tries replacements and pairs. Terms that the study
+//! calls replaceable are left out in turn, and the search is repeated without them. Next file to read:
+//! [`crate::judge::verdict`].
 
 use std::cmp::Ordering;
 
@@ -30,19 +31,19 @@ const RACE: usize = 8;
 const ROUNDS: usize = 2;
 /// Candidates that are refitted after it.
 const FINAL: usize = 3;
-/// Of the best scores, so many are refitted whatever the race says.
+/// Candidates with the best scores that are refitted whatever the race says.
 const SCORED: usize = 2;
-/// Libraries of at most so many candidates are refitted whole: a large misfit can mislead a linear score.
+/// Of at most so many candidates all are refitted, since a linear score can be wrong where the misfit is large.
 const SMALL: usize = 6;
 /// Further candidates are refitted when the race promises a cost within this many units of the effective noise of the best.
 const CLOSE: f64 = 12.0;
 
 /// What the stages of a search share.
-pub(crate) struct Searcher<'s, 'l, 'c> {
-    pub(crate) cache: &'s mut RunCache<'l>,
-    pub(crate) candidates: &'c [Candidate],
-    pub(crate) tracks: &'s [Track],
-    pub(crate) cut_short: bool,
+pub(super) struct Searcher<'s, 'l, 'c> {
+    pub(super) cache: &'s mut RunCache<'l>,
+    pub(super) candidates: &'c [Candidate],
+    pub(super) tracks: &'s [Track],
+    pub(super) cut_short: bool,
 }
 
 /// Searches from a fitted model.
@@ -78,15 +79,15 @@ pub(crate) fn search<'c>(
         cut_short,
     };
     if adequacy.is_gap() || largest_gain > found.null_distribution.threshold {
-        searcher.singles(&mut found)?;
-        searcher.replacements(&mut found)?;
+        searcher.refit_singles(&mut found)?;
+        searcher.replace_terms(&mut found)?;
         searcher.second_pass(&mut found, options)?;
     }
     found.cut_short = searcher.cut_short || searcher.cache.was_cut_short();
     Ok(found)
 }
 
-/// What chance would give at a fit.
+/// The scores that a search reaches by chance at a fit.
 fn null_distribution(
     cache: &RunCache<'_>,
     fit: &FittedVariant<'_>,
@@ -110,7 +111,7 @@ impl<'c> Searcher<'_, '_, 'c> {
         self.screen(fit, &of)
     }
 
-    pub(crate) fn screen(
+    pub(super) fn screen(
         &mut self,
         fit: &FittedVariant<'c>,
         of: &[(usize, usize)],
@@ -122,15 +123,15 @@ impl<'c> Searcher<'_, '_, 'c> {
         screen(self.cache, fit, self.candidates, of, self.tracks)
     }
 
-    /// Refits the best candidates alone.
-    fn singles(&mut self, found: &mut SearchResult<'c>) -> Result<(), ExplainError> {
+    /// Refits the best candidates, one effect each.
+    fn refit_singles(&mut self, found: &mut SearchResult<'c>) -> Result<(), ExplainError> {
         let best = self.best_of_each(&found.screening);
-        let fits = self.explore(&found.base, &best)?;
+        let fits = self.race_and_refit(&found.base, &best)?;
         self.judge_all(found, fits)
     }
 
     /// The best point of the grid of every candidate that could be named, largest gain first.
-    pub(crate) fn best_of_each(&self, screening: &[ScreeningResult]) -> Vec<ScreeningResult> {
+    pub(super) fn best_of_each(&self, screening: &[ScreeningResult]) -> Vec<ScreeningResult> {
         let gain = |h: &ScreeningResult| h.allowed_gain(self.candidates[h.candidate].sign());
         let mut best: Vec<ScreeningResult> = Vec::new();
         for result in screening.iter().filter(|h| h.failure.is_none() && !h.is_absorbed() && gain(h) > 0.0) {
@@ -144,9 +145,9 @@ impl<'c> Searcher<'_, '_, 'c> {
         best
     }
 
-    /// Adds single candidates to a fit: a race among the best, then refits of the last few. Where recordings are long, a few are
-    /// held at a time, and those that go on are raced again, which takes no run.
-    fn explore(
+    /// Adds single candidates to a fit: a race among the best, then refits of the first few. Where recordings are long, the race is
+    /// made with a few at a time, and repeated for those that are refitted; the cache has its runs.
+    fn race_and_refit(
         &mut self,
         parent: &FittedVariant<'c>,
         best: &[ScreeningResult],
@@ -160,14 +161,14 @@ impl<'c> Searcher<'_, '_, 'c> {
             raced.extend(self.race(parent, some)?.into_iter().map(Some));
             promised.extend(raced.iter().flatten().map(FittedVariant::promised));
         }
-        let kept = self.kept(best, &promised);
-        self.cache.stage("refit", &format!("{} candidates with every parameter free", kept.len()));
+        let finalists = self.finalists(best, &promised);
+        self.cache.stage("refit", &format!("{} candidates with every parameter free", finalists.len()));
         if racing.len() <= at_a_time {
-            return self.refit(kept.into_iter().filter_map(|i| raced[i].take()).collect());
+            return self.refit(finalists.into_iter().filter_map(|i| raced[i].take()).collect());
         }
         drop(raced);
-        let mut fits = Vec::with_capacity(kept.len());
-        for some in kept.chunks(at_a_time) {
+        let mut fits = Vec::with_capacity(finalists.len());
+        for some in finalists.chunks(at_a_time) {
             let screening: Vec<ScreeningResult> = some.iter().map(|i| racing[*i].clone()).collect();
             let again = self.race(parent, &screening)?;
             fits.extend(self.refit(again)?);
@@ -175,19 +176,21 @@ impl<'c> Searcher<'_, '_, 'c> {
         Ok(fits)
     }
 
-    /// A few steps of the fits that add each of these to a fit.
+    /// The first steps of the fits that add each of these to a fit.
     fn race(
         &mut self,
         parent: &FittedVariant<'c>,
         screening: &[ScreeningResult],
     ) -> Result<Vec<FittedVariant<'c>>, ExplainError> {
-        let mut fits =
-            screening.iter().map(|result| self.with(parent, result)).collect::<Result<Vec<_>, _>>()?;
+        let mut fits = screening
+            .iter()
+            .map(|result| self.with_candidate(parent, result))
+            .collect::<Result<Vec<_>, _>>()?;
         self.cut_short |= !drive_rounds(self.cache, &mut fits, ROUNDS)?;
         Ok(fits)
     }
 
-    /// Fits with one effect more than `parent` that are held at a time, at least one for each slot of the fleet: with fewer it waits.
+    /// How many fits with one effect more than `parent` are held at a time; at least one per slot of the fleet, so that no slot waits.
     fn fits_held(&mut self, parent: &FittedVariant<'c>) -> usize {
         let slots = self.cache.fleet().slots();
         // Two Jacobians, the predictions and the residuals.
@@ -195,21 +198,21 @@ impl<'c> Searcher<'_, '_, 'c> {
         (self.cache.series_held() / series).max(slots).max(1)
     }
 
-    /// Positions of the best that go on after a race, the one that promises most first.
-    fn kept(&self, best: &[ScreeningResult], promised: &[f64]) -> Vec<usize> {
+    /// Positions of the candidates that are refitted after the race, the one with the lowest promised cost first.
+    fn finalists(&self, best: &[ScreeningResult], promised: &[f64]) -> Vec<usize> {
         let mut order: Vec<usize> = (0..promised.len()).collect();
         order.sort_by(|a, b| promised[*a].total_cmp(&promised[*b]));
         let first = order.first().map_or(0.0, |i| promised[*i]);
         let scale = (first / self.cache.rows.train.len().max(1) as f64).max(1.0);
         let close = promised.iter().filter(|p| **p <= first + CLOSE * scale).count();
         let keep = if best.len() <= SMALL { SMALL } else { close.clamp(FINAL, FINAL + 2) };
-        // A step too long for the secant must not cost the best two scores their refit.
+        // The best two scores are refitted even if the race failed by a step too long for its secant approximation.
         let goes_on = |(place, i): &(usize, usize)| *place < keep || *i < SCORED;
         order.into_iter().enumerate().filter(goes_on).map(|(_, i)| i).collect()
     }
 
     /// Refits until all have converged.
-    pub(crate) fn refit(
+    pub(super) fn refit(
         &mut self,
         mut fits: Vec<FittedVariant<'c>>,
     ) -> Result<Vec<FittedVariant<'c>>, ExplainError> {
@@ -222,7 +225,7 @@ impl<'c> Searcher<'_, '_, 'c> {
     }
 
     /// A fit that adds a candidate to a fitted variant, at the amplitude that its score promises.
-    pub(crate) fn with(
+    pub(super) fn with_candidate(
         &self,
         parent: &FittedVariant<'c>,
         result: &ScreeningResult,
@@ -236,7 +239,7 @@ impl<'c> Searcher<'_, '_, 'c> {
         Ok(FittedVariant::from_parent(variant, parent, &result.point, &sensitivity, &self.cache.rows))
     }
 
-    pub(crate) fn judge_all(
+    pub(super) fn judge_all(
         &mut self,
         found: &mut SearchResult<'c>,
         fits: Vec<FittedVariant<'c>>,
@@ -251,8 +254,8 @@ impl<'c> Searcher<'_, '_, 'c> {
         Ok(())
     }
 
-    /// Leaves out every replaceable term in turn and searches for what replaces it.
-    fn replacements(&mut self, found: &mut SearchResult<'c>) -> Result<(), ExplainError> {
+    /// Leaves out every replaceable term in turn and searches for an effect in its place.
+    fn replace_terms(&mut self, found: &mut SearchResult<'c>) -> Result<(), ExplainError> {
         let equations = self.cache.study.setup.model.equations.as_ref();
         let terms: Vec<String> = equations.map(|e| e.replaceable.clone()).unwrap_or_default();
         for term in terms {
@@ -270,7 +273,7 @@ impl<'c> Searcher<'_, '_, 'c> {
             }
             let screening = self.screen_all(&without)?;
             let best = self.best_of_each(&screening);
-            let fits = self.explore(&without, &best)?;
+            let fits = self.race_and_refit(&without, &best)?;
             self.judge_all(found, fits)?;
         }
         Ok(())

@@ -1,10 +1,10 @@
-//! The second look of the search: what is left after the best, which replacement and which pair to try.
+//! The second pass of the search: the candidates are scored again at the best variant, then replacements and pairs are refitted.
 //!
 //! Next files to read: [`crate::judge::form`], then [`crate::judge::verdict`].
 
 use starlings_study::{Record, Study};
 
-use super::modulated_forms::{constants, modulated};
+use super::modulated_forms::{constants, modulated_forms};
 use super::search::Searcher;
 use crate::error::ExplainError;
 use crate::fit::candidate::Candidate;
@@ -19,9 +19,9 @@ use crate::screen::screening::screen;
 use crate::screen::screening_result::ScreeningResult;
 
 impl<'c> Searcher<'_, '_, 'c> {
-    /// Scores the candidates again at the best variant: what is left, and which replacements and pairs to try. The variant that
-    /// the verdict will be about has been looked at in the end.
-    pub(crate) fn second_pass(
+    /// Scores the candidates again at the best variant and refits replacements and pairs, until no better variant comes of it. In the
+    /// end the form of the variant that the verdict will be about has been measured.
+    pub(super) fn second_pass(
         &mut self,
         found: &mut SearchResult<'c>,
         options: &Options,
@@ -42,7 +42,7 @@ impl<'c> Searcher<'_, '_, 'c> {
             if seconds.is_empty() {
                 break;
             }
-            let fits = self.further(found, best, &seconds, options)?;
+            let fits = self.replacements_and_pairs(found, best, &seconds, options)?;
             let n = fits.len();
             self.judge_all(found, fits)?;
             let same = found.judged.first().is_some_and(|j| j.fit.variant.name() == name);
@@ -59,7 +59,8 @@ impl<'c> Searcher<'_, '_, 'c> {
         Ok(())
     }
 
-    /// Scores the candidates at a refitted variant, by its position, and notes what they and bent forms of its effect could still take away.
+    /// Scores the candidates at the refitted variant at a position, and notes the fall of χ² that they and modulated forms of its
+    /// effects would still bring.
     fn rescreen(
         &mut self,
         found: &mut SearchResult<'c>,
@@ -68,7 +69,7 @@ impl<'c> Searcher<'_, '_, 'c> {
         let judged = &found.judged[place];
         self.cache.stage("screen", &format!("again, with {}", judged.fit.variant.name()));
         let screening = self.screen(&judged.fit, &self.best_points(&found.screening))?;
-        let left = self.left(judged, &screening)?;
+        let left = self.measure_leftover(judged, &screening)?;
         let variant = |j: &JudgedFit<'_>| (j.fit.variant.name(), j.fit.variant.left_out.clone());
         let of_place = variant(judged);
         if let Some(first) = found.judged.iter_mut().find(|j| variant(j) == of_place) {
@@ -77,21 +78,25 @@ impl<'c> Searcher<'_, '_, 'c> {
         Ok(screening)
     }
 
-    /// What the candidates and the bent forms of the best could still take away.
-    fn left(&mut self, best: &JudgedFit<'c>, library: &[ScreeningResult]) -> Result<Leftover, ExplainError> {
-        let forms = modulated(best, self.tracks, span(self.cache.study));
+    /// The fall of χ² that the candidates and the modulated forms of the best would still bring.
+    fn measure_leftover(
+        &mut self,
+        best: &JudgedFit<'c>,
+        library: &[ScreeningResult],
+    ) -> Result<Leftover, ExplainError> {
+        let forms = modulated_forms(best, self.tracks, span(self.cache.study));
         let (modulated, constants) = (self.measure(best, forms)?, self.measure(best, constants(best))?);
         let measured = Measured { library, modulated: &modulated, constants: &constants };
         leftover(self.cache, &best.fit, &measured)
     }
 
-    /// The influence of additions that are no candidates, as far as the budget goes.
+    /// Screens effects that are not candidates, if the budget suffices.
     fn measure(
         &mut self,
         best: &JudgedFit<'c>,
         mut forms: Vec<Candidate>,
     ) -> Result<Vec<ScreeningResult>, ExplainError> {
-        // Not every term can be bent in every way: an own state may not read what the term reads.
+        // Not every modulated form builds: a state of its own may not read all that the term reads.
         forms.retain(|form| {
             let mut effects: Vec<AddedEffect<'_>> = best.fit.variant.effects.clone();
             effects.push(AddedEffect { candidate: form, index: 0, unit: 1.0 });
@@ -104,8 +109,8 @@ impl<'c> Searcher<'_, '_, 'c> {
         screen(self.cache, &best.fit, &forms, &of, self.tracks)
     }
 
-    /// Replacements (a second effect alone, where it was not refitted yet) and pairs.
-    fn further(
+    /// Refits replacements (a second effect alone, where it was not refitted yet) and pairs.
+    fn replacements_and_pairs(
         &mut self,
         found: &SearchResult<'c>,
         best: &JudgedFit<'c>,
@@ -124,19 +129,19 @@ impl<'c> Searcher<'_, '_, 'c> {
                 && let Some(alone) =
                     self.best_of_each(&found.screening).iter().find(|h| h.candidate == second.candidate)
             {
-                fits.push(self.with(&found.base, alone)?);
+                fits.push(self.with_candidate(&found.base, alone)?);
             }
             let mut pair: Vec<usize> = best.fit.variant.effects.iter().map(|m| m.index).collect();
             pair.push(second.candidate);
             if pair.len() <= options.max_effects && !tried(&pair) {
-                fits.push(self.with(&best.fit, second)?);
+                fits.push(self.with_candidate(&best.fit, second)?);
             }
         }
         self.cache.stage("refit", &format!("{} replacements and pairs", fits.len()));
         self.refit(fits)
     }
 
-    /// The best point of the grid of every candidate, as far as the first screening tells.
+    /// The best point of the grid of every candidate, by the first screening.
     fn best_points(&self, screening: &[ScreeningResult]) -> Vec<(usize, usize)> {
         let best = self.best_of_each(screening);
         let point = |result: &ScreeningResult| {

@@ -1,4 +1,4 @@
-//! The runs of a run cache: which are asked of the fleet, how many at a time, and where their answers come from later.
+//! Batches of runs: which runs the fleet is asked for, how many at a time, and how their results are read back.
 //!
 //! Next file to read: [`super::remembered`].
 
@@ -15,9 +15,9 @@ use super::{Point, RowPredictions, RunCache};
 use crate::error::{ExplainError, fleet_failure};
 use crate::rows::Row;
 
-/// Bytes of outputs that one batch brings, about.
+/// Approximate bytes of outputs of one batch.
 const PORTION: usize = 2 << 20;
-/// Runs of one batch per slot at least: that many keep every slot busy.
+/// Least number of runs of one batch per slot, so that no slot waits.
 const PER_SLOT: usize = 4;
 
 /// A run that the fleet was asked for.
@@ -30,8 +30,8 @@ struct RequestedRun {
 }
 
 impl RunCache<'_> {
-    /// Runs all points over all records in one batch; one answer per point, in their order. A point whose run fails on any
-    /// record has none.
+    /// Runs all points over all records in one batch and returns the predictions of each point, in their order. A point whose run
+    /// fails on any record has the reason instead.
     ///
     /// # Errors
     /// When the fleet or the store fails, or no place could make a run.
@@ -41,8 +41,8 @@ impl RunCache<'_> {
         Ok(answers)
     }
 
-    /// As [`RunCache::run`], but gives every answer away as soon as its batch is there: the position of its point, its runs over
-    /// the records, the answer.
+    /// As [`RunCache::run`], but hands the predictions of a point to `take` as soon as its batch has arrived: the position of the
+    /// point, the keys of its runs over the records, the predictions.
     ///
     /// # Errors
     /// As [`RunCache::run`].
@@ -53,11 +53,11 @@ impl RunCache<'_> {
     ) -> Result<(), ExplainError> {
         let at_a_time = self.at_a_time();
         for (batch, some) in points.chunks(at_a_time).enumerate() {
-            let keys = self.requested(some)?;
+            let keys = self.request_points(some)?;
             for (k, of_point) in keys.chunks(self.windows.len()).enumerate() {
                 let runs: Result<Vec<RememberedRun>, _> =
                     of_point.iter().map(|key| self.remembered(key)).collect();
-                take(self, batch * at_a_time + k, of_point, self.answer(&runs?)?);
+                take(self, batch * at_a_time + k, of_point, self.predictions(&runs?)?);
             }
         }
         Ok(())
@@ -69,18 +69,18 @@ impl RunCache<'_> {
     /// When the store fails.
     pub(crate) fn recall(&self, runs: &[RunKey]) -> Result<RowPredictions, ExplainError> {
         let runs: Result<Vec<RememberedRun>, _> = runs.iter().map(|key| self.stored(key)).collect();
-        self.answer(&runs?)
+        self.predictions(&runs?)
     }
 
-    /// Points of one batch: as many as [`PORTION`] of their outputs allows, but enough for every slot to have work.
+    /// Points of one batch: as many as [`PORTION`] of their outputs allows, but enough to keep every slot busy.
     fn at_a_time(&self) -> usize {
         let bytes: usize = self.windows.iter().map(|window| 8 * window.observed.len()).sum();
         let busy = PER_SLOT * self.fleet.slots() / self.windows.len().max(1);
         (PORTION / bytes.max(1)).max(busy).max(1)
     }
 
-    /// The rows of one point from its runs over the records: outputs turned into what the channels measure.
-    fn answer(&self, runs: &[RememberedRun]) -> Result<RowPredictions, ExplainError> {
+    /// The predictions of one point from its runs over the records: outputs turned into what the channels measure.
+    fn predictions(&self, runs: &[RememberedRun]) -> Result<RowPredictions, ExplainError> {
         let n_obs = self.study.setup.outputs.len();
         let mut measured = Vec::with_capacity(runs.len());
         for (run, (record, window)) in runs.iter().zip(self.windows.iter().enumerate()) {
@@ -99,7 +99,7 @@ impl RunCache<'_> {
         Ok(Ok(Arc::new(self.rows.rows.iter().map(value).collect())))
     }
 
-    /// The outputs of runs that are not over a record as it is, one batch for all; nothing where the model fails.
+    /// The outputs of runs over records that were changed, all in one batch; `None` where the model fails.
     ///
     /// # Errors
     /// As [`RunCache::run`].
@@ -111,18 +111,18 @@ impl RunCache<'_> {
         for (study, job) in runs {
             jobs.push((self.fleet.install(&study.setup)?, job));
         }
-        let keys = self.request(jobs)?;
+        let keys = self.request_jobs(jobs)?;
         keys.iter().map(|key| Ok(self.remembered(key)?.ok())).collect()
     }
 
     /// Outputs of every point over every record, as the model gives them: points in order, then records.
     pub(crate) fn outputs(&mut self, points: &[Point<'_>]) -> Result<Vec<RememberedRun>, ExplainError> {
-        let keys = self.requested(points)?;
+        let keys = self.request_points(points)?;
         keys.iter().map(|key| self.remembered(key)).collect()
     }
 
-    /// Has every point run over every record: the keys of the runs, points in order, then records.
-    fn requested(&mut self, points: &[Point<'_>]) -> Result<Vec<RunKey>, ExplainError> {
+    /// Runs every point over every record; the keys of the runs, by point, then record.
+    fn request_points(&mut self, points: &[Point<'_>]) -> Result<Vec<RunKey>, ExplainError> {
         let mut jobs = Vec::with_capacity(points.len() * self.windows.len());
         for (particle, point) in points.iter().enumerate() {
             let setup = self.fleet.install(&point.study.setup)?;
@@ -132,11 +132,11 @@ impl RunCache<'_> {
                 jobs.push((setup, Job { particle, record, window, theta, state: None }));
             }
         }
-        self.request(jobs)
+        self.request_jobs(jobs)
     }
 
-    /// The keys of these jobs, in their order; only those that nobody has asked for before are run.
-    fn request(&mut self, jobs: Vec<(SetupId, Job)>) -> Result<Vec<RunKey>, ExplainError> {
+    /// The keys of these jobs, in their order. Jobs whose result is in the store are not run again.
+    fn request_jobs(&mut self, jobs: Vec<(SetupId, Job)>) -> Result<Vec<RunKey>, ExplainError> {
         let mut keys = Vec::with_capacity(jobs.len());
         let programs = self.store.program()?.digest();
         let (mut open, mut requested, mut here) = (Vec::new(), Vec::new(), HashSet::new());
@@ -159,7 +159,7 @@ impl RunCache<'_> {
         Ok(keys)
     }
 
-    /// An answer that was given before, read back from the store if it is not held.
+    /// The result of an earlier run, read from the store if it is not held in memory.
     fn remembered(&mut self, key: &RunKey) -> Result<RememberedRun, ExplainError> {
         if let Some(known) = self.recent.get(key) {
             return Ok(known);
@@ -174,7 +174,7 @@ impl RunCache<'_> {
         Ok(body.map_or_else(|| Err(String::new()), |body| decode(&body)))
     }
 
-    /// Sends jobs and remembers their answers.
+    /// Sends jobs to the fleet and remembers their results.
     fn dispatch(
         &mut self,
         jobs: Vec<(SetupId, Job)>,
@@ -184,13 +184,13 @@ impl RunCache<'_> {
             return Ok(());
         }
         let outcomes = self.fleet.run_mixed(jobs);
-        // Also those that led to an error.
+        // The events are kept even if the runs end in an error.
         self.keep_events()?;
         let outcomes = outcomes.map_err(|error| fleet_failure(self.study, error))?;
         let mut answers = Vec::with_capacity(requested.len());
         let mut rows = Vec::with_capacity(requested.len());
         for (requested, outcome) in requested.iter().zip(outcomes) {
-            rows.push(self.row(requested.record, requested.particle, &outcome));
+            rows.push(self.job_row(requested.record, requested.particle, &outcome));
             self.workers.insert(outcome.worker.clone());
             let known =
                 from_outcome(self.study, outcome, requested.particle, requested.record, requested.n_value)?;
@@ -202,7 +202,7 @@ impl RunCache<'_> {
             self.recent.insert(key, known);
         }
         self.n_batch += 1;
-        self.tell("");
+        self.report_stage("");
         Ok(())
     }
 
@@ -213,7 +213,7 @@ impl RunCache<'_> {
         Ok(())
     }
 
-    fn row(&self, record: usize, particle: u32, outcome: &Outcome) -> JobRow {
+    fn job_row(&self, record: usize, particle: u32, outcome: &Outcome) -> JobRow {
         JobRow {
             pass: 0,
             step: self.n_batch,

@@ -1,6 +1,6 @@
-//! The answers that were asked for last, as many as fit into so many bytes: the others are read back from the store.
+//! A least-recently-used cache of runs, limited in bytes; a run that it does not hold is read back from the store.
 //!
-//! Which answers there are at all is the store's to know. Next file to read: [`crate::run_cache`].
+//! It does not know which runs exist: only the store does. Next file to read: [`crate::run_cache`].
 
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
@@ -9,9 +9,9 @@ use starlings_study::store::RunKey;
 
 use super::remembered::RememberedRun;
 
-/// Answers by key, the one that was not asked for longest leaving first.
+/// Runs by key; the least recently used one is dropped first.
 pub(crate) struct LruCache {
-    /// An answer and when it was asked for last.
+    /// A run and the time of its last use, counted in uses.
     answers: HashMap<RunKey, (RememberedRun, u64)>,
     by_time: BTreeMap<u64, RunKey>,
     now: u64,
@@ -20,12 +20,12 @@ pub(crate) struct LruCache {
 }
 
 impl LruCache {
-    /// Nothing yet, and so many bytes of outputs at most, whatever is asked for.
+    /// An empty cache of at most so many bytes.
     pub(crate) fn new(most: usize) -> Self {
         Self { answers: HashMap::new(), by_time: BTreeMap::new(), now: 0, bytes: 0, most }
     }
 
-    /// An answer that is held.
+    /// A run, where it is held; it becomes the most recently used.
     pub(crate) fn get(&mut self, key: &RunKey) -> Option<RememberedRun> {
         let (answer, asked) = self.answers.get_mut(key)?;
         self.now += 1;
@@ -35,13 +35,13 @@ impl LruCache {
         Some(answer.clone())
     }
 
-    /// Holds an answer; others leave for it.
-    pub(crate) fn insert(&mut self, key: RunKey, answer: RememberedRun) {
+    /// Holds a run, and drops others until the limit is kept.
+    pub(crate) fn insert(&mut self, key: RunKey, run: RememberedRun) {
         self.remove(&key);
         self.now += 1;
-        self.bytes += size(&answer);
+        self.bytes += size(&run);
         self.by_time.insert(self.now, key);
-        self.answers.insert(key, (answer, self.now));
+        self.answers.insert(key, (run, self.now));
         while self.bytes > self.most {
             let Some((_, oldest)) = self.by_time.pop_first() else { break };
             self.remove(&oldest);
@@ -56,9 +56,9 @@ impl LruCache {
     }
 }
 
-/// Bytes of an answer with what it takes to find it.
-fn size(answer: &RememberedRun) -> usize {
-    let body = answer.as_ref().map_or_else(String::len, |outputs: &Arc<Vec<f64>>| 8 * outputs.len());
+/// Bytes of a run and its keys.
+fn size(run: &RememberedRun) -> usize {
+    let body = run.as_ref().map_or_else(String::len, |outputs: &Arc<Vec<f64>>| 8 * outputs.len());
     body + 4 * size_of::<RunKey>()
 }
 

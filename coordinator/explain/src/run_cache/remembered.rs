@@ -1,6 +1,6 @@
-//! A run's answer and the bytes it is remembered by.
+//! The result of a run as it is remembered, and its bytes in the store.
 //!
-//! Answers are predictions, model failures and timeouts: an outcome has nothing else, so that no failure of a place is remembered.
+//! A result is a prediction, a failure of the model or a timeout. Failures of a worker are not outcomes and are never remembered.
 //! Next file to read: [`crate::run_cache`].
 
 use std::sync::Arc;
@@ -10,13 +10,13 @@ use starlings_study::Study;
 
 use crate::error::{ExplainError, no_answer};
 
-/// The outputs of one run, or why there are none.
+/// The outputs of one run, or the reason why it has none.
 pub(crate) type RememberedRun = Result<Arc<Vec<f64>>, String>;
 
-/// What an outcome says: a failure of the model is an answer, and so is a timeout.
+/// The result to remember of an outcome: outputs, or the reason of a failure or timeout.
 ///
 /// # Errors
-/// When the prediction has another length than the run asked for, which says nothing of the model.
+/// When the prediction has another length than was requested, which is a fault of the worker and not of the model.
 pub(crate) fn from_outcome(
     study: &Study,
     outcome: Outcome,
@@ -35,15 +35,15 @@ pub(crate) fn from_outcome(
     Err(no_answer(study, particle, record, format!("{n} predicted values for {n_value}")))
 }
 
-/// One byte that says which, then the numbers or the text.
-pub(crate) fn encode(known: &RememberedRun) -> Vec<u8> {
-    match known {
+/// One byte, 1 for outputs and 0 for a failure, then the numbers or the text.
+pub(crate) fn encode(run: &RememberedRun) -> Vec<u8> {
+    match run {
         Ok(outputs) => std::iter::once(1).chain(outputs.iter().flat_map(|v| v.to_le_bytes())).collect(),
         Err(reason) => [&[0], reason.as_bytes()].concat(),
     }
 }
 
-/// What was remembered.
+/// The result from its bytes.
 pub(crate) fn decode(body: &[u8]) -> RememberedRun {
     let (which, rest) = body.split_first().unwrap_or((&0, &[]));
     if *which == 0 {

@@ -11,8 +11,8 @@ use crate::error::ExplainError;
 use crate::locate::Track;
 
 impl RunCache<'_> {
-    /// The course of every scalar state and output of a variant, and of its inputs, at the times of the records. Of a solver
-    /// without the states: what they are between two calls, only it knows.
+    /// The course of every scalar state and output of a variant, and of its inputs, at the times of the records. The states of an
+    /// external solver are left out, because the solver does not show them.
     ///
     /// # Errors
     /// As [`RunCache::run`], and when the budget does not suffice for one point; a model that fails there gives no tracks.
@@ -38,7 +38,7 @@ impl RunCache<'_> {
             *window = Arc::new(Window { observed, ..Window::clone(window) });
         }
         let points = [Point { study: &seen, theta: point.theta.clone() }];
-        // A model of fields alone has inputs only, which need no run.
+        // A model without a scalar state or output has tracks of its inputs only, which need no run.
         let runs = self.outputs(if names.is_empty() { &[] } else { &points });
         self.windows = windows;
         let mut tracks = Vec::new();

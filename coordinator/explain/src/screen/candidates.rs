@@ -1,6 +1,6 @@
 //! Which effects are tried: those of the library and of the study, less what the model has already and what was left out.
 //!
-//! Whether a name exists and whether anything is left is told before a single run. Next file to read: [`crate::options`].
+//! A wrong name or an empty list is an error before the first run. Next file to read: [`crate::options`].
 
 use starlings_models::effect::library::{library_in, shows_in};
 use starlings_models::{EffectDef, Setup, nearest};
@@ -10,14 +10,14 @@ use crate::error::ExplainError;
 use crate::number::three;
 use crate::options::Options;
 
-/// The effects to try, the study's own first.
+/// The effects to try, those of the study first.
 ///
 /// # Errors
 /// When the model does not build without its effects, a name of `only` or `without` is not among the effects, or none is left.
 pub fn candidates(study: &Study, options: &Options) -> Result<Vec<EffectDef>, ExplainError> {
     let bare = Setup { model: study.setup.model.clone(), ..Setup::default() };
     let spec = bare.spec()?;
-    let fitted: Vec<String> = fitted(study);
+    let fitted: Vec<String> = fitted_outputs(study);
     let mut built_in = library_in(&spec, &study.time_unit);
     built_in.retain(|effect| shows_in(effect, &spec, &fitted));
     let all: Vec<&EffectDef> = match study.explain.library {
@@ -40,13 +40,13 @@ pub fn candidates(study: &Study, options: &Options) -> Result<Vec<EffectDef>, Ex
         }
     }
     if kept.is_empty() {
-        return Err(ExplainError::NothingToTry(nothing(study, options, all.len())));
+        return Err(ExplainError::NothingToTry(nothing_to_try(study, options, all.len())));
     }
     Ok(kept)
 }
 
-/// Outputs that a channel of the fit measures.
-pub(crate) fn fitted(study: &Study) -> Vec<String> {
+/// Outputs that a fitted channel measures.
+pub(crate) fn fitted_outputs(study: &Study) -> Vec<String> {
     let channels = study.records.iter().filter(|r| r.is_trained()).flat_map(|r| &r.channels);
     channels.filter(|c| !c.held_out).map(|c| c.output.clone()).collect()
 }
@@ -55,7 +55,7 @@ pub(crate) fn fitted(study: &Study) -> Vec<String> {
 /// larger.
 const APART: f64 = 1e15;
 
-/// A noise below the last digit of the values, or so far above them that nothing could ever show.
+/// Refuses a noise below the last digit of the values, or so far above them that no misfit could exceed it.
 fn check_noise(study: &Study) -> Result<(), ExplainError> {
     for record in study.records.iter() {
         for channel in &record.channels {
@@ -81,11 +81,11 @@ fn check_noise(study: &Study) -> Result<(), ExplainError> {
     Ok(())
 }
 
-/// Everything that can be told before the first run: names, an empty library, a noise that has nothing to do with the values, a
-/// budget below one set of runs for the fit.
+/// Checks what can be checked before the first run: the names, that an effect is left, the noise against the values, the budget
+/// against one set of runs of the fit.
 ///
 /// # Errors
-/// The first thing that is wrong.
+/// The first fault found.
 pub fn check(study: &Study, options: &Options) -> Result<(), ExplainError> {
     candidates(study, options)?;
     check_noise(study)?;
@@ -99,7 +99,7 @@ pub fn check(study: &Study, options: &Options) -> Result<(), ExplainError> {
     }
 }
 
-/// An effect of the model itself may be named too: leaving it out changes nothing.
+/// Refuses an unknown name. An effect that the model has already may be named; this has no influence.
 fn check_name(name: &str, study: &Study, all: &[&EffectDef]) -> Result<(), ExplainError> {
     let names: Vec<&str> = all.iter().copied().chain(&study.setup.effects).map(|e| e.name.as_str()).collect();
     if names.contains(&name) {
@@ -112,8 +112,8 @@ fn check_name(name: &str, study: &Study, all: &[&EffectDef]) -> Result<(), Expla
     Err(ExplainError::Name(format!("no effect is named `{name}`: {help}")))
 }
 
-/// Why nothing is left, with the remedy.
-fn nothing(study: &Study, options: &Options, n_all: usize) -> String {
+/// The message that no effect is left to try, with the remedy.
+fn nothing_to_try(study: &Study, options: &Options, n_all: usize) -> String {
     let library = match study.explain.library {
         Library::All => "the study and the built-in library",
         Library::Study => "the study (library = \"study\")",

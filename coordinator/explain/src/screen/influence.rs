@@ -1,7 +1,7 @@
-//! What a candidate would change, row by row: held where the influences of a screening are small together, else worked out again
-//! from the runs that the store keeps.
+//! The influence of a candidate on the predictions, row by row.
 //!
-//! Both ways give the same bits. Next file to read: [`super::screening`].
+//! It is held in memory where all influences of a screening fit there, and else computed again from the runs in the store. Both
+//! ways give the same bits. Next file to read: [`super::screening`].
 
 use std::sync::Arc;
 
@@ -15,9 +15,9 @@ use crate::run_cache::RunCache;
 /// d prediction / d amplitude over the noise, all rows.
 #[derive(Clone, Debug)]
 pub(crate) enum Influence {
-    /// It is held.
+    /// Held in memory.
     Held(Arc<DVector<f64>>),
-    /// It is worked out when it is asked for.
+    /// Computed from remembered runs when it is asked for.
     Remembered {
         /// The runs with the candidate, one per record.
         runs: Arc<[RunKey]>,
@@ -29,12 +29,12 @@ pub(crate) enum Influence {
 }
 
 impl Influence {
-    /// Of what has none.
+    /// The influence of a candidate without one.
     pub(crate) fn none() -> Self {
         Self::Held(Arc::new(DVector::zeros(0)))
     }
 
-    /// The values.
+    /// The values, all rows.
     ///
     /// # Errors
     /// When the store fails.

@@ -1,6 +1,7 @@
-//! What the search could not try, and why: parts of physics without a place in the model, equations that no candidate enters.
+//! What the search did not try, and why: families of effects that find no place in the model, and equations to which no candidate
+//! adds a term.
 //!
-//! "Nothing explains the gap" is a statement about what was tried; this is its other half. Next file to read:
+//! That nothing explains the gap is said of the candidates only, and so the result lists what was not among them. Next file to read:
 //! [`super::candidates`].
 
 use serde::{Deserialize, Serialize};
@@ -8,7 +9,7 @@ use starlings_models::effect::library::{FAMILIES, shows_in};
 use starlings_models::{EffectDef, Quantity, Role, Setup, Spec};
 use starlings_study::{Study, checked::Library};
 
-use super::candidates::fitted;
+use super::candidates::fitted_outputs;
 use crate::fit::candidate::Candidate;
 
 /// States that a sentence names at most.
@@ -27,7 +28,7 @@ pub struct NotTried {
 pub(crate) fn not_tried(study: &Study, candidates: &[Candidate]) -> Vec<NotTried> {
     let bare = Setup { model: study.setup.model.clone(), ..Setup::default() };
     let Ok(spec) = bare.spec() else { return Vec::new() };
-    let measured = fitted(study);
+    let measured = fitted_outputs(study);
     let tried = |effect: &EffectDef| candidates.iter().any(|c| c.name() == effect.name);
     let mut list = Vec::new();
     for family in FAMILIES {
@@ -64,8 +65,8 @@ fn untouched<'s>(spec: &'s Spec, candidates: &[Candidate]) -> Vec<(&'s str, Role
     scalar.map(|q| (q.name.as_str(), q.role)).collect()
 }
 
-/// What was not tried inside the equations, in one sentence with a remedy; empty where a candidate adds to each of them, or to a
-/// parameter and so may act in any.
+/// Which equations no candidate adds a term to, in one sentence with a remedy. Empty where there is none, or where a candidate adds
+/// to a parameter, which may act in any equation.
 pub(crate) fn sentence(study: &Study, candidates: &[Candidate]) -> String {
     let bare = Setup { model: study.setup.model.clone(), ..Setup::default() };
     let Ok(spec) = bare.spec() else { return String::new() };
@@ -106,7 +107,7 @@ fn joined(names: &[&str]) -> String {
     }
 }
 
-/// A sentence as it goes on inside another.
+/// What a family needs, as part of another sentence.
 fn lower(sentence: &str) -> String {
     let text = sentence.trim_end_matches('.');
     let mut letters = text.chars();

@@ -7,7 +7,7 @@ use starlings_estimators::Score;
 use super::influence::Influence;
 use crate::fit::model_variant::ModelVariant;
 
-/// A probe under way.
+/// A candidate at one point of its grid, and its measurement as far as it has come.
 pub(super) struct Probe<'c> {
     pub(super) candidate: usize,
     pub(super) variant: ModelVariant<'c>,
@@ -16,10 +16,10 @@ pub(super) struct Probe<'c> {
     pub(super) answer: Option<Result<MeasuredInfluence, String>>,
 }
 
-/// An influence that was measured.
+/// A measured influence with its score.
 pub(super) struct MeasuredInfluence {
     pub(super) influence: Influence,
     pub(super) score: Score,
-    /// Whether the rows that train feel nothing of it.
+    /// Whether it changes no training row.
     pub(super) is_unfelt: bool,
 }

@@ -1,13 +1,13 @@
-//! Rhythms and jumps of the residuals: where a period or an instant inside a term is worth trying.
+//! Dominant periods and change points of the residuals: values at which a period or an instant inside a term is screened.
 //!
-//! A sine whose period is off by more than a cycle over the record, and a step at the wrong instant, have no sensitivity to
-//! what is missing, however strong that is; a fixed grid misses them. Next file to read: [`crate::fit::candidate`].
+//! A sine whose period is wrong by more than a cycle over the record is uncorrelated with the one that is missing, and so is a
+//! step at the wrong instant. A fixed grid would miss both. Next file to read: [`crate::fit::candidate`].
 
 use crate::rows::{Rows, Usage};
 
-/// Periods and instants at most.
+/// Periods, and change points, at most.
 const MOST: usize = 2;
-/// Frequencies looked at, per record length.
+/// Frequencies per cycle over the record.
 const OVERSAMPLING: f64 = 4.0;
 /// Frequencies at most.
 const FREQUENCIES: usize = 600;
@@ -55,7 +55,7 @@ fn power(rows: &Rows, whitened: &[f64], stretch: &std::ops::Range<usize>, omega:
     2.0 * (cosine * cosine + sine * sine) / n
 }
 
-/// The instants at which the residuals of the training rows jump most: where the means of two windows, before and after,
+/// The instants at which the residuals of the training rows change most, the largest change first: where the means of two windows, before and after,
 /// differ most.
 pub(crate) fn change_points(rows: &Rows, predicted: &[f64]) -> Vec<f64> {
     let whitened = rows.whitened(predicted);

@@ -27,9 +27,9 @@ pub(crate) fn resolved_candidates(
     Ok(defs.into_iter().map(Candidate::new).collect())
 }
 
-/// The effects with their numbers in the model's units; one whose quantity does not move cannot be told and is left out. A
-/// length of time within a term is tried at the rhythms of the residuals: a period that is off by more than a cycle over the
-/// record has no sensitivity at all. An instant is tried where the residuals jump as well.
+/// The effects with their numbers in the model's units. An effect whose quantity is constant along the run is left out, since its
+/// numbers count in the course of that quantity. A duration inside a term is screened at the dominant periods of the residuals,
+/// an instant at their change points as well ([`super::residual_timing`]).
 fn resolved(
     study: &Study,
     defs: Vec<EffectDef>,

@@ -1,4 +1,4 @@
-//! What a probe of the screening tells: an influence, or that it must be made again with another amplitude, or a failure.
+//! What is made of the run of a probe: an influence, another amplitude to try, or a failure.
 //!
 //! Next file to read: [`super::influence`].
 
@@ -11,12 +11,12 @@ use super::influence::{Influence, difference};
 use super::probe::{MeasuredInfluence, Probe};
 use crate::run_cache::{RowPredictions, RunCache};
 
-/// Response that a derivative is taken from: root mean square over the spread of the channel.
+/// Size of a response at which a derivative is taken: root mean square over the spread of the channel.
 const WANTED: f64 = 3e-3;
-/// Responses outside of these are measured again with another amplitude.
+/// A response outside of this interval is measured again with another amplitude.
 const RESPONSE: [f64; 2] = [1e-5, 5e-2];
 
-/// What responses are measured by.
+/// What is the same for all probes of a screening.
 pub(super) struct ResponseScale<'s> {
     pub(super) optimum: &'s Optimum,
     pub(super) spread: &'s [f64],
@@ -24,7 +24,7 @@ pub(super) struct ResponseScale<'s> {
     pub(super) is_held: bool,
 }
 
-/// What a probe answered.
+/// The run of a probe.
 pub(super) struct ProbeResponse<'r> {
     pub(super) probe: &'r Probe<'r>,
     pub(super) answer: RowPredictions,
@@ -32,11 +32,11 @@ pub(super) struct ProbeResponse<'r> {
     pub(super) base: &'r Arc<Vec<f64>>,
 }
 
-/// What becomes of a probe.
+/// What follows for a probe.
 pub(super) enum ProbeOutcome {
-    /// It is measured again, with this amplitude.
+    /// Measure it again, with this amplitude.
     Amplitude(f64),
-    /// It is done.
+    /// It is measured, or has failed.
     Done(Result<MeasuredInfluence, String>),
 }
 

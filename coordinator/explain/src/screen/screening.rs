@@ -1,8 +1,8 @@
-//! The screening: one run per candidate and point of its grid tells what it would add to a finished fit.
+//! The screening: one run per candidate and point of its grid gives its score at a finished fit.
 //!
 //! A run with a small amplitude gives the sensitivity of every row; the score test projects the fitted parameters out of it.
-//! All candidates go to the fleet in one batch; those whose response was too small or too large for a derivative go a second
-//! time. Next files to read: [`response`], `score.rs` of the estimators, then [`crate::refit::search`].
+//! All candidates go to the fleet in one batch; those whose response was too small or too large for a derivative are run again
+//! with another amplitude. Next files to read: [`super::response`], `score.rs` of the estimators, then [`crate::refit::search`].
 
 use std::sync::Arc;
 
@@ -23,18 +23,18 @@ use crate::fit::model_variant::{AddedEffect, ModelVariant};
 use crate::locate::Track;
 use crate::run_cache::{Point, RunCache};
 
-/// Probe, as a share of what the term is added to.
+/// Amplitude of a probe, as a share of the natural amplitude.
 const PROBE: f64 = 3e-3;
-/// Times that a candidate is measured again.
+/// How many times at most a candidate is measured again.
 const AGAIN: usize = 2;
-/// Why a probe has no answer that the budget did not suffice for.
+/// The failure of a probe for which the budget did not suffice.
 const UNAFFORDED: &str = "the budget ended before its influence was measured";
-/// The score of what was not measured.
+/// The score of a candidate without a measured influence.
 const NO_SCORE: Score = Score { gain: 0.0, amplitude: 0.0, sd: f64::INFINITY, identifiable: 0.0 };
 
-/// Measures candidates at a fit: `of` names (candidate, point of its grid). Effects that the fit has already are left out.
-/// Where the budget does not suffice for all of them, none is measured, and what it does not suffice to measure again counts
-/// as failed; the run cache notes it.
+/// Screens candidates at a fit; `of` lists (candidate, point of its grid). Effects that the fit has already are left out. Where the
+/// budget does not suffice for all of them, none is measured. A candidate for whose repetition it does not suffice counts as
+/// failed. The run cache notes both.
 ///
 /// # Errors
 /// When the fleet or the store fails, or the fit leaves a direction free.
@@ -46,19 +46,19 @@ pub(crate) fn screen<'c>(
     tracks: &[Track],
 ) -> Result<Vec<ScreeningResult>, ExplainError> {
     let optimum = fit.optimum()?;
-    let (mut probes, mut unfit) = (Vec::new(), Vec::new());
+    let (mut probes, mut unusable) = (Vec::new(), Vec::new());
     for &(index, point) in of {
         if fit.variant.effects.iter().any(|m| m.candidate.name() == candidates[index].name()) {
             continue;
         }
         match probe(fit, candidates, index, point, tracks) {
             Ok(probe) => probes.push(probe),
-            // Two effects of one study may share a name inside, and then cannot stand in one model.
-            Err(error) => unfit.push(incompatible(index, &candidates[index].points[point], &error)),
+            // Two effects that share the name of a parameter or state cannot be in one model.
+            Err(error) => unusable.push(incompatible(index, &candidates[index].points[point], &error)),
         }
     }
     let spread = spread(cache);
-    let unmoved = unmoved(fit, &probes);
+    let unmoved = zero_amplitude(fit, &probes);
     if !cache.affords(probes.len() + usize::from(unmoved.is_some())) {
         cache.cut_short();
         return Ok(Vec::new());
@@ -74,7 +74,7 @@ pub(crate) fn screen<'c>(
             }
             break;
         }
-        let points: Vec<Point<'_>> = open.iter().map(|i| at(fit, &probes[*i])).collect();
+        let points: Vec<Point<'_>> = open.iter().map(|i| probe_point(fit, &probes[*i])).collect();
         let mut found = Vec::with_capacity(open.len());
         cache.run_each(&points, |cache, k, runs, answer| {
             let probe = &probes[open[k]];
@@ -90,10 +90,10 @@ pub(crate) fn screen<'c>(
             }
         }
     }
-    Ok(probes.into_iter().map(result).chain(unfit).collect())
+    Ok(probes.into_iter().map(finished).chain(unusable).collect())
 }
 
-/// A first guess of a probe.
+/// The probe of a candidate with a first amplitude.
 fn probe<'c>(
     fit: &FittedVariant<'c>,
     candidates: &'c [Candidate],
@@ -120,7 +120,7 @@ fn probe<'c>(
     Ok(Probe { candidate: index, variant, point, amplitude, answer: None })
 }
 
-fn at<'p>(fit: &FittedVariant<'_>, probe: &'p Probe<'_>) -> Point<'p> {
+fn probe_point<'p>(fit: &FittedVariant<'_>, probe: &'p Probe<'_>) -> Point<'p> {
     let mut z = probe.variant.continue_from(&fit.variant, fit.z(), &probe.point);
     z[probe.variant.first_entry_of(probe.variant.effects.len() - 1)] = probe.amplitude;
     Point { study: &probe.variant.study, theta: probe.variant.theta(&z) }
@@ -135,16 +135,17 @@ fn touches_states(probe: &Probe<'_>) -> bool {
     !(effect.candidate.def.states.is_empty() && effect.candidate.def.adds.iter().all(|a| only_output(&a.to)))
 }
 
-/// The fitted model with an effect of amplitude zero in its rates, where that is not the fitted model to the bit: a built-in
-/// model with a step of its own is then integrated in another way, and that difference is not the effect's doing.
-fn unmoved<'p>(fit: &FittedVariant<'_>, probes: &'p [Probe<'_>]) -> Option<Point<'p>> {
+/// The fitted model with an effect of amplitude zero in its rates. A built-in model with a step of its own is integrated in another
+/// way as soon as an effect is in its rates; the difference must not count as the influence of the effect. `None` where the model
+/// has no step of its own.
+fn zero_amplitude<'p>(fit: &FittedVariant<'_>, probes: &'p [Probe<'_>]) -> Option<Point<'p>> {
     let own_step = fit.variant.study.setup.model.equations.is_none();
     let probe = probes.iter().find(|p| touches_states(p)).filter(|_| own_step)?;
     let z = probe.variant.continue_from(&fit.variant, fit.z(), &probe.point);
     Some(Point { study: &probe.variant.study, theta: probe.variant.theta(&z) })
 }
 
-/// What predictions with an effect in the rates are compared with.
+/// The predictions with which those of an effect in the rates are compared.
 fn reference(
     cache: &mut RunCache<'_>,
     fit: &FittedVariant<'_>,
@@ -170,7 +171,7 @@ fn spread(cache: &RunCache<'_>) -> Vec<f64> {
     cache.rows.rows.iter().map(|row| by_output[row.output].max(row.noise)).collect()
 }
 
-/// A candidate that does not go with what the model has already.
+/// The result of a candidate that cannot be in one model with the effects of the fit.
 fn incompatible(candidate: usize, point: &[f64], error: &SetupError) -> ScreeningResult {
     ScreeningResult {
         candidate,
@@ -181,7 +182,7 @@ fn incompatible(candidate: usize, point: &[f64], error: &SetupError) -> Screenin
     }
 }
 
-fn result(probe: Probe<'_>) -> ScreeningResult {
+fn finished(probe: Probe<'_>) -> ScreeningResult {
     let Probe { candidate, point, answer, .. } = probe;
     let reason = match answer.unwrap_or_else(|| Err(String::new())) {
         Ok(MeasuredInfluence { influence, score, is_unfelt }) => {

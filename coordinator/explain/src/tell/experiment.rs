@@ -1,4 +1,4 @@
-//! The experiment that would tell tied effects apart: what to measure, how to drive, how long to record.
+//! The experiment that would best tell tied effects apart: what to measure, how to drive, how long to record.
 //!
 //! Every experiment is simulated with each of the tied variants as fitted; their difference in the noise of the channels is
 //! how well it separates them. The model's own parameters would be fitted again in the new data, so the figure is an upper
@@ -20,10 +20,10 @@ use crate::run_cache::RunCache;
 const NEW_CHANNEL: f64 = 0.03;
 /// Difference in χ² up to which a verdict can call two variants tied.
 const SEPARATED: f64 = 12.0;
-/// Factors on the drive.
+/// Factor on the swing of an input, and its inverse.
 const HARDER: f64 = 2.0;
 
-/// One thing to do.
+/// One experiment.
 struct Trial {
     says: String,
     window: Window,
@@ -57,7 +57,7 @@ pub(crate) fn propose(
 impl Experiment {
     /// What the best of the simulated experiments is worth, in one sentence.
     pub fn sentence(&self) -> String {
-        // Differences of rounding are none.
+        // Differences by rounding count as zero.
         let figure = |chi2: f64| three(if chi2 < 1e-3 { 0.0 } else { chi2 });
         let (separation, now) = (figure(self.separation), figure(self.separation_now));
         let of = if self.between.is_empty() { "them".to_owned() } else { self.between.join(" and ") };
@@ -76,7 +76,7 @@ impl Experiment {
     }
 }
 
-/// The record as it was, then everything that could be done instead.
+/// The record as it was, then the experiments that could be made instead.
 fn trials(study: &Study, record: usize, tracks: &[Track]) -> Vec<Trial> {
     let as_it_was = study.whole(record, false);
     let channels = &study.records[record].channels;
@@ -96,7 +96,7 @@ fn trials(study: &Study, record: usize, tracks: &[Track]) -> Vec<Trial> {
             list.push(trial(says, as_it_was.clone(), &with));
         }
     }
-    // An input that does not move has no swing.
+    // A constant input has no swing.
     let moves = |i: usize| spread(&as_it_was.inputs[i].values) > 0.0;
     for (i, input) in study.spec.inputs.iter().enumerate().filter(|(i, _)| moves(*i)) {
         for (factor, word) in [(HARDER, "twice"), (1.0 / HARDER, "half")] {
@@ -148,7 +148,7 @@ fn step_half_way(signal: &Signal) -> Signal {
     Signal { times: signal.times.clone(), values }
 }
 
-/// Twice as many observations, inputs repeated from the start of the window on; what a delay asks for before it stays.
+/// Twice as many observations, inputs repeated from the start of the window on; samples before it, which a delay reads, stay.
 fn stretched(window: &Window, n_obs: usize) -> Window {
     let last = window.times.last().copied().unwrap_or(window.start);
     let step =
@@ -160,7 +160,7 @@ fn stretched(window: &Window, n_obs: usize) -> Window {
         let to = signal.times.partition_point(|t| *t < window.start + span).max(1);
         let (mut times, mut values) = (signal.times[..to].to_vec(), signal.values[..to].to_vec());
         for (t, value) in later(&signal.times[..to]).into_iter().zip(&signal.values).skip(from) {
-            // Samples that lie closer than numbers do, so late, are one.
+            // Late times may round to the same number; only the first of such samples is kept.
             if times.last().is_some_and(|last| *last < t) {
                 times.push(t);
                 values.push(*value);

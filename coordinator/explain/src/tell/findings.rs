@@ -1,4 +1,4 @@
-//! Findings in the run's database and back: what the report and the files are made from later.
+//! The findings of an explanation, saved in the run's database, from which the report and the files are made.
 //!
 //! Next file to read: `explain.rs` of `starlings-report`.
 
@@ -10,7 +10,7 @@ use starlings_study::store::{EXPLANATION, Store, StoreError};
 use super::figures::Figures;
 use super::result::Explanation;
 
-/// Names under which the store keeps the parts.
+/// Names of the parts in the store.
 const FIGURES: &str = "figures";
 const EXPLAINED: &str = "explained";
 
@@ -25,7 +25,7 @@ pub struct Findings {
     pub explained_study: Option<String>,
 }
 
-/// Keeps the findings; the explanation is finished then.
+/// Saves the findings, by which the explanation is finished.
 ///
 /// # Errors
 /// When the store fails, or a figure is no finite number and so could not be read again.
@@ -35,12 +35,12 @@ pub fn save_findings(folder: &RunFolder, findings: &Findings) -> Result<(), Stor
     let figures = readable(FIGURES, &findings.figures)?;
     store.set_meta(FIGURES, &figures)?;
     store.set_meta(EXPLAINED, findings.explained_study.as_deref().unwrap_or_default())?;
-    // Last: with it the explanation counts as finished.
+    // This is written last, because the explanation counts as finished as soon as it is there.
     store.set_meta(EXPLANATION, &explanation)?;
-    // A finished explanation is never searched again, and its answers are most of the file. One that cannot be made smaller is
+    // The remembered runs are most of the file, and a finished explanation needs them no more. If they cannot be removed, it is
     // finished all the same.
     let _ = store.forget_runs();
-    // Somebody who reads the database right now keeps its log open; the explanation is finished all the same.
+    // A reader of the database may keep its log open; the explanation is finished all the same.
     let _ = store.close_log();
     Ok(())
 }
@@ -61,7 +61,7 @@ fn parsed<T: DeserializeOwned>(store: &Store, name: &'static str) -> Result<Opti
     text.map(|text| serde_json::from_str(&text).map_err(|e| store.damaged(name, e))).transpose()
 }
 
-/// JSON writes a NaN as `null` and does not read it as a number again: such a value is told now and not later.
+/// The value as JSON that can be read again. JSON writes a NaN as `null`, which is not read as a number; this is an error here.
 fn readable<T: Serialize + DeserializeOwned>(name: &'static str, value: &T) -> Result<String, StoreError> {
     let text = serde_json::to_string(value);
     let read = text.and_then(|text| serde_json::from_str::<T>(&text).map(|_| text));

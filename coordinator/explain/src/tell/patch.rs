@@ -1,7 +1,7 @@
-//! From a study and the effects that explain its misfit to the text of a study with the effects in it.
+//! The text of a study with the effects in it that explain its misfit.
 //!
-//! The author's text keeps its layout and comments; what is added stands beside what is like it. Nothing is estimated here:
-//! priors are wide around the estimates, so that a run of the new study finds its own. Next files to read: [`effect`] for what
+//! The author's text keeps its layout and comments; each addition is written beside its like. Nothing is estimated here: the
+//! priors are wide around the estimates, so that a run of the new study makes estimates of its own. Next files to read: [`effect`] for what
 //! is added, [`mod@remove`] for what is taken out, [`place`] for files that must still be found.
 
 mod effect;
@@ -29,13 +29,13 @@ pub struct PatchEffect {
 /// Why the study with the effects cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum PatchError {
-    /// The text of the study cannot be taken apart.
+    /// The text of the study cannot be parsed or changed.
     #[error("the study's text cannot be changed: {0}")]
     Text(String),
-    /// A rate term that is to be replaced stands nowhere.
+    /// The model has no rate term of the name of one that is to be replaced.
     #[error("no rate of the study's model has a term named `{0}`")]
     NoTerm(String),
-    /// The text that came out is no sound study.
+    /// The new text is refused as a study.
     #[error("the study with the effects in it is refused: {0}")]
     Refused(#[from] StudyError),
 }
@@ -67,7 +67,7 @@ pub fn explained_study(
         remove::orphans(&mut document)?;
     }
     let text = document.to_string();
-    // The solver has said already what it is.
+    // The description of the solver is known; it is not asked for a second time.
     let surroundings = match study.setup.model.description() {
         Some(description) => study.surroundings.knowing(description),
         None => study.surroundings.clone(),

@@ -1,6 +1,6 @@
-//! Why the others were refused, in words with numbers.
+//! Why variants and candidates were rejected, in words with numbers.
 //!
-//! Nothing is decided here: the gates and the verdict have spoken. Next file to read: [`crate::judge::gates`].
+//! Nothing is decided here; the gates and the verdict have decided. Next file to read: [`crate::judge::gates`].
 
 use super::result::Rejected;
 use crate::fit::candidate::Candidate;
@@ -53,7 +53,8 @@ pub(crate) fn rejected(
     list
 }
 
-/// A candidate that would gain more than chance, were it not for its sign at every point of its grid.
+/// The best screening result of a candidate that would gain more than chance if physics allowed its sign, at every point of its
+/// grid.
 fn wrong_sign<'f>(
     found: &'f SearchResult<'_>,
     index: usize,
@@ -65,7 +66,7 @@ fn wrong_sign<'f>(
         .max_by(|a, b| a.score.gain.total_cmp(&b.score.gain))
 }
 
-/// Why a variant that passes the gates is not the answer.
+/// Why a variant that passes the gates is not named.
 fn behind(found: &SearchResult<'_>, decision: &Decision, i: usize) -> String {
     let Some(best) = decision.best.map(|b| &found.judged[b]) else { return String::new() };
     let judged = &found.judged[i];

@@ -1,4 +1,4 @@
-//! What an explanation says, as it is written to `explain.json`: the contract with whoever reads it.
+//! The result of an explanation, as it is written to `explain.json`. Its field names are a contract with readers of that file.
 //!
 //! Plain data; nothing is computed here. Next file to read: [`super`].
 
@@ -41,7 +41,7 @@ pub struct Explanation {
     pub rejected: Vec<Rejected>,
     /// Root mean square error before and after, by channel and use; empty when nothing was added.
     pub gap: Vec<GapRow>,
-    /// What the data say that no fit has seen, by record and channel, with the effects that were named or came nearest.
+    /// Errors on held-out data, by record and channel, with the effects that were named or came nearest.
     #[serde(default)]
     pub held_out: Vec<HeldOut>,
     /// Kinds of physics of which nothing was tried, and why.
@@ -57,7 +57,7 @@ pub struct Explanation {
     pub untried: Vec<String>,
     /// The study with the effects in it, relative to the run folder.
     pub explained_study: Option<String>,
-    /// What the intervals and the verdict rest on.
+    /// The conditions under which the intervals and the verdict hold.
     pub conditional_on: String,
     /// Runs of the model: one particle over one record each.
     pub runs: u64,
@@ -67,7 +67,7 @@ pub struct Explanation {
     pub workers: usize,
     /// Wall time in s.
     pub wall_s: f64,
-    /// What is doubtful.
+    /// Warnings.
     pub warnings: Vec<String>,
 }
 
@@ -174,14 +174,14 @@ pub struct Remaining {
     pub whiteness_tested: bool,
     /// Factor that size and correlation of the residuals make on the variance of a smooth signal's coefficient.
     pub inflation: f64,
-    /// Fall of χ² that all candidates and bent forms of the effect together would still bring, to first order, in units of
+    /// Fall of χ² that all candidates and modulated forms of the effect together would still bring, to first order, in units of
     /// the effective noise.
     pub form_gain: f64,
     /// The same on the held-out span.
     pub form_gain_held_out: f64,
     /// Share of what remains above the noise that these would take away.
     pub form_share: f64,
-    /// Largest fall of χ² that a fully bent form of the effect would bring if it were the truth.
+    /// Largest fall of χ² that a fully modulated form of the effect would bring if it were the truth.
     pub form_power: f64,
     /// The shape of what remains, in words.
     pub shape: String,

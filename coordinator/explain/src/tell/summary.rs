@@ -1,4 +1,4 @@
-//! The findings in the words and numbers of `explain.json` and of its report.
+//! The parts of `explain.json` and of the report's figures, made from the search and the decision.
 //!
 //! Nothing is decided here. Next file to read: [`crate::run`].
 
@@ -63,7 +63,7 @@ pub(crate) fn patches(judged: &JudgedFit<'_>) -> Vec<PatchEffect> {
     effects.iter().zip(named).map(patch).collect()
 }
 
-/// Every candidate at its best point, with what became of it.
+/// The screening of every candidate at its best point, with its fate.
 pub(crate) fn screened(
     found: &SearchResult<'_>,
     candidates: &[Candidate],
@@ -95,6 +95,7 @@ pub(crate) fn screened(
     all
 }
 
+/// What became of a candidate, in the words of `explain.json`.
 fn fate(
     found: &SearchResult<'_>,
     decision: &Decision,
@@ -154,7 +155,7 @@ pub(crate) fn gap(cache: &RunCache<'_>, before: &[f64], after: &[f64]) -> Vec<Ga
     list
 }
 
-/// What is left of the gap after a fit; the form is that of the variant whose form was `checked`.
+/// What is left of the gap after a fit; the figures of the form are those of the variant whose form was `checked`.
 pub(crate) fn remaining(
     found: &SearchResult<'_>,
     added: Option<&JudgedFit<'_>>,
@@ -205,7 +206,7 @@ pub(crate) fn wilson_upper(rate: f64, n: f64) -> f64 {
     }
 }
 
-/// What the effects did to the model's own parameters.
+/// The changes of the model's own parameters by the effects.
 pub(crate) fn shifts(base: &FittedVariant<'_>, judged: &JudgedFit<'_>) -> Vec<ParameterShift> {
     let (before, own) = (base.theta(), &base.variant.study.theta);
     let shift = |after: Estimate| {

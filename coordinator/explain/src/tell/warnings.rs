@@ -1,4 +1,4 @@
-//! What is doubtful in an explanation, in sentences.
+//! The warnings of an explanation: what in it is doubtful.
 //!
 //! Next file to read: [`super::words`].
 
@@ -19,7 +19,7 @@ use crate::run_cache::RunCache;
 /// Distance in noise sd within which two simulated values are the same.
 const SAME: f64 = 0.01;
 
-/// What a fit that did not come to its end leaves in doubt.
+/// The warning of a fit that has not converged, or has no measured Jacobian.
 fn unfinished(fit: &FittedVariant<'_>) -> Option<String> {
     let name = fit.variant.name();
     if !fit.has_converged() {
@@ -36,7 +36,7 @@ fn unfinished(fit: &FittedVariant<'_>) -> Option<String> {
     })
 }
 
-/// Rivals that simulate the same values as what is shown.
+/// The warning of rivals that simulate the same values as the variant that is shown.
 fn same(
     cache: &RunCache<'_>,
     found: &SearchResult<'_>,
@@ -64,7 +64,7 @@ fn same(
     })
 }
 
-/// Held-out data that fail beside a name.
+/// The warning of held-out data that fail although an effect is named.
 fn still_failing(judged: &JudgedFit<'_>) -> Option<String> {
     let failing: Vec<&HeldOut> = judged.held_out.iter().filter(|h| h.fails).collect();
     (!failing.is_empty()).then(|| {
@@ -76,7 +76,7 @@ fn still_failing(judged: &JudgedFit<'_>) -> Option<String> {
     })
 }
 
-/// What is doubtful.
+/// All warnings.
 pub(crate) fn warnings(cache: &RunCache<'_>, found: &SearchResult<'_>, decision: &Decision) -> Vec<String> {
     let mut list = Vec::new();
     if found.cut_short {

@@ -1,6 +1,6 @@
 //! The sentences of an explanation: each is made from the figures that it stands beside.
 //!
-//! What speaks of noise is in [`crate::judge::adequacy`], what of held-out data in [`crate::judge::held_out`]. Next file to read:
+//! Sentences about noise are in [`crate::judge::adequacy`], those about held-out data in [`crate::judge::held_out`]. Next file to read:
 //! [`super::warnings`].
 
 use std::fmt::Write as _;
@@ -91,7 +91,7 @@ fn unexplained(
     sentences.join(" ")
 }
 
-/// That the data show no gap, by what they could show.
+/// That the data show no gap, with what they could have shown.
 fn no_gap(found: &SearchResult<'_>) -> String {
     let says = found.adequacy.says();
     let training = match found.adequacy.nature() {
@@ -119,7 +119,7 @@ fn subject(judged: &JudgedFit<'_>) -> String {
     format!("Missing: {}. {}", variant.name(), says.join(" "))
 }
 
-/// What becomes of the error, for each use that there is.
+/// How the error changes, for each use of the data.
 fn shrinking(cache: &RunCache<'_>, found: &SearchResult<'_>, judged: &JudgedFit<'_>) -> String {
     let noise = |y: &[f64], usage| {
         let whitened = cache.rows.whitened(y);
@@ -139,7 +139,7 @@ fn shrinking(cache: &RunCache<'_>, found: &SearchResult<'_>, judged: &JudgedFit<
     moves(&spans.into_iter().filter_map(part).collect::<Vec<(f64, f64, &str)>>())
 }
 
-/// How errors in noise sd move, in words: (before, after, of what). The verb is said once for neighbours that move alike.
+/// How errors in noise sd change, in words: (before, after, of what). Neighbours that change alike share one verb.
 pub(crate) fn moves(parts: &[(f64, f64, &str)]) -> String {
     let mut last = "";
     let mut words = Vec::new();
@@ -208,7 +208,7 @@ pub(crate) fn conditional_on(added: Option<&JudgedFit<'_>>) -> String {
     )
 }
 
-/// Candidates that a budget left without an answer.
+/// Candidates that the budget left without a refit.
 pub(crate) fn untried(found: &SearchResult<'_>, candidates: &[Candidate]) -> Vec<String> {
     if !found.cut_short {
         return Vec::new();

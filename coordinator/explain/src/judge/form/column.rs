@@ -1,6 +1,6 @@
-//! The influences that [`crate::judge::form`] adds to a fit, as columns: what of each is its own, and what it changes everywhere.
+//! The influences that [`super`] adds to a fit, as columns that are made orthogonal to the fitted parameters and to one another.
 //!
-//! They are held where they are small together, else worked out again whenever one is looked at. Next file to read:
+//! They are held in memory where all of them fit there, and else computed again whenever one is needed. Next file to read:
 //! [`crate::screen::influence`].
 
 use std::borrow::Cow;
@@ -13,20 +13,20 @@ use crate::fit::fitted_variant::FittedVariant;
 use crate::run_cache::RunCache;
 use crate::screen::screening_result::ScreeningResult;
 
-/// Part of a column that must be its own.
+/// Length below which a column counts as nothing but those taken before it.
 const SMALLEST: f64 = 0.05;
 
-/// One of them.
+/// The influence of one candidate.
 #[derive(Clone, Debug)]
-pub(crate) struct Column {
-    /// What the parameters cannot imitate of the rows that train, with the prior's: of length one.
-    pub(crate) own: DVector<f64>,
-    /// The change of all rows that goes with it, the parameters following.
-    pub(crate) all: DVector<f64>,
+pub(super) struct Column {
+    /// The part on training rows and prior that the parameters cannot imitate, of length one.
+    pub(super) own: DVector<f64>,
+    /// The change of all rows that belongs to it, with the parameters adjusted.
+    pub(super) all: DVector<f64>,
 }
 
 impl Column {
-    /// Takes another out of this one, which is made unit again; one that is nothing but the other becomes zero.
+    /// Makes this column orthogonal to another and of length one again; zero where nothing of it remains.
     fn sweep(&mut self, other: &Self) {
         let shared = other.own.dot(&self.own);
         self.own -= &other.own * shared;
@@ -38,22 +38,22 @@ impl Column {
     }
 }
 
-/// All of them.
-pub(crate) struct Columns<'f, 'l> {
+/// The columns of all candidates.
+pub(super) struct Columns<'f, 'l> {
     cache: &'f RunCache<'l>,
     jacobian: BlockAngular,
     optimum: &'f Optimum,
     screening: Vec<&'f ScreeningResult>,
-    /// The columns of all results, or none.
+    /// All columns, where they are held in memory; empty otherwise.
     held: Vec<Column>,
 }
 
 impl<'f, 'l> Columns<'f, 'l> {
-    /// The columns of these results, less those that the parameters imitate altogether.
+    /// The columns of these screening results, without those that the parameters imitate entirely.
     ///
     /// # Errors
     /// When the store fails.
-    pub(crate) fn new(
+    pub(super) fn new(
         cache: &'f RunCache<'l>,
         fit: &FittedVariant<'_>,
         optimum: &'f Optimum,
@@ -72,7 +72,7 @@ impl<'f, 'l> Columns<'f, 'l> {
     }
 
     /// Their number.
-    pub(crate) fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.screening.len()
     }
 
@@ -85,11 +85,11 @@ impl<'f, 'l> Columns<'f, 'l> {
         Ok((size > 0.0).then(|| Column { own: own / size, all: all() / size }))
     }
 
-    /// The column along which the residuals lie most, less those that were taken, one after the other.
+    /// The column that correlates most with the residuals, after it was made orthogonal to those taken before.
     ///
     /// # Errors
     /// When the store fails.
-    pub(crate) fn nearest(
+    pub(super) fn nearest(
         &self,
         residual: &DVector<f64>,
         taken: &[Column],

@@ -1,4 +1,4 @@
-//! Which equations can take an unknown input, and how strongly the data feel a constant one.
+//! Which equations can take an unknown input, and how much a constant one changes the outputs.
 //!
 //! Next file to read: [`super::walk`].
 
@@ -11,7 +11,7 @@ use starlings_study::Study;
 
 use crate::error::{ExplainError, fleet_failure};
 
-/// Change of the outputs, in noise sd, below which an input is not felt.
+/// Change of the outputs, in noise sd, below which an input counts as without influence.
 const FELT: f64 = 1e-6;
 
 /// A state whose rate takes an unknown input.
@@ -20,7 +20,7 @@ pub(super) struct Candidate {
     pub(super) state: String,
     /// Its unit label.
     pub(super) unit: String,
-    /// Its place in the state vector.
+    /// Its position in the state vector.
     pub(super) at: usize,
     /// The model with the input, as the fleet knows it; the input is the last parameter.
     pub(super) setup: SetupId,
@@ -38,7 +38,7 @@ struct Trial<'a> {
     at: usize,
     setup: SetupId,
     without: Prediction,
-    /// A constant input so small that the answer is the slope of a model that may be far from linear.
+    /// A constant input so small that the response of a nonlinear model is linear in it.
     input: f64,
 }
 
