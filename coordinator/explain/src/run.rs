@@ -18,8 +18,7 @@ use crate::fit::prediction_sd::prediction_sd;
 use crate::judge::effective_noise::inflation;
 use crate::judge::gates::JudgedFit;
 use crate::judge::search_result::SearchResult;
-use crate::judge::verdict::Decision;
-use crate::judge::verdict::Verdict;
+use crate::judge::verdict::{Decision, Verdict};
 use crate::locate;
 use crate::locate::{Located, Track, View};
 use crate::null_recordings;
@@ -30,11 +29,8 @@ use crate::tell::experiment::propose;
 use crate::tell::figures::Figures;
 use crate::tell::findings::Findings;
 use crate::tell::patch::explained_study;
-use crate::tell::rejected;
 use crate::tell::result::Explanation;
-use crate::tell::summary;
-use crate::tell::warnings;
-use crate::tell::words;
+use crate::tell::{rejected, summary, warnings, words};
 
 /// Explains a study's misfit.
 ///

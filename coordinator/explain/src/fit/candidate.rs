@@ -1,6 +1,7 @@
 //! An effect to try, with the points at which it is screened and the priors of its parameters.
 //!
-//! The grids of the parameters inside a term become one list of points. Nothing is run here. Next file to read: [`super::model_variant`].
+//! The grids of the parameters inside a term become one list of points. Nothing is run here. Next file to read:
+//! [`super::model_variant`].
 
 use std::collections::HashSet;
 
@@ -52,8 +53,8 @@ impl Candidate {
         }
     }
 
-    /// Priors of its parameters. That of the amplitude is a placeholder, since the search fits the amplitude without a prior; those
-    /// of the others are wide.
+    /// Priors of its parameters. That of the amplitude is a placeholder, since the search fits the amplitude without a prior;
+    /// those of the others are wide.
     pub(crate) fn priors(&self) -> Vec<EffectPrior> {
         let amplitude = EffectPrior { transform: Transform::Linear, mean: 0.0, sd: 1.0 };
         let inner = self.def.parameters.iter().skip(1).map(inner_prior);

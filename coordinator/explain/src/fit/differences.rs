@@ -53,8 +53,8 @@ impl FittedVariant<'_> {
         let rows = &cache.rows;
         let study = &self.variant.study;
         let distance = |j: usize| steps[study.theta[j].parameter] * z[j].abs().max(1.0);
-        // A held-out record is run with the mean of the entries, which moves by the mean of their steps. The derivative by one entry
-        // is that by the mean over the number of entries, hence the sum of the steps in the denominator.
+        // A held-out record is run with the mean of the entries, which moves by the mean of their steps. The derivative by one
+        // entry is that by the mean over the number of entries, hence the sum of the steps in the denominator.
         let mut together = vec![0.0; study.parameters.len()];
         for (j, entry) in study.theta.iter().enumerate() {
             together[entry.parameter] += distance(j);

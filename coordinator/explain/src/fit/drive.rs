@@ -1,4 +1,5 @@
-//! Drives the fits of several variants at a time: in every round the runs that all of them need next go to the fleet in one batch.
+//! Drives the fits of several variants at a time: in every round the runs that all of them need next go to the fleet in one
+//! batch.
 //!
 //! A Jacobian takes one run per parameter of the study: a parameter with one value per record is moved in all records at
 //! once, and each record answers to its own. Next files to read: [`super::fitted_variant`] for one of them, then
@@ -8,8 +9,7 @@ use nalgebra::DVector;
 use starlings_estimators::Need;
 
 use super::differences::STEP;
-use super::fitted_variant::FittedVariant;
-use super::fitted_variant::point;
+use super::fitted_variant::{FittedVariant, point};
 use super::jacobian::SplitJacobian;
 use crate::error::ExplainError;
 use crate::run_cache::{Point, RowPredictions, RunCache};

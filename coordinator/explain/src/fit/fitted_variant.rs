@@ -33,7 +33,8 @@ pub struct FittedVariant<'c> {
     /// held-out record depend on the values of all fitted records, because it is run with their mean.
     pub(crate) jacobian: SplitJacobian,
     /// d prediction over the noise for one standard deviation of each value that a held-out record has of its own, all rows ×
-    /// values that a record has; without columns until it was measured. Column k of one record and of another stand for different values.
+    /// values that a record has; without columns until it was measured. Column k of one record and of another stand for
+    /// different values.
     pub own_values: DMatrix<f64>,
 }
 

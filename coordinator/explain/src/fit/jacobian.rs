@@ -1,7 +1,7 @@
 //! The Jacobian of a fit, split into training rows and all other rows.
 //!
-//! The rows of a record depend on the values of that record only, hence it is a [`BlockAngular`] matrix. The training rows are shared
-//! with the solver of the fit. Next file to read: [`super::drive`].
+//! The rows of a record depend on the values of that record only, hence it is a [`BlockAngular`] matrix. The training rows are
+//! shared with the solver of the fit. Next file to read: [`super::drive`].
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -97,8 +97,8 @@ impl SplitJacobian {
     }
 }
 
-/// Blocks of rows with the parameters on which they depend: one block per record, or one for all where no record has values of its
-/// own.
+/// Blocks of rows with the parameters on which they depend: one block per record, or one for all where no record has values of
+/// its own.
 ///
 /// A held-out record is run with the mean of the fitted records' own values, and so depends on all of them; its initial values
 /// are those of its own prior.

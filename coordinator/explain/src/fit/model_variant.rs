@@ -93,8 +93,8 @@ impl<'c> ModelVariant<'c> {
         self.n_own + self.effects[..effect].iter().map(|m| m.candidate.def.parameters.len()).sum::<usize>()
     }
 
-    /// The z of this variant that corresponds to `from` of another: values are taken by name, an amplitude that is new is zero, and
-    /// the other parameters of a new effect stand at `point`.
+    /// The z of this variant that corresponds to `from` of another: values are taken by name, an amplitude that is new is zero,
+    /// and the other parameters of a new effect stand at `point`.
     pub(crate) fn continue_from(
         &self,
         other: &ModelVariant<'_>,

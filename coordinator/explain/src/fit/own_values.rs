@@ -1,9 +1,9 @@
 //! The uncertainty of a held-out record's own values: parameters with one value per record, which no fit estimates for it.
 //!
 //! Such a record is run with the mean of the fitted records' values, or for an initial value with its own prior median
-//! ([`starlings_study::Study::theta_for`]). The uncertainty of that mean is in the Jacobian of [`super::fitted_variant`]. The record's
-//! own value deviates from the mean, by as much as the fitted values scatter, or by its prior where only one is fitted. Next
-//! file to read: [`super::prediction_sd`].
+//! ([`starlings_study::Study::theta_for`]). The uncertainty of that mean is in the Jacobian of [`super::fitted_variant`]. The
+//! record's own value deviates from the mean, by as much as the fitted values scatter, or by its prior where only one is
+//! fitted. Next file to read: [`super::prediction_sd`].
 
 use std::sync::Arc;
 
@@ -86,8 +86,8 @@ fn scatter(fit: &FittedVariant<'_>, parameter: usize) -> f64 {
     (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt()
 }
 
-/// The influence of a held-out record's initial value on its rows, by a run with its prior median moved; nothing where it fails or
-/// the budget has ended.
+/// The influence of a held-out record's initial value on its rows, by a run with its prior median moved; nothing where it fails
+/// or the budget has ended.
 fn of_initial(
     cache: &mut RunCache<'_>,
     fit: &FittedVariant<'_>,

@@ -1,6 +1,7 @@
 //! How the training residuals of a fit compare with the stated noise, in figures and in words.
 //!
-//! Every sentence of an explanation about noise is made here or in [`super::held_out`], from the figures that it stands beside. Next file to read: [`crate::tell::words`].
+//! Every sentence of an explanation about noise is made here or in [`super::held_out`], from the figures that it stands beside.
+//! Next file to read: [`crate::tell::words`].
 
 use starlings_estimators::nis_band;
 
@@ -72,8 +73,8 @@ impl Adequacy {
         }
     }
 
-    /// How the residuals compare with the stated noise. Larger or smaller than it are residuals beyond both what chance leaves and
-    /// [`AS_STATED`].
+    /// How the residuals compare with the stated noise. Larger or smaller than it are residuals beyond both what chance leaves
+    /// and [`AS_STATED`].
     pub(crate) fn nature(&self) -> Nature {
         if self.n == 0 {
             return Nature::Nothing;

@@ -8,7 +8,8 @@ use super::search_result::SearchResult;
 
 /// Share of the fall of χ² that a further effect must contribute.
 const SECOND_SHARE: f64 = 0.1;
-/// Effective variance of the residuals above which they count as a discrepancy of another kind, not as a wrong form of the effect.
+/// Effective variance of the residuals above which they count as a discrepancy of another kind, not as a wrong form of the
+/// effect.
 pub(crate) const DISCREPANT: f64 = 20.0;
 
 /// What the check of the contributions leaves.
@@ -21,7 +22,8 @@ pub(crate) struct ContributionCheck {
     pub(crate) because: Option<String>,
 }
 
-/// Leaves out a further effect that does not contribute its share. `passing` are the positions of the variants that pass the gates.
+/// Leaves out a further effect that does not contribute its share. `passing` are the positions of the variants that pass the
+/// gates.
 pub(crate) fn check_contributions(found: &SearchResult<'_>, passing: &[usize]) -> ContributionCheck {
     let first = passing[0];
     let whole = &found.judged[first];

@@ -13,8 +13,7 @@ use super::misfit::Misfit;
 use super::uncertainty::Uncertainty;
 use crate::fit::fitted_variant::FittedVariant;
 use crate::fit::model_variant::AddedEffect;
-use crate::number::times;
-use crate::number::{spaced, three};
+use crate::number::{spaced, three, times};
 use crate::rows::{Row, Usage, unit};
 use crate::run_cache::RunCache;
 
@@ -79,8 +78,8 @@ impl JudgedFit<'_> {
         self.gain / self.inflation
     }
 
-    /// Fall of χ² on the training rows, the held-out span and the held-out channels, for ranking. The part of the held-out χ² that
-    /// the uncertainty of the estimate explains does not count against it.
+    /// Fall of χ² on the training rows, the held-out span and the held-out channels, for ranking. The part of the held-out χ²
+    /// that the uncertainty of the estimate explains does not count against it.
     pub(crate) fn rank(&self) -> f64 {
         self.gain + self.gain_held_out + self.allowance + self.gain_channels
     }

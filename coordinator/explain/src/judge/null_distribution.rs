@@ -39,8 +39,8 @@ pub(crate) struct NullDistribution {
 }
 
 impl NullDistribution {
-    /// Simulates the search without a gap, and scores decoys. `sensitivity` gives the influence of a candidate on the training rows;
-    /// about `at_a_time` of them are held at a time.
+    /// Simulates the search without a gap, and scores decoys. `sensitivity` gives the influence of a candidate on the training
+    /// rows; about `at_a_time` of them are held at a time.
     ///
     /// # Errors
     /// Those of `sensitivity`.
@@ -69,7 +69,8 @@ impl NullDistribution {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut normal = || StandardNormal.sample(&mut random);
         let mut first = null_maxima(correlation, &signs, 2 * SIMULATIONS, &mut normal);
-        // The sample from which a quantile is taken exceeds it at exactly the nominal rate; only another sample measures the true one.
+        // The sample from which a quantile is taken exceeds it at exactly the nominal rate; only another sample measures the
+        // true one.
         let mut maxima = first.split_off(SIMULATIONS);
         first.sort_by(f64::total_cmp);
         maxima.sort_by(f64::total_cmp);

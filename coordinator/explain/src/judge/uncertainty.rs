@@ -19,8 +19,8 @@ pub(super) struct Uncertainty<'f> {
 }
 
 impl<'f> Uncertainty<'f> {
-    /// The uncertainty of a fit. `None` where nothing is held out, where the fit leaves a direction free, or where its Jacobian is of another
-    /// point.
+    /// The uncertainty of a fit. `None` where nothing is held out, where the fit leaves a direction free, or where its Jacobian
+    /// is of another point.
     pub(super) fn of(cache: &RunCache<'_>, fit: &'f FittedVariant<'_>) -> Option<Self> {
         cache.rows.others().next()?;
         let optimum = fit.optimum().ok().filter(|_| fit.is_fresh())?;
@@ -32,10 +32,10 @@ impl<'f> Uncertainty<'f> {
         })
     }
 
-    /// bᵀ (C⁻¹ + JᵀJ)⁻¹ b with b = Jᵀ e: the fall of χ² from these rows, increasing (residuals e, Jacobian J), to a joint fit, for
-    /// an estimate of covariance C and values of a held-out record's own of unit variance. χ² less this is eᵀ (1 + J C Jᵀ)⁻¹ e,
-    /// the squared distance of the rows from their prediction (Mahalanobis 1936). Parameters on which the rows do not depend
-    /// are left out, which does not change it.
+    /// bᵀ (C⁻¹ + JᵀJ)⁻¹ b with b = Jᵀ e: the fall of χ² from these rows, increasing (residuals e, Jacobian J), to a joint fit,
+    /// for an estimate of covariance C and values of a held-out record's own of unit variance. χ² less this is eᵀ (1 + J C
+    /// Jᵀ)⁻¹ e, the squared distance of the rows from their prediction (Mahalanobis 1936). Parameters on which the rows do not
+    /// depend are left out, which does not change it.
     pub(super) fn allowance(&self, rows: &[usize]) -> f64 {
         self.fall(rows).filter(|fall| fall.is_finite()).unwrap_or(0.0)
     }

@@ -1,7 +1,8 @@
 //! The verdict on the variants that a search found: named, tie, unexplained or no gap.
 //!
-//! A variant is named if it passes every gate, no rival comes close, and neither candidates nor modulated forms would lower what
-//! it leaves beyond chance. Otherwise the verdict is a tie, or unexplained with the variant that came nearest. Next file to read: [`crate::tell::summary`].
+//! A variant is named if it passes every gate, no rival comes close, and neither candidates nor modulated forms would lower
+//! what it leaves beyond chance. Otherwise the verdict is a tie, or unexplained with the variant that came nearest. Next file
+//! to read: [`crate::tell::summary`].
 
 use starlings_estimators::effective_sample_size;
 use starlings_models::equations::{Expression, Slot};

@@ -6,8 +6,7 @@ use starlings_estimators::{autocorrelation, effective_sample_size, ljung_box};
 
 use super::bootstrap::{DRAWS, block_bootstrap_rms, block_length};
 use super::{ChannelGap, View};
-use crate::rows::Usage;
-use crate::rows::unit;
+use crate::rows::{Usage, unit};
 
 /// The figures, by record, then channel, then use.
 pub(super) fn channels(view: &View<'_>) -> Vec<ChannelGap> {

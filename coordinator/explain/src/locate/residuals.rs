@@ -3,8 +3,7 @@
 //! Next file to read: [`super::signal`].
 
 use super::View;
-use crate::rows::Usage;
-use crate::rows::unit;
+use crate::rows::{Usage, unit};
 
 /// Residuals of one channel in one use, in the order of the rows.
 pub(super) struct Residuals {

@@ -1,9 +1,9 @@
 //! The search: screen all candidates, refit the best, and start a second pass from the best of these.
 //!
-//! [`crate::screen::screening`] scores every candidate at the fitted model. The best run a short race, whose first step costs one
-//! run each; the first few of it are refitted with every parameter free and judged ([`crate::judge::gates`]). The second pass
-//! ([`super::second_pass`]) scores the candidates again at the best variant and tries replacements and pairs. Terms that the study
-//! calls replaceable are left out in turn, and the search is repeated without them. Next file to read:
+//! [`crate::screen::screening`] scores every candidate at the fitted model. The best run a short race, whose first step costs
+//! one run each; the first few of it are refitted with every parameter free and judged ([`crate::judge::gates`]). The second
+//! pass ([`super::second_pass`]) scores the candidates again at the best variant and tries replacements and pairs. Terms that
+//! the study calls replaceable are left out in turn, and the search is repeated without them. Next file to read:
 //! [`crate::judge::verdict`].
 
 use std::cmp::Ordering;
@@ -145,8 +145,8 @@ impl<'c> Searcher<'_, '_, 'c> {
         best
     }
 
-    /// Adds single candidates to a fit: a race among the best, then refits of the first few. Where recordings are long, the race is
-    /// made with a few at a time, and repeated for those that are refitted; the cache has its runs.
+    /// Adds single candidates to a fit: a race among the best, then refits of the first few. Where recordings are long, the
+    /// race is made with a few at a time, and repeated for those that are refitted; the cache has its runs.
     fn race_and_refit(
         &mut self,
         parent: &FittedVariant<'c>,
@@ -190,7 +190,8 @@ impl<'c> Searcher<'_, '_, 'c> {
         Ok(fits)
     }
 
-    /// How many fits with one effect more than `parent` are held at a time; at least one per slot of the fleet, so that no slot waits.
+    /// How many fits with one effect more than `parent` are held at a time; at least one per slot of the fleet, so that no slot
+    /// waits.
     fn fits_held(&mut self, parent: &FittedVariant<'c>) -> usize {
         let slots = self.cache.fleet().slots();
         // Two Jacobians, the predictions and the residuals.

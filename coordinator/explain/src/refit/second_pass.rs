@@ -19,8 +19,8 @@ use crate::screen::screening::screen;
 use crate::screen::screening_result::ScreeningResult;
 
 impl<'c> Searcher<'_, '_, 'c> {
-    /// Scores the candidates again at the best variant and refits replacements and pairs, until no better variant comes of it. In the
-    /// end the form of the variant that the verdict will be about has been measured.
+    /// Scores the candidates again at the best variant and refits replacements and pairs, until no better variant comes of it.
+    /// In the end the form of the variant that the verdict will be about has been measured.
     pub(super) fn second_pass(
         &mut self,
         found: &mut SearchResult<'c>,

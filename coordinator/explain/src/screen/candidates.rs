@@ -51,8 +51,8 @@ pub(crate) fn fitted_outputs(study: &Study) -> Vec<String> {
     channels.filter(|c| !c.held_out).map(|c| c.output.clone()).collect()
 }
 
-/// Powers of ten by which a noise and the largest recorded value may differ: beyond them the smaller is lost in the rounding of the
-/// larger.
+/// Powers of ten by which a noise and the largest recorded value may differ: beyond them the smaller is lost in the rounding of
+/// the larger.
 const APART: f64 = 1e15;
 
 /// Refuses a noise below the last digit of the values, or so far above them that no misfit could exceed it.

@@ -1,8 +1,8 @@
 //! The natural amplitude of a candidate: that at which its terms are as large as what they are added to.
 //!
-//! The terms are evaluated reference the run of the model as it is, without a further run. A probe with a small share of the natural
-//! amplitude gives a response that is neither lost in rounding nor far from linear. This is a first guess, which the screening
-//! corrects by the response that it measures. Next file to read: [`super::screening`].
+//! The terms are evaluated reference the run of the model as it is, without a further run. A probe with a small share of the
+//! natural amplitude gives a response that is neither lost in rounding nor far from linear. This is a first guess, which the
+//! screening corrects by the response that it measures. Next file to read: [`super::screening`].
 
 use starlings_models::effect::Addition;
 use starlings_models::equations::{At, Expression, Slot};

@@ -1,8 +1,8 @@
 //! What the search did not try, and why: families of effects that find no place in the model, and equations to which no candidate
 //! adds a term.
 //!
-//! That nothing explains the gap is said of the candidates only, and so the result lists what was not among them. Next file to read:
-//! [`super::candidates`].
+//! That nothing explains the gap is said of the candidates only, and so the result lists what was not among them. Next file to
+//! read: [`super::candidates`].
 
 use serde::{Deserialize, Serialize};
 use starlings_models::effect::library::{FAMILIES, shows_in};
@@ -65,8 +65,8 @@ fn untouched<'s>(spec: &'s Spec, candidates: &[Candidate]) -> Vec<(&'s str, Role
     scalar.map(|q| (q.name.as_str(), q.role)).collect()
 }
 
-/// Which equations no candidate adds a term to, in one sentence with a remedy. Empty where there is none, or where a candidate adds
-/// to a parameter, which may act in any equation.
+/// Which equations no candidate adds a term to, in one sentence with a remedy. Empty where there is none, or where a candidate
+/// adds to a parameter, which may act in any equation.
 pub(crate) fn sentence(study: &Study, candidates: &[Candidate]) -> String {
     let bare = Setup { model: study.setup.model.clone(), ..Setup::default() };
     let Ok(spec) = bare.spec() else { return String::new() };

@@ -55,8 +55,8 @@ fn power(rows: &Rows, whitened: &[f64], stretch: &std::ops::Range<usize>, omega:
     2.0 * (cosine * cosine + sine * sine) / n
 }
 
-/// The instants at which the residuals of the training rows change most, the largest change first: where the means of two windows, before and after,
-/// differ most.
+/// The instants at which the residuals of the training rows change most, the largest change first: where the means of two
+/// windows, before and after, differ most.
 pub(crate) fn change_points(rows: &Rows, predicted: &[f64]) -> Vec<f64> {
     let whitened = rows.whitened(predicted);
     let mut found: Vec<(f64, f64, f64)> = Vec::new();

@@ -32,9 +32,9 @@ const UNAFFORDED: &str = "the budget ended before its influence was measured";
 /// The score of a candidate without a measured influence.
 const NO_SCORE: Score = Score { gain: 0.0, amplitude: 0.0, sd: f64::INFINITY, identifiable: 0.0 };
 
-/// Screens candidates at a fit; `of` lists (candidate, point of its grid). Effects that the fit has already are left out. Where the
-/// budget does not suffice for all of them, none is measured. A candidate for whose repetition it does not suffice counts as
-/// failed. The run cache notes both.
+/// Screens candidates at a fit; `of` lists (candidate, point of its grid). Effects that the fit has already are left out. Where
+/// the budget does not suffice for all of them, none is measured. A candidate for whose repetition it does not suffice counts
+/// as failed. The run cache notes both.
 ///
 /// # Errors
 /// When the fleet or the store fails, or the fit leaves a direction free.
@@ -135,9 +135,9 @@ fn touches_states(probe: &Probe<'_>) -> bool {
     !(effect.candidate.def.states.is_empty() && effect.candidate.def.adds.iter().all(|a| only_output(&a.to)))
 }
 
-/// The fitted model with an effect of amplitude zero in its rates. A built-in model with a step of its own is integrated in another
-/// way as soon as an effect is in its rates; the difference must not count as the influence of the effect. `None` where the model
-/// has no step of its own.
+/// The fitted model with an effect of amplitude zero in its rates. A built-in model with a step of its own is integrated in
+/// another way as soon as an effect is in its rates; the difference must not count as the influence of the effect. `None` where
+/// the model has no step of its own.
 fn zero_amplitude<'p>(fit: &FittedVariant<'_>, probes: &'p [Probe<'_>]) -> Option<Point<'p>> {
     let own_step = fit.variant.study.setup.model.equations.is_none();
     let probe = probes.iter().find(|p| touches_states(p)).filter(|_| own_step)?;

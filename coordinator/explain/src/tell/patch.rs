@@ -1,8 +1,8 @@
 //! The text of a study with the effects in it that explain its misfit.
 //!
 //! The author's text keeps its layout and comments; each addition is written beside its like. Nothing is estimated here: the
-//! priors are wide around the estimates, so that a run of the new study makes estimates of its own. Next files to read: [`effect`] for what
-//! is added, [`mod@remove`] for what is taken out, [`place`] for files that must still be found.
+//! priors are wide around the estimates, so that a run of the new study makes estimates of its own. Next files to read:
+//! [`effect`] for what is added, [`mod@remove`] for what is taken out, [`place`] for files that must still be found.
 
 mod effect;
 mod place;

@@ -7,8 +7,7 @@ use crate::fit::candidate::Candidate;
 use crate::judge::misfit::Misfit;
 use crate::judge::search_result::SearchResult;
 use crate::judge::verdict::Decision;
-use crate::number::spaced;
-use crate::number::three;
+use crate::number::{spaced, three};
 use crate::screen::screening_result::ScreeningResult;
 
 /// What was refused, with reasons: refitted variants first, then candidates that failed, have no influence of their own, or

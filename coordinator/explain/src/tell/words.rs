@@ -1,7 +1,7 @@
 //! The sentences of an explanation: each is made from the figures that it stands beside.
 //!
-//! Sentences about noise are in [`crate::judge::adequacy`], those about held-out data in [`crate::judge::held_out`]. Next file to read:
-//! [`super::warnings`].
+//! Sentences about noise are in [`crate::judge::adequacy`], those about held-out data in [`crate::judge::held_out`]. Next file
+//! to read: [`super::warnings`].
 
 use std::fmt::Write as _;
 
@@ -13,11 +13,9 @@ use crate::judge::adequacy::Nature;
 use crate::judge::gates::JudgedFit;
 use crate::judge::held_out::{HeldOut, listed};
 use crate::judge::search_result::SearchResult;
-use crate::judge::verdict::Decision;
-use crate::judge::verdict::Verdict;
+use crate::judge::verdict::{Decision, Verdict};
 use crate::locate::Located;
-use crate::number::percent;
-use crate::number::{factor, times};
+use crate::number::{factor, percent, times};
 use crate::rows::Usage;
 use crate::run_cache::RunCache;
 use crate::screen::not_tried;

@@ -42,7 +42,7 @@ struct Trial<'a> {
     input: f64,
 }
 
-/// The scalar states whose input the channels feel, the most strongly felt first: two runs of the record each, in two batches.
+/// The scalar states whose input changes the channels, the largest change first: two runs of the record each, in two batches.
 /// None of a solver, whose equations are not open to an input in every rate.
 pub(super) fn candidates(
     study: &Study,
