@@ -1,5 +1,5 @@
-//! Held-out records against a closed form: they are run with the mean of the fitted records' values or with a prior, and what is
-//! expected of them must say how little is known of either.
+//! Held-out records against a closed form: they are run with the mean of the fitted records' values or with a prior, and the band
+//! of their predictions must contain the uncertainty of both.
 #![allow(missing_docs, clippy::unwrap_used)]
 
 mod study_kit;
@@ -90,8 +90,8 @@ fn closed_form(a: &[f64], b: &[f64], times: &[f64]) -> (DVector<f64>, DMatrix<f6
     let information = h.tr_mul(&h) / (NOISE * NOISE) + &precision;
     let covariance = information.cholesky().unwrap().inverse();
     let mean = &covariance * (h.tr_mul(&y) / (NOISE * NOISE) + precision * prior);
-    // Run with the mean of the two curvatures and the prior median of the start; the own curvature lies beside that mean by the
-    // scatter of the two, the own start beside the median by its prior.
+    // Run with the mean of the two curvatures and the prior median of the start; the own curvature deviates from that mean
+    // by the scatter of the two, the own start from the median by its prior.
     let of_c = DMatrix::from_fn(n, 5, |i, j| match j {
         0 => times[i],
         1 | 2 => 0.5 * times[i] * times[i],
@@ -168,6 +168,6 @@ fn the_gates_measure_a_held_out_record_by_its_distance_in_that_band() {
     let distance = error.dot(&covariance.cholesky().unwrap().solve(&error));
     assert!((said.before - (error.norm_squared() / n).sqrt() / NOISE).abs() < 1e-4, "{said:?}");
     assert!((said.beyond - (distance / n).sqrt()).abs() < 1e-4, "{said:?}, {distance}");
-    // Seven times the noise, and yet no more than the unknown start and curvature of that record explain.
+    // Seven times the noise, which the unknown start and curvature of that record explain.
     assert!(said.before > 5.0 && !said.fails, "{said:?}");
 }

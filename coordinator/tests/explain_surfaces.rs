@@ -1,4 +1,5 @@
-//! Explaining where the wall was measured as surfaces: what channels measure is for the rows, and courses are the model's own.
+//! Explanations of recordings of surfaces: rows are signed distances to the surfaces, as channels measure them; tracks are the
+//! outputs of the model itself.
 // Values that are copied are compared exactly; the helpers of a test file are tests too.
 #![allow(clippy::float_cmp, clippy::unwrap_used)]
 
@@ -72,6 +73,6 @@ fn courses_are_what_the_model_predicts_and_rows_what_the_channels_measure() {
     }
     let n = cache.rows.rows.len();
     assert!(n > 80, "{n} of ten nodes at twelve times");
-    // Asked again they come from memory, and are measured once all the same.
+    // A second request is answered from memory, and its outputs are turned into distances only once.
     assert_eq!(cache.run(&[point()]).unwrap().remove(0).unwrap(), predicted);
 }

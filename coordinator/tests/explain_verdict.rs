@@ -1,5 +1,5 @@
-//! What an explanation says where a name would be wrong: held-out data that still fail, physics that no candidate reaches, data
-//! that tell nothing. The sentences are those that the user reads.
+//! What an explanation says where a name would be wrong: held-out data that still fail, equations to which no candidate adds a
+//! term, data that cannot tell effects apart. The sentences are those that the user reads.
 #![allow(missing_docs, clippy::unwrap_used)]
 
 mod reactor_kit;
@@ -73,7 +73,7 @@ fn with_the_effect_described_the_same_data_give_its_name() {
     assert!(found.held_out.iter().all(|h| !h.fails), "{:?}", found.held_out);
 }
 
-/// A level that decays; everything else is the test's business.
+/// A level that decays; a test chooses the rest.
 fn decay(noise: &str, train: &str, more: &str) -> String {
     format!(
         r#"

@@ -49,12 +49,12 @@ pub struct RunCache<'a> {
     earlier_s: f64,
     watch: &'a mut dyn FnMut(&Stage),
     events: Option<&'a Receiver<FleetEvent>>,
-    pub(super) windows: Vec<Arc<Window>>,
+    windows: Vec<Arc<Window>>,
     /// Keys of the runs that were requested and counted; their results are in the store.
     counted: HashSet<RunKey>,
     recent: LruCache,
     /// Bytes of one kind of intermediate results that are held at most; what exceeds them is computed again when it is needed.
-    pub(super) hold: usize,
+    hold: usize,
     budget: Option<u64>,
     stage: &'static str,
     runs: Vec<(&'static str, u64)>,
@@ -101,12 +101,12 @@ impl<'a> RunCache<'a> {
     }
 
     /// Whether so many series of all rows may be held.
-    pub(super) fn holds(&self, n_series: usize) -> bool {
+    pub(crate) fn holds(&self, n_series: usize) -> bool {
         n_series <= self.series_held()
     }
 
     /// Series of all rows that may be held.
-    pub(super) fn series_held(&self) -> usize {
+    pub(crate) fn series_held(&self) -> usize {
         self.hold / (8 * self.rows.rows.len()).max(1)
     }
 
