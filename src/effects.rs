@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Parser;
 use serde_json::{Value, json};
-use starlings_coordinator::explain::{Options, candidates::candidates};
+use starlings_coordinator::explain::{Options, candidates};
 use starlings_coordinator::study::Study;
 use starlings_models::EffectDef;
 use starlings_models::effect::library::{FAMILIES, Family, stem};

@@ -9,9 +9,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use clap::Parser;
-use starlings_coordinator::explain::candidates::check;
-use starlings_coordinator::explain::keep::{keep, kept};
-use starlings_coordinator::explain::{Context, ExplainError, Explanation, Options, Stage, explain};
+use starlings_coordinator::explain::{
+    Context, ExplainError, Explanation, Options, Stage, check, explain, load_findings, save_findings,
+};
 use starlings_coordinator::report::{self, FilesError};
 use starlings_coordinator::study::store::Purpose;
 use starlings_coordinator::study::trial::trial;
@@ -92,7 +92,7 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     let display = Arc::new(Display::new(args.json));
     let mut crew = Crew::listen(&study, &plan, &display)?;
     let folder = run_folder::open(Purpose::Explanation, &study, args.out.as_deref(), args.resume)?;
-    if kept(&folder.store).map_err(Failure::run)?.is_some() {
+    if load_findings(&folder.store).map_err(Failure::run)?.is_some() {
         let path = folder.path.display();
         note(format_args!("the explanation in {path} is finished already; writing its files again"));
         return write(&folder, args.json);
@@ -106,7 +106,7 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     display.finish();
     crew.dismiss();
     let found = result.map_err(|error| failed(&error, &folder.path))?;
-    keep(&folder, &found).map_err(Failure::run)?;
+    save_findings(&folder, &found).map_err(Failure::run)?;
     write(&folder, args.json)
 }
 

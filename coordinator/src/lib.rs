@@ -1,7 +1,7 @@
 //! The coordinator: sends particles to the fleet, runs the study, explains its misfit, stores and reports both.
 //!
 //! Four crates, which import downwards only: [`fleet`] dispatches jobs and knows no study; [`study`] runs the loop and writes the
-//! store; [`explain`] says what a study's model lacks, by running versions of it; [`report`] reads only what the store holds. Here
+//! store; [`explain`] says what a study's model lacks, by running variants of it; [`report`] reads only what the store holds. Here
 //! are their names for programs that want all of them, and the tests that need more than one. Next file to read: [`study`].
 
 pub use starlings_explain as explain;

@@ -1,4 +1,4 @@
-//! Explanations end to end, in process: what is named, what is refused, and that they do not depend on who computed.
+//! Explanations end to end, in process: what is named, what is refused, and that neither depends on the fleet that computed it.
 #![allow(missing_docs, clippy::unwrap_used)]
 
 mod study_kit;
@@ -15,7 +15,7 @@ use starlings_coordinator::study::twin::{Twin, simulate};
 use study_kit::fleets::{Mortal, Shuffled};
 use study_kit::{Case, csv, grid};
 
-/// A mass on a spring that swings out; what else acts on it is the test's business.
+/// A decaying swing of a mass on a spring; a test adds what else acts on it.
 fn study(more: &str, explain: &str) -> String {
     format!(
         r#"
@@ -136,7 +136,7 @@ fn a_hidden_effect_is_named_added_and_the_gap_shrinks_where_nothing_was_fitted()
     assert_eq!(found.verdict, Verdict::Named, "{}", found.headline);
     assert_eq!(found.effects[0].name, "cubic-stiffness", "{}", found.headline);
     let amplitude = &found.effects[0].parameters[0];
-    // Five posterior sd: one draw of the noise.
+    // Five posterior sd, for one draw of the noise.
     assert!((amplitude.estimate - 2.0).abs() < 5.0 * amplitude.sd && amplitude.sd < 0.2, "{amplitude:?}");
     let held_out = found.gap.iter().find(|row| row.usage == "held-out").unwrap();
     assert!(held_out.after < 1.15 * held_out.noise && held_out.before > 2.0 * held_out.noise, "{held_out:?}");
@@ -165,7 +165,7 @@ fn nothing_is_named_where_nothing_is_missing() {
         let found = explained(&text, recording(&text, &[], &[], seed)).explanation;
         assert_eq!(found.verdict, Verdict::NoGap, "seed {seed}: {}", found.headline);
         assert!(found.effects.is_empty() && found.explained_study.is_none());
-        // The largest of a few dozen scores is beyond most of the decoys, but not beyond all.
+        // By chance the largest of a few dozen scores exceeds most of the decoys, but not all.
         assert!(found.false_alarm.decoys < 0.5, "seed {seed}: {}", found.false_alarm.decoys);
     }
 }
@@ -200,7 +200,7 @@ fn a_killed_explanation_is_continued_without_a_run_made_twice() {
         let mut found = go(&case, &folder, &mut again, &Options::default()).unwrap().explanation;
         found.workers = whole.workers;
         assert_eq!(found, whole, "after {left} batches");
-        // Every batch that was answered before the kill is one that is not asked for again.
+        // The runs of the batches before the kill are not made a second time.
         assert_eq!(again.answered, once.answered - left, "after {left} batches");
     }
 }
@@ -260,7 +260,7 @@ fn two_missing_effects_are_found_as_a_pair() {
 
 #[test]
 fn a_tie_lists_its_class_and_proposes_an_experiment() {
-    // Two names for nearly the same push: the data of a decaying swing cannot tell them apart.
+    // Two effects with nearly the same force: the data of a decaying swing cannot tell them apart.
     let twin = "\n[[effects]]\nname = \"breeze\"\nsays = \"A wind a little weaker.\"\nadds = [ { to = \"v\", term = \"-w_breeze*(v + 0.499)*abs(v + 0.499)\" } ]\nparameters = [ { name = \"w_breeze\", unit = \"1/m\", range = [0, 10] } ]\n";
     let text = study("", "only = [\"wind\", \"breeze\", \"cubic-stiffness\"]") + twin;
     let data = recording(&text, &[("wind", 0.6)], &[], 7);

@@ -1,4 +1,5 @@
-//! A budget holds whatever the search would still do, and a run that was lost with its workers is never passed over.
+//! A budget is kept at every stage of the search, and a run that was lost with its workers is an error and not a failure of the
+//! model.
 #![allow(clippy::unwrap_used)]
 
 mod study_kit;
@@ -201,13 +202,13 @@ fn stage(found: &Explanation, name: &str) -> u64 {
     found.runs_by_stage.iter().find(|(stage, _)| stage == name).map_or(0, |(_, runs)| *runs)
 }
 
-/// Every budget from one run to more than the full search asks for. From the fit's on they share a folder: what is known need
-/// not be computed again and counts all the same.
+/// Every budget from one run to more than the full search needs. From that of the fit on they share a folder: remembered runs are
+/// not computed again, and still count against the budget.
 fn kept(case: &Case) -> Vec<Explanation> {
     let full = go(case, &case.fresh(), &mut InProcess::new(2), None).unwrap();
     let folder = case.fresh();
     let mut found = Vec::new();
-    // The unknown inputs ask for the most that they might need.
+    // The search for unknown inputs starts only if the budget suffices for the most runs that it may need.
     for budget in 1..=full.runs + (MOST_RUNS + 2 * 2) as u64 {
         let mut fleet = Counting::new(None);
         let path = if budget <= stage(&full, "fit") { case.fresh() } else { folder.clone() };
@@ -222,7 +223,7 @@ fn kept(case: &Case) -> Vec<Explanation> {
                 );
                 found.push(cut);
             }
-            // The fit, and the courses of what was fitted.
+            // The fit, and one run for the courses of the fitted model.
             Err(ExplainError::Budget { .. }) => {
                 assert!(fleet.jobs <= budget && budget <= stage(&full, "fit"), "{} of {budget}", fleet.jobs);
             }
@@ -246,7 +247,7 @@ fn no_budget_is_exceeded_where_the_model_fails_on_one_side_and_a_candidate_is_me
     let found = kept(&brink());
     let full = found.last().unwrap();
     assert!(matches!(full.verdict, Verdict::Named | Verdict::Tie), "{}", full.headline);
-    // A refit that the budget cut off may still be the best there is; then it is told.
+    // A refit that the budget cut off may still be the best; then a warning says that it has not converged.
     let told =
         |e: &Explanation| e.warnings.iter().any(|w| w.contains("has not converged") || w.contains("secant"));
     assert!(found.iter().any(|e| !e.effects.is_empty() && told(e)));
@@ -278,7 +279,7 @@ fn the_runs_of_an_experiment_are_remembered_too() {
     let mut found = go(&case, &folder, &mut again, None).unwrap();
     found.workers = full.workers;
     assert_eq!(found, full);
-    // What was found of unknown inputs is followed window by window and computed anew; nothing else is.
+    // Unknown inputs are followed window by window, and these runs are not remembered; all others are.
     let followed = again.jobs;
     assert!(followed > 0, "one state's input is felt");
     let windows = 61;

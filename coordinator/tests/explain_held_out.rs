@@ -1,15 +1,11 @@
-//! Held-out records against a closed form: they are run with the mean of the fitted records' values or with a prior, and what is
-//! expected of them must say how little is known of either.
+//! Held-out records against a closed form: they are run with the mean of the fitted records' values or with a prior, and the band
+//! of their predictions must contain the uncertainty of both.
 #![allow(missing_docs, clippy::unwrap_used)]
 
 mod study_kit;
 
 use nalgebra::{DMatrix, DVector};
-use starlings_coordinator::explain::fit::{Fitted, drive};
-use starlings_coordinator::explain::held_out::HeldOut;
-use starlings_coordinator::explain::laboratory::Laboratory;
-use starlings_coordinator::explain::version::Version;
-use starlings_coordinator::explain::{Context, Options, explain};
+use starlings_coordinator::explain::{Context, FittedVariant, HeldOut, Options, RunCache, drive, explain};
 use starlings_coordinator::fleet::InProcess;
 use starlings_coordinator::study::Study;
 use starlings_coordinator::study::store::Store;
@@ -94,8 +90,8 @@ fn closed_form(a: &[f64], b: &[f64], times: &[f64]) -> (DVector<f64>, DMatrix<f6
     let information = h.tr_mul(&h) / (NOISE * NOISE) + &precision;
     let covariance = information.cholesky().unwrap().inverse();
     let mean = &covariance * (h.tr_mul(&y) / (NOISE * NOISE) + precision * prior);
-    // Run with the mean of the two curvatures and the prior median of the start; the own curvature lies beside that mean by the
-    // scatter of the two, the own start beside the median by its prior.
+    // Run with the mean of the two curvatures and the prior median of the start; the own curvature deviates from that mean
+    // by the scatter of the two, the own start from the median by its prior.
     let of_c = DMatrix::from_fn(n, 5, |i, j| match j {
         0 => times[i],
         1 | 2 => 0.5 * times[i] * times[i],
@@ -133,15 +129,14 @@ fn the_band_of_a_held_out_record_is_that_of_the_means_and_priors_that_it_is_run_
     let (study, store): (Study, Store) = (case.study(), store(&case));
     let mut fleet = InProcess::new(1);
     let mut context = Context { clock: &|| 0.0, watch: &mut |_| {}, events: None, earlier_s: 0.0 };
-    let mut laboratory = Laboratory::new(&study, &mut fleet, &store, &mut context, None);
-    let mut fits = [Fitted::from_prior(Version::new(&study, Vec::new(), &[]).unwrap())];
-    assert!(drive(&mut laboratory, &mut fits).unwrap());
+    let mut cache = RunCache::new(&study, &mut fleet, &store, &mut context, None);
+    let mut fits = [FittedVariant::of_study(&study).unwrap()];
+    assert!(drive(&mut cache, &mut fits).unwrap());
     let [mut fit] = fits;
-    fit.measure_own_values(&mut laboratory).unwrap();
+    fit.measure_own_values(&mut cache).unwrap();
     let (predicted, covariance) = closed_form(&data[1], &data[2], &data[0]);
-    let of_c: Vec<usize> =
-        (0..laboratory.rows.rows.len()).filter(|i| laboratory.rows.rows[*i].record == 2).collect();
-    let jacobian = fit.jacobian.whole(&laboratory.rows).select_rows(&of_c);
+    let of_c: Vec<usize> = (0..cache.rows.rows.len()).filter(|i| cache.rows.rows[*i].record == 2).collect();
+    let jacobian = fit.dense_jacobian(&cache.rows).select_rows(&of_c);
     let own = fit.own_values.select_rows(&of_c);
     let optimum = fit.optimum().unwrap();
     let band = &jacobian * optimum.covariance() * jacobian.transpose() + &own * own.transpose();
@@ -173,6 +168,6 @@ fn the_gates_measure_a_held_out_record_by_its_distance_in_that_band() {
     let distance = error.dot(&covariance.cholesky().unwrap().solve(&error));
     assert!((said.before - (error.norm_squared() / n).sqrt() / NOISE).abs() < 1e-4, "{said:?}");
     assert!((said.beyond - (distance / n).sqrt()).abs() < 1e-4, "{said:?}, {distance}");
-    // Seven times the noise, and yet no more than the unknown start and curvature of that record explain.
+    // Seven times the noise, which the unknown start and curvature of that record explain.
     assert!(said.before > 5.0 && !said.fails, "{said:?}");
 }

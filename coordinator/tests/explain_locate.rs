@@ -14,7 +14,7 @@ use study_kit::{Case, csv, grid, normals};
 const N: usize = 500;
 const DT: f64 = 0.01;
 
-/// A study that measures one pressure in `n_record` records; what is simulated is up to the test.
+/// A study that measures one pressure in `n_record` records; a test chooses what is simulated.
 fn study(n_record: usize, train: &str) -> Study {
     let mut text = "[study]\nname = \"gap\"\ntime_unit = \"s\"\n[model]\nkind = \"equations\"\n\
         outputs = [ { name = \"pressure\", unit = \"mmHg\", value = \"p\" } ]\n\
@@ -228,7 +228,7 @@ fn the_same_bins_show_what_another_model_leaves() {
         assert_eq!(same, map, "the same predictions give the same map");
         let again = map_again(&map, &view(&after));
         assert_eq!((&again.x_edges, &again.y_edges, &again.count), (&map.x_edges, &map.y_edges, &map.count));
-        // Adjusted for the bins, pure noise explains nothing but for chance: sd about sqrt(2·50)/500.
+        // Adjusted for the number of bins, the share that pure noise explains is zero with an sd of about sqrt(2·50)/500.
         assert!(again.explained < 0.08, "{}", again.explained);
     }
 }

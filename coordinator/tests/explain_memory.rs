@@ -1,4 +1,4 @@
-//! Explanations that hold little: what is worked out again gives the same findings to the bit.
+//! Explanations that hold little in memory: intermediate results that are computed again give the same findings to the bit.
 #![allow(missing_docs, clippy::unwrap_used)]
 
 mod study_kit;
@@ -45,7 +45,7 @@ fn an_explanation_that_may_hold_nothing_finds_the_same() {
     let case = Case::new(&format!("{STUDY}{TRAIN}"), &[("driven.csv", recording())]);
     let plenty = holding(&case, Options::default().hold);
     assert!(!plenty.explanation.effects.is_empty(), "{:?}", plenty.explanation);
-    // Nothing at all, and so much that some are held and others are not.
+    // A limit of nothing, and one with which some are held and others are not.
     for hold in [0, 100_000] {
         let little = holding(&case, hold);
         assert_eq!(little.explanation, plenty.explanation, "{hold} bytes");

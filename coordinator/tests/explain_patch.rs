@@ -1,11 +1,11 @@
-//! The study with an effect in it: the author's text and what was added, a study that runs as it is and runs the same model.
+//! The study with an effect in it: it keeps the author's text, runs as it is, and has the same model as the variant.
 #![allow(clippy::unwrap_used)]
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use starlings_coordinator::explain::patch::{PatchEffect, PatchError, explained_study};
 use starlings_coordinator::explain::result::Coefficient;
+use starlings_coordinator::explain::{PatchEffect, PatchError, explained_study};
 use starlings_coordinator::study::Study;
 use starlings_coordinator::study::trial::trial;
 use starlings_models::EffectDef;
@@ -165,7 +165,7 @@ fn a_built_in_effect_is_written_out_and_runs_as_if_written_by_hand() {
         "{WINDKESSEL}\n[[effects]]\nname = \"{name}\"\nbuilt_in = \"{name}\"\n[[parameters]]\nname = \"{amplitude}\"\nprior = {{ transform = \"log\", median = 0.08, factor = 2.0 }}\n"
     );
     let by_hand = case.study(&by_hand);
-    // The same model, the same medians: the same bits.
+    // The same model with the same medians gives the same bits.
     assert_eq!(misfit(&patched), misfit(&by_hand));
     assert_ne!(misfit(&patched), misfit(&study));
 }
@@ -188,7 +188,7 @@ fn an_effect_that_the_study_describes_is_not_described_twice() {
     let patched = case.patched(SPRING, &[found], &[]);
     assert_eq!(patched.text.matches("name = \"dry\"").count(), 1);
     assert_eq!(patched.setup.effects.len(), 1);
-    // Not estimated, so not uncertain.
+    // It was not estimated, and so it is a constant.
     assert!((patched.setup.model.constants["vs"] - 0.02).abs() < 1e-15);
     let by_hand = SPRING.replace("m = 1.0", "m = 1.0, vs = 0.02")
         + "[[parameters]]\nname = \"mu\"\nprior = { transform = \"log\", median = 0.3, factor = 2.0 }\n";

@@ -1,12 +1,12 @@
-//! Explaining where the wall was measured as surfaces: what channels measure is for the rows, and courses are the model's own.
+//! Explanations of recordings of surfaces: rows are signed distances to the surfaces, as channels measure them; tracks are the
+//! outputs of the model itself.
 // Values that are copied are compared exactly; the helpers of a test file are tests too.
 #![allow(clippy::float_cmp, clippy::unwrap_used)]
 
 use std::path::Path;
 
 use nalgebra::DVector;
-use starlings_coordinator::explain::Context;
-use starlings_coordinator::explain::laboratory::{Laboratory, Point};
+use starlings_coordinator::explain::{Context, Point, RunCache};
 use starlings_coordinator::fleet::{Fleet, InProcess};
 use starlings_coordinator::study::Study;
 use starlings_coordinator::study::store::Store;
@@ -47,10 +47,10 @@ fn courses_are_what_the_model_predicts_and_rows_what_the_channels_measure() {
     let store = Store::create(&folder.path().join("run.db"), &[]).unwrap();
     let mut context = Context { clock: &|| 0.0, watch: &mut |_| {}, events: None, earlier_s: 0.0 };
     let mut fleet = InProcess::new(2);
-    let mut laboratory = Laboratory::new(&study, &mut fleet, &store, &mut context, None);
+    let mut cache = RunCache::new(&study, &mut fleet, &store, &mut context, None);
     let point = || Point { study: &study, theta: theta.clone() };
 
-    let tracks = laboratory.tracks(&point()).unwrap();
+    let tracks = cache.tracks(&point()).unwrap();
     let scalar = || study.spec.outputs.iter().chain(&study.spec.states).filter(|q| q.size == 1);
     assert!(scalar().count() >= 3);
     for quantity in scalar() {
@@ -62,17 +62,17 @@ fn courses_are_what_the_model_predicts_and_rows_what_the_channels_measure() {
     }
 
     // The rows of the same study: signed distances of the displaced nodes to the surfaces.
-    let predicted = laboratory.run(&[point()]).unwrap().remove(0).unwrap();
+    let predicted = cache.run(&[point()]).unwrap().remove(0).unwrap();
     let mut measured = raw(&study, &theta);
     let displaced = measured.clone();
     study.measure(0, &study.records[0].times, &mut measured);
     assert_ne!(measured, displaced);
     let n_obs = study.setup.outputs.len();
-    for (row, y) in laboratory.rows.rows.iter().zip(predicted.iter()) {
+    for (row, y) in cache.rows.rows.iter().zip(predicted.iter()) {
         assert_eq!(*y, measured[row.step * n_obs + row.output]);
     }
-    let n = laboratory.rows.rows.len();
+    let n = cache.rows.rows.len();
     assert!(n > 80, "{n} of ten nodes at twelve times");
-    // Asked again they come from memory, and are measured once all the same.
-    assert_eq!(laboratory.run(&[point()]).unwrap().remove(0).unwrap(), predicted);
+    // A second request is answered from memory, and its outputs are turned into distances only once.
+    assert_eq!(cache.run(&[point()]).unwrap().remove(0).unwrap(), predicted);
 }

@@ -1,13 +1,12 @@
-//! What an explanation says where a name would be wrong: held-out data that still fail, physics that no candidate reaches, data
-//! that tell nothing. The sentences are those that the user reads.
+//! What an explanation says where a name would be wrong: held-out data that still fail, equations to which no candidate adds a
+//! term, data that cannot tell effects apart. The sentences are those that the user reads.
 #![allow(missing_docs, clippy::unwrap_used)]
 
 mod reactor_kit;
 mod study_kit;
 
 use reactor_kit::{reactor, recorded};
-use starlings_coordinator::explain::candidates::check;
-use starlings_coordinator::explain::{Context, ExplainError, Explanation, Options, Verdict, explain};
+use starlings_coordinator::explain::{Context, ExplainError, Explanation, Options, Verdict, check, explain};
 use starlings_coordinator::fleet::InProcess;
 use starlings_coordinator::study::Study;
 use starlings_coordinator::study::store::Store;
@@ -74,7 +73,7 @@ fn with_the_effect_described_the_same_data_give_its_name() {
     assert!(found.held_out.iter().all(|h| !h.fails), "{:?}", found.held_out);
 }
 
-/// A level that decays; everything else is the test's business.
+/// A level that decays; a test chooses the rest.
 fn decay(noise: &str, train: &str, more: &str) -> String {
     format!(
         r#"

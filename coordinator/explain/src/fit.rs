@@ -1,100 +1,14 @@
-//! Fits of several versions at a time: what they need next is asked of the fleet in one batch, round after round.
+//! Model variants and their least-squares fits.
 //!
-//! A Jacobian takes one run per parameter of the study: a parameter with one value per record is moved in all records at
-//! once, and each record answers to its own. Next files to read: [`super::fitted`] for one of them, then
-//! [`super::differences`].
+//! Files, each of which sees only those before it: [`candidate`] (an effect to try), [`model_variant`] (the study with effects
+//! added or terms left out), [`jacobian`], [`fitted_variant`] (a variant with its fit), [`differences`] (Jacobians from runs),
+//! [`drive`] (several fits at a time), [`own_values`] and [`prediction_sd`] (what is uncertain of a prediction).
 
-use nalgebra::DVector;
-use starlings_estimators::Need;
-
-use super::ExplainError;
-use super::differences::STEP;
-pub use super::fitted::Fitted;
-use super::fitted::point;
-use super::influences::Influences;
-use super::laboratory::{Answer, Laboratory, Point};
-
-/// Runs fits until none needs anything more. Returns whether the budget sufficed; a fit that it cut off stays where it is.
-///
-/// # Errors
-/// When the fleet or the store fails.
-pub fn drive(laboratory: &mut Laboratory<'_>, fits: &mut [Fitted<'_>]) -> Result<bool, ExplainError> {
-    drive_rounds(laboratory, fits, usize::MAX)
-}
-
-/// As [`drive`], so many rounds at most.
-///
-/// # Errors
-/// When the fleet or the store fails.
-pub fn drive_rounds(
-    laboratory: &mut Laboratory<'_>,
-    fits: &mut [Fitted<'_>],
-    rounds: usize,
-) -> Result<bool, ExplainError> {
-    for _ in 0..rounds {
-        let asked: Vec<Vec<DVector<f64>>> = fits.iter().map(Fitted::points).collect();
-        let n: usize = asked.iter().map(Vec::len).sum();
-        if n == 0 {
-            return Ok(true);
-        }
-        if !laboratory.affords(n) {
-            return Ok(false);
-        }
-        let points: Vec<Point<'_>> =
-            fits.iter().zip(&asked).flat_map(|(fit, of_fit)| of_fit.iter().map(|z| point(fit, z))).collect();
-        let mut answers = laboratory.run(&points)?.into_iter();
-        let mut afforded = true;
-        for (fit, of_fit) in fits.iter_mut().zip(asked) {
-            let of_fit: Vec<_> = answers.by_ref().take(of_fit.len()).collect();
-            if !of_fit.is_empty() {
-                afforded &= fit.take(laboratory, of_fit)?;
-            }
-        }
-        if !afforded {
-            return Ok(false);
-        }
-    }
-    Ok(true)
-}
-
-impl Fitted<'_> {
-    /// Points that answer the present need.
-    fn points(&self) -> Vec<DVector<f64>> {
-        match self.solver.need() {
-            Need::Residual(z) => vec![z.clone()],
-            Need::Jacobian(z) => self.moved(z, STEP),
-            Need::Nothing(_) => Vec::new(),
-        }
-    }
-    /// Hands the answers to the solver. Returns whether the budget sufficed for the runs that had to be made once more; if
-    /// not, the fit stays where it is.
-    fn take(&mut self, laboratory: &mut Laboratory<'_>, answers: Vec<Answer>) -> Result<bool, ExplainError> {
-        match self.solver.need().clone() {
-            Need::Residual(z) => {
-                let answer = answers.into_iter().next().and_then(Result::ok);
-                let residual = answer.as_ref().map(|y| train_residual(laboratory, y));
-                self.solver.give_residual(residual);
-                if let Some(predicted) = answer.filter(|_| *self.solver.best().0 == z) {
-                    self.predicted = predicted;
-                }
-            }
-            Need::Jacobian(z) => {
-                if !laboratory.affords(answers.iter().filter(|a| a.is_err()).count()) {
-                    return Ok(false);
-                }
-                let jacobian = self.differences(laboratory, &z, answers)?;
-                let jacobian = jacobian.map(|whole| Influences::of(&whole, &laboratory.rows));
-                self.solver.give_jacobian(jacobian.as_ref().map(|j| j.of_train.clone()));
-                self.jacobian = jacobian.unwrap_or_else(|| std::mem::take(&mut self.jacobian));
-            }
-            Need::Nothing(_) => {}
-        }
-        Ok(true)
-    }
-}
-
-/// (observed − predicted) / noise of the training rows.
-pub fn train_residual(laboratory: &Laboratory<'_>, predicted: &[f64]) -> DVector<f64> {
-    let whitened = laboratory.rows.whitened(predicted);
-    DVector::from_iterator(laboratory.rows.train.len(), laboratory.rows.train.iter().map(|i| whitened[*i]))
-}
+pub(crate) mod candidate;
+pub(crate) mod differences;
+pub(crate) mod drive;
+pub(crate) mod fitted_variant;
+pub(crate) mod jacobian;
+pub(crate) mod model_variant;
+pub(crate) mod own_values;
+pub(crate) mod prediction_sd;

@@ -1,32 +1,33 @@
-//! Where simulation and data disagree: residuals by channel, span, operating region and frequency, and what they go along with.
+//! Where simulation and data disagree: residuals by channel, span, operating region and frequency, and the signals that they
+//! correlate with.
 //!
-//! Nothing here decides what is missing, and except for [`unknown_inputs`] nothing is run: residuals of finished runs are
-//! looked at from several sides. Next files to read: [`result`] for what comes out, [`places`] for how a place is found.
+//! Nothing here decides what is missing, and except for [`unknown_inputs`] nothing is run: the residuals of finished runs are
+//! described in several ways. Next files to read: [`result`] for what comes out, [`places`] for how a place is found.
 
 mod bootstrap;
 mod channels;
 mod correlate;
 mod maps;
-pub(super) mod number;
 mod places;
 mod region;
 mod residuals;
-pub mod result;
+pub(crate) mod result;
 mod scan;
 mod sentence;
 mod signal;
 mod spectra;
-pub mod unknown_input;
+pub(crate) mod unknown_input;
 
-pub use bootstrap::{block_bootstrap_rms, block_length};
 pub use maps::map_again;
-pub use result::{ChannelGap, Correlated, Located, RegionMap, ResidualSpectrum, Track, UnknownInput};
+pub use result::{
+    ChannelGap, Correlated, Located, MisfitPlace, RegionMap, ResidualSpectrum, Track, UnknownInput,
+};
 use starlings_study::Study;
 pub use unknown_input::{MOST_RUNS, unknown_inputs};
 
-use super::Rows;
+use crate::rows::Rows;
 
-/// Finished runs of one model, to be looked at.
+/// Finished runs of one model, whose residuals are to be described.
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a> {
     /// The study.

@@ -1,6 +1,6 @@
-//! Every measured value of a study as one row, in a fixed order: the common language of locating, screening and judging.
+//! Every measured value of a study as one row, in a fixed order that all steps share.
 //!
-//! Predictions and residuals are vectors aligned with these rows. Next file to read: [`super::laboratory`].
+//! Predictions and residuals are vectors aligned with these rows. Next file to read: [`crate::run_cache`].
 
 use starlings_study::Study;
 use starlings_study::field::quantity_of;
@@ -18,7 +18,7 @@ pub enum Usage {
 
 impl Usage {
     /// The word of `explain.json`.
-    pub fn word(self) -> &'static str {
+    pub(crate) fn word(self) -> &'static str {
         match self {
             Self::Train => "train",
             Self::HeldOut => "held-out",
@@ -49,7 +49,7 @@ pub struct Row {
 }
 
 /// Unit label of a channel: its own where the study gives one, or that of its output, or of a state by that name.
-pub(super) fn unit(study: &Study, record: usize, channel: usize) -> String {
+pub(crate) fn unit(study: &Study, record: usize, channel: usize) -> String {
     let of = &study.records[record].channels[channel];
     let quantity = || {
         let output = quantity_of(&study.spec.outputs, &of.output);
@@ -97,18 +97,18 @@ impl Rows {
     }
 
     /// Positions of the rows that do not train, increasing.
-    pub fn others(&self) -> impl Iterator<Item = usize> + '_ {
+    pub(crate) fn others(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.rows.len()).filter(|i| self.rows[*i].usage != Usage::Train)
     }
 
     /// The rows of a record.
-    pub fn of_record(&self, record: usize) -> std::ops::Range<usize> {
+    pub(crate) fn of_record(&self, record: usize) -> std::ops::Range<usize> {
         let first = |record| self.rows.partition_point(|row| row.record < record);
         first(record)..first(record + 1)
     }
 
     /// Runs of consecutive rows of one record, channel and use: (first, one past the last).
-    pub fn stretches(&self) -> Vec<std::ops::Range<usize>> {
+    pub(crate) fn stretches(&self) -> Vec<std::ops::Range<usize>> {
         let key = |row: &Row| (row.record, row.channel, row.usage);
         let mut stretches = Vec::new();
         let mut first = 0;
@@ -123,12 +123,12 @@ impl Rows {
     }
 
     /// (observed − predicted) / noise of every row.
-    pub fn whitened(&self, predicted: &[f64]) -> Vec<f64> {
+    pub(crate) fn whitened(&self, predicted: &[f64]) -> Vec<f64> {
         self.rows.iter().zip(predicted).map(|(row, y)| (row.observed - y) / row.noise).collect()
     }
 
     /// Root mean square of observed − predicted over the rows that `of` takes; NaN for none.
-    pub fn rmse(&self, predicted: &[f64], of: impl Fn(&Row) -> bool) -> f64 {
+    pub(crate) fn rmse(&self, predicted: &[f64], of: impl Fn(&Row) -> bool) -> f64 {
         let squares: Vec<f64> = self
             .rows
             .iter()

@@ -1,7 +1,7 @@
 //! The whole explanation on a page: fit, locate, screen, refit, gates, verdict, add, show.
 //!
-//! Every stage runs the model on the fleet through one [`Laboratory`], which remembers each run; an explanation that was killed
-//! is continued by doing the same again. Next file to read: [`super::inquiry`].
+//! Every stage runs the model on the fleet through one [`RunCache`], which remembers each run; an explanation that was killed
+//! is continued by the same workflow, which finds its earlier runs in the database. Next file to read: [`crate::diagnosis`].
 
 use std::sync::Arc;
 
@@ -10,23 +10,27 @@ use starlings_models::ObserverDef;
 use starlings_study::Study;
 use starlings_study::store::Store;
 
-use super::answer;
-use super::background::inflation;
-use super::candidate::Candidate;
-use super::experiment::propose;
-use super::fit::Fitted;
-use super::inquiry::{Answer, answered};
-use super::judge::Judged;
-use super::laboratory::{Laboratory, Point};
-use super::locate::{self, Located, Track, View};
-use super::patch::explained_study;
-use super::reach;
-use super::refused;
-use super::search::Found;
-use super::verdict::Decision;
-use super::warnings;
-use super::words;
-use super::{Context, ExplainError, Explanation, Figures, Findings, Options, Verdict, null};
+use crate::diagnosis::{Diagnosis, diagnose};
+use crate::error::ExplainError;
+use crate::fit::candidate::Candidate;
+use crate::fit::fitted_variant::FittedVariant;
+use crate::fit::prediction_sd::prediction_sd;
+use crate::judge::effective_noise::inflation;
+use crate::judge::gates::JudgedFit;
+use crate::judge::search_result::SearchResult;
+use crate::judge::verdict::{Decision, Verdict};
+use crate::locate;
+use crate::locate::{Located, Track, View};
+use crate::null_recordings;
+use crate::options::{Context, Options};
+use crate::run_cache::{Point, RunCache};
+use crate::screen::not_tried;
+use crate::tell::experiment::propose;
+use crate::tell::figures::Figures;
+use crate::tell::findings::Findings;
+use crate::tell::patch::explained_study;
+use crate::tell::result::Explanation;
+use crate::tell::{rejected, summary, warnings, words};
 
 /// Explains a study's misfit.
 ///
@@ -40,19 +44,19 @@ pub fn explain(
     context: &mut Context<'_>,
     options: &Options,
 ) -> Result<Findings, ExplainError> {
-    // Every run is free: nothing may pull a simulation to the data that it is judged by.
+    // Every run is made without an observer, which would pull the simulation towards the data that it is compared with.
     let mut free = study.clone();
     free.setup.observer = ObserverDef::default();
     let budget = options.budget.or(study.explain.budget);
-    let mut laboratory = Laboratory::new(&free, &mut *fleet, store, context, budget);
-    laboratory.hold_at_most(options.hold);
-    let (mut findings, predicted) = answered(&mut laboratory, &free, options, |laboratory, answer| {
-        let predicted = Arc::clone(&answer.found.base.predicted);
-        Ok((finish(laboratory, &answer)?, predicted))
+    let mut cache = RunCache::new(&free, &mut *fleet, store, context, budget);
+    cache.hold_at_most(options.hold);
+    let (mut findings, predicted) = diagnose(&mut cache, &free, options, |cache, diagnosis| {
+        let predicted = Arc::clone(&diagnosis.found.base.predicted);
+        Ok((finish(cache, &diagnosis)?, predicted))
     })?;
-    drop(laboratory);
+    drop(cache);
     if options.nulls > 0 {
-        let nulls = null::measure(&free, &predicted, fleet, store, context, options)?;
+        let nulls = null_recordings::measure(&free, &predicted, fleet, store, context, options)?;
         findings.explanation.runs += nulls.runs;
         findings.explanation.runs_by_stage.push(("null".to_owned(), nulls.runs));
         findings.explanation.false_alarm.nulls = Some(nulls);
@@ -62,37 +66,37 @@ pub fn explain(
 }
 
 /// Where a fit disagrees with the data.
-fn look(laboratory: &Laboratory<'_>, fit: &Fitted<'_>, tracks: &[Track]) -> Located {
-    let sd = answer::prediction_sd(laboratory, fit);
-    locate::locate(&View { prediction_sd: Some(&sd), ..view(laboratory, fit, tracks) })
+fn look(cache: &RunCache<'_>, fit: &FittedVariant<'_>, tracks: &[Track]) -> Located {
+    let sd = prediction_sd(cache, fit);
+    locate::locate(&View { prediction_sd: Some(&sd), ..view(cache, fit, tracks) })
 }
 
-fn view<'v>(laboratory: &'v Laboratory<'_>, fit: &'v Fitted<'_>, tracks: &'v [Track]) -> View<'v> {
+fn view<'v>(cache: &'v RunCache<'_>, fit: &'v FittedVariant<'_>, tracks: &'v [Track]) -> View<'v> {
     View {
-        study: laboratory.study,
-        rows: &laboratory.rows,
+        study: cache.study,
+        rows: &cache.rows,
         predicted: &fit.predicted,
         prediction_sd: None,
         tracks,
-        seed: laboratory.study.seed,
+        seed: cache.study.seed,
     }
 }
 
 /// Puts the findings together.
-fn finish(laboratory: &mut Laboratory<'_>, answer: &Answer<'_, '_>) -> Result<Findings, ExplainError> {
-    let Answer { found, candidates, decision, tracks } = answer;
-    let mut before = look(laboratory, &found.base, tracks);
+fn finish(cache: &mut RunCache<'_>, diagnosis: &Diagnosis<'_, '_>) -> Result<Findings, ExplainError> {
+    let Diagnosis { found, candidates, decision, tracks } = diagnosis;
+    let mut before = look(cache, &found.base, tracks);
     let judged = decision.best.map(|i| &found.judged[i]);
     let added = judged.filter(|_| matches!(decision.verdict, Verdict::Named | Verdict::Tie));
     if decision.verdict != Verdict::NoGap {
-        before.forces = forces(laboratory, &found.base)?;
+        before.forces = forces(cache, &found.base)?;
     }
-    laboratory.stage("add", "");
-    let mut warnings = warnings::warnings(laboratory, found, decision);
+    cache.stage("add", "");
+    let mut warnings = warnings::warnings(cache, found, decision);
     let explained = match added {
         Some(judged) => {
-            let left_out = &judged.fit.version.left_out;
-            match explained_study(laboratory.study, &answer::patches(judged), left_out, laboratory.folder()) {
+            let left_out = &judged.fit.variant.left_out;
+            match explained_study(cache.study, &summary::patches(judged), left_out, cache.folder()) {
                 Ok(text) => Some(text),
                 Err(error) => {
                     warnings.push(format!("no explained study was written: {error}"));
@@ -103,85 +107,85 @@ fn finish(laboratory: &mut Laboratory<'_>, answer: &Answer<'_, '_>) -> Result<Fi
         None => None,
     };
     let experiment = match (judged, decision.rivals.first()) {
-        (Some(best), Some(rival)) => propose(laboratory, best, &found.judged[*rival], tracks)?,
+        (Some(best), Some(rival)) => propose(cache, best, &found.judged[*rival], tracks)?,
         _ => None,
     };
-    laboratory.stage("show", "");
-    let figures = figures(laboratory, found, decision, &before)?;
+    cache.stage("show", "");
+    let figures = figures(cache, found, decision, &before)?;
     let mut explanation =
-        explanation(laboratory, found, candidates, decision, &before, explained.is_some(), warnings);
+        explanation(cache, found, candidates, decision, &before, explained.is_some(), warnings);
     explanation.experiment = experiment;
     Ok(Findings { explanation, figures, explained_study: explained })
 }
 
 /// The unknown input of every equation, at the model as it is.
 fn forces(
-    laboratory: &mut Laboratory<'_>,
-    base: &Fitted<'_>,
+    cache: &mut RunCache<'_>,
+    base: &FittedVariant<'_>,
 ) -> Result<Vec<locate::UnknownInput>, ExplainError> {
-    laboratory.stage("locate", "the unknown input of every equation");
-    let study = &base.version.study;
+    cache.stage("locate", "the unknown input of every equation");
+    let study = &base.variant.study;
     let most = locate::MOST_RUNS + 2 * study.spec.states.len();
-    if !laboratory.affords_runs(most as u64) {
+    if !cache.affords_runs(most as u64) {
         return Ok(Vec::new());
     }
     let mut runs = 0;
     let theta = base.theta();
-    let forces = locate::unknown_inputs(study, laboratory.fleet(), theta.as_slice(), &mut runs)?;
-    laboratory.count(runs);
+    let forces = locate::unknown_inputs(study, cache.fleet(), theta.as_slice(), &mut runs)?;
+    cache.count(runs);
     Ok(forces)
 }
 
 fn figures(
-    laboratory: &mut Laboratory<'_>,
-    found: &Found<'_>,
+    cache: &mut RunCache<'_>,
+    found: &SearchResult<'_>,
     decision: &Decision,
     before: &Located,
 ) -> Result<Figures, ExplainError> {
     let judged = decision.best.map(|i| &found.judged[i]);
     let added = judged.filter(|_| matches!(decision.verdict, Verdict::Named | Verdict::Tie));
     let maps_after = match added {
-        Some(judged) if laboratory.affords(1) => {
-            let study = &judged.fit.version.study;
-            let tracks = laboratory.tracks(&Point { study, theta: judged.fit.theta() })?;
-            let view = view(laboratory, &judged.fit, &tracks);
+        Some(judged) if cache.affords(1) => {
+            let study = &judged.fit.variant.study;
+            let tracks = cache.tracks(&Point { study, theta: judged.fit.theta() })?;
+            let view = view(cache, &judged.fit, &tracks);
             before.maps.iter().map(|map| locate::map_again(map, &view)).collect()
         }
         _ => Vec::new(),
     };
     let after = added.map(|j| j.fit.predicted.as_slice());
-    let of_base = || inflation(&laboratory.rows, found.base.residual());
+    let of_base = || inflation(&cache.rows, found.base.residual());
     let inflation = judged.map_or_else(of_base, |j| j.inflation);
     Ok(Figures {
-        time_unit: laboratory.study.time_unit.clone(),
-        curves: answer::curves(laboratory, &found.base.predicted, after),
+        time_unit: cache.study.time_unit.clone(),
+        curves: summary::curves(cache, &found.base.predicted, after),
         before: before.clone(),
         maps_after,
-        null_gains: found.background.maxima.clone(),
-        decoy_gains: found.background.decoys.iter().map(|d| d / inflation).collect(),
+        null_gains: found.null_distribution.maxima.clone(),
+        decoy_gains: found.null_distribution.decoys.iter().map(|d| d / inflation).collect(),
         best_gain: best_gain(found, judged) / inflation,
     })
 }
 
-/// Fall of χ² by what the decision rests on, or else the largest that the screening promised: what decoys are compared with.
-fn best_gain(found: &Found<'_>, judged: Option<&Judged<'_>>) -> f64 {
-    judged.map_or(found.alarm, |j| j.gain)
+/// Fall of χ² by the variant on which the decision rests, or else the largest of the screening; decoys are compared with it.
+fn best_gain(found: &SearchResult<'_>, judged: Option<&JudgedFit<'_>>) -> f64 {
+    judged.map_or(found.largest_gain, |j| j.gain)
 }
 
 fn explanation(
-    laboratory: &Laboratory<'_>,
-    found: &Found<'_>,
+    cache: &RunCache<'_>,
+    found: &SearchResult<'_>,
     candidates: &[Candidate],
     decision: &Decision,
     before: &Located,
     explained: bool,
     warnings: Vec<String>,
 ) -> Explanation {
-    let study = laboratory.study;
+    let study = cache.study;
     let judged = decision.best.map(|i| &found.judged[i]);
     let added = judged.filter(|_| matches!(decision.verdict, Verdict::Named | Verdict::Tie));
     let checked = decision.checked.map(|i| &found.judged[i]);
-    let n_train = laboratory.rows.train.len();
+    let n_train = cache.rows.train.len();
     let nearest = judged.or(found.judged.first());
     let after = added.map(|j| j.fit.predicted.as_slice());
     Explanation {
@@ -189,30 +193,30 @@ fn explanation(
         model: study.setup.model.kind.clone(),
         seed: study.seed,
         verdict: decision.verdict,
-        headline: words::headline(laboratory, found, candidates, decision),
+        headline: words::headline(cache, found, candidates, decision),
         places: before.places.clone(),
-        effects: added.map(answer::effects).unwrap_or_default(),
-        replaced: added.map(|j| j.fit.version.left_out.clone()).unwrap_or_default(),
+        effects: added.map(summary::effects).unwrap_or_default(),
+        replaced: added.map(|j| j.fit.variant.left_out.clone()).unwrap_or_default(),
         tied_with: decision.tied.clone(),
         experiment: None,
         closest: nearest
             .filter(|_| decision.verdict == Verdict::Unexplained)
-            .and_then(|j| answer::effects(j).into_iter().next()),
-        screened: answer::screened(found, candidates, decision, n_train),
-        rejected: refused::rejected(found, candidates, decision),
-        gap: after.map(|y| answer::gap(laboratory, &found.base.predicted, y)).unwrap_or_default(),
+            .and_then(|j| summary::effects(j).into_iter().next()),
+        screened: summary::screened(found, candidates, decision, n_train),
+        rejected: rejected::rejected(found, candidates, decision),
+        gap: after.map(|y| summary::gap(cache, &found.base.predicted, y)).unwrap_or_default(),
         held_out: nearest.map_or(&found.held_out, |j| &j.held_out).clone(),
-        not_tried: reach::not_tried(study, candidates),
-        remaining: answer::remaining(found, added, checked, words::shape(found, added, before)),
-        false_alarm: answer::false_alarm(found, best_gain(found, judged)),
-        parameter_shifts: added.map(|j| answer::shifts(&found.base, j)).unwrap_or_default(),
+        not_tried: not_tried::not_tried(study, candidates),
+        remaining: summary::remaining(found, added, checked, words::shape(found, added, before)),
+        false_alarm: summary::false_alarm(found, best_gain(found, judged)),
+        parameter_shifts: added.map(|j| summary::shifts(&found.base, j)).unwrap_or_default(),
         untried: words::untried(found, candidates),
         explained_study: explained.then(|| "explained.toml".to_owned()),
         conditional_on: words::conditional_on(added),
-        runs: laboratory.runs(),
-        runs_by_stage: laboratory.runs_by_stage(),
-        workers: laboratory.n_answered(),
-        wall_s: laboratory.elapsed(),
+        runs: cache.runs(),
+        runs_by_stage: cache.runs_by_stage(),
+        workers: cache.n_answered(),
+        wall_s: cache.elapsed(),
         warnings: [study.warnings.clone(), warnings].concat(),
     }
 }

@@ -13,8 +13,8 @@ mod sample;
 mod tests;
 
 use serde::{Deserialize, Serialize};
-use starlings_explain::figures::Figures;
-use starlings_explain::result::{Experiment, Explanation, Verdict};
+use starlings_explain::result::{Experiment, Explanation};
+use starlings_explain::{Figures, Verdict};
 
 use super::{ReportError, layout, number};
 use candidates::Candidates;

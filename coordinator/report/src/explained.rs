@@ -2,8 +2,7 @@
 //!
 //! Next file to read: [`super::explain`].
 
-use starlings_explain::Findings;
-use starlings_explain::keep::kept;
+use starlings_explain::{Findings, load_findings};
 use starlings_study::RunFolder;
 use starlings_study::store::StoreError;
 use starlings_study::store::folder::StudyInfo;
@@ -16,7 +15,7 @@ use super::files::{FilesError, place};
 /// # Errors
 /// When the explanation is not finished, the store is damaged, or a file cannot be written.
 pub fn write_explanation(folder: &RunFolder) -> Result<Findings, FilesError> {
-    let found = kept(&folder.store)?.ok_or_else(|| FilesError::Unfinished(folder.path.clone()))?;
+    let found = load_findings(&folder.store)?.ok_or_else(|| FilesError::Unfinished(folder.path.clone()))?;
     let page = explain_page(&found.explanation, &found.figures, &about(folder)?)?;
     place(folder, "report.html", &page)?;
     if let Some(text) = &found.explained_study {

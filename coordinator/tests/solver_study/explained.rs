@@ -1,7 +1,8 @@
 //! What a solver lacks: effects on its inputs and outputs, and on the rates that it hosts.
 
-use starlings_coordinator::explain::patch::explained_study;
-use starlings_coordinator::explain::{Context, Explanation, Findings, Options, Verdict, explain};
+use starlings_coordinator::explain::{
+    Context, Explanation, Findings, Options, Verdict, explain, explained_study,
+};
 use starlings_coordinator::study::store::Store;
 use starlings_coordinator::study::{SolverHost, Study};
 

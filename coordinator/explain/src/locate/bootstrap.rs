@@ -1,6 +1,6 @@
-//! How sure a root mean square is: the bootstrap of moving blocks, for residuals that follow one another.
+//! The uncertainty of a root mean square: the bootstrap of moving blocks, for correlated residuals.
 //!
-//! Single values would be drawn as if they were independent; blocks keep what neighbours have in common. Next file to read:
+//! Drawing single values would treat them as independent; blocks keep the correlation of neighbours. Next file to read:
 //! [`super::places`].
 
 use rand::{RngExt, SeedableRng};
@@ -14,7 +14,7 @@ pub(super) const DRAWS: usize = 200;
 ///
 /// The blocks overlap and are drawn with replacement until the length of the series is reached, the last one being cut. The
 /// same seed gives the same bits. NaN for an empty series or without a draw.
-pub fn block_bootstrap_rms(residuals: &[f64], block: usize, n: usize, seed: u64) -> [f64; 2] {
+pub(crate) fn block_bootstrap_rms(residuals: &[f64], block: usize, n: usize, seed: u64) -> [f64; 2] {
     let length = residuals.len();
     if length == 0 || n == 0 {
         return [f64::NAN; 2];
@@ -44,7 +44,7 @@ pub fn block_bootstrap_rms(residuals: &[f64], block: usize, n: usize, seed: u64)
 
 /// Length of the blocks for a series: twice the values that amount to one independent value, at least the cube root of the
 /// length (the order that Künsch finds best) and at most a quarter of it.
-pub fn block_length(series: &[f64]) -> usize {
+pub(crate) fn block_length(series: &[f64]) -> usize {
     let n = series.len() as f64;
     let effective = effective_sample_size(series);
     let memory = if effective > 0.0 { 2.0 * n / effective } else { 1.0 };

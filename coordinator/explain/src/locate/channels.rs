@@ -6,8 +6,7 @@ use starlings_estimators::{autocorrelation, effective_sample_size, ljung_box};
 
 use super::bootstrap::{DRAWS, block_bootstrap_rms, block_length};
 use super::{ChannelGap, View};
-use crate::Usage;
-use crate::rows::unit;
+use crate::rows::{Usage, unit};
 
 /// The figures, by record, then channel, then use.
 pub(super) fn channels(view: &View<'_>) -> Vec<ChannelGap> {
@@ -56,7 +55,7 @@ fn gap(view: &View<'_>, record: usize, channel: usize, usage: Usage) -> Option<C
     })
 }
 
-/// A figure, or what stands for it where the values are too few or all alike: then nothing speaks against white residuals.
+/// A figure, or its value for white residuals where the values are too few or constant.
 fn known(figure: f64, otherwise: f64) -> f64 {
     if figure.is_finite() { figure } else { otherwise }
 }

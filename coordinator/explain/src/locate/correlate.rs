@@ -1,4 +1,4 @@
-//! What the residuals go along with: signals of the simulation, their rates, signs, squares and past.
+//! Signals with which the residuals correlate: those of the simulation, their rates, signs, squares and past.
 //!
 //! Rates are differences of simulated signals and inputs, never of measured values. Next file to read: [`super::signal`].
 
@@ -9,28 +9,28 @@ use super::residuals::{Residuals, primary};
 use super::signal::{MOST_TRACKS, along};
 use super::{Correlated, Track, View};
 
-/// Correlations told at most.
+/// Correlations reported at most.
 const MOST: usize = 12;
-/// Distance from zero that is asked for, in sd: some hundred signals are tried.
+/// Least distance from zero, in sd, large enough for a choice among some hundred signals.
 const SURE: f64 = 3.3;
-/// Smallest correlation that is worth a line.
+/// Smallest correlation that is reported.
 const LEAST: f64 = 0.1;
-/// Correlation of two signals from which the weaker one says nothing new.
+/// Correlation of two signals above which the weaker one is not reported.
 const ALIKE: f64 = 0.95;
 /// Lags tried over the largest share of a record.
 const LAGS: usize = 12;
 /// Largest lag as a share of the record.
 const LAG_SHARE: f64 = 0.1;
-/// What a less plain signal must correlate more than a plainer one.
+/// Least difference in correlation by which a derived signal must exceed a simpler one, per step of derivation.
 const PLAIN: f64 = 0.004;
-/// What a lag must add to the correlation at no lag.
+/// Least correlation that a lag must add to that without a lag.
 const LAG_GAIN: f64 = 0.05;
 
 /// A signal made of a track.
 struct Candidate {
     words: String,
     values: Vec<f64>,
-    /// How far it is from the track itself.
+    /// Number of steps by which it is derived from the track.
     steps: f64,
 }
 
@@ -127,7 +127,7 @@ fn lagged(study: &Study, track: &Track, group: &Residuals, now: &[f64]) -> Optio
     let span = longest.times.last()? - longest.times.first()?;
     let earlier = span * lag as f64 / (longest.times.len() - 1) as f64;
     let unit = if study.time_unit.is_empty() { String::new() } else { format!(" {}", study.time_unit) };
-    let words = format!("{} {}{unit} earlier", track.name, super::number::three(earlier));
+    let words = format!("{} {}{unit} earlier", track.name, crate::number::three(earlier));
     Some(Candidate { words, values, steps: 3.0 })
 }
 

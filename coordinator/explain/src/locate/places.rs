@@ -10,37 +10,37 @@ use super::View;
 use super::bootstrap::{DRAWS, block_bootstrap_rms, block_length};
 use super::region::{Region, best};
 use super::residuals::Residuals;
+use super::result::MisfitPlace;
 use super::sentence::{Figures, region_words, sentence};
 use super::signal::{Signal, signals};
-use crate::Usage;
-use crate::result::Place;
+use crate::rows::Usage;
 
 /// Regions of one channel at most: where it trains, and where it is held out.
 const MOST: (usize, usize) = (3, 1);
 /// Log-likelihood ratio that a region must reach: the largest of the some ten thousand intervals that are tried reaches
-/// 10 by chance. Residuals that follow one another count as so many fewer, and then less is asked for.
+/// 10 by chance. Correlated residuals count as fewer values, and then a smaller ratio suffices.
 const LEAST_GAIN: (f64, f64) = (12.0, 1.5);
-/// Smallest part of the values that residuals which follow one another are taken to amount to.
+/// Smallest share of independent values that correlated residuals are taken to amount to.
 const LEAST_EFFECTIVE: f64 = 0.03;
 /// Share of the misfit that a region must hold beyond its share of the values.
 const CONCENTRATION: f64 = 0.15;
-/// Ratio to the expected, in root mean square, from which a place is worth a line.
+/// Ratio to the expected root mean square from which a place is listed.
 const WORSE: f64 = 1.06;
 /// How many sd of a chi-square the squares must exceed their expectation.
 const SURE: f64 = 4.0;
-/// Share of the channel's misfit below which what other places leave over is not told.
+/// Share of the channel's misfit below which the rest beside other places is not listed.
 const REST: f64 = 0.1;
 
-/// A place with what it is ranked by.
+/// A place with its rank.
 struct Ranked {
-    place: Place,
+    place: MisfitPlace,
     usage: Usage,
     /// Sum over the values of squared residual over expected square, less one.
     excess: f64,
 }
 
 /// Places of all channels: training values first, then held-out ones, worst first.
-pub(super) fn places(view: &View<'_>, groups: &[Residuals]) -> Vec<Place> {
+pub(super) fn places(view: &View<'_>, groups: &[Residuals]) -> Vec<MisfitPlace> {
     let mut ranked: Vec<Ranked> = groups.iter().flat_map(|group| of_channel(view, group)).collect();
     let order = |usage: Usage| match usage {
         Usage::Train => 0,
@@ -81,7 +81,7 @@ fn of_channel(view: &View<'_>, group: &Residuals) -> Vec<Ranked> {
     found
 }
 
-/// The place of these values, `None` when they are not surely worse than expected.
+/// The place of these values; `None` where they are not significantly worse than expected.
 fn ranked(
     view: &View<'_>,
     group: &Residuals,
@@ -108,7 +108,7 @@ fn ranked(
         None if elsewhere => "elsewhere".to_owned(),
         None => String::new(),
     };
-    let place = Place {
+    let place = MisfitPlace {
         channel: group.channel.clone(),
         unit: group.unit.clone(),
         from: times().fold(f64::INFINITY, f64::min),

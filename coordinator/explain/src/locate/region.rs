@@ -2,15 +2,15 @@
 //!
 //! Next file to read: [`super::places`].
 
-use super::number::readable;
 use super::scan::scan;
 use super::signal::{Kind, Signal};
+use crate::number::readable;
 
-/// Bins per signal when two signals are looked at together.
+/// Bins per signal of two signals together.
 const GRID: usize = 8;
 /// Factor by which two signals must do better than one.
 const SECOND_SIGNAL: f64 = 1.15;
-/// Factor by which the time must do better than a signal of the model, which says more.
+/// Factor by which the time must do better than a signal of the model, which is preferred as the more informative one.
 const TIME: f64 = 1.02;
 
 /// An interval of one signal.

@@ -1,10 +1,9 @@
-//! The residuals of one channel in one use, over all records, side by side with where they were measured.
+//! The residuals of one channel in one use, over all records, with the record and time of each.
 //!
 //! Next file to read: [`super::signal`].
 
 use super::View;
-use crate::Usage;
-use crate::rows::unit;
+use crate::rows::{Usage, unit};
 
 /// Residuals of one channel in one use, in the order of the rows.
 pub(super) struct Residuals {

@@ -4,8 +4,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::result::Place;
-
 /// A signal of the model along every record, at the record's times: an input, a state or an output of the fitted model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Track {
@@ -19,12 +17,12 @@ pub struct Track {
 
 impl Track {
     /// Smallest and largest value over all records; infinite, the larger first, where there is none.
-    pub fn ends(&self) -> [f64; 2] {
+    pub(crate) fn ends(&self) -> [f64; 2] {
         ends(self.values.iter().flatten().copied())
     }
 
     /// Slope at a step of a record, from the neighbours in time, one-sided at the ends; `None` beyond them.
-    pub fn slope(&self, record: usize, step: usize, times: &[f64]) -> Option<f64> {
+    pub(crate) fn slope(&self, record: usize, step: usize, times: &[f64]) -> Option<f64> {
         let values = self.values.get(record)?;
         let last = values.len().min(times.len()).checked_sub(1)?;
         let (before, after) = (step.saturating_sub(1), (step + 1).min(last));
@@ -44,17 +42,40 @@ pub(super) fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Located {
     /// Where simulation and data disagree, worst first.
-    pub places: Vec<Place>,
+    pub places: Vec<MisfitPlace>,
     /// The misfit of every channel of every record.
     pub channels: Vec<ChannelGap>,
     /// Residuals over operating regions.
     pub maps: Vec<RegionMap>,
-    /// What the residuals go along with, strongest first.
+    /// Signals with which the residuals correlate, strongest first.
     pub correlations: Vec<Correlated>,
     /// Residuals by frequency.
     pub spectra: Vec<ResidualSpectrum>,
     /// The unknown input of each equation that would remove the residuals.
     pub forces: Vec<UnknownInput>,
+}
+
+/// A place where simulation and data disagree.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MisfitPlace {
+    /// Output name.
+    pub channel: String,
+    /// Unit label of the channel.
+    pub unit: String,
+    /// Start of the span.
+    pub from: f64,
+    /// End of the span.
+    pub to: f64,
+    /// The operating region in words, such as `flow > 50 mL/s`; empty for all of the span.
+    pub region: String,
+    /// Root mean square of observed − predicted there.
+    pub rmse: f64,
+    /// Its block-bootstrap 95 % interval.
+    pub interval95: [f64; 2],
+    /// What noise and the uncertainty of the fit would leave there.
+    pub expected: f64,
+    /// One sentence with the numbers.
+    pub sentence: String,
 }
 
 /// The misfit of one channel of one record in one use.
@@ -114,7 +135,7 @@ pub struct RegionMap {
     pub explained: f64,
 }
 
-/// A signal that the residuals of a channel go along with.
+/// A signal with which the residuals of a channel correlate.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Correlated {
     /// Output name.

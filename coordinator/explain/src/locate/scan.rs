@@ -2,17 +2,17 @@
 //!
 //! Every interval is compared with its outside by a log-likelihood ratio under Gaussian residuals (a scan statistic after
 //! Kulldorff, Communications in Statistics 26, 1997, with one of three alternatives: a larger variance inside, another mean
-//! inside, a mean that grows linearly from the interval's edge as behind a threshold). Nothing below the expected variance
-//! counts, so noise does not invite a cut. Next file to read: [`super::region`].
+//! inside, a mean that grows linearly from the interval's edge as behind a threshold). A variance below
+//! the expected one counts as the expected one, so that noise makes no cut. Next file to read: [`super::region`].
 
 /// Quantiles of the signal, and as many even steps of its range, at which cuts are tried first.
 const CUTS: usize = 28;
-/// What an interval with two ends must gain more than one with one end.
+/// Least gain by which an interval with two ends must exceed one with one end.
 const SECOND_END: f64 = 3.0;
 
 /// An interval of a signal's values.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Found {
+pub(super) struct SearchResult {
     /// Log-likelihood ratio against no interval.
     pub(super) gain: f64,
     /// Lower end; −∞ when open.
@@ -39,7 +39,7 @@ struct Sorted {
 
 /// The interval of `x` with the largest gain; `e` are residuals over their expected sd, of which `open` take part. `None`
 /// when the signal does not vary or there are too few values.
-pub(super) fn scan(x: &[f64], e: &[f64], open: &[bool]) -> Option<Found> {
+pub(super) fn scan(x: &[f64], e: &[f64], open: &[bool]) -> Option<SearchResult> {
     let sorted = Sorted::new(x, e, open)?;
     let cuts = sorted.cuts();
     let mut best: Option<(f64, usize, usize)> = None;
@@ -62,7 +62,7 @@ pub(super) fn scan(x: &[f64], e: &[f64], open: &[bool]) -> Option<Found> {
     }
     let (gain, i, j) = best?;
     let at = |k: usize| 0.5 * (sorted.x[k - 1] + sorted.x[k]);
-    Some(Found {
+    Some(SearchResult {
         gain,
         from: if i == 0 { f64::NEG_INFINITY } else { at(i) },
         to: if j == sorted.x.len() { f64::INFINITY } else { at(j) },
@@ -194,7 +194,7 @@ mod tests {
         (0..n).map(|_| StandardNormal.sample(&mut rng)).collect()
     }
 
-    fn scanned(shape: impl Fn(f64) -> f64) -> Found {
+    fn scanned(shape: impl Fn(f64) -> f64) -> SearchResult {
         let x: Vec<f64> = (0..600).map(|i| ((i as f64) * 0.7).sin()).collect();
         let e: Vec<f64> = x.iter().zip(noise(600, 1)).map(|(x, e)| e + shape(*x)).collect();
         scan(&x, &e, &[true; 600]).expect("there is something to scan")

@@ -1,12 +1,12 @@
 //! Places in words with numbers.
 //!
-//! Next file to read: [`super::number`].
+//! Next file to read: [`crate::number`].
 
-use super::number::{percent, three, threshold};
 use super::region::{Bound, Region};
 use super::residuals::Residuals;
 use super::signal::{Kind, Signal};
-use crate::Usage;
+use crate::number::{percent, three, threshold};
+use crate::rows::Usage;
 
 /// The figures of a place.
 pub(super) struct Figures {

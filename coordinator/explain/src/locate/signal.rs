@@ -1,4 +1,4 @@
-//! What a region is described by: a track, its size, or the time, with one value per residual.
+//! The signals by which a region is described: a track, its absolute value, or the time, with one value per residual.
 //!
 //! Next file to read: [`super::scan`].
 
@@ -8,7 +8,7 @@ use super::Track;
 use super::residuals::Residuals;
 use super::result::ends;
 
-/// Signals of the simulation that are looked at, at most: a field of many components must not take all the time.
+/// Signals of the simulation that are tried at most, which limits the time that a field of many components takes.
 pub(super) const MOST_TRACKS: usize = 24;
 
 /// What a signal stands for, which decides how it is put in words.

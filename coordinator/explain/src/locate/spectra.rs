@@ -5,7 +5,7 @@
 use std::f64::consts::TAU;
 
 use super::{ResidualSpectrum, View};
-use crate::Usage;
+use crate::rows::Usage;
 
 /// Values per segment at most.
 const SEGMENT: usize = 256;

@@ -1,10 +1,10 @@
 //! The input that an equation would need: a random walk added to the rate of one state, estimated from the data.
 //!
-//! All parameters stay where they are. The walk and the states it moves are followed by a reduced-order unscented filter
-//! whose particles span the leading directions of their joint covariance, and then smoothed backwards through the same
-//! coordinates, so that the estimate at a time knows the data after it. It says where and when something is missing, not
-//! what: any cause in that equation looks the same. A model that cannot restart has none. Next files to read:
-//! [`candidate`] for which equations are tried, [`walk`] for the filter.
+//! All parameters stay where they are. The walk and the states it moves are followed by a reduced-order unscented filter whose
+//! particles span the leading directions of their joint covariance, and then smoothed backwards through the same coordinates,
+//! so that the estimate at a time knows the data after it. It shows where and when something is missing, but not what: every
+//! cause in that equation gives the same input. A model that cannot restart has no estimate. Next files to read: [`candidate`]
+//! for which equations are tried, [`walk`] for the filter.
 //!
 //! The longest trained record is followed, and the two equations whose input its channels feel most. Cost per equation, in
 //! runs of that record: 2 to find how strongly the data feel the input, all that an equation costs which is not followed; then
@@ -22,7 +22,7 @@ use starlings_study::Study;
 use self::candidate::{Candidate, candidates};
 use self::walk::{DIRECTIONS, Estimate, Walk};
 use super::UnknownInput;
-use crate::ExplainError;
+use crate::error::ExplainError;
 
 /// Windows of the record at most: neighbouring ones are joined.
 const WINDOWS: usize = 200;

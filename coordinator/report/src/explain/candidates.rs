@@ -1,7 +1,7 @@
 //! What was tried and what became of it, and how often chance would have given a name.
 
 use serde::Serialize;
-use starlings_explain::figures::Figures;
+use starlings_explain::Figures;
 use starlings_explain::result::{Explanation, FalseAlarm, Nulls, Screened};
 
 use crate::ReportError;

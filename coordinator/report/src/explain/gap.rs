@@ -3,8 +3,8 @@
 //! Where nothing was added there is only a before, which is shown. Next file to read: `places.rs`.
 
 use serde::Serialize;
-use starlings_explain::figures::{Curve, Figures};
 use starlings_explain::result::{Explanation, GapRow, ParameterShift};
+use starlings_explain::{Curve, Figures};
 use starlings_study::field::component_of;
 
 use crate::ReportError;

@@ -3,7 +3,7 @@
 //! Next file to read: `candidates.rs`.
 
 use serde::Serialize;
-use starlings_explain::figures::Figures;
+use starlings_explain::Figures;
 use starlings_explain::locate::{ChannelGap, Correlated, Located, RegionMap, UnknownInput};
 use starlings_explain::result::Explanation;
 

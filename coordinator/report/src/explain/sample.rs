@@ -2,13 +2,12 @@
 
 mod figures;
 
-use starlings_explain::figures::Figures;
-use starlings_explain::held_out::HeldOut;
-use starlings_explain::reach::NotTried;
+use starlings_explain::locate::MisfitPlace;
 use starlings_explain::result::{
-    Coefficient, Experiment, Explanation, FalseAlarm, GapRow, NamedEffect, ParameterShift, Place, Rejected,
-    Remaining, Screened, Verdict,
+    Coefficient, Experiment, Explanation, FalseAlarm, GapRow, NamedEffect, ParameterShift, Rejected,
+    Remaining, Screened,
 };
+use starlings_explain::{Figures, HeldOut, NotTried, Verdict};
 
 use super::StudyAbout;
 
@@ -98,7 +97,7 @@ fn explanation(verdict: Verdict, records: usize) -> Explanation {
         seed: 1,
         verdict,
         headline: "The characteristic impedance is missing: 0.0943 mmHg s/mL.".into(),
-        places: vec![Place {
+        places: vec![MisfitPlace {
             channel: "pressure".into(),
             unit: "mmHg".into(),
             from: 0.0,

@@ -1,7 +1,7 @@
 //! Tests of the whole page.
 
-use starlings_explain::figures::{Curve, Figures};
-use starlings_explain::result::{Explanation, Nulls, Verdict};
+use starlings_explain::result::{Explanation, Nulls};
+use starlings_explain::{Curve, Figures, Verdict};
 
 use super::sample::{about, found};
 use super::{StudyAbout, explain_page};

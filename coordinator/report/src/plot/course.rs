@@ -2,7 +2,7 @@
 //!
 //! What an effect is worth is seen where the fit never looked. Next file to read: `region.rs`.
 
-use starlings_explain::figures::Curve;
+use starlings_explain::Curve;
 
 use super::super::ReportError;
 use super::axis::Axis;

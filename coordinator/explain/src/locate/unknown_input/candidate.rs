@@ -1,4 +1,4 @@
-//! Which equations can take an unknown input, and how strongly the data feel a constant one.
+//! Which equations can take an unknown input, and how much a constant one changes the outputs.
 //!
 //! Next file to read: [`super::walk`].
 
@@ -9,10 +9,9 @@ use starlings_models::effect::{Addition, EffectParameter};
 use starlings_models::{EffectDef, Job, Prediction, Quantity, SOLVER, Setup, Spec, Window};
 use starlings_study::Study;
 
-use crate::ExplainError;
-use crate::memory::told;
+use crate::error::{ExplainError, fleet_failure};
 
-/// Change of the outputs, in noise sd, below which an input is not felt.
+/// Change of the outputs, in noise sd, below which an input counts as without influence.
 const FELT: f64 = 1e-6;
 
 /// A state whose rate takes an unknown input.
@@ -21,7 +20,7 @@ pub(super) struct Candidate {
     pub(super) state: String,
     /// Its unit label.
     pub(super) unit: String,
-    /// Its place in the state vector.
+    /// Its position in the state vector.
     pub(super) at: usize,
     /// The model with the input, as the fleet knows it; the input is the last parameter.
     pub(super) setup: SetupId,
@@ -39,11 +38,11 @@ struct Trial<'a> {
     at: usize,
     setup: SetupId,
     without: Prediction,
-    /// A constant input so small that the answer is the slope of a model that may be far from linear.
+    /// A constant input so small that the response of a nonlinear model is linear in it.
     input: f64,
 }
 
-/// The scalar states whose input the channels feel, the most strongly felt first: two runs of the record each, in two batches.
+/// The scalar states whose input changes the channels, the largest change first: two runs of the record each, in two batches.
 /// None of a solver, whose equations are not open to an input in every rate.
 pub(super) fn candidates(
     study: &Study,
@@ -67,7 +66,7 @@ pub(super) fn candidates(
             (setup, Job { particle, record, window, theta, state: None })
         };
         let jobs = inputs.into_iter().enumerate().map(job).collect();
-        let outcomes = fleet.run_mixed(jobs).map_err(|error| told(study, error))?;
+        let outcomes = fleet.run_mixed(jobs).map_err(|error| fleet_failure(study, error))?;
         Ok(predictions(study, record, &window, outcomes))
     };
     let equations = equations(study, fleet)?;

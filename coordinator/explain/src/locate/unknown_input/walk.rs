@@ -15,8 +15,7 @@ use starlings_models::{Job, Prediction, Window};
 use starlings_study::Study;
 
 use super::candidate::{Candidate, predictions};
-use crate::ExplainError;
-use crate::memory::told;
+use crate::error::{ExplainError, fleet_failure};
 
 /// Coordinates at most.
 pub(super) const DIRECTIONS: usize = 4;
@@ -123,7 +122,7 @@ impl Walk<'_> {
         };
         let window = Arc::new(window);
         let outcomes = fleet.run(self.candidate.setup, vec![self.job(&window, None, 0.0)]);
-        let outcomes = outcomes.map_err(|error| told(self.study, error))?;
+        let outcomes = outcomes.map_err(|error| fleet_failure(self.study, error))?;
         let prediction = predictions(self.study, self.record, &window, outcomes).pop().flatten();
         Ok(prediction.map(|p| p.state))
     }
@@ -164,7 +163,8 @@ impl Walk<'_> {
         for (index, job) in jobs.iter_mut().enumerate() {
             job.particle = index as u32;
         }
-        let outcomes = fleet.run(self.candidate.setup, jobs).map_err(|error| told(self.study, error))?;
+        let outcomes =
+            fleet.run(self.candidate.setup, jobs).map_err(|error| fleet_failure(self.study, error))?;
         let mut answers = predictions(self.study, self.record, window, outcomes).into_iter();
         let mut of_walk = |z: &DMatrix<f64>| {
             let of_walk: Vec<_> = answers.by_ref().take(z.ncols()).collect();

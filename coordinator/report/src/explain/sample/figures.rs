@@ -1,7 +1,7 @@
 //! What the figures of that page show.
 
-use starlings_explain::figures::{Curve, Figures};
 use starlings_explain::locate::{ChannelGap, Correlated, Located, RegionMap, ResidualSpectrum, UnknownInput};
+use starlings_explain::{Curve, Figures};
 
 fn flow(t: f64) -> f64 {
     (90.0 * (2.0 * std::f64::consts::PI * t / 0.52).sin()).max(0.0)

@@ -1,0 +1,74 @@
+//! The diagnosis of one set of recordings, measured or simulated: the fit of the model as it is, the search, the verdict.
+//!
+//! Next files to read: [`crate::refit::search`], [`crate::judge::verdict`].
+
+use starlings_estimators::End;
+use starlings_study::Study;
+
+use crate::error::ExplainError;
+use crate::fit::candidate::Candidate;
+use crate::fit::drive::drive;
+use crate::fit::fitted_variant::FittedVariant;
+use crate::judge::search_result::SearchResult;
+use crate::judge::verdict::{Decision, decide};
+use crate::locate::Track;
+use crate::options::Options;
+use crate::refit::search::search;
+use crate::run_cache::{Point, RunCache};
+use crate::screen::residual_timing::{change_points, periods};
+use crate::screen::resolve::resolved_candidates;
+use crate::tell::words;
+
+/// A search with its verdict.
+pub(super) struct Diagnosis<'a, 'c> {
+    pub(super) found: SearchResult<'c>,
+    pub(super) candidates: &'a [Candidate],
+    pub(super) decision: Decision,
+    pub(super) tracks: &'a [Track],
+}
+
+/// Fits the model as it is, searches and decides, and returns what `then` makes of the diagnosis.
+///
+/// # Errors
+/// When the fleet or the store fails, there is nothing to try, the model as it is cannot be fitted, or the budget ends before
+/// it is.
+pub(super) fn diagnose<R>(
+    cache: &mut RunCache<'_>,
+    study: &Study,
+    options: &Options,
+    then: impl FnOnce(&mut RunCache<'_>, Diagnosis<'_, '_>) -> Result<R, ExplainError>,
+) -> Result<R, ExplainError> {
+    let base = fit_as_it_is(cache, study, options)?;
+    cache.stage("locate", "where simulation and data disagree");
+    let tracks = cache.tracks(&Point { study, theta: base.theta() })?;
+    let (periods, change_points) =
+        (periods(&cache.rows, &base.predicted), change_points(&cache.rows, &base.predicted));
+    let candidates = resolved_candidates(study, &tracks, &periods, &change_points, options)?;
+    let found = search(cache, base, &candidates, &tracks, options)?;
+    cache.stage("verdict", "");
+    let decision = decide(cache, &found, &candidates)?;
+    then(cache, Diagnosis { found, candidates: &candidates, decision, tracks: &tracks })
+}
+
+/// The fit of the model as it is, on the training rows.
+fn fit_as_it_is<'c>(
+    cache: &mut RunCache<'_>,
+    study: &'c Study,
+    options: &Options,
+) -> Result<FittedVariant<'c>, ExplainError> {
+    cache.stage("fit", "the model as it is");
+    let mut fits = [FittedVariant::of_study(study)?];
+    if !drive(cache, &mut fits)? {
+        return Err(cache.beyond_budget(study.parameters.len()));
+    }
+    let [mut fit] = fits;
+    if fit.end() == Some(End::NoStart) {
+        let reason = "no run succeeds at the prior median or next to it".to_owned();
+        return Err(ExplainError::Baseline(reason));
+    }
+    if !fit.has_converged() && !options.force {
+        return Err(ExplainError::NotConverged { iterations: fit.trials(), stand: words::stand(&fit) });
+    }
+    fit.measure_own_values(cache)?;
+    Ok(fit)
+}

@@ -1,0 +1,253 @@
+//! How the training residuals of a fit compare with the stated noise, in figures and in words.
+//!
+//! Every sentence of an explanation about noise is made here or in [`super::held_out`], from the figures that it stands beside.
+//! Next file to read: [`crate::tell::words`].
+
+use starlings_estimators::nis_band;
+
+use super::effective_noise::{inflation, whiteness};
+use crate::fit::fitted_variant::FittedVariant;
+use crate::number::{three, times};
+use crate::run_cache::RunCache;
+
+/// Residuals are not white if the probability of as large an autocorrelation in white ones is below this.
+pub(crate) const NOT_WHITE: f64 = 1e-3;
+/// Mean squares over the noise variance that count as the stated noise; a wider interval where chance allows it.
+const AS_STATED: [f64; 2] = [0.5, 1.5];
+/// Probability of the band in which chance leaves a mean square.
+const LEVEL: f64 = 0.999;
+/// Share of a signal's spread below which residuals are attributed to the integration or to rounding.
+const NUMERICAL: f64 = 1e-6;
+
+/// The training residuals of a fit against the stated noise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Adequacy {
+    /// Number of fitted values.
+    pub n: usize,
+    /// Root mean square over the stated noise.
+    pub rmse_over_noise: f64,
+    /// Probability of residuals at least as autocorrelated if they were white; `None` where no series is long enough to tell.
+    pub whiteness: Option<f64>,
+    /// Factor on the variance of a smooth signal's coefficient by the size and correlation of the residuals.
+    pub inflation: f64,
+    /// Root mean square over the spread of the recorded values; infinite where these do not vary.
+    pub over_spread: f64,
+}
+
+/// How the residuals compare with the stated noise.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Nature {
+    /// Nothing is fitted.
+    Nothing,
+    /// Of the size of the noise, and not shown to be correlated.
+    Noise,
+    /// Correlated in time.
+    Correlated,
+    /// Larger than the stated noise, and not shown to be correlated.
+    Larger,
+    /// Smaller than the stated noise, and not shown to be correlated.
+    Smaller,
+    /// Correlated in time, but smaller than what the stated noise would hide.
+    Hidden,
+}
+
+impl Adequacy {
+    /// The figures of a fit.
+    pub(crate) fn of(cache: &RunCache<'_>, fit: &FittedVariant<'_>) -> Self {
+        let (rows, residual) = (&cache.rows, fit.residual());
+        let n = rows.train.len();
+        let observed: Vec<(f64, f64)> = rows.stretches().into_iter().fold(Vec::new(), |mut all, stretch| {
+            let of = &rows.rows[stretch];
+            let mean = of.iter().map(|row| row.observed).sum::<f64>() / of.len() as f64;
+            all.extend(of.iter().map(|row| ((row.observed - mean) / row.noise, row.noise)));
+            all
+        });
+        let spread = rows.train.iter().map(|i| observed[*i].0.powi(2)).sum::<f64>();
+        let squares = residual.norm_squared();
+        Self {
+            n,
+            rmse_over_noise: (squares / n.max(1) as f64).sqrt(),
+            whiteness: whiteness(rows, residual),
+            inflation: inflation(rows, residual),
+            over_spread: if spread > 0.0 { (squares / spread).sqrt() } else { f64::INFINITY },
+        }
+    }
+
+    /// How the residuals compare with the stated noise. Larger or smaller than it are residuals beyond both what chance leaves
+    /// and [`AS_STATED`].
+    pub(crate) fn nature(&self) -> Nature {
+        if self.n == 0 {
+            return Nature::Nothing;
+        }
+        let square = self.rmse_over_noise.powi(2);
+        if self.whiteness.is_some_and(|p| p < NOT_WHITE) {
+            let hidden = self.inflation <= 1.0 && square < AS_STATED[0];
+            return if hidden { Nature::Hidden } else { Nature::Correlated };
+        }
+        let (lo, hi) = nis_band(self.n, LEVEL);
+        if square > hi.max(AS_STATED[1]) {
+            Nature::Larger
+        } else if square < lo.min(AS_STATED[0]) {
+            Nature::Smaller
+        } else {
+            Nature::Noise
+        }
+    }
+
+    /// Whether the residuals are white, or their correlation is hidden by the stated noise.
+    pub(crate) fn could_be_white(&self) -> bool {
+        self.nature() != Nature::Correlated
+    }
+
+    /// Whether the recorded values of every fitted channel of every record are constant.
+    pub(crate) fn is_at_rest(&self) -> bool {
+        self.n > 1 && self.over_spread.is_infinite()
+    }
+
+    /// Whether the residuals show that something is missing: they are correlated or larger than the stated noise.
+    pub(crate) fn is_gap(&self) -> bool {
+        matches!(self.nature(), Nature::Correlated | Nature::Larger)
+    }
+
+    /// The size of the noise that the residuals are compared with: the stated one, or their own where it is larger and white.
+    pub(crate) fn level(&self) -> f64 {
+        if self.could_be_white() { self.rmse_over_noise.max(1.0) } else { 1.0 }
+    }
+
+    /// The comparison as a sentence without capital and full stop.
+    pub(crate) fn says(&self) -> String {
+        let size = times(self.rmse_over_noise);
+        let at_rest = if self.is_at_rest() {
+            "; the recorded values do not vary, and data at rest tell little"
+        } else {
+            ""
+        };
+        format!("{}{at_rest}", self.compared(&size))
+    }
+
+    /// How the residuals compare with the stated noise, in words.
+    fn compared(&self, size: &str) -> String {
+        if self.is_numerical() {
+            return format!(
+                "the residuals are {size} the stated noise and only {} of the recorded signal's spread: so small a difference is \
+                 the error of integration or of the digits of the recording, and the stated noise is smaller than that",
+                three(self.over_spread)
+            );
+        }
+        let untested = self.whiteness.is_none();
+        let white = if untested {
+            "too few in a row, or too little varied, to tell whether they are correlated"
+        } else {
+            "with no sign of correlation in time"
+        };
+        match self.nature() {
+            Nature::Nothing => "no value is fitted".to_owned(),
+            Nature::Noise if untested => format!("the residuals are {size} the stated noise, {white}"),
+            Nature::Noise => {
+                format!("the residuals are {size} the stated noise, {white}: they could be noise")
+            }
+            Nature::Larger => format!(
+                "the residuals are {size} the stated noise, {white}: the noise is larger than stated, or what is missing changes \
+                 from sample to sample"
+            ),
+            Nature::Smaller => format!(
+                "the residuals are {size} the stated noise, {white}: the noise is smaller than stated, and what lies below the \
+                 stated one cannot show"
+            ),
+            Nature::Hidden => format!(
+                "the residuals are {size} the stated noise and correlated in time, but the stated noise alone would hide as much"
+            ),
+            Nature::Correlated => format!("the residuals are {size} the stated noise and correlated in time"),
+        }
+    }
+
+    /// Whether the residuals are no larger than what the simulation itself or the digits of a file leave.
+    pub(crate) fn is_numerical(&self) -> bool {
+        self.over_spread < NUMERICAL && self.rmse_over_noise > 1.0 && self.is_gap()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn figures() -> Vec<Adequacy> {
+        let mut all = Vec::new();
+        for n in [0, 1, 2, 3, 19, 20, 60, 1000] {
+            for rmse_over_noise in [0.0, 1e-9, 0.008, 0.3, 0.69, 0.8, 1.0, 1.2, 1.24, 2.5, 4.6, 547.0, 1e12] {
+                // Fewer than twenty values are not tested.
+                for whiteness in [None, Some(0.0), Some(9e-4), Some(1.1e-3), Some(0.5), Some(1.0)]
+                    .into_iter()
+                    .filter(|p| n >= 20 || p.is_none())
+                {
+                    for inflation in [1.0, 3.3, 200.0] {
+                        for over_spread in [1e-9, 1e-3, 0.5, f64::INFINITY] {
+                            all.push(Adequacy { n, rmse_over_noise, whiteness, inflation, over_spread });
+                        }
+                    }
+                }
+            }
+        }
+        all
+    }
+
+    #[test]
+    fn no_sentence_contradicts_the_figures_that_it_stands_beside() {
+        for a in figures() {
+            let text = a.says();
+            let (tested, square) = (a.whiteness.is_some(), a.rmse_over_noise.powi(2));
+            if text.contains("could be noise") {
+                let (lo, hi) = nis_band(a.n, LEVEL);
+                assert!(tested && square >= lo.min(0.5) && square <= hi.max(1.5), "{text}: {a:?}");
+            }
+            if text.contains("correlated in time") && !text.contains("whether they are") {
+                assert!(a.whiteness.is_some_and(|p| p < NOT_WHITE), "{text}: {a:?}");
+            }
+            assert_eq!(
+                text.contains("no sign of correlation"),
+                !a.is_numerical() && a.n > 0 && tested && a.whiteness >= Some(NOT_WHITE),
+                "{text}: {a:?}"
+            );
+            if text.contains("the noise is larger than stated") {
+                assert!(square > 1.5, "{text}: {a:?}");
+            }
+            if text.contains("the noise is smaller than stated") {
+                assert!(square < 0.5, "{text}: {a:?}");
+            }
+            if text.contains("error of integration") {
+                assert!(a.over_spread < 1e-6 && square > 1.0, "{text}: {a:?}");
+            }
+            assert_eq!(text.contains("do not vary"), a.n > 1 && a.over_spread.is_infinite(), "{text}: {a:?}");
+            assert_eq!(
+                text.contains(&format!("{} the stated noise", times(a.rmse_over_noise))),
+                a.n > 0,
+                "{text}: {a:?}"
+            );
+            assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
+        }
+    }
+
+    #[test]
+    fn one_sample_is_not_called_correlated_and_two_and_a_half_times_the_noise_not_noise() {
+        let one = Adequacy {
+            n: 1,
+            rmse_over_noise: 0.4,
+            whiteness: None,
+            inflation: 1.0,
+            over_spread: f64::INFINITY,
+        };
+        assert_eq!(one.nature(), Nature::Noise);
+        assert!(one.says().contains("too few in a row"), "{}", one.says());
+        let far =
+            Adequacy { n: 60, rmse_over_noise: 2.5, whiteness: Some(0.6), inflation: 6.2, over_spread: 0.1 };
+        assert_eq!(far.nature(), Nature::Larger);
+        assert_eq!(
+            far.says(),
+            "the residuals are 2.50 times the stated noise, with no sign of correlation in time: the noise is larger than stated, or \
+             what is missing changes from sample to sample"
+        );
+        let hidden = Adequacy { rmse_over_noise: 0.008, whiteness: Some(0.0), inflation: 1.0, ..far };
+        assert_eq!(hidden.nature(), Nature::Hidden);
+        assert!(!hidden.is_gap() && hidden.says().contains("would hide as much"), "{}", hidden.says());
+    }
+}

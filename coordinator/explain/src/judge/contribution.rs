@@ -1,0 +1,62 @@
+//! Whether every effect of a variant contributes its share to the narrowing of the gap.
+//!
+//! A further effect that contributes less is not named. It shows that the form of its partner is not quite right, or that a
+//! discrepancy of another kind remains. Next file to read: [`super::verdict`].
+
+use super::misfit::Misfit;
+use super::search_result::SearchResult;
+
+/// Share of the fall of χ² that a further effect must contribute.
+const SECOND_SHARE: f64 = 0.1;
+/// Effective variance of the residuals above which they count as a discrepancy of another kind, not as a wrong form of the
+/// effect.
+pub(crate) const DISCREPANT: f64 = 20.0;
+
+/// What the check of the contributions leaves.
+pub(crate) struct ContributionCheck {
+    /// The best variant each of whose effects contributes its share, on the training data and on the held-out span.
+    pub(crate) best: usize,
+    /// The variant whose form is checked; it may have a further effect that accounts for a discrepancy of another kind.
+    pub(crate) checked: usize,
+    /// Why nothing may be named, where a further effect contributes too little and so shows a wrong form of its partner.
+    pub(crate) because: Option<String>,
+}
+
+/// Leaves out a further effect that does not contribute its share. `passing` are the positions of the variants that pass the
+/// gates.
+pub(crate) fn check_contributions(found: &SearchResult<'_>, passing: &[usize]) -> ContributionCheck {
+    let first = passing[0];
+    let whole = &found.judged[first];
+    let all = ContributionCheck { best: first, checked: first, because: None };
+    if whole.fit.variant.effects.len() < 2 {
+        return all;
+    }
+    let alone = passing.iter().copied().find(|i| {
+        let judged = &found.judged[*i];
+        judged.fit.variant.effects.len() + 1 == whole.fit.variant.effects.len()
+            && judged.names().iter().all(|name| whole.names().contains(name))
+    });
+    let Some(alone) = alone else { return all };
+    let part = &found.judged[alone];
+    let share = |of: fn(&Misfit) -> f64| {
+        let whole_fall = of(&found.before) - of(&whole.misfit);
+        (of(&part.misfit) - of(&whole.misfit)) / whole_fall.max(f64::MIN_POSITIVE)
+    };
+    let train = share(|m| m.train);
+    let held_out = (whole.misfit.n_held_out > 0).then(|| share(|m| m.held_out));
+    if train >= SECOND_SHARE && held_out.is_none_or(|h| h >= SECOND_SHARE) {
+        return all;
+    }
+    // A contribution that does not recur in the held-out span does not come from the form of the effect.
+    if held_out.is_some_and(|h| h < 0.3 * train) || found.judged[alone].inflation > DISCREPANT {
+        return ContributionCheck { best: alone, ..all };
+    }
+    let because = format!(
+        "`{}` leaves {:.1} % of what `{}` takes away, too much for chance and too little for an effect of its own: its form is \
+         not quite right",
+        part.fit.variant.name(),
+        100.0 * train,
+        whole.fit.variant.name()
+    );
+    ContributionCheck { best: alone, checked: alone, because: Some(because) }
+}

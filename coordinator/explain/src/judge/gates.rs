@@ -1,0 +1,286 @@
+//! The gates: the tests that a refitted variant must pass before it may be named.
+//!
+//! Sign and range of its coefficients, the held-out span, the held-out channels, and evidence in units of the effective noise
+//! against what a search over the whole library finds by chance. A lower error alone is no reason to name an effect. Next
+//! file to read: [`super::search_result`].
+
+use starlings_estimators::End;
+
+use super::adequacy::Adequacy;
+use super::form::Leftover;
+use super::held_out::{HeldOut, held_out};
+use super::misfit::Misfit;
+use super::uncertainty::Uncertainty;
+use crate::fit::fitted_variant::FittedVariant;
+use crate::fit::model_variant::AddedEffect;
+use crate::number::{spaced, three, times};
+use crate::rows::{Row, Usage, unit};
+use crate::run_cache::RunCache;
+
+/// Factor by which a held-out error may grow without counting as worse.
+const WORSE: f64 = 1.02;
+/// Distance from the end of a range, as a share of its width, within which an estimate counts as at the end.
+const EDGE: f64 = 0.005;
+
+/// Why a variant may not be named.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Refusal {
+    /// The gate.
+    pub gate: &'static str,
+    /// Why, in words with numbers.
+    pub reason: String,
+}
+
+/// A refitted variant with the figures for and against it.
+#[derive(Clone, Debug)]
+pub(crate) struct JudgedFit<'c> {
+    /// The fit.
+    pub fit: FittedVariant<'c>,
+    /// Its misfit.
+    pub misfit: Misfit,
+    /// Factor on the variance of its residuals.
+    pub inflation: f64,
+    /// Its training residuals against the stated noise.
+    pub adequacy: Adequacy,
+    /// Its errors on held-out data, by record and channel.
+    pub held_out: Vec<HeldOut>,
+    /// Fall of χ² against the model as it is, training rows, less the price of parameters inside its terms and of further
+    /// effects.
+    pub gain: f64,
+    /// Fall of χ² on the held-out span.
+    pub gain_held_out: f64,
+    /// Part of the χ² of the held-out span that a fit of all data would take away, to first order: what the uncertainty of the
+    /// estimate explains.
+    pub allowance: f64,
+    /// Fall of χ² on the channels that are never fitted.
+    pub gain_channels: f64,
+    /// Share of the excess χ² that it takes away, training rows.
+    pub share: f64,
+    /// The same on the held-out span; `None` without one that has an excess.
+    pub share_held_out: Option<f64>,
+    /// Share of that excess which neither the variant, nor the uncertainty of its estimate, nor noise (two of its standard
+    /// deviations) accounts for.
+    pub unaccounted: f64,
+    /// Why it may not be named.
+    pub refusal: Option<Refusal>,
+    /// The fall of χ² that candidates and modulated forms would still bring, where the second pass measured it.
+    pub leftover: Option<Leftover>,
+}
+
+impl JudgedFit<'_> {
+    /// Names of its effects.
+    pub(crate) fn names(&self) -> Vec<String> {
+        self.fit.variant.effects.iter().map(|m| m.candidate.name().to_owned()).collect()
+    }
+
+    /// Fall of χ² in units of its own effective noise.
+    pub(crate) fn evidence(&self) -> f64 {
+        self.gain / self.inflation
+    }
+
+    /// Fall of χ² on the training rows, the held-out span and the held-out channels, for ranking. The part of the held-out χ²
+    /// that the uncertainty of the estimate explains does not count against it.
+    pub(crate) fn rank(&self) -> f64 {
+        self.gain + self.gain_held_out + self.allowance + self.gain_channels
+    }
+}
+
+/// Judges a variant against the model as it is. `threshold` is the gain that a search reaches by chance.
+pub(crate) fn judge<'c>(
+    cache: &RunCache<'_>,
+    base: &FittedVariant<'_>,
+    before: Misfit,
+    fit: FittedVariant<'c>,
+    threshold: f64,
+) -> JudgedFit<'c> {
+    let misfit = Misfit::of(cache, &fit);
+    let m = cache.rows.train.len() as f64;
+    let n_inner = fit.variant.n_param().saturating_sub(fit.variant.n_own + fit.variant.effects.len());
+    let adequacy = Adequacy::of(cache, &fit);
+    let inflation = adequacy.inflation;
+    // The price of a parameter inside a term is ln n (Schwarz 1978), with n the number of independent values.
+    let price = n_inner as f64 * (m / inflation).max(3.0).ln();
+    // The price of a further effect is the gain that a search reaches by chance.
+    let further = fit.variant.effects.len().saturating_sub(1) as f64 * threshold * inflation;
+    let gain = before.train - misfit.train - price - further;
+    let gain_held_out = before.held_out - misfit.held_out;
+    let share = ratio(before.train - misfit.train, before.train - m);
+    let n_held = misfit.n_held_out as f64;
+    let has_excess = before.held_out > n_held + 3.0 * (2.0 * n_held).sqrt();
+    let share_held_out =
+        (misfit.n_held_out > 0 && has_excess).then(|| ratio(gain_held_out, before.held_out - n_held));
+    let rows = &cache.rows.rows;
+    let held: Vec<usize> = (0..rows.len()).filter(|i| rows[*i].usage == Usage::HeldOut).collect();
+    let uncertainty = if held.is_empty() { None } else { Uncertainty::of(cache, &fit) };
+    let allowance = uncertainty.map_or(0.0, |of| of.allowance(&held));
+    let held_out = held_out(cache, base, &fit);
+    let beyond = misfit.held_out - allowance - n_held - 2.0 * (2.0 * n_held).sqrt();
+    let unaccounted = if has_excess { ratio(beyond.max(0.0), before.held_out - n_held) } else { 0.0 };
+    let mut judged = JudgedFit {
+        fit,
+        misfit,
+        inflation,
+        adequacy,
+        held_out,
+        gain,
+        gain_held_out,
+        allowance,
+        gain_channels: before.channels - misfit.channels,
+        share,
+        share_held_out,
+        unaccounted,
+        refusal: None,
+        leftover: None,
+    };
+    judged.refusal = refusal(cache, base, before, &judged, threshold);
+    judged
+}
+
+fn ratio(part: f64, whole: f64) -> f64 {
+    if whole > 0.0 { (part / whole).clamp(-1.0, 1.0) } else { 0.0 }
+}
+
+/// The first gate that a variant does not pass.
+fn refusal(
+    cache: &RunCache<'_>,
+    base: &FittedVariant<'_>,
+    before: Misfit,
+    judged: &JudgedFit<'_>,
+    threshold: f64,
+) -> Option<Refusal> {
+    if matches!(judged.fit.end(), Some(End::NoStart)) {
+        return Some(Refusal { gate: "failed", reason: "the model fails with it".to_owned() });
+    }
+    held_out_channel(cache, base, &judged.fit)
+        .or_else(|| held_out_span(before, judged))
+        .or_else(|| at_edge(&judged.fit))
+        .or_else(|| {
+            (judged.evidence() <= threshold)
+                .then(|| Refusal { gate: "evidence", reason: too_weak(judged, threshold) })
+        })
+}
+
+/// That the fall of χ² is not more than chance reaches, in words.
+fn too_weak(judged: &JudgedFit<'_>, threshold: f64) -> String {
+    if judged.gain <= 0.0 {
+        return "χ² less the price of its parameters does not fall".to_owned();
+    }
+    format!(
+        "χ² falls by {:.1}, which in units of the effective noise ({:.1}) is {:.1}; a search like this one reaches {threshold:.1} \
+         by chance",
+        judged.gain,
+        judged.inflation,
+        judged.evidence()
+    )
+}
+
+/// The refusal for a coefficient at the end of its range.
+fn at_edge(fit: &FittedVariant<'_>) -> Option<Refusal> {
+    let variant = &fit.variant;
+    let theta = fit.theta();
+    for (m, effect) in variant.effects.iter().enumerate() {
+        for (k, parameter) in effect.candidate.def.parameters.iter().enumerate() {
+            let j = variant.first_entry_of(m) + k;
+            let value = variant.study.theta[j].transform.to_physical(theta[j]);
+            let Some(end) = end_at(effect, k, value) else { continue };
+            let gate = if k == 0 && (end.abs() < f64::MIN_POSITIVE) { "sign" } else { "range" };
+            let unit = spaced(&parameter.unit);
+            return Some(Refusal {
+                gate,
+                reason: format!(
+                    "the best value of {} lies at the end of what physics allows ({}{unit}): the shape fits, the physics does \
+                     not",
+                    parameter.name,
+                    three(end)
+                ),
+            });
+        }
+    }
+    None
+}
+
+/// The end of the range of an effect's parameter `k` at which a value lies. Where the range is open at one side, the unit of the
+/// amplitude takes the place of its width, or the value at which an inner parameter was screened.
+fn end_at(effect: &AddedEffect<'_>, k: usize, value: f64) -> Option<f64> {
+    let candidate = effect.candidate;
+    let [lo, hi] = candidate.def.parameters[k].range;
+    let width = if lo.is_finite() && hi.is_finite() {
+        hi - lo
+    } else if k == 0 {
+        effect.unit
+    } else {
+        candidate.points[0][k - 1].abs()
+    };
+    [lo, hi].into_iter().find(|end| end.is_finite() && (value - end).abs() <= EDGE * width)
+}
+
+/// The refusal for a held-out span that gets worse.
+fn held_out_span(before: Misfit, judged: &JudgedFit<'_>) -> Option<Refusal> {
+    let after = judged.misfit;
+    let n = after.n_held_out as f64;
+    let size = |chi2: f64| times((chi2 / n).sqrt());
+    let slack = 3.0 * (2.0 * n).sqrt().min(before.held_out);
+    let worse = after.n_held_out > 0
+        && after.held_out > before.held_out * WORSE * WORSE
+        && after.held_out > before.held_out + slack.min(n);
+    worse.then(|| Refusal {
+        gate: "held-out span",
+        reason: format!(
+            "the error of the held-out span grows from {} to {} the noise",
+            size(before.held_out),
+            size(after.held_out)
+        ),
+    })
+}
+
+/// The refusal for a held-out channel that gets worse.
+fn held_out_channel(
+    cache: &RunCache<'_>,
+    base: &FittedVariant<'_>,
+    fit: &FittedVariant<'_>,
+) -> Option<Refusal> {
+    let rows = &cache.rows;
+    for (output, name) in cache.study.setup.outputs.iter().enumerate() {
+        let of = |row: &Row| row.output == output && row.usage == Usage::HeldOutChannel;
+        let Some(row) = rows.rows.iter().find(|row| of(row)) else { continue };
+        let (before, after) = (rows.rmse(&base.predicted, of), rows.rmse(&fit.predicted, of));
+        if after > before * WORSE {
+            return Some(Refusal {
+                gate: "held-out channel",
+                reason: format!(
+                    "the error of {name}, which is never fitted, grows from {} to {}{}",
+                    three(before),
+                    three(after),
+                    spaced(&unit(cache.study, row.record, row.channel))
+                ),
+            });
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::candidate::Candidate;
+    use starlings_models::EffectDef;
+    use starlings_models::effect::EffectParameter;
+
+    #[test]
+    fn closeness_to_the_end_of_an_open_range_is_measured_in_the_parameters_own_size() {
+        let with = |range, grid| EffectParameter { range, grid, ..EffectParameter::default() };
+        let (open, wide) = ([0.0, f64::INFINITY], [0.0, 10.0]);
+        let parameters = vec![with(open, vec![]), with([2.0, f64::INFINITY], vec![3.0]), with(wide, vec![])];
+        let candidate = Candidate::new(EffectDef { parameters, ..EffectDef::default() });
+        // The amplitude's unit is not that of the threshold inside the term: thousands against ones, or thousandths.
+        for unit in [4000.0, 4e-3] {
+            let effect = AddedEffect { candidate: &candidate, index: 0, unit };
+            assert_eq!(end_at(&effect, 0, 0.004 * unit), Some(0.0));
+            assert_eq!(end_at(&effect, 0, 0.006 * unit), None);
+            assert_eq!(end_at(&effect, 1, 2.6), None, "a fifth of its size away, unit {unit}");
+            assert_eq!(end_at(&effect, 1, 2.01), Some(2.0), "a three hundredth of it away, unit {unit}");
+            assert_eq!(end_at(&effect, 2, 9.96), Some(10.0));
+            assert_eq!(end_at(&effect, 2, 9.9), None);
+        }
+    }
+}

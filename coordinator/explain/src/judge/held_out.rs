@@ -1,0 +1,193 @@
+//! The errors of a variant on data that no fit has seen, one channel of one record at a time.
+//!
+//! Held-out data *fail* where their error is larger than noise, chance and the uncertainty of the estimate explain together.
+//! Which of those that fail forbid to name a variant, [`forbidding`] says.
+//! Next files to read: [`super::gates`] for the gates, [`super::uncertainty`] for what the uncertainty explains.
+
+use serde::{Deserialize, Serialize};
+use starlings_estimators::nis_band;
+
+use super::adequacy::Adequacy;
+use super::uncertainty::Uncertainty;
+use crate::fit::fitted_variant::FittedVariant;
+use crate::number::times;
+use crate::rows::{Row, Usage};
+use crate::run_cache::RunCache;
+
+/// Root mean square over its expectation above which held-out data fail ...
+const FAILS: f64 = 1.25;
+/// ... and which must also lie outside the band of this probability.
+const LEVEL: f64 = 0.9998;
+/// What the uncertainty of the estimate explains is known to first order only: a rest below this share of it is no failure.
+const FIRST_ORDER: f64 = 0.05;
+/// Where the training residuals are no noise either, a variant must take away this share of the excess χ² of every held-out
+/// channel of every record that fails ...
+const SHARE_OF_EACH: f64 = 0.25;
+/// ... and leave no more than this root mean square over the noise beyond the uncertainty of the estimate.
+const FAR: f64 = 2.5;
+/// Channels that a sentence names at most.
+const NAMED: usize = 3;
+
+/// One channel of one record in data that no fit has seen. Sizes are root mean squares over the stated noise.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HeldOut {
+    /// Record name.
+    pub record: String,
+    /// Output name.
+    pub channel: String,
+    /// `held-out` (span or record) or `held-out-channel`.
+    #[serde(rename = "use")]
+    pub usage: String,
+    /// Number of values.
+    pub n: usize,
+    /// Error of the model as it is.
+    pub before: f64,
+    /// Error with the effects that were named or came nearest; that of the model as it is where there are none.
+    pub after: f64,
+    /// Part of the latter that the uncertainty of the estimate does not explain; one is expected of noise.
+    pub beyond: f64,
+    /// Whether that is more than noise explains.
+    pub fails: bool,
+    /// Share of the excess χ² that went away, with what the uncertainty of the estimate explains; 0 where there was no excess.
+    pub mended: f64,
+}
+
+impl HeldOut {
+    /// Channel and errors in words: `product (never fitted) at 4.60 times its noise, 4.21 times beyond the uncertainty of
+    /// the estimate`.
+    pub fn says(&self, several_records: bool) -> String {
+        let what = if self.usage == Usage::HeldOutChannel.word() { "never fitted" } else { "held out" };
+        let of = if several_records { format!(", {}", self.record) } else { String::new() };
+        format!(
+            "{} ({what}{of}) at {} its noise, {} beyond the uncertainty of the estimate",
+            self.channel,
+            times(self.after),
+            times(self.beyond)
+        )
+    }
+}
+
+/// Every held-out channel of every record under a variant; `base` is the model as it is.
+pub(crate) fn held_out(
+    cache: &RunCache<'_>,
+    base: &FittedVariant<'_>,
+    fit: &FittedVariant<'_>,
+) -> Vec<HeldOut> {
+    let rows = &cache.rows;
+    if fit.predicted.len() != rows.rows.len() {
+        return Vec::new();
+    }
+    let level = Adequacy::of(cache, fit).level();
+    let (before, after) = (rows.whitened(&base.predicted), rows.whitened(&fit.predicted));
+    let uncertainty = Uncertainty::of(cache, fit);
+    let one = |at: Vec<usize>| {
+        let row: &Row = &rows.rows[at[0]];
+        let n = at.len() as f64;
+        let squares = |e: &[f64]| at.iter().map(|i| e[*i].powi(2)).sum::<f64>();
+        let (was, is) = (squares(&before), squares(&after));
+        let explained = uncertainty.as_ref().map_or(0.0, |of| of.allowance(&at));
+        let record = &cache.study.records[row.record];
+        let beyond = (is - explained).max(0.0) / (n * level * level);
+        HeldOut {
+            record: record.name.clone(),
+            channel: record.channels[row.channel].output.clone(),
+            usage: row.usage.word().to_owned(),
+            n: at.len(),
+            before: (was / n).sqrt(),
+            after: (is / n).sqrt(),
+            beyond: beyond.sqrt(),
+            fails: beyond > (FAILS * FAILS).max(nis_band(at.len(), LEVEL).1)
+                && is - explained > FIRST_ORDER * explained,
+            mended: if was > n { ((was - is + explained) / (was - n)).clamp(-1.0, 1.0) } else { 0.0 },
+        }
+    };
+    groups(&rows.rows).into_iter().map(one).collect()
+}
+
+/// Positions of the rows that no fit sees, by record, channel and use: what lies before the training span and what lies after
+/// it are one.
+fn groups(rows: &[Row]) -> Vec<Vec<usize>> {
+    let key = |i: usize| (rows[i].record, rows[i].channel, rows[i].usage);
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    for i in (0..rows.len()).filter(|i| rows[*i].usage != Usage::Train) {
+        match groups.iter_mut().find(|group| key(group[0]) == key(i)) {
+            Some(group) => group.push(i),
+            None => groups.push(vec![i]),
+        }
+    }
+    groups
+}
+
+/// The held-out data that forbid to name a variant. Where its training residuals are noise, these are all that fail, since no
+/// remaining discrepancy of the training data could be their cause; otherwise those with a large error and those that the
+/// variant improves too little.
+pub(crate) fn forbidding<'h>(adequacy: &Adequacy, of: &'h [HeldOut]) -> Vec<&'h HeldOut> {
+    let strict = adequacy.could_be_white();
+    of.iter().filter(|h| h.fails && (strict || h.mended < SHARE_OF_EACH || h.beyond > FAR)).collect()
+}
+
+/// Those that fail, the worst first, in words; empty without any.
+pub(crate) fn listed(of: &[&HeldOut]) -> String {
+    let mut worst: Vec<&&HeldOut> = of.iter().collect();
+    worst.sort_by(|a, b| b.beyond.total_cmp(&a.beyond));
+    let several = of.iter().any(|h| h.record != of[0].record);
+    let mut words: Vec<String> = worst.iter().take(NAMED).map(|h| h.says(several)).collect();
+    if of.len() > NAMED {
+        words.push(format!("{} more", of.len() - NAMED));
+    }
+    words.join("; ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn channel(after: f64, beyond: f64, mended: f64) -> HeldOut {
+        HeldOut {
+            record: "batch".to_owned(),
+            channel: "product".to_owned(),
+            usage: "held-out-channel".to_owned(),
+            n: 100,
+            before: 5.0,
+            after,
+            beyond,
+            fails: beyond > FAILS,
+            mended,
+        }
+    }
+
+    fn residuals(rmse_over_noise: f64, p: f64) -> Adequacy {
+        let inflation = if p < 1e-3 { 20.0 } else { 1.0 };
+        Adequacy { n: 200, rmse_over_noise, whiteness: Some(p), inflation, over_spread: 0.1 }
+    }
+
+    #[test]
+    fn a_name_is_withheld_while_anything_held_out_fails_and_the_training_residuals_are_noise() {
+        let noise = residuals(1.0, 0.4);
+        for (after, beyond, mended) in [(4.6, 4.2, 0.2), (4.6, 4.2, 0.95), (1.6, 1.5, 0.8)] {
+            let all = [channel(after, beyond, mended)];
+            assert_eq!(forbidding(&noise, &all).len(), 1, "{all:?}");
+        }
+        assert!(forbidding(&noise, &[channel(3.0, 1.1, 0.0)]).is_empty(), "the uncertainty explains it");
+    }
+
+    #[test]
+    fn where_the_training_residuals_are_no_noise_what_falls_enough_does_not_withhold_the_name() {
+        let correlated = residuals(0.8, 1e-9);
+        assert!(forbidding(&correlated, &[channel(1.9, 1.7, 0.42)]).is_empty());
+        assert_eq!(forbidding(&correlated, &[channel(1.9, 1.7, 0.1)]).len(), 1, "nothing improved it");
+        assert_eq!(forbidding(&correlated, &[channel(4.6, 4.2, 0.9)]).len(), 1, "far from its noise");
+    }
+
+    #[test]
+    fn what_fails_is_said_with_its_figures_the_worst_first() {
+        let mut all = [channel(4.6, 4.2, 0.2), channel(9.1, 8.05, 0.0)];
+        all[1].usage = "held-out".to_owned();
+        assert_eq!(
+            listed(&all.iter().collect::<Vec<_>>()),
+            "product (held out) at 9.10 times its noise, 8.05 times beyond the uncertainty of the estimate; product (never \
+             fitted) at 4.60 times its noise, 4.20 times beyond the uncertainty of the estimate"
+        );
+        assert_eq!(listed(&[]), "");
+    }
+}

@@ -1,0 +1,151 @@
+//! Objections against naming a variant that passes every gate, and why no variant passes them, in words with numbers.
+//!
+//! Next file to read: [`super::held_out`].
+
+use super::form::{Leftover, white_share};
+use super::gates::JudgedFit;
+use super::held_out::forbidding;
+use super::search_result::SearchResult;
+use crate::run_cache::RunCache;
+use crate::screen::screening_result::ScreeningResult;
+
+/// Share of white noise in the residuals above which the rest of them must be white too ...
+const AUDIBLE: f64 = 0.12;
+/// ... if their effective variance is above this.
+const STRUCTURED: f64 = 3.0;
+/// Share of the gap of the held-out span that may stay unaccounted for where the training residuals are noise.
+const UNACCOUNTED: f64 = 0.15;
+/// Where the residuals stay correlated, an effect must take away this share of the excess of the training rows ...
+const SHARE: f64 = 0.5;
+/// ... and this share of that of the held-out span.
+const SHARE_HELD_OUT: f64 = 0.4;
+/// ... and no more than this share of the decoys may do as well.
+const DECOYS: f64 = 0.05;
+
+/// Which candidate came nearest and the gate that refused it.
+pub(crate) fn nearest_refused(found: &SearchResult<'_>) -> String {
+    let nearest = found.judged.first().and_then(|j| Some((j, j.refusal.as_ref()?)));
+    nearest.map_or_else(
+        || nothing_refitted(found),
+        |(judged, refusal)| {
+            let name = judged.fit.variant.name();
+            format!(
+                "`{name}` comes nearest and is refused by the gate `{}`: {}",
+                refusal.gate, refusal.reason
+            )
+        },
+    )
+}
+
+/// Why nothing was refitted.
+fn nothing_refitted(found: &SearchResult<'_>) -> String {
+    let of = |wanted: fn(&ScreeningResult) -> bool| found.screening.iter().all(wanted);
+    let text = if found.cut_short {
+        "the budget ended before a candidate was refitted"
+    } else if of(|h| h.failure.is_some()) {
+        "no candidate has an influence that could be measured"
+    } else if of(|h| h.failure.is_some() || h.is_absorbed()) {
+        "the model's own parameters imitate every candidate that has an influence"
+    } else if found.adequacy.is_gap() {
+        "no candidate lowers the error with a sign that physics allows"
+    } else {
+        "no candidate gains more than chance on the training data"
+    };
+    text.to_owned()
+}
+
+/// The first objection against naming a variant that passes the gates.
+pub(crate) fn objection(
+    cache: &RunCache<'_>,
+    found: &SearchResult<'_>,
+    judged: &JudgedFit<'_>,
+    left: Leftover,
+) -> Option<String> {
+    let name = judged.fit.variant.name();
+    if let Some(because) = too_little(judged, &name) {
+        return Some(because);
+    }
+    if left.is_systematic {
+        let unseen = judged.misfit.n_held_out > 0 || !judged.held_out.is_empty();
+        let held_out = if unseen {
+            format!(" and {:.0} on the held-out data", left.gain_held_out)
+        } else {
+            String::new()
+        };
+        return Some(format!(
+            "`{name}` comes nearest, but other candidates or a bent form of it would still take away {:.0} of χ²{held_out}, in \
+             units of the effective noise: its form is not right",
+            left.gain
+        ));
+    }
+    if judged.adequacy.could_be_white() && judged.unaccounted > UNACCOUNTED {
+        return Some(format!(
+            "with `{name}` the residuals of the training data could be white, yet at least {:.0} % of the gap of the held-out \
+             span stays beyond the uncertainty of the estimate: its form does not carry on",
+            100.0 * judged.unaccounted
+        ));
+    }
+    if !forbidding(&judged.adequacy, &judged.held_out).is_empty() {
+        return Some(format!("`{name}` comes nearest, but what was held out still fails with it"));
+    }
+    if judged.adequacy.could_be_white() {
+        return None;
+    }
+    correlated(cache, found, judged)
+}
+
+/// The objection that the data are too few or constant, and so cannot tell one effect from another.
+fn too_little(judged: &JudgedFit<'_>, name: &str) -> Option<String> {
+    let (n, p) = (judged.adequacy.n, judged.fit.variant.n_param());
+    if n <= p {
+        let values = if n == 1 { "value is" } else { "values are" };
+        return Some(format!(
+            "`{name}` comes nearest, but {n} {values} fitted with {p} parameters: so few cannot tell one effect from another"
+        ));
+    }
+    judged.adequacy.is_at_rest().then(|| {
+        format!(
+            "`{name}` comes nearest, but the recorded values do not vary: data at rest cannot tell one effect from another"
+        )
+    })
+}
+
+/// The objection against a variant whose training residuals are correlated.
+fn correlated(cache: &RunCache<'_>, found: &SearchResult<'_>, judged: &JudgedFit<'_>) -> Option<String> {
+    let name = judged.fit.variant.name();
+    let white = white_share(&cache.rows, judged.fit.residual());
+    if white > AUDIBLE && judged.inflation > STRUCTURED {
+        return Some(format!(
+            "{}, but white noise makes {:.0} % of what is left and so shows that the rest is none: its form is not right, or \
+             something else is missing too",
+            takes_away(&name, judged.share),
+            100.0 * white
+        ));
+    }
+    let short = |share: f64, what: &str| {
+        let taken = if share > 0.0 { format!("only {:.0} %", 100.0 * share) } else { "nothing".to_owned() };
+        format!("`{name}` takes away {taken} of the gap on the {what}, and what is left is not noise")
+    };
+    if judged.share < SHARE {
+        return Some(short(judged.share, "training data"));
+    }
+    if let Some(share) = judged.share_held_out.filter(|s| *s < SHARE_HELD_OUT) {
+        return Some(short(share, "held-out span"));
+    }
+    let decoys = found.null_distribution.decoys_above(judged.gain);
+    (decoys > DECOYS).then(|| {
+        format!(
+            "{:.0} % of the decoys take away as much as `{name}`, and what is left is not noise",
+            100.0 * decoys
+        )
+    })
+}
+
+/// How much of the gap of the training data an effect takes away, in words.
+fn takes_away(name: &str, share: f64) -> String {
+    if share >= 0.995 {
+        format!("`{name}` brings the training data to their noise or below")
+    } else {
+        format!("`{name}` takes away {:.0} % of the gap", 100.0 * share.max(0.0))
+    }
+}

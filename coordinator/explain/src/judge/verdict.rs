@@ -1,0 +1,212 @@
+//! The verdict on the variants that a search found: named, tie, unexplained or no gap.
+//!
+//! A variant is named if it passes every gate, no rival comes close, and neither candidates nor modulated forms would lower
+//! what it leaves beyond chance. Otherwise the verdict is a tie, or unexplained with the variant that came nearest. Next file
+//! to read: [`crate::tell::summary`].
+
+use starlings_estimators::effective_sample_size;
+use starlings_models::equations::{Expression, Slot};
+
+use super::contribution::{ContributionCheck, DISCREPANT, check_contributions};
+use super::gates::JudgedFit;
+use super::objections::{nearest_refused, objection};
+use super::search_result::SearchResult;
+use crate::error::ExplainError;
+use crate::fit::candidate::Candidate;
+use crate::run_cache::RunCache;
+use crate::screen::screening_result::ScreeningResult;
+use serde::{Deserialize, Serialize};
+
+/// A rival is tied within this difference in χ², in units of the effective noise.
+const MARGIN: f64 = 6.0;
+/// Correlation of two influences above which no refit can tell their candidates apart.
+const ALIKE: f64 = 0.995;
+/// A rival is tied where the difference in χ² is less than so many of its standard deviations.
+const VUONG: f64 = 1.64;
+/// Fall of χ² by a fully modulated form that the data must allow before a form counts as tested. A form modulated by half makes a
+/// quarter of it, which exceeds the 12 units of the check of the form nine times in ten: 4 (√12 + 1.28)².
+const POWER: f64 = 90.0;
+/// Posterior over prior standard deviation above which the data do not determine a parameter inside a term.
+const UNINFORMED: f64 = 0.5;
+
+/// The verdict on a misfit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// One effect, or one set of effects, explains the gap and no other does.
+    Named,
+    /// Several explain it about equally well: the data cannot tell them apart.
+    Tie,
+    /// There is a gap, and nothing in the library explains it.
+    Unexplained,
+    /// The model explains the data at their noise.
+    NoGap,
+}
+
+/// The verdict, with positions in [`SearchResult::judged`].
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Decision {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// What is named, or the simplest of the tied, or what came nearest.
+    pub best: Option<usize>,
+    /// What came first by rank, and whose form was checked; in a tie it may differ from `best`.
+    pub checked: Option<usize>,
+    /// Names of the sets of effects tied with the best.
+    pub tied: Vec<Vec<String>>,
+    /// Positions of those of the tied that were refitted.
+    pub rivals: Vec<usize>,
+    /// Why it is not named, in words.
+    pub because: String,
+}
+
+/// Decides on what a search found.
+///
+/// # Errors
+/// When the store fails.
+pub(crate) fn decide(
+    cache: &RunCache<'_>,
+    found: &SearchResult<'_>,
+    candidates: &[Candidate],
+) -> Result<Decision, ExplainError> {
+    let none = |verdict, best, because: &str| Decision {
+        verdict,
+        best,
+        checked: best,
+        tied: Vec::new(),
+        rivals: Vec::new(),
+        because: because.to_owned(),
+    };
+    let passing = found.passing();
+    if passing.is_empty() {
+        let is_gap = found.adequacy.is_gap() && !found.adequacy.is_numerical();
+        return Ok(if is_gap || found.held_out.iter().any(|h| h.fails) {
+            none(Verdict::Unexplained, None, &nearest_refused(found))
+        } else {
+            none(Verdict::NoGap, None, "")
+        });
+    }
+    let ContributionCheck { best, checked, because } = check_contributions(found, &passing);
+    let judged = &found.judged[best];
+    let leftover = found.judged[checked].leftover.unwrap_or_default();
+    let because = because.or_else(|| objection(cache, found, judged, leftover));
+    if let Some(because) = because {
+        return Ok(Decision { checked: Some(checked), ..none(Verdict::Unexplained, Some(best), &because) });
+    }
+    // Beside a discrepancy of another kind the check of the form says nothing.
+    let is_tested = judged.inflation > DISCREPANT || leftover.power >= POWER;
+    let mut rivals = rivals(cache, found, &passing, best);
+    // Of forms that the data cannot tell apart the simplest is shown.
+    let mut best = best;
+    for rival in &mut rivals {
+        if complexity(&found.judged[*rival]) < complexity(&found.judged[best]) {
+            std::mem::swap(rival, &mut best);
+        }
+    }
+    let judged = &found.judged[best];
+    let mut tied: Vec<Vec<String>> = rivals.iter().map(|i| found.judged[*i].names()).collect();
+    for twin in twins(cache, found, judged, candidates)? {
+        if !tied.contains(&twin) {
+            tied.push(twin);
+        }
+    }
+    if !is_tested {
+        tied.push(vec![format!("another form of {}", judged.fit.variant.name())]);
+    }
+    tied.extend(limits(judged).into_iter().map(|limit| vec![limit]));
+    let verdict = if tied.is_empty() { Verdict::Named } else { Verdict::Tie };
+    Ok(Decision { verdict, best: Some(best), checked: Some(checked), tied, rivals, because: String::new() })
+}
+
+/// The limiting forms that the data do not exclude: those of a parameter inside a term that they do not determine.
+fn limits(judged: &JudgedFit<'_>) -> Vec<String> {
+    let variant = &judged.fit.variant;
+    let Ok(optimum) = judged.fit.optimum() else { return Vec::new() };
+    let mut limits = Vec::new();
+    for (m, effect) in variant.effects.iter().enumerate() {
+        for (k, parameter) in effect.candidate.def.parameters.iter().enumerate().skip(1) {
+            let j = variant.first_entry_of(m) + k;
+            // z counts in prior sd.
+            let sd = (optimum.covariance()[(j, j)].max(0.0) * judged.inflation).sqrt();
+            if sd > UNINFORMED {
+                limits.push(format!("{} at a limit of {}", effect.candidate.name(), parameter.name));
+            }
+        }
+    }
+    limits
+}
+
+/// Other variants that pass the gates and come as close as chance allows: by the fall of χ², or, up to twice that margin,
+/// because the difference of their residuals is not clearly of one sign (Vuong 1989, with the autocorrelation of that
+/// difference).
+fn rivals(cache: &RunCache<'_>, found: &SearchResult<'_>, passing: &[usize], best: usize) -> Vec<usize> {
+    let of_best = &found.judged[best];
+    let size = of_best.fit.variant.effects.len();
+    let near = |i: &usize| {
+        let judged = &found.judged[*i];
+        let apart = of_best.rank() - judged.rank();
+        *i != best
+            && judged.fit.variant.effects.len() == size
+            && judged.names() != of_best.names()
+            && (apart < MARGIN * of_best.inflation
+                || (apart < 2.0 * MARGIN * of_best.inflation
+                    && apart < VUONG * scatter(cache, of_best, judged)))
+    };
+    passing.iter().copied().filter(near).collect()
+}
+
+/// Standard deviation of the difference in χ² of two variants, over all rows.
+fn scatter(cache: &RunCache<'_>, a: &JudgedFit<'_>, b: &JudgedFit<'_>) -> f64 {
+    let rows = &cache.rows;
+    let (of_a, of_b) = (rows.whitened(&a.fit.predicted), rows.whitened(&b.fit.predicted));
+    let variance = |stretch: std::ops::Range<usize>| {
+        let apart: Vec<f64> = stretch.map(|i| of_b[i].powi(2) - of_a[i].powi(2)).collect();
+        let n = apart.len() as f64;
+        let mean = apart.iter().sum::<f64>() / n;
+        let square = apart.iter().map(|d| (d - mean).powi(2)).sum::<f64>();
+        let effective = effective_sample_size(&apart);
+        square * if effective > 0.0 { (n / effective).max(1.0) } else { 1.0 }
+    };
+    rows.stretches().into_iter().map(variance).sum::<f64>().sqrt()
+}
+
+/// Number of operations in the terms of a variant; of tied variants the one with the fewest is shown.
+fn complexity(judged: &JudgedFit<'_>) -> usize {
+    let terms = judged.fit.variant.effects.iter().flat_map(|m| &m.candidate.def.adds);
+    let resolve = |_: &str| Some(Slot::Parameter(0));
+    let size = |term: &String| Expression::parse(term).ok()?.compile(&resolve, &|_| None).ok();
+    terms.filter_map(|add| size(&add.term)).map(|program| program.n_operations()).sum()
+}
+
+/// Candidates that were not refitted and whose influence cannot be told from that of the best.
+fn twins(
+    cache: &RunCache<'_>,
+    found: &SearchResult<'_>,
+    judged: &JudgedFit<'_>,
+    candidates: &[Candidate],
+) -> Result<Vec<Vec<String>>, ExplainError> {
+    let [effect] = judged.fit.variant.effects.as_slice() else { return Ok(Vec::new()) };
+    let Ok(optimum) = found.base.optimum() else { return Ok(Vec::new()) };
+    let own = |result: &ScreeningResult| {
+        Ok::<_, ExplainError>(optimum.unimitated(&result.influence.of_train(cache)?))
+    };
+    let best = found.screening.iter().filter(|h| h.candidate == effect.index && h.failure.is_none());
+    let Some(best) = best.max_by(|a, b| a.score.gain.total_cmp(&b.score.gain)) else { return Ok(Vec::new()) };
+    let best = own(best)?;
+    let mut twins: Vec<Vec<String>> = Vec::new();
+    for result in found.screening.iter().filter(|h| h.failure.is_none() && !h.is_absorbed()) {
+        let refitted = found
+            .judged
+            .iter()
+            .any(|j| j.fit.variant.effects.len() == 1 && j.fit.variant.effects[0].index == result.candidate);
+        let other = own(result)?;
+        let alike = best.dot(&other).abs() / (best.norm() * other.norm());
+        let candidate = &candidates[result.candidate];
+        let name = vec![candidate.name().to_owned()];
+        let allowed = result.allowed_gain(candidate.sign()) > 0.0;
+        if !refitted && allowed && alike > ALIKE && !twins.contains(&name) {
+            twins.push(name);
+        }
+    }
+    Ok(twins)
+}

@@ -1,0 +1,167 @@
+//! The second pass of the search: the candidates are scored again at the best variant, then replacements and pairs are refitted.
+//!
+//! Next files to read: [`crate::judge::form`], then [`crate::judge::verdict`].
+
+use starlings_study::{Record, Study};
+
+use super::modulated_forms::{constants, modulated_forms};
+use super::search::Searcher;
+use crate::error::ExplainError;
+use crate::fit::candidate::Candidate;
+use crate::fit::fitted_variant::FittedVariant;
+use crate::fit::model_variant::{AddedEffect, ModelVariant};
+use crate::judge::contribution::check_contributions;
+use crate::judge::form::{Leftover, Measured, leftover};
+use crate::judge::gates::JudgedFit;
+use crate::judge::search_result::SearchResult;
+use crate::options::Options;
+use crate::screen::screening::screen;
+use crate::screen::screening_result::ScreeningResult;
+
+impl<'c> Searcher<'_, '_, 'c> {
+    /// Scores the candidates again at the best variant and refits replacements and pairs, until no better variant comes of it.
+    /// In the end the form of the variant that the verdict will be about has been measured.
+    pub(super) fn second_pass(
+        &mut self,
+        found: &mut SearchResult<'c>,
+        options: &Options,
+    ) -> Result<(), ExplainError> {
+        for _ in 1..=options.max_effects {
+            if found.judged.first().is_none_or(|j| j.refusal.is_some()) {
+                return Ok(());
+            }
+            let screening = self.rescreen(found, 0)?;
+            let best = &found.judged[0];
+            let name = best.fit.variant.name();
+            let seconds: Vec<ScreeningResult> = self
+                .best_of_each(&screening)
+                .into_iter()
+                .filter(|h| h.score.gain / best.inflation > found.null_distribution.threshold)
+                .take(2)
+                .collect();
+            if seconds.is_empty() {
+                break;
+            }
+            let fits = self.replacements_and_pairs(found, best, &seconds, options)?;
+            let n = fits.len();
+            self.judge_all(found, fits)?;
+            let same = found.judged.first().is_some_and(|j| j.fit.variant.name() == name);
+            if n == 0 || same {
+                break;
+            }
+        }
+        let passing = found.passing();
+        if let Some(chosen) = (!passing.is_empty()).then(|| check_contributions(found, &passing).checked)
+            && found.judged[chosen].leftover.is_none()
+        {
+            self.rescreen(found, chosen)?;
+        }
+        Ok(())
+    }
+
+    /// Scores the candidates at the refitted variant at a position, and notes the fall of χ² that they and modulated forms of its
+    /// effects would still bring.
+    fn rescreen(
+        &mut self,
+        found: &mut SearchResult<'c>,
+        place: usize,
+    ) -> Result<Vec<ScreeningResult>, ExplainError> {
+        let judged = &found.judged[place];
+        self.cache.stage("screen", &format!("again, with {}", judged.fit.variant.name()));
+        let screening = self.screen(&judged.fit, &self.best_points(&found.screening))?;
+        let left = self.measure_leftover(judged, &screening)?;
+        let variant = |j: &JudgedFit<'_>| (j.fit.variant.name(), j.fit.variant.left_out.clone());
+        let of_place = variant(judged);
+        if let Some(first) = found.judged.iter_mut().find(|j| variant(j) == of_place) {
+            first.leftover = Some(left);
+        }
+        Ok(screening)
+    }
+
+    /// The fall of χ² that the candidates and the modulated forms of the best would still bring.
+    fn measure_leftover(
+        &mut self,
+        best: &JudgedFit<'c>,
+        library: &[ScreeningResult],
+    ) -> Result<Leftover, ExplainError> {
+        let forms = modulated_forms(best, self.tracks, span(self.cache.study));
+        let (modulated, constants) = (self.measure(best, forms)?, self.measure(best, constants(best))?);
+        let measured = Measured { library, modulated: &modulated, constants: &constants };
+        leftover(self.cache, &best.fit, &measured)
+    }
+
+    /// Screens effects that are not candidates, if the budget suffices.
+    fn measure(
+        &mut self,
+        best: &JudgedFit<'c>,
+        mut forms: Vec<Candidate>,
+    ) -> Result<Vec<ScreeningResult>, ExplainError> {
+        // Not every modulated form builds: a state of its own may not read all that the term reads.
+        forms.retain(|form| {
+            let mut effects: Vec<AddedEffect<'_>> = best.fit.variant.effects.clone();
+            effects.push(AddedEffect { candidate: form, index: 0, unit: 1.0 });
+            ModelVariant::new(best.fit.variant.base, effects, &best.fit.variant.left_out).is_ok()
+        });
+        let of: Vec<(usize, usize)> = (0..forms.len()).map(|i| (i, 0)).collect();
+        if !self.cache.affords(of.len()) {
+            return Ok(Vec::new());
+        }
+        screen(self.cache, &best.fit, &forms, &of, self.tracks)
+    }
+
+    /// Refits replacements (a second effect alone, where it was not refitted yet) and pairs.
+    fn replacements_and_pairs(
+        &mut self,
+        found: &SearchResult<'c>,
+        best: &JudgedFit<'c>,
+        seconds: &[ScreeningResult],
+        options: &Options,
+    ) -> Result<Vec<FittedVariant<'c>>, ExplainError> {
+        let tried = |indices: &[usize]| {
+            found.judged.iter().any(|j| {
+                let effects: Vec<usize> = j.fit.variant.effects.iter().map(|m| m.index).collect();
+                effects.len() == indices.len() && indices.iter().all(|i| effects.contains(i))
+            })
+        };
+        let mut fits = Vec::new();
+        for second in seconds {
+            if !tried(&[second.candidate])
+                && let Some(alone) =
+                    self.best_of_each(&found.screening).iter().find(|h| h.candidate == second.candidate)
+            {
+                fits.push(self.with_candidate(&found.base, alone)?);
+            }
+            let mut pair: Vec<usize> = best.fit.variant.effects.iter().map(|m| m.index).collect();
+            pair.push(second.candidate);
+            if pair.len() <= options.max_effects && !tried(&pair) {
+                fits.push(self.with_candidate(&best.fit, second)?);
+            }
+        }
+        self.cache.stage("refit", &format!("{} replacements and pairs", fits.len()));
+        self.refit(fits)
+    }
+
+    /// The best point of the grid of every candidate, by the first screening.
+    fn best_points(&self, screening: &[ScreeningResult]) -> Vec<(usize, usize)> {
+        let best = self.best_of_each(screening);
+        let point = |result: &ScreeningResult| {
+            let points = &self.candidates[result.candidate].points;
+            points.iter().position(|p| *p == result.point).map(|p| (result.candidate, p))
+        };
+        let mut of: Vec<(usize, usize)> = best.iter().filter_map(point).collect();
+        for c in 0..self.candidates.len() {
+            let sound = screening.iter().any(|h| h.candidate == c && h.failure.is_none());
+            if sound && !of.iter().any(|(known, _)| *known == c) {
+                of.push((c, 0));
+            }
+        }
+        of
+    }
+}
+
+/// First and last training time of a study.
+fn span(study: &Study) -> [f64; 2] {
+    let spans = || study.records.iter().filter_map(Record::train_span);
+    let from = spans().map(|s| s[0]).fold(f64::INFINITY, f64::min);
+    [from, spans().map(|s| s[1]).fold(f64::NEG_INFINITY, f64::max)]
+}

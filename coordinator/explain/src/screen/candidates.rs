@@ -1,0 +1,135 @@
+//! Which effects are tried: those of the library and of the study, less what the model has already and what was left out.
+//!
+//! A wrong name or an empty list is an error before the first run. Next file to read: [`crate::options`].
+
+use starlings_models::effect::library::{library_in, shows_in};
+use starlings_models::{EffectDef, Setup, nearest};
+use starlings_study::{Study, checked::Library};
+
+use crate::error::ExplainError;
+use crate::number::three;
+use crate::options::Options;
+
+/// The effects to try, those of the study first.
+///
+/// # Errors
+/// When the model does not build without its effects, a name of `only` or `without` is not among the effects, or none is left.
+pub fn candidates(study: &Study, options: &Options) -> Result<Vec<EffectDef>, ExplainError> {
+    let bare = Setup { model: study.setup.model.clone(), ..Setup::default() };
+    let spec = bare.spec()?;
+    let fitted: Vec<String> = fitted_outputs(study);
+    let mut built_in = library_in(&spec, &study.time_unit);
+    built_in.retain(|effect| shows_in(effect, &spec, &fitted));
+    let all: Vec<&EffectDef> = match study.explain.library {
+        Library::All => study.candidates.iter().chain(&built_in).collect(),
+        Library::Study => study.candidates.iter().collect(),
+        Library::BuiltIn => built_in.iter().collect(),
+    };
+    for name in options.only.iter().chain(&options.without) {
+        check_name(name, study, &all)?;
+    }
+    let in_model = |effect: &EffectDef| {
+        study.setup.effects.iter().any(|known| known.name == effect.name || known.adds == effect.adds)
+    };
+    let mut kept: Vec<EffectDef> = Vec::new();
+    for effect in &all {
+        let wanted = options.only.is_empty() || options.only.contains(&effect.name);
+        let repeated = kept.iter().any(|known| known.name == effect.name || known.adds == effect.adds);
+        if wanted && !options.without.contains(&effect.name) && !in_model(effect) && !repeated {
+            kept.push((*effect).clone());
+        }
+    }
+    if kept.is_empty() {
+        return Err(ExplainError::NothingToTry(nothing_to_try(study, options, all.len())));
+    }
+    Ok(kept)
+}
+
+/// Outputs that a fitted channel measures.
+pub(crate) fn fitted_outputs(study: &Study) -> Vec<String> {
+    let channels = study.records.iter().filter(|r| r.is_trained()).flat_map(|r| &r.channels);
+    channels.filter(|c| !c.held_out).map(|c| c.output.clone()).collect()
+}
+
+/// Powers of ten by which a noise and the largest recorded value may differ: beyond them the smaller is lost in the rounding of
+/// the larger.
+const APART: f64 = 1e15;
+
+/// Refuses a noise below the last digit of the values, or so far above them that no misfit could exceed it.
+fn check_noise(study: &Study) -> Result<(), ExplainError> {
+    for record in study.records.iter() {
+        for channel in &record.channels {
+            let known = channel.values.iter().filter(|v| v.is_finite());
+            let largest = known.fold(0.0_f64, |most, v| most.max(v.abs()));
+            let size = if largest > 0.0 { largest } else { 1.0 };
+            let ratio = channel.noise / size;
+            if (1.0 / APART..=APART).contains(&ratio) {
+                continue;
+            }
+            let why = if ratio < 1.0 { "below the last digit of" } else { "so far above" };
+            let what = if ratio < 1.0 { "" } else { " that nothing could show" };
+            return Err(ExplainError::Noise(format!(
+                "the noise of {} in record `{}`, {}, lies {why} its values, the largest of which is {}{what}: give the standard \
+                 deviation of the measurement error in the channel's unit, or \"auto\"",
+                channel.output,
+                record.name,
+                three(channel.noise),
+                three(largest)
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Checks what can be checked before the first run: the names, that an effect is left, the noise against the values, the budget
+/// against one set of runs of the fit.
+///
+/// # Errors
+/// The first fault found.
+pub fn check(study: &Study, options: &Options) -> Result<(), ExplainError> {
+    candidates(study, options)?;
+    check_noise(study)?;
+    let trained = study.records.iter().filter(|record| record.is_trained()).count();
+    let needed = (trained * (study.theta.len() + 1)) as u64;
+    match options.budget.or(study.explain.budget) {
+        Some(budget) if budget < needed => {
+            Err(ExplainError::Budget { budget, stage: "fit", needed: needed - budget })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Refuses an unknown name. An effect that the model has already may be named; this has no influence.
+fn check_name(name: &str, study: &Study, all: &[&EffectDef]) -> Result<(), ExplainError> {
+    let names: Vec<&str> = all.iter().copied().chain(&study.setup.effects).map(|e| e.name.as_str()).collect();
+    if names.contains(&name) {
+        return Ok(());
+    }
+    let help = match nearest(name, &names) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => "`starlings effects STUDY` lists what would be tried".to_owned(),
+    };
+    Err(ExplainError::Name(format!("no effect is named `{name}`: {help}")))
+}
+
+/// The message that no effect is left to try, with the remedy.
+fn nothing_to_try(study: &Study, options: &Options, n_all: usize) -> String {
+    let library = match study.explain.library {
+        Library::All => "the study and the built-in library",
+        Library::Study => "the study (library = \"study\")",
+        Library::BuiltIn => "the built-in library (library = \"built-in\")",
+    };
+    let (n_without, n_only) = (options.without.len(), options.only.len());
+    if n_all == 0 {
+        let kind = &study.setup.model.kind;
+        return format!(
+            "there is no effect to try: {library} offers none for model `{kind}`; describe one as [[effects]], or give states \
+             and outputs their roles so that the built-in effects find their places"
+        );
+    }
+    format!(
+        "there is no effect left to try: {library} offers {n_all}, less what is in the model already, {n_without} in \
+         `without`{}; leave out fewer",
+        if n_only == 0 { String::new() } else { format!(", and all but {n_only} in `only`") }
+    )
+}

@@ -1,0 +1,114 @@
+//! Dominant periods and change points of the residuals: values at which a period or an instant inside a term is screened.
+//!
+//! A sine whose period is wrong by more than a cycle over the record is uncorrelated with the one that is missing, and so is a
+//! step at the wrong instant. A fixed grid would miss both. Next file to read: [`crate::fit::candidate`].
+
+use crate::rows::{Rows, Usage};
+
+/// Periods, and change points, at most.
+const MOST: usize = 2;
+/// Frequencies per cycle over the record.
+const OVERSAMPLING: f64 = 4.0;
+/// Frequencies at most.
+const FREQUENCIES: usize = 600;
+
+/// The periods at which the residuals of the training rows have the most power, the strongest first: least-squares power at
+/// each frequency (Lomb 1976, without the shift in time), summed over channels and records.
+pub(crate) fn periods(rows: &Rows, predicted: &[f64]) -> Vec<f64> {
+    let whitened = rows.whitened(predicted);
+    let stretches = training(rows);
+    let span = |s: &std::ops::Range<usize>| rows.rows[s.end - 1].time - rows.rows[s.start].time;
+    let longest = stretches.iter().map(span).fold(0.0, f64::max);
+    let samples = stretches.iter().map(ExactSizeIterator::len).max().unwrap_or(0);
+    if longest <= 0.0 || samples < 8 {
+        return Vec::new();
+    }
+    let step = 1.0 / (OVERSAMPLING * longest);
+    // Up to half the Nyquist frequency of even samples, from one cycle per record on.
+    let n = ((OVERSAMPLING * samples as f64 / 4.0) as usize).min(FREQUENCIES);
+    let mut powers: Vec<(f64, f64)> = Vec::new();
+    for k in OVERSAMPLING as usize..n {
+        let omega = std::f64::consts::TAU * step * k as f64;
+        let power = stretches.iter().map(|s| power(rows, &whitened, s, omega)).sum();
+        powers.push((power, step * k as f64));
+    }
+    powers.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut found: Vec<f64> = Vec::new();
+    for (_, frequency) in powers {
+        if found.len() < MOST && !found.iter().any(|known| (known - frequency).abs() < 1.5 / longest) {
+            found.push(frequency);
+        }
+    }
+    found.into_iter().map(|f| 1.0 / f).collect()
+}
+
+/// Power of the residuals of one stretch, less their mean, at one angular frequency.
+fn power(rows: &Rows, whitened: &[f64], stretch: &std::ops::Range<usize>, omega: f64) -> f64 {
+    let n = stretch.len().max(1) as f64;
+    let mean = whitened[stretch.clone()].iter().sum::<f64>() / n;
+    let (mut cosine, mut sine) = (0.0, 0.0);
+    for i in stretch.clone() {
+        let (s, c) = (omega * rows.rows[i].time).sin_cos();
+        cosine += (whitened[i] - mean) * c;
+        sine += (whitened[i] - mean) * s;
+    }
+    2.0 * (cosine * cosine + sine * sine) / n
+}
+
+/// The instants at which the residuals of the training rows change most, the largest change first: where the means of two
+/// windows, before and after, differ most.
+pub(crate) fn change_points(rows: &Rows, predicted: &[f64]) -> Vec<f64> {
+    let whitened = rows.whitened(predicted);
+    let mut found: Vec<(f64, f64, f64)> = Vec::new();
+    for stretch in training(rows) {
+        let (times, values): (Vec<f64>, Vec<f64>) = stretch.map(|i| (rows.rows[i].time, whitened[i])).unzip();
+        let width = (values.len() / 16).max(3);
+        for i in width..values.len().saturating_sub(width) {
+            let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
+            let size = (mean(&values[i..i + width]) - mean(&values[i - width..i])).abs();
+            found.push((size, times[i], times[i + width - 1] - times[i]));
+        }
+    }
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut instants: Vec<f64> = Vec::new();
+    for (_, time, apart) in found {
+        if instants.len() < MOST && !instants.iter().any(|known| (known - time).abs() <= apart) {
+            instants.push(time);
+        }
+    }
+    instants
+}
+
+fn training(rows: &Rows) -> Vec<std::ops::Range<usize>> {
+    rows.stretches().into_iter().filter(|s| rows.rows[s.start].usage == Usage::Train).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rows::Row;
+
+    fn rows(f: impl Fn(f64) -> f64) -> (Rows, Vec<f64>) {
+        let row = |step: usize| {
+            let time = 0.1 * step as f64;
+            let usage = Usage::Train;
+            Row { record: 0, channel: 0, output: 0, step, time, observed: f(time), noise: 1.0, usage }
+        };
+        let rows: Vec<Row> = (0..300).map(row).collect();
+        (Rows { train: (0..rows.len()).collect(), rows }, vec![0.0; 300])
+    }
+
+    #[test]
+    fn the_period_of_a_sine_is_found_to_a_fraction_of_a_cycle_over_the_record() {
+        let (rows, zero) = rows(|t| 3.0 + (std::f64::consts::TAU * t / 1.7).sin());
+        let found = periods(&rows, &zero);
+        // The frequencies are a quarter of a cycle over the record apart.
+        assert!((30.0 / found[0] - 30.0 / 1.7).abs() <= 0.13, "{found:?}");
+    }
+
+    #[test]
+    fn a_jump_is_found_at_its_instant() {
+        let (rows, zero) = rows(|t| if t < 12.35 { 0.0 } else { 2.0 });
+        assert!((change_points(&rows, &zero)[0] - 12.4).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,71 @@
+//! The candidates of a study with every number in the model's units.
+//!
+//! Parameters that count on the course of a quantity, in parts of the record or in sampling intervals are turned into the units
+//! of the model. Next file to read: [`super::natural_amplitude`].
+
+use starlings_models::effect::{EffectDef, Scale, scale};
+use starlings_study::{Record, Study};
+
+use super::candidates::candidates;
+use crate::error::ExplainError;
+use crate::fit::candidate::Candidate;
+use crate::locate::Track;
+use crate::options::Options;
+
+/// The candidates of a study, every number in the model's units. `tracks` are the courses of the model as it is.
+///
+/// # Errors
+/// As [`candidates`].
+pub(crate) fn resolved_candidates(
+    study: &Study,
+    tracks: &[Track],
+    periods: &[f64],
+    change_points: &[f64],
+    options: &Options,
+) -> Result<Vec<Candidate>, ExplainError> {
+    let defs = resolved(study, candidates(study, options)?, tracks, periods, change_points);
+    Ok(defs.into_iter().map(Candidate::new).collect())
+}
+
+/// The effects with their numbers in the model's units. An effect whose quantity is constant along the run is left out, since its
+/// numbers count in the course of that quantity. A duration inside a term is screened at the dominant periods of the residuals,
+/// an instant at their change points as well ([`super::residual_timing`]).
+fn resolved(
+    study: &Study,
+    defs: Vec<EffectDef>,
+    tracks: &[Track],
+    periods: &[f64],
+    change_points: &[f64],
+) -> Vec<EffectDef> {
+    let course = |name: &str| tracks.iter().find(|t| t.name == name).map(Track::ends);
+    let times = || study.records.iter().filter(|r| r.is_trained()).filter_map(Record::train_span);
+    let from = times().map(|s| s[0]).fold(f64::INFINITY, f64::min);
+    let to = times().map(|s| s[1]).fold(f64::NEG_INFINITY, f64::max);
+    let resolve = |def: EffectDef| {
+        let mut resolved = scale::resolve(&def, &course, [from, to], sampling(study));
+        for wanted in def.parameters.iter().skip(1) {
+            let Some(parameter) = resolved.parameters.iter_mut().find(|p| p.name == wanted.name) else {
+                continue;
+            };
+            let [lo, hi] = parameter.range;
+            let within =
+                |values: &[f64]| values.iter().copied().filter(|v| lo < *v && *v < hi).collect::<Vec<_>>();
+            match wanted.scale {
+                Scale::Duration if !within(periods).is_empty() => parameter.grid = within(periods),
+                Scale::Record => parameter.grid.extend(within(change_points)),
+                _ => {}
+            }
+        }
+        resolved
+    };
+    defs.into_iter().map(resolve).filter(scale::is_resolved).collect()
+}
+
+/// The median interval between observations of the first trained record.
+fn sampling(study: &Study) -> f64 {
+    let record = study.records.iter().find(|r| r.is_trained());
+    let mut steps: Vec<f64> =
+        record.map(|r| r.times.windows(2).map(|w| w[1] - w[0]).collect()).unwrap_or_default();
+    steps.sort_by(f64::total_cmp);
+    steps.get(steps.len() / 2).copied().unwrap_or(1.0)
+}

@@ -1,0 +1,15 @@
+//! What an explanation tells: its result, sentences, figures, warnings, and the study with the effects in it.
+//!
+//! Files: [`result`] (`explain.json`), [`figures`] (what the report draws), [`summary`] (the numbers of both), [`words`],
+//! [`warnings`] and [`rejected`] (the sentences), [`experiment`] (what would separate tied effects), [`patch`] (the study with
+//! the effects in it), [`findings`] (all of it, and its place in the run's database).
+
+pub(crate) mod experiment;
+pub(crate) mod figures;
+pub(crate) mod findings;
+pub(crate) mod patch;
+pub(crate) mod rejected;
+pub mod result;
+pub(crate) mod summary;
+pub(crate) mod warnings;
+pub(crate) mod words;

@@ -1,0 +1,95 @@
+//! Why variants and candidates were rejected, in words with numbers.
+//!
+//! Nothing is decided here; the gates and the verdict have decided. Next file to read: [`crate::judge::gates`].
+
+use super::result::Rejected;
+use crate::fit::candidate::Candidate;
+use crate::judge::misfit::Misfit;
+use crate::judge::search_result::SearchResult;
+use crate::judge::verdict::Decision;
+use crate::number::{spaced, three};
+use crate::screen::screening_result::ScreeningResult;
+
+/// What was refused, with reasons: refitted variants first, then candidates that failed, have no influence of their own, or
+/// would need the wrong sign.
+pub(crate) fn rejected(
+    found: &SearchResult<'_>,
+    candidates: &[Candidate],
+    decision: &Decision,
+) -> Vec<Rejected> {
+    let mut list = Vec::new();
+    let keep: Vec<usize> = decision.best.iter().copied().chain(decision.rivals.clone()).collect();
+    for (i, judged) in found.judged.iter().enumerate().filter(|(i, _)| !keep.contains(i)) {
+        let (gate, reason) = match &judged.refusal {
+            Some(refusal) => (refusal.gate.to_owned(), refusal.reason.clone()),
+            None => ("evidence".to_owned(), behind(found, decision, i)),
+        };
+        list.push(Rejected { name: judged.fit.variant.name(), gate, reason });
+    }
+    for (index, candidate) in candidates.iter().enumerate() {
+        let of = || found.screening.iter().filter(|h| h.candidate == index);
+        let name = candidate.name().to_owned();
+        if let Some(reason) =
+            of().find_map(|h| h.failure.clone()).filter(|_| of().all(|h| h.failure.is_some()))
+        {
+            list.push(Rejected { name, gate: "failed".to_owned(), reason });
+        } else if of().count() > 0 && of().all(ScreeningResult::is_absorbed) {
+            let reason =
+                "the model's parameters imitate it: it cannot be told from them, which does not mean absent";
+            list.push(Rejected { name, gate: "absorbed".to_owned(), reason: reason.to_owned() });
+        } else if let Some(result) = wrong_sign(found, index, candidate) {
+            let parameter = &candidate.def.parameters[0];
+            let reason = format!(
+                "{} would have to be {} ± {}{}, a sign that physics does not allow",
+                parameter.name,
+                three(result.score.amplitude),
+                three(result.score.sd),
+                spaced(&parameter.unit)
+            );
+            list.push(Rejected { name, gate: "sign".to_owned(), reason });
+        }
+    }
+    list
+}
+
+/// The best screening result of a candidate that would gain more than chance if physics allowed its sign, at every point of its
+/// grid.
+fn wrong_sign<'f>(
+    found: &'f SearchResult<'_>,
+    index: usize,
+    candidate: &Candidate,
+) -> Option<&'f ScreeningResult> {
+    let of = || found.screening.iter().filter(|h| h.candidate == index && h.failure.is_none());
+    let never = of().all(|h| h.allowed_gain(candidate.sign()) <= 0.0);
+    of().filter(|h| never && h.score.gain > found.null_distribution.threshold)
+        .max_by(|a, b| a.score.gain.total_cmp(&b.score.gain))
+}
+
+/// Why a variant that passes the gates is not named.
+fn behind(found: &SearchResult<'_>, decision: &Decision, i: usize) -> String {
+    let Some(best) = decision.best.map(|b| &found.judged[b]) else { return String::new() };
+    let judged = &found.judged[i];
+    let name = best.fit.variant.name();
+    if judged.fit.variant.effects.len() > best.fit.variant.effects.len() {
+        let of = |share: fn(&Misfit) -> f64| {
+            let (whole, part) = (share(&judged.misfit), share(&best.misfit));
+            100.0 * (part - whole) / (share(&found.before) - whole).max(f64::MIN_POSITIVE)
+        };
+        let train = of(|m| m.train);
+        let held_out = (judged.misfit.n_held_out > 0).then(|| of(|m| m.held_out));
+        if train < 10.0 || held_out.is_some_and(|h| h < 10.0) {
+            return format!(
+                "beyond `{name}` it takes away {train:.1} % of the gap on the training data{}: a further effect must carry a \
+                 tenth of {}",
+                held_out.map_or_else(String::new, |h| format!(" and {h:.1} % on the held-out span")),
+                if held_out.is_some() { "both" } else { "it" }
+            );
+        }
+    }
+    format!(
+        "with it χ² of all data together, less the price of its further parameters, falls by {:.1}, with `{name}` by {:.1}, in \
+         units of the effective noise",
+        judged.rank() / best.inflation,
+        best.rank() / best.inflation
+    )
+}

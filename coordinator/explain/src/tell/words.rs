@@ -1,0 +1,248 @@
+//! The sentences of an explanation: each is made from the figures that it stands beside.
+//!
+//! Sentences about noise are in [`crate::judge::adequacy`], those about held-out data in [`crate::judge::held_out`]. Next file
+//! to read: [`super::warnings`].
+
+use std::fmt::Write as _;
+
+use starlings_study::posterior;
+
+use crate::fit::candidate::Candidate;
+use crate::fit::fitted_variant::FittedVariant;
+use crate::judge::adequacy::Nature;
+use crate::judge::gates::JudgedFit;
+use crate::judge::held_out::{HeldOut, listed};
+use crate::judge::search_result::SearchResult;
+use crate::judge::verdict::{Decision, Verdict};
+use crate::locate::Located;
+use crate::number::{factor, percent, times};
+use crate::rows::Usage;
+use crate::run_cache::RunCache;
+use crate::screen::not_tried;
+
+/// Where a fit stands that has not converged.
+pub(crate) fn stand(fit: &FittedVariant<'_>) -> String {
+    let n = fit.residual().len().max(1) as f64;
+    let rms = (fit.residual().norm_squared() / n).sqrt();
+    format!("{} (root mean square residual {} noise sd)", values(fit), factor(rms))
+}
+
+/// The posterior's names and values in words, for a fit that has not converged.
+fn values(fit: &FittedVariant<'_>) -> String {
+    let theta = fit.theta();
+    let zero = vec![0.0; theta.len()];
+    let gaussian = posterior::independent(theta.as_slice(), &zero);
+    let estimates = posterior::estimates(&fit.variant.study, &gaussian);
+    estimates.iter().map(|e| format!("{} = {:.5}", e.name, e.estimate)).collect::<Vec<_>>().join(", ")
+}
+
+/// The verdict in a few sentences.
+pub(crate) fn headline(
+    cache: &RunCache<'_>,
+    found: &SearchResult<'_>,
+    candidates: &[Candidate],
+    decision: &Decision,
+) -> String {
+    let best = decision.best.map(|i| &found.judged[i]);
+    match (decision.verdict, best) {
+        (Verdict::Named, Some(judged)) => {
+            format!("{} {}", subject(judged), capital(&shrinking(cache, found, judged)))
+        }
+        (Verdict::Tie, Some(judged)) => {
+            let rivals: Vec<String> = decision.tied.iter().map(|set| set.join(" + ")).collect();
+            format!(
+                "{} or {}: the data cannot tell them apart. {}",
+                judged.fit.variant.name(),
+                rivals.join(" or "),
+                capital(&shrinking(cache, found, judged))
+            )
+        }
+        (Verdict::Unexplained, _) => unexplained(cache, found, candidates, decision),
+        _ => no_gap(found),
+    }
+}
+
+/// That nothing explains the gap, why, what fails of what was held out, and what was not tried.
+fn unexplained(
+    cache: &RunCache<'_>,
+    found: &SearchResult<'_>,
+    candidates: &[Candidate],
+    decision: &Decision,
+) -> String {
+    let because = if decision.because.is_empty() { String::new() } else { format!(": {}", decision.because) };
+    let nearest = decision.best.or((!found.judged.is_empty()).then_some(0)).map(|i| &found.judged[i]);
+    let mut sentences =
+        vec![format!("Nothing that was tried explains the gap{}.", because.trim_end_matches('.'))];
+    let of = nearest.map_or(&found.held_out, |j| &j.held_out);
+    let failing: Vec<&HeldOut> = of.iter().filter(|h| h.fails).collect();
+    if !failing.is_empty() {
+        let with = nearest.map_or_else(String::new, |j| format!(" with `{}`", j.fit.variant.name()));
+        sentences.push(format!("Held out and failing{with}: {}.", listed(&failing)));
+    }
+    if nearest.is_none() {
+        sentences.push(format!("On the training data {}.", found.adequacy.says()));
+    }
+    let not_tried = not_tried::sentence(cache.study, candidates);
+    if !not_tried.is_empty() {
+        sentences.push(not_tried);
+    }
+    sentences.join(" ")
+}
+
+/// That the data show no gap, with what they could have shown.
+fn no_gap(found: &SearchResult<'_>) -> String {
+    let says = found.adequacy.says();
+    let training = match found.adequacy.nature() {
+        Nature::Nothing => return format!("No gap could be seen: {says}."),
+        Nature::Noise if found.adequacy.whiteness.is_some() => {
+            format!("No gap: the model explains the training data at their noise; {says}.")
+        }
+        _ => format!("No gap that these data show: {says}."),
+    };
+    let largest = found.held_out.iter().map(|h| h.after).fold(f64::NAN, f64::max);
+    if largest.is_nan() {
+        return training;
+    }
+    let explained = if found.adequacy.is_numerical() {
+        ""
+    } else {
+        ", no more than noise and the uncertainty of the estimate explain"
+    };
+    format!("{training} What was held out is {} its noise at most{explained}.", times(largest))
+}
+
+fn subject(judged: &JudgedFit<'_>) -> String {
+    let variant = &judged.fit.variant;
+    let says: Vec<&str> = variant.effects.iter().map(|m| m.candidate.def.says.as_str()).collect();
+    format!("Missing: {}. {}", variant.name(), says.join(" "))
+}
+
+/// How the error changes, for each use of the data.
+fn shrinking(cache: &RunCache<'_>, found: &SearchResult<'_>, judged: &JudgedFit<'_>) -> String {
+    let noise = |y: &[f64], usage| {
+        let whitened = cache.rows.whitened(y);
+        let of = cache.rows.rows.iter().zip(&whitened).filter(|(row, _)| row.usage == usage);
+        let (n, sum) = of.fold((0.0, 0.0), |(n, sum), (_, e)| (n + 1.0, sum + e * e));
+        (n > 0.0).then(|| f64::sqrt(sum / n))
+    };
+    let spans = [
+        (Usage::Train, "the training data"),
+        (Usage::HeldOut, "the held-out span"),
+        (Usage::HeldOutChannel, "the held-out channels"),
+    ];
+    let part = |(usage, what)| {
+        let before = noise(&found.base.predicted, usage)?;
+        Some((before, noise(&judged.fit.predicted, usage)?, what))
+    };
+    moves(&spans.into_iter().filter_map(part).collect::<Vec<(f64, f64, &str)>>())
+}
+
+/// How errors in noise sd change, in words: (before, after, of what). Neighbours that change alike share one verb.
+pub(crate) fn moves(parts: &[(f64, f64, &str)]) -> String {
+    let mut last = "";
+    let mut words = Vec::new();
+    for (before, after, what) in parts {
+        let (from, to) = (factor(*before), factor(*after));
+        let verb = if from == to {
+            "stays"
+        } else if after < before {
+            "falls"
+        } else {
+            "rises"
+        };
+        let said = if verb == last { String::new() } else { format!("{verb} ") };
+        last = verb;
+        words.push(match verb {
+            "stays" => format!("{said}at {to} noise sd on {what}"),
+            _ => format!("{said}from {from} to {to} noise sd on {what}"),
+        });
+    }
+    format!("the error {}.", words.join(", "))
+}
+
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// The shape of what remains.
+pub(crate) fn shape(found: &SearchResult<'_>, added: Option<&JudgedFit<'_>>, before: &Located) -> String {
+    let adequacy = added.map_or(&found.adequacy, |j| &j.adequacy);
+    let mut text = adequacy.says();
+    if adequacy.nature() != Nature::Correlated {
+        return text;
+    }
+    match added {
+        Some(judged) => {
+            let _ = write!(text, "; against a smooth signal they count {} one", times(judged.inflation));
+            if let Some(left) = judged.leftover.filter(|left| left.share > 0.0) {
+                let share = percent(left.share);
+                let _ = write!(
+                    text,
+                    "; of what lies above the noise, candidates and bent forms of the effect would take away {share}, to first order"
+                );
+            }
+        }
+        None => {
+            if let Some(strongest) = before.correlations.first() {
+                let _ = write!(text, "; those of {} go along with {}", strongest.channel, strongest.with);
+            }
+        }
+    }
+    text
+}
+
+/// What the intervals and the verdict rest on.
+pub(crate) fn conditional_on(added: Option<&JudgedFit<'_>>) -> String {
+    let widened = added.map(|j| j.inflation.sqrt()).filter(|factor| *factor > 1.005);
+    let noise = widened.map_or_else(String::new, |factor| {
+        format!(
+            " Intervals are widened by a factor of {factor:.2} for the size and correlation of the residuals."
+        )
+    });
+    format!(
+        "A verdict names the best member of this library; an effect that is not in it can resemble one that is. Intervals hold \
+         for the model with the named effects, the stated noise, and parameters close to linear within them.{noise}"
+    )
+}
+
+/// Candidates that the budget left without a refit.
+pub(crate) fn untried(found: &SearchResult<'_>, candidates: &[Candidate]) -> Vec<String> {
+    if !found.cut_short {
+        return Vec::new();
+    }
+    let seen =
+        |index: usize| found.judged.iter().any(|j| j.fit.variant.effects.iter().any(|m| m.index == index));
+    let open = candidates.iter().enumerate().filter(|(i, _)| !seen(*i));
+    open.map(|(_, c)| c.name().to_owned()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_falls_rises_or_stays_as_its_figures_do() {
+        let all = [(2.16, 0.8, "the training data"), (2.54, 1.7, "the held-out span")];
+        assert_eq!(
+            moves(&all),
+            "the error falls from 2.16 to 0.80 noise sd on the training data, from 2.54 to 1.70 noise sd on the held-out span."
+        );
+        let mixed = [(2.0, 1.0, "a"), (1.0, 1.3, "b"), (1.001, 1.002, "c")];
+        assert_eq!(
+            moves(&mixed),
+            "the error falls from 2.00 to 1.00 noise sd on a, rises from 1.00 to 1.30 noise sd on b, stays at 1.00 noise sd on c."
+        );
+    }
+
+    #[test]
+    fn the_verb_is_that_of_the_figures_whatever_they_are() {
+        for before in [0.0, 1e-9, 0.5, 1.0, 3.0, 1e9] {
+            for after in [0.0, 1e-9, 0.5, 1.0, 3.0, 1e9] {
+                let text = moves(&[(before, after, "x")]);
+                assert_eq!(text.contains("falls"), after < before, "{text}");
+                assert_eq!(text.contains("rises"), after > before, "{text}");
+            }
+        }
+    }
+}
