@@ -19,7 +19,7 @@ use starlings_models::equations::{EquationsDef, EquationsModel};
 use starlings_models::integrate::{self, Solver, Tolerance};
 use starlings_models::limits::Limits;
 use starlings_models::segment::{History, Segment};
-use starlings_models::{Drive, Job, Model, ModelDef, Setup, Signal, Spec, Window};
+use starlings_models::{BuildSetup, Drive, Job, Model, ModelDef, Setup, Signal, Spec, Window};
 
 type Failure = Box<dyn std::error::Error>;
 

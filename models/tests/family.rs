@@ -7,7 +7,7 @@ use common::{job, kinds, largest_difference, plausible, run, run_in_pieces, setu
 use starlings_models::integrate::{self, Solver, Tolerance};
 use starlings_models::limits::Limits;
 use starlings_models::segment::Segment;
-use starlings_models::{Forward, Model, ModelFailure, ParticleError, Simulator, Spec, catalogue, native};
+use starlings_models::{BuildSetup, Model, ModelFailure, ParticleError, Spec, catalogue};
 
 #[test]
 fn every_kind_has_a_sentence_and_a_name_of_its_own() {
@@ -176,7 +176,7 @@ fn every_closed_step_agrees_with_the_integrated_rate() {
         }
     }
     let tolerance = Tolerance { relative: 1e-12, absolute: 1e-12 };
-    for model in native::all().unwrap() {
+    for model in catalogue::NATIVE.all().unwrap() {
         let spec = model.spec();
         let Some(allowed) = closed_step_tolerance(&spec.kind) else { continue };
         let theta = plausible(spec);
@@ -215,7 +215,7 @@ fn outputs_come_in_the_order_in_which_they_are_asked_for() {
 #[test]
 fn a_job_that_does_not_fit_is_refused() {
     let (setup, theta) = setup("windkessel-2");
-    let model = Simulator::new(&setup).unwrap();
+    let model = setup.build().unwrap();
     let good = window(&setup, 4);
     let refused = |window: &starlings_models::Window, theta: &[f64]| {
         let error = model.run(&job(window, theta)).unwrap_err();

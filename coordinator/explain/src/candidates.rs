@@ -3,7 +3,7 @@
 //! Whether a name exists and whether anything is left is told before a single run. Next file to read: [`super::options`].
 
 use starlings_models::effect::library::{library_in, shows_in};
-use starlings_models::{EffectDef, Setup, nearest};
+use starlings_models::{BuildSetup, EffectDef, Setup, nearest};
 use starlings_study::{Study, checked::Library};
 
 use super::locate::number::three;

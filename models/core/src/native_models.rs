@@ -1,0 +1,63 @@
+//! How the crates that hold built-in models list them: one list per family, and all families together.
+//!
+//! No model stands here: a family is a crate of its own, and whoever builds models says which families there are. Next file
+//! to read: [`crate::model`].
+
+use crate::layout;
+use crate::{Model, ModelDef, SetupError};
+
+/// One built-in model of a family's list.
+#[derive(Clone, Copy, Debug)]
+pub struct NativeModel {
+    /// The `kind` by which a study names it.
+    pub kind: &'static str,
+    /// Makes it; without a layout, in its default one.
+    pub build: fn(&ModelDef) -> Result<Box<dyn Model>, SetupError>,
+}
+
+impl NativeModel {
+    /// An entry for a model that has no layout.
+    pub const fn fixed<M: Model + Default + 'static>(kind: &'static str) -> Self {
+        Self { kind, build: fixed::<M> }
+    }
+}
+
+/// The built-in models of all families.
+#[derive(Clone, Copy, Debug)]
+pub struct NativeModels(&'static [&'static [NativeModel]]);
+
+impl NativeModels {
+    /// No model.
+    pub const NONE: Self = Self(&[]);
+
+    /// The lists of these families, in their order.
+    pub const fn of(families: &'static [&'static [NativeModel]]) -> Self {
+        Self(families)
+    }
+
+    /// Every entry.
+    pub fn iter(self) -> impl Iterator<Item = &'static NativeModel> {
+        self.0.iter().copied().flatten()
+    }
+
+    /// The entry of this kind.
+    pub fn find(self, kind: &str) -> Option<&'static NativeModel> {
+        self.iter().find(|native| native.kind == kind)
+    }
+
+    /// Every model in its default layout.
+    ///
+    /// # Errors
+    /// When a model refuses its own default, which is a defect.
+    pub fn all(self) -> Result<Vec<Box<dyn Model>>, SetupError> {
+        self.iter()
+            .map(|native| (native.build)(&ModelDef { kind: native.kind.to_owned(), ..ModelDef::default() }))
+            .collect()
+    }
+}
+
+/// Builds a model that has no layout.
+fn fixed<M: Model + Default + 'static>(def: &ModelDef) -> Result<Box<dyn Model>, SetupError> {
+    layout::none(def)?;
+    Ok(Box::new(M::default()))
+}
