@@ -1,4 +1,4 @@
-//! The spectral laboratory against closed forms: modes under every observer, slopes, best gains, a Windkessel.
+//! Spectra under observers against closed forms: modes under every observer, slopes, best gains, a Windkessel.
 
 #![allow(clippy::float_cmp)]
 

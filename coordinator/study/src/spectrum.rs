@@ -1,7 +1,7 @@
 //! The poles of a study's model under the observers that it can host: which are compared, at which gains, and what was found.
 //!
 //! The model stands at its prior medians, where its runs start. The arithmetic of poles is in `starlings_models::spectrum`;
-//! how the result is shown is the caller's. Next file to read: `models/src/spectrum.rs`.
+//! how the result is shown is the caller's. Next file to read: `models/core/src/spectrum.rs`.
 
 use starlings_models::catalogue::NATIVE;
 use starlings_models::spectrum::{Decay, LinearisedSetup, ObserverSpectrum, SpectrumError};

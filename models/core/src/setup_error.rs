@@ -5,7 +5,7 @@
 /// Why a setup does not make a model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SetupError {
-    /// A name that the model, the catalogue or the effect list does not have.
+    /// A name that no model, quantity, observer or effect has.
     #[error("no {what} named `{name}`{}", nearest.as_ref().map(|n| format!("; did you mean `{n}`?")).unwrap_or_default())]
     Unknown {
         /// What was looked for, such as `model`, `parameter` or `rate term`.
