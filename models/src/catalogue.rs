@@ -7,8 +7,9 @@
 use std::collections::HashSet;
 
 use starlings_models_core::equations::{self, EquationsModel};
-use starlings_models_core::external::Outline;
-use starlings_models_core::{Model, ModelDef, NativeModels, SOLVER, SetupError, Spec, layout, nearest};
+use starlings_models_core::{
+    Model, ModelDef, NativeModels, SOLVER, SetupError, Spec, external, layout, nearest,
+};
 
 pub use starlings_models_core::equations::KIND as EQUATIONS;
 
@@ -47,7 +48,7 @@ pub fn build(def: &ModelDef) -> Result<Box<dyn Model>, SetupError> {
             SetupError::Invalid("model kind `solver` needs a description of the solver".to_owned())
         })?;
         check_names(&description.spec)?;
-        return Ok(Box::new(Outline::new(description)));
+        return Ok(external::outline(description));
     }
     match (&def.equations, def.kind == EQUATIONS) {
         (Some(equations), true) => {

@@ -4,10 +4,10 @@
 mod common;
 
 use common::{job, kinds, largest_difference, plausible, run, run_in_pieces, setup, window};
-use starlings_models::integrate::{self, Solver, Tolerance};
+use starlings_models::integrate::{Solver, Tolerance};
 use starlings_models::limits::Limits;
 use starlings_models::segment::Segment;
-use starlings_models::{BuildSetup, Model, ModelFailure, ParticleError, Spec, catalogue};
+use starlings_models::{BuildSetup, Model, ModelFailure, ParticleError, Spec, advance_by, catalogue};
 
 #[test]
 fn every_kind_has_a_sentence_and_a_name_of_its_own() {
@@ -193,7 +193,7 @@ fn every_closed_step_agrees_with_the_integrated_rate() {
         model.initial(&theta, &mut exact);
         let mut integrated = exact.clone();
         model.advance(segment, &theta, &mut exact).unwrap();
-        integrate::advance::<dyn Model>(&*model, Solver::Dopri5(tolerance), segment, &theta, &mut integrated)
+        advance_by::<dyn Model>(&*model, Solver::Dopri5(tolerance), segment, &theta, &mut integrated)
             .unwrap();
         let difference = largest_difference(&exact, &integrated);
         assert!(difference < allowed, "{}: {difference:e}", spec.kind);

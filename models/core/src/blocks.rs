@@ -56,12 +56,7 @@ pub struct WallOutputs {
 
 impl Blocks {
     /// Number of wall displacements.
-    pub fn n_wall(&self) -> usize {
+    pub(crate) fn n_wall(&self) -> usize {
         self.stiffness.nrows()
-    }
-
-    /// Number of velocity unknowns.
-    pub fn n_velocity(&self) -> usize {
-        self.mass.nrows()
     }
 }

@@ -5,14 +5,14 @@
 //! says, [`scope`] for what its terms may name, [`terms`] for how it is evaluated, [`extended`] for the model with its
 //! effects, [`mod@library`] for the built-in list.
 
-pub mod def;
-pub mod extended;
+mod def;
+mod extended;
 pub mod library;
 pub mod scale;
-pub mod scope;
+mod scope;
 mod scratch;
-pub mod target;
-pub mod terms;
+mod target;
+mod terms;
 
 use crate::Drive;
 
@@ -22,12 +22,12 @@ pub use library::library;
 pub use scale::Scale;
 pub use scope::names;
 pub use target::Target;
-pub use terms::TermEffect;
+pub(crate) use terms::TermEffect;
 
 /// One time of an extended model. Slices follow the extended specification; `y` holds the inner model's outputs before any
 /// term is added to them, and is empty unless [`Touches::reads_outputs`].
 #[derive(Clone, Copy)]
-pub struct Moment<'a> {
+pub(crate) struct Moment<'a> {
     /// Time.
     pub t: f64,
     /// The extended state.
@@ -43,7 +43,7 @@ pub struct Moment<'a> {
 /// Which parts of a model an effect enters; the wrapper keeps the inner model's exact step where it can.
 #[allow(clippy::struct_excessive_bools, reason = "a set of independent facts")]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Touches {
+pub(crate) struct Touches {
     /// It adds to a rate or brings states.
     pub rates: bool,
     /// It adds to an output.
@@ -63,7 +63,7 @@ pub struct Touches {
 impl Touches {
     /// What this effect or the other touches.
     #[must_use]
-    pub fn or(self, other: Self) -> Self {
+    pub(crate) fn or(self, other: Self) -> Self {
         Self {
             rates: self.rates || other.rates,
             outputs: self.outputs || other.outputs,
@@ -77,10 +77,7 @@ impl Touches {
 }
 
 /// Adds physics to a model. Every method adds to what stands in the slice; none overwrites it, except an effect's own states.
-pub trait Effect: Send + Sync {
-    /// The definition.
-    fn def(&self) -> &EffectDef;
-
+pub(crate) trait Effect: Send + Sync {
     /// Which parts of the model it enters.
     fn touches(&self) -> Touches;
 

@@ -20,7 +20,7 @@ use crate::simulator::{check_job, free_names};
 use crate::solver::Description;
 use crate::{Forward, Job, ModelFailure, ObserverDef, ParticleError, Prediction, Signal, Spec, Window};
 use applied::Applied;
-pub use outline::{Outline, check_effects};
+pub use outline::{check_effects, outline};
 pub use parts::spec;
 use parts::{Parts, check_initial, check_observer};
 use rows::Rows;
@@ -121,7 +121,12 @@ impl<S: Solve> External<S> {
     }
 
     /// The window as the program sees it: inputs with their effects, and observed values of the outputs that are asked for.
-    fn window(&self, job: &Job, theta: &[f64], carried: &mut Carried) -> Result<Window, ParticleError> {
+    fn window(
+        &self,
+        job: &Job,
+        theta: &[f64],
+        of_effects: &mut EffectStates,
+    ) -> Result<Window, ParticleError> {
         let window = &*job.window;
         let observed = self.rows.observed(window);
         let mut seen = Window { observed, ..window.clone() };
@@ -134,13 +139,13 @@ impl<S: Solve> External<S> {
                 inputs: window.inputs.clone(),
                 times: times.clone(),
             };
-            let shown = effects.run(theta, replayed, carried.inputs.take())?;
+            let shown = effects.run(theta, replayed, of_effects.inputs.take())?;
             let signal = |i: usize| Signal {
                 times: times.clone(),
                 values: shown.outputs.iter().skip(i).step_by(n).copied().collect(),
             };
             seen.inputs = (0..n).map(signal).collect();
-            carried.inputs = Some(shown.state);
+            of_effects.inputs = Some(shown.state);
         }
         Ok(seen)
     }
@@ -151,12 +156,12 @@ impl<S: Solve> External<S> {
         job: &Job,
         theta: &[f64],
         outputs: Vec<f64>,
-        carried: &mut Carried,
+        of_effects: &mut EffectStates,
     ) -> Result<Vec<f64>, ParticleError> {
         let Some(effects) = &self.on_outputs else { return Ok(outputs) };
         let window = &*job.window;
         let n = self.description.spec.n_output();
-        let before = carried.last.take().filter(|_| window.times[0] > window.start);
+        let before = of_effects.last.take().filter(|_| window.times[0] > window.start);
         let times: Vec<f64> =
             before.iter().map(|_| window.start).chain(window.times.iter().copied()).collect();
         let recorded = (0..n).map(|i| Signal {
@@ -169,15 +174,15 @@ impl<S: Solve> External<S> {
             observed: vec![f64::NAN; outputs.len()],
             inputs: window.inputs.iter().cloned().chain(recorded).collect(),
         };
-        let shown = effects.run(theta, replayed, carried.outputs.take())?;
-        carried.outputs = Some(shown.state);
-        carried.last = outputs.len().checked_sub(n).map(|first| outputs[first..].to_vec());
+        let shown = effects.run(theta, replayed, of_effects.outputs.take())?;
+        of_effects.outputs = Some(shown.state);
+        of_effects.last = outputs.len().checked_sub(n).map(|first| outputs[first..].to_vec());
         Ok(shown.outputs)
     }
 
-    /// Takes apart the state of a job.
-    fn carried(&self, state: Option<&[f64]>) -> Result<(Option<Vec<f64>>, Carried), ParticleError> {
-        let Some(state) = state else { return Ok((None, Carried::default())) };
+    /// The state of a job as that of the program and what effects remember.
+    fn split_state(&self, state: Option<&[f64]>) -> Result<(Option<Vec<f64>>, EffectStates), ParticleError> {
+        let Some(state) = state else { return Ok((None, EffectStates::default())) };
         if !self.spec.restart {
             let name = &self.description.name;
             return Err(bad(format!("a state for the solver `{name}`, which cannot restart from one")));
@@ -190,12 +195,12 @@ impl<S: Solve> External<S> {
         let n_last = if self.on_outputs.is_some() { self.description.spec.n_output() } else { 0 };
         let (last, of_outputs) = rest.split_at(n_last);
         let some = |values: &[f64], there: bool| there.then(|| values.to_vec());
-        let carried = Carried {
+        let of_effects = EffectStates {
             inputs: some(of_inputs, self.on_inputs.is_some()),
             last: some(last, self.on_outputs.is_some()),
             outputs: some(of_outputs, self.on_outputs.is_some()),
         };
-        Ok((Some(own.to_vec()), carried))
+        Ok((Some(own.to_vec()), of_effects))
     }
 
     /// Refuses an answer of another shape, of which nobody knows whose doing it is, and one that is not finite.
@@ -233,9 +238,9 @@ impl<S: Solve> External<S> {
     }
 }
 
-/// What effects on signals carry from window to window.
+/// What effects on signals remember from window to window.
 #[derive(Default)]
-struct Carried {
+struct EffectStates {
     inputs: Option<Vec<f64>>,
     /// The outputs at the end of the window before, without effects.
     last: Option<Vec<f64>>,
@@ -251,8 +256,8 @@ impl<S: Solve> Forward for External<S> {
         check_job(job, self.binding.len(), self.rows.n_row(), &self.spec)?;
         let own = &self.description.spec;
         let theta = self.binding.theta(&job.theta, job.window.start)?;
-        let (state, mut carried) = self.carried(job.state.as_deref())?;
-        let window = self.window(job, &theta, &mut carried)?;
+        let (state, mut of_effects) = self.split_state(job.state.as_deref())?;
+        let window = self.window(job, &theta, &mut of_effects)?;
         let mut start = vec![f64::NAN; own.n_state()];
         self.binding.initial(&job.theta, &mut start);
         let given = (0..own.n_state()).filter(|i| !start[*i].is_nan());
@@ -274,10 +279,10 @@ impl<S: Solve> Forward for External<S> {
         };
         let solved = self.solve.solve(&run)?;
         self.check(&solved, &window)?;
-        let shown = self.add_to_outputs(job, &theta, solved.outputs, &mut carried)?;
+        let shown = self.add_to_outputs(job, &theta, solved.outputs, &mut of_effects)?;
         let outputs = self.rows.picked(&shown);
         let state = if self.spec.restart {
-            let parts = [Some(solved.state), carried.inputs, carried.last, carried.outputs];
+            let parts = [Some(solved.state), of_effects.inputs, of_effects.last, of_effects.outputs];
             parts.into_iter().flatten().flatten().collect()
         } else {
             Vec::new()

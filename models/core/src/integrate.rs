@@ -1,14 +1,14 @@
-//! Numerical integration of a model over one segment of linear inputs.
+//! Numerical integration of a system of ordinary differential equations over one span.
 //!
 //! One file per method: [`dopri5`] for smooth problems, [`rosenbrock`] for stiff ones, [`fixed`] for a step that never
 //! adapts. The step control, the location of switching points and sliding along them are shared by the adaptive methods.
-//! Nothing here keeps memory between segments, so that a run depends on its job only. Next file to read: [`dopri5`].
+//! Nothing here knows a model or keeps memory between spans, so that a run depends on its job only. Next file to read: [`dopri5`].
 
-pub mod auto;
+mod auto;
 mod control;
 mod dopri5;
 mod events;
-pub mod fixed;
+mod fixed;
 mod rosenbrock;
 mod sliding;
 mod span;
@@ -18,8 +18,9 @@ mod system;
 use dopri5::Dopri5;
 use rosenbrock::Rosenbrock;
 
-use crate::segment::Segment;
-use crate::{Model, ModelFailure};
+use crate::failure::ModelFailure;
+
+pub(crate) use system::{System, differences};
 
 /// How exact a step must be: its error estimate stays below `absolute + relative · |x|` in the root mean square.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,27 +59,25 @@ impl Default for Solver {
     }
 }
 
-/// Advances `x` over the segment by the chosen method.
+/// Advances `x` over a span by the chosen method.
 ///
 /// # Errors
 /// [`ModelFailure::TooManySteps`], [`ModelFailure::StepTooSmall`] or [`ModelFailure::NotFinite`], with the time reached.
-pub fn advance<M: Model + ?Sized>(
-    model: &M,
+pub(crate) fn advance<S: System>(
+    system: &mut S,
     solver: Solver,
-    segment: Segment<'_>,
-    theta: &[f64],
+    span: [f64; 2],
     x: &mut [f64],
 ) -> Result<(), ModelFailure> {
+    let n = x.len();
     match solver {
-        Solver::Auto(tolerance) => auto::advance(model, segment, theta, x, tolerance),
+        Solver::Auto(tolerance) => auto::advance(system, span, x, tolerance),
         Solver::Dopri5(tolerance) => {
-            let mut stepper = Dopri5::new(x.len(), false);
-            span::advance(model, segment, theta, x, tolerance, &mut stepper)
+            span::integrate(system, &mut Dopri5::new(n, false), span, x, tolerance).map(|_| ())
         }
         Solver::Rosenbrock(tolerance) => {
-            let mut stepper = Rosenbrock::new(x.len());
-            span::advance(model, segment, theta, x, tolerance, &mut stepper)
+            span::integrate(system, &mut Rosenbrock::new(n), span, x, tolerance).map(|_| ())
         }
-        Solver::Fixed { step } => fixed::advance(model, segment, theta, x, step),
+        Solver::Fixed { step } => fixed::advance(system, span, x, step),
     }
 }

@@ -38,12 +38,12 @@ pub mod surface;
 pub mod units;
 
 pub use blocks::Blocks;
-pub use effect::{Addition, Effect, EffectDef, EffectParameter, EffectState};
+pub use effect::{Addition, EffectDef, EffectParameter, EffectState};
 pub use external::{External, Run, Solve, Solved};
 pub use failure::{Failure, ModelFailure, ParticleError, Timeout};
 pub use job::{Forward, Job, Prediction, Signal, Window};
 pub use memory::{Memory, with_memories};
-pub use model::Model;
+pub use model::{Model, advance_by};
 pub use native_models::{NativeModel, NativeModels};
 pub use nearest::nearest;
 pub use observer::Observer;

@@ -12,7 +12,7 @@ use crate::ModelFailure;
 pub const MAX_STEPS: u64 = 2_000_000;
 
 /// Seconds of computing of one run where the study does not say otherwise.
-pub const TIMEOUT: f64 = 3600.0;
+pub(crate) const TIMEOUT: f64 = 3600.0;
 
 /// Steps between two looks at whether to stop: a look may read a clock, a step may be as short.
 const LOOK: u64 = 256;
@@ -28,7 +28,7 @@ pub struct Limits<'a> {
 
 impl<'a> Limits<'a> {
     /// At most `most` steps for a run that ends at time `until`, and an end as soon as `stop` says so.
-    pub fn new(most: u64, until: f64, stop: Option<&'a dyn Fn() -> bool>) -> Self {
+    pub(crate) fn new(most: u64, until: f64, stop: Option<&'a dyn Fn() -> bool>) -> Self {
         Self { most, taken: Cell::new(0), until, stop, stopped: Cell::new(false) }
     }
 
@@ -66,12 +66,12 @@ impl<'a> Limits<'a> {
     }
 
     /// The steps that one span of linear inputs may take: those of the run, or `usual` where the run has no limit.
-    pub fn in_one_span(&self, usual: u64) -> u64 {
+    pub(crate) fn in_one_span(&self, usual: u64) -> u64 {
         if self.most == u64::MAX { usual } else { self.most }
     }
 
     /// Whether the run ended because it was to stop.
-    pub fn stopped(&self) -> bool {
+    pub(crate) fn stopped(&self) -> bool {
         self.stopped.get()
     }
 

@@ -3,10 +3,14 @@
 //! A model does not know windows, data or observers: [`crate::simulator`] does. Next file to read: [`crate::equations`]
 //! for models written in a study; the built-in ones are crates beside this one.
 
-use crate::integrate::{self, Solver};
+mod on_segment;
+
+use crate::integrate::Solver;
 use crate::memory::Memory;
 use crate::segment::{Drive, Segment};
 use crate::{Blocks, ModelFailure, Spec};
+
+pub use on_segment::advance_by;
 
 /// A dynamical system dx/dt = f(t, x, θ, u), y = h(t, x, θ, u).
 ///
@@ -79,6 +83,6 @@ pub trait Model: Send + Sync {
     /// # Errors
     /// When the integrator cannot reach the segment's end.
     fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ModelFailure> {
-        integrate::advance(self, self.solver(), segment, theta, x)
+        advance_by(self, self.solver(), segment, theta, x)
     }
 }

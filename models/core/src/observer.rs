@@ -4,31 +4,23 @@
 //! stand on the model's [`crate::blocks`], the others on the states that outputs measure. Next file to read: [`nudging`],
 //! then [`dvf`].
 
-pub mod dvf;
-pub mod dvf_am;
+mod dvf;
+mod dvf_am;
 mod extension;
-pub mod image_force;
-pub mod measured;
-pub mod none;
-pub mod nudging;
-pub mod sdf;
-pub mod sdf_displacement;
+mod image_force;
+mod measured;
+mod none;
+mod nudging;
+mod sdf;
+mod sdf_displacement;
 mod wall;
-pub mod windkessel;
+mod windkessel;
 
 use nalgebra::DMatrix;
 
 use crate::SetupError;
 use crate::setup::ObserverDef;
 use crate::{Model, NativeModels, Spec, nearest};
-
-pub use dvf::VelocityFeedback;
-pub use image_force::ImageForce;
-pub use none::NoObserver;
-pub use nudging::Nudging;
-pub use sdf::DisplacementFeedback;
-pub use sdf_displacement::SolidFeedback;
-pub use windkessel::WindkesselObserver;
 
 /// What an observer corrects with: one observation time.
 #[derive(Clone, Copy)]
@@ -85,7 +77,7 @@ pub struct Wiring<'a> {
 }
 
 /// Makes an observer from its definition.
-pub type Build = fn(&ObserverDef, Wiring<'_>) -> Result<Box<dyn Observer>, SetupError>;
+pub(crate) type Build = fn(&ObserverDef, Wiring<'_>) -> Result<Box<dyn Observer>, SetupError>;
 
 /// One observer of the list.
 pub struct Kind {
@@ -94,7 +86,7 @@ pub struct Kind {
     /// One plain sentence.
     pub says: &'static str,
     /// Makes it.
-    pub build: Build,
+    pub(crate) build: Build,
 }
 
 /// Every observer.

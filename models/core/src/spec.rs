@@ -197,7 +197,7 @@ impl Spec {
     }
 
     /// Position of a scalar state, or of one component of a field of states: what a run can record under that name.
-    pub fn scalar_state(&self, name: &str) -> Option<usize> {
+    pub(crate) fn scalar_state(&self, name: &str) -> Option<usize> {
         Self::range_of(&self.states, name).filter(|range| range.len() == 1).map(|range| range.start)
     }
 

@@ -9,26 +9,27 @@
 //! slopes in the gain, [`gain`] for the gain to choose, [`locus`] for the way of each pole. Source: Moireau, Chapelle &
 //! Le Tallec (2008, 2009).
 
-pub mod component;
-pub mod coordinates;
-pub mod decay;
-pub mod gain;
-pub mod linearise;
-pub mod linearised_setup;
-pub mod locus;
-pub mod observed;
-pub mod pole;
-pub mod sensitivity;
+mod component;
+mod coordinates;
+mod decay;
+mod gain;
+mod linearise;
+mod linearised_setup;
+mod locus;
+mod observed;
+mod pole;
+mod sensitivity;
 mod vector;
 
 use nalgebra::DMatrix;
 
 use crate::{Model, Observer, SetupError};
 
+pub use component::ROUNDING;
 pub use coordinates::{Energy, natural};
 pub use decay::Decay;
 pub use gain::{Best, Beyond, GainCurve};
-pub use linearise::{linearisation, linearisation_at};
+pub use linearise::linearisation;
 pub use linearised_setup::{LinearisedSetup, ObserverSpectrum};
 pub use locus::Follower;
 pub use observed::{Feedback, ObservedSystem};

@@ -7,8 +7,8 @@
 //! surface. How a surface is segmented, and smooth interpolation between two of them in time, are not here. Next file to
 //! read: [`profile`].
 
-pub mod mesh;
-pub mod profile;
+mod mesh;
+mod profile;
 mod search;
 mod topology;
 mod triangle;

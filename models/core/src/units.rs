@@ -64,7 +64,7 @@ pub struct Unit {
 
 impl Unit {
     /// The unit of a plain number.
-    pub const ONE: Self = Self { factor: 1.0, exponents: [0.0; 7] };
+    pub(crate) const ONE: Self = Self { factor: 1.0, exponents: [0.0; 7] };
 
     /// Reads a label; nothing for one that is empty, unknown or ambiguous (`J/kg K`: write `J/(kg K)`).
     pub fn parse(label: &str) -> Option<Self> {
@@ -73,21 +73,14 @@ impl Unit {
 
     /// The unit of a product.
     #[must_use]
-    pub fn times(self, other: Self) -> Self {
+    pub(crate) fn times(self, other: Self) -> Self {
         let exponents = std::array::from_fn(|i| self.exponents[i] + other.exponents[i]);
         Self { factor: self.factor * other.factor, exponents }
     }
 
-    /// The unit of a quotient.
-    #[must_use]
-    pub fn per(self, other: Self) -> Self {
-        let exponents = std::array::from_fn(|i| self.exponents[i] - other.exponents[i]);
-        Self { factor: self.factor / other.factor, exponents }
-    }
-
     /// The unit of a power.
     #[must_use]
-    pub fn power(self, exponent: f64) -> Self {
+    pub(crate) fn power(self, exponent: f64) -> Self {
         Self { factor: self.factor.powf(exponent), exponents: self.exponents.map(|e| e * exponent) }
     }
 

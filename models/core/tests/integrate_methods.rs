@@ -1,9 +1,9 @@
 //! The integrators on smooth problems with known solutions: order, tolerance, stiffness, restart, failure.
 
-use starlings_models_core::integrate::{Solver, Tolerance, advance};
+use starlings_models_core::integrate::{Solver, Tolerance};
 use starlings_models_core::limits::Limits;
 use starlings_models_core::segment::{Drive, History, Segment};
-use starlings_models_core::{Model, ModelFailure, Quantity, Spec};
+use starlings_models_core::{Model, ModelFailure, Quantity, Spec, advance_by};
 
 type Rate = fn(f64, &[f64], &[f64], &mut [f64]);
 
@@ -49,7 +49,7 @@ impl History for Never {
 fn run(model: &Ode, solver: Solver, [t0, t1]: [f64; 2], x0: &[f64]) -> Result<Vec<f64>, ModelFailure> {
     let mut x = x0.to_vec();
     let segment = Segment { t0, t1, u0: &[1.0], slope: &[2.0], history: &Never, limits: &Limits::none() };
-    advance(model, solver, segment, &[], &mut x).map(|()| x)
+    advance_by(model, solver, segment, &[], &mut x).map(|()| x)
 }
 
 fn tolerance(relative: f64) -> Tolerance {

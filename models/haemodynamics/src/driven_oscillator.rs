@@ -8,7 +8,7 @@ use starlings_models_core::{Blocks, Drive, Model, ModelFailure, Quantity, Role, 
 use super::oscillator::{INITIAL_POSITION, blocks, free_motion, measures, outputs, parameters, states};
 
 /// m d²x/dt² + c dx/dt + k x = F(t), with position x and velocity v as states and outputs.
-pub struct DrivenOscillator {
+pub(crate) struct DrivenOscillator {
     spec: Spec,
 }
 

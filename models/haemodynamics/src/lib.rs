@@ -22,15 +22,15 @@ mod windkessel4;
 use starlings_models_core::NativeModel;
 
 pub use artery_1d::Artery1d;
-pub use driven_oscillator::DrivenOscillator;
+use driven_oscillator::DrivenOscillator;
 pub use fsi_tube::FsiTube;
 pub use oscillator::Oscillator;
-pub use toy_fsi::ToyFsi;
-pub use toy_fsi_stokes::ToyFsiStokes;
-pub use toy_fsi_windkessel::ToyFsiWindkessel;
+use toy_fsi::ToyFsi;
+use toy_fsi_stokes::ToyFsiStokes;
+use toy_fsi_windkessel::ToyFsiWindkessel;
 pub use windkessel2::Windkessel2;
-pub use windkessel3::Windkessel3;
-pub use windkessel4::Windkessel4;
+use windkessel3::Windkessel3;
+use windkessel4::Windkessel4;
 
 /// Every model of this family.
 pub const MODELS: &[NativeModel] = &[

@@ -18,9 +18,11 @@ mod step;
 mod topology;
 mod units;
 
-use starlings_models_core::integrate::{self, Solver, Tolerance};
+use starlings_models_core::integrate::{Solver, Tolerance};
 use starlings_models_core::segment::Segment;
-use starlings_models_core::{Drive, Model, ModelDef, ModelFailure, Quantity, SetupError, Spec, layout};
+use starlings_models_core::{
+    Drive, Model, ModelDef, ModelFailure, Quantity, SetupError, Spec, advance_by, layout,
+};
 
 use assembly::Assembly;
 use circuit::{Ends, FlowOf, Law};
@@ -105,7 +107,7 @@ impl RcrNetwork {
         x: &mut [f64],
     ) -> Result<(), ModelFailure> {
         if !self.network.circuit.is_linear() {
-            return integrate::advance(self, self.solver(), segment, theta, x);
+            return advance_by(self, self.solver(), segment, theta, x);
         }
         let length = segment.t1 - segment.t0;
         let end: Vec<f64> = segment.u0.iter().zip(segment.slope).map(|(u, s)| u + s * length).collect();

@@ -32,7 +32,7 @@ pub(crate) const WALL: WallOutputs =
     WallOutputs { displacement: "displacement", velocity: "velocity", pressure: None };
 
 /// A potential flow under a generalised string.
-pub struct ToyFsi {
+pub(crate) struct ToyFsi {
     spec: Spec,
     discretisation: Discretisation,
     vibrations: Cache<Vibration>,
@@ -44,7 +44,7 @@ impl ToyFsi {
     ///
     /// # Errors
     /// When a number of the layout is out of range or belongs to the other discretisation.
-    pub fn new(layout: &Layout) -> Result<Self, SetupError> {
+    pub(crate) fn new(layout: &Layout) -> Result<Self, SetupError> {
         let discretisation = layout.check()?;
         let n = match &discretisation {
             Discretisation::Modes(spectral) => spectral.len(),
@@ -68,7 +68,7 @@ impl ToyFsi {
     ///
     /// # Errors
     /// When the layout is wrong.
-    pub fn build(def: &ModelDef) -> Result<Box<dyn Model>, SetupError> {
+    pub(crate) fn build(def: &ModelDef) -> Result<Box<dyn Model>, SetupError> {
         Ok(Box::new(Self::new(&starlings_models_core::layout::read(def)?)?))
     }
 

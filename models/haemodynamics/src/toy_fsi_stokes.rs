@@ -24,7 +24,7 @@ use super::toy_fsi::vessel::{self, Vessel, wall_fields};
 use super::toy_fsi::{WALL, bump, modal_matrices};
 
 /// A Stokes flow under a generalised string.
-pub struct ToyFsiStokes {
+pub(crate) struct ToyFsiStokes {
     spec: Spec,
     spectral: Spectral,
     profiles: Profiles,
@@ -34,7 +34,7 @@ pub struct ToyFsiStokes {
 /// `[model.layout]` of the model.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Layout {
+pub(crate) struct Layout {
     /// Number of sine modes, and of nodes.
     pub modes: usize,
     /// Number of profiles of the flow across the channel in each mode.
@@ -102,7 +102,7 @@ impl ToyFsiStokes {
     ///
     /// # Errors
     /// When a number of the layout is out of range.
-    pub fn new(layout: &Layout) -> Result<Self, SetupError> {
+    pub(crate) fn new(layout: &Layout) -> Result<Self, SetupError> {
         let n = count("modes", layout.modes, 1)?;
         let n_b = count("polynomials", layout.polynomials, 1)?;
         count("modes", n * n_b, 1)?;
@@ -132,7 +132,7 @@ impl ToyFsiStokes {
     ///
     /// # Errors
     /// When the layout is wrong.
-    pub fn build(def: &ModelDef) -> Result<Box<dyn Model>, SetupError> {
+    pub(crate) fn build(def: &ModelDef) -> Result<Box<dyn Model>, SetupError> {
         Ok(Box::new(Self::new(&starlings_models_core::layout::read(def)?)?))
     }
 

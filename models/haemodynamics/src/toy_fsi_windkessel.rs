@@ -22,7 +22,7 @@ use super::toy_fsi::vessel::{Vessel, wall_fields};
 use super::toy_fsi::{WALL, modal_matrices};
 
 /// A channel under an elastic wall, from a known inflow to a Windkessel.
-pub struct ToyFsiWindkessel {
+pub(crate) struct ToyFsiWindkessel {
     spec: Spec,
     spectral: Spectral,
     systems: Cache<System>,
@@ -31,7 +31,7 @@ pub struct ToyFsiWindkessel {
 /// `[model.layout]` of the model.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Layout {
+pub(crate) struct Layout {
     /// Number of quarter-wave modes, and of nodes.
     pub modes: usize,
 }
@@ -143,7 +143,7 @@ impl ToyFsiWindkessel {
     ///
     /// # Errors
     /// When the number of modes is out of range.
-    pub fn new(layout: &Layout) -> Result<Self, SetupError> {
+    pub(crate) fn new(layout: &Layout) -> Result<Self, SetupError> {
         let n = count("modes", layout.modes, 1)?;
         let pressure = Quantity::new("pi", "dyn/cm^2").role(Role::Pressure);
         let outlet = Quantity::new("pressure", "dyn/cm^2").role(Role::Pressure);
@@ -171,7 +171,7 @@ impl ToyFsiWindkessel {
     ///
     /// # Errors
     /// When the layout is wrong.
-    pub fn build(def: &ModelDef) -> Result<Box<dyn Model>, SetupError> {
+    pub(crate) fn build(def: &ModelDef) -> Result<Box<dyn Model>, SetupError> {
         Ok(Box::new(Self::new(&starlings_models_core::layout::read(def)?)?))
     }
 

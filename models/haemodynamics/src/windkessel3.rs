@@ -10,7 +10,7 @@ use super::windkessel2::{
 };
 
 /// C dp/dt = q − p/R; the inlet pressure is p + Zc q.
-pub struct Windkessel3 {
+pub(crate) struct Windkessel3 {
     spec: Spec,
 }
 

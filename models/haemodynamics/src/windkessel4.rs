@@ -15,7 +15,7 @@ use super::windkessel2::{
 use super::windkessel3::characteristic_impedance;
 
 /// C dp/dt = q − p/R and L diL/dt = Zc (q − iL); the inlet pressure is p + Zc (q − iL).
-pub struct Windkessel4 {
+pub(crate) struct Windkessel4 {
     spec: Spec,
 }
 

@@ -40,11 +40,11 @@ pub struct Addition {
 }
 
 /// What stands before the name of an output that a term adds to, where a state may have that name too.
-pub const OUTPUT: &str = "output:";
+pub(crate) const OUTPUT: &str = "output:";
 
 impl Addition {
     /// Name of what the term adds to.
-    pub fn quantity(&self) -> &str {
+    pub(crate) fn quantity(&self) -> &str {
         self.to.strip_prefix(OUTPUT).unwrap_or(&self.to)
     }
 }

@@ -1,4 +1,4 @@
-//! A model with effects, which is a model again.
+//! A model with effects, itself a model.
 //!
 //! The effects' states follow the model's states and their parameters follow its parameters. The model sees the inputs with the
 //! effects' additions, except through `delay`, which reads the record, and so do terms that add to outputs; other terms see the
@@ -18,9 +18,9 @@ use super::{Effect, EffectDef, EffectParameter, Moment, Scale, TermEffect, Touch
 use crate::SetupError;
 use crate::bounds::unbounded;
 use crate::equations::{Slot, check};
-use crate::integrate::{self, Solver};
+use crate::integrate::Solver;
 use crate::segment::{Drive, Segment};
-use crate::{Blocks, Memory, Model, ModelFailure, Quantity, Spec};
+use crate::{Blocks, Memory, Model, ModelFailure, Quantity, Spec, advance_by};
 
 /// A model and the effects added to it.
 pub struct Extended {
@@ -227,7 +227,7 @@ impl Model for Extended {
     fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ModelFailure> {
         let Touches { rates, inputs, parameters_vary, .. } = self.touches;
         if rates || inputs || parameters_vary {
-            return integrate::advance(self, self.solver(), segment, theta, x);
+            return advance_by(self, self.solver(), segment, theta, x);
         }
         self.with_fixed_parameters(theta, |theta| self.inner.advance(segment, theta, x))
     }

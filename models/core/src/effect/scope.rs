@@ -14,7 +14,7 @@ use crate::{Memory, Quantity, Spec, nearest};
 
 /// What the expressions of an effect may name.
 #[derive(Clone, Copy)]
-pub struct Scope<'a> {
+pub(crate) struct Scope<'a> {
     /// The model with the states and parameters of all effects.
     pub spec: &'a Spec,
     /// The study's fixed values.

@@ -10,7 +10,7 @@ use crate::segment::Drive;
 use crate::{Quantity, Spec, nearest};
 
 /// One effect, made of expressions.
-pub struct TermEffect {
+pub(crate) struct TermEffect {
     def: EffectDef,
     touches: Touches,
     rates: Vec<(usize, Program)>,
@@ -26,7 +26,7 @@ impl TermEffect {
     ///
     /// # Errors
     /// When a term adds to something the model does not have, or an expression is wrong.
-    pub fn new(def: &EffectDef, scope: Scope<'_>) -> Result<Self, SetupError> {
+    pub(crate) fn new(def: &EffectDef, scope: Scope<'_>) -> Result<Self, SetupError> {
         let mut effect = Self {
             def: def.clone(),
             touches: Touches::default(),
@@ -133,10 +133,6 @@ fn at(moment: Moment<'_>) -> At<'_> {
 }
 
 impl Effect for TermEffect {
-    fn def(&self) -> &EffectDef {
-        &self.def
-    }
-
     fn touches(&self) -> Touches {
         self.touches
     }

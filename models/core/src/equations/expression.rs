@@ -30,7 +30,7 @@ impl Expression {
     }
 
     /// The expression's text; a derived expression keeps the text that it came from.
-    pub fn text(&self) -> &str {
+    pub(crate) fn text(&self) -> &str {
         &self.text
     }
 

@@ -56,11 +56,6 @@ impl EquationsModel {
     pub fn without(&self, terms: &[&str]) -> Result<Self, SetupError> {
         Self::with_constants(&self.def.without(terms)?, &self.constants)
     }
-
-    /// The equations as stated.
-    pub fn def(&self) -> &EquationsDef {
-        &self.def
-    }
 }
 
 fn write(programs: &[Program], at: &At<'_>, values: &mut [f64]) {

@@ -9,11 +9,10 @@ use crate::solver::Description;
 use crate::{Drive, Model, Spec};
 
 /// A model that is only described.
-pub struct Outline(Spec);
+pub(crate) struct Outline(Spec);
 
 impl Outline {
-    /// The specification that the program gives of itself.
-    pub fn new(description: &Description) -> Self {
+    pub(crate) fn new(description: &Description) -> Self {
         Self(description.spec.clone())
     }
 }
@@ -34,6 +33,11 @@ impl Model for Outline {
     fn output(&self, _t: f64, _x: &[f64], _theta: &[f64], _u: Drive<'_>, y: &mut [f64]) {
         y.fill(f64::NAN);
     }
+}
+
+/// The program as a model that is only described.
+pub fn outline(description: &Description) -> Box<dyn Model> {
+    Box::new(Outline::new(description))
 }
 
 /// Refuses effects that the program cannot take.

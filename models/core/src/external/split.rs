@@ -5,7 +5,7 @@
 
 use crate::EffectDef;
 use crate::SetupError;
-use crate::effect::target::Target;
+use crate::effect::Target;
 use crate::solver::Description;
 
 /// The effects of a setup by who adds them, each in its order.

@@ -9,7 +9,7 @@ use super::Tolerance;
 use super::events::Events;
 use super::stepper::{MAX_STEPS, Stepper, scaled};
 use super::system::{System, not_finite};
-use crate::ModelFailure;
+use crate::failure::ModelFailure;
 
 const SAFETY: f64 = 0.9;
 /// Weight of the integral part.

@@ -10,7 +10,7 @@ use super::control::Run;
 use super::dopri5::Dopri5;
 use super::stepper::Stepper;
 use super::system::System;
-use crate::ModelFailure;
+use crate::failure::ModelFailure;
 use crate::limits::Limits;
 
 /// Distance from the surface at which the two sides' rates are taken, in tolerances: beyond rounding, below notice.

@@ -6,9 +6,8 @@ use super::Tolerance;
 use super::control::{Run, Step};
 use super::sliding::slide;
 use super::stepper::Stepper;
-use super::system::{OnSegment, System};
-use crate::segment::Segment;
-use crate::{Model, ModelFailure};
+use super::system::System;
+use crate::failure::ModelFailure;
 
 /// How an integration ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,20 +47,4 @@ pub(super) fn integrate<S: System, P: Stepper>(
         }
     }
     Ok(Reached::End)
-}
-
-/// Advances `x` over a segment by one method.
-///
-/// # Errors
-/// [`ModelFailure::TooManySteps`], [`ModelFailure::StepTooSmall`] or [`ModelFailure::NotFinite`], with the time reached.
-pub(super) fn advance<M: Model + ?Sized, P: Stepper>(
-    model: &M,
-    segment: Segment<'_>,
-    theta: &[f64],
-    x: &mut [f64],
-    tolerance: Tolerance,
-    stepper: &mut P,
-) -> Result<(), ModelFailure> {
-    let mut system = OnSegment::new(model, segment, theta, x.len());
-    integrate(&mut system, stepper, [segment.t0, segment.t1], x, tolerance).map(|_| ())
 }

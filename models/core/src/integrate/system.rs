@@ -1,13 +1,12 @@
 //! What an integrator sees: a rate, switching functions and a Jacobian, at a time and a state.
 //!
-//! Parameters and inputs are bound here and appear no further. Next file to read: [`super::control`].
+//! Whoever has a system of its own, such as a model with its parameters and inputs, makes it one of these. Next file to read: [`super::control`].
 
+use crate::failure::ModelFailure;
 use crate::limits::Limits;
-use crate::segment::{Drive, Segment};
-use crate::{Model, ModelFailure, Spec};
 
 /// A system of ordinary differential equations.
-pub(super) trait System {
+pub(crate) trait System {
     fn n_state(&self) -> usize;
     fn rhs(&mut self, t: f64, x: &[f64], dx: &mut [f64]);
     fn n_switch(&self) -> usize;
@@ -34,7 +33,7 @@ pub(super) trait System {
 }
 
 /// One-sided differences with the step of Dennis & Schnabel (1983, §5.4).
-pub(super) fn differences<S: System + ?Sized>(
+pub(crate) fn differences<S: System + ?Sized>(
     system: &mut S,
     t: f64,
     x: &[f64],
@@ -72,77 +71,4 @@ pub(super) fn differences<S: System + ?Sized>(
 pub(super) fn not_finite<S: System + ?Sized>(system: &S, t: f64, values: &[f64]) -> ModelFailure {
     let component = values.iter().position(|v| !v.is_finite()).unwrap_or(0);
     ModelFailure::NotFinite { what: system.name(component), time: t }
-}
-
-/// A model on one segment.
-pub(super) struct OnSegment<'a, M: ?Sized> {
-    model: &'a M,
-    segment: Segment<'a>,
-    theta: &'a [f64],
-    u: Vec<f64>,
-    n_state: usize,
-    n_switch: usize,
-}
-
-impl<'a, M: Model + ?Sized> OnSegment<'a, M> {
-    pub(super) fn new(model: &'a M, segment: Segment<'a>, theta: &'a [f64], n_state: usize) -> Self {
-        Self { model, segment, theta, u: segment.u0.to_vec(), n_state, n_switch: model.n_switch() }
-    }
-
-    #[inline]
-    fn set_time(&mut self, t: f64) {
-        let past = t - self.segment.t0;
-        for ((u, u0), slope) in self.u.iter_mut().zip(self.segment.u0).zip(self.segment.slope) {
-            *u = u0 + slope * past;
-        }
-    }
-
-    #[inline]
-    fn drive(&self) -> Drive<'_> {
-        Drive { value: &self.u, slope: self.segment.slope, history: self.segment.history }
-    }
-}
-
-impl<M: Model + ?Sized> System for OnSegment<'_, M> {
-    fn n_state(&self) -> usize {
-        self.n_state
-    }
-
-    #[inline]
-    fn rhs(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
-        self.set_time(t);
-        self.model.rhs(t, x, self.theta, self.drive(), dx);
-    }
-
-    fn n_switch(&self) -> usize {
-        self.n_switch
-    }
-
-    fn switches(&mut self, t: f64, x: &[f64], g: &mut [f64]) {
-        self.set_time(t);
-        self.model.switches(t, x, self.theta, self.drive(), g);
-    }
-
-    fn jacobian(
-        &mut self,
-        t: f64,
-        x: &[f64],
-        f: &[f64],
-        dfdx: &mut [f64],
-        dfdt: &mut [f64],
-        scratch: &mut [f64],
-    ) {
-        self.set_time(t);
-        if !self.model.jacobian(t, x, self.theta, self.drive(), dfdx, dfdt) {
-            differences(self, t, x, f, dfdx, dfdt, scratch);
-        }
-    }
-
-    fn limits(&self) -> &Limits<'_> {
-        self.segment.limits
-    }
-
-    fn name(&self, component: usize) -> String {
-        format!("state `{}`", Spec::component(&self.model.spec().states, component))
-    }
 }

@@ -24,7 +24,7 @@ pub(super) const KIND: Kind = Kind {
 
 /// Feedback of the wall velocity, weighed by a norm N of the wall.
 #[derive(Debug)]
-pub struct VelocityFeedback {
+pub(crate) struct VelocityFeedback {
     wall: Wall,
     norm: fn(&Blocks) -> DMatrix<f64>,
 }
@@ -34,7 +34,7 @@ impl VelocityFeedback {
     ///
     /// # Errors
     /// When the model has no wall or its velocity is not observed.
-    pub fn new(
+    pub(crate) fn new(
         def: &ObserverDef,
         wiring: Wiring<'_>,
         norm: fn(&Blocks) -> DMatrix<f64>,

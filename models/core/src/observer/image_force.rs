@@ -22,7 +22,7 @@ pub(super) const KIND: Kind = Kind {
 
 /// A spring between the wall and its image.
 #[derive(Debug)]
-pub struct ImageForce {
+pub(crate) struct ImageForce {
     wall: Wall,
 }
 
@@ -31,7 +31,7 @@ impl ImageForce {
     ///
     /// # Errors
     /// When the model has no wall or its displacement is not observed.
-    pub fn new(def: &ObserverDef, wiring: Wiring<'_>) -> Result<Self, SetupError> {
+    pub(crate) fn new(def: &ObserverDef, wiring: Wiring<'_>) -> Result<Self, SetupError> {
         Ok(Self { wall: Wall::new(def, &wiring, Shown::Displacement)? })
     }
 

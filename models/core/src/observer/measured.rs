@@ -11,7 +11,7 @@ use crate::{Quantity, Spec, nearest};
 
 /// One observed row and the state component that it measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Measured {
+pub(crate) struct Measured {
     /// Row of the predicted outputs.
     pub row: usize,
     /// State component.
@@ -23,7 +23,7 @@ pub struct Measured {
 ///
 /// # Errors
 /// When a name in `corrects` is unknown, or the sizes of an output and its state differ.
-pub fn measured(def: &ObserverDef, wiring: &Wiring<'_>) -> Result<Vec<Measured>, SetupError> {
+pub(crate) fn measured(def: &ObserverDef, wiring: &Wiring<'_>) -> Result<Vec<Measured>, SetupError> {
     let spec = wiring.spec;
     for (output, state) in &def.corrects {
         find(&spec.outputs, output, "output")?;

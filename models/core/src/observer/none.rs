@@ -6,7 +6,7 @@ use super::{Correction, Kind, Observer};
 use crate::Model;
 
 /// Leaves the state as it is.
-pub struct NoObserver;
+pub(crate) struct NoObserver;
 
 /// The entry of the observer list.
 pub(super) const KIND: Kind =

@@ -19,7 +19,7 @@ use crate::setup::ObserverDef;
 
 /// Pulls measured states towards the data.
 #[derive(Debug)]
-pub struct Nudging {
+pub(crate) struct Nudging {
     gain: f64,
     /// Per corrected state component: its position and the rows that measure it.
     channels: Vec<(usize, Vec<usize>)>,
@@ -37,7 +37,7 @@ impl Nudging {
     ///
     /// # Errors
     /// When a name in `corrects` is unknown, the sizes of output and state differ, or no channel corrects a state.
-    pub fn new(def: &ObserverDef, wiring: Wiring<'_>) -> Result<Self, SetupError> {
+    pub(crate) fn new(def: &ObserverDef, wiring: Wiring<'_>) -> Result<Self, SetupError> {
         let mut channels: Vec<(usize, Vec<usize>)> = Vec::new();
         for Measured { row, state } in measured(def, &wiring)? {
             match channels.iter_mut().find(|(at, _)| *at == state) {

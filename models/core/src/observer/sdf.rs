@@ -24,7 +24,7 @@ pub(super) const KIND: Kind = Kind {
 
 /// Feedback of the wall displacement on the displacement.
 #[derive(Debug)]
-pub struct DisplacementFeedback {
+pub(crate) struct DisplacementFeedback {
     wall: Wall,
 }
 
@@ -33,7 +33,7 @@ impl DisplacementFeedback {
     ///
     /// # Errors
     /// When the model has no wall or its displacement is not observed.
-    pub fn new(def: &ObserverDef, wiring: Wiring<'_>) -> Result<Self, SetupError> {
+    pub(crate) fn new(def: &ObserverDef, wiring: Wiring<'_>) -> Result<Self, SetupError> {
         Ok(Self { wall: Wall::new(def, &wiring, Shown::Displacement)? })
     }
 }

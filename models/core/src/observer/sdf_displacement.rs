@@ -25,7 +25,7 @@ pub(super) const KIND: Kind = Kind {
 
 /// Feedback of the wall displacement that the solid alone feels.
 #[derive(Debug)]
-pub struct SolidFeedback {
+pub(crate) struct SolidFeedback {
     wall: Wall,
 }
 
@@ -34,7 +34,7 @@ impl SolidFeedback {
     ///
     /// # Errors
     /// When the model has no wall or its displacement is not observed.
-    pub fn new(def: &ObserverDef, wiring: Wiring<'_>) -> Result<Self, SetupError> {
+    pub(crate) fn new(def: &ObserverDef, wiring: Wiring<'_>) -> Result<Self, SetupError> {
         Ok(Self { wall: Wall::new(def, &wiring, Shown::Displacement)? })
     }
 }

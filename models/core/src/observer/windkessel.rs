@@ -24,7 +24,7 @@ pub(super) const KIND: Kind = Kind {
 
 /// Feedback of the outlet pressure on the Windkessel.
 #[derive(Debug)]
-pub struct WindkesselObserver {
+pub(crate) struct WindkesselObserver {
     gain: f64,
     /// Position of π in the state.
     state: usize,
@@ -39,7 +39,7 @@ impl WindkesselObserver {
     ///
     /// # Errors
     /// When the model has no Windkessel behind a wall or its pressure is not observed.
-    pub fn new(def: &ObserverDef, wiring: Wiring<'_>) -> Result<Self, SetupError> {
+    pub(crate) fn new(def: &ObserverDef, wiring: Wiring<'_>) -> Result<Self, SetupError> {
         let (block, pressure) = hosted(def, &wiring, |b| b.windkessel.zip(b.outputs.pressure))?;
         let rows: Vec<usize> = components(&wiring, pressure)?.into_iter().map(|(row, _)| row).collect();
         if rows.is_empty() {

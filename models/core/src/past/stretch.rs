@@ -2,7 +2,7 @@
 //! what it reads is already recorded.
 //!
 //! A stretch ends at the next knot of any memory. Where a delay is shorter than that, the stretch reads itself: it is run
-//! again until what it reads is what it records. Next file to read: [`crate::memory`].
+//! repeatedly until what it reads is what it records. Next file to read: [`crate::memory`].
 
 use super::Past;
 use super::track::{Piece, Track};

@@ -12,7 +12,7 @@ pub const ROUNDING: f64 = 1e-12;
 
 /// Rows of every block, in ascending order, such that no entry between two blocks of any matrix is larger than `negligible`
 /// times the matrix's largest.
-pub fn components(matrices: &[&DMatrix<f64>], negligible: f64) -> Vec<Vec<usize>> {
+pub(crate) fn components(matrices: &[&DMatrix<f64>], negligible: f64) -> Vec<Vec<usize>> {
     let n = matrices.first().map_or(0, |a| a.nrows());
     let mut root: Vec<usize> = (0..n).collect();
     for a in matrices {
@@ -43,7 +43,7 @@ fn find(root: &mut [usize], mut i: usize) -> usize {
 }
 
 /// The entries of a matrix between the rows of one block.
-pub fn block(a: &DMatrix<f64>, rows: &[usize]) -> DMatrix<f64> {
+pub(crate) fn block(a: &DMatrix<f64>, rows: &[usize]) -> DMatrix<f64> {
     DMatrix::from_fn(rows.len(), rows.len(), |i, j| a[(rows[i], rows[j])])
 }
 

@@ -23,7 +23,11 @@ pub fn linearisation(model: &dyn Model, theta: &[f64]) -> Result<DMatrix<f64>, S
 ///
 /// # Errors
 /// When the model depends on its past, switches there, or its rate is not finite there.
-pub fn linearisation_at(model: &dyn Model, theta: &[f64], x: &[f64]) -> Result<DMatrix<f64>, SpectrumError> {
+pub(super) fn linearisation_at(
+    model: &dyn Model,
+    theta: &[f64],
+    x: &[f64],
+) -> Result<DMatrix<f64>, SpectrumError> {
     if !model.memories().is_empty() {
         return Err(SpectrumError::Delayed { model: model.spec().kind.clone() });
     }

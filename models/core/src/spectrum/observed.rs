@@ -34,12 +34,12 @@ impl Feedback {
     }
 
     /// No feedback at all of n states.
-    pub fn none(n: usize) -> Self {
+    pub(crate) fn none(n: usize) -> Self {
         Self { linear: DMatrix::zeros(n, n), quadratic: DMatrix::zeros(n, n) }
     }
 
     /// Γ at a gain.
-    pub fn at(&self, gain: f64) -> DMatrix<f64> {
+    pub(crate) fn at(&self, gain: f64) -> DMatrix<f64> {
         &self.linear * gain + &self.quadratic * (gain * gain)
     }
 }
@@ -87,7 +87,7 @@ impl ObservedSystem {
     ///
     /// # Errors
     /// [`SpectrumError::GainTooLarge`], with the gain from which on it is so.
-    pub fn check_gain(&self, gain: f64) -> Result<(), SpectrumError> {
+    pub(crate) fn check_gain(&self, gain: f64) -> Result<(), SpectrumError> {
         for block in &self.blocks {
             let own = block.a.amax();
             // Of a model without rates nothing is lost.

@@ -28,15 +28,7 @@ pub fn poles(a: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, SpectrumError> {
     Ok(poles)
 }
 
-/// The largest real part of the poles; −∞ without states.
-///
-/// # Errors
-/// As [`poles`].
-pub fn max_re(a: &DMatrix<f64>) -> Result<f64, SpectrumError> {
-    Ok(rightmost(&poles(a)?))
-}
-
-/// The largest real part.
+/// The largest real part; −∞ without poles.
 pub(super) fn rightmost(poles: &[Complex<f64>]) -> f64 {
     poles.iter().map(|p| p.re).fold(f64::NEG_INFINITY, f64::max)
 }

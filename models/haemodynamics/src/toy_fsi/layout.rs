@@ -15,7 +15,7 @@ const MOST: usize = 1000;
 /// The layout as it is written.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Layout {
+pub(crate) struct Layout {
     /// Modes or elements; modes when it is not given.
     #[serde(default)]
     pub discretisation: Kind,
@@ -30,7 +30,7 @@ pub struct Layout {
 /// How the system is discretised.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Kind {
+pub(crate) enum Kind {
     /// Sine modes, each with its own added mass.
     #[default]
     Modes,

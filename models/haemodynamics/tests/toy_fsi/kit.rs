@@ -4,7 +4,7 @@ use nalgebra::{Complex, DMatrix, SymmetricEigen};
 use serde_json::Value;
 use starlings_haemodynamics::MODELS;
 use starlings_models_core::observer::{self, Wiring};
-use starlings_models_core::spectrum::component::ROUNDING;
+use starlings_models_core::spectrum::ROUNDING;
 use starlings_models_core::spectrum::{
     Best, Feedback, GainCurve, ObservedSystem, linearisation, natural, poles, slopes,
 };

@@ -3,7 +3,7 @@
 //! Next file to read: [`super::super::events`].
 
 use super::{Run, Step};
-use crate::ModelFailure;
+use crate::failure::ModelFailure;
 use crate::integrate::stepper::Stepper;
 use crate::integrate::system::System;
 
