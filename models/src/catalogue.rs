@@ -1,8 +1,8 @@
 //! Every kind of model that a study can name.
 //!
 //! The list is what a setup's kind is looked up in, what the `models` command prints, and what the family tests run over. A
-//! model is listed by the crate of its family; the families are listed here. Next file to read: [`crate::native`] for the built-in models,
-//! [`crate::equations`] for models written in a study.
+//! model is listed by the crate of its family; the families are listed here. Next file to read: [`crate::native`] for the
+//! built-in models, [`crate::equations`] for models written in a study.
 
 use std::collections::HashSet;
 
@@ -13,10 +13,8 @@ use starlings_models_core::{
 
 pub use starlings_models_core::equations::KIND as EQUATIONS;
 
-/// The built-in models, one line per family.
-pub const NATIVE: NativeModels = NativeModels::of(&[
-    starlings_haemodynamics::MODELS, //
-]);
+/// The built-in models, one entry per family.
+pub const NATIVE: NativeModels = NativeModels::of(&[starlings_haemodynamics::MODELS]);
 
 /// What every kind of model says of itself, in the order of the list of built-in ones, `equations` last; the lists of
 /// `equations` are empty, since the study fills them.

@@ -13,12 +13,29 @@ pub struct NativeModel {
     pub kind: &'static str,
     /// Makes it; without a layout, in its default one.
     pub build: fn(&ModelDef) -> Result<Box<dyn Model>, SetupError>,
+    /// Whether its own step is a scheme that agrees with the integrated rate to an order only, which the model's own tests
+    /// hold, and not to rounding.
+    pub of_own_order: bool,
 }
 
 impl NativeModel {
     /// An entry for a model that has no layout.
     pub const fn fixed<M: Model + Default + 'static>(kind: &'static str) -> Self {
-        Self { kind, build: fixed::<M> }
+        Self::laid_out(kind, fixed::<M>)
+    }
+
+    /// An entry for a model that reads its layout.
+    pub const fn laid_out(
+        kind: &'static str,
+        build: fn(&ModelDef) -> Result<Box<dyn Model>, SetupError>,
+    ) -> Self {
+        Self { kind, build, of_own_order: false }
+    }
+
+    /// The same for a model whose step is a scheme of an order of its own.
+    #[must_use]
+    pub const fn of_own_order(self) -> Self {
+        Self { of_own_order: true, ..self }
     }
 }
 

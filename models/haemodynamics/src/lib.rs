@@ -39,12 +39,12 @@ pub const MODELS: &[NativeModel] = &[
     NativeModel::fixed::<Windkessel4>("windkessel-4"),
     NativeModel::fixed::<Oscillator>("oscillator"),
     NativeModel::fixed::<DrivenOscillator>("driven-oscillator"),
-    NativeModel { kind: "fsi-tube", build: FsiTube::build },
-    NativeModel { kind: "artery-1d", build: Artery1d::build },
-    NativeModel { kind: "toy-fsi", build: ToyFsi::build },
-    NativeModel { kind: "toy-fsi-windkessel", build: ToyFsiWindkessel::build },
-    NativeModel { kind: "toy-fsi-stokes", build: ToyFsiStokes::build },
-    NativeModel { kind: "rcr-network", build: rcr_network::build },
+    NativeModel::laid_out("fsi-tube", FsiTube::build).of_own_order(),
+    NativeModel::laid_out("artery-1d", Artery1d::build).of_own_order(),
+    NativeModel::laid_out("toy-fsi", ToyFsi::build),
+    NativeModel::laid_out("toy-fsi-windkessel", ToyFsiWindkessel::build),
+    NativeModel::laid_out("toy-fsi-stokes", ToyFsiStokes::build),
+    NativeModel::laid_out("rcr-network", rcr_network::build),
 ];
 
 /// Steps of a model's own scheme within one span of linear inputs, at most.

@@ -118,7 +118,11 @@ mod tests {
             for b in labels {
                 let (one, other) = (Unit::parse(a).unwrap(), Unit::parse(b).unwrap());
                 let read = |text: &str| if text.is_empty() { Unit::ONE } else { Unit::parse(text).unwrap() };
-                assert!(read(&over(a, b)).same(&one.times(other.power(-1.0))), "{a} over {b}: {}", over(a, b));
+                assert!(
+                    read(&over(a, b)).same(&one.times(other.power(-1.0))),
+                    "{a} over {b}: {}",
+                    over(a, b)
+                );
                 assert!(read(&times(a, b)).same(&one.times(other)), "{a} times {b}: {}", times(a, b));
             }
         }
