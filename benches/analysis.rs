@@ -16,10 +16,10 @@ use serde_json::{Map, Value, json};
 use starlings_coordinator::study::recombine_by;
 use starlings_estimators::{Data, Drift, Filter, Noise, Particles, Points, Root, Roukf, SigmaSet};
 use starlings_models::equations::{EquationsDef, EquationsModel};
-use starlings_models::integrate::{self, Solver, Tolerance};
+use starlings_models::integrate::{Solver, Tolerance};
 use starlings_models::limits::Limits;
 use starlings_models::segment::{History, Segment};
-use starlings_models::{Drive, Job, Model, ModelDef, Setup, Signal, Spec, Window};
+use starlings_models::{BuildSetup, Drive, Job, Model, ModelDef, Setup, Signal, Spec, Window, advance_by};
 
 type Failure = Box<dyn std::error::Error>;
 
@@ -215,18 +215,12 @@ fn equations_against_rust(figures: &mut Map<String, Value>) -> Result<(), Failur
     let segment =
         Segment { t0: 0.0, t1: 50.0, u0: &[], slope: &[], history: &NoHistory, limits: &Limits::none() };
     let mut x = [0.1, 0.0];
-    integrate::advance(&rust, Solver::Dopri5(Tolerance::default()), segment, &[1.0, 0.1, 0.5], &mut x)?;
+    advance_by(&rust, Solver::Dopri5(Tolerance::default()), segment, &[1.0, 0.1, 0.5], &mut x)?;
     let native = best(20, || {
         x = [0.1, 0.0];
         black_box(
-            integrate::advance(
-                &rust,
-                Solver::Dopri5(Tolerance::default()),
-                segment,
-                &[1.0, 0.1, 0.5],
-                &mut x,
-            )
-            .is_ok(),
+            advance_by(&rust, Solver::Dopri5(Tolerance::default()), segment, &[1.0, 0.1, 0.5], &mut x)
+                .is_ok(),
         );
     });
     let by_rust = x;

@@ -18,7 +18,9 @@ use std::time::{Duration, Instant};
 
 use screening::Screening;
 use starlings_coordinator::fleet::{Fleet, FleetEvent, GrpcFleet, SetupId};
-use starlings_models::{Forward, Job, ModelDef, ParticleError, Prediction, Setup, SetupError, Spec, Window};
+use starlings_models::{
+    BuildSetup, Forward, Job, ModelDef, ParticleError, Prediction, Setup, SetupError, Spec, Window,
+};
 use starlings_worker::WorkerConfig;
 
 type Failure = Box<dyn std::error::Error>;

@@ -12,7 +12,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use starlings_models::{
-    Description, FilesDef, Forward, Job, ModelDef, Quantity, SOLVER, Setup, Signal, SolverDef, Spec, Window,
+    BuildSetup, Description, FilesDef, Forward, Job, ModelDef, Quantity, SOLVER, Setup, Signal, SolverDef,
+    Spec, Window,
 };
 use starlings_solver::{SiteOptions, Solvers};
 

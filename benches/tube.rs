@@ -23,7 +23,7 @@ use starlings_coordinator::study::store::Purpose;
 use starlings_coordinator::study::{RunContext, RunFolder, Study, Summary, run::run};
 use starlings_models::limits::Limits;
 use starlings_models::segment::{History, Segment};
-use starlings_models::{Job, Model, ModelDef, Setup, Signal, Window};
+use starlings_models::{BuildSetup, Job, Model, ModelDef, Setup, Signal, Window};
 use starlings_worker::WorkerConfig;
 
 type Failure = Box<dyn std::error::Error>;

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use starlings_coordinator::fleet::{Fleet, GrpcFleet, Outcome, SetupId};
 use starlings_models::equations::{EquationsDef, Method, OutputDef, SolverDef, StateDef};
-use starlings_models::{Addition, EffectDef, EffectParameter, Job, ModelDef, Setup, Window};
+use starlings_models::{Addition, BuildSetup, EffectDef, EffectParameter, Job, ModelDef, Setup, Window};
 
 use crate::{Failure, WORKERS, quantile};
 

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use starlings_coordinator::study::Study;
 use starlings_estimators::{Drift, Points, Transform};
-use starlings_models::{Job, Window};
+use starlings_models::{BuildSetup, Job, Window};
 
 /// Values above this stand only where nothing may be fitted.
 const SECRET: f64 = 1e6;

@@ -1,34 +1,51 @@
 //! From a setup to what runs its jobs: the model by its kind, its effects, its observer.
 //!
-//! Next file to read: [`crate::catalogue`].
+//! A setup is plain data that knows no family of models, so that these are methods of a trait. Next file to read:
+//! [`crate::catalogue`].
 
 use std::sync::Arc;
 
-use crate::effect::{Extended, library};
-use crate::memory::with_memories;
-use crate::{EffectDef, Forward, Model, SOLVER, Setup, SetupError, Simulator, Spec, catalogue, external};
+use starlings_models_core::effect::Extended;
+use starlings_models_core::{
+    Forward, Model, SOLVER, Setup, SetupError, Simulator, Spec, external, with_memories,
+};
+
+use crate::catalogue;
 
 /// Makes what runs the jobs of a setup.
 pub type Factory = Arc<dyn Fn(&Setup) -> Result<Box<dyn Forward>, SetupError> + Send + Sync>;
 
-impl Setup {
+/// What the catalogue makes of a setup.
+pub trait BuildSetup {
     /// Builds what runs jobs, and checks that everything fits together.
     ///
     /// # Errors
     /// When a name is unknown (with the nearest valid one), given twice or without value, or an expression is wrong.
-    pub fn build(&self) -> Result<Box<dyn Forward>, SetupError> {
-        if self.model.kind == SOLVER {
-            let message = "the model runs in a program of its own, which only a worker starts";
-            return Err(SetupError::Invalid(message.to_owned()));
-        }
-        Ok(Box::new(Simulator::new(self)?))
-    }
+    fn build(&self) -> Result<Box<dyn Forward>, SetupError>;
 
     /// What the model says of itself, effects and memories included; parameters, outputs and observer are not looked at.
     ///
     /// # Errors
     /// When the model or an effect does not build.
-    pub fn spec(&self) -> Result<Spec, SetupError> {
+    fn spec(&self) -> Result<Spec, SetupError>;
+
+    /// The model with its effects. Of a solver only the specification is known: its rates and outputs are no numbers.
+    ///
+    /// # Errors
+    /// When the model or an effect does not build.
+    fn model(&self) -> Result<Box<dyn Model>, SetupError>;
+}
+
+impl BuildSetup for Setup {
+    fn build(&self) -> Result<Box<dyn Forward>, SetupError> {
+        if self.model.kind == SOLVER {
+            let message = "the model runs in a program of its own, which only a worker starts";
+            return Err(SetupError::Invalid(message.to_owned()));
+        }
+        Ok(Box::new(Simulator::new(self.model()?, self, catalogue::NATIVE)?))
+    }
+
+    fn spec(&self) -> Result<Spec, SetupError> {
         if let Some(description) = self.model.description() {
             return external::spec(self, description);
         }
@@ -36,11 +53,7 @@ impl Setup {
         Ok(with_memories(model.spec(), model.memories()))
     }
 
-    /// The model with its effects. Of a solver only the specification is known: its rates and outputs are no numbers.
-    ///
-    /// # Errors
-    /// When the model or an effect does not build.
-    pub fn model(&self) -> Result<Box<dyn Model>, SetupError> {
+    fn model(&self) -> Result<Box<dyn Model>, SetupError> {
         let inner = catalogue::build(&self.model)?;
         if let Some(description) = self.model.description() {
             external::check_effects(self, description)?;
@@ -50,14 +63,5 @@ impl Setup {
         }
         let effects = self.written_out_effects(inner.spec())?;
         Ok(Box::new(Extended::new(inner, &effects, &self.model.constants)?))
-    }
-
-    /// The effects with the built-in ones written out for a model of this specification; their unit labels, which no run
-    /// reads, are those of a time in seconds.
-    ///
-    /// # Errors
-    /// When the model has no such built-in effect.
-    pub fn written_out_effects(&self, spec: &Spec) -> Result<Vec<EffectDef>, SetupError> {
-        self.effects.iter().map(|def| library::write_out(def, spec, "s")).collect()
     }
 }

@@ -1,23 +1,25 @@
 //! Every kind of model that a study can name.
 //!
-//! The list is what `Setup::build` looks kinds up in, what the `models` command prints, and what the family tests run over.
-//! Next file to read: [`crate::native`] for the built-in models, [`crate::equations`] for models written in a study.
+//! The list is what a setup's kind is looked up in, what the `models` command prints, and what the family tests run over. A
+//! model is listed by the crate of its family; the families are listed here. Next file to read: [`crate::native`] for the
+//! built-in models, [`crate::equations`] for models written in a study.
 
 use std::collections::HashSet;
 
-use crate::SetupError;
-use crate::equations::EquationsModel;
-use crate::external::Outline;
-use crate::setup::ModelDef;
-use crate::solver::SOLVER;
-use crate::{Model, Spec, equations, layout, native, nearest};
+use starlings_models_core::equations::{self, EquationsModel};
+use starlings_models_core::{
+    Model, ModelDef, NativeModels, SOLVER, SetupError, Spec, external, layout, nearest,
+};
 
-pub use crate::equations::KIND as EQUATIONS;
+pub use starlings_models_core::equations::KIND as EQUATIONS;
+
+/// The built-in models, one entry per family.
+pub const NATIVE: NativeModels = NativeModels::of(&[starlings_haemodynamics::MODELS]);
 
 /// What every kind of model says of itself, in the order of the list of built-in ones, `equations` last; the lists of
 /// `equations` are empty, since the study fills them.
 pub fn specs() -> Vec<Spec> {
-    let built = native::all().into_iter().flatten();
+    let built = NATIVE.all().into_iter().flatten();
     let mut specs: Vec<Spec> = built.map(|model| model.spec().clone()).collect();
     specs.push(Spec {
         kind: EQUATIONS.to_owned(),
@@ -44,7 +46,7 @@ pub fn build(def: &ModelDef) -> Result<Box<dyn Model>, SetupError> {
             SetupError::Invalid("model kind `solver` needs a description of the solver".to_owned())
         })?;
         check_names(&description.spec)?;
-        return Ok(Box::new(Outline::new(description)));
+        return Ok(external::outline(description));
     }
     match (&def.equations, def.kind == EQUATIONS) {
         (Some(equations), true) => {
@@ -63,16 +65,15 @@ pub fn build(def: &ModelDef) -> Result<Box<dyn Model>, SetupError> {
         }
         (None, false) => {}
     }
-    let kinds = native::kinds();
-    let Some(kind) = kinds.iter().find(|kind| kind.kind == def.kind) else {
-        let known = kinds.iter().map(|kind| kind.kind).chain([EQUATIONS]);
+    let Some(native) = NATIVE.find(&def.kind) else {
+        let known = NATIVE.iter().map(|native| native.kind).chain([EQUATIONS]);
         return Err(SetupError::Unknown {
             what: "model",
             name: def.kind.clone(),
             nearest: nearest(&def.kind, known),
         });
     };
-    let model = (kind.build)(def)?;
+    let model = (native.build)(def)?;
     check_names(model.spec())?;
     Ok(model)
 }
@@ -91,7 +92,7 @@ fn check_names(spec: &Spec) -> Result<(), SetupError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Quantity;
+    use starlings_models_core::Quantity;
 
     #[test]
     fn two_quantities_of_one_name_are_refused_unless_they_stand_in_different_lists() {

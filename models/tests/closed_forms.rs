@@ -3,7 +3,7 @@
 mod common;
 
 use common::{largest_difference, run, setup};
-use starlings_models::{Setup, Signal, Window};
+use starlings_models::{BuildSetup, Setup, Signal, Window};
 
 /// Observation times 0, 0.1, …, with every value missing.
 fn window(n: usize, n_obs: usize, inputs: Vec<Signal>) -> Window {

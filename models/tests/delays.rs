@@ -6,7 +6,7 @@ use common::{job, largest_difference, run, run_in_pieces, setup, window};
 use starlings_models::effect::{Addition, EffectParameter};
 use starlings_models::equations::{EquationsDef, InputDef, OutputDef, StateDef};
 use starlings_models::{
-    EffectDef, ModelDef, ModelFailure, ParticleError, Setup, SetupError, Signal, Window, memory,
+    BuildSetup, EffectDef, ModelDef, ModelFailure, ParticleError, Setup, SetupError, Signal, Window, memory,
 };
 
 fn state(name: &str, initial: &str, rate: &str) -> StateDef {

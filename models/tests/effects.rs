@@ -6,7 +6,7 @@ mod common;
 use common::{kinds, largest_difference, run, run_in_pieces, setup, window};
 use starlings_models::effect::{Addition, EffectParameter, EffectState};
 use starlings_models::equations::{EquationsDef, InputDef, OutputDef, StateDef};
-use starlings_models::{EffectDef, ModelDef, Quantity, Setup, SetupError, Signal};
+use starlings_models::{BuildSetup, EffectDef, ModelDef, Quantity, Setup, SetupError, Signal};
 
 fn effect(name: &str, adds: &[(&str, &str)], parameters: &[&str]) -> EffectDef {
     let add = |(to, term): &(&str, &str)| Addition { to: (*to).to_owned(), term: (*term).to_owned() };

@@ -8,8 +8,8 @@ use std::time::Duration;
 use common::{job, kinds, largest_difference, run, run_in_pieces, setup, window};
 use starlings_models::equations::{EquationsDef, InputDef, OutputDef, StateDef};
 use starlings_models::{
-    Addition, EffectDef, EffectParameter, Job, ModelDef, ModelFailure, ParticleError, Setup, SetupError,
-    Window,
+    Addition, BuildSetup, EffectDef, EffectParameter, Job, ModelDef, ModelFailure, ParticleError, Setup,
+    SetupError, Window,
 };
 
 fn effect(adds: &[(&str, &str)], parameters: &[&str]) -> EffectDef {

@@ -5,7 +5,7 @@ mod common;
 use common::{largest_difference, run, run_in_pieces, window};
 use starlings_models::effect::names;
 use starlings_models::equations::{EquationsDef, InputDef, OutputDef, StateDef};
-use starlings_models::{Addition, EffectDef, EffectParameter, ModelDef, Setup};
+use starlings_models::{Addition, BuildSetup, EffectDef, EffectParameter, ModelDef, Setup};
 
 const CONSTANTS: [(&str, f64); 7] =
     [("throat", 1.0), ("a", 0.4), ("b", 0.437), ("g", 0.3), ("c", 0.2), ("d", 0.15), ("L", 0.05)];

@@ -7,7 +7,7 @@ mod library_kit;
 use library_kit::benches;
 use starlings_models::effect::library::{library, library_in, shows_in, stem, write_out};
 use starlings_models::native::{Oscillator, Windkessel2};
-use starlings_models::{EffectDef, Model, SetupError, Spec};
+use starlings_models::{BuildSetup, EffectDef, Model, SetupError, Spec};
 
 #[test]
 fn a_pressure_outlet_with_a_flow_hosts_a_series_resistance() {

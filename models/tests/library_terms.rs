@@ -13,7 +13,7 @@ use std::collections::BTreeSet;
 use library_kit::{Bench, benches};
 use starlings_models::effect::library::{FAMILIES, Family, library, stem};
 use starlings_models::equations::StateDef;
-use starlings_models::{EffectDef, Setup};
+use starlings_models::{BuildSetup, EffectDef, Setup};
 use table::{Case, Hand, TABLE};
 
 fn effect(bench: &Bench, name: &str) -> EffectDef {

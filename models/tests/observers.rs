@@ -4,7 +4,7 @@
 mod common;
 
 use common::{kinds, largest_difference, run, run_in_pieces, setup, window};
-use starlings_models::{ModelDef, ObserverDef, Setup, Window};
+use starlings_models::{BuildSetup, ModelDef, ObserverDef, Setup, Window};
 
 fn nudged(setup: &Setup, gain: f64) -> Setup {
     let observer = ObserverDef { kind: "nudging".to_owned(), gain, ..ObserverDef::default() };

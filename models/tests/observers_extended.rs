@@ -1,9 +1,10 @@
 //! Observers of a wall on a model with effects.
 #![allow(clippy::float_cmp, clippy::unwrap_used, reason = "exact comparisons and helpers of tests")]
 
+use starlings_models::catalogue::NATIVE;
 use starlings_models::effect::{Addition, EffectParameter, EffectState};
 use starlings_models::observer::{self, Correction, Wiring};
-use starlings_models::{EffectDef, ModelDef, ObserverDef, Setup};
+use starlings_models::{BuildSetup, EffectDef, ModelDef, ObserverDef, Setup};
 
 /// A tube with an effect on its Windkessel that has a parameter and a state of its own.
 fn setup(with_effect: bool) -> Setup {
@@ -34,7 +35,7 @@ fn corrected(with_effect: bool, kind: &str) -> (Vec<f64>, nalgebra::DMatrix<f64>
     let (model, spec) = (setup.model().unwrap(), setup.spec().unwrap());
     let theta: Vec<f64> = spec.parameters.iter().map(|q| q.default.unwrap_or(0.0)).collect();
     let outputs = ["displacement".to_owned(), "velocity".to_owned()];
-    let wiring = Wiring { spec: &spec, outputs: &outputs, model: &*model, theta: &theta };
+    let wiring = Wiring { spec: &spec, outputs: &outputs, model: &*model, theta: &theta, native: NATIVE };
     let def = ObserverDef { kind: kind.to_owned(), gain: 3.0, ..ObserverDef::default() };
     let observer = observer::build(&def, wiring).unwrap();
     let mut x = vec![0.0; spec.n_state()];

@@ -2,13 +2,15 @@
 #![allow(clippy::float_cmp, clippy::unwrap_used, reason = "exact comparisons and helpers of tests")]
 
 mod common;
+#[path = "../core/tests/dense_wall/mod.rs"]
 mod dense_wall;
 
 use common::{largest_difference, run, setup, window};
 use dense_wall::{channels, poles};
 use nalgebra::DMatrix;
+use starlings_models::catalogue::NATIVE;
 use starlings_models::observer::{self, Wiring};
-use starlings_models::{ObserverDef, Setup, Window};
+use starlings_models::{BuildSetup, ObserverDef, Setup, Window};
 
 const THETA: [f64; 3] = [2.0, 0.0, 18.0];
 const OMEGA: f64 = 3.0;
@@ -25,7 +27,8 @@ fn observed(kind: &str, gain: f64) -> Setup {
 fn closed(kind: &str, gain: f64) -> DMatrix<f64> {
     let model = setup("oscillator").0.model().unwrap();
     let outputs = channels(&["position", "velocity"]);
-    let wiring = Wiring { spec: model.spec(), outputs: &outputs, model: &*model, theta: &THETA };
+    let wiring =
+        Wiring { spec: model.spec(), outputs: &outputs, model: &*model, theta: &THETA, native: NATIVE };
     let feedback = observer::build(&def(kind, gain), wiring).unwrap().feedback(&*model, &THETA);
     DMatrix::from_row_slice(2, 2, &[0.0, 1.0, -OMEGA * OMEGA, 0.0]) - feedback
 }
@@ -119,7 +122,8 @@ fn the_largest_stable_gain_of_an_image_force_is_where_runs_begin_to_grow_at_any_
     for dt in [0.005, 0.3, 0.6, 0.9] {
         let model = setup("oscillator").0.model().unwrap();
         let outputs = channels(&["position", "velocity"]);
-        let wiring = Wiring { spec: model.spec(), outputs: &outputs, model: &*model, theta: &THETA };
+        let wiring =
+            Wiring { spec: model.spec(), outputs: &outputs, model: &*model, theta: &THETA, native: NATIVE };
         let image_force = observer::build(&def("image-force", 1.0), wiring).unwrap();
         let most = image_force.stable_up_to(&*model, &THETA, dt).unwrap();
         let largest = |gain: f64| {

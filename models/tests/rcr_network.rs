@@ -7,7 +7,7 @@ mod rcr_network_kit;
 use common::{job, run};
 use rcr_network_kit::{beat, everything, flow_in, grid, network, over, series, signal, simulate};
 use serde_json::json;
-use starlings_models::{ModelFailure, ParticleError, Setup};
+use starlings_models::{BuildSetup, ModelFailure, ParticleError, Setup};
 
 #[test]
 fn a_capacitor_that_empties_through_a_resistance_decays_exponentially() {

@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 use common::{run, run_in_pieces};
 use rcr_network_kit::{beat, everything, flow_in, grid, network, over, signal, simulate};
 use serde_json::json;
-use starlings_models::{Setup, Signal};
+use starlings_models::{BuildSetup, Setup, Signal};
 
 #[test]
 fn a_half_wave_rectifier_passes_the_positive_halves() {

@@ -1,7 +1,7 @@
 //! What a netlist may not say, and where its refusal points.
 
 use serde_json::{Value, json};
-use starlings_models::{ModelDef, Setup, SetupError};
+use starlings_models::{BuildSetup, ModelDef, Setup, SetupError};
 
 /// Path and message of a refusal.
 fn refusal(layout: Value) -> (String, String) {

@@ -4,7 +4,7 @@
 mod common;
 
 use common::{job, run, setup, window};
-use starlings_models::{Job, Setup, Window};
+use starlings_models::{BuildSetup, Job, Setup, Window};
 
 fn names(names: &[&str]) -> Vec<String> {
     names.iter().map(|&name| name.to_owned()).collect()

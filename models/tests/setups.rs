@@ -4,7 +4,7 @@ mod common;
 
 use common::setup;
 use starlings_models::equations::{EquationsDef, StateDef};
-use starlings_models::{ModelDef, Setup, SetupError};
+use starlings_models::{BuildSetup, ModelDef, Setup, SetupError};
 
 fn refused(change: impl FnOnce(&mut Setup)) -> SetupError {
     let (mut setup, _) = setup("windkessel-3");

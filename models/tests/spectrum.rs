@@ -1,4 +1,4 @@
-//! The spectral laboratory against closed forms: modes under every observer, slopes, best gains, a Windkessel.
+//! Spectra under observers against closed forms: modes under every observer, slopes, best gains, a Windkessel.
 
 #![allow(clippy::float_cmp)]
 
@@ -20,7 +20,11 @@ use structure::{Structure, artery_modes, artery_windkessel, chain};
 /// An observer of a model whose outputs are observed as named.
 fn build(model: &dyn Model, outputs: &[String], kind: &str, gain: f64) -> Box<dyn observer::Observer> {
     let def = ObserverDef { kind: kind.to_owned(), gain, ..ObserverDef::default() };
-    observer::build(&def, Wiring { spec: model.spec(), outputs, model, theta: &[] }).expect("hosted")
+    observer::build(
+        &def,
+        Wiring { spec: model.spec(), outputs, model, theta: &[], native: catalogue::NATIVE },
+    )
+    .expect("hosted")
 }
 
 /// The error of a structure under one observer, in energy coordinates.
@@ -233,7 +237,13 @@ fn nudging_a_scalar_never_saturates() {
     let outputs = names(&["pressure"]);
     let at = |gain: f64| {
         let def = ObserverDef { kind: "nudging".to_owned(), gain, ..ObserverDef::default() };
-        let wiring = Wiring { spec: model.spec(), outputs: &outputs, model: &*model, theta: &theta };
+        let wiring = Wiring {
+            spec: model.spec(),
+            outputs: &outputs,
+            model: &*model,
+            theta: &theta,
+            native: catalogue::NATIVE,
+        };
         observer::build(&def, wiring).map(|o| o.feedback(&*model, &theta))
     };
     let feedback = Feedback::of(at).expect("built").expect("linear");

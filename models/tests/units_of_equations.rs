@@ -4,7 +4,7 @@
 use starlings_models::effect::{Addition, EffectParameter, EffectState};
 use starlings_models::equations::{EquationsDef, InputDef, OutputDef, StateDef};
 use starlings_models::units::{Labels, Mismatch};
-use starlings_models::{EffectDef, ModelDef, Setup, Spec};
+use starlings_models::{BuildSetup, EffectDef, ModelDef, Setup, Spec};
 
 /// A driven oscillator and an output of its energy; units as given for x, v, F and the energy.
 fn oscillator(terms: &[(&str, &str)], energy: &str) -> EquationsDef {

@@ -147,7 +147,7 @@ async fn goodbye(
 mod tests {
     use std::sync::Arc;
 
-    use starlings_models::{Job, Setup, Window};
+    use starlings_models::{BuildSetup, Job, Setup, Window};
     use starlings_proto::{JobEncoder, Lease, SentWindows, encode_setup};
     use tokio::sync::mpsc::unbounded_channel;
 

@@ -142,6 +142,8 @@ impl Setups {
 mod tests {
     use std::sync::mpsc;
 
+    use starlings_models::BuildSetup;
+
     use super::*;
 
     fn id(i: usize) -> SetupId {

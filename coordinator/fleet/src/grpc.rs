@@ -9,7 +9,7 @@ use std::sync::mpsc::{self, RecvTimeoutError, Sender};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use starlings_models::{Job, Setup};
+use starlings_models::{BuildSetup, Job, Setup};
 use starlings_proto::convert::job::check_size;
 use starlings_proto::{JobEncoder, MAX_MESSAGE, SetupId, encode_setup, own_build};
 use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};

@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use starlings_models::{Factory, Forward, Job, ModelFailure, ParticleError, Prediction, Setup};
+use starlings_models::{BuildSetup, Factory, Forward, Job, ModelFailure, ParticleError, Prediction, Setup};
 use starlings_proto::spent::spent;
 use starlings_proto::words::panic_text;
 use starlings_proto::{SetupId, encode_setup};

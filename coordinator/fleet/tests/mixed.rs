@@ -9,7 +9,7 @@ use std::sync::Arc;
 use fleet_kit::{ThreadWorker, any_port, await_workers, factory, jobs, listen};
 use starlings_fleet::{Fleet, FleetError, FleetEvent, InProcess, Outcome, SetupId};
 use starlings_models::{
-    Addition, EffectDef, EffectParameter, Job, ModelDef, Prediction, Setup, SetupError, Window,
+    Addition, BuildSetup, EffectDef, EffectParameter, Job, ModelDef, Prediction, Setup, SetupError, Window,
 };
 use starlings_worker::Factory;
 

@@ -6,7 +6,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use starlings_models::{Description, Forward, Setup, SetupError, SolverDef, SolverFault};
+use starlings_models::{BuildSetup, Description, Forward, Setup, SetupError, SolverDef, SolverFault};
 
 use starlings_fleet::Factory;
 

@@ -1,10 +1,11 @@
 //! The poles of a study's model under the observers that it can host: which are compared, at which gains, and what was found.
 //!
 //! The model stands at its prior medians, where its runs start. The arithmetic of poles is in `starlings_models::spectrum`;
-//! how the result is shown is the caller's. Next file to read: `models/src/spectrum.rs`.
+//! how the result is shown is the caller's. Next file to read: `models/core/src/spectrum.rs`.
 
-use starlings_models::SOLVER;
-use starlings_models::spectrum::{Decay, Laboratory, ObserverSpectrum, SpectrumError};
+use starlings_models::catalogue::NATIVE;
+use starlings_models::spectrum::{Decay, LinearisedSetup, ObserverSpectrum, SpectrumError};
+use starlings_models::{BuildSetup, SOLVER};
 
 use super::{Study, posterior};
 
@@ -30,7 +31,7 @@ pub struct Wanted {
 /// What was found.
 pub struct Spectrum {
     /// The model without observer.
-    pub laboratory: Laboratory,
+    pub laboratory: LinearisedSetup,
     /// The decay that is wanted.
     pub decay: Option<Decay>,
     /// Poles listed, at most those that there are.
@@ -81,7 +82,8 @@ pub fn examine(study: &Study, wanted: &Wanted) -> Result<Spectrum, ExamineError>
         return Err(ExamineError::Solver);
     }
     let medians = study.theta_for(0, posterior::prior(study).mean.as_slice());
-    let laboratory = Laboratory::new(&study.setup, &medians)?;
+    let model = study.setup.model().map_err(SpectrumError::from)?;
+    let laboratory = LinearisedSetup::new(model, &study.setup, &medians, NATIVE)?;
     let listed = wanted.poles.unwrap_or(LISTED).min(laboratory.poles().len());
     let gains = gains(study, wanted, &laboratory);
     let (kinds, refused) = kinds(study, wanted, &laboratory);
@@ -99,7 +101,7 @@ pub fn examine(study: &Study, wanted: &Wanted) -> Result<Spectrum, ExamineError>
 }
 
 /// The gains that are asked for, else the study's, else a range around the poles.
-fn gains(study: &Study, wanted: &Wanted, laboratory: &Laboratory) -> Vec<f64> {
+fn gains(study: &Study, wanted: &Wanted, laboratory: &LinearisedSetup) -> Vec<f64> {
     match (wanted.gains.is_empty(), study.spectrum.gains.is_empty()) {
         (false, _) => wanted.gains.clone(),
         (true, false) => study.spectrum.gains.clone(),
@@ -109,7 +111,11 @@ fn gains(study: &Study, wanted: &Wanted, laboratory: &Laboratory) -> Vec<f64> {
 
 /// The observers to compare, each once, and those that the model cannot host. An observer that was asked for and cannot be is
 /// an error later on; of the others nobody wants to know why.
-fn kinds(study: &Study, wanted: &Wanted, laboratory: &Laboratory) -> (Vec<String>, Vec<(String, String)>) {
+fn kinds(
+    study: &Study,
+    wanted: &Wanted,
+    laboratory: &LinearisedSetup,
+) -> (Vec<String>, Vec<(String, String)>) {
     let named = if wanted.observers.is_empty() { &study.spectrum.observers } else { &wanted.observers };
     let (mut kinds, mut refused) = (Vec::new(), Vec::new());
     if named.is_empty() {

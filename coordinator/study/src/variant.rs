@@ -4,7 +4,7 @@
 //! they are. Parameters that only a term left out used are gone with it. Next file to read: [`super::expand`].
 
 use starlings_estimators::{Drift, Transform};
-use starlings_models::{EffectDef, SetupError};
+use starlings_models::{BuildSetup, EffectDef, SetupError};
 
 use super::checked::{Study, StudyParameter};
 use super::expand::{self, INITIAL};

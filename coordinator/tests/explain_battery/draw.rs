@@ -5,7 +5,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use starlings_models::{EffectDef, Setup};
+use starlings_models::{BuildSetup, EffectDef, Setup};
 
 use crate::world::World;
 

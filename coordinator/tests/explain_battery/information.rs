@@ -7,7 +7,7 @@
 use nalgebra::{DMatrix, DVector};
 use starlings_coordinator::study::checked::StudyParameter;
 use starlings_estimators::Transform;
-use starlings_models::{EffectDef, Forward};
+use starlings_models::{BuildSetup, EffectDef, Forward};
 
 use crate::draw::{Draw, with_effect};
 use crate::world::World;

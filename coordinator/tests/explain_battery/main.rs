@@ -16,6 +16,8 @@ mod world;
 
 use std::path::PathBuf;
 
+use starlings_models::BuildSetup;
+
 use case::{Kind, Outcome};
 use draw::{STRENGTH, STRENGTH_WITHIN, change_of, draw};
 use plan::Plan;

@@ -3,6 +3,7 @@
 //! This is how the lists of truths, equals and absorbed effects were made; it looks only to first order.
 
 use nalgebra::{DMatrix, DVector};
+use starlings_models::BuildSetup;
 
 use crate::draw::{draw, noisy, random, sd, with_effect};
 use crate::information::{Refit, refit, training};

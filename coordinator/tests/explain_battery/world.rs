@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 use starlings_coordinator::study::Study;
 use starlings_models::effect::{library, scale::resolve};
-use starlings_models::equations::def::{Method, SolverDef};
-use starlings_models::{EffectDef, Forward, Job, Setup, Window};
+use starlings_models::equations::{Method, SolverDef};
+use starlings_models::{BuildSetup, EffectDef, Forward, Job, Setup, Window};
 
 use crate::systems::{Finer, System};
 

@@ -10,8 +10,8 @@ use starlings_coordinator::study::{
     FolderError, RunContext, RunError, RunFolder, SolverHost, Study, StudyError, Summary, run::run,
 };
 use starlings_models::{
-    Addition, Description, EffectDef, EffectParameter, External, Job, ModelDef, ParticleError, Run, SOLVER,
-    Setup, SetupError, Solve, Solved, Spec,
+    Addition, BuildSetup, Description, EffectDef, EffectParameter, External, Job, ModelDef, ParticleError,
+    Run, SOLVER, Setup, SetupError, Solve, Solved, Spec,
 };
 
 /// Equations behind the wall that a solver is.

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use starlings_coordinator::study::{Problem, SolverHost, Study};
-use starlings_models::{Description, Setup};
+use starlings_models::{BuildSetup, Description, Setup};
 
 use crate::inside::{Inside, Place};
 use crate::swing::{native, recording, solver};

@@ -4,7 +4,9 @@
 use std::sync::Arc;
 
 use starlings_models::equations::{EquationsDef, InputDef, OutputDef, StateDef};
-use starlings_models::{Forward, Job, ModelDef, Prediction, Setup, Signal, Spec, Window, catalogue};
+use starlings_models::{
+    BuildSetup, Forward, Job, ModelDef, Prediction, Setup, Signal, Spec, Window, catalogue,
+};
 
 /// A setup of one kind that predicts every output, with its parameters estimated; and plausible values for them.
 pub(crate) fn setup(kind: &str) -> (Setup, Vec<f64>) {

@@ -6,7 +6,7 @@
 mod systems;
 
 use starlings_models::effect::scale;
-use starlings_models::{EffectDef, Forward, Job, ParticleError, Setup, Signal, Simulator, Spec, Window};
+use starlings_models::{BuildSetup, EffectDef, Job, ParticleError, Setup, Signal, Spec, Window};
 
 use crate::common;
 
@@ -90,7 +90,7 @@ impl Bench {
         state: Option<Vec<f64>>,
     ) -> Result<Vec<f64>, ParticleError> {
         let names: Vec<&str> = setup.effects.iter().map(|effect| effect.name.as_str()).collect();
-        let model = Simulator::new(setup).unwrap_or_else(|e| panic!("{}, {names:?}: {e}", self.name));
+        let model = setup.build().unwrap_or_else(|e| panic!("{}, {names:?}: {e}", self.name));
         model.run(&Job { state, ..common::job(&self.window, theta) }).map(|prediction| prediction.outputs)
     }
 

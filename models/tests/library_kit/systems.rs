@@ -1,7 +1,7 @@
 //! Models as equations, with places for effects that no kind of the catalogue has.
 
 use starlings_models::equations::{EquationsDef, InputDef, OutputDef, StateDef};
-use starlings_models::{ModelDef, Role, Setup, catalogue};
+use starlings_models::{BuildSetup, ModelDef, Role, Setup, catalogue};
 
 use crate::common::plausible;
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use serde_json::{Value, json};
-use starlings_models::{ModelDef, Prediction, Setup, Signal, Window};
+use starlings_models::{BuildSetup, ModelDef, Prediction, Setup, Signal, Window};
 
 use crate::common::run;
 

@@ -1,4 +1,4 @@
-//! Linear fluid–structure systems written out as matrices: what the laboratory is tested on.
+//! Linear fluid–structure systems written out as matrices: what spectra are tested on.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use starlings_models::blocks::{Blocks, WallOutputs, WindkesselBlock};

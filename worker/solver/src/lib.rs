@@ -26,8 +26,8 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use starlings_models::{
-    Description, External, Factory, Forward, ParticleError, Run, SOLVER, Setup, SetupError, Solve, Solved,
-    SolverDef, SolverFault,
+    BuildSetup, Description, External, Factory, Forward, ParticleError, Run, SOLVER, Setup, SetupError,
+    Solve, Solved, SolverDef, SolverFault,
 };
 
 use adapter::Adapter;

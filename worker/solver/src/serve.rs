@@ -8,8 +8,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use starlings_models::{
-    Addition, Description, EffectDef, EffectParameter, Job, ModelDef, ModelFailure, ParticleError, Quantity,
-    SOLVER, Setup, SetupError, Solved, Spec,
+    Addition, BuildSetup, Description, EffectDef, EffectParameter, Job, ModelDef, ModelFailure,
+    ParticleError, Quantity, SOLVER, Setup, SetupError, Solved, Spec,
 };
 use starlings_proto::FRAME_SIZE;
 use starlings_proto::convert::solver::description::encode_description;

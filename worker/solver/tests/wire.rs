@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 use starlings_models::equations::EquationsDef;
 use starlings_models::{
-    Addition, EffectDef, EffectParameter, EffectState, External, Forward, Job, ModelDef, ObserverDef,
-    ParticleError, Run, SOLVER, Setup, Signal, Solve, Solved, SolverDef, Window,
+    Addition, BuildSetup, EffectDef, EffectParameter, EffectState, External, Forward, Job, ModelDef,
+    ObserverDef, ParticleError, Run, SOLVER, Setup, Signal, Solve, Solved, SolverDef, Window,
 };
 use starlings_solver::conformance::{Trial, conformance};
 use starlings_solver::serve::{Served, serve};

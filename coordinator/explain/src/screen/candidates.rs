@@ -3,7 +3,7 @@
 //! A wrong name or an empty list is an error before the first run. Next file to read: [`crate::options`].
 
 use starlings_models::effect::library::{library_in, shows_in};
-use starlings_models::{EffectDef, Setup, nearest};
+use starlings_models::{BuildSetup, EffectDef, Setup, nearest};
 use starlings_study::{Study, checked::Library};
 
 use crate::error::ExplainError;

@@ -6,7 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 use starlings_models::effect::library::{FAMILIES, shows_in};
-use starlings_models::{EffectDef, Quantity, Role, Setup, Spec};
+use starlings_models::{BuildSetup, EffectDef, Quantity, Role, Setup, Spec};
 use starlings_study::{Study, checked::Library};
 
 use super::candidates::fitted_outputs;

@@ -2,8 +2,9 @@
 //!
 //! Next file to read: [`super::view`].
 
-use starlings_models::spectrum::{Decay, Laboratory};
-use starlings_models::{ModelDef, Setup};
+use starlings_models::catalogue::NATIVE;
+use starlings_models::spectrum::{Decay, LinearisedSetup};
+use starlings_models::{BuildSetup, ModelDef, Setup};
 
 use super::{Locus, render};
 
@@ -13,7 +14,8 @@ fn page() -> String {
     let model =
         ModelDef { kind: "oscillator".to_owned(), constants: constants.into(), ..ModelDef::default() };
     let setup = Setup { model, outputs: outputs.clone(), ..Setup::default() };
-    let laboratory = Laboratory::new(&setup, &[]).expect("linear");
+    let laboratory =
+        LinearisedSetup::new(setup.model().expect("a model"), &setup, &[], NATIVE).expect("linear");
     let decay = Decay::new(10.0, 1.0).expect("a decay");
     let examine = |kind| laboratory.examine(kind, &[0.0, 10.0, 20.0], 2, Some(decay)).expect("hosted");
     let observers = ["sdf", "nudging"].map(examine);

@@ -4,7 +4,7 @@
 //! read: [`super::settings`].
 
 use starlings_models::effect::library;
-use starlings_models::{ModelDef, Setup};
+use starlings_models::{BuildSetup, ModelDef, Setup};
 use toml::Spanned;
 
 use super::settings::{choose, counted};

@@ -3,7 +3,7 @@
 //! What only a run can tell, such as how short a stiff model's steps are, the trial run tells: see [`crate::trial`].
 
 use starlings_models::limits::MAX_STEPS;
-use starlings_models::{Memory, SOLVER, Setup};
+use starlings_models::{BuildSetup, Memory, SOLVER, Setup};
 use toml::Spanned;
 
 use super::blame::expressions;

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use starlings_models::effect::library::write_out;
 use starlings_models::equations::Expression;
-use starlings_models::{EffectDef, ModelDef, Role, Setup, Spec};
+use starlings_models::{BuildSetup, EffectDef, ModelDef, Role, Setup, Spec};
 
 use super::blame::{blame, expressions, report_missing};
 use super::built::{CheckedModel, quantity, valid_names};

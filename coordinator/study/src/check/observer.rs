@@ -3,8 +3,9 @@
 //! Whether it fits the model, the model says when it is built: see [`super::model::check_build`]. Next file to read:
 //! [`super::blame`].
 
+use starlings_models::catalogue::NATIVE;
 use starlings_models::observer::{self, Observer, Wiring};
-use starlings_models::{Model, SOLVER, Setup, SetupError, Spec};
+use starlings_models::{BuildSetup, Model, SOLVER, Setup, SetupError, Spec};
 
 use super::blame::blame;
 use crate::checked::Record;
@@ -40,7 +41,7 @@ fn built(source: &Source, file: &StudyFile, setup: &Setup, records: &[Record]) -
     let build = |outputs: &[String]| -> Result<Built, SetupError> {
         let (model, spec) = (setup.model()?, setup.spec()?);
         let theta = constants(setup, &spec);
-        let wiring = Wiring { spec: &spec, outputs, model: &*model, theta: &theta };
+        let wiring = Wiring { spec: &spec, outputs, model: &*model, theta: &theta, native: NATIVE };
         let observer = observer::build(&setup.observer, wiring)?;
         Ok(Built { observer, model, theta })
     };

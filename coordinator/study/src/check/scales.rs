@@ -10,7 +10,9 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use starlings_models::effect::{EffectParameter, Scale, names, scale};
-use starlings_models::{EffectDef, Job, ObserverDef, ParticleError, SOLVER, Setup, SetupError, Spec, Window};
+use starlings_models::{
+    BuildSetup, EffectDef, Job, ObserverDef, ParticleError, SOLVER, Setup, SetupError, Spec, Window,
+};
 use starlings_proto::spent::spent;
 
 use super::built::CheckedModel;

@@ -6,8 +6,8 @@
 use std::collections::BTreeMap;
 
 use serde_json::Value;
-use starlings_models::Setup;
 use starlings_models::solver::SOLVER;
+use starlings_models::{BuildSetup, Setup};
 
 use crate::Study;
 use crate::expand::INITIAL;

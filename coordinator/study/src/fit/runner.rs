@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 use starlings_fleet::{Fleet, FleetError, Outcome, SetupId};
-use starlings_models::{Failure, Job, Prediction, Setup, Window};
+use starlings_models::{BuildSetup, Failure, Job, Prediction, Setup, Window};
 
 use super::timeouts::Timeouts;
 use crate::store::{JobRow, Store};

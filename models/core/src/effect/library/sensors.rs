@@ -1,0 +1,152 @@
+//! Effects of the instruments: what is measured differs from what is there, and the model's course is untouched.
+//!
+//! Next file to read: [`super::inputs`].
+
+use std::fmt::Write as _;
+
+use super::Grow;
+use super::draft::{ANY, Draft};
+use super::place::{EffectPlace, Host};
+use super::unit::per_time;
+use crate::effect::Scale;
+use crate::{EffectDef, Quantity};
+
+/// Every effect of this family.
+pub(super) const GROWERS: &[Grow] = &[offset, drift, gain, lag, delay, saturation, quantisation];
+
+/// Longest delay and lag, in sampling intervals: what is longer is seen in the data with the eye.
+pub(super) const LONGEST: f64 = 30.0;
+
+/// Nodes and weights of Gauss–Laguerre quadrature with three points (Abramowitz and Stegun 1964, table 25.9): the mean of a
+/// signal's past under an exponential memory.
+const LAGUERRE: [(f64, f64); 3] = [
+    (0.415_774_556_783_479, 0.711_093_009_929_173),
+    (2.294_280_360_279_042, 0.278_517_733_569_241),
+    (6.289_945_082_937_479, 0.010_389_256_501_586),
+];
+
+/// One effect for every output that one number describes.
+fn every(host: Host<'_>, one: impl Fn(&EffectPlace<'_>, &Quantity) -> EffectDef) -> Vec<EffectDef> {
+    host.each(host.all_outputs()).iter().map(|(place, output)| one(place, output)).collect()
+}
+
+/// A constant error.
+fn offset(host: Host<'_>) -> Vec<EffectDef> {
+    every(host, |place, y| {
+        let b = place.name("sensor_offset");
+        Draft::new(place, "sensor-offset", format!("The sensor of {} reads too much by a constant.", y.name))
+            .adds(&place.output(y), b.clone())
+            .coefficient(&b, &y.unit, ANY, "What is read too much.")
+            .confounders(&["bias-force", "sensor-drift", "sensor-gain"])
+            .source("Ljung 1999, System Identification, 2nd ed., ch. 14")
+    })
+}
+
+/// An error that grows from the start of the record.
+fn drift(host: Host<'_>) -> Vec<EffectDef> {
+    every(host, |place, y| {
+        let (rate, start) = (place.name("sensor_drift"), place.name("sensor_drift_start"));
+        Draft::new(place, "sensor-drift", format!("The sensor of {} drifts evenly with time.", y.name))
+            .adds(&place.output(y), format!("{rate}*(t - {start})"))
+            .coefficient(&rate, per_time(&y.unit, host.time), ANY, "Drift per time.")
+            .record_start(&start, host.time)
+            .confounders(&["sensor-offset", "input-drift"])
+            .source("Ljung 1999, System Identification, 2nd ed., ch. 14")
+    })
+}
+
+/// An error in proportion to the value.
+fn gain(host: Host<'_>) -> Vec<EffectDef> {
+    every(host, |place, y| {
+        let g = place.name("sensor_gain");
+        Draft::new(
+            place,
+            "sensor-gain",
+            format!("The sensor of {} reads too much by a constant factor.", y.name),
+        )
+        .adds(&place.output(y), format!("{g}*{}", y.name))
+        .coefficient(&g, "", [-1.0, f64::INFINITY], "What is read too much, as a part of the value.")
+        .confounders(&["sensor-offset", "input-gain", "sensor-saturation"])
+        .source("Doebelin 1990, Measurement Systems, 4th ed., ch. 3")
+    })
+}
+
+/// A sensor of first order: the mean of the past under an exponential memory, by quadrature.
+fn lag(host: Host<'_>) -> Vec<EffectDef> {
+    every(host, |place, y| {
+        let (tau, name) = (place.name("sensor_lag"), &y.name);
+        let mut term = String::new();
+        for (node, weight) in LAGUERRE {
+            // Writing to a text does not fail.
+            let _ = write!(term, "{weight}*(delay({name}, {node}*{tau}) - {name}) + ");
+        }
+        let term = term.trim_end_matches(" + ");
+        Draft::new(
+            place,
+            "sensor-lag",
+            format!("The sensor of {name} follows slowly, with a lag of first order."),
+        )
+        .adds(&place.output(y), term)
+        .coefficient(&tau, host.time, [0.0, LONGEST], "Time constant of the sensor.")
+        .counted_in(Scale::Sampling)
+        .confounders(&["sensor-delay", "input-delay"])
+        .source("Doebelin 1990, Measurement Systems, 4th ed., ch. 3")
+    })
+}
+
+/// A sensor that shows the value of then.
+fn delay(host: Host<'_>) -> Vec<EffectDef> {
+    every(host, |place, y| {
+        let (tau, name) = (place.name("sensor_delay"), &y.name);
+        Draft::new(place, "sensor-delay", format!("The sensor of {name} answers late by a constant time."))
+            .adds(&place.output(y), format!("delay({name}, {tau}) - {name}"))
+            .coefficient(&tau, host.time, [0.0, LONGEST], "The delay.")
+            .counted_in(Scale::Sampling)
+            .confounders(&["sensor-lag", "input-delay"])
+            .source("Doebelin 1990, Measurement Systems, 4th ed., ch. 3")
+    })
+}
+
+/// A sensor at the end of its range: a share of 1 is a hard limit.
+fn saturation(host: Host<'_>) -> Vec<EffectDef> {
+    every(host, |place, y| {
+        let (share, limit, name) = (place.name("sensor_clipped"), place.name("sensor_limit"), &y.name);
+        Draft::new(place, "sensor-saturation", format!("The sensor of {name} saturates above a limit."))
+            .adds(&place.output(y), format!("-{share}*max({name} - {limit}, 0)"))
+            // Room above the hard limit, so that an estimate of 1 does not stand at an edge.
+            .coefficient(&share, "", [0.0, 1.5], "Part that is lost above the limit; 1 is a hard limit.")
+            .inner(
+                &limit,
+                &y.unit,
+                ([0.0, 1.0], &[0.5, 0.75, 0.9]),
+                Scale::Range(name.clone()),
+                "Value above which the sensor saturates.",
+            )
+            .confounders(&["sensor-gain", "sensor-offset"])
+            .source("Ljung 1999, System Identification, 2nd ed., ch. 5")
+    })
+}
+
+/// A sensor that rounds to steps: the first three harmonics of the rounding error.
+fn quantisation(host: Host<'_>) -> Vec<EffectDef> {
+    every(host, |place, y| {
+        let (share, step, name) = (place.name("sensor_rounded"), place.name("sensor_step"), &y.name);
+        let sine = |k: i32| format!("sin({}*pi*{name}/{step})", 2 * k);
+        Draft::new(
+            place,
+            "sensor-quantisation",
+            format!("The sensor of {name} rounds its value to whole steps."),
+        )
+        .adds(&place.output(y), format!("-{share}*{step}/pi*({} - {}/2 + {}/3)", sine(1), sine(2), sine(3)))
+        .coefficient(&share, "", [0.0, 1.5], "Part of the rounding error that shows; 1 is all of it.")
+        .inner(
+            &step,
+            &y.unit,
+            ([0.02, 2.0], &[0.1, 0.25, 0.5]),
+            Scale::Amplitude(name.clone()),
+            "Step from one value to the next.",
+        )
+        .confounders(&["sensor-saturation"])
+        .source("Widrow and Kollár 2008, Quantization Noise")
+    })
+}

@@ -1,0 +1,132 @@
+//! A model made of expressions.
+//!
+//! It evaluates; [`crate::integrate`] integrates. Next file to read: [`crate::integrate`].
+
+use std::collections::BTreeMap;
+
+use super::at::{At, Direction, Slot};
+use super::build::{self, Built};
+use super::def::EquationsDef;
+use super::program::Program;
+use crate::integrate::Solver;
+use crate::segment::Drive;
+use crate::{Memory, Model, SetupError, Spec};
+
+/// A model whose equations a study states.
+#[derive(Clone, Debug)]
+pub struct EquationsModel {
+    def: EquationsDef,
+    constants: BTreeMap<String, f64>,
+    built: Built,
+    /// n − 1 zeros and a one: its ends are the unit vectors.
+    unit: Vec<f64>,
+}
+
+impl EquationsModel {
+    /// Checks and compiles the equations.
+    ///
+    /// Names that are neither state, input, output, `t` nor `pi` are parameters, in the order of first use: states first,
+    /// each with its initial value and then its rate, then outputs.
+    ///
+    /// # Errors
+    /// [`SetupError::Expression`] with place and column, [`SetupError::Twice`], or [`SetupError::Invalid`] for a state
+    /// without rate or initial value, an unusable name or an unusable solver.
+    pub fn new(def: &EquationsDef) -> Result<Self, SetupError> {
+        Self::with_constants(def, &BTreeMap::new())
+    }
+
+    /// As [`EquationsModel::new`], for a study that fixes some parameters: a delay of a state or output by a constant needs
+    /// no other bound.
+    ///
+    /// # Errors
+    /// As [`EquationsModel::new`].
+    pub fn with_constants(def: &EquationsDef, constants: &BTreeMap<String, f64>) -> Result<Self, SetupError> {
+        let built = build::build(def, constants)?;
+        let mut unit = vec![0.0; def.states.len()];
+        if let Some(last) = unit.last_mut() {
+            *last = 1.0;
+        }
+        Ok(Self { def: def.clone(), constants: constants.clone(), built, unit })
+    }
+
+    /// The same model with the named rate terms left out, wherever they occur; parameters that only they used are gone.
+    ///
+    /// # Errors
+    /// [`SetupError::Unknown`] for a term that is not replaceable.
+    pub fn without(&self, terms: &[&str]) -> Result<Self, SetupError> {
+        Self::with_constants(&self.def.without(terms)?, &self.constants)
+    }
+}
+
+fn write(programs: &[Program], at: &At<'_>, values: &mut [f64]) {
+    for (value, program) in values.iter_mut().zip(programs) {
+        *value = program.eval(at);
+    }
+}
+
+impl Model for EquationsModel {
+    fn spec(&self) -> &Spec {
+        &self.built.spec
+    }
+
+    fn initial(&self, theta: &[f64], x: &mut [f64]) {
+        write(&self.built.initial, &At { t: 0.0, x: &[], theta, u: Drive::NONE, y: &[] }, x);
+    }
+
+    fn rhs(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, dx: &mut [f64]) {
+        write(&self.built.rates, &At { t, x, theta, u, y: &[] }, dx);
+    }
+
+    fn output(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, y: &mut [f64]) {
+        write(&self.built.outputs, &At { t, x, theta, u, y: &[] }, y);
+    }
+
+    fn solver(&self) -> Solver {
+        self.built.solver
+    }
+
+    fn n_switch(&self) -> usize {
+        self.built.switches.len()
+    }
+
+    fn switches(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, g: &mut [f64]) {
+        write(&self.built.switches, &At { t, x, theta, u, y: &[] }, g);
+    }
+
+    fn memories(&self) -> &[Memory] {
+        &self.built.memories
+    }
+
+    fn remembered(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, values: &mut [f64]) {
+        let at = At { t, x, theta, u, y: &[] };
+        for (value, source) in values.iter_mut().zip(&self.built.sources) {
+            *value = match *source {
+                Slot::State(i) => x[i],
+                Slot::Output(i) => self.built.outputs[i].eval(&at),
+                _ => f64::NAN,
+            };
+        }
+    }
+
+    fn jacobian(
+        &self,
+        t: f64,
+        x: &[f64],
+        theta: &[f64],
+        u: Drive<'_>,
+        dfdx: &mut [f64],
+        dfdt: &mut [f64],
+    ) -> bool {
+        let n = self.unit.len();
+        let at = At { t, x, theta, u, y: &[] };
+        dfdx.fill(0.0);
+        for (i, (rate, depends)) in self.built.rates.iter().zip(&self.built.depends).enumerate() {
+            for &j in depends {
+                let along = Direction { x: &self.unit[n - 1 - j..], ..Direction::default() };
+                dfdx[j * n + i] = rate.eval_dual(&at, &along).1;
+            }
+            dfdt[i] = rate.eval_dual(&at, &Direction { t: 1.0, u: u.slope, ..Direction::default() }).1;
+        }
+        true
+    }
+}

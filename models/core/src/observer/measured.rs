@@ -1,0 +1,102 @@
+//! Which state component each observed row measures, and what rows together say of it.
+//!
+//! Next file to read: [`super::nudging`].
+
+use std::ops::Range;
+
+use super::{Correction, Wiring};
+use crate::SetupError;
+use crate::setup::ObserverDef;
+use crate::{Quantity, Spec, nearest};
+
+/// One observed row and the state component that it measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Measured {
+    /// Row of the predicted outputs.
+    pub row: usize,
+    /// State component.
+    pub state: usize,
+}
+
+/// The state component behind every observed row that measures one: the definition's `corrects` first, then the model's own
+/// `measures`.
+///
+/// # Errors
+/// When a name in `corrects` is unknown, or the sizes of an output and its state differ.
+pub(crate) fn measured(def: &ObserverDef, wiring: &Wiring<'_>) -> Result<Vec<Measured>, SetupError> {
+    let spec = wiring.spec;
+    for (output, state) in &def.corrects {
+        find(&spec.outputs, output, "output")?;
+        find(&spec.states, state, "state")?;
+    }
+    let mut found = Vec::new();
+    let mut row = 0;
+    for output in wiring.outputs {
+        let Some(rows) = shown(spec, output)? else {
+            row += 1;
+            continue;
+        };
+        if let Some(states) = behind(def, spec, output, rows.len())? {
+            found.extend(states.enumerate().map(|(i, state)| Measured { row: row + i, state }));
+        }
+        row += rows.len();
+    }
+    Ok(found)
+}
+
+/// The states that an observed output, or one component of it, measures.
+fn behind(
+    def: &ObserverDef,
+    spec: &Spec,
+    output: &str,
+    n: usize,
+) -> Result<Option<Range<usize>>, SetupError> {
+    let named = |name: &str| {
+        let own = || spec.measures.iter().find(|(of, _)| of == name).map(|(_, state)| state.as_str());
+        def.corrects.get(name).map(String::as_str).or_else(own)
+    };
+    let (field, index) = match output.strip_suffix(']').and_then(|o| o.rsplit_once('[')) {
+        Some((field, index)) if named(output).is_none() => (field, index.parse::<usize>().ok()),
+        _ => (output, None),
+    };
+    let Some(state) = named(field) else { return Ok(None) };
+    let states = find(&spec.states, state, "state")?;
+    let outputs = find(&spec.outputs, field, "output")?;
+    if outputs.len() != states.len() {
+        return Err(SetupError::Invalid(format!(
+            "output `{field}` has {} components and state `{state}` has {}: one cannot correct the other",
+            outputs.len(),
+            states.len()
+        )));
+    }
+    let first = states.start + index.unwrap_or(0);
+    Ok(Some(first..first + n))
+}
+
+/// The mean of observed − predicted over rows that show the same, and how many of them were observed; `None` when none was.
+pub(super) fn mean_innovation(at: &Correction<'_>, rows: &[usize]) -> Option<(f64, u32)> {
+    let (mut sum, mut n) = (0.0, 0_u32);
+    for &row in rows.iter().filter(|&&row| !at.observed[row].is_nan()) {
+        sum += at.observed[row] - at.predicted[row];
+        n += 1;
+    }
+    (n > 0).then(|| (sum / f64::from(n), n))
+}
+
+/// Components of an observed output; `None` for a recorded state, which takes one row and measures nothing.
+pub(super) fn shown(spec: &Spec, name: &str) -> Result<Option<Range<usize>>, SetupError> {
+    let unnamed = Spec::range_of(&spec.outputs, name).is_none();
+    if unnamed && spec.scalar_state(name).is_some() {
+        return Ok(None);
+    }
+    find(&spec.outputs, name, "output").map(Some)
+}
+
+/// Components of a named quantity or of one component of it.
+pub(super) fn find(list: &[Quantity], name: &str, what: &'static str) -> Result<Range<usize>, SetupError> {
+    Spec::range_of(list, name).ok_or_else(|| SetupError::Unknown {
+        what,
+        name: name.to_owned(),
+        nearest: nearest(name, list.iter().map(|q| &q.name)),
+    })
+}

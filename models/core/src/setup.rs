@@ -1,0 +1,81 @@
+//! What is sent to a worker once: the model, its constants, its observer and its effects, by name.
+//!
+//! These types are plain data (serde); the crate above builds a model of them and checks that they fit
+//! together. Next file to read: [`crate::simulator`].
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::effect::{EffectDef, library};
+use crate::equations::EquationsDef;
+use crate::solver::{Description, SolverDef};
+use crate::{SetupError, Spec};
+
+/// The model by kind, with the values that are not estimated.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ModelDef {
+    /// A kind in the list of a family of built-in models, `equations` or `solver`.
+    pub kind: String,
+    /// Fixed parameter values by name.
+    pub constants: BTreeMap<String, f64>,
+    /// The equations, when `kind` is `equations`.
+    pub equations: Option<EquationsDef>,
+    /// How the model is put together, where its kind leaves that to the study; see [`crate::layout`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub layout: Option<serde_json::Value>,
+    /// The solver, when `kind` is [`crate::SOLVER`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub solver: Option<Box<SolverDef>>,
+}
+
+impl ModelDef {
+    /// What the solver says of itself, where the model is one.
+    pub fn description(&self) -> Option<&Description> {
+        self.solver.as_ref()?.described.as_ref()
+    }
+}
+
+/// The observer by kind.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ObserverDef {
+    /// A kind in the list of [`crate::observer`], or `none`.
+    pub kind: String,
+    /// Gain in 1/time unit.
+    pub gain: f64,
+    /// Output → state that it corrects, where the model does not say so itself.
+    pub corrects: BTreeMap<String, String>,
+}
+
+/// Everything that stays the same over the jobs of one fit.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Setup {
+    /// The model.
+    pub model: ModelDef,
+    /// Names of the values in [`crate::Job::theta`]: model parameters, effect parameters, or `initial:<state>`.
+    pub parameters: Vec<String>,
+    /// Names of the predicted outputs, the rows of [`crate::Prediction::outputs`]. A name that no output has may be a scalar
+    /// state's: it is recorded as it is at each time, before any correction, and no observer takes it for measured.
+    pub outputs: Vec<String>,
+    /// The observer.
+    pub observer: ObserverDef,
+    /// Effects added to the model.
+    pub effects: Vec<EffectDef>,
+    /// Steps that one run may take; [`crate::limits::MAX_STEPS`] where nothing is said. A solver counts its own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_steps: Option<u64>,
+    /// Seconds of computing that one run may take; [`crate::limits::TIMEOUT`] where nothing is said. A solver has its own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub timeout: Option<f64>,
+}
+
+impl Setup {
+    /// The effects with the built-in ones written out for a model of this specification; their unit labels, which no run
+    /// reads, are those of a time in seconds.
+    ///
+    /// # Errors
+    /// When the model has no such built-in effect.
+    pub fn written_out_effects(&self, spec: &Spec) -> Result<Vec<EffectDef>, SetupError> {
+        self.effects.iter().map(|def| library::write_out(def, spec, "s")).collect()
+    }
+}

@@ -1,0 +1,280 @@
+//! Runs a model over a window: predict, record, then correct.
+//!
+//! For each observation time: advance over the spans on which the inputs are linear, record the outputs, and only then let
+//! the observer see the observed values of that same time. No clock and no randomness: same job, same bits. A run over
+//! consecutive windows equals one run over the whole. Next file to read: `inputs`, then `binding`.
+
+use crate::SetupError;
+use crate::binding::Binding;
+use crate::effect;
+use crate::inputs::Inputs;
+use crate::limits::{Limits, MAX_STEPS, TIMEOUT};
+use crate::memory::with_memories;
+use crate::observer::{self, Correction, Observer, Wiring};
+use crate::past::Past;
+use crate::segment::Segment;
+use crate::setup::Setup;
+use crate::{
+    Drive, Forward, Job, Model, ModelFailure, NativeModels, ParticleError, Prediction, Spec, Timeout, Window,
+    nearest,
+};
+
+/// A model, its observer, and the way from a job's values to its parameters.
+pub struct Simulator {
+    model: Box<dyn Model>,
+    /// The model's specification, with its memories as states.
+    spec: Spec,
+    observer: Box<dyn Observer>,
+    binding: Binding,
+    /// What stands in each predicted row.
+    rows: Vec<Row>,
+    /// Steps of one run at most.
+    max_steps: u64,
+    /// Seconds of computing of one run at most.
+    timeout: f64,
+}
+
+/// What is recorded in one row of a prediction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Row {
+    /// A component of the outputs.
+    Output(usize),
+    /// A component of the state, as it is before any correction at that time.
+    State(usize),
+}
+
+impl Simulator {
+    /// Resolves the names of a setup against its model, effects included, and builds its observer. `native` are the models
+    /// among which an observer that does not fit names those that it does.
+    ///
+    /// # Errors
+    /// When a name is unknown (with the nearest valid one), given twice or without value.
+    pub fn new(model: Box<dyn Model>, setup: &Setup, native: NativeModels) -> Result<Self, SetupError> {
+        let spec = with_memories(model.spec(), model.memories());
+        let rows = rows(model.spec(), &setup.outputs)?;
+        let binding = Binding::new(setup, &spec, &free_names(setup, &spec)?)?;
+        let (outputs, theta) = (&setup.outputs, binding.constants());
+        let wiring = Wiring { spec: &spec, outputs, model: &*model, theta, native };
+        let observer = observer::build(&setup.observer, wiring)?;
+        let max_steps = setup.max_steps.unwrap_or(MAX_STEPS);
+        let timeout = setup.timeout.unwrap_or(TIMEOUT);
+        Ok(Self { model, spec, observer, binding, rows, max_steps, timeout })
+    }
+
+    /// The model's state at the window's start, and the past that led to it.
+    fn start<'a>(
+        &self,
+        job: &'a Job,
+        theta: &[f64],
+        u: Drive<'_>,
+    ) -> Result<(Vec<f64>, Past<'a>), ParticleError> {
+        let (window, model) = (&*job.window, &*self.model);
+        if let Some(x) = &job.state {
+            let n = self.spec.n_state();
+            if x.len() != n {
+                return Err(bad(format!("{} state values for a model of {n}", x.len())));
+            }
+            self.check_finite(window.start, &[], x, &[])?;
+            let mut x = x.clone();
+            let past = Past::resumed(model, window, &mut x);
+            return Ok((x, past));
+        }
+        let mut x = vec![0.0; model.spec().n_state()];
+        model.initial(theta, &mut x);
+        self.binding.initial(&job.theta, &mut x);
+        self.check_finite(window.start, &[], &x, &[])?;
+        let past = Past::constant(model, window, u, theta, &x);
+        Ok((x, past))
+    }
+
+    /// Advances the model over one segment, and what it remembers with it.
+    fn advance(
+        &self,
+        past: &mut Past<'_>,
+        segment: Segment<'_>,
+        theta: &[f64],
+        x: &mut [f64],
+    ) -> Result<(), ModelFailure> {
+        if self.model.memories().is_empty() {
+            return self.model.advance(segment, theta, x);
+        }
+        past.advance(&*self.model, segment, theta, x)
+    }
+
+    /// The first quantity that is not finite, as an error. A wrong input is named before what it spoils.
+    fn check_finite(&self, t: f64, u: &[f64], x: &[f64], y: &[f64]) -> Result<(), ModelFailure> {
+        if x.iter().chain(y).all(|value| value.is_finite()) {
+            return Ok(());
+        }
+        let spec = self.spec();
+        let lists = [("input", &spec.inputs, u), ("state", &spec.states, x), ("output", &spec.outputs, y)];
+        let found = lists.iter().find_map(|(what, list, values)| {
+            let at = values.iter().position(|value| !value.is_finite())?;
+            Some(format!("{what} `{}`", Spec::component(list, at)))
+        });
+        Err(ModelFailure::NotFinite { what: found.unwrap_or_default(), time: t })
+    }
+}
+
+impl Forward for Simulator {
+    fn spec(&self) -> &Spec {
+        &self.spec
+    }
+
+    fn run(&self, job: &Job) -> Result<Prediction, ParticleError> {
+        self.run_within(job, &|| 0.0)
+    }
+
+    fn run_within(&self, job: &Job, spent: &dyn Fn() -> f64) -> Result<Prediction, ParticleError> {
+        check_job(job, self.binding.len(), self.rows.len(), &self.spec)?;
+        let end = job.window.times.last().copied().unwrap_or(job.window.start);
+        let is_late = || spent() > self.timeout;
+        let limits = Limits::new(self.max_steps, end, Some(&is_late));
+        let ran = self.limited(job, &limits);
+        if limits.stopped() { Err(self.late().into()) } else { ran }
+    }
+}
+
+impl Simulator {
+    /// Runs a job that fits.
+    fn limited(&self, job: &Job, limits: &Limits<'_>) -> Result<Prediction, ParticleError> {
+        let window = &*job.window;
+        let theta = self.binding.theta(&job.theta, window.start)?;
+        let mut inputs = Inputs::new(window);
+        let (mut x, mut past) = self.start(job, &theta, inputs.drive(window.start))?;
+        let mut y = vec![0.0; self.spec.n_output()];
+        let mut outputs = Vec::with_capacity(window.observed.len());
+        let n_obs = self.rows.len();
+        let mut previous = window.start;
+        for (j, &t) in window.times.iter().enumerate() {
+            inputs.walk([previous, t], limits, |segment| {
+                limits.take(1, segment.t0)?;
+                self.advance(&mut past, segment, &theta, &mut x)
+            })?;
+            let drive = Drive { history: &past, ..inputs.drive(t) };
+            self.model.output(t, &x, &theta, drive, &mut y);
+            self.check_finite(t, drive.value, &x, &y)?;
+            outputs.extend(self.rows.iter().map(|&row| match row {
+                Row::Output(i) => y[i],
+                Row::State(i) => x[i],
+            }));
+            let dt = t - previous;
+            if dt > 0.0 {
+                let column = j * n_obs..(j + 1) * n_obs;
+                let (observed, predicted) = (&window.observed[column.clone()], &outputs[column]);
+                let (model, theta) = (&*self.model, theta.as_slice());
+                self.observer.correct(Correction { t, dt, observed, predicted, model, theta }, &mut x);
+            }
+            previous = t;
+        }
+        past.store(previous, &mut x);
+        // An observer moves the state after the last check.
+        self.check_finite(previous, &[], &x, &[])?;
+        Ok(Prediction { outputs, state: x, cost: 0.0 })
+    }
+
+    fn late(&self) -> Timeout {
+        let limit = self.timeout;
+        let says =
+            format!("the run computed for more than {limit} s (`timeout` in `[model]` sets the limit)");
+        Timeout { limit, says }
+    }
+}
+
+/// Refuses a job whose lengths or times do not fit: so many parameter values, so many rows, the inputs of the specification.
+pub(crate) fn check_job(job: &Job, n_value: usize, n_row: usize, spec: &Spec) -> Result<(), ParticleError> {
+    let window = &*job.window;
+    let (given, wanted) = (job.theta.len(), n_value);
+    if given != wanted {
+        return Err(bad(format!("{given} parameter values for {wanted} parameters")));
+    }
+    let (given, wanted) = (window.observed.len(), n_row * window.times.len());
+    if given != wanted {
+        return Err(bad(format!("{given} observed values where outputs times times make {wanted}")));
+    }
+    let (given, wanted) = (window.inputs.len(), spec.inputs.len());
+    if given != wanted {
+        return Err(bad(format!("{given} input signals for a model with {wanted}")));
+    }
+    for (signal, input) in window.inputs.iter().zip(&spec.inputs) {
+        if signal.times.len() != signal.values.len() || signal.times.is_empty() {
+            let (times, values) = (signal.times.len(), signal.values.len());
+            return Err(bad(format!("input `{}` has {times} times and {values} values", input.name)));
+        }
+        if !signal.times.is_sorted_by(|a, b| a < b) {
+            return Err(bad(format!("the times of input `{}` do not increase", input.name)));
+        }
+    }
+    check_times(window)
+}
+
+/// Refuses a window without times, with times out of order or before its start.
+fn check_times(window: &Window) -> Result<(), ParticleError> {
+    let Some(&first) = window.times.first() else {
+        return Err(bad("a window without observation times".to_owned()));
+    };
+    if !window.start.is_finite() || !window.times.iter().all(|t| t.is_finite()) {
+        return Err(bad("a window with a time that is not finite".to_owned()));
+    }
+    if first < window.start || !window.times.is_sorted_by(|a, b| a < b) {
+        return Err(bad("observation times must increase from the window's start".to_owned()));
+    }
+    Ok(())
+}
+
+fn bad(message: String) -> ParticleError {
+    ParticleError::BadJob(message)
+}
+
+/// The names that only terms of effects use, so that a constant may have them.
+pub(crate) fn free_names(setup: &Setup, spec: &Spec) -> Result<Vec<String>, SetupError> {
+    let lists = [&spec.states, &spec.inputs, &spec.outputs];
+    let taken = |name: &String| lists.into_iter().flatten().any(|q| q.name == *name);
+    Ok(effect::names(&setup.effects)?.into_iter().filter(|name| !taken(name)).collect())
+}
+
+/// What the named outputs record, in their order; a scalar state where no output has that name.
+fn rows(spec: &Spec, outputs: &[String]) -> Result<Vec<Row>, SetupError> {
+    let mut rows = Vec::new();
+    for (i, name) in outputs.iter().enumerate() {
+        if outputs[..i].contains(name) {
+            return Err(SetupError::Twice(name.clone()));
+        }
+        if let Some(range) = Spec::range_of(&spec.outputs, name) {
+            rows.extend(range.map(Row::Output));
+        } else if let Some(at) = spec.scalar_state(name) {
+            rows.push(Row::State(at));
+        } else {
+            let scalars = spec.states.iter().filter(|q| q.size == 1);
+            return Err(SetupError::Unknown {
+                what: "output or scalar state",
+                name: name.clone(),
+                nearest: nearest(name, spec.outputs.iter().chain(scalars).map(|q| &q.name)),
+            });
+        }
+    }
+    Ok(rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Quantity;
+
+    #[test]
+    fn a_field_takes_one_row_per_component_and_is_named_with_its_index() {
+        let field = Quantity { size: 3, ..Quantity::new("wall", "mm") };
+        let list = vec![Quantity::new("p", ""), field, Quantity::new("q", "")];
+        let states = vec![Quantity::new("p", "")];
+        let spec = Spec { states, outputs: list.clone(), ..Spec::default() };
+        let names = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
+        assert_eq!(
+            rows(&spec, &names(&["q", "wall"])).expect("known outputs"),
+            [4, 1, 2, 3].map(Row::Output)
+        );
+        assert_eq!(rows(&spec, &names(&["wall[2]", "p"])).expect("known outputs"), [3, 0].map(Row::Output));
+        assert!(rows(&spec, &names(&["wall[3]"])).is_err(), "beyond the field");
+        assert_eq!(Spec::component(&list, 3), "wall[2]");
+        assert_eq!(Spec::component(&list, 4), "q");
+    }
+}

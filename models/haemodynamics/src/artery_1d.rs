@@ -1,0 +1,194 @@
+//! Blood flow in a network of arteries: nonlinear waves of area and flow along each vessel.
+//!
+//! Large displacements, convection, taper and branching are here; the wall's inertia is not (at the frequencies of a pulse
+//! ρ_s h ω² is below a thousandth of the wall's stiffness), nor are valves, the heart, and flow faster than its waves. The
+//! linear tube [`super::fsi_tube`] is another model of one such vessel. Next file to read: `artery_1d/vessels.rs`, then
+//! `artery_1d/step.rs`.
+
+mod checks;
+mod layout;
+mod network;
+mod node;
+mod quantities;
+mod step;
+mod transport;
+mod vessels;
+mod viscous;
+mod wall;
+
+use starlings_models_core::segment::Segment;
+use starlings_models_core::{Drive, Model, ModelDef, ModelFailure, SetupError, Spec};
+
+use crate::MOST_STEPS;
+use layout::Layout;
+use network::Network;
+use step::Volumes;
+use step::{Inflow, Work};
+use vessels::Vessels;
+
+/// Area A and flow Q along vessels (Hughes & Lubliner 1973; Formaggia, Lamponi & Quarteroni 2003), with R = √(A/π):
+///
+/// ∂A/∂t + ∂Q/∂x = 0,  ∂Q/∂t + ∂(α Q²/A)/∂x + (A/ρ) ∂p/∂x = −K_r Q/A,  K_r = 8πμ/ρ,
+///
+/// p = p_ext + (E h/((1 − ν²)R0²) + k_s)(R − R0) + (c_w + c_s) ∂R/∂t.
+///
+/// At junctions mass is conserved and p + ½ρu² is continuous; at an RCR outlet p = π + R_p Q and C dπ/dt = Q −
+/// (π − p_venous)/R_d. Units are cm, g, s and dyn/cm². The vessels, their Young's moduli E and the outlets are those of the
+/// [`Layout`].
+pub struct Artery1d {
+    spec: Spec,
+    network: Network,
+}
+
+/// Why a step was not possible.
+#[derive(Clone, Debug, PartialEq)]
+enum Fault {
+    /// A vessel has no area left.
+    Collapsed { cell: usize },
+    /// The flow in a cell is not slower than its waves.
+    Supercritical { cell: usize },
+    /// The vessels at a node allow no flow slower than its waves.
+    Node { name: String },
+    /// The pressures of all nodes together have no solution.
+    Network,
+}
+
+impl Fault {
+    fn at(self, t: f64) -> ModelFailure {
+        ModelFailure::Solver(match self {
+            Self::Collapsed { cell } => format!("the vessel collapses in cell {cell} at t = {t}"),
+            Self::Supercritical { cell } => {
+                format!("the flow reaches the speed of its waves in cell {cell} at t = {t}")
+            }
+            Self::Network => format!("no pressures of its nodes fit the network at t = {t}"),
+            Self::Node { name } => {
+                format!("no flow below the speed of its waves fits the node `{name}` at t = {t}")
+            }
+        })
+    }
+}
+
+impl Artery1d {
+    /// Makes a network in this layout.
+    ///
+    /// # Errors
+    /// When the layout cannot be; the error says where.
+    pub fn new(layout: &Layout) -> Result<Self, SetupError> {
+        let network = Network::new(layout)?;
+        Ok(Self { spec: quantities::spec(&network), network })
+    }
+
+    /// Makes the network of a study.
+    ///
+    /// # Errors
+    /// When its layout cannot be read, or cannot be.
+    pub(super) fn build(def: &ModelDef) -> Result<Box<dyn Model>, SetupError> {
+        Ok(Box::new(Self::new(&starlings_models_core::layout::read(def)?)?))
+    }
+
+    /// Advances the state over one segment as [`Model::advance`] does, and says what entered and left the network on the way.
+    ///
+    /// # Errors
+    /// When a vessel collapses or a flow reaches the speed of its waves.
+    pub fn advance_counting(
+        &self,
+        segment: Segment<'_>,
+        theta: &[f64],
+        x: &mut [f64],
+    ) -> Result<Volumes, ModelFailure> {
+        let finite = |value: &f64| value.is_finite();
+        if !(segment.u0.iter().all(finite) && segment.slope.iter().all(finite)) {
+            return Err(ModelFailure::NotFinite { what: "input `flow`".to_owned(), time: segment.t0 });
+        }
+        let vessels = Vessels::new(&self.network, theta);
+        let (mut work, mut volumes) = (Work::new(&vessels), Volumes::default());
+        let (mut t, mut n_step) = (segment.t0, 0);
+        while t < segment.t1 {
+            if let Some(i) = x.iter().position(|value| !value.is_finite()) {
+                let what = format!("state `{}`", Spec::component(&self.spec.states, i));
+                return Err(ModelFailure::NotFinite { what, time: t });
+            }
+            let (left, longest) = (segment.t1 - t, vessels.longest_step(x));
+            if longest.is_nan() {
+                return Err(ModelFailure::NotFinite { what: "the speed of waves".to_owned(), time: t });
+            }
+            // Equal steps up to the segment's end, as far as the state does not change the longest one.
+            let dt = left / (left / longest).ceil().max(1.0);
+            let next = if dt < left { t + dt } else { segment.t1 };
+            if next <= t {
+                return Err(ModelFailure::StepTooSmall { time: t, step: dt });
+            }
+            segment.limits.foresee(longest, t)?;
+            segment.limits.take(1, t)?;
+            let inflow = Inflow {
+                start: segment.u0[0] + segment.slope[0] * (t - segment.t0),
+                slope: segment.slope[0],
+            };
+            vessels.step(next - t, inflow, x, &mut work, &mut volumes).map_err(|fault| fault.at(t))?;
+            t = next;
+            n_step += 1;
+            if n_step > MOST_STEPS {
+                return Err(ModelFailure::TooManySteps { time: t, limit: MOST_STEPS });
+            }
+        }
+        Ok(volumes)
+    }
+
+    /// Volume in cm³ that the vessels hold in a state.
+    pub fn volume(&self, x: &[f64]) -> f64 {
+        let of = |tube: &network::Tube| tube.dx * x[tube.first..tube.first + tube.n].iter().sum::<f64>();
+        self.network.tubes.iter().map(of).sum()
+    }
+}
+
+impl Model for Artery1d {
+    fn spec(&self) -> &Spec {
+        &self.spec
+    }
+
+    /// At rest under the pressure p0.
+    fn initial(&self, theta: &[f64], x: &mut [f64]) {
+        let vessels = Vessels::new(&self.network, theta);
+        let n = self.network.n_cell;
+        for (area, ring) in x.iter_mut().zip(&vessels.cells) {
+            *area = ring.area(vessels.p_start - vessels.p_ext);
+        }
+        x[n..2 * n].fill(0.0);
+        x[2 * n..].fill(vessels.p_start);
+    }
+
+    fn rhs(&self, _t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, dx: &mut [f64]) {
+        let vessels = Vessels::new(&self.network, theta);
+        if vessels.rate(u.value[0], x, &mut Work::new(&vessels), dx).is_err() {
+            dx.fill(f64::NAN);
+        }
+    }
+
+    fn output(&self, _t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, y: &mut [f64]) {
+        let vessels = Vessels::new(&self.network, theta);
+        let (n, mut work) = (self.network.n_cell, Work::new(&vessels));
+        let mut rate = vec![0.0; x.len()];
+        if vessels.rate(u.value[0], x, &mut work, &mut rate).is_err() {
+            return y.fill(f64::NAN);
+        }
+        for (i, tube) in self.network.tubes.iter().enumerate() {
+            let first = Vessels::first_face(i, tube);
+            for j in 0..tube.n {
+                let (cell, ring) = (tube.first + j, vessels.cells[tube.first + j]);
+                let viscous = 0.5 * (work.viscous.face[first + j] + work.viscous.face[first + j + 1]);
+                y[cell] = ring.displacement(x[cell]);
+                y[n + cell] = vessels.p_ext + ring.pressure(x[cell]) + viscous;
+            }
+        }
+        y[2 * n..3 * n].copy_from_slice(&x[n..2 * n]);
+        y[3 * n] = work.faces.node[self.network.inlet];
+        for (&node, y) in self.network.outlets.iter().zip(y[3 * n + 1..].chunks_mut(2)) {
+            y[0] = work.faces.node[node];
+            y[1] = vessels.outflow(node, &work.faces);
+        }
+    }
+
+    fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ModelFailure> {
+        self.advance_counting(segment, theta, x).map(|_| ())
+    }
+}

@@ -1,0 +1,73 @@
+//! What the vessels of a layout must satisfy one by one: names, sizes, numbers of cells.
+//!
+//! Whether they make a network is checked in [`super::network`], the next file to read.
+
+use std::collections::HashSet;
+
+use starlings_models_core::SetupError;
+use starlings_models_core::layout::fault;
+
+use super::layout::{Segment, young};
+use crate::MOST_CELLS;
+
+/// Regions of all vessels together at most: the pressures of their ends are one full system of equations in every step.
+const MOST_REGIONS: usize = 1000;
+
+/// Names become parts of parameters, states and outputs, which expressions may use.
+pub(super) fn name(path: &str, name: &str) -> Result<(), SetupError> {
+    let fits = name.starts_with(|c: char| c.is_ascii_alphabetic())
+        && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+    if fits { Ok(()) } else { Err(fault(path, format!("`{name}` is no name: use letters, digits and `_`"))) }
+}
+
+/// Refuses what no vessel can be, too many cells, and vessels whose parameters would share a name.
+pub(super) fn segments(segments: &[Segment]) -> Result<(), SetupError> {
+    let (mut n_cell, mut n_region, mut moduli) = (0_usize, 0_usize, HashSet::new());
+    for (i, segment) in segments.iter().enumerate() {
+        let path = |key: &str| format!("segments[{i}].{key}");
+        for (key, name) in [("name", &segment.name), ("from", &segment.from), ("to", &segment.to)] {
+            self::name(&path(key), name)?;
+        }
+        if segments[..i].iter().any(|other| other.name == segment.name) {
+            return Err(fault(&path("name"), format!("two segments are called `{}`", segment.name)));
+        }
+        if segment.from == segment.to {
+            return Err(fault(&path("to"), format!("`{}` ends where it starts", segment.name)));
+        }
+        let sizes = [
+            ("length", segment.length),
+            ("radius", segment.radius),
+            ("radius_to", segment.radius_to.unwrap_or(segment.radius)),
+            ("thickness", segment.thickness),
+        ];
+        for (key, size) in sizes {
+            if !(size > 0.0 && size.is_finite()) {
+                return Err(fault(&path(key), format!("{key} is {size}: give a number of cm above zero")));
+            }
+        }
+        let (cells, regions) = (segment.cells, segment.regions);
+        (n_cell, n_region) = (n_cell.saturating_add(cells), n_region.saturating_add(regions));
+        for (key, n, most) in [("cells", n_cell, MOST_CELLS), ("regions", n_region, MOST_REGIONS)] {
+            if n > most {
+                let message = format!("{n} {key} up to here: give at most {most} in all vessels together");
+                return Err(fault(&path(key), message));
+            }
+        }
+        if regions == 0 || !cells.is_multiple_of(regions) || cells / regions < 2 {
+            let message = format!(
+                "{cells} cells in {regions} regions: give a whole number of cells per region, at least two"
+            );
+            return Err(fault(&path("cells"), message));
+        }
+        for region in 0..regions {
+            let (modulus, place) = young(segment, region, segments.len() == 1);
+            if !moduli.insert(modulus.clone()) {
+                let message = format!(
+                    "Young's modulus of {place} is `{modulus}`, and so is another: rename one of the two"
+                );
+                return Err(fault(&path("name"), message));
+            }
+        }
+    }
+    Ok(())
+}

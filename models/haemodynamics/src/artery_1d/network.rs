@@ -1,0 +1,214 @@
+//! The network that a layout makes: tubes of one stiffness each, cut into cells, and the nodes at which they end.
+//!
+//! A vessel with several regions becomes a chain of tubes, so that a jump of stiffness lies on a node, where mass and total
+//! pressure are continuous whatever the walls on its two sides. Next file to read: [`super::vessels`], which gives the
+//! network the values of the parameters.
+
+use starlings_models_core::SetupError;
+use starlings_models_core::layout::fault;
+
+use super::checks;
+use super::layout::{Layout, NodeKind, Segment, young};
+
+/// A tube of one Young's modulus.
+#[derive(Debug)]
+pub(super) struct Tube {
+    /// Number of its first cell in the network.
+    pub(super) first: usize,
+    /// Number of cells.
+    pub(super) n: usize,
+    /// Length of a cell in cm.
+    pub(super) dx: f64,
+    /// R0 at the n + 1 faces of the cells in cm.
+    pub(super) radius: Vec<f64>,
+    /// Wall thickness in cm.
+    pub(super) thickness: f64,
+    /// Nodes at the start and at the end.
+    pub(super) nodes: [usize; 2],
+}
+
+/// Where a tube meets a node.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct End {
+    /// The tube.
+    pub(super) tube: usize,
+    /// 1 where the tube ends in the node, −1 where it starts there: flow times this is flow into the node.
+    pub(super) sign: f64,
+}
+
+impl End {
+    /// Number of this end among all ends of the network.
+    pub(super) fn index(self) -> usize {
+        2 * self.tube + usize::from(self.sign > 0.0)
+    }
+}
+
+/// A node and the ends of tubes in it.
+#[derive(Debug)]
+pub(super) struct Node {
+    pub(super) name: String,
+    pub(super) kind: NodeKind,
+    pub(super) ends: Vec<End>,
+    /// Number among the outlets, where it is one.
+    pub(super) outlet: Option<usize>,
+}
+
+/// The whole network.
+#[derive(Debug)]
+pub(super) struct Network {
+    pub(super) tubes: Vec<Tube>,
+    pub(super) nodes: Vec<Node>,
+    pub(super) n_cell: usize,
+    /// Name and description of the Young's modulus of each tube.
+    pub(super) young: Vec<(String, String)>,
+    /// The node of the inlet.
+    pub(super) inlet: usize,
+    /// The nodes of the outlets, in the order of the layout.
+    pub(super) outlets: Vec<usize>,
+}
+
+impl Network {
+    /// Makes the network of a layout.
+    ///
+    /// # Errors
+    /// When a number is not positive or there are too many cells, a name is used twice or is none, or the vessels are no
+    /// connected network between one inlet and its outlets.
+    pub(super) fn new(layout: &Layout) -> Result<Self, SetupError> {
+        checks::segments(&layout.segments)?;
+        let mut network = Self::with_nodes(layout)?;
+        for segment in &layout.segments {
+            network.add(segment, layout.segments.len() == 1);
+        }
+        network.check_nodes(layout)?;
+        network.check_connected(layout)?;
+        Ok(network)
+    }
+
+    /// Only the nodes: those that the layout lists, then the joints that vessels name.
+    fn with_nodes(layout: &Layout) -> Result<Self, SetupError> {
+        let (mut nodes, mut outlets, mut inlets) = (Vec::<Node>::new(), Vec::new(), Vec::new());
+        for (i, entry) in layout.nodes.iter().enumerate() {
+            let path = format!("nodes[{i}].name");
+            checks::name(&path, &entry.name)?;
+            if nodes.iter().any(|node| node.name == entry.name) {
+                return Err(fault(&path, format!("two nodes are called `{}`", entry.name)));
+            }
+            let mut outlet = None;
+            match entry.kind {
+                NodeKind::Inlet => inlets.push(i),
+                NodeKind::Rcr | NodeKind::Resistance => {
+                    outlet = Some(outlets.len());
+                    outlets.push(i);
+                }
+                NodeKind::Junction => {}
+            }
+            nodes.push(Node { name: entry.name.clone(), kind: entry.kind, ends: Vec::new(), outlet });
+        }
+        let [inlet] = inlets[..] else {
+            let message = format!(
+                "{} inlets: list exactly one node of kind \"inlet\", where the flow enters",
+                inlets.len()
+            );
+            return Err(fault("nodes", message));
+        };
+        if outlets.is_empty() {
+            return Err(fault("nodes", "no outlet: list a node of kind \"rcr\" or \"resistance\""));
+        }
+        Ok(Self { tubes: Vec::new(), nodes, n_cell: 0, young: Vec::new(), inlet, outlets })
+    }
+
+    /// The node of this name; a joint where there is none yet.
+    fn node(&mut self, name: &str) -> usize {
+        if let Some(found) = self.nodes.iter().position(|node| node.name == name) {
+            return found;
+        }
+        self.nodes.push(Node {
+            name: name.to_owned(),
+            kind: NodeKind::Junction,
+            ends: Vec::new(),
+            outlet: None,
+        });
+        self.nodes.len() - 1
+    }
+
+    /// Adds a vessel as a chain of tubes, one per region.
+    fn add(&mut self, segment: &Segment, alone: bool) {
+        let (regions, n) = (segment.regions, segment.cells / segment.regions);
+        let dx = segment.length / segment.cells as f64;
+        let end = segment.radius_to.unwrap_or(segment.radius);
+        let radius = |face: usize| {
+            let part = face as f64 / segment.cells as f64;
+            (1.0 - part).mul_add(segment.radius, part * end)
+        };
+        let mut from = self.node(&segment.from);
+        for region in 0..regions {
+            let to = if region + 1 == regions {
+                self.node(&segment.to)
+            } else {
+                // Not a name that a layout may use.
+                self.node(&format!("{}:{}", segment.name, region + 1))
+            };
+            let tube = self.tubes.len();
+            self.nodes[from].ends.push(End { tube, sign: -1.0 });
+            self.nodes[to].ends.push(End { tube, sign: 1.0 });
+            self.tubes.push(Tube {
+                first: self.n_cell,
+                n,
+                dx,
+                radius: (region * n..=(region + 1) * n).map(radius).collect(),
+                thickness: segment.thickness,
+                nodes: [from, to],
+            });
+            self.n_cell += n;
+            self.young.push(young(segment, region, alone));
+            from = to;
+        }
+    }
+
+    fn check_nodes(&self, layout: &Layout) -> Result<(), SetupError> {
+        for (i, node) in self.nodes.iter().enumerate() {
+            let listed = format!("nodes[{i}].name");
+            let n = node.ends.len();
+            if n == 0 {
+                return Err(fault(&listed, format!("no segment starts or ends at `{}`", node.name)));
+            }
+            if node.kind != NodeKind::Junction && n > 1 {
+                let message =
+                    format!("{n} segments meet at `{}`: an inlet or an outlet is the end of one", node.name);
+                return Err(fault(&listed, message));
+            }
+            if node.kind == NodeKind::Junction && n == 1 {
+                let at = layout.segments.iter().position(|s| s.from == node.name || s.to == node.name);
+                let message = format!(
+                    "nothing follows `{}`: list it in `nodes` as an inlet or an outlet (\"rcr\", \"resistance\"), or join \
+                     another segment to it",
+                    node.name
+                );
+                return Err(fault(&format!("segments[{}]", at.unwrap_or_default()), message));
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses tubes that the inlet's flow does not reach.
+    fn check_connected(&self, layout: &Layout) -> Result<(), SetupError> {
+        let mut reached = vec![false; self.nodes.len()];
+        let mut next = vec![self.inlet];
+        while let Some(node) = next.pop() {
+            if !std::mem::replace(&mut reached[node], true) {
+                next.extend(self.nodes[node].ends.iter().flat_map(|end| self.tubes[end.tube].nodes));
+            }
+        }
+        let lost = |s: &Segment| self.nodes.iter().zip(&reached).any(|(n, r)| n.name == s.from && !r);
+        match layout.segments.iter().position(lost) {
+            None => Ok(()),
+            Some(i) => {
+                let message = format!(
+                    "no way leads from the inlet to `{}`: join it to the network",
+                    layout.segments[i].name
+                );
+                Err(fault(&format!("segments[{i}]"), message))
+            }
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! Arterial networks for tests, and ways to run and read them.
+#![allow(clippy::unwrap_used, dead_code, reason = "test helpers; each test binary uses its part")]
+
+use starlings_haemodynamics::Artery1d;
+use starlings_models_core::limits::Limits;
+use starlings_models_core::segment::{Drive, History, Segment};
+use starlings_models_core::{Model, Spec};
+
+struct NoHistory;
+
+impl History for NoHistory {
+    fn at(&self, _: usize, _: f64) -> f64 {
+        f64::NAN
+    }
+}
+
+/// No load, no friction, no viscosity of the wall.
+pub(crate) const QUIET: [(&str, f64); 3] = [("p0", 0.0), ("mu", 0.0), ("c_w", 0.0)];
+
+/// Speed of small waves in a wall of E = 5e6, h = 0.15, ν = 1/2 around a radius of 1: K = 1e6, ρ = 1.06.
+pub(crate) fn speed() -> f64 {
+    (1e6_f64 / 2.12).sqrt()
+}
+
+pub(crate) fn artery(layout: serde_json::Value) -> Artery1d {
+    Artery1d::new(&serde_json::from_value(layout).unwrap()).unwrap()
+}
+
+/// A tube of 25 cm with radius 1 cm at its inlet and an RCR outlet.
+pub(crate) fn tube(cells: usize, regions: usize, radius_to: f64) -> Artery1d {
+    artery(serde_json::json!({
+        "segments": [{
+            "name": "tube", "from": "inlet", "to": "outlet", "length": 25.0, "radius": 1.0, "radius_to": radius_to,
+            "thickness": 0.15, "cells": cells, "regions": regions,
+        }],
+        "nodes": [{ "name": "inlet", "kind": "inlet" }, { "name": "outlet", "kind": "rcr" }],
+    }))
+}
+
+/// The tube of 25 cm again, and two daughters of 25 cm behind it.
+pub(crate) fn bifurcation(cells: usize) -> Artery1d {
+    let vessel = |name: &str, from: &str, to: &str, radius: f64| {
+        serde_json::json!({
+            "name": name, "from": from, "to": to, "length": 25.0, "radius": radius, "thickness": 0.15, "cells": cells,
+        })
+    };
+    artery(serde_json::json!({
+        "segments": [
+            vessel("aorta", "heart", "fork", 1.0),
+            vessel("left", "fork", "left_leg", 0.7),
+            vessel("right", "fork", "right_leg", 0.6),
+        ],
+        "nodes": [
+            { "name": "heart", "kind": "inlet" },
+            { "name": "left_leg", "kind": "rcr" },
+            { "name": "right_leg", "kind": "resistance" },
+        ],
+    }))
+}
+
+/// The defaults with some values of their own.
+pub(crate) fn theta(model: &Artery1d, own: &[(&str, f64)]) -> Vec<f64> {
+    let parameters = &model.spec().parameters;
+    let mut theta: Vec<f64> = parameters.iter().map(|q| q.default.unwrap()).collect();
+    for (name, value) in own {
+        theta[parameters.iter().position(|q| q.name == *name).unwrap()] = *value;
+    }
+    theta
+}
+
+pub(crate) fn start(model: &Artery1d, theta: &[f64]) -> Vec<f64> {
+    let mut x = vec![0.0; model.spec().n_state()];
+    model.initial(theta, &mut x);
+    x
+}
+
+/// Advances over a time in which the flow goes linearly from one value to another; returns the volumes in and out.
+pub(crate) fn run(
+    model: &Artery1d,
+    theta: &[f64],
+    x: &mut [f64],
+    [t0, t1]: [f64; 2],
+    flow: [f64; 2],
+) -> [f64; 2] {
+    let slope = [(flow[1] - flow[0]) / (t1 - t0)];
+    let segment =
+        Segment { t0, t1, u0: &flow[..1], slope: &slope, history: &NoHistory, limits: &Limits::none() };
+    let volumes = model.advance_counting(segment, theta, x).unwrap();
+    [volumes.inflow, volumes.outflow]
+}
+
+/// Advances over a signal sampled every `step`, from `from` to `to` samples; returns the volumes in and out.
+pub(crate) fn drive(
+    model: &Artery1d,
+    theta: &[f64],
+    x: &mut [f64],
+    samples: std::ops::Range<usize>,
+    step: f64,
+    flow: &dyn Fn(f64) -> f64,
+) -> [f64; 2] {
+    let mut volumes = [0.0; 2];
+    for i in samples {
+        let times = [i as f64 * step, (i + 1) as f64 * step];
+        let [inflow, outflow] = run(model, theta, x, times, times.map(flow));
+        volumes[0] += inflow;
+        volumes[1] += outflow;
+    }
+    volumes
+}
+
+pub(crate) fn rate(model: &Artery1d, theta: &[f64], x: &[f64], flow: f64) -> Vec<f64> {
+    let mut dx = vec![f64::NAN; x.len()];
+    model.rhs(0.0, x, theta, Drive { value: &[flow], slope: &[0.0], history: &NoHistory }, &mut dx);
+    dx
+}
+
+pub(crate) fn outputs(model: &Artery1d, theta: &[f64], x: &[f64], flow: f64) -> Vec<f64> {
+    let mut y = vec![f64::NAN; model.spec().n_output()];
+    model.output(0.0, x, theta, Drive { value: &[flow], slope: &[0.0], history: &NoHistory }, &mut y);
+    y
+}
+
+pub(crate) fn output(model: &Artery1d, y: &[f64], name: &str) -> f64 {
+    y[Spec::offset(&model.spec().outputs, name).unwrap()]
+}
