@@ -1,10 +1,11 @@
 //! The page of an explanation: what the model lacks, where that shows, and the gap before and after.
 //!
 //! Made from the explanation and the data of its figures alone; nothing is fitted or judged here. The verdict and the warnings come
-//! before any number. Next files to read: [`effect`], [`gap`], [`places`], [`candidates`], and the template `explain/explain.html`.
+//! before any number. Next files to read: [`figures`], [`effect`], [`gap`], [`places`], [`candidates`], and the template `explain/explain.html`.
 
 mod candidates;
 mod effect;
+mod figures;
 mod gap;
 mod places;
 #[cfg(test)]
@@ -16,6 +17,7 @@ use serde::{Deserialize, Serialize};
 use starlings_explain::figures::Figures;
 use starlings_explain::result::{Experiment, Explanation, Verdict};
 
+use super::plot::figure::Slots;
 use super::{ReportError, layout, number};
 use candidates::Candidates;
 use effect::EffectView;
@@ -58,7 +60,9 @@ struct Page<'a> {
     verdict: &'static str,
     verdict_words: &'static str,
     facts: Vec<(&'static str, String)>,
+    figures: Slots,
     gap: Gap,
+    curves_left_out: usize,
     failing: Vec<String>,
     effect_title: &'static str,
     effects: Vec<EffectView>,
@@ -73,7 +77,7 @@ struct Page<'a> {
 }
 
 impl<'a> Page<'a> {
-    fn new(found: &'a Explanation, figures: &'a Figures, about: &'a StudyAbout) -> Result<Self, ReportError> {
+    fn new(found: &'a Explanation, data: &'a Figures, about: &'a StudyAbout) -> Result<Self, ReportError> {
         let (verdict, verdict_words) = match found.verdict {
             Verdict::Named => ("named", "Named"),
             Verdict::Tie => ("tie", "Tie"),
@@ -89,7 +93,9 @@ impl<'a> Page<'a> {
             verdict,
             verdict_words,
             facts: facts(found, about),
-            gap: Gap::new(found, figures)?,
+            figures: figures::draw(found, data)?,
+            gap: Gap::new(found, data)?,
+            curves_left_out: figures::course::left_out(data),
             failing: failing(found),
             effect_title: match found.verdict {
                 _ if nearest => "What came nearest",
@@ -100,8 +106,8 @@ impl<'a> Page<'a> {
             ties: found.tied_with.iter().map(|set| set.join(" + ")).collect(),
             separation: experiment.map_or_else(String::new, Experiment::sentence),
             experiments: experiment.map_or(Vec::new(), effect::experiments),
-            places: Places::new(found, figures)?,
-            candidates: Candidates::new(found, figures)?,
+            places: Places::new(found, data)?,
+            candidates: Candidates::new(found, data)?,
             shifts: found.parameter_shifts.iter().map(gap::ShiftRow::new).collect::<Result<_, _>>()?,
             remaining: remaining(found),
             stages: found.runs_by_stage.iter().map(|(stage, n)| (stage.clone(), n.to_string())).collect(),

@@ -6,8 +6,8 @@ use plotters::style::WHITE;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::data::{ChannelPlot, ParameterRow, ReportData};
+use super::page::figures::fit;
 use super::plot::figure::with_unit;
-use super::plot::fit;
 use super::plot::interval::{self, Place};
 use super::plot::palette::{BLUE, INK, MUTED, VERMILION};
 use super::plot::scene::{Surface, picture, stroke, units, whole, write, write_title};
