@@ -3,7 +3,7 @@
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
-use starlings_proto::WireError;
+use starlings_proto::ProtocolError;
 
 /// A failure of the fleet as a whole; a failed job is an [`super::Outcome`].
 #[derive(Debug, thiserror::Error)]
@@ -37,9 +37,9 @@ pub enum FleetError {
         /// The workers' words.
         reason: String,
     },
-    /// A job or a setup does not fit the wire; for a state, the text says how large it may be.
+    /// A job or a setup does not fit the protocol; for a state, the text says how large it may be.
     #[error(transparent)]
-    TooLarge(WireError),
+    TooLarge(ProtocolError),
     /// A setup that was never installed.
     #[error("the setup was not installed in this fleet")]
     UnknownSetup,

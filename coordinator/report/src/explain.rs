@@ -1,13 +1,13 @@
 //! The page of an explanation: what the model lacks, where that shows, and the gap before and after.
 //!
 //! Made from the explanation and the data of its figures alone; nothing is fitted or judged here. The verdict and the warnings come
-//! before any number. Next files to read: [`figures`], [`effect`], [`gap`], [`places`], [`candidates`], and the template `explain/explain.html`.
+//! before any number. Next files to read: [`figures`], [`effect`], [`gap`], [`disagreement`], [`candidates`], and the template `explain/explain.html`.
 
 mod candidates;
+mod disagreement;
 mod effect;
 mod figures;
 mod gap;
-mod places;
 #[cfg(test)]
 mod sample;
 #[cfg(test)]
@@ -20,9 +20,9 @@ use starlings_explain::result::{Experiment, Explanation, Verdict};
 use super::plot::figure::Slots;
 use super::{ReportError, layout, number};
 use candidates::Candidates;
+use disagreement::Disagreement;
 use effect::EffectView;
 use gap::Gap;
-use places::Places;
 
 /// What the page says of the study besides the explanation. Empty texts are left out.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -69,7 +69,7 @@ struct Page<'a> {
     ties: Vec<String>,
     separation: String,
     experiments: Vec<[String; 2]>,
-    places: Places,
+    disagreement: Disagreement,
     candidates: Candidates,
     shifts: Vec<gap::ShiftRow>,
     remaining: Vec<(&'static str, String)>,
@@ -106,7 +106,7 @@ impl<'a> Page<'a> {
             ties: found.tied_with.iter().map(|set| set.join(" + ")).collect(),
             separation: experiment.map_or_else(String::new, Experiment::sentence),
             experiments: experiment.map_or(Vec::new(), effect::experiments),
-            places: Places::new(found, data)?,
+            disagreement: Disagreement::new(found, data)?,
             candidates: Candidates::new(found, data)?,
             shifts: found.parameter_shifts.iter().map(gap::ShiftRow::new).collect::<Result<_, _>>()?,
             remaining: remaining(found),

@@ -3,12 +3,13 @@
 //! [`Solvers`] makes of a setup something that runs jobs, whether the model is built in or runs outside. A solver is started
 //! when first needed, one program per slot, supervised, and ended with the worker. No retries on other machines are decided
 //! here. Next files to read: [`mod@adapter`] for the ways to reach a solver, [`mod@instance`] for one program, [`mod@site`] for
-//! where programs run, [`mod@serve`] for the other end of the wire.
+//! where programs run, [`mod@serve`] for the other end of the connection.
 
 mod adapter;
 mod backoff;
 mod clear;
 pub mod conformance;
+mod core_slots;
 mod error;
 mod guard;
 pub mod instance;
@@ -16,7 +17,6 @@ mod losses;
 mod machine;
 mod process;
 mod scratch;
-mod seats;
 pub mod serve;
 mod site;
 mod stopped;
@@ -88,7 +88,7 @@ impl Solvers {
 
     /// The same beside `first` programs of other processes on this machine, which are bound to cores before its own.
     #[must_use]
-    pub fn seated_after(self, first: usize) -> Self {
+    pub fn with_cores_after(self, first: usize) -> Self {
         let settings = Settings { first, ..self.0.settings.clone() };
         Self::with(self.0.options.clone(), settings)
     }

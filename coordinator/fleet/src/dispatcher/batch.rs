@@ -10,7 +10,7 @@ use starlings_models::{Failure, Prediction};
 use starlings_proto::SetupId;
 
 use super::message::{ControlId, WorkerId};
-use super::queue::{Again, Queue};
+use super::queue::{Queue, RetryKey};
 use crate::Outcome;
 use crate::job_name::JobName;
 
@@ -235,9 +235,9 @@ impl Batch {
 
     /// Jobs that come back and may go to no other worker: those that are decided end with the failure they had, the others may go
     /// back to where they failed. Returns those that ended.
-    pub(super) fn settle(&mut self, again: Again) -> Vec<usize> {
+    pub(super) fn settle(&mut self, key: RetryKey) -> Vec<usize> {
         let mut ended = Vec::new();
-        for index in self.queue.take_all(again) {
+        for index in self.queue.take_all(key) {
             let attempts = self.attempts(index);
             match self.jobs[index].earlier.take() {
                 Some(Earlier { end: Ended::Decided(failure), name }) => {
@@ -282,7 +282,7 @@ impl Batch {
     /// Has a job wait again.
     pub(super) fn requeue(&mut self, index: usize) {
         let job = &self.jobs[index];
-        self.queue.put_back(index, Again { avoided: job.avoided, setup: job.setup });
+        self.queue.put_back(index, RetryKey { avoided: job.avoided, setup: job.setup });
     }
 
     fn end(&mut self, index: usize, outcome: Outcome) {

@@ -13,8 +13,8 @@ use starlings_proto::Lease;
 
 use super::Dispatcher;
 use super::batch::{Batch, Doubt, Ended};
-use super::hand_out::lease;
 use super::message::{BatchError, Command, ControlId, WorkerId};
+use super::schedule::lease;
 
 impl Dispatcher {
     /// An abnormal end: tried once more, and then decided by a control run in the same place.

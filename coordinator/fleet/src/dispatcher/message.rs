@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use starlings_proto::{Answer, Lease, SetupId};
+use starlings_proto::{Lease, LeaseOutcome, SetupId};
 
 use crate::job_name::JobName;
 use crate::{FleetEvent, Outcome};
@@ -102,7 +102,7 @@ pub(crate) enum Event {
         /// Under which lease.
         lease: Lease,
         /// What.
-        answer: Answer,
+        answer: LeaseOutcome,
         /// Wall time of the run, seconds.
         cost: f64,
     },

@@ -1,6 +1,6 @@
 //! The gap before and after: errors by channel and use, and what became of the model's own parameters.
 //!
-//! Where nothing was added there is only a before, which is shown. Next file to read: `places.rs`.
+//! Where nothing was added there is only a before, which is shown. Next file to read: `disagreement.rs`.
 
 use serde::Serialize;
 use starlings_explain::figures::Figures;

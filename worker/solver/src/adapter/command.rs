@@ -5,12 +5,12 @@
 //! Each run has a folder of its own, kept for people to look at when the run fails. Next files to read: [`template`] and
 //! [`request`] for what goes in, [`program`] for the run, [`rule`] and [`answer`] for what comes out.
 
-mod answer;
 mod fault;
 mod inspect;
 pub(super) mod json;
 mod program;
 mod request;
+mod results;
 mod rule;
 mod table;
 mod template;
@@ -26,14 +26,14 @@ use starlings_models::{Description, ParticleError, Run, Solved, SolverDef, Spec,
 
 use super::{Adapter, Kind};
 use crate::SolverError;
+use crate::core_slots::CoreSlots;
 use crate::error::tail_text;
 use crate::process::{Launch, Process, ending, is_killed};
-use crate::seats::Seats;
 use crate::site::Site;
 use crate::stopped::stopped;
-use answer::Answer;
 pub(crate) use inspect::faults;
 use program::{End, Output};
+use results::RunResults;
 use rule::{Rule, lies_inside};
 use template::{OWN_NAMES, Templates};
 use traces::{kept, said};
@@ -57,7 +57,7 @@ struct PerRun {
     templates: Templates,
     copies: Vec<(String, PathBuf)>,
     rules: BTreeMap<String, Rule>,
-    seats: Seats,
+    core_slots: CoreSlots,
 }
 
 /// How an attempt ended that gave no answer.
@@ -66,8 +66,8 @@ enum Failed {
     Program(String),
     /// It did not end in time.
     Late(String),
-    /// The place cannot make the run.
-    Place(String),
+    /// The host cannot make the run: a program, a file or a folder is missing.
+    Host(String),
     /// Somebody killed the program, or took its folder away: worth another attempt at once.
     Disturbed(String),
 }
@@ -101,7 +101,7 @@ impl PerRun {
             .collect();
         let command = request::command(&def.command, Path::new(&def.folder), &inside, &description.spec)?;
         let copies = files.copies.into_iter().map(|(name, path)| (name, PathBuf::from(path))).collect();
-        let seats = Seats::default();
+        let core_slots = CoreSlots::default();
         Ok(Self {
             def: def.clone(),
             site: Arc::clone(site),
@@ -110,7 +110,7 @@ impl PerRun {
             templates,
             copies,
             rules,
-            seats,
+            core_slots,
         })
     }
 
@@ -133,7 +133,7 @@ impl PerRun {
         Ok(())
     }
 
-    fn launch(&self, command: &[String], folder: &Path, seat: usize) -> Result<Process, SolverError> {
+    fn launch(&self, command: &[String], folder: &Path, core_slot: usize) -> Result<Process, SolverError> {
         let threads = self.def.threads;
         self.site.start(&Launch {
             command,
@@ -141,7 +141,7 @@ impl PerRun {
             folder: Some(folder),
             environment: self.def.environment.clone(),
             threads,
-            cores: self.def.pin.then(|| self.site.cores(seat, threads)),
+            cores: self.def.pin.then(|| self.site.cores(core_slot, threads)),
             memory: self.def.memory,
             input: true,
         })
@@ -149,7 +149,7 @@ impl PerRun {
 
     /// One start of the program, the `last` that is tried or not.
     fn attempt(&self, run: &Run<'_>, last: bool) -> Result<Solved, Failed> {
-        let place = |what: String| Failed::Place(format!("{} cannot run: {what}", self.program()));
+        let place = |what: String| Failed::Host(format!("{} cannot run: {what}", self.program()));
         let scratch =
             self.site.scratch("run").map_err(|error| place(format!("no folder for it: {error}")))?;
         if let Err(what) = self.furnish(run, scratch.path()) {
@@ -158,12 +158,12 @@ impl PerRun {
         }
         let spec = &self.description.spec;
         let told = request::document(spec, run).to_string();
-        let seat = self.seats.take();
+        let core_slot = self.core_slots.take();
         let command = request::filled(&self.command, spec, run, scratch.path());
-        let started = self.launch(&command, scratch.path(), seat.number());
+        let started = self.launch(&command, scratch.path(), core_slot.number());
         let mut process = started.map_err(|error| {
             let what = error.to_string();
-            if scratch.is_gone() && !last { Failed::Disturbed(what) } else { Failed::Place(what) }
+            if scratch.is_gone() && !last { Failed::Disturbed(what) } else { Failed::Host(what) }
         })?;
         let patience = Duration::try_from_secs_f64(self.def.timeout).unwrap_or(Duration::MAX);
         let (end, output) = program::to_its_end(&mut process, told.clone().into_bytes(), patience);
@@ -190,7 +190,7 @@ impl PerRun {
             Err(what) if disturbed && !last => return Err(Failed::Disturbed(what)),
             Err(what) if scratch.is_gone() => {
                 let folder = scratch.path().display();
-                return Err(Failed::Place(format!("{what}; its folder {folder} was removed while it ran")));
+                return Err(Failed::Host(format!("{what}; its folder {folder} was removed while it ran")));
             }
             Err(what) => {
                 let said = tail_text(&tail);
@@ -201,13 +201,13 @@ impl PerRun {
         Err(match end {
             End::Late => Failed::Late(what),
             End::Ended(_) if !killed => Failed::Program(what),
-            End::Ended(_) | End::Stopped => Failed::Place(what),
+            End::Ended(_) | End::Stopped => Failed::Host(what),
         })
     }
 
     /// The outputs that were asked for.
     fn read(&self, run: &Run<'_>, folder: &Path, output: &Output) -> Result<Solved, String> {
-        let answer = Answer::new(folder, output);
+        let results = RunResults::new(folder, output);
         let times = &run.window.times;
         let mut columns = Vec::with_capacity(run.outputs.len());
         for name in run.outputs {
@@ -215,7 +215,7 @@ impl PerRun {
             let size = quantity.map_or(1, |q| q.size);
             let whole = Rule::whole(name);
             let rule = self.rules.get(name).unwrap_or(&whole);
-            let values = answer.values(rule, size, times);
+            let values = results.values(rule, size, times);
             columns.push((size, values.map_err(|fault| self.unreadable(name, &fault))?));
         }
         let at = |j: usize| columns.iter().flat_map(move |(size, values)| &values[j * size..(j + 1) * size]);
@@ -252,7 +252,7 @@ impl Adapter for PerRun {
                     attempts += 1;
                 }
                 Err(Failed::Program(text)) => return Err(ParticleError::Undecided(text)),
-                Err(Failed::Place(text)) => return Err(ParticleError::Infrastructure(text)),
+                Err(Failed::Host(text)) => return Err(ParticleError::Infrastructure(text)),
                 Err(Failed::Late(says)) => return Err(Timeout { limit: self.def.timeout, says }.into()),
             }
         }

@@ -18,7 +18,7 @@ const ROWS: usize = 80;
 
 /// Where the gap is, ready to be arranged.
 #[derive(Debug, Serialize)]
-pub(super) struct Places {
+pub(super) struct Disagreement {
     sentences: Vec<String>,
     channels: Vec<Vec<String>>,
     correlations: Vec<CorrelationRow>,
@@ -33,7 +33,7 @@ struct CorrelationRow {
     meter: String,
 }
 
-impl Places {
+impl Disagreement {
     /// Formats what locating found.
     ///
     /// # Errors
