@@ -5,6 +5,7 @@
 //! is the only place that checks and translates. No socket and no scheduling here. Next file to read:
 //! [`convert`].
 
+pub mod adapters;
 mod codec;
 pub mod convert;
 pub mod spent;

@@ -29,6 +29,7 @@ use starlings_models::{
     Description, External, Factory, Forward, ParticleError, Run, SOLVER, Setup, SetupError, Solve, Solved,
     SolverDef, SolverFault,
 };
+use starlings_proto::adapters::{self, ADAPTERS};
 
 use adapter::Adapter;
 pub use error::SolverError;
@@ -38,12 +39,13 @@ pub use site::SiteOptions;
 
 /// The ways to reach a solver, by name, with a sentence about each.
 pub fn adapters() -> impl Iterator<Item = (&'static str, &'static str)> {
-    adapter::KINDS.iter().map(|kind| (kind.name, kind.says))
+    ADAPTERS.iter().map(|adapter| (adapter.name, adapter.says))
 }
 
 /// What is wrong with the files and the command of a program that is started for every run; nothing is started.
 pub fn faults(def: &SolverDef) -> Vec<SolverFault> {
-    if def.adapter == adapter::command::KIND.name { adapter::command::faults(def) } else { Vec::new() }
+    let per_run = adapters::adapter(&def.adapter).is_some_and(|adapter| adapter.per_run);
+    if per_run { adapter::command::faults(def) } else { Vec::new() }
 }
 
 /// The solvers of one process.
@@ -142,7 +144,9 @@ impl Solvers {
             (def.command, def.folder) = (command.clone(), folder.clone());
         }
         // Studies of one solver share its programs, whatever else they say.
-        let described = def.described.clone().filter(|_| !adapter::asks(&def.adapter));
+        let describes_itself =
+            adapters::adapter(&def.adapter).is_some_and(|adapter| adapter.describes_itself);
+        let described = def.described.clone().filter(|_| !describes_itself);
         let key = format!("{:?}", SolverDef { described, ..def.clone() });
         let mut open = self.0.open.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(reached) = open.get(&key) {

@@ -24,7 +24,7 @@ use std::time::Duration;
 
 use starlings_models::{Description, ParticleError, Run, Solved, SolverDef, Spec, Timeout, nearest};
 
-use super::{Adapter, Kind};
+use super::Adapter;
 use crate::SolverError;
 use crate::core_slots::CoreSlots;
 use crate::error::tail_text;
@@ -38,12 +38,13 @@ use rule::{Rule, lies_inside};
 use template::{OWN_NAMES, Templates};
 use traces::{kept, said};
 
-pub(crate) const KIND: Kind = Kind {
-    name: "command",
-    says: "a program started for every run; input files from templates, outputs by rule, no code",
-    asks: false,
-    open: |def, site| Ok(Box::new(PerRun::new(def, site)?)),
-};
+/// A program started for every run.
+///
+/// # Errors
+/// When the study lacks what it needs.
+pub(super) fn open(def: &SolverDef, site: &Arc<Site>) -> Result<Box<dyn Adapter>, SolverError> {
+    Ok(Box::new(PerRun::new(def, site)?))
+}
 
 /// Times that a run is made when somebody kills its program or removes its folder.
 const ATTEMPTS: u32 = 12;

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use starlings_models::{Description, ParticleError, Run, Solved, SolverDef, Timeout};
 
-use super::{Adapter, Kind};
+use super::Adapter;
 use crate::SolverError;
 use crate::backoff::Backoff;
 use crate::core_slots::{CoreSlot, CoreSlots};
@@ -17,12 +17,13 @@ use crate::instance::{How, Instance};
 use crate::losses::Losses;
 use crate::site::Site;
 
-pub(crate) const KIND: Kind = Kind {
-    name: "grpc",
-    says: "a program that serves solver.proto, or an address where one does",
-    asks: true,
-    open: |def, site| Ok(Box::new(Grpc::new(def, site, def.command.clone())?)),
-};
+/// Programs that the command of the definition starts, or one at its address.
+///
+/// # Errors
+/// When the study lacks what it needs.
+pub(super) fn open(def: &SolverDef, site: &Arc<Site>) -> Result<Box<dyn Adapter>, SolverError> {
+    Ok(Box::new(Grpc::new(def, site, def.command.clone())?))
+}
 
 /// Programs that serve `solver.proto`.
 pub(crate) struct Grpc {
