@@ -12,7 +12,7 @@ pub mod spent;
 pub mod words;
 
 pub use bytes::Bytes;
-pub use codec::Codec;
+pub(crate) use codec::Codec;
 pub use convert::{
     FromWorker, Hello, JobEncoder, Lease, LeaseOutcome, ProtocolError, ReceivedWindows, SentWindows, SetupId,
     ToWorker, Welcome, decode_setup, digest, encode_setup,

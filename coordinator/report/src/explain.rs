@@ -26,17 +26,17 @@ use gap::Gap;
 
 /// What the page says of the study besides the explanation. Empty texts are left out.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct StudyAbout {
+pub(crate) struct StudyAbout {
     /// What the study is about.
-    pub says: String,
+    pub(crate) says: String,
     /// The command that makes this explanation again.
-    pub command: String,
+    pub(crate) command: String,
     /// When it was started.
-    pub started: String,
+    pub(crate) started: String,
     /// Version of the program.
-    pub version: String,
+    pub(crate) version: String,
     /// Names of the model's states: a term added to one of them is written as a rate of change.
-    pub states: Vec<String>,
+    pub(crate) states: Vec<String>,
 }
 
 /// Makes the page of an explanation: one HTML document that refers to nothing outside itself.
@@ -44,7 +44,7 @@ pub struct StudyAbout {
 /// # Errors
 ///
 /// [`ReportError`] when a figure or the page cannot be made; data that are missing are shown as missing.
-pub fn explain_page(
+pub(crate) fn explain_page(
     explanation: &Explanation,
     figures: &Figures,
     about: &StudyAbout,

@@ -25,7 +25,6 @@ mod sample;
 mod tests;
 
 pub use data::ReportData;
-pub use explain::{StudyAbout, explain_page};
 pub use explained::{state_names, write_explanation};
 pub use files::{FilesError, write_files, write_page};
 pub use identify::identify_page;

@@ -14,7 +14,7 @@ use super::{ProtocolError, window};
 use crate::generated;
 
 /// Name of a window: BLAKE3 of its arrays with their lengths.
-pub type WindowId = [u8; 32];
+pub(crate) type WindowId = [u8; 32];
 
 /// Largest window that travels inside its jobs, encoded bytes.
 const INLINE: usize = 16 * 1024;
@@ -44,7 +44,7 @@ impl<T> Default for Windows<T> {
 
 impl<T> Windows<T> {
     /// What is held under a name.
-    pub fn get(&self, id: &WindowId) -> Option<&T> {
+    pub(crate) fn get(&self, id: &WindowId) -> Option<&T> {
         self.held.get(id).map(|(_, window)| window)
     }
 

@@ -21,7 +21,7 @@ use starlings_proto::words::status_text;
 use tokio::runtime::Runtime;
 use tonic::transport::Channel;
 
-pub use connect::{ADDRESS, SOCKET};
+pub use connect::SOCKET;
 use connect::{SolverAddress, connect};
 
 use super::SolverError;

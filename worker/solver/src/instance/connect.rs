@@ -24,7 +24,7 @@ use crate::scratch::Scratch;
 /// Variable that names the Unix socket on which a solver listens.
 pub const SOCKET: &str = "STARLINGS_SOLVER_SOCKET";
 /// Variable that names the loopback address on which a solver listens.
-pub const ADDRESS: &str = "STARLINGS_SOLVER_ADDRESS";
+pub(crate) const ADDRESS: &str = "STARLINGS_SOLVER_ADDRESS";
 
 /// HTTP/2 windows per stream and per connection, bytes: a state of many megabytes travels in one go.
 const WINDOWS: (u32, u32) = (64 * 1024 * 1024, 64 * 1024 * 1024);
