@@ -1,7 +1,7 @@
 //! Translates between the generated types and the project's own types, and checks everything that arrives.
 //!
-//! The only module that looks inside [`crate::generated`] and [`crate::generated_solver`]. Every bit of every number survives both ways; a malformed message is a
-//! [`ProtocolError`], never a panic. Next files to read: [`from_worker`], [`to_worker`], [`job`].
+//! The only module that looks inside [`crate::generated`] and [`crate::generated_solver`]. Every bit of every number survives both
+//! ways; a malformed message is a [`ProtocolError`], never a panic. Next files to read: [`from_worker`], [`to_worker`], [`job`].
 
 pub mod floats;
 pub mod from_worker;

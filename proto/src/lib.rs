@@ -1,9 +1,8 @@
 //! The protocols between coordinator, workers and external solvers.
 //!
 //! `proto/fleet.proto` says what travels between coordinator and worker, `proto/solver.proto` between a worker and a solver
-//! outside, in which unit and shape. [`generated`] and [`generated_solver`] are generated from them and nobody looks inside: [`convert`]
-//! is the only place that checks and translates. No socket and no scheduling here. Next file to read:
-//! [`convert`].
+//! outside, in which unit and shape. [`generated`] and [`generated_solver`] are generated from them; [`convert`] alone looks inside
+//! and checks and translates them. No socket and no scheduling here. Next file to read: [`convert`].
 
 pub mod adapters;
 mod codec;

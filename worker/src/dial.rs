@@ -119,7 +119,7 @@ pub(crate) async fn dial(
                 "no coordinator at {address} yet ({last}): dialling for up to {patience} s (`--patience` sets the wait)"
             );
         }
-        // Spread by the process's nonce, so that a thousand workers do not knock at the same moment.
+        // Spread by the process's nonce, so that a thousand workers do not dial at the same moment.
         let spread = 0.5 + (hello.nonce % 1024) as f64 / 2048.0;
         tokio::select! {
             () = config.cancel.cancelled() => return Ok(Dialled::Cancelled),

@@ -58,7 +58,7 @@ pub(crate) async fn serve(
             _ = beats.tick() => {
                 let (running, queued) = slots.load();
                 send(&connection.outbox, FromWorker::Heartbeat { running, queued });
-                // A worker that serves once has nowhere else to go: only the end of its connection ends its session.
+                // A worker that serves once does not dial again: only the end of its connection ends its session.
                 if let Some(reason) = silence.after_beat().filter(|_| !config.once) {
                     return Ended::Lost(reason);
                 }
@@ -71,7 +71,7 @@ pub(crate) async fn serve(
 const SILENT_BEATS: u32 = 3;
 
 /// Counts heartbeats of this side since the coordinator was last heard. Counting beats instead of reading a clock keeps a
-/// suspended laptop from declaring its coordinator dead.
+/// suspended machine from taking its coordinator for gone.
 #[derive(Default)]
 struct Silence {
     beats: u32,

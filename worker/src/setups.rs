@@ -86,7 +86,7 @@ impl Setups {
         if let Err(error) = spawned {
             let mut shared = self.lock();
             shared.builders -= 1;
-            // Another builder will come to it; without any, nobody would.
+            // A running builder takes it next; only without one the failure to start a thread matters.
             let stranded =
                 if shared.builders == 0 { std::mem::take(&mut shared.waiting) } else { VecDeque::new() };
             drop(shared);

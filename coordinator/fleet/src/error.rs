@@ -64,7 +64,7 @@ pub enum FleetError {
         /// Each worker with its reason.
         reasons: String,
     },
-    /// A program ends abnormally, and no run is known to work that could tell whether the parameters or the place do it.
+    /// A program ends abnormally, and no run is known to work that could tell whether the parameters or the host cause it.
     #[error(
         "the run of particle {particle} over record {record}{} ends abnormally wherever it is made, and no other run of that \
          window works: nobody can tell whether its parameters or the machines are at fault: {reason}\n  mend what it names, then \
@@ -81,7 +81,7 @@ pub enum FleetError {
         /// How it ended last.
         reason: String,
     },
-    /// A job has no answer, and not by the model's doing.
+    /// A job has no answer, for another reason than a failure of the model.
     #[error("the run of particle {particle} over record {record} has no usable answer: {reason}")]
     NoAnswer {
         /// Index of the job among those that were to run.

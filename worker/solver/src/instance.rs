@@ -255,7 +255,7 @@ impl Instance {
         Lost { how, what: what + &self.homeless(), tail }
     }
 
-    /// That its folder is gone, as the end of a sentence: whatever it says of its end, that is why.
+    /// That its folder is gone, as the end of a sentence; this is the cause of its end, whatever it says itself.
     fn homeless(&self) -> String {
         let gone = self.is_homeless().then(|| self.scratch.path().display());
         gone.map(|folder| format!("; its folder {folder} was removed meanwhile")).unwrap_or_default()

@@ -78,7 +78,7 @@ impl Dispatcher {
         }
     }
 
-    /// The model's doing, or the limit of wall time: tried once more on another worker, if there is one.
+    /// A failure of the model, or the limit of wall time: tried once more on another worker, if there is one.
     fn decided(&mut self, id: WorkerId, index: usize, failure: Failure) {
         let Some(batch) = &mut self.batch else { return };
         let name = self.workers.get(&id).map_or("", |w| w.name.as_str());

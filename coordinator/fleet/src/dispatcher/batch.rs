@@ -1,6 +1,6 @@
 //! The jobs of one batch: the setup that each needs, how often each was tried, how each ended.
 //!
-//! Next files to read: `queue`, for those that wait, `doubt` for those that failed and nobody knows why.
+//! Next files to read: `queue`, for those that wait, `doubt` for those that failed for an unknown reason.
 
 mod notices;
 
@@ -64,9 +64,9 @@ struct Earlier {
 /// How an attempt without a prediction ended.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Ended {
-    /// It is the model's doing, or the limit of wall time.
+    /// A failure of the model, or the limit of wall time.
     Decided(Failure),
-    /// Abnormally: nobody knows yet whose doing it is.
+    /// Abnormally: the cause, parameters or host, is not known yet.
     Undecided(String),
 }
 
@@ -259,7 +259,7 @@ impl Batch {
         self.end(index, Outcome { result, attempts, worker: name.to_owned() });
     }
 
-    /// A job is called back only for one of these setups, and at most once, so that it cannot travel for ever.
+    /// A job is recalled only for one of these setups, and at most once, so that it cannot be sent to and fro without end.
     pub(super) fn may_recall(&self, job: u64, setups: &BTreeSet<SetupId>) -> bool {
         self.index_of(job).is_some_and(|index| {
             let job = &self.jobs[index];

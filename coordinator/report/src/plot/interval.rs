@@ -1,4 +1,6 @@
 //! The 95 % intervals of a parameter before and after the data, as two bars on one line.
+//!
+//! The bars are placed by [`Axis`], which plotters has no logarithmic equal of; a chart would add axes that the row has no room for.
 
 use plotters::element::Rectangle;
 use plotters::style::{Color, RGBColor};

@@ -3,7 +3,7 @@
 //!
 //! The study says what the program has, since it cannot be asked. It starts every run anew, so no run continues from a state.
 //! Each run has a folder of its own, kept for people to look at when the run fails. Next files to read: [`template`] and
-//! [`request`] for what goes in, [`program`] for the run, [`rule`] and [`answer`] for what comes out.
+//! [`request`] for what goes in, [`program`] for the run, [`rule`] and [`results`] for what comes out.
 
 mod fault;
 mod inspect;

@@ -107,9 +107,9 @@ impl Adapter for Grpc {
                 Ok(pinned) => pinned,
                 Err(error) => {
                     let killed = matches!(error, SolverError::NotReady { killed: true, .. });
-                    let again = if killed { losses.killed() } else { losses.fell() };
+                    let retry = if killed { losses.killed() } else { losses.fell() };
                     // A program that is not even ready has not seen the parameters.
-                    if !again {
+                    if !retry {
                         return Err(ParticleError::Infrastructure(error.to_string()));
                     }
                     continue;
@@ -126,7 +126,7 @@ impl Adapter for Grpc {
                 }
                 // The program is gone or of no more use: dropping it ends its whole group.
                 Err(lost) => {
-                    let again = match lost.how {
+                    let retry = match lost.how {
                         How::Silent | How::Stopped => false,
                         How::Fell => losses.fell(),
                         How::Killed => losses.killed(),
@@ -135,7 +135,7 @@ impl Adapter for Grpc {
                     let text = lost.text(times);
                     drop(pinned);
                     tracing::warn!(particle = run.particle, record = run.record, times, "{text}");
-                    if !again {
+                    if !retry {
                         return Err(match lost.how {
                             How::Silent => Timeout { limit: self.def.timeout, says: text }.into(),
                             How::Fell => ParticleError::Undecided(text),

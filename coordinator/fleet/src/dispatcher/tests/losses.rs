@@ -79,10 +79,10 @@ fn a_worker_that_says_goodbye_counts_no_attempt() {
 fn a_model_failure_is_tried_once_more_on_another_worker() {
     let mut stage = Stage::with(&[1, 1]);
     let jobs = stage.jobs(submit(1));
-    let again = stage.jobs(answered(jobs[0].0, LeaseOutcome::Ran(Err(solver("no"))), 1.0));
-    assert_eq!(again.len(), 1);
-    assert_ne!(again[0].0.epoch, jobs[0].0.epoch);
-    let done = stage.step(answered(again[0].0, LeaseOutcome::Ran(Err(solver("no, again"))), 1.0));
+    let retried = stage.jobs(answered(jobs[0].0, LeaseOutcome::Ran(Err(solver("no"))), 1.0));
+    assert_eq!(retried.len(), 1);
+    assert_ne!(retried[0].0.epoch, jobs[0].0.epoch);
+    let done = stage.step(answered(retried[0].0, LeaseOutcome::Ran(Err(solver("no, again"))), 1.0));
     let outcome = &outcomes(&done).expect("a second failure ends it")[0];
     assert_eq!((outcome.result.clone(), outcome.attempts), (Err(failed("no, again").into()), 2));
 }

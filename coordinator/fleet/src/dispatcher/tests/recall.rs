@@ -29,9 +29,9 @@ fn a_job_is_called_back_only_once() {
     let commands = stage.step(answered(jobs[0].0, LeaseOutcome::Ran(Err(solver("no"))), 1.0));
     let waiting = sent(&commands)[0].0;
     assert!(commands.contains(&Command::Cancel { worker: WorkerId(waiting.epoch), leases: vec![waiting] }));
-    let again = stage.step(answered(waiting, LeaseOutcome::Withdrawn, 0.0));
-    assert_eq!(sent(&again).len(), 1);
-    assert_eq!(again.len(), 1, "it stays there now");
+    let retried = stage.step(answered(waiting, LeaseOutcome::Withdrawn, 0.0));
+    assert_eq!(sent(&retried).len(), 1);
+    assert_eq!(retried.len(), 1, "it stays there now");
 }
 
 #[test]

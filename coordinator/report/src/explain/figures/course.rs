@@ -1,6 +1,6 @@
 //! Measured against simulated without and with the added effects, and the residuals of both.
 //!
-//! What an effect is worth is seen where the fit never looked. Next file to read: `region.rs`.
+//! The effect is judged by the held-out span and channels, which no fit has seen. Next file to read: `region.rs`.
 
 use starlings_explain::figures::{Curve, Figures};
 use starlings_explain::result::{Explanation, GapRow};

@@ -1,6 +1,6 @@
 //! The unknown input of one equation: against time, and against the state of that equation.
 //!
-//! A force that is one curve over the state depends on that state; one that is a cloud there depends on something else. Next
+//! Points along one curve over the state mean that the input depends on that state; a cloud means that it does not. Next
 //! file to read: `spectrum.rs`.
 
 use starlings_explain::figures::Figures;

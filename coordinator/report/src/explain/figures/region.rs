@@ -1,6 +1,6 @@
 //! Residuals over operating regions: bars over the bins of one signal, a map over the bins of two.
 //!
-//! The same map before and after the effects is drawn on the same scale, so that the eye may compare. Next file to read:
+//! The same map before and after the effects is drawn on the same scale, so that both can be compared. Next file to read:
 //! `force.rs`.
 
 use starlings_explain::figures::Figures;
