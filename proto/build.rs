@@ -1,4 +1,4 @@
-//! Generates the wire types from `proto/*.proto` without protoc: protox compiles, tonic-prost-build emits.
+//! Generates the types of the messages from `proto/*.proto` without protoc: protox compiles, tonic-prost-build emits.
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("cargo:rerun-if-changed=proto");

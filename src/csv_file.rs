@@ -35,7 +35,7 @@ where
 }
 
 /// Where the files of a study are looked for.
-pub(crate) enum Place<'a> {
+pub(crate) enum StudyLocation<'a> {
     /// Its file stands here, and its recordings relative to it.
     Known(&'a Path),
     /// Not known: any file counts whose path ends as the study writes it.
@@ -46,11 +46,15 @@ pub(crate) enum Place<'a> {
 type Output<'a> = (&'static str, &'a Option<PathBuf>);
 
 /// Refuses, before anything runs, outputs that would overwrite the study, its data or each other, or cannot be written.
-pub(crate) fn check_outputs(outputs: &[Output<'_>], study: &str, place: &Place<'_>) -> Result<(), Failure> {
+pub(crate) fn check_outputs(
+    outputs: &[Output<'_>],
+    study: &str,
+    location: &StudyLocation<'_>,
+) -> Result<(), Failure> {
     let given: Vec<(&str, &Path)> =
         outputs.iter().filter_map(|(option, path)| Some((*option, path.as_deref()?))).collect();
     for (i, (option, path)) in given.iter().enumerate() {
-        spare_study(path, study, place).map_err(|failure| failure.with(&format!(" with {option}")))?;
+        spare_study(path, study, location).map_err(|failure| failure.with(&format!(" with {option}")))?;
         let same = |other: &&(&str, &Path)| is_same(other.1, path);
         if let Some((earlier, _)) = given[..i].iter().find(same) {
             let path = path.display();
@@ -91,7 +95,7 @@ fn probe(path: &Path) -> std::io::Result<()> {
 }
 
 /// Refuses an output that would overwrite the study or a file that it names.
-fn spare_study(output: &Path, study: &str, place: &Place<'_>) -> Result<(), Failure> {
+fn spare_study(output: &Path, study: &str, location: &StudyLocation<'_>) -> Result<(), Failure> {
     // What does not exist cannot be overwritten, and a device is no file of a study.
     let Some(target) = output.canonicalize().ok().filter(|target| target.is_file()) else {
         return Ok(());
@@ -103,12 +107,12 @@ fn spare_study(output: &Path, study: &str, place: &Place<'_>) -> Result<(), Fail
     if std::fs::read(&target).is_ok_and(|bytes| bytes == study.as_bytes()) {
         return refuse("the study file");
     }
-    let is_target = |name: &str| match place {
-        Place::Known(file) => {
+    let is_target = |name: &str| match location {
+        StudyLocation::Known(file) => {
             let beside = file.parent().unwrap_or(Path::new("")).join(name);
             beside.canonicalize().is_ok_and(|path| path == target)
         }
-        Place::Unknown => {
+        StudyLocation::Unknown => {
             let names = Path::new(name).components().filter_map(|part| match part {
                 Component::Normal(part) => Some(part),
                 _ => None,

@@ -1,6 +1,6 @@
 //! `starlings explain`: where simulation and recordings disagree, which effect is missing, the gap before and after.
 //!
-//! Next files to read: [`mod@print`] for the answer on a terminal, [`crate::crew`] for the fleet.
+//! Next files to read: [`mod@print`] for the answer on a terminal, [`crate::fleet_session`] for the fleet.
 
 mod print;
 
@@ -18,8 +18,8 @@ use starlings_coordinator::study::trial::trial;
 use starlings_coordinator::study::{RunFolder, Study};
 
 use crate::console::{line, note};
-use crate::crew::{Crew, FleetArgs};
 use crate::failure::Failure;
+use crate::fleet_session::{FleetArgs, FleetSession};
 use crate::interrupt;
 use crate::load::load;
 use crate::progress::Display;
@@ -90,21 +90,21 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     trial(&study).map_err(Failure::input)?;
     // Listen before the folder is made: a port in use must leave nothing behind.
     let display = Arc::new(Display::new(args.json));
-    let mut crew = Crew::listen(&study, &plan, &display)?;
+    let mut session = FleetSession::listen(&study, &plan, &display)?;
     let folder = run_folder::open(Purpose::Explanation, &study, args.out.as_deref(), args.resume)?;
     if load_findings(&folder.store).map_err(Failure::run)?.is_some() {
         let path = folder.path.display();
         note(format_args!("the explanation in {path} is finished already; writing its files again"));
         return write(&folder, args.json);
     }
-    crew.gather(&study, &plan)?;
+    session.start_workers(&study, &plan)?;
     let mut watch = |stage: &Stage| display.stage(stage);
     let clock = move || started.elapsed().as_secs_f64();
     let earlier_s = folder.store.elapsed_s().map_err(Failure::run)?;
-    let mut context = Context { clock: &clock, watch: &mut watch, events: Some(&crew.events), earlier_s };
-    let result = explain(&study, &mut crew.fleet, &folder.store, &mut context, &options);
+    let mut context = Context { clock: &clock, watch: &mut watch, events: Some(&session.events), earlier_s };
+    let result = explain(&study, &mut session.fleet, &folder.store, &mut context, &options);
     display.finish();
-    crew.dismiss();
+    session.close();
     let found = result.map_err(|error| failed(&error, &folder.path))?;
     save_findings(&folder, &found).map_err(Failure::run)?;
     write(&folder, args.json)

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::{Parser, ValueEnum};
 use starlings_coordinator::study::{RunFolder, store};
 
-use crate::csv_file::{self, Place};
+use crate::csv_file::{self, StudyLocation};
 use crate::failure::Failure;
 
 /// Write a table of a run folder as CSV.
@@ -66,5 +66,5 @@ fn spare(args: &Args, folder: &RunFolder) -> Result<(), Failure> {
         return Err(Failure::input(format!("{path} is a file of the run: choose another file with -o")));
     }
     let study = folder.store.meta("study").map_err(Failure::run)?.unwrap_or_default();
-    csv_file::check_outputs(&[("-o", &args.output)], &study, &Place::Unknown)
+    csv_file::check_outputs(&[("-o", &args.output)], &study, &StudyLocation::Unknown)
 }

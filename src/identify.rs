@@ -11,9 +11,9 @@ use starlings_coordinator::study::trial::{Depth, dry_run};
 use starlings_estimators::BATCH;
 
 use crate::console::{line, note, number, table, text};
-use crate::crew::{Crew, FleetArgs};
-use crate::csv_file::{self, Place};
+use crate::csv_file::{self, StudyLocation};
 use crate::failure::Failure;
+use crate::fleet_session::{FleetArgs, FleetSession};
 use crate::interrupt;
 use crate::load::load;
 use crate::progress::Display;
@@ -51,13 +51,13 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let mut study = load(&args.study)?;
     let plan = args.fleet.plan(&study)?;
     let outputs = [("--html", &args.html), ("--csv", &args.csv)];
-    csv_file::check_outputs(&outputs, &study.text, &Place::Known(&study.file))?;
+    csv_file::check_outputs(&outputs, &study.text, &StudyLocation::Known(&study.file))?;
     let at = At::from_argument(&args.at);
     at.centre(&study).map_err(Failure::input)?;
     dry_run(&mut study, &BATCH, Depth::First).map_err(Failure::input)?;
     let display = Arc::new(Display::new(args.json));
-    let mut crew = Crew::listen(&study, &plan, &display)?;
-    crew.gather(&study, &plan)?;
+    let mut session = FleetSession::listen(&study, &plan, &display)?;
+    session.start_workers(&study, &plan)?;
     if !args.json {
         let records = study.records.iter().filter(|record| record.is_trained()).count();
         let runs = (2 * study.parameters.len() + 1) * records;
@@ -66,9 +66,9 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
             if records == 1 { "" } else { "s" }
         ));
     }
-    let result = identify(&study, &mut crew.fleet, &at);
+    let result = identify(&study, &mut session.fleet, &at);
     display.finish();
-    crew.dismiss();
+    session.close();
     let found = result.map_err(|error| match error {
         IdentifyError::Run(cause) if cause.is_cancelled() => {
             interrupt::failure("nothing is kept of it: start again")

@@ -1,7 +1,7 @@
 //! Ctrl-C, and the signals by which systems end programs: what was started is ended, and the exit code says which it was.
 //!
 //! The first signal cancels the work of the fleet, so that the command ends in order; before there is a fleet, and at the
-//! second signal, the process ends at once, and the guard ends its solvers. Next file to read: [`crate::crew`].
+//! second signal, the process ends at once, and the guard ends its solvers. Next file to read: [`crate::fleet_session`].
 
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::{Mutex, Once, PoisonError, mpsc};

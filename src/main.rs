@@ -8,12 +8,12 @@
 mod check;
 mod conformance;
 mod console;
-mod crew;
 mod csv_file;
 mod effects;
 mod explain;
 mod export;
 mod failure;
+mod fleet_session;
 mod guard;
 mod identify;
 mod interrupt;

@@ -12,8 +12,8 @@ use starlings_coordinator::study::trial::{Depth, dry_run};
 use starlings_coordinator::study::{Progress, RunContext, Summary, run as study_run};
 
 use crate::console::{line, note, number, table};
-use crate::crew::{Crew, FleetArgs};
 use crate::failure::Failure;
+use crate::fleet_session::{FleetArgs, FleetSession};
 use crate::interrupt;
 use crate::load::load;
 use crate::progress::Display;
@@ -48,7 +48,7 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     dry_run(&mut study, kind, Depth::First).map_err(Failure::input)?;
     // Listen before the folder is made: a port in use must leave nothing behind.
     let display = Arc::new(Display::new(args.json));
-    let mut crew = Crew::listen(&study, &plan, &display)?;
+    let mut session = FleetSession::listen(&study, &plan, &display)?;
     let mut folder = run_folder::open(Purpose::Run, &study, args.out.as_deref(), args.resume)?;
     if let Some(summary) = folder.summary().map_err(Failure::run)? {
         note(format_args!(
@@ -58,19 +58,19 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
         report::write_files(&folder).map_err(Failure::run)?;
         return print(&summary, &folder.path, args.json);
     }
-    crew.gather(&study, &plan)?;
+    session.start_workers(&study, &plan)?;
     let mut watch = |p: &Progress| display.step(p);
     let clock = move || started.elapsed().as_secs_f64();
     let mut context = RunContext {
         clock: &clock,
         watch: &mut watch,
-        events: Some(&crew.events),
+        events: Some(&session.events),
         earlier_s: 0.0,
         threads: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
     };
-    let result = study_run::run(&study, &mut crew.fleet, &mut folder, &mut context);
+    let result = study_run::run(&study, &mut session.fleet, &mut folder, &mut context);
     display.finish();
-    crew.dismiss();
+    session.close();
     let path = folder.path.display();
     let summary = result.map_err(|error| {
         let remedy = format!("the run so far is in {path}: continue it with --out {path} --resume");

@@ -11,7 +11,7 @@ use crate::failure::Failure;
 
 /// Serve the model of a study as an external solver, where STARLINGS_SOLVER_SOCKET says.
 ///
-/// For trying out the wire between workers and solvers, and as a solver to compare another one with.
+/// For trying out the protocol between workers and solvers, and as a solver to compare another one with.
 #[derive(Parser)]
 pub(crate) struct Args {
     /// The study whose model is served; its data and priors are not looked at.

@@ -12,7 +12,7 @@ use starlings_models::effect::{EffectDef, library};
 use starlings_models::{Spec, catalogue, nearest};
 
 use crate::console::note;
-use crate::csv_file::{self, Place};
+use crate::csv_file::{self, StudyLocation};
 use crate::failure::Failure;
 use crate::load::load;
 
@@ -96,7 +96,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     }
     let study = load(&args.study)?;
     let outputs = [("-o", &args.output), ("--state-out", &args.state_out)];
-    csv_file::check_outputs(&outputs, &study.text, &Place::Known(&study.file))?;
+    csv_file::check_outputs(&outputs, &study.text, &StudyLocation::Known(&study.file))?;
     check_names(args, &study)?;
     let record = match &args.record {
         None => 0,

@@ -15,7 +15,7 @@ use starlings_models::observer::kinds;
 use starlings_models::spectrum::Decay;
 
 use crate::console::line;
-use crate::csv_file::{self, Place};
+use crate::csv_file::{self, StudyLocation};
 use crate::failure::Failure;
 use crate::load::load;
 
@@ -72,7 +72,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     csv_file::check_outputs(
         &[("--csv", &args.csv), ("--html", &args.html)],
         &study.text,
-        &Place::Known(&study.file),
+        &StudyLocation::Known(&study.file),
     )?;
     let wanted = Wanted {
         observers: args.observers.clone(),

@@ -53,7 +53,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let cancel = CancellationToken::new();
     cancel_on_signal(&cancel);
     let slots = args.slots.unwrap_or(cores);
-    let mut solvers = solvers()?.seated_after(args.place.saturating_mul(slots));
+    let mut solvers = solvers()?.with_cores_after(args.place.saturating_mul(slots));
     if let Some(command) = command {
         solvers = solvers.with_command(command, here()?);
     }

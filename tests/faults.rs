@@ -12,8 +12,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use common::repository;
 use fault_kit::disk;
 use fault_kit::judge::{Outcome, clean, judge, nothing_left};
-use fault_kit::place::Place;
 use fault_kit::plan::{Case, Fault, Lasts, Must, Reached, Verb, all, few};
+use fault_kit::study_folder::StudyFolder;
 use fault_kit::table::{PAGE, Table};
 
 /// Lets all cases happen, as many at a time as there are cores; what is wrong with them.
@@ -76,7 +76,7 @@ fn ctrl_c_ends_a_command_with_130_and_all_that_it_started_and_resume_goes_on() {
         let undisturbed = clean(verb, Reached::Command);
         // After the trial runs, of which nothing is stored.
         for at in [undisturbed.n_run / 4, undisturbed.n_run / 2] {
-            let place = Place::new(verb, Reached::Command, "");
+            let place = StudyFolder::new(verb, Reached::Command, "");
             place.break_at(&interrupt, (at, at));
             let ended = place.go(&[]).unwrap();
             assert_eq!(ended.code, Some(130), "{}", ended.stderr);
@@ -99,7 +99,7 @@ fn ctrl_c_ends_a_command_with_130_and_all_that_it_started_and_resume_goes_on() {
 #[test]
 fn another_program_in_the_place_of_this_one_starts_no_worker_of_the_run() {
     let undisturbed = clean(Verb::Run, Reached::Command);
-    let place = Place::new(Verb::Run, Reached::Command, "");
+    let place = StudyFolder::new(Verb::Run, Reached::Command, "");
     let own = place.path("starlings");
     std::fs::copy(env!("CARGO_BIN_EXE_starlings"), &own).unwrap();
     let half = undisturbed.n_run / 2;
@@ -116,7 +116,7 @@ fn another_program_in_the_place_of_this_one_starts_no_worker_of_the_run() {
 
 #[test]
 fn ctrl_c_before_anything_is_computed_leaves_nothing() {
-    let place = Place::new(Verb::Run, Reached::Command, "");
+    let place = StudyFolder::new(Verb::Run, Reached::Command, "");
     place.break_at(&met("interrupt", Lasts::Once, Must::Stop, &[]), (1, 1));
     let ended = place.go(&[]).unwrap();
     assert_eq!(ended.code, Some(130), "{}", ended.stderr);

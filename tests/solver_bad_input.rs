@@ -9,12 +9,12 @@ mod kit;
 
 use std::process::Stdio;
 
-use bad_solver_kit::{Place, blocking_place, gone, members, signal, workers};
+use bad_solver_kit::{BadSolverStudy, blocking_place, gone, members, signal, workers};
 use common::{output, starlings, wait_until};
 
 #[test]
 fn a_solver_that_fails_at_the_prior_median_ends_the_command_before_anything_is_made() {
-    let place = Place::new("sys.exit('cannot read mesh.vtk')");
+    let place = BadSolverStudy::new("sys.exit('cannot read mesh.vtk')");
     for name in ["check", "run"] {
         let (code, said) = place.told(name);
         assert_eq!(code, 2, "{said}");
@@ -31,7 +31,7 @@ fn a_solver_that_fails_at_the_prior_median_ends_the_command_before_anything_is_m
 
 #[test]
 fn a_particle_that_fails_is_told_with_its_record_and_values_and_the_study_goes_on() {
-    let place = Place::new("if rate < 0.96: sys.exit('cannot factor the matrix')");
+    let place = BadSolverStudy::new("if rate < 0.96: sys.exit('cannot factor the matrix')");
     let (code, said) = place.told("run");
     assert_eq!(code, 0, "{said}");
     let (_, rest) = said.split_once(", record 0 (rate = 0.95").unwrap_or_else(|| panic!("{said}"));
@@ -46,7 +46,8 @@ fn a_particle_that_fails_is_told_with_its_record_and_values_and_the_study_goes_o
 
 #[test]
 fn a_solver_that_fails_everywhere_but_at_the_prior_median_ends_the_run_with_its_words() {
-    let place = Place::new("if abs(rate - 1) > 1e-6 or abs(start - 10) > 1e-6: sys.exit('no licence left')");
+    let place =
+        BadSolverStudy::new("if abs(rate - 1) > 1e-6 or abs(start - 10) > 1e-6: sys.exit('no licence left')");
     let (code, said) = place.told("run");
     assert_eq!(code, 1, "{said}");
     for words in ["particle 1, record 0 (rate = ", "no licence left", "error: "] {
@@ -56,7 +57,7 @@ fn a_solver_that_fails_everywhere_but_at_the_prior_median_ends_the_run_with_its_
 
 #[test]
 fn an_answer_that_is_no_number_is_told_like_any_other_failure() {
-    let place = Place::new("if rate < 0.96: excess[3] = float('nan')");
+    let place = BadSolverStudy::new("if rate < 0.96: excess[3] = float('nan')");
     let (code, said) = place.told("run");
     assert_eq!(code, 0, "{said}");
     assert!(said.contains(", record 0 (rate = 0.95") && said.contains("given up after 2 attempts"), "{said}");
@@ -79,8 +80,9 @@ fn a_worker_that_is_told_to_end_leaves_no_solver_and_no_folder() {
     let place = blocking_place();
     let (mut command, groups) = place.blocked();
     for worker in workers(&command) {
-        let own =
-            |place: &Place| place.left().iter().any(|(n, _)| n.starts_with(&format!("starlings-{worker}-")));
+        let own = |place: &BadSolverStudy| {
+            place.left().iter().any(|(n, _)| n.starts_with(&format!("starlings-{worker}-")))
+        };
         assert!(own(&place), "its solver has a folder");
         signal("-TERM", &worker);
         wait_until("its folder is gone", || !own(&place));
@@ -106,7 +108,7 @@ fn a_killed_worker_leaves_no_folder() {
 
 #[test]
 fn after_a_sound_run_no_folder_is_left() {
-    let place = Place::new("");
+    let place = BadSolverStudy::new("");
     for name in ["check", "run"] {
         let (code, said) = place.told(name);
         assert_eq!(code, 0, "{said}");
@@ -116,7 +118,7 @@ fn after_a_sound_run_no_folder_is_left() {
 
 #[test]
 fn a_program_that_serves_leaves_no_folder_either() {
-    let (place, folder) = (Place::new(""), kit::Folder::new());
+    let (place, folder) = (BadSolverStudy::new(""), kit::Folder::new());
     folder.serving("study.toml", "");
     for name in ["check", "run"] {
         let mut command = starlings();
@@ -132,7 +134,7 @@ fn a_program_that_serves_leaves_no_folder_either() {
 
 #[test]
 fn a_program_that_stops_while_it_serves_ends_with_an_interrupted_command() {
-    let (place, folder) = (Place::new(""), kit::Folder::new());
+    let (place, folder) = (BadSolverStudy::new(""), kit::Folder::new());
     folder.serving("study.toml", "");
     let mut command = starlings()
         .arg("run")

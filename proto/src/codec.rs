@@ -12,7 +12,7 @@ use tonic_prost::{ProstCodec, ProstDecoder};
 
 /// Encodes `T`, decodes `U`.
 #[derive(Debug)]
-pub struct Codec<T, U>(PhantomData<(T, U)>);
+pub(crate) struct Codec<T, U>(PhantomData<(T, U)>);
 
 impl<T, U> Default for Codec<T, U> {
     fn default() -> Self {
@@ -37,7 +37,7 @@ impl<T: Message + Send + 'static, U: Message + Default + Send + 'static> tonic::
 
 /// Encodes a message into a buffer of its size.
 #[derive(Debug)]
-pub struct Whole<T>(PhantomData<T>);
+pub(crate) struct Whole<T>(PhantomData<T>);
 
 impl<T: Message> Encoder for Whole<T> {
     type Item = T;

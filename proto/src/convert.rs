@@ -1,7 +1,7 @@
-//! Translates between the wire and the project's own types, and checks everything that arrives.
+//! Translates between the generated types and the project's own types, and checks everything that arrives.
 //!
-//! The only module that looks inside [`crate::wire`] and [`crate::solver_wire`]. Every bit of every number survives both ways; a malformed message is a
-//! [`WireError`], never a panic. Next files to read: [`from_worker`], [`to_worker`], [`job`].
+//! The only module that looks inside [`crate::generated`] and [`crate::generated_solver`]. Every bit of every number survives both
+//! ways; a malformed message is a [`ProtocolError`], never a panic. Next files to read: [`from_worker`], [`to_worker`], [`job`].
 
 pub mod floats;
 pub mod from_worker;
@@ -13,12 +13,12 @@ pub mod windows;
 
 use starlings_models::Setup;
 
-pub use from_worker::{Answer, FromWorker, Hello};
+pub use from_worker::{FromWorker, Hello, LeaseOutcome};
 pub use job::JobEncoder;
 pub use to_worker::{ToWorker, Welcome};
 pub use windows::{ReceivedWindows, SentWindows};
 
-use crate::wire;
+use crate::generated;
 
 /// Name of a setup: BLAKE3 of its JSON text.
 pub type SetupId = [u8; 32];
@@ -36,7 +36,7 @@ pub struct Lease {
 
 /// Why a message is not what the protocol says.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum WireError {
+pub enum ProtocolError {
     /// A field that must be there is not.
     #[error("the message has no `{0}`")]
     Missing(&'static str),
@@ -76,7 +76,7 @@ pub enum WireError {
         /// The lease to answer.
         lease: Lease,
         /// What is wrong with the job.
-        source: Box<WireError>,
+        source: Box<ProtocolError>,
     },
     /// A setup that does not survive its own text, or text that is no setup.
     #[error("the setup does not travel: {0}")]
@@ -91,12 +91,12 @@ pub fn digest(bytes: &[u8]) -> [u8; 32] {
 /// The JSON text of a setup and its name.
 ///
 /// # Errors
-/// [`WireError::Setup`] when the text would not give the same setup back, as with an infinite constant.
-pub fn encode_setup(setup: &Setup) -> Result<(SetupId, bytes::Bytes), WireError> {
-    let json = serde_json::to_vec(setup).map_err(|e| WireError::Setup(e.to_string()))?;
-    let back = serde_json::from_slice::<Setup>(&json).map_err(|e| WireError::Setup(e.to_string()))?;
+/// [`ProtocolError::Setup`] when the text would not give the same setup back, as with an infinite constant.
+pub fn encode_setup(setup: &Setup) -> Result<(SetupId, bytes::Bytes), ProtocolError> {
+    let json = serde_json::to_vec(setup).map_err(|e| ProtocolError::Setup(e.to_string()))?;
+    let back = serde_json::from_slice::<Setup>(&json).map_err(|e| ProtocolError::Setup(e.to_string()))?;
     if back != *setup {
-        return Err(WireError::Setup("its JSON text gives another setup back".to_owned()));
+        return Err(ProtocolError::Setup("its JSON text gives another setup back".to_owned()));
     }
     Ok((digest(&json), json.into()))
 }
@@ -104,33 +104,33 @@ pub fn encode_setup(setup: &Setup) -> Result<(SetupId, bytes::Bytes), WireError>
 /// The setup of a JSON text, checked against its name.
 ///
 /// # Errors
-/// [`WireError::Setup`] when the text was damaged or is no setup.
-pub fn decode_setup(id: &SetupId, json: &[u8]) -> Result<Setup, WireError> {
+/// [`ProtocolError::Setup`] when the text was damaged or is no setup.
+pub fn decode_setup(id: &SetupId, json: &[u8]) -> Result<Setup, ProtocolError> {
     if digest(json) != *id {
-        return Err(WireError::Setup("its text does not hash to its name".to_owned()));
+        return Err(ProtocolError::Setup("its text does not hash to its name".to_owned()));
     }
-    serde_json::from_slice(json).map_err(|e| WireError::Setup(e.to_string()))
+    serde_json::from_slice(json).map_err(|e| ProtocolError::Setup(e.to_string()))
 }
 
-pub(crate) fn setup_id(bytes: &[u8]) -> Result<SetupId, WireError> {
-    bytes.try_into().map_err(|_| WireError::Shape {
+pub(crate) fn setup_id(bytes: &[u8]) -> Result<SetupId, ProtocolError> {
+    bytes.try_into().map_err(|_| ProtocolError::Shape {
         field: "setup id",
         message: format!("has {} bytes, expected 32", bytes.len()),
     })
 }
 
-pub(crate) fn required<T>(value: Option<T>, field: &'static str) -> Result<T, WireError> {
-    value.ok_or(WireError::Missing(field))
+pub(crate) fn required<T>(value: Option<T>, field: &'static str) -> Result<T, ProtocolError> {
+    value.ok_or(ProtocolError::Missing(field))
 }
 
-impl From<Lease> for wire::Lease {
+impl From<Lease> for generated::Lease {
     fn from(lease: Lease) -> Self {
         Self { epoch: lease.epoch, job: lease.job, attempt: lease.attempt }
     }
 }
 
-impl From<wire::Lease> for Lease {
-    fn from(lease: wire::Lease) -> Self {
+impl From<generated::Lease> for Lease {
+    fn from(lease: generated::Lease) -> Self {
         Self { epoch: lease.epoch, job: lease.job, attempt: lease.attempt }
     }
 }

@@ -1,20 +1,20 @@
-//! The wire between the coordinator and its workers.
+//! The protocols between coordinator, workers and external solvers.
 //!
 //! `proto/fleet.proto` says what travels between coordinator and worker, `proto/solver.proto` between a worker and a solver
-//! outside, in which unit and shape. [`wire`] and [`solver_wire`] are generated from them and nobody looks inside: [`convert`]
-//! is the only place that checks and translates. No socket and no scheduling here. Next file to read:
-//! [`convert`].
+//! outside, in which unit and shape. [`generated`] and [`generated_solver`] are generated from them; [`convert`] alone looks inside
+//! and checks and translates them. No socket and no scheduling here. Next file to read: [`convert`].
 
+pub mod adapters;
 mod codec;
 pub mod convert;
 pub mod spent;
 pub mod words;
 
 pub use bytes::Bytes;
-pub use codec::Codec;
+pub(crate) use codec::Codec;
 pub use convert::{
-    Answer, FromWorker, Hello, JobEncoder, Lease, ReceivedWindows, SentWindows, SetupId, ToWorker, Welcome,
-    WireError, decode_setup, digest, encode_setup,
+    FromWorker, Hello, JobEncoder, Lease, LeaseOutcome, ProtocolError, ReceivedWindows, SentWindows, SetupId,
+    ToWorker, Welcome, decode_setup, digest, encode_setup,
 };
 
 /// Number of the protocol; coordinator and worker must have the same.
@@ -55,12 +55,12 @@ pub fn own_build() -> Option<[u8; 32]> {
 
 /// Types and service stubs generated from `proto/fleet.proto`.
 #[allow(missing_docs, unreachable_pub, clippy::all, clippy::pedantic, rust_2018_idioms)]
-pub mod wire {
+pub mod generated {
     tonic::include_proto!("starlings.fleet.v1");
 }
 
 /// Types and service stubs generated from `proto/solver.proto`.
 #[allow(missing_docs, unreachable_pub, clippy::all, clippy::pedantic, rust_2018_idioms)]
-pub mod solver_wire {
+pub mod generated_solver {
     tonic::include_proto!("starlings.solver.v1");
 }

@@ -54,9 +54,9 @@ print(json.dumps({"excess": excess}))
 "#;
 
 /// A study with a solver that misbehaves, and a folder for temporary files of its own.
-pub(crate) struct Place(pub(crate) tempfile::TempDir);
+pub(crate) struct BadSolverStudy(pub(crate) tempfile::TempDir);
 
-impl Place {
+impl BadSolverStudy {
     pub(crate) fn new(misbehave: &str) -> Self {
         let place = Self(tempfile::Builder::new().prefix("bad-").tempdir().unwrap());
         std::fs::create_dir(place.temporary()).unwrap();
@@ -145,8 +145,8 @@ if abs(rate - 1) > 1e-6 or abs(start - 10) > 1e-6:
     )
 }
 
-pub(crate) fn blocking_place() -> Place {
-    let place = Place::new("");
+pub(crate) fn blocking_place() -> BadSolverStudy {
+    let place = BadSolverStudy::new("");
     place.write("solver.py", &SOLVER.replace("MISBEHAVE", &blocking(place.0.path())));
     place
 }

@@ -7,9 +7,9 @@ use std::fs;
 use std::process::Command;
 
 use super::judge::{Outcome, clean};
-use super::place::Place;
 use super::plan::{Reached, Verb};
 use super::processes;
+use super::study_folder::StudyFolder;
 
 /// Room of the file systems, KiB: from nearly none to more than a run needs.
 pub(crate) const ROOM: [u32; 12] = [4, 16, 40, 72, 104, 136, 168, 200, 264, 360, 600, 2048];
@@ -36,7 +36,7 @@ pub(crate) fn may_mount() -> bool {
 /// # Errors
 /// When anything else comes of it than the undisturbed result, or an error that says so and a resume to it.
 pub(crate) fn judge(verb: Verb, room: u32) -> Result<Outcome, String> {
-    let place = Place::new(verb, Reached::Command, "");
+    let place = StudyFolder::new(verb, Reached::Command, "");
     fs::create_dir(place.out()).unwrap();
     fs::create_dir(place.path("kept")).unwrap();
     let own = place.command(&[]);
@@ -49,7 +49,7 @@ pub(crate) fn judge(verb: Verb, room: u32) -> Result<Outcome, String> {
     judged.map_err(|fault| format!("{verb:?} on a disk of {room} KiB: {fault}"))
 }
 
-fn disturbed(place: &Place, command: &mut Command, verb: Verb) -> Result<Outcome, String> {
+fn disturbed(place: &StudyFolder, command: &mut Command, verb: Verb) -> Result<Outcome, String> {
     let ended = place.to_the_end(command)?;
     let kept = |name: &str| fs::read_to_string(place.path("kept").join(name)).unwrap_or_default();
     if !processes::of(&place.mark()).is_empty() {

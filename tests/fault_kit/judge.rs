@@ -7,9 +7,9 @@ use std::collections::BTreeMap;
 use std::sync::{Mutex, OnceLock};
 use std::time::{Duration, Instant};
 
-use super::place::{Ended, Place};
 use super::plan::{Case, Must, Reached, Verb};
 use super::processes;
+use super::study_folder::{Ended, StudyFolder};
 
 /// What came of a case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -32,11 +32,11 @@ const AFTERWARDS: Duration = Duration::from_secs(30);
 
 /// The undisturbed study, run once.
 pub(crate) fn clean(verb: Verb, reached: Reached) -> Clean {
-    type Known = BTreeMap<(Verb, Reached), &'static OnceLock<Clean>>;
-    static KNOWN: Mutex<Known> = Mutex::new(BTreeMap::new());
+    type CleanRuns = BTreeMap<(Verb, Reached), &'static OnceLock<Clean>>;
+    static KNOWN: Mutex<CleanRuns> = Mutex::new(BTreeMap::new());
     let known = *KNOWN.lock().unwrap().entry((verb, reached)).or_insert_with(|| Box::leak(Box::default()));
     let make = || {
-        let place = Place::new(verb, reached, "");
+        let place = StudyFolder::new(verb, reached, "");
         let ended = place.go(&[]).unwrap();
         assert_eq!(ended.code, Some(0), "undisturbed: {}", ended.stderr);
         Clean { result: place.result().unwrap(), n_run: place.n_run() }
@@ -55,7 +55,7 @@ fn settings(case: &Case) -> &'static str {
 /// When anything else comes of it than may.
 pub(crate) fn judge(case: &Case) -> Result<Outcome, String> {
     let clean = clean(case.verb, case.reached);
-    let place = Place::new(case.verb, case.reached, settings(case));
+    let place = StudyFolder::new(case.verb, case.reached, settings(case));
     let runs = case.runs(clean.n_run);
     place.break_at(&case.fault, runs);
     let judged = disturbed(case, &place, &clean);
@@ -63,7 +63,7 @@ pub(crate) fn judge(case: &Case) -> Result<Outcome, String> {
     judged.map_err(|fault| format!("{}, at run {} of {}: {fault}", case.name(), runs.0, clean.n_run))
 }
 
-fn disturbed(case: &Case, place: &Place, clean: &Clean) -> Result<Outcome, String> {
+fn disturbed(case: &Case, place: &StudyFolder, clean: &Clean) -> Result<Outcome, String> {
     let first = place.go(&[])?;
     nothing_left(place, &[&first])?;
     let outcome = match first.code {
@@ -108,7 +108,7 @@ fn named(case: &Case, ended: &Ended) -> Result<(), String> {
 }
 
 /// No process, and no scratch folder but those that the error says are kept.
-pub(crate) fn nothing_left(place: &Place, ended: &[&Ended]) -> Result<(), String> {
+pub(crate) fn nothing_left(place: &StudyFolder, ended: &[&Ended]) -> Result<(), String> {
     let said: String = ended.iter().map(|command| command.stderr.as_str()).collect();
     let started = Instant::now();
     loop {
@@ -128,7 +128,7 @@ pub(crate) fn nothing_left(place: &Place, ended: &[&Ended]) -> Result<(), String
 const OF_LAUNCHER: &str = "ompi.";
 
 /// Scratch folders that are there and that nothing of what was `said` names.
-fn scratch(place: &Place, said: &str) -> Vec<String> {
+fn scratch(place: &StudyFolder, said: &str) -> Vec<String> {
     let mut found = Vec::new();
     let is_ours = |entry: &std::fs::DirEntry| !entry.file_name().to_string_lossy().starts_with(OF_LAUNCHER);
     let roots = std::fs::read_dir(place.path("scratch")).unwrap().filter_map(Result::ok).filter(is_ours);
@@ -145,7 +145,7 @@ fn scratch(place: &Place, said: &str) -> Vec<String> {
 }
 
 /// Whether the folder stands in the row of a run that failed.
-fn told_in_store(place: &Place, folder: &str) -> bool {
+fn told_in_store(place: &StudyFolder, folder: &str) -> bool {
     let flags = rusqlite::OpenFlags::SQLITE_OPEN_READ_ONLY;
     let told = rusqlite::Connection::open_with_flags(place.out().join("run.db"), flags).and_then(|db| {
         let sql = "SELECT (SELECT count(*) FROM jobs WHERE instr(error, ?1)) + (SELECT count(*) FROM events WHERE instr(text, ?1))";

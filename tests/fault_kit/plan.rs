@@ -1,6 +1,6 @@
 //! The faults: what happens, how long it lasts, and at which run of the study.
 //!
-//! Next file to read: [`super::place`].
+//! Next file to read: [`super::study_folder`].
 
 /// The command whose study is disturbed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

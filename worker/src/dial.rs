@@ -3,7 +3,7 @@
 
 use std::time::{Duration, Instant};
 
-use starlings_proto::wire::{self, fleet_client::FleetClient};
+use starlings_proto::generated::{self, fleet_client::FleetClient};
 use starlings_proto::words::{causes, status_text};
 use starlings_proto::{FRAME_SIZE, FromWorker, Hello, MAX_MESSAGE, ReceivedWindows, ToWorker, Welcome};
 use tokio::sync::mpsc::{self, UnboundedSender};
@@ -33,16 +33,16 @@ const KEEP_ALIVE_PATIENCE: Duration = Duration::from_secs(30);
 const WINDOWS: (u32, u32) = (4 * 1024 * 1024, 16 * 1024 * 1024);
 
 /// An open stream whose Welcome has arrived.
-pub(crate) struct Stay {
+pub(crate) struct Connection {
     pub(crate) welcome: Welcome,
-    pub(crate) outbox: UnboundedSender<wire::FromWorker>,
-    pub(crate) inbound: Streaming<wire::ToWorker>,
+    pub(crate) outbox: UnboundedSender<generated::FromWorker>,
+    pub(crate) inbound: Streaming<generated::ToWorker>,
     /// The named windows that have arrived.
     pub(crate) windows: ReceivedWindows,
 }
 
 pub(crate) enum Dialled {
-    Connected(Box<Stay>),
+    Connected(Box<Connection>),
     /// The coordinator is there, but its run is over.
     Over(String),
     Cancelled,
@@ -97,7 +97,7 @@ pub(crate) async fn dial(
         let last = tokio::select! {
             () = config.cancel.cancelled() => return Ok(Dialled::Cancelled),
             attached = attempt => match attached {
-                Ok(stay) => return Ok(Dialled::Connected(Box::new(stay))),
+                Ok(connection) => return Ok(Dialled::Connected(Box::new(connection))),
                 Err(Attempt::Refused(reason)) => {
                     return Err(WorkerError::Refused { address: config.connect.clone(), reason });
                 }
@@ -119,7 +119,7 @@ pub(crate) async fn dial(
                 "no coordinator at {address} yet ({last}): dialling for up to {patience} s (`--patience` sets the wait)"
             );
         }
-        // Spread by the process's nonce, so that a thousand workers do not knock at the same moment.
+        // Spread by the process's nonce, so that a thousand workers do not dial at the same moment.
         let spread = 0.5 + (hello.nonce % 1024) as f64 / 2048.0;
         tokio::select! {
             () = config.cancel.cancelled() => return Ok(Dialled::Cancelled),
@@ -129,7 +129,7 @@ pub(crate) async fn dial(
     }
 }
 
-async fn attach(endpoint: &Endpoint, hello: Hello) -> Result<Stay, Attempt> {
+async fn attach(endpoint: &Endpoint, hello: Hello) -> Result<Connection, Attempt> {
     let channel = endpoint.connect().await.map_err(|error| Attempt::Failed(causes(&error)))?;
     let mut client = FleetClient::new(channel)
         .max_decoding_message_size(MAX_MESSAGE)
@@ -144,7 +144,7 @@ async fn attach(endpoint: &Endpoint, hello: Hello) -> Result<Stay, Attempt> {
     let mut windows = ReceivedWindows::default();
     let first = inbound.message().await.map_err(|s| failed(&status_text(&s)))?;
     match first.map(|message| ToWorker::decode(message, &mut windows)) {
-        Some(Ok(ToWorker::Welcome(welcome))) => Ok(Stay { welcome, outbox, inbound, windows }),
+        Some(Ok(ToWorker::Welcome(welcome))) => Ok(Connection { welcome, outbox, inbound, windows }),
         Some(Ok(ToWorker::Refuse(reason))) => Err(Attempt::Refused(reason)),
         Some(Ok(ToWorker::Drain(reason))) => Err(Attempt::Over(reason)),
         Some(Ok(_)) => Err(failed("it did not answer with a Welcome")),

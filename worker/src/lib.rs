@@ -2,7 +2,7 @@
 //!
 //! The network lives on the calling thread; every slot computes on a thread of its own, so a model that never yields delays
 //! no heartbeat. A worker keeps nothing between jobs that a job needs: built setups are a cache. No decision about retries
-//! is taken here. Next files to read: [`config`], then `session` for one stay with a coordinator and `slots` for the threads
+//! is taken here. Next files to read: [`config`], then `session` for one session with a coordinator and `slots` for the threads
 //! that compute.
 
 pub mod config;
@@ -29,7 +29,7 @@ pub struct WorkerReport {
     pub predictions: u64,
     /// Jobs answered with a failure.
     pub failures: u64,
-    /// Stays with a coordinator.
+    /// Sessions with a coordinator.
     pub sessions: u64,
     /// Why it ended, one sentence.
     pub reason: String,
@@ -104,15 +104,15 @@ async fn serve(config: &WorkerConfig, slots: &Slots) -> Result<WorkerReport, Wor
     let hello = config.hello();
     let mut sessions = 0;
     loop {
-        let stay = match dial::dial(config, &endpoint, &hello).await? {
+        let connection = match dial::dial(config, &endpoint, &hello).await? {
             Dialled::Cancelled => return Ok(report(slots, sessions, "cancelled before it was connected")),
             Dialled::Over(reason) => return Ok(report(slots, sessions, &reason)),
-            Dialled::Connected(stay) => stay,
+            Dialled::Connected(connection) => connection,
         };
         sessions += 1;
-        tracing::info!(run = stay.welcome.run, address = config.connect, "joined");
+        tracing::info!(run = connection.welcome.run, address = config.connect, "joined");
         let stayed_since = Instant::now();
-        let ended = session::serve(*stay, slots, &setups, config).await;
+        let ended = session::serve(*connection, slots, &setups, config).await;
         slots.forget_queue();
         tracing::info!(?ended, seconds = stayed_since.elapsed().as_secs_f64(), "left");
         match ended {

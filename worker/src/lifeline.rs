@@ -1,6 +1,6 @@
 //! The lifeline to a supervisor: a standard input that closes when the supervisor ends, however it ends.
 //!
-//! A connection cannot tell this before it stands: a worker whose coordinator died while it was still dialling would dial on.
+//! A worker that still dials has no connection whose end would tell it that its coordinator died; the lifeline does.
 
 use std::io::Read;
 

@@ -1,22 +1,22 @@
-//! One stay with a coordinator: from its Welcome until it drains, vanishes, or the worker is cancelled.
+//! One session with a coordinator: from its Welcome until it drains, vanishes, or the worker is cancelled.
 
 use std::time::Duration;
 
 use starlings_models::ParticleError;
 use starlings_proto::words::status_text;
-use starlings_proto::{Answer, FromWorker, ReceivedWindows, ToWorker, WireError, wire};
+use starlings_proto::{FromWorker, LeaseOutcome, ProtocolError, ReceivedWindows, ToWorker, generated};
 use tokio::sync::mpsc::UnboundedSender;
 use tonic::Streaming;
 
 use crate::WorkerConfig;
-use crate::dial::Stay;
+use crate::dial::Connection;
 use crate::setups::Setups;
 use crate::slots::{Slots, Task, answer};
 
 /// How long a leaving worker waits for the coordinator to close the stream.
 const GOODBYE_PATIENCE: Duration = Duration::from_secs(1);
 
-/// How a stay ended.
+/// How a session ended.
 #[derive(Debug)]
 pub(crate) enum Ended {
     /// The coordinator asked the worker to leave.
@@ -27,33 +27,38 @@ pub(crate) enum Ended {
     Cancelled,
 }
 
-pub(crate) async fn serve(mut stay: Stay, slots: &Slots, setups: &Setups, config: &WorkerConfig) -> Ended {
-    let mut beats = tokio::time::interval(Duration::from_secs_f64(stay.welcome.heartbeat));
+pub(crate) async fn serve(
+    mut connection: Connection,
+    slots: &Slots,
+    setups: &Setups,
+    config: &WorkerConfig,
+) -> Ended {
+    let mut beats = tokio::time::interval(Duration::from_secs_f64(connection.welcome.heartbeat));
     beats.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
     let mut silence = Silence::default();
     loop {
         tokio::select! {
             // Messages first: a flood of jobs must not be mistaken for silence.
             biased;
-            message = stay.inbound.message() => {
+            message = connection.inbound.message() => {
                 silence.broken();
-                match take(message, &stay.outbox, &mut stay.windows, slots, setups) {
+                match take(message, &connection.outbox, &mut connection.windows, slots, setups) {
                     Ok(()) => {}
                     Err(Ended::Drained(reason)) => {
-                        goodbye(&stay.outbox, &mut stay.inbound, &reason).await;
+                        goodbye(&connection.outbox, &mut connection.inbound, &reason).await;
                         return Ended::Drained(reason);
                     }
                     Err(ended) => return ended,
                 }
             }
             () = config.cancel.cancelled() => {
-                goodbye(&stay.outbox, &mut stay.inbound, "it was told to end").await;
+                goodbye(&connection.outbox, &mut connection.inbound, "it was told to end").await;
                 return Ended::Cancelled;
             }
             _ = beats.tick() => {
                 let (running, queued) = slots.load();
-                send(&stay.outbox, FromWorker::Heartbeat { running, queued });
-                // A worker that serves once has nowhere else to go: only the end of its connection ends its stay.
+                send(&connection.outbox, FromWorker::Heartbeat { running, queued });
+                // A worker that serves once does not dial again: only the end of its connection ends its session.
                 if let Some(reason) = silence.after_beat().filter(|_| !config.once) {
                     return Ended::Lost(reason);
                 }
@@ -66,7 +71,7 @@ pub(crate) async fn serve(mut stay: Stay, slots: &Slots, setups: &Setups, config
 const SILENT_BEATS: u32 = 3;
 
 /// Counts heartbeats of this side since the coordinator was last heard. Counting beats instead of reading a clock keeps a
-/// suspended laptop from declaring its coordinator dead.
+/// suspended machine from taking its coordinator for gone.
 #[derive(Default)]
 struct Silence {
     beats: u32,
@@ -85,8 +90,8 @@ impl Silence {
 }
 
 fn take(
-    message: Result<Option<wire::ToWorker>, tonic::Status>,
-    outbox: &UnboundedSender<wire::FromWorker>,
+    message: Result<Option<generated::ToWorker>, tonic::Status>,
+    outbox: &UnboundedSender<generated::FromWorker>,
     windows: &mut ReceivedWindows,
     slots: &Slots,
     setups: &Setups,
@@ -106,10 +111,10 @@ fn take(
                 if setups.miss(setup) {
                     send(outbox, FromWorker::Setup { id: setup, result: Err("it is forgotten".to_owned()) });
                 }
-                answer(outbox, lease, Answer::Withdrawn, 0.0);
+                answer(outbox, lease, LeaseOutcome::Withdrawn, 0.0);
             }
         }
-        Err(WireError::Job { lease, source }) => refuse(outbox, lease, source.to_string()),
+        Err(ProtocolError::Job { lease, source }) => refuse(outbox, lease, source.to_string()),
         Ok(ToWorker::Setup { id, setup }) => {
             let outbox = outbox.clone();
             setups.order(id, setup, Box::new(move |result| send(&outbox, FromWorker::Setup { id, result })));
@@ -122,11 +127,11 @@ fn take(
     Ok(())
 }
 
-fn refuse(outbox: &UnboundedSender<wire::FromWorker>, lease: starlings_proto::Lease, reason: String) {
-    answer(outbox, lease, Answer::Ran(Err(ParticleError::BadJob(reason))), 0.0);
+fn refuse(outbox: &UnboundedSender<generated::FromWorker>, lease: starlings_proto::Lease, reason: String) {
+    answer(outbox, lease, LeaseOutcome::Ran(Err(ParticleError::BadJob(reason))), 0.0);
 }
 
-fn send(outbox: &UnboundedSender<wire::FromWorker>, message: FromWorker) {
+fn send(outbox: &UnboundedSender<generated::FromWorker>, message: FromWorker) {
     if let Ok(message) = message.encode() {
         let _ = outbox.send(message);
     }
@@ -134,8 +139,8 @@ fn send(outbox: &UnboundedSender<wire::FromWorker>, message: FromWorker) {
 
 /// Says goodbye and waits shortly until the coordinator closes the stream, so that the message is not lost.
 async fn goodbye(
-    outbox: &UnboundedSender<wire::FromWorker>,
-    inbound: &mut Streaming<wire::ToWorker>,
+    outbox: &UnboundedSender<generated::FromWorker>,
+    inbound: &mut Streaming<generated::ToWorker>,
     reason: &str,
 ) {
     send(outbox, FromWorker::Goodbye(reason.to_owned()));
@@ -178,7 +183,8 @@ mod tests {
         let mut encoder = JobEncoder::default();
         let lease = |number| Lease { epoch: 1, job: number, attempt: 1 };
         let mut given = |number| encoder.encode(lease(number), &id, &job(), &mut SentWindows::default()).1;
-        let back = |number| FromWorker::Result { lease: lease(number), answer: Answer::Withdrawn, cost: 0.0 };
+        let back =
+            |number| FromWorker::Result { lease: lease(number), answer: LeaseOutcome::Withdrawn, cost: 0.0 };
 
         (1..=3).for_each(|number| take(given(number)));
         assert!(matches!(next(), FromWorker::Setup { id: lost, result: Err(_) } if lost == id));
@@ -187,7 +193,7 @@ mod tests {
         take(ToWorker::setup(&id, json));
         assert_eq!(next(), FromWorker::Setup { id, result: Ok(()) });
         take(given(4));
-        assert!(matches!(next(), FromWorker::Result { answer: Answer::Ran(Ok(_)), .. }));
+        assert!(matches!(next(), FromWorker::Result { answer: LeaseOutcome::Ran(Ok(_)), .. }));
         slots.close();
     }
 }

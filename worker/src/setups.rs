@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use starlings_models::{Factory, Forward, Setup};
 use starlings_proto::words::panic_text;
-use starlings_proto::{SetupId, WireError};
+use starlings_proto::{ProtocolError, SetupId};
 
 /// Setups kept built: a screening sends some dozens, each of a few kilobytes.
 pub(crate) const KEPT: usize = 512;
@@ -47,7 +47,7 @@ struct Built {
 /// A setup to build.
 struct Order {
     id: SetupId,
-    setup: Result<Box<Setup>, WireError>,
+    setup: Result<Box<Setup>, ProtocolError>,
     tell: Tell,
 }
 
@@ -72,7 +72,7 @@ impl Setups {
     }
 
     /// Builds a setup, on another thread, and tells how that went; one that is there already is only told of.
-    pub(crate) fn order(&self, id: SetupId, setup: Result<Box<Setup>, WireError>, tell: Tell) {
+    pub(crate) fn order(&self, id: SetupId, setup: Result<Box<Setup>, ProtocolError>, tell: Tell) {
         let mut shared = self.lock();
         shared.missed.remove(&id);
         shared.waiting.push_back(Order { id, setup, tell });
@@ -86,7 +86,7 @@ impl Setups {
         if let Err(error) = spawned {
             let mut shared = self.lock();
             shared.builders -= 1;
-            // Another builder will come to it; without any, nobody would.
+            // A running builder takes it next; only without one the failure to start a thread matters.
             let stranded =
                 if shared.builders == 0 { std::mem::take(&mut shared.waiting) } else { VecDeque::new() };
             drop(shared);
@@ -112,7 +112,7 @@ impl Setups {
         order
     }
 
-    fn build(&self, id: SetupId, setup: Result<Box<Setup>, WireError>) -> Result<(), String> {
+    fn build(&self, id: SetupId, setup: Result<Box<Setup>, ProtocolError>) -> Result<(), String> {
         let setup = setup.map_err(|error| error.to_string())?;
         let forward = catch_unwind(AssertUnwindSafe(|| (self.factory)(&setup)))
             .map_err(|panic| panic_text(panic.as_ref()))?

@@ -12,7 +12,7 @@ use std::time::Instant;
 use starlings_models::{Forward, Job, ModelFailure, ParticleError};
 use starlings_proto::spent::spent;
 use starlings_proto::words::panic_text;
-use starlings_proto::{Answer, FromWorker, Lease, wire};
+use starlings_proto::{FromWorker, Lease, LeaseOutcome, generated};
 use tokio::sync::mpsc::UnboundedSender;
 
 /// One job with everything needed to run and answer it. The outbox belongs to the stream that gave the lease: once that
@@ -21,7 +21,7 @@ pub(crate) struct Task {
     pub(crate) lease: Lease,
     pub(crate) forward: Arc<dyn Forward>,
     pub(crate) job: Job,
-    pub(crate) outbox: UnboundedSender<wire::FromWorker>,
+    pub(crate) outbox: UnboundedSender<generated::FromWorker>,
 }
 
 /// The slots of this process.
@@ -86,7 +86,7 @@ impl Slots {
         drop(queue);
         let withdrawn: VecDeque<Task> = withdrawn;
         for task in withdrawn {
-            answer(&task.outbox, task.lease, Answer::Withdrawn, 0.0);
+            answer(&task.outbox, task.lease, LeaseOutcome::Withdrawn, 0.0);
         }
     }
 
@@ -143,15 +143,20 @@ impl Shared {
             self.running.fetch_sub(1, Ordering::Relaxed);
             let counter = if result.is_ok() { &self.predictions } else { &self.failures };
             counter.fetch_add(1, Ordering::Relaxed);
-            answer(&outbox, lease, Answer::Ran(result), cost);
+            answer(&outbox, lease, LeaseOutcome::Ran(result), cost);
         }
     }
 }
 
-/// Answers a lease; an answer that does not fit on the wire becomes a failure that says so.
-pub(crate) fn answer(outbox: &UnboundedSender<wire::FromWorker>, lease: Lease, answer: Answer, cost: f64) {
+/// Answers a lease; an answer that does not fit in a message becomes a failure that says so.
+pub(crate) fn answer(
+    outbox: &UnboundedSender<generated::FromWorker>,
+    lease: Lease,
+    answer: LeaseOutcome,
+    cost: f64,
+) {
     let message = FromWorker::Result { lease, answer, cost }.encode().or_else(|error| {
-        let answer = Answer::Ran(Err(ParticleError::BadJob(error.to_string())));
+        let answer = LeaseOutcome::Ran(Err(ParticleError::BadJob(error.to_string())));
         FromWorker::Result { lease, answer, cost }.encode()
     });
     if let Ok(message) = message {

@@ -13,19 +13,19 @@
 //! The jobs of a batch may need different setups: all of them are sent at once, and a job goes only to a worker that has built
 //! its own, while others are still being built. A worker that forgets a setup is sent it again.
 //!
-//! Not here: what a job contains, the wire, other parameters for a failed particle. Next files to read: [`message`] for
-//! events and commands, [`roster`] for workers, [`batch`] for jobs, `hand_out` for what follows from any event.
+//! Not here: what a job contains, the protocol, other parameters for a failed particle. Next files to read: [`message`] for
+//! events and commands, [`roster`] for workers, [`batch`] for jobs, `schedule` for what follows from any event.
 
 mod answers;
 mod aside;
 pub(crate) mod batch;
 mod doubt;
-mod hand_out;
 pub(crate) mod message;
 mod proven;
 mod queue;
 pub(crate) mod roster;
 mod run_times;
+mod schedule;
 #[cfg(test)]
 mod tests;
 mod watch;

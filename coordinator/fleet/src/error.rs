@@ -3,7 +3,7 @@
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
-use starlings_proto::WireError;
+use starlings_proto::ProtocolError;
 
 /// A failure of the fleet as a whole; a failed job is an [`super::Outcome`].
 #[derive(Debug, thiserror::Error)]
@@ -37,9 +37,9 @@ pub enum FleetError {
         /// The workers' words.
         reason: String,
     },
-    /// A job or a setup does not fit the wire; for a state, the text says how large it may be.
+    /// A job or a setup does not fit the protocol; for a state, the text says how large it may be.
     #[error(transparent)]
-    TooLarge(WireError),
+    TooLarge(ProtocolError),
     /// A setup that was never installed.
     #[error("the setup was not installed in this fleet")]
     UnknownSetup,
@@ -64,7 +64,7 @@ pub enum FleetError {
         /// Each worker with its reason.
         reasons: String,
     },
-    /// A program ends abnormally, and no run is known to work that could tell whether the parameters or the place do it.
+    /// A program ends abnormally, and no run is known to work that could tell whether the parameters or the host cause it.
     #[error(
         "the run of particle {particle} over record {record}{} ends abnormally wherever it is made, and no other run of that \
          window works: nobody can tell whether its parameters or the machines are at fault: {reason}\n  mend what it names, then \
@@ -81,7 +81,7 @@ pub enum FleetError {
         /// How it ended last.
         reason: String,
     },
-    /// A job has no answer, and not by the model's doing.
+    /// A job has no answer, for another reason than a failure of the model.
     #[error("the run of particle {particle} over record {record} has no usable answer: {reason}")]
     NoAnswer {
         /// Index of the job among those that were to run.

@@ -111,7 +111,7 @@ pub enum FleetEvent {
         /// How the last one ended.
         reason: String,
     },
-    /// An answer that nobody waits for any more; ignored.
+    /// An answer to a lease that has ended; ignored.
     LateAnswer {
         /// Who sent it.
         worker: String,

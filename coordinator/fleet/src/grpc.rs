@@ -81,7 +81,7 @@ pub struct FleetHandle {
 
 impl FleetHandle {
     /// Says that the local workers are given up: a batch without other workers ends with this reason.
-    pub fn give_up(&self, reason: String) {
+    pub(crate) fn give_up(&self, reason: String) {
         self.hub.give_up(reason);
     }
 
@@ -91,17 +91,17 @@ impl FleetHandle {
     }
 
     /// How many workers may be lost under one job.
-    pub fn max_attempts(&self) -> u32 {
+    pub(crate) fn max_attempts(&self) -> u32 {
         self.hub.max_attempts()
     }
 
     /// Asks the workers with these process numbers to leave.
-    pub fn dismiss(&self, pids: &[u32]) {
+    pub(crate) fn dismiss(&self, pids: &[u32]) {
         self.hub.dismiss(pids);
     }
 
     /// Passes an event on.
-    pub fn tell(&self, event: FleetEvent) {
+    pub(crate) fn tell(&self, event: FleetEvent) {
         self.hub.tell(event);
     }
 }

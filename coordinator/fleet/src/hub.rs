@@ -14,7 +14,7 @@ use std::sync::mpsc::Sender;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use starlings_proto::{Bytes, Hello, PROTOCOL, SetupId, ToWorker, Welcome, wire};
+use starlings_proto::{Bytes, Hello, PROTOCOL, SetupId, ToWorker, Welcome, generated};
 use tokio::sync::{Notify, mpsc::UnboundedSender};
 use tonic::Status;
 
@@ -23,10 +23,10 @@ use super::dispatcher::{BatchError, Event, Joining, Rules, WorkerId};
 use super::job_name::JobName;
 use super::{FleetEvent, Outcome};
 pub(super) use state::{Closed, Submission};
-use state::{Known, Link, State};
+use state::{Link, SetupShape, State};
 
 /// What a link carries to its worker.
-pub(super) type Outgoing = Result<wire::ToWorker, Status>;
+pub(super) type Outgoing = Result<generated::ToWorker, Status>;
 
 /// Answer to the caller of a batch.
 pub(super) type Reply = Result<Vec<Outcome>, BatchError>;
@@ -98,7 +98,7 @@ impl Hub {
     pub(super) fn install(&self, id: SetupId, json: Bytes, parameters: Vec<String>, n_state: Option<usize>) {
         let mut state = self.lock();
         state.setups.insert(id, json);
-        state.known.insert(id, Known { parameters, n_state });
+        state.shapes.insert(id, SetupShape { parameters, n_state });
     }
 
     pub(super) fn knows<'a>(&self, mut setups: impl Iterator<Item = &'a SetupId>) -> bool {

@@ -1,6 +1,6 @@
 //! A fleet without a network: runs the jobs on threads of this process.
 //!
-//! There is one place only: what it cannot make ends the batch. Next file to read: `settle`, for runs that end abnormally.
+//! There is one host only: a run that it cannot make ends the batch. Next file to read: `settle`, for runs that end abnormally.
 
 mod settle;
 

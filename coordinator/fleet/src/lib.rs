@@ -25,7 +25,7 @@ pub use grpc::{FleetConfig, FleetHandle, GrpcFleet};
 pub use in_process::InProcess;
 pub use local_workers::{LocalConfig, LocalWorkers};
 pub use starlings_models::Factory;
-pub use starlings_proto::{SetupId, WireError};
+pub use starlings_proto::{ProtocolError, SetupId};
 pub use travel::travels;
 
 use starlings_models::{Failure, Job, Prediction, Setup};

@@ -4,7 +4,7 @@ use std::net::TcpListener;
 use std::sync::Arc;
 use std::time::Duration;
 
-use starlings_proto::wire::fleet_server::FleetServer;
+use starlings_proto::generated::fleet_server::FleetServer;
 use starlings_proto::words::{causes, panic_words};
 use starlings_proto::{FRAME_SIZE, MAX_MESSAGE};
 use tokio::sync::mpsc::UnboundedReceiver;

@@ -1,9 +1,9 @@
-//! The gRPC side of a worker's stay: reads its stream and turns each message into an event.
+//! The gRPC side of a worker's connection: reads its stream and turns each message into an event.
 
 use std::sync::Arc;
 use std::time::Duration;
 
-use starlings_proto::wire::{self, fleet_server};
+use starlings_proto::generated::{self, fleet_server};
 use starlings_proto::words::status_text;
 use starlings_proto::{FromWorker, ToWorker};
 use tokio::sync::mpsc;
@@ -26,7 +26,7 @@ impl fleet_server::Fleet for Service {
 
     async fn work(
         &self,
-        request: Request<Streaming<wire::FromWorker>>,
+        request: Request<Streaming<generated::FromWorker>>,
     ) -> Result<Response<Self::WorkStream>, Status> {
         let mut inbound = request.into_inner();
         let first = tokio::time::timeout(HELLO_PATIENCE, inbound.message())
@@ -70,7 +70,7 @@ impl Drop for Leaving {
 }
 
 /// Reads until the stream ends; its worker leaves with it.
-async fn read(hub: Arc<Hub>, worker: WorkerId, mut inbound: Streaming<wire::FromWorker>) {
+async fn read(hub: Arc<Hub>, worker: WorkerId, mut inbound: Streaming<generated::FromWorker>) {
     let reason = "its messages are no longer read".to_owned();
     let mut leaving = Leaving { hub: Arc::clone(&hub), worker, reason, clean: false };
     (leaving.reason, leaving.clean) = loop {

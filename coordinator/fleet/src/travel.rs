@@ -1,20 +1,20 @@
-//! Whether a run fits through the wire between coordinator and workers, asked before there are any.
+//! Whether a run fits in the messages between coordinator and workers, asked before there are any.
 //!
 //! Next file to read: the module `convert` of `starlings-proto`, which holds the limits.
 
 use starlings_models::{Job, Prediction};
 use starlings_proto::convert::job::check_size;
-use starlings_proto::{MAX_INLINE_STATE, WireError};
+use starlings_proto::{MAX_INLINE_STATE, ProtocolError};
 
 /// Whether a job and its prediction can travel.
 ///
 /// # Errors
 /// What is too large, as the fleet would say it.
-pub fn travels(job: &Job, prediction: &Prediction) -> Result<(), WireError> {
+pub fn travels(job: &Job, prediction: &Prediction) -> Result<(), ProtocolError> {
     check_size(job)?;
     let bytes = prediction.state.len() * 8;
     if bytes > MAX_INLINE_STATE {
-        return Err(WireError::StateTooLarge { bytes, limit: MAX_INLINE_STATE });
+        return Err(ProtocolError::StateTooLarge { bytes, limit: MAX_INLINE_STATE });
     }
     Ok(())
 }

@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, mpsc};
 use std::time::Duration;
 
 use fleet_kit::{
-    ThreadWorker, Wire, any_port, assert_exact, await_event, await_workers, factory, jobs, listen, square,
+    Proxy, ThreadWorker, any_port, assert_exact, await_event, await_workers, factory, jobs, listen, square,
 };
 use starlings_fleet::{Fleet, FleetConfig, FleetError, FleetEvent, GrpcFleet, InProcess};
 use starlings_models::{Job, ModelDef, Setup, Window};
@@ -106,15 +106,15 @@ fn a_worker_may_start_before_its_coordinator() {
 #[test]
 fn a_worker_whose_wire_is_cut_in_the_middle_loses_nothing_and_comes_back() {
     let (mut fleet, events, _) = listen(any_port());
-    let wire = Arc::new(Wire::to(fleet.address()));
-    let (cut, runs) = (Arc::clone(&wire), Arc::new(AtomicU32::new(0)));
+    let proxy = Arc::new(Proxy::to(fleet.address()));
+    let (cut, runs) = (Arc::clone(&proxy), Arc::new(AtomicU32::new(0)));
     let unsteady = factory(move |job| {
         if runs.fetch_add(1, Ordering::Relaxed) == 7 {
             cut.cut();
         }
         Ok(square(job))
     });
-    let near = ThreadWorker::start(wire.address, unsteady);
+    let near = ThreadWorker::start(proxy.address, unsteady);
     await_workers(&events, 1);
     let setup = fleet.install(&Setup::default()).unwrap();
     let jobs = jobs(200);
@@ -129,7 +129,7 @@ fn a_worker_whose_wire_is_cut_in_the_middle_loses_nothing_and_comes_back() {
 #[test]
 fn a_once_worker_ends_when_its_wire_is_cut_even_while_a_job_computes() {
     let (mut fleet, events, _) = listen(any_port());
-    let wire = Wire::to(fleet.address());
+    let proxy = Proxy::to(fleet.address());
     let (started, starts) = mpsc::channel();
     let started = Mutex::new(started);
     let started = Arc::new(started);
@@ -139,7 +139,7 @@ fn a_once_worker_ends_when_its_wire_is_cut_even_while_a_job_computes() {
             std::thread::park();
         }
     });
-    let once = ThreadWorker::start_with(wire.address, endless, |config| config.once = true);
+    let once = ThreadWorker::start_with(proxy.address, endless, |config| config.once = true);
     await_workers(&events, 1);
     let run = std::thread::spawn(move || {
         let setup = fleet.install(&Setup::default()).unwrap();
@@ -147,13 +147,13 @@ fn a_once_worker_ends_when_its_wire_is_cut_even_while_a_job_computes() {
         (fleet.run(setup, jobs.clone()).unwrap(), jobs, fleet)
     });
     starts.recv().unwrap();
-    wire.cut();
+    proxy.cut();
     let report = once.end().expect("a vanished coordinator is no error to a worker that serves once");
     assert_eq!((report.predictions, report.sessions), (0, 1));
     let address = match await_event(&events, |e| matches!(e, FleetEvent::WorkerLeft { .. })) {
         FleetEvent::WorkerLeft { requeued, .. } => {
             assert_eq!(requeued, 1);
-            wire.address
+            proxy.address
         }
         _ => unreachable!("awaited"),
     };
@@ -252,18 +252,18 @@ fn a_coordinator_that_stands_still_loses_no_worker_that_serves_once() {
     config.heartbeat = Duration::from_millis(500);
     config.patience = Duration::from_secs(10);
     let mut fleet = GrpcFleet::listen(config).unwrap();
-    let wire = Wire::to(fleet.address());
+    let proxy = Proxy::to(fleet.address());
     let local = factory(|job| Ok(square(job)));
-    let worker = ThreadWorker::start_with(wire.address, local, |config| config.once = true);
+    let worker = ThreadWorker::start_with(proxy.address, local, |config| config.once = true);
     await_workers(&events, 1);
     // An answered batch: the worker has had its welcome.
     let setup = fleet.install(&Setup::default()).unwrap();
     let jobs = jobs(20);
     assert_exact(&fleet.run(setup, jobs.clone()).unwrap(), &jobs);
     // Time itself is what is tested here: the worker hears nothing for five heartbeats, three are its patience otherwise.
-    wire.silence(true);
+    proxy.silence(true);
     std::thread::park_timeout(Duration::from_millis(2500));
-    wire.silence(false);
+    proxy.silence(false);
     assert_exact(&fleet.run(setup, jobs.clone()).unwrap(), &jobs);
     fleet.close();
     let report = worker.end().unwrap();

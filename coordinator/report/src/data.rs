@@ -16,267 +16,267 @@ pub struct ReportData {
     /// Name of the study.
     pub study: String,
     /// Name of the forward model.
-    pub model: String,
+    pub(crate) model: String,
     /// What the study says about itself.
-    pub says: Option<String>,
+    pub(crate) says: Option<String>,
     /// The estimator and its settings, on one line.
-    pub estimator: String,
+    pub(crate) estimator: String,
     /// Seed from which every random choice derives.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// Unit of every time that is not said to be in seconds.
-    pub time_unit: String,
+    pub(crate) time_unit: String,
     /// When the run started, as text.
-    pub started: Option<String>,
+    pub(crate) started: Option<String>,
     /// Wall-clock time of the run, s.
-    pub wall_s: f64,
+    pub(crate) wall_s: f64,
     /// The result in one sentence; when absent it is made from the parameters.
-    pub headline: Option<String>,
+    pub(crate) headline: Option<String>,
     /// What a reader must know before any number; shown before everything else.
     pub warnings: Vec<String>,
     /// One row per estimated parameter, in the order of the study.
-    pub parameters: Vec<ParameterRow>,
+    pub(crate) parameters: Vec<ParameterRow>,
     /// The intervals given the residuals come first, because they are much wider than those at the stated noise.
-    pub residuals_first: bool,
+    pub(crate) residuals_first: bool,
     /// Posterior correlation of the parameters, n_param rows of n_param values, in the order of `parameters`.
-    pub correlation: Vec<Vec<f64>>,
+    pub(crate) correlation: Vec<Vec<f64>>,
     /// Families of numbered parameters of one unit, such as E1 to E5, in the order of their numbers.
-    pub families: Vec<Family>,
+    pub(crate) families: Vec<Family>,
     /// What the observer does for the state; `None` without one.
-    pub observer: Option<ObserverRow>,
+    pub(crate) observer: Option<ObserverRow>,
     /// Which constants the estimates hang on.
-    pub hangs_on: Option<starlings_study::constants::HangsOn>,
+    pub(crate) hangs_on: Option<starlings_study::constants::HangsOn>,
     /// One per parameter: how its estimate moved during the run.
-    pub tracks: Vec<Track>,
+    pub(crate) tracks: Vec<Track>,
     /// What the horizontal axis of the tracks is, with its unit.
-    pub x_label: String,
+    pub(crate) x_label: String,
     /// One per record and observed output.
-    pub channels: Vec<ChannelPlot>,
+    pub(crate) channels: Vec<ChannelPlot>,
     /// One per record and observed output, of the residuals.
-    pub autocorrelation: Vec<Autocorrelation>,
+    pub(crate) autocorrelation: Vec<Autocorrelation>,
     /// Normalised innovation squared, one series per pass.
-    pub nis: Vec<NisSeries>,
+    pub(crate) nis: Vec<NisSeries>,
     /// Mean over the last pass of the normalised innovation squared per observed value; 1 is expected.
-    pub nis_per_observation: Option<f64>,
+    pub(crate) nis_per_observation: Option<f64>,
     /// Innovation log-likelihood of the last pass, natural logarithm.
-    pub log_likelihood: Option<f64>,
+    pub(crate) log_likelihood: Option<f64>,
     /// What the fleet did.
-    pub fleet: FleetTable,
+    pub(crate) fleet: FleetTable,
     /// What the intervals are conditional on, in one or more sentences.
-    pub conditional_on: String,
+    pub(crate) conditional_on: String,
     /// The command that makes this run again.
-    pub command: String,
+    pub(crate) command: String,
     /// Version of the program that made the run.
-    pub version: String,
+    pub(crate) version: String,
 }
 
 /// Parameters that differ by a number alone.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct Family {
+pub(crate) struct Family {
     /// What their names begin with.
-    pub stem: String,
+    pub(crate) stem: String,
     /// Number of each and its row of [`ReportData::parameters`].
-    pub members: Vec<(u32, usize)>,
+    pub(crate) members: Vec<(u32, usize)>,
     /// They are stiffnesses of the regions of a vessel.
-    pub stiffness: bool,
+    pub(crate) stiffness: bool,
 }
 
 /// Innovations with the observer and without it, in noise standard deviations.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct ObserverRow {
+pub(crate) struct ObserverRow {
     /// Kind of the observer.
-    pub kind: String,
+    pub(crate) kind: String,
     /// Its gain, in 1/time unit.
-    pub gain: f64,
+    pub(crate) gain: f64,
     /// Root mean square over the training spans with the observer.
-    pub with: f64,
+    pub(crate) with: f64,
     /// The same without it.
-    pub without: f64,
+    pub(crate) without: f64,
     /// Their course, one per record.
-    pub courses: Vec<ObserverPlot>,
+    pub(crate) courses: Vec<ObserverPlot>,
 }
 
 /// Root mean square innovation over the channels at every time of one record; the three vectors have equal length.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct ObserverPlot {
+pub(crate) struct ObserverPlot {
     /// Name of the record.
-    pub record: String,
+    pub(crate) record: String,
     /// Observation times.
-    pub time: Vec<f64>,
+    pub(crate) time: Vec<f64>,
     /// With the observer, in noise standard deviations.
-    pub with: Vec<f64>,
+    pub(crate) with: Vec<f64>,
     /// Without it.
-    pub without: Vec<f64>,
+    pub(crate) without: Vec<f64>,
 }
 
 /// How one parameter's estimate moved.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct Track {
+pub(crate) struct Track {
     /// Name of the parameter.
-    pub name: String,
+    pub(crate) name: String,
     /// Unit; empty for a pure number.
-    pub unit: String,
+    pub(crate) unit: String,
     /// Prior median, drawn as a line.
-    pub prior_median: f64,
+    pub(crate) prior_median: f64,
     /// Draw the value on a logarithmic axis (a parameter estimated through its logarithm).
-    pub log_axis: bool,
+    pub(crate) log_axis: bool,
     /// One per pass, in order; the last is the result.
-    pub passes: Vec<PassTrack>,
+    pub(crate) passes: Vec<PassTrack>,
 }
 
 /// One pass of one parameter; the four vectors have equal length.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct PassTrack {
+pub(crate) struct PassTrack {
     /// Number of the pass, from 1.
-    pub pass: usize,
+    pub(crate) pass: usize,
     /// Times or iterations.
-    pub time: Vec<f64>,
+    pub(crate) time: Vec<f64>,
     /// Estimate.
-    pub estimate: Vec<f64>,
+    pub(crate) estimate: Vec<f64>,
     /// Estimate − 2 sd, in the parameter's own scale.
-    pub lo: Vec<f64>,
+    pub(crate) lo: Vec<f64>,
     /// Estimate + 2 sd, in the parameter's own scale.
-    pub hi: Vec<f64>,
+    pub(crate) hi: Vec<f64>,
 }
 
 /// One observed output of one record, free run with the final estimate; the three vectors have equal length.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct ChannelPlot {
+pub(crate) struct ChannelPlot {
     /// Name of the record.
-    pub record: String,
+    pub(crate) record: String,
     /// Name of the channel.
-    pub channel: String,
+    pub(crate) channel: String,
     /// Unit of the channel; empty for a pure number.
-    pub unit: String,
+    pub(crate) unit: String,
     /// Times of observation.
-    pub time: Vec<f64>,
+    pub(crate) time: Vec<f64>,
     /// Measured values; `None` where the recording has none.
-    pub observed: Vec<Option<f64>>,
+    pub(crate) observed: Vec<Option<f64>>,
     /// Prediction with the final estimate.
-    pub predicted: Vec<f64>,
+    pub(crate) predicted: Vec<f64>,
     /// Standard deviation of the measurement noise, in the channel's unit.
-    pub noise: f64,
+    pub(crate) noise: f64,
     /// First and last time of the training span; `None` when no time of this record was fitted.
-    pub train: Option<[f64; 2]>,
+    pub(crate) train: Option<[f64; 2]>,
     /// The channel was never fitted.
-    pub held_out_channel: bool,
+    pub(crate) held_out_channel: bool,
     /// Root mean square residual on the training span.
-    pub train_rmse: Option<f64>,
+    pub(crate) train_rmse: Option<f64>,
     /// Root mean square residual on everything that was held out.
-    pub held_out_rmse: Option<f64>,
+    pub(crate) held_out_rmse: Option<f64>,
 }
 
 /// Sample autocorrelation of the residuals of one channel; the two vectors have equal length.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct Autocorrelation {
+pub(crate) struct Autocorrelation {
     /// Name of the record.
-    pub record: String,
+    pub(crate) record: String,
     /// Name of the channel.
-    pub channel: String,
+    pub(crate) channel: String,
     /// Lags, in the study's time unit.
-    pub lag_time: Vec<f64>,
+    pub(crate) lag_time: Vec<f64>,
     /// Autocorrelation at each lag, in [−1, 1].
-    pub value: Vec<f64>,
+    pub(crate) value: Vec<f64>,
     /// Half-width of the 95 % band of white noise, 1.96/√n.
-    pub band: f64,
+    pub(crate) band: f64,
 }
 
 /// Normalised innovation squared over one pass; the vectors have equal length.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct NisSeries {
+pub(crate) struct NisSeries {
     /// Number of the pass, from 1.
-    pub pass: usize,
+    pub(crate) pass: usize,
     /// Times or iterations.
-    pub time: Vec<f64>,
+    pub(crate) time: Vec<f64>,
     /// Normalised innovation squared divided by the number of values used; 1 is expected.
-    pub nis_per_observation: Vec<f64>,
+    pub(crate) nis_per_observation: Vec<f64>,
     /// Lower end of the 95 % band of chi-square per observation, for the values used in each analysis.
-    pub lo: Vec<f64>,
+    pub(crate) lo: Vec<f64>,
     /// Upper end of that band.
-    pub hi: Vec<f64>,
+    pub(crate) hi: Vec<f64>,
     /// Observed values used in each analysis.
-    pub n_used: Vec<usize>,
+    pub(crate) n_used: Vec<usize>,
 }
 
 /// What the fleet did during the run.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct FleetTable {
+pub(crate) struct FleetTable {
     /// One row per worker, in order of joining.
-    pub workers: Vec<WorkerRow>,
+    pub(crate) workers: Vec<WorkerRow>,
     /// Model runs that were asked for.
-    pub runs_total: u64,
+    pub(crate) runs_total: u64,
     /// Runs that failed for good.
-    pub failed: u64,
+    pub(crate) failed: u64,
     /// Attempts beyond the first of a run.
-    pub retried: u64,
+    pub(crate) retried: u64,
     /// Sigma points that were pulled towards the mean and run again.
-    pub rescued: u64,
+    pub(crate) rescued: u64,
     /// Duration of one run; `None` when nothing was timed.
-    pub time_per_run: Option<RunTimes>,
+    pub(crate) time_per_run: Option<RunTimes>,
     /// Joins, losses and failures, in order of time.
-    pub events: Vec<FleetEvent>,
+    pub(crate) events: Vec<FleetEvent>,
 }
 
 /// One worker of the run.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct WorkerRow {
+pub(crate) struct WorkerRow {
     /// Name under which the worker joined.
-    pub name: String,
+    pub(crate) name: String,
     /// Host it ran on.
-    pub host: String,
+    pub(crate) host: String,
     /// Jobs it answered.
-    pub jobs: u64,
+    pub(crate) jobs: u64,
     /// Runs that failed on it for good.
-    pub failed: u64,
+    pub(crate) failed: u64,
     /// Mean duration of one job, s.
-    pub mean_s: f64,
+    pub(crate) mean_s: f64,
     /// Share of the run's wall time that its slots computed, 0 to 1; `None` when wall time or slots are not known.
-    pub busy_share: Option<f64>,
+    pub(crate) busy_share: Option<f64>,
 }
 
 /// Duration of one model run, s.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct RunTimes {
+pub(crate) struct RunTimes {
     /// Shortest.
-    pub min: f64,
+    pub(crate) min: f64,
     /// Median.
-    pub median: f64,
+    pub(crate) median: f64,
     /// 95th percentile.
-    pub p95: f64,
+    pub(crate) p95: f64,
     /// Longest.
-    pub max: f64,
+    pub(crate) max: f64,
     /// Histogram, bins in ascending order.
-    pub bins: Vec<RunTimeBin>,
+    pub(crate) bins: Vec<RunTimeBin>,
 }
 
 /// One bin of the histogram of run times.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct RunTimeBin {
+pub(crate) struct RunTimeBin {
     /// Lower edge, s.
-    pub from: f64,
+    pub(crate) from: f64,
     /// Upper edge, s.
-    pub to: f64,
+    pub(crate) to: f64,
     /// Runs in the bin.
-    pub count: u64,
+    pub(crate) count: u64,
 }
 
 /// Something that happened on the fleet.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct FleetEvent {
+pub(crate) struct FleetEvent {
     /// Time since the start of the run, s.
-    pub time_s: f64,
+    pub(crate) time_s: f64,
     /// What happened.
-    pub text: String,
+    pub(crate) text: String,
 }

@@ -1,12 +1,13 @@
 //! The page of an explanation: what the model lacks, where that shows, and the gap before and after.
 //!
 //! Made from the explanation and the data of its figures alone; nothing is fitted or judged here. The verdict and the warnings come
-//! before any number. Next files to read: [`effect`], [`gap`], [`places`], [`candidates`], and the template `explain/explain.html`.
+//! before any number. Next files to read: [`figures`], [`effect`], [`gap`], [`disagreement`], [`candidates`], and the template `explain/explain.html`.
 
 mod candidates;
+mod disagreement;
 mod effect;
+mod figures;
 mod gap;
-mod places;
 #[cfg(test)]
 mod sample;
 #[cfg(test)]
@@ -16,25 +17,26 @@ use serde::{Deserialize, Serialize};
 use starlings_explain::result::{Experiment, Explanation};
 use starlings_explain::{Figures, Verdict};
 
+use super::plot::figure::Slots;
 use super::{ReportError, layout, number};
 use candidates::Candidates;
+use disagreement::Disagreement;
 use effect::EffectView;
 use gap::Gap;
-use places::Places;
 
 /// What the page says of the study besides the explanation. Empty texts are left out.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct StudyAbout {
+pub(crate) struct StudyAbout {
     /// What the study is about.
-    pub says: String,
+    pub(crate) says: String,
     /// The command that makes this explanation again.
-    pub command: String,
+    pub(crate) command: String,
     /// When it was started.
-    pub started: String,
+    pub(crate) started: String,
     /// Version of the program.
-    pub version: String,
+    pub(crate) version: String,
     /// Names of the model's states: a term added to one of them is written as a rate of change.
-    pub states: Vec<String>,
+    pub(crate) states: Vec<String>,
 }
 
 /// Makes the page of an explanation: one HTML document that refers to nothing outside itself.
@@ -42,7 +44,7 @@ pub struct StudyAbout {
 /// # Errors
 ///
 /// [`ReportError`] when a figure or the page cannot be made; data that are missing are shown as missing.
-pub fn explain_page(
+pub(crate) fn explain_page(
     explanation: &Explanation,
     figures: &Figures,
     about: &StudyAbout,
@@ -58,14 +60,16 @@ struct Page<'a> {
     verdict: &'static str,
     verdict_words: &'static str,
     facts: Vec<(&'static str, String)>,
+    figures: Slots,
     gap: Gap,
+    curves_left_out: usize,
     failing: Vec<String>,
     effect_title: &'static str,
     effects: Vec<EffectView>,
     ties: Vec<String>,
     separation: String,
     experiments: Vec<[String; 2]>,
-    places: Places,
+    disagreement: Disagreement,
     candidates: Candidates,
     shifts: Vec<gap::ShiftRow>,
     remaining: Vec<(&'static str, String)>,
@@ -73,7 +77,7 @@ struct Page<'a> {
 }
 
 impl<'a> Page<'a> {
-    fn new(found: &'a Explanation, figures: &'a Figures, about: &'a StudyAbout) -> Result<Self, ReportError> {
+    fn new(found: &'a Explanation, data: &'a Figures, about: &'a StudyAbout) -> Result<Self, ReportError> {
         let (verdict, verdict_words) = match found.verdict {
             Verdict::Named => ("named", "Named"),
             Verdict::Tie => ("tie", "Tie"),
@@ -89,7 +93,9 @@ impl<'a> Page<'a> {
             verdict,
             verdict_words,
             facts: facts(found, about),
-            gap: Gap::new(found, figures)?,
+            figures: figures::draw(found, data)?,
+            gap: Gap::new(found, data)?,
+            curves_left_out: figures::course::left_out(data),
             failing: failing(found),
             effect_title: match found.verdict {
                 _ if nearest => "What came nearest",
@@ -100,8 +106,8 @@ impl<'a> Page<'a> {
             ties: found.tied_with.iter().map(|set| set.join(" + ")).collect(),
             separation: experiment.map_or_else(String::new, Experiment::sentence),
             experiments: experiment.map_or(Vec::new(), effect::experiments),
-            places: Places::new(found, figures)?,
-            candidates: Candidates::new(found, figures)?,
+            disagreement: Disagreement::new(found, data)?,
+            candidates: Candidates::new(found, data)?,
             shifts: found.parameter_shifts.iter().map(gap::ShiftRow::new).collect::<Result<_, _>>()?,
             remaining: remaining(found),
             stages: found.runs_by_stage.iter().map(|(stage, n)| (stage.clone(), n.to_string())).collect(),

@@ -11,7 +11,7 @@ use starlings_study::identify::result::{ParameterInfo, SubsetInfo};
 
 use super::data::ParameterRow;
 use super::hangs_on::{self, HangsOnView};
-use super::plot::figure::Figure;
+use super::plot::figure::Slots;
 use super::plot::interval;
 use super::{ReportError, correlation, layout, number};
 
@@ -26,9 +26,7 @@ struct Page<'a> {
     parameters: Vec<ParameterView>,
     directions: Vec<[String; 3]>,
     correlation: Vec<Vec<correlation::Cell>>,
-    sensitivity: Vec<Figure>,
-    gsf: Vec<Figure>,
-    collinearity: Option<Figure>,
+    figures: Slots,
     subsets: Vec<[String; 2]>,
     subsets_left_out: usize,
     hangs_on: Option<HangsOnView>,
@@ -64,9 +62,7 @@ impl<'a> Page<'a> {
             parameters: found.parameters.iter().map(parameter).collect::<Result<_, _>>()?,
             directions: directions(found),
             correlation: found.correlation.iter().enumerate().map(|(k, row)| cells(k, row)).collect(),
-            sensitivity: figures::sensitivity(found)?,
-            gsf: figures::generalised(found)?,
-            collinearity: figures::collinearity(found)?,
+            figures: figures::draw(found)?,
             subsets: subsets.iter().take(SUBSETS).map(subset).collect(),
             subsets_left_out: subsets.len().saturating_sub(SUBSETS),
             hangs_on: hangs_on::view(Some(&found.hangs_on)),

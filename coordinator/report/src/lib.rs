@@ -15,7 +15,6 @@ mod identify;
 mod layout;
 pub mod locus;
 mod number;
-mod outputs;
 mod overview;
 mod page;
 mod plot;
@@ -26,7 +25,6 @@ mod sample;
 mod tests;
 
 pub use data::ReportData;
-pub use explain::{StudyAbout, explain_page};
 pub use explained::{state_names, write_explanation};
 pub use files::{FilesError, write_files, write_page};
 pub use identify::identify_page;
@@ -59,6 +57,11 @@ pub fn render(data: &ReportData) -> Result<String, ReportError> {
 }
 
 impl ReportData {
+    /// What the horizontal axis of a course over the run says.
+    fn x_label(&self) -> &str {
+        if self.x_label.is_empty() { "step" } else { &self.x_label }
+    }
+
     /// Whether the values of a parameter belong on a logarithmic axis.
     fn log_axis(&self, parameter: &str) -> bool {
         self.tracks.iter().any(|track| track.name == parameter && track.log_axis)

@@ -6,9 +6,9 @@ use plotters::style::WHITE;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::data::{ChannelPlot, ParameterRow, ReportData};
+use super::page::figures::fit;
 use super::plot::figure::with_unit;
-use super::plot::fit;
-use super::plot::interval::{self, Place};
+use super::plot::interval::{self, BarArea};
 use super::plot::palette::{BLUE, INK, MUTED, VERMILION};
 use super::plot::scene::{Surface, picture, stroke, units, whole, write, write_title};
 use super::{ReportError, headline, number};
@@ -85,8 +85,8 @@ fn intervals(surface: &Surface<'_>, data: &ReportData) -> Result<(), ReportError
         let value = interval_text(row);
         write(surface, (units(8), top), &name_beside(row, &value), INK, MIDDLE_LEFT)?;
         write(surface, (right, top), &value, INK, MIDDLE_RIGHT)?;
-        let place = Place { left: units(8), right, middle: top + units(24) };
-        interval::draw(surface, row, data.log_axis(&row.name), place)?;
+        let area = BarArea { left: units(8), right, middle: top + units(24) };
+        interval::draw(surface, row, data.log_axis(&row.name), area)?;
     }
     let note = "blue: after the data, grey: before";
     let note = match data.parameters.len() - rows.len() {

@@ -1,15 +1,18 @@
 //! What the page's template needs: texts already formatted and figures already drawn.
 //!
 //! The template (`report.html`) only arranges; every number is formatted here or in a figure. Next file to read:
-//! `plot.rs`.
+//! [`figures`].
+
+pub(crate) mod figures;
+mod outputs;
 
 use serde::Serialize;
 
 use super::data::{ObserverRow, ParameterRow, ReportData};
 use super::hangs_on::{self, HangsOnView};
-use super::plot::figure::Figure;
-use super::plot::{along, interval, nis, observer as observer_plot, run_times, track};
-use super::{ReportError, correlation, headline, number, outputs};
+use super::plot::figure::Slots;
+use super::plot::interval;
+use super::{ReportError, correlation, headline, number};
 
 /// At most this many events of the fleet are listed.
 const EVENTS: usize = 60;
@@ -27,12 +30,9 @@ pub(crate) struct Page<'a> {
     intervals: [&'static str; 2],
     facts: Vec<(&'static str, String)>,
     parameters: Vec<ParameterView>,
-    families: Vec<Figure>,
-    fits: Vec<Figure>,
-    residuals: Vec<Figure>,
-    tracks: Vec<Figure>,
-    nis: Option<Figure>,
-    observer: Option<ObserverView>,
+    figures: Slots,
+    /// What the observer does, in a sentence.
+    observer: Option<String>,
     hangs_on: Option<HangsOnView>,
     nis_mean: String,
     log_likelihood: String,
@@ -52,18 +52,10 @@ struct ParameterView {
     strip: String,
 }
 
-/// What the observer does, in a sentence and in figures.
-#[derive(Debug, Serialize)]
-struct ObserverView {
-    says: String,
-    figures: Vec<Figure>,
-}
-
 #[derive(Debug, Serialize)]
 struct FleetView {
     counts: Vec<(&'static str, String)>,
     workers: Vec<Vec<String>>,
-    run_times: Option<Figure>,
     events: Vec<(String, String)>,
     events_left_out: usize,
 }
@@ -80,19 +72,14 @@ impl<'a> Page<'a> {
                 number::with_sd(v, if v.abs() < 100.0 { 0.1 } else { 1.0 })
             })
         };
-        let x_label = if data.x_label.is_empty() { "step" } else { &data.x_label };
         Ok(Self {
             data,
             headline: headline::of(data),
             intervals: if data.residuals_first { [GIVEN, STATED] } else { [STATED, GIVEN] },
             facts: facts(data),
             parameters: data.parameters.iter().map(|row| parameter(row, data)).collect::<Result<_, _>>()?,
-            families: data.families.iter().map(|f| along::figure(f, data)).collect::<Result<_, _>>()?,
-            fits: outputs::fits(data)?,
-            residuals: outputs::residuals(data)?,
-            tracks: data.tracks.iter().map(|t| track::figure(t, x_label)).collect::<Result<_, _>>()?,
-            nis: nis::figure(&data.nis, x_label)?,
-            observer: data.observer.as_ref().map(|row| observer(row, data)).transpose()?,
+            figures: figures::draw(data)?,
+            observer: data.observer.as_ref().map(|row| observer(row, data)),
             hangs_on: hangs_on::view(data.hangs_on.as_ref()),
             nis_mean: optional(data.nis_per_observation),
             log_likelihood: optional(data.log_likelihood),
@@ -102,7 +89,7 @@ impl<'a> Page<'a> {
                 .enumerate()
                 .map(|(k, row)| correlation::row(k, row))
                 .collect(),
-            fleet: fleet(data)?,
+            fleet: fleet(data),
         })
     }
 }
@@ -117,20 +104,17 @@ fn facts(data: &ReportData) -> Vec<(&'static str, String)> {
     facts
 }
 
-fn observer(row: &ObserverRow, data: &ReportData) -> Result<ObserverView, ReportError> {
+fn observer(row: &ObserverRow, data: &ReportData) -> String {
     let digits = |value: f64| number::significant(value, 3);
     let per = if data.time_unit.is_empty() { String::new() } else { format!("\u{a0}1/{}", data.time_unit) };
-    let says = format!(
+    format!(
         "With the observer {} at a gain of {}{per} the model, at the estimate, misses the next observation by {} noise sd; a \
          run without it misses the same data by {}.",
         row.kind,
         digits(row.gain),
         digits(row.with),
         digits(row.without)
-    );
-    let shown = row.courses.iter().filter(|c| !c.time.is_empty());
-    let figures = shown.map(|c| observer_plot::figure(c, row, &data.time_unit)).collect::<Result<_, _>>()?;
-    Ok(ObserverView { says, figures })
+    )
 }
 
 fn parameter(row: &ParameterRow, data: &ReportData) -> Result<ParameterView, ReportError> {
@@ -154,7 +138,7 @@ fn parameter(row: &ParameterRow, data: &ReportData) -> Result<ParameterView, Rep
     })
 }
 
-fn fleet(data: &ReportData) -> Result<FleetView, ReportError> {
+fn fleet(data: &ReportData) -> FleetView {
     let fleet = &data.fleet;
     let mut counts = vec![
         ("model runs", fleet.runs_total.to_string()),
@@ -177,11 +161,10 @@ fn fleet(data: &ReportData) -> Result<FleetView, ReportError> {
         ]
     };
     let listed = fleet.events.iter().take(EVENTS);
-    Ok(FleetView {
+    FleetView {
         counts,
         workers: fleet.workers.iter().map(worker).collect(),
-        run_times: fleet.time_per_run.as_ref().map_or(Ok(None), run_times::figure)?,
         events: listed.map(|e| (number::duration(e.time_s), e.text.clone())).collect(),
         events_left_out: fleet.events.len().saturating_sub(EVENTS),
-    })
+    }
 }

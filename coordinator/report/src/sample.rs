@@ -1,4 +1,4 @@
-//! Data of a run that never was, for the tests of the report: a decaying, beating pressure and three parameters.
+//! Invented data of a run, for the tests of the report: a decaying, beating pressure and three parameters.
 
 use super::data::{
     Autocorrelation, ChannelPlot, FleetEvent, FleetTable, NisSeries, ParameterRow, PassTrack, ReportData,

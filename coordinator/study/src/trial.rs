@@ -6,7 +6,7 @@ pub mod dry_run;
 
 use std::sync::Arc;
 
-use starlings_fleet::{WireError, travels};
+use starlings_fleet::{ProtocolError, travels};
 use starlings_models::external::table::foreign_bytes;
 use starlings_models::{Forward, Job, ModelFailure, ParticleError, Prediction, SOLVER, SetupError, Window};
 use starlings_proto::spent::spent;
@@ -80,7 +80,7 @@ pub enum TrialError {
         /// Record name.
         record: String,
         /// What is too large.
-        source: WireError,
+        source: ProtocolError,
     },
     /// Model and data are so far apart that the square of their difference is no number.
     #[error(
@@ -148,7 +148,7 @@ pub fn trial(study: &Study) -> Result<Vec<TrialChannel>, TrialError> {
 /// Why a run of a trial is none.
 enum Fault {
     Run(ParticleError),
-    Travel(WireError),
+    Travel(ProtocolError),
 }
 
 /// One run, here as on a worker, that could also have been sent there.

@@ -2,7 +2,7 @@
 
 use bytes::Bytes;
 
-use super::WireError;
+use super::ProtocolError;
 
 /// Little-endian bytes of the values.
 pub fn encode(values: &[f64]) -> Bytes {
@@ -16,11 +16,11 @@ pub fn encode(values: &[f64]) -> Bytes {
 /// The values of little-endian bytes.
 ///
 /// # Errors
-/// [`WireError::Ragged`] when the bytes are no multiple of eight.
-pub fn decode(bytes: &[u8], field: &'static str) -> Result<Vec<f64>, WireError> {
+/// [`ProtocolError::Ragged`] when the bytes are no multiple of eight.
+pub fn decode(bytes: &[u8], field: &'static str) -> Result<Vec<f64>, ProtocolError> {
     let (words, rest) = bytes.as_chunks::<8>();
     if !rest.is_empty() {
-        return Err(WireError::Ragged { field, bytes: bytes.len() });
+        return Err(ProtocolError::Ragged { field, bytes: bytes.len() });
     }
     Ok(words.iter().map(|word| f64::from_le_bytes(*word)).collect())
 }

@@ -3,9 +3,9 @@
 use bytes::Bytes;
 use starlings_models::{ModelFailure, ParticleError, Prediction, Timeout};
 
-use super::{Lease, SetupId, WireError, floats, job::check_state, required, setup_id};
+use super::{Lease, ProtocolError, SetupId, floats, job::check_state, required, setup_id};
 use crate::MAX_SLOTS;
-use crate::wire::{self, failure, from_worker::Kind, result::Outcome};
+use crate::generated::{self, failure, from_worker::Kind, result::Outcome};
 
 /// Who a worker is. First message of every stream.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -30,7 +30,7 @@ pub struct Hello {
 
 /// How one lease ended on a worker.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Answer {
+pub enum LeaseOutcome {
     /// A prediction, or why there is none.
     Ran(Result<Prediction, ParticleError>),
     /// The job was withdrawn before it started.
@@ -54,7 +54,7 @@ pub enum FromWorker {
         /// The lease answered.
         lease: Lease,
         /// How it ended.
-        answer: Answer,
+        answer: LeaseOutcome,
         /// Wall time of the run, seconds, not negative.
         cost: f64,
     },
@@ -73,28 +73,28 @@ impl FromWorker {
     /// The message to send.
     ///
     /// # Errors
-    /// [`WireError::StateTooLarge`] for a prediction whose state does not fit in a message.
-    pub fn encode(self) -> Result<wire::FromWorker, WireError> {
+    /// [`ProtocolError::StateTooLarge`] for a prediction whose state does not fit in a message.
+    pub fn encode(self) -> Result<generated::FromWorker, ProtocolError> {
         let kind = match self {
             Self::Hello(hello) => Kind::Hello(encode_hello(hello)),
             Self::Setup { id, result } => {
-                Kind::Setup(wire::SetupResult { id: Bytes::copy_from_slice(&id), failure: result.err() })
+                Kind::Setup(generated::SetupResult { id: Bytes::copy_from_slice(&id), failure: result.err() })
             }
             Self::Result { lease, answer, cost } => {
                 let outcome = Some(encode_answer(answer)?);
-                Kind::Result(wire::Result { lease: Some(lease.into()), outcome, cost_s: cost })
+                Kind::Result(generated::Result { lease: Some(lease.into()), outcome, cost_s: cost })
             }
-            Self::Heartbeat { running, queued } => Kind::Heartbeat(wire::Heartbeat { running, queued }),
-            Self::Goodbye(reason) => Kind::Goodbye(wire::Goodbye { reason }),
+            Self::Heartbeat { running, queued } => Kind::Heartbeat(generated::Heartbeat { running, queued }),
+            Self::Goodbye(reason) => Kind::Goodbye(generated::Goodbye { reason }),
         };
-        Ok(wire::FromWorker { kind: Some(kind) })
+        Ok(generated::FromWorker { kind: Some(kind) })
     }
 
     /// Checks a message that arrived.
     ///
     /// # Errors
     /// What is missing or does not fit.
-    pub fn decode(message: wire::FromWorker) -> Result<Self, WireError> {
+    pub fn decode(message: generated::FromWorker) -> Result<Self, ProtocolError> {
         Ok(match required(message.kind, "kind")? {
             Kind::Hello(hello) => Self::Hello(decode_hello(hello)?),
             Kind::Setup(s) => Self::Setup { id: setup_id(&s.id)?, result: s.failure.map_or(Ok(()), Err) },
@@ -105,49 +105,51 @@ impl FromWorker {
     }
 }
 
-fn encode_hello(hello: Hello) -> wire::Hello {
+fn encode_hello(hello: Hello) -> generated::Hello {
     let Hello { protocol, version, cores, slots, host, pid, nonce, build } = hello;
     let build = build.map_or_else(Bytes::new, |hash| Bytes::copy_from_slice(&hash));
-    wire::Hello { protocol, version, cores, slots, host, pid, nonce, build }
+    generated::Hello { protocol, version, cores, slots, host, pid, nonce, build }
 }
 
-fn decode_hello(hello: wire::Hello) -> Result<Hello, WireError> {
-    let wire::Hello { protocol, version, cores, slots, host, pid, nonce, build } = hello;
+fn decode_hello(hello: generated::Hello) -> Result<Hello, ProtocolError> {
+    let generated::Hello { protocol, version, cores, slots, host, pid, nonce, build } = hello;
     if slots == 0 || slots as usize > MAX_SLOTS {
         let message = format!("{slots}, expected 1 to {MAX_SLOTS}");
-        return Err(WireError::Shape { field: "slots", message });
+        return Err(ProtocolError::Shape { field: "slots", message });
     }
     let build = if build.is_empty() { None } else { Some(setup_id(&build)?) };
     Ok(Hello { protocol, version, cores, slots, host, pid, nonce, build })
 }
 
-fn encode_answer(answer: Answer) -> Result<Outcome, WireError> {
+fn encode_answer(answer: LeaseOutcome) -> Result<Outcome, ProtocolError> {
     Ok(match answer {
-        Answer::Ran(Ok(prediction)) => {
+        LeaseOutcome::Ran(Ok(prediction)) => {
             check_state(&prediction.state)?;
-            Outcome::Prediction(wire::Prediction {
+            Outcome::Prediction(generated::Prediction {
                 outputs: floats::encode(&prediction.outputs),
                 state: floats::encode(&prediction.state),
             })
         }
-        Answer::Ran(Err(error)) => Outcome::Failure(wire::Failure { kind: Some(encode_failure(error)) }),
-        Answer::Withdrawn => Outcome::Withdrawn(wire::Withdrawn {}),
+        LeaseOutcome::Ran(Err(error)) => {
+            Outcome::Failure(generated::Failure { kind: Some(encode_failure(error)) })
+        }
+        LeaseOutcome::Withdrawn => Outcome::Withdrawn(generated::Withdrawn {}),
     })
 }
 
-fn decode_result(result: wire::Result) -> Result<FromWorker, WireError> {
+fn decode_result(result: generated::Result) -> Result<FromWorker, ProtocolError> {
     let lease = required(result.lease, "lease")?.into();
     let cost = if result.cost_s > 0.0 && result.cost_s.is_finite() { result.cost_s } else { 0.0 };
     let answer = match required(result.outcome, "outcome")? {
         Outcome::Prediction(p) => {
             let state = floats::decode(&p.state, "state")?;
             check_state(&state)?;
-            Answer::Ran(Ok(Prediction { outputs: floats::decode(&p.outputs, "outputs")?, state, cost }))
+            LeaseOutcome::Ran(Ok(Prediction { outputs: floats::decode(&p.outputs, "outputs")?, state, cost }))
         }
         Outcome::Failure(failure) => {
-            Answer::Ran(Err(decode_failure(required(failure.kind, "failure kind")?)?))
+            LeaseOutcome::Ran(Err(decode_failure(required(failure.kind, "failure kind")?)?))
         }
-        Outcome::Withdrawn(_) => Answer::Withdrawn,
+        Outcome::Withdrawn(_) => LeaseOutcome::Withdrawn,
     };
     Ok(FromWorker::Result { lease, answer, cost })
 }
@@ -158,7 +160,7 @@ fn encode_failure(error: ParticleError) -> failure::Kind {
         ParticleError::BadJob(text) => failure::Kind::BadJob(text),
         ParticleError::Infrastructure(text) => failure::Kind::Infrastructure(text),
         ParticleError::Timeout(Timeout { limit, says }) => {
-            failure::Kind::Timeout(wire::Timeout { limit_s: Some(limit), says })
+            failure::Kind::Timeout(generated::Timeout { limit_s: Some(limit), says })
         }
         ParticleError::Undecided(text) => failure::Kind::Undecided(text),
     }
@@ -167,20 +169,20 @@ fn encode_failure(error: ParticleError) -> failure::Kind {
 fn encode_model_failure(failed: ModelFailure) -> failure::Kind {
     match failed {
         ModelFailure::NotFinite { what, time } => {
-            failure::Kind::NotFinite(wire::NotFinite { what, time: Some(time) })
+            failure::Kind::NotFinite(generated::NotFinite { what, time: Some(time) })
         }
         ModelFailure::StepTooSmall { time, step } => {
-            failure::Kind::StepTooSmall(wire::StepTooSmall { time: Some(time), step: Some(step) })
+            failure::Kind::StepTooSmall(generated::StepTooSmall { time: Some(time), step: Some(step) })
         }
         ModelFailure::TooManySteps { time, limit } => {
-            failure::Kind::TooManySteps(wire::TooManySteps { time: Some(time), limit })
+            failure::Kind::TooManySteps(generated::TooManySteps { time: Some(time), limit })
         }
         ModelFailure::OutsideDomain(text) => failure::Kind::OutsideDomain(text),
         ModelFailure::Solver(text) => failure::Kind::Solver(text),
     }
 }
 
-fn decode_failure(kind: failure::Kind) -> Result<ParticleError, WireError> {
+fn decode_failure(kind: failure::Kind) -> Result<ParticleError, ProtocolError> {
     let failed = match kind {
         failure::Kind::BadJob(text) => return Ok(ParticleError::BadJob(text)),
         failure::Kind::Infrastructure(text) => return Ok(ParticleError::Infrastructure(text)),

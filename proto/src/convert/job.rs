@@ -7,8 +7,8 @@ use starlings_models::{Job, Window};
 
 use super::window;
 use super::windows::{self, ReceivedWindows, SentWindows, WindowId};
-use super::{Lease, SetupId, WireError, floats, required};
-use crate::{MAX_INLINE_STATE, MAX_MESSAGE, wire};
+use super::{Lease, ProtocolError, SetupId, floats, required};
+use crate::{MAX_INLINE_STATE, MAX_MESSAGE, generated};
 
 /// Room left in a message for everything that is no array.
 const MESSAGE_MARGIN: usize = 64 * 1024;
@@ -25,7 +25,7 @@ pub struct JobEncoder {
 struct Encoded {
     /// Keeps its place in memory.
     _window: Arc<Window>,
-    wire: wire::Window,
+    message: generated::Window,
     /// Where it is too large to travel inside every job.
     name: Option<WindowId>,
 }
@@ -47,16 +47,16 @@ impl JobEncoder {
         setup: &SetupId,
         job: &Job,
         sent: &mut SentWindows,
-    ) -> (Option<wire::ToWorker>, wire::ToWorker) {
+    ) -> (Option<generated::ToWorker>, generated::ToWorker) {
         let window = self.window(&job.window);
         let (ahead, over) = match &window.name {
             Some(id) => {
                 let name = bytes::Bytes::copy_from_slice(id);
-                (windows::ahead(id, &window.wire, sent), wire::job::Over::WindowId(name))
+                (windows::ahead(id, &window.message, sent), generated::job::Over::WindowId(name))
             }
-            None => (None, wire::job::Over::Window(window.wire.clone())),
+            None => (None, generated::job::Over::Window(window.message.clone())),
         };
-        let message = wire::Job {
+        let message = generated::Job {
             lease: Some(lease.into()),
             setup: bytes::Bytes::copy_from_slice(setup),
             particle: job.particle,
@@ -65,13 +65,13 @@ impl JobEncoder {
             theta: floats::encode(&job.theta),
             state: job.state.as_deref().map(floats::encode),
         };
-        (ahead, wire::ToWorker { kind: Some(wire::to_worker::Kind::Job(message)) })
+        (ahead, generated::ToWorker { kind: Some(generated::to_worker::Kind::Job(message)) })
     }
 
     fn window(&mut self, window: &Arc<Window>) -> &Encoded {
         self.windows.entry(Arc::as_ptr(window) as usize).or_insert_with(|| {
-            let wire = window::encode(window);
-            Encoded { _window: Arc::clone(window), name: windows::name(&wire), wire }
+            let message = window::encode(window);
+            Encoded { _window: Arc::clone(window), name: windows::name(&message), message }
         })
     }
 }
@@ -79,9 +79,9 @@ impl JobEncoder {
 /// Whether a job can travel in one message and will be taken at the other end.
 ///
 /// # Errors
-/// [`WireError::StateTooLarge`], or [`WireError::Shape`] when the window has no times, its arrays do not fit together, or window
+/// [`ProtocolError::StateTooLarge`], or [`ProtocolError::Shape`] when the window has no times, its arrays do not fit together, or window
 /// and parameters exceed a message.
-pub fn check_size(job: &Job) -> Result<(), WireError> {
+pub fn check_size(job: &Job) -> Result<(), ProtocolError> {
     check_state(job.state.as_deref().unwrap_or_default())?;
     let window = &job.window;
     window::check(window)?;
@@ -92,28 +92,30 @@ pub fn check_size(job: &Job) -> Result<(), WireError> {
         let message = format!(
             "{bytes} bytes, at most {limit} fit in a message: use fewer observation times per window"
         );
-        return Err(WireError::Shape { field: "window", message });
+        return Err(ProtocolError::Shape { field: "window", message });
     }
     Ok(())
 }
 
-pub(super) fn check_state(state: &[f64]) -> Result<(), WireError> {
+pub(super) fn check_state(state: &[f64]) -> Result<(), ProtocolError> {
     let bytes = state.len() * 8;
     if bytes > MAX_INLINE_STATE {
-        return Err(WireError::StateTooLarge { bytes, limit: MAX_INLINE_STATE });
+        return Err(ProtocolError::StateTooLarge { bytes, limit: MAX_INLINE_STATE });
     }
     Ok(())
 }
 
-pub(super) fn decode_job(job: &wire::Job, received: &ReceivedWindows) -> Result<Job, WireError> {
+pub(super) fn decode_job(job: &generated::Job, received: &ReceivedWindows) -> Result<Job, ProtocolError> {
     let state = job.state.as_ref().map(|bytes| floats::decode(bytes, "state")).transpose()?;
     check_state(state.as_deref().unwrap_or_default())?;
     Ok(Job {
         particle: job.particle,
         record: job.record,
         window: match required(job.over.as_ref(), "window")? {
-            wire::job::Over::Window(window) => Arc::new(window::decode(window)?),
-            wire::job::Over::WindowId(id) => Arc::clone(named(id, received).ok_or(WireError::UnknownWindow)?),
+            generated::job::Over::Window(window) => Arc::new(window::decode(window)?),
+            generated::job::Over::WindowId(id) => {
+                Arc::clone(named(id, received).ok_or(ProtocolError::UnknownWindow)?)
+            }
         },
         theta: floats::decode(&job.theta, "theta")?,
         state,

@@ -6,8 +6,10 @@ pub mod description;
 
 use starlings_models::{Addition, ModelFailure, ObserverDef, ParticleError, Run, Signal, Solved, Window};
 
-use super::{WireError, floats, required};
-use crate::solver_wire::{self as wire, failure::Kind as FailureKind, run_reply::Kind as ReplyKind};
+use super::{ProtocolError, floats, required};
+use crate::generated_solver::{
+    self as generated, failure::Kind as FailureKind, run_reply::Kind as ReplyKind,
+};
 
 /// Number of the protocol between worker and solver; both must have the same.
 pub const SOLVER_PROTOCOL: u32 = 2;
@@ -47,14 +49,17 @@ pub enum Reply {
 }
 
 /// The message that asks for a run; `scratch` is the program's own folder.
-pub fn encode_run(run: &Run<'_>, scratch: &str) -> wire::RunRequest {
+pub fn encode_run(run: &Run<'_>, scratch: &str) -> generated::RunRequest {
     let named = |values: &[(String, f64)]| {
-        values.iter().map(|(name, value)| wire::Named { name: name.clone(), value: Some(*value) }).collect()
+        values
+            .iter()
+            .map(|(name, value)| generated::Named { name: name.clone(), value: Some(*value) })
+            .collect()
     };
-    let term = |add: &Addition| wire::Term { state: add.to.clone(), expression: add.term.clone() };
+    let term = |add: &Addition| generated::Term { state: add.to.clone(), expression: add.term.clone() };
     let signal =
-        |s: &Signal| wire::Signal { times: floats::encode(&s.times), values: floats::encode(&s.values) };
-    wire::RunRequest {
+        |s: &Signal| generated::Signal { times: floats::encode(&s.times), values: floats::encode(&s.values) };
+    generated::RunRequest {
         particle: run.particle,
         record: run.record,
         parameters: floats::encode(run.parameters),
@@ -64,7 +69,7 @@ pub fn encode_run(run: &Run<'_>, scratch: &str) -> wire::RunRequest {
         times: floats::encode(&run.window.times),
         outputs: run.outputs.to_vec(),
         observed: floats::encode(&run.window.observed),
-        observer: Some(wire::Observer { kind: run.observer.kind.clone(), gain: run.observer.gain }),
+        observer: Some(generated::Observer { kind: run.observer.kind.clone(), gain: run.observer.gain }),
         inputs: run.window.inputs.iter().map(signal).collect(),
         terms: run.terms.iter().map(term).collect(),
         constants: named(run.constants),
@@ -76,16 +81,16 @@ pub fn encode_run(run: &Run<'_>, scratch: &str) -> wire::RunRequest {
 ///
 /// # Errors
 /// When a field is missing or ragged.
-pub fn decode_run(message: &wire::RunRequest) -> Result<Request, WireError> {
-    let named = |values: &[wire::Named]| {
-        let one = |n: &wire::Named| Ok((n.name.clone(), required(n.value, "value")?));
-        values.iter().map(one).collect::<Result<Vec<_>, WireError>>()
+pub fn decode_run(message: &generated::RunRequest) -> Result<Request, ProtocolError> {
+    let named = |values: &[generated::Named]| {
+        let one = |n: &generated::Named| Ok((n.name.clone(), required(n.value, "value")?));
+        values.iter().map(one).collect::<Result<Vec<_>, ProtocolError>>()
     };
-    let signal = |s: &wire::Signal| {
+    let signal = |s: &generated::Signal| {
         let times = floats::decode(&s.times, "input times")?;
         Ok(Signal { times, values: floats::decode(&s.values, "input values")? })
     };
-    let term = |t: &wire::Term| Addition { to: t.state.clone(), term: t.expression.clone() };
+    let term = |t: &generated::Term| Addition { to: t.state.clone(), term: t.expression.clone() };
     let observer = message.observer.clone().unwrap_or_default();
     Ok(Request {
         particle: message.particle,
@@ -97,7 +102,7 @@ pub fn decode_run(message: &wire::RunRequest) -> Result<Request, WireError> {
             start: required(message.start, "start")?,
             times: floats::decode(&message.times, "times")?,
             observed: floats::decode(&message.observed, "observed")?,
-            inputs: message.inputs.iter().map(signal).collect::<Result<_, WireError>>()?,
+            inputs: message.inputs.iter().map(signal).collect::<Result<_, ProtocolError>>()?,
         },
         observer: ObserverDef { kind: observer.kind, gain: observer.gain, ..ObserverDef::default() },
         state: message.state.as_ref().map(|bytes| floats::decode(bytes, "state")).transpose()?,
@@ -107,13 +112,13 @@ pub fn decode_run(message: &wire::RunRequest) -> Result<Request, WireError> {
 }
 
 /// The message of a reply.
-pub fn encode_reply(reply: &Reply) -> wire::RunReply {
+pub fn encode_reply(reply: &Reply) -> generated::RunReply {
     let failure = |kind: FailureKind, text: String, time| {
-        ReplyKind::Failure(wire::Failure { kind: kind.into(), text, time })
+        ReplyKind::Failure(generated::Failure { kind: kind.into(), text, time })
     };
     let kind = match reply {
-        Reply::Progress(time) => ReplyKind::Progress(wire::Progress { time: Some(*time) }),
-        Reply::Ended(Ok(solved)) => ReplyKind::Finished(wire::Finished {
+        Reply::Progress(time) => ReplyKind::Progress(generated::Progress { time: Some(*time) }),
+        Reply::Ended(Ok(solved)) => ReplyKind::Finished(generated::Finished {
             outputs: floats::encode(&solved.outputs),
             state: floats::encode(&solved.state),
         }),
@@ -137,14 +142,14 @@ pub fn encode_reply(reply: &Reply) -> wire::RunReply {
             failure(FailureKind::Solver, timeout.to_string(), None)
         }
     };
-    wire::RunReply { kind: Some(kind) }
+    generated::RunReply { kind: Some(kind) }
 }
 
 /// A reply of a solver.
 ///
 /// # Errors
 /// When it is empty or ragged.
-pub fn decode_reply(message: wire::RunReply) -> Result<Reply, WireError> {
+pub fn decode_reply(message: generated::RunReply) -> Result<Reply, ProtocolError> {
     Ok(match required(message.kind, "kind")? {
         ReplyKind::Progress(progress) => Reply::Progress(required(progress.time, "time")?),
         ReplyKind::Finished(finished) => Reply::Ended(Ok(Solved {

@@ -3,8 +3,8 @@
 use bytes::Bytes;
 use starlings_models::{Job, Setup};
 
-use super::{Lease, ReceivedWindows, SetupId, WireError, decode_setup, job, required, setup_id, windows};
-use crate::wire::{self, to_worker::Kind};
+use super::{Lease, ProtocolError, ReceivedWindows, SetupId, decode_setup, job, required, setup_id, windows};
+use crate::generated::{self, to_worker::Kind};
 
 /// The coordinator takes the worker.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,7 +31,7 @@ pub enum ToWorker {
         /// Its name.
         id: SetupId,
         /// The setup, or what is wrong with it.
-        setup: Result<Box<Setup>, WireError>,
+        setup: Result<Box<Setup>, ProtocolError>,
     },
     /// A window that jobs will name: it is kept.
     Window,
@@ -54,41 +54,44 @@ pub enum ToWorker {
 
 impl ToWorker {
     /// The message for [`ToWorker::Welcome`].
-    pub fn welcome(welcome: Welcome) -> wire::ToWorker {
+    pub fn welcome(welcome: Welcome) -> generated::ToWorker {
         let Welcome { protocol, run, heartbeat, epoch } = welcome;
-        message(Kind::Welcome(wire::Welcome { protocol, run, heartbeat, epoch }))
+        message(Kind::Welcome(generated::Welcome { protocol, run, heartbeat, epoch }))
     }
 
     /// The message for [`ToWorker::Refuse`].
-    pub fn refuse(reason: &str) -> wire::ToWorker {
-        message(Kind::Refuse(wire::Refuse { reason: reason.to_owned() }))
+    pub fn refuse(reason: &str) -> generated::ToWorker {
+        message(Kind::Refuse(generated::Refuse { reason: reason.to_owned() }))
     }
 
     /// The message for [`ToWorker::Setup`], from the text made by [`super::encode_setup`].
-    pub fn setup(id: &SetupId, json: Bytes) -> wire::ToWorker {
-        message(Kind::Setup(wire::SetupMsg { id: Bytes::copy_from_slice(id), json }))
+    pub fn setup(id: &SetupId, json: Bytes) -> generated::ToWorker {
+        message(Kind::Setup(generated::SetupMsg { id: Bytes::copy_from_slice(id), json }))
     }
 
     /// The message for [`ToWorker::Cancel`].
-    pub fn cancel(leases: &[Lease]) -> wire::ToWorker {
-        message(Kind::Cancel(wire::Cancel { leases: leases.iter().copied().map(Into::into).collect() }))
+    pub fn cancel(leases: &[Lease]) -> generated::ToWorker {
+        message(Kind::Cancel(generated::Cancel { leases: leases.iter().copied().map(Into::into).collect() }))
     }
 
     /// The message for [`ToWorker::Heartbeat`].
-    pub fn heartbeat() -> wire::ToWorker {
-        message(Kind::Heartbeat(wire::Heartbeat { running: 0, queued: 0 }))
+    pub fn heartbeat() -> generated::ToWorker {
+        message(Kind::Heartbeat(generated::Heartbeat { running: 0, queued: 0 }))
     }
 
     /// The message for [`ToWorker::Drain`].
-    pub fn drain(reason: &str) -> wire::ToWorker {
-        message(Kind::Drain(wire::Drain { reason: reason.to_owned() }))
+    pub fn drain(reason: &str) -> generated::ToWorker {
+        message(Kind::Drain(generated::Drain { reason: reason.to_owned() }))
     }
 
     /// Checks a message that arrived on a stream of which these windows were `received` before.
     ///
     /// # Errors
-    /// What is missing or does not fit; [`WireError::Job`] where the lease is good and can be answered.
-    pub fn decode(message: wire::ToWorker, received: &mut ReceivedWindows) -> Result<Self, WireError> {
+    /// What is missing or does not fit; [`ProtocolError::Job`] where the lease is good and can be answered.
+    pub fn decode(
+        message: generated::ToWorker,
+        received: &mut ReceivedWindows,
+    ) -> Result<Self, ProtocolError> {
         Ok(match required(message.kind, "kind")? {
             Kind::Welcome(w) => Self::Welcome(decode_welcome(w)?),
             Kind::Refuse(r) => Self::Refuse(r.reason),
@@ -108,14 +111,14 @@ impl ToWorker {
     }
 }
 
-fn message(kind: Kind) -> wire::ToWorker {
-    wire::ToWorker { kind: Some(kind) }
+fn message(kind: Kind) -> generated::ToWorker {
+    generated::ToWorker { kind: Some(kind) }
 }
 
-fn decode_welcome(welcome: wire::Welcome) -> Result<Welcome, WireError> {
-    let wire::Welcome { protocol, run, heartbeat, epoch } = welcome;
+fn decode_welcome(welcome: generated::Welcome) -> Result<Welcome, ProtocolError> {
+    let generated::Welcome { protocol, run, heartbeat, epoch } = welcome;
     if !(heartbeat > 0.0 && heartbeat < 1e6) {
-        return Err(WireError::Shape {
+        return Err(ProtocolError::Shape {
             field: "heartbeat",
             message: format!("{heartbeat} s, expected a positive time"),
         });
@@ -123,14 +126,14 @@ fn decode_welcome(welcome: wire::Welcome) -> Result<Welcome, WireError> {
     Ok(Welcome { protocol, run, heartbeat, epoch })
 }
 
-fn decode_job(wire_job: &wire::Job, received: &ReceivedWindows) -> Result<ToWorker, WireError> {
+fn decode_job(wire_job: &generated::Job, received: &ReceivedWindows) -> Result<ToWorker, ProtocolError> {
     let lease: Lease = required(wire_job.lease, "lease")?.into();
     let decoded =
         setup_id(&wire_job.setup).and_then(|setup| Ok((setup, job::decode_job(wire_job, received)?)));
     match decoded {
         Ok((setup, job)) => Ok(ToWorker::Job { lease, setup, job }),
         // The stream is broken, not the job.
-        Err(WireError::UnknownWindow) => Err(WireError::UnknownWindow),
-        Err(source) => Err(WireError::Job { lease, source: Box::new(source) }),
+        Err(ProtocolError::UnknownWindow) => Err(ProtocolError::UnknownWindow),
+        Err(source) => Err(ProtocolError::Job { lease, source: Box::new(source) }),
     }
 }

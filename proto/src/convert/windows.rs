@@ -10,11 +10,11 @@ use std::sync::Arc;
 use prost::Message;
 use starlings_models::Window;
 
-use super::{WireError, window};
-use crate::wire;
+use super::{ProtocolError, window};
+use crate::generated;
 
 /// Name of a window: BLAKE3 of its arrays with their lengths.
-pub type WindowId = [u8; 32];
+pub(crate) type WindowId = [u8; 32];
 
 /// Largest window that travels inside its jobs, encoded bytes.
 const INLINE: usize = 16 * 1024;
@@ -44,7 +44,7 @@ impl<T> Default for Windows<T> {
 
 impl<T> Windows<T> {
     /// What is held under a name.
-    pub fn get(&self, id: &WindowId) -> Option<&T> {
+    pub(crate) fn get(&self, id: &WindowId) -> Option<&T> {
         self.held.get(id).map(|(_, window)| window)
     }
 
@@ -65,33 +65,41 @@ impl<T> Windows<T> {
 }
 
 /// The name of a window, where it is large enough to travel under one.
-pub(super) fn name(window: &wire::Window) -> Option<WindowId> {
+pub(super) fn name(window: &generated::Window) -> Option<WindowId> {
     (window.encoded_len() > INLINE).then(|| digest(window))
 }
 
 /// The message that sends a window ahead of its jobs; nothing where the stream has it.
-pub(super) fn ahead(id: &WindowId, window: &wire::Window, sent: &mut SentWindows) -> Option<wire::ToWorker> {
+pub(super) fn ahead(
+    id: &WindowId,
+    window: &generated::Window,
+    sent: &mut SentWindows,
+) -> Option<generated::ToWorker> {
     if sent.get(id).is_some() {
         return None;
     }
     sent.keep(*id, window.encoded_len(), ());
-    let message = wire::WindowMsg { id: bytes::Bytes::copy_from_slice(id), window: Some(window.clone()) };
-    Some(wire::ToWorker { kind: Some(wire::to_worker::Kind::Window(message)) })
+    let message =
+        generated::WindowMsg { id: bytes::Bytes::copy_from_slice(id), window: Some(window.clone()) };
+    Some(generated::ToWorker { kind: Some(generated::to_worker::Kind::Window(message)) })
 }
 
 /// Checks a window that arrived ahead of its jobs, and keeps it.
-pub(super) fn receive(message: &wire::WindowMsg, received: &mut ReceivedWindows) -> Result<(), WireError> {
+pub(super) fn receive(
+    message: &generated::WindowMsg,
+    received: &mut ReceivedWindows,
+) -> Result<(), ProtocolError> {
     let found = super::required(message.window.as_ref(), "window")?;
     let id = digest(found);
     if *message.id != id {
         let message = "does not hash to its name".to_owned();
-        return Err(WireError::Shape { field: "window", message });
+        return Err(ProtocolError::Shape { field: "window", message });
     }
     received.keep(id, found.encoded_len(), Arc::new(window::decode(found)?));
     Ok(())
 }
 
-fn digest(window: &wire::Window) -> WindowId {
+fn digest(window: &generated::Window) -> WindowId {
     let mut hasher = blake3::Hasher::new();
     let mut add = |part: &[u8]| {
         // Lengths keep neighbouring arrays apart.

@@ -1,4 +1,4 @@
-//! The ways to reach a solver, one file each.
+//! The ways to reach a solver, one file each; what studies may say of them stands in `proto/src/adapters.rs`.
 //!
 //! An adapter turns a run into whatever its solver understands and the answer back; it decides nothing about retries. Next
 //! files to read: [`grpc`], then the others.
@@ -6,6 +6,7 @@
 use std::sync::Arc;
 
 use starlings_models::{Description, ParticleError, Run, Solved, SolverDef, nearest};
+use starlings_proto::adapters::ADAPTERS;
 
 use super::SolverError;
 use super::site::Site;
@@ -38,40 +39,39 @@ pub(crate) trait Adapter: Send + Sync {
 }
 
 /// Makes the adapter of a definition; nothing is started yet.
-pub(crate) type Open = fn(&SolverDef, &Arc<Site>) -> Result<Box<dyn Adapter>, SolverError>;
+type Open = fn(&SolverDef, &Arc<Site>) -> Result<Box<dyn Adapter>, SolverError>;
 
-/// One way to reach a solver.
-pub(crate) struct Kind {
-    /// The name in a study.
-    pub(crate) name: &'static str,
-    /// One plain sentence.
-    pub(crate) says: &'static str,
-    /// Whether the solver itself says what it is; else the study does.
-    pub(crate) asks: bool,
-    /// How it is opened.
-    pub(crate) open: Open,
-}
-
-/// Every way.
-pub(crate) const KINDS: [Kind; 5] = [grpc::KIND, command::KIND, fmu::KIND, um_bridge::KIND, mpi::KIND];
-
-/// Whether the solver behind an adapter of this name says itself what it is.
-pub(crate) fn asks(name: &str) -> bool {
-    KINDS.iter().any(|kind| kind.name == name && kind.asks)
-}
+/// What opens each of [`ADAPTERS`], in their order.
+const OPEN: [(&str, Open); ADAPTERS.len()] = [
+    ("grpc", grpc::open),
+    ("command", command::open),
+    ("fmu", fmu::open),
+    ("um-bridge", um_bridge::open),
+    ("mpi", mpi::open),
+];
 
 /// The adapter that a study names.
 ///
 /// # Errors
 /// When there is none of that name, or the study lacks what it needs.
 pub(crate) fn open(def: &SolverDef, site: &Arc<Site>) -> Result<Box<dyn Adapter>, SolverError> {
-    let Some(kind) = KINDS.iter().find(|kind| kind.name == def.adapter) else {
-        let names = KINDS.iter().map(|kind| kind.name);
+    let Some((_, open)) = OPEN.iter().find(|(name, _)| *name == def.adapter) else {
+        let names = ADAPTERS.iter().map(|adapter| adapter.name);
         return Err(SolverError::Adapter {
             name: def.adapter.clone(),
             nearest: nearest(&def.adapter, names.clone()),
             known: names.collect::<Vec<_>>().join(", "),
         });
     };
-    (kind.open)(def, site)
+    open(def, site)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_adapter_that_a_study_may_name_can_be_opened() {
+        assert_eq!(OPEN.map(|(name, _)| name), ADAPTERS.map(|adapter| adapter.name));
+    }
 }

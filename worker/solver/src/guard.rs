@@ -1,4 +1,4 @@
-//! A process that outlives its worker by a moment, to end the solvers that the worker leaves behind.
+//! A process that ends the solvers which a dead worker leaves behind.
 //!
 //! The worker holds the writing end of the guard's standard input. A line `+N` puts a process group under guard, `-N` takes it
 //! out; `+/folder` and `-/folder` do so with a folder that the worker made, and `=/folder/inner` says that a folder in it stays.
@@ -93,7 +93,7 @@ struct Guarded {
 }
 
 impl Guarded {
-    /// Takes one line to heart; one that makes no sense is passed over.
+    /// Obeys one line; one that makes no sense is passed over.
     fn hear(&mut self, line: &str) {
         let Some((sign, what)) = line.split_at_checked(1) else { return };
         if what.starts_with('/') {

@@ -14,15 +14,15 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use starlings_models::{Description, ModelFailure, ParticleError, Run, Solved, SolverDef};
-use starlings_proto::WireError;
+use starlings_proto::ProtocolError;
 use starlings_proto::convert::solver::{Reply, decode_reply, encode_run};
-use starlings_proto::solver_wire::solver_client::SolverClient;
+use starlings_proto::generated_solver::solver_client::SolverClient;
 use starlings_proto::words::status_text;
 use tokio::runtime::Runtime;
 use tonic::transport::Channel;
 
-pub use connect::{ADDRESS, SOCKET};
-use connect::{Place, connect};
+pub use connect::SOCKET;
+use connect::{SolverAddress, connect};
 
 use super::SolverError;
 use super::error::tail_text;
@@ -99,12 +99,13 @@ impl Instance {
             |error: std::io::Error| SolverError::Start { program: name.clone(), reason: error.to_string() };
         let scratch = site.scratch("solver").map_err(failed)?;
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
-        let place = Place::of(def, command, &scratch).map_err(failed)?;
+        let address = SolverAddress::of(def, command, &scratch).map_err(failed)?;
         let mut process = None;
         if !command.is_empty() {
-            let environment = def.environment.clone().into_iter().chain(place.environment.clone()).collect();
+            let environment =
+                def.environment.clone().into_iter().chain(address.environment.clone()).collect();
             let launch = Launch {
-                command: &place.command,
+                command: &address.command,
                 base: &def.folder,
                 folder: None,
                 environment,
@@ -120,7 +121,7 @@ impl Instance {
             process.remember_output();
         }
         let patience = Duration::try_from_secs_f64(def.start_timeout).unwrap_or(Duration::MAX);
-        let (client, described) = connect(&runtime, &place.target, &name, process.as_mut(), patience)?;
+        let (client, described) = connect(&runtime, &address.target, &name, process.as_mut(), patience)?;
         Ok(Self { name, process, _lifeline: lifeline, scratch, client, runtime, described })
     }
 
@@ -254,7 +255,7 @@ impl Instance {
         Lost { how, what: what + &self.homeless(), tail }
     }
 
-    /// That its folder is gone, as the end of a sentence: whatever it says of its end, that is why.
+    /// That its folder is gone, as the end of a sentence; this is the cause of its end, whatever it says itself.
     fn homeless(&self) -> String {
         let gone = self.is_homeless().then(|| self.scratch.path().display());
         gone.map(|folder| format!("; its folder {folder} was removed meanwhile")).unwrap_or_default()
@@ -289,9 +290,9 @@ enum Broken {
 }
 
 /// What is wrong with a message, without the name of the field where that says nothing.
-fn plain(error: WireError) -> String {
+fn plain(error: ProtocolError) -> String {
     match error {
-        WireError::Shape { field: "description", message } => message,
+        ProtocolError::Shape { field: "description", message } => message,
         other => other.to_string(),
     }
 }

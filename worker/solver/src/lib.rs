@@ -3,12 +3,13 @@
 //! [`Solvers`] makes of a setup something that runs jobs, whether the model is built in or runs outside. A solver is started
 //! when first needed, one program per slot, supervised, and ended with the worker. No retries on other machines are decided
 //! here. Next files to read: [`mod@adapter`] for the ways to reach a solver, [`mod@instance`] for one program, [`mod@site`] for
-//! where programs run, [`mod@serve`] for the other end of the wire.
+//! where programs run, [`mod@serve`] for the other end of the connection.
 
 mod adapter;
 mod backoff;
 mod clear;
 pub mod conformance;
+mod core_slots;
 mod error;
 mod guard;
 pub mod instance;
@@ -16,7 +17,6 @@ mod losses;
 mod machine;
 mod process;
 mod scratch;
-mod seats;
 pub mod serve;
 mod site;
 mod stopped;
@@ -29,6 +29,7 @@ use starlings_models::{
     BuildSetup, Description, External, Factory, Forward, ParticleError, Run, SOLVER, Setup, SetupError,
     Solve, Solved, SolverDef, SolverFault,
 };
+use starlings_proto::adapters::{self, ADAPTERS};
 
 use adapter::Adapter;
 pub use error::SolverError;
@@ -38,12 +39,13 @@ pub use site::SiteOptions;
 
 /// The ways to reach a solver, by name, with a sentence about each.
 pub fn adapters() -> impl Iterator<Item = (&'static str, &'static str)> {
-    adapter::KINDS.iter().map(|kind| (kind.name, kind.says))
+    ADAPTERS.iter().map(|adapter| (adapter.name, adapter.says))
 }
 
 /// What is wrong with the files and the command of a program that is started for every run; nothing is started.
 pub fn faults(def: &SolverDef) -> Vec<SolverFault> {
-    if def.adapter == adapter::command::KIND.name { adapter::command::faults(def) } else { Vec::new() }
+    let per_run = adapters::adapter(&def.adapter).is_some_and(|adapter| adapter.per_run);
+    if per_run { adapter::command::faults(def) } else { Vec::new() }
 }
 
 /// The solvers of one process.
@@ -88,7 +90,7 @@ impl Solvers {
 
     /// The same beside `first` programs of other processes on this machine, which are bound to cores before its own.
     #[must_use]
-    pub fn seated_after(self, first: usize) -> Self {
+    pub fn with_cores_after(self, first: usize) -> Self {
         let settings = Settings { first, ..self.0.settings.clone() };
         Self::with(self.0.options.clone(), settings)
     }
@@ -142,7 +144,9 @@ impl Solvers {
             (def.command, def.folder) = (command.clone(), folder.clone());
         }
         // Studies of one solver share its programs, whatever else they say.
-        let described = def.described.clone().filter(|_| !adapter::asks(&def.adapter));
+        let describes_itself =
+            adapters::adapter(&def.adapter).is_some_and(|adapter| adapter.describes_itself);
+        let described = def.described.clone().filter(|_| !describes_itself);
         let key = format!("{:?}", SolverDef { described, ..def.clone() });
         let mut open = self.0.open.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(reached) = open.get(&key) {

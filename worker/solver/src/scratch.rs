@@ -74,7 +74,7 @@ impl Drop for Root {
     }
 }
 
-/// A new folder that is nobody else's business: other users of the machine neither read it nor reach the sockets in it.
+/// A new private folder: other users of the machine neither read it nor reach the sockets in it.
 fn private(prefix: &str, within: &Path) -> io::Result<PathBuf> {
     let permissions = fs::Permissions::from_mode(0o700);
     Ok(Builder::new().prefix(prefix).permissions(permissions).tempdir_in(within)?.keep())

@@ -1,6 +1,6 @@
 //! Serves a built-in model as an external solver: the other end of `solver.proto`.
 //!
-//! What a solver in another language does, done for a model of a study: for trying out the wire, for conformance, and to put
+//! What a solver in another language does, done for a model of a study: for trying out the protocol, for conformance, and to put
 //! a model of equations behind a process of its own. Next file to read: `proto/solver.proto`.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -14,8 +14,8 @@ use starlings_models::{
 use starlings_proto::FRAME_SIZE;
 use starlings_proto::convert::solver::description::encode_description;
 use starlings_proto::convert::solver::{Reply, Request, decode_run, encode_reply};
-use starlings_proto::solver_wire::solver_server::{Solver, SolverServer};
-use starlings_proto::solver_wire::{self as wire, RunReply, RunRequest};
+use starlings_proto::generated_solver::solver_server::{Solver, SolverServer};
+use starlings_proto::generated_solver::{self as generated, RunReply, RunRequest};
 use starlings_proto::words::panic_text;
 use tokio::net::UnixListener;
 use tokio_stream::wrappers::UnixListenerStream;
@@ -89,7 +89,7 @@ impl Served {
     }
 }
 
-/// A state under a name that the wire takes.
+/// A state under a name that the protocol takes.
 fn plain(q: &Quantity) -> Quantity {
     Quantity { name: q.name.replace(':', "_"), ..q.clone() }
 }
@@ -118,8 +118,8 @@ struct Service(Arc<Served>);
 impl Solver for Service {
     async fn describe(
         &self,
-        _request: tonic::Request<wire::DescribeRequest>,
-    ) -> Result<Response<wire::Description>, Status> {
+        _request: tonic::Request<generated::DescribeRequest>,
+    ) -> Result<Response<generated::Description>, Status> {
         Ok(Response::new(encode_description(&self.0.description())))
     }
 

@@ -1,4 +1,4 @@
-//! The place where solvers run: their processes, their scratch folders, and the guard that ends them if this process dies.
+//! Where solvers run: their processes, their scratch folders, and the guard that ends them if this process dies.
 //!
 //! Every program is started in a process group of its own, with the end of its standard error remembered. Next files to read:
 //! [`super::process`], [`super::scratch`], [`super::guard`].

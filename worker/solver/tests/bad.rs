@@ -13,8 +13,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use kit::{Bad, Reaction, finished, job, quantity, reaching, setup, sound, soundly};
 use starlings_models::{ModelFailure, ParticleError};
 use starlings_proto::convert::floats;
-use starlings_proto::solver_wire::run_reply::Kind;
-use starlings_proto::solver_wire::{Failure, Finished, Measure, Progress, RunReply, failure};
+use starlings_proto::generated_solver::run_reply::Kind;
+use starlings_proto::generated_solver::{Failure, Finished, Measure, Progress, RunReply, failure};
 use starlings_solver::{SiteOptions, Solvers};
 use tonic::Status;
 
@@ -177,7 +177,7 @@ fn nobody_listening_is_told_after_the_time_for_a_start() {
 }
 
 /// How a description is refused that somebody has changed.
-fn refused(change: impl FnOnce(&mut starlings_proto::solver_wire::Description)) -> String {
+fn refused(change: impl FnOnce(&mut starlings_proto::generated_solver::Description)) -> String {
     let mut described = sound();
     change(&mut described);
     let bad = Bad::new(described, soundly);

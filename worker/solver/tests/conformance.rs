@@ -10,8 +10,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use starlings_models::{Description, ParticleError, Quantity, SOLVER, Solved, SolverDef, Spec};
 use starlings_proto::convert::solver::description::encode_description;
 use starlings_proto::convert::solver::{Reply, Request, decode_run, encode_reply};
-use starlings_proto::solver_wire::solver_server::{Solver, SolverServer};
-use starlings_proto::solver_wire::{self as wire, RunReply, RunRequest};
+use starlings_proto::generated_solver::solver_server::{Solver, SolverServer};
+use starlings_proto::generated_solver::{self as generated, RunReply, RunRequest};
 use starlings_solver::conformance::{Conformance, Trial, conformance};
 use starlings_solver::{SiteOptions, Solvers};
 use tokio::net::UnixListener;
@@ -167,8 +167,8 @@ struct Service(Arc<Decay>);
 impl Solver for Service {
     async fn describe(
         &self,
-        _request: tonic::Request<wire::DescribeRequest>,
-    ) -> Result<Response<wire::Description>, Status> {
+        _request: tonic::Request<generated::DescribeRequest>,
+    ) -> Result<Response<generated::Description>, Status> {
         Ok(Response::new(encode_description(&Decay::description())))
     }
 

@@ -5,7 +5,7 @@
 use std::time::Duration;
 
 use starlings_models::{Failure, ParticleError, Prediction};
-use starlings_proto::{Answer, Lease};
+use starlings_proto::{Lease, LeaseOutcome};
 
 use super::Dispatcher;
 use super::batch::{Doubt, Ended};
@@ -13,29 +13,36 @@ use super::message::{BatchError, Command, WorkerId};
 use crate::FleetEvent;
 
 impl Dispatcher {
-    pub(super) fn answered(&mut self, now: Duration, id: WorkerId, lease: Lease, answer: Answer, cost: f64) {
+    pub(super) fn answered(
+        &mut self,
+        now: Duration,
+        id: WorkerId,
+        lease: Lease,
+        answer: LeaseOutcome,
+        cost: f64,
+    ) {
         let Some(worker) = self.workers.get_mut(&id) else { return };
         worker.last_heard = now;
         let valid = lease.epoch == id.0 && worker.release(lease.job, lease.attempt);
         let index = self.batch.as_ref().and_then(|batch| batch.index_of(lease.job));
         let (true, Some(index), Some(batch)) = (valid, index, &mut self.batch) else {
-            if matches!(answer, Answer::Ran(_)) {
+            if matches!(answer, LeaseOutcome::Ran(_)) {
                 let notice = FleetEvent::LateAnswer { worker: worker.name.clone(), job: lease.job };
                 self.out.push(Command::Notice(notice));
             }
             return;
         };
         match answer {
-            Answer::Withdrawn => batch.withdrawn(index),
-            Answer::Ran(result) if matches!(batch.doubt(index), Some(Doubt::Control(_))) => {
+            LeaseOutcome::Withdrawn => batch.withdrawn(index),
+            LeaseOutcome::Ran(result) if matches!(batch.doubt(index), Some(Doubt::Control(_))) => {
                 self.controlled(now, id, index, result);
             }
-            Answer::Ran(Ok(prediction)) => {
+            LeaseOutcome::Ran(Ok(prediction)) => {
                 worker.learn_cost(cost);
                 self.run_times.learn(cost);
                 self.predicted(id, index, prediction);
             }
-            Answer::Ran(Err(error)) => self.failed(now, id, index, error),
+            LeaseOutcome::Ran(Err(error)) => self.failed(now, id, index, error),
         }
     }
 
@@ -71,7 +78,7 @@ impl Dispatcher {
         }
     }
 
-    /// The model's doing, or the limit of wall time: tried once more on another worker, if there is one.
+    /// A failure of the model, or the limit of wall time: tried once more on another worker, if there is one.
     fn decided(&mut self, id: WorkerId, index: usize, failure: Failure) {
         let Some(batch) = &mut self.batch else { return };
         let name = self.workers.get(&id).map_or("", |w| w.name.as_str());

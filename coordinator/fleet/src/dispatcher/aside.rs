@@ -1,4 +1,4 @@
-//! Workers set aside: their place cannot make runs now, so they get none for a while, then one to try, and all again when it works.
+//! Workers set aside: their place cannot make runs now, so they get none for a while, then one to try, and jobs as before when it works.
 //!
 //! What a place cannot do counts no attempt of a job. When no other worker is left, patience ends the batch: see [`super::watch`].
 

@@ -1,6 +1,6 @@
 //! The jobs of one batch: the setup that each needs, how often each was tried, how each ended.
 //!
-//! Next files to read: `queue`, for those that wait, `doubt` for those that failed and nobody knows why.
+//! Next files to read: `queue`, for those that wait, `doubt` for those that failed for an unknown reason.
 
 mod notices;
 
@@ -10,7 +10,7 @@ use starlings_models::{Failure, Prediction};
 use starlings_proto::SetupId;
 
 use super::message::{ControlId, WorkerId};
-use super::queue::{Again, Queue};
+use super::queue::{Queue, RetryKey};
 use crate::Outcome;
 use crate::job_name::JobName;
 
@@ -64,9 +64,9 @@ struct Earlier {
 /// How an attempt without a prediction ended.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Ended {
-    /// It is the model's doing, or the limit of wall time.
+    /// A failure of the model, or the limit of wall time.
     Decided(Failure),
-    /// Abnormally: nobody knows yet whose doing it is.
+    /// Abnormally: the cause, parameters or host, is not known yet.
     Undecided(String),
 }
 
@@ -235,9 +235,9 @@ impl Batch {
 
     /// Jobs that come back and may go to no other worker: those that are decided end with the failure they had, the others may go
     /// back to where they failed. Returns those that ended.
-    pub(super) fn settle(&mut self, again: Again) -> Vec<usize> {
+    pub(super) fn settle(&mut self, key: RetryKey) -> Vec<usize> {
         let mut ended = Vec::new();
-        for index in self.queue.take_all(again) {
+        for index in self.queue.take_all(key) {
             let attempts = self.attempts(index);
             match self.jobs[index].earlier.take() {
                 Some(Earlier { end: Ended::Decided(failure), name }) => {
@@ -259,7 +259,7 @@ impl Batch {
         self.end(index, Outcome { result, attempts, worker: name.to_owned() });
     }
 
-    /// A job is called back only for one of these setups, and at most once, so that it cannot travel for ever.
+    /// A job is recalled only for one of these setups, and at most once, so that it cannot be sent to and fro without end.
     pub(super) fn may_recall(&self, job: u64, setups: &BTreeSet<SetupId>) -> bool {
         self.index_of(job).is_some_and(|index| {
             let job = &self.jobs[index];
@@ -282,7 +282,7 @@ impl Batch {
     /// Has a job wait again.
     pub(super) fn requeue(&mut self, index: usize) {
         let job = &self.jobs[index];
-        self.queue.put_back(index, Again { avoided: job.avoided, setup: job.setup });
+        self.queue.put_back(index, RetryKey { avoided: job.avoided, setup: job.setup });
     }
 
     fn end(&mut self, index: usize, outcome: Outcome) {

@@ -1,4 +1,4 @@
-//! Abnormal ends: whose doing they are, the parameters' or the place's, is found out by control runs.
+//! Abnormal ends: control runs tell whether the parameters or the worker's host cause them.
 //!
 //! A program that crashes or answers nonsense says nothing of θ by itself: a licence that ran out looks the same. The run is tried
 //! once more, elsewhere if possible. If it fails there too, a run over the same record and window that is known to work is made in
@@ -13,8 +13,8 @@ use starlings_proto::Lease;
 
 use super::Dispatcher;
 use super::batch::{Batch, Doubt, Ended};
-use super::hand_out::lease;
 use super::message::{BatchError, Command, ControlId, WorkerId};
+use super::schedule::lease;
 
 impl Dispatcher {
     /// An abnormal end: tried once more, and then decided by a control run in the same place.

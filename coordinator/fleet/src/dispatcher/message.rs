@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use starlings_proto::{Answer, Lease, SetupId};
+use starlings_proto::{Lease, LeaseOutcome, SetupId};
 
 use crate::job_name::JobName;
 use crate::{FleetEvent, Outcome};
@@ -12,7 +12,7 @@ use crate::{FleetEvent, Outcome};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct WorkerId(pub u64);
 
-/// A worker at the door.
+/// A worker that asks to be taken.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Joining {
     /// Number of its stream.
@@ -102,7 +102,7 @@ pub(crate) enum Event {
         /// Under which lease.
         lease: Lease,
         /// What.
-        answer: Answer,
+        answer: LeaseOutcome,
         /// Wall time of the run, seconds.
         cost: f64,
     },
@@ -142,7 +142,7 @@ pub(crate) enum BatchError {
         /// Each with its reason.
         reasons: String,
     },
-    /// A program ends abnormally again and again, and no run is known to work that could tell whose doing it is.
+    /// A program ends abnormally on every attempt, and no run is known to work that could tell whether the parameters or the host cause it.
     NoControl {
         /// Index of the job in the batch.
         index: usize,

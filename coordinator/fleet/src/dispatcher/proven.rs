@@ -13,30 +13,30 @@ use crate::job_name::JobName;
 const KEPT: usize = 2;
 
 /// Record and window of a run.
-type Place = (u32, [u64; 2]);
+type RecordWindow = (u32, [u64; 2]);
 
 /// Runs that are known to work.
 #[derive(Debug, Default)]
 pub(super) struct Proven {
-    kept: BTreeMap<Place, Vec<(SetupId, ControlId)>>,
+    kept: BTreeMap<RecordWindow, Vec<(SetupId, ControlId)>>,
     next: u64,
 }
 
 impl Proven {
     /// Takes note of a run that worked; what has to be kept and forgotten for it.
     pub(super) fn learn(&mut self, name: JobName, setup: &SetupId, index: usize, out: &mut Vec<Command>) {
-        let of_place = self.kept.entry((name.record, name.span)).or_default();
-        if of_place.iter().any(|(known, _)| known == setup) {
+        let of_window = self.kept.entry((name.record, name.span)).or_default();
+        if of_window.iter().any(|(known, _)| known == setup) {
             return;
         }
-        if of_place.len() == KEPT {
-            // The first one stays: most studies have one model, and explanations begin with the one without effects.
-            let (_, control) = of_place.remove(KEPT - 1);
+        if of_window.len() == KEPT {
+            // The first one is kept: most studies have one model, and explanations begin with the one without effects.
+            let (_, control) = of_window.remove(KEPT - 1);
             out.push(Command::Forget { control });
         }
         self.next += 1;
         let control = ControlId(self.next);
-        of_place.push((*setup, control));
+        of_window.push((*setup, control));
         out.push(Command::Keep { control, index });
     }
 
@@ -45,13 +45,13 @@ impl Proven {
         if self.kept.is_empty() {
             return;
         }
-        let wanted: BTreeSet<Place> = names.map(|name| (name.record, name.span)).collect();
-        self.kept.retain(|place, kept| {
-            let stays = wanted.contains(place);
-            if !stays {
+        let wanted: BTreeSet<RecordWindow> = names.map(|name| (name.record, name.span)).collect();
+        self.kept.retain(|window, kept| {
+            let wanted_still = wanted.contains(window);
+            if !wanted_still {
                 out.extend(kept.iter().map(|&(_, control)| Command::Forget { control }));
             }
-            stays
+            wanted_still
         });
     }
 

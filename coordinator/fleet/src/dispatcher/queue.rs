@@ -1,15 +1,15 @@
-//! The jobs of a batch that wait to be given: those never given before, in job order, and those that come back.
+//! The jobs of a batch that wait for a worker: fresh ones, in job order, and those to retry.
 //!
-//! Jobs of one setup wait behind each other; a setup that is still being built does not hold up the jobs of others. Who may
-//! get a job is not decided here. Next file to read: `hand_out`.
+//! Jobs of one setup wait behind each other; a setup that is still being built does not hold up the jobs of others. Which
+//! worker gets a job is not decided here. Next file to read: `schedule`.
 
 use std::collections::{BTreeMap, VecDeque};
 
 use super::message::WorkerId;
 
-/// Jobs that come back: whom they must not go to, and which setup of the batch they need.
+/// What jobs to retry have in common: the worker to avoid and the setup of the batch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Again {
+pub(super) struct RetryKey {
     /// The worker on which the model failed.
     pub(super) avoided: Option<WorkerId>,
     /// Position of the setup in the batch.
@@ -19,18 +19,19 @@ pub(super) struct Again {
 /// What waits.
 #[derive(Debug)]
 pub(super) struct Queue {
-    /// Per setup, the jobs never given.
+    /// Per setup, the jobs never assigned.
     fresh: Vec<VecDeque<usize>>,
     /// The first fresh job of each setup, with the setup.
     heads: BTreeMap<usize, usize>,
-    again: BTreeMap<Again, VecDeque<usize>>,
+    /// Jobs to retry.
+    retries: BTreeMap<RetryKey, VecDeque<usize>>,
 }
 
 impl Queue {
     /// Jobs 0, 1, ... with the setup of each.
     pub(super) fn new(n_setup: usize, setup_of: impl Iterator<Item = usize>) -> Self {
         let mut queue =
-            Self { fresh: vec![VecDeque::new(); n_setup], heads: BTreeMap::new(), again: BTreeMap::new() };
+            Self { fresh: vec![VecDeque::new(); n_setup], heads: BTreeMap::new(), retries: BTreeMap::new() };
         for (index, setup) in setup_of.enumerate() {
             if queue.fresh[setup].is_empty() {
                 queue.heads.insert(index, setup);
@@ -56,27 +57,27 @@ impl Queue {
     }
 
     /// Puts a job back.
-    pub(super) fn put_back(&mut self, index: usize, again: Again) {
-        self.again.entry(again).or_default().push_back(index);
+    pub(super) fn put_back(&mut self, index: usize, key: RetryKey) {
+        self.retries.entry(key).or_default().push_back(index);
     }
 
-    /// The kinds of jobs that come back.
-    pub(super) fn again(&self) -> Vec<Again> {
-        self.again.iter().filter(|(_, jobs)| !jobs.is_empty()).map(|(&key, _)| key).collect()
+    /// The keys of the jobs to retry.
+    pub(super) fn retries(&self) -> Vec<RetryKey> {
+        self.retries.iter().filter(|(_, jobs)| !jobs.is_empty()).map(|(&key, _)| key).collect()
     }
 
-    /// Whether such a job waits.
-    pub(super) fn has(&self, again: Again) -> bool {
-        self.again.get(&again).is_some_and(|jobs| !jobs.is_empty())
+    /// Whether a job with this key waits.
+    pub(super) fn has(&self, key: RetryKey) -> bool {
+        self.retries.get(&key).is_some_and(|jobs| !jobs.is_empty())
     }
 
-    /// Takes one job that comes back.
-    pub(super) fn next_again(&mut self, again: Again) -> Option<usize> {
-        self.again.get_mut(&again)?.pop_front()
+    /// Takes the first job with this key.
+    pub(super) fn next_retry(&mut self, key: RetryKey) -> Option<usize> {
+        self.retries.get_mut(&key)?.pop_front()
     }
 
-    /// Takes all of them.
-    pub(super) fn take_all(&mut self, again: Again) -> Vec<usize> {
-        Vec::from(self.again.remove(&again).unwrap_or_default())
+    /// Takes all jobs with this key.
+    pub(super) fn take_all(&mut self, key: RetryKey) -> Vec<usize> {
+        Vec::from(self.retries.remove(&key).unwrap_or_default())
     }
 }

@@ -12,7 +12,7 @@ mod waiting;
 use std::time::Duration;
 
 use starlings_models::{ModelFailure, ParticleError, Prediction};
-use starlings_proto::{Answer, Lease, SetupId};
+use starlings_proto::{Lease, LeaseOutcome, SetupId};
 
 use super::{BatchError, Command, ControlId, Dispatcher, Event, Joining, Rules, Worker, WorkerId};
 use crate::job_name::JobName;
@@ -66,7 +66,7 @@ fn prediction(index: usize) -> Prediction {
     Prediction { outputs: vec![index as f64], state: vec![], cost: 0.0 }
 }
 
-fn answered(lease: Lease, answer: Answer, cost: f64) -> Event {
+fn answered(lease: Lease, answer: LeaseOutcome, cost: f64) -> Event {
     Event::Answered { worker: WorkerId(lease.epoch), lease, answer, cost }
 }
 
@@ -150,7 +150,7 @@ fn place(text: &str) -> ParticleError {
 }
 
 fn ran(lease: Lease, result: Result<Prediction, ParticleError>) -> Event {
-    answered(lease, Answer::Ran(result), 1.0)
+    answered(lease, LeaseOutcome::Ran(result), 1.0)
 }
 
 /// The control runs among commands.

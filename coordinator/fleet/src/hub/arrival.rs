@@ -4,19 +4,19 @@
 //! sent it is at fault. Next file to read: [`super::state`].
 
 use starlings_models::{Job, ParticleError, Prediction};
-use starlings_proto::{Answer, Lease, SetupId};
+use starlings_proto::{Lease, LeaseOutcome, SetupId};
 
 use super::state::State;
 use crate::dispatcher::Asked;
 
 impl State {
     /// An answer, or what is wrong with it as a failure of its worker. One that nobody waits for is left as it is.
-    pub(super) fn checked(&self, lease: &Lease, answer: Answer) -> Answer {
-        let Answer::Ran(Ok(prediction)) = &answer else { return answer };
+    pub(super) fn checked(&self, lease: &Lease, answer: LeaseOutcome) -> LeaseOutcome {
+        let LeaseOutcome::Ran(Ok(prediction)) = &answer else { return answer };
         let Some((setup, job)) = self.asked(lease) else { return answer };
-        let n_state = self.known.get(setup).and_then(|known| known.n_state);
+        let n_state = self.shapes.get(setup).and_then(|shape| shape.n_state);
         match fault(prediction, job, n_state) {
-            Some(fault) => Answer::Ran(Err(ParticleError::Infrastructure(fault))),
+            Some(fault) => LeaseOutcome::Ran(Err(ParticleError::Infrastructure(fault))),
             None => answer,
         }
     }

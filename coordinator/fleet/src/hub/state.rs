@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use starlings_models::Job;
 use starlings_proto::{
-    Bytes, Hello, JobEncoder, Lease, PROTOCOL, SentWindows, SetupId, ToWorker, VERSION, wire,
+    Bytes, Hello, JobEncoder, Lease, PROTOCOL, SentWindows, SetupId, ToWorker, VERSION, generated,
 };
 use tokio::sync::mpsc::UnboundedSender;
 
@@ -21,7 +21,7 @@ pub(super) struct State {
     pub(super) dispatcher: Dispatcher,
     pub(super) links: BTreeMap<WorkerId, Link>,
     pub(super) setups: BTreeMap<SetupId, Bytes>,
-    pub(super) known: BTreeMap<SetupId, Known>,
+    pub(super) shapes: BTreeMap<SetupId, SetupShape>,
     pub(super) running: Option<Submission>,
     /// Jobs that are known to work, for control runs.
     pub(super) kept: BTreeMap<ControlId, (SetupId, Job)>,
@@ -34,8 +34,8 @@ pub(super) struct State {
     pub(super) other_builds: BTreeSet<[u8; 32]>,
 }
 
-/// What is known of a setup without building it.
-pub(super) struct Known {
+/// Names and sizes of what a setup runs, as far as they are known without building it.
+pub(super) struct SetupShape {
     /// Names of its parameters, in the order of a job's.
     pub(super) parameters: Vec<String>,
     /// Length of a state, where it is known.
@@ -63,7 +63,7 @@ impl Link {
     }
 
     /// A link that is closing ends in `leave`, which returns its leases.
-    fn send(&self, message: wire::ToWorker) {
+    fn send(&self, message: generated::ToWorker) {
         let _ = self.sender.send(Ok(message));
     }
 }
@@ -91,7 +91,7 @@ impl State {
             dispatcher: Dispatcher::new(rules),
             links: BTreeMap::new(),
             setups: BTreeMap::new(),
-            known: BTreeMap::new(),
+            shapes: BTreeMap::new(),
             running: None,
             kept: BTreeMap::new(),
             events,
@@ -212,11 +212,11 @@ impl State {
     fn parameters(&self, index: usize) -> Vec<(String, f64)> {
         let job = self.running.as_ref().and_then(|running| running.jobs.get(index));
         let Some((setup, job)) = job else { return Vec::new() };
-        let names = self.known.get(setup).map(|known| &known.parameters).into_iter().flatten();
+        let names = self.shapes.get(setup).map(|shape| &shape.parameters).into_iter().flatten();
         names.cloned().zip(job.theta.iter().copied()).collect()
     }
 
-    fn send(&self, worker: WorkerId, message: wire::ToWorker) {
+    fn send(&self, worker: WorkerId, message: generated::ToWorker) {
         if let Some(link) = self.links.get(&worker) {
             link.send(message);
         }

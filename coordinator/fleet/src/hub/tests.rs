@@ -3,7 +3,7 @@
 use std::sync::mpsc::{self, Receiver};
 
 use starlings_models::{ModelFailure, Setup, Window};
-use starlings_proto::{Answer, JobEncoder, ReceivedWindows, encode_setup};
+use starlings_proto::{JobEncoder, LeaseOutcome, ReceivedWindows, encode_setup};
 use tokio::sync::mpsc::unbounded_channel;
 
 use super::*;
@@ -80,7 +80,7 @@ fn a_run_that_is_given_up_is_told_with_the_values_of_its_parameters() {
             Ok(ToWorker::Job { lease, .. }) => Some(lease),
             _ => None,
         });
-    let answer = Answer::Ran(Err(ModelFailure::Solver("diverged".to_owned()).into()));
+    let answer = LeaseOutcome::Ran(Err(ModelFailure::Solver("diverged".to_owned()).into()));
     hub.handle(Event::Answered { worker, lease: lease.expect("it is sent"), answer, cost: 0.1 });
     assert!(replies.try_recv().is_ok(), "the batch has ended");
     let told = events.try_iter().filter(FleetEvent::is_notable).map(|e| e.to_string()).collect::<Vec<_>>();

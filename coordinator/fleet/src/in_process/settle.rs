@@ -54,8 +54,8 @@ fn decided(
     results: &[Ran],
     index: usize,
 ) -> Result<Ran, FleetError> {
-    let again = |at: usize| run_one(tasks[at].0, tasks[at].1);
-    let reason = match again(index) {
+    let rerun = |at: usize| run_one(tasks[at].0, tasks[at].1);
+    let reason = match rerun(index) {
         Err(ParticleError::Undecided(reason)) => reason,
         other => return Ok(other),
     };
@@ -68,11 +68,11 @@ fn decided(
         let (particle, record, parameters) = (job.particle, job.record, String::new());
         return Err(FleetError::NoControl { particle, record, parameters, reason });
     };
-    if let Err(error) = again(control) {
+    if let Err(error) = rerun(control) {
         let reasons = format!("a run that worked before fails: {error}");
         return Err(FleetError::Unavailable { waited: 0.0, reasons });
     }
-    Ok(again(index).map_err(|error| match error {
+    Ok(rerun(index).map_err(|error| match error {
         ParticleError::Undecided(text) => ModelFailure::Solver(text).into(),
         other => other,
     }))

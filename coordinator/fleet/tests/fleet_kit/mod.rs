@@ -1,4 +1,4 @@
-//! What the fleet's tests share: toy models, workers on threads, a wire that can be cut.
+//! What the fleet's tests share: toy models, workers on threads, a proxy whose connections can be cut.
 #![allow(dead_code, unreachable_pub, clippy::unwrap_used, clippy::missing_panics_doc)]
 
 use std::io::{Read, Write};
@@ -131,7 +131,7 @@ impl ThreadWorker {
 }
 
 /// A way to a server that can be cut like a cable; afterwards it passes new connections again.
-pub struct Wire {
+pub struct Proxy {
     pub address: SocketAddr,
     ends: Arc<Mutex<Vec<TcpStream>>>,
     silent: Arc<Silent>,
@@ -151,7 +151,7 @@ impl Silent {
     }
 }
 
-impl Wire {
+impl Proxy {
     pub fn to(server: SocketAddr) -> Self {
         let listener = TcpListener::bind(any_port()).expect("a free port");
         let address = listener.local_addr().expect("bound");

@@ -8,25 +8,25 @@ use serde::{Deserialize, Serialize};
 /// noise, or given the residuals. Both hold 95 %, in the parameter's own scale.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct ParameterRow {
+pub(crate) struct ParameterRow {
     /// Name in the study.
-    pub name: String,
+    pub(crate) name: String,
     /// Unit; empty for a pure number.
-    pub unit: String,
+    pub(crate) unit: String,
     /// Posterior estimate.
-    pub estimate: f64,
+    pub(crate) estimate: f64,
     /// Posterior standard deviation.
-    pub sd: f64,
+    pub(crate) sd: f64,
     /// Lower end of the posterior 95 % interval.
-    pub lo: f64,
+    pub(crate) lo: f64,
     /// Upper end of the posterior 95 % interval.
-    pub hi: f64,
+    pub(crate) hi: f64,
     /// The other interval, lower and upper end; `None` when there is only one.
-    pub other: Option<[f64; 2]>,
+    pub(crate) other: Option<[f64; 2]>,
     /// Prior median.
-    pub prior_median: f64,
+    pub(crate) prior_median: f64,
     /// Lower end of the prior 95 % interval.
-    pub prior_lo: f64,
+    pub(crate) prior_lo: f64,
     /// Upper end of the prior 95 % interval.
-    pub prior_hi: f64,
+    pub(crate) prior_hi: f64,
 }

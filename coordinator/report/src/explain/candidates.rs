@@ -6,8 +6,6 @@ use starlings_explain::result::{Explanation, FalseAlarm, Nulls, Screened};
 
 use crate::ReportError;
 use crate::number::{self, quantity};
-use crate::plot::alarm::{self, Gains};
-use crate::plot::figure::Figure;
 use crate::plot::meter::{Bar, meter};
 use crate::plot::palette::{BLUE, GREY};
 
@@ -19,7 +17,6 @@ const LISTED: usize = 80;
 pub(super) struct Candidates {
     screened: Vec<CandidateRow>,
     left_out: usize,
-    alarm: Option<Figure>,
     alarm_facts: Vec<(&'static str, String)>,
     measured: Option<String>,
 }
@@ -37,22 +34,15 @@ struct CandidateRow {
 }
 
 impl Candidates {
-    /// Formats the candidates and draws the histogram of chance.
+    /// Formats the candidates.
     ///
     /// # Errors
     ///
     /// A figure cannot be drawn.
     pub(super) fn new(found: &Explanation, figures: &Figures) -> Result<Self, ReportError> {
-        let gains = Gains {
-            null: &figures.null_gains,
-            decoys: &figures.decoy_gains,
-            best: figures.best_gain,
-            threshold: found.false_alarm.threshold,
-        };
         Ok(Self {
             screened: found.screened.iter().take(LISTED).map(row).collect::<Result<_, _>>()?,
             left_out: found.screened.len().saturating_sub(LISTED),
-            alarm: alarm::figure(&gains)?,
             alarm_facts: alarm_facts(&found.false_alarm, figures.best_gain),
             measured: found.false_alarm.nulls.as_ref().map(measured),
         })

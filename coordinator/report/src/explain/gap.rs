@@ -1,25 +1,18 @@
-//! The gap before and after: errors by channel and use, the curves, and what became of the model's own parameters.
+//! The gap before and after: errors by channel and use, and what became of the model's own parameters.
 //!
-//! Where nothing was added there is only a before, which is shown. Next file to read: `places.rs`.
+//! Where nothing was added there is only a before, which is shown. Next file to read: `disagreement.rs`.
 
 use serde::Serialize;
+use starlings_explain::Figures;
 use starlings_explain::result::{Explanation, GapRow, ParameterShift};
-use starlings_explain::{Curve, Figures};
-use starlings_study::field::component_of;
 
 use crate::ReportError;
 use crate::number::{self, quantity};
-use crate::plot::course;
-use crate::plot::figure::Figure;
 use crate::plot::meter::{Bar, meter};
 use crate::plot::palette::{BLUE, GREY, INK, VERMILION};
 
-/// Curves drawn at most.
-const CURVES: usize = 24;
 /// Rows of the table at most.
 const ROWS: usize = 80;
-/// Observed components up to which every one of a field is drawn by itself.
-const FEW: usize = 3;
 
 /// The gap, ready to be arranged.
 #[derive(Debug, Serialize)]
@@ -27,8 +20,6 @@ pub(super) struct Gap {
     rows: Vec<GapView>,
     rows_left_out: usize,
     compared: bool,
-    curves: Vec<Figure>,
-    curves_left_out: usize,
 }
 
 #[derive(Debug, Serialize)]
@@ -45,27 +36,18 @@ struct GapView {
 }
 
 impl Gap {
-    /// Formats the errors and draws the curves.
+    /// Formats the errors.
     ///
     /// # Errors
     ///
     /// A figure cannot be drawn.
     pub(super) fn new(found: &Explanation, figures: &Figures) -> Result<Self, ReportError> {
-        let rows = if found.gap.is_empty() { as_it_is(figures) } else { found.gap.clone() };
-        let shown = shown(&figures.curves);
-        let mut curves = Vec::new();
-        for curve in shown.iter().take(CURVES) {
-            let numbers = numbers(curve, &rows);
-            curves.push(course::values(curve, &figures.time_unit, &numbers)?);
-            curves.push(course::residuals(curve, &figures.time_unit)?);
-        }
+        let rows = rows(found, figures);
         let view = |row: &GapRow| GapView::new(row, &rows, unit_of(&row.channel, figures));
         Ok(Self {
             rows: rows.iter().take(ROWS).map(view).collect::<Result<_, _>>()?,
             rows_left_out: rows.len().saturating_sub(ROWS),
             compared: !found.gap.is_empty(),
-            curves,
-            curves_left_out: figures.curves.len().saturating_sub(shown.len().min(CURVES)),
         })
     }
 }
@@ -110,13 +92,19 @@ impl GapView {
     }
 }
 
-fn words(usage: &str) -> &'static str {
+/// The use of a channel in words.
+pub(super) fn words(usage: &str) -> &'static str {
     match usage {
         "train" => "training",
         "held-out" => "held-out span",
         "held-out-channel" => "held-out channel",
         _ => "other",
     }
+}
+
+/// The errors before and after; where nothing was added, those of the model as it is.
+pub(super) fn rows(found: &Explanation, figures: &Figures) -> Vec<GapRow> {
+    if found.gap.is_empty() { as_it_is(figures) } else { found.gap.clone() }
 }
 
 /// The errors of the model as it is.
@@ -136,42 +124,6 @@ fn unit_of<'a>(channel: &str, figures: &'a Figures) -> &'a str {
     let of_curve = figures.curves.iter().find(|c| c.channel == channel).map(|c| c.unit.as_str());
     let of_gap = || figures.before.channels.iter().find(|c| c.channel == channel).map(|c| c.unit.as_str());
     of_curve.or_else(of_gap).unwrap_or("")
-}
-
-/// The errors of one curve, as a sentence.
-fn numbers(curve: &Curve, rows: &[GapRow]) -> String {
-    let own = rows.iter().filter(|row| row.channel == curve.channel && row.record == curve.record);
-    let mut parts: Vec<String> = own
-        .map(|row| {
-            let before = quantity(row.before, &curve.unit);
-            if row.after.is_finite() {
-                format!(
-                    "{} RMSE {before} before, {} after",
-                    words(&row.usage),
-                    quantity(row.after, &curve.unit)
-                )
-            } else {
-                format!("{} RMSE {before}", words(&row.usage))
-            }
-        })
-        .collect();
-    parts.push(format!("noise sd {}", quantity(curve.noise, &curve.unit)));
-    let mut letters = parts.join("; ");
-    if let Some(first) = letters.get(..1).map(str::to_uppercase) {
-        letters.replace_range(..1, &first);
-    }
-    format!("{letters}.")
-}
-
-/// The curves that are drawn: of a field its first, middle and last component.
-fn shown(curves: &[Curve]) -> Vec<&Curve> {
-    let field = |c: &Curve| component_of(&c.channel).map(|(field, _)| field.to_owned());
-    let groups = curves.chunk_by(|a, b| a.record == b.record && field(a).is_some() && field(a) == field(b));
-    let pick = |group: &'_ [Curve]| -> Vec<usize> {
-        let n = group.len();
-        if n > FEW { vec![0, n / 2, n - 1] } else { (0..n).collect() }
-    };
-    groups.flat_map(|group| pick(group).into_iter().map(move |k| &group[k])).collect()
 }
 
 /// What happened to one parameter, ready to be arranged.

@@ -1,4 +1,4 @@
-//! Data of an explanation that never was, for the tests of the page: a pressure that a model without a series resistance misses.
+//! Invented data of an explanation, for the tests of the page: a pressure that a model without a series resistance misses.
 
 mod figures;
 

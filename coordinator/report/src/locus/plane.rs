@@ -15,18 +15,18 @@ use crate::plot::scene::{Scene, picture};
 /// Width and height of the plane, in figure units.
 const SIZE: (i32, i32) = (640, 400);
 
-/// A drawing and the places on it that the script needs.
+/// A drawing and the positions on it that the script needs.
 pub(super) struct Plane {
     /// One SVG element.
     pub(super) svg: String,
     /// `[observer][pole]`.
-    pub(super) places: Vec<Vec<Places>>,
+    pub(super) positions: Vec<Vec<Positions>>,
 }
 
-/// Per gain, a place in drawing units; nothing outside the plane's edges.
-pub(super) type Places = Vec<Option<(i32, i32)>>;
+/// Per gain, a position in drawing units; nothing outside the plane's edges.
+pub(super) type Positions = Vec<Option<(i32, i32)>>;
 
-/// Draws the loci of the shown poles, one colour per observer, and places the poles at the frames.
+/// Draws the loci of the shown poles, one colour per observer, and positions the poles at the frames.
 ///
 /// # Errors
 ///
@@ -61,7 +61,7 @@ pub(super) fn draw(
                        without observer.";
     let scene = Scene { title, description: description.to_owned(), x: x.clone(), y: y.clone(), marks };
     let svg = picture(SIZE, &scene.title, &scene.description, |surface| scene.draw(surface))?;
-    let mut places = Vec::with_capacity(n);
+    let mut positions = Vec::with_capacity(n);
     for observer in ways {
         let mut of_observer = Vec::with_capacity(observer.poles.len());
         for way in &observer.poles {
@@ -70,9 +70,9 @@ pub(super) fn draw(
             let points: Vec<Point> = way.iter().map(at).collect();
             of_observer.push(scene.positions(SIZE, &points)?);
         }
-        places.push(of_observer);
+        positions.push(of_observer);
     }
-    Ok(Plane { svg, places })
+    Ok(Plane { svg, positions })
 }
 
 /// The parts of a way that lie inside the plane.

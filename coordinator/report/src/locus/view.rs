@@ -78,7 +78,7 @@ impl View {
         let data = json!({
             "gain": gains.iter().map(|gain| significant(*gain, 3)).collect::<Vec<_>>(),
             "colour": hex,
-            "place": plane.places,
+            "place": plane.positions,
             "rate": ways.iter().map(rates).collect::<Vec<_>>(),
             "cursor": figure.cursor,
             "height": figure.height,

@@ -1,9 +1,14 @@
 //! A figure as the page shows it: the drawing, its caption and the meaning of its colours.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
 use super::super::ReportError;
 use super::scene::Scene;
+
+/// The figures of a page by the slot of its template that they fill.
+pub(crate) type Slots = BTreeMap<&'static str, Vec<Figure>>;
 
 /// A drawing with the text that belongs to it.
 #[derive(Debug, Clone, Serialize)]

@@ -1,4 +1,6 @@
 //! What can be drawn on two axes.
+//!
+//! Plain data, our own because the elements of plotters are bound to a backend and cannot be kept in a list.
 
 use plotters::style::RGBColor;
 

@@ -1,4 +1,6 @@
 //! A small graphic for a row of a table: bars on one short scale.
+//!
+//! The scale is our own because a chart of plotters has room for axes and labels, and rounds pixels in another way.
 
 use plotters::element::Rectangle;
 use plotters::style::{Color, RGBColor};

@@ -1,7 +1,8 @@
 //! A scene is two axes and the marks on them; drawing it here is the only place that knows the drawing library.
 //!
 //! Axis labels are written horizontally, the vertical one above its axis: on a narrow screen that stays readable. A scene
-//! has no legend; the caption below a figure names the colours. Next file to read: `figure.rs`.
+//! has no legend; the caption below a figure names the colours. The `<svg>` element is our own because that of plotters has a fixed
+//! size and no name for assistive technology. Next file to read: `figure.rs`.
 
 use plotters::backend::SVGBackend;
 use plotters::chart::{ChartBuilder, ChartContext};

@@ -1,4 +1,6 @@
 //! Long series become envelopes: the smallest and the largest value of every bucket of samples, so no peak is lost.
+//!
+//! Our own because plotters draws every point that it is given.
 
 /// Series of at most this many samples are drawn as they are.
 const PLAIN: usize = 900;

@@ -1,6 +1,6 @@
 //! An axis as the drawing library wants it: its scale, and its ticks instead of the library's own.
 //!
-//! Where the ticks stand is not decided here. Next file to read: `axis.rs`.
+//! Our own because plotters lets a caller choose the text of a tick but not its value. Where the ticks stand is not decided here. Next file to read: `axis.rs`.
 
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 use plotters::coord::types::RangedCoordf64;

@@ -42,7 +42,7 @@ pub(crate) fn solver(source: &Source, file: &StudyFile, solver_host: &SolverHost
         source.file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let folder = std::path::absolute(beside).unwrap_or_else(|_| beside.to_owned());
     let mut def = def(source, section, &run_folder(source, section, &folder));
-    def.files = (section.adapter == "command").then(|| FilesDef {
+    def.files = section.per_run.then(|| FilesDef {
         templates: templates(source, section, &folder),
         copies: copies(source, section, &folder),
         reads: reads(section),
@@ -53,7 +53,7 @@ pub(crate) fn solver(source: &Source, file: &StudyFile, solver_host: &SolverHost
     if source.count() > before {
         return None;
     }
-    if let Some(written) = def.described.clone().filter(|_| section.adapter == "command") {
+    if let Some(written) = def.described.clone().filter(|_| section.per_run) {
         let def = SolverDef { described: Some(written), ..def.clone() };
         for fault in solver_host.inspect(&def) {
             files::report(source, section, &def, &folder, fault);
@@ -64,7 +64,7 @@ pub(crate) fn solver(source: &Source, file: &StudyFile, solver_host: &SolverHost
     }
     let found = match &section.described {
         Some(name) => described(source, name, &folder)?,
-        None => match def.described.take_if(|_| section.adapter == "command") {
+        None => match def.described.take_if(|_| section.per_run) {
             Some(written) => written,
             None => asked(source, section, &def, solver_host)?,
         },

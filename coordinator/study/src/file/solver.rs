@@ -6,6 +6,7 @@
 use std::ops::Range;
 
 use starlings_models::Role;
+use starlings_proto::adapters::{self, ADAPTERS, AdapterDef, NamedBy};
 use toml::Spanned;
 
 use super::Named;
@@ -36,15 +37,6 @@ pub(crate) const KEYS: [&str; 18] = [
     "copies",
 ];
 
-/// Adapters with the keys that not all of them have.
-const ADAPTERS: [(&str, &[&str]); 5] = [
-    ("grpc", &["address", "described"]),
-    ("command", &["parameters", "outputs", "inputs", "templates", "copies"]),
-    ("fmu", &["described"]),
-    ("um-bridge", &["address", "model", "described", "parameters", "outputs", "inputs"]),
-    ("mpi", &["ranks", "described"]),
-];
-
 /// How one of them begins that reads an output.
 const RULES: [&str; 4] = ["json", "csv", "column", "regex"];
 
@@ -54,6 +46,8 @@ pub(crate) struct ProgramSection {
     /// Where the program, or else its address, is named.
     pub(crate) place: Range<usize>,
     pub(crate) adapter: String,
+    /// Whether it is started for every run.
+    pub(crate) per_run: bool,
     pub(crate) command: Vec<String>,
     pub(crate) address: Option<String>,
     /// Where it runs, as seen from the study.
@@ -94,10 +88,13 @@ pub(crate) struct ProgramQuantity {
 /// Reads `[model]` of a solver, whose `kind` stands at `kind`.
 pub(crate) fn program(source: &Source, t: &Table<'_>, kind: Range<usize>) -> ProgramSection {
     let adapter = adapter(source, t);
-    refuse_foreign(source, t, &adapter);
+    let known = adapters::adapter(&adapter);
+    if let Some(known) = known {
+        refuse_foreign(source, t, known);
+    }
     let command = t.texts("command");
     let address = t.text("address");
-    check_reach(source, t, &adapter, &command, &kind);
+    check_reach(source, t, known, &command, &kind);
     let place = |key| t.get(key).map(Node::span);
     let section = ProgramSection {
         place: place("command").or_else(|| place("address")).unwrap_or(kind),
@@ -114,13 +111,14 @@ pub(crate) fn program(source: &Source, t: &Table<'_>, kind: Range<usize>) -> Pro
         model: t.text("model").map(Spanned::into_inner),
         described: t.text("described"),
         parameters: quantities(source, t, "parameters", &["name", "unit", "role", "default", "range"]),
-        outputs: quantities(source, t, "outputs", output_keys(&adapter)),
+        outputs: quantities(source, t, "outputs", output_keys(known)),
         inputs: quantities(source, t, "inputs", &["name", "unit", "role"]),
         templates: named_texts(source, &t.free_entries("templates")),
         copies: copies(source, t),
         adapter,
+        per_run: known.is_some_and(|known| known.per_run),
     };
-    if section.adapter == "command" {
+    if section.per_run {
         for (key, expected) in [
             ("parameters", "such as `[ { name = \"E\", unit = \"Pa\" } ]`"),
             ("outputs", "such as `[ { name = \"tip\", unit = \"m\", read = \"csv:result.csv:tip\" } ]`"),
@@ -134,8 +132,8 @@ pub(crate) fn program(source: &Source, t: &Table<'_>, kind: Range<usize>) -> Pro
 }
 
 /// Only a program that is started for every run leaves its answer where a rule finds it.
-fn output_keys(adapter: &str) -> &'static [&'static str] {
-    if adapter == "um-bridge" {
+fn output_keys(adapter: Option<&AdapterDef>) -> &'static [&'static str] {
+    if adapter.is_some_and(|known| known.keys.contains(&"outputs") && !known.per_run) {
         &["name", "unit", "role", "size"]
     } else {
         &["name", "unit", "role", "size", "read"]
@@ -144,26 +142,25 @@ fn output_keys(adapter: &str) -> &'static [&'static str] {
 
 fn adapter(source: &Source, t: &Table<'_>) -> String {
     let Some(word) = t.text("adapter") else { return "grpc".to_owned() };
-    if !ADAPTERS.iter().any(|(name, _)| name == word.get_ref()) {
-        let valid: Vec<String> = ADAPTERS.iter().map(|(name, _)| (*name).to_owned()).collect();
+    if adapters::adapter(word.get_ref()).is_none() {
+        let valid: Vec<String> = ADAPTERS.iter().map(|adapter| adapter.name.to_owned()).collect();
         source.report_unknown(word.span(), format!("unknown adapter `{}`", word.get_ref()), &valid);
     }
     word.into_inner()
 }
 
 /// Keys of another adapter: they would be ignored, which nobody expects.
-fn refuse_foreign(source: &Source, t: &Table<'_>, adapter: &str) {
-    let Some((_, own)) = ADAPTERS.iter().find(|(name, _)| *name == adapter) else { return };
+fn refuse_foreign(source: &Source, t: &Table<'_>, adapter: &AdapterDef) {
     for key in KEYS {
         let owners: Vec<String> = ADAPTERS
             .iter()
-            .filter(|(_, keys)| keys.contains(&key))
-            .map(|(name, _)| format!("\"{name}\""))
+            .filter(|other| other.keys.contains(&key))
+            .map(|other| format!("\"{}\"", other.name))
             .collect();
-        if let Some(span) = t.key_span(key).filter(|_| !owners.is_empty() && !own.contains(&key)) {
-            let message =
-                format!("`{key}` belongs to adapter = {}, this one is \"{adapter}\"", owners.join(" or "));
-            source.report_with(span, message, format!("remove it, or use adapter = {}", owners.join(" or ")));
+        if let Some(span) = t.key_span(key).filter(|_| !owners.is_empty() && !adapter.keys.contains(&key)) {
+            let (owners, own) = (owners.join(" or "), adapter.name);
+            let message = format!("`{key}` belongs to adapter = {owners}, this one is \"{own}\"");
+            source.report_with(span, message, format!("remove it, or use adapter = {owners}"));
         }
     }
 }
@@ -172,7 +169,7 @@ fn refuse_foreign(source: &Source, t: &Table<'_>, adapter: &str) {
 fn check_reach(
     source: &Source,
     t: &Table<'_>,
-    adapter: &str,
+    adapter: Option<&AdapterDef>,
     command: &[Spanned<String>],
     kind: &Range<usize>,
 ) {
@@ -188,25 +185,17 @@ fn check_reach(
         return;
     }
     let has = |key| t.get(key).is_some();
-    match adapter {
-        "um-bridge" if !has("address") => {
-            t.missing("address", "where the server listens, such as \"http://127.0.0.1:4242\"");
-        }
-        "grpc" if has("command") && has("address") => {
+    match adapter.map(|known| known.named_by) {
+        Some(NamedBy::Address(expected)) if !has("address") => t.missing("address", expected),
+        Some(NamedBy::CommandOrAddress(_)) if has("command") && has("address") => {
             let span = t.key_span("address").unwrap_or(kind.clone());
             let message = "`command` starts a solver and `address` dials one that runs already";
             source.report_with(span, message, "remove one of the two");
         }
-        "grpc" if !has("command") && !has("address") => {
-            t.missing(
-                "command",
-                "program and arguments, such as `[\"python3\", \"beam.py\"]` (or `address`)",
-            );
+        Some(NamedBy::CommandOrAddress(expected)) if !has("command") && !has("address") => {
+            t.missing("command", expected);
         }
-        "fmu" if !has("command") => t.missing("command", "the file of the FMU, such as `[\"tank.fmu\"]`"),
-        "command" | "mpi" if !has("command") => {
-            t.missing("command", "program and arguments, such as `[\"./beam\", \"input.txt\"]`");
-        }
+        Some(NamedBy::Command(expected)) if !has("command") => t.missing("command", expected),
         _ => {}
     }
 }

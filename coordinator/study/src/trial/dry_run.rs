@@ -9,12 +9,10 @@ use std::sync::Arc;
 use starlings_estimators::{Form, Kind};
 use starlings_models::external::table::is_transposed;
 use starlings_models::{Forward, Prediction, Window};
+use starlings_proto::adapters::adapter;
 
 use super::{Fault, TrialChannel, TrialError, named, run, trial};
 use crate::{Study, posterior};
-
-/// Adapters whose programs cannot say of themselves which times they answer for.
-const STARTS_ANEW: [&str; 2] = ["command", "um-bridge"];
 
 /// Windows of a record that are run where not all are.
 const FIRST: usize = 3;
@@ -111,10 +109,13 @@ impl<'a> DryRun<'a> {
         let window = Arc::new(self.study.whole(self.record, true));
         let is_part = window.times.len() < self.study.records[self.record].times.len();
         let solver = self.study.setup.model.solver.as_ref();
-        let anew = solver.map(|solver| STARTS_ANEW.contains(&solver.adapter.as_str()));
+        // A solver that does not describe itself cannot say which times it answers for.
+        let unasked = solver.map(|s| adapter(&s.adapter).is_some_and(|adapter| !adapter.describes_itself));
         let prediction = match self.run(&window, None) {
             Ok(prediction) => prediction,
-            Err(Fault::Run(source)) if is_part && anew == Some(true) => return Ok(Some(source.to_string())),
+            Err(Fault::Run(source)) if is_part && unasked == Some(true) => {
+                return Ok(Some(source.to_string()));
+            }
             Err(fault) => {
                 let n = window.times.len();
                 let span =
@@ -122,7 +123,7 @@ impl<'a> DryRun<'a> {
                 return Err(self.failed(fault, span));
             }
         };
-        if anew == Some(false) {
+        if unasked == Some(false) {
             self.check_layout(&window, &prediction)?;
         }
         Ok(None)

@@ -2,16 +2,18 @@
 
 use starlings_models::{Description, Quantity, Role, SOLVER, Spec};
 
-use super::{SOLVER_PROTOCOL, WireError};
-use crate::solver_wire as wire;
+use super::{ProtocolError, SOLVER_PROTOCOL};
+use crate::generated_solver as generated;
 
 /// The message of a description.
-pub fn encode_description(description: &Description) -> wire::Description {
+pub fn encode_description(description: &Description) -> generated::Description {
     let Description { spec, name, deterministic, observers, hosts } = description;
     let list = |quantities: &[Quantity]| quantities.iter().map(encode_quantity).collect();
-    let measure =
-        |(output, state): &(String, String)| wire::Measure { output: output.clone(), state: state.clone() };
-    wire::Description {
+    let measure = |(output, state): &(String, String)| generated::Measure {
+        output: output.clone(),
+        state: state.clone(),
+    };
+    generated::Description {
         protocol: SOLVER_PROTOCOL,
         name: name.clone(),
         says: spec.says.clone(),
@@ -31,7 +33,7 @@ pub fn encode_description(description: &Description) -> wire::Description {
 ///
 /// # Errors
 /// When it speaks another protocol, or describes what makes no sense ([`Description::fault`]).
-pub fn decode_description(message: &wire::Description) -> Result<Description, WireError> {
+pub fn decode_description(message: &generated::Description) -> Result<Description, ProtocolError> {
     if message.protocol != SOLVER_PROTOCOL {
         return Err(wrong(format!(
             "it speaks protocol {}, this worker speaks {SOLVER_PROTOCOL}: use matching versions of both",
@@ -62,10 +64,10 @@ pub fn decode_description(message: &wire::Description) -> Result<Description, Wi
     }
 }
 
-fn encode_quantity(q: &Quantity) -> wire::Quantity {
+fn encode_quantity(q: &Quantity) -> generated::Quantity {
     let role = serde_json::to_value(q.role).ok().and_then(|value| value.as_str().map(str::to_owned));
     let bound = |value: f64| value.is_finite().then_some(value);
-    wire::Quantity {
+    generated::Quantity {
         name: q.name.clone(),
         unit: q.unit.clone(),
         size: q.size as u32,
@@ -77,8 +79,8 @@ fn encode_quantity(q: &Quantity) -> wire::Quantity {
     }
 }
 
-fn list(what: &str, quantities: &[wire::Quantity]) -> Result<Vec<Quantity>, WireError> {
-    let one = |q: &wire::Quantity| {
+fn list(what: &str, quantities: &[generated::Quantity]) -> Result<Vec<Quantity>, ProtocolError> {
+    let one = |q: &generated::Quantity| {
         let role = if q.role.is_empty() { "other" } else { &q.role };
         let role: Role = serde_json::from_value(role.into())
             .map_err(|_| wrong(format!("{what} `{}` has the role `{role}`, which does not exist", q.name)))?;
@@ -92,6 +94,6 @@ fn list(what: &str, quantities: &[wire::Quantity]) -> Result<Vec<Quantity>, Wire
     quantities.iter().map(one).collect()
 }
 
-fn wrong(message: String) -> WireError {
-    WireError::Shape { field: "description", message }
+fn wrong(message: String) -> ProtocolError {
+    ProtocolError::Shape { field: "description", message }
 }

@@ -3,14 +3,14 @@
 //!
 //! The study says what the program has, since it cannot be asked. It starts every run anew, so no run continues from a state.
 //! Each run has a folder of its own, kept for people to look at when the run fails. Next files to read: [`template`] and
-//! [`request`] for what goes in, [`program`] for the run, [`rule`] and [`answer`] for what comes out.
+//! [`request`] for what goes in, [`program`] for the run, [`rule`] and [`results`] for what comes out.
 
-mod answer;
 mod fault;
 mod inspect;
 pub(super) mod json;
 mod program;
 mod request;
+mod results;
 mod rule;
 mod table;
 mod template;
@@ -24,26 +24,27 @@ use std::time::Duration;
 
 use starlings_models::{Description, ParticleError, Run, Solved, SolverDef, Spec, Timeout, nearest};
 
-use super::{Adapter, Kind};
+use super::Adapter;
 use crate::SolverError;
+use crate::core_slots::CoreSlots;
 use crate::error::tail_text;
 use crate::process::{Launch, Process, ending, is_killed};
-use crate::seats::Seats;
 use crate::site::Site;
 use crate::stopped::stopped;
-use answer::Answer;
 pub(crate) use inspect::faults;
 use program::{End, Output};
+use results::RunResults;
 use rule::{Rule, lies_inside};
 use template::{OWN_NAMES, Templates};
 use traces::{kept, said};
 
-pub(crate) const KIND: Kind = Kind {
-    name: "command",
-    says: "a program started for every run; input files from templates, outputs by rule, no code",
-    asks: false,
-    open: |def, site| Ok(Box::new(PerRun::new(def, site)?)),
-};
+/// A program started for every run.
+///
+/// # Errors
+/// When the study lacks what it needs.
+pub(super) fn open(def: &SolverDef, site: &Arc<Site>) -> Result<Box<dyn Adapter>, SolverError> {
+    Ok(Box::new(PerRun::new(def, site)?))
+}
 
 /// Times that a run is made when somebody kills its program or removes its folder.
 const ATTEMPTS: u32 = 12;
@@ -57,7 +58,7 @@ struct PerRun {
     templates: Templates,
     copies: Vec<(String, PathBuf)>,
     rules: BTreeMap<String, Rule>,
-    seats: Seats,
+    core_slots: CoreSlots,
 }
 
 /// How an attempt ended that gave no answer.
@@ -66,8 +67,8 @@ enum Failed {
     Program(String),
     /// It did not end in time.
     Late(String),
-    /// The place cannot make the run.
-    Place(String),
+    /// The host cannot make the run: a program, a file or a folder is missing.
+    Host(String),
     /// Somebody killed the program, or took its folder away: worth another attempt at once.
     Disturbed(String),
 }
@@ -101,7 +102,7 @@ impl PerRun {
             .collect();
         let command = request::command(&def.command, Path::new(&def.folder), &inside, &description.spec)?;
         let copies = files.copies.into_iter().map(|(name, path)| (name, PathBuf::from(path))).collect();
-        let seats = Seats::default();
+        let core_slots = CoreSlots::default();
         Ok(Self {
             def: def.clone(),
             site: Arc::clone(site),
@@ -110,7 +111,7 @@ impl PerRun {
             templates,
             copies,
             rules,
-            seats,
+            core_slots,
         })
     }
 
@@ -133,7 +134,7 @@ impl PerRun {
         Ok(())
     }
 
-    fn launch(&self, command: &[String], folder: &Path, seat: usize) -> Result<Process, SolverError> {
+    fn launch(&self, command: &[String], folder: &Path, core_slot: usize) -> Result<Process, SolverError> {
         let threads = self.def.threads;
         self.site.start(&Launch {
             command,
@@ -141,7 +142,7 @@ impl PerRun {
             folder: Some(folder),
             environment: self.def.environment.clone(),
             threads,
-            cores: self.def.pin.then(|| self.site.cores(seat, threads)),
+            cores: self.def.pin.then(|| self.site.cores(core_slot, threads)),
             memory: self.def.memory,
             input: true,
         })
@@ -149,7 +150,7 @@ impl PerRun {
 
     /// One start of the program, the `last` that is tried or not.
     fn attempt(&self, run: &Run<'_>, last: bool) -> Result<Solved, Failed> {
-        let place = |what: String| Failed::Place(format!("{} cannot run: {what}", self.program()));
+        let place = |what: String| Failed::Host(format!("{} cannot run: {what}", self.program()));
         let scratch =
             self.site.scratch("run").map_err(|error| place(format!("no folder for it: {error}")))?;
         if let Err(what) = self.furnish(run, scratch.path()) {
@@ -158,12 +159,12 @@ impl PerRun {
         }
         let spec = &self.description.spec;
         let told = request::document(spec, run).to_string();
-        let seat = self.seats.take();
+        let core_slot = self.core_slots.take();
         let command = request::filled(&self.command, spec, run, scratch.path());
-        let started = self.launch(&command, scratch.path(), seat.number());
+        let started = self.launch(&command, scratch.path(), core_slot.number());
         let mut process = started.map_err(|error| {
             let what = error.to_string();
-            if scratch.is_gone() && !last { Failed::Disturbed(what) } else { Failed::Place(what) }
+            if scratch.is_gone() && !last { Failed::Disturbed(what) } else { Failed::Host(what) }
         })?;
         let patience = Duration::try_from_secs_f64(self.def.timeout).unwrap_or(Duration::MAX);
         let (end, output) = program::to_its_end(&mut process, told.clone().into_bytes(), patience);
@@ -190,7 +191,7 @@ impl PerRun {
             Err(what) if disturbed && !last => return Err(Failed::Disturbed(what)),
             Err(what) if scratch.is_gone() => {
                 let folder = scratch.path().display();
-                return Err(Failed::Place(format!("{what}; its folder {folder} was removed while it ran")));
+                return Err(Failed::Host(format!("{what}; its folder {folder} was removed while it ran")));
             }
             Err(what) => {
                 let said = tail_text(&tail);
@@ -201,13 +202,13 @@ impl PerRun {
         Err(match end {
             End::Late => Failed::Late(what),
             End::Ended(_) if !killed => Failed::Program(what),
-            End::Ended(_) | End::Stopped => Failed::Place(what),
+            End::Ended(_) | End::Stopped => Failed::Host(what),
         })
     }
 
     /// The outputs that were asked for.
     fn read(&self, run: &Run<'_>, folder: &Path, output: &Output) -> Result<Solved, String> {
-        let answer = Answer::new(folder, output);
+        let results = RunResults::new(folder, output);
         let times = &run.window.times;
         let mut columns = Vec::with_capacity(run.outputs.len());
         for name in run.outputs {
@@ -215,7 +216,7 @@ impl PerRun {
             let size = quantity.map_or(1, |q| q.size);
             let whole = Rule::whole(name);
             let rule = self.rules.get(name).unwrap_or(&whole);
-            let values = answer.values(rule, size, times);
+            let values = results.values(rule, size, times);
             columns.push((size, values.map_err(|fault| self.unreadable(name, &fault))?));
         }
         let at = |j: usize| columns.iter().flat_map(move |(size, values)| &values[j * size..(j + 1) * size]);
@@ -252,7 +253,7 @@ impl Adapter for PerRun {
                     attempts += 1;
                 }
                 Err(Failed::Program(text)) => return Err(ParticleError::Undecided(text)),
-                Err(Failed::Place(text)) => return Err(ParticleError::Infrastructure(text)),
+                Err(Failed::Host(text)) => return Err(ParticleError::Infrastructure(text)),
                 Err(Failed::Late(says)) => return Err(Timeout { limit: self.def.timeout, says }.into()),
             }
         }

@@ -9,35 +9,36 @@ use std::time::Duration;
 
 use starlings_models::{Description, ParticleError, Run, Solved, SolverDef, Timeout};
 
-use super::{Adapter, Kind};
+use super::Adapter;
 use crate::SolverError;
 use crate::backoff::Backoff;
+use crate::core_slots::{CoreSlot, CoreSlots};
 use crate::instance::{How, Instance};
 use crate::losses::Losses;
-use crate::seats::{Seat, Seats};
 use crate::site::Site;
 
-pub(crate) const KIND: Kind = Kind {
-    name: "grpc",
-    says: "a program that serves solver.proto, or an address where one does",
-    asks: true,
-    open: |def, site| Ok(Box::new(Grpc::new(def, site, def.command.clone())?)),
-};
+/// Programs that the command of the definition starts, or one at its address.
+///
+/// # Errors
+/// When the study lacks what it needs.
+pub(super) fn open(def: &SolverDef, site: &Arc<Site>) -> Result<Box<dyn Adapter>, SolverError> {
+    Ok(Box::new(Grpc::new(def, site, def.command.clone())?))
+}
 
 /// Programs that serve `solver.proto`.
 pub(crate) struct Grpc {
     def: SolverDef,
     command: Vec<String>,
     site: Arc<Site>,
-    idle: Mutex<Vec<Seated>>,
+    idle: Mutex<Vec<PinnedInstance>>,
     backoff: Mutex<Backoff>,
-    seats: Seats,
+    core_slots: CoreSlots,
 }
 
-/// A program and the number by which it found its cores, which is free again after its end.
-struct Seated {
+/// A program and the slot of cores that it is bound to, which is free again after its end.
+struct PinnedInstance {
     instance: Instance,
-    _seat: Seat,
+    _core_slot: CoreSlot,
 }
 
 impl Grpc {
@@ -50,12 +51,12 @@ impl Grpc {
             let message = "a solver needs a `command` that starts it, or an `address` where it listens";
             return Err(SolverError::Incomplete(message.to_owned()));
         }
-        let (idle, backoff, seats) = (Mutex::default(), Mutex::default(), Seats::default());
-        Ok(Self { def: def.clone(), command, site: Arc::clone(site), idle, backoff, seats })
+        let (idle, backoff, core_slots) = (Mutex::default(), Mutex::default(), CoreSlots::default());
+        Ok(Self { def: def.clone(), command, site: Arc::clone(site), idle, backoff, core_slots })
     }
 
     /// An idle program, or a new one.
-    fn take(&self) -> Result<Seated, SolverError> {
+    fn take(&self) -> Result<PinnedInstance, SolverError> {
         while let Some(idle) = self.idle() {
             // A program whose folder was taken away would fail: it ends here.
             if !idle.instance.is_homeless() {
@@ -64,37 +65,37 @@ impl Grpc {
         }
         let pause = self.backoff.lock().unwrap_or_else(PoisonError::into_inner).pause();
         std::thread::sleep(pause);
-        let seat = self.seats.take();
-        let instance = Instance::start(&self.def, &self.command, &self.site, seat.number());
+        let core_slot = self.core_slots.take();
+        let instance = Instance::start(&self.def, &self.command, &self.site, core_slot.number());
         let mut backoff = self.backoff.lock().unwrap_or_else(PoisonError::into_inner);
         if instance.is_ok() {
             backoff.worked();
         } else {
             backoff.failed();
         }
-        Ok(Seated { instance: instance?, _seat: seat })
+        Ok(PinnedInstance { instance: instance?, _core_slot: core_slot })
     }
 
-    fn idle(&self) -> Option<Seated> {
+    fn idle(&self) -> Option<PinnedInstance> {
         self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop()
     }
 
-    fn give_back(&self, seated: Seated) {
-        self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(seated);
+    fn give_back(&self, pinned: PinnedInstance) {
+        self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(pinned);
     }
 }
 
 impl Adapter for Grpc {
     fn describe(&self) -> Result<Description, SolverError> {
         let mut losses = Losses::default();
-        let mut seated = loop {
+        let mut pinned = loop {
             match self.take() {
                 Err(SolverError::NotReady { killed: true, .. }) if losses.killed() => {}
                 taken => break taken?,
             }
         };
-        let description = seated.instance.describe()?;
-        self.give_back(seated);
+        let description = pinned.instance.describe()?;
+        self.give_back(pinned);
         Ok(description)
     }
 
@@ -102,39 +103,39 @@ impl Adapter for Grpc {
         let patience = Duration::try_from_secs_f64(self.def.timeout).unwrap_or(Duration::MAX);
         let mut losses = Losses::default();
         loop {
-            let mut seated = match self.take() {
-                Ok(seated) => seated,
+            let mut pinned = match self.take() {
+                Ok(pinned) => pinned,
                 Err(error) => {
                     let killed = matches!(error, SolverError::NotReady { killed: true, .. });
-                    let again = if killed { losses.killed() } else { losses.fell() };
+                    let retry = if killed { losses.killed() } else { losses.fell() };
                     // A program that is not even ready has not seen the parameters.
-                    if !again {
+                    if !retry {
                         return Err(ParticleError::Infrastructure(error.to_string()));
                     }
                     continue;
                 }
             };
-            match seated.instance.run(run, patience) {
+            match pinned.instance.run(run, patience) {
                 Ok(answer) => {
-                    let homeless = answer.is_err() && seated.instance.is_homeless();
+                    let homeless = answer.is_err() && pinned.instance.is_homeless();
                     if homeless && losses.killed() {
                         continue;
                     }
-                    self.give_back(seated);
+                    self.give_back(pinned);
                     return answer;
                 }
                 // The program is gone or of no more use: dropping it ends its whole group.
                 Err(lost) => {
-                    let again = match lost.how {
+                    let retry = match lost.how {
                         How::Silent | How::Stopped => false,
                         How::Fell => losses.fell(),
                         How::Killed => losses.killed(),
                     };
                     let times = losses.total() + u32::from(matches!(lost.how, How::Silent | How::Stopped));
                     let text = lost.text(times);
-                    drop(seated);
+                    drop(pinned);
                     tracing::warn!(particle = run.particle, record = run.record, times, "{text}");
-                    if !again {
+                    if !retry {
                         return Err(match lost.how {
                             How::Silent => Timeout { limit: self.def.timeout, says: text }.into(),
                             How::Fell => ParticleError::Undecided(text),
@@ -147,9 +148,9 @@ impl Adapter for Grpc {
     }
 
     fn run_and_leave(&self, run: &Run<'_>) -> bool {
-        let Ok(mut seated) = self.take() else { return false };
-        seated.instance.leave(run);
-        self.give_back(seated);
+        let Ok(mut pinned) = self.take() else { return false };
+        pinned.instance.leave(run);
+        self.give_back(pinned);
         true
     }
 }

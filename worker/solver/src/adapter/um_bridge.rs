@@ -16,7 +16,7 @@ use std::time::Duration;
 use serde_json::{Map, Value, json};
 use starlings_models::{Description, ParticleError, Quantity, Run, SOLVER, Solved, SolverDef, Spec, Timeout};
 
-use super::{Adapter, Kind};
+use super::Adapter;
 use crate::SolverError;
 use crate::losses::Losses;
 use crate::site::Site;
@@ -26,12 +26,13 @@ use client::Trouble;
 use pool::Pool;
 use server::Server;
 
-pub(crate) const KIND: Kind = Kind {
-    name: "um-bridge",
-    says: "a UM-Bridge server over HTTP, started by the worker or by somebody else",
-    asks: false,
-    open: |def, site| Ok(Box::new(UmBridge::new(def, site)?)),
-};
+/// Servers that the command of the definition starts, or one at its address.
+///
+/// # Errors
+/// When the study lacks what it needs.
+pub(super) fn open(def: &SolverDef, site: &Arc<Site>) -> Result<Box<dyn Adapter>, SolverError> {
+    Ok(Box::new(UmBridge::new(def, site)?))
+}
 
 /// Servers with one of their models.
 struct UmBridge {

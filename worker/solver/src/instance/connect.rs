@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 use starlings_models::{Description, SolverDef};
 use starlings_proto::convert::solver::SOLVER_PROTOCOL;
 use starlings_proto::convert::solver::description::decode_description;
-use starlings_proto::solver_wire::DescribeRequest;
-use starlings_proto::solver_wire::solver_client::SolverClient;
+use starlings_proto::generated_solver::DescribeRequest;
+use starlings_proto::generated_solver::solver_client::SolverClient;
 use starlings_proto::words::{causes, status_text};
 use starlings_proto::{FRAME_SIZE, LIFELINE};
 use tokio::runtime::Runtime;
@@ -24,7 +24,7 @@ use crate::scratch::Scratch;
 /// Variable that names the Unix socket on which a solver listens.
 pub const SOCKET: &str = "STARLINGS_SOLVER_SOCKET";
 /// Variable that names the loopback address on which a solver listens.
-pub const ADDRESS: &str = "STARLINGS_SOLVER_ADDRESS";
+pub(crate) const ADDRESS: &str = "STARLINGS_SOLVER_ADDRESS";
 
 /// HTTP/2 windows per stream and per connection, bytes: a state of many megabytes travels in one go.
 const WINDOWS: (u32, u32) = (64 * 1024 * 1024, 64 * 1024 * 1024);
@@ -34,13 +34,13 @@ const MAX_ANSWER: usize = i32::MAX as usize;
 const LOOK: Duration = Duration::from_millis(5);
 
 /// Where a program listens, and how it is told.
-pub(super) struct Place {
+pub(super) struct SolverAddress {
     pub(super) target: String,
     pub(super) environment: BTreeMap<String, String>,
     pub(super) command: Vec<String>,
 }
 
-impl Place {
+impl SolverAddress {
     pub(super) fn of(def: &SolverDef, command: &[String], scratch: &Scratch) -> std::io::Result<Self> {
         let mut environment = BTreeMap::from([(LIFELINE.to_owned(), "1".to_owned())]);
         let Some(address) = &def.address else {

@@ -8,9 +8,11 @@ use std::sync::Arc;
 use starlings_models::{Job, ModelDef, SOLVER, Setup, SolverDef, Window};
 use starlings_proto::convert::floats;
 use starlings_proto::convert::solver::SOLVER_PROTOCOL;
-use starlings_proto::solver_wire::run_reply::Kind;
-use starlings_proto::solver_wire::solver_server::{Solver, SolverServer};
-use starlings_proto::solver_wire::{DescribeRequest, Description, Finished, Quantity, RunReply, RunRequest};
+use starlings_proto::generated_solver::run_reply::Kind;
+use starlings_proto::generated_solver::solver_server::{Solver, SolverServer};
+use starlings_proto::generated_solver::{
+    DescribeRequest, Description, Finished, Quantity, RunReply, RunRequest,
+};
 use starlings_solver::{SiteOptions, Solvers};
 use tokio::net::UnixListener;
 use tokio_stream::wrappers::UnixListenerStream;

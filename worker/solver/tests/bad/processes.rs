@@ -59,12 +59,12 @@ fn misbehaving() {
 }
 
 /// A folder for one test and the solver that misbehaves in it.
-struct Place {
+struct Misbehaving {
     folder: tempfile::TempDir,
     def: SolverDef,
 }
 
-impl Place {
+impl Misbehaving {
     fn new(how: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let program = std::env::current_exe().unwrap().display().to_string();
@@ -126,7 +126,7 @@ fn wait_until(what: &str, mut ready: impl FnMut() -> bool) {
 
 #[test]
 fn a_solver_that_dies_on_every_run_is_told_with_its_ending_and_the_end_of_its_output() {
-    let place = Place::new("exits");
+    let place = Misbehaving::new("exits");
     let says = place.failure();
     let (sentence, tail) = says.split_once("; the end of its output:\n").unwrap();
     assert!(sentence.contains("exited with status 3 during a run (and 1 before, on the same run)"), "{says}");
@@ -136,7 +136,7 @@ fn a_solver_that_dies_on_every_run_is_told_with_its_ending_and_the_end_of_its_ou
 
 #[test]
 fn garbage_on_both_outputs_disturbs_no_run() {
-    let place = Place::new("garbage");
+    let place = Misbehaving::new("garbage");
     let solvers = place.solvers();
     let forward = solvers.build(&setup(&solvers, &place.def)).unwrap();
     assert_eq!(forward.run(&job(None)).unwrap().outputs, [0.0; 6]);
@@ -146,14 +146,14 @@ fn garbage_on_both_outputs_disturbs_no_run() {
 
 #[test]
 fn values_that_are_not_finite_are_told_with_the_end_of_the_output() {
-    let says = Place::new("nan").failure();
+    let says = Misbehaving::new("nan").failure();
     assert!(says.contains("returned NaN: output `tip` is not a finite number at t = 0.1"), "{says}");
     assert!(says.contains("negative volume in element 12"), "{says}");
 }
 
 #[test]
 fn a_solver_that_eats_memory_meets_its_limit() {
-    let mut place = Place::new("eats");
+    let mut place = Misbehaving::new("eats");
     place.def.memory = Some(LITTLE);
     let says = place.failure();
     assert!(
@@ -164,7 +164,7 @@ fn a_solver_that_eats_memory_meets_its_limit() {
 
 #[test]
 fn a_solver_that_blocks_and_ignores_the_request_to_end_is_ended_with_its_group() {
-    let mut place = Place::new("hangs");
+    let mut place = Misbehaving::new("hangs");
     let blocking = "trap '' TERM INT HUP; echo $$ > \"$BAD_SOLVER_CHILDREN\"; \"$0\" \"$@\"; true";
     place.def.command.splice(0..0, ["sh", "-c", blocking].map(str::to_owned));
     place.def.timeout = 0.3;
@@ -177,7 +177,7 @@ fn a_solver_that_blocks_and_ignores_the_request_to_end_is_ended_with_its_group()
 
 #[test]
 fn children_that_a_solver_leaves_in_its_group_end_with_it() {
-    let place = Place::new("starts exec sleep 600");
+    let place = Misbehaving::new("starts exec sleep 600");
     let says = place.failure();
     assert!(says.contains("exited with status 3"), "{says}");
     assert_eq!(place.children().len(), 2, "one for each start");
@@ -186,7 +186,7 @@ fn children_that_a_solver_leaves_in_its_group_end_with_it() {
 
 #[test]
 fn a_child_that_left_the_group_and_holds_the_output_open_blocks_nobody() {
-    let place = Place::new("starts exec setsid sleep 600");
+    let place = Misbehaving::new("starts exec setsid sleep 600");
     let started = Instant::now();
     let says = place.failure();
     assert!(says.contains("exited with status 3") && says.contains("cannot factor the matrix"), "{says}");
@@ -205,7 +205,7 @@ fn guarding() {
 #[test]
 #[ignore = "the worker that another test kills"]
 fn working() {
-    let place = Place::new("hangs");
+    let place = Misbehaving::new("hangs");
     let program = std::env::current_exe().unwrap();
     let guarding = ["--ignored", "--exact", "processes::guarding", "--nocapture"].map(str::to_owned).to_vec();
     let scratch = Some(PathBuf::from(std::env::var("SCRATCH").unwrap()));

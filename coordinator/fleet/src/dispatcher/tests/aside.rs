@@ -32,7 +32,7 @@ fn a_worker_that_was_set_aside_is_tried_with_one_job_and_gets_all_again_when_it_
     let jobs = stage.jobs(submit(3));
     stage.step(ran(jobs[0].0, Err(place("no licence"))));
     for (lease, _) in &jobs[1..] {
-        stage.step(answered(*lease, Answer::Withdrawn, 0.0));
+        stage.step(answered(*lease, LeaseOutcome::Withdrawn, 0.0));
     }
     let tried = sent(&stage.seconds(1, &[1]));
     assert_eq!(tried.len(), 1, "one job to try it");

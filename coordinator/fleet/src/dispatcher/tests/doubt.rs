@@ -6,9 +6,9 @@ use super::*;
 fn parked() -> (Stage, Lease) {
     let mut stage = Stage::with(&[2]);
     let jobs = stage.jobs(submit(2));
-    let again = stage.jobs(ran(jobs[0].0, Err(crash("signal 11"))));
-    assert_eq!(again.len(), 1, "the only worker tries it once more");
-    let commands = stage.step(ran(again[0].0, Err(crash("signal 11"))));
+    let retried = stage.jobs(ran(jobs[0].0, Err(crash("signal 11"))));
+    assert_eq!(retried.len(), 1, "the only worker tries it once more");
+    let commands = stage.step(ran(retried[0].0, Err(crash("signal 11"))));
     assert!(sent(&commands).is_empty() && controls(&commands).is_empty(), "nothing is known to work yet");
     (stage, jobs[1].0)
 }
@@ -60,8 +60,8 @@ fn a_control_run_that_fails_sets_the_worker_aside_and_the_job_runs_elsewhere() {
 #[test]
 fn a_crash_where_nothing_else_works_ends_the_batch_with_its_words() {
     let (mut stage, second) = parked();
-    let again = stage.jobs(ran(second, Err(crash("signal 11"))));
-    let ended = stage.step(ran(again[0].0, Err(crash("signal 6"))));
+    let retried = stage.jobs(ran(second, Err(crash("signal 11"))));
+    let ended = stage.step(ran(retried[0].0, Err(crash("signal 6"))));
     let error = BatchError::NoControl {
         index: 0,
         particle: 0,
@@ -78,8 +78,8 @@ fn a_run_that_worked_in_the_batch_before_is_a_control_run_in_the_next_of_the_sam
     let first = stage.jobs(submit(1));
     stage.step(ran(first[0].0, Ok(prediction(0))));
     let jobs = stage.jobs(submit(1));
-    let again = stage.jobs(ran(jobs[0].0, Err(crash("signal 11"))));
-    assert_eq!(controls(&stage.step(ran(again[0].0, Err(crash("signal 11"))))).len(), 1);
+    let retried = stage.jobs(ran(jobs[0].0, Err(crash("signal 11"))));
+    assert_eq!(controls(&stage.step(ran(retried[0].0, Err(crash("signal 11"))))).len(), 1);
     // Another window: what worked before says nothing of it, and is forgotten.
     let name = JobName { particle: 0, record: 0, span: [1, 2] };
     let commands = stage.step(Event::Submit { jobs: vec![(SETUP, name)] });
@@ -91,10 +91,10 @@ fn a_crash_is_tried_on_another_worker_first_and_controlled_there() {
     let mut stage = Stage::with(&[1, 1]);
     let jobs = stage.jobs(submit(2));
     stage.step(ran(jobs[1].0, Ok(prediction(1))));
-    let again = stage.jobs(ran(jobs[0].0, Err(crash("signal 11"))));
-    assert_ne!(again[0].0.epoch, jobs[0].0.epoch);
-    let control = controls(&stage.step(ran(again[0].0, Err(crash("signal 11")))))[0].0;
-    assert_eq!(control.epoch, again[0].0.epoch);
+    let retried = stage.jobs(ran(jobs[0].0, Err(crash("signal 11"))));
+    assert_ne!(retried[0].0.epoch, jobs[0].0.epoch);
+    let control = controls(&stage.step(ran(retried[0].0, Err(crash("signal 11")))))[0].0;
+    assert_eq!(control.epoch, retried[0].0.epoch);
 }
 
 /// What a batch ends with where every run crashes from now on, and after how many runs and seconds.

@@ -18,7 +18,7 @@ fn outcomes_come_in_job_order_whatever_the_order_of_answers() {
     jobs.reverse();
     let mut last = vec![];
     for (lease, index) in jobs {
-        last = stage.step(answered(lease, Answer::Ran(Ok(prediction(index))), 1.0));
+        last = stage.step(answered(lease, LeaseOutcome::Ran(Ok(prediction(index))), 1.0));
     }
     let outcomes = outcomes(&last).expect("the last answer ends the batch");
     let results = outcomes.iter().map(|o| o.result.clone().unwrap().outputs[0]).collect::<Vec<_>>();
@@ -31,11 +31,11 @@ fn long_jobs_are_held_two_per_slot_and_short_ones_sixty_four() {
     let mut stage = Stage::with(&[2]);
     let jobs = stage.jobs(submit(1000));
     assert_eq!(jobs.len(), 4, "two per slot before anything is measured");
-    let next = stage.jobs(answered(jobs[0].0, Answer::Ran(Ok(prediction(0))), 3.0));
+    let next = stage.jobs(answered(jobs[0].0, LeaseOutcome::Ran(Ok(prediction(0))), 3.0));
     assert_eq!(next.len(), 1, "one answer frees one place");
     let mut stage = Stage::with(&[2]);
     let jobs = stage.jobs(submit(1000));
-    stage.jobs(answered(jobs[0].0, Answer::Ran(Ok(prediction(0))), 1e-6));
+    stage.jobs(answered(jobs[0].0, LeaseOutcome::Ran(Ok(prediction(0))), 1e-6));
     assert_eq!(stage.dispatcher.in_flight(WorkerId(1)), 128);
 }
 
@@ -47,7 +47,7 @@ fn a_setup_is_sent_once_per_worker_and_before_its_jobs() {
     assert_eq!(first, [Command::SendSetup { worker: WorkerId(1), setup: SETUP }]);
     let jobs = stage.jobs(Event::SetupDone { worker: WorkerId(1), setup: SETUP });
     assert_eq!(jobs.len(), 1);
-    stage.step(answered(jobs[0].0, Answer::Ran(Ok(prediction(0))), 1.0));
+    stage.step(answered(jobs[0].0, LeaseOutcome::Ran(Ok(prediction(0))), 1.0));
     assert_eq!(stage.step(submit(1)).len(), 1, "the second batch needs only its job");
 }
 
@@ -67,7 +67,7 @@ fn late_duplicate_and_foreign_answers_are_ignored() {
     let jobs = stage.jobs(submit(2));
     let (lease, _) = jobs[0];
     let late = |commands: Vec<Command>| matches!(commands.as_slice(), [Command::Notice(FleetEvent::LateAnswer { job, .. })] if *job == lease.job);
-    let ok = || Answer::Ran(Ok(prediction(9)));
+    let ok = || LeaseOutcome::Ran(Ok(prediction(9)));
     assert!(late(stage.step(answered(Lease { attempt: 2, ..lease }, ok(), 1.0))), "an attempt never started");
     let past = Lease { epoch: 99, ..lease };
     let from_past = Event::Answered { worker: WorkerId(lease.epoch), lease: past, answer: ok(), cost: 1.0 };
@@ -90,8 +90,8 @@ fn an_aborted_batch_calls_its_jobs_back_and_their_answers_only_free_the_slots() 
         [Command::Cancel { worker: WorkerId(1), leases }, Command::BatchFailed(BatchError::Cancelled)]
     );
     assert_eq!(stage.jobs(submit(5)), [], "both places are still held by withdrawn jobs");
-    stage.step(answered(jobs[0].0, Answer::Ran(Ok(prediction(0))), 1.0));
-    stage.step(answered(jobs[1].0, Answer::Withdrawn, 0.0));
+    stage.step(answered(jobs[0].0, LeaseOutcome::Ran(Ok(prediction(0))), 1.0));
+    stage.step(answered(jobs[1].0, LeaseOutcome::Withdrawn, 0.0));
     assert_eq!(stage.dispatcher.in_flight(WorkerId(1)), 2, "two jobs of the new batch");
 }
 

@@ -14,7 +14,7 @@ fn a_lost_worker_returns_all_its_leases() {
     let mut open = first.into_iter().filter(|(lease, _)| lease.epoch == 1).collect::<Vec<_>>();
     while let Some((lease, index)) = open.pop() {
         done += 1;
-        open.extend(stage.jobs(answered(lease, Answer::Ran(Ok(prediction(index))), 1.0)));
+        open.extend(stage.jobs(answered(lease, LeaseOutcome::Ran(Ok(prediction(index))), 1.0)));
     }
     assert_eq!(done, 4);
 }
@@ -71,7 +71,7 @@ fn a_worker_that_says_goodbye_counts_no_attempt() {
         stage.step(Event::Joined(joining(id, 1)));
         last = stage.jobs(Event::SetupDone { worker: WorkerId(id), setup: SETUP });
     }
-    let done = stage.step(answered(last[0].0, Answer::Ran(Ok(prediction(0))), 1.0));
+    let done = stage.step(answered(last[0].0, LeaseOutcome::Ran(Ok(prediction(0))), 1.0));
     assert_eq!(outcomes(&done).expect("done")[0].attempts, 1);
 }
 
@@ -79,10 +79,10 @@ fn a_worker_that_says_goodbye_counts_no_attempt() {
 fn a_model_failure_is_tried_once_more_on_another_worker() {
     let mut stage = Stage::with(&[1, 1]);
     let jobs = stage.jobs(submit(1));
-    let again = stage.jobs(answered(jobs[0].0, Answer::Ran(Err(solver("no"))), 1.0));
-    assert_eq!(again.len(), 1);
-    assert_ne!(again[0].0.epoch, jobs[0].0.epoch);
-    let done = stage.step(answered(again[0].0, Answer::Ran(Err(solver("no, again"))), 1.0));
+    let retried = stage.jobs(answered(jobs[0].0, LeaseOutcome::Ran(Err(solver("no"))), 1.0));
+    assert_eq!(retried.len(), 1);
+    assert_ne!(retried[0].0.epoch, jobs[0].0.epoch);
+    let done = stage.step(answered(retried[0].0, LeaseOutcome::Ran(Err(solver("no, again"))), 1.0));
     let outcome = &outcomes(&done).expect("a second failure ends it")[0];
     assert_eq!((outcome.result.clone(), outcome.attempts), (Err(failed("no, again").into()), 2));
 }
@@ -91,7 +91,7 @@ fn a_model_failure_is_tried_once_more_on_another_worker() {
 fn a_model_failure_on_the_only_worker_ends_at_once() {
     let mut stage = Stage::with(&[4]);
     let jobs = stage.jobs(submit(1));
-    let done = stage.step(answered(jobs[0].0, Answer::Ran(Err(solver("no"))), 1.0));
+    let done = stage.step(answered(jobs[0].0, LeaseOutcome::Ran(Err(solver("no"))), 1.0));
     assert_eq!(outcomes(&done).expect("ended")[0].result, Err(failed("no").into()));
 }
 
@@ -102,7 +102,10 @@ fn a_failed_job_does_not_wait_for_another_worker_that_left() {
     let on_first = jobs.iter().find(|(lease, _)| lease.epoch == 1).expect("spread").0;
     // The second worker is full, so the failed job waits for it; then it dies.
     assert!(
-        stage.jobs(answered(on_first, Answer::Ran(Err(solver("no"))), 1.0)).iter().all(|(l, _)| l.epoch == 1)
+        stage
+            .jobs(answered(on_first, LeaseOutcome::Ran(Err(solver("no"))), 1.0))
+            .iter()
+            .all(|(l, _)| l.epoch == 1)
     );
     let commands = stage.step(left(2, false));
     assert!(
@@ -128,7 +131,7 @@ fn a_job_that_does_not_fit_the_model_is_not_tried_elsewhere() {
     let mut stage = Stage::with(&[1, 1]);
     let jobs = stage.jobs(submit(1));
     let error = ParticleError::BadJob("three values, expected two".to_owned());
-    let done = stage.step(answered(jobs[0].0, Answer::Ran(Err(error.clone())), 1.0));
+    let done = stage.step(answered(jobs[0].0, LeaseOutcome::Ran(Err(error.clone())), 1.0));
     let reason =
         "given up after 1 attempt: the job does not fit the model: three values, expected two".to_owned();
     let ended = BatchError::NoAnswer { index: 0, particle: 0, record: 0, reason };

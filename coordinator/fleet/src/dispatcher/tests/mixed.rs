@@ -41,7 +41,7 @@ fn a_job_starts_as_soon_as_its_own_setup_is_built() {
     let jobs = stage.jobs(done(1, 2));
     assert_eq!(jobs.iter().map(|(_, index)| *index).collect::<Vec<_>>(), [1, 2], "those of the built setup");
     assert_eq!(stage.jobs(done(1, 1)), [], "both places are taken");
-    let next = stage.jobs(answered(jobs[0].0, Answer::Ran(Ok(prediction(1))), 1.0));
+    let next = stage.jobs(answered(jobs[0].0, LeaseOutcome::Ran(Ok(prediction(1))), 1.0));
     assert_eq!(next.iter().map(|(_, index)| *index).collect::<Vec<_>>(), [0], "the earliest job");
 }
 
@@ -64,7 +64,7 @@ fn a_waiting_job_is_not_called_back_for_an_idle_slot_without_its_setup() {
     let commands = stage.step(done(2, 2));
     assert_eq!(sent(&commands).len(), 1);
     let job = sent(&commands)[0].0;
-    let commands = stage.step(answered(job, Answer::Ran(Ok(prediction(2))), 1.0));
+    let commands = stage.step(answered(job, LeaseOutcome::Ran(Ok(prediction(2))), 1.0));
     let kept = Command::Keep { control: ControlId(1), index: 2 };
     assert_eq!(commands, [kept], "the idle worker could not run it");
     let commands = stage.step(done(2, 1));
@@ -90,7 +90,7 @@ fn a_setup_that_failed_matters_no_more_once_its_jobs_are_done() {
     stage.step(Event::LocalOnly);
     stage.step(submit_mixed(&[1, 2]));
     let jobs = stage.jobs(done(1, 1));
-    stage.step(answered(jobs[0].0, Answer::Ran(Ok(prediction(0))), 1.0));
+    stage.step(answered(jobs[0].0, LeaseOutcome::Ran(Ok(prediction(0))), 1.0));
     stage.step(Event::Joined(joining(2, 1)));
     let jobs = stage.jobs(done(2, 2));
     assert_eq!(jobs.len(), 1, "a late worker is sent only what is still needed, and runs it");
@@ -107,7 +107,7 @@ fn a_batch_that_waits_for_one_setup_says_which_worker_cannot_build_it_and_ends_w
         !stage.seconds(70, &[1]).iter().any(|c| matches!(c, Command::BatchFailed(_))),
         "a job is still being computed"
     );
-    stage.step(answered(jobs[0].0, Answer::Ran(Ok(prediction(0))), 1.0));
+    stage.step(answered(jobs[0].0, LeaseOutcome::Ran(Ok(prediction(0))), 1.0));
     let told = stage.seconds(3, &[1]);
     let why = |c: &Command| matches!(c, Command::Notice(FleetEvent::Waiting { missing, .. }) if missing == "the model cannot be built by w1 (no legs)");
     assert!(told.iter().any(why), "{told:?}");
@@ -124,7 +124,7 @@ fn setups_that_wait_behind_others_are_not_blamed_for_them() {
     let later = stage.seconds(50, &[1]);
     assert!(!later.iter().any(|c| matches!(c, Command::Notice(FleetEvent::SetupFailed { .. }))), "{later:?}");
     stage.step(done(1, 2));
-    stage.step(answered(jobs[0].0, Answer::Ran(Ok(prediction(0))), 1.0));
+    stage.step(answered(jobs[0].0, LeaseOutcome::Ran(Ok(prediction(0))), 1.0));
     let late = stage.seconds(60, &[1]);
     assert!(late.iter().any(|c| matches!(c, Command::Notice(FleetEvent::SetupFailed { .. }))), "{late:?}");
 }
@@ -136,12 +136,16 @@ fn a_worker_that_forgot_a_setup_is_sent_it_again_and_loses_no_job() {
     let jobs = stage.jobs(done(1, 1));
     assert_eq!(setups_sent(&stage.step(failed(1, 1, "it is forgotten"))), [(1, 1)]);
     for (lease, _) in &jobs {
-        assert_eq!(stage.jobs(answered(*lease, Answer::Withdrawn, 0.0)), [], "not before it is built again");
+        assert_eq!(
+            stage.jobs(answered(*lease, LeaseOutcome::Withdrawn, 0.0)),
+            [],
+            "not before it is built again"
+        );
     }
     let mut jobs = stage.jobs(done(1, 1));
     let mut last = vec![];
     while let Some((lease, index)) = jobs.pop() {
-        last = stage.step(answered(lease, Answer::Ran(Ok(prediction(index))), 1.0));
+        last = stage.step(answered(lease, LeaseOutcome::Ran(Ok(prediction(index))), 1.0));
         jobs.extend(sent(&last));
     }
     let attempts = outcomes(&last).expect("done").iter().map(|o| o.attempts).collect::<Vec<_>>();
@@ -154,6 +158,6 @@ fn a_failed_job_goes_to_another_worker_only_if_that_may_have_its_setup() {
     stage.step(submit_mixed(&[1, 2]));
     stage.step(failed(2, 1, "no legs"));
     let jobs = stage.jobs(done(1, 1));
-    let commands = stage.step(answered(jobs[0].0, Answer::Ran(Err(solver("no"))), 1.0));
+    let commands = stage.step(answered(jobs[0].0, LeaseOutcome::Ran(Err(solver("no"))), 1.0));
     assert!(commands.iter().any(|c| matches!(c, Command::GivenUp { .. })), "{commands:?}");
 }

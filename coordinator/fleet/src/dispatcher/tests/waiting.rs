@@ -102,7 +102,7 @@ fn a_job_that_does_not_come_back_is_named_with_its_worker_at_doubled_times() {
     for (usual, first) in [(1.0, 30), (6.0, 60)] {
         let mut stage = Stage::with(&[1, 1]);
         let jobs = stage.jobs(submit(2));
-        stage.step(answered(jobs[0].0, Answer::Ran(Ok(prediction(0))), usual));
+        stage.step(answered(jobs[0].0, LeaseOutcome::Ran(Ok(prediction(0))), usual));
         // The first tick sees it running.
         stage.seconds(1, &[1, 2]);
         assert_eq!(waits(&stage.seconds(first - 1, &[1, 2])), [] as [String; 0]);
@@ -112,7 +112,7 @@ fn a_job_that_does_not_come_back_is_named_with_its_worker_at_doubled_times() {
         assert_eq!(told, std::slice::from_ref(&expected));
         assert_eq!(waits(&stage.seconds(first - 1, &[1, 2])), [] as [String; 0]);
         assert_eq!(waits(&stage.seconds(1, &[1, 2])), [expected]);
-        let done = stage.step(answered(jobs[1].0, Answer::Ran(Ok(prediction(1))), 1.0));
+        let done = stage.step(answered(jobs[1].0, LeaseOutcome::Ran(Ok(prediction(1))), 1.0));
         assert!(outcomes(&done).is_some(), "it was not ended");
     }
 }

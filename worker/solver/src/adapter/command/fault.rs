@@ -1,6 +1,6 @@
 //! What can be wrong with what a program wrote; every sentence names the file and what to look at.
 //!
-//! Next file to read: [`super::answer`].
+//! Next file to read: [`super::results`].
 
 /// Why an output cannot be read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -1,7 +1,7 @@
 //! JSON as programs write it, and the numbers of an output in it.
 //!
 //! Many languages write numbers that are not finite as bare `NaN` and `Infinity`, which JSON does not have; they are read as
-//! `null`, which is NaN here. Next file to read: [`super::answer`].
+//! `null`, which is NaN here. Next file to read: [`super::results`].
 
 use serde_json::Value;
 use starlings_models::nearest;

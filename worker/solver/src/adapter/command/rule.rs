@@ -1,7 +1,7 @@
 //! Where an output is found in what a program wrote.
 //!
 //! A rule is one line of the study, such as `csv:result.csv:tip`; without one an output is a key of the JSON object on standard
-//! output. Nothing is read here. Next file to read: [`super::answer`], which follows the rules.
+//! output. Nothing is read here. Next file to read: [`super::results`], which follows the rules.
 
 use std::path::{Component, Path};
 

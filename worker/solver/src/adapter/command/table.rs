@@ -1,6 +1,6 @@
 //! Numbers in tables: files of separated values with a heading, and columns of plain text.
 //!
-//! Next file to read: [`super::answer`].
+//! Next file to read: [`super::results`].
 
 use starlings_models::{Signal, nearest};
 

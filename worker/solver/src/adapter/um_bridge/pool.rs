@@ -9,8 +9,8 @@ use starlings_models::SolverDef;
 use super::server::Server;
 use crate::SolverError;
 use crate::backoff::Backoff;
+use crate::core_slots::{CoreSlot, CoreSlots};
 use crate::losses::Losses;
-use crate::seats::{Seat, Seats};
 use crate::site::Site;
 
 /// Servers of one definition.
@@ -20,21 +20,21 @@ pub(super) struct Pool {
     /// Servers that nobody uses; at a fixed address the one that everybody uses.
     kept: Mutex<Vec<Taken>>,
     backoff: Mutex<Backoff>,
-    seats: Seats,
+    core_slots: CoreSlots,
 }
 
-/// A server in use, and the number by which its program found its cores.
+/// A server in use, and the slot of cores that its program is bound to.
 #[derive(Clone)]
 pub(super) struct Taken {
     pub(super) server: Arc<Server>,
-    _seat: Arc<Seat>,
+    _core_slot: Arc<CoreSlot>,
 }
 
 impl Pool {
     /// Nothing is started yet.
     pub(super) fn new(def: &SolverDef, site: &Arc<Site>) -> Self {
-        let (kept, backoff, seats) = (Mutex::default(), Mutex::default(), Seats::default());
-        Self { def: def.clone(), site: Arc::clone(site), kept, backoff, seats }
+        let (kept, backoff, core_slots) = (Mutex::default(), Mutex::default(), CoreSlots::default());
+        Self { def: def.clone(), site: Arc::clone(site), kept, backoff, core_slots }
     }
 
     /// Whether all slots share one server.
@@ -71,10 +71,10 @@ impl Pool {
     }
 
     fn started(&self) -> Result<Taken, SolverError> {
-        let seat = self.seats.take();
+        let core_slot = self.core_slots.take();
         // A server for all slots may use all cores.
         let is_bound = self.def.pin && !self.is_shared();
-        let cores = is_bound.then(|| self.site.cores(seat.number(), self.def.threads));
+        let cores = is_bound.then(|| self.site.cores(core_slot.number(), self.def.threads));
         let mut losses = Losses::default();
         loop {
             let pause = self.backoff.lock().unwrap_or_else(PoisonError::into_inner).pause();
@@ -84,7 +84,7 @@ impl Pool {
             match started {
                 Ok(server) => {
                     backoff.worked();
-                    return Ok(Taken { server: Arc::new(server), _seat: Arc::new(seat) });
+                    return Ok(Taken { server: Arc::new(server), _core_slot: Arc::new(core_slot) });
                 }
                 Err(error) => {
                     backoff.failed();

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use proptest::prelude::*;
 use starlings_models::{ParticleError, Prediction, Timeout};
-use starlings_proto::{Answer, Lease, SetupId};
+use starlings_proto::{Lease, LeaseOutcome, SetupId};
 
 use super::super::{RULES, answered, crash, joining, left, place, prediction, setup, solver, submit_mixed};
 use crate::Outcome;
@@ -146,7 +146,7 @@ impl World {
         self.event(Event::Joined(joining(self.next_id, slots)));
     }
 
-    pub(super) fn answer(&mut self, which: usize, answer: impl FnOnce(usize) -> Answer, cost: f64) {
+    pub(super) fn answer(&mut self, which: usize, answer: impl FnOnce(usize) -> LeaseOutcome, cost: f64) {
         let Some((&key, &(lease, index))) = pick(&self.open, which) else { return };
         self.open.remove(&key);
         self.controls.remove(&key);
@@ -194,18 +194,18 @@ impl World {
             Act::Answer(which, cost) => match pick(&self.open, which) {
                 // A called-back job may come back unstarted.
                 Some((_, (lease, _))) if self.withdrawn.contains(lease) && which % 2 == 0 => {
-                    self.answer(which, |_| Answer::Withdrawn, 0.0);
+                    self.answer(which, |_| LeaseOutcome::Withdrawn, 0.0);
                 }
-                _ => self.answer(which, |index| Answer::Ran(Ok(prediction(index))), cost),
+                _ => self.answer(which, |index| LeaseOutcome::Ran(Ok(prediction(index))), cost),
             },
-            Act::Fail(which) => self.answer(which, |_| Answer::Ran(Err(solver("no"))), 1.0),
-            Act::Crash(which) => self.answer(which, |_| Answer::Ran(Err(crash("crash"))), 1.0),
-            Act::Place(which) => self.answer(which, |_| Answer::Ran(Err(place("disk full"))), 1.0),
-            Act::Late(which) => self.answer(which, |_| Answer::Ran(Err(late().into())), 1.0),
+            Act::Fail(which) => self.answer(which, |_| LeaseOutcome::Ran(Err(solver("no"))), 1.0),
+            Act::Crash(which) => self.answer(which, |_| LeaseOutcome::Ran(Err(crash("crash"))), 1.0),
+            Act::Place(which) => self.answer(which, |_| LeaseOutcome::Ran(Err(place("disk full"))), 1.0),
+            Act::Late(which) => self.answer(which, |_| LeaseOutcome::Ran(Err(late().into())), 1.0),
             Act::Repeat(which) => {
                 if !self.past.is_empty() {
                     let lease = self.past[which % self.past.len()];
-                    self.event(answered(lease, Answer::Ran(Ok(prediction(usize::MAX))), 1.0));
+                    self.event(answered(lease, LeaseOutcome::Ran(Ok(prediction(usize::MAX))), 1.0));
                 }
             }
             Act::Wait(seconds) => {
@@ -224,7 +224,7 @@ impl World {
         let Some((&key, _)) = pick(&self.open, which) else { return };
         let is_control = self.controls.contains(&key);
         let end = |index: usize| if is_control { Ok(prediction(index)) } else { ends(index) };
-        self.answer(which, |index| Answer::Ran(end(index)), 1.0);
+        self.answer(which, |index| LeaseOutcome::Ran(end(index)), 1.0);
     }
 
     /// From here on the world is kind: one good worker, prompt answers.

@@ -1,25 +1,30 @@
 //! Predicted against measured, over time.
 
-use plotters::style::RGBColor;
+use crate::data::{ChannelPlot, ReportData};
+use crate::page::outputs::{Output, examples, outputs};
+use crate::plot::axis::Axis;
+use crate::plot::figure::{Figure, with_unit};
+use crate::plot::mark::Mark;
+use crate::plot::measured::{measured, measured_key, spans};
+use crate::plot::palette::{BLUE, INK, VERMILION};
+use crate::plot::scene::Scene;
+use crate::plot::thin;
+use crate::{ReportError, number};
 
-use super::super::data::ChannelPlot;
-use super::super::{ReportError, number};
-use super::axis::Axis;
-use super::figure::{Figure, with_unit};
-use super::mark::Mark;
-use super::palette::{BLUE, INK, MUTED, SHADE, VERMILION};
-use super::scene::Scene;
-use super::thin;
-
-/// At most this many measured values are drawn as dots.
-const DOTS: usize = 160;
-
-/// Draws one channel of one record.
+/// One figure per scalar output; of a field the first, the middle and the last component.
 ///
 /// # Errors
 ///
-/// The figure cannot be drawn.
-pub(crate) fn figure(channel: &ChannelPlot, time_unit: &str) -> Result<Figure, ReportError> {
+/// A figure cannot be drawn.
+pub(super) fn figures(data: &ReportData) -> Result<Vec<Figure>, ReportError> {
+    let shown = outputs(data).into_iter().flat_map(|output| match output {
+        Output::Scalar(channel) => vec![channel],
+        Output::Field(_, components) => examples(&components).to_vec(),
+    });
+    shown.map(|channel| figure(channel, &data.time_unit)).collect()
+}
+
+fn figure(channel: &ChannelPlot, time_unit: &str) -> Result<Figure, ReportError> {
     let mut keys = vec![(measured_key(&channel.time), "measured")];
     if trained(channel).is_some() {
         keys.extend([("line blue", "predicted, training"), ("area shade", "training span")]);
@@ -51,48 +56,6 @@ pub(crate) fn scene(channel: &ChannelPlot, time_unit: &str) -> Scene {
         y,
         marks,
     }
-}
-
-/// The training span and the words above both spans.
-pub(crate) fn spans(trained: Option<[f64; 2]>, x: &Axis) -> Vec<Mark> {
-    let Some([from, to]) = trained else {
-        return vec![Mark::Heading { x: x.lo, text: "held out".to_owned(), colour: VERMILION }];
-    };
-    let (from, to) = (from.clamp(x.lo, x.hi), to.clamp(x.lo, x.hi));
-    let mut marks = vec![Mark::Span { from, to, colour: SHADE }];
-    let room = |width: f64| width > 0.22 * (x.hi - x.lo);
-    if room(to - from) {
-        marks.push(Mark::Heading { x: from, text: "training".to_owned(), colour: MUTED });
-    }
-    if room(x.hi - to) {
-        marks.push(Mark::Heading { x: to, text: "held out".to_owned(), colour: VERMILION });
-    }
-    marks
-}
-
-/// Measured values: dots when they are few, otherwise a curve.
-pub(crate) fn measured(time: &[f64], value: &[f64], colour: RGBColor) -> Vec<Mark> {
-    let known: Vec<_> = time.iter().copied().zip(value.iter().copied()).filter(|p| p.1.is_finite()).collect();
-    if drawn_as_dots(time) {
-        return vec![Mark::Dots { points: known, colour, radius: 2.25 }];
-    }
-    thin::parts(time, value, value)
-        .iter()
-        .map(|part| match thin::curve(part) {
-            points if points.len() < 2 => Mark::Dots { points, colour, radius: 1.75 },
-            points => Mark::Line { points, colour, width: 1.25 },
-        })
-        .collect()
-}
-
-/// Whether [`measured`] draws a series at these times as dots.
-pub(crate) fn drawn_as_dots(time: &[f64]) -> bool {
-    time.len() <= DOTS
-}
-
-/// The legend's sample for what [`measured`] draws in ink.
-pub(crate) fn measured_key(time: &[f64]) -> &'static str {
-    if drawn_as_dots(time) { "dot ink" } else { "line ink" }
 }
 
 /// The training span of a channel that was fitted.

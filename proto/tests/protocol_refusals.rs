@@ -5,16 +5,16 @@ use std::sync::Arc;
 
 use starlings_models::{Job, Prediction, Setup, Signal, Window};
 use starlings_proto::{
-    Answer, FromWorker, JobEncoder, Lease, MAX_INLINE_STATE, MAX_SLOTS, ReceivedWindows, SentWindows,
-    ToWorker, WireError, convert::job::check_size, encode_setup, wire,
+    FromWorker, JobEncoder, Lease, LeaseOutcome, MAX_INLINE_STATE, MAX_SLOTS, ProtocolError, ReceivedWindows,
+    SentWindows, ToWorker, convert::job::check_size, encode_setup, generated,
 };
 
 /// The message of a job whose window travels inside it.
-fn encode(lease: Lease, job: &Job) -> wire::ToWorker {
+fn encode(lease: Lease, job: &Job) -> generated::ToWorker {
     JobEncoder::default().encode(lease, &[0; 32], job, &mut SentWindows::default()).1
 }
 
-fn decode(message: wire::ToWorker) -> Result<ToWorker, WireError> {
+fn decode(message: generated::ToWorker) -> Result<ToWorker, ProtocolError> {
     ToWorker::decode(message, &mut ReceivedWindows::default())
 }
 
@@ -27,7 +27,7 @@ fn small_job() -> Job {
 fn a_setup_with_an_infinite_constant_is_refused_before_it_travels() {
     let mut setup = Setup::default();
     setup.model.constants.insert("R".to_owned(), f64::INFINITY);
-    assert!(matches!(encode_setup(&setup), Err(WireError::Setup(_))));
+    assert!(matches!(encode_setup(&setup), Err(ProtocolError::Setup(_))));
 }
 
 #[test]
@@ -41,38 +41,38 @@ fn a_state_beyond_the_limit_is_refused_on_both_sides() {
 
     let lease = Lease { epoch: 1, job: 1, attempt: 1 };
     let sent = encode(lease, &job);
-    assert!(matches!(decode(sent), Err(WireError::Job { lease: l, .. }) if l == lease));
+    assert!(matches!(decode(sent), Err(ProtocolError::Job { lease: l, .. }) if l == lease));
     let prediction = Prediction { outputs: vec![], state: job.state.unwrap(), cost: 0.0 };
-    let result = FromWorker::Result { lease, answer: Answer::Ran(Ok(prediction)), cost: 0.0 };
-    assert!(matches!(result.encode(), Err(WireError::StateTooLarge { .. })));
+    let result = FromWorker::Result { lease, answer: LeaseOutcome::Ran(Ok(prediction)), cost: 0.0 };
+    assert!(matches!(result.encode(), Err(ProtocolError::StateTooLarge { .. })));
 }
 
 #[test]
 fn a_malformed_job_names_its_lease_so_that_it_can_be_answered() {
     let lease = Lease { epoch: 1, job: 9, attempt: 1 };
     let sent = encode(lease, &small_job());
-    let Some(wire::to_worker::Kind::Job(good)) = sent.kind else { panic!("a job is encoded as a job") };
-    let without_times = wire::Window { start: Some(0.0), ..wire::Window::default() };
-    let spoil: [&dyn Fn(&mut wire::Job); 4] = [
+    let Some(generated::to_worker::Kind::Job(good)) = sent.kind else { panic!("a job is encoded as a job") };
+    let without_times = generated::Window { start: Some(0.0), ..generated::Window::default() };
+    let spoil: [&dyn Fn(&mut generated::Job); 4] = [
         &|job| job.theta = vec![1, 2, 3].into(),
         &|job| job.setup = vec![0; 31].into(),
         &|job| job.over = None,
-        &|job| job.over = Some(wire::job::Over::Window(without_times.clone())),
+        &|job| job.over = Some(generated::job::Over::Window(without_times.clone())),
     ];
     for damage in spoil {
         let mut job = good.clone();
         damage(&mut job);
-        let message = wire::ToWorker { kind: Some(wire::to_worker::Kind::Job(job)) };
-        assert!(matches!(decode(message), Err(WireError::Job { lease: l, .. }) if l == lease));
+        let message = generated::ToWorker { kind: Some(generated::to_worker::Kind::Job(job)) };
+        assert!(matches!(decode(message), Err(ProtocolError::Job { lease: l, .. }) if l == lease));
     }
 }
 
 #[test]
 fn a_worker_without_slots_or_with_too_many_is_malformed() {
     for slots in [0, MAX_SLOTS as u32 + 1, u32::MAX] {
-        let hello = wire::Hello { slots, ..wire::Hello::default() };
-        let message = wire::FromWorker { kind: Some(wire::from_worker::Kind::Hello(hello)) };
-        assert!(matches!(FromWorker::decode(message), Err(WireError::Shape { field: "slots", .. })));
+        let hello = generated::Hello { slots, ..generated::Hello::default() };
+        let message = generated::FromWorker { kind: Some(generated::from_worker::Kind::Hello(hello)) };
+        assert!(matches!(FromWorker::decode(message), Err(ProtocolError::Shape { field: "slots", .. })));
     }
 }
 
@@ -86,6 +86,6 @@ fn a_window_that_no_worker_would_take_is_refused_before_it_travels() {
     for damage in spoil {
         let mut job = small_job();
         damage(Arc::make_mut(&mut job.window));
-        assert!(matches!(check_size(&job), Err(WireError::Shape { .. })), "{job:?}");
+        assert!(matches!(check_size(&job), Err(ProtocolError::Shape { .. })), "{job:?}");
     }
 }

@@ -1,4 +1,4 @@
-//! A model behind the wire of external solvers gives what it gives in this process.
+//! A model behind the protocol of external solvers gives what it gives in this process.
 
 #![allow(clippy::unwrap_used)] // a failed unwrap is a failed test
 
@@ -41,7 +41,7 @@ fn served(folder: &Path) -> (Solvers, SolverDef) {
     (Solvers::new(SiteOptions::default()), SolverDef { address, ..SolverDef::default() })
 }
 
-/// The native setup and the same one behind the wire.
+/// The native setup and the same one behind the protocol.
 fn both(solvers: &Solvers, def: &SolverDef, effects: Vec<EffectDef>) -> (Box<dyn Forward>, Box<dyn Forward>) {
     let names = effects.iter().flat_map(|e| e.parameters.iter().map(|p| p.name.clone()));
     let native = Setup {

@@ -1,17 +1,22 @@
 //! Residuals over operating regions: bars over the bins of one signal, a map over the bins of two.
 //!
-//! The same map before and after the effects is drawn on the same scale, so that the eye may compare. Next file to read:
+//! The same map before and after the effects is drawn on the same scale, so that both can be compared. Next file to read:
 //! `force.rs`.
 
+use starlings_explain::Figures;
 use starlings_explain::locate::RegionMap;
+use starlings_explain::result::Explanation;
 
-use super::super::ReportError;
-use super::super::number::{self, quantity};
-use super::axis::Axis;
-use super::figure::{Figure, with_unit};
-use super::mark::Mark;
-use super::palette::{BLUE, GREEN, GREY, INK, MUTED, VERMILION};
-use super::scene::Scene;
+use crate::ReportError;
+use crate::number::{self, quantity};
+use crate::plot::axis::Axis;
+use crate::plot::figure::{Figure, with_unit};
+use crate::plot::mark::Mark;
+use crate::plot::palette::{BLUE, GREEN, GREY, INK, MUTED, VERMILION};
+use crate::plot::scene::Scene;
+
+/// Maps drawn at most.
+const MAPS: usize = 10;
 
 /// One bin with values.
 #[derive(Debug, Clone, Copy)]
@@ -30,16 +35,30 @@ impl Bin {
     }
 }
 
-/// Draws `map`, on the scale of all of `alike`; `None` when it has no bin with values.
+/// The maps that account for most of the residuals, each beside itself with the effects.
 ///
 /// # Errors
 ///
-/// The figure cannot be drawn.
-pub(crate) fn figure(
-    map: &RegionMap,
-    when: &str,
-    alike: &[&RegionMap],
-) -> Result<Option<Figure>, ReportError> {
+/// A figure cannot be drawn.
+pub(super) fn figures(_: &Explanation, data: &Figures) -> Result<Vec<Figure>, ReportError> {
+    let mut order: Vec<&RegionMap> = data.before.maps.iter().collect();
+    order.sort_by(|a, b| b.explained.total_cmp(&a.explained));
+    let mut figures = Vec::new();
+    for before in order.into_iter().take(MAPS) {
+        let same = |m: &&RegionMap| m.channel == before.channel && m.x == before.x && m.y == before.y;
+        let after = data.maps_after.iter().find(same);
+        let alike: Vec<&RegionMap> = [Some(before), after].into_iter().flatten().collect();
+        let word = if after.is_some() { "before" } else { "the model as it is" };
+        figures.extend(figure(before, word, &alike)?);
+        if let Some(after) = after {
+            figures.extend(figure(after, "after", &alike)?);
+        }
+    }
+    Ok(figures)
+}
+
+/// Draws `map`, on the scale of all of `alike`; `None` when it has no bin with values.
+fn figure(map: &RegionMap, when: &str, alike: &[&RegionMap]) -> Result<Option<Figure>, ReportError> {
     let bins = bins(map);
     if bins.is_empty() {
         return Ok(None);

@@ -1,13 +1,16 @@
 //! What the search finds where nothing is missing, beside what it found in the data.
 //!
-//! Next file to read: `meter.rs`.
+//! Next file to read: `course.rs`.
 
-use super::super::{ReportError, number};
-use super::axis::Axis;
-use super::figure::Figure;
-use super::mark::Mark;
-use super::palette::{BLUE, GREY, INK, VERMILION};
-use super::scene::Scene;
+use starlings_explain::Figures;
+use starlings_explain::result::Explanation;
+
+use crate::plot::axis::Axis;
+use crate::plot::figure::Figure;
+use crate::plot::mark::Mark;
+use crate::plot::palette::{BLUE, GREY, INK, VERMILION};
+use crate::plot::scene::Scene;
+use crate::{ReportError, number};
 
 /// Bins over the whole axis.
 const BINS: usize = 30;
@@ -18,23 +21,34 @@ const FAR: f64 = 12.0;
 
 /// The gains of one search: falls of χ² in units of the effective noise.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Gains<'a> {
+struct Gains<'a> {
     /// Largest gain in each simulation without a gap.
-    pub(crate) null: &'a [f64],
+    null: &'a [f64],
     /// Gains of the decoys.
-    pub(crate) decoys: &'a [f64],
+    decoys: &'a [f64],
     /// Gain of the best candidate in the data.
-    pub(crate) best: f64,
+    best: f64,
     /// What a gain must exceed.
-    pub(crate) threshold: f64,
+    threshold: f64,
 }
 
-/// Draws the histogram; `None` without any simulation or decoy.
+/// One histogram; none without any simulation or decoy.
 ///
 /// # Errors
 ///
-/// The figure cannot be drawn.
-pub(crate) fn figure(gains: &Gains<'_>) -> Result<Option<Figure>, ReportError> {
+/// A figure cannot be drawn.
+pub(super) fn figures(found: &Explanation, data: &Figures) -> Result<Vec<Figure>, ReportError> {
+    let gains = Gains {
+        null: &data.null_gains,
+        decoys: &data.decoy_gains,
+        best: data.best_gain,
+        threshold: found.false_alarm.threshold,
+    };
+    Ok(figure(&gains)?.into_iter().collect())
+}
+
+/// Draws the histogram; `None` without any simulation or decoy.
+fn figure(gains: &Gains<'_>) -> Result<Option<Figure>, ReportError> {
     let chance: Vec<f64> =
         gains.null.iter().chain(gains.decoys).copied().filter(|gain| gain.is_finite()).collect();
     if chance.is_empty() {

@@ -1,23 +1,59 @@
 //! Measured against simulated without and with the added effects, and the residuals of both.
 //!
-//! What an effect is worth is seen where the fit never looked. Next file to read: `region.rs`.
+//! The effect is judged by the held-out span and channels, which no fit has seen. Next file to read: `region.rs`.
 
-use starlings_explain::Curve;
+use starlings_explain::result::{Explanation, GapRow};
+use starlings_explain::{Curve, Figures};
+use starlings_study::field::component_of;
 
-use super::super::ReportError;
-use super::axis::Axis;
-use super::figure::{Figure, with_unit};
-use super::fit::{drawn_as_dots, measured, measured_key, spans};
-use super::mark::Mark;
-use super::palette::{BLUE, GREEN, INK, MUTED, VERMILION};
-use super::scene::Scene;
+use crate::ReportError;
+use crate::explain::gap::{rows, words};
+use crate::number::quantity;
+use crate::plot::axis::Axis;
+use crate::plot::figure::{Figure, with_unit};
+use crate::plot::mark::Mark;
+use crate::plot::measured::{drawn_as_dots, measured, measured_key, spans};
+use crate::plot::palette::{BLUE, GREEN, INK, MUTED, VERMILION};
+use crate::plot::scene::Scene;
 
-/// Draws one channel of one record; `numbers` is the sentence with its errors.
+/// Curves drawn at most.
+const CURVES: usize = 24;
+/// Observed components up to which every one of a field is drawn by itself.
+const FEW: usize = 3;
+
+/// Of every curve that is drawn the values and the residuals.
 ///
 /// # Errors
 ///
-/// The figure cannot be drawn.
-pub(crate) fn values(curve: &Curve, time_unit: &str, numbers: &str) -> Result<Figure, ReportError> {
+/// A figure cannot be drawn.
+pub(super) fn figures(found: &Explanation, data: &Figures) -> Result<Vec<Figure>, ReportError> {
+    let rows = rows(found, data);
+    let mut figures = Vec::new();
+    for curve in shown(&data.curves).into_iter().take(CURVES) {
+        figures.push(values(curve, &data.time_unit, &numbers(curve, &rows))?);
+        figures.push(residuals(curve, &data.time_unit)?);
+    }
+    Ok(figures)
+}
+
+/// How many curves are not drawn.
+pub(in crate::explain) fn left_out(data: &Figures) -> usize {
+    data.curves.len().saturating_sub(shown(&data.curves).len().min(CURVES))
+}
+
+/// The curves that are drawn: of a field its first, middle and last component.
+fn shown(curves: &[Curve]) -> Vec<&Curve> {
+    let field = |c: &Curve| component_of(&c.channel).map(|(field, _)| field.to_owned());
+    let groups = curves.chunk_by(|a, b| a.record == b.record && field(a).is_some() && field(a) == field(b));
+    let pick = |group: &'_ [Curve]| -> Vec<usize> {
+        let n = group.len();
+        if n > FEW { vec![0, n / 2, n - 1] } else { (0..n).collect() }
+    };
+    groups.flat_map(|group| pick(group).into_iter().map(move |k| &group[k])).collect()
+}
+
+/// Draws one channel of one record; `numbers` is the sentence with its errors.
+fn values(curve: &Curve, time_unit: &str, numbers: &str) -> Result<Figure, ReportError> {
     let series = [&curve.observed, &curve.before, &curve.after];
     let label = with_unit(&curve.channel, &curve.unit);
     let y = Axis::around(&label, series.into_iter().flatten().copied()).with_headroom();
@@ -44,11 +80,7 @@ pub(crate) fn values(curve: &Curve, time_unit: &str, numbers: &str) -> Result<Fi
 }
 
 /// Draws the residuals of one channel of one record.
-///
-/// # Errors
-///
-/// The figure cannot be drawn.
-pub(crate) fn residuals(curve: &Curve, time_unit: &str) -> Result<Figure, ReportError> {
+fn residuals(curve: &Curve, time_unit: &str) -> Result<Figure, ReportError> {
     let of =
         |simulated: &[f64]| curve.observed.iter().zip(simulated).map(|(o, s)| o - s).collect::<Vec<f64>>();
     let (before, after) = (of(&curve.before), of(&curve.after));
@@ -80,6 +112,31 @@ pub(crate) fn residuals(curve: &Curve, time_unit: &str) -> Result<Figure, Report
     let title = format!("{}, record {}: residuals", curve.channel, curve.record);
     let scene = Scene { title, description: caption.clone(), x, y, marks };
     Figure::new(&scene, &keys, caption)
+}
+
+/// The errors of one curve, as a sentence.
+fn numbers(curve: &Curve, rows: &[GapRow]) -> String {
+    let own = rows.iter().filter(|row| row.channel == curve.channel && row.record == curve.record);
+    let mut parts: Vec<String> = own
+        .map(|row| {
+            let before = quantity(row.before, &curve.unit);
+            if row.after.is_finite() {
+                format!(
+                    "{} RMSE {before} before, {} after",
+                    words(&row.usage),
+                    quantity(row.after, &curve.unit)
+                )
+            } else {
+                format!("{} RMSE {before}", words(&row.usage))
+            }
+        })
+        .collect();
+    parts.push(format!("noise sd {}", quantity(curve.noise, &curve.unit)));
+    let mut letters = parts.join("; ");
+    if let Some(first) = letters.get(..1).map(str::to_uppercase) {
+        letters.replace_range(..1, &first);
+    }
+    format!("{letters}.")
 }
 
 fn time_axis(curve: &Curve, time_unit: &str) -> Axis {

@@ -1,22 +1,27 @@
 //! A family of parameters against its number: the stiffness of a vessel's regions along the vessel.
 
-use super::super::data::{Family, ParameterRow, ReportData};
-use super::super::{ReportError, number};
-use super::axis::Axis;
-use super::figure::{Figure, with_unit};
-use super::mark::Mark;
-use super::palette::{BLUE, GREY, MUTED};
-use super::scene::Scene;
+use crate::data::{Family, ParameterRow, ReportData};
+use crate::plot::axis::Axis;
+use crate::plot::figure::{Figure, with_unit};
+use crate::plot::mark::Mark;
+use crate::plot::palette::{BLUE, GREY, MUTED};
+use crate::plot::scene::Scene;
+use crate::{ReportError, number};
 
 /// Half the width that a parameter takes of the room between two numbers.
 const HALF: f64 = 0.32;
 
-/// Draws one family, its members in the order of their numbers.
+/// One figure per family.
 ///
 /// # Errors
 ///
-/// The figure cannot be drawn.
-pub(crate) fn figure(family: &Family, data: &ReportData) -> Result<Figure, ReportError> {
+/// A figure cannot be drawn.
+pub(super) fn figures(data: &ReportData) -> Result<Vec<Figure>, ReportError> {
+    data.families.iter().map(|family| figure(family, data)).collect()
+}
+
+/// Draws one family, its members in the order of their numbers.
+fn figure(family: &Family, data: &ReportData) -> Result<Figure, ReportError> {
     let rows: Vec<(f64, &ParameterRow)> = family
         .members
         .iter()

@@ -5,13 +5,13 @@
 
 use plotters::style::RGBColor;
 
-use super::super::data::ChannelPlot;
-use super::super::{ReportError, number};
-use super::axis::Axis;
-use super::figure::{Figure, with_unit};
-use super::mark::Mark;
-use super::palette::{BLUE, VERMILION};
-use super::scene::Scene;
+use crate::data::ChannelPlot;
+use crate::plot::axis::Axis;
+use crate::plot::figure::{Figure, with_unit};
+use crate::plot::mark::Mark;
+use crate::plot::palette::{BLUE, VERMILION};
+use crate::plot::scene::Scene;
+use crate::{ReportError, number};
 
 /// Cells along the time axis at most.
 const COLUMNS: usize = 60;
@@ -25,7 +25,7 @@ const SHADES: i32 = 6;
 /// # Errors
 ///
 /// The figure cannot be drawn.
-pub(crate) fn figure(
+pub(super) fn figure(
     field: &str,
     components: &[(usize, &ChannelPlot)],
     time_unit: &str,

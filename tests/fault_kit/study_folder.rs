@@ -25,13 +25,13 @@ pub(crate) struct Ended {
 }
 
 /// The folder of one study.
-pub(crate) struct Place {
+pub(crate) struct StudyFolder {
     folder: tempfile::TempDir,
     verb: Verb,
     reached: Reached,
 }
 
-impl Place {
+impl StudyFolder {
     /// With everything that the study needs, and no fault; `settings` go to `[model]`.
     pub(crate) fn new(verb: Verb, reached: Reached, settings: &str) -> Self {
         let folder = tempfile::Builder::new().prefix("fault-").tempdir().unwrap();

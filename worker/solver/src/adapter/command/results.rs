@@ -19,13 +19,13 @@ use super::table::{Table, number, plain_column};
 const SPOKEN: &str = "the standard output";
 
 /// What a program wrote; every file is read once.
-pub(super) struct Answer<'a> {
+pub(super) struct RunResults<'a> {
     folder: &'a Path,
     output: &'a Output,
     read: RefCell<BTreeMap<String, Rc<str>>>,
 }
 
-impl<'a> Answer<'a> {
+impl<'a> RunResults<'a> {
     pub(super) fn new(folder: &'a Path, output: &'a Output) -> Self {
         Self { folder, output, read: RefCell::default() }
     }

@@ -1,20 +1,41 @@
 //! Residuals, observed − predicted, over time.
 
-use super::super::data::ChannelPlot;
-use super::super::{ReportError, number};
-use super::axis::Axis;
-use super::figure::{Figure, with_unit};
-use super::fit::{measured, measured_key, spans, trained};
-use super::mark::Mark;
-use super::palette::{GREEN, INK, MUTED};
-use super::scene::Scene;
+use super::fit::trained;
+use super::{autocorrelation, field_map};
+use crate::data::{ChannelPlot, ReportData};
+use crate::page::outputs::{Output, examples, outputs};
+use crate::plot::axis::Axis;
+use crate::plot::figure::{Figure, with_unit};
+use crate::plot::mark::Mark;
+use crate::plot::measured::{measured, measured_key, spans};
+use crate::plot::palette::{GREEN, INK, MUTED};
+use crate::plot::scene::Scene;
+use crate::{ReportError, number};
 
-/// Draws the residuals of one channel of one record.
+/// The residuals, each followed by its autocorrelation; of a field the map, and the autocorrelation at its middle.
 ///
 /// # Errors
 ///
-/// The figure cannot be drawn.
-pub(crate) fn figure(channel: &ChannelPlot, time_unit: &str) -> Result<Figure, ReportError> {
+/// A figure cannot be drawn.
+pub(super) fn figures(data: &ReportData) -> Result<Vec<Figure>, ReportError> {
+    let mut figures = Vec::new();
+    for output in outputs(data) {
+        match output {
+            Output::Scalar(channel) => {
+                figures.push(figure(channel, &data.time_unit)?);
+                figures.extend(autocorrelation::figure(channel, data)?);
+            }
+            Output::Field(field, components) => {
+                figures.push(field_map::figure(field, &components, &data.time_unit)?);
+                figures.extend(autocorrelation::figure(examples(&components)[1], data)?);
+            }
+        }
+    }
+    Ok(figures)
+}
+
+/// Draws the residuals of one channel of one record.
+fn figure(channel: &ChannelPlot, time_unit: &str) -> Result<Figure, ReportError> {
     let residual: Vec<f64> =
         channel.observed.iter().zip(&channel.predicted).map(|(o, p)| o.unwrap_or(f64::NAN) - p).collect();
     let margin = if channel.noise.is_finite() { 2.0 * channel.noise } else { 0.0 };

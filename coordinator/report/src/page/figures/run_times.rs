@@ -1,19 +1,25 @@
 //! How long the model runs took.
 
-use super::super::data::RunTimes;
-use super::super::{ReportError, number};
-use super::axis::Axis;
-use super::figure::Figure;
-use super::mark::Mark;
-use super::palette::BLUE;
-use super::scene::Scene;
+use crate::data::{ReportData, RunTimes};
+use crate::plot::axis::Axis;
+use crate::plot::figure::Figure;
+use crate::plot::mark::Mark;
+use crate::plot::palette::BLUE;
+use crate::plot::scene::Scene;
+use crate::{ReportError, number};
 
-/// Draws the histogram of run times; `None` when it has no bins.
+/// One histogram of the run times; none without bins.
 ///
 /// # Errors
 ///
-/// The figure cannot be drawn.
-pub(crate) fn figure(times: &RunTimes) -> Result<Option<Figure>, ReportError> {
+/// A figure cannot be drawn.
+pub(super) fn figures(data: &ReportData) -> Result<Vec<Figure>, ReportError> {
+    let drawn = data.fleet.time_per_run.as_ref().map(figure).transpose()?;
+    Ok(drawn.flatten().into_iter().collect())
+}
+
+/// Draws the histogram of run times; `None` when it has no bins.
+fn figure(times: &RunTimes) -> Result<Option<Figure>, ReportError> {
     let bins: Vec<_> = times.bins.iter().filter(|b| b.from.is_finite() && b.to.is_finite()).collect();
     let (Some(first), Some(last)) = (bins.first(), bins.last()) else { return Ok(None) };
     let (unit, factor) = match last.to {

@@ -9,8 +9,8 @@ use starlings_models::{
     Job, ModelDef, ModelFailure, ParticleError, Prediction, Setup, Signal, Timeout, Window,
 };
 use starlings_proto::{
-    Answer, FromWorker, Hello, JobEncoder, Lease, MAX_SLOTS, ReceivedWindows, SentWindows, ToWorker, Welcome,
-    WireError, decode_setup, encode_setup, wire,
+    FromWorker, Hello, JobEncoder, Lease, LeaseOutcome, MAX_SLOTS, ProtocolError, ReceivedWindows,
+    SentWindows, ToWorker, Welcome, decode_setup, encode_setup, generated,
 };
 
 fn any_float() -> impl Strategy<Value = f64> {
@@ -90,15 +90,15 @@ fn model_failure() -> impl Strategy<Value = ModelFailure> {
     ]
 }
 
-fn answer() -> impl Strategy<Value = Answer> {
+fn answer() -> impl Strategy<Value = LeaseOutcome> {
     prop_oneof![
-        (floats(8), floats(8)).prop_map(|(outputs, state)| Answer::Ran(Ok(Prediction {
+        (floats(8), floats(8)).prop_map(|(outputs, state)| LeaseOutcome::Ran(Ok(Prediction {
             outputs,
             state,
             cost: 0.25
         }))),
-        failure().prop_map(|error| Answer::Ran(Err(error))),
-        Just(Answer::Withdrawn),
+        failure().prop_map(|error| LeaseOutcome::Ran(Err(error))),
+        Just(LeaseOutcome::Withdrawn),
     ]
 }
 
@@ -135,7 +135,7 @@ fn through_bytes<M: Message + Default>(message: &M) -> M {
 }
 
 /// What a worker makes of the first message of a stream.
-fn decode(message: wire::ToWorker) -> Result<ToWorker, WireError> {
+fn decode(message: generated::ToWorker) -> Result<ToWorker, ProtocolError> {
     ToWorker::decode(message, &mut ReceivedWindows::default())
 }
 
@@ -181,15 +181,15 @@ proptest! {
         let got = FromWorker::decode(through_bytes(&message.clone().encode().unwrap())).unwrap();
         match (&message, &got) {
             (
-                FromWorker::Result { lease: a, answer: Answer::Ran(Ok(sent)), .. },
-                FromWorker::Result { lease: b, answer: Answer::Ran(Ok(back)), .. },
+                FromWorker::Result { lease: a, answer: LeaseOutcome::Ran(Ok(sent)), .. },
+                FromWorker::Result { lease: b, answer: LeaseOutcome::Ran(Ok(back)), .. },
             ) => {
                 prop_assert_eq!(a, b);
                 prop_assert_eq!((bits(&sent.outputs), bits(&sent.state)), (bits(&back.outputs), bits(&back.state)));
             }
             (
-                FromWorker::Result { lease: a, answer: Answer::Ran(Err(sent)), .. },
-                FromWorker::Result { lease: b, answer: Answer::Ran(Err(back)), .. },
+                FromWorker::Result { lease: a, answer: LeaseOutcome::Ran(Err(sent)), .. },
+                FromWorker::Result { lease: b, answer: LeaseOutcome::Ran(Err(back)), .. },
             ) => {
                 prop_assert_eq!(a, b);
                 prop_assert_eq!(failure_bits(sent), failure_bits(back));
@@ -200,10 +200,10 @@ proptest! {
 
     #[test]
     fn arbitrary_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
-        if let Ok(message) = wire::ToWorker::decode(bytes.as_slice()) {
+        if let Ok(message) = generated::ToWorker::decode(bytes.as_slice()) {
             let _ = decode(message);
         }
-        if let Ok(message) = wire::FromWorker::decode(bytes.as_slice()) {
+        if let Ok(message) = generated::FromWorker::decode(bytes.as_slice()) {
             let _ = FromWorker::decode(message);
         }
     }
@@ -215,7 +215,7 @@ proptest! {
         let mut bytes = sent.encode_to_vec();
         let at = at.index(bytes.len());
         bytes[at] = byte;
-        if let Ok(message) = wire::ToWorker::decode(bytes.as_slice()) {
+        if let Ok(message) = generated::ToWorker::decode(bytes.as_slice()) {
             let _ = decode(message);
         }
     }
@@ -246,5 +246,5 @@ fn a_setup_arrives_as_sent_and_a_damaged_one_says_so() {
     setup.model.constants.insert("R".to_owned(), 0.1 + 0.2);
     let (id, json) = encode_setup(&setup).unwrap();
     assert_eq!(decode_setup(&id, &json), Ok(setup));
-    assert!(matches!(decode_setup(&id, &json[1..]), Err(WireError::Setup(_))));
+    assert!(matches!(decode_setup(&id, &json[1..]), Err(ProtocolError::Setup(_))));
 }

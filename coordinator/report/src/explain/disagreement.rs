@@ -1,36 +1,27 @@
-//! Where simulation and data disagree: places, channels, operating regions, correlations, frequencies, unknown inputs.
+//! Where simulation and data disagree, in words and tables: places, channels, correlations.
 //!
 //! Next file to read: `candidates.rs`.
 
 use serde::Serialize;
 use starlings_explain::Figures;
-use starlings_explain::locate::{ChannelGap, Correlated, Located, RegionMap, UnknownInput};
+use starlings_explain::locate::{ChannelGap, Correlated};
 use starlings_explain::result::Explanation;
 
 use super::probability;
 use crate::ReportError;
 use crate::number::{self, quantity};
-use crate::plot::figure::Figure;
 use crate::plot::meter::{Bar, meter};
 use crate::plot::palette::{BLUE, INK, MUTED, VERMILION};
-use crate::plot::{force, region, spectrum};
 
-/// Maps, spectra and unknown inputs drawn at most.
-const MAPS: usize = 10;
-const SPECTRA: usize = 6;
-const FORCES: usize = 8;
 /// Rows of the table of channels at most.
 const ROWS: usize = 80;
 
 /// Where the gap is, ready to be arranged.
 #[derive(Debug, Serialize)]
-pub(super) struct Places {
+pub(super) struct Disagreement {
     sentences: Vec<String>,
     channels: Vec<Vec<String>>,
-    maps: Vec<Figure>,
     correlations: Vec<CorrelationRow>,
-    spectra: Vec<Figure>,
-    forces: Vec<Figure>,
 }
 
 #[derive(Debug, Serialize)]
@@ -42,23 +33,18 @@ struct CorrelationRow {
     meter: String,
 }
 
-impl Places {
-    /// Formats and draws what locating found.
+impl Disagreement {
+    /// Formats what locating found.
     ///
     /// # Errors
     ///
     /// A figure cannot be drawn.
     pub(super) fn new(found: &Explanation, figures: &Figures) -> Result<Self, ReportError> {
         let located = &figures.before;
-        let spectra = located.spectra.iter().take(SPECTRA);
-        let spectra = spectra.filter_map(|s| spectrum::figure(s, &figures.time_unit).transpose());
         Ok(Self {
             sentences: found.places.iter().map(|place| place.sentence.clone()).collect(),
             channels: located.channels.iter().take(ROWS).map(channel).collect(),
-            maps: maps(located, &figures.maps_after)?,
             correlations: located.correlations.iter().map(correlation).collect::<Result<_, _>>()?,
-            spectra: spectra.collect::<Result<_, _>>()?,
-            forces: forces(located, &figures.time_unit)?,
         })
     }
 }
@@ -77,24 +63,6 @@ fn channel(c: &ChannelGap) -> Vec<String> {
         probability(c.whiteness_p),
         number::significant(c.effective_n, 2),
     ]
-}
-
-/// The maps that account for most of the residuals, each beside itself with the effects.
-fn maps(located: &Located, after: &[RegionMap]) -> Result<Vec<Figure>, ReportError> {
-    let mut order: Vec<&RegionMap> = located.maps.iter().collect();
-    order.sort_by(|a, b| b.explained.total_cmp(&a.explained));
-    let mut figures = Vec::new();
-    for before in order.into_iter().take(MAPS) {
-        let same = |m: &&RegionMap| m.channel == before.channel && m.x == before.x && m.y == before.y;
-        let after = after.iter().find(same);
-        let alike: Vec<&RegionMap> = [Some(before), after].into_iter().flatten().collect();
-        let word = if after.is_some() { "before" } else { "the model as it is" };
-        figures.extend(region::figure(before, word, &alike)?);
-        if let Some(after) = after {
-            figures.extend(region::figure(after, "after", &alike)?);
-        }
-    }
-    Ok(figures)
 }
 
 fn correlation(c: &Correlated) -> Result<CorrelationRow, ReportError> {
@@ -119,16 +87,4 @@ fn correlation(c: &Correlated) -> Result<CorrelationRow, ReportError> {
             &bars,
         )?,
     })
-}
-
-/// The inputs that gain most, each against time and against its state.
-fn forces(located: &Located, time_unit: &str) -> Result<Vec<Figure>, ReportError> {
-    let mut order: Vec<&UnknownInput> = located.forces.iter().filter(|f| !f.time.is_empty()).collect();
-    order.sort_by(|a, b| b.log_likelihood_gain.total_cmp(&a.log_likelihood_gain));
-    let mut figures = Vec::new();
-    for input in order.into_iter().take(FORCES) {
-        figures.push(force::over_time(input, time_unit)?);
-        figures.push(force::over_state(input)?);
-    }
-    Ok(figures)
 }

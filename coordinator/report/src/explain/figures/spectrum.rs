@@ -2,21 +2,32 @@
 //!
 //! Next file to read: `alarm.rs`.
 
+use starlings_explain::Figures;
 use starlings_explain::locate::ResidualSpectrum;
+use starlings_explain::result::Explanation;
 
-use super::super::{ReportError, number};
-use super::axis::Axis;
-use super::figure::{Figure, with_unit};
-use super::mark::Mark;
-use super::palette::{BLUE, MUTED};
-use super::scene::Scene;
+use crate::plot::axis::Axis;
+use crate::plot::figure::{Figure, with_unit};
+use crate::plot::mark::Mark;
+use crate::plot::palette::{BLUE, MUTED};
+use crate::plot::scene::Scene;
+use crate::{ReportError, number};
 
-/// Draws one spectrum; `None` when it has no positive frequency with power.
+/// Spectra drawn at most.
+const SPECTRA: usize = 6;
+
+/// The first spectra that have anything to show.
 ///
 /// # Errors
 ///
-/// The figure cannot be drawn.
-pub(crate) fn figure(spectrum: &ResidualSpectrum, time_unit: &str) -> Result<Option<Figure>, ReportError> {
+/// A figure cannot be drawn.
+pub(super) fn figures(_: &Explanation, data: &Figures) -> Result<Vec<Figure>, ReportError> {
+    let spectra = data.before.spectra.iter().take(SPECTRA);
+    spectra.filter_map(|s| figure(s, &data.time_unit).transpose()).collect()
+}
+
+/// Draws one spectrum; `None` when it has no positive frequency with power.
+fn figure(spectrum: &ResidualSpectrum, time_unit: &str) -> Result<Option<Figure>, ReportError> {
     let pairs = spectrum.frequency.iter().zip(&spectrum.power_over_noise);
     let (frequency, power): (Vec<f64>, Vec<f64>) =
         pairs.filter(|(f, p)| **f > 0.0 && **p > 0.0 && f.is_finite() && p.is_finite()).unzip();

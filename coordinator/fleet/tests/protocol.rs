@@ -10,16 +10,16 @@ use fleet_kit::{
 };
 use starlings_fleet::{Fleet, FleetEvent};
 use starlings_models::Setup;
-use starlings_proto::wire::{self, fleet_client::FleetClient};
-use starlings_proto::{Answer, FromWorker, Hello, Lease, PROTOCOL, ReceivedWindows, ToWorker, VERSION};
+use starlings_proto::generated::{self, fleet_client::FleetClient};
+use starlings_proto::{FromWorker, Hello, Lease, LeaseOutcome, PROTOCOL, ReceivedWindows, ToWorker, VERSION};
 use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
 use tokio_stream::wrappers::UnboundedReceiverStream;
 use tonic::Streaming;
 
 /// A worker played by hand.
 struct Hand {
-    outbox: UnboundedSender<wire::FromWorker>,
-    inbound: Streaming<wire::ToWorker>,
+    outbox: UnboundedSender<generated::FromWorker>,
+    inbound: Streaming<generated::ToWorker>,
     windows: ReceivedWindows,
 }
 
@@ -66,7 +66,7 @@ impl Hand {
     }
 
     fn answer(&self, lease: Lease, job: &starlings_models::Job) {
-        self.say(FromWorker::Result { lease, answer: Answer::Ran(Ok(square(job))), cost: 1.0 });
+        self.say(FromWorker::Result { lease, answer: LeaseOutcome::Ran(Ok(square(job))), cost: 1.0 });
     }
 }
 
@@ -167,7 +167,7 @@ fn a_malformed_message_ends_the_stream_and_nothing_else() {
     block_on(async {
         let mut hand = Hand::dial(fleet.address(), hello()).await;
         assert!(matches!(hand.hear().await, Some(ToWorker::Welcome(_))));
-        hand.outbox.send(wire::FromWorker { kind: None }).unwrap();
+        hand.outbox.send(generated::FromWorker { kind: None }).unwrap();
         assert_eq!(hand.hear().await, None);
     });
     await_event(

@@ -2,26 +2,29 @@
 //!
 //! The band is that of each analysis: one that uses fewer observed values scatters more.
 
-use super::super::data::NisSeries;
-use super::super::{ReportError, number};
-use super::axis::Axis;
-use super::figure::Figure;
-use super::fit::{drawn_as_dots, measured};
-use super::mark::Mark;
-use super::palette::{BLUE, GREEN, GREY, MUTED};
-use super::scene::Scene;
-use super::thin;
+use crate::data::{NisSeries, ReportData};
+use crate::plot::axis::Axis;
+use crate::plot::figure::Figure;
+use crate::plot::mark::Mark;
+use crate::plot::measured::{drawn_as_dots, measured};
+use crate::plot::palette::{BLUE, GREEN, GREY, MUTED};
+use crate::plot::scene::Scene;
+use crate::plot::thin;
+use crate::{ReportError, number};
 
 /// Smallest value on the logarithmic axis: what is below stands on the axis.
 const FLOOR: f64 = 1e-2;
 
-/// Draws all passes; `None` when there is none.
+/// One figure of all passes; none without a pass.
 ///
 /// # Errors
 ///
-/// The figure cannot be drawn.
-pub(crate) fn figure(passes: &[NisSeries], x_label: &str) -> Result<Option<Figure>, ReportError> {
-    let Some(last) = passes.last() else { return Ok(None) };
+/// A figure cannot be drawn.
+pub(super) fn figures(data: &ReportData) -> Result<Vec<Figure>, ReportError> {
+    data.nis.last().map(|last| figure(&data.nis, last, data.x_label())).into_iter().collect()
+}
+
+fn figure(passes: &[NisSeries], last: &NisSeries, x_label: &str) -> Result<Figure, ReportError> {
     let x = Axis::over_run(x_label, passes.iter().flat_map(|p| p.time.iter().copied()));
     let floored = |v: &f64| if v.is_nan() { f64::NAN } else { v.max(FLOOR) };
     let values = passes.iter().flat_map(|p| &p.nis_per_observation).chain(&last.lo).chain(&last.hi);
@@ -43,7 +46,7 @@ pub(crate) fn figure(passes: &[NisSeries], x_label: &str) -> Result<Option<Figur
     keys.extend([("area green", "95\u{a0}% band"), ("dash muted", "expected: 1")]);
     let title = "Normalised innovation squared per observation".to_owned();
     let scene = Scene { title, description: caption.clone(), x, y, marks };
-    Figure::new(&scene, &keys, caption).map(Some)
+    Figure::new(&scene, &keys, caption)
 }
 
 fn band(series: &NisSeries, ends: (f64, f64)) -> Vec<Mark> {

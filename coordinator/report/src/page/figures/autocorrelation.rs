@@ -1,23 +1,30 @@
 //! Sample autocorrelation of the residuals of one channel.
 
-use super::super::ReportError;
-use super::super::data::Autocorrelation;
-use super::axis::Axis;
-use super::figure::{Figure, with_unit};
-use super::mark::Mark;
-use super::palette::{BLUE, GREEN, MUTED};
-use super::scene::Scene;
-use super::thin;
+use crate::ReportError;
+use crate::data::{Autocorrelation, ChannelPlot, ReportData};
+use crate::plot::axis::Axis;
+use crate::plot::figure::{Figure, with_unit};
+use crate::plot::mark::Mark;
+use crate::plot::palette::{BLUE, GREEN, MUTED};
+use crate::plot::scene::Scene;
+use crate::plot::thin;
 
 /// More lags than this are drawn as a curve.
 const STEMS: usize = 120;
 
-/// Draws one autocorrelation with the band of white noise.
+/// The autocorrelation of one channel of one record, where it was stored.
 ///
 /// # Errors
 ///
 /// The figure cannot be drawn.
-pub(crate) fn figure(series: &Autocorrelation, time_unit: &str) -> Result<Figure, ReportError> {
+pub(super) fn figure(channel: &ChannelPlot, data: &ReportData) -> Result<Option<Figure>, ReportError> {
+    let same = |a: &&Autocorrelation| a.record == channel.record && a.channel == channel.channel;
+    let found = data.autocorrelation.iter().find(same).filter(|a| !a.value.is_empty());
+    found.map(|series| draw(series, &data.time_unit)).transpose()
+}
+
+/// Draws one autocorrelation with the band of white noise.
+fn draw(series: &Autocorrelation, time_unit: &str) -> Result<Figure, ReportError> {
     let x = Axis::tight(&with_unit("lag", time_unit), series.lag_time.iter().copied());
     let lowest = series.value.iter().copied().filter(|v| v.is_finite()).fold(-series.band.abs(), f64::min);
     let y = Axis::around("autocorrelation of the residuals", [lowest.min(-0.1), 1.0]);

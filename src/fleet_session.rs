@@ -69,7 +69,7 @@ impl FleetArgs {
 }
 
 /// The fleet of one run, its local workers, and the way of its events to the store.
-pub(crate) struct Crew {
+pub(crate) struct FleetSession {
     pub(crate) fleet: GrpcFleet,
     local: Option<LocalWorkers>,
     /// What happened, for the store.
@@ -77,7 +77,7 @@ pub(crate) struct Crew {
     watcher: std::thread::JoinHandle<()>,
 }
 
-impl Crew {
+impl FleetSession {
     /// Listens for workers; none is started yet.
     pub(crate) fn listen(study: &Study, plan: &Plan, display: &Arc<Display>) -> Result<Self, Failure> {
         let cancel = CancellationToken::new();
@@ -98,7 +98,7 @@ impl Crew {
     }
 
     /// Starts the local workers, or says how to start others.
-    pub(crate) fn gather(&mut self, study: &Study, plan: &Plan) -> Result<(), Failure> {
+    pub(crate) fn start_workers(&mut self, study: &Study, plan: &Plan) -> Result<(), Failure> {
         let address = self.fleet.address();
         if !plan.local {
             note(format_args!(
@@ -121,7 +121,7 @@ impl Crew {
     }
 
     /// Ends the fleet and its workers.
-    pub(crate) fn dismiss(self) {
+    pub(crate) fn close(self) {
         let Self { fleet, local, watcher, .. } = self;
         fleet.close();
         drop(local);

@@ -1,4 +1,4 @@
-//! What may follow from any event: failures settle, control runs are made, jobs are given out and called back, the batch ends.
+//! Scheduling, done after every event: failures settle, control runs are made, jobs are assigned and recalled, the batch ends.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,15 +10,15 @@ use super::message::{BatchError, Command, WorkerId};
 use super::roster::{self, SetupState, Worker};
 
 impl Dispatcher {
-    /// Everything that may follow from any event: settle, make control runs, give out, recall, end.
+    /// Everything that may follow from any event: settle, make control runs, assign, recall, end.
     pub(super) fn proceed(&mut self) {
         if self.local_only {
             self.fail_without_setup();
         }
         self.settle_failures();
-        // Before jobs are given out: a place on trial makes one run at a time, and this one tells more.
+        // Before jobs are assigned: a place on trial makes one run at a time, and this one tells more.
         self.control();
-        self.give_out();
+        self.assign();
         self.recall();
         if let Some(batch) = self.batch.take_if(|batch| batch.is_done()) {
             self.starved = None;
@@ -53,27 +53,27 @@ impl Dispatcher {
     /// the one where they failed.
     fn settle_failures(&mut self) {
         let Some(batch) = &mut self.batch else { return };
-        for again in batch.queue.again() {
-            let Some(avoided) = again.avoided else { continue };
-            let setup = batch.setup(again.setup);
+        for key in batch.queue.retries() {
+            let Some(avoided) = key.avoided else { continue };
+            let setup = batch.setup(key.setup);
             let other = self.workers.values().any(|w| w.id != avoided && w.could_take(setup));
             if !other {
-                for index in batch.settle(again) {
+                for index in batch.settle(key) {
                     self.out.push(batch.failed(index));
                 }
             }
         }
     }
 
-    fn give_out(&mut self) {
+    fn assign(&mut self) {
         let Some(batch) = &mut self.batch else { return };
-        for again in batch.queue.again() {
-            let setup = *batch.setup(again.setup);
-            while batch.queue.has(again) {
-                let Some(worker) = roster::least_loaded(&mut self.workers, &setup, again.avoided) else {
+        for key in batch.queue.retries() {
+            let setup = *batch.setup(key.setup);
+            while batch.queue.has(key) {
+                let Some(worker) = roster::least_loaded(&mut self.workers, &setup, key.avoided) else {
                     break;
                 };
-                let Some(index) = batch.queue.next_again(again) else { break };
+                let Some(index) = batch.queue.next_retry(key) else { break };
                 self.out.push(lease(worker, batch, index));
             }
         }
@@ -137,7 +137,7 @@ fn next_setup(workers: &BTreeMap<WorkerId, Worker>, batch: &Batch) -> Option<usi
     batch.queue.fresh_setups().find(|&setup| open.iter().any(|w| w.is_ready(batch.setup(setup))))
 }
 
-/// Gives a job to a worker.
+/// Assigns a job to a worker.
 pub(super) fn lease(worker: &mut Worker, batch: &mut Batch, index: usize) -> Command {
     let lease = Lease { epoch: worker.id.0, job: batch.job_number(index), attempt: batch.start(index) };
     worker.hold(lease);

@@ -5,14 +5,14 @@ use std::sync::Arc;
 
 use prost::Message;
 use starlings_models::{Job, Signal, Window};
-use starlings_proto::{JobEncoder, Lease, ReceivedWindows, SentWindows, ToWorker, WireError, wire};
+use starlings_proto::{JobEncoder, Lease, ProtocolError, ReceivedWindows, SentWindows, ToWorker, generated};
 
-fn through_bytes(message: &wire::ToWorker) -> wire::ToWorker {
-    wire::ToWorker::decode(message.encode_to_vec().as_slice()).unwrap()
+fn through_bytes(message: &generated::ToWorker) -> generated::ToWorker {
+    generated::ToWorker::decode(message.encode_to_vec().as_slice()).unwrap()
 }
 
 /// What a worker makes of the first message of a stream.
-fn decode(message: wire::ToWorker) -> Result<ToWorker, WireError> {
+fn decode(message: generated::ToWorker) -> Result<ToWorker, ProtocolError> {
     ToWorker::decode(message, &mut ReceivedWindows::default())
 }
 
@@ -34,8 +34,8 @@ fn the_windows_of_a_batch_are_encoded_once_and_shared_by_its_messages() {
     let mut encoder = JobEncoder::of(&jobs);
     let mut times_of = |job: &Job| {
         let (_, sent) = encoder.encode(LEASE, &[7; 32], job, &mut SentWindows::default());
-        let Some(wire::to_worker::Kind::Job(message)) = sent.kind else { panic!("a job") };
-        let Some(wire::job::Over::Window(window)) = message.over else { panic!("a small window") };
+        let Some(generated::to_worker::Kind::Job(message)) = sent.kind else { panic!("a job") };
+        let Some(generated::job::Over::Window(window)) = message.over else { panic!("a small window") };
         window.times.as_ptr()
     };
     let places: Vec<_> = jobs.iter().map(&mut times_of).collect();
@@ -85,11 +85,12 @@ fn a_large_window_travels_once_on_a_stream_and_its_jobs_share_it() {
 fn a_stream_that_lost_a_window_is_broken_and_not_the_job() {
     let [job, _] = jobs_over_a_large_window();
     let (ahead, message) = JobEncoder::default().encode(LEASE, &[7; 32], &job, &mut SentWindows::default());
-    assert_eq!(decode(message), Err(WireError::UnknownWindow));
-    let Some(wire::ToWorker { kind: Some(wire::to_worker::Kind::Window(mut window)) }) = ahead else {
+    assert_eq!(decode(message), Err(ProtocolError::UnknownWindow));
+    let Some(generated::ToWorker { kind: Some(generated::to_worker::Kind::Window(mut window)) }) = ahead
+    else {
         panic!("the window is sent ahead")
     };
     window.window.as_mut().unwrap().start = Some(0.5);
-    let damaged = decode(wire::ToWorker { kind: Some(wire::to_worker::Kind::Window(window)) });
-    assert!(matches!(damaged, Err(WireError::Shape { field: "window", .. })), "{damaged:?}");
+    let damaged = decode(generated::ToWorker { kind: Some(generated::to_worker::Kind::Window(window)) });
+    assert!(matches!(damaged, Err(ProtocolError::Shape { field: "window", .. })), "{damaged:?}");
 }
