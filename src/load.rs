@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use starlings_coordinator::study::{SolverHost, Study, Undescribed};
 use starlings_models::SetupError;
 use starlings_solver::Solvers;
-use starlings_solver::faults;
+use starlings_solver::{adapters, faults};
 
 use crate::failure::Failure;
 use crate::solvers::solvers;
@@ -27,7 +27,8 @@ pub(crate) fn load(path: &Path) -> Result<Study, Failure> {
         })
     };
     let factory = Arc::new(|setup: &_| here().map_err(SetupError::Invalid)?.build(setup));
-    Ok(Study::load_with(path, &SolverHost::asking(describe, factory).inspecting(faults))?)
+    let host = SolverHost::asking(describe, factory).inspecting(faults).by(adapters());
+    Ok(Study::load_with(path, &host)?)
 }
 
 /// Ends the solvers of this process; one that is needed again starts again.

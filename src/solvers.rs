@@ -22,5 +22,5 @@ pub(crate) fn own_program() -> std::io::Result<PathBuf> {
 
 /// Takes the name of a way to reach a solver, and shows them all where it is another.
 pub(crate) fn adapter_names() -> PossibleValuesParser {
-    adapters().map(|(name, says)| PossibleValue::new(name).help(says)).into()
+    adapters().into_iter().map(|a| PossibleValue::new(a.name).help(a.says)).into()
 }

@@ -14,7 +14,7 @@ use starlings_solver::adapters;
 
 /// Whether a text names every adapter that a worker has.
 fn names_all(text: &str) -> bool {
-    adapters().all(|(name, _)| text.contains(name))
+    adapters().iter().all(|adapter| text.contains(adapter.name))
 }
 
 #[test]
@@ -23,7 +23,7 @@ fn studies_and_options_know_the_adapters_that_workers_have() {
     folder.serving("study.toml", "adapter = \"telepathy\"");
     let (code, _, said) = output(starlings().arg("check").arg(folder.path().join("study.toml")));
     assert!(code == 2 && said.contains("unknown adapter `telepathy`") && names_all(&said), "{said}");
-    for (name, _) in adapters() {
+    for name in adapters().iter().map(|adapter| adapter.name) {
         folder.serving("study.toml", &format!("adapter = {name:?}\ntimeout = 0"));
         let (code, _, said) = output(starlings().arg("check").arg(folder.path().join("study.toml")));
         assert!(code == 2 && !said.contains("unknown adapter"), "{said}");

@@ -12,12 +12,12 @@ mod study_kit;
 #[path = "solver_study/swing.rs"]
 mod swing;
 
-use inside::{Inside, Place, threads};
+use inside::{Inside, Place, nobody, threads};
 use starlings_coordinator::fleet::InProcess;
 use starlings_coordinator::study::identify::{At, identify};
 use starlings_coordinator::study::trial::trial;
 use starlings_coordinator::study::twin::{Twin, simulate};
-use starlings_coordinator::study::{SolverHost, Study, Summary};
+use starlings_coordinator::study::{Study, Summary};
 use starlings_estimators::{Kind, ROUKF};
 use study_kit::off;
 use swing::{native, recording, solver};
@@ -30,7 +30,7 @@ fn both(more: &str, change: fn(&mut starlings_models::Description)) -> (Place, S
     let data = recording(&[], &[], 7);
     let here = Place::new(&[("study.toml", &native(more)), ("swing.csv", &data)]);
     let there = Place::new(&[("study.toml", &solver(more)), ("swing.csv", &data)]);
-    let study = here.load(&SolverHost::default()).unwrap_or_else(|error| panic!("{error}"));
+    let study = here.load(&nobody()).unwrap_or_else(|error| panic!("{error}"));
     let inside = Inside::of(&study, &["v"]).described(change);
     let outside = there.load(&inside.solver_host()).unwrap_or_else(|error| panic!("{error}"));
     (here, study, there, outside, inside)
@@ -141,7 +141,7 @@ fn a_solver_that_a_file_describes_is_not_started_where_the_study_is_loaded() {
         &solver("").replace("command = [\"swing\"]", "command = [\"swing\"]\ndescribed = \"swing.json\""),
     );
     // Nobody here can start a solver, and nobody needs to.
-    let study = there.load(&SolverHost::default()).unwrap_or_else(|error| panic!("{error}"));
+    let study = there.load(&nobody()).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(study.setup.model.description(), Some(inside.description()));
     assert_eq!(trial(&study).unwrap(), []);
     assert!(study.warnings.iter().any(|w| w.contains("described by a file")), "{:?}", study.warnings);

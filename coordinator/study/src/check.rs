@@ -87,7 +87,7 @@ impl Study {
 
 fn check(path: &Path, text: &str, solver_host: &SolverHost) -> Result<Study, StudyError> {
     let source = Source::new(path, text);
-    let file = read(&source)?;
+    let file = read(&source, solver_host.adapters())?;
     if source.count() > 0 {
         // What is written in a wrong form would be judged wrongly; what stands in the files can be told.
         survey::survey(&source, &file);

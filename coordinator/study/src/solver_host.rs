@@ -7,6 +7,7 @@ use std::fmt;
 use std::sync::Arc;
 
 use starlings_models::{BuildSetup, Description, Forward, Setup, SetupError, SolverDef, SolverFault};
+use starlings_proto::adapters::AdapterDef;
 
 use starlings_fleet::Factory;
 
@@ -39,6 +40,7 @@ pub struct SolverHost {
     describe: Describe,
     inspect: Inspect,
     factory: Factory,
+    adapters: Arc<[AdapterDef]>,
 }
 
 impl SolverHost {
@@ -55,7 +57,28 @@ impl SolverHost {
         describe: impl Fn(&SolverDef) -> Result<Description, Undescribed> + Send + Sync + 'static,
         factory: Factory,
     ) -> Self {
-        Self { describe: Arc::new(describe), inspect: Arc::new(|_| Vec::new()), factory }
+        Self {
+            describe: Arc::new(describe),
+            inspect: Arc::new(|_| Vec::new()),
+            factory,
+            adapters: Arc::default(),
+        }
+    }
+
+    /// The same host, with the ways by which it reaches solvers; a study may name no other.
+    #[must_use]
+    pub fn by(self, adapters: Vec<AdapterDef>) -> Self {
+        Self { adapters: adapters.into(), ..self }
+    }
+
+    /// The ways to reach a solver.
+    pub fn adapters(&self) -> &[AdapterDef] {
+        &self.adapters
+    }
+
+    /// The way of this name.
+    pub fn adapter(&self, name: &str) -> Option<&AdapterDef> {
+        self.adapters.iter().find(|adapter| adapter.name == name)
     }
 
     /// The same host, in which somebody looks at the files of a solver while the study is read.

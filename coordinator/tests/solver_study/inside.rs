@@ -13,12 +13,18 @@ use starlings_models::{
     Addition, BuildSetup, Description, EffectDef, EffectParameter, External, Job, ModelDef, ParticleError,
     Run, SOLVER, Setup, SetupError, Solve, Solved, Spec,
 };
+use starlings_solver::adapters;
 
 /// Equations behind the wall that a solver is.
 #[derive(Clone)]
 pub(crate) struct Inside {
     model: ModelDef,
     description: Description,
+}
+
+/// A host that starts no solver.
+pub(crate) fn nobody() -> SolverHost {
+    SolverHost::default().by(adapters())
 }
 
 impl Inside {
@@ -46,7 +52,7 @@ impl Inside {
     /// Who asks and runs it.
     pub(crate) fn solver_host(&self) -> SolverHost {
         let known = self.description.clone();
-        SolverHost::new(move |_| Ok(known.clone()), self.factory())
+        SolverHost::new(move |_| Ok(known.clone()), self.factory()).by(adapters())
     }
 
     /// What a fleet makes setups with.

@@ -1,4 +1,4 @@
-//! The ways to reach a solver, one file each; what studies may say of them stands in `proto/src/adapters.rs`.
+//! The list of ways to reach a solver, one file each: what a study may say of it and what opens it.
 //!
 //! An adapter turns a run into whatever its solver understands and the answer back; it decides nothing about retries. Next
 //! files to read: [`grpc`], then the others.
@@ -6,7 +6,7 @@
 use std::sync::Arc;
 
 use starlings_models::{Description, ParticleError, Run, Solved, SolverDef, nearest};
-use starlings_proto::adapters::ADAPTERS;
+use starlings_proto::adapters::AdapterDef;
 
 use super::SolverError;
 use super::site::Site;
@@ -41,37 +41,43 @@ pub(crate) trait Adapter: Send + Sync {
 /// Makes the adapter of a definition; nothing is started yet.
 type Open = fn(&SolverDef, &Arc<Site>) -> Result<Box<dyn Adapter>, SolverError>;
 
-/// What opens each of [`ADAPTERS`], in their order.
-const OPEN: [(&str, Open); ADAPTERS.len()] = [
-    ("grpc", grpc::open),
-    ("command", command::open),
-    ("fmu", fmu::open),
-    ("um-bridge", um_bridge::open),
-    ("mpi", mpi::open),
+/// A way to reach a solver, and what opens it.
+struct Entry {
+    def: AdapterDef,
+    open: Open,
+}
+
+/// Every way.
+const ADAPTERS: [Entry; 5] = [
+    Entry { def: grpc::DEF, open: grpc::open },
+    Entry { def: command::DEF, open: command::open },
+    Entry { def: fmu::DEF, open: fmu::open },
+    Entry { def: um_bridge::DEF, open: um_bridge::open },
+    Entry { def: mpi::DEF, open: mpi::open },
 ];
+
+/// What every way says of itself.
+pub(crate) fn defs() -> [AdapterDef; ADAPTERS.len()] {
+    ADAPTERS.map(|entry| entry.def)
+}
+
+/// What the way of this name says of itself.
+pub(crate) fn def(name: &str) -> Option<AdapterDef> {
+    defs().into_iter().find(|def| def.name == name)
+}
 
 /// The adapter that a study names.
 ///
 /// # Errors
 /// When there is none of that name, or the study lacks what it needs.
 pub(crate) fn open(def: &SolverDef, site: &Arc<Site>) -> Result<Box<dyn Adapter>, SolverError> {
-    let Some((_, open)) = OPEN.iter().find(|(name, _)| *name == def.adapter) else {
-        let names = ADAPTERS.iter().map(|adapter| adapter.name);
+    let Some(entry) = ADAPTERS.iter().find(|entry| entry.def.name == def.adapter) else {
+        let names = ADAPTERS.iter().map(|entry| entry.def.name);
         return Err(SolverError::Adapter {
             name: def.adapter.clone(),
             nearest: nearest(&def.adapter, names.clone()),
             known: names.collect::<Vec<_>>().join(", "),
         });
     };
-    open(def, site)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_adapter_that_a_study_may_name_can_be_opened() {
-        assert_eq!(OPEN.map(|(name, _)| name), ADAPTERS.map(|adapter| adapter.name));
-    }
+    (entry.open)(def, site)
 }

@@ -29,7 +29,7 @@ use starlings_models::{
     BuildSetup, Description, External, Factory, Forward, ParticleError, Run, SOLVER, Setup, SetupError,
     Solve, Solved, SolverDef, SolverFault,
 };
-use starlings_proto::adapters::{self, ADAPTERS};
+use starlings_proto::adapters::AdapterDef;
 
 use adapter::Adapter;
 pub use error::SolverError;
@@ -37,14 +37,14 @@ pub use guard::guard;
 use site::Site;
 pub use site::SiteOptions;
 
-/// The ways to reach a solver, by name, with a sentence about each.
-pub fn adapters() -> impl Iterator<Item = (&'static str, &'static str)> {
-    ADAPTERS.iter().map(|adapter| (adapter.name, adapter.says))
+/// The ways to reach a solver.
+pub fn adapters() -> Vec<AdapterDef> {
+    adapter::defs().into()
 }
 
 /// What is wrong with the files and the command of a program that is started for every run; nothing is started.
 pub fn faults(def: &SolverDef) -> Vec<SolverFault> {
-    let per_run = adapters::adapter(&def.adapter).is_some_and(|adapter| adapter.per_run);
+    let per_run = adapter::def(&def.adapter).is_some_and(|adapter| adapter.per_run);
     if per_run { adapter::command::faults(def) } else { Vec::new() }
 }
 
@@ -144,8 +144,7 @@ impl Solvers {
             (def.command, def.folder) = (command.clone(), folder.clone());
         }
         // Studies of one solver share its programs, whatever else they say.
-        let describes_itself =
-            adapters::adapter(&def.adapter).is_some_and(|adapter| adapter.describes_itself);
+        let describes_itself = adapter::def(&def.adapter).is_some_and(|adapter| adapter.describes_itself);
         let described = def.described.clone().filter(|_| !describes_itself);
         let key = format!("{:?}", SolverDef { described, ..def.clone() });
         let mut open = self.0.open.lock().unwrap_or_else(PoisonError::into_inner);

@@ -4,6 +4,7 @@
 //! place. Next file to read: [`crate::check::model`], which asks the model whether they make sense.
 
 use starlings_models::{Role, SOLVER};
+use starlings_proto::adapters::AdapterDef;
 use toml::Spanned;
 
 use super::layout::Layout;
@@ -20,7 +21,7 @@ use crate::problem::Source;
 const EQUATIONS: [&str; 6] = ["outputs", "inputs", "replaceable", "roles", "solver", "states"];
 
 /// Reads `[model]`.
-pub(crate) fn model(source: &Source, root: &Table<'_>) -> ModelSection {
+pub(crate) fn model(source: &Source, root: &Table<'_>, adapters: &[AdapterDef]) -> ModelSection {
     let mut keys = [
         &["kind", "constants", "initial", "layout", "max_steps", "timeout"],
         &EQUATIONS[..],
@@ -49,7 +50,7 @@ pub(crate) fn model(source: &Source, root: &Table<'_>) -> ModelSection {
         .required_text("kind", "a model's name (`starlings models` lists them), \"equations\" or \"solver\"");
     let of_kind = kind.get_ref().as_str();
     let equations = (of_kind == "equations").then(|| equations(source, &t));
-    let solver = (of_kind == SOLVER).then(|| program(source, &t, kind.span()));
+    let solver = (of_kind == SOLVER).then(|| program(source, &t, kind.span(), adapters));
     refuse_foreign(source, &t, of_kind);
     let timeout = if of_kind == SOLVER { None } else { t.number("timeout") };
     let layout = t.get("layout").map(|node| Layout::read(source, node));

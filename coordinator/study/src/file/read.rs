@@ -3,6 +3,7 @@
 //! Every complaint about form (a missing or unknown key, a wrong type) is reported to the [`Source`]; reading goes on so that
 //! one look shows them all. Next file to read: [`super::model`] for the model and the effects.
 
+use starlings_proto::adapters::AdapterDef;
 use toml::Spanned;
 use toml::de::DeTable;
 
@@ -28,11 +29,11 @@ const SECTIONS: [&str; 10] = [
     "fleet",
 ];
 
-/// Reads the text of a study file; faults of form are with the source then.
+/// Reads the text of a study file, in which a solver is reached by one of the adapters; faults of form are with the source then.
 ///
 /// # Errors
 /// Where the text is no TOML, or has a table in the place of a list.
-pub(crate) fn read(source: &Source) -> Result<StudyFile, StudyError> {
+pub(crate) fn read(source: &Source, adapters: &[AdapterDef]) -> Result<StudyFile, StudyError> {
     let (root, faults) = DeTable::parse_recoverable(&source.text);
     if super::brackets::report(source, root.get_ref(), !faults.is_empty()) {
         source.verdict()?;
@@ -45,7 +46,7 @@ pub(crate) fn read(source: &Source) -> Result<StudyFile, StudyError> {
     let root = Table::from_map(source, root.get_ref(), 0..0, "the study", &SECTIONS);
     let file = StudyFile {
         study: study(&root),
-        model: model(source, &root),
+        model: model(source, &root, adapters),
         parameters: parameters(&root),
         observer: observer(source, &root),
         records: records(source, &root),

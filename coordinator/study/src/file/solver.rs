@@ -6,7 +6,7 @@
 use std::ops::Range;
 
 use starlings_models::Role;
-use starlings_proto::adapters::{self, ADAPTERS, AdapterDef, NamedBy};
+use starlings_proto::adapters::{AdapterDef, NamedBy};
 use toml::Spanned;
 
 use super::Named;
@@ -86,11 +86,16 @@ pub(crate) struct ProgramQuantity {
 }
 
 /// Reads `[model]` of a solver, whose `kind` stands at `kind`.
-pub(crate) fn program(source: &Source, t: &Table<'_>, kind: Range<usize>) -> ProgramSection {
-    let adapter = adapter(source, t);
-    let known = adapters::adapter(&adapter);
+pub(crate) fn program(
+    source: &Source,
+    t: &Table<'_>,
+    kind: Range<usize>,
+    adapters: &[AdapterDef],
+) -> ProgramSection {
+    let adapter = adapter(source, t, adapters);
+    let known = adapters.iter().find(|known| known.name == adapter);
     if let Some(known) = known {
-        refuse_foreign(source, t, known);
+        refuse_foreign(source, t, known, adapters);
     }
     let command = t.texts("command");
     let address = t.text("address");
@@ -140,19 +145,19 @@ fn output_keys(adapter: Option<&AdapterDef>) -> &'static [&'static str] {
     }
 }
 
-fn adapter(source: &Source, t: &Table<'_>) -> String {
+fn adapter(source: &Source, t: &Table<'_>, adapters: &[AdapterDef]) -> String {
     let Some(word) = t.text("adapter") else { return "grpc".to_owned() };
-    if adapters::adapter(word.get_ref()).is_none() {
-        let valid: Vec<String> = ADAPTERS.iter().map(|adapter| adapter.name.to_owned()).collect();
+    if adapters.iter().all(|known| known.name != word.get_ref()) {
+        let valid: Vec<String> = adapters.iter().map(|adapter| adapter.name.to_owned()).collect();
         source.report_unknown(word.span(), format!("unknown adapter `{}`", word.get_ref()), &valid);
     }
     word.into_inner()
 }
 
 /// Keys of another adapter: they would be ignored, which nobody expects.
-fn refuse_foreign(source: &Source, t: &Table<'_>, adapter: &AdapterDef) {
+fn refuse_foreign(source: &Source, t: &Table<'_>, adapter: &AdapterDef, adapters: &[AdapterDef]) {
     for key in KEYS {
-        let owners: Vec<String> = ADAPTERS
+        let owners: Vec<String> = adapters
             .iter()
             .filter(|other| other.keys.contains(&key))
             .map(|other| format!("\"{}\"", other.name))

@@ -9,7 +9,6 @@ use std::sync::Arc;
 use starlings_estimators::{Form, Kind};
 use starlings_models::external::table::is_transposed;
 use starlings_models::{Forward, Prediction, Window};
-use starlings_proto::adapters::adapter;
 
 use super::{Fault, TrialChannel, TrialError, named, run, trial};
 use crate::{Study, posterior};
@@ -110,7 +109,9 @@ impl<'a> DryRun<'a> {
         let is_part = window.times.len() < self.study.records[self.record].times.len();
         let solver = self.study.setup.model.solver.as_ref();
         // A solver that does not describe itself cannot say which times it answers for.
-        let unasked = solver.map(|s| adapter(&s.adapter).is_some_and(|adapter| !adapter.describes_itself));
+        let unasked = solver.map(|s| {
+            self.study.solver_host.adapter(&s.adapter).is_some_and(|adapter| !adapter.describes_itself)
+        });
         let prediction = match self.run(&window, None) {
             Ok(prediction) => prediction,
             Err(Fault::Run(source)) if is_part && unasked == Some(true) => {

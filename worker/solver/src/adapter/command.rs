@@ -7,6 +7,16 @@
 
 mod fault;
 mod inspect;
+
+/// What it says of itself.
+pub(crate) const DEF: AdapterDef = AdapterDef {
+    name: "command",
+    says: "a program started for every run; input files from templates, outputs by rule, no code",
+    describes_itself: false,
+    per_run: true,
+    named_by: NamedBy::Command("program and arguments, such as `[\"./beam\", \"input.txt\"]`"),
+    keys: &["parameters", "outputs", "inputs", "templates", "copies"],
+};
 pub(super) mod json;
 mod program;
 mod request;
@@ -23,6 +33,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use starlings_models::{Description, ParticleError, Run, Solved, SolverDef, Spec, Timeout, nearest};
+use starlings_proto::adapters::{AdapterDef, NamedBy};
 
 use super::Adapter;
 use crate::SolverError;

@@ -6,11 +6,22 @@
 use std::sync::Arc;
 
 use starlings_models::SolverDef;
+use starlings_proto::adapters::{AdapterDef, NamedBy};
 
 use super::Adapter;
 use super::grpc::Grpc;
 use crate::SolverError;
 use crate::site::Site;
+
+/// What it says of itself.
+pub(crate) const DEF: AdapterDef = AdapterDef {
+    name: "fmu",
+    says: "a functional mock-up unit, through the Python package and fmpy",
+    describes_itself: true,
+    per_run: false,
+    named_by: NamedBy::Command("the file of the FMU, such as `[\"tank.fmu\"]`"),
+    keys: &["described"],
+};
 
 /// The Python package with the FMU of the definition.
 ///

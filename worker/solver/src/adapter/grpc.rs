@@ -8,6 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use starlings_models::{Description, ParticleError, Run, Solved, SolverDef, Timeout};
+use starlings_proto::adapters::{AdapterDef, NamedBy};
 
 use super::Adapter;
 use crate::SolverError;
@@ -16,6 +17,18 @@ use crate::core_slots::{CoreSlot, CoreSlots};
 use crate::instance::{How, Instance};
 use crate::losses::Losses;
 use crate::site::Site;
+
+/// What it says of itself.
+pub(crate) const DEF: AdapterDef = AdapterDef {
+    name: "grpc",
+    says: "a program that serves solver.proto, or an address where one does",
+    describes_itself: true,
+    per_run: false,
+    named_by: NamedBy::CommandOrAddress(
+        "program and arguments, such as `[\"python3\", \"beam.py\"]` (or `address`)",
+    ),
+    keys: &["address", "described"],
+};
 
 /// Programs that the command of the definition starts, or one at its address.
 ///

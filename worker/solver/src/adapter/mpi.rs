@@ -6,11 +6,22 @@
 use std::sync::Arc;
 
 use starlings_models::SolverDef;
+use starlings_proto::adapters::{AdapterDef, NamedBy};
 
 use super::Adapter;
 use super::grpc::Grpc;
 use crate::SolverError;
 use crate::site::Site;
+
+/// What it says of itself.
+pub(crate) const DEF: AdapterDef = AdapterDef {
+    name: "mpi",
+    says: "an MPI program whose rank 0 serves solver.proto",
+    describes_itself: true,
+    per_run: false,
+    named_by: NamedBy::Command("program and arguments, such as `[\"./beam\", \"input.txt\"]`"),
+    keys: &["ranks", "described"],
+};
 
 /// The launcher with the command of the definition on every rank.
 ///

@@ -15,6 +15,7 @@ use std::time::Duration;
 
 use serde_json::{Map, Value, json};
 use starlings_models::{Description, ParticleError, Quantity, Run, SOLVER, Solved, SolverDef, Spec, Timeout};
+use starlings_proto::adapters::{AdapterDef, NamedBy};
 
 use super::Adapter;
 use crate::SolverError;
@@ -25,6 +26,16 @@ use answer::{asked, rows};
 use client::Trouble;
 use pool::Pool;
 use server::Server;
+
+/// What it says of itself.
+pub(crate) const DEF: AdapterDef = AdapterDef {
+    name: "um-bridge",
+    says: "a UM-Bridge server over HTTP, started by the worker or by somebody else",
+    describes_itself: false,
+    per_run: false,
+    named_by: NamedBy::Address("where the server listens, such as \"http://127.0.0.1:4242\""),
+    keys: &["address", "model", "described", "parameters", "outputs", "inputs"],
+};
 
 /// Servers that the command of the definition starts, or one at its address.
 ///
