@@ -1,7 +1,7 @@
 //! The figures of an explanation, one file per kind.
 //!
-//! A new one is a file with `figures(&Explanation, &Figures)`, its line in [`SLOTS`], and its slot in `explain/explain.html`. Next
-//! file to read: [`course`].
+//! A new one is a file with `figures(&Explanation, &Figures)` and its line in [`SLOTS`], where it is a section of its own unless
+//! `explain/explain.html` names it. Next file to read: [`course`].
 
 mod alarm;
 pub(super) mod course;
@@ -13,17 +13,17 @@ use starlings_explain::Figures;
 use starlings_explain::result::Explanation;
 
 use crate::ReportError;
-use crate::plot::figure::{Figure, Slots};
+use crate::plot::figure::{Figure, Slot, Slots};
 
 type Draw = fn(&Explanation, &Figures) -> Result<Vec<Figure>, ReportError>;
 
-/// Slots of the template, and what draws the figures of each.
-const SLOTS: [(&str, Draw); 5] = [
-    ("courses", course::figures),
-    ("maps", region::figures),
-    ("spectra", spectrum::figures),
-    ("forces", force::figures),
-    ("alarm", alarm::figures),
+/// The places for figures, in the order of their sections, and what draws the figures of each.
+const SLOTS: [Slot<Draw>; 5] = [
+    Slot::named("courses", course::figures),
+    Slot::named("maps", region::figures),
+    Slot::named("spectra", spectrum::figures),
+    Slot::named("forces", force::figures),
+    Slot::named("alarm", alarm::figures),
 ];
 
 /// Draws every figure of the page.
@@ -32,5 +32,5 @@ const SLOTS: [(&str, Draw); 5] = [
 ///
 /// A figure cannot be drawn.
 pub(super) fn draw(found: &Explanation, data: &Figures) -> Result<Slots, ReportError> {
-    SLOTS.iter().map(|(slot, draw)| Ok((*slot, draw(found, data)?))).collect()
+    Slots::draw(&SLOTS, |draw| draw(found, data))
 }

@@ -1,7 +1,7 @@
 //! The figures of an identifiability analysis, one file per kind.
 //!
-//! A new one is a file with `figures(&Identification)`, its line in [`SLOTS`], and its slot in `identify.html`. Next file to read:
-//! [`sensitivity`].
+//! A new one is a file with `figures(&Identification)` and its line in [`SLOTS`], where it is a section of its own unless
+//! `identify.html` names it. Next file to read: [`sensitivity`].
 
 mod collinearity;
 mod generalised;
@@ -10,15 +10,20 @@ mod sensitivity;
 use starlings_study::identify::Identification;
 
 use crate::ReportError;
-use crate::plot::figure::{Figure, Slots};
+use crate::plot::figure::{Figure, Slot, Slots};
 
 type Draw = fn(&Identification) -> Result<Vec<Figure>, ReportError>;
 
-/// Slots of the template, and what draws the figures of each.
-const SLOTS: [(&str, Draw); 3] = [
-    ("sensitivity", sensitivity::figures),
-    ("gsf", generalised::figures),
-    ("collinearity", collinearity::figures),
+/// The places for figures, in the order of their sections, and what draws the figures of each.
+const SLOTS: [Slot<Draw>; 3] = [
+    Slot::named("sensitivity", sensitivity::figures),
+    Slot::section(
+        "gsf",
+        "Generalised sensitivities",
+        "These data determine no parameter by themselves.",
+        generalised::figures,
+    ),
+    Slot::named("collinearity", collinearity::figures),
 ];
 
 /// Draws every figure of the page.
@@ -27,5 +32,5 @@ const SLOTS: [(&str, Draw); 3] = [
 ///
 /// A figure cannot be drawn.
 pub(super) fn draw(found: &Identification) -> Result<Slots, ReportError> {
-    SLOTS.iter().map(|(slot, draw)| Ok((*slot, draw(found)?))).collect()
+    Slots::draw(&SLOTS, |draw| draw(found))
 }

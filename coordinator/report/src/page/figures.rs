@@ -1,7 +1,7 @@
 //! The figures of a run's report, one file per kind.
 //!
-//! A new one is a file with `figures(&ReportData)`, its line in [`SLOTS`], and its slot in `report.html`. Next file to read:
-//! [`fit`].
+//! A new one is a file with `figures(&ReportData)` and its line in [`SLOTS`], where it is a section of its own unless
+//! `report.html` names it. Next file to read: [`fit`].
 
 mod along;
 mod autocorrelation;
@@ -15,19 +15,19 @@ mod track;
 
 use crate::ReportError;
 use crate::data::ReportData;
-use crate::plot::figure::{Figure, Slots};
+use crate::plot::figure::{Figure, Slot, Slots};
 
 type Draw = fn(&ReportData) -> Result<Vec<Figure>, ReportError>;
 
-/// Slots of the template, and what draws the figures of each.
-const SLOTS: [(&str, Draw); 7] = [
-    ("families", along::figures),
-    ("fits", fit::figures),
-    ("residuals", residual::figures),
-    ("tracks", track::figures),
-    ("nis", nis::figures),
-    ("observer", observer::figures),
-    ("run_times", run_times::figures),
+/// The places for figures, in the order of their sections, and what draws the figures of each.
+const SLOTS: [Slot<Draw>; 7] = [
+    Slot::named("families", along::figures),
+    Slot::section("fit", "Predicted against measured", "No prediction was stored.", fit::figures),
+    Slot::section("residuals", "Residuals", "No residuals were stored.", residual::figures),
+    Slot::section("tracks", "Parameters over the run", "No analyses were stored.", track::figures),
+    Slot::named("nis", nis::figures),
+    Slot::named("observer", observer::figures),
+    Slot::named("run_times", run_times::figures),
 ];
 
 /// Draws every figure of the page.
@@ -36,5 +36,5 @@ const SLOTS: [(&str, Draw); 7] = [
 ///
 /// A figure cannot be drawn.
 pub(super) fn draw(data: &ReportData) -> Result<Slots, ReportError> {
-    SLOTS.iter().map(|(slot, draw)| Ok((*slot, draw(data)?))).collect()
+    Slots::draw(&SLOTS, |draw| draw(data))
 }

@@ -7,8 +7,58 @@ use serde::Serialize;
 use super::super::ReportError;
 use super::scene::Scene;
 
-/// The figures of a page by the slot of its template that they fill.
-pub(crate) type Slots = BTreeMap<&'static str, Vec<Figure>>;
+/// A place on a page for the figures that `draw` gives.
+pub(crate) struct Slot<Draw> {
+    /// Its name, by which a template may set it where it likes.
+    pub(crate) name: &'static str,
+    /// Heading, and what is said without figures, where it is a section of its own that the template need not name.
+    pub(crate) section: Option<(&'static str, &'static str)>,
+    /// Draws its figures.
+    pub(crate) draw: Draw,
+}
+
+impl<Draw> Slot<Draw> {
+    /// A place that the template names.
+    pub(crate) const fn named(name: &'static str, draw: Draw) -> Self {
+        Self { name, section: None, draw }
+    }
+
+    /// A section of its own.
+    pub(crate) const fn section(
+        name: &'static str,
+        title: &'static str,
+        absent: &'static str,
+        draw: Draw,
+    ) -> Self {
+        Self { name, section: Some((title, absent)), draw }
+    }
+}
+
+/// The figures of a page.
+#[derive(Debug, Serialize)]
+pub(crate) struct Slots {
+    /// By the name of their slot.
+    #[serde(flatten)]
+    by_name: BTreeMap<&'static str, Vec<Figure>>,
+    /// The sections of their own: name, heading, what is said without figures.
+    sections: Vec<[&'static str; 3]>,
+}
+
+impl Slots {
+    /// Draws the figures of every slot.
+    ///
+    /// # Errors
+    ///
+    /// A figure cannot be drawn.
+    pub(crate) fn draw<Draw>(
+        slots: &[Slot<Draw>],
+        figures: impl Fn(&Draw) -> Result<Vec<Figure>, ReportError>,
+    ) -> Result<Self, ReportError> {
+        let sections = slots.iter().filter_map(|s| s.section.map(|(title, absent)| [s.name, title, absent]));
+        let by_name = slots.iter().map(|slot| Ok((slot.name, figures(&slot.draw)?)));
+        Ok(Self { by_name: by_name.collect::<Result<_, ReportError>>()?, sections: sections.collect() })
+    }
+}
 
 /// A drawing with the text that belongs to it.
 #[derive(Debug, Clone, Serialize)]
