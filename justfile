@@ -31,6 +31,10 @@ explain-battery:
 faults:
     PATH="$PWD/target/solvers/bin:$PATH" STARLINGS_WRITE_PAGES=1 cargo test --test faults -- --ignored --nocapture
 
+# The examples of docs/extending.md: applied to a copy, built and tested.
+extending:
+    .ci/extending
+
 # Formatting and lints, warnings are errors.
 lint:
     cargo fmt --all --check

@@ -5,7 +5,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use starlings_coordinator::study::{Problem, Study};
+use starlings_coordinator::study::{Problem, SolverHost, Study};
 
 /// A good study of an aortic recording; every case spoils one place of it.
 const STUDY: &str = r#"[study]
@@ -97,7 +97,7 @@ fn problems(study: &str, recording: &str) -> Vec<Problem> {
     std::fs::write(folder.path().join("beat.csv"), recording).unwrap();
     let file = folder.path().join("study.toml");
     std::fs::write(&file, study).unwrap();
-    match Study::load(&file) {
+    match Study::load_with(&file, &SolverHost::default().by(starlings_solver::adapters())) {
         Ok(_) => Vec::new(),
         Err(error) => error.problems,
     }

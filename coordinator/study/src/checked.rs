@@ -38,7 +38,7 @@ pub struct Study {
     pub parameters: Vec<StudyParameter>,
     /// The estimated vector: shared parameters once, the others once per trained record.
     pub theta: Vec<ThetaEntry>,
-    /// The recordings, which versions of the study share.
+    /// The recordings, which variants of the study share.
     pub records: Arc<Vec<Record>>,
     /// The estimator.
     pub estimator: EstimatorChoice,
