@@ -129,7 +129,7 @@ fn write_page(path: &Path, found: &Found<'_>) -> Result<(), Failure> {
         model: &found.study.setup.model.kind,
         time_unit: &found.study.time_unit,
         outputs: &found.study.setup.outputs,
-        poles: found.spectrum.laboratory.poles(),
+        poles: found.spectrum.linearised.poles(),
         listed: found.spectrum.listed,
         decay: found.spectrum.decay,
         observers: &found.spectrum.observers,

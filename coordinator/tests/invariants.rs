@@ -1,4 +1,4 @@
-//! Same study, same bytes: whoever computes, in whatever order, however often it is interrupted.
+//! The same study gives the same bytes, whatever computes it, in whatever order, and however often it is interrupted.
 #![allow(clippy::unwrap_used)]
 mod study_kit;
 
@@ -79,7 +79,7 @@ fn cases() -> Vec<(&'static str, Case)> {
     ]
 }
 
-/// Everything that must not depend on who computed and when.
+/// Everything that must not depend on what computed it and when.
 fn essence(done: &Done) -> String {
     let s = &done.summary;
     let table = |name, columns| format!("{:?}", done.table(name, columns));
@@ -101,9 +101,9 @@ fn the_number_of_threads_and_the_order_of_computing_do_not_change_a_byte() {
         let reference = case.run_on(&mut InProcess::new(1)).unwrap_or_else(|e| panic!("{name}: {e}"));
         let runs = &reference.summary.runs;
         for threads in [2, 5] {
-            let again = case.run_on(&mut InProcess::new(threads)).unwrap();
-            assert!(essence(&again) == essence(&reference), "{name} on {threads} threads");
-            assert_eq!(&again.summary.runs, runs, "{name}");
+            let repeated = case.run_on(&mut InProcess::new(threads)).unwrap();
+            assert!(essence(&repeated) == essence(&reference), "{name} on {threads} threads");
+            assert_eq!(&repeated.summary.runs, runs, "{name}");
         }
         let shuffled = case.run_on(&mut Shuffled::new(3)).unwrap();
         assert!(essence(&shuffled) == essence(&reference), "{name}, shuffled");
@@ -112,7 +112,7 @@ fn the_number_of_threads_and_the_order_of_computing_do_not_change_a_byte() {
     }
 }
 
-/// Runs until the fleet dies after so many calls, then to the end on another fleet.
+/// Runs until the fleet stops after so many calls, then to the end on another fleet.
 fn interrupted(case: &Case, calls: usize) -> Done {
     let path = case.fresh();
     let error = case.go(&path, &mut Mortal::new(calls)).err().unwrap();
@@ -136,8 +136,8 @@ fn interrupt_everywhere(name: &str, case: &Case) {
     assert!(whole.answered > 3, "{name}: {} calls", whole.answered);
     for calls in 0..whole.answered {
         let done = interrupted(case, calls);
-        let (again, before) = (essence(&done), essence(&reference));
-        assert!(again == before, "{name}, interrupted after {calls} calls: {} {}", done.csv, reference.csv);
+        let (resumed, before) = (essence(&done), essence(&reference));
+        assert!(resumed == before, "{name}, interrupted after {calls} calls: {} {}", done.csv, reference.csv);
         assert_eq!(done.summary.runs, reference.summary.runs, "{name}, interrupted after {calls} calls");
     }
 }

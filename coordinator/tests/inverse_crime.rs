@@ -185,7 +185,7 @@ fn ratios_off(found: &[f64]) -> f64 {
 fn the_linear_tube_finds_the_stiffness_ratios_of_the_nonlinear_artery_and_says_what_it_misses() {
     let noisy = Twin { young: 5e6, peak: 300.0, noise: 0.1, radius: 1.0 };
     let wall = noisy.wall();
-    // Not small: the radius is up to a third above that of the unloaded vessel, and the linear tube knows only the latter.
+    // Not small: the radius is up to a third above that of the unloaded vessel, and the linear tube uses only the latter.
     assert!(wall.radius[0] > 1.0 && wall.radius[1] > 1.3, "{:?}", wall.radius);
 
     let done = noisy.fit(&wall);
@@ -199,7 +199,7 @@ fn the_linear_tube_finds_the_stiffness_ratios_of_the_nonlinear_artery_and_says_w
     let done = exact.fit(&wall);
     let found = exact.found(&done);
     assert!(ratios_off(&found) < 0.1, "{found:?}");
-    // A hundredth of the pulse shows that the model is another one, and the run says so.
+    // Noise of a hundredth of the pulse shows that the model is another one, and NIS warns.
     let nis = done.summary.fit.nis_per_observation;
     assert!(nis > 3.0, "{nis}");
     for warning in

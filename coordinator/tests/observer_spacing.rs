@@ -1,4 +1,4 @@
-//! What an observer is said to do for the state: corrected at the spacing at which the fit itself was.
+//! The reported effect of an observer on the state: corrected at the spacing at which the fit itself was.
 #![allow(clippy::unwrap_used)]
 mod study_kit;
 
@@ -68,7 +68,7 @@ fn a_model_that_fails_under_its_observer_at_the_estimate_is_told_in_the_summary(
     // The run with the observer alone covers the whole record with data in it; the free run has none.
     let with_observer = |at: &At<'_>| {
         let window = &at.job.window;
-        at.again && window.times.len() > 10 && window.observed.iter().any(|v| v.is_finite())
+        at.retried && window.times.len() > 10 && window.observed.iter().any(|v| v.is_finite())
     };
     let mut fleet = Failing::new(with_observer);
     let done = case(false).run_on(&mut fleet).unwrap_or_else(|error| panic!("{error}"));

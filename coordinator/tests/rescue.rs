@@ -7,7 +7,7 @@ use starlings_coordinator::study::RunError;
 use study_kit::fleets::{At, Failing};
 use study_kit::{Case, Done, csv, grid, linear, normals};
 
-/// A decay whose rate k the model cannot take beyond a wall: the logarithm is no number there.
+/// A decay whose rate k has an upper limit in the model, the wall: beyond it the logarithm is no number.
 fn walled(estimator: &str, wall: f64) -> Case {
     let times = grid(30, 0.1);
     let noise = normals(30, 9);
@@ -126,7 +126,7 @@ fn a_linear_model_gives_the_same_posterior_with_and_without_a_pulled_point() {
 fn several_failing_points_of_one_ensemble_are_pulled_one_by_one() {
     let case = line("passes = 1");
     let whole = case.run_on(&mut InProcess::new(1)).unwrap();
-    let mut fleet = Failing::new(|at: &At<'_>| at.ensemble == 3 && at.job.particle != 2 && !at.again);
+    let mut fleet = Failing::new(|at: &At<'_>| at.ensemble == 3 && at.job.particle != 2 && !at.retried);
     let pulled = case.run_on(&mut fleet).unwrap();
     assert_same(&pulled, &whole, 1, "three of four points");
     assert_eq!(pulled.summary.runs.rescued, 3);
@@ -164,7 +164,7 @@ fn a_simplex_that_fails_next_to_the_mean_ends_the_run_with_advice() {
     for part in ["even next to the mean", "a = ", "initial:x = ", "made to fail", "logit", "star points"] {
         assert!(text.contains(part), "`{part}` is missing: {text}");
     }
-    // What was done stays: the same run goes on once the model runs again.
+    // What was stored is kept: the same run goes on once the model runs again.
     let done = case.go(&path, &mut InProcess::new(1)).unwrap();
     assert_eq!(done.csv, case.run().csv);
 }

@@ -1,4 +1,4 @@
-//! When passes end, what is said where they do not, and which constant an answer hangs on.
+//! When passes end, the warning where they do not settle, and which constant an answer hangs on.
 #![allow(clippy::unwrap_used)]
 mod study_kit;
 

@@ -12,7 +12,7 @@ mod study_kit;
 #[path = "solver_study/swing.rs"]
 mod swing;
 
-use inside::{Inside, Place, nobody, threads};
+use inside::{Inside, Place, no_host, threads};
 use starlings_coordinator::fleet::InProcess;
 use starlings_coordinator::study::identify::{At, identify};
 use starlings_coordinator::study::trial::trial;
@@ -30,7 +30,7 @@ fn both(more: &str, change: fn(&mut starlings_models::Description)) -> (Place, S
     let data = recording(&[], &[], 7);
     let here = Place::new(&[("study.toml", &native(more)), ("swing.csv", &data)]);
     let there = Place::new(&[("study.toml", &solver(more)), ("swing.csv", &data)]);
-    let study = here.load(&nobody()).unwrap_or_else(|error| panic!("{error}"));
+    let study = here.load(&no_host()).unwrap_or_else(|error| panic!("{error}"));
     let inside = Inside::of(&study, &["v"]).described(change);
     let outside = there.load(&inside.solver_host()).unwrap_or_else(|error| panic!("{error}"));
     (here, study, there, outside, inside)
@@ -44,8 +44,8 @@ fn apart(a: &Summary, b: &Summary) -> f64 {
     parameters.fold(off(a.fit.log_likelihood, b.fit.log_likelihood, 1.0), f64::max)
 }
 
-/// Runs both and compares. The arithmetic behind the wall is that of this process: only the order in which names are
-/// resolved could differ, and a posterior that it moved would not be the same study's.
+/// Runs both and compares. The solver computes with the arithmetic of this process: only the order in which names are resolved
+/// could differ, and a posterior that it moved would not be the same study's.
 fn assert_the_same(more: &str, change: fn(&mut starlings_models::Description), kind: &Kind) {
     let (here, study, there, outside, inside) = both(more, change);
     assert_eq!(outside.estimator.kind, kind);
@@ -77,7 +77,7 @@ fn a_solver_that_cannot_restart_is_fitted_as_a_whole_without_being_told() {
     let want = here.run(&study, &mut InProcess::new(2), "run").unwrap();
     // As above.
     assert!(apart(&got, &want) < 1e-10);
-    // Said in the study it needs no word.
+    // Stated in the study, it gives no warning.
     let (.., said, _) = both(BATCH, once);
     assert!(!said.warnings.iter().any(|w| w.contains("restart")), "{:?}", said.warnings);
 }
@@ -140,8 +140,8 @@ fn a_solver_that_a_file_describes_is_not_started_where_the_study_is_loaded() {
         "study.toml",
         &solver("").replace("command = [\"swing\"]", "command = [\"swing\"]\ndescribed = \"swing.json\""),
     );
-    // Nobody here can start a solver, and nobody needs to.
-    let study = there.load(&nobody()).unwrap_or_else(|error| panic!("{error}"));
+    // No solver can be started here, and none has to be.
+    let study = there.load(&no_host()).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(study.setup.model.description(), Some(inside.description()));
     assert_eq!(trial(&study).unwrap(), []);
     assert!(study.warnings.iter().any(|w| w.contains("described by a file")), "{:?}", study.warnings);

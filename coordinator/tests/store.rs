@@ -1,4 +1,4 @@
-//! The run's database: a row for every event, job and analysis, and plain words when it cannot be used.
+//! The run's database: a row for every event, job and analysis, and a message with the remedy when it cannot be used.
 #![allow(clippy::unwrap_used)]
 mod study_kit;
 
@@ -70,9 +70,9 @@ fn the_summary_that_is_read_back_is_the_summary_that_was_made() {
         let done = case.run();
         let text = done.folder.store.meta("summary").unwrap().unwrap();
         assert_eq!(serde_json::from_str::<Summary>(&text).unwrap(), done.summary);
-        let again = RunFolder::open(&done.folder.path).unwrap();
-        assert_eq!(again.summary().unwrap().unwrap(), done.summary);
-        assert_eq!(again.store.meta("posterior").unwrap().unwrap(), done.csv);
+        let reopened = RunFolder::open(&done.folder.path).unwrap();
+        assert_eq!(reopened.summary().unwrap().unwrap(), done.summary);
+        assert_eq!(reopened.store.meta("posterior").unwrap().unwrap(), done.csv);
     }
 }
 

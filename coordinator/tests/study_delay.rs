@@ -1,4 +1,4 @@
-//! An input that takes hold late, in windows: each must hold the input's past.
+//! A delayed input, fitted in windows: each must hold the input's past.
 #![allow(clippy::unwrap_used)]
 mod study_kit;
 

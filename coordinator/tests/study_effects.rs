@@ -112,7 +112,7 @@ fn a_threshold_can_be_estimated_in_the_unit_of_its_level() {
     };
     let study = rim(24.0);
     assert!(study.warnings.is_empty(), "{:?}", study.warnings);
-    // Beyond the course at the prior medians: taken, and told.
+    // Beyond the course at the prior medians: accepted with a warning.
     let study = rim(45.0);
     assert_eq!(study.warnings.len(), 1, "{:?}", study.warnings);
     let warning = &study.warnings[0];

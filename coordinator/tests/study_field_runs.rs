@@ -1,4 +1,4 @@
-//! Runs of models with fields: periodic starts and relative noise of twins, what the summary pools, what the observer does.
+//! Runs of models with fields: periodic starts and relative noise of twins, what the summary pools, the effect of the observer.
 // Values that are copied are compared exactly; the helpers of a test file are tests too.
 #![allow(clippy::float_cmp, clippy::unwrap_used)]
 mod study_kit;
@@ -75,7 +75,7 @@ fn a_field_is_one_entry_of_the_summary_and_data_ten_steps_apart_determine_the_st
     assert!((told / rmse - 1.0).abs() < 1e-12, "{told} {rmse}");
     for (name, truth) in TRUTH {
         let p = done.estimate(name);
-        // Four standard deviations: an interval that misses the truth by more is wrong, not unlucky.
+        // Four standard deviations: the truth lies further off in one of sixteen thousand draws.
         assert!(
             (p.estimate - truth).abs() < 4.0 * p.sd && p.sd < 0.1 * truth,
             "{name}: {} ± {}",

@@ -118,8 +118,8 @@ fn a_run_starts_from_the_file_of_initial_values_but_where_one_is_estimated() {
     assert_eq!(study.setup.model.constants["initial:pi"], of.start.last().unwrap().1);
     // Times at their start show the state that was given, to the last bit.
     let values = TRUTH.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
-    let again = simulate(&study, &Twin { values, ..Twin::default() }).unwrap();
-    assert_eq!(again.values, of.values);
+    let restarted = simulate(&study, &Twin { values, ..Twin::default() }).unwrap();
+    assert_eq!(restarted.values, of.values);
     let estimated = started().replace(
         "[[records]]",
         "[[parameters]]\nname = \"initial:pi\"\nprior = { transform = \"log\", median = 1e5, factor = 1.2 }\n[[records]]",

@@ -1,4 +1,4 @@
-//! What a run may cost: steps that no run should take are refused, with how many there would be and what to do.
+//! Limits of the cost of a run: too many steps are refused, with how many there would be and what to do.
 #![allow(clippy::unwrap_used)] // a failed unwrap is a failed test
 
 use std::fmt::Write as _;
@@ -15,7 +15,7 @@ fn recording() -> String {
     text
 }
 
-/// What loading a study and its trial run say; nothing of a sound one.
+/// The messages of loading a study and of its trial run; empty for a sound one.
 fn told(study: &str) -> String {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("data.csv"), recording()).unwrap();

@@ -93,7 +93,8 @@ fn prestress_gives_the_stiffness_that_an_image_taken_for_the_reference_does_not(
     let [displacement, velocity] = [DISPLACEMENT, VELOCITY].map(|c| estimate(radius, &image, c, &data));
     assert!((displacement - 1.0).abs() < 0.02, "{displacement}");
     assert!((velocity - 1.0).abs() < 0.1, "{velocity}");
-    // Without it, a velocity makes the wall too stiff by the square of the stretch in the image: the same E h/R² with the image's R.
+    // Without it, a velocity makes the wall too stiff by the square of the stretch in the image: the same E h/R² with the
+    // image's R.
     let ring = Rings::new(&[velocity * YOUNG], &[0.15], 0.5);
     let stretch = radius / ring.unloaded(&[radius], DIASTOLE).unwrap().shape[0];
     let factor = estimate(radius, "", VELOCITY, &data) / velocity;

@@ -1,4 +1,4 @@
-//! Surfaces that are none: each refused with its file, line and remedy.
+//! Files that hold no valid surface: each refused with its file, line and remedy.
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 mod study_kit;
 

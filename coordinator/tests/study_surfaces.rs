@@ -41,7 +41,7 @@ fn study(channel: &str) -> String {
     STUDY.replace("CHANNEL", channel)
 }
 
-/// The record's file: times and flow, and a column that nobody reads.
+/// The record's file: times and flow, and a column that is not used.
 fn flow() -> String {
     let times = grid(41, 0.02);
     let values: Vec<f64> =

@@ -1,4 +1,4 @@
-//! Runs that are given up after their limit of time: a decision that a resume repeats, and that the result tells.
+//! Runs that are given up after their limit of time: a decision that a resume repeats, and that the result reports.
 #![allow(clippy::unwrap_used)] // a failed unwrap is a failed test
 
 mod study_kit;

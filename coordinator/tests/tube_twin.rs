@@ -167,7 +167,7 @@ fn wall_and_tissue_together_are_reported_as_one_stiffness() {
     let with_tissue: Vec<f64> = done.summary.correlation[..5].iter().map(|row| row[5]).collect();
     assert!(with_tissue.iter().any(|c| *c < -0.95), "{with_tissue:?}");
     println!("correlation with k_s: {with_tissue:?}");
-    // What a ring feels is known: E h/((1 − ν²)R²) + k_s, of which the first is E/5 here.
+    // The sum that sets the motion of a ring is known: E h/((1 − ν²)R²) + k_s, of which the first is E/5 here.
     for (i, octave) in OCTAVES.iter().enumerate() {
         let sum = done.estimate(&format!("E{}", i + 1)).estimate / 5.0 + done.estimate("k_s").estimate;
         let want = 1e6 * octave.exp2() + 2e5;
@@ -201,7 +201,7 @@ fn a_stiff_strap_around_the_first_two_of_ten_regions_is_found_with_its_factor() 
             let factor: f64 = weight.iter().zip(&found).map(|(weight, (mean, _))| weight * mean).sum();
             let sd = sd_of(&weight, &found, &done.summary.correlation);
             println!("strap, seed {seed}, region {}: 2^{factor:.4} ± {sd:.4}", i + 1);
-            // Anybody would call it stiffer.
+            // Sharp enough to tell that it is stiffer.
             assert!(sd < 0.1, "± {sd} octaves");
             let off = (factor - 1.0) / sd;
             assert!(off.abs() < 3.5, "seed {seed}, region {}: 2^{factor} ± {sd}", i + 1);

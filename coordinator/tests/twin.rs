@@ -1,4 +1,4 @@
-//! Twin experiments: data simulated from a known truth, and what the run says about them.
+//! Twin experiments: data simulated from a known truth, and the result of the run.
 #![allow(clippy::unwrap_used)]
 mod study_kit;
 
@@ -211,7 +211,7 @@ fn a_parameter_that_does_not_matter_is_said_to_be_unknown() {
         assert!(done.warns("almost nothing about idle"), "{estimator}: {:?}", done.summary.warnings);
         assert!(!done.warns("almost nothing about a:"), "{:?}", done.summary.warnings);
         let idle = done.estimate("idle");
-        // Nothing was learned: the posterior is the prior, to what curvature along the other parameter feigns.
+        // No information: the posterior is the prior, up to what the curvature along the other parameter adds.
         let sd = 2f64.ln();
         assert!((idle.estimate / 1.5).ln().abs() < 0.01 * sd, "{estimator}: {}", idle.estimate);
         assert!((idle.interval95[1] / idle.prior_interval95[1]).ln().abs() < 0.02 * sd, "{estimator}");

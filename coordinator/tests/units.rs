@@ -1,4 +1,4 @@
-//! Unit labels of whole studies: which contradictions are told, in which words, and which labels contradict nothing.
+//! Unit labels of whole studies: which contradictions are reported, in which words, and which labels contradict nothing.
 // The helpers of a test file are tests too.
 #![allow(clippy::unwrap_used)]
 

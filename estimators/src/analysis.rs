@@ -1,7 +1,7 @@
 //! One analysis: predictions and data in, the r x r transform and every diagnostic out.
 //!
-//! The steps are those of Moireau & Chapelle (2011), algorithm 3, with the transform written out: X+ = X- T. It
-//! deliberately knows neither states nor drift. Read next: `roukf.rs`, which applies it.
+//! The steps are those of Moireau & Chapelle (2011), algorithm 3, with the transform written out: X+ = X- T. States are not an
+//! argument. Read next: `roukf.rs`, which applies it.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -10,7 +10,7 @@ use crate::particles::Geometry;
 use crate::whiten::{Spread, Sweep, Whitened};
 use crate::{Data, EstimatorError, Root};
 
-/// Everything one analysis says.
+/// The result of one analysis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Analysis {
     /// Transform T, r x r, drift included: X+ = X- T for states and parameters alike. Every column sums to one; the row

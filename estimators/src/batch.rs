@@ -4,8 +4,8 @@
 //! the derivative. Gauss-Newton with the prior as a term of its own (Bell 1994), solved by QR of the
 //! stacked whitened rows (`linearisation.rs`), damped after Levenberg (1944) and
 //! Marquardt (1963), the damping controlled after Nielsen (1999). A centre that lowers the cost is kept; otherwise the
-//! step is shortened and recomputed from the linearisation of the best centre. It deliberately stops nowhere by itself:
-//! the caller looks at `converged` and `max_iterations`. Read next: `linearisation.rs`.
+//! step is shortened and recomputed from the linearisation of the best centre. There is no loop here: the caller stops at
+//! `converged` or at `max_iterations`. Read next: `linearisation.rs`.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -27,7 +27,7 @@ const FIRST_GROWTH: f64 = 4.0;
 /// No parameter moves further than this in one step, in prior sd.
 const LONGEST: f64 = 2.0;
 /// Steps rejected in a row before the best centre is linearised again with closer points.
-const STUBBORN: usize = 4;
+const MOST_REJECTED: usize = 4;
 /// Points come no closer than this, relative to the spread asked for.
 const NARROWEST: f64 = 0.1;
 /// Ensembles around the prior mean before the start counts as failed.
@@ -41,8 +41,8 @@ pub struct Batch {
     /// Rows that answer to some of the parameters only; empty where every row may answer to all. The noise of different blocks
     /// is independent.
     pub blocks: Vec<Block>,
-    /// Spread of the points in units of the current posterior sd (of the prior sd at first). As the steps get shorter
-    /// than one sd, the points close in with them, down to a tenth of this.
+    /// Spread of the points in units of the current posterior sd (of the prior sd at first). When the steps get shorter than
+    /// one sd, the points move closer to the centre with them, down to a tenth of this.
     pub spread: f64,
     /// Ensembles at most; the caller stops there.
     pub max_iterations: usize,
@@ -211,8 +211,8 @@ impl Batch {
         let singular = EstimatorError::NotPositiveDefinite { what: "posterior" };
         let newton = best.newton().ok_or_else(|| singular.clone())?;
         let step = best.along.norm();
-        let again = !accepted && next.rejected.is_multiple_of(STUBBORN);
-        if again {
+        let relinearise = !accepted && next.rejected.is_multiple_of(MOST_REJECTED);
+        if relinearise {
             next.trial.clone_from(&best.centre);
             next.width *= 0.3;
             next.refresh();
@@ -264,12 +264,12 @@ impl Batch {
 }
 
 impl BatchState {
-    /// Lowers the damping by how well the linear model foretold the fall of the cost.
+    /// Lowers the damping by how well the linear model predicted the fall of the cost.
     fn relax(&mut self, from: &Linearisation, to: &Linearisation) {
         let s = &to.centre - &from.centre;
-        let foretold = from.foretold(&s);
-        if foretold > 0.0 {
-            let ratio = (from.cost - to.cost) / foretold;
+        let predicted_fall = from.predicted_fall(&s);
+        if predicted_fall > 0.0 {
+            let ratio = (from.cost - to.cost) / predicted_fall;
             self.damping *= (1.0 - (2.0 * ratio - 1.0).powi(3)).clamp(0.3, 2.0);
         }
         self.growth = FIRST_GROWTH;
@@ -281,8 +281,8 @@ impl BatchState {
         self.growth *= 2.0;
     }
 
-    /// The slope is about to be measured again: what the old one did to the damping is half forgotten, in the logarithm.
-    /// Forgotten altogether, steps that are too long for the model's curvature would be tried again for ever.
+    /// Called before the slope is measured again: moves the damping half way back to [`REJECTED_DAMPING`] in the logarithm.
+    /// With a full reset the fit could repeat for ever steps that are too long for the model's curvature.
     fn refresh(&mut self) {
         self.damping = (self.damping * REJECTED_DAMPING).sqrt();
         self.growth = FIRST_GROWTH;

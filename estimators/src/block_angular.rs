@@ -19,8 +19,8 @@ use nalgebra::{DMatrix, DVector};
 pub(crate) use reduction::Diagonal;
 pub(crate) use subspace::Subspace;
 
-/// Part of the length of a step that must lie in the columns of a block for its secant to be changed: of less, rounding and the
-/// errors of the runs would make the slope.
+/// Part of the length of a step that must lie in the columns of a block for its secant to be changed: with less, rounding and
+/// the errors of the runs would determine the slope.
 const LEAST_PART: f64 = 1e-4;
 
 /// A matrix of m x p in blocks of rows; entries outside of the blocks are zero. A clone shares the entries.
@@ -207,10 +207,12 @@ impl BlockAngular {
         }
     }
 
-    /// The secant update: A x comes closer to what a step x (p) has changed, of which `surprise` (m) is what A x left.
+    /// The secant update: changes A so that A x, for a step x (p), comes closer to the observed change; `surprise` (m) is the
+    /// observed change minus A x.
     ///
-    /// Every row learns from the part of the step that it answers to (Broyden 1965; row by row for a matrix with zeros, Schubert
-    /// 1970, Broyden 1971), which leaves the zeros. A block in whose columns next to nothing of the step lies stays as it is.
+    /// Every row is changed along the part of the step that lies in its columns (Broyden 1965; row by row for a matrix with
+    /// zeros, Schubert 1970, Broyden 1971), which keeps the zeros. A block in whose columns almost none of the step lies is not
+    /// changed.
     pub(crate) fn learn(&mut self, surprise: &DVector<f64>, step: &DVector<f64>) {
         let whole = step.norm_squared();
         for block in Arc::make_mut(&mut self.blocks) {

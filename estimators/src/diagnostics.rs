@@ -1,6 +1,6 @@
 //! Diagnostics of residuals and posteriors: noise, autocorrelation, the band of the NIS, correlations.
 //!
-//! Deliberately without judgement: what deserves a warning is the caller's business. Read next: `analysis.rs`.
+//! No thresholds for warnings here: the caller sets them. Read next: `analysis.rs`.
 
 use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -10,8 +10,8 @@ const MEDIAN_ABSOLUTE: f64 = 0.674_489_750_196_081_7;
 
 /// Noise sd of an evenly sampled smooth series from its third differences: median |d3| / (0.6745 sqrt 20).
 ///
-/// Differences that touch a NaN are skipped; NaN when none is left. Third differences remove any parabola, and white
-/// noise has third differences of variance 1 + 9 + 9 + 1 = 20; the median is blind to a few jumps.
+/// Differences that touch a NaN are skipped; NaN when none is left. Third differences remove any parabola, and white noise has
+/// third differences of variance 1 + 9 + 9 + 1 = 20; a few jumps hardly change the median.
 pub fn noise_from_third_differences(series: &[f64]) -> f64 {
     let mut size: Vec<f64> = series
         .windows(4)

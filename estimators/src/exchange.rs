@@ -1,15 +1,16 @@
 //! Exchanges the prior under which a Gaussian posterior was computed.
 //!
 //! A second pass of a filter starts from a narrow prior around the first estimate, so that its particles stay where the
-//! model is nearly linear. What it learned is then combined with the prior that was meant: in information form,
-//! posterior - used + wanted. Deliberately Gaussian: no data is seen again. Read next: `gaussian.rs`.
+//! model is nearly linear. Its result is then combined with the prior that was meant: in information form, posterior - used +
+//! wanted. It works on Gaussians only: the data are not used again. Read next: `gaussian.rs`.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::data::same;
 use crate::{EstimatorError, Gaussian, spectral};
 
-/// Information of a direction, in units of that of the used prior, up to which it counts as none; the next decade fades in.
+/// Information of a direction, in units of that of the used prior, up to which it counts as none; from there to ten times as
+/// much its weight rises linearly from 0 to 1.
 ///
 /// Rounding of a covariance that went through thousands of analyses stays below 1e-11. A direction of which the data
 /// know a hundredth of what the wanted prior does still has 1e-8 under a used prior of a thousandth of its sd.
@@ -44,7 +45,8 @@ impl Exchanged {
 /// `wanted`, wherever their mean went: a slope of the likelihood without curvature would move it without bound.
 ///
 /// # Errors
-/// `Shape`, `NotPositiveDefinite` for a singular covariance, `NotFinite` and `NotDecomposed` when the two are out of all proportion.
+/// `Shape`, `NotPositiveDefinite` for a singular covariance, `NotFinite` and `NotDecomposed` when the scales of the two differ
+/// too much.
 pub fn exchange_prior(
     posterior: &Gaussian,
     used: &Gaussian,

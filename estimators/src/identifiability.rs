@@ -3,8 +3,8 @@
 //! The sensitivities S are the derivatives of the predictions by the transformed parameters, divided by the noise sd of
 //! their rows; F = S^T S is the Fisher information. Everything is local: it holds where the sensitivities were taken, and
 //! for a model that is close to linear within the result. Directions are compared in units of the prior sd, so that a
-//! flow and a stiffness can stand in one combination. Deliberately without any observed value, name or threshold for a
-//! warning. Read next: `identifiability/fisher.rs`, then `collinearity.rs` and `generalised.rs` beside it.
+//! flow and a stiffness can stand in one combination. Observed values, names and thresholds for warnings are not used here.
+//! Read next: `identifiability/fisher.rs`, then `collinearity.rs` and `generalised.rs` beside it.
 
 mod collinearity;
 mod direction;
@@ -22,7 +22,7 @@ use nalgebra::DMatrix;
 use crate::EstimatorError;
 use crate::data::same;
 
-/// A column shorter than this, in noise sd per prior sd, is no response: rounding of the predictions looks like it.
+/// A column shorter than this, in noise sd per prior sd, counts as no response: rounding of the predictions can be as large.
 const SILENT: f64 = 1e-6;
 
 /// Whitened sensitivities of an experiment, rows without an observation left out.

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::particles::Geometry;
 use crate::spectral;
 
-/// Above this squared size of S the unit matrix in 1 + S^T S drowns in rounding.
+/// Above this squared size of S the unit matrix in 1 + S^T S is lost in rounding.
 const LARGEST: f64 = 1e12;
 
 fn drowns(size: f64) -> bool {

@@ -1,7 +1,7 @@
-//! What an estimator says of itself: its name in a study file, the settings that it reads, and how it goes through the data.
+//! The description of an estimator: its name in a study file, the settings that it reads, and how it goes through the data.
 //!
-//! Being in the list [`crate::KINDS`] is all that a filter needs: its name becomes valid in a study file, and the loop over
-//! windows runs it. Deliberately no arithmetic. Read next: `filter.rs`, then `roukf.rs`.
+//! A filter in the list [`crate::KINDS`] needs nothing else: its name is valid in a study file, and the loop over windows runs
+//! it. No arithmetic here. Read next: `filter.rs`, then `roukf.rs`.
 
 use std::fmt;
 

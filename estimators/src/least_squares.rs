@@ -1,9 +1,9 @@
-//! Damped least squares over runs that somebody else makes: it says which run it needs next and takes the answer.
+//! Damped least squares over runs that the caller makes: it says which run it needs next and takes the result.
 //!
 //! Levenberg (1944) and Marquardt (1963) with the secant update of Broyden (1965) between Jacobians, for models whose runs
-//! are the only cost: a Jacobian is asked for at the start, where the secant no longer foretells the cost, and once at the
-//! end. Deliberately in scaled parameters z of the caller's choice, with an independent Gaussian prior and bounds on each.
-//! Read next: `block_angular.rs`, what a Jacobian is, and `score.rs`, which asks what another parameter would add in the end.
+//! are the only cost: a Jacobian is asked for at the start, where the secant no longer predicts the cost, and once at the end.
+//! In scaled parameters z of the caller's choice, with an independent Gaussian prior and bounds on each. Read next:
+//! `block_angular.rs`, what a Jacobian is, and `score.rs`, which computes what another parameter would add to a finished fit.
 
 mod damped;
 mod need;
@@ -19,7 +19,7 @@ use crate::block_angular::BlockAngular;
 /// Damping after the first rejected step.
 const REJECTED_DAMPING: f64 = 1e-2;
 /// Rejected steps in a row after which the fit has stalled.
-const STUBBORN: usize = 8;
+const MOST_REJECTED: usize = 8;
 /// Longest step of one component, in units of z.
 const LONGEST: f64 = 3.0;
 
@@ -68,7 +68,7 @@ impl LeastSquares {
     }
 
     /// A fit from a point whose residual (m) and approximate Jacobian (m x p) are known: its first step costs one run. It ends
-    /// as soon as the secant promises nothing more; [`LeastSquares::polish`] goes on from there.
+    /// as soon as the secant predicts no further fall of the cost; [`LeastSquares::polish`] goes on from there.
     pub fn from_known(
         z: DVector<f64>,
         residual: DVector<f64>,
@@ -116,7 +116,7 @@ impl LeastSquares {
         self.cost
     }
 
-    /// The cost that the linear model promises at its minimum.
+    /// The minimum of the cost that the linear model predicts.
     pub fn promised(&self) -> f64 {
         match &self.need {
             Need::Residual(_) if self.cost.is_finite() => self.cost - self.predicted,
@@ -124,7 +124,7 @@ impl LeastSquares {
         }
     }
 
-    /// The fall of the cost that the linear model promised with the last step that was considered.
+    /// The fall of the cost that the linear model predicted for the last step that was considered.
     pub fn last_promise(&self) -> f64 {
         self.predicted
     }
@@ -211,22 +211,22 @@ impl LeastSquares {
         self.damping = self.damping.max(REJECTED_DAMPING) * 5.0;
         if self.trials_left == 0 {
             self.need = Need::Nothing(End::Limit);
-        } else if self.rejected > STUBBORN {
+        } else if self.rejected > MOST_REJECTED {
             self.give_up(was_fresh);
         } else if self.thorough && self.measured.is_none() {
             self.damping = 0.0;
             self.need = Need::Jacobian(self.z.clone());
         } else if self.rejected > 1 && self.restore() {
-            // The secant did not help either: shorter steps along the measured slope must, in the end, lower the cost.
+            // The secant did not help either. Along the measured slope, steps that are short enough lower the cost.
             self.plan();
         } else {
-            // The secant has learned from the failure: what it holds is no longer of this point alone.
+            // The secant update used the failed step too: the Jacobian is no longer the one measured at this point.
             self.fresh = false;
             self.plan();
         }
     }
 
-    /// Ends for want of a step that lowers the cost. What the undamped step promises tells how far from a minimum that is.
+    /// Ends because no step lowers the cost. The fall that the undamped step predicts shows how far from a minimum that is.
     fn give_up(&mut self, was_fresh: bool) {
         let of_here = self.restore() || was_fresh;
         self.damping = 0.0;
@@ -261,8 +261,8 @@ impl LeastSquares {
         self.need = Need::Residual(&self.z + step);
     }
 
-    /// The damped step within the bounds; notes the fall of the cost that it promises. Components at a bound that pull
-    /// outwards are left where they are.
+    /// The damped step within the bounds; notes the fall of the cost that it predicts. Components at a bound that pull outwards
+    /// are left where they are.
     fn step(&mut self) -> Option<DVector<f64>> {
         let p = self.z.len();
         let precision = &self.prior.precision;

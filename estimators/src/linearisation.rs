@@ -1,4 +1,4 @@
-//! The fit at one centre and the slope of the predictions around it: what one ensemble of a batch fit says.
+//! The fit at one centre and the slope of the predictions around it: the result of one ensemble of a batch fit.
 //!
 //! Everything is in parameters whitened by the prior, theta = mean + L u with u standard normal, so that the prior is
 //! the unit matrix and a step of size one is one prior sd. The whitened Jacobian stands under the prior's rows and is
@@ -79,7 +79,7 @@ impl Ensemble<'_> {
         }
     }
 
-    /// The points that ran, as far as these rows tell.
+    /// The points that ran, judged by these rows.
     fn active(&self, rows: &[usize]) -> Vec<bool> {
         let finite = |j: usize| rows.iter().all(|&k| self.predictions[(k, j)].is_finite());
         (0..=self.set.n_particle()).map(|j| !self.failed[j] && finite(j)).collect()
@@ -234,8 +234,8 @@ impl Stack {
 }
 
 impl Linearisation {
-    /// How much the cost falls by a step of u, as the linear model foretells it.
-    pub(crate) fn foretold(&self, step: &DVector<f64>) -> f64 {
+    /// How much the cost falls by a step of u, as the linear model predicts it.
+    pub(crate) fn predicted_fall(&self, step: &DVector<f64>) -> f64 {
         let moved = &self.root * step;
         2.0 * moved.dot(&self.along) - moved.norm_squared()
     }

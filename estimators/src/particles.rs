@@ -111,7 +111,7 @@ impl Geometry {
 }
 
 /// The inverse over the directions that are spanned, and the direction with the least spread with its variance. A moment that
-/// cannot be decomposed spans nothing.
+/// cannot be decomposed counts as spanning no direction.
 fn inverted(moment: DMatrix<f64>) -> (DMatrix<f64>, (DVector<f64>, f64)) {
     let p = moment.nrows();
     let Ok(eigen) = spectral::eigen(moment, "second moment of the sigma points") else {

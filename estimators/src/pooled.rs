@@ -1,7 +1,8 @@
-//! Are residuals of several places of one kind white, taken together? Autocorrelation around zero, and what it costs.
+//! Tests whether several series of residuals of one kind are white together: pooled autocorrelation around zero, and the factor
+//! by which correlation raises the variance of a mean.
 //!
 //! Residuals of a right model have mean zero, so no mean is taken away: an offset shows as correlation at every lag.
-//! Deliberately without a verdict: which probability deserves a word is the caller's business. Read next: `whiteness.rs`.
+//! No thresholds here: the caller chooses the probability to warn at. Read next: `whiteness.rs`.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 

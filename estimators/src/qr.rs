@@ -1,10 +1,10 @@
 //! Orthonormal basis and triangle of stacked rows, fast where the columns are many.
 //!
 //! A study with values of its own for every record has hundreds of parameters; reflections one column at a time then cost more
-//! than all runs. Many columns are made orthonormal by two Cholesky factors instead, the second of which takes away what
-//! rounding left of the first (CholeskyQR2: Yamamoto, Nakatsukasa, Yanagisawa and Fukaya 2015), as long as the first leaves them
-//! nearly orthonormal; else by reflections. Few columns always are, so that their bits do not depend on this file. Read next:
-//! `score.rs`.
+//! than all runs. Many columns are made orthonormal by two Cholesky factors instead, the second of which removes the rounding
+//! errors of the first (CholeskyQR2: Yamamoto, Nakatsukasa, Yanagisawa and Fukaya 2015), as long as the first leaves them
+//! nearly orthonormal; else by reflections. A few columns always take reflections, so that their bits do not depend on this
+//! file. Read next: `score.rs`.
 
 use nalgebra::DMatrix;
 

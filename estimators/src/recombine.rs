@@ -4,9 +4,8 @@
 //! they came from, which are still in the first cache. A second matrix would cost half as much traffic again, since memory
 //! reads a line before it writes one. While a block is multiplied, the one after the next is fetched. Every register
 //! holds a piece of the result until it is complete; the vector instructions are chosen when the program runs. Matrices
-//! far beyond the caches are cut by rows into shares for the caller's threads; every row is made the same way whoever makes
-//! it, so the bits do not know how many there were.
-//! Read next: `roukf.rs`, which makes T.
+//! far beyond the caches are cut by rows into shares for the caller's threads; a row is computed in the same way in every
+//! share, so the bits do not depend on their number. Read next: `roukf.rs`, which makes T.
 
 #![allow(
     clippy::inline_always,
@@ -24,9 +23,9 @@ const TILES: usize = 4;
 /// Blocks between the one that is multiplied and the one that is fetched.
 const AHEAD: usize = 2;
 
-/// Numbers in X from which threads pay for themselves: 32 MiB.
+/// Numbers in X from which several threads are faster than one: 32 MiB.
 const SHARED: usize = 4 * 1024 * 1024;
-/// Threads at most: more do not move the memory bus.
+/// Threads at most: the memory bandwidth limits more of them.
 const THREADS: usize = 4;
 
 /// Replaces X by X T: `x` is n x r, a particle per column, `t` is r x r.

@@ -76,7 +76,7 @@ impl Filter for Roukf {
             m.set_column(i, &(&geometry.mean * (1.0 - kept)));
             m[(i, i)] += kept;
         } else {
-            // A dropped particle comes back on the line that the others define.
+            // A dropped particle is put on the line from the mean that the regression over the others gives.
             m.set_column(i, &(&geometry.mean + &geometry.slope * self.set.points.column(i) * s));
         }
         let mut pull = p.pull.clone();
@@ -95,9 +95,8 @@ impl Filter for Roukf {
         self.set.n_particle() > self.set.n_param() + 1
     }
 
-    /// Keeps the p leading directions of the whole spread of
-    /// the augmented particles, its even part included, so that with as many parameters as states the filter is the
-    /// plain unscented one.
+    /// Keeps the p leading directions of the whole spread of the augmented particles, its even part included, so that with as
+    /// many parameters as states the filter is the plain unscented one.
     ///
     /// Up to 2 p directions spread, of which p are kept; what the others held is reported. Particles that were pulled or
     /// dropped, and the simplex, are left as they are (R = 1): a pulled set has no even part that could be trusted.

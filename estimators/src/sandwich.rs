@@ -3,12 +3,13 @@
 //! An estimate moves with the errors e of the data as A e, A = H^-1 J^T W^-1/2: its covariance is the sandwich
 //! H^-1 (P0^-1 + S) H^-1, P0^-1 the prior's precision and S the covariance of the summed scores J^T W^-1/2 e (Huber 1967; White
 //! 1980). With white errors of the stated size S is the data's information and the sandwich is H^-1; with errors that are
-//! larger or correlated it is wider. S is estimated from the residuals in two ways, and the larger counts, parameter by parameter:
-//! `scores.rs` asks nothing of the errors but that they are stationary beyond the record, and has too little to go on when they
-//! stay correlated over a good part of it; `working.rs` then has enough, by assuming how the correlation falls. Where the
-//! errors are likely white the cosines are left out, which know the size of white scores less well than the scores themselves do.
-//! Deliberately never narrower than the interval at the stated noise, up to which the estimate itself is computed. Errors that repeat with
-//! the input, and so look like an effect of the parameters, leave no residual and are not covered. Read next: `scores.rs`.
+//! larger or correlated it is wider. S is estimated from the residuals in two ways, and the larger counts, parameter by
+//! parameter: `scores.rs` assumes of the errors only that they are stationary beyond the record, and is imprecise when they
+//! stay correlated over a good part of it; `working.rs` is precise there, because it assumes how the correlation falls. Where
+//! the errors are likely white the cosines of `scores.rs` are left out, since the sum of squares estimates the variance of
+//! white scores more precisely. The result is never narrower than the interval at the stated noise, up to which the estimate
+//! itself is computed. Errors that repeat with the input, and so look like an effect of the parameters, leave no residual and
+//! are not covered. Read next: `scores.rs`.
 
 #[cfg(test)]
 mod alternatives;
@@ -24,7 +25,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::EstimatorError;
 use crate::data::same;
 
-/// Residuals beyond the number of parameters below which nothing is said.
+/// Residuals beyond the number of parameters below which no factor is given.
 const FEWEST: usize = 8;
 
 /// Where an observed value stands.
@@ -38,7 +39,7 @@ pub struct DataPoint {
     pub channel: usize,
 }
 
-/// A fit at its estimate: what the residuals and their slope say. m observed values, p parameters in units of their prior sd.
+/// A fit at its estimate: residuals and their slope. m observed values, p parameters in units of their prior sd.
 #[derive(Debug, Clone, Copy)]
 pub struct Residuals<'a> {
     /// d prediction / d parameter over the noise sd, m x p.
@@ -76,7 +77,8 @@ impl Residuals<'_> {
             let of_records: Vec<Vec<f64>> = records.iter().map(|record| record.scores(j)).collect();
             let correlated = lost * scores::variance(&of_records);
             variance[j] = working.as_ref().map_or(correlated, |working| {
-                // What is likely white needs no cosines, which know the size of white scores less well than the scores do.
+                // Likely white: the cosines are left out, since the sum of squares estimates the variance of white scores more
+                // precisely.
                 let alike = working.variance[j];
                 let expected = records.iter().flat_map(|record| record.expected(j));
                 let white = scores::uneven(&of_records, expected).map_or(alike, |of_white| lost * of_white);
@@ -157,7 +159,7 @@ struct Record {
 }
 
 impl Record {
-    /// What the errors at each time moved parameter `j` by, all channels together.
+    /// The scores of parameter `j`: by how much the errors at each time move it, all channels together.
     fn scores(&self, j: usize) -> Vec<f64> {
         let mut scores = vec![0.0; self.n_time];
         for series in &self.series {

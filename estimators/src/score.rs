@@ -1,8 +1,8 @@
 //! The score test: what a parameter that the model does not have would add to a finished fit, from its sensitivity alone.
 //!
 //! Rao (1948), in the form of Engle (1984): the part of the new sensitivity that the fitted parameters cannot imitate is
-//! compared with the residuals. Deliberately linear: whether the promise holds is for a refit to show. Everything is
-//! whitened by the noise. Read next: `least_squares.rs`.
+//! compared with the residuals. The gain is linear: only a refit shows whether it is real. Everything is whitened by the noise.
+//! Read next: `least_squares.rs`.
 
 use nalgebra::{Cholesky, DMatrix, DVector, DVectorView};
 
@@ -69,7 +69,7 @@ impl Optimum {
         let root = precision.map(f64::sqrt);
         let mut all = residual.clone().resize_vertically(m + p, 0.0);
         all.rows_mut(m, p).copy_from(&root.component_mul(pull));
-        // From the triangle of the rows: their square would lose what a wide prior leaves of an informed direction.
+        // From the triangle of the rows: their square would lose the digits of an informed direction beside a wide prior.
         let range = Subspace::new(jacobian, &root)?;
         Ok(Self { range, jacobian: jacobian.clone(), residual: all })
     }
@@ -82,7 +82,7 @@ impl Optimum {
     /// The part of a sensitivity (m) that the fitted parameters cannot imitate, with the prior's rows, m + p.
     pub fn unimitated(&self, sensitivity: &DVector<f64>) -> DVector<f64> {
         let s = sensitivity.clone().resize_vertically(self.residual.len(), 0.0);
-        // Twice, since one projection leaves what rounding left of the first.
+        // Projected twice: the second projection removes the rounding errors of the first.
         self.range.outside(&self.range.outside(&s))
     }
 
@@ -96,7 +96,7 @@ impl Optimum {
         &self.residual
     }
 
-    /// The score of a sensitivity d prediction / d amplitude (m). No gain when nothing of it is its own.
+    /// The score of a sensitivity d prediction / d amplitude (m). No gain when the fitted parameters can imitate all of it.
     pub fn score(&self, sensitivity: &DVector<f64>) -> Score {
         let whole = sensitivity.norm();
         let own = self.unimitated(sensitivity);
@@ -126,7 +126,7 @@ const AT_A_TIME: usize = 64;
 /// Products of k columns made of length one, k x k; a column of length zero stays so.
 ///
 /// `column` gives one of them, all of the same length. Of at most [`SPECTRAL`] columns so many are held at a time, and each is
-/// asked for once with every such block; of more, whose products are dearer, all are held.
+/// asked for once with every such block; of more, whose products are costlier, all are held.
 ///
 /// # Errors
 /// Those of `column`.
@@ -167,10 +167,10 @@ pub fn score_correlation<E>(
 /// Largest gain of any of k parameters where nothing is missing, for each simulation: the distribution that a search over all
 /// of them must exceed.
 ///
-/// `correlation` is that of the unimitated sensitivities, as [`score_correlation`] gives it; `signs` says which sign of each amplitude counts (0 both). `draw`
-/// gives independent standard normal numbers. The scores are jointly Gaussian with the correlation of the columns, so k
-/// numbers make a simulation, whatever the number of data. Infinite throughout, so that nothing exceeds it, for sensitivities
-/// that are not finite.
+/// `correlation` is that of the unimitated sensitivities, as [`score_correlation`] gives it; `signs` says which sign of each
+/// amplitude counts (0 both). `draw` gives independent standard normal numbers. The scores are jointly Gaussian with the
+/// correlation of the columns, so k numbers make a simulation, whatever the number of data. Infinite throughout, so that
+/// nothing exceeds it, for sensitivities that are not finite.
 pub fn null_maxima(
     correlation: DMatrix<f64>,
     signs: &[f64],

@@ -1,8 +1,8 @@
 //! Eigenvalues and singular values with a limit on their iterations: a decomposition that does not end is an error that
 //! names its matrix.
 //!
-//! Deliberately nothing of its own: the iterations are nalgebra's. Read next: `information.rs`, which reads what the data say
-//! off a decomposition.
+//! The iterations are nalgebra's; the limit and the error are added here. Read next: `information.rs`, which computes the
+//! information of the data from a decomposition.
 
 use nalgebra::{DMatrix, DVector, Dyn, SymmetricEigen};
 

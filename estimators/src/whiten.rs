@@ -3,7 +3,7 @@
 //! With q the weights of the reference (sum one), column j is W^{-1/2} (z_j - Z q) and the last column is
 //! W^{-1/2} (z - Z q): sensitivities, innovation and residual spread are all combinations of these columns, so one
 //! (r+1) x (r+1) Gram matrix holds everything an analysis needs. It is accumulated in blocks of 512 rows that stay in
-//! cache. Deliberately ignorant of sigma points. Read next: `gram.rs`, then `information.rs`.
+//! cache. It uses no sigma points. Read next: `gram.rs`, then `information.rs`.
 
 #![allow(
     clippy::inline_always,
@@ -87,7 +87,7 @@ impl Sweep<'_> {
         let mut out = self.empty();
         let mut columns = keep.then(|| DMatrix::zeros(self.rows.len(), self.n_column()));
         let mut block = Block::new(self.n_column());
-        // Rows of one channel share their noise: its logarithm, dear for many rows, is taken once per change.
+        // Rows of one channel share their noise: its logarithm, costly for many rows, is taken once per change.
         let (mut last, mut reciprocal, mut log) = (f64::NAN, f64::NAN, f64::NAN);
         for (b, rows) in self.rows.chunks(BLOCK).enumerate() {
             let first = b * BLOCK;

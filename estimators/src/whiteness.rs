@@ -1,6 +1,6 @@
-//! Are residuals white? The portmanteau test of Ljung and Box.
+//! Tests whether residuals are white: the portmanteau test of Ljung and Box.
 //!
-//! Deliberately without a verdict: which probability deserves a word is the caller's business. Read next: `diagnostics.rs`.
+//! No thresholds here: the caller chooses the probability to warn at. Read next: `diagnostics.rs`.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 

@@ -13,7 +13,7 @@ pub(super) const ROWS: usize = 8;
 
 /// The result, machine-readable; a slope that does not exist is null.
 pub(super) fn as_json(found: &Found<'_>) -> Value {
-    let poles = &found.spectrum.laboratory.poles()[..found.spectrum.listed];
+    let poles = &found.spectrum.linearised.poles()[..found.spectrum.listed];
     let observers = found.spectrum.observers.iter().map(|o| {
         json!({
             "name": o.name,
@@ -32,7 +32,7 @@ pub(super) fn as_json(found: &Found<'_>) -> Value {
         "model": found.study.setup.model.kind,
         "time_unit": found.study.time_unit,
         "observed": found.study.setup.outputs,
-        "n_poles": found.spectrum.laboratory.poles().len(),
+        "n_poles": found.spectrum.linearised.poles().len(),
         "poles": poles.iter().map(|p| [p.re, p.im]).collect::<Vec<_>>(),
         "wanted_max_re": found.spectrum.decay.map(starlings_models::spectrum::Decay::max_re),
         "observers": observers.collect::<Vec<_>>(),
@@ -48,7 +48,7 @@ pub(super) fn text(found: &Found<'_>) -> Result<(), Failure> {
     line(format_args!("{}: model {}, observed {outputs}", study.name, study.setup.model.kind))?;
     line(format_args!(
         "\n{} poles; the slowest [{unit}], and Re ∂λ/∂γ",
-        found.spectrum.laboratory.poles().len()
+        found.spectrum.linearised.poles().len()
     ))?;
     print_text(table(&slopes(found), true))?;
     if let Some(error) = disagreement(&found.spectrum.observers) {
@@ -88,7 +88,7 @@ fn refusals(refused: &[(String, String)]) -> Vec<(Vec<&str>, String)> {
 /// A pole and its slope under every observer; of a conjugate pair the upper one.
 fn slopes(found: &Found<'_>) -> Vec<Vec<String>> {
     let mut rows = vec![heading("pole", found)];
-    let poles = found.spectrum.laboratory.poles()[..found.spectrum.listed].iter().enumerate();
+    let poles = found.spectrum.linearised.poles()[..found.spectrum.listed].iter().enumerate();
     for (i, pole) in poles.filter(|(_, pole)| pole.im >= 0.0).take(found.rows) {
         let scale = pole.norm();
         let real = round_off(pole.re, scale);
@@ -107,7 +107,7 @@ fn slopes(found: &Found<'_>) -> Vec<Vec<String>> {
 fn rates(found: &Found<'_>) -> Vec<Vec<String>> {
     let mut rows = vec![heading("gain", found)];
     let Some(first) = found.spectrum.observers.first() else { return rows };
-    let scale = found.spectrum.laboratory.poles().iter().map(|pole| pole.norm()).fold(0.0, f64::max);
+    let scale = found.spectrum.linearised.poles().iter().map(|pole| pole.norm()).fold(0.0, f64::max);
     for (k, gain) in first.gain.iter().enumerate() {
         let rate = |o: &ObserverSpectrum| number(round_off(o.max_re[k], scale), None);
         rows.push(
@@ -125,7 +125,7 @@ fn bests(found: &Found<'_>) -> Vec<Vec<String>> {
             .map(|t| (*t).to_owned())
             .collect(),
     ];
-    let scale = found.spectrum.laboratory.poles().iter().map(|pole| pole.norm()).fold(0.0, f64::max);
+    let scale = found.spectrum.linearised.poles().iter().map(|pole| pole.norm()).fold(0.0, f64::max);
     for o in &found.spectrum.observers {
         let mut row = vec![
             o.name.clone(),

@@ -1,6 +1,6 @@
-//! From a study as written to a [`Study`]: names against the model, numbers against sense, recordings against both.
+//! Checks a study file and makes a [`Study`] of it: names against the model, numbers for plausibility, recordings for both.
 //!
-//! Checks go on after a fault as long as their answer can be trusted, so that one look shows as much as possible. Next file
+//! Checks go on after a fault as long as their answer can be trusted, so that one call reports as much as possible. Next file
 //! to read: [`self::model`].
 
 mod blame;
@@ -89,7 +89,7 @@ fn check(path: &Path, text: &str, solver_host: &SolverHost) -> Result<Study, Stu
     let source = Source::new(path, text);
     let file = read(&source, solver_host.adapters())?;
     if source.count() > 0 {
-        // What is written in a wrong form would be judged wrongly; what stands in the files can be told.
+        // After a fault of form other checks could be misleading; priors and data files can still be checked.
         survey::survey(&source, &file);
         source.verdict()?;
     }
@@ -148,7 +148,7 @@ fn check(path: &Path, text: &str, solver_host: &SolverHost) -> Result<Study, Stu
     })
 }
 
-/// What only the finished setup can tell: whether it builds, what a run of it costs, whether its observer fits.
+/// Checks that need the finished setup: whether it builds, what a run of it costs, whether its observer fits.
 fn check_setup(
     source: &Source,
     file: &StudyFile,
@@ -162,7 +162,7 @@ fn check_setup(
     source.verdict()
 }
 
-/// The name becomes a folder's.
+/// Checks the study's name, which becomes the name of a folder.
 fn check_name(source: &Source, file: &StudyFile) {
     let name = file.study.name.get_ref();
     if name.is_empty()
@@ -217,14 +217,14 @@ fn check_record_list(source: &Source, file: &StudyFile) {
             source.report_with(record.name.span(), message, "names of records are unique in a study");
         }
     }
-    // A name that no channel measures is nowhere: a typing error would fit what should stay unseen.
+    // A held-out name that no channel measures is refused: with a typing error the channel that is meant would be fitted.
     let measured: Vec<String> =
         file.records.iter().flat_map(|r| &r.channels).map(|c| c.output.get_ref().clone()).collect();
     let found = |name: &str| measured.iter().any(|m| field_of(m) == field_of(name));
     report_unmeasured(source, file, &measured, &found);
 }
 
-/// A component that its field's channel has no column for is told only once the files are read.
+/// Checks held-out components of fields: whether their channel has a column for them is known only after the files are read.
 fn check_held_out_components(source: &Source, file: &StudyFile, records: &[Record]) {
     let measured: Vec<String> = records.iter().flat_map(|r| &r.channels).map(|c| c.output.clone()).collect();
     let found = |name: &str| measured.iter().any(|m| m == name || field_of(m) == name);

@@ -1,6 +1,6 @@
-//! A checked study: plain data that the run can rely on without asking again.
+//! A checked study: plain data that the run uses without further checks.
 //!
-//! Nothing here reads files or judges: [`super::check`] does. Next files to read: [`super::expand`] for the way from the
+//! Nothing here reads files or checks: [`super::check`] does. Next files to read: [`super::expand`] for the way from the
 //! estimated vector to a job's values, [`super::plan`] for the windows.
 
 use std::path::PathBuf;
@@ -30,7 +30,7 @@ pub struct Study {
     pub time_unit: String,
     /// What workers receive: its parameters are the values of a job, its outputs those of all channels, first seen first.
     pub setup: Setup,
-    /// What the model with its effects says of itself.
+    /// Description of the model with its effects.
     pub spec: Spec,
     /// Effects that the file describes and that are not part of the model: none of their parameters has a value.
     pub candidates: Arc<Vec<EffectDef>>,
@@ -48,13 +48,13 @@ pub struct Study {
     pub explain: ExplainChoice,
     /// What `spectrum` compares.
     pub spectrum: SpectrumChoice,
-    /// An input is used at earlier times: windows then carry it from the record's start.
+    /// An input is used at earlier times: windows then hold it from the record's start.
     pub delays: bool,
-    /// Whether the model can be run in this process; a solver that a file describes may be elsewhere.
+    /// Whether the model can be run in this process; a solver that a file describes may be on another machine.
     pub runs_here: bool,
     /// Whether every run covers a whole record, since the solver answers for nothing less; found by a dry run.
     pub whole_answers: bool,
-    /// Who starts its solver, where the model is one.
+    /// Starts its solver, where the model is one.
     pub solver_host: SolverHost,
     /// What is doubtful but no error.
     pub warnings: Vec<String>,
@@ -161,7 +161,7 @@ pub struct EstimatorChoice {
     pub tolerance: f64,
 }
 
-/// Workers and how patient to be with them.
+/// Workers, and how long to wait for them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FleetChoice {
     /// Local worker processes.

@@ -1,8 +1,8 @@
-//! Which constant does the answer hang on? How far the estimate moves when a fixed number of the model is one per cent off.
+//! How far the estimate moves when a fixed number of the model is one per cent off: which constants the answer hangs on.
 //!
-//! The data cannot tell: an estimate follows a wrong constant, often without a trace in the residuals. To first order it moves by
-//! −(P₀⁻¹ + JᵀW⁻¹J)⁻¹ JᵀW⁻¹ ∂y/∂c (the normal equations, differentiated by the constant; Björck 1996, section 1.4). J takes one
-//! ensemble, ∂y/∂c one run per constant and record. Next file to read: [`moved`], then [`super::identify::ensemble`].
+//! The data do not show it: an estimate follows a wrong constant, often without a trace in the residuals. To first order it
+//! moves by −(P₀⁻¹ + JᵀW⁻¹J)⁻¹ JᵀW⁻¹ ∂y/∂c (the normal equations, differentiated by the constant; Björck 1996, section 1.4). J
+//! takes one ensemble, ∂y/∂c one run per constant and record. Next file to read: [`moved`], then [`super::identify::ensemble`].
 
 pub mod moved;
 
@@ -61,7 +61,7 @@ pub(crate) fn in_sds(size: f64) -> String {
     if size < 10.0 { format!("{size:.1}") } else { format!("{size:.0}") }
 }
 
-/// What the answer hangs on.
+/// How far estimates follow the constants of the model.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct HangsOn {
     /// The constants, the one that moves an estimate most first.
@@ -73,7 +73,7 @@ pub struct HangsOn {
 }
 
 impl HangsOn {
-    /// Moves from which on a constant deserves a sentence, in posterior sd per per cent.
+    /// Moves from which on a constant is named in a sentence, in posterior sd per per cent.
     const TOLD: f64 = 0.5;
 
     /// Sentences about the constants that matter most, at most so many.
@@ -168,7 +168,7 @@ fn around(
     Ok(found)
 }
 
-/// How the estimate answers to a change of the predictions.
+/// How the estimate responds to a change of the predictions.
 struct EstimateResponse<'a> {
     study: &'a Study,
     response: &'a Response,

@@ -1,7 +1,7 @@
 //! The study file as it is written: every section and key, with its place, before any check of meaning.
 //!
-//! Types, missing and unknown keys are settled here; whether names exist and numbers make sense is [`super::check`]'s
-//! business. Next file to read: [`crate::file::read`], which fills these.
+//! Types, missing and unknown keys are checked here; whether names exist and numbers make sense is checked in [`super::check`].
+//! Next file to read: [`crate::file::read`], which fills these.
 
 mod brackets;
 pub(super) mod layout;

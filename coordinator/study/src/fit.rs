@@ -1,9 +1,9 @@
 //! The fit: how a study's windows become ensembles on the fleet, and ensembles a posterior.
 //!
-//! [`filter`] runs the sequential passes that [`schedule`] lays out until they [`settle`], and [`batch`] the whole-record iterations; both send their particles through
-//! [`runner`]; [`rescue`] and [`resample`] are what the filter does when points fail or carry more spread than an affine map
-//! can; [`free_run`] runs the estimate freely at the end. The arithmetic is in `starlings-estimators`. Next file to read:
-//! [`filter`].
+//! [`filter`] runs the sequential passes that [`schedule`] lays out until they [`settle`], and [`batch`] the whole-record
+//! iterations; both send their particles through [`runner`]; [`rescue`] and [`resample`] are what the filter does when points
+//! fail or carry more spread than an affine map can; [`free_run`] runs the estimate freely at the end. The arithmetic is in
+//! `starlings-estimators`. Next file to read: [`filter`].
 
 pub(crate) mod batch;
 mod ensemble;

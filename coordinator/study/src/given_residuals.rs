@@ -1,8 +1,8 @@
-//! The intervals given the residuals: one small ensemble around the finished estimate, and what its slopes and residuals say.
+//! The intervals given the residuals: one small ensemble around the finished estimate, its slopes and its residuals.
 //!
-//! One run per parameter beside the estimate tells how every observed value answers to it; a parameter with one value per
-//! record is moved in all records at once. The runs see what the fit's runs saw: with an observer its corrections are in
-//! residuals and slopes alike. The arithmetic is in the `sandwich` module of `starlings-estimators`. Nothing of this reaches the
+//! One run per parameter beside the estimate gives the slope of every observed value; a parameter with one value per record is
+//! moved in all records at once. The runs get the same observed values as the fit's runs: with an observer its corrections are
+//! in residuals and slopes alike. The arithmetic is in the `sandwich` module of `starlings-estimators`. None of this enters the
 //! posterior. Next file to read: [`crate::summary`].
 
 use std::sync::Arc;
@@ -17,12 +17,12 @@ use super::{RunError, Study, posterior};
 /// Distance of the points from the estimate, in posterior sd: close enough for a model that is nearly linear within one.
 const DISTANCE: f64 = 0.1;
 
-/// What the residuals say of the intervals.
+/// The result for the intervals.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum GivenResiduals {
     /// Factor on the sd of each entry of the estimated vector, at least one.
     Wider(Vec<f64>),
-    /// Nothing; a clause that says why.
+    /// No factor is known; a clause that says why.
     Unknown(String),
 }
 
@@ -124,7 +124,7 @@ impl Slopes<'_> {
         rows
     }
 
-    /// d prediction / d parameter over the noise, per prior sd. A record answers to its own value only.
+    /// d prediction / d parameter over the noise, per prior sd. The rows of a record depend on its own value only.
     fn slope(&self, row: &Row, j: usize) -> f64 {
         let entry = &self.study.theta[j];
         if entry.record.is_some_and(|record| record != row.place.record) {

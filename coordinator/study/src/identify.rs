@@ -1,9 +1,9 @@
-//! Is the estimation reasonable, before it is made? One ensemble around a point tells what these data could determine.
+//! What the data of a study could determine, from one ensemble around a point before the estimation is made.
 //!
-//! Every record runs freely from its start with sigma points close to the prior median (or to the estimate of a finished
-//! run), so the sensitivities are those that the batch fit sees: no observer, no analysis in between. What was observed is
-//! used only to know where a value counts; its size plays no role. Deliberately without any change of the study. Next
-//! files to read: [`ensemble`], then [`result`]; the arithmetic is `identifiability` in `starlings-estimators`.
+//! Every record runs freely from its start with sigma points close to the prior median (or to the estimate of a finished run),
+//! so the sensitivities are those that the batch fit sees: no observer, no analysis in between. Observed values are used only
+//! to know which rows count; their size plays no role. The study is not changed. Next files to read: [`ensemble`], then
+//! [`result`]; the arithmetic is `identifiability` in `starlings-estimators`.
 
 pub mod advice;
 pub mod at;
@@ -24,7 +24,7 @@ use starlings_fleet::Fleet;
 use super::fit::runner::EnsembleRunner;
 use super::{Study, constants};
 
-/// Runs one ensemble of the study around a point and says what its data could determine.
+/// Runs one ensemble of the study around a point and returns what its data could determine.
 ///
 /// # Errors
 /// When the point is no point of this study, the fleet fails, or the model fails next to the point.

@@ -1,8 +1,8 @@
-//! What the observer does for the state: one run with it at the estimate, beside the free run without it.
+//! The effect of the observer on the state: one run with it at the estimate, beside the free run without it.
 //!
 //! Both runs predict the same observations; with the observer each prediction follows the corrections of all earlier ones, at
-//! the spacings at which the filter's own runs are corrected.
-//! Nothing of this reaches the posterior. Next file to read: [`crate::fit::free_run`].
+//! the spacings at which the filter's own runs are corrected. None of this enters the posterior. Next file to read:
+//! [`crate::fit::free_run`].
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -51,7 +51,7 @@ pub(crate) struct Comparison {
     pub courses: Vec<ObserverCourse>,
 }
 
-/// What came of the comparison.
+/// The result of the comparison.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Compared {
     /// The study has no observer.
@@ -101,7 +101,7 @@ pub(crate) fn compare(
     Ok(Compared::Both(Comparison { fit, courses }))
 }
 
-/// What a reader does not learn, and why.
+/// The sentence that says which comparison is missing, and why.
 fn failed(study: &Study, record: usize, error: &Failure) -> String {
     format!(
         "with the estimated parameters the model fails under the observer `{}` on record `{}` ({error}): what the observer \

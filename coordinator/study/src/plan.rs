@@ -1,6 +1,6 @@
 //! From recordings to windows: what a run sees of a record, and when.
 //!
-//! Held-out values are left out here and nowhere else: a window that reaches the fleet never holds one. Next file to read:
+//! Held-out values are left out here only: no window that reaches the fleet holds one. Next file to read:
 //! [`crate::fit::filter`], which runs the windows.
 
 use std::sync::Arc;
@@ -31,7 +31,8 @@ impl Study {
     }
 
     /// One window over a record from its first row on. With `train_only` the times and values that train, for a fit of the
-    /// whole record and for an observer, which then corrects at the times and spacings of the filter's windows; otherwise every time and no observed value, for a free run.
+    /// whole record and for an observer, which then corrects at the times and spacings of the filter's windows; otherwise every
+    /// time and no observed value, for a free run.
     pub fn whole(&self, record: usize, train_only: bool) -> Window {
         let of_record = &self.records[record];
         let start = of_record.times.first().copied().unwrap_or_default();

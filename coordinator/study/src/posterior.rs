@@ -1,4 +1,4 @@
-//! From a Gaussian in transformed units to what a reader wants: medians and intervals in physical units.
+//! From a Gaussian in transformed units to medians and intervals in physical units.
 //!
 //! A median and a central interval are exact under a monotone transform; the standard deviation in physical units is the
 //! first-order one, |dv/dθ|·sd.
@@ -25,8 +25,8 @@ pub struct Estimate {
     pub sd: f64,
     /// Central 95 % interval at the stated noise.
     pub interval95: [f64; 2],
-    /// Half-width of the interval given the residuals over 1.96, to first order as `sd` is; `None` when the residuals say
-    /// nothing of it.
+    /// Half-width of the interval given the residuals over 1.96, to first order as `sd` is; `None` where there is no such
+    /// interval.
     #[serde(default)]
     pub sd_given_residuals: Option<f64>,
     /// 95 % interval given the residuals: whatever noise was stated, for errors as large and as correlated as those that the

@@ -1,7 +1,7 @@
 //! What is wrong with a study or its data: where, what was found, what was expected, and a remedy.
 //!
-//! Rendering with source excerpts is the binary's business; here a problem is data with a one-line display. Next file to
-//! read: [`super::file`].
+//! The binary renders problems with source excerpts; here a problem is data with a one-line display. Next file to read:
+//! [`super::file`].
 
 use std::cell::RefCell;
 use std::fmt;
@@ -89,7 +89,7 @@ impl Source {
         self.add(span, message.into(), suggestion(&name, valid));
     }
 
-    /// Adds a problem, perhaps of another file, unless it is known: one cause can be met on several ways.
+    /// Adds a problem, perhaps of another file, unless it is known: several checks may find one cause.
     pub(super) fn adopt(&self, problem: Problem) {
         let mut found = self.found.borrow_mut();
         if !found.contains(&problem) {

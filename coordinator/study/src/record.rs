@@ -51,7 +51,7 @@ impl<'a> Recordings<'a> {
         Self { source, folder, files: BTreeMap::new() }
     }
 
-    /// The file of this name with the times in the named column; nothing after a complaint. `at` is where the study names it.
+    /// The file of this name with the times in the named column; `None` when a problem was reported. `at` is where the study names it.
     pub(super) fn table(
         &mut self,
         name: &str,
@@ -79,7 +79,7 @@ impl<'a> Recordings<'a> {
         }
     }
 
-    /// The file of this name cut into cells; nothing after a complaint. `at` is where the study names it.
+    /// The file of this name cut into cells; `None` when a problem was reported. `at` is where the study names it.
     pub(super) fn open(&mut self, name: &str, at: &Spanned<String>) -> Option<Rc<Csv>> {
         let path = self.folder.join(name);
         if let Some(known) = self.files.get(&path) {
@@ -143,7 +143,7 @@ impl<'a> Recordings<'a> {
             );
         }
         let Some(table) = self.table(section.file.get_ref(), &section.file, &section.time) else {
-            // Names can be told without the file.
+            // Names can be checked without the file.
             for channel in &section.channels {
                 part::quantity(self.source, channel, spec);
             }
@@ -184,7 +184,8 @@ impl<'a> Recordings<'a> {
 }
 
 impl Recordings<'_> {
-    /// What is wrong with the files of a record, whatever the model has: missing files and columns, cells that are no numbers.
+    /// Reports what is wrong with the files of a record, whatever the model: missing files and columns, cells that are no
+    /// numbers.
     pub(super) fn survey(&mut self, section: &RecordSection) {
         if section.file.get_ref().is_empty() {
             return;
@@ -241,7 +242,7 @@ impl Context<'_> {
     }
 }
 
-/// A training span that was refused and told.
+/// A training span that was refused and reported.
 struct Refused;
 
 /// The training span, `None` when the whole record is held out.

@@ -52,7 +52,7 @@ pub enum RunError {
         /// What the estimator advises.
         source: EstimatorError,
     },
-    /// A run has no answer, and that is not the model's doing.
+    /// A run has no usable answer, and the model did not fail.
     #[error(
         "the run of particle {particle} over record `{record}`{} has no usable answer: {reason}",
         in_brackets(values)
@@ -64,7 +64,7 @@ pub enum RunError {
         record: String,
         /// Its parameters in physical units; empty where they are not known.
         values: String,
-        /// What came instead.
+        /// What is wrong with the answer.
         reason: String,
     },
     /// A figure of the result is no finite number.
@@ -86,7 +86,7 @@ pub enum RunError {
 }
 
 impl RunError {
-    /// Whether somebody cancelled the work, rather than that it failed.
+    /// Whether the work was cancelled; false when it failed.
     pub fn is_cancelled(&self) -> bool {
         matches!(self, Self::Fleet(FleetError::Cancelled))
     }
@@ -117,7 +117,7 @@ pub struct Fit {
     pub passes: usize,
     /// False when the iteration limit came first.
     pub converged: bool,
-    /// How far the last pass moved the estimate; `None` for one pass, which has nothing to be compared with.
+    /// How far the last pass moved the estimate; `None` for one pass, which has no estimate before it.
     pub last_move: Option<Move>,
 }
 
@@ -166,7 +166,7 @@ pub struct Progress {
     pub workers: usize,
 }
 
-/// What the run needs from the outside: time, somebody who watches, and the fleet's events.
+/// What the run gets from its caller: a clock, a function for progress, and the fleet's events.
 pub struct RunContext<'a> {
     /// Seconds since the program started.
     pub clock: &'a dyn Fn() -> f64,
@@ -186,7 +186,7 @@ impl RunContext<'_> {
         self.earlier_s + (self.clock)()
     }
 
-    /// Stores the fleet's events and tells the watcher.
+    /// Stores the fleet's events and reports progress.
     pub(super) fn after_step(&mut self, store: &Store, progress: &Progress) -> Result<(), StoreError> {
         self.keep_events(store)?;
         store.commit_if_due(self.elapsed())?;
@@ -205,7 +205,7 @@ impl RunContext<'_> {
 /// Runs or continues a study in its folder and writes the result.
 ///
 /// # Errors
-/// When the fleet, the estimator or the store fails; what was done until then stays in the store, with what the fleet told.
+/// When the fleet, the estimator or the store fails; what was done until then stays in the store, with the fleet's events.
 pub fn run(
     study: &Study,
     fleet: &mut dyn Fleet,
@@ -214,7 +214,7 @@ pub fn run(
 ) -> Result<Summary, RunError> {
     let result = from_start_to_end(study, fleet, folder, context);
     if result.is_err() {
-        // The error itself is what counts, also where the store is why.
+        // The error of the run is returned, not that of the events, also where the store caused both.
         let _ = context.keep_events(&folder.store);
     }
     result
@@ -280,8 +280,8 @@ fn from_start_to_end(
     Ok(result)
 }
 
-/// Which constants the answer hangs on, or why that is not known. Nothing is said of parameters that drift: they follow
-/// whatever is wrong.
+/// How far the estimates follow the constants, or why that is not known. Empty for parameters that drift: they follow any
+/// change of the model.
 fn hangs_on(runner: &mut EnsembleRunner<'_>, fit: &Fit) -> Result<Result<HangsOn, String>, RunError> {
     if runner.study().drifts() {
         return Ok(Ok(HangsOn::default()));

@@ -7,14 +7,14 @@ use starlings_models::Job;
 
 use crate::store::RunKey;
 
-/// The key of a run that nothing pulls: the programs that make it (a digest), the setup and the job, without what was observed.
+/// The key of a run without observer: the programs that make it (a digest), the setup and the job, without what was observed.
 pub fn free(programs: &[u8; 32], setup: &SetupId, job: &Job) -> RunKey {
     let mut hasher = blake3::Hasher::new();
     hash(&mut hasher, programs, setup, job);
     *hasher.finalize().as_bytes()
 }
 
-/// The key of a run that an observer may pull to what was observed.
+/// The key of a run that an observer may correct by what was observed.
 pub(crate) fn observed(programs: &[u8; 32], setup: &SetupId, job: &Job) -> RunKey {
     let mut hasher = blake3::Hasher::new();
     hash(&mut hasher, programs, setup, job);
@@ -36,7 +36,7 @@ fn hash(hasher: &mut blake3::Hasher, programs: &[u8; 32], setup: &SetupId, job: 
     }
 }
 
-/// Numbers in every bit, as keys and comparisons of studies take them in.
+/// Adds numbers, bit by bit, for keys and for comparisons of studies.
 pub(crate) fn numbers(hasher: &mut blake3::Hasher, values: &[f64]) {
     // Lengths keep neighbouring lists apart.
     hasher.update(&(values.len() as u64).to_le_bytes());

@@ -1,7 +1,7 @@
-//! What a study needs from the outside where its model runs in a program of its own: somebody who starts it.
+//! How a study whose model runs in a program of its own reaches that program: functions of the caller that start it.
 //!
-//! The study itself starts no process. It is loaded with two functions, one that asks a solver what it is and one that makes
-//! what runs jobs, and keeps them for its trial runs. Next file to read: [`super::check`].
+//! The study itself starts no process. It is loaded with two functions, one that asks a solver for its description and one that
+//! makes what runs jobs, and keeps them for its trial runs. Next file to read: [`super::check`].
 
 use std::fmt;
 use std::sync::Arc;
@@ -11,14 +11,14 @@ use starlings_proto::adapters::AdapterDef;
 
 use starlings_fleet::Factory;
 
-/// Why a solver does not say what it is.
+/// Why there is no description of a solver.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Undescribed {
     /// One sentence, with the end of the program's output where there is one.
     pub reason: String,
-    /// The last that the program itself said before it ended.
+    /// The last text that the program itself wrote before it ended.
     pub last_words: Option<String>,
-    /// Whether the program is not on this machine, so that somebody elsewhere has to describe it.
+    /// Whether the program is not on this machine, so that its description has to be written on another one.
     pub is_absent: bool,
 }
 
@@ -28,13 +28,13 @@ impl From<String> for Undescribed {
     }
 }
 
-/// Asks a solver what it is.
+/// Asks a solver for its description.
 type Describe = Arc<dyn Fn(&SolverDef) -> Result<Description, Undescribed> + Send + Sync>;
 
-/// Looks at the files of a solver without starting it.
+/// Checks the files of a solver without starting it.
 type Inspect = Arc<dyn Fn(&SolverDef) -> Vec<SolverFault> + Send + Sync>;
 
-/// Who starts solvers. The default starts none: built-in models and equations need nobody.
+/// Starts solvers. The default starts none: built-in models and equations need none.
 #[derive(Clone)]
 pub struct SolverHost {
     describe: Describe,
@@ -52,7 +52,7 @@ impl SolverHost {
         Self::asking(move |def| describe(def).map_err(Undescribed::from), factory)
     }
 
-    /// The same where it is known why a solver does not describe itself.
+    /// The same, with a reason where there is no description.
     pub fn asking(
         describe: impl Fn(&SolverDef) -> Result<Description, Undescribed> + Send + Sync + 'static,
         factory: Factory,
@@ -65,23 +65,23 @@ impl SolverHost {
         }
     }
 
-    /// The same host, with the ways by which it reaches solvers; a study may name no other.
+    /// The same host, with the adapters by which it reaches solvers; a study may name no other.
     #[must_use]
     pub fn by(self, adapters: Vec<AdapterDef>) -> Self {
         Self { adapters: adapters.into(), ..self }
     }
 
-    /// The ways to reach a solver.
+    /// The adapters by which solvers are reached.
     pub fn adapters(&self) -> &[AdapterDef] {
         &self.adapters
     }
 
-    /// The way of this name.
+    /// The adapter of this name.
     pub fn adapter(&self, name: &str) -> Option<&AdapterDef> {
         self.adapters.iter().find(|adapter| adapter.name == name)
     }
 
-    /// The same host, in which somebody looks at the files of a solver while the study is read.
+    /// The same host, with a function that checks the files of a solver while the study is read.
     #[must_use]
     pub fn inspecting(
         self,
@@ -90,17 +90,17 @@ impl SolverHost {
         Self { inspect: Arc::new(inspect), ..self }
     }
 
-    /// The same host, in which every solver is known to be this one.
+    /// The same host, which gives this description for every solver.
     #[must_use]
     pub fn knowing(&self, description: &Description) -> Self {
         let known = description.clone();
         Self { describe: Arc::new(move |_| Ok(known.clone())), ..self.clone() }
     }
 
-    /// What a solver says of itself.
+    /// The description of a solver.
     ///
     /// # Errors
-    /// Why it does not.
+    /// Why there is none.
     pub fn describe(&self, solver: &SolverDef) -> Result<Description, Undescribed> {
         (self.describe)(solver)
     }

@@ -15,7 +15,7 @@ const LISTED: usize = 100;
 /// The slowest poles that gains are chosen around where none are given.
 const AROUND: usize = 16;
 
-/// What is asked; everything that is left open is the study's section `[spectrum]`'s.
+/// What is asked; what is left open is taken from the study's section `[spectrum]`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Wanted {
     /// Kinds of observers; empty for all that the model can host.
@@ -30,8 +30,8 @@ pub struct Wanted {
 
 /// What was found.
 pub struct Spectrum {
-    /// The model without observer.
-    pub laboratory: LinearisedSetup,
+    /// The linearised model without observer.
+    pub linearised: LinearisedSetup,
     /// The decay that is wanted.
     pub decay: Option<Decay>,
     /// Poles listed, at most those that there are.
@@ -65,10 +65,10 @@ pub enum ExamineError {
     /// The model has none, or cannot host an observer that was asked for.
     #[error(transparent)]
     Spectrum(#[from] SpectrumError),
-    /// Nothing but runs is known of a solver.
+    /// The model is a solver: its equations are not known.
     #[error("the model runs in a program of its own: its equations are not known, nor are its poles")]
     Solver,
-    /// The examination of an observer ended without an answer.
+    /// The examination of an observer panicked.
     #[error("the observer `{0}` could not be examined")]
     Broken(String),
 }
@@ -83,12 +83,12 @@ pub fn examine(study: &Study, wanted: &Wanted) -> Result<Spectrum, ExamineError>
     }
     let medians = study.theta_for(0, posterior::prior(study).mean.as_slice());
     let model = study.setup.model().map_err(SpectrumError::from)?;
-    let laboratory = LinearisedSetup::new(model, &study.setup, &medians, NATIVE)?;
-    let listed = wanted.poles.unwrap_or(LISTED).min(laboratory.poles().len());
-    let gains = gains(study, wanted, &laboratory);
-    let (kinds, refused) = kinds(study, wanted, &laboratory);
+    let linearised = LinearisedSetup::new(model, &study.setup, &medians, NATIVE)?;
+    let listed = wanted.poles.unwrap_or(LISTED).min(linearised.poles().len());
+    let gains = gains(study, wanted, &linearised);
+    let (kinds, refused) = kinds(study, wanted, &linearised);
     let decay = wanted.decay.or(study.spectrum.decay);
-    let work = |kind: &String| laboratory.examine(kind, &gains, listed, decay);
+    let work = |kind: &String| linearised.examine(kind, &gains, listed, decay);
     let results: Vec<_> = std::thread::scope(|scope| {
         let threads: Vec<_> = kinds.iter().map(|kind| scope.spawn(move || work(kind))).collect();
         threads.into_iter().map(std::thread::ScopedJoinHandle::join).collect()
@@ -97,29 +97,29 @@ pub fn examine(study: &Study, wanted: &Wanted) -> Result<Spectrum, ExamineError>
     for (kind, result) in kinds.iter().zip(results) {
         observers.push(result.map_err(|_| ExamineError::Broken(kind.clone()))??);
     }
-    Ok(Spectrum { laboratory, decay, listed, observers, refused })
+    Ok(Spectrum { linearised, decay, listed, observers, refused })
 }
 
 /// The gains that are asked for, else the study's, else a range around the poles.
-fn gains(study: &Study, wanted: &Wanted, laboratory: &LinearisedSetup) -> Vec<f64> {
+fn gains(study: &Study, wanted: &Wanted, linearised: &LinearisedSetup) -> Vec<f64> {
     match (wanted.gains.is_empty(), study.spectrum.gains.is_empty()) {
         (false, _) => wanted.gains.clone(),
         (true, false) => study.spectrum.gains.clone(),
-        (true, true) => laboratory.usual_gains(AROUND),
+        (true, true) => linearised.usual_gains(AROUND),
     }
 }
 
-/// The observers to compare, each once, and those that the model cannot host. An observer that was asked for and cannot be is
-/// an error later on; of the others nobody wants to know why.
+/// The observers to compare, each once, and those that the model cannot host, which are listed only where none is named. A
+/// named observer that the model cannot host is an error later on.
 fn kinds(
     study: &Study,
     wanted: &Wanted,
-    laboratory: &LinearisedSetup,
+    linearised: &LinearisedSetup,
 ) -> (Vec<String>, Vec<(String, String)>) {
     let named = if wanted.observers.is_empty() { &study.spectrum.observers } else { &wanted.observers };
     let (mut kinds, mut refused) = (Vec::new(), Vec::new());
     if named.is_empty() {
-        for (kind, why) in laboratory.observers() {
+        for (kind, why) in linearised.observers() {
             match why {
                 None => kinds.push(kind.to_owned()),
                 Some(why) => refused.push((kind.to_owned(), why.to_string())),

@@ -1,8 +1,9 @@
 //! The run's one file: a SQLite database with one row per event, job and analysis.
 //!
 //! Whatever is shown later — summary, report, export, resume — is read from here and from nowhere else. Each analysis is
-//! written in one piece with the snapshot that a resumed run starts from, and a few quick ones are committed together, so a
-//! run killed at any instant continues from a whole analysis at most [`HOLD_S`] before. Nothing here computes. Next file to read: [`crate::store::snapshot`].
+//! written in one piece with the snapshot that a resumed run starts from, and a few quick ones are committed together, so a run
+//! killed at any instant continues from a whole analysis at most [`HOLD_S`] before. Nothing here computes. Next file to read:
+//! [`crate::store::snapshot`].
 
 mod call;
 mod changes;
@@ -55,7 +56,7 @@ pub struct Store {
 
 impl Drop for Store {
     fn drop(&mut self) {
-        // Nobody is left to be told; what was committed before stays.
+        // A destructor returns no error; what was committed before is kept.
         let _ = self.commit();
     }
 }
@@ -142,7 +143,7 @@ impl Store {
         &self.connection
     }
 
-    /// That something it holds cannot be read: which, and why.
+    /// The error that something it holds cannot be read: which, and why.
     pub fn damaged(&self, what: &'static str, reason: impl std::fmt::Display) -> StoreError {
         StoreError::Damaged { path: self.path.clone(), what, reason: reason.to_string() }
     }
@@ -182,7 +183,7 @@ impl Store {
         Ok(())
     }
 
-    /// Writes one analysis and the snapshot after it, in one piece; [`Store::commit`] or the end of the store makes it last.
+    /// Writes one analysis and the snapshot after it, in one piece; [`Store::commit`] or the end of the store makes it durable.
     ///
     /// # Errors
     /// When the database refuses; nothing of the analysis is then kept, and those before are committed.
@@ -204,19 +205,19 @@ impl Store {
             }
             connection.execute_batch("SAVEPOINT analysis")?;
             insert().inspect_err(|_| {
-                // The failure before is the one to tell; a full disk may have ended the transaction already.
+                // The failure before is returned; a full disk may have ended the transaction already.
                 let _ = connection.execute_batch("ROLLBACK TO analysis; RELEASE analysis");
             })
         };
         let written = write();
         if written.is_err() {
-            // The first failure is the one to tell.
+            // The first failure is returned.
             let _ = self.commit();
         }
         self.guard(written)
     }
 
-    /// Makes everything written so far last.
+    /// Makes everything written so far durable.
     ///
     /// # Errors
     /// When the database refuses.
@@ -269,7 +270,7 @@ impl Store {
         Ok(kept.unwrap_or(0.0_f64).max(told))
     }
 
-    /// Notes how far the run has come.
+    /// Stores how far the run has come.
     ///
     /// # Errors
     /// When the database refuses.

@@ -18,7 +18,7 @@ use super::{Fit, Study};
 
 /// Ratio of the two intervals above which the one given the residuals comes first.
 const FIRST: f64 = 1.5;
-/// What the intervals given the residuals ask for.
+/// What the intervals given the residuals assume.
 const RESIDUALS: &str = " The intervals given the residuals ask nothing of the noise's size and correlation, which they take from \
     the residuals; they ask that what the model lacks does not repeat with its inputs.";
 
@@ -51,7 +51,8 @@ pub struct FitSummary {
     pub channels: Vec<ChannelFit>,
     /// Per record.
     pub records: Vec<RecordFit>,
-    /// Normalised innovation squared per observation in the last pass (batch: squared whitened residual); about 1 is healthy.
+    /// Normalised innovation squared per observation in the last pass (batch: squared whitened residual); about 1 when the
+    /// model explains the data at the stated noise.
     pub nis_per_observation: f64,
     /// Log-likelihood of the data with the parameters integrated out (natural logarithm).
     pub log_likelihood: f64,
@@ -90,7 +91,7 @@ pub struct Summary {
     /// What the observer does for the state; absent without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub observer: Option<ObserverFit>,
-    /// Which constants of the model the estimates hang on; absent where it has none, and for parameters that drift.
+    /// How far the estimates follow the constants of the model; absent where it has none, and for parameters that drift.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hangs_on: Option<HangsOn>,
     /// Runs.

@@ -2,8 +2,9 @@
 //!
 //! A channel of this kind has a node of the model's wall and one surface per time. Its observed value is zero, its predicted
 //! one the signed distance of the displaced node to the surface of the time, positive outside (Moireau et al. 2013). Models,
-//! workers and estimators know displacements and numbers only. How surfaces are read is in [`crate::record`]. Next file to
-//! read: [`super::distances`], where predictions become distances.
+//! one the signed distance of the displaced node to the surface of the time, positive outside (Moireau et al. 2013). Models,
+//! workers and estimators get displacements and numbers only. How surfaces are read is in [`crate::record`]. Next file to read:
+//! [`super::distances`], where predictions become distances.
 
 use std::sync::Arc;
 

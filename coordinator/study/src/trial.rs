@@ -1,4 +1,4 @@
-//! One trial run of every record at the prior median, in this process: does the model run at all where the study starts?
+//! One trial run of every record at the prior median, in this process: whether the model runs where the study starts.
 //!
 //! Next file to read: [`mod@dry_run`], which makes the runs of a fit.
 
@@ -14,7 +14,7 @@ use starlings_proto::spent::spent;
 use super::{Study, posterior};
 pub use dry_run::{Depth, dry_run};
 
-/// What the trial showed about one channel.
+/// The result of the trial for one channel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrialChannel {
     /// Record name.
@@ -145,13 +145,13 @@ pub fn trial(study: &Study) -> Result<Vec<TrialChannel>, TrialError> {
     Ok(channels)
 }
 
-/// Why a run of a trial is none.
+/// Why a run of a trial failed.
 enum Fault {
     Run(ParticleError),
     Travel(ProtocolError),
 }
 
-/// One run, here as on a worker, that could also have been sent there.
+/// One run, in this process; its job and prediction must also fit the protocol to workers.
 fn run(
     model: &dyn Forward,
     record: usize,

@@ -125,7 +125,7 @@ fn place(study: &Study, twin: &Twin) -> Result<(Setup, Vec<f64>), TwinError> {
     let prior = posterior::prior(study);
     let mut theta = study.theta_for(twin.record, prior.mean.as_slice());
     setup.outputs = components(&study.spec.outputs);
-    // The truth runs free.
+    // The truth has no observer.
     setup.observer = ObserverDef::default();
     let mut values = twin.values.clone();
     for (name, amplitude) in &twin.effects {

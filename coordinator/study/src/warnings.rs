@@ -19,7 +19,7 @@ use super::{Fit, Study};
 pub(super) const CORRELATED: f64 = 0.95;
 /// Share of the prior sd above which the data are said not to inform a parameter, or a combination of parameters.
 pub(super) const UNINFORMED: f64 = 0.9;
-/// Share of the spread that resampling may leave out in silence.
+/// Share of the spread that resampling may leave out without a warning.
 const DROPPED: f64 = 0.05;
 /// Prior standard deviations beyond which an estimate contradicts its prior.
 const FAR_FROM_PRIOR: f64 = 4.0;
@@ -82,7 +82,7 @@ fn correlated_pairs(summary: &Summary) -> Vec<String> {
     found
 }
 
-/// Two parameters that are known as one.
+/// The warning that two parameters are known only in combination.
 pub(super) fn correlated(first: &str, second: &str, value: f64) -> String {
     format!(
         "{first} and {second} are correlated ({value:.3}): the data determine their combination, not each of them."
@@ -106,7 +106,7 @@ fn uninformed(study: &Study, fit: &Fit) -> Vec<String> {
         .collect()
 }
 
-/// Combinations that keep their prior although not each of their parameters does.
+/// Combinations about which the data say almost nothing although they inform some of their parameters.
 fn uninformed_directions(study: &Study, fit: &Fit) -> Vec<String> {
     let names: Vec<&str> = study.theta.iter().map(|t| t.name.as_str()).collect();
     let prior_sd: Vec<f64> = study.theta.iter().map(|t| t.prior_sd).collect();
@@ -119,7 +119,7 @@ fn uninformed_directions(study: &Study, fit: &Fit) -> Vec<String> {
         .collect()
 }
 
-/// A combination about which the data say almost nothing.
+/// The warning about such a combination.
 pub(super) fn uninformed_combination(combination: &str, share: f64) -> String {
     format!(
         "the data say almost nothing about the combination {combination} (each in units of its prior sd): its uncertainty \

@@ -33,7 +33,7 @@ fn measure(system: &System, seeds: std::ops::Range<u64>) -> Tally {
     tally
 }
 
-/// The battery's promise: coverage near its nominal value, and no estimate far off without a word.
+/// The limits of the battery: coverage near its nominal value, and no estimate far off without a warning.
 fn trustworthy(system: &System) {
     let n_param = system.truth.len() as u64;
     let enough = if n_param < 5 { INTERVALS / n_param } else { 0 };
@@ -119,7 +119,7 @@ fn a_wrong_start_is_warned_of_with_and_without_forgetting_and_a_wrong_outlet_is_
     assert_eq!(found.blamed, 1, "{}", found.row(&case));
 }
 
-/// Draws of right models without an alarm but by chance.
+/// Draws of right models with a false alarm: no more than occur by chance.
 #[test]
 #[ignore = "two hundred studies of three systems: `just coverage`"]
 fn right_models_are_warned_of_in_one_run_of_a_hundred_at_most() {

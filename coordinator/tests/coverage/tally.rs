@@ -1,4 +1,4 @@
-//! What came of the draws: intervals that hold the truth, distances from it, warnings, passes, runs.
+//! Counts over the draws: intervals that hold the truth, distances from it, warnings, passes, runs.
 
 use starlings_coordinator::fleet::InProcess;
 use starlings_coordinator::study::store::Purpose;

@@ -12,7 +12,7 @@ use crate::tally::run;
 /// Beats of the tube that are fitted: enough for intervals of a per cent.
 const BEATS: f64 = 3.0;
 
-/// A wrong model, and the constant to blame where the data cannot tell.
+/// A wrong model, and the constant to name where the data do not show it.
 pub(crate) struct Wrong {
     pub(crate) name: &'static str,
     pub(crate) system: System,

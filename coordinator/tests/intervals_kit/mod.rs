@@ -16,10 +16,10 @@ const SPAN: f64 = 8.0;
 /// Sampling interval of the inputs, in s.
 const FINE: f64 = 0.002;
 
-/// What the errors of a recording are, beside white noise of the stated sd.
+/// The errors of a recording, beside white noise of the stated sd.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Errors {
-    /// Nothing.
+    /// None.
     White,
     /// An autoregression of first order, its correlation at one sample, of twice the stated sd.
     Correlated(f64),
@@ -37,12 +37,12 @@ pub enum System {
     Oscillator { n: usize },
 }
 
-/// Of all intervals of all parameters and twins.
+/// Over all intervals of all parameters and twins.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shares {
-    /// Hold the truth at the stated noise.
+    /// Share that holds the truth at the stated noise.
     pub stated: f64,
-    /// Hold the truth given the residuals.
+    /// Share that holds the truth given the residuals.
     pub given: f64,
     /// Median ratio of their lengths, in transformed units.
     pub wider: f64,

@@ -1,5 +1,5 @@
-//! Growth of biomass on a substrate, and its product, after Monod (1949): a model in which nothing dies, and recordings of cells
-//! that do.
+//! Growth of biomass on a substrate, and its product, after Monod (1949): a model without death of cells, and recordings in
+//! which cells die.
 #![allow(missing_docs, unreachable_pub, clippy::unwrap_used)]
 
 use starlings_coordinator::study::twin::{Twin, simulate};

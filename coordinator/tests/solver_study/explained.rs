@@ -6,7 +6,7 @@ use starlings_coordinator::explain::{
 use starlings_coordinator::study::Study;
 use starlings_coordinator::study::store::Store;
 
-use crate::inside::{Inside, Place, nobody, threads};
+use crate::inside::{Inside, Place, no_host, threads};
 use crate::messages;
 use crate::swing::{native, recording, solver};
 
@@ -24,7 +24,7 @@ fn explained(data: &str, hosts: &[&str]) -> Explanation {
 fn findings(data: &str, hosts: &[&str], text: &str) -> (Findings, Place, Inside) {
     let here = Place::new(&[("study.toml", &native("")), ("swing.csv", data)]);
     let there = Place::new(&[("study.toml", text), ("swing.csv", data)]);
-    let inside = Inside::of(&here.load(&nobody()).unwrap(), hosts);
+    let inside = Inside::of(&here.load(&no_host()).unwrap(), hosts);
     std::fs::create_dir(there.folder.path().join("out")).unwrap();
     let study = there.load(&inside.solver_host()).unwrap();
     let store = Store::create(&there.folder.path().join("out/run.db"), &[]).unwrap();
@@ -80,11 +80,11 @@ fn the_explained_study_finds_the_solver_from_the_folder_that_it_stands_in() {
 #[test]
 fn the_files_of_a_program_are_found_from_another_folder() {
     let place = messages::place(&messages::command());
-    let study = place.load(&nobody()).unwrap();
+    let study = place.load(&no_host()).unwrap();
     let out = place.folder.path().join("runs/one");
     std::fs::create_dir_all(&out).unwrap();
     let text = explained_study(&study, &[], &[], &out).unwrap_or_else(|error| panic!("{error}"));
-    let moved = Study::from_text_with(&out.join("explained.toml"), &text, &nobody()).unwrap();
+    let moved = Study::from_text_with(&out.join("explained.toml"), &text, &no_host()).unwrap();
     let (before, after) = (study.setup.model.solver.unwrap(), moved.setup.model.solver.unwrap());
     let (before, after) = (before.files.unwrap(), after.files.unwrap());
     assert_eq!(after.templates, before.templates);

@@ -15,7 +15,7 @@ use starlings_models::{
 };
 use starlings_solver::adapters;
 
-/// Equations behind the wall that a solver is.
+/// Equations that run as a solver.
 #[derive(Clone)]
 pub(crate) struct Inside {
     model: ModelDef,
@@ -23,7 +23,7 @@ pub(crate) struct Inside {
 }
 
 /// A host that starts no solver.
-pub(crate) fn nobody() -> SolverHost {
+pub(crate) fn no_host() -> SolverHost {
     SolverHost::default().by(adapters())
 }
 
@@ -49,7 +49,7 @@ impl Inside {
         self
     }
 
-    /// Who asks and runs it.
+    /// The host that describes and runs it.
     pub(crate) fn solver_host(&self) -> SolverHost {
         let known = self.description.clone();
         SolverHost::new(move |_| Ok(known.clone()), self.factory()).by(adapters())
@@ -78,7 +78,7 @@ impl Solve for Inside {
         model.constants.extend(run.constants.iter().cloned());
         let own = self.description.spec.parameters.iter().map(|q| q.name.clone());
         let initial = run.initial.iter().map(|(state, _)| format!("initial:{state}"));
-        // An effect needs an amplitude; what the terms are worth stands in their constants.
+        // An effect needs an amplitude; the sizes of the terms are in its constants.
         let always = EffectParameter { name: "always".to_owned(), ..EffectParameter::default() };
         let scaled = |add: &Addition| Addition { to: add.to.clone(), term: format!("always*({})", add.term) };
         let terms = EffectDef {

@@ -6,7 +6,7 @@ use starlings_coordinator::study::{Problem, SolverHost, Study};
 use starlings_models::{BuildSetup, Description, Setup};
 use starlings_solver::adapters;
 
-use crate::inside::{Inside, Place, nobody};
+use crate::inside::{Inside, Place, no_host};
 use crate::swing::{native, recording, solver};
 
 /// The model of a program that is started for every run, in the place of the equations.
@@ -51,7 +51,7 @@ pub(crate) fn place(study: &str) -> Place {
 
 fn inside() -> Inside {
     let here = place(&native(""));
-    Inside::of(&here.load(&nobody()).unwrap(), &["v"])
+    Inside::of(&here.load(&no_host()).unwrap(), &["v"])
 }
 
 /// `line:column: message`, and the help where there is one, with the folder left out.
@@ -71,7 +71,7 @@ fn problems(study: &str, solver_host: &SolverHost) -> Vec<String> {
     }
 }
 
-/// Spoils a good study one place at a time: `- ` the place, `+ ` what is put there, then what is told.
+/// Spoils a good study one place at a time: `- ` the place, `+ ` what is put there, then what is reported.
 fn check(good: &str, solver_host: &SolverHost, cases: &str) {
     assert_eq!(problems(good, solver_host), [""; 0]);
     let mut wrong = String::new();
@@ -100,19 +100,19 @@ fn keys_of_a_solver_are_told_with_place_and_remedy() {
 
 #[test]
 fn keys_of_a_program_that_is_started_for_every_run_are_told_with_place_and_remedy() {
-    check(&command(), &nobody(), include_str!("command.txt"));
+    check(&command(), &no_host(), include_str!("command.txt"));
 }
 
 #[test]
 fn what_a_program_is_started_with_travels_with_the_study() {
     let place = place(&command());
-    let study: Study = place.load(&nobody()).unwrap();
+    let study: Study = place.load(&no_host()).unwrap();
     let solver = study.setup.model.solver.as_ref().unwrap();
     assert_eq!(solver.folder, place.folder.path().display().to_string());
     let inner = place.folder.path().join("inner");
     std::fs::create_dir(&inner).unwrap();
     place.write("study.toml", &command().replace("timeout = 60", "timeout = 60\nfolder = \"inner\""));
-    let moved = place.load(&nobody()).unwrap().setup.model.solver.unwrap();
+    let moved = place.load(&no_host()).unwrap().setup.model.solver.unwrap();
     assert_eq!(moved.folder, inner.canonicalize().unwrap().display().to_string());
     assert_eq!(solver.command, ["./bin/swing", "{folder}"]);
     assert_eq!((solver.memory, solver.timeout.to_bits()), (Some(2 << 30), 60.0_f64.to_bits()));
@@ -129,7 +129,7 @@ fn what_a_program_is_started_with_travels_with_the_study() {
 #[test]
 fn a_template_that_changed_since_starts_another_run() {
     let place = place(&command());
-    let load = || place.load(&nobody()).unwrap();
+    let load = || place.load(&no_host()).unwrap();
     let created = starlings_coordinator::study::RunFolder::create(
         starlings_coordinator::study::store::Purpose::Run,
         &place.folder.path().join("run"),
@@ -150,7 +150,7 @@ fn a_template_that_changed_since_starts_another_run() {
     }
 }
 
-/// What is told of a solver that says this of itself.
+/// What is reported of a solver with this description.
 fn described(change: impl FnOnce(&mut Description)) -> Vec<String> {
     problems(&solver(""), &inside().described(change).solver_host())
 }
@@ -212,8 +212,8 @@ fn a_solver_that_cannot_be_started_is_told_with_the_way_out() {
     let told = problems(&solver(""), &mute);
     assert_eq!(told[0], "7:11: the solver does not say what it is: it exited with status 3");
     assert!(told[1].contains("described = \"solver.json\""), "{told:?}");
-    let nobody = problems(&solver(""), &nobody());
-    assert_eq!(nobody[0], "7:11: the solver does not say what it is: no solver can be started here");
+    let unstarted = problems(&solver(""), &no_host());
+    assert_eq!(unstarted[0], "7:11: the solver does not say what it is: no solver can be started here");
 }
 
 #[test]

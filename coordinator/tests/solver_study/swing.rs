@@ -2,7 +2,7 @@
 
 use starlings_coordinator::study::twin::{Twin, simulate};
 
-use crate::inside::{Place, nobody};
+use crate::inside::{Place, no_host};
 use crate::study_kit::{csv, grid};
 
 const EQUATIONS: &str = r#"
@@ -88,7 +88,7 @@ pub(crate) fn recording(effects: &[(&str, f64)], values: &[(&str, f64)], seed: u
         |list: &[(&str, f64)]| list.iter().map(|(name, v)| ((*name).to_owned(), *v)).collect::<Vec<_>>();
     let truth = [&[("k", 4.4), ("c", 0.3), ("initial:x", 0.55)], values].concat();
     let twin = Twin { values: named(&truth), effects: named(effects), seed, ..Twin::default() };
-    let made = simulate(&place.load(&nobody()).unwrap(), &twin).unwrap();
+    let made = simulate(&place.load(&no_host()).unwrap(), &twin).unwrap();
     let noisy = |column: usize, sd: f64| -> Vec<f64> {
         let noise = crate::study_kit::normals(times.len(), seed + column as u64);
         made.values[column].iter().zip(noise).map(|(v, e)| v + sd * e).collect()

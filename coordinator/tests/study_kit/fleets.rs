@@ -56,7 +56,7 @@ pub struct At<'a> {
     /// Ensembles before this one; a particle that is tried again belongs to the ensemble before.
     pub ensemble: usize,
     /// The particle is tried again at a shorter distance.
-    pub again: bool,
+    pub retried: bool,
 }
 
 /// Fails the jobs that a rule picks.
@@ -80,13 +80,13 @@ impl<R: FnMut(&At<'_>) -> bool> Fleet for Failing<R> {
     }
 
     fn run_mixed(&mut self, jobs: Vec<(SetupId, Job)>) -> Result<Vec<Outcome>, FleetError> {
-        let again = jobs.iter().all(|(_, job)| job.particle == jobs[0].1.particle);
-        if !again {
+        let retried = jobs.iter().all(|(_, job)| job.particle == jobs[0].1.particle);
+        if !retried {
             self.ensembles += 1;
         }
         let ensemble = self.ensembles.saturating_sub(1);
         let fails: Vec<bool> =
-            jobs.iter().map(|(_, job)| (self.rule)(&At { job, ensemble, again })).collect();
+            jobs.iter().map(|(_, job)| (self.rule)(&At { job, ensemble, retried })).collect();
         let mut outcomes = self.inner.run_mixed(jobs)?;
         for (outcome, fails) in outcomes.iter_mut().zip(fails) {
             if fails {

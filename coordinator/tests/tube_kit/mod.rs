@@ -37,7 +37,7 @@ fn inflow(i: usize) -> f64 {
     if phase < 0.3 { 300.0 * (PI * phase / 0.3).sin() } else { 0.0 }
 }
 
-/// What happened in a tube.
+/// A simulated tube.
 pub struct Truth {
     pub cells: usize,
     pub octaves: Vec<f64>,

@@ -37,7 +37,8 @@ fn diagonal(size: f64) -> Diagonal {
     Diagonal { entries: vector(P, 1).map(|v| size * (1.5 + v)), right: vector(P, 2) * size }
 }
 
-/// The dense rows that [`BlockAngular::least_squares`] minimises, free columns alone, with their right-hand side as the last column.
+/// The dense rows that [`BlockAngular::least_squares`] minimises, free columns alone, with their right-hand side as the last
+/// column.
 fn stacked(a: &DMatrix<f64>, free: &[usize], right: &DVector<f64>, diagonals: &[Diagonal]) -> DMatrix<f64> {
     let (m, n) = (a.nrows(), free.len());
     let mut rows = a.select_columns(free).resize(m + diagonals.len() * n, n + 1, 0.0);

@@ -69,7 +69,7 @@ fn index(gram: &DMatrix<f64>, places: &[usize], accuracy: f64) -> Option<f64> {
         return Some(1.0);
     }
     let of_subset = DMatrix::from_fn(places.len(), places.len(), |i, j| gram[(places[i], places[j])]);
-    // A matrix that cannot be decomposed tells nothing apart.
+    // Columns whose matrix cannot be decomposed count as dependent.
     let least = spectral::eigen(of_subset, "collinearity").ok()?.eigenvalues.min();
     // The smallest eigenvalue is known to the accuracy of the columns squared, and to rounding.
     (least > (accuracy * accuracy).max(16.0 * f64::EPSILON)).then(|| (1.0 / least.sqrt()).max(1.0))

@@ -1,7 +1,7 @@
 //! Directions in parameter space as combinations that can be named: the largest coefficient is one.
 //!
-//! Directions about which the data say nothing at all have no natural axes of their own; they are turned so that each has
-//! a parameter that the others lack, by Gauss-Jordan elimination with complete pivoting. Deliberately without words.
+//! Directions about which the data hold no information have no natural axes of their own; they are turned so that each has a
+//! parameter that the others lack, by Gauss-Jordan elimination with complete pivoting. The caller writes them as text.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -1,4 +1,4 @@
-//! Small problems with known ends.
+//! Small problems with known solutions.
 
 use nalgebra::DMatrix;
 

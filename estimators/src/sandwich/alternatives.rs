@@ -1,4 +1,4 @@
-//! Middles of the sandwich against each other, on two linear models: the second table of docs/intervals.md.
+//! Estimators of S, the middle of the sandwich, compared on two linear models: the second table of docs/intervals.md.
 //!
 //! `just intervals` prints it. What is used here is the last column. Next file to read: [`super`].
 

@@ -1,4 +1,4 @@
-//! The variance of a sum of correlated scores from their slowest cosines.
+//! The variance of a sum of correlated scores from their lowest-frequency cosines.
 //!
 //! The spectrum at zero is the mean square of the first B coefficients of the cosine transform, which has B degrees of freedom and
 //! takes Student's t (Müller 2007; Lazarus, Lewis, Stock & Watson 2018). B is the number with the least mean squared error
@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-/// Largest autocorrelation that the choice of B believes (Andrews 1991, note to table II).
+/// Largest autocorrelation that the choice of B takes into account (Andrews 1991, note to table II).
 const MOST_CORRELATED: f64 = 0.97;
 /// Cosines at most: beyond, Student's t is a Gaussian.
 const MOST: usize = 400;
@@ -60,7 +60,7 @@ fn part(scores: &[f64], n_record: usize) -> Part {
     let n = scores.len();
     let count = cosines(scores);
     let squares: f64 = (1..=count).map(|k| coefficient(scores, k).powi(2)).sum();
-    // With several records what one sums up to is an error too; only the sum over all of them is the fit's zero.
+    // With several records the sum of one record's scores is an error too: the fit sets only the sum over all records to zero.
     if n_record == 1 {
         return Part { variance: n as f64 * squares / count as f64, freedom: count as f64 };
     }

@@ -72,7 +72,7 @@ fn the_influence_is_the_sandwichs_bread() {
     assert!((&influence.rows - &expected).amax() < 1e-13);
     for j in 0..2 {
         assert!((influence.variance[j] - inverse[(j, j)]).abs() < 1e-14);
-        // Prior and data share H^-1 between them.
+        // The prior's part and the data's part add up to H^-1.
         let of_data = influence.rows.column(j).norm_squared();
         assert!((influence.of_prior[j] + of_data - influence.variance[j]).abs() < 1e-14);
     }

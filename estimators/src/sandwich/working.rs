@@ -1,11 +1,11 @@
-//! The variance of the estimate for errors of a form that falls with time: white noise and a part that forgets exponentially.
+//! The variance of the estimate for errors of a given form: white noise plus a part whose correlation decays exponentially.
 //!
 //! Each channel of a record has errors w + x, w white and x an autoregression of first order in continuous time; its correlation
-//! time and share are not estimated but averaged over, by the restricted likelihood of the residuals, which knows that the
-//! parameters took their share of them (Patterson & Thompson 1971; for autoregressive errors Cooper & Thompson 1977). The estimate
-//! stays that of the stated noise: the covariance is a working one (Liang & Zeger 1986). Where channels err together, the
-//! innovations tell by how much that widens the sum. Deliberately not used for more numbers than a second can hold.
-//! Read next: `filter.rs`.
+//! time and share are not estimated but averaged over, by the restricted likelihood of the residuals, which accounts for the
+//! part of them that the parameters have fitted (Patterson & Thompson 1971; for autoregressive errors Cooper & Thompson 1977).
+//! The estimate stays that of the stated noise: the covariance is a working one (Liang & Zeger 1986). Where errors of channels
+//! are correlated, their innovations give the factor by which that widens the sum. Not used where it would take more than about
+//! a second. Read next: `filter.rs`.
 
 pub(super) mod filter;
 
@@ -22,12 +22,12 @@ const N_TIME: usize = 14;
 const SHARES: [f64; 6] = [1e-4, 0.03, 0.1, 0.25, 0.5, 0.75];
 /// Forms with less than this probability are left out.
 const NEGLIGIBLE: f64 = 1e-6;
-/// Residuals of a channel below which nothing is said of their correlation.
+/// Residuals of a channel below which their correlation is not estimated.
 const FEWEST: usize = 8;
 /// Residuals times squared number of columns beyond which this file is not used.
 const LARGEST: f64 = 1e7;
 
-/// What the forms say of the errors.
+/// The result over all forms of the errors.
 pub(super) struct Working {
     /// Variance of each parameter in squared prior sd, length p.
     pub(super) variance: DVector<f64>,
@@ -52,7 +52,7 @@ pub(super) fn working(records: &[Record]) -> Option<Working> {
     Some(sum)
 }
 
-/// The channels of a record, and how much wider their sum is for erring together.
+/// The channels of a record, with the factor by which correlation between channels widens their sum.
 fn of_record(record: &Record, p: usize) -> Working {
     let mut sum = Working { variance: DVector::zeros(p), white: 1.0 };
     let mut joint = vec![DVector::<f64>::zeros(p); record.n_time];

@@ -41,7 +41,7 @@ fn a_prior_that_was_pulled_gives_the_new_parameter_room() {
     let residual = line(n, |_| 1.0 - estimate);
     let fit = Optimum::new(&residual, &one, &precision, &DVector::from_element(1, -estimate)).expect("posed");
     let score = fit.score(&line(n, |_| 1.0));
-    // With it the constant returns to its prior mean and the amplitude is 1: the whole cost is won.
+    // With it the constant returns to its prior mean and the amplitude is 1: the gain is the whole cost.
     let cost = residual.norm_squared() + 100.0 * estimate * estimate;
     assert!((score.amplitude - 1.0).abs() < 1e-10 && (score.gain - cost).abs() < 1e-8, "{score:?}");
 }

@@ -1,7 +1,7 @@
 //! From a refusal of the model to the place in the study file that caused it.
 //!
-//! The model knows names and expressions, not files: names are looked up among the names that the file gives, expressions
-//! among its expressions. Next file to read: [`crate::problem`].
+//! The model's errors hold names and expressions, not places: names are looked up among the names that the file gives,
+//! expressions among its expressions. Next file to read: [`crate::problem`].
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! The model of a study once it builds, and what it says of the names that a study may use.
+//! The model of a study once it builds, and the names that a study may use for its quantities.
 //!
 //! Next file to read: [`super::model`], which builds it.
 
@@ -19,7 +19,7 @@ pub(crate) struct CheckedModel {
     pub(crate) delays: bool,
 }
 
-/// What the model says of a parameter or of the state behind an initial value.
+/// The model's description of a parameter, or of the state behind an initial value.
 pub(crate) fn quantity<'a>(spec: &'a Spec, name: &str) -> Option<&'a Quantity> {
     match name.strip_prefix(INITIAL) {
         Some(state) => quantity_of(&spec.states, state),

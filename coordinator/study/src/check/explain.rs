@@ -1,6 +1,6 @@
 //! Settings of `explain`: what is held out must leave something to fit, what is named must exist.
 //!
-//! Whether anything is left to try is the command's question, not the study's: other commands run such a study. Next file to
+//! Whether any candidate is left to try is checked by the command `explain`: other commands run such a study. Next file to
 //! read: [`super::settings`].
 
 use starlings_models::effect::library;
@@ -30,14 +30,14 @@ pub(crate) fn explain(source: &Source, file: &StudyFile) -> ExplainChoice {
     }
 }
 
-/// Effects that are named must be described in the study or grow from its model.
+/// Effects that are named must be described in the study or be built-in effects for its model.
 pub(crate) fn check_names(source: &Source, file: &StudyFile, model: &ModelDef) {
     let section = &file.explain;
     if section.without.is_empty() && section.only.is_empty() {
         return;
     }
     let bare = Setup { model: model.clone(), ..Setup::default() };
-    // A model that does not build is told elsewhere.
+    // A model that does not build is reported elsewhere.
     let Ok(spec) = bare.spec() else { return };
     let mut known: Vec<String> = library(&spec).into_iter().map(|effect| effect.name).collect();
     known.extend(file.effects.iter().map(|effect| effect.name.get_ref().clone()));

@@ -1,6 +1,6 @@
 //! What a run of the study may cost, and whether a delay alone costs more.
 //!
-//! What only a run can tell, such as how short a stiff model's steps are, the trial run tells: see [`crate::trial`].
+//! What depends on a run, such as the step length of a stiff model, is checked by the trial run: see [`crate::trial`].
 
 use starlings_models::limits::MAX_STEPS;
 use starlings_models::{BuildSetup, Memory, SOLVER, Setup};
@@ -12,7 +12,7 @@ use crate::file::StudyFile;
 use crate::problem::Source;
 use crate::variant::reads_past;
 
-/// The limit of steps that the study sets, if any; a limit that makes no sense is reported.
+/// The limit of steps that the study sets, if any; one out of range is reported.
 pub(super) fn max_steps(source: &Source, file: &StudyFile) -> Option<u64> {
     let given = file.model.max_steps.as_ref()?;
     let (message, help) = if file.model.kind.get_ref() == SOLVER {
@@ -26,12 +26,12 @@ pub(super) fn max_steps(source: &Source, file: &StudyFile) -> Option<u64> {
     None
 }
 
-/// The limit of computing time that the study sets for a model that is no solver, if any; one that makes no sense is reported.
+/// The limit of computing time that the study sets for a model that is no solver, if any; one out of range is reported.
 pub(super) fn timeout(source: &Source, file: &StudyFile) -> Option<f64> {
     file.model.timeout.as_ref().map(|given| seconds(source, "timeout", given))
 }
 
-/// A time of the study in seconds; one that makes no sense is reported.
+/// A time of the study in seconds; one out of range is reported.
 pub(super) fn seconds(source: &Source, key: &str, given: &Spanned<f64>) -> f64 {
     let found = *given.get_ref();
     if !(found > 0.0 && found <= 3.2e9) {

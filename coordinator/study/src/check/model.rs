@@ -1,6 +1,6 @@
 //! The model of a study: definitions from what is written, built to see whether they fit together.
 //!
-//! What the model refuses is told at the place in the file that caused it: see [`super::blame`]. Next file to read:
+//! What the model refuses is reported at the place in the file that caused it: see [`super::blame`]. Next file to read:
 //! [`super::parameters`].
 
 use std::collections::BTreeMap;
@@ -21,7 +21,7 @@ use crate::file::{EffectSection, StudyFile};
 use crate::problem::Source;
 use crate::variant::{has_delay, reads_past};
 
-/// Builds the model of a study; nothing after a complaint.
+/// Builds the model of a study; `None` when a problem was reported.
 pub(crate) fn model(
     source: &Source,
     file: &StudyFile,
@@ -96,7 +96,7 @@ fn sort_effects(source: &Source, file: &StudyFile, setup: &mut Setup, bare: &Spe
     (source.count() == before).then_some(candidates)
 }
 
-/// Terms are scalar: a field in one is told before its name is not found.
+/// Terms are scalar: a field in a term is reported here, before its name is looked up.
 fn refuse_fields(source: &Source, section: &EffectSection, bare: &Spec) {
     let fields: Vec<_> = bare.states.iter().chain(&bare.outputs).filter(|q| q.size > 1).collect();
     for (_, term) in &section.adds {
@@ -113,7 +113,7 @@ fn refuse_fields(source: &Source, section: &EffectSection, bare: &Spec) {
     }
 }
 
-/// Parses every expression, so that each fault of spelling is told and not only the first.
+/// Parses every expression, so that each syntax error is reported and not only the first.
 fn check_expressions(source: &Source, file: &StudyFile) {
     for text in expressions(file) {
         if let Err(error) = Expression::parse(text.get_ref()) {

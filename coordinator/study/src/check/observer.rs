@@ -1,6 +1,6 @@
 //! Whether the observer fits the recordings: what it needs is fitted, and its gain is stable at their spacing.
 //!
-//! Whether it fits the model, the model says when it is built: see [`super::model::check_build`]. Next file to read:
+//! Whether it fits the model is checked when the model is built: see [`super::model::check_build`]. Next file to read:
 //! [`super::blame`].
 
 use starlings_models::catalogue::NATIVE;
@@ -15,7 +15,7 @@ use crate::problem::Source;
 
 /// Reports an observer that lacks what it needs, or whose gain makes its correction unstable.
 pub(crate) fn check(source: &Source, file: &StudyFile, setup: &Setup, records: &[Record]) {
-    // What an observer of a solver needs, and what gain it stands, only the solver knows.
+    // What an observer inside a solver needs, and which gains are stable there, is not known here.
     if matches!(setup.observer.kind.as_str(), "" | "none") || setup.model.kind == SOLVER {
         return;
     }
@@ -31,7 +31,7 @@ struct Built {
     theta: Vec<f64>,
 }
 
-/// The observer as it works in the fit, where held-out channels are never seen; nothing after a complaint.
+/// The observer as it works in the fit, where held-out channels are never seen; `None` when a problem was reported.
 fn built(source: &Source, file: &StudyFile, setup: &Setup, records: &[Record]) -> Option<Built> {
     let seen = |output: &String| {
         let channels = records.iter().filter(|r| r.is_trained()).flat_map(|r| &r.channels);

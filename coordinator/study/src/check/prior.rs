@@ -22,7 +22,7 @@ pub(crate) struct Prior {
     pub(crate) drift: Drift,
 }
 
-/// Checks a prior against itself and against what the model says of the quantity. Nothing after a complaint.
+/// Checks a prior against itself and against what the model says of the quantity. `None` when a problem was reported.
 pub(crate) fn prior(
     source: &Source,
     parameter: &ParameterSection,
@@ -62,7 +62,7 @@ pub(crate) fn prior(
     (source.count() == before).then_some(Prior { transform: transform?, mean, sd: sd?, drift })
 }
 
-/// Whether a median can be transformed and lies where physics allows; otherwise says so.
+/// Whether a median can be transformed and lies in the range of its quantity; otherwise it is reported.
 pub(crate) fn check_median(
     source: &Source,
     median: &Spanned<f64>,
@@ -210,7 +210,7 @@ fn factor_to_sd(source: &Source, factor: &Spanned<f64>, transform: &Transform) -
     Some(if matches!(transform, Transform::Log2) { value.log2() } else { value.ln() })
 }
 
-/// A transform may not reach values that physics forbids for certain.
+/// A transform may not reach values that are physically impossible for certain.
 fn check_bounds(source: &Source, prior: &PriorSection, transform: &Transform, quantity: &Quantity) {
     let [lowest, highest] = quantity.range;
     if let (Transform::Logit { lo, hi }, Some(written)) = (transform, &prior.transform) {

@@ -1,4 +1,4 @@
-//! Parameters of effects that do not count in the model's units: they bound nothing until a recording has measured them.
+//! Parameters of effects that do not count in the model's units: their ranges hold only once a recording has given the scale.
 //!
 //! Next file to read: [`super::scales`], which measures.
 
@@ -13,7 +13,7 @@ pub(crate) fn relative(effects: &[EffectDef]) -> impl Iterator<Item = &EffectPar
     effects.iter().flat_map(|effect| &effect.parameters).filter(|p| p.scale != Scale::Absolute)
 }
 
-/// Opens the ranges of parameters that do not count in the model's units: they bound nothing yet.
+/// Opens the ranges of parameters that do not count in the model's units: their scale is not known yet.
 pub(crate) fn open(spec: &mut Spec, effects: &[EffectDef]) {
     for parameter in relative(effects) {
         if let Some(quantity) = spec.parameters.iter_mut().find(|q| q.name == parameter.name) {

@@ -1,10 +1,10 @@
-//! Numbers of built-in effects that count in something else than the model's units: how far a recording moves, how long it
-//! lasts, how often it is sampled.
+//! Numbers of built-in effects that do not count in the model's units but in the course of a quantity, the length of a
+//! recording or its sampling interval.
 //!
-//! They become numbers of the model once, before anything is run with the effect. Where one counts on a course, the model is run
-//! without such effects at the prior medians. What counts on a course says where a search looks and not what physics allows:
-//! it gives a parameter without a value its default, and a value elsewhere is told and taken. Next file to read:
-//! [`starlings_models::effect::scale`].
+//! They become numbers of the model once, before anything is run with the effect. Where one counts on a course, the model is
+//! run without such effects at the prior medians. A range on a course limits where a search looks, not what is physically
+//! possible: it gives the default of a parameter without a value; a value outside of it is accepted with a warning. Next file
+//! to read: [`starlings_models::effect::scale`].
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -27,7 +27,7 @@ use crate::plan::training_rows;
 use crate::problem::Source;
 use crate::solver_host::SolverHost;
 
-/// What the numbers of effects are measured with.
+/// The scales in which numbers of effects count.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Ruler {
     /// The smallest and the largest value of each scalar state, output and input.
@@ -55,7 +55,8 @@ pub(crate) enum CourseError {
 }
 
 impl Ruler {
-    /// Measures as much as the effects of this setup need. The first trial tells the sampling; without one nothing is known.
+    /// Measures the scales that the effects of this setup need. The sampling is that of the first trial; without a trial no
+    /// scale is known.
     ///
     /// # Errors
     /// When the model without these effects does not build or run.
@@ -75,7 +76,7 @@ impl Ruler {
         Ok(Self { courses, record, sampling })
     }
 
-    /// The effect with ranges and grids in the model's units, as a search would look.
+    /// The effect with ranges and grids in the model's units, as a search uses them.
     fn as_searched(&self, def: &EffectDef) -> EffectDef {
         scale::in_units(def, &|name| self.courses.get(name).copied(), self.record, self.sampling)
     }
@@ -121,7 +122,7 @@ fn scalars(spec: &Spec, is_solver: bool) -> Vec<String> {
     outputs.chain(states).map(|q| q.name.clone()).collect()
 }
 
-/// How far everything moves in these runs.
+/// The smallest and the largest value of every scalar over these runs.
 fn courses(
     setup: &Setup,
     trials: &[Trial<'_>],
@@ -204,7 +205,7 @@ pub(crate) fn check(
     }));
 }
 
-/// A value that a study gives to a parameter far from where the quantity that it counts on moves.
+/// A warning about a value that a study gives to a parameter far from the course of the quantity that it counts on.
 fn elsewhere(file: &StudyFile, written: &EffectParameter, found: &EffectParameter) -> Option<String> {
     let name = &written.name;
     let constant = file.model.constants.iter().find(|(n, _)| n.get_ref() == name).map(|(_, v)| *v.get_ref());

@@ -153,7 +153,7 @@ fn patience(source: &Source, value: &Spanned<f64>) -> f64 {
     seconds
 }
 
-/// Keys that belong to other estimators than the chosen one: they would be ignored, which nobody expects.
+/// Keys that belong to other estimators than the chosen one: they would be ignored silently.
 fn foreign_keys(source: &Source, section: &EstimatorSection, kind: &Kind, once: Option<&Description>) {
     let given = [
         ("passes", section.passes.as_ref().map(Spanned::span)),

@@ -1,8 +1,7 @@
-//! A model that runs in a program of its own: what it says of itself, and what a study may ask of it.
+//! A model that runs in a program of its own: its description, and what a study may ask of it.
 //!
-//! Nothing is started here; whoever loads the study asks the solver ([`crate::SolverHost`]). What it says is not
-//! trusted: names must be unique and ranges sensible before anything is judged against them. Next file to read:
-//! [`super::model`].
+//! Nothing is started here; the caller's [`crate::SolverHost`] asks the solver. The description is checked first: names must be
+//! unique and ranges sensible before anything is compared with them. Next file to read: [`super::model`].
 
 mod files;
 
@@ -21,10 +20,10 @@ use crate::file::StudyFile;
 use crate::file::solver::{ProgramQuantity, ProgramSection};
 use crate::problem::Source;
 
-/// A solver that has said what it is.
+/// A solver with its description.
 pub(crate) struct DescribedSolver {
     pub(crate) def: SolverDef,
-    /// Whether it can be started in this process: one that a file describes may be elsewhere.
+    /// Whether it can be started in this process: one with a description in a file may be on another machine.
     pub(crate) is_here: bool,
 }
 
@@ -34,7 +33,7 @@ impl DescribedSolver {
     }
 }
 
-/// The solver of a study with its description; nothing after a complaint, or where the model is none.
+/// The solver of a study with its description; `None` when a problem was reported, or where the model is none.
 pub(crate) fn solver(source: &Source, file: &StudyFile, solver_host: &SolverHost) -> Option<DescribedSolver> {
     let section = file.model.solver.as_ref()?;
     let before = source.count();
@@ -119,7 +118,7 @@ fn reads(section: &ProgramSection) -> std::collections::BTreeMap<String, String>
     section.outputs.iter().filter_map(rule).collect()
 }
 
-/// What the study itself says of a program that cannot be asked.
+/// The description of a program that cannot be asked, from the study.
 fn written(source: &Source, section: &ProgramSection) -> Description {
     for (what, list) in
         [("parameter", &section.parameters), ("output", &section.outputs), ("input", &section.inputs)]
@@ -170,7 +169,7 @@ fn one(source: &Source, written: &ProgramQuantity) -> Quantity {
     quantity
 }
 
-/// Has the solver say what it is.
+/// Asks the solver for its description.
 fn asked(
     source: &Source,
     section: &ProgramSection,
@@ -205,7 +204,7 @@ pub(crate) fn check_files(source: &Source, section: &ProgramSection) {
     copies(source, section, &folder);
 }
 
-/// Refuses a description that makes no sense.
+/// Refuses a description with duplicate names or impossible ranges.
 fn check_description(source: &Source, section: &ProgramSection, description: &Description) {
     let place = section.described.as_ref().map_or(section.place.clone(), toml::Spanned::span);
     if let Some(fault) = description.fault() {
@@ -214,7 +213,7 @@ fn check_description(source: &Source, section: &ProgramSection, description: &De
     }
 }
 
-/// Refuses what no observer of a solver can be told, and returns what is worth a word.
+/// Refuses what an observer of a solver cannot be given, and returns warnings.
 pub(crate) fn check(source: &Source, file: &StudyFile, known: Option<&DescribedSolver>) -> Vec<String> {
     let Some((known, description)) = known.and_then(|known| Some((known, known.description()?))) else {
         return Vec::new();
@@ -247,18 +246,18 @@ pub(crate) fn check(source: &Source, file: &StudyFile, known: Option<&DescribedS
     warnings
 }
 
-/// Whether a setup fits its solver, without one: everything but the run itself.
+/// Checks a setup against the description of its solver, without the solver: everything but the run itself.
 ///
 /// # Errors
 /// What does not fit.
 pub(crate) fn fits(setup: &Setup, description: &Description) -> Result<(), SetupError> {
-    External::new(setup, description.clone(), Nobody).map(|_| ())
+    External::new(setup, description.clone(), NeverRun).map(|_| ())
 }
 
-/// Runs nothing.
-struct Nobody;
+/// A solver that is never run.
+struct NeverRun;
 
-impl Solve for Nobody {
+impl Solve for NeverRun {
     fn solve(&self, _: &Run<'_>) -> Result<Solved, ParticleError> {
         Err(ParticleError::Infrastructure("no solver was started".to_owned()))
     }

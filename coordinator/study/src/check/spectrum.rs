@@ -1,4 +1,4 @@
-//! `[spectrum]`: names of observers, gains from zero, a decay that is one.
+//! `[spectrum]`: names of observers, gains of at least zero, a decay in its range.
 //!
 //! Next file to read: [`crate::checked`].
 

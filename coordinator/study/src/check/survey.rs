@@ -1,7 +1,7 @@
-//! What can be told of a study whose form or whose model is wrong: its priors by themselves, and its files.
+//! Faults that can be found in a study whose form or whose model is wrong: those of its priors by themselves, and of its files.
 //!
-//! Somebody who mends the one should not learn of the others only then. Nothing is judged against the model here. Next file to
-//! read: [`crate::record`].
+//! They are reported together with the faults of form or model. Nothing is compared with the model here. Next file to read:
+//! [`crate::record`].
 
 use crate::check::prior;
 use crate::check::solver::check_files;
@@ -9,13 +9,13 @@ use crate::file::StudyFile;
 use crate::problem::{Source, StudyError};
 use crate::record::Recordings;
 
-/// What is wrong with a study whose model is none.
+/// The faults of a study whose model does not build.
 pub(crate) fn without_model(source: &Source, file: &StudyFile) -> StudyError {
     survey(source, file);
     source.verdict().err().unwrap_or(StudyError { problems: vec![] })
 }
 
-/// Reports what is wrong with priors and files whatever the model is.
+/// Reports the faults of priors and files that do not depend on the model.
 pub(crate) fn survey(source: &Source, file: &StudyFile) {
     let whole = source.count();
     for parameter in file.parameters.iter().filter(|p| p.prior.transform.is_some()) {

@@ -1,8 +1,8 @@
-//! What the unit labels of a study contradict each other in: worth a word, never a refusal.
+//! Contradictions between the unit labels of a study: each is a warning, none a refusal.
 //!
-//! Numbers are taken as they stand. A built-in model holds in every consistent system of units, so there only labels that no
-//! one system joins are told; equations hold in the units that the study writes them in. What an input's column is in, no
-//! label says. Next file to read: [`starlings_models::units`].
+//! Numbers are taken as they stand. A built-in model holds in every consistent system of units, so there only labels that fit
+//! no common system are reported; equations hold in the units that the study writes them in. The column of an input has no unit
+//! label. Next file to read: [`starlings_models::units`].
 
 use starlings_models::units::{Labels, Unit, consistent};
 
@@ -16,7 +16,7 @@ const MODEL_TIME: &str = "s";
 
 /// Every warning about units.
 pub(crate) fn warnings(file: &StudyFile, model: &CheckedModel, records: &[Record]) -> Vec<String> {
-    // What a solver calls its units are its own: nothing converts them.
+    // A solver may use any units: nothing converts them.
     let exact = model.setup.model.equations.is_some() || model.setup.model.solver.is_some();
     let pairs = pairs(file, model, records);
     let mut list: Vec<String> = pairs.iter().filter(|p| p.differs(exact)).map(Pair::sentence).collect();
@@ -38,9 +38,9 @@ pub(crate) fn warnings(file: &StudyFile, model: &CheckedModel, records: &[Record
     list
 }
 
-/// Outputs whose innovation `corrects` adds to a state in another unit. The model's own labels are compared: what the study's
-/// labels contradict in them is told of them. A warning as everywhere, for an output may show a state in a unit of its own; an
-/// observer then pulls by another share than its gain says, and the wrong state looks just like it.
+/// Outputs whose innovation `corrects` adds to a state in another unit. The model's own labels are compared: contradictions
+/// with the study's labels have warnings of their own. It is a warning, since an output may show a state in another unit; the
+/// observer then corrects by another share than its gain states, and a wrong state in `corrects` looks the same.
 fn corrections(file: &StudyFile, model: &CheckedModel) -> Vec<String> {
     let warn = |(output, state): &(toml::Spanned<String>, toml::Spanned<String>)| {
         let (output, state) = (output.get_ref(), state.get_ref());
@@ -83,7 +83,7 @@ impl Pair {
         self.units.is_some_and(|(a, b)| if exact { !a.same(&b) } else { !a.same_dimension(&b) })
     }
 
-    /// Whether the label is the model's, be it in other words.
+    /// Whether the label means the model's unit, perhaps in another spelling.
     fn is_the_models(&self) -> bool {
         self.units.is_none_or(|(a, b)| a.same(&b))
     }
@@ -114,7 +114,7 @@ fn pairs(file: &StudyFile, model: &CheckedModel, records: &[Record]) -> Vec<Pair
     pairs
 }
 
-/// The label that keeps the others from being one system of units.
+/// The label without which the others form one system of units.
 fn mixed_systems(pairs: &[Pair], time: &str) -> Option<String> {
     let time = Pair::new("time".to_owned(), time, MODEL_TIME);
     let comparable = |p: &&Pair| p.units.is_some_and(|(a, b)| a.same_dimension(&b));

@@ -1,7 +1,8 @@
 //! The fixed numbers of a study's model, each as a setup in which it is a little larger.
 //!
-//! Constants of the study, parameters of a built-in model at their defaults, the numbers of a layout (all of one key together), and a given initial
-//! state as a whole. Whole numbers of a layout are counts and stay. Next file to read: [`starlings_models::Setup`].
+//! Constants of the study, parameters of a built-in model at their defaults, the numbers of a layout (all of one key together),
+//! and a given initial state as a whole. Whole numbers of a layout are counts and are not moved. Next file to read:
+//! [`starlings_models::Setup`].
 
 use std::collections::BTreeMap;
 
@@ -110,7 +111,7 @@ fn gather(value: &Value, keys: &mut Vec<String>) {
     }
 }
 
-/// A number written with a point: a length, not a count. Zero has no per cent.
+/// A number written with a point: a length, not a count. Zero is left out: one per cent of it is zero.
 fn is_measure(value: &Value) -> bool {
     matches!(value, Value::Number(n) if n.is_f64() && n.as_f64().is_some_and(|v| v.abs() > 0.0))
 }

@@ -1,4 +1,4 @@
-//! `[parameters]` where `[[parameters]]` is meant: the first slip of everybody who knows TOML's tables and not its lists.
+//! `[parameters]` where `[[parameters]]` is meant: a common mistake in TOML.
 //!
 //! TOML itself would complain about every key that then stands twice. Next file to read: [`super::read`].
 
@@ -8,7 +8,7 @@ use toml::de::{DeTable, DeValue};
 
 use crate::problem::Source;
 
-/// The lists of a study, by their way from the root.
+/// The lists of a study, by their path from the root.
 const LISTS: [&str; 4] = ["parameters", "records", "effects", "model.states"];
 
 /// Reports every list that is written as a table, once; whether there was one. `spoilt`: the text is no TOML.

@@ -1,6 +1,6 @@
 //! The layout of a model: any table of the file as one value, and the way back from a path in it to a place in the file.
 //!
-//! What a layout may hold is the model's business; it answers with a path such as `regions[2].to`. Next file to read:
+//! What a layout may hold is checked by the model, whose errors hold a path such as `regions[2].to`. Next file to read:
 //! [`crate::check::model`].
 
 use std::ops::Range;

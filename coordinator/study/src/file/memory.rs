@@ -1,4 +1,4 @@
-//! Amounts of memory as people write them.
+//! Amounts of memory, such as `2 GiB`.
 //!
 //! Next file to read: [`super::solver`].
 
@@ -31,7 +31,7 @@ pub(super) fn memory(source: &Source, node: &Node<'_>) -> Option<u64> {
         None
     };
     match bytes {
-        // Below this no program of any language starts, above it is no number of bytes.
+        // Less is too little for any program, more is beyond any machine.
         Some(bytes) if (1e6..1e18).contains(&bytes) => Some(bytes as u64),
         Some(bytes) if bytes.is_finite() => {
             let message = format!("`memory` must be at least 1 MB, found {bytes} bytes");

@@ -1,6 +1,6 @@
-//! What a quantity of the model may say of itself wherever it stands: its unit and its role.
+//! The keys that any quantity of a model may have: its unit and its role.
 //!
-//! Next files to read: [`super::model`] and [`super::solver`], whose quantities say so.
+//! Next files to read: [`super::model`] and [`super::solver`], whose quantities have them.
 
 use serde::Deserialize;
 use serde::de::IntoDeserializer;
@@ -40,7 +40,7 @@ pub(super) fn role(source: &Source, t: &Table<'_>) -> Role {
     t.text("role").map_or(Role::Other, |name| named_role(source, &name))
 }
 
-/// The role of this name; one that there is not is reported.
+/// The role of this name; an unknown one is reported.
 pub(super) fn named_role(source: &Source, name: &Spanned<String>) -> Role {
     let deserializer: StrDeserializer<'_, serde::de::value::Error> =
         name.get_ref().as_str().into_deserializer();

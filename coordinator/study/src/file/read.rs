@@ -1,7 +1,7 @@
 //! From TOML text to a [`StudyFile`]: sections, parameters and records.
 //!
-//! Every complaint about form (a missing or unknown key, a wrong type) is reported to the [`Source`]; reading goes on so that
-//! one look shows them all. Next file to read: [`super::model`] for the model and the effects.
+//! Every fault of form (a missing or unknown key, a wrong type) is reported to the [`Source`]; reading goes on so that one call
+//! reports them all. Next file to read: [`super::model`] for the model and the effects.
 
 use starlings_proto::adapters::AdapterDef;
 use toml::Spanned;
@@ -29,7 +29,8 @@ const SECTIONS: [&str; 10] = [
     "fleet",
 ];
 
-/// Reads the text of a study file, in which a solver is reached by one of the adapters; faults of form are with the source then.
+/// Reads the text of a study file, in which a solver is reached by one of the adapters; faults of form are reported to the
+/// source.
 ///
 /// # Errors
 /// Where the text is no TOML, or has a table in the place of a list.

@@ -1,7 +1,7 @@
 //! Reading `[model]` where the model runs in a program of its own.
 //!
-//! Every adapter has its keys; those of another are reported. Whether files exist and what the solver says of itself is not
-//! asked here. Next file to read: [`crate::check`], module `solver`.
+//! Every adapter has its keys; those of another are reported. Whether files exist and what the solver's description holds is
+//! not checked here. Next file to read: [`crate::check`], module `solver`.
 
 use std::ops::Range;
 
@@ -136,7 +136,7 @@ pub(crate) fn program(
     section
 }
 
-/// Only a program that is started for every run leaves its answer where a rule finds it.
+/// The keys of an output, without `read` for an adapter whose program is not started for every run.
 fn output_keys(adapter: Option<&AdapterDef>) -> &'static [&'static str] {
     if adapter.is_some_and(|known| known.keys.contains(&"outputs") && !known.per_run) {
         &["name", "unit", "role", "size"]
@@ -154,7 +154,7 @@ fn adapter(source: &Source, t: &Table<'_>, adapters: &[AdapterDef]) -> String {
     word.into_inner()
 }
 
-/// Keys of another adapter: they would be ignored, which nobody expects.
+/// Keys of another adapter: they would be ignored silently.
 fn refuse_foreign(source: &Source, t: &Table<'_>, adapter: &AdapterDef, adapters: &[AdapterDef]) {
     for key in KEYS {
         let owners: Vec<String> = adapters
@@ -170,7 +170,7 @@ fn refuse_foreign(source: &Source, t: &Table<'_>, adapter: &AdapterDef, adapters
     }
 }
 
-/// Every solver is started or dialled, and only one of both unless it is a server that is started too.
+/// Every solver is either started or reached at an address; both are given only for a server that is started too.
 fn check_reach(
     source: &Source,
     t: &Table<'_>,

@@ -91,7 +91,7 @@ impl<'a> Table<'a> {
         text(self.source, self.get(key)?, &format!("`{key}`"))
     }
 
-    /// A text that must be there; empty after the complaint that it is not.
+    /// A text that must be there; empty when its absence was reported.
     pub(crate) fn required_text(&self, key: &str, expected: &str) -> Spanned<String> {
         if self.get(key).is_none() {
             self.missing(key, expected);
@@ -185,7 +185,7 @@ impl<'a> Table<'a> {
     }
 }
 
-/// A text, or a complaint.
+/// A text; `None` when a problem was reported.
 pub(crate) fn text(source: &Source, node: &Node<'_>, what: &str) -> Option<Spanned<String>> {
     let Some(value) = node.get_ref().as_str() else {
         wrong_type(source, node, what, "a text in quotes");
@@ -194,7 +194,7 @@ pub(crate) fn text(source: &Source, node: &Node<'_>, what: &str) -> Option<Spann
     Some(Spanned::new(node.span(), value.to_owned()))
 }
 
-/// A finite number, or a complaint.
+/// A finite number; `None` when a problem was reported.
 pub(crate) fn number(source: &Source, node: &Node<'_>, what: &str) -> Option<Spanned<f64>> {
     let Some(value) = any_number(node.get_ref()).filter(|v| v.is_finite()) else {
         wrong_type(source, node, what, "a finite number");

@@ -1,4 +1,4 @@
-//! What the estimator does not see of an ensemble: the states of its particles, and the noise of its rows.
+//! The parts of an ensemble that the estimator does not get: the states of its particles, and the noise of its rows.
 
 use nalgebra::DMatrix;
 use starlings_estimators::{Noise, Recombination};
@@ -6,7 +6,7 @@ use starlings_estimators::{Noise, Recombination};
 use super::runner::StepWindows;
 use crate::Study;
 
-/// X⁺ = X⁻T for the states of every record, by so many threads; the bits do not depend on them.
+/// X⁺ = X⁻T for the states of every record, by up to so many threads; the bits do not depend on their number.
 pub(super) fn recombine(states: &mut [Option<DMatrix<f64>>], transform: &DMatrix<f64>, threads: usize) {
     for x in states.iter_mut().flatten() {
         recombine_by(x, transform, threads);

@@ -1,7 +1,8 @@
 //! The sequential fit: passes of a filter over the training windows, one ensemble per step.
 //!
-//! What differs from pass to pass is in [`super::schedule`], when they end in [`super::settle`]; the sigma-point arithmetic lives in `starlings-estimators`; model
-//! states are only recombined here. Next file to read: [`super::schedule`], then [`super::rescue`].
+//! What differs from pass to pass is in [`super::schedule`], when they end in [`super::settle`]; the sigma-point arithmetic
+//! lives in `starlings-estimators`; model states are only recombined here. Next file to read: [`super::schedule`], then
+//! [`super::rescue`].
 
 use starlings_estimators::{Analysis, Data, MakeFilter, Particles};
 

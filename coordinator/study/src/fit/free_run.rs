@@ -1,7 +1,7 @@
-//! The final forward run: every record from its start, free, with the estimate; what the fit is judged by.
+//! The final forward run: every record from its start, free, with the estimate; its misfit is that of the fit.
 //!
-//! The runs get no observed value at all, so neither an observer nor the fit can help them, on the held-out spans least of
-//! all. Next file to read: [`crate::summary`].
+//! The runs get no observed value, neither of the training span nor of a held-out one, so that no observer can correct them.
+//! Next file to read: [`crate::summary`].
 
 use std::sync::Arc;
 

@@ -2,7 +2,7 @@
 //!
 //! Only the r × r Gram matrix of the particles reaches the estimator. Predictions at a window's end are taken again at the
 //! redrawn points by runs of zero length; the earlier ones of its times, and all of them where an observer has already
-//! brought the datum into the state, are mixed as the states are. Source: Moireau & Chapelle (2011), Verdandi's treatment of
+//! corrected the state by the datum, are mixed as the states are. Source: Moireau & Chapelle (2011), Verdandi's treatment of
 //! the canonical and star sets.
 
 use std::sync::Arc;
@@ -17,14 +17,14 @@ use super::stack::stack_outputs;
 use crate::expand::INITIAL;
 use crate::{RunError, Study};
 
-/// Weight of an initial value beside the states that carry it on.
-const FORGOTTEN: f64 = 1e-3;
+/// Weight of an initial value while its record runs, beside the states that follow from it.
+const INITIAL_WEIGHT: f64 = 1e-3;
 
 /// Gram matrix (r × r) of the √α-weighted deviations of the augmented particles.
 ///
-/// Rows are made commensurable: each state quantity by its size in the ensemble mean, each parameter by its prior sd.
-/// Initial values have done their work through the states and hardly count again while their record runs; without any
-/// weight, one that its state has forgotten would be mixed at random.
+/// Rows are made commensurable: each state quantity by its size in the ensemble mean, each parameter by its prior sd. Initial
+/// values act through the states while their record runs, so they have a small weight then; with none, an initial value that no
+/// longer shows in its state would be mixed at random.
 fn gram(
     study: &Study,
     weights: &DVector<f64>,
@@ -45,7 +45,7 @@ fn gram(
     for (j, entry) in study.theta.iter().enumerate() {
         let initial = study.parameters[entry.parameter].name.starts_with(INITIAL);
         let running = entry.record.map_or(states.iter().any(Option::is_some), |r| states[r].is_some());
-        let share = if initial && running { FORGOTTEN } else { 1.0 };
+        let share = if initial && running { INITIAL_WEIGHT } else { 1.0 };
         add(&mut gram, &particles.theta.rows(j, 1).into_owned(), weights, entry.prior_sd / share);
     }
     gram
@@ -91,7 +91,7 @@ pub(crate) fn redraw(
     let mut mixed = states.clone();
     recombine(&mut mixed, &transform, runner.threads);
     let mut observed = predictions * transform;
-    // Where an observer has brought the datum into the state, an output of that state is no prediction of it.
+    // Where an observer has corrected the state by the datum, an output of that state is no prediction of it.
     if study.observer_is_off() && !observe_again(runner, at, &redrawn.theta, &mixed, windows, &mut observed)?
     {
         return Ok(None);

@@ -1,8 +1,8 @@
 //! What happens to a sigma point whose run failed on every worker: it is pulled towards the mean and run again.
 //!
-//! A pulled point is a real run at a nearer point, never a guess; the analysis knows its distance and stays exact for a
-//! linear model. A point that fails even close to the mean is dropped where the others still span the parameters. Both are
-//! reported as lost information. Next file to read: [`super::filter`].
+//! A pulled point is run at its nearer place; the analysis takes its distance into account and stays exact for a linear model.
+//! A point that fails even close to the mean is dropped where the others still span the parameters. Both are reported as lost
+//! information. Next file to read: [`super::filter`].
 
 use nalgebra::DMatrix;
 use starlings_estimators::{Filter, Particles};

@@ -1,7 +1,7 @@
 //! One ensemble to the fleet and back: windows and particles become jobs, outcomes become predictions and states.
 //!
-//! Outcomes are gathered by particle and record, never by arrival, so the numbers do not know who computed them. What to do
-//! about a particle that failed is not decided here: see [`super::rescue`].
+//! Outcomes are gathered by particle and record, never by arrival, so the numbers do not depend on which worker computed them.
+//! What to do about a particle that failed is not decided here: see [`super::rescue`].
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -27,10 +27,10 @@ pub(crate) struct AnalysisIndex {
     pub(crate) step: usize,
 }
 
-/// A prediction per particle and window, or why there is none: the model's doing, or the limit of wall time.
+/// A prediction per particle and window, or why there is none: a failure of the model, or the limit of wall time.
 pub(crate) type Results = Vec<Vec<Result<Prediction, Failure>>>;
 
-/// Sends runs to a fleet and keeps the rows that the store will want.
+/// Sends runs to a fleet and keeps their rows for the store.
 pub(crate) struct EnsembleRunner<'a> {
     study: &'a Study,
     fleet: &'a mut dyn Fleet,
@@ -43,7 +43,7 @@ pub(crate) struct EnsembleRunner<'a> {
     pub(crate) failed: u64,
     /// Extra attempts.
     pub(crate) retried: u64,
-    /// Threads that recombine states; one unless somebody says more.
+    /// Threads that recombine states; one by default.
     pub(crate) threads: usize,
     /// Workers that answered.
     workers: BTreeSet<String>,
@@ -91,8 +91,9 @@ impl<'a> EnsembleRunner<'a> {
         self.timeouts.as_ref()?.warning()
     }
 
-    /// Runs the given particles over the windows and gives back what the study's channels measure of them. `theta` is p × r in transformed units, `states[record]` is n × r or
-    /// `None` at a record's start. Returns `[particle in the order given][window]`.
+    /// Runs the given particles over the windows and gives back what the study's channels measure of them. `theta` is p × r in
+    /// transformed units, `states[record]` is n × r or `None` at a record's start. Returns `[particle in the order
+    /// given][window]`.
     ///
     /// # Errors
     /// When the fleet fails as a whole.
@@ -229,7 +230,7 @@ impl<'a> EnsembleRunner<'a> {
         Ok(known.into_iter().flatten().collect())
     }
 
-    /// A prediction of another length is no answer: it says nothing of this particle.
+    /// A prediction of another length is an error of the run, not a failure of the particle.
     fn check(
         &self,
         prediction: &Prediction,

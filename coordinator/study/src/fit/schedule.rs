@@ -80,8 +80,8 @@ impl<'a> Schedule<'a> {
 
     /// Standard deviations of the points at the start of a pass, transformed units.
     ///
-    /// Where the number of passes is open, no point starts further out than one posterior sd: with data that know a parameter
-    /// to less than `spread` of its prior, a wider ensemble would bend on its way to the estimate.
+    /// Where the number of passes is open, no point starts further out than one posterior sd: with data that determine a
+    /// parameter to less than `spread` of its prior, the predictions of a wider ensemble would be far from linear.
     fn scale(&self, pass: usize, around: &Gaussian, narrow: f64) -> Vec<f64> {
         let sd = posterior::standard_deviations(around);
         if pass > 0 && self.drifting.is_some() {

@@ -2,10 +2,10 @@
 //!
 //! A tight pass proposes a step of Gauss and Newton. Its full length is taken where that does not raise the cost, the squared
 //! misfit of a run at the point plus its squared distance from the prior; otherwise the best of ever shorter ones (step
-//! halving: Nocedal & Wright 2006, section 3.1, with the decrease tested by runs of whole records). So the cost falls from pass to pass,
-//! and the passes end at the most probable value, as the batch fit does. Where no length lowers it, the points are drawn
-//! together and the pass is made again. Deliberately without any state that a snapshot would have to hold beside the
-//! ensemble: what is decided between two passes is decided again on resume. Next file to read: [`super::filter`].
+//! halving: Nocedal & Wright 2006, section 3.1, with the decrease tested by runs of whole records). So the cost falls from pass
+//! to pass, and the passes end at the most probable value, as the batch fit does. Where no length lowers it, the points are
+//! drawn together and the pass is repeated. No state is kept that a snapshot would have to hold beside the ensemble: a resume
+//! repeats the decision between two passes. Next file to read: [`super::filter`].
 
 use std::sync::Arc;
 
@@ -51,10 +51,10 @@ pub(super) fn next(
         if narrow < NARROWEST {
             return Ok(None);
         }
-        let mut again =
+        let mut repeated =
             schedule.start_at(now.figures.pass + 1, &reported.posterior, now.estimate.centre.clone(), narrow);
-        again.estimate.cost = now.estimate.cost;
-        return Ok(Some(again));
+        repeated.estimate.cost = now.estimate.cost;
+        return Ok(Some(repeated));
     };
     let mut next =
         schedule.start_at(now.figures.pass + 1, &reported.posterior, found.point, now.estimate.narrow);
@@ -68,7 +68,7 @@ struct Point {
     cost: f64,
 }
 
-/// From where a pass started towards what it found.
+/// The line from the centre of a pass to the point that it found.
 struct Search<'a> {
     schedule: &'a Schedule<'a>,
     now: &'a Snapshot<Ensemble>,
@@ -90,19 +90,19 @@ impl<'a> Search<'a> {
 
     /// The longest step that does not raise the cost, or of the shorter ones the best; `None` when all raise it.
     ///
-    /// A first pass only chooses a point: where no part of its step is better than the prior median, that is it.
+    /// In a first pass, where no part of the step is better than the prior median, the prior median is the next centre.
     fn run(&self, runner: &mut EnsembleRunner<'_>) -> Result<Option<Point>, RunError> {
         let first = self.now.figures.pass == 0;
         let start = self.now.estimate.cost;
         let lengths: &[f64] = if start.is_some() { &[1.0] } else { &[1.0, 0.0] };
         let mut points = self.points(runner, lengths)?;
-        let stay = if start.is_none() { points.pop() } else { None };
-        let level = start.or(stay.as_ref().map(|p| p.cost)).unwrap_or(f64::INFINITY);
+        let unmoved = if start.is_none() { points.pop() } else { None };
+        let level = start.or(unmoved.as_ref().map(|p| p.cost)).unwrap_or(f64::INFINITY);
         let Some(full) = points.pop().filter(|p| p.cost <= level + LEVEL) else {
             let shorter = self.points(runner, &SHORTER)?;
             let best =
                 shorter.into_iter().filter(|p| p.cost < level).min_by(|a, b| a.cost.total_cmp(&b.cost));
-            return Ok(best.or(stay.filter(|_| first)));
+            return Ok(best.or(unmoved.filter(|_| first)));
         };
         Ok(Some(full))
     }
@@ -111,7 +111,7 @@ impl<'a> Search<'a> {
     fn points(&self, runner: &mut EnsembleRunner<'_>, lengths: &[f64]) -> Result<Vec<Point>, RunError> {
         let from = &self.now.estimate.centre;
         let theta = DMatrix::from_fn(from.len(), lengths.len(), |j, k| {
-            // The whole step ends exactly at what was found.
+            // The whole step ends exactly at the point that was found.
             if lengths[k] >= 1.0 { self.found[j] } else { from[j] + lengths[k] * (self.found[j] - from[j]) }
         });
         let at = AnalysisIndex { pass: self.now.figures.pass + 1, step: self.now.figures.step };

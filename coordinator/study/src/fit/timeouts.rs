@@ -1,7 +1,8 @@
 //! Timeouts of a run, as decisions: kept in the store at once, and repeated without a run by a resume.
 //!
-//! A limit of wall time depends on the machine, so the same run may be in time once and late another time. What was decided once
-//! stays decided. Nothing else is kept here: a prediction is the same whenever it is made. Next file to read: [`super::runner`].
+//! A limit of wall time depends on the machine, so the same run may be in time once and late another time. A timeout, once
+//! stored, is not decided anew. Nothing else is kept here: a prediction is the same whenever it is made. Next file to read:
+//! [`super::runner`].
 
 use std::collections::HashMap;
 
@@ -15,7 +16,7 @@ use crate::store::{RunKey, Store, StoreError};
 pub(super) struct Timeouts<'a> {
     store: &'a Store,
     known: HashMap<RunKey, Timeout>,
-    /// Digest of the programs that make the runs now: another one decides for itself.
+    /// Digest of the programs that make the runs now: timeouts of other programs do not count.
     programs: [u8; 32],
 }
 
@@ -35,7 +36,7 @@ impl<'a> Timeouts<'a> {
         self.known.is_empty()
     }
 
-    /// What a reader of the result must know of them.
+    /// The warning about them for a reader of the result.
     pub(super) fn warning(&self) -> Option<String> {
         let n = self.known.len();
         let limit = self.known.values().map(|timeout| timeout.limit).next()?;
@@ -64,7 +65,7 @@ impl<'a> Timeouts<'a> {
     }
 }
 
-/// What tells a timeout from the answers of an explanation.
+/// Separates the keys of timeouts from those of the answers of an explanation.
 const MARK: u8 = 2;
 
 fn encode(timeout: &Timeout) -> Vec<u8> {

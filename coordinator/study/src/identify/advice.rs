@@ -1,6 +1,6 @@
-//! What deserves a warning before an estimation, and what to do about it.
+//! The warnings before an estimation, and what to do about them.
 //!
-//! The limits are those of the warnings of a finished run, so that `identify` foretells them. Next file to read:
+//! The limits are those of the warnings of a finished run, so that `identify` gives the same ones earlier. Next file to read:
 //! [`crate::warnings`].
 
 use super::result::{DirectionInfo, Identification, ParameterInfo};
@@ -12,7 +12,7 @@ const CRITICAL: f64 = 10.0;
 /// At most this many pairs have a warning of their own.
 const PAIRS: usize = 20;
 
-/// All warnings: those of the study, silent parameters, uninformed parameters and combinations, correlated pairs.
+/// All warnings: those of the study, parameters without effect, uninformed parameters and combinations, correlated pairs.
 pub fn warnings(study: &Study, found: &Identification) -> Vec<String> {
     let mut warnings = study.warnings.clone();
     let silent =
@@ -43,19 +43,19 @@ impl Identification {
             let later = row.iter().enumerate().skip(i + 1);
             pairs.extend(later.filter_map(|(j, c)| Some((i, j, c.filter(|c| c.abs() > CORRELATED)?))));
         }
-        // As they are written: what differs by rounding only stays in the order of the parameters.
+        // Sorted by the digits that are printed: what differs by rounding only stays in the order of the parameters.
         pairs.sort_by_key(|(_, _, c)| std::cmp::Reverse((1000.0 * c.abs()).round() as i64));
         pairs
     }
 }
 
-/// Parameters that change a prediction and yet keep their prior.
+/// Parameters that change a prediction but about which the data say almost nothing.
 fn uninformed(found: &Identification) -> impl Iterator<Item = &ParameterInfo> {
     let keeps = |p: &&ParameterInfo| p.expected_sd > UNINFORMED * p.prior_sd;
     found.parameters.iter().filter(keeps).filter(|p| !found.silent.contains(&p.name))
 }
 
-/// Combinations that keep their prior although not each of their parameters does.
+/// Combinations about which the data say almost nothing although they inform some of their parameters.
 fn weak(found: &Identification) -> impl Iterator<Item = &DirectionInfo> {
     let keeps = |name: &String| {
         found.parameters.iter().any(|p| p.name == *name && p.expected_sd > UNINFORMED * p.prior_sd)
@@ -93,7 +93,7 @@ pub fn advice(found: &Identification) -> String {
     said.join(" ")
 }
 
-/// Nothing keeps its prior.
+/// The advice where the data inform every parameter and combination.
 fn sound(found: &Identification) -> String {
     let least = found.parameters.iter().min_by(|a, b| a.informed.total_cmp(&b.informed));
     let width = least.map_or(String::new(), |p| {

@@ -1,7 +1,7 @@
 //! One ensemble on the fleet: every record from its start, freely, for star points close to one point.
 //!
-//! A parameter with one value per record is moved in all records at once: a record answers to its own value only, so one
-//! pair of runs tells the derivative of each. That makes 2q + 1 runs of every record for q parameters of the study.
+//! A parameter with one value per record is moved in all records at once: a record depends on its own value only, so one pair
+//! of runs gives the derivative of each. That makes 2q + 1 runs of every record for q parameters of the study.
 
 use std::sync::Arc;
 
@@ -33,7 +33,7 @@ pub struct Row {
     pub step: usize,
 }
 
-/// How the predictions of all observed values answer to the parameters.
+/// The slopes of the predictions of all observed values by the parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Response {
     /// The observed values: records in order, then times, then outputs.
@@ -54,12 +54,12 @@ pub fn accuracy(spread: f64) -> f64 {
     spread * spread
 }
 
-/// What a run sees of the recordings.
+/// Which observed values a run is given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Seen {
-    /// Nothing: it runs freely, whatever the observer.
+    /// None: it runs freely, whatever the observer.
     Freely,
-    /// What a run of the fit sees: an observer corrects it.
+    /// Those of a run of the fit: an observer corrects it.
     AsFitted,
 }
 
@@ -130,7 +130,7 @@ pub fn outputs(
     finite.then(|| DVector::from_vec(values))
 }
 
-/// The same window without an observed value: nothing can pull the run.
+/// The same window without an observed value: no observer can correct the run.
 fn freed(window: &Window) -> Window {
     Window { observed: vec![f64::NAN; window.observed.len()], ..window.clone() }
 }
@@ -153,7 +153,7 @@ impl Around<'_> {
         })
     }
 
-    /// A particle in words: what was moved, and where to.
+    /// A particle as text: what was moved, and where to.
     fn place(&self, particle: usize, record: usize) -> String {
         let moved = |parameter: usize| self.set.points[(parameter, particle)].abs() > 0.0;
         let Some(parameter) = (0..self.set.n_param()).find(|q| moved(*q)) else {
@@ -233,7 +233,7 @@ impl Around<'_> {
         }
     }
 
-    /// From columns per parameter of the study to columns per entry of the estimated vector: a record answers to its own.
+    /// From columns per parameter of the study to columns per entry of the estimated vector: a record depends on its own.
     fn whitened(&self, rows: &[Row], predictions: &DMatrix<f64>) -> Result<DMatrix<f64>, EstimatorError> {
         let slopes = sigma_point_sensitivities(&self.set, predictions, self.scale)?;
         Ok(DMatrix::from_fn(rows.len(), self.study.theta.len(), |i, j| {

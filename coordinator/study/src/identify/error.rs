@@ -1,4 +1,4 @@
-//! Why the sensitivities of a study could not be had.
+//! Why the sensitivities of a study could not be computed.
 //!
 //! Next file to read: [`super::ensemble`].
 
@@ -8,7 +8,7 @@ use starlings_models::Failure;
 use crate::store::StoreError;
 use crate::{FolderError, RunError};
 
-/// Why the sensitivities could not be had.
+/// Why the sensitivities could not be computed.
 #[derive(Debug, thiserror::Error)]
 pub enum IdentifyError {
     /// The fleet failed, or a run has no usable answer.

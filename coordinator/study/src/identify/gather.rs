@@ -75,7 +75,7 @@ fn parameters(study: &Study, centre: &[f64], s: &Sensitivities, fisher: &Fisher)
     let norms = s.norms();
     let errors = fisher.standard_errors();
     let info = |(j, (e, entry)): (usize, (Estimate, &ThetaEntry))| {
-        // Rounding must not make the data say less than nothing.
+        // Rounding must not make the expected sd larger than the prior sd.
         let expected_sd = sd[j].min(entry.prior_sd);
         ParameterInfo {
             name: e.name,

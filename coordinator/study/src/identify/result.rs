@@ -1,4 +1,4 @@
-//! What the analysis says, in names and units: what `--json` prints, and what the page shows.
+//! The result of the analysis, in names and units: what `--json` prints, and what the page shows.
 //!
 //! Widths are in transformed units, as the `sd` of a prior is, unless a field says otherwise. A figure that does not exist
 //! is `null`, never a number that stands for infinity. Next file to read: [`super::gather`].
@@ -124,7 +124,7 @@ pub struct Identification {
     pub records: Vec<RecordSteps>,
     /// Names of the parameters that change no observed prediction.
     pub silent: Vec<String>,
-    /// Which constants of the model an estimate would hang on.
+    /// How far an estimate would follow the constants of the model.
     pub hangs_on: HangsOn,
     /// Observed values.
     pub n_obs: usize,

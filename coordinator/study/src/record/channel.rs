@@ -14,7 +14,7 @@ use crate::file::ChannelSection;
 use crate::problem::quoted_list;
 
 impl ChannelReader<'_> {
-    /// All channels, their values still at every row of the file; nothing after a complaint.
+    /// All channels, their values still at every row of the file; `None` when a problem was reported.
     pub(crate) fn channels(&self, context: &mut Context<'_>) -> Option<Vec<Channel>> {
         let before = self.source.count();
         let mut channels: Vec<Channel> = Vec::new();
@@ -54,7 +54,7 @@ impl ChannelReader<'_> {
         let derived = self.derived(section)?;
         let read = |part: Part| Some((self.values(section, &part)?, part));
         let mut measured: Vec<(Vec<f64>, Part)> = parts.into_iter().map(read).collect::<Option<_>>()?;
-        // A component without any value is one that the file lacks.
+        // A component without any value is treated like one that the file lacks.
         context.warnings.extend(self.empty_columns(&measured));
         measured.retain(|(values, _)| measured_somewhere(values));
         if !measured.iter().any(|(values, _)| self.has_value(&self.derive(derived, values))) {
@@ -99,7 +99,7 @@ impl ChannelReader<'_> {
         })
     }
 
-    /// A noise that the study does not give is worth a word.
+    /// The warning about a noise that the study does not give.
     fn noise_warning(&self, section: &ChannelSection, noise: &Noise, label: &str) -> Option<String> {
         noise.how.starts_with("from").then(|| {
             format!(

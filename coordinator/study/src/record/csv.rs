@@ -117,7 +117,7 @@ impl Csv {
         }
     }
 
-    /// Why a row has another number of cells than the header, as far as one can guess.
+    /// The likely reason why a row has another number of cells than the header.
     fn row_help(&self, row: usize) -> String {
         let (width, wanted) = (self.width(row), self.headers.len());
         let whole = |cell: &str| cell.parse::<i64>().is_ok();
@@ -259,7 +259,7 @@ impl Csv {
     }
 }
 
-/// Refuses what has other separators than commas, before every row is told to have too few cells.
+/// Refuses other separators than commas, before every row is reported to have too few cells.
 fn refuse_foreign(path: &Path, text: &str) -> Result<(), StudyError> {
     let Some(foreign) = Foreign::of(text) else { return Ok(()) };
     let source = Source::new(path, text);

@@ -19,7 +19,7 @@ pub(super) enum Derived {
 }
 
 impl Derived {
-    /// The output's values from the column's; NaN where they cannot be told. `used` says which rows count for the fit.
+    /// The output's values from the column's; NaN where they cannot be computed. `used` says which rows count for the fit.
     pub(super) fn values(self, times: &[f64], column: &[f64], used: &[bool]) -> Vec<f64> {
         match self {
             Self::Itself => column.to_vec(),
@@ -119,7 +119,7 @@ fn differentiate(times: &[f64], values: &[f64], used: &[bool]) -> Vec<f64> {
 }
 
 impl ChannelReader<'_> {
-    /// What the column holds; nothing after a complaint.
+    /// What the column holds; `None` when a problem was reported.
     pub(super) fn derived(&self, section: &ChannelSection) -> Option<Derived> {
         let start = section.start.as_ref();
         let derived = match section.from.as_ref().map(|from| (from, from.get_ref().as_str())) {

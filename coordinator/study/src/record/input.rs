@@ -9,7 +9,7 @@ use super::{Recordings, Table};
 use crate::file::RecordSection;
 use crate::problem::{Source, quoted_list};
 
-/// The signals in the order of the model's inputs; nothing after a complaint.
+/// The signals in the order of the model's inputs; `None` when a problem was reported.
 pub(crate) fn inputs(
     files: &mut Recordings<'_>,
     section: &RecordSection,

@@ -1,6 +1,6 @@
 //! Triangle meshes in the Object File Format: `OFF`, the numbers of vertices and faces, coordinates, then faces `3 a b c`.
 //!
-//! Colours and polygons are not here; whether the triangles make a surface is judged by the mesh itself. Next file to read:
+//! Colours and polygons are not read; whether the triangles make a surface is checked by the mesh itself. Next file to read:
 //! [`super::surface`].
 
 use std::ops::Range;

@@ -18,12 +18,12 @@ pub(super) struct Part {
 }
 
 impl ChannelReader<'_> {
-    /// The quantity that a channel measures; nothing after a complaint.
+    /// The quantity that a channel measures; `None` when a problem was reported.
     pub(super) fn quantity(&self, section: &ChannelSection) -> Option<&Quantity> {
         quantity(self.source, section, self.spec)
     }
 
-    /// The scalar channels behind a written one; nothing after a complaint.
+    /// The scalar channels behind a written one; `None` when a problem was reported.
     pub(super) fn parts(&self, section: &ChannelSection, quantity: &Quantity) -> Option<Vec<Part>> {
         let (output, column) = (section.output.get_ref(), section.column.get_ref());
         let n = Spec::range_of(&self.spec.outputs, output).map_or(1, |range| range.len());
@@ -61,7 +61,7 @@ impl ChannelReader<'_> {
         Some(parts)
     }
 
-    /// Says what was looked for in vain.
+    /// Reports that the file has no column for any component of a channel.
     fn no_component(&self, section: &ChannelSection, quantity: &Quantity) {
         let (column, name, last) = (section.column.get_ref(), &quantity.name, quantity.size - 1);
         let message = format!(
@@ -78,7 +78,7 @@ impl ChannelReader<'_> {
     }
 }
 
-/// The quantity that a channel measures; nothing after a complaint.
+/// The quantity that a channel measures; `None` when a problem was reported.
 pub(super) fn quantity<'a>(
     source: &Source,
     section: &ChannelSection,

@@ -1,4 +1,4 @@
-//! What is at hand while the channels of a record are read, and which of its rows count.
+//! What is shared while the channels of a record are read, and which of its rows count.
 //!
 //! Next file to read: [`super::channel`].
 

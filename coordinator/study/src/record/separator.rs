@@ -1,8 +1,8 @@
-//! What a recording is where it is no CSV with commas, a header and decimal points: what spreadsheets and loggers write.
+//! Recognises files that are no CSV with commas, a header and decimal points, as spreadsheets and loggers write them.
 //!
 //! Next file to read: [`super::csv`].
 
-/// What separates the columns, where it is not a comma, in words; and whether the numbers have decimal commas.
+/// What separates the columns where it is not a comma, as text, and whether the numbers have decimal commas.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Foreign {
     pub(super) separator: &'static str,
@@ -41,7 +41,7 @@ pub(super) fn is_decimal_comma(cell: &str) -> bool {
     cell.matches(',').count() == 1 && cell.replace(',', ".").parse::<f64>().is_ok()
 }
 
-/// What a file is that is no text in UTF-8, as far as its first bytes tell, and the remedy.
+/// The kind of a file that is no text in UTF-8, judged by its first bytes, and the remedy.
 pub(super) fn of_bytes(bytes: &[u8]) -> (&'static str, &'static str) {
     match bytes {
         [b'P', b'K', 3, 4, ..] => {

@@ -30,7 +30,7 @@ pub(super) struct Surfaces<'a> {
 }
 
 impl Surfaces<'_> {
-    /// The surfaces; nothing after a complaint.
+    /// The surfaces; `None` when a problem was reported.
     pub(super) fn read(&self) -> Option<Shapes> {
         let shapes = match (columns(self.csv, ["time", "file"]), columns(self.csv, ["time", "z", "r"])) {
             (Some([time, file]), _) => self.listed(time, file),
@@ -136,7 +136,7 @@ impl Surfaces<'_> {
         })
     }
 
-    /// Where the `n` nodes of an output are at rest; nothing after a complaint.
+    /// Where the `n` nodes of an output are at rest; `None` when a problem was reported.
     pub(super) fn rest(&self, csv: &Csv, n: usize, output: &str) -> Option<Vec<NodeAtRest>> {
         let places = match columns(self.csv, ["time", "file"]) {
             Some(_) => mesh_places(csv),
@@ -196,7 +196,8 @@ fn profile_places(csv: &Csv) -> Result<Vec<NodeAtRest>, Problem> {
     let normals = if let Some(normals) = vectors(csv, ["nz", "nr"])? {
         normals
     } else {
-        // The line judges itself: a wall against z has its normals inward, and displacements the wrong sign.
+        // The check of a profile refuses a line against z, for which normals would point inward and displacements have the
+        // wrong sign.
         Profile::new(rest.clone()).map_err(|error| {
             let help = "order the nodes from inlet to outlet, or give their directions in columns `nz`, `nr`";
             csv.problem(0, 0, format!("the wall at rest: {error}"), help)
@@ -245,7 +246,7 @@ fn columns<const N: usize>(csv: &Csv, names: [&str; N]) -> Option<[usize; N]> {
     Some(found)
 }
 
-/// What a file has instead of the columns that were looked for.
+/// The message about a file without the columns that were looked for, and the columns that it has.
 fn lacks(csv: &Csv, wanted: &str) -> (String, String) {
     (
         format!("`{}` has not the columns {wanted}", csv.path.display()),

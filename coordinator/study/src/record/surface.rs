@@ -16,7 +16,7 @@ use crate::problem::quoted_list;
 use crate::surfaces::Node;
 
 impl ChannelReader<'_> {
-    /// The channels of a surface, one per node; nothing after a complaint.
+    /// The channels of a surface, one per node; `None` when a problem was reported.
     pub(super) fn surface(
         &self,
         section: &ChannelSection,
@@ -42,7 +42,7 @@ impl ChannelReader<'_> {
             let node = Node { rest, normal, seen: Arc::clone(&shapes) };
             let at = |time: &f64| if node.is_shown(*time) { 0.0 } else { f64::NAN };
             let values: Vec<f64> = self.table.times.iter().map(at).collect();
-            // A node that no surface shows is one that was not measured.
+            // A node that no surface shows counts as not measured.
             if !measured_somewhere(&values) {
                 continue;
             }
@@ -93,7 +93,8 @@ impl ChannelReader<'_> {
         )
     }
 
-    /// Only what moves a wall can be compared with a surface; an output that says nothing of itself may. Nothing after a complaint.
+    /// Only the displacement of a wall can be compared with a surface; an output without a role is accepted. Nothing after a
+    /// complaint.
     fn displacement(&self, section: &ChannelSection) -> Option<()> {
         let quantity = self.quantity(section)?;
         if matches!(quantity.role, Role::Displacement | Role::Other) {
@@ -110,7 +111,7 @@ impl ChannelReader<'_> {
         None
     }
 
-    /// The noise of a surface is the scatter of its points along the normal, which only its maker knows.
+    /// The noise of a surface is the scatter of its points along the normal; it cannot be found from the data.
     fn surface_noise(&self, section: &ChannelSection) -> Option<f64> {
         match *section.noise.get_ref() {
             Some(sd) if sd > 0.0 => return Some(sd),

@@ -18,7 +18,7 @@ pub(super) struct SurfaceFiles {
 }
 
 impl Recordings<'_> {
-    /// The files of every channel of a record, none where it is no surface; nothing after a complaint.
+    /// The files of every channel of a record, none where it is no surface; `None` when a problem was reported.
     pub(super) fn surfaces(&mut self, section: &RecordSection) -> Option<Vec<Option<SurfaceFiles>>> {
         let found: Vec<Option<Option<SurfaceFiles>>> = section
             .channels

@@ -1,4 +1,4 @@
-//! With which command a run is continued, and what that command accepts.
+//! The command by which a run is continued, and what that command accepts.
 //!
 //! Next file to read: [`super::resume`].
 

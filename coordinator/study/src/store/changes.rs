@@ -1,6 +1,6 @@
 //! What differs between two texts of a study file, in the words of the file.
 //!
-//! Only for telling: whether a difference changes a number is known from [`super::meaning`].
+//! Only for messages: whether a difference changes a number is known from [`super::meaning`].
 
 use std::collections::BTreeMap;
 
@@ -22,10 +22,10 @@ const WITHOUT_EFFECT: [&str; 12] = [
     "model.start_timeout",
 ];
 
-/// Differences that are told at most; the first say what matters.
+/// Differences that are named at most; the first ones show what matters.
 const SHOWN: usize = 6;
 
-/// The keys that may change a number and differ, each as `key` from … to …; empty where both say the same in another order.
+/// The keys that may change a number and differ, each as `key` from … to …; empty where both differ in order only.
 pub(super) fn changes(before: &str, now: &str) -> Vec<String> {
     let (Ok(before), Ok(now)) = (before.parse::<Table>(), now.parse::<Table>()) else { return Vec::new() };
     let (before, now) = (flat(before), flat(now));

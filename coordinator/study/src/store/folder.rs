@@ -61,7 +61,7 @@ impl RunFolder {
         std::fs::create_dir_all(path)
             .map_err(|source| FolderError::Unwritable { path: path.to_owned(), source })?;
         let lock = lock(path)?;
-        // Somebody else may have been here before the lock.
+        // Another process may have started a run before the lock was taken.
         free()?;
         let info = json(&info(study, command, started));
         let (meaning, program) = (json(&Meaning::of(study, purpose)), json(&Program::of(study)));
@@ -107,7 +107,7 @@ impl RunFolder {
             posterior::to_csv(study, &fit.posterior).map_err(|e| self.store.damaged("posterior", e))?;
         self.store.set_meta("posterior", &posterior)?;
         self.store.set_meta("summary", &json(summary))?;
-        // Somebody who reads the database right now keeps its log open; the run is finished all the same.
+        // The log stays open while another process reads the database; the run is finished all the same.
         let _ = self.store.close_log();
         Ok(())
     }
@@ -130,7 +130,7 @@ pub(super) fn lock(path: &Path) -> Result<File, FolderError> {
         File::open(path).map_err(|source| FolderError::Unwritable { path: path.to_owned(), source })?;
     match file.try_lock() {
         Err(TryLockError::WouldBlock) => Err(FolderError::Locked(path.to_owned())),
-        // Some network file systems know no locks; a run there is better than none.
+        // Some network file systems have no locks; the run then goes on without one.
         Ok(()) | Err(TryLockError::Error(_)) => Ok(file),
     }
 }
@@ -142,7 +142,7 @@ pub(super) fn lock(path: &Path) -> Result<File, FolderError> {
 pub fn write(path: &Path, text: &str) -> io::Result<()> {
     let partial = path.with_extension("partial");
     std::fs::write(&partial, text).and_then(|()| std::fs::rename(&partial, path)).inspect_err(|_| {
-        // Already failing: what cannot be removed either stays.
+        // The failure to write is returned; a partial file that cannot be removed either is left.
         let _ = std::fs::remove_file(&partial);
     })
 }

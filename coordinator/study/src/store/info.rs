@@ -13,7 +13,7 @@ use crate::{Study, ThetaEntry};
 pub struct StudyInfo {
     /// Study name.
     pub name: String,
-    /// What the study says of itself.
+    /// The study's own description.
     pub says: Option<String>,
     /// Model kind.
     pub model: String,

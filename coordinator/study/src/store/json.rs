@@ -4,7 +4,7 @@
 
 use serde::Serialize;
 
-/// The text; empty for what cannot be written, which plain data never is.
+/// The text; empty for what cannot be written, which does not occur for plain data.
 pub(crate) fn json(value: &impl Serialize) -> String {
     serde_json::to_string(value).unwrap_or_default()
 }

@@ -1,7 +1,7 @@
-//! How the database of a new run comes to be: filled under another name, given its own when it is complete.
+//! Makes the database of a new run: it is filled under another name and renamed when it is complete.
 //!
-//! So a database that stands under its name is whole, whenever its maker was killed; what a killed maker leaves beside it is
-//! removed by the next. Next file to read: [`super::schema`].
+//! So a database under its final name is complete, whenever the program that made it was killed; files left over from a killed
+//! program are removed by the next one. Next file to read: [`super::schema`].
 
 use std::fs::File;
 use std::io;
@@ -41,7 +41,7 @@ pub(super) fn unfinished(path: &Path) -> PathBuf {
     with_ending(path, ".unfinished")
 }
 
-/// Whether a file is one that a killed maker of the database left behind.
+/// Whether a file was left over when a program was killed while it made the database.
 pub(super) fn is_left_over(file: &Path, database: &Path) -> bool {
     COMPANIONS.iter().any(|ending| with_ending(&unfinished(database), ending) == file)
 }
@@ -49,7 +49,7 @@ pub(super) fn is_left_over(file: &Path, database: &Path) -> bool {
 /// Removes a database and what SQLite keeps beside it.
 pub(super) fn remove(path: &Path) {
     for ending in COMPANIONS {
-        // Mostly there is none; what cannot be removed is told by whoever is hindered by it.
+        // Mostly there is none; a file that cannot be removed is reported by the later step that it hinders.
         let _ = std::fs::remove_file(with_ending(path, ending));
     }
 }

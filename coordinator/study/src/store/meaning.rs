@@ -1,8 +1,8 @@
-//! What decides the numbers of a run, part by part: a resumed run must find every part as it was.
+//! Digests of everything that decides the numbers of a run, part by part: a resumed run must find every part unchanged.
 //!
 //! The parts are those of the checked study, not of its text: comments, layout, patience and the fleet are in none of them, the
-//! recordings are. Where the programs lie that run the model is the business of [`super::program`]. Next file to read:
-//! [`super::changes`], which says in the words of the study file what differs.
+//! recordings are. The programs that run the model are in [`super::program`]. Next file to read: [`super::changes`], which says
+//! in the words of the study file what differs.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Debug;
@@ -22,7 +22,7 @@ pub(super) enum Part {
     StudyFile,
     /// Numbers of recordings and of initial values.
     Recordings,
-    /// What a solver says of itself, and the files that go to it.
+    /// The description of a solver, and the files that go to it.
     Solver,
 }
 
@@ -82,7 +82,7 @@ fn named(record: &Record) -> String {
     format!("{RECORD}{}", record.name)
 }
 
-/// What decides the answers of a solver, without where it lies and what it may use.
+/// What decides the answers of a solver, without its place and its resources.
 fn asked(solver: &SolverDef) -> SolverDef {
     SolverDef {
         adapter: solver.adapter.clone(),
@@ -123,7 +123,7 @@ fn start(study: &Study) -> String {
     written(&values.map(|(name, value)| (name, value.to_bits())).collect::<Vec<_>>())
 }
 
-/// What a solver says of itself and the files that go to it, templates and copies.
+/// The description of a solver and the files that go to it, templates and copies.
 fn solver(study: &Study) -> String {
     let Some(solver) = &study.setup.model.solver else { return String::new() };
     let mut hasher = blake3::Hasher::new();
@@ -132,7 +132,7 @@ fn solver(study: &Study) -> String {
         hasher.update(json(&(&files.templates, &files.reads)).as_bytes());
         for (name, path) in &files.copies {
             hasher.update(name.as_bytes());
-            // A copy that cannot be read now is told by the run that needs it.
+            // A copy that cannot be read now is reported by the run that needs it.
             hasher.update(&std::fs::read(path).unwrap_or_default());
         }
     }

@@ -21,7 +21,7 @@ pub struct Program(BTreeMap<String, String>);
 const VERSION_OF: &str = "version";
 const BUILD: &str = "build";
 
-/// Digits of a build that people are shown.
+/// Digits of a build that are displayed.
 const SHOWN: usize = 12;
 
 impl Program {
@@ -50,13 +50,13 @@ impl Program {
         self.0.get(VERSION_OF).map_or("", String::as_str)
     }
 
-    /// Its build, as people are shown it.
+    /// Its build, as it is displayed.
     pub fn build(&self) -> &str {
         let build = self.0.get(BUILD).map_or("", String::as_str);
         build.get(..SHOWN).unwrap_or(build)
     }
 
-    /// What keys of remembered runs hold of it.
+    /// The part of it in keys of remembered runs.
     pub fn digest(&self) -> [u8; 32] {
         let mut hasher = blake3::Hasher::new();
         for (name, value) in &self.0 {
@@ -109,7 +109,7 @@ fn solver_parts(solver: &SolverDef) -> Vec<(String, String)> {
     );
     for word in &solver.command {
         let file = Path::new(&solver.folder).join(word);
-        // Words that are no files, and programs that the system finds elsewhere, are not looked into.
+        // Words that are no files, and programs that the system finds elsewhere, are not read.
         if let Some(bytes) = file.is_file().then(|| std::fs::read(&file).ok()).flatten() {
             parts.push((format!("{FILE}{word}"), blake3::hash(&bytes).to_hex().to_string()));
         }

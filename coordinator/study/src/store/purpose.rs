@@ -1,4 +1,4 @@
-//! What a run folder is for: its database says so, and the other command leaves it alone.
+//! The command that a run folder belongs to: its database holds it, and the other command refuses the folder.
 
 use super::{Store, StoreError};
 

@@ -1,7 +1,6 @@
-//! Runs of the model that need not be made twice: their answers by a key that says everything that went into them.
+//! Runs of the model that need not be made twice: their answers by a key of everything that went into them.
 //!
-//! What a key covers and how an answer is written as bytes is the caller's business. Next file to read:
-//! [`crate::store`].
+//! What a key covers and how an answer is written as bytes is decided by the caller. Next file to read: [`crate::store`].
 
 use rusqlite::{OptionalExtension, params};
 
@@ -61,7 +60,7 @@ impl Store {
         self.guard(select.exists([key.as_slice()]))
     }
 
-    /// Forgets all answers, which nobody asks for any more, and gives their space back.
+    /// Removes all answers, which are no longer needed, and frees their space.
     ///
     /// # Errors
     /// When the database refuses.

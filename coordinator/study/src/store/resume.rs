@@ -1,7 +1,7 @@
 //! What an interrupted run may be continued with: the same study, the same recordings, the same programs.
 //!
-//! Changes that change no number are taken, the others are told; another build goes on only where that was asked for, and
-//! then the result says so. Next file to read: [`super::meaning`].
+//! Changes that change no number are accepted, others are refused with a message; another build goes on only where that was
+//! asked for, and then the result says so. Next file to read: [`super::meaning`].
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -15,7 +15,7 @@ use super::meaning::{Meaning, Part};
 use super::{Program, Purpose, Store, StoreError};
 use crate::Study;
 
-/// Name under which the store keeps that its numbers come from more than one program.
+/// Name under which the store notes that its numbers come from more than one program.
 const MIXED: &str = "mixed";
 
 impl RunFolder {
@@ -99,7 +99,7 @@ impl RunFolder {
         Ok(())
     }
 
-    /// Notes how the run goes on.
+    /// Stores how the run goes on.
     fn told(&self, text: &str, study: &Study, purpose: Purpose, call: &Call<'_>) -> Result<(), FolderError> {
         if *text != *study.text {
             let at = self.store.elapsed_s()?;
@@ -144,14 +144,14 @@ fn same_study(
     Err(FolderError::OtherStudy { folder: path.to_owned(), what, which })
 }
 
-/// The part to tell of. A change of the study file may change what is read of the others; where the file says the same, it is what a
-/// solver says of itself that gave its words another meaning.
+/// The part to report. A change of the study file may change the other parts too; where the file is unchanged, a change of the
+/// solver's description has changed the meaning of its words.
 fn first(parts: &BTreeSet<Part>, told: &[String]) -> Option<Part> {
     let by_itself = parts.contains(&Part::Solver) && told.is_empty();
     parts.iter().copied().find(|part| !(by_itself && *part == Part::StudyFile))
 }
 
-/// What becomes of what is stored, where a run goes on with another program.
+/// What happens to the stored results, where a run goes on with another program.
 fn kept(purpose: Purpose) -> &'static str {
     match purpose {
         Purpose::Run => "what is stored stays, the rest is computed anew, and the result says so",

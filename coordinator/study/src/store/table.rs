@@ -1,4 +1,4 @@
-//! A table of the run as text, for export and for looking.
+//! A table of the run as text, for export and display.
 //!
 //! Next file to read: [`crate::store`].
 

@@ -1,4 +1,4 @@
-//! What only a store can be asked: that a disk without room is told and loses nothing, that answers are remembered.
+//! Tests of the store alone: a disk without room is reported and loses nothing, answers are remembered.
 #![allow(clippy::unwrap_used)]
 
 use nalgebra::DMatrix;
@@ -97,7 +97,7 @@ fn answers_of_runs_are_remembered_by_their_key_and_over_a_kill() {
     let (a, b, c) = ([1_u8; 32], [2_u8; 32], [3_u8; 32]);
     store.remember_runs([(&a, b"one".as_slice()), (&b, b"".as_slice())], &[]).unwrap();
     store.remember_runs([(&a, b"again".as_slice())], &[]).unwrap();
-    // Neither closed nor dropped: what a killed process leaves.
+    // Neither closed nor dropped, as after a killed process.
     std::mem::forget(store);
     let store = Store::open(&folder.path().join("run.db")).unwrap();
     assert_eq!(store.remembered_run(&a).unwrap().as_deref(), Some(b"again".as_slice()));

@@ -2,7 +2,7 @@
 //!
 //! The filter's windows run one after the other from the state in which the one before ended; the batch fit runs the training
 //! span. A program that is started anew for every run and answers for the times of a whole record only, whatever it was asked,
-//! is served: the study then runs whole records and takes the rows that train. Next file to read: [`crate::plan`].
+//! is supported: the study then runs whole records and takes the rows that train. Next file to read: [`crate::plan`].
 
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ const FIRST: usize = 3;
 pub enum Depth {
     /// All, as in one pass for one particle.
     All,
-    /// The first of every record: before a run, which makes the others anyway.
+    /// The first of every record: before a run, which makes the others later.
     First,
 }
 
@@ -47,7 +47,7 @@ pub fn dry_run(study: &mut Study, kind: &Kind, depth: Depth) -> Result<Vec<Trial
         };
         if let Some(why) = told.filter(|_| !study.whole_answers) {
             study.whole_answers = true;
-            // Where the run can be looked at is of no interest: it did what it always does.
+            // The folder of the run is left out: this answer is accepted.
             let why = why.split("; the folder of the run").next().unwrap_or_default();
             study.warnings.push(format!(
                 "the solver answers for the times of a whole record, not for the training span alone: every run of the fit covers \
@@ -130,7 +130,7 @@ impl<'a> DryRun<'a> {
         Ok(None)
     }
 
-    /// A run over the first time alone has its outputs where a longer one must have them too.
+    /// A table that is transposed shows in a run over the first time alone.
     fn check_layout(&self, window: &Arc<Window>, prediction: &Prediction) -> Result<(), TrialError> {
         let (n, n_times) = (self.study.setup.outputs.len(), window.times.len());
         if n < 2 || n_times < 2 {
@@ -143,7 +143,7 @@ impl<'a> DryRun<'a> {
         };
         let alone = match self.run(&Arc::new(first), None) {
             Ok(alone) => alone,
-            // Where times and outputs are as many, only now can the solver see it.
+            // With as many times as outputs, only this run lets the solver's reader see it.
             Err(Fault::Run(source)) if source.to_string().contains("is transposed") => {
                 return Err(self.failed(Fault::Run(source), "over its first time alone".to_owned()));
             }

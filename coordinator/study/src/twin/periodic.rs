@@ -1,8 +1,8 @@
 //! The periodic state of a driven model: the state that one period of its inputs returns to itself.
 //!
-//! Repeating the period forgets a start only as fast as the slowest mode decays, and a Windkessel forgets over many beats.
-//! Anderson mixing (Anderson 1965; Walker & Ni 2011, algorithm AA) combines the last periods so that their changes cancel
-//! best, which removes the few slow modes after about as many periods. Next file to read: [`super`].
+//! Repeating the period removes the effect of a start only as fast as the slowest mode decays, which takes many beats in a
+//! Windkessel. Anderson mixing (Anderson 1965; Walker & Ni 2011, algorithm AA) combines the last periods so that their changes
+//! cancel best, which removes the few slow modes after about as many periods. Next file to read: [`super`].
 
 use std::collections::VecDeque;
 
@@ -54,7 +54,7 @@ pub(super) fn fixed_point(
     for n_period in 1..=LIMIT {
         let image = match period(x.as_slice()) {
             Ok(image) => DVector::from_vec(image),
-            // A mixture of states may be none that the model accepts: go on from the last one that it made itself.
+            // The model may refuse a mixture of states: go on from the last state in which a run ended.
             Err(error) => match mixing.last_image.take() {
                 Some(image) if n_period < LIMIT => {
                     x = image;

@@ -1,4 +1,4 @@
-//! Do model, noise and residuals fit together? NIS, correlation in time, and whether the estimate is where it should be.
+//! Whether model, noise and residuals fit together: NIS, correlation in time, and whether the estimate is where it should be.
 //!
 //! Every rule is a test with a stated probability of a false alarm, not a fixed limit: what a right model with white noise of
 //! the stated sd would show by chance is no warning. Next file to read: [`super::residuals`].
@@ -14,17 +14,17 @@ use crate::{Fit, Study, fit::settle, posterior};
 const LEVEL: f64 = 0.998;
 /// Probability of a false alarm about correlated residuals, over all series of a study.
 const CORRELATED_BY_CHANCE: f64 = 1e-3;
-/// Correlation that leaves less than this share of the values is worth a word even where it is certain.
-const WORTH_A_WORD: f64 = 1.5;
-/// Autocorrelation at one sample that is always told.
+/// Factor by which correlation must raise the variance of a mean to be reported, where it is certain but not strong.
+const LEAST_INFLATION: f64 = 1.5;
+/// Autocorrelation at one sample above which it is always reported.
 const STRONG: f64 = 0.5;
 /// Lags of the test for white residuals; a fifth of the series where that is less (Hyndman & Athanasopoulos 2021, section 5.4).
 const LAGS: usize = 10;
 /// Values below which a series is not tested for correlation.
 const FEWEST: usize = 20;
-/// Squared distance, in posterior sd, of an estimate from the best that a free run may show in silence.
+/// Squared distance, in posterior sd, of an estimate from the best up to which a free run gives no warning.
 const OFF: f64 = 1.0;
-/// Share of the misfit that rounding may be.
+/// Share of the misfit that passes for rounding.
 const ROUNDING: f64 = 1e-6;
 
 /// NIS outside the band that a right model keeps to, given how many of the residuals are independent.
@@ -72,7 +72,7 @@ fn correlated_in_time(residuals: &Residuals, n_series: usize) -> Option<String> 
     let n: usize = residuals.n();
     let effective = if lag1 > STRONG {
         n as f64 * (1.0 - lag1) / (1.0 + lag1)
-    } else if certain && pooled.inflation() > WORTH_A_WORD {
+    } else if certain && pooled.inflation() > LEAST_INFLATION {
         n as f64 / pooled.inflation()
     } else {
         return None;

@@ -1,4 +1,4 @@
-//! Residuals by record and output, in units of their noise: what the warnings about noise, model and correlation stand on.
+//! Residuals by record and output, in units of their noise: the basis of the warnings about noise, model and correlation.
 //!
 //! Of a fit with one value per parameter and no observer they are those of the free run with the estimate. With drift or an
 //! observer a free run says nothing of the fit; then they are the innovations of the last pass. Next file to read:

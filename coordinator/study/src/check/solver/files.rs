@@ -1,5 +1,5 @@
-//! The files of a solver: templates, which are read here and travel with the study; files to copy, which must exist; a
-//! description written by somebody who could ask.
+//! The files of a solver: templates, which are read here and become part of the study; files to copy, which must exist; a
+//! description that was written where the solver can be asked.
 //!
 //! Next file to read: [`super`].
 
@@ -61,7 +61,7 @@ pub(super) fn described(source: &Source, name: &Spanned<String>, folder: &Path) 
     description.ok()
 }
 
-/// Reports what somebody found who looked at the solver's files: a template at its line, the rest where the study names it.
+/// Reports the faults that were found in the solver's files: of a template at its line, others where the study names the file.
 pub(super) fn report(
     source: &Source,
     section: &ProgramSection,
