@@ -34,9 +34,9 @@ pub(crate) struct FleetArgs {
 
 /// What was asked for, checked.
 pub(crate) struct Plan {
-    address: SocketAddr,
-    /// Workers are started here, so many.
-    local: bool,
+    /// Where to listen; `None` for local workers, which have their connections from this process.
+    address: Option<SocketAddr>,
+    /// Workers to start where it does not listen.
     n_worker: usize,
 }
 
@@ -49,12 +49,12 @@ impl FleetArgs {
                 "--workers must be at least 1 (or use --listen ADDR and start workers elsewhere)",
             ));
         }
-        Ok(Plan { address: self.address()?, local: self.listen.is_none(), n_worker })
+        let address = self.listen.as_deref().map(|text| self.address(text)).transpose()?;
+        Ok(Plan { address, n_worker })
     }
 
-    /// Where to listen: a free loopback port for local workers, or what was asked for.
-    fn address(&self) -> Result<SocketAddr, Failure> {
-        let text = self.listen.as_deref().unwrap_or("127.0.0.1:0");
+    /// Where to listen, as it was asked for.
+    fn address(&self, text: &str) -> Result<SocketAddr, Failure> {
         let address = text.to_socket_addrs().ok().and_then(|mut all| all.next()).ok_or_else(|| {
             Failure::input(format!("--listen {text}: expected HOST:PORT, such as 127.0.0.1:7000"))
         })?;
@@ -99,8 +99,7 @@ impl FleetSession {
 
     /// Starts the local workers, or says how to start others.
     pub(crate) fn start_workers(&mut self, study: &Study, plan: &Plan) -> Result<(), Failure> {
-        let address = self.fleet.address();
-        if !plan.local {
+        if let Some(address) = self.fleet.address() {
             note(format_args!(
                 "listening on {address}; start workers with: starlings worker --connect {address}"
             ));
@@ -113,7 +112,6 @@ impl FleetSession {
             program: own_program().map_err(Failure::run)?,
             args: ["worker", "--slots", &slots].map(str::to_owned).to_vec(),
             n: plan.n_worker,
-            address,
             fleet: self.fleet.handle(),
         };
         self.local = Some(LocalWorkers::spawn(config).map_err(Failure::run)?);

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use clap::Parser;
 use starlings_models::SolverDef;
-use starlings_worker::{LIFELINE, MAX_SLOTS, WorkerConfig, WorkerError};
+use starlings_worker::{MAX_SLOTS, WorkerConfig, WorkerError};
 use tokio_util::sync::CancellationToken;
 
 use crate::console::{cancel_on_signal, line};
@@ -62,7 +62,6 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         once: args.once,
         patience,
         cancel,
-        lifeline: std::env::var_os(LIFELINE).is_some(),
         factory: solvers.factory(),
         ..WorkerConfig::new(connect.clone())
     };

@@ -1,6 +1,5 @@
-//! A fleet of this program's own processes on a loopback port, for the benchmarks that need one.
+//! A fleet of this program's own processes on sockets of its own, for the benchmarks that need one.
 
-use std::net::Ipv4Addr;
 use std::sync::mpsc::{self, Receiver};
 
 use starlings_coordinator::fleet::{FleetConfig, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers};
@@ -8,23 +7,17 @@ use tokio_util::sync::CancellationToken;
 
 use crate::Failure;
 
-/// Starts `n` workers: this program with `--connect` and the fleet's address. They end when the second is dropped.
+/// Starts `n` workers: this program with `--connect stdin`. They end when the second is dropped.
 pub(crate) fn start(
     name: &str,
     n: usize,
 ) -> Result<(GrpcFleet, LocalWorkers, Receiver<FleetEvent>), Failure> {
     let (sender, events) = mpsc::channel();
-    let fleet = GrpcFleet::listen(FleetConfig::new(
-        (Ipv4Addr::LOCALHOST, 0).into(),
-        name,
-        CancellationToken::new(),
-        sender,
-    ))?;
+    let fleet = GrpcFleet::listen(FleetConfig::new(None, name, CancellationToken::new(), sender))?;
     let workers = LocalWorkers::spawn(LocalConfig {
         program: std::env::current_exe()?,
         args: vec![],
         n,
-        address: fleet.address(),
         fleet: fleet.handle(),
     })?;
     Ok((fleet, workers, events))

@@ -32,7 +32,11 @@ pub const FRAME_SIZE: u32 = 256 * 1024;
 /// Largest number of slots of one worker: each is a thread.
 pub const MAX_SLOTS: usize = 4096;
 
-/// Environment variable by which a supervisor tells a worker that its standard input is a lifeline: a pipe that closes when the
+/// What a worker is told to connect to where its standard input is the connection: one of a pair of sockets, of which the process
+/// that started it holds the other.
+pub const INHERITED: &str = "stdin";
+
+/// Environment variable by which a supervisor tells a solver that its standard input is a lifeline: a pipe that closes when the
 /// supervisor ends, however it ends.
 pub const LIFELINE: &str = "STARLINGS_LIFELINE";
 

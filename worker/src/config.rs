@@ -11,16 +11,13 @@ use tokio_util::sync::CancellationToken;
 /// What a worker is told when it starts.
 #[derive(Clone)]
 pub struct WorkerConfig {
-    /// The coordinator, `host:port`.
+    /// The coordinator, `host:port`, or [`starlings_proto::INHERITED`] for the standard input, which is served once.
     pub connect: String,
     /// Jobs at the same time, at least 1, at most [`starlings_proto::MAX_SLOTS`].
     pub slots: usize,
     /// End when the coordinator's connection closes, instead of dialling again. A coordinator that is silent while the connection
     /// stands, as when it is stopped, is waited for.
     pub once: bool,
-    /// End when the standard input of this process closes, as under a supervisor that holds its other end. Otherwise the standard
-    /// input is never read.
-    pub lifeline: bool,
     /// How long to dial without an answer before giving up.
     pub patience: Duration,
     /// Ends the worker: it says goodbye and its jobs go elsewhere.
@@ -40,7 +37,6 @@ impl WorkerConfig {
             connect: connect.into(),
             slots: 1,
             once: false,
-            lifeline: false,
             patience: Duration::from_secs(60),
             cancel: CancellationToken::new(),
             factory: Arc::new(Setup::build),

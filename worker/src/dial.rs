@@ -1,15 +1,21 @@
 //! Dials the coordinator until it answers: the whole way to its Welcome is one attempt, since a listener that is about to
 //! close accepts connections and drops them.
 
+use std::os::fd::AsFd;
+use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
 
+use hyper_util::rt::TokioIo;
 use starlings_proto::generated::{self, fleet_client::FleetClient};
 use starlings_proto::words::{causes, status_text};
-use starlings_proto::{FRAME_SIZE, FromWorker, Hello, MAX_MESSAGE, ReceivedWindows, ToWorker, Welcome};
+use starlings_proto::{
+    FRAME_SIZE, FromWorker, Hello, INHERITED, MAX_MESSAGE, ReceivedWindows, ToWorker, Welcome,
+};
 use tokio::sync::mpsc::{self, UnboundedSender};
 use tokio_stream::wrappers::UnboundedReceiverStream;
 use tonic::Streaming;
-use tonic::transport::Endpoint;
+use tonic::transport::{Channel, Endpoint, Uri};
+use tower::service_fn;
 
 use crate::{WorkerConfig, WorkerError};
 
@@ -54,7 +60,62 @@ enum Attempt {
     Over(String),
 }
 
-pub(crate) fn endpoint(config: &WorkerConfig) -> Result<Endpoint, WorkerError> {
+/// The way to the coordinator.
+pub(crate) enum Way {
+    /// Dialled, as often as it is needed.
+    Dialled(Endpoint),
+    /// The standard input, which is there already, and once.
+    Inherited(Endpoint, UnixStream),
+}
+
+impl Way {
+    pub(crate) fn is_inherited(&self) -> bool {
+        matches!(self, Self::Inherited(..))
+    }
+
+    async fn open(&self) -> Result<Channel, String> {
+        match self {
+            Self::Dialled(endpoint) => endpoint.connect().await.map_err(|error| causes(&error)),
+            Self::Inherited(endpoint, socket) => {
+                let socket = socket.try_clone().and_then(|socket| {
+                    socket.set_nonblocking(true)?;
+                    tokio::net::UnixStream::from_std(socket)
+                });
+                let mut socket = Some(socket);
+                let connect = move |_: Uri| {
+                    let taken =
+                        || Err(std::io::Error::other("the standard input was the connection already"));
+                    std::future::ready(socket.take().unwrap_or_else(taken).map(TokioIo::new))
+                };
+                endpoint.connect_with_connector(service_fn(connect)).await.map_err(|error| causes(&error))
+            }
+        }
+    }
+}
+
+/// The way that the worker was told.
+///
+/// # Errors
+/// When it was told no address, or its standard input is no socket where that is the way.
+pub(crate) fn way(config: &WorkerConfig) -> Result<Way, WorkerError> {
+    if config.connect != INHERITED {
+        return Ok(Way::Dialled(endpoint(config)?));
+    }
+    let own = std::io::stdin().as_fd().try_clone_to_owned().map_err(WorkerError::NoSocket)?;
+    let socket = UnixStream::from(own);
+    socket.peer_addr().map_err(WorkerError::NoSocket)?;
+    // The address is never resolved.
+    Ok(Way::Inherited(with_windows(Endpoint::from_static("http://coordinator")), socket))
+}
+
+fn with_windows(endpoint: Endpoint) -> Endpoint {
+    endpoint
+        .initial_stream_window_size(WINDOWS.0)
+        .initial_connection_window_size(WINDOWS.1)
+        .max_frame_size(FRAME_SIZE)
+}
+
+fn endpoint(config: &WorkerConfig) -> Result<Endpoint, WorkerError> {
     let address = &config.connect;
     let bad = || WorkerError::BadAddress { address: address.clone() };
     let bare = address.strip_prefix("http://").unwrap_or(address);
@@ -62,13 +123,8 @@ pub(crate) fn endpoint(config: &WorkerConfig) -> Result<Endpoint, WorkerError> {
         bare.rsplit_once(':').and_then(|(host, port)| port.parse::<u16>().ok().filter(|_| !host.is_empty()));
     port.ok_or_else(bad)?;
     let endpoint = Endpoint::from_shared(format!("http://{bare}")).map_err(|_| bad())?;
-    let endpoint = endpoint
-        .connect_timeout(ATTEMPT)
-        .tcp_nodelay(true)
-        .tcp_keepalive(Some(KEEP_ALIVE))
-        .initial_stream_window_size(WINDOWS.0)
-        .initial_connection_window_size(WINDOWS.1)
-        .max_frame_size(FRAME_SIZE);
+    let endpoint =
+        with_windows(endpoint).connect_timeout(ATTEMPT).tcp_nodelay(true).tcp_keepalive(Some(KEEP_ALIVE));
     if config.once {
         // TCP's keep-alive alone: the system answers it even for a coordinator that is stopped, and not for a host that is gone.
         return Ok(endpoint);
@@ -80,18 +136,13 @@ pub(crate) fn endpoint(config: &WorkerConfig) -> Result<Endpoint, WorkerError> {
 }
 
 /// Dials until a coordinator welcomes, refuses, or patience ends.
-pub(crate) async fn dial(
-    config: &WorkerConfig,
-    endpoint: &Endpoint,
-    hello: &Hello,
-) -> Result<Dialled, WorkerError> {
+pub(crate) async fn dial(config: &WorkerConfig, way: &Way, hello: &Hello) -> Result<Dialled, WorkerError> {
     let started = Instant::now();
     let mut wait = FIRST_WAIT;
-    // Local workers may be a moment ahead of whoever listens; others are told what they wait for.
-    let mut told = config.lifeline;
+    let mut told = false;
     loop {
         let attempt = async {
-            let patience = tokio::time::timeout(ATTEMPT, attach(endpoint, hello.clone()));
+            let patience = tokio::time::timeout(ATTEMPT, attach(way, hello.clone()));
             patience.await.unwrap_or_else(|_| Err(Attempt::Failed("no answer to Hello".to_owned())))
         };
         let last = tokio::select! {
@@ -106,7 +157,7 @@ pub(crate) async fn dial(
             },
         };
         let waited = started.elapsed();
-        if waited >= config.patience {
+        if waited >= config.patience || way.is_inherited() {
             let address = config.connect.clone();
             return Err(WorkerError::NoCoordinator { address, waited: waited.as_secs_f64(), last });
         }
@@ -129,8 +180,8 @@ pub(crate) async fn dial(
     }
 }
 
-async fn attach(endpoint: &Endpoint, hello: Hello) -> Result<Connection, Attempt> {
-    let channel = endpoint.connect().await.map_err(|error| Attempt::Failed(causes(&error)))?;
+async fn attach(way: &Way, hello: Hello) -> Result<Connection, Attempt> {
+    let channel = way.open().await.map_err(Attempt::Failed)?;
     let mut client = FleetClient::new(channel)
         .max_decoding_message_size(MAX_MESSAGE)
         .max_encoding_message_size(MAX_MESSAGE);

@@ -7,7 +7,6 @@
 
 pub mod config;
 mod dial;
-mod lifeline;
 mod session;
 mod setups;
 mod slots;
@@ -64,6 +63,9 @@ pub enum WorkerError {
         /// The address given.
         address: String,
     },
+    /// The standard input is to be the connection and is no socket.
+    #[error("the standard input is no connection to a coordinator ({0}): give --connect HOST:PORT")]
+    NoSocket(std::io::Error),
     /// More slots than a worker may have.
     #[error("{slots} slots: a worker has at most {MAX_SLOTS}; start several workers instead")]
     TooManySlots {
@@ -89,9 +91,6 @@ pub fn run(config: WorkerConfig) -> Result<WorkerReport, WorkerError> {
     let slots = Slots::start(config.slots.max(1)).map_err(WorkerError::Start)?;
     let runtime =
         tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(WorkerError::Start)?;
-    if config.lifeline {
-        lifeline::watch(config.cancel.clone()).map_err(WorkerError::Start)?;
-    }
     let result = runtime.block_on(serve(&config, &slots));
     slots.close();
     runtime.shutdown_background();
@@ -99,12 +98,12 @@ pub fn run(config: WorkerConfig) -> Result<WorkerReport, WorkerError> {
 }
 
 async fn serve(config: &WorkerConfig, slots: &Slots) -> Result<WorkerReport, WorkerError> {
-    let endpoint = dial::endpoint(config)?;
+    let way = dial::way(config)?;
     let setups = setups::Setups::new(Arc::clone(&config.factory));
     let hello = config.hello();
     let mut sessions = 0;
     loop {
-        let connection = match dial::dial(config, &endpoint, &hello).await? {
+        let connection = match dial::dial(config, &way, &hello).await? {
             Dialled::Cancelled => return Ok(report(slots, sessions, "cancelled before it was connected")),
             Dialled::Over(reason) => return Ok(report(slots, sessions, &reason)),
             Dialled::Connected(connection) => connection,
@@ -118,7 +117,9 @@ async fn serve(config: &WorkerConfig, slots: &Slots) -> Result<WorkerReport, Wor
         match ended {
             Ended::Drained(reason) => return Ok(report(slots, sessions, &reason)),
             Ended::Cancelled => return Ok(report(slots, sessions, "cancelled")),
-            Ended::Lost(reason) if config.once => return Ok(report(slots, sessions, &reason)),
+            Ended::Lost(reason) if config.once || way.is_inherited() => {
+                return Ok(report(slots, sessions, &reason));
+            }
             Ended::Lost(_) => {}
         }
     }

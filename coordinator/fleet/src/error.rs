@@ -20,12 +20,10 @@ pub enum FleetError {
     #[error("cancelled")]
     Cancelled,
     /// No worker could take a job for too long.
-    #[error(
-        "waited {waited:.0} s for a worker at {address}: {missing}; start one with `starlings worker --connect {address}`"
-    )]
+    #[error("waited {waited:.0} s for a worker{}", waited_for(*address, missing))]
     NoWorkers {
-        /// Where workers can connect.
-        address: SocketAddr,
+        /// Where workers can connect; `None` where only processes of this one work.
+        address: Option<SocketAddr>,
         /// How long it was waited, seconds.
         waited: f64,
         /// What is missing.
@@ -100,6 +98,16 @@ pub enum FleetError {
 
 fn in_brackets(text: &str) -> String {
     if text.is_empty() { String::new() } else { format!(" ({text})") }
+}
+
+/// Where a worker was expected, what is missing, and what to do.
+fn waited_for(address: Option<SocketAddr>, missing: &str) -> String {
+    match address {
+        Some(address) => {
+            format!(" at {address}: {missing}; start one with `starlings worker --connect {address}`")
+        }
+        None => format!(" on this machine: {missing}"),
+    }
 }
 
 fn remedy(source: &std::io::Error, address: SocketAddr) -> String {

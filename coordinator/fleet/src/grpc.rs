@@ -4,6 +4,7 @@
 //! read: [`super::hub`], then [`super::network`].
 
 use std::net::{SocketAddr, TcpListener};
+use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
 use std::thread::JoinHandle;
@@ -17,7 +18,8 @@ use tokio_util::sync::CancellationToken;
 
 use super::dispatcher::{BatchError, Event, Rules};
 use super::hub::{Hub, Reply, Submission};
-use super::{Fleet, FleetError, FleetEvent, Outcome, network};
+use super::network::{self, Ways};
+use super::{Fleet, FleetError, FleetEvent, Outcome};
 
 /// How often a waiting caller checks that the network thread lives.
 const ALIVE_CHECK: Duration = Duration::from_secs(1);
@@ -25,8 +27,8 @@ const ALIVE_CHECK: Duration = Duration::from_secs(1);
 /// How a fleet listens and when it loses patience.
 #[derive(Clone, Debug)]
 pub struct FleetConfig {
-    /// Where to listen; port 0 picks a free one.
-    pub address: SocketAddr,
+    /// Where to listen, port 0 picks a free one; `None`: nowhere, for a fleet of processes that this one starts.
+    pub address: Option<SocketAddr>,
     /// Name of the run, told to workers.
     pub run_name: String,
     /// Time between heartbeats; a worker silent for twice as long is lost.
@@ -46,13 +48,13 @@ pub struct FleetConfig {
 impl FleetConfig {
     /// The usual numbers: heartbeat 8 s, patience 5 minutes, five losses per job.
     pub fn new(
-        address: SocketAddr,
+        address: impl Into<Option<SocketAddr>>,
         run_name: &str,
         cancel: CancellationToken,
         events: Sender<FleetEvent>,
     ) -> Self {
         Self {
-            address,
+            address: address.into(),
             run_name: run_name.to_owned(),
             heartbeat: Duration::from_secs(8),
             patience: Duration::from_secs(300),
@@ -67,7 +69,8 @@ impl FleetConfig {
 /// Workers that dial in.
 pub struct GrpcFleet {
     hub: Arc<Hub>,
-    address: SocketAddr,
+    address: Option<SocketAddr>,
+    adopted: UnboundedSender<UnixStream>,
     batches: UnboundedSender<Submission>,
     stop: CancellationToken,
     network: Option<JoinHandle<Result<(), String>>>,
@@ -77,6 +80,7 @@ pub struct GrpcFleet {
 #[derive(Clone)]
 pub struct FleetHandle {
     hub: Arc<Hub>,
+    adopted: UnboundedSender<UnixStream>,
 }
 
 impl FleetHandle {
@@ -100,6 +104,12 @@ impl FleetHandle {
         self.hub.dismiss(pids);
     }
 
+    /// Takes this end of a pair of sockets, of which a process that this one started holds the other, as the way to a worker.
+    pub(crate) fn adopt(&self, end: UnixStream) {
+        // A network that ended has told why.
+        let _ = self.adopted.send(end);
+    }
+
     /// Passes an event on.
     pub(crate) fn tell(&self, event: FleetEvent) {
         self.hub.tell(event);
@@ -112,10 +122,8 @@ impl GrpcFleet {
     /// # Errors
     /// [`FleetError::Bind`] when the address is taken or does not exist; [`FleetError::Stopped`] when no thread can start.
     pub fn listen(config: FleetConfig) -> Result<Self, FleetError> {
-        let bind = |source| FleetError::Bind { address: config.address, source };
-        let listener = TcpListener::bind(config.address).map_err(bind)?;
-        listener.set_nonblocking(true).map_err(bind)?;
-        let address = listener.local_addr().map_err(bind)?;
+        let listener = config.address.map(listen).transpose()?;
+        let address = listener.as_ref().map(|(_, address)| *address);
         let rules = Rules {
             heartbeat: config.heartbeat,
             patience: config.patience,
@@ -124,26 +132,30 @@ impl GrpcFleet {
         let hub = Arc::new(Hub::new(config.run_name, config.build, rules, config.events));
         let stop = CancellationToken::new();
         let (batches, submitted) = unbounded_channel();
+        let (adopted, ends) = unbounded_channel();
+        let ways = Ways { listener: listener.map(|(listener, _)| listener), adopted: ends };
         let network = {
             let (hub, cancel, stop) = (Arc::clone(&hub), config.cancel.clone(), stop.clone());
             let heartbeat = config.heartbeat;
             std::thread::Builder::new()
                 .name("fleet-network".to_owned())
-                .spawn(move || network::run(listener, &hub, heartbeat, submitted, &cancel, &stop))
+                .spawn(move || network::run(ways, &hub, heartbeat, submitted, &cancel, &stop))
                 .map_err(|e| FleetError::Stopped(e.to_string()))?
         };
-        hub.tell(FleetEvent::Listening { address });
-        Ok(Self { hub, address, batches, stop, network: Some(network) })
+        if let Some(address) = address {
+            hub.tell(FleetEvent::Listening { address });
+        }
+        Ok(Self { hub, address, adopted, batches, stop, network: Some(network) })
     }
 
-    /// Where workers can connect, with the port that was picked.
-    pub fn address(&self) -> SocketAddr {
+    /// Where workers can connect, with the port that was picked; `None` where none can.
+    pub fn address(&self) -> Option<SocketAddr> {
         self.address
     }
 
     /// For the supervisor of local workers.
     pub fn handle(&self) -> FleetHandle {
-        FleetHandle { hub: Arc::clone(&self.hub) }
+        FleetHandle { hub: Arc::clone(&self.hub), adopted: self.adopted.clone() }
     }
 
     /// Asks all workers to leave, waits shortly for them, and stops the network. Dropping does the same.
@@ -252,10 +264,17 @@ impl Drop for GrpcFleet {
     }
 }
 
+/// Listens on the address, and says which port was picked.
+fn listen(address: SocketAddr) -> Result<(TcpListener, SocketAddr), FleetError> {
+    let bind = |source| FleetError::Bind { address, source };
+    let listener = TcpListener::bind(address).map_err(bind)?;
+    listener.set_nonblocking(true).map_err(bind)?;
+    let address = listener.local_addr().map_err(bind)?;
+    Ok((listener, address))
+}
+
 #[cfg(test)]
 mod tests {
-    use std::net::Ipv4Addr;
-
     use starlings_models::Window;
 
     use super::*;
@@ -263,9 +282,8 @@ mod tests {
     #[test]
     fn a_panic_in_the_middle_of_a_decision_ends_the_run_with_an_error() {
         let (sender, _events) = mpsc::channel();
-        let address = (Ipv4Addr::LOCALHOST, 0).into();
-        let config = FleetConfig::new(address, "test", CancellationToken::new(), sender);
-        let mut fleet = GrpcFleet::listen(config).expect("a free port");
+        let config = FleetConfig::new(None, "test", CancellationToken::new(), sender);
+        let mut fleet = GrpcFleet::listen(config).expect("a fleet");
         let setup = fleet.install(&Setup::default()).expect("it travels");
         fleet.hub.panic_inside();
         let window = Window { start: 0.0, times: vec![1.0], observed: vec![0.0], inputs: vec![] };

@@ -1,11 +1,10 @@
 //! Worker processes on this machine: starts them, starts a dead one again, ends them all.
 //!
-//! A worker ends by itself when its connection or its lifeline closes, so none outlives this process, however it ends. Nothing
-//! is decided about jobs here: a dead worker's jobs are the dispatcher's business. Next file to read: `process`.
+//! The standard input of each is its connection: one of a pair of sockets, which nobody else can reach. A worker ends by itself
+//! when it closes, so none outlives this process, however it ends. Nothing is decided about jobs here: a dead worker's jobs are the dispatcher's business. Next file to read: `process`.
 
 mod process;
 
-use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitStatus;
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
@@ -41,13 +40,11 @@ const LEAVE_PATIENCE: Duration = Duration::from_secs(2);
 pub struct LocalConfig {
     /// The program, usually this one.
     pub program: PathBuf,
-    /// Its first arguments, such as `worker --slots 1`; `--connect ADDRESS --once --patience SECONDS --place I` follow, the
+    /// Its first arguments, such as `worker --slots 1`; `--connect stdin --place I` follow, the
     /// last with the process's place among the `n`, which the one that is started after it keeps.
     pub args: Vec<String>,
     /// How many processes.
     pub n: usize,
-    /// Where they connect.
-    pub address: SocketAddr,
     /// The fleet to tell when they die.
     pub fleet: FleetHandle,
 }

@@ -1,6 +1,7 @@
 //! The network thread: one runtime that serves the workers' streams, keeps time, and starts the caller's batches.
 
 use std::net::TcpListener;
+use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -9,6 +10,8 @@ use starlings_proto::words::{causes, panic_words};
 use starlings_proto::{FRAME_SIZE, MAX_MESSAGE};
 use tokio::sync::mpsc::UnboundedReceiver;
 use tokio::task::{JoinError, JoinSet};
+use tokio_stream::StreamExt;
+use tokio_stream::wrappers::UnboundedReceiverStream;
 use tokio_util::sync::CancellationToken;
 use tonic::transport::Server;
 use tonic::transport::server::TcpIncoming;
@@ -30,9 +33,17 @@ const KEEP_ALIVE: (Duration, Duration) = (Duration::from_secs(60), Duration::fro
 /// HTTP/2 windows per stream and per connection, bytes: enough for a long fat network.
 const WINDOWS: (u32, u32) = (4 * 1024 * 1024, 16 * 1024 * 1024);
 
+/// The ways on which workers come.
+pub(super) struct Ways {
+    /// From anywhere that reaches the address.
+    pub(super) listener: Option<TcpListener>,
+    /// Ends of the pairs of sockets that processes of this one hold the other ends of. Nothing else can come on them.
+    pub(super) adopted: UnboundedReceiver<UnixStream>,
+}
+
 /// Serves until stopped; then asks the workers to leave and waits shortly for them.
 pub(super) fn run(
-    listener: TcpListener,
+    ways: Ways,
     hub: &Arc<Hub>,
     heartbeat: Duration,
     submitted: UnboundedReceiver<Submission>,
@@ -44,8 +55,9 @@ pub(super) fn run(
         .build()
         .map_err(|error| error.to_string())?;
     let outcome = runtime.block_on(async {
-        let listener = tokio::net::TcpListener::from_std(listener).map_err(|error| error.to_string())?;
-        let incoming = TcpIncoming::from(listener).with_nodelay(Some(true));
+        let Ways { listener, adopted } = ways;
+        let listened = listener.map(tokio::net::TcpListener::from_std).transpose();
+        let listened = listened.map_err(|error| error.to_string())?;
         let mut tasks = JoinSet::new();
         tasks.spawn(tick(Arc::clone(hub), heartbeat));
         tasks.spawn(beat(Arc::clone(hub), heartbeat));
@@ -54,14 +66,35 @@ pub(super) fn run(
         let service = FleetServer::new(Service { hub: Arc::clone(hub) })
             .max_decoding_message_size(MAX_MESSAGE)
             .max_encoding_message_size(MAX_MESSAGE);
-        let server = Server::builder()
-            .http2_keepalive_interval(Some(KEEP_ALIVE.0))
-            .http2_keepalive_timeout(Some(KEEP_ALIVE.1))
-            .initial_stream_window_size(WINDOWS.0)
-            .initial_connection_window_size(WINDOWS.1)
-            .max_frame_size(FRAME_SIZE)
-            .add_service(service)
-            .serve_with_incoming(incoming);
+        let server = || {
+            Server::builder()
+                .http2_keepalive_interval(Some(KEEP_ALIVE.0))
+                .http2_keepalive_timeout(Some(KEEP_ALIVE.1))
+                .initial_stream_window_size(WINDOWS.0)
+                .initial_connection_window_size(WINDOWS.1)
+                .max_frame_size(FRAME_SIZE)
+                .add_service(service.clone())
+        };
+        let inherited = UnboundedReceiverStream::new(adopted).map(|end| {
+            end.set_nonblocking(true)?;
+            tokio::net::UnixStream::from_std(end)
+        });
+        let listening = async {
+            match listened {
+                Some(listener) => {
+                    let incoming = TcpIncoming::from(listener).with_nodelay(Some(true));
+                    server().serve_with_incoming(incoming).await
+                }
+                None => std::future::pending().await,
+            }
+        };
+        let server = async {
+            tokio::select! {
+                ended = listening => ended,
+                // The handles of the fleet hold its other end open.
+                ended = server().serve_with_incoming(inherited) => ended,
+            }
+        };
         tokio::select! {
             ended = server => Err(ended.err().map_or_else(|| "its server ended".to_owned(), |error| causes(&error))),
             Some(ended) = tasks.join_next() => Err(task_ended(ended)),

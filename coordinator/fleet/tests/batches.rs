@@ -21,7 +21,7 @@ fn one_two_and_four_workers_give_the_same_outcomes_in_job_order() {
     for n in [1, 2, 4] {
         let (mut fleet, events, _) = listen(any_port());
         let workers = (0..n)
-            .map(|_| ThreadWorker::start(fleet.address(), factory(|job| Ok(square(job)))))
+            .map(|_| ThreadWorker::start(fleet.address().unwrap(), factory(|job| Ok(square(job)))))
             .collect::<Vec<_>>();
         await_workers(&events, n);
         assert_eq!((fleet.n_workers(), fleet.slots()), (n, n));
@@ -79,7 +79,7 @@ fn threads_and_a_worker_over_the_wire_give_the_same_bits() {
     };
     let here = run(&mut InProcess::new(2));
     let (mut fleet, _events, _) = listen(any_port());
-    let mut config = WorkerConfig::new(fleet.address().to_string());
+    let mut config = WorkerConfig::new(fleet.address().unwrap().to_string());
     config.slots = 2;
     let worker = std::thread::spawn(move || starlings_worker::run(config));
     assert_eq!(run(&mut fleet), here);
@@ -106,7 +106,7 @@ fn a_worker_may_start_before_its_coordinator() {
 #[test]
 fn a_worker_whose_wire_is_cut_in_the_middle_loses_nothing_and_comes_back() {
     let (mut fleet, events, _) = listen(any_port());
-    let proxy = Arc::new(Proxy::to(fleet.address()));
+    let proxy = Arc::new(Proxy::to(fleet.address().unwrap()));
     let (cut, runs) = (Arc::clone(&proxy), Arc::new(AtomicU32::new(0)));
     let unsteady = factory(move |job| {
         if runs.fetch_add(1, Ordering::Relaxed) == 7 {
@@ -129,7 +129,7 @@ fn a_worker_whose_wire_is_cut_in_the_middle_loses_nothing_and_comes_back() {
 #[test]
 fn a_once_worker_ends_when_its_wire_is_cut_even_while_a_job_computes() {
     let (mut fleet, events, _) = listen(any_port());
-    let proxy = Proxy::to(fleet.address());
+    let proxy = Proxy::to(fleet.address().unwrap());
     let (started, starts) = mpsc::channel();
     let started = Mutex::new(started);
     let started = Arc::new(started);
@@ -169,7 +169,7 @@ fn a_cancelled_worker_says_goodbye_and_its_jobs_go_elsewhere() {
     let leaving = CancellationToken::new();
     let (token, seen) = (leaving.clone(), leaving.clone());
     let first = ThreadWorker::start_with(
-        fleet.address(),
+        fleet.address().unwrap(),
         factory(move |job| {
             token.cancel();
             Ok(square(job))
@@ -183,7 +183,7 @@ fn a_cancelled_worker_says_goodbye_and_its_jobs_go_elsewhere() {
         }
         Ok(square(job))
     });
-    let _second = ThreadWorker::start(fleet.address(), slow);
+    let _second = ThreadWorker::start(fleet.address().unwrap(), slow);
     await_workers(&events, 2);
     let setup = fleet.install(&Setup::default()).unwrap();
     let jobs = jobs(50);
@@ -205,7 +205,7 @@ fn a_cancelled_run_returns_although_its_job_never_ends() {
             std::thread::park();
         }
     });
-    let worker = ThreadWorker::start(fleet.address(), endless);
+    let worker = ThreadWorker::start(fleet.address().unwrap(), endless);
     await_workers(&events, 1);
     let setup = fleet.install(&Setup::default()).unwrap();
     assert!(matches!(fleet.run(setup, jobs(3)), Err(FleetError::Cancelled)));
@@ -229,7 +229,7 @@ fn a_model_that_computes_for_several_heartbeats_is_not_declared_dead() {
         let _ = gate.lock().unwrap().recv();
         Ok(square(job))
     });
-    let _worker = ThreadWorker::start(fleet.address(), slow);
+    let _worker = ThreadWorker::start(fleet.address().unwrap(), slow);
     await_workers(&events, 1);
     // Time itself is what is tested here: the job takes ten heartbeats, silence of two is a loss.
     let clock = std::thread::spawn(move || {
@@ -252,7 +252,7 @@ fn a_coordinator_that_stands_still_loses_no_worker_that_serves_once() {
     config.heartbeat = Duration::from_millis(500);
     config.patience = Duration::from_secs(10);
     let mut fleet = GrpcFleet::listen(config).unwrap();
-    let proxy = Proxy::to(fleet.address());
+    let proxy = Proxy::to(fleet.address().unwrap());
     let local = factory(|job| Ok(square(job)));
     let worker = ThreadWorker::start_with(proxy.address, local, |config| config.once = true);
     await_workers(&events, 1);

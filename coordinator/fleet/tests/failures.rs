@@ -23,7 +23,7 @@ fn a_model_failure_is_an_outcome_after_two_workers_tried() {
             _ => Ok(square(job)),
         })
     };
-    let _workers = [0; 2].map(|_| ThreadWorker::start(fleet.address(), failing()));
+    let _workers = [0; 2].map(|_| ThreadWorker::start(fleet.address().unwrap(), failing()));
     await_workers(&events, 2);
     let setup = fleet.install(&Setup::default()).unwrap();
     let outcomes = fleet.run(setup, jobs(6)).unwrap();
@@ -42,11 +42,14 @@ fn a_model_failure_is_an_outcome_after_two_workers_tried() {
 fn a_port_in_use_is_named_with_a_remedy() {
     let (fleet, _events, _) = listen(any_port());
     let (sender, _receiver) = mpsc::channel();
-    let config = FleetConfig::new(fleet.address(), "second", CancellationToken::new(), sender);
+    let config = FleetConfig::new(fleet.address().unwrap(), "second", CancellationToken::new(), sender);
     let error = GrpcFleet::listen(config).err().expect("the port is taken");
     let text = error.to_string();
     assert!(matches!(error, FleetError::Bind { .. }));
-    assert!(text.contains(&fleet.address().port().to_string()) && text.contains("another port"), "{text}");
+    assert!(
+        text.contains(&fleet.address().unwrap().port().to_string()) && text.contains("another port"),
+        "{text}"
+    );
 }
 
 #[test]
@@ -77,7 +80,7 @@ fn a_setup_that_no_worker_can_build_ends_the_run_with_its_text() {
     let broken = || -> starlings_worker::Factory {
         Arc::new(|_| Err(SetupError::Invalid("the model has no legs".to_owned())))
     };
-    let _workers = [0; 2].map(|_| ThreadWorker::start(fleet.address(), broken()));
+    let _workers = [0; 2].map(|_| ThreadWorker::start(fleet.address().unwrap(), broken()));
     await_workers(&events, 2);
     let setup = fleet.install(&Setup::default()).unwrap();
     let error = fleet.run(setup, jobs(1)).unwrap_err();

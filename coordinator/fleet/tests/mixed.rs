@@ -52,7 +52,7 @@ fn assert_multiplied(outcomes: &[Outcome], jobs: &[(SetupId, Job)], n_setup: usi
 #[test]
 fn every_job_of_a_mixed_batch_runs_with_its_own_setup() {
     let (mut fleet, events, _) = listen(any_port());
-    let _workers = [0; 2].map(|_| ThreadWorker::start(fleet.address(), gains()));
+    let _workers = [0; 2].map(|_| ThreadWorker::start(fleet.address().unwrap(), gains()));
     await_workers(&events, 2);
     for n_setup in [2, 40] {
         let setups: Vec<_> = (0..n_setup).map(|i| fleet.install(&gain(f64::from(i))).unwrap()).collect();
@@ -67,7 +67,7 @@ fn every_job_of_a_mixed_batch_runs_with_its_own_setup() {
 #[test]
 fn more_setups_than_a_worker_keeps_are_sent_again_and_no_job_is_lost() {
     let (mut fleet, events, _) = listen(any_port());
-    let worker = ThreadWorker::start(fleet.address(), gains());
+    let worker = ThreadWorker::start(fleet.address().unwrap(), gains());
     await_workers(&events, 1);
     let setups: Vec<_> = (0..600).map(|i| fleet.install(&gain(f64::from(i))).unwrap()).collect();
     assert_eq!(setups.iter().collect::<BTreeSet<_>>().len(), 600);
@@ -84,7 +84,7 @@ fn more_setups_than_a_worker_keeps_are_sent_again_and_no_job_is_lost() {
 fn jobs_of_one_forgotten_setup_in_flight_together_do_not_end_a_batch_of_local_workers() {
     let (mut fleet, events, _) = listen(any_port());
     fleet.handle().local_only();
-    let worker = ThreadWorker::start(fleet.address(), gains());
+    let worker = ThreadWorker::start(fleet.address().unwrap(), gains());
     await_workers(&events, 1);
     let setups: Vec<_> = (0..600).map(|i| fleet.install(&gain(f64::from(i))).unwrap()).collect();
     let pairs: Vec<_> = setups.iter().flat_map(|&setup| [setup; 2]).collect();
@@ -150,7 +150,7 @@ fn a_mixed_batch_gives_the_same_bits_on_threads_and_over_the_wire() {
     assert_eq!((here[0].0.len(), here[1].0.len()), (39, 78));
     let (mut fleet, events, _) = listen(any_port());
     let real: Factory = Arc::new(|setup: &Setup| setup.build());
-    let _workers = [0; 2].map(|_| ThreadWorker::start(fleet.address(), Arc::clone(&real)));
+    let _workers = [0; 2].map(|_| ThreadWorker::start(fleet.address().unwrap(), Arc::clone(&real)));
     await_workers(&events, 2);
     assert_eq!(run(&mut fleet), here);
     fleet.close();
@@ -160,7 +160,7 @@ fn a_mixed_batch_gives_the_same_bits_on_threads_and_over_the_wire() {
 fn one_setup_that_no_worker_can_build_ends_a_mixed_batch_with_its_reason_and_the_next_batch_runs() {
     let (mut fleet, events, _) = listen(any_port());
     fleet.handle().local_only();
-    let _workers = [0; 2].map(|_| ThreadWorker::start(fleet.address(), gains()));
+    let _workers = [0; 2].map(|_| ThreadWorker::start(fleet.address().unwrap(), gains()));
     await_workers(&events, 2);
     let good = fleet.install(&gain(0.0)).unwrap();
     let bad = fleet.install(&gain(-3.0)).unwrap();

@@ -4,15 +4,17 @@
 
 mod fleet_kit;
 
-use std::net::TcpListener;
+use std::os::fd::OwnedFd;
+use std::os::unix::net::UnixStream;
 use std::process::{Command, Stdio};
 use std::sync::mpsc;
 use std::time::Duration;
 
-use fleet_kit::{any_port, assert_exact, await_event, factory, jobs, listen, square};
+use fleet_kit::{assert_exact, await_event, factory, jobs, private, square};
 use starlings_fleet::{Fleet, FleetConfig, FleetError, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers};
 use starlings_models::Setup;
-use starlings_worker::{LIFELINE, WorkerConfig};
+use starlings_proto::INHERITED;
+use starlings_worker::WorkerConfig;
 use tokio_util::sync::CancellationToken;
 
 fn local(fleet: &GrpcFleet, n: usize, program: &str, args: &[&str]) -> LocalConfig {
@@ -20,12 +22,11 @@ fn local(fleet: &GrpcFleet, n: usize, program: &str, args: &[&str]) -> LocalConf
         program: program.into(),
         args: args.iter().map(|&a| a.to_owned()).collect(),
         n,
-        address: fleet.address(),
         fleet: fleet.handle(),
     }
 }
 
-/// This test program as a worker: the shell turns `--connect ADDRESS` into the variable that [`worker_process`] reads.
+/// This test program as a worker: the shell turns `--connect stdin` into the variable that [`worker_process`] reads.
 fn workers(fleet: &GrpcFleet, n: usize) -> LocalWorkers {
     let this = std::env::current_exe().unwrap();
     let script = format!(
@@ -40,8 +41,6 @@ fn workers(fleet: &GrpcFleet, n: usize) -> LocalWorkers {
 fn worker_process() {
     let Ok(address) = std::env::var("TEST_WORKER_CONNECT") else { return };
     let mut config = WorkerConfig::new(address);
-    config.once = true;
-    config.lifeline = std::env::var_os(LIFELINE).is_some();
     config.factory = factory(|job| {
         // Long enough that a kill hits a running batch.
         let (_open, never) = mpsc::channel::<()>();
@@ -53,7 +52,7 @@ fn worker_process() {
 
 #[test]
 fn a_killed_worker_process_is_started_again_and_nothing_is_lost() {
-    let (mut fleet, events, _) = listen(any_port());
+    let (mut fleet, events, _) = private();
     let workers = workers(&fleet, 2);
     let run = std::thread::spawn(move || {
         let setup = fleet.install(&Setup::default()).unwrap();
@@ -79,7 +78,7 @@ fn a_killed_worker_process_is_started_again_and_nothing_is_lost() {
 #[test]
 fn workers_that_die_at_once_end_the_run_with_their_last_words() {
     let (sender, events) = mpsc::channel();
-    let mut config = FleetConfig::new(any_port(), "broken", CancellationToken::new(), sender);
+    let mut config = FleetConfig::new(None, "broken", CancellationToken::new(), sender);
     config.max_attempts = 1;
     let mut fleet = GrpcFleet::listen(config).unwrap();
     let folder = tempfile::tempdir().unwrap();
@@ -117,28 +116,37 @@ fn workers_that_die_at_once_end_the_run_with_their_last_words() {
 
 #[test]
 fn a_program_that_does_not_exist_is_named() {
-    let (fleet, _events, _) = listen(any_port());
+    let (fleet, _events, _) = private();
     let error = LocalWorkers::spawn(local(&fleet, 1, "/no/such/program", &[])).err().expect("cannot start");
     assert!(error.to_string().contains("/no/such/program"), "{error}");
 }
 
 #[test]
-fn a_worker_that_never_found_its_coordinator_ends_with_its_lifeline() {
-    let nobody = TcpListener::bind(any_port()).unwrap().local_addr().unwrap();
+fn a_local_worker_ends_with_its_coordinator_even_before_it_is_welcomed() {
+    let (own, its) = UnixStream::pair().unwrap();
     let mut worker = Command::new(std::env::current_exe().unwrap())
         .args(["--exact", "worker_process", "--ignored"])
-        .env("TEST_WORKER_CONNECT", nobody.to_string())
-        .env(LIFELINE, "stdin")
-        .stdin(Stdio::piped())
+        .env("TEST_WORKER_CONNECT", INHERITED)
+        .stdin(OwnedFd::from(its))
         .stdout(Stdio::null())
+        .stderr(Stdio::null())
         .spawn()
         .unwrap();
-    assert!(worker.try_wait().unwrap().is_none(), "it dials");
+    assert!(worker.try_wait().unwrap().is_none(), "it waits for an answer");
     let cut = std::time::Instant::now();
-    drop(worker.stdin.take());
-    assert!(
-        worker.wait().unwrap().success(),
-        "without its lifeline it is cancelled, and does not dial in vain"
-    );
-    assert!(cut.elapsed() < Duration::from_secs(30), "its patience is a minute");
+    drop(own);
+    worker.wait().unwrap();
+    assert!(cut.elapsed() < Duration::from_secs(30), "its patience is a minute, which it does not use");
+}
+
+#[test]
+fn a_standard_input_that_is_no_socket_is_called_so() {
+    let output = Command::new(std::env::current_exe().unwrap())
+        .args(["--exact", "worker_process", "--ignored", "--nocapture"])
+        .env("TEST_WORKER_CONNECT", INHERITED)
+        .stdin(Stdio::null())
+        .output()
+        .unwrap();
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(!output.status.success() && told.contains("NoSocket"), "{told}");
 }

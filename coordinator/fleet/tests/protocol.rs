@@ -92,7 +92,7 @@ fn another_release_is_refused_with_the_remedy() {
     let (fleet, events, _) = listen(any_port());
     block_on(async {
         let old = Hello { version: "0.0.1".to_owned(), ..hello() };
-        let answer = Hand::dial(fleet.address(), old).await.hear().await;
+        let answer = Hand::dial(fleet.address().unwrap(), old).await.hear().await;
         assert!(matches!(&answer, Some(ToWorker::Refuse(reason)) if reason.contains("0.0.1")), "{answer:?}");
     });
     await_event(&events, |e| matches!(e, FleetEvent::WorkerRefused { .. }));
@@ -102,7 +102,7 @@ fn another_release_is_refused_with_the_remedy() {
 #[test]
 fn a_process_that_dials_again_takes_over_and_its_old_answers_are_late() {
     let (mut fleet, events, _) = listen(any_port());
-    let address = fleet.address();
+    let address = fleet.address().unwrap();
     let run = std::thread::spawn(move || {
         let setup = fleet.install(&Setup::default()).unwrap();
         let jobs = jobs(4);
@@ -135,7 +135,7 @@ fn a_process_that_dials_again_takes_over_and_its_old_answers_are_late() {
 #[test]
 fn a_worker_that_vanishes_with_jobs_in_hand_loses_none_of_them() {
     let (mut fleet, events, _) = listen(any_port());
-    let address = fleet.address();
+    let address = fleet.address().unwrap();
     let run = std::thread::spawn(move || {
         let setup = fleet.install(&Setup::default()).unwrap();
         let jobs = jobs(10);
@@ -165,7 +165,7 @@ fn a_worker_that_vanishes_with_jobs_in_hand_loses_none_of_them() {
 fn a_malformed_message_ends_the_stream_and_nothing_else() {
     let (fleet, events, _) = listen(any_port());
     block_on(async {
-        let mut hand = Hand::dial(fleet.address(), hello()).await;
+        let mut hand = Hand::dial(fleet.address().unwrap(), hello()).await;
         assert!(matches!(hand.hear().await, Some(ToWorker::Welcome(_))));
         hand.outbox.send(generated::FromWorker { kind: None }).unwrap();
         assert_eq!(hand.hear().await, None);
@@ -180,7 +180,7 @@ fn a_malformed_message_ends_the_stream_and_nothing_else() {
 #[test]
 fn a_worker_that_dials_when_the_run_is_over_ends_well() {
     let (fleet, _events, _) = listen(any_port());
-    let address = fleet.address();
+    let address = fleet.address().unwrap();
     block_on(async {
         let mut hand = Hand::dial(address, hello()).await;
         assert!(matches!(hand.hear().await, Some(ToWorker::Welcome(_))));
@@ -198,7 +198,7 @@ fn a_worker_that_dials_when_the_run_is_over_ends_well() {
 fn a_broken_connection_says_what_broke() {
     let (fleet, events, _) = listen(any_port());
     block_on(async {
-        let mut hand = Hand::dial(fleet.address(), hello()).await;
+        let mut hand = Hand::dial(fleet.address().unwrap(), hello()).await;
         assert!(matches!(hand.hear().await, Some(ToWorker::Welcome(_))));
     });
     // The runtime is gone in the middle of the stream.

@@ -2,19 +2,18 @@
 
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader};
+use std::os::fd::OwnedFd;
+use std::os::unix::net::UnixStream;
 use std::path::Path;
-use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use starlings_proto::LIFELINE;
+use starlings_proto::INHERITED;
 
 use super::LocalConfig;
 use crate::FleetError;
-
-/// Seconds that a local worker dials: its coordinator listens before it starts.
-const PATIENCE: &str = "10";
 
 /// How long to wait for the end of a dead process's standard error.
 const LAST_WORDS: Duration = Duration::from_millis(50);
@@ -28,8 +27,6 @@ pub(super) struct Process {
     started: Instant,
     stderr: Option<JoinHandle<()>>,
     tail: Arc<Mutex<VecDeque<String>>>,
-    /// The other end of the child's standard input: the system closes it when this process ends, however it ends.
-    _lifeline: Option<ChildStdin>,
 }
 
 /// The program, where it is this one also after another was put in its place: all workers of a run are of one build.
@@ -46,20 +43,21 @@ const DELETED: &str = " (deleted)";
 impl Process {
     pub(super) fn start(config: &LocalConfig, place: usize) -> Result<Self, FleetError> {
         let mut command = Command::new(standing(&config.program));
-        command.args(&config.args).args(["--connect", &config.address.to_string()]);
-        command
-            .args(["--once", "--patience", PATIENCE, "--place", &place.to_string()])
-            .env(LIFELINE, "stdin");
-        command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
+        let spawn = |source| FleetError::Spawn { program: config.program.clone(), source };
+        let (own, its) = UnixStream::pair().map_err(spawn)?;
+        command.args(&config.args).args(["--connect", INHERITED, "--place", &place.to_string()]);
+        command.stdin(OwnedFd::from(its)).stdout(Stdio::null()).stderr(Stdio::piped());
         // A group of its own: an interrupt on the terminal reaches the coordinator only, which ends the workers in order.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
-        let spawn = |source| FleetError::Spawn { program: config.program.clone(), source };
         let mut child = command.spawn().map_err(spawn)?;
-        let (pipe, lifeline) = (child.stderr.take(), child.stdin.take());
+        // The command holds the child's end: as long as it does, the end of the child would not be noticed.
+        drop(command);
+        config.fleet.adopt(own);
+        let pipe = child.stderr.take();
         let tail = Arc::new(Mutex::new(VecDeque::new()));
         // From here on the guard ends the child, whatever fails.
-        let mut process = Self { child, started: Instant::now(), stderr: None, tail, _lifeline: lifeline };
+        let mut process = Self { child, started: Instant::now(), stderr: None, tail };
         if let Some(pipe) = pipe {
             let tail = Arc::clone(&process.tail);
             let keep = move || keep_tail(BufReader::new(pipe), &tail);
@@ -129,14 +127,12 @@ mod tests {
     #[test]
     fn a_process_that_nobody_keeps_is_killed() {
         let (sender, _events) = mpsc::channel();
-        let address = (std::net::Ipv4Addr::LOCALHOST, 0).into();
-        let fleet = GrpcFleet::listen(FleetConfig::new(address, "test", CancellationToken::new(), sender));
-        let fleet = fleet.expect("a free port");
+        let fleet = GrpcFleet::listen(FleetConfig::new(None, "test", CancellationToken::new(), sender));
+        let fleet = fleet.expect("a fleet");
         let config = LocalConfig {
             program: "/bin/sh".into(),
             args: ["-c", "exec sleep 600"].map(str::to_owned).to_vec(),
             n: 1,
-            address,
             fleet: fleet.handle(),
         };
         let process = Process::start(&config, 0).expect("there is a shell");

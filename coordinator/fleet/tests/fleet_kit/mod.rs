@@ -83,6 +83,15 @@ pub fn any_port() -> SocketAddr {
 
 /// A fleet with short patience, its events and its cancellation.
 pub fn listen(address: SocketAddr) -> (GrpcFleet, Receiver<FleetEvent>, CancellationToken) {
+    start(Some(address))
+}
+
+/// The same for processes of this one alone.
+pub fn private() -> (GrpcFleet, Receiver<FleetEvent>, CancellationToken) {
+    start(None)
+}
+
+fn start(address: Option<SocketAddr>) -> (GrpcFleet, Receiver<FleetEvent>, CancellationToken) {
     let (sender, events) = mpsc::channel();
     let cancel = CancellationToken::new();
     let mut config = FleetConfig::new(address, "test", cancel.clone(), sender);
