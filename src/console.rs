@@ -10,6 +10,7 @@ use tracing_subscriber::filter::LevelFilter;
 
 use crate::failure::Failure;
 pub(crate) use crate::note::note;
+use crate::plain::Plain;
 
 /// Sends log lines to standard error: warnings, or more with each `-v`.
 pub(crate) fn log_to_stderr(verbose: u8) {
@@ -35,7 +36,10 @@ pub(crate) fn line(content: impl Display) -> Result<(), Failure> {
 /// Writes to standard output, without an end of line of its own.
 pub(crate) fn text(content: impl Display) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
-    write!(out, "{content}").and_then(|()| out.flush()).map_err(|e| lost(&e))
+    // What goes into a file or another program arrives as it is.
+    let written =
+        if out.is_terminal() { write!(out, "{}", Plain(content)) } else { write!(out, "{content}") };
+    written.and_then(|()| out.flush()).map_err(|e| lost(&e))
 }
 
 /// What a failed write to standard output means.

@@ -1,5 +1,6 @@
 //! A table as CSV, to a file or to standard output, never over what a study needs.
 
+use std::borrow::Cow;
 use std::ffi::OsStr;
 use std::io::Write;
 use std::path::{Component, Path, PathBuf};
@@ -26,12 +27,23 @@ where
     };
     let mut csv = csv::Writer::from_writer(sink);
     for row in rows {
-        csv.write_record(row).map_err(|error| match error.into_kind() {
-            csv::ErrorKind::Io(error) => lost(error),
-            other => Failure::run(format!("{other:?}")),
+        csv.write_record(row.into_iter().map(|cell| inert(cell.as_ref()).into_owned())).map_err(|error| {
+            match error.into_kind() {
+                csv::ErrorKind::Io(error) => lost(error),
+                other => Failure::run(format!("{other:?}")),
+            }
         })?;
     }
     csv.flush().map_err(lost)
+}
+
+/// A cell that no spreadsheet takes for a formula: a text that begins like one gets an apostrophe before it.
+fn inert(cell: &[u8]) -> Cow<'_, [u8]> {
+    let is_number = || std::str::from_utf8(cell).is_ok_and(|text| text.parse::<f64>().is_ok());
+    match cell.first() {
+        Some(b'=' | b'+' | b'-' | b'@' | b'\t' | b'\r') if !is_number() => [b"'", cell].concat().into(),
+        _ => cell.into(),
+    }
 }
 
 /// Where the files of a study are looked for.
@@ -126,4 +138,19 @@ fn spare_study(output: &Path, study: &str, location: &StudyLocation<'_>) -> Resu
     let mut names =
         quoted.flat_map(|text| [Some(text), text.rsplit_once(':').map(|(file, _)| file)]).flatten();
     if names.any(is_target) { refuse("one of the study's data files") } else { Ok(()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::inert;
+
+    #[test]
+    fn numbers_stay_and_formulas_become_texts() {
+        for number in ["-1.5e-3", "+2", "0.25", "-inf", "pressure", ""] {
+            assert_eq!(*inert(number.as_bytes()), *number.as_bytes());
+        }
+        for formula in ["=HYPERLINK(\"http://x\")", "+A1", "-2+3", "@SUM(1)", "\tx"] {
+            assert_eq!(*inert(formula.as_bytes()), *format!("'{formula}").as_bytes());
+        }
+    }
 }

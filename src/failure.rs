@@ -7,7 +7,8 @@ use miette::{Diagnostic, LabeledSpan, NamedSource, Report, Severity, SourceCode}
 use serde_json::{Value, json};
 use starlings_coordinator::study::{Problem, StudyError};
 
-use crate::note::note;
+use crate::note::{drawn, note};
+use crate::plain::{Plain, of_same_length};
 
 /// Why a command ended without doing what was asked.
 pub(crate) enum Failure {
@@ -92,7 +93,7 @@ impl Failure {
             }
             Self::Study(error) => {
                 for problem in &error.problems {
-                    note(format_args!("{:?}", Report::new(Shown::from(problem))));
+                    drawn(format_args!("{:?}", Report::new(Shown::from(problem))));
                 }
                 let n = error.problems.len();
                 if n > 1 {
@@ -123,13 +124,19 @@ impl From<&Problem> for Shown {
         let source = problem
             .source_text
             .as_ref()
-            .map(|text| NamedSource::new(problem.file.display().to_string(), text.to_string()));
+            .map(|text| NamedSource::new(Plain(problem.file.display()).to_string(), of_same_length(text)));
         let message = if source.is_some() && problem.span.is_some() {
             problem.message.clone()
         } else {
             format!("{}: {}", problem.file.display(), problem.message)
         };
-        Self { message, help: problem.help.clone(), source, span: problem.span.clone() }
+        let plain = |text: &String| Plain(text).to_string();
+        Self {
+            message: plain(&message),
+            help: problem.help.as_ref().map(plain),
+            source,
+            span: problem.span.clone(),
+        }
     }
 }
 

@@ -20,6 +20,7 @@ mod interrupt;
 mod load;
 mod models;
 mod note;
+mod plain;
 mod progress;
 mod report;
 mod run;

@@ -3,7 +3,14 @@
 use std::fmt::Display;
 use std::io::{self, Write};
 
+use crate::plain::Plain;
+
 /// Writes a line to standard error; when nobody reads it, the work goes on.
 pub(crate) fn note(content: impl Display) {
+    drawn(Plain(content));
+}
+
+/// The same for a text that holds colours of our own, and nothing from outside that a terminal would obey.
+pub(crate) fn drawn(content: impl Display) {
     let _ = writeln!(io::stderr().lock(), "{content}");
 }

@@ -8,7 +8,7 @@ mod common;
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
 
-use common::{analyses, kill, repository, starlings, wait_until};
+use common::{analyses, kill, output, repository, starlings, wait_until};
 
 /// What the open files of a process are, such as `socket:[4711]`.
 fn files(pid: u32) -> Vec<PathBuf> {
@@ -75,4 +75,19 @@ fn a_run_with_local_workers_can_be_reached_by_no_other_process() {
         let inode = file.to_string_lossy().trim_start_matches("socket:[").trim_end_matches(']').to_owned();
         assert!(!reachable.contains(&inode), "{file:?} can be reached from outside");
     }
+}
+
+#[test]
+fn no_escape_sequence_of_a_study_reaches_the_terminal() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("study.toml");
+    let hostile = "\\u001b[2J\\u009b31m\\u202e";
+    let text = format!("[study]\nname = \"a\"\n\"b{hostile}\" = 1\n[model]\nkind = \"oscillator\"\n");
+    std::fs::write(&file, text).unwrap();
+    let (code, stdout, stderr) = output(starlings().arg("check").arg(&file));
+    assert_eq!(code, 2, "{stderr}");
+    for c in ['\u{1b}', '\u{9b}', '\u{202e}'] {
+        assert!(!stdout.contains(c) && !stderr.contains(c), "{c:?} in {stderr:?}");
+    }
+    assert!(stderr.contains('\u{241b}'), "it is shown: {stderr}");
 }
