@@ -80,9 +80,6 @@ pub enum RunError {
         /// Why.
         source: Failure,
     },
-    /// A value that must serialise did not.
-    #[error("internal: {0}")]
-    Internal(String),
 }
 
 impl RunError {

@@ -126,13 +126,7 @@ mod tests {
     #[test]
     fn the_parts_make_the_whole_again() {
         let usage = |i: usize| [Usage::HeldOut, Usage::Train, Usage::HeldOutChannel][i % 3];
-        let row = |step: usize| {
-            let (time, usage) = (step as f64, usage(step));
-            Row { record: 0, channel: 0, output: 0, step, time, observed: 0.0, noise: 1.0, usage }
-        };
-        let rows: Vec<Row> = (0..11).map(row).collect();
-        let train = (0..11).filter(|i| usage(*i) == Usage::Train).collect();
-        let rows = Rows { rows, train };
+        let rows = Rows::sample(11, usage);
         let whole = DMatrix::from_fn(11, 2, |i, j| (10 * i + j) as f64);
         let parts = SplitJacobian::of(&whole.clone().into(), &rows);
         assert_eq!(parts.dense(&rows), whole);

@@ -50,24 +50,11 @@ pub(crate) fn whiteness(rows: &Rows, residual: &DVector<f64>) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
-    use rand_distr::{Distribution, StandardNormal};
-
     use super::*;
-    use crate::rows::Row;
+    use crate::rows::white;
 
     fn rows(n: usize) -> Rows {
-        let row = |step: usize| {
-            let (time, usage) = (step as f64, Usage::Train);
-            Row { record: 0, channel: 0, output: 0, step, time, observed: 0.0, noise: 1.0, usage }
-        };
-        Rows { rows: (0..n).map(row).collect(), train: (0..n).collect() }
-    }
-
-    fn white(n: usize, seed: u64) -> DVector<f64> {
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        DVector::from_fn(n, |_, _| StandardNormal.sample(&mut random))
+        Rows::sample(n, |_| Usage::Train)
     }
 
     #[test]

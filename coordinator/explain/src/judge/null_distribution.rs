@@ -133,28 +133,15 @@ mod tests {
     use nalgebra::DMatrix;
 
     use super::*;
-    use crate::rows::{Row, Usage};
+    use crate::rows::{Usage, white};
     use crate::screen::influence::Influence;
     use starlings_models::EffectDef;
     use starlings_models::effect::EffectParameter;
 
-    fn rows(n: usize) -> Rows {
-        let row = |step: usize| {
-            let (time, usage) = (step as f64, Usage::Train);
-            Row { record: 0, channel: 0, output: 0, step, time, observed: 0.0, noise: 1.0, usage }
-        };
-        Rows { rows: (0..n).map(row).collect(), train: (0..n).collect() }
-    }
-
-    fn white(n: usize, seed: u64) -> DVector<f64> {
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        DVector::from_fn(n, |_, _| StandardNormal.sample(&mut random))
-    }
-
     #[test]
     fn the_false_alarm_rate_is_counted_on_simulations_that_the_threshold_does_not_know() {
         let (m, n_candidate) = (120, 30);
-        let rows = rows(m);
+        let rows = Rows::sample(m, |_| Usage::Train);
         let candidate = Candidate::new(EffectDef {
             parameters: vec![EffectParameter::default()],
             ..EffectDef::default()

@@ -89,13 +89,12 @@ mod tests {
     use crate::rows::Row;
 
     fn rows(f: impl Fn(f64) -> f64) -> (Rows, Vec<f64>) {
-        let row = |step: usize| {
-            let time = 0.1 * step as f64;
-            let usage = Usage::Train;
-            Row { record: 0, channel: 0, output: 0, step, time, observed: f(time), noise: 1.0, usage }
-        };
-        let rows: Vec<Row> = (0..300).map(row).collect();
-        (Rows { train: (0..rows.len()).collect(), rows }, vec![0.0; 300])
+        let mut rows = Rows::sample(300, |_| Usage::Train);
+        for row in &mut rows.rows {
+            row.time *= 0.1;
+            row.observed = f(row.time);
+        }
+        (rows, vec![0.0; 300])
     }
 
     #[test]

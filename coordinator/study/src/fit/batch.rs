@@ -124,13 +124,11 @@ fn run_ensemble(
     theta: &DMatrix<f64>,
     windows: &StepWindows,
 ) -> Result<Results, RunError> {
-    let before = (runner.total, runner.failed, runner.retried);
+    let before = runner.counts;
     let everyone: Vec<usize> = (0..theta.ncols()).collect();
     let states = vec![None; now.states.len()];
     let results = runner.run(at, &everyone, theta, &states, windows)?;
-    now.figures.counts.total += runner.total - before.0;
-    now.figures.counts.failed += runner.failed - before.1;
-    now.figures.counts.retried += runner.retried - before.2;
+    now.figures.counts.add_since(before, runner.counts);
     Ok(results)
 }
 

@@ -42,12 +42,9 @@ pub(crate) fn fit(
             store.analysis(&row, &now)?;
             context.after_step(store, &schedule.progress(&now, runner))?;
         }
-        let counted = (runner.total, runner.failed, runner.retried);
+        let before_runs = runner.counts;
         let next = settle::next(runner, &schedule, &now, &reported)?;
-        let counts = &mut now.figures.counts;
-        counts.total += runner.total - counted.0;
-        counts.failed += runner.failed - counted.1;
-        counts.retried += runner.retried - counted.2;
+        now.figures.counts.add_since(before_runs, runner.counts);
         let Some(mut next) = next else { return Ok(schedule.finish(&now, reported)) };
         next.figures.counts = now.figures.counts;
         next.figures.information_lost = now.figures.information_lost;
@@ -68,7 +65,7 @@ fn step(
     let windows = schedule.step_windows(now.figures.step);
     let at = AnalysisIndex { pass: now.figures.pass + 1, step: now.figures.step };
     let filter = schedule.filter(now.figures.pass);
-    let counted = (runner.total, runner.failed, runner.retried);
+    let before_runs = runner.counts;
     let Forecast { mut particles, results, rescued } =
         forecast(runner, filter, particles(now), &mut now.states, &windows, at)?;
     for (index, (record, _)) in windows.iter().enumerate() {
@@ -94,9 +91,7 @@ fn step(
         }
     }
     advance(now, &particles, &analysis);
-    now.figures.counts.total += runner.total - counted.0;
-    now.figures.counts.failed += runner.failed - counted.1;
-    now.figures.counts.retried += runner.retried - counted.2;
+    now.figures.counts.add_since(before_runs, runner.counts);
     now.figures.counts.rescued += rescued;
     let after = schedule.reported(now)?;
     let mut row = row(schedule.study, at, &windows, &analysis, before, &after);

@@ -11,6 +11,7 @@ use starlings_fleet::{Fleet, FleetError, Outcome, SetupId};
 use starlings_models::{BuildSetup, Failure, Job, Prediction, Setup, Window};
 
 use super::timeouts::Timeouts;
+use crate::store::snapshot::Counts;
 use crate::store::{JobRow, Store};
 use crate::trial::named;
 use crate::{RunError, Study};
@@ -37,12 +38,8 @@ pub(crate) struct EnsembleRunner<'a> {
     setup: SetupId,
     /// One row per run since the last [`EnsembleRunner::take_rows`].
     rows: Vec<JobRow>,
-    /// Runs asked for.
-    pub(crate) total: u64,
-    /// Runs that failed for good.
-    pub(crate) failed: u64,
-    /// Extra attempts.
-    pub(crate) retried: u64,
+    /// Runs so far; none of them rescues anything here.
+    pub(crate) counts: Counts,
     /// Threads that recombine states; one by default.
     pub(crate) threads: usize,
     /// Workers that answered.
@@ -67,9 +64,7 @@ impl<'a> EnsembleRunner<'a> {
             fleet,
             setup,
             rows: Vec::new(),
-            total: 0,
-            failed: 0,
-            retried: 0,
+            counts: Counts::default(),
             threads: 1,
             workers: BTreeSet::new(),
             n_state,
@@ -120,7 +115,7 @@ impl<'a> EnsembleRunner<'a> {
             }
         };
         let n_job = particles.len() * sent.len();
-        self.total += n_job as u64;
+        self.counts.total += n_job as u64;
         let mut outcomes = self.outcomes(at, n_job, job)?.into_iter();
         let mut results = Vec::with_capacity(particles.len());
         for &particle in particles {
@@ -131,8 +126,8 @@ impl<'a> EnsembleRunner<'a> {
                 if !outcome.worker.is_empty() && !self.workers.contains(&outcome.worker) {
                     self.workers.insert(outcome.worker.clone());
                 }
-                self.retried += u64::from(outcome.attempts.saturating_sub(1));
-                self.failed += u64::from(outcome.result.is_err());
+                self.counts.retried += u64::from(outcome.attempts.saturating_sub(1));
+                self.counts.failed += u64::from(outcome.result.is_err());
                 let mut result = outcome.result.map(|p| self.picked(*record, window, p));
                 if let Ok(prediction) = &mut result {
                     self.check(prediction, *record, particle, theta, window)?;
@@ -169,7 +164,7 @@ impl<'a> EnsembleRunner<'a> {
                 jobs.push((setup, job));
             }
         }
-        self.total += jobs.len() as u64;
+        self.counts.total += jobs.len() as u64;
         let outcomes = self.fleet.run_mixed(jobs).map_err(|error| told(self.study, error, |_| None))?;
         let mut outcomes = outcomes.into_iter();
         let mut results = Vec::with_capacity(setups.len());

@@ -48,6 +48,15 @@ pub struct Counts {
     pub rescued: u64,
 }
 
+impl Counts {
+    /// Adds the runs that a runner made between two of its counts.
+    pub(crate) fn add_since(&mut self, before: Self, now: Self) {
+        self.total += now.total - before.total;
+        self.failed += now.failed - before.failed;
+        self.retried += now.retried - before.retried;
+    }
+}
+
 /// What every estimator keeps between two analyses: where it stands, and the figures of the pass.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Figures {
