@@ -1,8 +1,8 @@
 //! Every kind of model that a study can name.
 //!
 //! The list is what a setup's kind is looked up in, what the `models` command prints, and what the family tests run over. A
-//! model is listed by the crate of its family; the families are listed here. Next file to read: [`crate::native`] for the
-//! built-in models, [`crate::equations`] for models written in a study.
+//! model is listed by the crate of its family; the families are listed here. Next files to read: [`crate::build`],
+//! and in `models/core` `native_models.rs` for lists and `equations.rs` for models written in a study.
 
 use std::collections::HashSet;
 

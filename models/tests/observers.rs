@@ -4,6 +4,7 @@
 mod common;
 
 use common::{kinds, largest_difference, run, run_in_pieces, setup, window};
+use starlings_models::observer;
 use starlings_models::{BuildSetup, ModelDef, ObserverDef, Setup, Window};
 
 fn nudged(setup: &Setup, gain: f64) -> Setup {
@@ -11,20 +12,32 @@ fn nudged(setup: &Setup, gain: f64) -> Setup {
     Setup { observer, ..setup.clone() }
 }
 
+/// Every model that can host the observer as it is, with what a run of it needs.
+fn hosts(observer: &str, gain: f64) -> Vec<(String, Setup, Vec<f64>)> {
+    let of_kind = |kind: String| {
+        let (setup, theta) = setup(&kind);
+        let observer = ObserverDef { kind: observer.to_owned(), gain, ..ObserverDef::default() };
+        let setup = Setup { observer, ..setup };
+        setup.build().is_ok().then_some((kind, setup, theta))
+    };
+    kinds().into_iter().filter_map(of_kind).collect()
+}
+
 #[test]
 fn on_noise_free_data_of_the_true_model_the_prediction_does_not_move_with_the_gain() {
-    for kind in kinds() {
-        let (setup, theta) = setup(&kind);
-        let mut window = window(&setup, 40);
-        let truth = run(&*setup.build().unwrap(), &window, &theta);
-        window.observed.clone_from(&truth.outputs);
+    for observer in observer::kinds() {
+        let hosts_of = |gain| hosts(observer.kind, gain);
+        assert!(!hosts_of(0.1).is_empty(), "no model of the list hosts `{}`", observer.kind);
         for gain in [0.1, 10.0, 1e6] {
-            // Bitwise: every innovation is exactly zero.
-            assert_eq!(
-                run(&*nudged(&setup, gain).build().unwrap(), &window, &theta),
-                truth,
-                "{kind}, gain {gain}"
-            );
+            for (kind, setup, theta) in hosts_of(gain) {
+                let mut window = window(&setup, 40);
+                let free = Setup { observer: ObserverDef::default(), ..setup.clone() };
+                let truth = run(&*free.build().unwrap(), &window, &theta);
+                window.observed.clone_from(&truth.outputs);
+                // Bitwise: every innovation is exactly zero.
+                let observed = run(&*setup.build().unwrap(), &window, &theta);
+                assert_eq!(observed, truth, "{kind} with {}, gain {gain}", observer.kind);
+            }
         }
     }
 }

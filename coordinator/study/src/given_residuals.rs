@@ -5,8 +5,6 @@
 //! in residuals and slopes alike. The arithmetic is in the `sandwich` module of `starlings-estimators`. None of this enters the
 //! posterior. Next file to read: [`crate::summary`].
 
-use std::sync::Arc;
-
 use nalgebra::{DMatrix, DVector};
 use starlings_estimators::{DataPoint, Gaussian, Residuals};
 
@@ -40,10 +38,7 @@ pub(crate) fn compare(
         return Ok(GivenResiduals::Unknown(why.to_owned()));
     }
     let sd = posterior::standard_deviations(posterior);
-    let windows: StepWindows = (0..study.records.len())
-        .filter(|record| study.records[*record].is_trained())
-        .map(|record| (record, Arc::new(study.whole(record, true))))
-        .collect();
+    let windows = study.trained_windows();
     for side in [1.0, -1.0] {
         let theta = DMatrix::from_fn(sd.len(), study.parameters.len() + 1, |j, particle| {
             let moved = particle == study.theta[j].parameter + 1;
@@ -63,10 +58,7 @@ fn run(
     theta: &DMatrix<f64>,
     windows: &StepWindows,
 ) -> Result<Option<DMatrix<f64>>, RunError> {
-    let particles: Vec<usize> = (0..theta.ncols()).collect();
-    let states = vec![None; runner.study().records.len()];
-    let results =
-        runner.run(runner::AnalysisIndex { pass: 0, step: 3 }, &particles, theta, &states, windows)?;
+    let results = runner.run_from_start(runner::AnalysisIndex { pass: 0, step: 3 }, theta, windows)?;
     if results.iter().flatten().any(Result::is_err) {
         return Ok(None);
     }

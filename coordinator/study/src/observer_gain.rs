@@ -4,15 +4,13 @@
 //! the spacings at which the filter's own runs are corrected. None of this enters the posterior. Next file to read:
 //! [`crate::fit::free_run`].
 
-use std::collections::HashMap;
-use std::sync::Arc;
-
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use starlings_estimators::Gaussian;
 use starlings_models::{Failure, Window};
+use std::collections::HashMap;
 
-use super::fit::runner::{AnalysisIndex, EnsembleRunner, StepWindows};
+use super::fit::runner::{AnalysisIndex, EnsembleRunner};
 use super::store::PredictionRow;
 use super::{RunError, Study};
 
@@ -75,11 +73,9 @@ pub(crate) fn compare(
     if study.observer_is_off() {
         return Ok(Compared::NoObserver);
     }
-    let trained = (0..study.records.len()).filter(|record| study.records[*record].is_trained());
-    let windows: StepWindows = trained.map(|record| (record, Arc::new(study.whole(record, true)))).collect();
+    let windows = study.trained_windows();
     let theta = DMatrix::from_column_slice(posterior.mean.len(), 1, posterior.mean.as_slice());
-    let states = vec![None; study.records.len()];
-    let results = runner.run(AnalysisIndex { pass: 0, step: 1 }, &[0], &theta, &states, &windows)?;
+    let results = runner.run_from_start(AnalysisIndex { pass: 0, step: 1 }, &theta, &windows)?;
     let mut courses = Vec::new();
     let mut sums = Sums::default();
     for ((record, window), result) in windows.iter().zip(results.into_iter().flatten()) {

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use starlings_models::{Signal, Window};
 
 use super::checked::{Record, Study};
+use crate::fit::runner::StepWindows;
 
 impl Study {
     /// The training windows of a record, `every` observation times each; none for a held-out record.
@@ -45,6 +46,12 @@ impl Study {
             observed: vec![f64::NAN; of_record.times.len() * self.setup.outputs.len()],
             inputs: of_record.inputs.clone(),
         }
+    }
+
+    /// Every trained record from its start, each with its number, as [`Study::whole`] gives it to a fit of the whole record.
+    pub(crate) fn trained_windows(&self) -> StepWindows {
+        let trained = (0..self.records.len()).filter(|record| self.records[*record].is_trained());
+        trained.map(|record| (record, Arc::new(self.whole(record, true)))).collect()
     }
 
     /// The window that is asked for where this one is wanted from the record's start: all times of the record where the solver

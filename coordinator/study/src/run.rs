@@ -5,9 +5,8 @@
 
 use std::sync::mpsc::Receiver;
 
-use starlings_estimators::{EstimatorError, Form, Gaussian};
-use starlings_fleet::{Fleet, FleetError, FleetEvent};
-use starlings_models::Failure;
+use starlings_estimators::{Form, Gaussian};
+use starlings_fleet::{Fleet, FleetEvent};
 
 use super::constants::{self, HangsOn};
 use super::fit::{batch, filter, free_run};
@@ -15,83 +14,12 @@ use super::given_residuals::{self, GivenResiduals};
 use super::identify::IdentifyError;
 use super::store::{Store, StoreError};
 use super::summary::Summary;
-use super::{Study, observer_gain, summary, warnings};
+use super::{RunError, Study, observer_gain, summary, warnings};
 use crate::fit::runner::EnsembleRunner;
 use crate::observer_gain::Compared;
 use crate::store::folder::{OBSERVER, RunFolder};
 use crate::store::json::json;
 use crate::store::snapshot::{Counts, Snapshot};
-
-/// Why a run ended without a result.
-#[derive(Debug, thiserror::Error)]
-pub enum RunError {
-    /// The fleet failed as a whole.
-    #[error(transparent)]
-    Fleet(#[from] FleetError),
-    /// The store failed.
-    #[error(transparent)]
-    Store(#[from] StoreError),
-    /// The estimator could not go on.
-    #[error(transparent)]
-    Estimator(#[from] EstimatorError),
-    /// A sigma point failed at every distance from the mean and the others do not span the parameters.
-    #[error(
-        "sigma point {particle} of pass {pass}, step {step} failed even next to the mean ({values}): {cause}; {source}"
-    )]
-    SigmaPointLost {
-        /// Index of the sigma point.
-        particle: usize,
-        /// Pass, from 1.
-        pass: usize,
-        /// Step within the pass.
-        step: usize,
-        /// Its parameters in physical units.
-        values: String,
-        /// Why its run failed.
-        cause: String,
-        /// What the estimator advises.
-        source: EstimatorError,
-    },
-    /// A run has no usable answer, and the model did not fail.
-    #[error(
-        "the run of particle {particle} over record `{record}`{} has no usable answer: {reason}",
-        in_brackets(values)
-    )]
-    NoAnswer {
-        /// Index of the sigma point.
-        particle: usize,
-        /// Record name.
-        record: String,
-        /// Its parameters in physical units; empty where they are not known.
-        values: String,
-        /// What is wrong with the answer.
-        reason: String,
-    },
-    /// A figure of the result is no finite number.
-    #[error(
-        "the {0} of the result is not a finite number: the priors or the noise are out of all proportion to the data"
-    )]
-    NotFinite(String),
-    /// The model fails at the estimate itself.
-    #[error("the model fails with the estimated parameters on record `{record}`: {source}")]
-    FinalRun {
-        /// Record name.
-        record: String,
-        /// Why.
-        source: Failure,
-    },
-}
-
-impl RunError {
-    /// Whether the work was cancelled; false when it failed.
-    pub fn is_cancelled(&self) -> bool {
-        matches!(self, Self::Fleet(FleetError::Cancelled))
-    }
-}
-
-fn in_brackets(values: &str) -> String {
-    if values.is_empty() { String::new() } else { format!(" ({values})") }
-}
 
 /// What a fit leaves behind.
 #[derive(Clone, Debug)]

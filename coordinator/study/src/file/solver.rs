@@ -147,7 +147,8 @@ fn output_keys(adapter: Option<&AdapterDef>) -> &'static [&'static str] {
 
 fn adapter(source: &Source, t: &Table<'_>, adapters: &[AdapterDef]) -> String {
     let Some(word) = t.text("adapter") else { return "grpc".to_owned() };
-    if adapters.iter().all(|known| known.name != word.get_ref()) {
+    // Where no solver can be reached at all, the one that is asked for its description says so.
+    if !adapters.is_empty() && adapters.iter().all(|known| known.name != word.get_ref()) {
         let valid: Vec<String> = adapters.iter().map(|adapter| adapter.name.to_owned()).collect();
         source.report_unknown(word.span(), format!("unknown adapter `{}`", word.get_ref()), &valid);
     }

@@ -27,10 +27,7 @@ pub(crate) fn fit(
     resumed: Option<Snapshot>,
 ) -> Result<Fit, RunError> {
     let study = runner.study();
-    let windows: StepWindows = (0..study.records.len())
-        .filter(|record| study.records[*record].is_trained())
-        .map(|record| (record, Arc::new(study.whole(record, true))))
-        .collect();
+    let windows = study.trained_windows();
     let blocks = blocks(study, &windows);
     let n_point_param = blocks.first().map_or(study.theta.len(), |block| block.parameters.len());
     let batch = Batch {
@@ -125,9 +122,7 @@ fn run_ensemble(
     windows: &StepWindows,
 ) -> Result<Results, RunError> {
     let before = runner.counts;
-    let everyone: Vec<usize> = (0..theta.ncols()).collect();
-    let states = vec![None; now.states.len()];
-    let results = runner.run(at, &everyone, theta, &states, windows)?;
+    let results = runner.run_from_start(at, theta, windows)?;
     now.figures.counts.add_since(before, runner.counts);
     Ok(results)
 }

@@ -24,8 +24,7 @@ pub(crate) fn run(
     let windows: StepWindows =
         (0..study.records.len()).map(|record| (record, Arc::new(study.whole(record, false)))).collect();
     let theta = DMatrix::from_column_slice(posterior.mean.len(), 1, posterior.mean.as_slice());
-    let states = vec![None; study.records.len()];
-    let results = runner.run(AnalysisIndex { pass: 0, step: 0 }, &[0], &theta, &states, &windows)?;
+    let results = runner.run_from_start(AnalysisIndex { pass: 0, step: 0 }, &theta, &windows)?;
     let mut rows = Vec::new();
     for ((record, window), result) in windows.iter().zip(results.into_iter().flatten()) {
         let prediction = result

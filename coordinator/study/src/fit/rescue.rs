@@ -41,7 +41,7 @@ pub(crate) fn forecast(
     let results = runner.run(at, &everyone, &particles.theta, states, windows)?;
     let mut forecast = Forecast { particles, results, rescued: 0 };
     for particle in everyone {
-        if failure(&forecast.results[particle]).is_some() {
+        if forecast.results[particle].iter().any(Result::is_err) {
             rescue(runner, filter, &mut forecast, states, windows, at, particle)?;
             forecast.rescued += 1;
         }
@@ -67,7 +67,7 @@ fn rescue(
         forecast.particles = pulled;
         let mut retried = runner.run(at, &[particle], &forecast.particles.theta, states, windows)?;
         let of_particle = retried.swap_remove(0);
-        let failed = failure(&of_particle).is_some();
+        let failed = of_particle.iter().any(Result::is_err);
         forecast.results[particle] = of_particle;
         if !failed {
             return Ok(());
@@ -83,12 +83,6 @@ fn rescue(
             source,
         })?;
     Ok(())
-}
-
-fn failure(
-    of_particle: &[Result<starlings_models::Prediction, starlings_models::Failure>],
-) -> Option<String> {
-    of_particle.iter().find_map(|r| r.as_ref().err().map(ToString::to_string))
 }
 
 /// The first failure among a particle's windows, with its record.

@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
-use starlings_fleet::{Fleet, FleetError, Outcome, SetupId};
+use starlings_fleet::{Fleet, Outcome, SetupId};
 use starlings_models::{BuildSetup, Failure, Job, Prediction, Setup, Window};
 
 use super::timeouts::Timeouts;
@@ -116,28 +116,23 @@ impl<'a> EnsembleRunner<'a> {
         };
         let n_job = particles.len() * sent.len();
         self.counts.total += n_job as u64;
-        let mut outcomes = self.outcomes(at, n_job, job)?.into_iter();
-        let mut results = Vec::with_capacity(particles.len());
-        for &particle in particles {
-            let mut of_particle = Vec::with_capacity(windows.len());
-            for ((record, window), outcome) in windows.iter().zip(outcomes.by_ref()) {
-                self.rows.push(self.row(at, *record, particle, &outcome));
-                // A timeout that is repeated from the store has no worker.
-                if !outcome.worker.is_empty() && !self.workers.contains(&outcome.worker) {
-                    self.workers.insert(outcome.worker.clone());
-                }
-                self.counts.retried += u64::from(outcome.attempts.saturating_sub(1));
-                self.counts.failed += u64::from(outcome.result.is_err());
-                let mut result = outcome.result.map(|p| self.picked(*record, window, p));
-                if let Ok(prediction) = &mut result {
-                    self.check(prediction, *record, particle, theta, window)?;
-                    self.study.measure(*record, &window.times, &mut prediction.outputs);
-                }
-                of_particle.push(result);
-            }
-            results.push(of_particle);
-        }
-        Ok(results)
+        let outcomes = self.outcomes(at, n_job, job)?;
+        self.gather(at, outcomes, particles.iter().map(|&particle| (particle, particle)), theta, windows)
+    }
+
+    /// Runs all particles, the columns of `theta`, over windows that begin where their records do. Returns `[particle][window]`.
+    ///
+    /// # Errors
+    /// When the fleet fails as a whole.
+    pub(crate) fn run_from_start(
+        &mut self,
+        at: AnalysisIndex,
+        theta: &DMatrix<f64>,
+        windows: &StepWindows,
+    ) -> Result<Results, RunError> {
+        let everyone: Vec<usize> = (0..theta.ncols()).collect();
+        let states = vec![None; self.study.records.len()];
+        self.run(at, &everyone, theta, &states, windows)
     }
 
     /// Runs one particle over the windows with each of the setups, which differ from the study's in the model's numbers only.
@@ -165,21 +160,44 @@ impl<'a> EnsembleRunner<'a> {
             }
         }
         self.counts.total += jobs.len() as u64;
-        let outcomes = self.fleet.run_mixed(jobs).map_err(|error| told(self.study, error, |_| None))?;
+        let outcomes =
+            self.fleet.run_mixed(jobs).map_err(|error| RunError::of_fleet(self.study, error, |_| None))?;
+        self.gather(at, outcomes, (0..setups.len()).map(|setup| (setup, 0)), theta, windows)
+    }
+
+    /// Counts and notes the outcomes of the particles, each given with its column of `theta`, window after window, and takes from
+    /// every prediction what the channels measure. Returns `[particle in the order given][window]`.
+    fn gather(
+        &mut self,
+        at: AnalysisIndex,
+        outcomes: Vec<Outcome>,
+        particles: impl Iterator<Item = (usize, usize)>,
+        theta: &DMatrix<f64>,
+        windows: &StepWindows,
+    ) -> Result<Results, RunError> {
         let mut outcomes = outcomes.into_iter();
-        let mut results = Vec::with_capacity(setups.len());
-        for particle in 0..setups.len() {
-            let mut of_setup = Vec::with_capacity(windows.len());
+        let mut results = Vec::with_capacity(particles.size_hint().0);
+        for (particle, column) in particles {
+            let mut of_particle = Vec::with_capacity(windows.len());
             for ((record, window), outcome) in windows.iter().zip(outcomes.by_ref()) {
                 self.rows.push(self.row(at, *record, particle, &outcome));
-                let mut result = outcome.result.map(|p| self.picked(*record, window, p));
+                // A timeout that is repeated from the store has no worker.
+                if !outcome.worker.is_empty() && !self.workers.contains(&outcome.worker) {
+                    self.workers.insert(outcome.worker.clone());
+                }
+                self.counts.retried += u64::from(outcome.attempts.saturating_sub(1));
+                self.counts.failed += u64::from(outcome.result.is_err());
+                let mut result = outcome.result;
                 if let Ok(prediction) = &mut result {
-                    self.check(prediction, *record, 0, theta, window)?;
+                    // Of what the solver gave, the outputs that the study asked for.
+                    let given = std::mem::take(&mut prediction.outputs);
+                    prediction.outputs = self.study.picked(*record, window, given);
+                    self.check(prediction, *record, column, theta, window)?;
                     self.study.measure(*record, &window.times, &mut prediction.outputs);
                 }
-                of_setup.push(result);
+                of_particle.push(result);
             }
-            results.push(of_setup);
+            results.push(of_particle);
         }
         Ok(results)
     }
@@ -187,12 +205,6 @@ impl<'a> EnsembleRunner<'a> {
     /// The window that a job carries: what the solver answers for, with what an observer knows.
     fn sent(&self, record: usize, window: &Arc<Window>) -> Arc<Window> {
         self.study.sendable(record, &self.study.asked(record, window))
-    }
-
-    /// The outputs that the study asked for, of those that the solver gave.
-    fn picked(&self, record: usize, window: &Window, prediction: Prediction) -> Prediction {
-        let outputs = self.study.picked(record, window, prediction.outputs);
-        Prediction { outputs, ..prediction }
     }
 
     /// One outcome per job; those that are known to be timeouts are not run.
@@ -216,7 +228,9 @@ impl<'a> EnsembleRunner<'a> {
         }
         let outcomes = self.fleet.run(self.setup, open.iter().map(|index| job(*index)).collect());
         let values = |at: usize| open.get(at).map(|index| named(self.study, &job(*index).theta));
-        for (index, outcome) in open.iter().zip(outcomes.map_err(|error| told(self.study, error, values))?) {
+        for (index, outcome) in
+            open.iter().zip(outcomes.map_err(|error| RunError::of_fleet(self.study, error, values))?)
+        {
             if let (Some(timeouts), Err(Failure::Timeout(timeout))) = (&mut timeouts, &outcome.result) {
                 timeouts.keep(&self.setup, &job(*index), timeout)?;
             }
@@ -278,17 +292,5 @@ impl<'a> EnsembleRunner<'a> {
     /// The study that is run.
     pub(crate) fn study(&self) -> &'a Study {
         self.study
-    }
-}
-
-/// A fleet's failure, with names and values where it is about one run.
-fn told(study: &Study, error: FleetError, values: impl Fn(usize) -> Option<String>) -> RunError {
-    match error {
-        FleetError::NoAnswer { job, particle, record, reason } => {
-            let (record, values) =
-                (study.records[record as usize].name.clone(), values(job).unwrap_or_default());
-            RunError::NoAnswer { particle: particle as usize, record, values, reason }
-        }
-        other => other.into(),
     }
 }

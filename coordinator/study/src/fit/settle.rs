@@ -7,8 +7,6 @@
 //! drawn together and the pass is repeated. No state is kept that a snapshot would have to hold beside the ensemble: a resume
 //! repeats the decision between two passes. Next file to read: [`super::filter`].
 
-use std::sync::Arc;
-
 use nalgebra::DMatrix;
 
 use super::runner::{AnalysisIndex, EnsembleRunner, StepWindows};
@@ -79,12 +77,11 @@ struct Search<'a> {
 impl<'a> Search<'a> {
     fn new(schedule: &'a Schedule<'a>, now: &'a Snapshot<Ensemble>, reported: &Reported) -> Self {
         let study = schedule.study;
-        let trained = (0..study.records.len()).filter(|record| study.records[*record].is_trained());
         Self {
             schedule,
             now,
             found: reported.posterior.mean.iter().copied().collect(),
-            windows: trained.map(|record| (record, Arc::new(study.whole(record, true)))).collect(),
+            windows: study.trained_windows(),
         }
     }
 
@@ -115,9 +112,7 @@ impl<'a> Search<'a> {
             if lengths[k] >= 1.0 { self.found[j] } else { from[j] + lengths[k] * (self.found[j] - from[j]) }
         });
         let at = AnalysisIndex { pass: self.now.figures.pass + 1, step: self.now.figures.step };
-        let everyone: Vec<usize> = (0..lengths.len()).collect();
-        let states = vec![None; self.schedule.study.records.len()];
-        let results = runner.run(at, &everyone, &theta, &states, &self.windows)?;
+        let results = runner.run_from_start(at, &theta, &self.windows)?;
         let prior = posterior::prior(self.schedule.study);
         let point = |(k, of_point): (usize, &Vec<Result<_, _>>)| {
             let at = theta.column(k);

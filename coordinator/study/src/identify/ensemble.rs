@@ -87,24 +87,20 @@ pub(crate) fn run_with(
     let points = Around { study, centre, set, scale: spread(study) / reach };
     let observed = windows(study, Seen::AsFitted);
     let sent = windows(study, seen);
-    let everyone: Vec<usize> = (0..points.set.n_particle()).collect();
-    let states = vec![None; study.records.len()];
-    let results =
-        runner.run(AnalysisIndex { pass: 0, step: 2 }, &everyone, &points.theta(), &states, &sent)?;
+    let results = runner.run_from_start(AnalysisIndex { pass: 0, step: 2 }, &points.theta(), &sent)?;
     points.check(&results, &sent)?;
     let (rows, predictions) = points.gather(&observed, &results)?;
     let whitened = points.whitened(&rows, &predictions)?;
-    Ok(Response { rows, whitened, runs: (everyone.len() * sent.len()) as u64 })
+    Ok(Response { rows, whitened, runs: (points.set.n_particle() * sent.len()) as u64 })
 }
 
 /// Every trained record from its start.
 pub fn windows(study: &Study, seen: Seen) -> StepWindows {
-    let trained = (0..study.records.len()).filter(|record| study.records[*record].is_trained());
-    let window = |record: usize| {
-        let window = study.whole(record, true);
-        if seen == Seen::Freely { freed(&window) } else { window }
-    };
-    trained.map(|record| (record, Arc::new(window(record)))).collect()
+    let mut windows = study.trained_windows();
+    if seen == Seen::Freely {
+        windows.iter_mut().for_each(|(_, window)| *window = Arc::new(freed(window)));
+    }
+    windows
 }
 
 /// What one run of every window predicts of the given rows; `None` when a run failed or a value is not finite.
