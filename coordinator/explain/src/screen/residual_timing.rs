@@ -86,7 +86,6 @@ fn training(rows: &Rows) -> Vec<std::ops::Range<usize>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rows::Row;
 
     fn rows(f: impl Fn(f64) -> f64) -> (Rows, Vec<f64>) {
         let mut rows = Rows::sample(300, |_| Usage::Train);

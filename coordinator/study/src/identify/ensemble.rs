@@ -98,7 +98,9 @@ pub(crate) fn run_with(
 pub fn windows(study: &Study, seen: Seen) -> StepWindows {
     let mut windows = study.trained_windows();
     if seen == Seen::Freely {
-        windows.iter_mut().for_each(|(_, window)| *window = Arc::new(freed(window)));
+        for (_, window) in &mut windows {
+            *window = Arc::new(freed(window));
+        }
     }
     windows
 }
