@@ -2,11 +2,12 @@
 //!
 //! `proto/fleet.proto` says what travels between coordinator and worker, `proto/solver.proto` between a worker and a solver
 //! outside, in which unit and shape. [`generated`] and [`generated_solver`] are generated from them; [`convert`] alone looks inside
-//! and checks and translates them. No socket and no scheduling here. Next file to read: [`convert`].
+//! and checks and translates them; [`socket`] is the connection of workers that one process started. No scheduling here. Next file to read: [`convert`].
 
 pub mod adapters;
 mod codec;
 pub mod convert;
+pub mod socket;
 pub mod spent;
 pub mod words;
 

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use hyper_util::rt::TokioIo;
 use starlings_proto::generated::{self, fleet_client::FleetClient};
+use starlings_proto::socket::SocketEnd;
 use starlings_proto::words::{causes, status_text};
 use starlings_proto::{
     FRAME_SIZE, FromWorker, Hello, INHERITED, MAX_MESSAGE, ReceivedWindows, ToWorker, Welcome,
@@ -77,10 +78,7 @@ impl Way {
         match self {
             Self::Dialled(endpoint) => endpoint.connect().await.map_err(|error| causes(&error)),
             Self::Inherited(endpoint, socket) => {
-                let socket = socket.try_clone().and_then(|socket| {
-                    socket.set_nonblocking(true)?;
-                    tokio::net::UnixStream::from_std(socket)
-                });
+                let socket = socket.try_clone().and_then(SocketEnd::new);
                 let mut socket = Some(socket);
                 let connect = move |_: Uri| {
                     let taken =

@@ -41,6 +41,8 @@ struct Shared {
 #[derive(Default)]
 struct Queue {
     tasks: VecDeque<Task>,
+    /// Threads that wait for a task.
+    idle: usize,
     closed: bool,
 }
 
@@ -74,8 +76,14 @@ impl Slots {
     }
 
     pub(crate) fn push(&self, task: Task) {
-        self.shared.lock().tasks.push_back(task);
-        self.shared.filled.notify_one();
+        let mut queue = self.shared.lock();
+        queue.tasks.push_back(task);
+        let waited_for = queue.idle > 0;
+        drop(queue);
+        // Each notice is a call of the system, also where nobody waits.
+        if waited_for {
+            self.shared.filled.notify_one();
+        }
     }
 
     /// Answers the given leases as withdrawn where they have not started.
@@ -129,7 +137,9 @@ impl Shared {
             if let Some(task) = queue.tasks.pop_front() {
                 return Some(task);
             }
+            queue.idle += 1;
             queue = self.filled.wait(queue).unwrap_or_else(PoisonError::into_inner);
+            queue.idle -= 1;
         }
     }
 

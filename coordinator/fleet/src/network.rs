@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use starlings_proto::generated::fleet_server::FleetServer;
+use starlings_proto::socket::SocketEnd;
 use starlings_proto::words::{causes, panic_words};
 use starlings_proto::{FRAME_SIZE, MAX_MESSAGE};
 use tokio::sync::mpsc::UnboundedReceiver;
@@ -75,10 +76,7 @@ pub(super) fn run(
                 .max_frame_size(FRAME_SIZE)
                 .add_service(service.clone())
         };
-        let inherited = UnboundedReceiverStream::new(adopted).map(|end| {
-            end.set_nonblocking(true)?;
-            tokio::net::UnixStream::from_std(end)
-        });
+        let inherited = UnboundedReceiverStream::new(adopted).map(SocketEnd::new);
         let listening = async {
             match listened {
                 Some(listener) => {
