@@ -12,6 +12,8 @@ mod expand;
 pub mod field;
 mod file;
 mod fit;
+#[cfg(fuzzing)]
+pub mod fuzzing;
 mod given_residuals;
 pub mod identify;
 mod observer_gain;

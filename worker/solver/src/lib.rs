@@ -11,6 +11,8 @@ mod clear;
 pub mod conformance;
 mod core_slots;
 mod error;
+#[cfg(fuzzing)]
+pub mod fuzzing;
 mod guard;
 pub mod instance;
 mod losses;

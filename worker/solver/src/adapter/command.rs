@@ -8,15 +8,6 @@
 mod fault;
 mod inspect;
 
-/// What it says of itself.
-pub(crate) const DEF: AdapterDef = AdapterDef {
-    name: "command",
-    says: "a program started for every run; input files from templates, outputs by rule, no code",
-    describes_itself: false,
-    per_run: true,
-    named_by: NamedBy::Command("program and arguments, such as `[\"./beam\", \"input.txt\"]`"),
-    keys: &["parameters", "outputs", "inputs", "templates", "copies"],
-};
 pub(super) mod json;
 mod program;
 mod request;
@@ -49,6 +40,15 @@ use rule::{Rule, lies_inside};
 use template::{OWN_NAMES, Templates};
 use traces::{kept, said};
 
+/// What it says of itself.
+pub(crate) const DEF: AdapterDef = AdapterDef {
+    name: "command",
+    says: "a program started for every run; input files from templates, outputs by rule, no code",
+    describes_itself: false,
+    per_run: true,
+    named_by: NamedBy::Command("program and arguments, such as `[\"./beam\", \"input.txt\"]`"),
+    keys: &["parameters", "outputs", "inputs", "templates", "copies"],
+};
 /// A program started for every run.
 ///
 /// # Errors
@@ -285,4 +285,35 @@ fn rules(reads: &BTreeMap<String, String>, spec: &Spec) -> Result<BTreeMap<Strin
         rules.insert(name.clone(), rule);
     }
     Ok(rules)
+}
+
+#[cfg(fuzzing)]
+pub(crate) mod fuzzing {
+    //! What the fuzzer reaches.
+
+    use std::collections::BTreeMap;
+
+    use super::program::Output;
+    use super::results::RunResults;
+    use super::rule::{Rule, STANDARD_OUTPUT};
+    use super::template::Templates;
+
+    /// Reads two outputs at two times by a rule of the standard output.
+    pub(crate) fn results(rule: &str, written: &str) {
+        let Ok(rule) = Rule::parse(rule, "y") else { return };
+        // A file would have to be written for every try.
+        if rule.file() != STANDARD_OUTPUT {
+            return;
+        }
+        let output = Output { bytes: written.as_bytes().to_vec(), cut: false };
+        let nowhere = std::path::Path::new("/nonexistent");
+        if let Ok(values) = RunResults::new(nowhere, &output).values(&rule, 2, &[0.0, 1.0]) {
+            assert_eq!(values.len(), 4);
+        }
+    }
+
+    /// Reads a template.
+    pub(crate) fn template(text: &str) {
+        let _ = Templates::parsed(&BTreeMap::from([("input.txt".to_owned(), text.to_owned())]));
+    }
 }
