@@ -26,6 +26,7 @@ pub use starlings_models::Factory;
 pub use starlings_proto::access::AccessError;
 pub use starlings_proto::{INHERITED, LIFELINE, MAX_SLOTS};
 use way::Way;
+pub use way::check_address;
 
 /// What a worker did until it ended.
 #[derive(Clone, Debug, PartialEq, Eq)]

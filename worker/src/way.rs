@@ -218,6 +218,14 @@ fn is_other_server(error: &tonic::transport::Error) -> bool {
     false
 }
 
+/// Whether this is an address that could be dialled.
+///
+/// # Errors
+/// When it is none.
+pub fn check_address(address: &str) -> Result<(), WorkerError> {
+    uri(address, "https").map(drop)
+}
+
 fn uri(address: &str, scheme: &str) -> Result<Uri, WorkerError> {
     let bad = || WorkerError::BadAddress { address: address.to_owned() };
     let bare = address.strip_prefix(&format!("{scheme}://")).unwrap_or(address);
