@@ -185,10 +185,15 @@ fn a_handshake_that_trickles_in_is_cut_off_after_its_limit() {
 #[test]
 fn a_caller_that_is_silent_after_its_handshake_is_cut_off_after_its_limit() {
     let door = Guarded::new();
-    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build().unwrap();
-    let channel = runtime.block_on(endpoint(&door).connect()).unwrap();
+    let endpoint = endpoint(&door);
+    std::thread::spawn(move || {
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+        runtime.block_on(async {
+            let _silent = endpoint.connect().await.unwrap();
+            std::future::pending::<()>().await;
+        });
+    });
     door.await_refusal("in time");
-    drop(channel);
     door.assert_nobody_joined();
 }
 

@@ -96,9 +96,9 @@ impl File {
         })
     }
 
-    /// How a worker ends that finds no coordinator within a moment.
+    /// How a worker ends that tries once.
     pub fn tried(&self) -> Result<WorkerReport, WorkerError> {
-        self.worker(|config| config.patience = Duration::from_millis(200)).end()
+        self.worker(|config| config.patience = Duration::ZERO).end()
     }
 }
 
