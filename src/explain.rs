@@ -19,7 +19,7 @@ use starlings_coordinator::study::{RunFolder, Study};
 
 use crate::console::{line, note};
 use crate::failure::Failure;
-use crate::fleet_session::{FleetArgs, FleetSession};
+use crate::fleet_session::{FleetArgs, FleetSession, Out};
 use crate::interrupt;
 use crate::load::load;
 use crate::progress::Display;
@@ -84,7 +84,7 @@ impl Args {
 pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     interrupt::watch();
     let study = load(&args.study)?;
-    let plan = args.fleet.plan(&study)?;
+    let plan = args.fleet.plan(&study, Some(&Out(args.out.as_deref())))?;
     let options = args.options(&study);
     check(&study, &options).map_err(Failure::input)?;
     trial(&study).map_err(Failure::input)?;
@@ -97,7 +97,7 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
         note(format_args!("the explanation in {path} is finished already; writing its files again"));
         return write(&folder, args.json);
     }
-    session.start_workers(&study, &plan)?;
+    session.start_workers(&study, &plan, Some(&folder.path))?;
     let mut watch = |stage: &Stage| display.stage(stage);
     let clock = move || started.elapsed().as_secs_f64();
     let earlier_s = folder.store.elapsed_s().map_err(Failure::run)?;

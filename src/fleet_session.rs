@@ -2,12 +2,15 @@
 //!
 //! Shared by every command that runs the model on the fleet. Next file to read: [`crate::run`].
 
-use std::net::{SocketAddr, ToSocketAddrs};
+use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
+use std::path::{Path, PathBuf};
+
 use clap::Args;
-use starlings_coordinator::fleet::{FleetConfig, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers};
+use starlings_coordinator::fleet::access::{Access, AccessFault};
+use starlings_coordinator::fleet::{FleetConfig, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers, Refused};
 use starlings_coordinator::study::Study;
 use tokio_util::sync::CancellationToken;
 
@@ -27,8 +30,12 @@ pub(crate) struct FleetArgs {
     /// Wait for workers to dial this address (HOST:PORT, port 0 picks a free one) instead of starting local ones.
     #[arg(long, value_name = "ADDR")]
     listen: Option<String>,
-    /// Allow --listen beyond loopback although the connection is neither encrypted nor authenticated.
-    #[arg(long)]
+    /// With --listen: write what workers need to find and to prove themselves into this file; access.json in the run folder
+    /// without it. Where it exists its secrets are used again, so that copies of it stay good over several commands.
+    #[arg(long, value_name = "FILE", requires = "listen")]
+    access: Option<PathBuf>,
+    /// With --listen: take whoever connects, without encryption or proof.
+    #[arg(long, requires = "listen", conflicts_with = "access")]
     insecure: bool,
 }
 
@@ -36,42 +43,78 @@ pub(crate) struct FleetArgs {
 pub(crate) struct Plan {
     /// Where to listen; `None` for local workers, which have their connections from this process.
     address: Option<SocketAddr>,
+    /// The name of the host to listen on, where it was given by name.
+    host: Option<String>,
+    /// Where the access file goes; `None` without one.
+    access: Option<AccessPlan>,
     /// Workers to start where it does not listen.
     n_worker: usize,
 }
 
+/// Where an access file goes.
+enum AccessPlan {
+    /// Here.
+    File(PathBuf),
+    /// Into the run folder, which is made later.
+    RunFolder,
+}
+
+/// Name of the access file in a run folder.
+const ACCESS: &str = "access.json";
+
 impl FleetArgs {
-    /// Checks the arguments; nothing is started yet.
-    pub(crate) fn plan(&self, study: &Study) -> Result<Plan, Failure> {
+    /// Checks the arguments; nothing is started yet. `out` is the run folder where it is named, `None` for a command that makes
+    /// none.
+    pub(crate) fn plan(&self, study: &Study, out: Option<&Out<'_>>) -> Result<Plan, Failure> {
         let n_worker = self.workers.unwrap_or(study.fleet.workers);
         if n_worker == 0 {
             return Err(Failure::input(
                 "--workers must be at least 1 (or use --listen ADDR and start workers elsewhere)",
             ));
         }
-        let address = self.listen.as_deref().map(|text| self.address(text)).transpose()?;
-        Ok(Plan { address, n_worker })
+        let address = self.listen.as_deref().map(address).transpose()?;
+        let named = self.listen.as_deref().and_then(|text| Some(text.rsplit_once(':')?.0.to_owned()));
+        let host = named.filter(|host| host.trim_matches(['[', ']']).parse::<IpAddr>().is_err());
+        let access = match (address, self.insecure) {
+            (Some(_), false) => Some(self.access_plan(out)?),
+            _ => None,
+        };
+        Ok(Plan { address, host, access, n_worker })
     }
 
-    /// Where to listen, as it was asked for.
-    fn address(&self, text: &str) -> Result<SocketAddr, Failure> {
-        let address = text.to_socket_addrs().ok().and_then(|mut all| all.next()).ok_or_else(|| {
-            Failure::input(format!("--listen {text}: expected HOST:PORT, such as 127.0.0.1:7000"))
-        })?;
-        if !address.ip().is_loopback() && !self.insecure {
-            return Err(Failure::input(format!(
-                "{address} is reachable from other machines, and the connection is neither encrypted nor authenticated in \
-                 this version: listen on 127.0.0.1, or accept it with --insecure on a network you trust"
-            )));
+    fn access_plan(&self, out: Option<&Out<'_>>) -> Result<AccessPlan, Failure> {
+        match (&self.access, out) {
+            (Some(file), _) => Ok(AccessPlan::File(file.clone())),
+            (None, Some(Out(Some(folder)))) => Ok(AccessPlan::File(folder.join(ACCESS))),
+            (None, Some(Out(None))) => Ok(AccessPlan::RunFolder),
+            (None, None) => Err(Failure::input(
+                "this command makes no run folder: say with --access FILE where the access file goes by which workers prove \
+                 themselves",
+            )),
         }
-        Ok(address)
     }
+}
+
+/// The run folder of a command, where it was named.
+pub(crate) struct Out<'a>(pub(crate) Option<&'a Path>);
+
+/// Where to listen, as it was asked for.
+fn address(text: &str) -> Result<SocketAddr, Failure> {
+    text.to_socket_addrs()
+        .ok()
+        .and_then(|mut all| all.next())
+        .ok_or_else(|| Failure::input(format!("--listen {text}: expected HOST:PORT, such as 127.0.0.1:7000")))
+}
+
+fn failed(fault: &AccessFault) -> Failure {
+    if fault.is_input() { Failure::input(format!("--access: {fault}")) } else { Failure::run(fault) }
 }
 
 /// The fleet of one run, its local workers, and the way of its events to the store.
 pub(crate) struct FleetSession {
     pub(crate) fleet: GrpcFleet,
     local: Option<LocalWorkers>,
+    access: Option<Access>,
     /// What happened, for the store.
     pub(crate) events: mpsc::Receiver<FleetEvent>,
     watcher: std::thread::JoinHandle<()>,
@@ -91,26 +134,35 @@ impl FleetSession {
         if let Some(attempts) = study.fleet.max_attempts {
             config.max_attempts = attempts;
         }
+        let access = match &plan.access {
+            None => None,
+            Some(AccessPlan::File(file)) => Some(Access::at(Some(file)).map_err(|fault| failed(&fault))?),
+            Some(AccessPlan::RunFolder) => Some(Access::at(None).map_err(|fault| failed(&fault))?),
+        };
+        config.secrets = access.as_ref().map(|access| access.secrets().clone());
         let fleet = GrpcFleet::listen(config).map_err(Failure::run)?;
         let display = Arc::clone(display);
-        let watcher = std::thread::spawn(move || relay(heard, &kept, &display));
-        Ok(Self { fleet, local: None, events, watcher })
+        let refused = fleet.refused();
+        let watcher = std::thread::spawn(move || relay(heard, &kept, &display, &refused));
+        Ok(Self { fleet, local: None, access, events, watcher })
     }
 
-    /// Starts the local workers, or says how to start others.
-    pub(crate) fn start_workers(&mut self, study: &Study, plan: &Plan) -> Result<(), Failure> {
+    /// Starts the local workers, or says how to start others; `folder` is the run folder, where there is one.
+    pub(crate) fn start_workers(
+        &mut self,
+        study: &Study,
+        plan: &Plan,
+        folder: Option<&Path>,
+    ) -> Result<(), Failure> {
         if let Some(address) = self.fleet.address() {
-            note(format_args!(
-                "listening on {address}; start workers with: starlings worker --connect {address}"
-            ));
-            return Ok(());
+            return self.invite(address, &study.name, plan, folder);
         }
         // Their places are the workers'.
         end_solvers();
         let slots = study.fleet.slots.unwrap_or(1).to_string();
         let config = LocalConfig {
             program: own_program().map_err(Failure::run)?,
-            args: ["worker", "--slots", &slots].map(str::to_owned).to_vec(),
+            args: ["worker", "--allow-commands-from-study", "--slots", &slots].map(str::to_owned).to_vec(),
             n: plan.n_worker,
             fleet: self.fleet.handle(),
         };
@@ -118,9 +170,42 @@ impl FleetSession {
         Ok(())
     }
 
+    /// Writes the access file, and says how to start workers.
+    fn invite(
+        &mut self,
+        address: SocketAddr,
+        run: &str,
+        plan: &Plan,
+        folder: Option<&Path>,
+    ) -> Result<(), Failure> {
+        let file = match &plan.access {
+            Some(AccessPlan::File(file)) => file.clone(),
+            Some(AccessPlan::RunFolder) => folder.unwrap_or(Path::new(".")).join(ACCESS),
+            None => {
+                note(format_args!(
+                    "warning: --insecure: nothing is encrypted, and whoever reaches {address} joins this run, reads its data and can \
+                     decide its result\nlistening on {address}; start workers with: starlings worker --connect {address} --insecure"
+                ));
+                return Ok(());
+            }
+        };
+        if let Some(access) = &mut self.access {
+            access.publish(&file, run, address, plan.host.as_deref()).map_err(|fault| failed(&fault))?;
+        }
+        let absolute = std::path::absolute(&file).unwrap_or(file);
+        let name = absolute.to_string_lossy();
+        let name = shell_words::quote(&name);
+        note(format_args!("listening on {address}; start workers with: starlings worker --access {name}"));
+        Ok(())
+    }
+
     /// Ends the fleet and its workers.
     pub(crate) fn close(self) {
-        let Self { fleet, local, watcher, .. } = self;
+        let Self { fleet, local, watcher, mut access, .. } = self;
+        // Before the workers leave: one that stays looks there for what comes next.
+        if let Some(access) = &mut access {
+            access.end();
+        }
         fleet.close();
         drop(local);
         // The relay ends with the last sender of events; a panic in it has been printed already.
@@ -129,10 +214,16 @@ impl FleetSession {
 }
 
 /// Shows the events that people should see at once and hands all of them on to the store.
-fn relay(heard: mpsc::Receiver<FleetEvent>, kept: &mpsc::Sender<FleetEvent>, display: &Display) {
+fn relay(
+    heard: mpsc::Receiver<FleetEvent>,
+    kept: &mpsc::Sender<FleetEvent>,
+    display: &Display,
+    refused: &Refused,
+) {
     for event in heard {
         if event.is_notable() {
-            display.say(&event.to_string());
+            let refused = refused.summary().filter(|_| matches!(event, FleetEvent::Waiting { .. }));
+            display.say(&refused.map_or(event.to_string(), |refused| format!("{event}; {refused}")));
         } else {
             tracing::info!(kind = event.kind(), "{event}");
         }

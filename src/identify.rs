@@ -49,7 +49,7 @@ pub(crate) struct Args {
 /// Runs the ensemble and prints what it says.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let mut study = load(&args.study)?;
-    let plan = args.fleet.plan(&study)?;
+    let plan = args.fleet.plan(&study, None)?;
     let outputs = [("--html", &args.html), ("--csv", &args.csv)];
     csv_file::check_outputs(&outputs, &study.text, &StudyLocation::Known(&study.file))?;
     let at = At::from_argument(&args.at);
@@ -57,7 +57,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     dry_run(&mut study, &BATCH, Depth::First).map_err(Failure::input)?;
     let display = Arc::new(Display::new(args.json));
     let mut session = FleetSession::listen(&study, &plan, &display)?;
-    session.start_workers(&study, &plan)?;
+    session.start_workers(&study, &plan, None)?;
     if !args.json {
         let records = study.records.iter().filter(|record| record.is_trained()).count();
         let runs = (2 * study.parameters.len() + 1) * records;

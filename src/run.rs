@@ -13,7 +13,7 @@ use starlings_coordinator::study::{Progress, RunContext, Summary, run as study_r
 
 use crate::console::{line, note, number, table};
 use crate::failure::Failure;
-use crate::fleet_session::{FleetArgs, FleetSession};
+use crate::fleet_session::{FleetArgs, FleetSession, Out};
 use crate::interrupt;
 use crate::load::load;
 use crate::progress::Display;
@@ -43,7 +43,7 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     interrupt::watch();
     let mut study = load(&args.study)?;
-    let plan = args.fleet.plan(&study)?;
+    let plan = args.fleet.plan(&study, Some(&Out(args.out.as_deref())))?;
     let kind = study.estimator.kind;
     dry_run(&mut study, kind, Depth::First).map_err(Failure::input)?;
     // Listen before the folder is made: a port in use must leave nothing behind.
@@ -58,7 +58,7 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
         report::write_files(&folder).map_err(Failure::run)?;
         return print(&summary, &folder.path, args.json);
     }
-    session.start_workers(&study, &plan)?;
+    session.start_workers(&study, &plan, Some(&folder.path))?;
     let mut watch = |p: &Progress| display.step(p);
     let clock = move || started.elapsed().as_secs_f64();
     let mut context = RunContext {

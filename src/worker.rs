@@ -1,4 +1,9 @@
 //! `starlings worker`: dial a coordinator and run its jobs until it says goodbye.
+//!
+//! Next files to read: [`contact`] for whom it works, [`permit`] for what it runs.
+
+mod contact;
+mod permit;
 
 use std::time::Duration;
 
@@ -10,18 +15,21 @@ use tokio_util::sync::CancellationToken;
 use crate::console::{cancel_on_signal, line};
 use crate::failure::Failure;
 use crate::solvers::{adapter_names, solvers};
+use contact::ContactArgs;
+use permit::{PermitArgs, here};
 
 /// Be a worker: dial the coordinator, run its jobs, hold nothing it needs.
+///
+/// It runs built-in models and equations. Programs that a study names are run only where --solver or --solver-from names them
+/// here, or --allow-commands-from-study permits all of them.
 #[derive(Parser)]
 pub(crate) struct Args {
-    /// Address of the coordinator, HOST:PORT.
-    #[arg(long, value_name = "ADDR", required_unless_present = "describe")]
-    connect: Option<String>,
-    /// The command that starts the solver on this machine, as a shell would take it apart; it replaces that of every study.
-    #[arg(long, value_name = "CMD")]
-    solver: Option<String>,
+    #[command(flatten)]
+    contact: ContactArgs,
+    #[command(flatten)]
+    permit: PermitArgs,
     /// Print what the solver says of itself as JSON, for `described` in a study, and do nothing else.
-    #[arg(long, requires = "solver", conflicts_with_all = ["connect", "slots", "once"])]
+    #[arg(long, requires = "solver", conflicts_with_all = ["connect", "access", "slots", "once"])]
     describe: bool,
     /// How the solver is reached, for --describe.
     #[arg(long, default_value = "grpc", value_name = "NAME", requires = "describe", value_parser = adapter_names())]
@@ -42,50 +50,33 @@ pub(crate) struct Args {
 
 /// Works until drained, cancelled or out of patience.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    let command = args.solver.as_deref().map(solver_command).transpose()?;
-    let Some(connect) = &args.connect else { return describe(&args.adapter, command.unwrap_or_default()) };
+    if !args.contact.is_given() {
+        return describe(&args.adapter, args.permit.command()?.unwrap_or_default());
+    }
     if args.slots.is_some_and(|n| n == 0 || n > MAX_SLOTS) {
         return Err(Failure::input(format!("--slots must be from 1 to {MAX_SLOTS}")));
     }
     let patience = Duration::try_from_secs_f64(args.patience)
         .map_err(|_| Failure::input("--patience must be a number of seconds, zero or more"))?;
+    let permit = args.permit.permit()?;
+    let contact = args.contact.config()?;
+    if !args.contact.is_inherited() {
+        args.permit.warn();
+    }
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let cancel = CancellationToken::new();
     cancel_on_signal(&cancel);
     let slots = args.slots.unwrap_or(cores);
-    let mut solvers = solvers()?.with_cores_after(args.place.saturating_mul(slots));
-    if let Some(command) = command {
-        solvers = solvers.with_command(command, here()?);
-    }
-    let config = WorkerConfig {
-        slots,
-        once: args.once,
-        patience,
-        cancel,
-        factory: solvers.factory(),
-        ..WorkerConfig::new(connect.clone())
-    };
+    let solvers = solvers()?.with_cores_after(args.place.saturating_mul(slots)).permitting(permit);
+    let config =
+        WorkerConfig { slots, once: args.once, patience, cancel, factory: solvers.factory(), ..contact };
     let report = starlings_worker::run(config).map_err(|error| match error {
         WorkerError::BadAddress { .. } => Failure::input(format!("--connect: {error}")),
+        WorkerError::Access(_) | WorkerError::Ended { .. } => Failure::input(format!("--access: {error}")),
         _ => Failure::run(error),
     })?;
     tracing::info!(predictions = report.predictions, failures = report.failures, reason = ?report.reason, "done");
     Ok(())
-}
-
-/// A command line in parts; there must be a program.
-fn solver_command(text: &str) -> Result<Vec<String>, Failure> {
-    let parts =
-        shell_words::split(text).map_err(|error| Failure::input(format!("--solver {text}: {error}")))?;
-    if parts.first().is_none_or(String::is_empty) {
-        return Err(Failure::input("--solver names no program: such as --solver \"python3 beam.py\""));
-    }
-    Ok(parts)
-}
-
-/// Where names of files in a command line lead.
-fn here() -> Result<String, Failure> {
-    Ok(std::env::current_dir().map_err(Failure::run)?.display().to_string())
 }
 
 /// Starts the solver, asks what it is and prints the answer.

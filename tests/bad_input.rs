@@ -198,12 +198,18 @@ fn a_port_in_use_is_named_with_its_remedy() {
 }
 
 #[test]
-fn listening_beyond_loopback_needs_a_word() {
+fn options_of_an_address_without_one_and_proof_without_proof_are_refused() {
     let (dir, file) = study(same, same);
     let out = dir.path().join("out");
-    let (code, _, stderr) =
-        output(starlings().arg("run").arg(&file).arg("--out").arg(&out).args(["--listen", "0.0.0.0:0"]));
-    assert_eq!(code, 2, "{stderr}");
-    assert!(stderr.contains("--insecure"), "{stderr}");
-    assert!(!out.exists());
+    for (options, says) in [
+        (&["--insecure"][..], "--listen"),
+        (&["--access", "a.json"], "--listen"),
+        (&["--listen", "127.0.0.1:0", "--access", "a.json", "--insecure"], "cannot be used with"),
+    ] {
+        let (code, _, stderr) =
+            output(starlings().arg("run").arg(&file).arg("--out").arg(&out).args(options));
+        assert_eq!(code, 2, "{stderr}");
+        assert!(stderr.contains(says), "{stderr}");
+        assert!(!out.exists());
+    }
 }

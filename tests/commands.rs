@@ -127,7 +127,8 @@ fn a_folder_without_a_run_is_refused() {
 fn a_worker_gives_up_with_the_address_when_nobody_answers() {
     // A port that was free a moment ago: nobody listens there.
     let address = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
-    let (code, _, stderr) = output(starlings().args(["worker", "--connect", &address, "--patience", "0.2"]));
+    let (code, _, stderr) =
+        output(starlings().args(["worker", "--connect", &address, "--insecure", "--patience", "0.2"]));
     assert_eq!(code, 1, "{stderr}");
     assert!(stderr.contains(&address), "{stderr}");
 }

@@ -13,7 +13,7 @@ use common::{analyses, bytes, kill, repository, run, starlings, wait_until};
 
 const STUDY: &str = "examples/pig-aorta/study.toml";
 
-/// A coordinator that waits for workers, and the address it printed.
+/// A coordinator that waits for workers, and the access file that it printed.
 fn coordinator(study: &Path, out: &Path) -> (Child, String) {
     let mut child = starlings()
         .arg("run")
@@ -27,17 +27,17 @@ fn coordinator(study: &Path, out: &Path) -> (Child, String) {
         .expect("the binary starts");
     let stderr = child.stderr.take().expect("piped");
     let mut lines = BufReader::new(stderr).lines().map_while(Result::ok);
-    let address = lines
-        .find_map(|line| line.split("--connect ").nth(1).map(|a| a.trim().to_owned()))
+    let access = lines
+        .find_map(|line| line.split("--access ").nth(1).map(|a| a.trim().to_owned()))
         .expect("the coordinator says how to start a worker");
     // Keep reading, or a full pipe would stop the coordinator.
     std::thread::spawn(move || lines.for_each(drop));
-    (child, address)
+    (child, access)
 }
 
-fn worker(address: &str) -> Child {
+fn worker(access: &str) -> Child {
     starlings()
-        .args(["worker", "--connect", address, "--slots", "1", "--once"])
+        .args(["worker", "--access", access, "--slots", "1", "--once"])
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .spawn()
@@ -63,9 +63,9 @@ fn a_worker_killed_in_the_middle_changes_no_byte() {
     let dir = tempfile::tempdir().unwrap();
     let (study, quiet, noisy) = (repository(STUDY), dir.path().join("quiet"), dir.path().join("noisy"));
     run(&study, &quiet, 2);
-    let (mut child, address) = coordinator(&study, &noisy);
-    let mut victim = worker(&address);
-    let mut survivor = worker(&address);
+    let (mut child, access) = coordinator(&study, &noisy);
+    let mut victim = worker(&access);
+    let mut survivor = worker(&access);
     wait_until("some analyses", || analyses(&noisy) > 60);
     kill(&mut victim);
     assert!(child.wait().unwrap().success(), "the run goes on with the other worker");

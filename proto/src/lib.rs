@@ -2,11 +2,14 @@
 //!
 //! `proto/fleet.proto` says what travels between coordinator and worker, `proto/solver.proto` between a worker and a solver
 //! outside, in which unit and shape. [`generated`] and [`generated_solver`] are generated from them; [`convert`] alone looks inside
-//! and checks and translates them; [`socket`] is the connection of workers that one process started. No scheduling here. Next file to read: [`convert`].
+//! and checks and translates them. [`access`] is the file by which both sides know each other, [`socket`] the connection of workers
+//! that one process started. No scheduling here. Next file to read: [`convert`].
 
+pub mod access;
 pub mod adapters;
 mod codec;
 pub mod convert;
+pub mod private_file;
 pub mod socket;
 pub mod spent;
 pub mod words;
@@ -19,7 +22,7 @@ pub use convert::{
 };
 
 /// Number of the protocol; coordinator and worker must have the same.
-pub const PROTOCOL: u32 = 3;
+pub const PROTOCOL: u32 = 4;
 
 /// Largest state that travels inside a job or a prediction, bytes.
 pub const MAX_INLINE_STATE: usize = 256 * 1024;

@@ -1,6 +1,7 @@
 //! What a worker is told when it starts.
 
 use std::hash::{BuildHasher, Hasher};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -13,6 +14,11 @@ use tokio_util::sync::CancellationToken;
 pub struct WorkerConfig {
     /// The coordinator, `host:port`, or [`starlings_proto::INHERITED`] for the standard input, which is served once.
     pub connect: String,
+    /// The access file: what proves the coordinator and this worker to each other, and the addresses to dial where `connect` is
+    /// empty. Without it the connection is plain and whoever answers is taken for the coordinator.
+    pub access: Option<PathBuf>,
+    /// Stay when a run is over and serve the next command that writes the access file, for as long without work.
+    pub stay: Option<Duration>,
     /// Jobs at the same time, at least 1, at most [`starlings_proto::MAX_SLOTS`].
     pub slots: usize,
     /// End when the coordinator's connection closes, instead of dialling again. A coordinator that is silent while the connection
@@ -35,6 +41,8 @@ impl WorkerConfig {
     pub fn new(connect: impl Into<String>) -> Self {
         Self {
             connect: connect.into(),
+            access: None,
+            stay: None,
             slots: 1,
             once: false,
             patience: Duration::from_secs(60),

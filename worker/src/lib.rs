@@ -7,19 +7,26 @@
 
 pub mod config;
 mod dial;
+mod idle;
 mod session;
 mod setups;
 mod slots;
+mod way;
 
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
 pub use config::WorkerConfig;
 use dial::Dialled;
+use idle::Idle;
 use session::Ended;
 use slots::Slots;
 pub use starlings_models::Factory;
-pub use starlings_proto::{LIFELINE, MAX_SLOTS};
+pub use starlings_proto::access::AccessError;
+pub use starlings_proto::{INHERITED, LIFELINE, MAX_SLOTS};
+use way::Way;
+pub use way::check_address;
 
 /// What a worker did until it ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -63,6 +70,22 @@ pub enum WorkerError {
         /// The address given.
         address: String,
     },
+    /// The access file is of no use.
+    #[error(transparent)]
+    Access(#[from] AccessError),
+    /// The access file is of a run that has ended.
+    #[error(
+        "the run `{run}` of the access file {} has ended: start a coordinator with --access {}, or the worker with --stay to wait \
+         for one",
+        file.display(),
+        file.display()
+    )]
+    Ended {
+        /// The file.
+        file: PathBuf,
+        /// Name of the run.
+        run: String,
+    },
     /// The standard input is to be the connection and is no socket.
     #[error("the standard input is no connection to a coordinator ({0}): give --connect HOST:PORT")]
     NoSocket(std::io::Error),
@@ -98,24 +121,35 @@ pub fn run(config: WorkerConfig) -> Result<WorkerReport, WorkerError> {
 }
 
 async fn serve(config: &WorkerConfig, slots: &Slots) -> Result<WorkerReport, WorkerError> {
-    let way = dial::way(config)?;
+    let way = Way::of(config)?;
     let setups = setups::Setups::new(Arc::clone(&config.factory));
     let hello = config.hello();
     let mut sessions = 0;
+    let mut idle = config.stay.map(Idle::new);
     loop {
-        let connection = match dial::dial(config, &way, &hello).await? {
+        let patience = idle.as_ref().map_or(config.patience, Idle::left);
+        let connection = match dial::dial(config, &way, &hello, patience).await? {
+            Dialled::Idle => {
+                return Ok(report(slots, sessions, &idle.map(|idle| idle.reason()).unwrap_or_default()));
+            }
             Dialled::Cancelled => return Ok(report(slots, sessions, "cancelled before it was connected")),
             Dialled::Over(reason) => return Ok(report(slots, sessions, &reason)),
             Dialled::Connected(connection) => connection,
         };
         sessions += 1;
-        tracing::info!(run = connection.welcome.run, address = config.connect, "joined");
+        tracing::info!(run = connection.welcome.run, address = way.name(), "joined");
         let stayed_since = Instant::now();
-        let ended = session::serve(*connection, slots, &setups, config).await;
+        let ended = session::serve(*connection, slots, &setups, config, idle.as_mut()).await;
         slots.forget_queue();
+        if let Some(idle) = &mut idle {
+            idle.look(slots);
+        }
         tracing::info!(?ended, seconds = stayed_since.elapsed().as_secs_f64(), "left");
         match ended {
-            Ended::Drained(reason) => return Ok(report(slots, sessions, &reason)),
+            Ended::Drained(reason) if config.stay.is_some() => {
+                tracing::info!(reason, "waiting for the next command");
+            }
+            Ended::Drained(reason) | Ended::Idle(reason) => return Ok(report(slots, sessions, &reason)),
             Ended::Cancelled => return Ok(report(slots, sessions, "cancelled")),
             Ended::Lost(reason) if config.once || way.is_inherited() => {
                 return Ok(report(slots, sessions, &reason));

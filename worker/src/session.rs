@@ -10,6 +10,7 @@ use tonic::Streaming;
 
 use crate::WorkerConfig;
 use crate::dial::Connection;
+use crate::idle::Idle;
 use crate::setups::Setups;
 use crate::slots::{Slots, Task, answer};
 
@@ -25,6 +26,8 @@ pub(crate) enum Ended {
     Lost(String),
     /// The worker was cancelled.
     Cancelled,
+    /// A worker that stays had no work for as long as it waits.
+    Idle(String),
 }
 
 pub(crate) async fn serve(
@@ -32,6 +35,7 @@ pub(crate) async fn serve(
     slots: &Slots,
     setups: &Setups,
     config: &WorkerConfig,
+    mut idle: Option<&mut Idle>,
 ) -> Ended {
     let mut beats = tokio::time::interval(Duration::from_secs_f64(connection.welcome.heartbeat));
     beats.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
@@ -58,6 +62,14 @@ pub(crate) async fn serve(
             _ = beats.tick() => {
                 let (running, queued) = slots.load();
                 send(&connection.outbox, FromWorker::Heartbeat { running, queued });
+                if let Some(idle) = &mut idle {
+                    idle.look(slots);
+                    if idle.left().is_zero() {
+                        let reason = idle.reason();
+                        goodbye(&connection.outbox, &mut connection.inbound, &reason).await;
+                        return Ended::Idle(reason);
+                    }
+                }
                 // A worker that serves once does not dial again: only the end of its connection ends its session.
                 if let Some(reason) = silence.after_beat().filter(|_| !config.once) {
                     return Ended::Lost(reason);

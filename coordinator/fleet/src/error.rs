@@ -16,14 +16,19 @@ pub enum FleetError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// The secrets of the run make no certificate.
+    #[error("cannot listen with the secrets of this run: {0}")]
+    Secrets(String),
     /// The run was cancelled.
     #[error("cancelled")]
     Cancelled,
     /// No worker could take a job for too long.
-    #[error("waited {waited:.0} s for a worker{}", waited_for(*address, missing))]
+    #[error("waited {waited:.0} s for a worker{}", waited_for(*address, *is_open, missing))]
     NoWorkers {
         /// Where workers can connect; `None` where only processes of this one work.
         address: Option<SocketAddr>,
+        /// Whether whoever reaches the address is taken.
+        is_open: bool,
         /// How long it was waited, seconds.
         waited: f64,
         /// What is missing.
@@ -101,10 +106,17 @@ fn in_brackets(text: &str) -> String {
 }
 
 /// Where a worker was expected, what is missing, and what to do.
-fn waited_for(address: Option<SocketAddr>, missing: &str) -> String {
+fn waited_for(address: Option<SocketAddr>, is_open: bool, missing: &str) -> String {
     match address {
+        Some(address) if is_open => {
+            let start = format!("starlings worker --connect {address} --insecure");
+            format!(" at {address}: {missing}; start one with `{start}`")
+        }
         Some(address) => {
-            format!(" at {address}: {missing}; start one with `starlings worker --connect {address}`")
+            let start = "starlings worker --access FILE";
+            format!(
+                " at {address}: {missing}; start one with `{start}`, where FILE is this run's access file"
+            )
         }
         None => format!(" on this machine: {missing}"),
     }

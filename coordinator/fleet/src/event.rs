@@ -46,6 +46,15 @@ pub enum FleetEvent {
         /// Why, with the remedy.
         reason: String,
     },
+    /// Callers have not proved themselves; told of the first of a kind, the tenth, the hundredth and so on.
+    CallerRefused {
+        /// Address of the last one.
+        from: String,
+        /// Why, with the remedy.
+        reason: String,
+        /// Callers so far that were refused for this reason.
+        count: u64,
+    },
     /// A worker is gone.
     WorkerLeft {
         /// Its name.

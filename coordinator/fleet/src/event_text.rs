@@ -12,6 +12,7 @@ impl FleetEvent {
             Self::WorkerJoined { .. } => "worker-joined",
             Self::OtherBuild { .. } => "other-build",
             Self::WorkerRefused { .. } => "worker-refused",
+            Self::CallerRefused { .. } => "caller-refused",
             Self::WorkerLeft { .. } => "worker-left",
             Self::SetupFailed { .. } => "setup-failed",
             Self::WorkerSetAside { .. } => "worker-set-aside",
@@ -32,6 +33,7 @@ impl FleetEvent {
         matches!(
             self,
             Self::WorkerRefused { .. }
+                | Self::CallerRefused { .. }
                 | Self::OtherBuild { .. }
                 | Self::SetupFailed { .. }
                 | Self::WorkerSetAside { .. }
@@ -65,6 +67,12 @@ impl fmt::Display for FleetEvent {
                 )
             }
             Self::WorkerRefused { host, reason } => write!(f, "a worker from {host} was refused: {reason}"),
+            Self::CallerRefused { from, reason, count: 1 } => {
+                write!(f, "a caller from {from} was refused: {reason}")
+            }
+            Self::CallerRefused { from, reason, count } => {
+                write!(f, "{count} callers were refused, last one from {from}: {reason}")
+            }
             Self::WorkerLeft { worker, reason, requeued: 0 } => write!(f, "worker {worker} left: {reason}"),
             Self::WorkerLeft { worker, reason, requeued } => {
                 write!(f, "worker {worker} left: {reason}; {requeued} of its runs go to others")

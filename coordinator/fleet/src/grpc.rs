@@ -16,7 +16,9 @@ use starlings_proto::{JobEncoder, MAX_MESSAGE, SetupId, encode_setup, own_build}
 use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
 use tokio_util::sync::CancellationToken;
 
+use super::access::Secrets;
 use super::dispatcher::{BatchError, Event, Rules};
+use super::door::{Door, Refusals};
 use super::hub::{Hub, Reply, Submission};
 use super::network::{self, Ways};
 use super::{Fleet, FleetError, FleetEvent, Outcome};
@@ -29,6 +31,9 @@ const ALIVE_CHECK: Duration = Duration::from_secs(1);
 pub struct FleetConfig {
     /// Where to listen, port 0 picks a free one; `None`: nowhere, for a fleet of processes that this one starts.
     pub address: Option<SocketAddr>,
+    /// What proves this coordinator to workers and workers to it where it listens; without it, connections are plain and whoever
+    /// reaches the address is taken.
+    pub secrets: Option<Secrets>,
     /// Name of the run, told to workers.
     pub run_name: String,
     /// Time between heartbeats; a worker silent for twice as long is lost.
@@ -55,6 +60,7 @@ impl FleetConfig {
     ) -> Self {
         Self {
             address: address.into(),
+            secrets: None,
             run_name: run_name.to_owned(),
             heartbeat: Duration::from_secs(8),
             patience: Duration::from_secs(300),
@@ -74,6 +80,8 @@ pub struct GrpcFleet {
     batches: UnboundedSender<Submission>,
     stop: CancellationToken,
     network: Option<JoinHandle<Result<(), String>>>,
+    refusals: Arc<Refusals>,
+    is_open: bool,
 }
 
 /// Lets the supervisor of local workers end a fleet's wait.
@@ -133,7 +141,15 @@ impl GrpcFleet {
         let stop = CancellationToken::new();
         let (batches, submitted) = unbounded_channel();
         let (adopted, ends) = unbounded_channel();
-        let ways = Ways { listener: listener.map(|(listener, _)| listener), adopted: ends };
+        let refusals = {
+            let hub = Arc::clone(&hub);
+            Refusals::new(move |event| hub.tell(event))
+        };
+        let door = listener
+            .map(|(listener, _)| Door::new(listener, config.secrets.as_ref(), Arc::clone(&refusals)))
+            .transpose()
+            .map_err(FleetError::Secrets)?;
+        let ways = Ways { door, adopted: ends };
         let network = {
             let (hub, cancel, stop) = (Arc::clone(&hub), config.cancel.clone(), stop.clone());
             let heartbeat = config.heartbeat;
@@ -145,12 +161,26 @@ impl GrpcFleet {
         if let Some(address) = address {
             hub.tell(FleetEvent::Listening { address });
         }
-        Ok(Self { hub, address, adopted, batches, stop, network: Some(network) })
+        Ok(Self {
+            hub,
+            address,
+            adopted,
+            batches,
+            stop,
+            network: Some(network),
+            refusals,
+            is_open: config.secrets.is_none(),
+        })
     }
 
     /// Where workers can connect, with the port that was picked; `None` where none can.
     pub fn address(&self) -> Option<SocketAddr> {
         self.address
+    }
+
+    /// How many callers were refused, and the last of them with the reason; `None` where none was.
+    pub fn refused(&self) -> Refused {
+        Refused(Arc::clone(&self.refusals))
     }
 
     /// For the supervisor of local workers.
@@ -192,7 +222,15 @@ impl GrpcFleet {
         match error {
             BatchError::Cancelled => FleetError::Cancelled,
             BatchError::NoWorkers { waited, missing } => {
-                FleetError::NoWorkers { address: self.address, waited: waited.as_secs_f64(), missing }
+                let missing =
+                    [Some(missing), self.refusals.summary()].into_iter().flatten().collect::<Vec<_>>();
+                let missing = missing.join("; ");
+                FleetError::NoWorkers {
+                    address: self.address,
+                    is_open: self.is_open,
+                    waited: waited.as_secs_f64(),
+                    missing,
+                }
             }
             BatchError::SetupFailed { reason } => FleetError::SetupFailed { reason },
             BatchError::LocalWorkers(reason) => FleetError::LocalWorkers(reason),
@@ -207,6 +245,17 @@ impl GrpcFleet {
                 FleetError::NoAnswer { job: index, particle, record, reason }
             }
         }
+    }
+}
+
+/// The callers that a fleet refused, for whoever waits for workers.
+#[derive(Clone)]
+pub struct Refused(Arc<Refusals>);
+
+impl Refused {
+    /// How many there were, and the last of them with the reason; nothing where there was none.
+    pub fn summary(&self) -> Option<String> {
+        self.0.summary()
     }
 }
 

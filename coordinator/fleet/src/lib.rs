@@ -4,9 +4,11 @@
 //! network; [`InProcess`] runs jobs on threads of this process; [`LocalWorkers`] keeps worker processes on this machine
 //! alive. Nothing here knows estimators, studies or stores, and nothing here retries with other parameters: a particle whose
 //! model fails is an [`Outcome`] whose result is an error. A failure of a place sets a worker aside; when none is left the batch
-//! ends with a [`FleetError`]. Next file to read: [`dispatcher`].
+//! ends with a [`FleetError`]. Whoever dials passes the [`door`]. Next file to read: [`dispatcher`].
 
+pub mod access;
 mod dispatcher;
+mod door;
 mod error;
 mod event;
 mod event_text;
@@ -21,7 +23,7 @@ mod travel;
 
 pub use error::FleetError;
 pub use event::FleetEvent;
-pub use grpc::{FleetConfig, FleetHandle, GrpcFleet};
+pub use grpc::{FleetConfig, FleetHandle, GrpcFleet, Refused};
 pub use in_process::InProcess;
 pub use local_workers::{LocalConfig, LocalWorkers};
 pub use starlings_models::Factory;

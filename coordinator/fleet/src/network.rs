@@ -1,6 +1,5 @@
 //! The network thread: one runtime that serves the workers' streams, keeps time, and starts the caller's batches.
 
-use std::net::TcpListener;
 use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::time::Duration;
@@ -14,10 +13,11 @@ use tokio::task::{JoinError, JoinSet};
 use tokio_stream::StreamExt;
 use tokio_stream::wrappers::UnboundedReceiverStream;
 use tokio_util::sync::CancellationToken;
+use tonic::service::interceptor::InterceptedService;
 use tonic::transport::Server;
-use tonic::transport::server::TcpIncoming;
 
 use super::dispatcher::{BatchError, Event};
+use super::door::Door;
 use super::hub::{Hub, Submission};
 use super::service::Service;
 
@@ -36,8 +36,8 @@ const WINDOWS: (u32, u32) = (4 * 1024 * 1024, 16 * 1024 * 1024);
 
 /// The ways on which workers come.
 pub(super) struct Ways {
-    /// From anywhere that reaches the address.
-    pub(super) listener: Option<TcpListener>,
+    /// From anywhere that reaches the address, once it has proved itself.
+    pub(super) door: Option<Door>,
     /// Ends of the pairs of sockets that processes of this one hold the other ends of. Nothing else can come on them.
     pub(super) adopted: UnboundedReceiver<UnixStream>,
 }
@@ -56,9 +56,9 @@ pub(super) fn run(
         .build()
         .map_err(|error| error.to_string())?;
     let outcome = runtime.block_on(async {
-        let Ways { listener, adopted } = ways;
-        let listened = listener.map(tokio::net::TcpListener::from_std).transpose();
-        let listened = listened.map_err(|error| error.to_string())?;
+        let Ways { door, adopted } = ways;
+        let opened = door.map(|door| Ok((door.check(), door.open()?))).transpose();
+        let opened = opened.map_err(|error: std::io::Error| error.to_string())?;
         let mut tasks = JoinSet::new();
         tasks.spawn(tick(Arc::clone(hub), heartbeat));
         tasks.spawn(beat(Arc::clone(hub), heartbeat));
@@ -74,14 +74,13 @@ pub(super) fn run(
                 .initial_stream_window_size(WINDOWS.0)
                 .initial_connection_window_size(WINDOWS.1)
                 .max_frame_size(FRAME_SIZE)
-                .add_service(service.clone())
         };
         let inherited = UnboundedReceiverStream::new(adopted).map(SocketEnd::new);
         let listening = async {
-            match listened {
-                Some(listener) => {
-                    let incoming = TcpIncoming::from(listener).with_nodelay(Some(true));
-                    server().serve_with_incoming(incoming).await
+            match opened {
+                Some((check, incoming)) => {
+                    let checked = InterceptedService::new(service.clone(), check);
+                    server().add_service(checked).serve_with_incoming(incoming).await
                 }
                 None => std::future::pending().await,
             }
@@ -90,7 +89,7 @@ pub(super) fn run(
             tokio::select! {
                 ended = listening => ended,
                 // The handles of the fleet hold its other end open.
-                ended = server().serve_with_incoming(inherited) => ended,
+                ended = server().add_service(service.clone()).serve_with_incoming(inherited) => ended,
             }
         };
         tokio::select! {

@@ -24,7 +24,7 @@ mod units;
 use std::path::Path;
 use std::sync::Arc;
 
-use starlings_models::Setup;
+use starlings_models::{Setup, SolverDef};
 
 use self::built::CheckedModel;
 use self::parameters::initial_medians;
@@ -53,19 +53,21 @@ impl Study {
     /// # Errors
     /// As [`Study::load`].
     pub fn load_with(path: &Path, solver_host: &SolverHost) -> Result<Self, StudyError> {
-        match std::fs::read_to_string(path) {
-            Ok(text) => Self::from_text_with(path, &text, solver_host),
-            Err(error) => {
-                let problem = Problem {
-                    message: format!("cannot read the study: {error}"),
-                    help: Some("give the path of a study file (TOML)".to_owned()),
-                    file: path.to_owned(),
-                    source_text: None,
-                    span: None,
-                };
-                Err(StudyError { problems: vec![problem] })
-            }
-        }
+        Self::from_text_with(path, &text_of(path)?, solver_host)
+    }
+
+    /// The solver of a study file as the study names it: its recordings are not looked at, and nothing is started.
+    ///
+    /// # Errors
+    /// When the file is no study, its model is no solver, or a file of the solver is missing.
+    pub fn solver_of(path: &Path, solver_host: &SolverHost) -> Result<SolverDef, StudyError> {
+        let text = text_of(path)?;
+        let source = Source::new(path, &text);
+        let file = read(&source, solver_host.adapters())?;
+        source.verdict()?;
+        let own = solver::own(&source, &file);
+        source.verdict()?;
+        own.ok_or_else(|| StudyError { problems: Vec::new() })
     }
 
     /// Checks the text of a study file that stands, or stood, at `file`.
@@ -83,6 +85,19 @@ impl Study {
     pub fn from_text_with(file: &Path, text: &str, solver_host: &SolverHost) -> Result<Self, StudyError> {
         check(file, text, solver_host)
     }
+}
+
+fn text_of(path: &Path) -> Result<String, StudyError> {
+    std::fs::read_to_string(path).map_err(|error| {
+        let problem = Problem {
+            message: format!("cannot read the study: {error}"),
+            help: Some("give the path of a study file (TOML)".to_owned()),
+            file: path.to_owned(),
+            source_text: None,
+            span: None,
+        };
+        StudyError { problems: vec![problem] }
+    })
 }
 
 fn check(path: &Path, text: &str, solver_host: &SolverHost) -> Result<Study, StudyError> {

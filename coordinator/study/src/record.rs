@@ -293,7 +293,8 @@ fn plain(error: &std::io::Error) -> String {
 pub(crate) fn mesh(text: &str) {
     let Ok(off::Off { vertices, triangles }) = off::read(text) else { return };
     for open_ends in [0, 2] {
-        if let Ok(mesh) = starlings_models::surface::Mesh::new(vertices.clone(), triangles.clone(), open_ends) {
+        if let Ok(mesh) = starlings_models::surface::Mesh::new(vertices.clone(), triangles.clone(), open_ends)
+        {
             assert!(mesh.foot([0.5, -0.25, 2.0]).is_some());
         }
     }

@@ -17,6 +17,7 @@ mod guard;
 pub mod instance;
 mod losses;
 mod machine;
+mod permit;
 mod process;
 mod scratch;
 pub mod serve;
@@ -36,6 +37,7 @@ use starlings_proto::adapters::AdapterDef;
 use adapter::Adapter;
 pub use error::SolverError;
 pub use guard::guard;
+pub use permit::Permit;
 use site::Site;
 pub use site::SiteOptions;
 
@@ -62,10 +64,10 @@ struct Shared {
 }
 
 /// What holds for the solvers of every study here.
-#[derive(Clone, Default)]
+#[derive(Clone)]
 struct Settings {
-    /// Replaces the command of every study, and the folder that it starts from.
-    command: Option<(Vec<String>, String)>,
+    /// Which programs are started.
+    permit: Permit,
     /// Programs of other processes that come first where cores are shared out.
     first: usize,
 }
@@ -77,16 +79,15 @@ struct Reached {
 }
 
 impl Solvers {
-    /// No solver is started yet.
+    /// No solver is started yet. Any program of a study may be, as for a study of this user's own.
     pub fn new(options: SiteOptions) -> Self {
-        Self::with(options, Settings::default())
+        Self::with(options, Settings { permit: Permit::Study, first: 0 })
     }
 
-    /// The same with another command than the studies say, as on a machine where the program lies elsewhere; names in it are
-    /// those of files in `folder`.
+    /// The same, where setups may have no other program started.
     #[must_use]
-    pub fn with_command(self, command: Vec<String>, folder: String) -> Self {
-        let settings = Settings { command: Some((command, folder)), ..self.0.settings.clone() };
+    pub fn permitting(self, permit: Permit) -> Self {
+        let settings = Settings { permit, ..self.0.settings.clone() };
         Self::with(self.0.options.clone(), settings)
     }
 
@@ -126,7 +127,8 @@ impl Solvers {
         let def = setup.model.solver.as_deref();
         let def = def.ok_or_else(|| SetupError::Invalid("the setup names no solver".to_owned()))?;
         let invalid = |error: SolverError| SetupError::Invalid(error.to_string());
-        let reached = self.reach(def).map_err(invalid)?;
+        let permitted = self.0.settings.permit.of(def).map_err(SetupError::Invalid)?;
+        let reached = self.reach(&permitted).map_err(invalid)?;
         let description = reached.describe().map_err(invalid)?;
         if let Some(known) = def.described.as_ref().filter(|known| **known != description) {
             return Err(SetupError::Invalid(differs(known, &description)));
@@ -141,11 +143,8 @@ impl Solvers {
     }
 
     fn reach(&self, def: &SolverDef) -> Result<Arc<Reached>, SolverError> {
-        let mut def = def.clone();
-        if let Some((command, folder)) = &self.0.settings.command {
-            (def.command, def.folder) = (command.clone(), folder.clone());
-        }
         // Studies of one solver share its programs, whatever else they say.
+        let def = def.clone();
         let describes_itself = adapter::def(&def.adapter).is_some_and(|adapter| adapter.describes_itself);
         let described = def.described.clone().filter(|_| !describes_itself);
         let key = format!("{:?}", SolverDef { described, ..def.clone() });

@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 use starlings_models::{
     Description, FilesDef, Forward, Job, ModelDef, Quantity, SOLVER, Setup, Signal, SolverDef, Spec, Window,
 };
-use starlings_solver::{SiteOptions, Solvers};
+use starlings_solver::{Permit, SiteOptions, Solvers};
 use tempfile::TempDir;
 
 /// A study's folder with a shell script in it, and the solver that runs it.
@@ -148,9 +148,8 @@ fn arguments_take_values_and_other_braces_stay() {
 #[test]
 fn a_command_of_the_machine_leads_to_files_of_its_own_folder() {
     let mut bench = Bench::new("echo '{\"tip\": 7}'", &[]).command(&["no-such-program"]);
-    let folder = bench.def.folder.clone();
-    let command = ["sh", "solve.sh"].map(str::to_owned).to_vec();
-    bench.solvers = bench.solvers.with_command(command, folder);
+    let own = SolverDef { command: ["sh", "solve.sh"].map(str::to_owned).to_vec(), ..bench.def.clone() };
+    bench.solvers = bench.solvers.permitting(Permit::Pinned(Box::new(own)));
     assert_eq!(bench.run(1.0, &[1.0]).unwrap(), [7.0]);
 }
 

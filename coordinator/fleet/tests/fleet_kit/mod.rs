@@ -1,6 +1,8 @@
 //! What the fleet's tests share: toy models, workers on threads, a proxy whose connections can be cut.
 #![allow(dead_code, unreachable_pub, clippy::unwrap_used, clippy::missing_panics_doc)]
 
+pub mod access;
+
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::mpsc::{self, Receiver};

@@ -37,18 +37,8 @@ impl DescribedSolver {
 pub(crate) fn solver(source: &Source, file: &StudyFile, solver_host: &SolverHost) -> Option<DescribedSolver> {
     let section = file.model.solver.as_ref()?;
     let before = source.count();
-    let beside =
-        source.file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let folder = std::path::absolute(beside).unwrap_or_else(|_| beside.to_owned());
-    let mut def = def(source, section, &run_folder(source, section, &folder));
-    def.files = section.per_run.then(|| FilesDef {
-        templates: templates(source, section, &folder),
-        copies: copies(source, section, &folder),
-        reads: reads(section),
-    });
-    if !section.parameters.is_empty() || !section.outputs.is_empty() {
-        def.described = Some(written(source, section));
-    }
+    let folder = study_folder(source);
+    let mut def = named(source, section, &folder);
     if source.count() > before {
         return None;
     }
@@ -71,6 +61,37 @@ pub(crate) fn solver(source: &Source, file: &StudyFile, solver_host: &SolverHost
     check_description(source, section, &found);
     def.described = Some(Description { spec: Spec { kind: SOLVER.to_owned(), ..found.spec }, ..found });
     (source.count() == before).then_some(DescribedSolver { def, is_here: section.described.is_none() })
+}
+
+/// The solver of a study as the study names it; nobody has asked it anything.
+pub(crate) fn own(source: &Source, file: &StudyFile) -> Option<SolverDef> {
+    let Some(section) = &file.model.solver else {
+        let message = "the model of this study runs in no program of its own";
+        source.report_with(0..0, message.to_owned(), "give a study with `[model] kind = \"solver\"`");
+        return None;
+    };
+    Some(named(source, section, &study_folder(source)))
+}
+
+/// Where the study stands.
+fn study_folder(source: &Source) -> PathBuf {
+    let beside =
+        source.file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    std::path::absolute(beside).unwrap_or_else(|_| beside.to_owned())
+}
+
+/// What the section says, with the texts of its templates.
+fn named(source: &Source, section: &ProgramSection, folder: &Path) -> SolverDef {
+    let mut def = def(source, section, &run_folder(source, section, folder));
+    def.files = section.per_run.then(|| FilesDef {
+        templates: templates(source, section, folder),
+        copies: copies(source, section, folder),
+        reads: reads(section),
+    });
+    if !section.parameters.is_empty() || !section.outputs.is_empty() {
+        def.described = Some(written(source, section));
+    }
+    def
 }
 
 /// Where the program runs: the study's folder, or one that is named from there.
