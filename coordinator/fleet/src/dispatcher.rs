@@ -35,8 +35,8 @@ use std::time::Duration;
 
 use starlings_proto::SetupId;
 
-use super::FleetEvent;
 use super::job_name::JobName;
+use super::{FleetEvent, Outcome};
 use batch::{Batch, Lost};
 pub(crate) use doubt::Asked;
 pub(crate) use message::{BatchError, Command, ControlId, Event, Joining, WorkerId};
@@ -70,6 +70,8 @@ pub(crate) struct Dispatcher {
     run_times: RunTimes,
     proven: Proven,
     local_only: bool,
+    /// Outcomes of a batch that ended in an error, of which its caller was not told.
+    left: Vec<(usize, Outcome)>,
     out: Vec<Command>,
 }
 
@@ -88,6 +90,7 @@ impl Dispatcher {
             run_times: RunTimes::default(),
             proven: Proven::default(),
             local_only: false,
+            left: Vec::new(),
             out: Vec::new(),
         }
     }
@@ -100,6 +103,11 @@ impl Dispatcher {
     /// Number of slots of all workers.
     pub(crate) fn slots(&self) -> usize {
         self.workers.values().map(|w| w.slots).sum()
+    }
+
+    /// Outcomes of the running batch, or of one that ended in an error, that were not handed on before.
+    pub(crate) fn arrived(&mut self) -> Vec<(usize, Outcome)> {
+        self.batch.as_mut().map_or_else(|| std::mem::take(&mut self.left), Batch::arrived)
     }
 
     /// Takes one event at time `now` (any fixed origin) and returns what has to be done about it.
@@ -209,12 +217,14 @@ impl Dispatcher {
             }
         }
         self.proven.keep_only(batch.names(), &mut self.out);
+        self.left.clear();
         self.batch = Some(batch);
         self.next_job += n;
     }
 
     fn abort(&mut self, error: BatchError) {
-        let Some(batch) = self.batch.take() else { return };
+        let Some(mut batch) = self.batch.take() else { return };
+        self.left = batch.arrived();
         for worker in self.workers.values() {
             let leases = worker.leases().filter(|l| batch.index_of(l.job).is_some()).collect::<Vec<_>>();
             if !leases.is_empty() {

@@ -89,6 +89,11 @@ impl Hub {
         self.lock().stopped.clone().unwrap_or_else(|| "its thread ended".to_owned())
     }
 
+    /// Outcomes that the caller of the batch was not told of before.
+    pub(super) fn arrived(&self) -> Vec<(usize, Outcome)> {
+        self.lock().dispatcher.arrived()
+    }
+
     pub(super) fn counts(&self) -> (usize, usize) {
         let state = self.lock();
         (state.dispatcher.n_workers(), state.dispatcher.slots())

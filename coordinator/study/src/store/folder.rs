@@ -107,6 +107,7 @@ impl RunFolder {
             posterior::to_csv(study, &fit.posterior).map_err(|e| self.store.damaged("posterior", e))?;
         self.store.set_meta("posterior", &posterior)?;
         self.store.set_meta("summary", &json(summary))?;
+        self.store.forget_arrived()?;
         // The log stays open while another process reads the database; the run is finished all the same.
         let _ = self.store.close_log();
         Ok(())
