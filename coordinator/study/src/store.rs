@@ -14,6 +14,7 @@ pub mod folder;
 mod folder_error;
 mod info;
 pub(super) mod json;
+mod lock;
 mod make;
 mod meaning;
 mod program;
