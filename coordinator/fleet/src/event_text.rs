@@ -19,6 +19,7 @@ impl FleetEvent {
             Self::ControlRun { .. } => "control-run",
             Self::JobRetried { .. } => "job-retried",
             Self::JobFailed { .. } => "job-failed",
+            Self::RunsBrought { .. } => "runs-brought",
             Self::LateAnswer { .. } => "late-answer",
             Self::Waiting { .. } => "waiting",
             Self::Progress { .. } => "progress",
@@ -34,6 +35,7 @@ impl FleetEvent {
             Self::WorkerRefused { .. }
                 | Self::OtherBuild { .. }
                 | Self::SetupFailed { .. }
+                | Self::RunsBrought { .. }
                 | Self::WorkerSetAside { .. }
                 | Self::JobFailed { .. }
                 | Self::Waiting { .. }
@@ -89,6 +91,12 @@ impl fmt::Display for FleetEvent {
                 write!(
                     f,
                     "particle {particle}, record {record}{with}: given up after {attempts} attempt{s}: {reason}"
+                )
+            }
+            Self::RunsBrought { worker, finished, computing } => {
+                write!(
+                    f,
+                    "worker {worker} brought {finished} finished runs along and goes on with {computing}"
                 )
             }
             Self::LateAnswer { worker, job } => {

@@ -20,11 +20,16 @@ use tokio_util::sync::CancellationToken;
 use super::dispatcher::{BatchError, Event, Rules};
 use super::handle::FleetHandle;
 use super::hub::{Hub, Reply, Submission};
+use super::identity::RunIdentity;
 use super::network::{self, Ways};
 use super::{Arrived, Fleet, FleetError, FleetEvent, Outcome, TELL_EVERY};
 
 /// How long the caller of a batch that was dropped waits for the network's last words.
 const ALIVE_CHECK: Duration = Duration::from_secs(1);
+
+/// How long a run that is continued waits for the workers of its earlier start, which dial every two seconds, before it gives away
+/// jobs that they may have done.
+const GRACE: Duration = Duration::from_millis(2500);
 
 /// How a fleet listens and when it loses patience.
 #[derive(Clone, Debug)]
@@ -39,6 +44,8 @@ pub struct FleetConfig {
     pub patience: Duration,
     /// How many workers may be lost under one job before it is given up.
     pub max_attempts: u32,
+    /// The run: workers of an earlier start of it bring along what they have done.
+    pub identity: RunIdentity,
     /// BLAKE3 of this executable: a worker of another one is told of. `None`: none is.
     pub build: Option<[u8; 32]>,
     /// Ends [`Fleet::run`] promptly with [`FleetError::Cancelled`].
@@ -61,6 +68,7 @@ impl FleetConfig {
             heartbeat: Duration::from_secs(8),
             patience: Duration::from_secs(300),
             max_attempts: 5,
+            identity: RunIdentity::new(),
             build: own_build(),
             cancel,
             events,
@@ -91,7 +99,10 @@ impl GrpcFleet {
             patience: config.patience,
             max_attempts: config.max_attempts,
         };
-        let hub = Arc::new(Hub::new(config.run_name, config.build, rules, config.events));
+        let started_again = address.is_some() && config.identity.incarnation > 1;
+        let opens = if started_again { GRACE } else { Duration::ZERO };
+        let hub = Hub::new(config.run_name, config.build, config.identity, rules, opens, config.events);
+        let hub = Arc::new(hub);
         let stop = CancellationToken::new();
         let (batches, submitted) = unbounded_channel();
         let (adopted, ends) = unbounded_channel();

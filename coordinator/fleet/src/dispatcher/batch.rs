@@ -3,6 +3,7 @@
 //! Next files to read: `queue`, for those that wait, `doubt` for those that failed for an unknown reason.
 
 mod arrived;
+mod held;
 mod notices;
 
 use std::collections::{BTreeMap, BTreeSet};
