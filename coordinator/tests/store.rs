@@ -120,7 +120,7 @@ fn a_folder_with_a_run_and_a_changed_study_are_refused() {
     assert!(occupied.to_string().contains("--resume"), "{occupied}");
     let path = done.folder.path.clone();
     let locked = RunFolder::resume(Purpose::Run, &path, &study, &Call::default()).err().unwrap();
-    assert!(matches!(locked, FolderError::Locked(_)), "the folder is still open: {locked}");
+    assert!(matches!(locked, FolderError::Locked { .. }), "the folder is still open: {locked}");
     drop(done);
     let mut changed = study.clone();
     changed.text = changed.text.replacen("passes = 1", "passes = 3", 1).into();

@@ -3,9 +3,12 @@
 //! The only module that looks inside [`crate::generated`] and [`crate::generated_solver`]. Every bit of every number survives both
 //! ways; a malformed message is a [`ProtocolError`], never a panic. Next files to read: [`from_worker`], [`to_worker`], [`job`].
 
+pub mod ended;
 pub mod floats;
 pub mod from_worker;
+pub mod held;
 pub mod job;
+pub mod key;
 pub mod solver;
 pub mod to_worker;
 mod window;
@@ -14,7 +17,9 @@ pub mod windows;
 use starlings_models::Setup;
 
 pub use from_worker::{FromWorker, Hello, LeaseOutcome};
+pub use held::HeldRun;
 pub use job::JobEncoder;
+pub use key::{JobKey, JobKeys, job_key};
 pub use to_worker::{ToWorker, Welcome};
 pub use windows::{ReceivedWindows, SentWindows};
 

@@ -17,8 +17,8 @@ pub mod words;
 pub use bytes::Bytes;
 pub(crate) use codec::Codec;
 pub use convert::{
-    FromWorker, Hello, JobEncoder, Lease, LeaseOutcome, ProtocolError, ReceivedWindows, SentWindows, SetupId,
-    ToWorker, Welcome, decode_setup, digest, encode_setup,
+    FromWorker, HeldRun, Hello, JobEncoder, JobKey, JobKeys, Lease, LeaseOutcome, ProtocolError,
+    ReceivedWindows, SentWindows, SetupId, ToWorker, Welcome, decode_setup, digest, encode_setup, job_key,
 };
 
 /// Number of the protocol; coordinator and worker must have the same.

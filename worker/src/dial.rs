@@ -10,6 +10,7 @@ use tokio::sync::mpsc::{self, UnboundedSender};
 use tokio_stream::wrappers::UnboundedReceiverStream;
 use tonic::Streaming;
 
+use crate::held::Run;
 use crate::way::{ATTEMPT, NoWay, Way};
 use crate::{WorkerConfig, WorkerError};
 
@@ -53,11 +54,17 @@ impl From<NoWay> for Attempt {
 }
 
 /// Dials until a coordinator welcomes, refuses, or patience ends. A worker that stays waits for the next one where a run is over.
+///
+/// `seen` is the run that was served last: an earlier start of it is not served.
+///
+/// # Errors
+/// When nobody answers within the patience, or the coordinator refuses.
 pub(crate) async fn dial(
     config: &WorkerConfig,
     way: &Way,
     hello: &Hello,
     patience: Duration,
+    seen: Option<Run>,
 ) -> Result<Dialled, WorkerError> {
     let stays = config.stay.is_some();
     let started = Instant::now();
@@ -66,7 +73,9 @@ pub(crate) async fn dial(
     loop {
         let attempt = async {
             let patience = tokio::time::timeout(ATTEMPT, attach(way, hello.clone()));
-            patience.await.unwrap_or_else(|_| Err(Attempt::Failed("no answer to Hello".to_owned())))
+            let attached = patience.await;
+            let attached = attached.unwrap_or_else(|_| Err(Attempt::Failed("no answer to Hello".to_owned())));
+            attached.and_then(|connection| current(connection, seen))
         };
         let last = tokio::select! {
             () = config.cancel.cancelled() => return Ok(Dialled::Cancelled),
@@ -104,6 +113,19 @@ pub(crate) async fn dial(
             () = tokio::time::sleep(wait.mul_f64(spread).min(patience.saturating_sub(waited))) => {}
         }
         wait = (wait * 3 / 2).min(LONGEST_WAIT);
+    }
+}
+
+/// Refuses a coordinator whose run was started again since it began.
+fn current(connection: Connection, seen: Option<Run>) -> Result<Connection, Attempt> {
+    let Welcome { run, run_id, incarnation, .. } = &connection.welcome;
+    match seen.filter(|seen| seen.id == *run_id && seen.incarnation > *incarnation) {
+        None => Ok(connection),
+        Some(seen) => Err(Attempt::Failed(format!(
+            "the coordinator there is start {incarnation} of the run `{run}`, and this worker has worked for start {} of it: end the \
+             earlier one",
+            seen.incarnation
+        ))),
     }
 }
 

@@ -7,10 +7,13 @@
 
 pub mod config;
 mod dial;
+mod held;
 mod idle;
+mod news;
 mod session;
 mod setups;
 mod slots;
+mod watch;
 mod way;
 
 use std::path::PathBuf;
@@ -18,12 +21,16 @@ use std::sync::Arc;
 use std::time::Instant;
 
 pub use config::WorkerConfig;
-use dial::Dialled;
+use dial::{Connection, Dialled};
+pub use held::HoldLimits;
+use held::{Held, Run};
 use idle::Idle;
+pub use news::{News, Tell};
 use session::Ended;
 use slots::Slots;
 pub use starlings_models::Factory;
 pub use starlings_proto::access::AccessError;
+use starlings_proto::{FromWorker, HeldRun, Welcome};
 pub use starlings_proto::{INHERITED, LIFELINE, MAX_SLOTS};
 use way::Way;
 pub use way::check_address;
@@ -111,16 +118,23 @@ pub fn run(config: WorkerConfig) -> Result<WorkerReport, WorkerError> {
     if config.slots > MAX_SLOTS {
         return Err(WorkerError::TooManySlots { slots: config.slots });
     }
-    let slots = Slots::start(config.slots.max(1)).map_err(WorkerError::Start)?;
+    // One that ends with its connection has nobody to bring results to.
+    let lasts = !config.once && config.connect != INHERITED;
+    let held = lasts.then(|| Arc::new(Held::new(config.hold, &config.scratch)));
+    let slots = Slots::start(config.slots.max(1), held.clone()).map_err(WorkerError::Start)?;
     let runtime =
         tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(WorkerError::Start)?;
-    let result = runtime.block_on(serve(&config, &slots));
+    let result = runtime.block_on(serve(&config, &slots, held.as_deref()));
     slots.close();
     runtime.shutdown_background();
     result
 }
 
-async fn serve(config: &WorkerConfig, slots: &Slots) -> Result<WorkerReport, WorkerError> {
+async fn serve(
+    config: &WorkerConfig,
+    slots: &Slots,
+    held: Option<&Held>,
+) -> Result<WorkerReport, WorkerError> {
     let way = Way::of(config)?;
     let setups = setups::Setups::new(Arc::clone(&config.factory));
     let hello = config.hello();
@@ -128,7 +142,7 @@ async fn serve(config: &WorkerConfig, slots: &Slots) -> Result<WorkerReport, Wor
     let mut idle = config.stay.map(Idle::new);
     loop {
         let patience = idle.as_ref().map_or(config.patience, Idle::left);
-        let connection = match dial::dial(config, &way, &hello, patience).await? {
+        let connection = match dial::dial(config, &way, &hello, patience, held.and_then(Held::run)).await? {
             Dialled::Idle => {
                 return Ok(report(slots, sessions, &idle.map(|idle| idle.reason()).unwrap_or_default()));
             }
@@ -139,8 +153,15 @@ async fn serve(config: &WorkerConfig, slots: &Slots) -> Result<WorkerReport, Wor
         sessions += 1;
         tracing::info!(run = connection.welcome.run, address = way.name(), "joined");
         let stayed_since = Instant::now();
-        let ended = session::serve(*connection, slots, &setups, config, idle.as_mut()).await;
-        slots.forget_queue();
+        begin(config, slots, held, &connection);
+        let ended = session::serve(*connection, slots, &setups, held, config, idle.as_mut()).await;
+        match held {
+            Some(held) if matches!(ended, Ended::Lost(_)) => {
+                slots.detach();
+                held.disconnected();
+            }
+            _ => slots.forget(),
+        }
         if let Some(idle) = &mut idle {
             idle.look(slots);
         }
@@ -154,10 +175,40 @@ async fn serve(config: &WorkerConfig, slots: &Slots) -> Result<WorkerReport, Wor
             Ended::Lost(reason) if config.once || way.is_inherited() => {
                 return Ok(report(slots, sessions, &reason));
             }
-            Ended::Lost(_) => {}
+            Ended::Lost(reason) => {
+                let (running, queued) = slots.load();
+                (config.tell)(&News::Lost { reason, computing: (running + queued) as usize });
+            }
         }
     }
 }
+
+/// Tells a coordinator what is held for its run, or forgets it where it is for another one.
+fn begin(config: &WorkerConfig, slots: &Slots, held: Option<&Held>, connection: &Connection) {
+    let Welcome { run, run_id, incarnation, .. } = &connection.welcome;
+    let (run, address) = (run.clone(), config.connect.clone());
+    (config.tell)(&News::Connected { run, address, slots: config.slots.max(1) });
+    let Some(held) = held else { return };
+    if !held.connected(Run { id: *run_id, incarnation: *incarnation }) {
+        slots.forget();
+    }
+    let outbox = &connection.outbox;
+    let going_on = slots.attach(outbox.clone());
+    let (portions, computing) = (held.portions(PORTION), going_on.len());
+    let finished = portions.iter().map(Vec::len).sum();
+    if finished + computing == 0 {
+        return;
+    }
+    // First what goes on: it is given away otherwise.
+    let going_on = going_on.into_iter().map(|key| HeldRun { key, ended: None }).collect();
+    for runs in std::iter::once(going_on).chain(portions) {
+        session::send(outbox, FromWorker::Held(runs));
+    }
+    (config.tell)(&News::Delivered { finished, computing });
+}
+
+/// Bytes of results in one message.
+const PORTION: usize = 1 << 20;
 
 fn report(slots: &Slots, sessions: u64, reason: &str) -> WorkerReport {
     let (predictions, failures) = slots.answered();

@@ -20,6 +20,7 @@ impl FleetEvent {
             Self::ControlRun { .. } => "control-run",
             Self::JobRetried { .. } => "job-retried",
             Self::JobFailed { .. } => "job-failed",
+            Self::RunsBrought { .. } => "runs-brought",
             Self::LateAnswer { .. } => "late-answer",
             Self::Waiting { .. } => "waiting",
             Self::Progress { .. } => "progress",
@@ -36,6 +37,7 @@ impl FleetEvent {
                 | Self::CallerRefused { .. }
                 | Self::OtherBuild { .. }
                 | Self::SetupFailed { .. }
+                | Self::RunsBrought { .. }
                 | Self::WorkerSetAside { .. }
                 | Self::JobFailed { .. }
                 | Self::Waiting { .. }
@@ -97,6 +99,12 @@ impl fmt::Display for FleetEvent {
                 write!(
                     f,
                     "particle {particle}, record {record}{with}: given up after {attempts} attempt{s}: {reason}"
+                )
+            }
+            Self::RunsBrought { worker, finished, computing } => {
+                write!(
+                    f,
+                    "worker {worker} brought {finished} finished runs along and goes on with {computing}"
                 )
             }
             Self::LateAnswer { worker, job } => {

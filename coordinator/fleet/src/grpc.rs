@@ -4,6 +4,7 @@
 //! read: [`super::hub`], then [`super::network`].
 
 use std::net::{SocketAddr, TcpListener};
+use std::ops::ControlFlow;
 use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
@@ -19,12 +20,18 @@ use tokio_util::sync::CancellationToken;
 use super::access::Secrets;
 use super::dispatcher::{BatchError, Event, Rules};
 use super::door::{Door, Refusals};
+use super::handle::FleetHandle;
 use super::hub::{Hub, Reply, Submission};
+use super::identity::RunIdentity;
 use super::network::{self, Ways};
-use super::{Fleet, FleetError, FleetEvent, Outcome};
+use super::{Arrived, Fleet, FleetError, FleetEvent, Outcome, TELL_EVERY};
 
-/// How often a waiting caller checks that the network thread lives.
+/// How long the caller of a batch that was dropped waits for the network's last words.
 const ALIVE_CHECK: Duration = Duration::from_secs(1);
+
+/// How long a run that is continued waits for the workers of its earlier start, which dial every two seconds, before it gives away
+/// jobs that they may have done.
+const GRACE: Duration = Duration::from_millis(2500);
 
 /// How a fleet listens and when it loses patience.
 #[derive(Clone, Debug)]
@@ -42,6 +49,8 @@ pub struct FleetConfig {
     pub patience: Duration,
     /// How many workers may be lost under one job before it is given up.
     pub max_attempts: u32,
+    /// The run: workers of an earlier start of it bring along what they have done.
+    pub identity: RunIdentity,
     /// BLAKE3 of this executable: a worker of another one is told of. `None`: none is.
     pub build: Option<[u8; 32]>,
     /// Ends [`Fleet::run`] promptly with [`FleetError::Cancelled`].
@@ -65,6 +74,7 @@ impl FleetConfig {
             heartbeat: Duration::from_secs(8),
             patience: Duration::from_secs(300),
             max_attempts: 5,
+            identity: RunIdentity::new(),
             build: own_build(),
             cancel,
             events,
@@ -84,46 +94,6 @@ pub struct GrpcFleet {
     is_open: bool,
 }
 
-/// Lets the supervisor of local workers end a fleet's wait.
-#[derive(Clone)]
-pub struct FleetHandle {
-    hub: Arc<Hub>,
-    adopted: UnboundedSender<UnixStream>,
-}
-
-impl FleetHandle {
-    /// Says that the local workers are given up: a batch without other workers ends with this reason.
-    pub(crate) fn give_up(&self, reason: String) {
-        self.hub.give_up(reason);
-    }
-
-    /// Says that all workers are processes of this machine: a setup that they cannot build ends a batch at once.
-    pub fn local_only(&self) {
-        self.hub.handle(Event::LocalOnly);
-    }
-
-    /// How many workers may be lost under one job.
-    pub(crate) fn max_attempts(&self) -> u32 {
-        self.hub.max_attempts()
-    }
-
-    /// Asks the workers with these process numbers to leave.
-    pub(crate) fn dismiss(&self, pids: &[u32]) {
-        self.hub.dismiss(pids);
-    }
-
-    /// Takes this end of a pair of sockets, of which a process that this one started holds the other, as the way to a worker.
-    pub(crate) fn adopt(&self, end: UnixStream) {
-        // A network that ended has told why.
-        let _ = self.adopted.send(end);
-    }
-
-    /// Passes an event on.
-    pub(crate) fn tell(&self, event: FleetEvent) {
-        self.hub.tell(event);
-    }
-}
-
 impl GrpcFleet {
     /// Listens and starts the network thread.
     ///
@@ -137,7 +107,10 @@ impl GrpcFleet {
             patience: config.patience,
             max_attempts: config.max_attempts,
         };
-        let hub = Arc::new(Hub::new(config.run_name, config.build, rules, config.events));
+        let started_again = address.is_some() && config.identity.incarnation > 1;
+        let opens = if started_again { GRACE } else { Duration::ZERO };
+        let hub = Hub::new(config.run_name, config.build, config.identity, rules, opens, config.events);
+        let hub = Arc::new(hub);
         let stop = CancellationToken::new();
         let (batches, submitted) = unbounded_channel();
         let (adopted, ends) = unbounded_channel();
@@ -185,7 +158,7 @@ impl GrpcFleet {
 
     /// For the supervisor of local workers.
     pub fn handle(&self) -> FleetHandle {
-        FleetHandle { hub: Arc::clone(&self.hub), adopted: self.adopted.clone() }
+        FleetHandle::new(Arc::clone(&self.hub), self.adopted.clone())
     }
 
     /// Asks all workers to leave, waits shortly for them, and stops the network. Dropping does the same.
@@ -193,10 +166,18 @@ impl GrpcFleet {
         drop(self);
     }
 
-    fn wait(&self, replies: &mpsc::Receiver<Reply>) -> Result<Vec<Outcome>, FleetError> {
+    fn wait(
+        &self,
+        replies: &mpsc::Receiver<Reply>,
+        arrived: Arrived<'_>,
+    ) -> Result<Vec<Outcome>, FleetError> {
         loop {
-            match replies.recv_timeout(ALIVE_CHECK) {
-                Ok(reply) => return reply.map_err(|error| self.explain(error)),
+            match replies.recv_timeout(TELL_EVERY) {
+                Ok(Ok(outcomes)) => return Ok(outcomes),
+                Ok(Err(error)) => {
+                    let _ = arrived(self.hub.arrived());
+                    return Err(self.explain(error));
+                }
                 Err(RecvTimeoutError::Disconnected) => {
                     // The batch was dropped by a network that is about to end: what it says then is the reason.
                     let deadline = Instant::now() + ALIVE_CHECK;
@@ -208,6 +189,10 @@ impl GrpcFleet {
                 Err(RecvTimeoutError::Timeout) => {
                     if self.has_ended() {
                         return Err(FleetError::Stopped(self.hub.why_stopped()));
+                    }
+                    if arrived(self.hub.arrived()).is_break() {
+                        self.hub.handle(Event::Abort(BatchError::Cancelled));
+                        return Err(FleetError::Cancelled);
                     }
                 }
             }
@@ -277,6 +262,14 @@ impl Fleet for GrpcFleet {
     }
 
     fn run_mixed(&mut self, jobs: Vec<(SetupId, Job)>) -> Result<Vec<Outcome>, FleetError> {
+        self.run_telling(jobs, &mut |_| ControlFlow::Continue(()))
+    }
+
+    fn run_telling(
+        &mut self,
+        jobs: Vec<(SetupId, Job)>,
+        arrived: Arrived<'_>,
+    ) -> Result<Vec<Outcome>, FleetError> {
         for (_, job) in &jobs {
             check_size(job).map_err(FleetError::TooLarge)?;
         }
@@ -288,7 +281,7 @@ impl Fleet for GrpcFleet {
         let encoder = JobEncoder::of(jobs.iter().map(|(_, job)| job));
         let sent = self.batches.send(Submission { jobs, encoder, reply });
         sent.map_err(|_| FleetError::Stopped(self.hub.why_stopped()))?;
-        self.wait(&replies)
+        self.wait(&replies, arrived)
     }
 
     fn n_workers(&self) -> usize {

@@ -5,6 +5,7 @@
 //! read: `state`, then [`super::service`], which brings the workers' events.
 
 mod arrival;
+mod held;
 mod state;
 #[cfg(test)]
 mod tests;
@@ -14,12 +15,13 @@ use std::sync::mpsc::Sender;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use starlings_proto::{Bytes, Hello, PROTOCOL, SetupId, ToWorker, Welcome, generated};
+use starlings_proto::{Bytes, HeldRun, Hello, PROTOCOL, SetupId, ToWorker, Welcome, generated};
 use tokio::sync::{Notify, mpsc::UnboundedSender};
 use tonic::Status;
 
 use super::dispatcher::message::hex;
-use super::dispatcher::{BatchError, Event, Joining, Rules, WorkerId};
+use super::dispatcher::{BatchError, Dispatcher, Event, Joining, Rules, WorkerId};
+use super::identity::RunIdentity;
 use super::job_name::JobName;
 use super::{FleetEvent, Outcome};
 pub(super) use state::{Closed, Submission};
@@ -36,6 +38,7 @@ pub(super) struct Hub {
     state: Mutex<State>,
     started: Instant,
     run_name: String,
+    identity: RunIdentity,
     heartbeat: Duration,
     build: Option<[u8; 32]>,
     max_attempts: u32,
@@ -47,16 +50,19 @@ impl Hub {
     pub(super) fn new(
         run_name: String,
         build: Option<[u8; 32]>,
+        identity: RunIdentity,
         rules: Rules,
+        opens: Duration,
         events: Sender<FleetEvent>,
     ) -> Self {
         // Epochs start anywhere, so that answers to an earlier coordinator on the same port carry none of this one's.
         let first_epoch = std::hash::RandomState::new().build_hasher().finish() >> 1;
-        let state = State::new(first_epoch, rules, events);
+        let state = State::new(first_epoch, Dispatcher::new(rules).opening_at(opens), events);
         Self {
             state: Mutex::new(state),
             started: Instant::now(),
             run_name,
+            identity,
             heartbeat: rules.heartbeat,
             build,
             max_attempts: rules.max_attempts,
@@ -89,6 +95,11 @@ impl Hub {
         self.lock().stopped.clone().unwrap_or_else(|| "its thread ended".to_owned())
     }
 
+    /// Outcomes that the caller of the batch was not told of before.
+    pub(super) fn arrived(&self) -> Vec<(usize, Outcome)> {
+        self.lock().dispatcher.arrived()
+    }
+
     pub(super) fn counts(&self) -> (usize, usize) {
         let state = self.lock();
         (state.dispatcher.n_workers(), state.dispatcher.slots())
@@ -117,7 +128,7 @@ impl Hub {
         let jobs = batch.jobs.iter().map(|(setup, job)| (*setup, JobName::of(job))).collect();
         state.handle(now, Event::Abort(BatchError::Cancelled));
         state.running = Some(batch);
-        state.handle(now, Event::Submit { jobs });
+        state.begin(now, jobs);
     }
 
     /// Takes a worker or says why not. The first message on its link is the welcome.
@@ -137,10 +148,12 @@ impl Hub {
             run: self.run_name.clone(),
             heartbeat: self.heartbeat.as_secs_f64(),
             epoch: id.0,
+            run_id: self.identity.id,
+            incarnation: self.identity.incarnation,
         };
         let _ = link.send(Ok(ToWorker::welcome(welcome)));
-        state.links.insert(id, Link::new(link, hello.pid));
         let name = format!("{}@{}/{}", state.joined, hello.host, hello.pid);
+        state.links.insert(id, Link::new(name.clone(), link, hello.pid));
         let Hello { cores, slots, host, pid, nonce, build, .. } = hello;
         let other = state.other_build(self.build, build).map(|(own, build)| FleetEvent::OtherBuild {
             worker: name.clone(),
@@ -155,6 +168,12 @@ impl Hub {
         Ok(id)
     }
 
+    /// Takes runs that a worker brings along from an earlier connection of the same run.
+    pub(super) fn bring(&self, worker: WorkerId, runs: Vec<HeldRun>) {
+        let now = self.started.elapsed();
+        self.decide().bring(now, worker, runs);
+    }
+
     pub(super) fn leave(&self, worker: WorkerId, reason: String, clean: bool) {
         let now = self.started.elapsed();
         // After a panic under the lock there is nothing left to decide: the next tick ends the fleet.
@@ -163,6 +182,7 @@ impl Hub {
         }
         let mut state = self.lock();
         state.links.remove(&worker);
+        state.waiting.left(worker);
         state.handle(now, Event::Left { worker, reason, clean });
         drop(state);
         self.link_ended.notify_waiters();

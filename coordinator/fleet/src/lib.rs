@@ -13,7 +13,9 @@ mod error;
 mod event;
 mod event_text;
 mod grpc;
+mod handle;
 mod hub;
+mod identity;
 mod in_process;
 mod job_name;
 mod local_workers;
@@ -23,14 +25,25 @@ mod travel;
 
 pub use error::FleetError;
 pub use event::FleetEvent;
-pub use grpc::{FleetConfig, FleetHandle, GrpcFleet, Refused};
+pub use grpc::{FleetConfig, GrpcFleet, Refused};
+pub use handle::FleetHandle;
+pub use identity::RunIdentity;
 pub use in_process::InProcess;
 pub use local_workers::{LocalConfig, LocalWorkers};
 pub use starlings_models::Factory;
-pub use starlings_proto::{ProtocolError, SetupId};
+pub use starlings_proto::{ProtocolError, SetupId, job_key};
 pub use travel::travels;
 
+use std::ops::ControlFlow;
+use std::time::Duration;
+
 use starlings_models::{Failure, Job, Prediction, Setup};
+
+/// How often outcomes are told of while their batch goes on.
+pub const TELL_EVERY: Duration = Duration::from_millis(500);
+
+/// Takes outcomes of jobs, each with the place of its job in the batch, while the batch goes on. A break ends the batch.
+pub type Arrived<'a> = &'a mut dyn FnMut(Vec<(usize, Outcome)>) -> ControlFlow<()>;
 
 /// How one job of a batch ended.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,6 +77,21 @@ pub trait Fleet {
     /// As [`Fleet::run_mixed`].
     fn run(&mut self, setup: SetupId, jobs: Vec<Job>) -> Result<Vec<Outcome>, FleetError> {
         self.run_mixed(jobs.into_iter().map(|job| (setup, job)).collect())
+    }
+
+    /// As [`Fleet::run_mixed`], and tells of outcomes while the batch goes on: every [`TELL_EVERY`], also when there are none, of
+    /// those that were not told of before, and of the rest when it ends in an error. Of a batch that is over sooner nothing is told,
+    /// and nothing by a fleet that runs in this process.
+    ///
+    /// # Errors
+    /// As [`Fleet::run_mixed`]; [`FleetError::Cancelled`] when the caller breaks off.
+    fn run_telling(
+        &mut self,
+        jobs: Vec<(SetupId, Job)>,
+        arrived: Arrived<'_>,
+    ) -> Result<Vec<Outcome>, FleetError> {
+        let _ = arrived;
+        self.run_mixed(jobs)
     }
 
     /// Number of workers now.

@@ -9,6 +9,8 @@ pub(crate) mod batch;
 mod ensemble;
 pub(crate) mod filter;
 pub(crate) mod free_run;
+mod journal;
+mod kept;
 pub(crate) mod resample;
 pub(crate) mod rescue;
 pub(crate) mod runner;

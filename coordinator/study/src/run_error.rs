@@ -6,6 +6,7 @@ use starlings_models::Failure;
 
 use crate::Study;
 use crate::store::StoreError;
+use crate::trial::named;
 
 /// Why a run ended without a result.
 #[derive(Debug, thiserror::Error)]
@@ -68,19 +69,15 @@ pub enum RunError {
 }
 
 impl RunError {
-    /// A fleet's failure, with names and values where it is about one run.
-    pub(crate) fn of_fleet(
-        study: &Study,
-        error: FleetError,
-        values: impl Fn(usize) -> Option<String>,
-    ) -> Self {
-        match error {
-            FleetError::NoAnswer { job, particle, record, reason } => {
-                let (record, values) =
-                    (study.records[record as usize].name.clone(), values(job).unwrap_or_default());
+    /// The same with names and values where a job of the fleet is meant; `theta` gives the parameters of a job.
+    pub(crate) fn naming(self, study: &Study, theta: impl Fn(usize) -> Option<Vec<f64>>) -> Self {
+        match self {
+            Self::Fleet(FleetError::NoAnswer { job, particle, record, reason }) => {
+                let record = study.records[record as usize].name.clone();
+                let values = theta(job).map_or_else(String::new, |theta| named(study, &theta));
                 Self::NoAnswer { particle: particle as usize, record, values, reason }
             }
-            other => other.into(),
+            other => other,
         }
     }
 

@@ -4,6 +4,7 @@
 
 use starlings_fleet::SetupId;
 use starlings_models::Job;
+use starlings_proto::JobKeys;
 
 use crate::store::RunKey;
 
@@ -14,11 +15,11 @@ pub fn free(programs: &[u8; 32], setup: &SetupId, job: &Job) -> RunKey {
     *hasher.finalize().as_bytes()
 }
 
-/// The key of a run that an observer may correct by what was observed.
-pub(crate) fn observed(programs: &[u8; 32], setup: &SetupId, job: &Job) -> RunKey {
+/// The key of a run that an observer may correct by what was observed: the programs and the whole job.
+pub(crate) fn observed(programs: &[u8; 32], keys: &mut JobKeys, setup: &SetupId, job: &Job) -> RunKey {
     let mut hasher = blake3::Hasher::new();
-    hash(&mut hasher, programs, setup, job);
-    numbers(&mut hasher, &job.window.observed);
+    hasher.update(programs);
+    hasher.update(&keys.of(setup, job));
     *hasher.finalize().as_bytes()
 }
 

@@ -5,13 +5,16 @@
 //! killed at any instant continues from a whole analysis at most [`HOLD_S`] before. Nothing here computes. Next file to read:
 //! [`crate::store::snapshot`].
 
+mod arrived;
 mod call;
 mod changes;
+mod elapsed;
 mod error;
 pub mod folder;
 mod folder_error;
 mod info;
 pub(super) mod json;
+mod lock;
 mod make;
 mod meaning;
 mod program;
@@ -33,6 +36,7 @@ use rusqlite::{Connection, OptionalExtension, Row, params};
 use schema::{SCHEMA_VERSION, insert_analysis, insert_jobs, insert_predictions};
 use snapshot::{Estimate, Snapshot};
 
+pub use arrived::ArrivedRun;
 pub use error::StoreError;
 pub use program::Program;
 pub use purpose::{EXPLANATION, Purpose};
@@ -43,15 +47,14 @@ pub use table::table;
 /// Analyses are committed together for at most so long, in s: a commit costs about as much as the rows of an analysis.
 const HOLD_S: f64 = 0.05;
 
-/// Name under which the store keeps how far the run has come.
-const ELAPSED: &str = "elapsed_s";
-
 /// An open run database.
 pub struct Store {
     path: PathBuf,
     connection: Connection,
     /// Time of the last commit, in s of the run's wall time.
     committed_s: Cell<f64>,
+    /// Whether there are runs of an analysis that is not made yet.
+    holds_arrived: Cell<bool>,
 }
 
 impl Drop for Store {
@@ -70,6 +73,8 @@ impl Store {
         let store = Self::existing(path, rusqlite::OpenFlags::SQLITE_OPEN_READ_WRITE)?;
         store.keep_a_log()?;
         store.guard(store.connection.execute_batch(remembered::TABLE))?;
+        store.guard(store.connection.execute_batch(arrived::TABLE))?;
+        store.holds_arrived.set(store.guard(arrived::any(&store.connection))?);
         Ok(store)
     }
 
@@ -110,7 +115,8 @@ impl Store {
     fn connect(path: &Path, flags: rusqlite::OpenFlags) -> Result<Self, StoreError> {
         let connection = Connection::open_with_flags(path, flags)
             .map_err(|source| StoreError::Database { path: path.to_owned(), source })?;
-        Ok(Self { path: path.to_owned(), connection, committed_s: Cell::new(f64::NEG_INFINITY) })
+        let (committed_s, holds_arrived) = (Cell::new(f64::NEG_INFINITY), Cell::new(false));
+        Ok(Self { path: path.to_owned(), connection, committed_s, holds_arrived })
     }
 
     /// WAL with NORMAL keeps every committed transaction through a killed process at the price of one write each.
@@ -197,6 +203,7 @@ impl Store {
             insert_analysis(connection, row)?;
             insert_jobs(connection, &row.jobs)?;
             snapshot.write(connection)?;
+            arrived::forget(connection, self.holds_arrived.get())?;
             connection.execute_batch("RELEASE analysis")
         };
         let write = || -> rusqlite::Result<()> {
@@ -213,6 +220,8 @@ impl Store {
         if written.is_err() {
             // The first failure is returned.
             let _ = self.commit();
+        } else {
+            self.holds_arrived.set(false);
         }
         self.guard(written)
     }
@@ -256,26 +265,6 @@ impl Store {
             transaction.commit()
         };
         self.guard(write())
-    }
-
-    /// How far the run had come, in s of its wall time: the last commit or the last event, whichever is later; zero for a
-    /// new run.
-    ///
-    /// # Errors
-    /// When the database refuses.
-    pub fn elapsed_s(&self) -> Result<f64, StoreError> {
-        let of_events = "SELECT coalesce(max(at_s), 0.0) FROM events";
-        let told: f64 = self.guard(self.connection.query_row(of_events, [], |row| row.get(0)))?;
-        let kept = self.meta(ELAPSED)?.and_then(|text| text.parse().ok());
-        Ok(kept.unwrap_or(0.0_f64).max(told))
-    }
-
-    /// Stores how far the run has come.
-    ///
-    /// # Errors
-    /// When the database refuses.
-    pub fn note_elapsed(&self, now_s: f64) -> Result<(), StoreError> {
-        self.set_meta(ELAPSED, &now_s.to_string())
     }
 
     /// All rows of a query, each mapped by `map`. The tables are those of `schema.rs`.

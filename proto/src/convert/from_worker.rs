@@ -3,6 +3,7 @@
 use bytes::Bytes;
 use starlings_models::{ModelFailure, ParticleError, Prediction, Timeout};
 
+use super::held::{HeldRun, decode_held, encode_held};
 use super::{Lease, ProtocolError, SetupId, floats, job::check_state, required, setup_id};
 use crate::MAX_SLOTS;
 use crate::generated::{self, failure, from_worker::Kind, result::Outcome};
@@ -67,6 +68,8 @@ pub enum FromWorker {
     },
     /// The worker leaves on purpose.
     Goodbye(String),
+    /// What it finished or still makes for an earlier connection of the same run.
+    Held(Vec<HeldRun>),
 }
 
 impl FromWorker {
@@ -86,6 +89,7 @@ impl FromWorker {
             }
             Self::Heartbeat { running, queued } => Kind::Heartbeat(generated::Heartbeat { running, queued }),
             Self::Goodbye(reason) => Kind::Goodbye(generated::Goodbye { reason }),
+            Self::Held(runs) => Kind::Held(encode_held(runs)),
         };
         Ok(generated::FromWorker { kind: Some(kind) })
     }
@@ -101,6 +105,7 @@ impl FromWorker {
             Kind::Result(result) => decode_result(result)?,
             Kind::Heartbeat(h) => Self::Heartbeat { running: h.running, queued: h.queued },
             Kind::Goodbye(g) => Self::Goodbye(g.reason),
+            Kind::Held(held) => Self::Held(decode_held(held)?),
         })
     }
 }
@@ -123,35 +128,59 @@ fn decode_hello(hello: generated::Hello) -> Result<Hello, ProtocolError> {
 
 fn encode_answer(answer: LeaseOutcome) -> Result<Outcome, ProtocolError> {
     Ok(match answer {
-        LeaseOutcome::Ran(Ok(prediction)) => {
-            check_state(&prediction.state)?;
-            Outcome::Prediction(generated::Prediction {
-                outputs: floats::encode(&prediction.outputs),
-                state: floats::encode(&prediction.state),
-            })
-        }
-        LeaseOutcome::Ran(Err(error)) => {
-            Outcome::Failure(generated::Failure { kind: Some(encode_failure(error)) })
+        LeaseOutcome::Ran(ended) => {
+            check_state(ended.as_ref().map(|prediction| &*prediction.state).unwrap_or_default())?;
+            encode_ended(&ended)
         }
         LeaseOutcome::Withdrawn => Outcome::Withdrawn(generated::Withdrawn {}),
     })
 }
 
+pub(super) fn encode_ended(ended: &Result<Prediction, ParticleError>) -> Outcome {
+    match ended {
+        Ok(prediction) => Outcome::Prediction(generated::Prediction {
+            outputs: floats::encode(&prediction.outputs),
+            state: floats::encode(&prediction.state),
+        }),
+        Err(error) => Outcome::Failure(generated::Failure { kind: Some(encode_failure(error.clone())) }),
+    }
+}
+
 fn decode_result(result: generated::Result) -> Result<FromWorker, ProtocolError> {
     let lease = required(result.lease, "lease")?.into();
-    let cost = if result.cost_s > 0.0 && result.cost_s.is_finite() { result.cost_s } else { 0.0 };
-    let answer = match required(result.outcome, "outcome")? {
+    if let Some(Outcome::Withdrawn(_)) = result.outcome {
+        return Ok(FromWorker::Result {
+            lease,
+            answer: LeaseOutcome::Withdrawn,
+            cost: seconds(result.cost_s),
+        });
+    }
+    let (ended, cost) = decode_ended(result)?;
+    if let Ok(prediction) = &ended {
+        check_state(&prediction.state)?;
+    }
+    Ok(FromWorker::Result { lease, answer: LeaseOutcome::Ran(ended), cost })
+}
+
+/// How a run ended, and its wall time in seconds; its state may have any length.
+pub(super) fn decode_ended(
+    result: generated::Result,
+) -> Result<(Result<Prediction, ParticleError>, f64), ProtocolError> {
+    let cost = seconds(result.cost_s);
+    let ended = match required(result.outcome, "outcome")? {
         Outcome::Prediction(p) => {
-            let state = floats::decode(&p.state, "state")?;
-            check_state(&state)?;
-            LeaseOutcome::Ran(Ok(Prediction { outputs: floats::decode(&p.outputs, "outputs")?, state, cost }))
+            let (outputs, state) =
+                (floats::decode(&p.outputs, "outputs")?, floats::decode(&p.state, "state")?);
+            Ok(Prediction { outputs, state, cost })
         }
-        Outcome::Failure(failure) => {
-            LeaseOutcome::Ran(Err(decode_failure(required(failure.kind, "failure kind")?)?))
-        }
-        Outcome::Withdrawn(_) => LeaseOutcome::Withdrawn,
+        Outcome::Failure(failure) => Err(decode_failure(required(failure.kind, "failure kind")?)?),
+        Outcome::Withdrawn(_) => return Err(ProtocolError::Missing("end of the run")),
     };
-    Ok(FromWorker::Result { lease, answer, cost })
+    Ok((ended, cost))
+}
+
+fn seconds(cost: f64) -> f64 {
+    if cost > 0.0 && cost.is_finite() { cost } else { 0.0 }
 }
 
 fn encode_failure(error: ParticleError) -> failure::Kind {

@@ -99,7 +99,7 @@ pub(super) fn receive(
     Ok(())
 }
 
-fn digest(window: &generated::Window) -> WindowId {
+pub(super) fn digest(window: &generated::Window) -> WindowId {
     let mut hasher = blake3::Hasher::new();
     let mut add = |part: &[u8]| {
         // Lengths keep neighbouring arrays apart.

@@ -2,12 +2,13 @@
 //!
 //! Next file to read: [`super::remembered`].
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use starlings_fleet::{Outcome, SetupId};
 use starlings_models::Job;
-use starlings_study::store::{JobRow, RunKey, StoreError};
+use starlings_study::store::{JobRow, RunKey, Store, StoreError};
 use starlings_study::{Study, run_key};
 
 use super::remembered::{RememberedRun, decode, encode, from_outcome};
@@ -174,7 +175,7 @@ impl RunCache<'_> {
         Ok(body.map_or_else(|| Err(String::new()), |body| decode(&body)))
     }
 
-    /// Sends jobs to the fleet and remembers their results.
+    /// Sends jobs to the fleet and remembers their results, those of a long batch as they arrive.
     fn dispatch(
         &mut self,
         jobs: Vec<(SetupId, Job)>,
@@ -183,17 +184,32 @@ impl RunCache<'_> {
         if jobs.is_empty() {
             return Ok(());
         }
-        let outcomes = self.fleet.run_mixed(jobs);
+        let mut arrivals = Arrivals {
+            study: self.study,
+            store: self.store,
+            requested,
+            batch: self.n_batch,
+            early: HashMap::new(),
+            refused: None,
+        };
+        let outcomes = self.fleet.run_telling(jobs, &mut |early| arrivals.take_early(early));
+        let Arrivals { mut early, refused, .. } = arrivals;
         // The events are kept even if the runs end in an error.
         self.keep_events()?;
+        if let Some(error) = refused {
+            return Err(error);
+        }
         let outcomes = outcomes.map_err(|error| fleet_failure(self.study, error))?;
         let mut answers = Vec::with_capacity(requested.len());
         let mut rows = Vec::with_capacity(requested.len());
-        for (requested, outcome) in requested.iter().zip(outcomes) {
-            rows.push(self.job_row(requested.record, requested.particle, &outcome));
+        for (index, (requested, outcome)) in requested.iter().zip(outcomes).enumerate() {
             self.workers.insert(outcome.worker.clone());
-            let known =
-                from_outcome(self.study, outcome, requested.particle, requested.record, requested.n_value)?;
+            if let Some(known) = early.remove(&index) {
+                self.recent.insert(requested.key, known);
+                continue;
+            }
+            let (row, known) = remembered(self.study, self.n_batch, requested, outcome)?;
+            rows.push(row);
             answers.push((requested.key, known));
         }
         self.store.note_elapsed(self.elapsed())?;
@@ -212,17 +228,68 @@ impl RunCache<'_> {
         }
         Ok(())
     }
+}
 
-    fn job_row(&self, record: usize, particle: u32, outcome: &Outcome) -> JobRow {
-        JobRow {
-            pass: 0,
-            step: self.n_batch,
-            record: self.study.records[record].name.clone(),
-            particle,
-            attempts: outcome.attempts,
-            worker: outcome.worker.clone(),
-            error: outcome.result.as_ref().err().map(ToString::to_string),
-            cost_s: outcome.result.as_ref().map_or(0.0, |p| p.cost),
+/// What becomes of results that arrive while their batch goes on.
+struct Arrivals<'a> {
+    study: &'a Study,
+    store: &'a Store,
+    requested: &'a [RequestedRun],
+    batch: usize,
+    /// Results that are in the store, by the places of their jobs.
+    early: HashMap<usize, RememberedRun>,
+    refused: Option<ExplainError>,
+}
+
+impl Arrivals<'_> {
+    /// Remembers results; one that cannot be remembered ends the batch.
+    fn take_early(&mut self, outcomes: Vec<(usize, Outcome)>) -> ControlFlow<()> {
+        match self.remember(outcomes) {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(error) => {
+                self.refused = Some(error);
+                ControlFlow::Break(())
+            }
         }
     }
+
+    fn remember(&mut self, outcomes: Vec<(usize, Outcome)>) -> Result<(), ExplainError> {
+        if outcomes.is_empty() {
+            return Ok(());
+        }
+        let (mut rows, mut runs) = (Vec::new(), Vec::new());
+        for (index, outcome) in outcomes {
+            let (row, known) = remembered(self.study, self.batch, &self.requested[index], outcome)?;
+            rows.push(row);
+            runs.push((index, known));
+        }
+        let keyed = runs.iter().map(|(index, known)| (&self.requested[*index].key, encode(known)));
+        self.store.remember_runs(keyed, &rows)?;
+        self.early.extend(runs);
+        Ok(())
+    }
+}
+
+/// The row and the result to remember of a run.
+///
+/// # Errors
+/// When the prediction has another length than was requested.
+fn remembered(
+    study: &Study,
+    batch: usize,
+    requested: &RequestedRun,
+    outcome: Outcome,
+) -> Result<(JobRow, RememberedRun), ExplainError> {
+    let RequestedRun { record, particle, n_value, .. } = *requested;
+    let row = JobRow {
+        pass: 0,
+        step: batch,
+        record: study.records[record].name.clone(),
+        particle,
+        attempts: outcome.attempts,
+        worker: outcome.worker.clone(),
+        error: outcome.result.as_ref().err().map(ToString::to_string),
+        cost_s: outcome.result.as_ref().map_or(0.0, |p| p.cost),
+    };
+    Ok((row, from_outcome(study, outcome, particle, record, n_value)?))
 }

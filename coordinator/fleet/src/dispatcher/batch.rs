@@ -2,6 +2,8 @@
 //!
 //! Next files to read: `queue`, for those that wait, `doubt` for those that failed for an unknown reason.
 
+mod arrived;
+mod held;
 mod notices;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -36,7 +38,10 @@ pub(super) struct Batch {
     pub(super) queue: Queue,
     /// Jobs that failed twice and wait for a run that is known to work.
     parked: BTreeMap<usize, WorkerId>,
-    done: usize,
+    /// Jobs with an outcome, in the order in which they ended.
+    ended: Vec<usize>,
+    /// How many of them the caller was told of.
+    handed_on: usize,
     told: usize,
 }
 
@@ -102,7 +107,8 @@ impl Batch {
             jobs: states,
             queue,
             parked: BTreeMap::new(),
-            done: 0,
+            ended: Vec::new(),
+            handed_on: 0,
             told: 0,
         }
     }
@@ -148,7 +154,7 @@ impl Batch {
     }
 
     pub(super) fn is_done(&self) -> bool {
-        self.done == self.jobs.len()
+        self.ended.len() == self.jobs.len()
     }
 
     pub(super) fn into_outcomes(self) -> Vec<Outcome> {
@@ -218,7 +224,7 @@ impl Batch {
 
     /// Jobs without an outcome.
     pub(super) fn n_open(&self) -> usize {
-        self.jobs.len() - self.done
+        self.jobs.len() - self.ended.len()
     }
 
     /// Takes back a job whose worker is gone; `counted` when the worker may have died of it.
@@ -289,7 +295,7 @@ impl Batch {
         let job = &mut self.jobs[index];
         debug_assert!(job.outcome.is_none(), "a job ends once: its only lease is released before");
         if job.outcome.replace(outcome).is_none() {
-            self.done += 1;
+            self.ended.push(index);
             self.open[job.setup] -= 1;
         }
     }

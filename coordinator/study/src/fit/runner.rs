@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector};
 use starlings_fleet::{Fleet, Outcome, SetupId};
 use starlings_models::{BuildSetup, Failure, Job, Prediction, Setup, Window};
 
-use super::timeouts::Timeouts;
+use super::kept::Kept;
 use crate::store::snapshot::Counts;
 use crate::store::{JobRow, Store};
 use crate::trial::named;
@@ -26,6 +26,13 @@ pub(crate) struct AnalysisIndex {
     pub(crate) pass: usize,
     /// Analysis within the pass, from 0.
     pub(crate) step: usize,
+}
+
+impl AnalysisIndex {
+    /// Whether a fit makes it, and not the forward run.
+    pub(super) fn is_of_fit(self) -> bool {
+        self.pass > 0
+    }
 }
 
 /// A prediction per particle and window, or why there is none: a failure of the model, or the limit of wall time.
@@ -46,8 +53,8 @@ pub(crate) struct EnsembleRunner<'a> {
     workers: BTreeSet<String>,
     /// Length of a state, where the model's specification says it.
     n_state: Option<usize>,
-    /// Runs that were given up after their limit of wall time, where a store keeps them.
-    timeouts: Option<Timeouts<'a>>,
+    /// What a store keeps of runs, where there is one.
+    kept: Option<Kept<'a>>,
 }
 
 impl<'a> EnsembleRunner<'a> {
@@ -68,22 +75,22 @@ impl<'a> EnsembleRunner<'a> {
             threads: 1,
             workers: BTreeSet::new(),
             n_state,
-            timeouts: None,
+            kept: None,
         })
     }
 
-    /// The same, with timeouts kept in a store: one that is there is repeated without a run.
+    /// The same, with runs kept in a store: what it knows is not run again.
     ///
     /// # Errors
     /// When the store cannot be read.
     pub(crate) fn deciding(mut self, store: &'a Store) -> Result<Self, RunError> {
-        self.timeouts = Some(Timeouts::read(store)?);
+        self.kept = Some(Kept::read(store)?);
         Ok(self)
     }
 
     /// A warning about the timeouts in the store, if there are any.
     pub(crate) fn timeouts(&self) -> Option<String> {
-        self.timeouts.as_ref()?.warning()
+        self.kept.as_ref()?.warning()
     }
 
     /// Runs the given particles over the windows and gives back what the study's channels measure of them. `theta` is p × r in
@@ -102,17 +109,18 @@ impl<'a> EnsembleRunner<'a> {
     ) -> Result<Results, RunError> {
         let sent: StepWindows =
             windows.iter().map(|(record, window)| (*record, self.sent(*record, window))).collect();
-        let study = self.study;
+        let (study, setup) = (self.study, self.setup);
         let job = |index: usize| {
             let (particle, (record, window)) = (particles[index / sent.len()], &sent[index % sent.len()]);
             let column: DVector<f64> = theta.column(particle).into_owned();
-            Job {
+            let job = Job {
                 particle: particle as u32,
                 record: *record as u32,
                 window: Arc::clone(window),
                 theta: study.theta_for(*record, column.as_slice()),
                 state: states[*record].as_ref().map(|x| x.column(particle).iter().copied().collect()),
-            }
+            };
+            (setup, job)
         };
         let n_job = particles.len() * sent.len();
         self.counts.total += n_job as u64;
@@ -160,8 +168,7 @@ impl<'a> EnsembleRunner<'a> {
             }
         }
         self.counts.total += jobs.len() as u64;
-        let outcomes =
-            self.fleet.run_mixed(jobs).map_err(|error| RunError::of_fleet(self.study, error, |_| None))?;
+        let outcomes = self.outcomes(at, jobs.len(), |index| jobs[index].clone())?;
         self.gather(at, outcomes, (0..setups.len()).map(|setup| (setup, 0)), theta, windows)
     }
 
@@ -207,36 +214,18 @@ impl<'a> EnsembleRunner<'a> {
         self.study.sendable(record, &self.study.asked(record, window))
     }
 
-    /// One outcome per job; those that are known to be timeouts are not run.
+    /// One outcome per job; those that the store knows are not run.
     fn outcomes(
         &mut self,
         at: AnalysisIndex,
         n_job: usize,
-        job: impl Fn(usize) -> Job,
+        job: impl Fn(usize) -> (SetupId, Job),
     ) -> Result<Vec<Outcome>, RunError> {
-        // The forward run with the estimate decides nothing about a sigma point: it is tried anew.
-        let mut timeouts = self.timeouts.as_mut().filter(|_| at.pass > 0);
-        let mut known: Vec<Option<Outcome>> = match &timeouts {
-            Some(timeouts) if !timeouts.is_empty() => {
-                (0..n_job).map(|index| timeouts.known(&self.setup, &job(index))).collect()
-            }
-            _ => vec![None; n_job],
+        let ran = match &mut self.kept {
+            Some(kept) => kept.run(self.fleet, at, n_job, &job),
+            None => self.fleet.run_mixed((0..n_job).map(&job).collect()).map_err(RunError::from),
         };
-        let open: Vec<usize> = (0..n_job).filter(|index| known[*index].is_none()).collect();
-        if open.is_empty() {
-            return Ok(known.into_iter().flatten().collect());
-        }
-        let outcomes = self.fleet.run(self.setup, open.iter().map(|index| job(*index)).collect());
-        let values = |at: usize| open.get(at).map(|index| named(self.study, &job(*index).theta));
-        for (index, outcome) in
-            open.iter().zip(outcomes.map_err(|error| RunError::of_fleet(self.study, error, values))?)
-        {
-            if let (Some(timeouts), Err(Failure::Timeout(timeout))) = (&mut timeouts, &outcome.result) {
-                timeouts.keep(&self.setup, &job(*index), timeout)?;
-            }
-            known[*index] = Some(outcome);
-        }
-        Ok(known.into_iter().flatten().collect())
+        ran.map_err(|error| error.naming(self.study, |at| (at < n_job).then(|| job(at).1.theta)))
     }
 
     /// A prediction of another length is an error of the run, not a failure of the particle.

@@ -8,6 +8,7 @@ use std::collections::HashMap;
 
 use starlings_fleet::{Outcome, SetupId};
 use starlings_models::{Job, Timeout};
+use starlings_proto::JobKeys;
 
 use crate::run_key;
 use crate::store::{RunKey, Store, StoreError};
@@ -49,7 +50,8 @@ impl<'a> Timeouts<'a> {
 
     /// The timeout of a job as its outcome, if it was decided before.
     pub(super) fn known(&self, setup: &SetupId, job: &Job) -> Option<Outcome> {
-        let timeout = self.known.get(&run_key::observed(&self.programs, setup, job))?;
+        let timeout =
+            self.known.get(&run_key::observed(&self.programs, &mut JobKeys::default(), setup, job))?;
         Some(Outcome { result: Err(timeout.clone().into()), attempts: 0, worker: String::new() })
     }
 
@@ -58,7 +60,7 @@ impl<'a> Timeouts<'a> {
     /// # Errors
     /// When the store refuses.
     pub(super) fn keep(&mut self, setup: &SetupId, job: &Job, timeout: &Timeout) -> Result<(), StoreError> {
-        let key = run_key::observed(&self.programs, setup, job);
+        let key = run_key::observed(&self.programs, &mut JobKeys::default(), setup, job);
         self.store.remember_runs([(&key, encode(timeout).as_slice())], &[])?;
         self.known.insert(key, timeout.clone());
         Ok(())

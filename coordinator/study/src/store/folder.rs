@@ -4,7 +4,6 @@
 //! next one. Result files are written beside their place and renamed into it, so a reader never sees half of one. Next files
 //! to read: [`crate::store`], and [`super::resume`] for what a run may be continued with.
 
-use std::fs::{File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -17,6 +16,7 @@ pub use super::folder_error::FolderError;
 pub use super::info::StudyInfo;
 use super::info::info;
 use super::json::json;
+use super::lock::FolderLock;
 use super::make;
 use super::meaning::Meaning;
 
@@ -27,7 +27,7 @@ pub struct RunFolder {
     /// Its database.
     pub store: Store,
     /// Held for as long as this process runs in the folder.
-    pub(super) _lock: Option<File>,
+    pub(super) _lock: Option<FolderLock>,
 }
 
 /// Name under which the store keeps the course of the innovations with and without the observer.
@@ -60,7 +60,7 @@ impl RunFolder {
         free()?;
         std::fs::create_dir_all(path)
             .map_err(|source| FolderError::Unwritable { path: path.to_owned(), source })?;
-        let lock = lock(path)?;
+        let lock = FolderLock::take(path)?;
         // Another process may have started a run before the lock was taken.
         free()?;
         let info = json(&info(study, command, started));
@@ -107,6 +107,7 @@ impl RunFolder {
             posterior::to_csv(study, &fit.posterior).map_err(|e| self.store.damaged("posterior", e))?;
         self.store.set_meta("posterior", &posterior)?;
         self.store.set_meta("summary", &json(summary))?;
+        self.store.forget_arrived()?;
         // The log stays open while another process reads the database; the run is finished all the same.
         let _ = self.store.close_log();
         Ok(())
@@ -122,17 +123,6 @@ pub(super) fn freeze(path: &Path, text: &str) -> Result<(), FolderError> {
 /// Whether a folder has its study.
 pub(super) fn is_frozen(path: &Path) -> bool {
     path.join(FROZEN).exists()
-}
-
-/// Locks the folder until the file is dropped.
-pub(super) fn lock(path: &Path) -> Result<File, FolderError> {
-    let file =
-        File::open(path).map_err(|source| FolderError::Unwritable { path: path.to_owned(), source })?;
-    match file.try_lock() {
-        Err(TryLockError::WouldBlock) => Err(FolderError::Locked(path.to_owned())),
-        // Some network file systems have no locks; the run then goes on without one.
-        Ok(()) | Err(TryLockError::Error(_)) => Ok(file),
-    }
 }
 
 /// Writes a file beside its place and renames it into it.

@@ -15,8 +15,15 @@ pub enum FolderError {
     #[error("{0} exists already, and a run would overwrite it: choose another folder with --out")]
     InTheWay(PathBuf),
     /// Another process runs in it.
-    #[error("another process is running in {0}: wait for its end, or stop it")]
-    Locked(PathBuf),
+    #[error(
+        "another process is running in {folder}{by}: wait for its end, stop it, or choose another folder with --out"
+    )]
+    Locked {
+        /// The folder.
+        folder: PathBuf,
+        /// ` (process 17 on host)`; empty where that is not known.
+        by: String,
+    },
     /// Its run never got as far as its first step.
     #[error("{0} holds no run that could be continued: remove the folder and start again without --resume")]
     NeverStarted(PathBuf),

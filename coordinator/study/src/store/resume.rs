@@ -8,8 +8,9 @@ use std::path::Path;
 
 use super::call::Call;
 use super::changes::changes;
-use super::folder::{DATABASE, FolderError, RunFolder, StudyInfo, freeze, is_frozen, lock};
+use super::folder::{DATABASE, FolderError, RunFolder, StudyInfo, freeze, is_frozen};
 use super::json::json;
+use super::lock::{FolderLock, NAME};
 use super::make::is_left_over;
 use super::meaning::{Meaning, Part};
 use super::{Program, Purpose, Store, StoreError};
@@ -39,7 +40,7 @@ impl RunFolder {
                 .err()
                 .map_or(FolderError::NeverStarted(path.to_owned()), Into::into));
         }
-        let lock = lock(path)?;
+        let lock = FolderLock::take(path)?;
         let store = Store::open(&database)?;
         let found = Purpose::of(&store)?;
         if found != purpose {
@@ -119,8 +120,8 @@ impl RunFolder {
 
 /// Whether a start was killed here before there was a run: an empty folder, or what [`Store::create`] leaves in one.
 fn was_begun(path: &Path, database: &Path) -> bool {
-    std::fs::read_dir(path)
-        .is_ok_and(|mut entries| entries.all(|entry| entry.is_ok_and(|e| is_left_over(&e.path(), database))))
+    let left = |file: &Path| is_left_over(file, database) || file == path.join(NAME);
+    std::fs::read_dir(path).is_ok_and(|mut entries| entries.all(|entry| entry.is_ok_and(|e| left(&e.path()))))
 }
 
 fn same_study(

@@ -10,9 +10,9 @@ use crate::job_name::JobName;
 impl Batch {
     /// How far the batch is, when that changed.
     pub(in crate::dispatcher) fn progress(&mut self) -> Option<FleetEvent> {
-        let changed = self.told != self.done;
-        self.told = self.done;
-        changed.then_some(FleetEvent::Progress { done: self.done, total: self.jobs.len() })
+        let changed = self.told != self.ended.len();
+        self.told = self.ended.len();
+        changed.then_some(FleetEvent::Progress { done: self.ended.len(), total: self.jobs.len() })
     }
 
     /// What a job is called in a sentence.

@@ -100,3 +100,26 @@ fn an_empty_batch_is_done_at_once() {
     let mut stage = Stage::with(&[]);
     assert_eq!(stage.step(submit(0)), [Command::BatchDone(vec![])]);
 }
+
+#[test]
+fn outcomes_are_handed_on_once_while_the_batch_goes_on_and_the_rest_when_it_fails() {
+    let mut stage = Stage::with(&[4]);
+    let jobs = stage.jobs(submit(4));
+    let places = |stage: &mut Stage| {
+        let arrived = stage.dispatcher.arrived();
+        arrived
+            .into_iter()
+            .map(|(index, outcome)| (index, outcome.result.unwrap().outputs[0]))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(places(&mut stage), []);
+    for at in [2, 0] {
+        stage.step(answered(jobs[at].0, LeaseOutcome::Ran(Ok(prediction(at))), 1.0));
+    }
+    assert_eq!(places(&mut stage), [(2, 2.0), (0, 0.0)]);
+    assert_eq!(places(&mut stage), []);
+    stage.step(answered(jobs[1].0, LeaseOutcome::Ran(Ok(prediction(1))), 1.0));
+    stage.step(Event::Abort(BatchError::Cancelled));
+    assert_eq!(places(&mut stage), [(1, 1.0)]);
+    assert_eq!(places(&mut stage), []);
+}

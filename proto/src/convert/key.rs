@@ -1,0 +1,104 @@
+//! The key of a job: a hash of everything in it, by which its result is known again.
+//!
+//! A run depends on its job alone, so a result with the key of a job is the result of that job, whoever asked for it first. Both ends
+//! compute the key from the same arrays; it does not travel with a job. Next file to read: [`super::ended`].
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use starlings_models::{Job, Window};
+
+use super::{SetupId, floats, window, windows};
+
+/// BLAKE3 of a job with its setup: particle, record, window, parameters and state, bit by bit.
+pub type JobKey = [u8; 32];
+
+/// Makes keys of jobs; the windows that they share are hashed once.
+#[derive(Debug, Default)]
+pub struct JobKeys {
+    /// By the place of a window in memory, which stays its own for as long as the window is held here.
+    windows: HashMap<usize, (Arc<Window>, [u8; 32])>,
+}
+
+impl JobKeys {
+    /// The key of one job.
+    pub fn of(&mut self, setup: &SetupId, job: &Job) -> JobKey {
+        let place = Arc::as_ptr(&job.window) as usize;
+        let (_, over) = self
+            .windows
+            .entry(place)
+            .or_insert_with(|| (Arc::clone(&job.window), windows::digest(&window::encode(&job.window))));
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(setup);
+        hasher.update(&job.particle.to_le_bytes());
+        hasher.update(&job.record.to_le_bytes());
+        hasher.update(over);
+        hasher.update(&(job.theta.len() as u64).to_le_bytes());
+        hasher.update(&floats::encode(&job.theta));
+        // By its own hash, so that a state has the same part in the key however it travels.
+        if let Some(state) = &job.state {
+            hasher.update(blake3::hash(&floats::encode(state)).as_bytes());
+        }
+        *hasher.finalize().as_bytes()
+    }
+}
+
+/// The key of one job.
+pub fn job_key(setup: &SetupId, job: &Job) -> JobKey {
+    JobKeys::default().of(setup, job)
+}
+
+#[cfg(test)]
+mod tests {
+    use starlings_models::Signal;
+
+    use super::*;
+
+    fn job() -> Job {
+        let inputs = vec![Signal { times: vec![0.0, 1.0], values: vec![2.0, 3.0] }];
+        let window = Window { start: 0.0, times: vec![1.0], observed: vec![f64::NAN], inputs };
+        Job { particle: 1, record: 2, window: window.into(), theta: vec![0.5, -0.0], state: Some(vec![1.0]) }
+    }
+
+    #[test]
+    fn every_part_of_a_job_has_its_part_in_the_key() {
+        let with = |change: &dyn Fn(&mut Job)| {
+            let mut job = job();
+            change(&mut job);
+            job_key(&[7; 32], &job)
+        };
+        let over = |change: &dyn Fn(&mut Window)| with(&|job| change(Arc::make_mut(&mut job.window)));
+        let same = with(&|_| {});
+        let mut keys = vec![
+            same,
+            job_key(&[8; 32], &job()),
+            with(&|job| job.particle = 3),
+            with(&|job| job.record = 3),
+            with(&|job| job.theta[1] = 0.0),
+            with(&|job| job.theta.truncate(1)),
+            with(&|job| job.state = None),
+            with(&|job| job.state = Some(Vec::new())),
+            with(&|job| job.state = Some(vec![1.5])),
+            over(&|window| window.start = -1.0),
+            over(&|window| window.times[0] = 2.0),
+            over(&|window| window.observed[0] = 0.0),
+            over(&|window| window.inputs[0].times[1] = 2.0),
+            over(&|window| window.inputs[0].values[1] = 2.0),
+            over(&|window| window.inputs.clear()),
+        ];
+        assert_eq!(job_key(&[7; 32], &job()), same, "another copy of the same job");
+        let n = keys.len();
+        keys.sort_unstable();
+        keys.dedup();
+        assert_eq!(keys.len(), n);
+    }
+
+    #[test]
+    fn a_shared_window_gives_the_key_of_a_window_of_its_own() {
+        let (mut keys, first) = (JobKeys::default(), job());
+        let second = Job { particle: 9, ..first.clone() };
+        assert_eq!(keys.of(&[7; 32], &first), job_key(&[7; 32], &job()));
+        assert_eq!(keys.of(&[7; 32], &second), job_key(&[7; 32], &Job { particle: 9, ..job() }));
+        assert_eq!(keys.windows.len(), 1);
+    }
+}
