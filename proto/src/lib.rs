@@ -18,7 +18,7 @@ pub use convert::{
 };
 
 /// Number of the protocol; coordinator and worker must have the same.
-pub const PROTOCOL: u32 = 3;
+pub const PROTOCOL: u32 = 4;
 
 /// Largest state that travels inside a job or a prediction, bytes.
 pub const MAX_INLINE_STATE: usize = 256 * 1024;

@@ -119,7 +119,7 @@ fn take(
             let outbox = outbox.clone();
             setups.order(id, setup, Box::new(move |result| send(&outbox, FromWorker::Setup { id, result })));
         }
-        Ok(ToWorker::Cancel(leases)) => slots.withdraw(&leases),
+        Ok(ToWorker::Cancel { leases, stop }) => slots.withdraw(&leases, stop),
         Ok(ToWorker::Drain(reason)) => return Err(Ended::Drained(reason)),
         Ok(ToWorker::Window | ToWorker::Heartbeat | ToWorker::Welcome(_) | ToWorker::Refuse(_)) => {}
         Err(error) => return Err(Ended::Lost(format!("the coordinator sent a malformed message: {error}"))),

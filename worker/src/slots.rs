@@ -9,7 +9,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Instant;
 
-use starlings_models::{Forward, Job, ModelFailure, ParticleError};
+use starlings_models::{Forward, Job, ModelFailure, ParticleError, Stop, Until};
 use starlings_proto::spent::spent;
 use starlings_proto::words::panic_text;
 use starlings_proto::{FromWorker, Lease, LeaseOutcome, generated};
@@ -41,6 +41,8 @@ struct Shared {
 #[derive(Default)]
 struct Queue {
     tasks: VecDeque<Task>,
+    /// What is being computed, each with the word that stops it.
+    computing: Vec<(Lease, Stop)>,
     closed: bool,
 }
 
@@ -78,9 +80,13 @@ impl Slots {
         self.shared.filled.notify_one();
     }
 
-    /// Answers the given leases as withdrawn where they have not started.
-    pub(crate) fn withdraw(&self, leases: &[Lease]) {
+    /// Answers the given leases as withdrawn where they have not started; where `stop` says so, those that have are told to stop
+    /// and answered when they did.
+    pub(crate) fn withdraw(&self, leases: &[Lease], stop: bool) {
         let mut queue = self.shared.lock();
+        if stop {
+            queue.computing.iter().filter(|(lease, _)| leases.contains(lease)).for_each(|(_, stop)| stop.set());
+        }
         let (withdrawn, kept) = queue.tasks.drain(..).partition(|task| leases.contains(&task.lease));
         queue.tasks = kept;
         drop(queue);
@@ -120,27 +126,38 @@ impl Shared {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn next(&self) -> Option<Task> {
+    /// The next task, and the word that stops it.
+    fn next(&self) -> Option<(Task, Stop)> {
         let mut queue = self.lock();
         loop {
             if queue.closed {
                 return None;
             }
             if let Some(task) = queue.tasks.pop_front() {
-                return Some(task);
+                let stop = Stop::default();
+                queue.computing.push((task.lease, stop.clone()));
+                return Some((task, stop));
             }
             queue = self.filled.wait(queue).unwrap_or_else(PoisonError::into_inner);
         }
     }
 
     fn work(&self) {
-        while let Some(Task { lease, forward, job, outbox }) = self.next() {
+        while let Some((Task { lease, forward, job, outbox }, stop)) = self.next() {
             self.running.fetch_add(1, Ordering::Relaxed);
             let started = Instant::now();
-            let result = catch_unwind(AssertUnwindSafe(|| forward.run_within(&job, &spent())))
+            let spent = spent();
+            let until = Until { spent: &spent, stop: &stop };
+            let result = catch_unwind(AssertUnwindSafe(|| forward.run_within(&job, &until)))
                 .unwrap_or_else(|panic| Err(ModelFailure::Solver(panic_text(panic.as_ref())).into()));
             let cost = started.elapsed().as_secs_f64();
             self.running.fetch_sub(1, Ordering::Relaxed);
+            self.lock().computing.retain(|(other, _)| *other != lease);
+            // A result that came all the same is as good as any; what a stopped run says of itself is not.
+            if result.is_err() && stop.is_set() {
+                answer(&outbox, lease, LeaseOutcome::Withdrawn, cost);
+                continue;
+            }
             let counter = if result.is_ok() { &self.predictions } else { &self.failures };
             counter.fetch_add(1, Ordering::Relaxed);
             answer(&outbox, lease, LeaseOutcome::Ran(result), cost);

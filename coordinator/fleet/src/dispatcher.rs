@@ -19,18 +19,24 @@
 mod answers;
 mod aside;
 pub(crate) mod batch;
+mod canary;
+mod dispute;
 mod doubt;
+mod duplicate;
 pub(crate) mod message;
+mod opinion;
 mod proven;
 mod queue;
+mod repeats;
 pub(crate) mod roster;
 mod run_times;
 mod schedule;
+mod strays;
 #[cfg(test)]
 mod tests;
 mod watch;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use starlings_proto::SetupId;
@@ -39,8 +45,10 @@ use super::FleetEvent;
 use super::job_name::JobName;
 use batch::{Batch, Lost};
 pub(crate) use doubt::Asked;
-pub(crate) use message::{BatchError, Command, ControlId, Event, Joining, WorkerId};
+pub(crate) use message::{BatchError, Command, ControlId, Event, Joining, Likeness, WorkerId};
 use proven::Proven;
+pub(crate) use repeats::Comparing;
+use repeats::Repeats;
 use roster::{SetupState, Worker};
 use run_times::RunTimes;
 use watch::{Overdue, Starved};
@@ -54,6 +62,10 @@ pub(crate) struct Rules {
     pub patience: Duration,
     /// How many workers may be lost under one job before it is given up.
     pub max_attempts: u32,
+    /// How results of workers are compared; not at all without it.
+    pub comparing: Option<Comparing>,
+    /// A run that takes so many times the usual time is given up; none is without it.
+    pub timeout_factor: Option<f64>,
 }
 
 /// The decisions of a fleet. One batch at a time.
@@ -69,7 +81,12 @@ pub(crate) struct Dispatcher {
     overdue: Option<Overdue>,
     run_times: RunTimes,
     proven: Proven,
+    repeats: Repeats,
+    /// Jobs of the batch that more than one worker was given.
+    duplicated: BTreeSet<usize>,
     local_only: bool,
+    /// The time of the event that is being handled.
+    now: Duration,
     out: Vec<Command>,
 }
 
@@ -87,7 +104,10 @@ impl Dispatcher {
             overdue: None,
             run_times: RunTimes::default(),
             proven: Proven::default(),
+            repeats: Repeats::default(),
+            duplicated: BTreeSet::new(),
             local_only: false,
+            now: Duration::ZERO,
             out: Vec::new(),
         }
     }
@@ -104,6 +124,7 @@ impl Dispatcher {
 
     /// Takes one event at time `now` (any fixed origin) and returns what has to be done about it.
     pub(crate) fn step(&mut self, now: Duration, event: Event) -> Vec<Command> {
+        self.now = now;
         match event {
             Event::Joined(joining) => self.joined(now, &joining),
             Event::Left { worker, reason, clean } => self.lose(worker, &reason, clean),
@@ -116,6 +137,7 @@ impl Dispatcher {
             Event::Answered { worker, lease, answer, cost } => {
                 self.answered(now, worker, lease, answer, cost);
             }
+            Event::Likeness { setup, likeness } => _ = self.repeats.likeness.insert(setup, likeness),
             Event::LocalOnly => self.local_only = true,
             Event::Tick => self.tick(now),
             Event::Abort(error) => self.abort(error),
@@ -154,6 +176,12 @@ impl Dispatcher {
         for (position, job) in leases.into_iter().enumerate() {
             let Some(batch) = &mut self.batch else { break };
             let Some(index) = batch.index_of(job) else { continue };
+            // What it repeated, or others have too, does not depend on it.
+            let shared = || self.workers.values().any(|w| w.holds(job));
+            let repeated = self.repeats.open.contains(&(id, index));
+            if repeated || batch.is_finished(index) || (self.duplicated.contains(&index) && shared()) {
+                continue;
+            }
             let counted = !clean && position < worker.slots;
             let why = format!("{} was lost: {reason}", worker.name);
             match batch.lost(index, counted, self.rules.max_attempts) {
@@ -166,6 +194,7 @@ impl Dispatcher {
                 Lost::GivenUp => given_up = Some((index, batch.attempts(index), why)),
             }
         }
+        self.repeats.forget(id);
         let notice = FleetEvent::WorkerLeft { worker: worker.name, reason: reason.to_owned(), requeued };
         self.out.push(Command::Notice(notice));
         if let Some((index, attempts, why)) = given_up {
@@ -208,6 +237,8 @@ impl Dispatcher {
                 }
             }
         }
+        self.repeats.begin();
+        self.duplicated.clear();
         self.proven.keep_only(batch.names(), &mut self.out);
         self.batch = Some(batch);
         self.next_job += n;
@@ -218,7 +249,7 @@ impl Dispatcher {
         for worker in self.workers.values() {
             let leases = worker.leases().filter(|l| batch.index_of(l.job).is_some()).collect::<Vec<_>>();
             if !leases.is_empty() {
-                self.out.push(Command::Cancel { worker: worker.id, leases });
+                self.out.push(Command::Cancel { worker: worker.id, leases, stop: true });
             }
         }
         self.starved = None;

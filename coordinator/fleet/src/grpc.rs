@@ -16,8 +16,8 @@ use starlings_proto::{JobEncoder, MAX_MESSAGE, SetupId, encode_setup, own_build}
 use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
 use tokio_util::sync::CancellationToken;
 
-use super::dispatcher::{BatchError, Event, Rules};
-use super::hub::{Hub, Reply, Submission};
+use super::dispatcher::{BatchError, Comparing, Event, Likeness, Rules};
+use super::hub::{Hub, Reply, SetupShape, Submission};
 use super::network::{self, Ways};
 use super::{Fleet, FleetError, FleetEvent, Outcome};
 
@@ -37,6 +37,12 @@ pub struct FleetConfig {
     pub patience: Duration,
     /// How many workers may be lost under one job before it is given up.
     pub max_attempts: u32,
+    /// How results of workers are compared: what draws the runs that are repeated, the study's seed.
+    pub seed: u64,
+    /// Whether workers whose results differ are allowed, and only told of.
+    pub mixed: bool,
+    /// A run that takes so many times the usual time is given up as a timeout; none is without it.
+    pub timeout_factor: Option<f64>,
     /// BLAKE3 of this executable: a worker of another one is told of. `None`: none is.
     pub build: Option<[u8; 32]>,
     /// Ends [`Fleet::run`] promptly with [`FleetError::Cancelled`].
@@ -59,6 +65,9 @@ impl FleetConfig {
             heartbeat: Duration::from_secs(8),
             patience: Duration::from_secs(300),
             max_attempts: 5,
+            seed: 0,
+            mixed: false,
+            timeout_factor: None,
             build: own_build(),
             cancel,
             events,
@@ -128,6 +137,8 @@ impl GrpcFleet {
             heartbeat: config.heartbeat,
             patience: config.patience,
             max_attempts: config.max_attempts,
+            comparing: Some(Comparing { seed: config.seed, mixed: config.mixed }),
+            timeout_factor: config.timeout_factor,
         };
         let hub = Arc::new(Hub::new(config.run_name, config.build, rules, config.events));
         let stop = CancellationToken::new();
@@ -203,6 +214,9 @@ impl GrpcFleet {
             BatchError::NoControl { particle, record, parameters, reason, .. } => {
                 FleetError::NoControl { particle, record, parameters, reason }
             }
+            BatchError::Disagreement { particle, record, workers } => {
+                FleetError::Disagreement { particle, record, workers }
+            }
             BatchError::NoAnswer { index, particle, record, reason } => {
                 FleetError::NoAnswer { job: index, particle, record, reason }
             }
@@ -222,7 +236,8 @@ impl Fleet for GrpcFleet {
         // length.
         if !self.hub.knows(std::iter::once(&id)) {
             let n_state = setup.spec().ok().filter(|spec| spec.restart).map(|spec| spec.n_state());
-            self.hub.install(id, json, setup.parameters.clone(), n_state);
+            let shape = SetupShape { parameters: setup.parameters.clone(), n_state };
+            self.hub.install(id, json, shape, likeness(setup));
         }
         Ok(id)
     }
@@ -261,6 +276,15 @@ impl Drop for GrpcFleet {
                 Err(_) => tracing::error!("the fleet's network thread panicked"),
             }
         }
+    }
+}
+
+/// How runs of a setup compare: a program outside promises equal bits, or does not.
+fn likeness(setup: &Setup) -> Likeness {
+    match setup.model.solver.as_deref().map(|solver| solver.described.as_ref()) {
+        None => Likeness::Exact,
+        Some(Some(described)) if described.deterministic => Likeness::Promised,
+        Some(_) => Likeness::None,
     }
 }
 

@@ -5,6 +5,7 @@
 //! read: `state`, then [`super::service`], which brings the workers' events.
 
 mod arrival;
+mod excluded;
 mod state;
 #[cfg(test)]
 mod tests;
@@ -19,11 +20,11 @@ use tokio::sync::{Notify, mpsc::UnboundedSender};
 use tonic::Status;
 
 use super::dispatcher::message::hex;
-use super::dispatcher::{BatchError, Event, Joining, Rules, WorkerId};
+use super::dispatcher::{BatchError, Event, Joining, Likeness, Rules, WorkerId};
 use super::job_name::JobName;
 use super::{FleetEvent, Outcome};
-pub(super) use state::{Closed, Submission};
-use state::{Link, SetupShape, State};
+pub(super) use state::{Closed, SetupShape, Submission};
+use state::{Link, State};
 
 /// What a link carries to its worker.
 pub(super) type Outgoing = Result<generated::ToWorker, Status>;
@@ -95,10 +96,18 @@ impl Hub {
     }
 
     /// Takes a setup as it travels, with the names of its parameters, and the length of a state where it is known.
-    pub(super) fn install(&self, id: SetupId, json: Bytes, parameters: Vec<String>, n_state: Option<usize>) {
-        let mut state = self.lock();
+    pub(super) fn install(
+        &self,
+        id: SetupId,
+        json: Bytes,
+        shape: SetupShape,
+        likeness: Likeness,
+    ) {
+        let now = self.started.elapsed();
+        let mut state = self.decide();
+        state.handle(now, Event::Likeness { setup: id, likeness });
         state.setups.insert(id, json);
-        state.shapes.insert(id, SetupShape { parameters, n_state });
+        state.shapes.insert(id, shape);
     }
 
     pub(super) fn knows<'a>(&self, mut setups: impl Iterator<Item = &'a SetupId>) -> bool {
@@ -139,7 +148,7 @@ impl Hub {
             epoch: id.0,
         };
         let _ = link.send(Ok(ToWorker::welcome(welcome)));
-        state.links.insert(id, Link::new(link, hello.pid));
+        state.links.insert(id, Link::new(link, hello.pid, hello.nonce));
         let name = format!("{}@{}/{}", state.joined, hello.host, hello.pid);
         let Hello { cores, slots, host, pid, nonce, build, .. } = hello;
         let other = state.other_build(self.build, build).map(|(own, build)| FleetEvent::OtherBuild {

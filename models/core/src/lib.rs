@@ -41,6 +41,7 @@ pub use blocks::Blocks;
 pub use effect::{Addition, EffectDef, EffectParameter, EffectState};
 pub use external::{External, Run, Solve, Solved};
 pub use failure::{Failure, ModelFailure, ParticleError, Timeout};
+pub use limits::{Stop, Until};
 pub use job::{Forward, Job, Prediction, Signal, Window};
 pub use memory::{Memory, with_memories};
 pub use model::{Model, advance_by};

@@ -7,6 +7,9 @@ use super::{Lease, ProtocolError, SetupId, floats, job::check_state, required, s
 use crate::MAX_SLOTS;
 use crate::generated::{self, failure, from_worker::Kind, result::Outcome};
 
+/// Longest time that a run may say it took, seconds.
+const LONGEST_RUN: f64 = 1e7;
+
 /// Who a worker is. First message of every stream.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Hello {
@@ -139,7 +142,7 @@ fn encode_answer(answer: LeaseOutcome) -> Result<Outcome, ProtocolError> {
 
 fn decode_result(result: generated::Result) -> Result<FromWorker, ProtocolError> {
     let lease = required(result.lease, "lease")?.into();
-    let cost = if result.cost_s > 0.0 && result.cost_s.is_finite() { result.cost_s } else { 0.0 };
+    let cost = if result.cost_s > 0.0 { result.cost_s.min(LONGEST_RUN) } else { 0.0 };
     let answer = match required(result.outcome, "outcome")? {
         Outcome::Prediction(p) => {
             let state = floats::decode(&p.state, "state")?;

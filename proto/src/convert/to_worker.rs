@@ -44,8 +44,13 @@ pub enum ToWorker {
         /// The job.
         job: Job,
     },
-    /// Withdraw these jobs if they have not started.
-    Cancel(Vec<Lease>),
+    /// Withdraw these jobs.
+    Cancel {
+        /// Which.
+        leases: Vec<Lease>,
+        /// Also those that are being computed.
+        stop: bool,
+    },
     /// The coordinator is alive.
     Heartbeat,
     /// The run is over: leave.
@@ -70,8 +75,9 @@ impl ToWorker {
     }
 
     /// The message for [`ToWorker::Cancel`].
-    pub fn cancel(leases: &[Lease]) -> generated::ToWorker {
-        message(Kind::Cancel(generated::Cancel { leases: leases.iter().copied().map(Into::into).collect() }))
+    pub fn cancel(leases: &[Lease], stop: bool) -> generated::ToWorker {
+        let leases = leases.iter().copied().map(Into::into).collect();
+        message(Kind::Cancel(generated::Cancel { leases, stop }))
     }
 
     /// The message for [`ToWorker::Heartbeat`].
@@ -104,7 +110,9 @@ impl ToWorker {
                 Self::Window
             }
             Kind::Job(job) => decode_job(&job, received)?,
-            Kind::Cancel(c) => Self::Cancel(c.leases.into_iter().map(Into::into).collect()),
+            Kind::Cancel(c) => {
+                Self::Cancel { leases: c.leases.into_iter().map(Into::into).collect(), stop: c.stop }
+            }
             Kind::Heartbeat(_) => Self::Heartbeat,
             Kind::Drain(d) => Self::Drain(d.reason),
         })

@@ -3,6 +3,7 @@
 //! Next files to read: `queue`, for those that wait, `doubt` for those that failed for an unknown reason.
 
 mod notices;
+mod results;
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -52,6 +53,8 @@ struct State {
     earlier: Option<Earlier>,
     doubt: Option<Doubt>,
     outcome: Option<Outcome>,
+    /// Who made the run of the outcome.
+    by: Option<WorkerId>,
 }
 
 /// How an attempt ended, kept while the job is tried again.
@@ -254,8 +257,10 @@ impl Batch {
         ended
     }
 
-    pub(super) fn finish(&mut self, index: usize, result: Result<Prediction, Failure>, name: &str) {
-        let attempts = self.attempts(index) + 1;
+    /// Takes what `by` answered, whose name is told in the outcome.
+    pub(super) fn finish(&mut self, index: usize, result: Result<Prediction, Failure>, by: (WorkerId, &str)) {
+        let (attempts, (id, name)) = (self.attempts(index) + 1, by);
+        self.jobs[index].by = Some(id);
         self.end(index, Outcome { result, attempts, worker: name.to_owned() });
     }
 

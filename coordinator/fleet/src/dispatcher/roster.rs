@@ -6,7 +6,7 @@ use std::time::Duration;
 use starlings_proto::{Lease, SetupId};
 
 use super::aside::Aside;
-use super::message::{Joining, WorkerId};
+use super::message::{Joining, WorkerId, hex};
 
 /// Jobs per slot held by a worker whose jobs are long: one runs, one waits.
 const MIN_CREDIT: usize = 2;
@@ -19,6 +19,9 @@ const LOOKAHEAD: f64 = 0.01;
 
 /// Weight of the newest run in the moving average of run times.
 const NEWEST: f64 = 0.3;
+
+/// Leases that a worker holds at most before it has answered any: each may carry a state.
+const UNPROVEN: usize = 512;
 
 /// Shortest run, in seconds, for which calling a job back is worth two messages.
 const RECALL_WORTH: f64 = 0.005;
@@ -51,6 +54,18 @@ pub(super) struct Worker {
     held: BTreeMap<u64, Held>,
     sent: u64,
     cost: Option<f64>,
+    /// BLAKE3 of its executable in hexadecimal; empty when unknown.
+    pub(super) build: String,
+    /// Whether one of its results was compared with another worker's.
+    pub(super) compared: bool,
+    /// Its predictions that became outcomes.
+    pub(super) taken: u64,
+    /// Answers that nobody had asked for, less those that somebody had.
+    pub(super) strays: u32,
+    /// Its runs that others finished since it last answered.
+    pub(super) overtaken: u32,
+    /// Leases that it has answered.
+    answers: usize,
 }
 
 /// One lease: how often the job was started, when in the worker's order, whether it was called back, since when it has certainly
@@ -60,6 +75,7 @@ struct Held {
     attempt: u32,
     order: u64,
     recalled: bool,
+    since: Duration,
     running_since: Option<Duration>,
 }
 
@@ -76,6 +92,12 @@ impl Worker {
             held: BTreeMap::new(),
             sent: 0,
             cost: None,
+            build: joining.build.map_or_else(String::new, |hash| hex(&hash)),
+            compared: false,
+            taken: 0,
+            strays: 0,
+            overtaken: 0,
+            answers: 0,
         }
     }
 
@@ -151,24 +173,48 @@ impl Worker {
             Some(cost) => ((LOOKAHEAD / cost.max(1e-9)) as usize).clamp(MIN_CREDIT, MAX_CREDIT),
             None => MIN_CREDIT,
         };
-        self.load() < self.slots * credit
+        // A worker that has answered little holds little, however many slots it says it has.
+        self.load() < (self.slots * credit).min(UNPROVEN + self.answers)
     }
 
-    pub(super) fn hold(&mut self, lease: Lease) {
+    pub(super) fn hold(&mut self, lease: Lease, since: Duration) {
         self.sent += 1;
-        self.held.insert(
-            lease.job,
-            Held { attempt: lease.attempt, order: self.sent, recalled: false, running_since: None },
-        );
+        let (attempt, order) = (lease.attempt, self.sent);
+        self.held.insert(lease.job, Held { attempt, order, recalled: false, since, running_since: None });
     }
 
-    /// Ends a lease; false when it is not held.
-    pub(super) fn release(&mut self, job: u64, attempt: u32) -> bool {
-        let held = self.held.get(&job).is_some_and(|h| h.attempt == attempt);
-        if held {
-            self.held.remove(&job);
+    /// Whether it has a lease of this job.
+    pub(super) fn holds(&self, job: u64) -> bool {
+        self.held.contains_key(&job)
+    }
+
+    /// Its lease of this job.
+    pub(super) fn lease_of(&self, job: u64) -> Option<Lease> {
+        let held = self.held.get(&job)?;
+        Some(Lease { epoch: self.id.0, job, attempt: held.attempt })
+    }
+
+    /// Its leases, each with its age and the number of runs per slot that were to be made before it ended.
+    pub(super) fn ages(&self, now: Duration) -> Vec<(u64, Duration, usize)> {
+        let age = |job: &u64| self.held.get(job).map_or(now, |held| held.since);
+        let aged = self.leases_in_order().into_iter().enumerate();
+        aged.map(|(i, job)| (job, now.saturating_sub(age(&job)), i / self.slots + 1)).collect()
+    }
+
+    /// Its name, with its build where that is known.
+    pub(super) fn called(&self) -> String {
+        match self.build.get(..12) {
+            Some(build) => format!("{} (build {build})", self.name),
+            None => self.name.clone(),
         }
-        held
+    }
+
+    /// Ends a lease, and says whether it had been called back; `None` when it is not held.
+    pub(super) fn release(&mut self, job: u64, attempt: u32) -> Option<bool> {
+        self.held.get(&job).filter(|held| held.attempt == attempt)?;
+        self.answers += 1;
+        self.overtaken = 0;
+        self.held.remove(&job).map(|held| held.recalled)
     }
 
     pub(super) fn leases(&self) -> impl Iterator<Item = Lease> + '_ {

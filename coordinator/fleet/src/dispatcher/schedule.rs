@@ -1,6 +1,7 @@
 //! Scheduling, done after every event: failures settle, control runs are made, jobs are assigned and recalled, the batch ends.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
 
 use starlings_proto::{Lease, SetupId};
 
@@ -18,9 +19,13 @@ impl Dispatcher {
         self.settle_failures();
         // Before jobs are assigned: a place on trial makes one run at a time, and this one tells more.
         self.control();
+        self.canaries();
         self.assign();
         self.recall();
-        if let Some(batch) = self.batch.take_if(|batch| batch.is_done()) {
+        if self.batch.as_ref().is_some_and(Batch::is_done)
+            && self.is_compared()
+            && let Some(batch) = self.batch.take()
+        {
             self.starved = None;
             self.overdue = None;
             self.out.push(Command::BatchDone(batch.into_outcomes()));
@@ -74,7 +79,7 @@ impl Dispatcher {
                     break;
                 };
                 let Some(index) = batch.queue.next_retry(key) else { break };
-                self.out.push(lease(worker, batch, index));
+                self.out.push(lease(worker, batch, index, self.now));
             }
         }
         // The earliest fresh job whose setup is built on a worker with room; jobs of setups still being built let it pass.
@@ -82,7 +87,7 @@ impl Dispatcher {
             let id = *batch.setup(setup);
             let Some(worker) = roster::least_loaded(&mut self.workers, &id, None) else { break };
             let Some(index) = batch.queue.next_fresh(setup) else { break };
-            self.out.push(lease(worker, batch, index));
+            self.out.push(lease(worker, batch, index, self.now));
         }
     }
 
@@ -122,7 +127,7 @@ impl Dispatcher {
                 continue;
             };
             batch.mark_recalled(held.job);
-            self.out.push(Command::Cancel { worker: victim.id, leases: vec![held] });
+            self.out.push(Command::Cancel { worker: victim.id, leases: vec![held], stop: false });
             open -= 1;
         }
     }
@@ -138,8 +143,8 @@ fn next_setup(workers: &BTreeMap<WorkerId, Worker>, batch: &Batch) -> Option<usi
 }
 
 /// Assigns a job to a worker.
-pub(super) fn lease(worker: &mut Worker, batch: &mut Batch, index: usize) -> Command {
+pub(super) fn lease(worker: &mut Worker, batch: &mut Batch, index: usize, now: Duration) -> Command {
     let lease = Lease { epoch: worker.id.0, job: batch.job_number(index), attempt: batch.start(index) };
-    worker.hold(lease);
+    worker.hold(lease, now);
     Command::SendJob { worker: worker.id, lease, index }
 }

@@ -57,6 +57,7 @@ impl Dispatcher {
         self.watch_setups(now);
         self.watch_starvation(now);
         self.watch_overdue(now);
+        self.watch_slow(now);
     }
 
     /// A worker that builds a setup for longer than patience counts as one that cannot build it.

@@ -12,6 +12,7 @@ use starlings_proto::{
 };
 use tokio::sync::mpsc::UnboundedSender;
 
+use super::excluded::Excluded;
 use super::{Outgoing, Reply};
 use crate::FleetEvent;
 use crate::dispatcher::{BatchError, Command, ControlId, Dispatcher, Event, Rules, WorkerId};
@@ -32,27 +33,29 @@ pub(super) struct State {
     pub(super) given_up: Option<String>,
     pub(super) stopped: Option<String>,
     pub(super) other_builds: BTreeSet<[u8; 32]>,
+    pub(super) excluded: Excluded,
 }
 
 /// Names and sizes of what a setup runs, as far as they are known without building it.
-pub(super) struct SetupShape {
+pub(crate) struct SetupShape {
     /// Names of its parameters, in the order of a job's.
-    pub(super) parameters: Vec<String>,
+    pub(crate) parameters: Vec<String>,
     /// Length of a state, where it is known.
-    pub(super) n_state: Option<usize>,
+    pub(crate) n_state: Option<usize>,
 }
 
 /// The way to one worker.
 pub(super) struct Link {
     pub(super) sender: UnboundedSender<Outgoing>,
     pub(super) pid: u32,
+    pub(super) nonce: u64,
     /// Windows that were sent on it.
     pub(super) windows: SentWindows,
 }
 
 impl Link {
-    pub(super) fn new(sender: UnboundedSender<Outgoing>, pid: u32) -> Self {
-        Self { sender, pid, windows: SentWindows::default() }
+    pub(super) fn new(sender: UnboundedSender<Outgoing>, pid: u32, nonce: u64) -> Self {
+        Self { sender, pid, nonce, windows: SentWindows::default() }
     }
 
     fn give(&mut self, encoder: &mut JobEncoder, lease: Lease, (setup, job): &(SetupId, Job)) {
@@ -101,6 +104,7 @@ impl State {
             given_up: None,
             stopped: None,
             other_builds: BTreeSet::new(),
+            excluded: Excluded::default(),
         }
     }
 
@@ -111,6 +115,9 @@ impl State {
                  worker from the coordinator's release",
                 hello.host, hello.version, hello.protocol
             )));
+        }
+        if let Some(reason) = self.excluded.why(hello.nonce) {
+            return Err(Closed::Refused(reason.to_owned()));
         }
         if self.draining {
             return Err(Closed::Over("the run is over".to_owned()));
@@ -179,7 +186,8 @@ impl State {
             Command::Forget { control } => {
                 self.kept.remove(&control);
             }
-            Command::Cancel { worker, leases } => self.send(worker, ToWorker::cancel(&leases)),
+            Command::Cancel { worker, leases, stop } => self.send(worker, ToWorker::cancel(&leases, stop)),
+            Command::PutOut { worker, reason } => self.put_out(worker, &reason),
             // Its stream ends without a word: a worker that still lives dials again.
             Command::Close { worker } => {
                 self.links.remove(&worker);
@@ -220,6 +228,13 @@ impl State {
         if let Some(link) = self.links.get(&worker) {
             link.send(message);
         }
+    }
+
+    /// Ends a worker's session for good: it is told why, and its process is not taken again.
+    fn put_out(&mut self, worker: WorkerId, reason: &str) {
+        let Some(link) = self.links.remove(&worker) else { return };
+        link.send(ToWorker::drain(reason));
+        self.excluded.add(link.nonce, reason);
     }
 
     pub(super) fn reply(&mut self, reply: Reply) {
