@@ -9,7 +9,7 @@
 use std::time::Duration;
 
 use starlings_models::{ParticleError, Prediction};
-use starlings_proto::LeaseOutcome;
+use starlings_proto::{LeaseOutcome, SetupId};
 
 use super::Dispatcher;
 use super::message::{Likeness, WorkerId};
@@ -72,6 +72,16 @@ impl Dispatcher {
         self.repeat_sampled();
     }
 
+    /// Compares runs of a setup no more.
+    pub(super) fn compare_no_more(&mut self, setup: SetupId) {
+        self.repeats.likeness.insert(setup, Likeness::None);
+        let Some(batch) = &self.batch else { return };
+        let other = |index: usize| *batch.setup_of(index) != setup;
+        self.repeats.contributors.retain(|_, contributor| other(contributor.index));
+        self.repeats.disputes.retain(|index, _| other(*index));
+        self.repeats.sampled.retain(|index| other(*index));
+    }
+
     /// Has a result of a worker repeated by another one; false when nobody has room.
     fn repeat(&mut self, index: usize, by: WorkerId) -> bool {
         let Some(batch) = &mut self.batch else { return false };
@@ -83,8 +93,7 @@ impl Dispatcher {
             let was_tried = tried.as_ref().is_some_and(|tried| tried.contains(&w.id));
             w.id != by && has_room && w.takes(&setup) && !w.holds(job) && !was_tried
         };
-        // One that was not compared either: a run for two.
-        let key = |w: &&mut Worker| (w.compared, w.load() * 1000 / w.slots);
+        let key = |w: &&mut Worker| w.load() * 1000 / w.slots;
         let Some(worker) = self.workers.values_mut().filter(fits).min_by_key(key) else { return false };
         self.repeats.open.insert((worker.id, index));
         self.repeats.n_repeat += 1;
@@ -152,11 +161,8 @@ impl Dispatcher {
         // An outcome that was taken back meanwhile is compared when there is a new one.
         let Some((by, result)) = batch.prediction(index).filter(|(by, _)| *by != id) else { return };
         if said.as_ref().is_ok_and(|said| same_bits(said, result)) {
-            let setup = *batch.setup_of(index);
-            for worker in [by, id] {
-                self.trusted(worker);
-                self.repeats.compared.insert((worker, setup));
-            }
+            // That the other one repeats well says nothing of what it answers of its own.
+            self.trusted(by);
         } else {
             let first = Ok(result.clone());
             self.dispute(index, [(by, first), (id, said)]);

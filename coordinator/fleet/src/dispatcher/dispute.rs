@@ -40,8 +40,8 @@ impl Dispatcher {
             return self.accept(index, &opinions, |what| FleetEvent::WorkersDiffer { what });
         }
         if promised && !unsteady(&opinions).is_empty() {
-            self.repeats.likeness.insert(setup, Likeness::None);
-            return self.accept(index, &opinions, |what| FleetEvent::NotReproducible { what });
+            self.accept(index, &opinions, |what| FleetEvent::NotReproducible { what });
+            return self.compare_no_more(setup);
         }
         match verdict(&opinions) {
             Verdict::Wrong(wrong) if !promised || !self.ask(index, |w| wrong.contains(&w.id)) => {

@@ -1,8 +1,10 @@
 //! Events in, commands compared.
 
 mod aside;
+mod canary;
 mod chaos;
 mod doubt;
+mod duplicate;
 mod leases;
 mod losses;
 mod mixed;
