@@ -30,6 +30,9 @@ pub(crate) struct FleetArgs {
     /// Allow --listen beyond loopback although the connection is neither encrypted nor authenticated.
     #[arg(long)]
     insecure: bool,
+    /// Allow workers whose results differ, as of other builds or processors: a warning of the result instead of an error.
+    #[arg(long)]
+    mixed: bool,
 }
 
 /// What was asked for, checked.
@@ -38,6 +41,8 @@ pub(crate) struct Plan {
     address: Option<SocketAddr>,
     /// Workers to start where it does not listen.
     n_worker: usize,
+    /// Whether results of workers may differ.
+    mixed: bool,
 }
 
 impl FleetArgs {
@@ -50,7 +55,7 @@ impl FleetArgs {
             ));
         }
         let address = self.listen.as_deref().map(|text| self.address(text)).transpose()?;
-        Ok(Plan { address, n_worker })
+        Ok(Plan { address, n_worker, mixed: self.mixed })
     }
 
     /// Where to listen, as it was asked for.
@@ -91,6 +96,8 @@ impl FleetSession {
         if let Some(attempts) = study.fleet.max_attempts {
             config.max_attempts = attempts;
         }
+        (config.seed, config.mixed) = (study.seed, plan.mixed);
+        config.timeout_factor = study.fleet.timeout_factor;
         let fleet = GrpcFleet::listen(config).map_err(Failure::run)?;
         let display = Arc::clone(display);
         let watcher = std::thread::spawn(move || relay(heard, &kept, &display));

@@ -8,6 +8,7 @@ pub mod adapters;
 mod codec;
 pub mod convert;
 pub mod spent;
+pub mod text;
 pub mod words;
 
 pub use bytes::Bytes;

@@ -85,7 +85,11 @@ impl Slots {
     pub(crate) fn withdraw(&self, leases: &[Lease], stop: bool) {
         let mut queue = self.shared.lock();
         if stop {
-            queue.computing.iter().filter(|(lease, _)| leases.contains(lease)).for_each(|(_, stop)| stop.set());
+            queue
+                .computing
+                .iter()
+                .filter(|(lease, _)| leases.contains(lease))
+                .for_each(|(_, stop)| stop.set());
         }
         let (withdrawn, kept) = queue.tasks.drain(..).partition(|task| leases.contains(&task.lease));
         queue.tasks = kept;

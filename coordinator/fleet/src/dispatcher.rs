@@ -34,6 +34,7 @@ mod schedule;
 mod strays;
 #[cfg(test)]
 mod tests;
+mod timeout;
 mod watch;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -178,7 +179,7 @@ impl Dispatcher {
             let Some(index) = batch.index_of(job) else { continue };
             // What it repeated, or others have too, does not depend on it.
             let shared = || self.workers.values().any(|w| w.holds(job));
-            let repeated = self.repeats.open.contains(&(id, index));
+            let repeated = self.repeats.open.contains(&(id, index)) || worker.has_dropped(job);
             if repeated || batch.is_finished(index) || (self.duplicated.contains(&index) && shared()) {
                 continue;
             }
@@ -206,6 +207,9 @@ impl Dispatcher {
         let Some(worker) = self.workers.get_mut(&id) else { return };
         worker.last_heard = now;
         let needed = self.batch.as_ref().is_some_and(|batch| batch.needs(&setup));
+        if worker.answers_unasked(&setup, &state) {
+            return self.stray(id, "it speaks of setups that it was not sent, again and again");
+        }
         if let SetupState::Failed(reason) = &state {
             if worker.is_ready(&setup) {
                 // It had built it: its cache was full.

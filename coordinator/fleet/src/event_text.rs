@@ -101,22 +101,32 @@ impl fmt::Display for FleetEvent {
                 )
             }
             Self::WorkerExcluded { worker, build, reason, again, earlier } => {
-                let build = if build.is_empty() { String::new() } else { format!(" (build {})", short(build)) };
+                let build =
+                    if build.is_empty() { String::new() } else { format!(" (build {})", short(build)) };
                 let earlier = if *earlier == 0 {
                     String::new()
                 } else {
                     format!("; {earlier} of its runs were used before")
                 };
-                write!(f, "worker {worker}{build} is put out: {reason}; {again} of its runs are made again{earlier}")
+                write!(
+                    f,
+                    "worker {worker}{build} is put out: {reason}; {again} of its runs are made again{earlier}"
+                )
             }
             Self::WorkersDiffer { what } => {
                 write!(f, "workers give different results for one run, which is allowed here: {what}")
             }
             Self::NotReproducible { what } => {
-                write!(f, "the solver gives another result when it is asked again, so its runs are not compared: {what}")
+                write!(
+                    f,
+                    "the solver gives another result when it is asked again, so its runs are not compared: {what}"
+                )
             }
             Self::JobDuplicated { particle, record, slow, worker } => {
-                write!(f, "particle {particle}, record {record}: takes long on worker {slow}, given to worker {worker} too")
+                write!(
+                    f,
+                    "particle {particle}, record {record}: takes long on worker {slow}, given to worker {worker} too"
+                )
             }
             Self::Untold { of, count, last } => {
                 write!(f, "{count} more events of the kind {of} were not told one by one; the last: {last}")

@@ -7,6 +7,7 @@
 mod arrival;
 mod excluded;
 mod state;
+mod teller;
 #[cfg(test)]
 mod tests;
 
@@ -66,7 +67,8 @@ impl Hub {
     }
 
     pub(super) fn tell(&self, event: FleetEvent) {
-        let _ = self.lock().events.send(event);
+        let now = self.started.elapsed();
+        self.lock().events.tell(now, event);
     }
 
     pub(super) fn handle(&self, event: Event) {
@@ -96,13 +98,7 @@ impl Hub {
     }
 
     /// Takes a setup as it travels, with the names of its parameters, and the length of a state where it is known.
-    pub(super) fn install(
-        &self,
-        id: SetupId,
-        json: Bytes,
-        shape: SetupShape,
-        likeness: Likeness,
-    ) {
+    pub(super) fn install(&self, id: SetupId, json: Bytes, shape: SetupShape, likeness: Likeness) {
         let now = self.started.elapsed();
         let mut state = self.decide();
         state.handle(now, Event::Likeness { setup: id, likeness });
@@ -135,7 +131,7 @@ impl Hub {
         let mut state = self.decide();
         if let Err(closed) = state.admit(&hello) {
             if let Closed::Refused(reason) = closed.clone() {
-                let _ = state.events.send(FleetEvent::WorkerRefused { host: hello.host, reason });
+                state.events.tell(now, FleetEvent::WorkerRefused { host: hello.host, reason });
             }
             return Err(closed);
         }
@@ -159,7 +155,7 @@ impl Hub {
         });
         state.handle(now, Event::Joined(Joining { id, name, host, pid, slots, cores, nonce, build }));
         if let Some(event) = other {
-            let _ = state.events.send(event);
+            state.events.tell(now, event);
         }
         Ok(id)
     }
@@ -193,7 +189,9 @@ impl Hub {
 
     /// Asks all workers to leave and takes no new ones.
     pub(super) fn drain(&self, reason: &str) {
+        let now = self.started.elapsed();
         let mut state = self.lock();
+        state.events.tell_rest(now);
         state.draining = true;
         for link in state.links.values() {
             let _ = link.sender.send(Ok(ToWorker::drain(reason)));

@@ -91,7 +91,7 @@ fn run_one(forward: &dyn Forward, job: &Job) -> Result<Prediction, ParticleError
         let until = Until { spent: &spent(), stop: &Stop::default() };
         forward.run_within(job, &until)
     }))
-        .unwrap_or_else(|panic| Err(ModelFailure::Solver(panic_text(panic.as_ref())).into()));
+    .unwrap_or_else(|panic| Err(ModelFailure::Solver(panic_text(panic.as_ref())).into()));
     if let Ok(prediction) = &mut result {
         prediction.cost = started.elapsed().as_secs_f64();
     }

@@ -18,7 +18,9 @@ use crate::effect::Addition;
 use crate::setup::Setup;
 use crate::simulator::{check_job, free_names};
 use crate::solver::Description;
-use crate::{Forward, Job, ModelFailure, ObserverDef, ParticleError, Prediction, Signal, Spec, Stop, Until, Window};
+use crate::{
+    Forward, Job, ModelFailure, ObserverDef, ParticleError, Prediction, Signal, Spec, Stop, Until, Window,
+};
 use applied::Applied;
 pub use outline::{check_effects, outline};
 pub use parts::spec;

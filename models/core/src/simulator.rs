@@ -15,8 +15,8 @@ use crate::past::Past;
 use crate::segment::Segment;
 use crate::setup::Setup;
 use crate::{
-    Drive, Forward, Job, Model, ModelFailure, NativeModels, ParticleError, Prediction, Spec, Stop, Timeout, Until, Window,
-    nearest,
+    Drive, Forward, Job, Model, ModelFailure, NativeModels, ParticleError, Prediction, Spec, Stop, Timeout,
+    Until, Window, nearest,
 };
 
 /// A model, its observer, and the way from a job's values to its parameters.

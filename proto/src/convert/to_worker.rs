@@ -5,6 +5,7 @@ use starlings_models::{Job, Setup};
 
 use super::{Lease, ProtocolError, ReceivedWindows, SetupId, decode_setup, job, required, setup_id, windows};
 use crate::generated::{self, to_worker::Kind};
+use crate::text::cut;
 
 /// The coordinator takes the worker.
 #[derive(Clone, Debug, PartialEq)]
@@ -100,7 +101,7 @@ impl ToWorker {
     ) -> Result<Self, ProtocolError> {
         Ok(match required(message.kind, "kind")? {
             Kind::Welcome(w) => Self::Welcome(decode_welcome(w)?),
-            Kind::Refuse(r) => Self::Refuse(r.reason),
+            Kind::Refuse(r) => Self::Refuse(cut(r.reason)),
             Kind::Setup(s) => {
                 let id = setup_id(&s.id)?;
                 Self::Setup { id, setup: decode_setup(&id, &s.json).map(Box::new) }
@@ -114,7 +115,7 @@ impl ToWorker {
                 Self::Cancel { leases: c.leases.into_iter().map(Into::into).collect(), stop: c.stop }
             }
             Kind::Heartbeat(_) => Self::Heartbeat,
-            Kind::Drain(d) => Self::Drain(d.reason),
+            Kind::Drain(d) => Self::Drain(cut(d.reason)),
         })
     }
 }
@@ -125,13 +126,13 @@ fn message(kind: Kind) -> generated::ToWorker {
 
 fn decode_welcome(welcome: generated::Welcome) -> Result<Welcome, ProtocolError> {
     let generated::Welcome { protocol, run, heartbeat, epoch } = welcome;
-    if !(heartbeat > 0.0 && heartbeat < 1e6) {
+    if !(0.01..=3600.0).contains(&heartbeat) {
         return Err(ProtocolError::Shape {
             field: "heartbeat",
-            message: format!("{heartbeat} s, expected a positive time"),
+            message: format!("{heartbeat} s, expected 0.01 s to an hour"),
         });
     }
-    Ok(Welcome { protocol, run, heartbeat, epoch })
+    Ok(Welcome { protocol, run: cut(run), heartbeat, epoch })
 }
 
 fn decode_job(wire_job: &generated::Job, received: &ReceivedWindows) -> Result<ToWorker, ProtocolError> {

@@ -67,22 +67,25 @@ impl Dispatcher {
         worker.last_heard = now;
         let own = lease.epoch == id.0;
         let released = if own { worker.release(lease.job, lease.attempt) } else { None };
-        let batch = self.batch.as_ref();
+        let (batch, is_stray) = (self.batch.as_ref(), released.is_none());
         let found = batch.and_then(|batch| Some((batch, batch.index_of(lease.job)?)));
-        let (Some(recalled), Some((batch, index))) = (released, found) else {
+        let (Some(released), Some((batch, index))) = (released, found) else {
             if matches!(answer, LeaseOutcome::Ran(_)) {
                 let notice = FleetEvent::LateAnswer { worker: worker.name.clone(), job: lease.job };
                 self.out.push(Command::Notice(notice));
             }
-            if released.is_none() {
+            if is_stray {
                 self.stray(id, "it answers runs that it was not given, again and again");
             }
             return None;
         };
+        if released.dropped {
+            return None;
+        }
         if matches!(answer, LeaseOutcome::Ran(_)) {
             worker.strays = worker.strays.saturating_sub(1);
         }
-        Some((index, recalled || worker.aside.is_some() || !worker.is_ready(batch.setup_of(index))))
+        Some((index, released.recalled || worker.aside.is_some() || !worker.is_ready(batch.setup_of(index))))
     }
 
     fn predicted(&mut self, id: WorkerId, index: usize, prediction: Prediction) {
@@ -120,7 +123,7 @@ impl Dispatcher {
     }
 
     /// A failure of the model, or the limit of wall time: tried once more on another worker, if there is one.
-    fn decided(&mut self, id: WorkerId, index: usize, failure: Failure) {
+    pub(super) fn decided(&mut self, id: WorkerId, index: usize, failure: Failure) {
         let Some(batch) = &mut self.batch else { return };
         let name = self.workers.get(&id).map_or("", |w| w.name.as_str());
         batch.set_doubt(index, None);
@@ -130,8 +133,12 @@ impl Dispatcher {
             self.out.push(Command::Notice(batch.retried(index, name, &failure.to_string())));
             batch.retry_elsewhere(index, id, Ended::Decided(failure), name);
         } else {
+            let is_model = matches!(failure, Failure::Model(_)) && batch.may_retry(index);
             batch.finish(index, Err(failure), (id, name));
             self.out.push(batch.failed(index));
+            if is_model {
+                self.contributed(id, index);
+            }
         }
     }
 

@@ -13,7 +13,7 @@ use starlings_proto::{LeaseOutcome, SetupId};
 
 use super::Dispatcher;
 use super::message::{Likeness, WorkerId};
-use super::opinion::{Opinion, Said, same_bits};
+use super::opinion::{Opinion, Said, alike};
 use super::repeats::{Contributor, Dispute, MOST};
 use super::roster::Worker;
 use super::schedule::lease;
@@ -27,7 +27,7 @@ impl Dispatcher {
         }
     }
 
-    /// Takes note of a prediction that became an outcome.
+    /// Takes note of a prediction, or a failure that nobody has seen but one worker, that became an outcome.
     pub(super) fn contributed(&mut self, id: WorkerId, index: usize) {
         if self.likeness(index) == Likeness::None {
             return;
@@ -105,7 +105,7 @@ impl Dispatcher {
         let slots = self.slots() as u64;
         while let Some(&index) = self.repeats.sampled.front() {
             let Some(batch) = &self.batch else { return };
-            let Some((by, _)) = batch.prediction(index).filter(|_| self.repeats.affords()) else {
+            let Some((by, _)) = batch.said(index).filter(|_| self.repeats.affords()) else {
                 self.repeats.sampled.pop_front();
                 continue;
             };
@@ -159,12 +159,11 @@ impl Dispatcher {
         }
         let Some(batch) = &self.batch else { return };
         // An outcome that was taken back meanwhile is compared when there is a new one.
-        let Some((by, result)) = batch.prediction(index).filter(|(by, _)| *by != id) else { return };
-        if said.as_ref().is_ok_and(|said| same_bits(said, result)) {
+        let Some((by, first)) = batch.said(index).filter(|(by, _)| *by != id) else { return };
+        if alike(&said, &first) {
             // That the other one repeats well says nothing of what it answers of its own.
             self.trusted(by);
         } else {
-            let first = Ok(result.clone());
             self.dispute(index, [(by, first), (id, said)]);
         }
     }
@@ -200,8 +199,10 @@ impl Dispatcher {
         }
         self.repeats.contributors.iter().all(|(id, contributor)| {
             let (job, setup) = (batch.job_number(contributor.index), batch.setup_of(contributor.index));
-            let could =
-                |w: &Worker| w.id != *id && w.takes(setup) && !w.holds(job) && !contributor.tried.contains(&w.id);
+            // One that is still building the setup is waited for: the first worker that is ready may have done it all.
+            let could = |w: &Worker| {
+                w.id != *id && w.will_take(setup) && !w.holds(job) && !contributor.tried.contains(&w.id)
+            };
             !self.workers.values().any(could)
         })
     }

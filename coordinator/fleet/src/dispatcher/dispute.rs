@@ -104,8 +104,12 @@ impl Dispatcher {
             } else {
                 "it gives other results than others do"
             };
-            let reason =
-                format!("{how}: of particle {}, record {}, {}", name.particle, name.record, difference(&told));
+            let reason = format!(
+                "{how}: of particle {}, record {}, {}",
+                name.particle,
+                name.record,
+                difference(&told)
+            );
             self.put_out(id, &told[0].name, reason);
         }
     }

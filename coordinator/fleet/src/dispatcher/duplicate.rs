@@ -19,6 +19,9 @@ const FACTOR: f64 = 4.0;
 /// And never before this time.
 const SHORTEST: Duration = Duration::from_secs(2);
 
+/// Runs shorter than this, in seconds, are given to an idle worker many at a time, as they are otherwise.
+const SHORT: f64 = 0.005;
+
 /// Workers that have the same job at most.
 const MOST: usize = 3;
 
@@ -41,7 +44,7 @@ impl Dispatcher {
     pub(super) fn is_shared(&self, index: usize) -> bool {
         let Some(batch) = &self.batch else { return false };
         let job = batch.job_number(index);
-        self.duplicated.contains(&index) && self.workers.values().any(|w| w.holds(job))
+        self.duplicated.contains(&index) && self.workers.values().any(|w| w.holds(job) && !w.has_dropped(job))
     }
 
     /// Gives the slowest jobs to idle slots, and waits no longer for repeats that do not come.
@@ -56,7 +59,8 @@ impl Dispatcher {
             let has = |w: &&Worker| w.holds(job);
             let Some(slow) = self.workers.values().find(has).map(|w| w.name.clone()) else { continue };
             let idle = |w: &&mut Worker| {
-                w.takes(&setup) && w.load() < w.slots && !w.holds(job) && batch.may_duplicate(index, w.id)
+                let has_room = if usual < SHORT { w.has_room() } else { w.load() < w.slots };
+                w.takes(&setup) && has_room && !w.holds(job) && batch.may_duplicate(index, w.id)
             };
             let Some(worker) = self.workers.values_mut().find(idle) else { continue };
             let (name, to) = (batch.name(index), worker.name.clone());
@@ -76,7 +80,8 @@ impl Dispatcher {
             let Some(worker) = self.workers.get(&id) else { continue };
             let job = batch.job_number(index);
             let own = worker.ages(now).into_iter().find(|(held, _, _)| *held == job);
-            if own.is_some_and(|(_, age, rounds)| age > limit(REPEAT_SHORTEST, REPEAT_FACTOR, usual, rounds)) {
+            if own.is_some_and(|(_, age, rounds)| age > limit(REPEAT_SHORTEST, REPEAT_FACTOR, usual, rounds))
+            {
                 late.push((id, index, worker.lease_of(job)));
             }
         }
@@ -104,8 +109,7 @@ impl Dispatcher {
             }
         }
         for (id, times) in mute {
-            let reason =
-                format!("it has answered nothing while others finished {times} runs that it holds");
+            let reason = format!("it has answered nothing while others finished {times} runs that it holds");
             self.set_aside(now, id, &reason);
         }
     }
@@ -125,7 +129,8 @@ fn candidates(workers: &[&Worker], batch: &Batch, now: Duration, usual: f64) -> 
     let mut held = std::collections::BTreeMap::<usize, (usize, Slow)>::new();
     for worker in workers {
         for (job, age, rounds) in worker.ages(now) {
-            let Some(index) = batch.index_of(job).filter(|index| !batch.is_finished(*index)) else { continue };
+            let open = |index: &usize| !batch.is_finished(*index) && !worker.has_dropped(job);
+            let Some(index) = batch.index_of(job).filter(open) else { continue };
             let slow = age > limit(SHORTEST, FACTOR, usual, rounds);
             let entry = held.entry(index).or_insert((0, Slow { index, age, slow: true }));
             entry.0 += 1;

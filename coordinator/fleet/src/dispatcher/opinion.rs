@@ -34,14 +34,15 @@ pub(super) enum Verdict {
 }
 
 /// Whether two predictions are the same to the last bit.
-pub(super) fn same_bits(a: &Prediction, b: &Prediction) -> bool {
+fn same_bits(a: &Prediction, b: &Prediction) -> bool {
     let bits = |values: &[f64], others: &[f64]| {
         values.len() == others.len() && values.iter().zip(others).all(|(v, w)| v.to_bits() == w.to_bits())
     };
     bits(&a.outputs, &b.outputs) && bits(&a.state, &b.state)
 }
 
-fn alike(a: &Said, b: &Said) -> bool {
+/// Whether two workers say the same.
+pub(super) fn alike(a: &Said, b: &Said) -> bool {
     match (a, b) {
         (Ok(a), Ok(b)) => same_bits(a, b),
         // Words may carry numbers that differ by rounding; that there is no prediction is what counts.

@@ -23,6 +23,9 @@ const NEWEST: f64 = 0.3;
 /// Leases that a worker holds at most before it has answered any: each may carry a state.
 const UNPROVEN: usize = 512;
 
+/// Setups known of a worker, beyond which none is taken note of that it was not sent.
+const UNASKED: usize = 1024;
+
 /// Shortest run, in seconds, for which calling a job back is worth two messages.
 const RECALL_WORTH: f64 = 0.005;
 
@@ -68,6 +71,15 @@ pub(super) struct Worker {
     answers: usize,
 }
 
+/// A lease that has ended.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Released {
+    /// It had been called back.
+    pub(super) recalled: bool,
+    /// Its answer does not matter.
+    pub(super) dropped: bool,
+}
+
 /// One lease: how often the job was started, when in the worker's order, whether it was called back, since when it has certainly
 /// been computed.
 #[derive(Clone, Copy, Debug)]
@@ -75,6 +87,7 @@ struct Held {
     attempt: u32,
     order: u64,
     recalled: bool,
+    dropped: bool,
     since: Duration,
     running_since: Option<Duration>,
 }
@@ -159,6 +172,12 @@ impl Worker {
         self.aside.is_none() && self.is_ready(setup)
     }
 
+    /// Whether it runs jobs of this setup now, or once it has built what it was sent.
+    pub(super) fn will_take(&self, setup: &SetupId) -> bool {
+        let state = self.setups.get(setup);
+        self.aside.is_none() && matches!(state, Some(SetupState::Ready | SetupState::Pending { .. }))
+    }
+
     /// Whether a control run can be made there now. In a place that was set aside it is how the place is tried when a job that
     /// tried it crashed.
     pub(super) fn may_control(&self, setup: &SetupId) -> bool {
@@ -180,7 +199,31 @@ impl Worker {
     pub(super) fn hold(&mut self, lease: Lease, since: Duration) {
         self.sent += 1;
         let (attempt, order) = (lease.attempt, self.sent);
-        self.held.insert(lease.job, Held { attempt, order, recalled: false, since, running_since: None });
+        self.held.insert(
+            lease.job,
+            Held { attempt, order, recalled: false, dropped: false, since, running_since: None },
+        );
+    }
+
+    /// Marks a lease whose answer does not matter any more.
+    pub(super) fn drop_lease(&mut self, job: u64) {
+        if let Some(held) = self.held.get_mut(&job) {
+            held.dropped = true;
+        }
+    }
+
+    /// Whether the answer of a lease does not matter any more.
+    pub(super) fn has_dropped(&self, job: u64) -> bool {
+        self.held.get(&job).is_some_and(|held| held.dropped)
+    }
+
+    /// Time in which nothing could happen is no time of its runs.
+    pub(super) fn stood_still(&mut self, gap: Duration, now: Duration) {
+        self.last_heard = (self.last_heard + gap).min(now);
+        for held in self.held.values_mut() {
+            held.since = (held.since + gap).min(now);
+            held.running_since = held.running_since.map(|since| (since + gap).min(now));
+        }
     }
 
     /// Whether it has a lease of this job.
@@ -209,12 +252,12 @@ impl Worker {
         }
     }
 
-    /// Ends a lease, and says whether it had been called back; `None` when it is not held.
-    pub(super) fn release(&mut self, job: u64, attempt: u32) -> Option<bool> {
+    /// Ends a lease; `None` when it is not held.
+    pub(super) fn release(&mut self, job: u64, attempt: u32) -> Option<Released> {
         self.held.get(&job).filter(|held| held.attempt == attempt)?;
         self.answers += 1;
         self.overtaken = 0;
-        self.held.remove(&job).map(|held| held.recalled)
+        self.held.remove(&job).map(|held| Released { recalled: held.recalled, dropped: held.dropped })
     }
 
     pub(super) fn leases(&self) -> impl Iterator<Item = Lease> + '_ {
@@ -250,6 +293,15 @@ impl Worker {
         }
         self.setups.insert(setup, SetupState::Pending { since: now });
         true
+    }
+
+    /// Whether an answer about a setup is of no use: of a setup that it failed to build before, or of far more than it was sent.
+    pub(super) fn answers_unasked(&self, setup: &SetupId, state: &SetupState) -> bool {
+        match self.setups.get(setup) {
+            Some(SetupState::Failed(_)) => matches!(state, SetupState::Failed(_)),
+            Some(_) => false,
+            None => self.setups.len() >= UNASKED,
+        }
     }
 
     /// Takes an answer about a setup: those that wait behind it are being built from now on.

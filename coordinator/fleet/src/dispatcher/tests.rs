@@ -29,14 +29,13 @@ impl Dispatcher {
     }
 }
 
-const RULES: Rules =
-    Rules {
-        heartbeat: Duration::from_secs(8),
-        patience: Duration::from_secs(60),
-        max_attempts: 3,
-        comparing: None,
-        timeout_factor: None,
-    };
+const RULES: Rules = Rules {
+    heartbeat: Duration::from_secs(8),
+    patience: Duration::from_secs(60),
+    max_attempts: 3,
+    comparing: None,
+    timeout_factor: None,
+};
 
 fn joining(id: u64, slots: u32) -> Joining {
     Joining {

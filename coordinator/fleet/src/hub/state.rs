@@ -13,9 +13,16 @@ use starlings_proto::{
 use tokio::sync::mpsc::UnboundedSender;
 
 use super::excluded::Excluded;
+use super::teller::Teller;
 use super::{Outgoing, Reply};
 use crate::FleetEvent;
 use crate::dispatcher::{BatchError, Command, ControlId, Dispatcher, Event, Rules, WorkerId};
+
+/// Workers of one coordinator at most.
+const MAX_WORKERS: usize = 4096;
+
+/// Builds of workers that are told one by one.
+const MAX_BUILDS: usize = 64;
 
 /// Guarded by the hub's lock.
 pub(super) struct State {
@@ -26,7 +33,9 @@ pub(super) struct State {
     pub(super) running: Option<Submission>,
     /// Jobs that are known to work, for control runs.
     pub(super) kept: BTreeMap<ControlId, (SetupId, Job)>,
-    pub(super) events: Sender<FleetEvent>,
+    pub(super) events: Teller,
+    /// The time of the last event.
+    now: Duration,
     pub(super) first_epoch: u64,
     pub(super) joined: u64,
     pub(super) draining: bool,
@@ -97,7 +106,8 @@ impl State {
             shapes: BTreeMap::new(),
             running: None,
             kept: BTreeMap::new(),
-            events,
+            events: Teller::new(events),
+            now: Duration::ZERO,
             first_epoch,
             joined: 0,
             draining: false,
@@ -119,6 +129,10 @@ impl State {
         if let Some(reason) = self.excluded.why(hello.nonce) {
             return Err(Closed::Refused(reason.to_owned()));
         }
+        if self.links.len() >= MAX_WORKERS {
+            let reason = format!("{MAX_WORKERS} workers are connected, and no more are taken");
+            return Err(Closed::Refused(reason));
+        }
         if self.draining {
             return Err(Closed::Over("the run is over".to_owned()));
         }
@@ -126,6 +140,7 @@ impl State {
     }
 
     pub(super) fn handle(&mut self, now: Duration, event: Event) {
+        self.now = now;
         let event = match event {
             Event::Answered { worker, lease, answer, cost } => {
                 let answer = self.checked(&lease, answer);
@@ -157,7 +172,8 @@ impl State {
         build: Option<[u8; 32]>,
     ) -> Option<([u8; 32], [u8; 32])> {
         let pair = own.zip(build).filter(|(own, build)| own != build)?;
-        self.other_builds.insert(pair.1).then_some(pair)
+        let is_new = self.other_builds.len() < MAX_BUILDS && self.other_builds.insert(pair.1);
+        is_new.then_some(pair)
     }
 
     fn carry_out(&mut self, command: Command) {
@@ -211,9 +227,9 @@ impl State {
         }
     }
 
-    fn tell(&self, event: FleetEvent) {
+    fn tell(&mut self, event: FleetEvent) {
         tracing::debug!(?event, "fleet");
-        let _ = self.events.send(event);
+        self.events.tell(self.now, event);
     }
 
     /// Names and values of the parameters of a job of the running batch.

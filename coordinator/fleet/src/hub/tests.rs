@@ -34,7 +34,15 @@ fn hello(pid: u32, build: Option<[u8; 32]>) -> Hello {
 fn hub(build: Option<[u8; 32]>) -> (Hub, Receiver<FleetEvent>) {
     let (sender, events) = mpsc::channel();
     let (heartbeat, patience) = (Duration::from_secs(8), Duration::from_secs(300));
-    (Hub::new("test".to_owned(), build, Rules { heartbeat, patience, max_attempts: 5, comparing: None, timeout_factor: None }, sender), events)
+    (
+        Hub::new(
+            "test".to_owned(),
+            build,
+            Rules { heartbeat, patience, max_attempts: 5, comparing: None, timeout_factor: None },
+            sender,
+        ),
+        events,
+    )
 }
 
 fn batch(hub: &Hub) -> (Submission, Receiver<Reply>) {

@@ -2,10 +2,11 @@
 //!
 //! Next file to read: [`crate::dispatcher::canary`].
 
-use starlings_models::{Failure, Prediction};
+use starlings_models::Failure;
 
 use super::{Batch, Ended};
 use crate::dispatcher::message::WorkerId;
+use crate::dispatcher::opinion::Said;
 
 impl Batch {
     /// Whether a job has an outcome.
@@ -13,10 +14,15 @@ impl Batch {
         self.jobs[index].outcome.is_some()
     }
 
-    /// The prediction of a job and who made it.
-    pub(in crate::dispatcher) fn prediction(&self, index: usize) -> Option<(WorkerId, &Prediction)> {
+    /// The prediction of a job, or how the model failed, and who said so. A timeout is nothing that another one would say.
+    pub(in crate::dispatcher) fn said(&self, index: usize) -> Option<(WorkerId, Said)> {
         let job = &self.jobs[index];
-        job.by.zip(job.outcome.as_ref()?.result.as_ref().ok())
+        let said = match &job.outcome.as_ref()?.result {
+            Ok(prediction) => Ok(prediction.clone()),
+            Err(failure @ Failure::Model(_)) => Err(failure.to_string()),
+            Err(Failure::Timeout(_)) => return None,
+        };
+        Some((job.by?, said))
     }
 
     /// The jobs that ended with what this worker answered.

@@ -89,7 +89,10 @@ fn a_worker_whose_outputs_are_half_a_per_cent_too_small_is_put_out_and_its_runs_
             _ => None,
         });
         let told = told.expect("it is named");
-        assert!(told.contains(&format!("worker w{liar} is put out")) && told.contains("predicted value 1"), "{told}");
+        assert!(
+            told.contains(&format!("worker w{liar} is put out")) && told.contains("predicted value 1"),
+            "{told}"
+        );
         assert_eq!(stage.dispatcher.n_workers(), 2);
     }
 }
@@ -150,7 +153,8 @@ fn a_program_outside_that_contradicts_itself_is_told_and_accuses_no_worker() {
         Ok(scaled(index, 1.0 + 0.01 * n))
     });
     assert!(outcomes(&all).is_some() && put_out(&all).is_empty());
-    let told = all.iter().filter(|c| matches!(c, Command::Notice(FleetEvent::NotReproducible { .. }))).count();
+    let told =
+        all.iter().filter(|c| matches!(c, Command::Notice(FleetEvent::NotReproducible { .. }))).count();
     assert_eq!(told, 1);
     // Nor is it compared any more.
     let next = stage.step(submit(9));

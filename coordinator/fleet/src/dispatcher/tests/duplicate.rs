@@ -22,7 +22,8 @@ fn a_slow_job_is_given_to_an_idle_worker_too_and_the_first_result_wins() {
     let commands = stage.seconds(1, &[1, 2]);
     let [(other, 0)] = sent(&commands)[..] else { panic!("{commands:?}") };
     assert_ne!(other.epoch, slow.0.epoch);
-    let told = commands.iter().any(|c| matches!(c, Command::Notice(FleetEvent::JobDuplicated { particle: 0, .. })));
+    let told =
+        commands.iter().any(|c| matches!(c, Command::Notice(FleetEvent::JobDuplicated { particle: 0, .. })));
     assert!(told, "{commands:?}");
     let done = stage.step(ran(other, Ok(prediction(0))));
     let stopped = Command::Cancel { worker: WorkerId(slow.0.epoch), leases: vec![slow.0], stop: true };
@@ -76,7 +77,9 @@ fn a_worker_of_4096_slots_that_only_beats_does_not_hold_a_batch_and_is_set_aside
         }
         let commands = stage.seconds(1, &[1, 2]);
         open.extend(sent(&commands));
-        aside |= commands.iter().any(|c| matches!(c, Command::Notice(FleetEvent::WorkerSetAside { worker, .. }) if worker == "w1"));
+        aside |= commands.iter().any(
+            |c| matches!(c, Command::Notice(FleetEvent::WorkerSetAside { worker, .. }) if worker == "w1"),
+        );
         if done {
             break;
         }

@@ -11,7 +11,10 @@ fn a_job_waiting_behind_a_long_one_is_called_back_for_an_idle_slot() {
     let commands = stage.step(answered(idle, LeaseOutcome::Ran(Ok(prediction(1))), 1.0));
     let waiting = jobs[2].0;
     let kept = Command::Keep { control: ControlId(1), index: 1 };
-    assert_eq!(commands, [kept, Command::Cancel { worker: WorkerId(waiting.epoch), leases: vec![waiting], stop: false }]);
+    assert_eq!(
+        commands,
+        [kept, Command::Cancel { worker: WorkerId(waiting.epoch), leases: vec![waiting], stop: false }]
+    );
     let moved = stage.jobs(answered(waiting, LeaseOutcome::Withdrawn, 0.0));
     assert_eq!(moved.len(), 1);
     assert_eq!((moved[0].0.epoch, moved[0].0.attempt), (idle.epoch, 2));
@@ -28,7 +31,11 @@ fn a_job_is_called_back_only_once() {
     // The job that failed on one worker waits behind the other's long one, and may not go where it failed.
     let commands = stage.step(answered(jobs[0].0, LeaseOutcome::Ran(Err(solver("no"))), 1.0));
     let waiting = sent(&commands)[0].0;
-    assert!(commands.contains(&Command::Cancel { worker: WorkerId(waiting.epoch), leases: vec![waiting], stop: false }));
+    assert!(commands.contains(&Command::Cancel {
+        worker: WorkerId(waiting.epoch),
+        leases: vec![waiting],
+        stop: false
+    }));
     let retried = stage.step(answered(waiting, LeaseOutcome::Withdrawn, 0.0));
     assert_eq!(sent(&retried).len(), 1);
     assert_eq!(retried.len(), 1, "it stays there now");
