@@ -37,6 +37,9 @@ pub(crate) struct FleetArgs {
     /// With --listen: take whoever connects, without encryption or proof.
     #[arg(long, requires = "listen", conflicts_with = "access")]
     insecure: bool,
+    /// Allow workers whose results differ, as of other builds or processors: a warning of the result instead of an error.
+    #[arg(long)]
+    mixed: bool,
 }
 
 /// What was asked for, checked.
@@ -49,6 +52,8 @@ pub(crate) struct Plan {
     access: Option<AccessPlan>,
     /// Workers to start where it does not listen.
     n_worker: usize,
+    /// Whether results of workers may differ.
+    mixed: bool,
 }
 
 /// Where an access file goes.
@@ -79,7 +84,7 @@ impl FleetArgs {
             (Some(_), false) => Some(self.access_plan(out)?),
             _ => None,
         };
-        Ok(Plan { address, host, access, n_worker })
+        Ok(Plan { address, host, access, n_worker, mixed: self.mixed })
     }
 
     fn access_plan(&self, out: Option<&Out<'_>>) -> Result<AccessPlan, Failure> {
@@ -140,6 +145,8 @@ impl FleetSession {
             Some(AccessPlan::RunFolder) => Some(Access::at(None).map_err(|fault| failed(&fault))?),
         };
         config.secrets = access.as_ref().map(|access| access.secrets().clone());
+        (config.seed, config.mixed) = (study.seed, plan.mixed);
+        config.timeout_factor = study.fleet.timeout_factor;
         let fleet = GrpcFleet::listen(config).map_err(Failure::run)?;
         let display = Arc::clone(display);
         let refused = fleet.refused();

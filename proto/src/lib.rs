@@ -12,6 +12,7 @@ pub mod convert;
 pub mod private_file;
 pub mod socket;
 pub mod spent;
+pub mod text;
 pub mod words;
 
 pub use bytes::Bytes;

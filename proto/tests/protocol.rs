@@ -235,7 +235,8 @@ fn the_coordinator_s_messages_arrive_as_sent() {
     let pairs = [
         (ToWorker::welcome(welcome.clone()), ToWorker::Welcome(welcome)),
         (ToWorker::refuse("no"), ToWorker::Refuse("no".to_owned())),
-        (ToWorker::cancel(&leases), ToWorker::Cancel(leases)),
+        (ToWorker::cancel(&leases, false), ToWorker::Cancel { leases: leases.clone(), stop: false }),
+        (ToWorker::cancel(&leases, true), ToWorker::Cancel { leases, stop: true }),
         (ToWorker::heartbeat(), ToWorker::Heartbeat),
         (ToWorker::drain("done"), ToWorker::Drain("done".to_owned())),
     ];

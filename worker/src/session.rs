@@ -149,7 +149,7 @@ fn take(
             let outbox = outbox.clone();
             setups.order(id, setup, Box::new(move |result| send(&outbox, FromWorker::Setup { id, result })));
         }
-        Ok(ToWorker::Cancel(leases)) => slots.withdraw(&leases),
+        Ok(ToWorker::Cancel { leases, stop }) => slots.withdraw(&leases, stop),
         Ok(ToWorker::Adopt { runs, rest_is_void }) => {
             let gone = slots.adopt(runs, outbox);
             answer_held(gone, outbox, held);

@@ -9,7 +9,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Instant;
 
-use starlings_models::{Forward, Job, ModelFailure, ParticleError, Prediction};
+use starlings_models::{Forward, Job, ModelFailure, ParticleError, Prediction, Stop, Until};
 use starlings_proto::convert::ended;
 use starlings_proto::spent::spent;
 use starlings_proto::words::panic_text;
@@ -25,6 +25,8 @@ pub(crate) struct Task {
     pub(crate) setup: SetupId,
     pub(crate) forward: Arc<dyn Forward>,
     pub(crate) job: Arc<Job>,
+    /// The word that stops it.
+    stop: Stop,
     /// Who wants the answer. A stream that ends takes it away, and a later one may ask again.
     asked: Mutex<Option<Asked>>,
 }
@@ -38,7 +40,7 @@ pub(crate) struct Asked {
 
 impl Task {
     pub(crate) fn new(asked: Asked, setup: SetupId, forward: Arc<dyn Forward>, job: Job) -> Self {
-        Self { setup, forward, job: Arc::new(job), asked: Mutex::new(Some(asked)) }
+        Self { setup, forward, job: Arc::new(job), stop: Stop::default(), asked: Mutex::new(Some(asked)) }
     }
 
     fn asked(&self) -> MutexGuard<'_, Option<Asked>> {
@@ -129,9 +131,15 @@ impl Slots {
         }
     }
 
-    /// Answers the given leases as withdrawn where they have not started.
-    pub(crate) fn withdraw(&self, leases: &[Lease]) {
+    /// Answers the given leases as withdrawn where they have not started; where `stop` says so, those that have are told to stop
+    /// and answered when they did.
+    pub(crate) fn withdraw(&self, leases: &[Lease], stop: bool) {
         let mut queue = self.shared.lock();
+        if stop {
+            for running in queue.running.iter().filter(|task| task.has_lease(leases)) {
+                running.stop.set();
+            }
+        }
         let (withdrawn, kept) = queue.tasks.drain(..).partition(|task| task.has_lease(leases));
         queue.tasks = kept;
         drop(queue);
@@ -240,10 +248,20 @@ impl Shared {
         while let Some(task) = self.next() {
             self.running.fetch_add(1, Ordering::Relaxed);
             let started = Instant::now();
-            let result = catch_unwind(AssertUnwindSafe(|| task.forward.run_within(&task.job, &spent())))
+            let spent = spent();
+            let until = Until { spent: &spent, stop: &task.stop };
+            let result = catch_unwind(AssertUnwindSafe(|| task.forward.run_within(&task.job, &until)))
                 .unwrap_or_else(|panic| Err(ModelFailure::Solver(panic_text(panic.as_ref())).into()));
             let cost = started.elapsed().as_secs_f64();
             self.running.fetch_sub(1, Ordering::Relaxed);
+            // A result that came all the same is as good as any; what a stopped run says of itself is not.
+            if result.is_err() && task.stop.is_set() {
+                self.lock().running.retain(|running| !Arc::ptr_eq(running, &task));
+                if let Some(Asked { lease, outbox }) = task.asked().take() {
+                    answer(&outbox, lease, LeaseOutcome::Withdrawn, cost);
+                }
+                continue;
+            }
             let counter = if result.is_ok() { &self.predictions } else { &self.failures };
             counter.fetch_add(1, Ordering::Relaxed);
             self.finished(&task, result, cost);

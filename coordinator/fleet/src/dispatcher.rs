@@ -19,19 +19,26 @@
 mod answers;
 mod aside;
 pub(crate) mod batch;
+mod canary;
+mod dispute;
 mod doubt;
+mod duplicate;
 mod held;
 pub(crate) mod message;
+mod opinion;
 mod proven;
 mod queue;
+mod repeats;
 pub(crate) mod roster;
 mod run_times;
 mod schedule;
+mod strays;
 #[cfg(test)]
 mod tests;
+mod timeout;
 mod watch;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use starlings_proto::SetupId;
@@ -41,8 +48,10 @@ use super::{FleetEvent, Outcome};
 use batch::{Batch, Lost};
 pub(crate) use doubt::Asked;
 pub(crate) use held::Taken;
-pub(crate) use message::{BatchError, Command, ControlId, Event, Joining, WorkerId};
+pub(crate) use message::{BatchError, Command, ControlId, Event, Joining, Likeness, WorkerId};
 use proven::Proven;
+pub(crate) use repeats::Comparing;
+use repeats::Repeats;
 use roster::{SetupState, Worker};
 use run_times::RunTimes;
 use watch::{Overdue, Starved};
@@ -56,6 +65,10 @@ pub(crate) struct Rules {
     pub patience: Duration,
     /// How many workers may be lost under one job before it is given up.
     pub max_attempts: u32,
+    /// How results of workers are compared; not at all without it.
+    pub comparing: Option<Comparing>,
+    /// A run that takes so many times the usual time is given up; none is without it.
+    pub timeout_factor: Option<f64>,
 }
 
 /// The decisions of a fleet. One batch at a time.
@@ -71,11 +84,15 @@ pub(crate) struct Dispatcher {
     overdue: Option<Overdue>,
     run_times: RunTimes,
     proven: Proven,
+    repeats: Repeats,
+    /// Jobs of the batch that more than one worker was given.
+    duplicated: BTreeSet<usize>,
     local_only: bool,
     /// No job is given away before: workers of an earlier start may come back with them.
     opens: Duration,
     /// No job is given away while it is looked for what workers brought along.
     pub(crate) is_matching: bool,
+    /// The time of the event that is being handled.
     now: Duration,
     /// Outcomes of a batch that ended in an error, of which its caller was not told.
     left: Vec<(usize, Outcome)>,
@@ -96,6 +113,8 @@ impl Dispatcher {
             overdue: None,
             run_times: RunTimes::default(),
             proven: Proven::default(),
+            repeats: Repeats::default(),
+            duplicated: BTreeSet::new(),
             local_only: false,
             opens: Duration::ZERO,
             is_matching: false,
@@ -140,6 +159,7 @@ impl Dispatcher {
             Event::Answered { worker, lease, answer, cost } => {
                 self.answered(now, worker, lease, answer, cost);
             }
+            Event::Likeness { setup, likeness } => _ = self.repeats.likeness.insert(setup, likeness),
             Event::LocalOnly => self.local_only = true,
             Event::Tick => self.tick(now),
             Event::Abort(error) => self.abort(error),
@@ -178,6 +198,12 @@ impl Dispatcher {
         for (position, job) in leases.into_iter().enumerate() {
             let Some(batch) = &mut self.batch else { break };
             let Some(index) = batch.index_of(job) else { continue };
+            // What it repeated, or others have too, does not depend on it.
+            let shared = || self.workers.values().any(|w| w.holds(job));
+            let repeated = self.repeats.open.contains(&(id, index)) || worker.has_dropped(job);
+            if repeated || batch.is_finished(index) || (self.duplicated.contains(&index) && shared()) {
+                continue;
+            }
             let counted = !clean && position < worker.slots;
             let why = format!("{} was lost: {reason}", worker.name);
             match batch.lost(index, counted, self.rules.max_attempts) {
@@ -190,6 +216,7 @@ impl Dispatcher {
                 Lost::GivenUp => given_up = Some((index, batch.attempts(index), why)),
             }
         }
+        self.repeats.forget(id);
         let notice = FleetEvent::WorkerLeft { worker: worker.name, reason: reason.to_owned(), requeued };
         self.out.push(Command::Notice(notice));
         if let Some((index, attempts, why)) = given_up {
@@ -201,6 +228,9 @@ impl Dispatcher {
         let Some(worker) = self.workers.get_mut(&id) else { return };
         worker.last_heard = now;
         let needed = self.batch.as_ref().is_some_and(|batch| batch.needs(&setup));
+        if worker.answers_unasked(&setup, &state) {
+            return self.stray(id, "it speaks of setups that it was not sent, again and again");
+        }
         if let SetupState::Failed(reason) = &state {
             if worker.is_ready(&setup) {
                 // It had built it: its cache was full.
@@ -232,6 +262,8 @@ impl Dispatcher {
                 }
             }
         }
+        self.repeats.begin();
+        self.duplicated.clear();
         self.proven.keep_only(batch.names(), &mut self.out);
         self.left.clear();
         self.batch = Some(batch);
@@ -244,7 +276,7 @@ impl Dispatcher {
         for worker in self.workers.values() {
             let leases = worker.leases().filter(|l| batch.index_of(l.job).is_some()).collect::<Vec<_>>();
             if !leases.is_empty() {
-                self.out.push(Command::Cancel { worker: worker.id, leases });
+                self.out.push(Command::Cancel { worker: worker.id, leases, stop: true });
             }
         }
         self.starved = None;

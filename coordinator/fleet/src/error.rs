@@ -96,6 +96,20 @@ pub enum FleetError {
         /// What happened.
         reason: String,
     },
+    /// Workers give different results for the same run, and nobody could say which is right.
+    #[error(
+        "workers give different results for the run of particle {particle} over record {record}, and no third one could say which is \
+         right: {workers}\n  start workers of one build on machines of one kind and continue with --resume, or allow differences with \
+         --mixed"
+    )]
+    Disagreement {
+        /// Index of the sigma point.
+        particle: u32,
+        /// Index of the record.
+        record: u32,
+        /// The workers with their builds, and a value in which they differ.
+        workers: String,
+    },
     /// The network thread ended although nobody closed the fleet.
     #[error("the fleet's network stopped: {0}")]
     Stopped(String),

@@ -129,6 +129,49 @@ pub enum FleetEvent {
         /// Runs that it still makes.
         computing: usize,
     },
+    /// A worker gives other results than others do for the same job: it is put out.
+    WorkerExcluded {
+        /// Its name.
+        worker: String,
+        /// BLAKE3 of its executable, hexadecimal; empty when unknown.
+        build: String,
+        /// What it answered and what the others did.
+        reason: String,
+        /// Its runs of this batch that are made again.
+        again: usize,
+        /// Its runs of earlier batches, which were taken.
+        earlier: u64,
+    },
+    /// Workers give different results for the same job, which was allowed.
+    WorkersDiffer {
+        /// The workers with their builds and a value in which they differ.
+        what: String,
+    },
+    /// A solver outside gives other results when it is asked again: its runs are compared no more.
+    NotReproducible {
+        /// The workers with a value in which their runs differ.
+        what: String,
+    },
+    /// A job that takes long was given to another worker too.
+    JobDuplicated {
+        /// Index of the sigma point.
+        particle: u32,
+        /// Index of the record.
+        record: u32,
+        /// Who has had it.
+        slow: String,
+        /// Who got it too.
+        worker: String,
+    },
+    /// Events that were not told one by one.
+    Untold {
+        /// Their kind.
+        of: String,
+        /// How many.
+        count: u64,
+        /// The last of them, in words.
+        last: String,
+    },
     /// An answer to a lease that has ended; ignored.
     LateAnswer {
         /// Who sent it.

@@ -21,6 +21,11 @@ impl FleetEvent {
             Self::JobRetried { .. } => "job-retried",
             Self::JobFailed { .. } => "job-failed",
             Self::RunsBrought { .. } => "runs-brought",
+            Self::WorkerExcluded { .. } => "worker-excluded",
+            Self::WorkersDiffer { .. } => "workers-differ",
+            Self::NotReproducible { .. } => "not-reproducible",
+            Self::JobDuplicated { .. } => "job-duplicated",
+            Self::Untold { .. } => "untold",
             Self::LateAnswer { .. } => "late-answer",
             Self::Waiting { .. } => "waiting",
             Self::Progress { .. } => "progress",
@@ -40,6 +45,10 @@ impl FleetEvent {
                 | Self::RunsBrought { .. }
                 | Self::WorkerSetAside { .. }
                 | Self::JobFailed { .. }
+                | Self::WorkerExcluded { .. }
+                | Self::WorkersDiffer { .. }
+                | Self::NotReproducible { .. }
+                | Self::Untold { .. }
                 | Self::Waiting { .. }
                 | Self::LocalWorkerRestarted { .. }
                 | Self::LocalWorkerGivenUp { .. }
@@ -106,6 +115,37 @@ impl fmt::Display for FleetEvent {
                     f,
                     "worker {worker} brought {finished} finished runs along and goes on with {computing}"
                 )
+            }
+            Self::WorkerExcluded { worker, build, reason, again, earlier } => {
+                let build =
+                    if build.is_empty() { String::new() } else { format!(" (build {})", short(build)) };
+                let earlier = if *earlier == 0 {
+                    String::new()
+                } else {
+                    format!("; {earlier} of its runs were used before")
+                };
+                write!(
+                    f,
+                    "worker {worker}{build} is put out: {reason}; {again} of its runs are made again{earlier}"
+                )
+            }
+            Self::WorkersDiffer { what } => {
+                write!(f, "workers give different results for one run, which is allowed here: {what}")
+            }
+            Self::NotReproducible { what } => {
+                write!(
+                    f,
+                    "the solver gives another result when it is asked again, so its runs are not compared: {what}"
+                )
+            }
+            Self::JobDuplicated { particle, record, slow, worker } => {
+                write!(
+                    f,
+                    "particle {particle}, record {record}: takes long on worker {slow}, given to worker {worker} too"
+                )
+            }
+            Self::Untold { of, count, last } => {
+                write!(f, "{count} more events of the kind {of} were not told one by one; the last: {last}")
             }
             Self::LateAnswer { worker, job } => {
                 write!(f, "worker {worker} answered run {job} too late; ignored")

@@ -18,10 +18,10 @@ use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
 use tokio_util::sync::CancellationToken;
 
 use super::access::Secrets;
-use super::dispatcher::{BatchError, Event, Rules};
+use super::dispatcher::{BatchError, Comparing, Event, Likeness, Rules};
 use super::door::{Door, Refusals};
 use super::handle::FleetHandle;
-use super::hub::{Hub, Reply, Submission};
+use super::hub::{Hub, Reply, SetupShape, Submission};
 use super::identity::RunIdentity;
 use super::network::{self, Ways};
 use super::{Arrived, Fleet, FleetError, FleetEvent, Outcome, TELL_EVERY};
@@ -51,6 +51,12 @@ pub struct FleetConfig {
     pub max_attempts: u32,
     /// The run: workers of an earlier start of it bring along what they have done.
     pub identity: RunIdentity,
+    /// How results of workers are compared: what draws the runs that are repeated, the study's seed.
+    pub seed: u64,
+    /// Whether workers whose results differ are allowed, and only told of.
+    pub mixed: bool,
+    /// A run that takes so many times the usual time is given up as a timeout; none is without it.
+    pub timeout_factor: Option<f64>,
     /// BLAKE3 of this executable: a worker of another one is told of. `None`: none is.
     pub build: Option<[u8; 32]>,
     /// Ends [`Fleet::run`] promptly with [`FleetError::Cancelled`].
@@ -75,6 +81,9 @@ impl FleetConfig {
             patience: Duration::from_secs(300),
             max_attempts: 5,
             identity: RunIdentity::new(),
+            seed: 0,
+            mixed: false,
+            timeout_factor: None,
             build: own_build(),
             cancel,
             events,
@@ -106,6 +115,8 @@ impl GrpcFleet {
             heartbeat: config.heartbeat,
             patience: config.patience,
             max_attempts: config.max_attempts,
+            comparing: Some(Comparing { seed: config.seed, mixed: config.mixed }),
+            timeout_factor: config.timeout_factor,
         };
         let started_again = address.is_some() && config.identity.incarnation > 1;
         let opens = if started_again { GRACE } else { Duration::ZERO };
@@ -226,6 +237,9 @@ impl GrpcFleet {
             BatchError::NoControl { particle, record, parameters, reason, .. } => {
                 FleetError::NoControl { particle, record, parameters, reason }
             }
+            BatchError::Disagreement { particle, record, workers } => {
+                FleetError::Disagreement { particle, record, workers }
+            }
             BatchError::NoAnswer { index, particle, record, reason } => {
                 FleetError::NoAnswer { job: index, particle, record, reason }
             }
@@ -256,7 +270,8 @@ impl Fleet for GrpcFleet {
         // length.
         if !self.hub.knows(std::iter::once(&id)) {
             let n_state = setup.spec().ok().filter(|spec| spec.restart).map(|spec| spec.n_state());
-            self.hub.install(id, json, setup.parameters.clone(), n_state);
+            let shape = SetupShape { parameters: setup.parameters.clone(), n_state };
+            self.hub.install(id, json, shape, likeness(setup));
         }
         Ok(id)
     }
@@ -303,6 +318,15 @@ impl Drop for GrpcFleet {
                 Err(_) => tracing::error!("the fleet's network thread panicked"),
             }
         }
+    }
+}
+
+/// How runs of a setup compare: a program outside promises equal bits, or does not.
+fn likeness(setup: &Setup) -> Likeness {
+    match setup.model.solver.as_deref().map(|solver| solver.described.as_ref()) {
+        None => Likeness::Exact,
+        Some(Some(described)) if described.deterministic => Likeness::Promised,
+        Some(_) => Likeness::None,
     }
 }
 

@@ -5,8 +5,10 @@
 //! read: `state`, then [`super::service`], which brings the workers' events.
 
 mod arrival;
+mod excluded;
 mod held;
 mod state;
+mod teller;
 #[cfg(test)]
 mod tests;
 
@@ -20,12 +22,12 @@ use tokio::sync::{Notify, mpsc::UnboundedSender};
 use tonic::Status;
 
 use super::dispatcher::message::hex;
-use super::dispatcher::{BatchError, Dispatcher, Event, Joining, Rules, WorkerId};
+use super::dispatcher::{BatchError, Dispatcher, Event, Joining, Likeness, Rules, WorkerId};
 use super::identity::RunIdentity;
 use super::job_name::JobName;
 use super::{FleetEvent, Outcome};
-pub(super) use state::{Closed, Submission};
-use state::{Link, SetupShape, State};
+pub(super) use state::{Closed, SetupShape, Submission};
+use state::{Link, State};
 
 /// What a link carries to its worker.
 pub(super) type Outgoing = Result<generated::ToWorker, Status>;
@@ -71,7 +73,8 @@ impl Hub {
     }
 
     pub(super) fn tell(&self, event: FleetEvent) {
-        let _ = self.lock().events.send(event);
+        let now = self.started.elapsed();
+        self.lock().events.tell(now, event);
     }
 
     pub(super) fn handle(&self, event: Event) {
@@ -106,10 +109,12 @@ impl Hub {
     }
 
     /// Takes a setup as it travels, with the names of its parameters, and the length of a state where it is known.
-    pub(super) fn install(&self, id: SetupId, json: Bytes, parameters: Vec<String>, n_state: Option<usize>) {
-        let mut state = self.lock();
+    pub(super) fn install(&self, id: SetupId, json: Bytes, shape: SetupShape, likeness: Likeness) {
+        let now = self.started.elapsed();
+        let mut state = self.decide();
+        state.handle(now, Event::Likeness { setup: id, likeness });
         state.setups.insert(id, json);
-        state.shapes.insert(id, SetupShape { parameters, n_state });
+        state.shapes.insert(id, shape);
     }
 
     pub(super) fn knows<'a>(&self, mut setups: impl Iterator<Item = &'a SetupId>) -> bool {
@@ -137,7 +142,7 @@ impl Hub {
         let mut state = self.decide();
         if let Err(closed) = state.admit(&hello) {
             if let Closed::Refused(reason) = closed.clone() {
-                let _ = state.events.send(FleetEvent::WorkerRefused { host: hello.host, reason });
+                state.events.tell(now, FleetEvent::WorkerRefused { host: hello.host, reason });
             }
             return Err(closed);
         }
@@ -153,7 +158,7 @@ impl Hub {
         };
         let _ = link.send(Ok(ToWorker::welcome(welcome)));
         let name = format!("{}@{}/{}", state.joined, hello.host, hello.pid);
-        state.links.insert(id, Link::new(name.clone(), link, hello.pid));
+        state.links.insert(id, Link::new(name.clone(), link, hello.pid, hello.nonce));
         let Hello { cores, slots, host, pid, nonce, build, .. } = hello;
         let other = state.other_build(self.build, build).map(|(own, build)| FleetEvent::OtherBuild {
             worker: name.clone(),
@@ -163,7 +168,7 @@ impl Hub {
         });
         state.handle(now, Event::Joined(Joining { id, name, host, pid, slots, cores, nonce, build }));
         if let Some(event) = other {
-            let _ = state.events.send(event);
+            state.events.tell(now, event);
         }
         Ok(id)
     }
@@ -204,7 +209,9 @@ impl Hub {
 
     /// Asks all workers to leave and takes no new ones.
     pub(super) fn drain(&self, reason: &str) {
+        let now = self.started.elapsed();
         let mut state = self.lock();
+        state.events.tell_rest(now);
         state.draining = true;
         for link in state.links.values() {
             let _ = link.sender.send(Ok(ToWorker::drain(reason)));

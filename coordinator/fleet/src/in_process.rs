@@ -11,7 +11,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use starlings_models::{BuildSetup, Factory, Forward, Job, ModelFailure, ParticleError, Prediction, Setup};
+use starlings_models::{
+    BuildSetup, Factory, Forward, Job, ModelFailure, ParticleError, Prediction, Setup, Stop, Until,
+};
 use starlings_proto::spent::spent;
 use starlings_proto::words::panic_text;
 use starlings_proto::{SetupId, encode_setup};
@@ -85,8 +87,11 @@ impl Fleet for InProcess {
 /// One run; a panic of the model is a failure of the model.
 fn run_one(forward: &dyn Forward, job: &Job) -> Result<Prediction, ParticleError> {
     let started = Instant::now();
-    let mut result = catch_unwind(AssertUnwindSafe(|| forward.run_within(job, &spent())))
-        .unwrap_or_else(|panic| Err(ModelFailure::Solver(panic_text(panic.as_ref())).into()));
+    let mut result = catch_unwind(AssertUnwindSafe(|| {
+        let until = Until { spent: &spent(), stop: &Stop::default() };
+        forward.run_within(job, &until)
+    }))
+    .unwrap_or_else(|panic| Err(ModelFailure::Solver(panic_text(panic.as_ref())).into()));
     if let Ok(prediction) = &mut result {
         prediction.cost = started.elapsed().as_secs_f64();
     }

@@ -3,89 +3,14 @@
 
 mod fleet_kit;
 
-use std::net::SocketAddr;
-
+use fleet_kit::hand::{Hand, block_on, hello};
 use fleet_kit::{
     ThreadWorker, any_port, assert_exact, await_event, await_workers, factory, jobs, listen, square,
 };
 use starlings_fleet::{Fleet, FleetEvent};
 use starlings_models::Setup;
-use starlings_proto::generated::{self, fleet_client::FleetClient};
-use starlings_proto::{FromWorker, Hello, Lease, LeaseOutcome, PROTOCOL, ReceivedWindows, ToWorker, VERSION};
-use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
-use tokio_stream::wrappers::UnboundedReceiverStream;
-use tonic::Streaming;
-
-/// A worker played by hand.
-struct Hand {
-    outbox: UnboundedSender<generated::FromWorker>,
-    inbound: Streaming<generated::ToWorker>,
-    windows: ReceivedWindows,
-}
-
-impl Hand {
-    async fn dial(address: SocketAddr, hello: Hello) -> Self {
-        let mut client = FleetClient::connect(format!("http://{address}")).await.unwrap();
-        let (outbox, outgoing) = unbounded_channel();
-        outbox.send(FromWorker::Hello(hello).encode().unwrap()).unwrap();
-        let inbound = client.work(UnboundedReceiverStream::new(outgoing)).await.unwrap().into_inner();
-        Self { outbox, inbound, windows: ReceivedWindows::default() }
-    }
-
-    fn say(&self, message: FromWorker) {
-        self.outbox.send(message.encode().unwrap()).unwrap();
-    }
-
-    /// The next message that is no heartbeat; `None` when the stream ended.
-    async fn hear(&mut self) -> Option<ToWorker> {
-        while let Ok(Some(message)) = self.inbound.message().await {
-            match ToWorker::decode(message, &mut self.windows).unwrap() {
-                ToWorker::Heartbeat => {}
-                message => return Some(message),
-            }
-        }
-        None
-    }
-
-    /// Builds the setup and returns the first jobs, as many as asked for.
-    async fn take_jobs(&mut self, n: usize) -> Vec<(Lease, starlings_models::Job)> {
-        let mut jobs = vec![];
-        while jobs.len() < n {
-            match self.hear().await.expect("still connected") {
-                ToWorker::Setup { id, .. } => self.say(FromWorker::Setup { id, result: Ok(()) }),
-                ToWorker::Job { lease, job, .. } => jobs.push((lease, job)),
-                _ => {}
-            }
-        }
-        jobs
-    }
-
-    /// Until the run is over; a stream dropped earlier would take unsent answers with it.
-    async fn stay_until_drained(&mut self) {
-        while !matches!(self.hear().await, Some(ToWorker::Drain(_)) | None) {}
-    }
-
-    fn answer(&self, lease: Lease, job: &starlings_models::Job) {
-        self.say(FromWorker::Result { lease, answer: LeaseOutcome::Ran(Ok(square(job))), cost: 1.0 });
-    }
-}
-
-fn hello() -> Hello {
-    Hello {
-        protocol: PROTOCOL,
-        version: VERSION.to_owned(),
-        cores: 1,
-        slots: 1,
-        host: "hand".to_owned(),
-        pid: 1,
-        nonce: 42,
-        build: None,
-    }
-}
-
-fn block_on<T>(future: impl Future<Output = T>) -> T {
-    tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap().block_on(future)
-}
+use starlings_proto::generated;
+use starlings_proto::{Hello, ToWorker};
 
 #[test]
 fn another_release_is_refused_with_the_remedy() {
@@ -150,7 +75,8 @@ fn a_worker_that_vanishes_with_jobs_in_hand_loses_none_of_them() {
         doomed.take_jobs(1).await;
         drop(doomed);
         let mut heir = Hand::dial(address, Hello { nonce: 2, ..hello() }).await;
-        for _ in 0..9 {
+        // The other nine, and once more the one that the doomed worker answered: its result is compared.
+        for _ in 0..10 {
             let (lease, job) = heir.take_jobs(1).await.remove(0);
             heir.answer(lease, &job);
         }

@@ -172,6 +172,8 @@ pub struct FleetChoice {
     pub patience: Option<f64>,
     /// Workers that may be lost under one run before the study ends; `None` for the fleet's own default.
     pub max_attempts: Option<u32>,
+    /// A run that takes so many times the usual time is given up; `None`: none is.
+    pub timeout_factor: Option<f64>,
 }
 
 /// Which effects `explain` may try.

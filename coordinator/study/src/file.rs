@@ -248,4 +248,5 @@ pub(super) struct FleetSection {
     pub(super) slots: Option<Spanned<u64>>,
     pub(super) patience: Option<Spanned<f64>>,
     pub(super) max_attempts: Option<Spanned<u64>>,
+    pub(super) timeout_factor: Option<Spanned<f64>>,
 }

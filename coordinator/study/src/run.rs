@@ -195,6 +195,7 @@ fn from_start_to_end(
     result.warnings.extend(unknown);
     result.warnings.extend(folder.mixed()?);
     result.warnings.extend(runner.timeouts());
+    result.warnings.extend(folder.store.told_of_workers()?);
     match hangs_on {
         Ok(found) => result.hangs_on = (found.runs > 0).then_some(found),
         Err(why) => result.warnings.push(why),

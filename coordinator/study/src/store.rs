@@ -27,6 +27,7 @@ pub mod snapshot;
 mod table;
 #[cfg(test)]
 mod tests;
+mod told;
 
 use std::cell::Cell;
 use std::path::{Path, PathBuf};

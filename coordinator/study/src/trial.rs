@@ -8,7 +8,9 @@ use std::sync::Arc;
 
 use starlings_fleet::{ProtocolError, travels};
 use starlings_models::external::table::foreign_bytes;
-use starlings_models::{Forward, Job, ModelFailure, ParticleError, Prediction, SOLVER, SetupError, Window};
+use starlings_models::{
+    Forward, Job, ModelFailure, ParticleError, Prediction, SOLVER, SetupError, Stop, Until, Window,
+};
 use starlings_proto::spent::spent;
 
 use super::{Study, posterior};
@@ -161,7 +163,8 @@ fn run(
 ) -> Result<Prediction, Fault> {
     let job =
         Job { particle: 0, record: record as u32, window: Arc::clone(window), theta: theta.to_vec(), state };
-    let prediction = model.run_within(&job, &spent()).map_err(Fault::Run)?;
+    let until = Until { spent: &spent(), stop: &Stop::default() };
+    let prediction = model.run_within(&job, &until).map_err(Fault::Run)?;
     travels(&job, &prediction).map_err(Fault::Travel)?;
     Ok(prediction)
 }

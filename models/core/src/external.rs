@@ -18,7 +18,9 @@ use crate::effect::Addition;
 use crate::setup::Setup;
 use crate::simulator::{check_job, free_names};
 use crate::solver::Description;
-use crate::{Forward, Job, ModelFailure, ObserverDef, ParticleError, Prediction, Signal, Spec, Window};
+use crate::{
+    Forward, Job, ModelFailure, ObserverDef, ParticleError, Prediction, Signal, Spec, Stop, Until, Window,
+};
 use applied::Applied;
 pub use outline::{check_effects, outline};
 pub use parts::spec;
@@ -48,6 +50,8 @@ pub struct Run<'a> {
     pub terms: &'a [Addition],
     /// Values of names in the terms that are no quantities of the program.
     pub constants: &'a [(String, f64)],
+    /// Tells when nobody wants the answer any more; the program is then ended.
+    pub stop: Option<&'a Stop>,
 }
 
 /// What the program predicts.
@@ -253,6 +257,10 @@ impl<S: Solve> Forward for External<S> {
     }
 
     fn run(&self, job: &Job) -> Result<Prediction, ParticleError> {
+        self.run_within(job, &Until { spent: &|| 0.0, stop: &Stop::default() })
+    }
+
+    fn run_within(&self, job: &Job, until: &Until<'_>) -> Result<Prediction, ParticleError> {
         check_job(job, self.binding.len(), self.rows.n_row(), &self.spec)?;
         let own = &self.description.spec;
         let theta = self.binding.theta(&job.theta, job.window.start)?;
@@ -276,6 +284,7 @@ impl<S: Solve> Forward for External<S> {
             state: state.as_deref(),
             terms: &self.terms,
             constants: &constants,
+            stop: Some(until.stop),
         };
         let solved = self.solve.solve(&run)?;
         self.check(&solved, &window)?;

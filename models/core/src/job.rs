@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use crate::{ParticleError, Spec};
+use crate::{ParticleError, Spec, Until};
 
 /// A sampled signal, linear between its samples and constant beyond them.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,13 +70,13 @@ pub trait Forward: Send + Sync {
     /// When the run gives no usable prediction; only a model failure among them is data about the parameters.
     fn run(&self, job: &Job) -> Result<Prediction, ParticleError>;
 
-    /// Runs one job, which may take as long as its setup says: `spent` tells the seconds that it has computed so far. What runs
-    /// in a program of its own is timed by whoever started the program.
+    /// Runs one job, which may take as long as its setup says and its caller wants it. What runs in a program of its own is timed by
+    /// whoever started the program. A run that was stopped ends with any error.
     ///
     /// # Errors
     /// As [`Forward::run`], and [`ParticleError::Timeout`].
-    fn run_within(&self, job: &Job, spent: &dyn Fn() -> f64) -> Result<Prediction, ParticleError> {
-        let _ = spent;
+    fn run_within(&self, job: &Job, until: &Until<'_>) -> Result<Prediction, ParticleError> {
+        let _ = until;
         self.run(job)
     }
 }

@@ -42,6 +42,7 @@ pub use effect::{Addition, EffectDef, EffectParameter, EffectState};
 pub use external::{External, Run, Solve, Solved};
 pub use failure::{Failure, ModelFailure, ParticleError, Timeout};
 pub use job::{Forward, Job, Prediction, Signal, Window};
+pub use limits::{Stop, Until};
 pub use memory::{Memory, with_memories};
 pub use model::{Model, advance_by};
 pub use native_models::{NativeModel, NativeModels};

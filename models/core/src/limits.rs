@@ -5,6 +5,8 @@
 //! steps. Next file to read: [`crate::simulator`], which sets the limits of a run.
 
 use std::cell::Cell;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::ModelFailure;
 
@@ -16,6 +18,31 @@ pub(crate) const TIMEOUT: f64 = 3600.0;
 
 /// Steps between two looks at whether to stop: a look may read a clock, a step may be as short.
 const LOOK: u64 = 256;
+
+/// A caller's word that nobody wants the answer of a run any more.
+#[derive(Clone, Debug, Default)]
+pub struct Stop(Arc<AtomicBool>);
+
+impl Stop {
+    /// Says it.
+    pub fn set(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether it was said.
+    pub fn is_set(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+/// What may end a run before its end.
+#[derive(Clone, Copy)]
+pub struct Until<'a> {
+    /// Tells the seconds that the run has computed so far.
+    pub spent: &'a dyn Fn() -> f64,
+    /// Whether nobody wants the answer any more.
+    pub stop: &'a Stop,
+}
 
 /// The limits of one run, and how much of them is used.
 pub struct Limits<'a> {

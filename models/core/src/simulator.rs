@@ -15,8 +15,8 @@ use crate::past::Past;
 use crate::segment::Segment;
 use crate::setup::Setup;
 use crate::{
-    Drive, Forward, Job, Model, ModelFailure, NativeModels, ParticleError, Prediction, Spec, Timeout, Window,
-    nearest,
+    Drive, Forward, Job, Model, ModelFailure, NativeModels, ParticleError, Prediction, Spec, Stop, Timeout,
+    Until, Window, nearest,
 };
 
 /// A model, its observer, and the way from a job's values to its parameters.
@@ -122,13 +122,13 @@ impl Forward for Simulator {
     }
 
     fn run(&self, job: &Job) -> Result<Prediction, ParticleError> {
-        self.run_within(job, &|| 0.0)
+        self.run_within(job, &Until { spent: &|| 0.0, stop: &Stop::default() })
     }
 
-    fn run_within(&self, job: &Job, spent: &dyn Fn() -> f64) -> Result<Prediction, ParticleError> {
+    fn run_within(&self, job: &Job, until: &Until<'_>) -> Result<Prediction, ParticleError> {
         check_job(job, self.binding.len(), self.rows.len(), &self.spec)?;
         let end = job.window.times.last().copied().unwrap_or(job.window.start);
-        let is_late = || spent() > self.timeout;
+        let is_late = || until.stop.is_set() || (until.spent)() > self.timeout;
         let limits = Limits::new(self.max_steps, end, Some(&is_late));
         let ran = self.limited(job, &limits);
         if limits.stopped() { Err(self.late().into()) } else { ran }

@@ -7,6 +7,10 @@ use super::held::{HeldRun, decode_held, encode_held};
 use super::{Lease, ProtocolError, SetupId, floats, job::check_state, required, setup_id};
 use crate::MAX_SLOTS;
 use crate::generated::{self, failure, from_worker::Kind, result::Outcome};
+use crate::text::{self, cut};
+
+/// Longest time that a run may say it took, seconds.
+const LONGEST_RUN: f64 = 1e7;
 
 /// Who a worker is. First message of every stream.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -101,10 +105,12 @@ impl FromWorker {
     pub fn decode(message: generated::FromWorker) -> Result<Self, ProtocolError> {
         Ok(match required(message.kind, "kind")? {
             Kind::Hello(hello) => Self::Hello(decode_hello(hello)?),
-            Kind::Setup(s) => Self::Setup { id: setup_id(&s.id)?, result: s.failure.map_or(Ok(()), Err) },
+            Kind::Setup(s) => {
+                Self::Setup { id: setup_id(&s.id)?, result: s.failure.map_or(Ok(()), |why| Err(cut(why))) }
+            }
             Kind::Result(result) => decode_result(result)?,
             Kind::Heartbeat(h) => Self::Heartbeat { running: h.running, queued: h.queued },
-            Kind::Goodbye(g) => Self::Goodbye(g.reason),
+            Kind::Goodbye(g) => Self::Goodbye(cut(g.reason)),
             Kind::Held(held) => Self::Held(decode_held(held)?),
         })
     }
@@ -123,6 +129,7 @@ fn decode_hello(hello: generated::Hello) -> Result<Hello, ProtocolError> {
         return Err(ProtocolError::Shape { field: "slots", message });
     }
     let build = if build.is_empty() { None } else { Some(setup_id(&build)?) };
+    let (host, version) = (text::host(&host), text::host(&version));
     Ok(Hello { protocol, version, cores, slots, host, pid, nonce, build })
 }
 
@@ -180,7 +187,7 @@ pub(super) fn decode_ended(
 }
 
 fn seconds(cost: f64) -> f64 {
-    if cost > 0.0 && cost.is_finite() { cost } else { 0.0 }
+    if cost > 0.0 { cost.min(LONGEST_RUN) } else { 0.0 }
 }
 
 fn encode_failure(error: ParticleError) -> failure::Kind {
@@ -213,14 +220,14 @@ fn encode_model_failure(failed: ModelFailure) -> failure::Kind {
 
 fn decode_failure(kind: failure::Kind) -> Result<ParticleError, ProtocolError> {
     let failed = match kind {
-        failure::Kind::BadJob(text) => return Ok(ParticleError::BadJob(text)),
-        failure::Kind::Infrastructure(text) => return Ok(ParticleError::Infrastructure(text)),
-        failure::Kind::Undecided(text) => return Ok(ParticleError::Undecided(text)),
+        failure::Kind::BadJob(text) => return Ok(ParticleError::BadJob(cut(text))),
+        failure::Kind::Infrastructure(text) => return Ok(ParticleError::Infrastructure(cut(text))),
+        failure::Kind::Undecided(text) => return Ok(ParticleError::Undecided(cut(text))),
         failure::Kind::Timeout(f) => {
-            return Ok(Timeout { limit: required(f.limit_s, "limit_s")?, says: f.says }.into());
+            return Ok(Timeout { limit: required(f.limit_s, "limit_s")?, says: cut(f.says) }.into());
         }
         failure::Kind::NotFinite(f) => {
-            ModelFailure::NotFinite { what: f.what, time: required(f.time, "time")? }
+            ModelFailure::NotFinite { what: cut(f.what), time: required(f.time, "time")? }
         }
         failure::Kind::StepTooSmall(f) => {
             ModelFailure::StepTooSmall { time: required(f.time, "time")?, step: required(f.step, "step")? }
@@ -228,8 +235,8 @@ fn decode_failure(kind: failure::Kind) -> Result<ParticleError, ProtocolError> {
         failure::Kind::TooManySteps(f) => {
             ModelFailure::TooManySteps { time: required(f.time, "time")?, limit: f.limit }
         }
-        failure::Kind::OutsideDomain(text) => ModelFailure::OutsideDomain(text),
-        failure::Kind::Solver(text) => ModelFailure::Solver(text),
+        failure::Kind::OutsideDomain(text) => ModelFailure::OutsideDomain(cut(text)),
+        failure::Kind::Solver(text) => ModelFailure::Solver(cut(text)),
     };
     Ok(failed.into())
 }

@@ -7,6 +7,7 @@ use super::held::{decode_adopted, encode_adopted};
 use super::key::JobKey;
 use super::{Lease, ProtocolError, ReceivedWindows, SetupId, decode_setup, job, required, setup_id, windows};
 use crate::generated::{self, to_worker::Kind};
+use crate::text::cut;
 
 /// The coordinator takes the worker.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,8 +51,13 @@ pub enum ToWorker {
         /// The job.
         job: Job,
     },
-    /// Withdraw these jobs if they have not started.
-    Cancel(Vec<Lease>),
+    /// Withdraw these jobs.
+    Cancel {
+        /// Which.
+        leases: Vec<Lease>,
+        /// Also those that are being computed.
+        stop: bool,
+    },
     /// The coordinator is alive.
     Heartbeat,
     /// The run is over: leave.
@@ -86,8 +92,9 @@ impl ToWorker {
     }
 
     /// The message for [`ToWorker::Cancel`].
-    pub fn cancel(leases: &[Lease]) -> generated::ToWorker {
-        message(Kind::Cancel(generated::Cancel { leases: leases.iter().copied().map(Into::into).collect() }))
+    pub fn cancel(leases: &[Lease], stop: bool) -> generated::ToWorker {
+        let leases = leases.iter().copied().map(Into::into).collect();
+        message(Kind::Cancel(generated::Cancel { leases, stop }))
     }
 
     /// The message for [`ToWorker::Heartbeat`].
@@ -120,7 +127,7 @@ impl ToWorker {
     ) -> Result<Self, ProtocolError> {
         Ok(match required(message.kind, "kind")? {
             Kind::Welcome(w) => Self::Welcome(decode_welcome(w)?),
-            Kind::Refuse(r) => Self::Refuse(r.reason),
+            Kind::Refuse(r) => Self::Refuse(cut(r.reason)),
             Kind::Setup(s) => {
                 let id = setup_id(&s.id)?;
                 Self::Setup { id, setup: decode_setup(&id, &s.json).map(Box::new) }
@@ -130,14 +137,16 @@ impl ToWorker {
                 Self::Window
             }
             Kind::Job(job) => decode_job(&job, received)?,
-            Kind::Cancel(c) => Self::Cancel(c.leases.into_iter().map(Into::into).collect()),
+            Kind::Cancel(c) => {
+                Self::Cancel { leases: c.leases.into_iter().map(Into::into).collect(), stop: c.stop }
+            }
             Kind::Heartbeat(_) => Self::Heartbeat,
-            Kind::Drain(d) => Self::Drain(d.reason),
+            Kind::Drain(d) => Self::Drain(cut(d.reason)),
             Kind::Adopt(a) => {
                 let rest_is_void = a.rest_is_void;
                 Self::Adopt { runs: decode_adopted(a)?, rest_is_void }
             }
-            Kind::Notice(n) => Self::Notice(n.text),
+            Kind::Notice(n) => Self::Notice(cut(n.text)),
         })
     }
 }
@@ -148,17 +157,17 @@ fn message(kind: Kind) -> generated::ToWorker {
 
 fn decode_welcome(welcome: generated::Welcome) -> Result<Welcome, ProtocolError> {
     let generated::Welcome { protocol, run, heartbeat, epoch, run_id, incarnation } = welcome;
-    if !(heartbeat > 0.0 && heartbeat < 1e6) {
+    if !(0.01..=3600.0).contains(&heartbeat) {
         return Err(ProtocolError::Shape {
             field: "heartbeat",
-            message: format!("{heartbeat} s, expected a positive time"),
+            message: format!("{heartbeat} s, expected 0.01 s to an hour"),
         });
     }
     let run_id = run_id.as_ref().try_into().map_err(|_| ProtocolError::Shape {
         field: "run id",
         message: format!("has {} bytes, expected 16", run_id.len()),
     })?;
-    Ok(Welcome { protocol, run, heartbeat, epoch, run_id, incarnation })
+    Ok(Welcome { protocol, run: cut(run), heartbeat, epoch, run_id, incarnation })
 }
 
 fn decode_job(wire_job: &generated::Job, received: &ReceivedWindows) -> Result<ToWorker, ProtocolError> {

@@ -13,7 +13,7 @@ use std::process::ChildStdin;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use starlings_models::{Description, ModelFailure, ParticleError, Run, Solved, SolverDef};
+use starlings_models::{Description, ModelFailure, ParticleError, Run, Solved, SolverDef, Stop};
 use starlings_proto::ProtocolError;
 use starlings_proto::convert::solver::{Reply, decode_reply, encode_run};
 use starlings_proto::generated_solver::solver_client::SolverClient;
@@ -34,6 +34,8 @@ use super::stopwatch::{Stopwatch, Time};
 
 /// How long a run that is given up on purpose may go on.
 const LEFT_AFTER: Duration = Duration::from_millis(2);
+/// How often it is looked whether anybody still wants the answer.
+const STOP_LOOK: Duration = Duration::from_millis(100);
 /// How long a program that broke its connection may take to end, as a launcher of ranks does, so that its ending can be told.
 const LAST_WORDS: Duration = Duration::from_secs(5);
 /// The same of one that only broke the protocol and need not end.
@@ -58,6 +60,8 @@ pub(crate) enum How {
     Fell,
     /// Somebody killed it.
     Killed,
+    /// Nobody wanted the answer any more.
+    Unwanted,
 }
 
 impl Lost {
@@ -164,7 +168,7 @@ impl Instance {
             }
         };
         let process = self.process.as_ref();
-        match self.runtime.block_on(within(patience, process, conversation)) {
+        match self.runtime.block_on(within(patience, run.stop, process, conversation)) {
             Ok(Ok(answer)) => {
                 Ok(answer.and_then(|solved| self.sound(run, solved)).map_err(|e| self.named(e)))
             }
@@ -180,6 +184,7 @@ impl Instance {
         let ended = if self.process.is_some() { " and was ended" } else { "" };
         let what = match how {
             How::Stopped => stopped(&solver, seconds),
+            How::Unwanted => format!("nobody wants the answer of {solver} any more"),
             _ => format!("{solver} did not answer within {seconds} s{ended} (`timeout` sets the limit)"),
         };
         Lost { how, what, tail: self.tail() }
@@ -265,15 +270,19 @@ impl Instance {
 /// An answer within so much time, in which the program was not stopped.
 async fn within<T>(
     patience: Duration,
+    stop: Option<&Stop>,
     process: Option<&Process>,
     answer: impl Future<Output = T>,
 ) -> Result<T, How> {
     let mut watch = Stopwatch::start(patience, Instant::now());
     let mut answer = pin!(answer);
     loop {
+        if stop.is_some_and(Stop::is_set) {
+            return Err(How::Unwanted);
+        }
         match watch.look(Instant::now(), || process.is_some_and(Process::is_stopped)) {
             Time::Left(left) => {
-                if let Ok(answer) = tokio::time::timeout(left, &mut answer).await {
+                if let Ok(answer) = tokio::time::timeout(left.min(STOP_LOOK), &mut answer).await {
                     return Ok(answer);
                 }
             }

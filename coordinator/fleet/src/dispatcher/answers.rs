@@ -21,37 +21,81 @@ impl Dispatcher {
         answer: LeaseOutcome,
         cost: f64,
     ) {
-        let Some(worker) = self.workers.get_mut(&id) else { return };
-        worker.last_heard = now;
-        let valid = lease.epoch == id.0 && worker.release(lease.job, lease.attempt);
-        let index = self.batch.as_ref().and_then(|batch| batch.index_of(lease.job));
-        let (true, Some(index), Some(batch)) = (valid, index, &mut self.batch) else {
-            if matches!(answer, LeaseOutcome::Ran(_)) {
-                let notice = FleetEvent::LateAnswer { worker: worker.name.clone(), job: lease.job };
-                self.out.push(Command::Notice(notice));
-            }
-            return;
-        };
+        let Some((index, asked_back)) = self.released(now, id, lease, &answer) else { return };
+        let is_shared = self.is_shared(index);
+        let Some(batch) = &mut self.batch else { return };
+        if self.repeats.open.remove(&(id, index)) || batch.is_finished(index) {
+            return self.repeated(now, id, index, answer);
+        }
         match answer {
-            LeaseOutcome::Withdrawn => batch.withdrawn(index),
+            LeaseOutcome::Ran(Ok(prediction)) if !matches!(batch.doubt(index), Some(Doubt::Control(_))) => {
+                if let Some(worker) = self.workers.get_mut(&id) {
+                    worker.learn_cost(cost);
+                }
+                self.run_times.learn(cost);
+                self.overtake(now, id, index);
+                self.predicted(id, index, prediction);
+            }
+            LeaseOutcome::Ran(Err(ParticleError::Infrastructure(reason))) if is_shared => {
+                self.set_aside(now, id, &reason);
+            }
+            // Whoever has it too decides.
+            _ if is_shared => {}
+            LeaseOutcome::Withdrawn => {
+                batch.withdrawn(index);
+                if !asked_back {
+                    self.stray(id, "it gives runs back that nobody called back, again and again");
+                }
+            }
             LeaseOutcome::Ran(result) if matches!(batch.doubt(index), Some(Doubt::Control(_))) => {
                 self.controlled(now, id, index, result);
             }
-            LeaseOutcome::Ran(Ok(prediction)) => {
-                worker.learn_cost(cost);
-                self.run_times.learn(cost);
-                self.predicted(id, index, prediction);
-            }
+            LeaseOutcome::Ran(Ok(_)) => {}
             LeaseOutcome::Ran(Err(error)) => self.failed(now, id, index, error),
         }
     }
 
+    /// Ends the lease that is answered. Its job, unless it is of no batch any more, and whether it had been asked back.
+    fn released(
+        &mut self,
+        now: Duration,
+        id: WorkerId,
+        lease: Lease,
+        answer: &LeaseOutcome,
+    ) -> Option<(usize, bool)> {
+        let worker = self.workers.get_mut(&id)?;
+        worker.last_heard = now;
+        let own = lease.epoch == id.0;
+        let released = if own { worker.release(lease.job, lease.attempt) } else { None };
+        let (batch, is_stray) = (self.batch.as_ref(), released.is_none());
+        let found = batch.and_then(|batch| Some((batch, batch.index_of(lease.job)?)));
+        let (Some(released), Some((batch, index))) = (released, found) else {
+            if matches!(answer, LeaseOutcome::Ran(_)) {
+                let notice = FleetEvent::LateAnswer { worker: worker.name.clone(), job: lease.job };
+                self.out.push(Command::Notice(notice));
+            }
+            if is_stray {
+                self.stray(id, "it answers runs that it was not given, again and again");
+            }
+            return None;
+        };
+        if released.dropped {
+            return None;
+        }
+        if matches!(answer, LeaseOutcome::Ran(_)) {
+            worker.strays = worker.strays.saturating_sub(1);
+        }
+        Some((index, released.recalled || worker.aside.is_some() || !worker.is_ready(batch.setup_of(index))))
+    }
+
     fn predicted(&mut self, id: WorkerId, index: usize, prediction: Prediction) {
+        self.succeeded_where_another_failed(id, index, &prediction);
         let Some(batch) = &mut self.batch else { return };
         let name = self.workers.get(&id).map_or("", |w| w.name.as_str());
         self.proven.learn(batch.name(index), batch.setup_of(index), index, &mut self.out);
         batch.set_doubt(index, None);
-        batch.finish(index, Ok(prediction), name);
+        batch.finish(index, Ok(prediction), (id, name));
+        self.contributed(id, index);
         self.works(id);
     }
 
@@ -79,7 +123,7 @@ impl Dispatcher {
     }
 
     /// A failure of the model, or the limit of wall time: tried once more on another worker, if there is one.
-    fn decided(&mut self, id: WorkerId, index: usize, failure: Failure) {
+    pub(super) fn decided(&mut self, id: WorkerId, index: usize, failure: Failure) {
         let Some(batch) = &mut self.batch else { return };
         let name = self.workers.get(&id).map_or("", |w| w.name.as_str());
         batch.set_doubt(index, None);
@@ -89,8 +133,12 @@ impl Dispatcher {
             self.out.push(Command::Notice(batch.retried(index, name, &failure.to_string())));
             batch.retry_elsewhere(index, id, Ended::Decided(failure), name);
         } else {
-            batch.finish(index, Err(failure), name);
+            let is_model = matches!(failure, Failure::Model(_)) && batch.may_retry(index);
+            batch.finish(index, Err(failure), (id, name));
             self.out.push(batch.failed(index));
+            if is_model {
+                self.contributed(id, index);
+            }
         }
     }
 

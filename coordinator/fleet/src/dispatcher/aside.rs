@@ -51,7 +51,7 @@ impl Dispatcher {
         self.out.push(Command::Notice(notice));
         let leases: Vec<_> = worker.leases().collect();
         if !leases.is_empty() {
-            self.out.push(Command::Cancel { worker: id, leases });
+            self.out.push(Command::Cancel { worker: id, leases, stop: false });
         }
     }
 

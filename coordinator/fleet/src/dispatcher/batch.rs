@@ -5,6 +5,7 @@
 mod arrived;
 mod held;
 mod notices;
+mod results;
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -42,6 +43,7 @@ pub(super) struct Batch {
     ended: Vec<usize>,
     /// How many of them the caller was told of.
     handed_on: usize,
+    /// How many there were when progress was told last.
     told: usize,
 }
 
@@ -57,6 +59,8 @@ struct State {
     earlier: Option<Earlier>,
     doubt: Option<Doubt>,
     outcome: Option<Outcome>,
+    /// Who made the run of the outcome.
+    by: Option<WorkerId>,
 }
 
 /// How an attempt ended, kept while the job is tried again.
@@ -260,8 +264,10 @@ impl Batch {
         ended
     }
 
-    pub(super) fn finish(&mut self, index: usize, result: Result<Prediction, Failure>, name: &str) {
-        let attempts = self.attempts(index) + 1;
+    /// Takes what `by` answered, whose name is told in the outcome.
+    pub(super) fn finish(&mut self, index: usize, result: Result<Prediction, Failure>, by: (WorkerId, &str)) {
+        let (attempts, (id, name)) = (self.attempts(index) + 1, by);
+        self.jobs[index].by = Some(id);
         self.end(index, Outcome { result, attempts, worker: name.to_owned() });
     }
 

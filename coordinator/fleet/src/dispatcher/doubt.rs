@@ -23,7 +23,7 @@ impl Dispatcher {
         let name = self.workers.get(&id).map_or("", |w| w.name.as_str());
         if batch.doubt(index) == Some(Doubt::Confirmed) {
             batch.set_doubt(index, None);
-            batch.finish(index, Err(Failure::Model(ModelFailure::Solver(text))), name);
+            batch.finish(index, Err(Failure::Model(ModelFailure::Solver(text))), (id, name));
             self.out.push(batch.failed(index));
             return;
         }
@@ -66,7 +66,7 @@ impl Dispatcher {
             batch.set_doubt(index, Some(Doubt::Control(control)));
             let lease =
                 Lease { epoch: worker.id.0, job: batch.job_number(index), attempt: batch.start(index) };
-            worker.hold(lease);
+            worker.hold(lease, self.now);
             self.out.push(Command::SendControl { worker: worker.id, lease, control });
         }
         let stuck = batch.parked().len() == batch.n_open();
@@ -98,7 +98,7 @@ impl Dispatcher {
             }
             None => {
                 batch.set_doubt(index, Some(Doubt::Confirmed));
-                self.out.push(lease(worker, batch, index));
+                self.out.push(lease(worker, batch, index, now));
                 self.works(id);
             }
             Some(fault) => {

@@ -53,14 +53,14 @@ impl Dispatcher {
         let holder = self.workers.values_mut().find_map(|w| Some((w.id, w.take_back(job)?)));
         match holder {
             Some((other, lease)) if other != id => {
-                self.out.push(Command::Cancel { worker: other, leases: vec![lease] });
+                self.out.push(Command::Cancel { worker: other, leases: vec![lease], stop: true });
             }
             Some(_) => {}
             None if batch.unqueue(index) => {}
             None => return Taken::No,
         }
         let Some(worker) = self.workers.get_mut(&id) else { return Taken::No };
-        let lease = schedule::hold(worker, batch, index);
+        let lease = schedule::hold(worker, batch, index, now);
         match answer {
             Some((answer, cost)) => {
                 self.answered(now, id, lease, answer, cost);

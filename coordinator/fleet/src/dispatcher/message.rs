@@ -106,12 +106,30 @@ pub(crate) enum Event {
         /// Wall time of the run, seconds.
         cost: f64,
     },
+    /// How runs of a setup are to be compared; to the last bit where nothing was said.
+    Likeness {
+        /// The setup.
+        setup: SetupId,
+        /// How alike its runs are.
+        likeness: Likeness,
+    },
     /// All workers are processes of this machine, started from one program: what one of them cannot build, none can.
     LocalOnly,
     /// Time passed.
     Tick,
     /// The batch must end with this error.
     Abort(BatchError),
+}
+
+/// How alike two runs of one job are on two workers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Likeness {
+    /// To the last bit: the model is computed by the worker itself.
+    Exact,
+    /// To the last bit as far as the program outside keeps what it says of itself.
+    Promised,
+    /// Runs may differ, so none is repeated.
+    None,
 }
 
 /// Why a batch ended without outcomes.
@@ -154,6 +172,15 @@ pub(crate) enum BatchError {
         parameters: String,
         /// How it ended last.
         reason: String,
+    },
+    /// Workers give different results for one job, and nobody is left who could say which is right.
+    Disagreement {
+        /// Index of the sigma point.
+        particle: u32,
+        /// Index of the record.
+        record: u32,
+        /// The workers with their builds and a value in which they differ.
+        workers: String,
     },
     /// A job has no answer, and not by the model's doing: it was lost with worker after worker, or does not fit the model.
     NoAnswer {
@@ -212,12 +239,21 @@ pub(crate) enum Command {
         /// Which.
         control: ControlId,
     },
-    /// Withdraw jobs that have not started.
+    /// Withdraw jobs.
     Cancel {
         /// From whom.
         worker: WorkerId,
         /// Which.
         leases: Vec<Lease>,
+        /// Also those that are being computed; only those that have not started otherwise.
+        stop: bool,
+    },
+    /// Put a worker out, and take its process no more.
+    PutOut {
+        /// Whom.
+        worker: WorkerId,
+        /// Why: told to it.
+        reason: String,
     },
     /// End a worker's stream.
     Close {

@@ -6,7 +6,7 @@ use std::time::Duration;
 use starlings_proto::{Lease, SetupId};
 
 use super::aside::Aside;
-use super::message::{Joining, WorkerId};
+use super::message::{Joining, WorkerId, hex};
 
 /// Jobs per slot held by a worker whose jobs are long: one runs, one waits.
 const MIN_CREDIT: usize = 2;
@@ -19,6 +19,12 @@ const LOOKAHEAD: f64 = 0.01;
 
 /// Weight of the newest run in the moving average of run times.
 const NEWEST: f64 = 0.3;
+
+/// Leases that a worker holds at most before it has answered any: each may carry a state.
+const UNPROVEN: usize = 512;
+
+/// Setups known of a worker, beyond which none is taken note of that it was not sent.
+const UNASKED: usize = 1024;
 
 /// Shortest run, in seconds, for which calling a job back is worth two messages.
 const RECALL_WORTH: f64 = 0.005;
@@ -51,6 +57,27 @@ pub(super) struct Worker {
     held: BTreeMap<u64, Held>,
     sent: u64,
     cost: Option<f64>,
+    /// BLAKE3 of its executable in hexadecimal; empty when unknown.
+    pub(super) build: String,
+    /// Whether one of its results was compared with another worker's.
+    pub(super) compared: bool,
+    /// Its predictions that became outcomes.
+    pub(super) taken: u64,
+    /// Answers that nobody had asked for, less those that somebody had.
+    pub(super) strays: u32,
+    /// Its runs that others finished since it last answered.
+    pub(super) overtaken: u32,
+    /// Leases that it has answered.
+    answers: usize,
+}
+
+/// A lease that has ended.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Released {
+    /// It had been called back.
+    pub(super) recalled: bool,
+    /// Its answer does not matter.
+    pub(super) dropped: bool,
 }
 
 /// One lease: how often the job was started, when in the worker's order, whether it was called back, since when it has certainly
@@ -60,6 +87,8 @@ struct Held {
     attempt: u32,
     order: u64,
     recalled: bool,
+    dropped: bool,
+    since: Duration,
     running_since: Option<Duration>,
 }
 
@@ -76,6 +105,12 @@ impl Worker {
             held: BTreeMap::new(),
             sent: 0,
             cost: None,
+            build: joining.build.map_or_else(String::new, |hash| hex(&hash)),
+            compared: false,
+            taken: 0,
+            strays: 0,
+            overtaken: 0,
+            answers: 0,
         }
     }
 
@@ -137,6 +172,12 @@ impl Worker {
         self.aside.is_none() && self.is_ready(setup)
     }
 
+    /// Whether it runs jobs of this setup now, or once it has built what it was sent.
+    pub(super) fn will_take(&self, setup: &SetupId) -> bool {
+        let state = self.setups.get(setup);
+        self.aside.is_none() && matches!(state, Some(SetupState::Ready | SetupState::Pending { .. }))
+    }
+
     /// Whether a control run can be made there now. In a place that was set aside it is how the place is tried when a job that
     /// tried it crashed.
     pub(super) fn may_control(&self, setup: &SetupId) -> bool {
@@ -151,24 +192,72 @@ impl Worker {
             Some(cost) => ((LOOKAHEAD / cost.max(1e-9)) as usize).clamp(MIN_CREDIT, MAX_CREDIT),
             None => MIN_CREDIT,
         };
-        self.load() < self.slots * credit
+        // A worker that has answered little holds little, however many slots it says it has.
+        self.load() < (self.slots * credit).min(UNPROVEN + self.answers)
     }
 
-    pub(super) fn hold(&mut self, lease: Lease) {
+    pub(super) fn hold(&mut self, lease: Lease, since: Duration) {
         self.sent += 1;
+        let (attempt, order) = (lease.attempt, self.sent);
         self.held.insert(
             lease.job,
-            Held { attempt: lease.attempt, order: self.sent, recalled: false, running_since: None },
+            Held { attempt, order, recalled: false, dropped: false, since, running_since: None },
         );
     }
 
-    /// Ends a lease; false when it is not held.
-    pub(super) fn release(&mut self, job: u64, attempt: u32) -> bool {
-        let held = self.held.get(&job).is_some_and(|h| h.attempt == attempt);
-        if held {
-            self.held.remove(&job);
+    /// Marks a lease whose answer does not matter any more.
+    pub(super) fn drop_lease(&mut self, job: u64) {
+        if let Some(held) = self.held.get_mut(&job) {
+            held.dropped = true;
         }
-        held
+    }
+
+    /// Whether the answer of a lease does not matter any more.
+    pub(super) fn has_dropped(&self, job: u64) -> bool {
+        self.held.get(&job).is_some_and(|held| held.dropped)
+    }
+
+    /// Time in which nothing could happen is no time of its runs.
+    pub(super) fn stood_still(&mut self, gap: Duration, now: Duration) {
+        self.last_heard = (self.last_heard + gap).min(now);
+        for held in self.held.values_mut() {
+            held.since = (held.since + gap).min(now);
+            held.running_since = held.running_since.map(|since| (since + gap).min(now));
+        }
+    }
+
+    /// Whether it has a lease of this job.
+    pub(super) fn holds(&self, job: u64) -> bool {
+        self.held.contains_key(&job)
+    }
+
+    /// Its lease of this job.
+    pub(super) fn lease_of(&self, job: u64) -> Option<Lease> {
+        let held = self.held.get(&job)?;
+        Some(Lease { epoch: self.id.0, job, attempt: held.attempt })
+    }
+
+    /// Its leases, each with its age and the number of runs per slot that were to be made before it ended.
+    pub(super) fn ages(&self, now: Duration) -> Vec<(u64, Duration, usize)> {
+        let age = |job: &u64| self.held.get(job).map_or(now, |held| held.since);
+        let aged = self.leases_in_order().into_iter().enumerate();
+        aged.map(|(i, job)| (job, now.saturating_sub(age(&job)), i / self.slots + 1)).collect()
+    }
+
+    /// Its name, with its build where that is known.
+    pub(super) fn called(&self) -> String {
+        match self.build.get(..12) {
+            Some(build) => format!("{} (build {build})", self.name),
+            None => self.name.clone(),
+        }
+    }
+
+    /// Ends a lease; `None` when it is not held.
+    pub(super) fn release(&mut self, job: u64, attempt: u32) -> Option<Released> {
+        self.held.get(&job).filter(|held| held.attempt == attempt)?;
+        self.answers += 1;
+        self.overtaken = 0;
+        self.held.remove(&job).map(|held| Released { recalled: held.recalled, dropped: held.dropped })
     }
 
     /// Ends the lease of a job, whatever its attempt.
@@ -210,6 +299,15 @@ impl Worker {
         }
         self.setups.insert(setup, SetupState::Pending { since: now });
         true
+    }
+
+    /// Whether an answer about a setup is of no use: of a setup that it failed to build before, or of far more than it was sent.
+    pub(super) fn answers_unasked(&self, setup: &SetupId, state: &SetupState) -> bool {
+        match self.setups.get(setup) {
+            Some(SetupState::Failed(_)) => matches!(state, SetupState::Failed(_)),
+            Some(_) => false,
+            None => self.setups.len() >= UNASKED,
+        }
     }
 
     /// Takes an answer about a setup: those that wait behind it are being built from now on.

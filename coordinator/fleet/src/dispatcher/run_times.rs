@@ -19,6 +19,11 @@ impl RunTimes {
         self.latest.push_back(seconds);
     }
 
+    /// Runs known, up to those kept.
+    pub(super) fn len(&self) -> usize {
+        self.latest.len()
+    }
+
     /// Median, seconds; `None` before the first run.
     pub(super) fn median(&self) -> Option<f64> {
         let mut sorted = self.latest.iter().copied().collect::<Vec<_>>();

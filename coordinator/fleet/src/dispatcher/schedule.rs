@@ -1,6 +1,7 @@
 //! Scheduling, done after every event: failures settle, control runs are made, jobs are assigned and recalled, the batch ends.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
 
 use starlings_proto::{Lease, SetupId};
 
@@ -19,10 +20,14 @@ impl Dispatcher {
         // Before jobs are assigned: a place on trial makes one run at a time, and this one tells more.
         self.control();
         if self.now >= self.opens && !self.is_matching {
+            self.canaries();
             self.assign();
         }
         self.recall();
-        if let Some(batch) = self.batch.take_if(|batch| batch.is_done()) {
+        if self.batch.as_ref().is_some_and(Batch::is_done)
+            && self.is_compared()
+            && let Some(batch) = self.batch.take()
+        {
             self.starved = None;
             self.overdue = None;
             self.out.push(Command::BatchDone(batch.into_outcomes()));
@@ -76,7 +81,7 @@ impl Dispatcher {
                     break;
                 };
                 let Some(index) = batch.queue.next_retry(key) else { break };
-                self.out.push(lease(worker, batch, index));
+                self.out.push(lease(worker, batch, index, self.now));
             }
         }
         // The earliest fresh job whose setup is built on a worker with room; jobs of setups still being built let it pass.
@@ -84,7 +89,7 @@ impl Dispatcher {
             let id = *batch.setup(setup);
             let Some(worker) = roster::least_loaded(&mut self.workers, &id, None) else { break };
             let Some(index) = batch.queue.next_fresh(setup) else { break };
-            self.out.push(lease(worker, batch, index));
+            self.out.push(lease(worker, batch, index, self.now));
         }
     }
 
@@ -124,7 +129,7 @@ impl Dispatcher {
                 continue;
             };
             batch.mark_recalled(held.job);
-            self.out.push(Command::Cancel { worker: victim.id, leases: vec![held] });
+            self.out.push(Command::Cancel { worker: victim.id, leases: vec![held], stop: false });
             open -= 1;
         }
     }
@@ -140,14 +145,14 @@ fn next_setup(workers: &BTreeMap<WorkerId, Worker>, batch: &Batch) -> Option<usi
 }
 
 /// Assigns a job to a worker.
-pub(super) fn lease(worker: &mut Worker, batch: &mut Batch, index: usize) -> Command {
-    let lease = hold(worker, batch, index);
+pub(super) fn lease(worker: &mut Worker, batch: &mut Batch, index: usize, now: Duration) -> Command {
+    let lease = hold(worker, batch, index, now);
     Command::SendJob { worker: worker.id, lease, index }
 }
 
 /// Counts a job as held by a worker.
-pub(super) fn hold(worker: &mut Worker, batch: &mut Batch, index: usize) -> Lease {
+pub(super) fn hold(worker: &mut Worker, batch: &mut Batch, index: usize, now: Duration) -> Lease {
     let lease = Lease { epoch: worker.id.0, job: batch.job_number(index), attempt: batch.start(index) };
-    worker.hold(lease);
+    worker.hold(lease, now);
     lease
 }

@@ -1,8 +1,10 @@
 //! Events in, commands compared.
 
 mod aside;
+mod canary;
 mod chaos;
 mod doubt;
+mod duplicate;
 mod leases;
 mod losses;
 mod mixed;
@@ -27,8 +29,13 @@ impl Dispatcher {
     }
 }
 
-const RULES: Rules =
-    Rules { heartbeat: Duration::from_secs(8), patience: Duration::from_secs(60), max_attempts: 3 };
+const RULES: Rules = Rules {
+    heartbeat: Duration::from_secs(8),
+    patience: Duration::from_secs(60),
+    max_attempts: 3,
+    comparing: None,
+    timeout_factor: None,
+};
 
 fn joining(id: u64, slots: u32) -> Joining {
     Joining {

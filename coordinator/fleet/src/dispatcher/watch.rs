@@ -38,7 +38,7 @@ impl Dispatcher {
         self.last_tick = Some(now);
         if gap > self.rules.heartbeat {
             // This process stood still (suspended, or starved of processor time): what workers sent meanwhile is unread.
-            self.workers.values_mut().for_each(|w| w.last_heard = (w.last_heard + gap).min(now));
+            self.workers.values_mut().for_each(|w| w.stood_still(gap, now));
         }
         let limit = self.rules.heartbeat * 2;
         let silent = self.workers.values().filter(|w| now.saturating_sub(w.last_heard) > limit);
@@ -57,6 +57,8 @@ impl Dispatcher {
         self.watch_setups(now);
         self.watch_starvation(now);
         self.watch_overdue(now);
+        self.watch_timeouts(now);
+        self.watch_slow(now);
     }
 
     /// A worker that builds a setup for longer than patience counts as one that cannot build it.

@@ -12,10 +12,18 @@ use starlings_proto::{
 };
 use tokio::sync::mpsc::UnboundedSender;
 
+use super::excluded::Excluded;
 use super::held::Waiting;
+use super::teller::Teller;
 use super::{Outgoing, Reply};
 use crate::FleetEvent;
 use crate::dispatcher::{BatchError, Command, ControlId, Dispatcher, Event, WorkerId};
+
+/// Workers of one coordinator at most.
+const MAX_WORKERS: usize = 4096;
+
+/// Builds of workers that are told one by one.
+const MAX_BUILDS: usize = 64;
 
 /// Guarded by the hub's lock.
 pub(super) struct State {
@@ -26,7 +34,9 @@ pub(super) struct State {
     pub(super) running: Option<Submission>,
     /// Jobs that are known to work, for control runs.
     pub(super) kept: BTreeMap<ControlId, (SetupId, Job)>,
-    pub(super) events: Sender<FleetEvent>,
+    pub(super) events: Teller,
+    /// The time of the last event.
+    now: Duration,
     pub(super) first_epoch: u64,
     pub(super) joined: u64,
     pub(super) draining: bool,
@@ -35,14 +45,15 @@ pub(super) struct State {
     pub(super) other_builds: BTreeSet<[u8; 32]>,
     /// Runs that workers brought along.
     pub(super) waiting: Waiting,
+    pub(super) excluded: Excluded,
 }
 
 /// Names and sizes of what a setup runs, as far as they are known without building it.
-pub(super) struct SetupShape {
+pub(crate) struct SetupShape {
     /// Names of its parameters, in the order of a job's.
-    pub(super) parameters: Vec<String>,
+    pub(crate) parameters: Vec<String>,
     /// Length of a state, where it is known.
-    pub(super) n_state: Option<usize>,
+    pub(crate) n_state: Option<usize>,
 }
 
 /// The way to one worker.
@@ -50,13 +61,14 @@ pub(super) struct Link {
     pub(super) name: String,
     pub(super) sender: UnboundedSender<Outgoing>,
     pub(super) pid: u32,
+    pub(super) nonce: u64,
     /// Windows that were sent on it.
     pub(super) windows: SentWindows,
 }
 
 impl Link {
-    pub(super) fn new(name: String, sender: UnboundedSender<Outgoing>, pid: u32) -> Self {
-        Self { name, sender, pid, windows: SentWindows::default() }
+    pub(super) fn new(name: String, sender: UnboundedSender<Outgoing>, pid: u32, nonce: u64) -> Self {
+        Self { name, sender, pid, nonce, windows: SentWindows::default() }
     }
 
     fn give(&mut self, encoder: &mut JobEncoder, lease: Lease, (setup, job): &(SetupId, Job)) {
@@ -98,7 +110,8 @@ impl State {
             shapes: BTreeMap::new(),
             running: None,
             kept: BTreeMap::new(),
-            events,
+            events: Teller::new(events),
+            now: Duration::ZERO,
             first_epoch,
             joined: 0,
             draining: false,
@@ -106,6 +119,7 @@ impl State {
             stopped: None,
             other_builds: BTreeSet::new(),
             waiting: Waiting::default(),
+            excluded: Excluded::default(),
         }
     }
 
@@ -117,6 +131,13 @@ impl State {
                 hello.host, hello.version, hello.protocol
             )));
         }
+        if let Some(reason) = self.excluded.why(hello.nonce) {
+            return Err(Closed::Refused(reason.to_owned()));
+        }
+        if self.links.len() >= MAX_WORKERS {
+            let reason = format!("{MAX_WORKERS} workers are connected, and no more are taken");
+            return Err(Closed::Refused(reason));
+        }
         if self.draining {
             return Err(Closed::Over("the run is over".to_owned()));
         }
@@ -124,6 +145,7 @@ impl State {
     }
 
     pub(super) fn handle(&mut self, now: Duration, event: Event) {
+        self.now = now;
         let event = match event {
             Event::Answered { worker, lease, answer, cost } => {
                 let answer = self.checked(&lease, answer);
@@ -155,7 +177,8 @@ impl State {
         build: Option<[u8; 32]>,
     ) -> Option<([u8; 32], [u8; 32])> {
         let pair = own.zip(build).filter(|(own, build)| own != build)?;
-        self.other_builds.insert(pair.1).then_some(pair)
+        let is_new = self.other_builds.len() < MAX_BUILDS && self.other_builds.insert(pair.1);
+        is_new.then_some(pair)
     }
 
     pub(super) fn carry_out(&mut self, command: Command) {
@@ -184,7 +207,8 @@ impl State {
             Command::Forget { control } => {
                 self.kept.remove(&control);
             }
-            Command::Cancel { worker, leases } => self.send(worker, ToWorker::cancel(&leases)),
+            Command::Cancel { worker, leases, stop } => self.send(worker, ToWorker::cancel(&leases, stop)),
+            Command::PutOut { worker, reason } => self.put_out(worker, &reason),
             // Its stream ends without a word: a worker that still lives dials again.
             Command::Close { worker } => {
                 self.links.remove(&worker);
@@ -208,9 +232,9 @@ impl State {
         }
     }
 
-    pub(super) fn tell(&self, event: FleetEvent) {
+    pub(super) fn tell(&mut self, event: FleetEvent) {
         tracing::debug!(?event, "fleet");
-        let _ = self.events.send(event);
+        self.events.tell(self.now, event);
     }
 
     /// Names and values of the parameters of a job of the running batch.
@@ -230,6 +254,13 @@ impl State {
     /// What a worker is called in events.
     pub(super) fn name(&self, worker: WorkerId) -> String {
         self.links.get(&worker).map_or_else(String::new, |link| link.name.clone())
+    }
+
+    /// Ends a worker's session for good: it is told why, and its process is not taken again.
+    fn put_out(&mut self, worker: WorkerId, reason: &str) {
+        let Some(link) = self.links.remove(&worker) else { return };
+        link.send(ToWorker::drain(reason));
+        self.excluded.add(link.nonce, reason);
     }
 
     pub(super) fn reply(&mut self, reply: Reply) {

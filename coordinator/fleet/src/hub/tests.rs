@@ -34,13 +34,14 @@ fn hello(pid: u32, build: Option<[u8; 32]>) -> Hello {
 fn hub(build: Option<[u8; 32]>) -> (Hub, Receiver<FleetEvent>) {
     let (sender, events) = mpsc::channel();
     let (heartbeat, patience) = (Duration::from_secs(8), Duration::from_secs(300));
-    let rules = Rules { heartbeat, patience, max_attempts: 5 };
+    let rules = Rules { heartbeat, patience, max_attempts: 5, comparing: None, timeout_factor: None };
     (Hub::new("test".to_owned(), build, RunIdentity::new(), rules, Duration::ZERO, sender), events)
 }
 
 fn batch(hub: &Hub) -> (Submission, Receiver<Reply>) {
     let (setup, json) = encode_setup(&Setup::default()).expect("it travels");
-    hub.install(setup, json, vec!["k".to_owned()], None);
+    let shape = SetupShape { parameters: vec!["k".to_owned()], n_state: None };
+    hub.install(setup, json, shape, Likeness::Exact);
     let window = Window { start: 0.0, times: vec![1.0], observed: vec![0.0], inputs: vec![] };
     let job = starlings_models::Job {
         particle: 0,

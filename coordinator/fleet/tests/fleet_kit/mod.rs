@@ -2,6 +2,7 @@
 #![allow(dead_code, unreachable_pub, clippy::unwrap_used, clippy::missing_panics_doc)]
 
 pub mod access;
+pub mod hand;
 
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, Shutdown, SocketAddr, TcpListener, TcpStream};
@@ -85,19 +86,31 @@ pub fn any_port() -> SocketAddr {
 
 /// A fleet with short patience, its events and its cancellation.
 pub fn listen(address: SocketAddr) -> (GrpcFleet, Receiver<FleetEvent>, CancellationToken) {
-    start(Some(address))
+    start(Some(address), |_| {})
+}
+
+/// The same with a configuration of its own.
+pub fn listen_with(
+    address: SocketAddr,
+    change: impl FnOnce(&mut FleetConfig),
+) -> (GrpcFleet, Receiver<FleetEvent>, CancellationToken) {
+    start(Some(address), change)
 }
 
 /// The same for processes of this one alone.
 pub fn private() -> (GrpcFleet, Receiver<FleetEvent>, CancellationToken) {
-    start(None)
+    start(None, |_| {})
 }
 
-fn start(address: Option<SocketAddr>) -> (GrpcFleet, Receiver<FleetEvent>, CancellationToken) {
+fn start(
+    address: Option<SocketAddr>,
+    change: impl FnOnce(&mut FleetConfig),
+) -> (GrpcFleet, Receiver<FleetEvent>, CancellationToken) {
     let (sender, events) = mpsc::channel();
     let cancel = CancellationToken::new();
     let mut config = FleetConfig::new(address, "test", cancel.clone(), sender);
     config.patience = Duration::from_secs(60);
+    change(&mut config);
     (GrpcFleet::listen(config).expect("a free port"), events, cancel)
 }
 

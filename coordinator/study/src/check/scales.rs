@@ -11,7 +11,8 @@ use std::sync::Arc;
 
 use starlings_models::effect::{EffectParameter, Scale, names, scale};
 use starlings_models::{
-    BuildSetup, EffectDef, Job, ObserverDef, ParticleError, SOLVER, Setup, SetupError, Spec, Window,
+    BuildSetup, EffectDef, Job, ObserverDef, ParticleError, SOLVER, Setup, SetupError, Spec, Stop, Until,
+    Window,
 };
 use starlings_proto::spent::spent;
 
@@ -147,7 +148,7 @@ fn courses(
         };
         let theta = trial.theta.iter().zip(&kept).filter(|(_, kept)| **kept).map(|(v, _)| *v).collect();
         let job = Job { particle: 0, record: index as u32, window: Arc::new(window), theta, state: None };
-        let outputs = model.run_within(&job, &spent())?.outputs;
+        let outputs = model.run_within(&job, &Until { spent: &spent(), stop: &Stop::default() })?.outputs;
         for row in outputs.chunks(n_obs.max(1)) {
             bare.outputs.iter().zip(row).for_each(|(name, value)| widen(name, *value));
         }

@@ -100,7 +100,19 @@ pub(crate) fn fleet(source: &Source, section: &FleetSection) -> FleetChoice {
         slots: counted(source, section.slots.as_ref(), "slots", 4096),
         patience: section.patience.as_ref().map(|p| patience(source, p)),
         max_attempts: counted(source, section.max_attempts.as_ref(), "max_attempts", 1000).map(|n| n as u32),
+        timeout_factor: section.timeout_factor.as_ref().and_then(|f| timeout_factor(source, f)),
     }
+}
+
+/// How many times the usual time a run may take: a factor that ends ordinary runs is a mistake.
+fn timeout_factor(source: &Source, given: &Spanned<f64>) -> Option<f64> {
+    let factor = *given.get_ref();
+    if (2.0..=1e6).contains(&factor) {
+        return Some(factor);
+    }
+    let help = "20 ends a run that takes twenty times as long as runs usually do";
+    source.report_with(given.span(), format!("`timeout_factor` must be from 2 to 1e6, found {factor}"), help);
+    None
 }
 
 /// The choice behind a word; an unknown word is reported.

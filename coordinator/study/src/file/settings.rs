@@ -52,7 +52,8 @@ pub(super) fn estimator(root: &Table<'_>) -> EstimatorSection {
 
 /// Reads `[fleet]`.
 pub(super) fn fleet(root: &Table<'_>) -> FleetSection {
-    let Some(t) = root.table("fleet", "[fleet]", &["workers", "slots", "patience", "max_attempts"]) else {
+    let keys = ["workers", "slots", "patience", "max_attempts", "timeout_factor"];
+    let Some(t) = root.table("fleet", "[fleet]", &keys) else {
         return FleetSection::default();
     };
     FleetSection {
@@ -60,5 +61,6 @@ pub(super) fn fleet(root: &Table<'_>) -> FleetSection {
         slots: t.count("slots"),
         patience: t.number("patience"),
         max_attempts: t.count("max_attempts"),
+        timeout_factor: t.number("timeout_factor"),
     }
 }

@@ -178,11 +178,12 @@ impl PerRun {
             if scratch.is_gone() && !last { Failed::Disturbed(what) } else { Failed::Host(what) }
         })?;
         let patience = Duration::try_from_secs_f64(self.def.timeout).unwrap_or(Duration::MAX);
-        let (end, output) = program::to_its_end(&mut process, told.clone().into_bytes(), patience);
+        let (end, output) = program::to_its_end(&mut process, told.clone().into_bytes(), patience, run.stop);
         let solved = match end {
             End::Ended(status) if status.success() => self.read(run, scratch.path(), &output),
             End::Ended(status) => Err(format!("{} {}", self.program(), ending(status))),
             End::Stopped => Err(stopped(&self.program(), self.def.timeout)),
+            End::Unwanted => return Err(Failed::Host("nobody wants the answer any more".to_owned())),
             End::Late => Err(format!(
                 "{} did not end within {} s and was killed (`timeout` sets the limit)",
                 self.program(),
@@ -213,7 +214,7 @@ impl PerRun {
         Err(match end {
             End::Late => Failed::Late(what),
             End::Ended(_) if !killed => Failed::Program(what),
-            End::Ended(_) | End::Stopped => Failed::Host(what),
+            End::Ended(_) | End::Stopped | End::Unwanted => Failed::Host(what),
         })
     }
 

@@ -140,7 +140,7 @@ impl Adapter for Grpc {
                 // The program is gone or of no more use: dropping it ends its whole group.
                 Err(lost) => {
                     let retry = match lost.how {
-                        How::Silent | How::Stopped => false,
+                        How::Silent | How::Stopped | How::Unwanted => false,
                         How::Fell => losses.fell(),
                         How::Killed => losses.killed(),
                     };
@@ -152,7 +152,7 @@ impl Adapter for Grpc {
                         return Err(match lost.how {
                             How::Silent => Timeout { limit: self.def.timeout, says: text }.into(),
                             How::Fell => ParticleError::Undecided(text),
-                            How::Killed | How::Stopped => ParticleError::Infrastructure(text),
+                            How::Killed | How::Stopped | How::Unwanted => ParticleError::Infrastructure(text),
                         });
                     }
                 }

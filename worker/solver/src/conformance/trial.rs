@@ -62,6 +62,7 @@ impl Trial {
             state: None,
             terms: &[],
             constants: &[],
+            stop: None,
         }
     }
 }

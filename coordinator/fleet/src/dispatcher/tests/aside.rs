@@ -23,7 +23,11 @@ fn what_waits_in_a_worker_that_is_set_aside_is_called_back() {
     let mut stage = Stage::with(&[1]);
     let jobs = stage.jobs(submit(2));
     let commands = stage.step(ran(jobs[0].0, Err(place("disk full"))));
-    assert!(commands.contains(&Command::Cancel { worker: WorkerId(1), leases: vec![jobs[1].0] }));
+    assert!(commands.contains(&Command::Cancel {
+        worker: WorkerId(1),
+        leases: vec![jobs[1].0],
+        stop: false
+    }));
 }
 
 #[test]

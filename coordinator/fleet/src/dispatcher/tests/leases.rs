@@ -87,7 +87,10 @@ fn an_aborted_batch_calls_its_jobs_back_and_their_answers_only_free_the_slots() 
     let leases = jobs.iter().map(|(lease, _)| *lease).collect();
     assert_eq!(
         commands,
-        [Command::Cancel { worker: WorkerId(1), leases }, Command::BatchFailed(BatchError::Cancelled)]
+        [
+            Command::Cancel { worker: WorkerId(1), leases, stop: true },
+            Command::BatchFailed(BatchError::Cancelled)
+        ]
     );
     assert_eq!(stage.jobs(submit(5)), [], "both places are still held by withdrawn jobs");
     stage.step(answered(jobs[0].0, LeaseOutcome::Ran(Ok(prediction(0))), 1.0));

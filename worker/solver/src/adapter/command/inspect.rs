@@ -133,5 +133,6 @@ fn sample<'a>(window: &'a Window, parameters: &'a [f64]) -> Run<'a> {
         state: None,
         terms: &[],
         constants: &[],
+        stop: None,
     }
 }

@@ -8,6 +8,8 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use starlings_models::Stop;
+
 use crate::process::Process;
 use crate::stopwatch::{Stopwatch, Time};
 
@@ -16,6 +18,9 @@ pub(super) const LIMIT: usize = 64 * 1024 * 1024;
 
 /// How often a program that keeps its standard output open is looked at.
 const LOOK: Duration = Duration::from_millis(20);
+
+/// How often it is looked whether anybody still wants the answer.
+const STOP_LOOK: Duration = Duration::from_millis(100);
 /// How long a program that has closed its standard output and ended may leave that output unread.
 const LAST_WORDS: Duration = Duration::from_secs(1);
 
@@ -36,10 +41,17 @@ pub(super) enum End {
     Late,
     /// Somebody stopped it for as long as it may take.
     Stopped,
+    /// Nobody wanted its answer any more.
+    Unwanted,
 }
 
 /// Runs a started program to its end: `input` goes to its standard input.
-pub(super) fn to_its_end(process: &mut Process, input: Vec<u8>, patience: Duration) -> (End, Output) {
+pub(super) fn to_its_end(
+    process: &mut Process,
+    input: Vec<u8>,
+    patience: Duration,
+    stop: Option<&Stop>,
+) -> (End, Output) {
     let mut watch = Stopwatch::start(patience, Instant::now());
     if let Some(mut pipe) = process.input() {
         // A program that reads nothing is none the worse: its pipe breaks when it ends.
@@ -49,6 +61,9 @@ pub(super) fn to_its_end(process: &mut Process, input: Vec<u8>, patience: Durati
     let read_up = drain(process, &output);
     let mut is_open = true;
     let end = loop {
+        if stop.is_some_and(Stop::is_set) {
+            break End::Unwanted;
+        }
         let left = match watch.look(Instant::now(), || process.is_stopped()) {
             Time::Left(left) => left,
             Time::Up => break End::Late,
@@ -58,7 +73,7 @@ pub(super) fn to_its_end(process: &mut Process, input: Vec<u8>, patience: Durati
             // Most programs close their output by ending, which wakes this at once.
             is_open = matches!(read_up.recv_timeout(LOOK.min(left)), Err(RecvTimeoutError::Timeout));
         }
-        let status = if is_open { process.ended() } else { process.wait(left) };
+        let status = if is_open { process.ended() } else { process.wait(left.min(STOP_LOOK)) };
         if let Some(status) = status {
             break End::Ended(status);
         }

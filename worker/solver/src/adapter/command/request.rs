@@ -125,6 +125,7 @@ mod tests {
             state: None,
             terms: &[],
             constants: &[],
+            stop: None,
         };
         let made =
             filled(&words("run --E={E} {load}/{end} {print} {folder}/a"), &spec(), &run, Path::new("/s"));

@@ -205,6 +205,7 @@ mod tests {
             state: None,
             terms: &[],
             constants: &[],
+            stop: None,
         };
         let texts = BTreeMap::from([("beam.inp".to_owned(), text.to_owned())]);
         let templates = Templates::new(&texts).map_err(|error| error.to_string())?;

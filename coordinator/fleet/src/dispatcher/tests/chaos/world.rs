@@ -8,8 +8,8 @@ use starlings_models::{ParticleError, Prediction, Timeout};
 use starlings_proto::{Lease, LeaseOutcome, SetupId};
 
 use super::super::{RULES, answered, crash, joining, left, place, prediction, setup, solver, submit_mixed};
-use crate::Outcome;
 use crate::dispatcher::{BatchError, Command, ControlId, Dispatcher, Event, WorkerId};
+use crate::{FleetEvent, Outcome};
 
 /// One thing that the world does; numbers choose among what is possible then.
 #[derive(Clone, Debug)]
@@ -60,6 +60,12 @@ pub(super) struct World {
     pub(super) kept: BTreeSet<ControlId>,
     /// Which of the open leases are control runs.
     pub(super) controls: BTreeSet<(u64, u64)>,
+    /// Jobs that were given to another worker too, because they took long.
+    pub(super) duplicated: BTreeSet<usize>,
+    /// Jobs that somebody answered with a prediction or a failure of the model.
+    pub(super) answered: BTreeSet<usize>,
+    /// Workers that were put out.
+    pub(super) put_out: BTreeSet<u64>,
     pub(super) ended: Option<Result<Vec<Outcome>, BatchError>>,
 }
 
@@ -79,6 +85,9 @@ impl World {
             past: vec![],
             kept: BTreeSet::new(),
             controls: BTreeSet::new(),
+            duplicated: BTreeSet::new(),
+            answered: BTreeSet::new(),
+            put_out: BTreeSet::new(),
             ended: None,
         };
         if local {
@@ -105,8 +114,10 @@ impl World {
                 assert!(self.built.contains(&needed), "a job is sent only to a worker with its setup");
                 assert!(self.alive.contains(&worker.0), "a job is sent only to a live worker");
                 let twice = self.open.values().any(|(_, open)| *open == index);
-                assert!(!twice, "a job has one lease at a time");
-                self.open.insert((worker.0, lease.job), (lease, index));
+                let again = self.duplicated.contains(&index) || self.answered.contains(&index);
+                assert!(!twice || again, "a job has one lease at a time, unless it is slow or compared");
+                let held = self.open.insert((worker.0, lease.job), (lease, index));
+                assert!(held.is_none(), "a worker has one lease of a job at a time");
             }
             Command::SendControl { worker, lease, control } => {
                 assert!(self.kept.contains(&control), "a control run is one that is kept");
@@ -125,6 +136,13 @@ impl World {
             }
             Command::BatchFailed(error) => {
                 assert!(self.ended.replace(Err(error)).is_none(), "a batch ends once");
+            }
+            Command::PutOut { worker, .. } => {
+                self.forget(worker.0);
+                self.put_out.insert(worker.0);
+            }
+            Command::Notice(FleetEvent::JobDuplicated { particle, .. }) => {
+                self.duplicated.insert(particle as usize);
             }
             Command::Notice(_) | Command::GivenUp { .. } => {}
         }
@@ -152,6 +170,7 @@ impl World {
         self.controls.remove(&key);
         self.withdrawn.retain(|other| *other != lease);
         self.past.push(lease);
+        self.answered.insert(index);
         self.event(answered(lease, answer(index), cost));
     }
 

@@ -1,0 +1,110 @@
+//! What is known of repeated runs: how many were made, which are open, whose results nobody has compared yet.
+//!
+//! Only data. Next files to read: [`super::canary`], [`super::dispute`].
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+
+use starlings_proto::SetupId;
+
+use super::message::{Likeness, WorkerId};
+use super::opinion::Opinion;
+
+/// How results are compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Comparing {
+    /// Draws the runs that are repeated.
+    pub seed: u64,
+    /// Whether workers may differ, which is then told and nothing else.
+    pub mixed: bool,
+}
+
+/// One run in so many is repeated.
+const SAMPLED: u64 = 64;
+
+/// Of so many runs at most one is a repeat, beside the first ones of each worker.
+pub(super) const MOST: u64 = 50;
+
+/// A worker whose results of this batch nobody has compared yet.
+#[derive(Debug)]
+pub(super) struct Contributor {
+    /// Its name with its build.
+    pub(super) name: String,
+    /// Its first result.
+    pub(super) index: usize,
+    /// Who was asked to repeat it and gave no result.
+    pub(super) tried: BTreeSet<WorkerId>,
+}
+
+/// Workers that say different things of a job.
+#[derive(Debug)]
+pub(super) struct Dispute {
+    pub(super) opinions: Vec<Opinion>,
+    /// How often each was asked.
+    pub(super) asked: BTreeMap<WorkerId, u32>,
+}
+
+/// Repeated runs.
+#[derive(Debug, Default)]
+pub(super) struct Repeats {
+    /// Setups whose runs are not compared to the last bit.
+    pub(super) likeness: BTreeMap<SetupId, Likeness>,
+    /// Workers and setups of which a run was compared.
+    pub(super) compared: BTreeSet<(WorkerId, SetupId)>,
+    /// Runs with a prediction, and those of them that repeated another.
+    pub(super) n_run: u64,
+    pub(super) n_repeat: u64,
+    /// Runs since one was repeated at the end of a batch.
+    pub(super) since_last: u64,
+    /// Leases of this batch that repeat a job.
+    pub(super) open: BTreeSet<(WorkerId, usize)>,
+    pub(super) contributors: BTreeMap<WorkerId, Contributor>,
+    /// Jobs of this batch to repeat.
+    pub(super) sampled: VecDeque<usize>,
+    pub(super) disputes: BTreeMap<usize, Dispute>,
+    /// Setups of which a difference was told.
+    pub(super) told: BTreeSet<SetupId>,
+}
+
+impl Repeats {
+    /// Forgets what belongs to a batch.
+    pub(super) fn begin(&mut self) {
+        self.open.clear();
+        self.contributors.clear();
+        self.sampled.clear();
+        self.disputes.clear();
+    }
+
+    /// How runs of a setup are compared.
+    pub(super) fn likeness(&self, setup: &SetupId) -> Likeness {
+        self.likeness.get(setup).copied().unwrap_or(Likeness::Exact)
+    }
+
+    /// Whether a job is drawn to be repeated.
+    pub(super) fn draws(&self, seed: u64, job: u64) -> bool {
+        mixed(seed ^ mixed(job)) % SAMPLED == 0
+    }
+
+    /// Whether one more repeat stays within its share of the runs.
+    pub(super) fn affords(&self) -> bool {
+        (self.n_repeat + 1) * MOST <= self.n_run
+    }
+
+    /// Whether a job of this batch is being repeated.
+    pub(super) fn repeats(&self, index: usize) -> bool {
+        self.open.iter().any(|(_, job)| *job == index)
+    }
+
+    /// A worker is gone: its repeats are.
+    pub(super) fn forget(&mut self, worker: WorkerId) {
+        self.open.retain(|(by, _)| *by != worker);
+        self.compared.retain(|(by, _)| *by != worker);
+    }
+}
+
+/// Bits that look like drawn ones (splitmix64).
+fn mixed(x: u64) -> u64 {
+    let x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
+}

@@ -1,0 +1,82 @@
+//! A worker played by hand: says what it is told to say.
+
+use std::net::SocketAddr;
+
+use starlings_proto::generated::{self, fleet_client::FleetClient};
+use starlings_proto::{FromWorker, Hello, Lease, LeaseOutcome, PROTOCOL, ReceivedWindows, ToWorker, VERSION};
+use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
+use tokio_stream::wrappers::UnboundedReceiverStream;
+use tonic::Streaming;
+
+use super::square;
+
+/// A worker played by hand.
+pub struct Hand {
+    pub outbox: UnboundedSender<generated::FromWorker>,
+    pub inbound: Streaming<generated::ToWorker>,
+    windows: ReceivedWindows,
+}
+
+impl Hand {
+    pub async fn dial(address: SocketAddr, hello: Hello) -> Self {
+        let mut client = FleetClient::connect(format!("http://{address}")).await.unwrap();
+        let (outbox, outgoing) = unbounded_channel();
+        outbox.send(FromWorker::Hello(hello).encode().unwrap()).unwrap();
+        let inbound = client.work(UnboundedReceiverStream::new(outgoing)).await.unwrap().into_inner();
+        Self { outbox, inbound, windows: ReceivedWindows::default() }
+    }
+
+    pub fn say(&self, message: FromWorker) {
+        self.outbox.send(message.encode().unwrap()).unwrap();
+    }
+
+    /// The next message that is no heartbeat; `None` when the stream ended.
+    pub async fn hear(&mut self) -> Option<ToWorker> {
+        while let Ok(Some(message)) = self.inbound.message().await {
+            match ToWorker::decode(message, &mut self.windows).unwrap() {
+                ToWorker::Heartbeat => {}
+                message => return Some(message),
+            }
+        }
+        None
+    }
+
+    /// Builds the setup and returns the first jobs, as many as asked for.
+    pub async fn take_jobs(&mut self, n: usize) -> Vec<(Lease, starlings_models::Job)> {
+        let mut jobs = vec![];
+        while jobs.len() < n {
+            match self.hear().await.expect("still connected") {
+                ToWorker::Setup { id, .. } => self.say(FromWorker::Setup { id, result: Ok(()) }),
+                ToWorker::Job { lease, job, .. } => jobs.push((lease, job)),
+                _ => {}
+            }
+        }
+        jobs
+    }
+
+    /// Until the run is over; a stream dropped earlier would take unsent answers with it.
+    pub async fn stay_until_drained(&mut self) {
+        while !matches!(self.hear().await, Some(ToWorker::Drain(_)) | None) {}
+    }
+
+    pub fn answer(&self, lease: Lease, job: &starlings_models::Job) {
+        self.say(FromWorker::Result { lease, answer: LeaseOutcome::Ran(Ok(square(job))), cost: 1.0 });
+    }
+}
+
+pub fn hello() -> Hello {
+    Hello {
+        protocol: PROTOCOL,
+        version: VERSION.to_owned(),
+        cores: 1,
+        slots: 1,
+        host: "hand".to_owned(),
+        pid: 1,
+        nonce: 42,
+        build: None,
+    }
+}
+
+pub fn block_on<T>(future: impl Future<Output = T>) -> T {
+    tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap().block_on(future)
+}
