@@ -126,8 +126,13 @@ impl GrpcFleet {
         let (batches, submitted) = unbounded_channel();
         let (adopted, ends) = unbounded_channel();
         let refusals = {
-            let hub = Arc::clone(&hub);
-            Refusals::new(move |event| hub.tell(event))
+            // Whoever asks for the refused outlives the fleet, whose events end with it.
+            let hub = Arc::downgrade(&hub);
+            Refusals::new(move |event| {
+                if let Some(hub) = hub.upgrade() {
+                    hub.tell(event);
+                }
+            })
         };
         let door = listener
             .map(|(listener, _)| Door::new(listener, config.secrets.as_ref(), Arc::clone(&refusals)))
