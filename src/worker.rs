@@ -49,6 +49,10 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     }
     let patience = Duration::try_from_secs_f64(args.patience)
         .map_err(|_| Failure::input("--patience must be a number of seconds, zero or more"))?;
+    // Without it, what leaves the group of a solver outlives it.
+    if let Err(error) = starlings_solver::adopt_orphans() {
+        tracing::debug!(%error, "orphans are not adopted");
+    }
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let cancel = CancellationToken::new();
     cancel_on_signal(&cancel);

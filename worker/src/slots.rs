@@ -15,6 +15,10 @@ use starlings_proto::words::panic_text;
 use starlings_proto::{FromWorker, Lease, LeaseOutcome, generated};
 use tokio::sync::mpsc::UnboundedSender;
 
+/// Jobs that may wait per slot, twice what a coordinator sends ahead, and of the whole worker at least.
+const WAITING: usize = 128;
+const LEAST_WAITING: usize = 1024;
+
 /// One job with everything needed to run and answer it. The outbox belongs to the stream that gave the lease: once that
 /// stream is gone, so is the answer.
 pub(crate) struct Task {
@@ -27,6 +31,8 @@ pub(crate) struct Task {
 /// The slots of this process.
 pub(crate) struct Slots {
     shared: Arc<Shared>,
+    /// Jobs that may wait.
+    most: usize,
 }
 
 #[derive(Default)]
@@ -56,7 +62,7 @@ impl Slots {
         n: usize,
         spawn: impl Fn(usize, Box<dyn FnOnce() + Send>) -> std::io::Result<JoinHandle<()>>,
     ) -> std::io::Result<Self> {
-        let slots = Self { shared: Arc::default() };
+        let slots = Self { shared: Arc::default(), most: WAITING.saturating_mul(n).max(LEAST_WAITING) };
         let mut started = Vec::with_capacity(n);
         for slot in 0..n {
             let shared = Arc::clone(&slots.shared);
@@ -103,6 +109,11 @@ impl Slots {
     /// Drops what waits, as when its stream is gone.
     pub(crate) fn forget_queue(&self) {
         self.shared.lock().tasks.clear();
+    }
+
+    /// Whether so many jobs wait that no coordinator that keeps to its own rules sent them.
+    pub(crate) fn is_flooded(&self) -> bool {
+        self.shared.lock().tasks.len() >= self.most
     }
 
     /// Jobs being computed and jobs waiting.
@@ -188,6 +199,67 @@ pub(crate) fn answer(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Computes until it is told to stop.
+    struct Endless;
+
+    impl Forward for Endless {
+        fn spec(&self) -> &starlings_models::Spec {
+            unreachable!("nobody asks")
+        }
+
+        fn run(&self, _: &Job) -> Result<starlings_models::Prediction, ParticleError> {
+            unreachable!("it is run within limits")
+        }
+
+        fn run_within(
+            &self,
+            _: &Job,
+            until: &Until<'_>,
+        ) -> Result<starlings_models::Prediction, ParticleError> {
+            while !until.stop.is_set() {
+                std::thread::yield_now();
+            }
+            Err(ParticleError::Infrastructure("stopped".to_owned()))
+        }
+    }
+
+    #[test]
+    fn a_computing_job_is_stopped_when_that_is_asked_for_and_answered_as_withdrawn() {
+        let (outbox, mut sent) = tokio::sync::mpsc::unbounded_channel();
+        let slots = Slots::start(1).unwrap();
+        let lease = |job| Lease { epoch: 1, job, attempt: 1 };
+        let window =
+            starlings_models::Window { start: 0.0, times: vec![1.0], observed: vec![0.0], inputs: vec![] };
+        let window = Arc::new(window);
+        for number in 1..=3 {
+            let job = Job { particle: 0, record: 0, window: Arc::clone(&window), theta: vec![], state: None };
+            slots.push(Task {
+                lease: lease(number),
+                forward: Arc::new(Endless),
+                job,
+                outbox: outbox.clone(),
+            });
+        }
+        while slots.load().0 == 0 {
+            std::thread::yield_now();
+        }
+        let mut withdrawn = || match FromWorker::decode(sent.blocking_recv().unwrap()).unwrap() {
+            FromWorker::Result { lease, answer: LeaseOutcome::Withdrawn, .. } => lease.job,
+            other => panic!("{other:?}"),
+        };
+        // Without the word, only what waits comes back.
+        slots.withdraw(&[lease(1), lease(2)], false);
+        assert_eq!(withdrawn(), 2);
+        slots.withdraw(&[lease(1)], true);
+        assert_eq!(withdrawn(), 1);
+        while slots.load().0 == 0 {
+            std::thread::yield_now();
+        }
+        slots.withdraw(&[lease(3)], true);
+        assert_eq!(withdrawn(), 3);
+        slots.close();
+    }
 
     #[test]
     fn threads_that_started_end_again_when_the_system_gives_no_more() {

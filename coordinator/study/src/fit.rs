@@ -7,6 +7,7 @@
 
 pub(crate) mod batch;
 mod ensemble;
+mod failures;
 pub(crate) mod filter;
 pub(crate) mod free_run;
 pub(crate) mod resample;
@@ -16,6 +17,8 @@ mod schedule;
 pub(crate) mod settle;
 pub(crate) mod stack;
 mod timeouts;
+mod told;
 
 pub use ensemble::recombine_by;
+pub use failures::{FailedRange, FailureCluster};
 pub use settle::LIMIT;

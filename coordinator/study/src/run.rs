@@ -10,7 +10,7 @@ use starlings_fleet::{Fleet, FleetError, FleetEvent};
 use starlings_models::Failure;
 
 use super::constants::{self, HangsOn};
-use super::fit::{batch, filter, free_run};
+use super::fit::{FailureCluster, batch, filter, free_run};
 use super::given_residuals::{self, GivenResiduals};
 use super::identify::IdentifyError;
 use super::store::{Store, StoreError};
@@ -271,6 +271,8 @@ fn from_start_to_end(
     result.warnings.extend(folder.mixed()?);
     result.warnings.extend(runner.timeouts());
     result.warnings.extend(folder.store.told_of_workers()?);
+    result.failures = runner.failures();
+    result.warnings.extend(result.failures.iter().take(3).map(FailureCluster::told));
     match hangs_on {
         Ok(found) => result.hangs_on = (found.runs > 0).then_some(found),
         Err(why) => result.warnings.push(why),

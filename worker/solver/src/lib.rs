@@ -15,6 +15,7 @@ mod guard;
 pub mod instance;
 mod losses;
 mod machine;
+mod orphans;
 mod process;
 mod scratch;
 pub mod serve;
@@ -34,6 +35,7 @@ use starlings_proto::adapters::AdapterDef;
 use adapter::Adapter;
 pub use error::SolverError;
 pub use guard::guard;
+pub use orphans::adopt_orphans;
 use site::Site;
 pub use site::SiteOptions;
 

@@ -7,10 +7,12 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
-use starlings_fleet::{Fleet, FleetError, Outcome, SetupId};
+use starlings_fleet::{Fleet, Outcome, SetupId};
 use starlings_models::{BuildSetup, Failure, Job, Prediction, Setup, Window};
 
+use super::failures::{FailureCluster, Failures};
 use super::timeouts::Timeouts;
+use super::told::told;
 use crate::store::{JobRow, Store};
 use crate::trial::named;
 use crate::{RunError, Study};
@@ -51,6 +53,8 @@ pub(crate) struct EnsembleRunner<'a> {
     n_state: Option<usize>,
     /// Runs that were given up after their limit of wall time, where a store keeps them.
     timeouts: Option<Timeouts<'a>>,
+    /// Runs by how they ended.
+    failures: Failures,
 }
 
 impl<'a> EnsembleRunner<'a> {
@@ -74,6 +78,7 @@ impl<'a> EnsembleRunner<'a> {
             workers: BTreeSet::new(),
             n_state,
             timeouts: None,
+            failures: Failures::default(),
         })
     }
 
@@ -89,6 +94,11 @@ impl<'a> EnsembleRunner<'a> {
     /// A warning about the timeouts in the store, if there are any.
     pub(crate) fn timeouts(&self) -> Option<String> {
         self.timeouts.as_ref()?.warning()
+    }
+
+    /// Failed runs by message and place.
+    pub(crate) fn failures(&self) -> Vec<FailureCluster> {
+        self.failures.clusters(&self.study.setup.parameters)
     }
 
     /// Runs the given particles over the windows and gives back what the study's channels measure of them. `theta` is p × r in
@@ -133,6 +143,9 @@ impl<'a> EnsembleRunner<'a> {
                 }
                 self.retried += u64::from(outcome.attempts.saturating_sub(1));
                 self.failed += u64::from(outcome.result.is_err());
+                let values = self.study.theta_for(*record, theta.column(particle).into_owned().as_slice());
+                let failure = outcome.result.as_ref().err().map(ToString::to_string);
+                self.failures.learn(&values, failure.as_deref());
                 let mut result = outcome.result.map(|p| self.picked(*record, window, p));
                 if let Ok(prediction) = &mut result {
                     self.check(prediction, *record, particle, theta, window)?;
@@ -283,17 +296,5 @@ impl<'a> EnsembleRunner<'a> {
     /// The study that is run.
     pub(crate) fn study(&self) -> &'a Study {
         self.study
-    }
-}
-
-/// A fleet's failure, with names and values where it is about one run.
-fn told(study: &Study, error: FleetError, values: impl Fn(usize) -> Option<String>) -> RunError {
-    match error {
-        FleetError::NoAnswer { job, particle, record, reason } => {
-            let (record, values) =
-                (study.records[record as usize].name.clone(), values(job).unwrap_or_default());
-            RunError::NoAnswer { particle: particle as usize, record, values, reason }
-        }
-        other => other.into(),
     }
 }
