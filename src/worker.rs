@@ -63,6 +63,10 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if !args.contact.is_inherited() {
         args.permit.warn();
     }
+    // Without it, what leaves the group of a solver outlives it.
+    if let Err(error) = starlings_solver::adopt_orphans() {
+        tracing::debug!(%error, "orphans are not adopted");
+    }
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let cancel = CancellationToken::new();
     cancel_on_signal(&cancel);

@@ -132,6 +132,9 @@ fn take(
         Err(status) => return Err(Ended::Lost(format!("the connection broke: {}", status_text(&status)))),
     };
     match ToWorker::decode(message, windows) {
+        Ok(ToWorker::Job { .. }) if slots.is_flooded() => {
+            return Err(Ended::Lost("the coordinator sent more jobs than can wait here".to_owned()));
+        }
         Ok(ToWorker::Job { lease, setup, job }) => {
             if let Some(forward) = setups.get(&setup) {
                 slots.push(Task::new(Asked { lease, outbox: outbox.clone() }, setup, forward, job));

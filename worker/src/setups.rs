@@ -18,6 +18,9 @@ pub(crate) const KEPT: usize = 512;
 /// Setups built at the same time, so that one that takes minutes does not hold up the others.
 const BUILDERS: usize = 4;
 
+/// Setups that may wait to be built: more than any batch has.
+const WAITING: usize = 1 << 16;
+
 /// Told how building went.
 pub(crate) type Tell = Box<dyn FnOnce(Result<(), String>) + Send>;
 
@@ -75,6 +78,10 @@ impl Setups {
     pub(crate) fn order(&self, id: SetupId, setup: Result<Box<Setup>, ProtocolError>, tell: Tell) {
         let mut shared = self.lock();
         shared.missed.remove(&id);
+        if shared.waiting.len() >= WAITING {
+            drop(shared);
+            return tell(Err(format!("{WAITING} setups wait to be built already")));
+        }
         shared.waiting.push_back(Order { id, setup, tell });
         if shared.builders >= BUILDERS {
             return;

@@ -1,60 +1,38 @@
 //! The threads that compute: one queue, one thread per slot, first in first out.
 //!
-//! A panicking model is a failed job, not a dead worker. The wall time of each run is measured here.
+//! A panicking model is a failed job, not a dead worker. The wall time of each run is measured here. Next files to
+//! read: [`task`], and [`streams`] for what becomes of runs when a connection ends.
 
-use std::collections::{HashMap, VecDeque};
+mod streams;
+mod task;
+#[cfg(test)]
+mod tests;
+
+use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Instant;
 
-use starlings_models::{Forward, Job, ModelFailure, ParticleError, Prediction, Stop, Until};
-use starlings_proto::convert::ended;
+use starlings_models::{ModelFailure, Until};
 use starlings_proto::spent::spent;
 use starlings_proto::words::panic_text;
-use starlings_proto::{
-    FromWorker, HeldRun, JobKey, JobKeys, Lease, LeaseOutcome, SetupId, generated, job_key,
-};
+use starlings_proto::{Lease, LeaseOutcome, generated};
 use tokio::sync::mpsc::UnboundedSender;
 
 use crate::held::Held;
+pub(crate) use task::{Asked, Task, answer};
 
-/// One job with everything needed to run and answer it.
-pub(crate) struct Task {
-    pub(crate) setup: SetupId,
-    pub(crate) forward: Arc<dyn Forward>,
-    pub(crate) job: Arc<Job>,
-    /// The word that stops it.
-    stop: Stop,
-    /// Who wants the answer. A stream that ends takes it away, and a later one may ask again.
-    asked: Mutex<Option<Asked>>,
-}
-
-/// A lease and the way of its answer.
-#[derive(Clone)]
-pub(crate) struct Asked {
-    pub(crate) lease: Lease,
-    pub(crate) outbox: UnboundedSender<generated::FromWorker>,
-}
-
-impl Task {
-    pub(crate) fn new(asked: Asked, setup: SetupId, forward: Arc<dyn Forward>, job: Job) -> Self {
-        Self { setup, forward, job: Arc::new(job), stop: Stop::default(), asked: Mutex::new(Some(asked)) }
-    }
-
-    fn asked(&self) -> MutexGuard<'_, Option<Asked>> {
-        self.asked.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn has_lease(&self, leases: &[Lease]) -> bool {
-        self.asked().as_ref().is_some_and(|asked| leases.contains(&asked.lease))
-    }
-}
+/// Jobs that may wait per slot, twice what a coordinator sends ahead, and of the whole worker at least.
+const WAITING: usize = 128;
+const LEAST_WAITING: usize = 1024;
 
 /// The slots of this process.
 pub(crate) struct Slots {
     shared: Arc<Shared>,
+    /// Jobs that may wait.
+    most: usize,
 }
 
 struct Shared {
@@ -101,7 +79,8 @@ impl Slots {
             predictions: AtomicU64::new(0),
             failures: AtomicU64::new(0),
         };
-        let slots = Self { shared: Arc::new(shared) };
+        let most = WAITING.saturating_mul(n).max(LEAST_WAITING);
+        let slots = Self { shared: Arc::new(shared), most };
         let mut started = Vec::with_capacity(n);
         for slot in 0..n {
             let shared = Arc::clone(&slots.shared);
@@ -156,49 +135,9 @@ impl Slots {
         queue.running.iter().for_each(|task| drop(task.asked().take()));
     }
 
-    /// Its stream is gone: what was begun and what waits goes on, and its results are held.
-    pub(crate) fn detach(&self) {
-        let mut queue = self.shared.lock();
-        queue.stream = None;
-        let all = queue.tasks.iter().chain(&queue.running);
-        all.for_each(|task| drop(task.asked().take()));
-    }
-
-    /// A stream of the same run is there: the keys of what an earlier one asked for and is not finished. What finishes from now on is
-    /// told to it.
-    pub(crate) fn attach(&self, stream: UnboundedSender<generated::FromWorker>) -> Vec<JobKey> {
-        let mut queue = self.shared.lock();
-        queue.stream = Some(stream);
-        queue.full = false;
-        let (mut keys, all) = (JobKeys::default(), queue.running.iter().chain(&queue.tasks));
-        let keys = all.map(|task| keys.of(&task.setup, &task.job)).collect();
-        drop(queue);
-        self.shared.filled.notify_all();
-        keys
-    }
-
-    /// Gives leases to what an earlier stream asked for; those that are left over are neither computed nor wait.
-    pub(crate) fn adopt(
-        &self,
-        runs: Vec<(JobKey, Lease)>,
-        outbox: &UnboundedSender<generated::FromWorker>,
-    ) -> Vec<(JobKey, Lease)> {
-        let mut leases: HashMap<JobKey, Lease> = runs.into_iter().collect();
-        if leases.is_empty() {
-            return Vec::new();
-        }
-        let (mut keys, queue) = (JobKeys::default(), self.shared.lock());
-        for task in queue.running.iter().chain(&queue.tasks) {
-            if let Some(lease) = leases.remove(&keys.of(&task.setup, &task.job)) {
-                *task.asked() = Some(Asked { lease, outbox: outbox.clone() });
-            }
-        }
-        leases.into_iter().collect()
-    }
-
-    /// Drops what waits and nobody asks for any more.
-    pub(crate) fn drop_void(&self) {
-        self.shared.lock().tasks.retain(|task| task.asked().is_some());
+    /// Whether so many jobs wait that no coordinator that keeps to its own rules sent them.
+    pub(crate) fn is_flooded(&self) -> bool {
+        self.shared.lock().tasks.len() >= self.most
     }
 
     /// Jobs being computed and jobs waiting.
@@ -266,66 +205,5 @@ impl Shared {
             counter.fetch_add(1, Ordering::Relaxed);
             self.finished(&task, result, cost);
         }
-    }
-
-    /// Answers a task that ran; held is the result whether there is somebody to answer or not.
-    fn finished(&self, task: &Arc<Task>, result: Result<Prediction, ParticleError>, cost: f64) {
-        let has_room =
-            self.held.as_ref().is_none_or(|held| held.keep(task.setup, Arc::clone(&task.job), &result, cost));
-        let mut queue = self.lock();
-        queue.running.retain(|running| !Arc::ptr_eq(running, task));
-        // A stream that came meanwhile has been told all that is held.
-        queue.full |= !has_room && queue.stream.is_none();
-        let stream = queue.stream.clone();
-        drop(queue);
-        match (task.asked().take(), stream) {
-            (Some(Asked { lease, outbox }), _) => answer(&outbox, lease, LeaseOutcome::Ran(result), cost),
-            (None, Some(stream)) => {
-                let ended = Some(ended::encode(&result, cost).into());
-                let run = HeldRun { key: job_key(&task.setup, &task.job), ended };
-                if let Ok(message) = FromWorker::Held(vec![run]).encode() {
-                    let _ = stream.send(message);
-                }
-            }
-            (None, None) => {}
-        }
-    }
-}
-
-/// Answers a lease; an answer that does not fit in a message becomes a failure that says so.
-pub(crate) fn answer(
-    outbox: &UnboundedSender<generated::FromWorker>,
-    lease: Lease,
-    answer: LeaseOutcome,
-    cost: f64,
-) {
-    let message = FromWorker::Result { lease, answer, cost }.encode().or_else(|error| {
-        let answer = LeaseOutcome::Ran(Err(ParticleError::BadJob(error.to_string())));
-        FromWorker::Result { lease, answer, cost }.encode()
-    });
-    if let Ok(message) = message {
-        let _ = outbox.send(message);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn threads_that_started_end_again_when_the_system_gives_no_more() {
-        let ended = Arc::new(AtomicU32::new(0));
-        let spawn = |slot, work: Box<dyn FnOnce() + Send>| {
-            if slot == 3 {
-                return Err(std::io::Error::other("no more threads"));
-            }
-            let ended = Arc::clone(&ended);
-            Ok(std::thread::spawn(move || {
-                work();
-                ended.fetch_add(1, Ordering::Relaxed);
-            }))
-        };
-        assert!(Slots::start_with(5, None, spawn).is_err());
-        assert_eq!(ended.load(Ordering::Relaxed), 3);
     }
 }

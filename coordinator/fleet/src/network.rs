@@ -34,6 +34,9 @@ const KEEP_ALIVE: (Duration, Duration) = (Duration::from_secs(60), Duration::fro
 /// HTTP/2 windows per stream and per connection, bytes: enough for a long fat network.
 const WINDOWS: (u32, u32) = (4 * 1024 * 1024, 16 * 1024 * 1024);
 
+/// Calls of one connection at the same time: a worker makes one, and dials again before the last one has ended now and then.
+const STREAMS: u32 = 16;
+
 /// The ways on which workers come.
 pub(super) struct Ways {
     /// From anywhere that reaches the address, once it has proved itself.
@@ -74,6 +77,7 @@ pub(super) fn run(
                 .initial_stream_window_size(WINDOWS.0)
                 .initial_connection_window_size(WINDOWS.1)
                 .max_frame_size(FRAME_SIZE)
+                .max_concurrent_streams(Some(STREAMS))
         };
         let inherited = UnboundedReceiverStream::new(adopted).map(SocketEnd::new);
         let listening = async {

@@ -7,6 +7,7 @@
 
 pub(crate) mod batch;
 mod ensemble;
+mod failures;
 pub(crate) mod filter;
 pub(crate) mod free_run;
 mod journal;
@@ -20,4 +21,5 @@ pub(crate) mod stack;
 mod timeouts;
 
 pub use ensemble::recombine_by;
+pub use failures::{FailedRange, FailureCluster};
 pub use settle::LIMIT;

@@ -35,7 +35,7 @@ pub mod variant;
 mod warnings;
 
 pub use checked::{EstimatorChoice, FleetChoice, Record, Study, ThetaEntry};
-pub use fit::{LIMIT as MAX_PASSES, recombine_by};
+pub use fit::{FailedRange, FailureCluster, LIMIT as MAX_PASSES, recombine_by};
 pub use observer_gain::ObserverCourse;
 pub use problem::{Problem, StudyError};
 pub use run::{Fit, Move, Progress, RunContext};

@@ -9,7 +9,7 @@ use starlings_estimators::{Form, Gaussian};
 use starlings_fleet::{Fleet, FleetEvent};
 
 use super::constants::{self, HangsOn};
-use super::fit::{batch, filter, free_run};
+use super::fit::{FailureCluster, batch, filter, free_run};
 use super::given_residuals::{self, GivenResiduals};
 use super::identify::IdentifyError;
 use super::store::{Store, StoreError};
@@ -196,6 +196,8 @@ fn from_start_to_end(
     result.warnings.extend(folder.mixed()?);
     result.warnings.extend(runner.timeouts());
     result.warnings.extend(folder.store.told_of_workers()?);
+    result.failures = runner.failures();
+    result.warnings.extend(result.failures.iter().take(3).map(FailureCluster::told));
     match hangs_on {
         Ok(found) => result.hangs_on = (found.runs > 0).then_some(found),
         Err(why) => result.warnings.push(why),

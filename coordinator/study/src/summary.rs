@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::constants::HangsOn;
 use super::field::field_of;
+use super::fit::FailureCluster;
 use super::given_residuals::GivenResiduals;
 use super::observer_gain::ObserverFit;
 use super::posterior::{self, Estimate, estimates};
@@ -100,6 +101,9 @@ pub struct Summary {
     pub workers: usize,
     /// Wall time in s.
     pub wall_s: f64,
+    /// Failed runs by message and place; those of this part of the run where it was resumed.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub failures: Vec<FailureCluster>,
     /// What the reader must know before using the numbers.
     pub warnings: Vec<String>,
     /// What the intervals are conditional on.
@@ -170,6 +174,7 @@ pub fn make(study: &Study, fit: &Fit, predictions: &[PredictionRow], workers: us
         },
         workers,
         wall_s,
+        failures: Vec::new(),
         warnings: Vec::new(),
         conditional_on: conditional_on(study),
     }

@@ -1,7 +1,7 @@
 //! A process that ends the solvers which a dead worker leaves behind.
 //!
 //! The worker holds the writing end of the guard's standard input. A line `+N` puts a process group under guard, `-N` takes it
-//! out; `+/folder` and `-/folder` do so with a folder that the worker made, and `=/folder/inner` says that a folder in it stays.
+//! out, `*MARK` says how the marks of programs begin that left their group; `+/folder` and `-/folder` do so with a folder that the worker made, and `=/folder/inner` says that a folder in it stays.
 //! When the input ends, however the worker died, every group still under guard is killed and every folder removed. Next files
 //! to read: [`super::process`], [`super::clear`].
 
@@ -15,6 +15,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use rustix::process::{Pid, Signal, kill_process_group};
 
 use super::clear::clear;
+use super::orphans;
 
 /// The guard of this process.
 pub(crate) struct Guard {
@@ -31,11 +32,16 @@ impl Guard {
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .process_group(0);
-        let mut child = command.spawn()?;
+        let mut child = orphans::start(&mut command)?;
         let input = child.stdin.take().ok_or_else(|| io::Error::other("the guard has no standard input"))?;
         // It ends by itself when its input closes, and is waited for lest it stay as a zombie.
-        std::thread::Builder::new().name("guard".to_owned()).spawn(move || child.wait())?;
-        Ok(Self { input: Arc::new(Mutex::new(input)) })
+        std::thread::Builder::new().name("guard".to_owned()).spawn(move || {
+            let _ = child.wait();
+            orphans::forget(child.id().cast_signed());
+        })?;
+        let guard = Self { input: Arc::new(Mutex::new(input)) };
+        guard.notice().tell('*', &orphans::marks_here());
+        Ok(guard)
     }
 
     /// A way to tell it of groups and folders.
@@ -90,6 +96,8 @@ struct Guarded {
     groups: BTreeSet<i32>,
     folders: BTreeSet<PathBuf>,
     kept: BTreeSet<PathBuf>,
+    /// What the marks of the worker's descendants begin with.
+    marks: Option<String>,
 }
 
 impl Guarded {
@@ -104,6 +112,8 @@ impl Guarded {
                 "=" => _ = self.kept.insert(folder),
                 _ => {}
             }
+        } else if sign == "*" {
+            self.marks = Some(what.to_owned()).filter(|marks| marks.len() > 1);
         } else if let Ok(group) = what.parse() {
             match sign {
                 "+" => _ = self.groups.insert(group),
@@ -123,6 +133,9 @@ pub fn guard(input: impl BufRead) {
     }
     for group in guarded.groups {
         kill_group(group);
+    }
+    if let Some(marks) = guarded.marks {
+        orphans::kill_marked(&marks);
     }
     for folder in guarded.folders {
         clear(&folder, &guarded.kept);

@@ -21,6 +21,7 @@ use rustix::thread::{CpuSet, sched_setaffinity};
 use super::SolverError;
 use super::error::ABSENT;
 use super::guard::{Notice, kill_group};
+use super::orphans;
 use super::stopped::is_stopped;
 pub(crate) use ending::{ending, is_killed};
 use last_lines::remember;
@@ -92,8 +93,8 @@ impl Process {
             command.current_dir(folder);
         }
         let input = if launch.input { Stdio::piped() } else { Stdio::null() };
-        let mut child =
-            command.stdin(input).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().map_err(failed)?;
+        command.stdin(input).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = orphans::start(&mut command).map_err(failed)?;
         let group = child.id().cast_signed();
         if let Some(notice) = &notice {
             notice.begin(child.id());
@@ -200,7 +201,9 @@ impl Drop for Process {
         if let Some(notice) = &self.notice {
             notice.end(self.group.cast_unsigned());
         }
+        orphans::forget(self.group);
         let _ = self.child.wait();
+        orphans::end_orphans();
     }
 }
 

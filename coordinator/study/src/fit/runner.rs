@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, DVector};
 use starlings_fleet::{Fleet, Outcome, SetupId};
 use starlings_models::{BuildSetup, Failure, Job, Prediction, Setup, Window};
 
+use super::failures::{FailureCluster, Failures};
 use super::kept::Kept;
 use crate::store::snapshot::Counts;
 use crate::store::{JobRow, Store};
@@ -55,6 +56,8 @@ pub(crate) struct EnsembleRunner<'a> {
     n_state: Option<usize>,
     /// What a store keeps of runs, where there is one.
     kept: Option<Kept<'a>>,
+    /// Runs by how they ended.
+    failures: Failures,
 }
 
 impl<'a> EnsembleRunner<'a> {
@@ -76,6 +79,7 @@ impl<'a> EnsembleRunner<'a> {
             workers: BTreeSet::new(),
             n_state,
             kept: None,
+            failures: Failures::default(),
         })
     }
 
@@ -91,6 +95,11 @@ impl<'a> EnsembleRunner<'a> {
     /// A warning about the timeouts in the store, if there are any.
     pub(crate) fn timeouts(&self) -> Option<String> {
         self.kept.as_ref()?.warning()
+    }
+
+    /// Failed runs by message and place.
+    pub(crate) fn failures(&self) -> Vec<FailureCluster> {
+        self.failures.clusters(&self.study.setup.parameters)
     }
 
     /// Runs the given particles over the windows and gives back what the study's channels measure of them. `theta` is p × r in
@@ -194,6 +203,9 @@ impl<'a> EnsembleRunner<'a> {
                 }
                 self.counts.retried += u64::from(outcome.attempts.saturating_sub(1));
                 self.counts.failed += u64::from(outcome.result.is_err());
+                let values = self.study.theta_for(*record, theta.column(column).into_owned().as_slice());
+                let failure = outcome.result.as_ref().err().map(ToString::to_string);
+                self.failures.learn(&values, failure.as_deref());
                 let mut result = outcome.result;
                 if let Ok(prediction) = &mut result {
                     // Of what the solver gave, the outputs that the study asked for.

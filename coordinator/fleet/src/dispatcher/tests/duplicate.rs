@@ -110,3 +110,53 @@ fn a_worker_that_gives_everything_back_or_answers_what_it_was_not_asked_is_put_o
     });
     assert_eq!(out, Some(1100));
 }
+
+#[test]
+fn a_run_of_many_times_the_usual_time_is_given_up_where_that_is_asked_for_and_tried_once_more_elsewhere() {
+    let mut stage = warm(&[1, 1], 1.0);
+    stage.dispatcher.rules.timeout_factor = Some(3.0);
+    let jobs = stage.jobs(submit(2));
+    stage.step(ran(jobs[1].0, Ok(prediction(1))));
+    let first = jobs[0].0;
+    let commands = stage.seconds(5, &[1, 2]);
+    let stopped = Command::Cancel { worker: WorkerId(first.epoch), leases: vec![first], stop: true };
+    assert!(commands.contains(&stopped), "{commands:?}");
+    let [(again, 0)] = sent(&commands)[..] else { panic!("{commands:?}") };
+    assert_ne!(again.epoch, first.epoch);
+    // What the first one says now does not matter, and frees its slot.
+    assert_eq!(stage.step(answered(first, LeaseOutcome::Withdrawn, 0.0)), []);
+    let done = stage.seconds(6, &[1, 2]);
+    let outcome = &outcomes(&done).expect("both ended")[0];
+    let Err(starlings_models::Failure::Timeout(timeout)) = &outcome.result else { panic!("{outcome:?}") };
+    assert!((timeout.limit - 3.0).abs() < 1e-9 && timeout.says.contains("timeout_factor"), "{timeout:?}");
+    // Without the factor nobody gives it up.
+    let mut stage = warm(&[1], 1.0);
+    stage.step(submit(1));
+    assert!(outcomes(&stage.seconds(60, &[1])).is_none());
+}
+
+#[test]
+fn a_worker_that_fails_setups_without_end_is_put_out_and_told_of_once() {
+    let mut stage = Stage { dispatcher: Dispatcher::new(RULES), now: Duration::ZERO };
+    stage.step(Event::Joined(joining(1, 1)));
+    stage.step(submit(1));
+    let failed = |n: u32| Event::SetupFailed { worker: WorkerId(1), setup: SETUP, reason: format!("no {n}") };
+    let commands = (0..3000).flat_map(|n| stage.step(failed(n))).collect::<Vec<_>>();
+    let told =
+        commands.iter().filter(|c| matches!(c, Command::Notice(FleetEvent::SetupFailed { .. }))).count();
+    assert_eq!(told, 1);
+    assert!(commands.iter().any(|c| matches!(c, Command::PutOut { worker: WorkerId(1), .. })));
+}
+
+#[test]
+fn a_worker_that_names_setups_nobody_knows_is_put_out_before_they_fill_the_memory() {
+    let mut stage = Stage { dispatcher: Dispatcher::new(RULES), now: Duration::ZERO };
+    stage.step(Event::Joined(joining(1, 1)));
+    let out = (0..5000_u32).position(|n| {
+        let mut setup = [0; 32];
+        setup[..4].copy_from_slice(&n.to_le_bytes());
+        let commands = stage.step(Event::SetupDone { worker: WorkerId(1), setup });
+        commands.iter().any(|c| matches!(c, Command::PutOut { .. }))
+    });
+    assert_eq!(out, Some(1024 + 100));
+}

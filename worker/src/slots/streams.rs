@@ -1,0 +1,83 @@
+//! A worker's jobs over the end of one stream and the beginning of the next: what was begun goes on, and its result is held.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use starlings_models::{ParticleError, Prediction};
+use starlings_proto::convert::ended;
+use starlings_proto::{FromWorker, HeldRun, JobKey, JobKeys, Lease, LeaseOutcome, generated, job_key};
+use tokio::sync::mpsc::UnboundedSender;
+
+use super::{Asked, Shared, Slots, Task, answer};
+
+impl Slots {
+    /// Its stream is gone: what was begun and what waits goes on, and its results are held.
+    pub(crate) fn detach(&self) {
+        let mut queue = self.shared.lock();
+        queue.stream = None;
+        let all = queue.tasks.iter().chain(&queue.running);
+        all.for_each(|task| drop(task.asked().take()));
+    }
+
+    /// A stream of the same run is there: the keys of what an earlier one asked for and is not finished. What finishes from now on is
+    /// told to it.
+    pub(crate) fn attach(&self, stream: UnboundedSender<generated::FromWorker>) -> Vec<JobKey> {
+        let mut queue = self.shared.lock();
+        queue.stream = Some(stream);
+        queue.full = false;
+        let (mut keys, all) = (JobKeys::default(), queue.running.iter().chain(&queue.tasks));
+        let keys = all.map(|task| keys.of(&task.setup, &task.job)).collect();
+        drop(queue);
+        self.shared.filled.notify_all();
+        keys
+    }
+
+    /// Gives leases to what an earlier stream asked for; those that are left over are neither computed nor wait.
+    pub(crate) fn adopt(
+        &self,
+        runs: Vec<(JobKey, Lease)>,
+        outbox: &UnboundedSender<generated::FromWorker>,
+    ) -> Vec<(JobKey, Lease)> {
+        let mut leases: HashMap<JobKey, Lease> = runs.into_iter().collect();
+        if leases.is_empty() {
+            return Vec::new();
+        }
+        let (mut keys, queue) = (JobKeys::default(), self.shared.lock());
+        for task in queue.running.iter().chain(&queue.tasks) {
+            if let Some(lease) = leases.remove(&keys.of(&task.setup, &task.job)) {
+                *task.asked() = Some(Asked { lease, outbox: outbox.clone() });
+            }
+        }
+        leases.into_iter().collect()
+    }
+
+    /// Drops what waits and nobody asks for any more.
+    pub(crate) fn drop_void(&self) {
+        self.shared.lock().tasks.retain(|task| task.asked().is_some());
+    }
+}
+
+impl Shared {
+    /// Answers a task that ran; held is the result whether there is somebody to answer or not.
+    pub(super) fn finished(&self, task: &Arc<Task>, result: Result<Prediction, ParticleError>, cost: f64) {
+        let has_room =
+            self.held.as_ref().is_none_or(|held| held.keep(task.setup, Arc::clone(&task.job), &result, cost));
+        let mut queue = self.lock();
+        queue.running.retain(|running| !Arc::ptr_eq(running, task));
+        // A stream that came meanwhile has been told all that is held.
+        queue.full |= !has_room && queue.stream.is_none();
+        let stream = queue.stream.clone();
+        drop(queue);
+        match (task.asked().take(), stream) {
+            (Some(Asked { lease, outbox }), _) => answer(&outbox, lease, LeaseOutcome::Ran(result), cost),
+            (None, Some(stream)) => {
+                let ended = Some(ended::encode(&result, cost).into());
+                let run = HeldRun { key: job_key(&task.setup, &task.job), ended };
+                if let Ok(message) = FromWorker::Held(vec![run]).encode() {
+                    let _ = stream.send(message);
+                }
+            }
+            (None, None) => {}
+        }
+    }
+}
