@@ -260,7 +260,8 @@ fn a_setup_arrives_as_sent_and_a_damaged_one_says_so() {
 #[test]
 fn heartbeats_of_no_length_or_no_end_are_refused() {
     for heartbeat in [0.0, -0.0, -1.0, 1e-300, 1e-3, 1e300, f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-        let welcome = Welcome { protocol: 4, run: String::new(), heartbeat, epoch: 1 };
+        let welcome =
+            Welcome { protocol: 4, run: String::new(), heartbeat, epoch: 1, run_id: [0; 16], incarnation: 1 };
         let error = ToWorker::decode(ToWorker::welcome(welcome), &mut ReceivedWindows::default());
         assert!(
             matches!(error, Err(ProtocolError::Shape { field: "heartbeat", .. })),
