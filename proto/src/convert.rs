@@ -7,6 +7,7 @@ pub mod floats;
 pub mod from_worker;
 pub mod job;
 pub mod solver;
+pub mod state;
 pub mod to_worker;
 mod window;
 pub mod windows;
@@ -15,6 +16,7 @@ use starlings_models::Setup;
 
 pub use from_worker::{FromWorker, Hello, LeaseOutcome};
 pub use job::JobEncoder;
+pub use state::{State, StateId, StateNaming};
 pub use to_worker::{ToWorker, Welcome};
 pub use windows::{ReceivedWindows, SentWindows};
 
@@ -59,11 +61,8 @@ pub enum ProtocolError {
     /// A job over a window that was not sent before it.
     #[error("a job names a window that was not sent before it")]
     UnknownWindow,
-    /// A state beyond [`crate::MAX_INLINE_STATE`].
-    #[error(
-        "the state has {bytes} bytes; more than {limit} cannot travel inside a job, and chunked transfer of states is not \
-         available yet"
-    )]
+    /// A state beyond [`crate::MAX_STATE`], or beyond [`crate::MAX_INLINE_STATE`] inside a message.
+    #[error("the state has {bytes} bytes; more than {limit} cannot travel")]
     StateTooLarge {
         /// Size of the state in bytes.
         bytes: usize,
@@ -113,10 +112,13 @@ pub fn decode_setup(id: &SetupId, json: &[u8]) -> Result<Setup, ProtocolError> {
 }
 
 pub(crate) fn setup_id(bytes: &[u8]) -> Result<SetupId, ProtocolError> {
-    bytes.try_into().map_err(|_| ProtocolError::Shape {
-        field: "setup id",
-        message: format!("has {} bytes, expected 32", bytes.len()),
-    })
+    hash(bytes, "setup id")
+}
+
+fn hash(bytes: &[u8], field: &'static str) -> Result<[u8; 32], ProtocolError> {
+    let shape =
+        |_| ProtocolError::Shape { field, message: format!("has {} bytes, expected 32", bytes.len()) };
+    bytes.try_into().map_err(shape)
 }
 
 pub(crate) fn required<T>(value: Option<T>, field: &'static str) -> Result<T, ProtocolError> {

@@ -14,14 +14,17 @@ pub use bytes::Bytes;
 pub(crate) use codec::Codec;
 pub use convert::{
     FromWorker, Hello, JobEncoder, Lease, LeaseOutcome, ProtocolError, ReceivedWindows, SentWindows, SetupId,
-    ToWorker, Welcome, decode_setup, digest, encode_setup,
+    State, StateId, StateNaming, ToWorker, Welcome, decode_setup, digest, encode_setup,
 };
 
 /// Number of the protocol; coordinator and worker must have the same.
-pub const PROTOCOL: u32 = 3;
+pub const PROTOCOL: u32 = 4;
 
-/// Largest state that travels inside a job or a prediction, bytes.
+/// Largest state that travels inside a job or a prediction, bytes; a larger one travels by itself, under a name.
 pub const MAX_INLINE_STATE: usize = 256 * 1024;
+
+/// Largest state that either side takes, bytes.
+pub const MAX_STATE: usize = 16 * 1024 * 1024 * 1024;
 
 /// Largest message either side accepts, bytes.
 pub const MAX_MESSAGE: usize = 16 * 1024 * 1024;

@@ -7,9 +7,11 @@
 
 pub mod config;
 mod dial;
+mod inbox;
 mod session;
 mod setups;
 mod slots;
+mod transfer;
 
 use std::sync::Arc;
 use std::time::Instant;

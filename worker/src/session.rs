@@ -10,8 +10,9 @@ use tonic::Streaming;
 
 use crate::WorkerConfig;
 use crate::dial::Connection;
+use crate::inbox::Inbox;
 use crate::setups::Setups;
-use crate::slots::{Slots, Task, answer};
+use crate::slots::{Slots, answer};
 
 /// How long a leaving worker waits for the coordinator to close the stream.
 const GOODBYE_PATIENCE: Duration = Duration::from_secs(1);
@@ -36,13 +37,14 @@ pub(crate) async fn serve(
     let mut beats = tokio::time::interval(Duration::from_secs_f64(connection.welcome.heartbeat));
     beats.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
     let mut silence = Silence::default();
+    let inbox = Inbox::new(connection.transfers.clone(), config.slots);
     loop {
         tokio::select! {
             // Messages first: a flood of jobs must not be mistaken for silence.
             biased;
             message = connection.inbound.message() => {
                 silence.broken();
-                match take(message, &connection.outbox, &mut connection.windows, slots, setups) {
+                match take(message, &connection.outbox, &mut connection.windows, slots, setups, &inbox) {
                     Ok(()) => {}
                     Err(Ended::Drained(reason)) => {
                         goodbye(&connection.outbox, &mut connection.inbound, &reason).await;
@@ -57,6 +59,7 @@ pub(crate) async fn serve(
             }
             _ = beats.tick() => {
                 let (running, queued) = slots.load();
+                let queued = queued + inbox.len() as u32;
                 send(&connection.outbox, FromWorker::Heartbeat { running, queued });
                 // A worker that serves once does not dial again: only the end of its connection ends its session.
                 if let Some(reason) = silence.after_beat().filter(|_| !config.once) {
@@ -95,6 +98,7 @@ fn take(
     windows: &mut ReceivedWindows,
     slots: &Slots,
     setups: &Setups,
+    inbox: &Inbox,
 ) -> Result<(), Ended> {
     let message = match message {
         Ok(Some(message)) => message,
@@ -104,7 +108,7 @@ fn take(
     match ToWorker::decode(message, windows) {
         Ok(ToWorker::Job { lease, setup, job }) => {
             if let Some(forward) = setups.get(&setup) {
-                slots.push(Task { lease, forward, job, outbox: outbox.clone() });
+                inbox.take(slots, lease, forward, job, outbox);
             } else {
                 // First the setup, so that the job that comes back finds it missing here; and once, however many of its jobs
                 // are on their way: a second time would stand for the setup that is sent again.
@@ -119,7 +123,10 @@ fn take(
             let outbox = outbox.clone();
             setups.order(id, setup, Box::new(move |result| send(&outbox, FromWorker::Setup { id, result })));
         }
-        Ok(ToWorker::Cancel(leases)) => slots.withdraw(&leases),
+        Ok(ToWorker::Cancel(leases)) => {
+            inbox.withdraw(&leases, outbox);
+            slots.withdraw(&leases);
+        }
         Ok(ToWorker::Drain(reason)) => return Err(Ended::Drained(reason)),
         Ok(ToWorker::Window | ToWorker::Heartbeat | ToWorker::Welcome(_) | ToWorker::Refuse(_)) => {}
         Err(error) => return Err(Ended::Lost(format!("the coordinator sent a malformed message: {error}"))),
@@ -153,15 +160,23 @@ mod tests {
     use std::sync::Arc;
 
     use starlings_models::{BuildSetup, Job, Setup, Window};
-    use starlings_proto::{JobEncoder, Lease, SentWindows, encode_setup};
+    use starlings_proto::generated::fleet_client::FleetClient;
+    use starlings_proto::{JobEncoder, Lease, SentWindows, State, encode_setup};
     use tokio::sync::mpsc::unbounded_channel;
 
     use super::*;
+    use crate::transfer::Transfers;
 
     /// A run of the oscillator to time 1.
-    fn job() -> Job {
+    fn job() -> Job<State> {
         let window = Window { start: 0.0, times: vec![1.0], observed: vec![f64::NAN], inputs: vec![] };
         Job { particle: 0, record: 0, window: Arc::new(window), theta: vec![], state: None }
+    }
+
+    /// No state travels.
+    fn inbox() -> Inbox {
+        let channel = tonic::transport::Endpoint::from_static("http://nowhere").connect_lazy();
+        Inbox::new(Transfers::new(FleetClient::new(channel), 1, 1), 1)
     }
 
     fn oscillator() -> Setup {
@@ -177,7 +192,10 @@ mod tests {
         let (slots, setups) =
             (Slots::start(1).unwrap(), Setups::new(Arc::new(|setup: &Setup| setup.build())));
         let mut windows = ReceivedWindows::default();
-        let mut take = |message| take(Ok(Some(message)), &outbox, &mut windows, &slots, &setups).unwrap();
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+        let inbox = runtime.block_on(async { inbox() });
+        let mut take =
+            |message| take(Ok(Some(message)), &outbox, &mut windows, &slots, &setups, &inbox).unwrap();
         let mut next = || FromWorker::decode(sent.blocking_recv().expect("an answer")).unwrap();
         let (id, json) = encode_setup(&oscillator()).unwrap();
         let mut encoder = JobEncoder::default();

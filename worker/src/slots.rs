@@ -13,7 +13,10 @@ use starlings_models::{Forward, Job, ModelFailure, ParticleError};
 use starlings_proto::spent::spent;
 use starlings_proto::words::panic_text;
 use starlings_proto::{FromWorker, Lease, LeaseOutcome, generated};
+use tokio::sync::OwnedSemaphorePermit;
 use tokio::sync::mpsc::UnboundedSender;
+
+use crate::transfer::Transfers;
 
 /// One job with everything needed to run and answer it. The outbox belongs to the stream that gave the lease: once that
 /// stream is gone, so is the answer.
@@ -22,9 +25,14 @@ pub(crate) struct Task {
     pub(crate) forward: Arc<dyn Forward>,
     pub(crate) job: Job,
     pub(crate) outbox: UnboundedSender<generated::FromWorker>,
+    /// The way of a large end state.
+    pub(crate) transfers: Transfers,
+    /// What a large state takes of the room for jobs that have not started.
+    pub(crate) room: Option<OwnedSemaphorePermit>,
 }
 
 /// The slots of this process.
+#[derive(Clone)]
 pub(crate) struct Slots {
     shared: Arc<Shared>,
 }
@@ -134,7 +142,8 @@ impl Shared {
     }
 
     fn work(&self) {
-        while let Some(Task { lease, forward, job, outbox }) = self.next() {
+        while let Some(Task { lease, forward, job, outbox, transfers, room }) = self.next() {
+            drop(room);
             self.running.fetch_add(1, Ordering::Relaxed);
             let started = Instant::now();
             let result = catch_unwind(AssertUnwindSafe(|| forward.run_within(&job, &spent())))
@@ -143,6 +152,8 @@ impl Shared {
             self.running.fetch_sub(1, Ordering::Relaxed);
             let counter = if result.is_ok() { &self.predictions } else { &self.failures };
             counter.fetch_add(1, Ordering::Relaxed);
+            drop(job);
+            let result = result.and_then(|prediction| transfers.sendable(lease, prediction));
             answer(&outbox, lease, LeaseOutcome::Ran(result), cost);
         }
     }

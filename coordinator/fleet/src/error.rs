@@ -4,6 +4,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use starlings_proto::ProtocolError;
+use starlings_states::StateError;
 
 /// A failure of the fleet as a whole; a failed job is an [`super::Outcome`].
 #[derive(Debug, thiserror::Error)]
@@ -91,9 +92,18 @@ pub enum FleetError {
         /// What happened.
         reason: String,
     },
+    /// A large state of a particle cannot be kept or read.
+    #[error("{0}")]
+    State(String),
     /// The network thread ended although nobody closed the fleet.
     #[error("the fleet's network stopped: {0}")]
     Stopped(String),
+}
+
+impl From<StateError> for FleetError {
+    fn from(error: StateError) -> Self {
+        Self::State(error.to_string())
+    }
 }
 
 fn in_brackets(text: &str) -> String {

@@ -11,15 +11,15 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use starlings_models::{BuildSetup, Job, Setup};
-use starlings_proto::convert::job::check_size;
-use starlings_proto::{JobEncoder, MAX_MESSAGE, SetupId, encode_setup, own_build};
+use starlings_proto::convert::job::{check_size, check_state};
+use starlings_proto::{JobEncoder, MAX_MESSAGE, SetupId, State, encode_setup, own_build};
 use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
 use tokio_util::sync::CancellationToken;
 
 use super::dispatcher::{BatchError, Event, Rules};
 use super::hub::{Hub, Reply, Submission};
 use super::network::{self, Ways};
-use super::{Fleet, FleetError, FleetEvent, Outcome};
+use super::{Fleet, FleetError, FleetEvent, Held, Outcome, StateError, StateStore};
 
 /// How often a waiting caller checks that the network thread lives.
 const ALIVE_CHECK: Duration = Duration::from_secs(1);
@@ -43,6 +43,8 @@ pub struct FleetConfig {
     pub cancel: CancellationToken,
     /// Where events go.
     pub events: Sender<FleetEvent>,
+    /// Where states are kept that are too large to travel inside a message.
+    pub states: StateStore,
 }
 
 impl FleetConfig {
@@ -62,6 +64,7 @@ impl FleetConfig {
             build: own_build(),
             cancel,
             events,
+            states: StateStore::new(StateStore::MEMORY),
         }
     }
 }
@@ -129,7 +132,7 @@ impl GrpcFleet {
             patience: config.patience,
             max_attempts: config.max_attempts,
         };
-        let hub = Arc::new(Hub::new(config.run_name, config.build, rules, config.events));
+        let hub = Arc::new(Hub::new(config.run_name, config.build, rules, config.events, config.states));
         let stop = CancellationToken::new();
         let (batches, submitted) = unbounded_channel();
         let (adopted, ends) = unbounded_channel();
@@ -163,7 +166,7 @@ impl GrpcFleet {
         drop(self);
     }
 
-    fn wait(&self, replies: &mpsc::Receiver<Reply>) -> Result<Vec<Outcome>, FleetError> {
+    fn wait(&self, replies: &mpsc::Receiver<Reply>) -> Result<Vec<Outcome<Held>>, FleetError> {
         loop {
             match replies.recv_timeout(ALIVE_CHECK) {
                 Ok(reply) => return reply.map_err(|error| self.explain(error)),
@@ -184,6 +187,36 @@ impl GrpcFleet {
         }
     }
 
+    /// Runs jobs whose states may be in the store; those of the outcomes are there where they are large.
+    fn run_all(&self, jobs: Vec<(SetupId, Job<Held>)>) -> Result<Vec<Outcome<Held>>, FleetError> {
+        for (_, job) in &jobs {
+            check_size(job).map_err(FleetError::TooLarge)?;
+            check_state(job.state.as_ref().map_or(0, Held::n_state)).map_err(FleetError::TooLarge)?;
+        }
+        if !self.hub.knows(jobs.iter().map(|(setup, _)| setup)) {
+            return Err(FleetError::UnknownSetup);
+        }
+        let mut states = Vec::new();
+        let mut travelling = |held: Held| {
+            Ok(match held.into_travelling(self.hub.states())? {
+                Held::Values(values) => State::Values(values),
+                Held::Stored(state) => {
+                    let id = state.id();
+                    states.push(state);
+                    State::Named(id)
+                }
+            })
+        };
+        let jobs = jobs.into_iter().map(|(setup, job)| Ok((setup, job.try_map(&mut travelling)?)));
+        let jobs = jobs.collect::<Result<Vec<_>, StateError>>()?;
+        let (reply, replies) = mpsc::channel();
+        // Here and not under the hub's lock.
+        let encoder = JobEncoder::of(jobs.iter().map(|(_, job)| job));
+        let sent = self.batches.send(Submission { jobs, _states: states, encoder, reply });
+        sent.map_err(|_| FleetError::Stopped(self.hub.why_stopped()))?;
+        self.wait(&replies)
+    }
+
     fn has_ended(&self) -> bool {
         self.network.as_ref().is_none_or(JoinHandle::is_finished)
     }
@@ -197,6 +230,7 @@ impl GrpcFleet {
             BatchError::SetupFailed { reason } => FleetError::SetupFailed { reason },
             BatchError::LocalWorkers(reason) => FleetError::LocalWorkers(reason),
             BatchError::Stopped(reason) => FleetError::Stopped(reason),
+            BatchError::State(reason) => FleetError::State(reason),
             BatchError::Unavailable { waited, reasons } => {
                 FleetError::Unavailable { waited: waited.as_secs_f64(), reasons }
             }
@@ -228,18 +262,18 @@ impl Fleet for GrpcFleet {
     }
 
     fn run_mixed(&mut self, jobs: Vec<(SetupId, Job)>) -> Result<Vec<Outcome>, FleetError> {
-        for (_, job) in &jobs {
-            check_size(job).map_err(FleetError::TooLarge)?;
-        }
-        if !self.hub.knows(jobs.iter().map(|(setup, _)| setup)) {
-            return Err(FleetError::UnknownSetup);
-        }
-        let (reply, replies) = mpsc::channel();
-        // Here and not under the hub's lock.
-        let encoder = JobEncoder::of(jobs.iter().map(|(_, job)| job));
-        let sent = self.batches.send(Submission { jobs, encoder, reply });
-        sent.map_err(|_| FleetError::Stopped(self.hub.why_stopped()))?;
-        self.wait(&replies)
+        let held = |values| Ok::<_, FleetError>(Held::Values(values));
+        let jobs = jobs.into_iter().map(|(setup, job)| Ok((setup, job.try_map(held)?)));
+        let outcomes = self.run_all(jobs.collect::<Result<_, FleetError>>()?)?;
+        outcomes.into_iter().map(|outcome| Ok(outcome.try_map(Held::into_values)?)).collect()
+    }
+
+    fn run_held(&mut self, jobs: Vec<(SetupId, Job<Held>)>) -> Result<Vec<Outcome<Held>>, FleetError> {
+        self.run_all(jobs)
+    }
+
+    fn states(&self) -> Option<&StateStore> {
+        Some(self.hub.states())
     }
 
     fn n_workers(&self) -> usize {

@@ -6,6 +6,7 @@
 
 mod arrival;
 mod state;
+mod states;
 #[cfg(test)]
 mod tests;
 
@@ -21,7 +22,7 @@ use tonic::Status;
 use super::dispatcher::message::hex;
 use super::dispatcher::{BatchError, Event, Joining, Rules, WorkerId};
 use super::job_name::JobName;
-use super::{FleetEvent, Outcome};
+use super::{FleetEvent, Held, Outcome, StateStore};
 pub(super) use state::{Closed, Submission};
 use state::{Link, SetupShape, State};
 
@@ -29,7 +30,7 @@ use state::{Link, SetupShape, State};
 pub(super) type Outgoing = Result<generated::ToWorker, Status>;
 
 /// Answer to the caller of a batch.
-pub(super) type Reply = Result<Vec<Outcome>, BatchError>;
+pub(super) type Reply = Result<Vec<Outcome<Held>>, BatchError>;
 
 /// Shared by the network thread and the callers.
 pub(super) struct Hub {
@@ -39,6 +40,7 @@ pub(super) struct Hub {
     heartbeat: Duration,
     build: Option<[u8; 32]>,
     max_attempts: u32,
+    store: StateStore,
     /// Woken whenever a link ends.
     pub(super) link_ended: Notify,
 }
@@ -49,10 +51,11 @@ impl Hub {
         build: Option<[u8; 32]>,
         rules: Rules,
         events: Sender<FleetEvent>,
+        store: StateStore,
     ) -> Self {
         // Epochs start anywhere, so that answers to an earlier coordinator on the same port carry none of this one's.
         let first_epoch = std::hash::RandomState::new().build_hasher().finish() >> 1;
-        let state = State::new(first_epoch, rules, events);
+        let state = State::new(first_epoch, rules, events, store.clone());
         Self {
             state: Mutex::new(state),
             started: Instant::now(),
@@ -60,6 +63,7 @@ impl Hub {
             heartbeat: rules.heartbeat,
             build,
             max_attempts: rules.max_attempts,
+            store,
             link_ended: Notify::new(),
         }
     }
@@ -116,6 +120,7 @@ impl Hub {
         }
         let jobs = batch.jobs.iter().map(|(setup, job)| (*setup, JobName::of(job))).collect();
         state.handle(now, Event::Abort(BatchError::Cancelled));
+        state.states.forget();
         state.running = Some(batch);
         state.handle(now, Event::Submit { jobs });
     }
@@ -140,6 +145,7 @@ impl Hub {
         };
         let _ = link.send(Ok(ToWorker::welcome(welcome)));
         state.links.insert(id, Link::new(link, hello.pid));
+        state.states.joined(id, hello.nonce, hello.slots);
         let name = format!("{}@{}/{}", state.joined, hello.host, hello.pid);
         let Hello { cores, slots, host, pid, nonce, build, .. } = hello;
         let other = state.other_build(self.build, build).map(|(own, build)| FleetEvent::OtherBuild {
@@ -163,6 +169,7 @@ impl Hub {
         }
         let mut state = self.lock();
         state.links.remove(&worker);
+        state.states.left(worker);
         state.handle(now, Event::Left { worker, reason, clean });
         drop(state);
         self.link_ended.notify_waiters();

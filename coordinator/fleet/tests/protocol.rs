@@ -11,7 +11,9 @@ use fleet_kit::{
 use starlings_fleet::{Fleet, FleetEvent};
 use starlings_models::Setup;
 use starlings_proto::generated::{self, fleet_client::FleetClient};
-use starlings_proto::{FromWorker, Hello, Lease, LeaseOutcome, PROTOCOL, ReceivedWindows, ToWorker, VERSION};
+use starlings_proto::{
+    FromWorker, Hello, Lease, LeaseOutcome, PROTOCOL, ReceivedWindows, State, ToWorker, VERSION,
+};
 use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
 use tokio_stream::wrappers::UnboundedReceiverStream;
 use tonic::Streaming;
@@ -53,7 +55,7 @@ impl Hand {
         while jobs.len() < n {
             match self.hear().await.expect("still connected") {
                 ToWorker::Setup { id, .. } => self.say(FromWorker::Setup { id, result: Ok(()) }),
-                ToWorker::Job { lease, job, .. } => jobs.push((lease, job)),
+                ToWorker::Job { lease, job, .. } => jobs.push((lease, job.try_map(inside).unwrap())),
                 _ => {}
             }
         }
@@ -66,8 +68,14 @@ impl Hand {
     }
 
     fn answer(&self, lease: Lease, job: &starlings_models::Job) {
-        self.say(FromWorker::Result { lease, answer: LeaseOutcome::Ran(Ok(square(job))), cost: 1.0 });
+        let answer = square(job).try_map(|values| Ok::<_, ()>(State::from(values))).unwrap();
+        self.say(FromWorker::Result { lease, answer: LeaseOutcome::Ran(Ok(answer)), cost: 1.0 });
     }
+}
+
+/// A state that came inside its job.
+fn inside(state: State) -> Result<Vec<f64>, State> {
+    if let State::Values(values) = state { Ok(values) } else { Err(state) }
 }
 
 fn hello() -> Hello {

@@ -3,7 +3,7 @@
 use bytes::Bytes;
 use starlings_models::{ModelFailure, ParticleError, Prediction, Timeout};
 
-use super::{Lease, ProtocolError, SetupId, floats, job::check_state, required, setup_id};
+use super::{Lease, ProtocolError, SetupId, State, floats, job::check_inline, required, setup_id, state};
 use crate::MAX_SLOTS;
 use crate::generated::{self, failure, from_worker::Kind, result::Outcome};
 
@@ -32,7 +32,7 @@ pub struct Hello {
 #[derive(Clone, Debug, PartialEq)]
 pub enum LeaseOutcome {
     /// A prediction, or why there is none.
-    Ran(Result<Prediction, ParticleError>),
+    Ran(Result<Prediction<State>, ParticleError>),
     /// The job was withdrawn before it started.
     Withdrawn,
 }
@@ -124,10 +124,14 @@ fn decode_hello(hello: generated::Hello) -> Result<Hello, ProtocolError> {
 fn encode_answer(answer: LeaseOutcome) -> Result<Outcome, ProtocolError> {
     Ok(match answer {
         LeaseOutcome::Ran(Ok(prediction)) => {
-            check_state(&prediction.state)?;
+            if let State::Values(values) = &prediction.state {
+                check_inline(values.len())?;
+            }
+            let (inside, state_id) = state::encode(Some(&prediction.state));
             Outcome::Prediction(generated::Prediction {
                 outputs: floats::encode(&prediction.outputs),
-                state: floats::encode(&prediction.state),
+                state: inside.unwrap_or_default(),
+                state_id,
             })
         }
         LeaseOutcome::Ran(Err(error)) => {
@@ -142,8 +146,7 @@ fn decode_result(result: generated::Result) -> Result<FromWorker, ProtocolError>
     let cost = if result.cost_s > 0.0 && result.cost_s.is_finite() { result.cost_s } else { 0.0 };
     let answer = match required(result.outcome, "outcome")? {
         Outcome::Prediction(p) => {
-            let state = floats::decode(&p.state, "state")?;
-            check_state(&state)?;
+            let state = state::decode(Some(&p.state), p.state_id.as_deref())?.unwrap_or_default();
             LeaseOutcome::Ran(Ok(Prediction { outputs: floats::decode(&p.outputs, "outputs")?, state, cost }))
         }
         Outcome::Failure(failure) => {

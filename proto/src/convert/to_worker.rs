@@ -3,7 +3,9 @@
 use bytes::Bytes;
 use starlings_models::{Job, Setup};
 
-use super::{Lease, ProtocolError, ReceivedWindows, SetupId, decode_setup, job, required, setup_id, windows};
+use super::{
+    Lease, ProtocolError, ReceivedWindows, SetupId, State, decode_setup, job, required, setup_id, windows,
+};
 use crate::generated::{self, to_worker::Kind};
 
 /// The coordinator takes the worker.
@@ -42,7 +44,7 @@ pub enum ToWorker {
         /// The setup to run it with.
         setup: SetupId,
         /// The job.
-        job: Job,
+        job: Job<State>,
     },
     /// Withdraw these jobs if they have not started.
     Cancel(Vec<Lease>),

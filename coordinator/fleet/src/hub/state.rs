@@ -6,15 +6,16 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::mpsc::Sender;
 use std::time::Duration;
 
-use starlings_models::Job;
 use starlings_proto::{
     Bytes, Hello, JobEncoder, Lease, PROTOCOL, SentWindows, SetupId, ToWorker, VERSION, generated,
 };
 use tokio::sync::mpsc::UnboundedSender;
 
+use super::states::States;
 use super::{Outgoing, Reply};
-use crate::FleetEvent;
 use crate::dispatcher::{BatchError, Command, ControlId, Dispatcher, Event, Rules, WorkerId};
+use crate::wire::Job;
+use crate::{FleetEvent, StateStore, StoredState};
 
 /// Guarded by the hub's lock.
 pub(super) struct State {
@@ -25,6 +26,8 @@ pub(super) struct State {
     pub(super) running: Option<Submission>,
     /// Jobs that are known to work, for control runs.
     pub(super) kept: BTreeMap<ControlId, (SetupId, Job)>,
+    /// Large states of jobs and answers.
+    pub(super) states: States,
     pub(super) events: Sender<FleetEvent>,
     pub(super) first_epoch: u64,
     pub(super) joined: u64,
@@ -80,13 +83,15 @@ pub(crate) enum Closed {
 /// A batch and who waits for it.
 pub(crate) struct Submission {
     pub(crate) jobs: Vec<(SetupId, Job)>,
+    /// The states that the jobs name.
+    pub(crate) _states: Vec<StoredState>,
     /// Holds the windows of the jobs as they travel.
     pub(crate) encoder: JobEncoder,
     pub(crate) reply: Sender<Reply>,
 }
 
 impl State {
-    pub(super) fn new(first_epoch: u64, rules: Rules, events: Sender<FleetEvent>) -> Self {
+    pub(super) fn new(first_epoch: u64, rules: Rules, events: Sender<FleetEvent>, store: StateStore) -> Self {
         Self {
             dispatcher: Dispatcher::new(rules),
             links: BTreeMap::new(),
@@ -94,6 +99,7 @@ impl State {
             shapes: BTreeMap::new(),
             running: None,
             kept: BTreeMap::new(),
+            states: States::new(store),
             events,
             first_epoch,
             joined: 0,
@@ -121,7 +127,8 @@ impl State {
     pub(super) fn handle(&mut self, now: Duration, event: Event) {
         let event = match event {
             Event::Answered { worker, lease, answer, cost } => {
-                let answer = self.checked(&lease, answer);
+                let own = lease.epoch == worker.0;
+                let answer = if own { self.checked(&lease, answer) } else { answer };
                 Event::Answered { worker, lease, answer, cost }
             }
             other => other,
@@ -174,17 +181,24 @@ impl State {
             }
             Command::Keep { control, index } => {
                 let job = self.running.as_ref().and_then(|running| running.jobs.get(index));
-                self.kept.extend(job.map(|job| (control, job.clone())));
+                if let Some(job) = job {
+                    self.states.keep(control, &job.1);
+                    self.kept.insert(control, job.clone());
+                }
             }
             Command::Forget { control } => {
                 self.kept.remove(&control);
+                self.states.forget_kept(control);
             }
             Command::Cancel { worker, leases } => self.send(worker, ToWorker::cancel(&leases)),
             // Its stream ends without a word: a worker that still lives dials again.
             Command::Close { worker } => {
                 self.links.remove(&worker);
             }
-            Command::BatchDone(outcomes) => self.reply(Ok(outcomes)),
+            Command::BatchDone(outcomes) => {
+                let outcomes = self.states.held(outcomes);
+                self.reply(outcomes);
+            }
             Command::BatchFailed(mut error) => {
                 if let BatchError::NoControl { index, parameters, .. } = &mut error {
                     let named = self.parameters(*index);
@@ -225,6 +239,7 @@ impl State {
     pub(super) fn reply(&mut self, reply: Reply) {
         if let Some(running) = self.running.take() {
             let _ = running.reply.send(reply);
+            self.states.forget();
         }
     }
 }

@@ -34,7 +34,16 @@ fn hello(pid: u32, build: Option<[u8; 32]>) -> Hello {
 fn hub(build: Option<[u8; 32]>) -> (Hub, Receiver<FleetEvent>) {
     let (sender, events) = mpsc::channel();
     let (heartbeat, patience) = (Duration::from_secs(8), Duration::from_secs(300));
-    (Hub::new("test".to_owned(), build, Rules { heartbeat, patience, max_attempts: 5 }, sender), events)
+    (
+        Hub::new(
+            "test".to_owned(),
+            build,
+            Rules { heartbeat, patience, max_attempts: 5 },
+            sender,
+            StateStore::new(0),
+        ),
+        events,
+    )
 }
 
 fn batch(hub: &Hub) -> (Submission, Receiver<Reply>) {
@@ -49,7 +58,10 @@ fn batch(hub: &Hub) -> (Submission, Receiver<Reply>) {
         state: None,
     };
     let (reply, replies) = mpsc::channel();
-    (Submission { jobs: vec![(setup, job)], encoder: JobEncoder::default(), reply }, replies)
+    (
+        Submission { jobs: vec![(setup, job)], _states: Vec::new(), encoder: JobEncoder::default(), reply },
+        replies,
+    )
 }
 
 #[test]

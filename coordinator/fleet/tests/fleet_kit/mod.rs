@@ -92,10 +92,19 @@ pub fn private() -> (GrpcFleet, Receiver<FleetEvent>, CancellationToken) {
 }
 
 fn start(address: Option<SocketAddr>) -> (GrpcFleet, Receiver<FleetEvent>, CancellationToken) {
+    start_with(address, |_| {})
+}
+
+/// The same, with other numbers.
+pub fn start_with(
+    address: Option<SocketAddr>,
+    change: impl FnOnce(&mut FleetConfig),
+) -> (GrpcFleet, Receiver<FleetEvent>, CancellationToken) {
     let (sender, events) = mpsc::channel();
     let cancel = CancellationToken::new();
     let mut config = FleetConfig::new(address, "test", cancel.clone(), sender);
     config.patience = Duration::from_secs(60);
+    change(&mut config);
     (GrpcFleet::listen(config).expect("a free port"), events, cancel)
 }
 
