@@ -7,8 +7,10 @@ use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
 use clap::Args;
-use starlings_coordinator::fleet::{FleetConfig, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers};
-use starlings_coordinator::study::Study;
+use starlings_coordinator::fleet::{
+    FleetConfig, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers, StateStore,
+};
+use starlings_coordinator::study::{Study, bytes_of};
 use tokio_util::sync::CancellationToken;
 
 use crate::console::note;
@@ -30,6 +32,17 @@ pub(crate) struct FleetArgs {
     /// Allow --listen beyond loopback although the connection is neither encrypted nor authenticated.
     #[arg(long)]
     insecure: bool,
+    /// Memory for states of particles that are larger than 256 KiB, such as "8 GiB"; what is beyond it stands in the run folder.
+    #[arg(long, value_name = "SIZE", default_value = "1 GiB", value_parser = memory)]
+    state_memory: usize,
+}
+
+/// Bytes of an amount such as `8 GiB`.
+fn memory(text: &str) -> Result<usize, String> {
+    let bytes = bytes_of(text).filter(|bytes| (0.0..1e18).contains(bytes));
+    bytes
+        .map(|bytes| bytes as usize)
+        .ok_or_else(|| "expected a number with its unit, such as \"8 GiB\"".to_owned())
 }
 
 /// What was asked for, checked.
@@ -38,6 +51,8 @@ pub(crate) struct Plan {
     address: Option<SocketAddr>,
     /// Workers to start where it does not listen.
     n_worker: usize,
+    /// Bytes for large states.
+    state_memory: usize,
 }
 
 impl FleetArgs {
@@ -50,7 +65,7 @@ impl FleetArgs {
             ));
         }
         let address = self.listen.as_deref().map(|text| self.address(text)).transpose()?;
-        Ok(Plan { address, n_worker })
+        Ok(Plan { address, n_worker, state_memory: self.state_memory })
     }
 
     /// Where to listen, as it was asked for.
@@ -91,6 +106,7 @@ impl FleetSession {
         if let Some(attempts) = study.fleet.max_attempts {
             config.max_attempts = attempts;
         }
+        config.states = StateStore::new(plan.state_memory);
         let fleet = GrpcFleet::listen(config).map_err(Failure::run)?;
         let display = Arc::clone(display);
         let watcher = std::thread::spawn(move || relay(heard, &kept, &display));

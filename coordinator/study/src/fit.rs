@@ -17,5 +17,4 @@ pub(crate) mod settle;
 pub(crate) mod stack;
 mod timeouts;
 
-pub use ensemble::recombine_by;
 pub use settle::LIMIT;

@@ -6,7 +6,7 @@
 use std::sync::mpsc::Receiver;
 
 use starlings_estimators::{EstimatorError, Form, Gaussian};
-use starlings_fleet::{Fleet, FleetError, FleetEvent};
+use starlings_fleet::{Fleet, FleetError, FleetEvent, StateError, StateStore};
 use starlings_models::Failure;
 
 use super::constants::{self, HangsOn};
@@ -31,6 +31,9 @@ pub enum RunError {
     /// The store failed.
     #[error(transparent)]
     Store(#[from] StoreError),
+    /// A large state of a particle cannot be kept or read.
+    #[error(transparent)]
+    State(#[from] StateError),
     /// The estimator could not go on.
     #[error(transparent)]
     Estimator(#[from] EstimatorError),
@@ -226,7 +229,12 @@ fn from_start_to_end(
     folder: &mut RunFolder,
     context: &mut RunContext<'_>,
 ) -> Result<Summary, RunError> {
-    let resumed = Snapshot::read(&folder.store, study.records.len())?;
+    let states = fleet.states().cloned().unwrap_or_else(|| StateStore::new(StateStore::MEMORY));
+    if !states.settle(&folder.states()) {
+        return Err(RunError::Internal("states of another run are in the fleet's store".to_owned()));
+    }
+    let resumed = Snapshot::read(&folder.store, study.records.len(), &states)?;
+    states.sweep();
     context.earlier_s = folder.store.elapsed_s()?;
     folder.store.event(
         context.elapsed(),
@@ -277,6 +285,7 @@ fn from_start_to_end(
     result.check_finite().map_err(RunError::NotFinite)?;
     folder.store.event(context.elapsed(), "run", "run finished")?;
     folder.finish(study, &fit, &result)?;
+    states.clear();
     Ok(result)
 }
 

@@ -12,6 +12,7 @@ pub mod folder;
 mod folder_error;
 mod info;
 pub(super) mod json;
+mod kept_states;
 mod make;
 mod meaning;
 mod program;
@@ -25,11 +26,12 @@ mod table;
 #[cfg(test)]
 mod tests;
 
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 use std::path::{Path, PathBuf};
 
 use rusqlite::{Connection, OptionalExtension, Row, params};
 
+use kept_states::KeptStates;
 use schema::{SCHEMA_VERSION, insert_analysis, insert_jobs, insert_predictions};
 use snapshot::{Estimate, Snapshot};
 
@@ -52,6 +54,8 @@ pub struct Store {
     connection: Connection,
     /// Time of the last commit, in s of the run's wall time.
     committed_s: Cell<f64>,
+    /// Large states of the last snapshots.
+    kept: RefCell<KeptStates>,
 }
 
 impl Drop for Store {
@@ -70,6 +74,7 @@ impl Store {
         let store = Self::existing(path, rusqlite::OpenFlags::SQLITE_OPEN_READ_WRITE)?;
         store.keep_a_log()?;
         store.guard(store.connection.execute_batch(remembered::TABLE))?;
+        store.guard(store.connection.execute_batch(kept_states::TABLE))?;
         Ok(store)
     }
 
@@ -110,7 +115,12 @@ impl Store {
     fn connect(path: &Path, flags: rusqlite::OpenFlags) -> Result<Self, StoreError> {
         let connection = Connection::open_with_flags(path, flags)
             .map_err(|source| StoreError::Database { path: path.to_owned(), source })?;
-        Ok(Self { path: path.to_owned(), connection, committed_s: Cell::new(f64::NEG_INFINITY) })
+        Ok(Self {
+            path: path.to_owned(),
+            connection,
+            committed_s: Cell::new(f64::NEG_INFINITY),
+            kept: RefCell::default(),
+        })
     }
 
     /// WAL with NORMAL keeps every committed transaction through a killed process at the price of one write each.
@@ -213,6 +223,8 @@ impl Store {
         if written.is_err() {
             // The first failure is returned.
             let _ = self.commit();
+        } else {
+            self.kept.borrow_mut().wrote(snapshot.stored());
         }
         self.guard(written)
     }
@@ -225,7 +237,10 @@ impl Store {
         if self.connection.is_autocommit() {
             return Ok(());
         }
-        self.guard(self.connection.execute_batch("COMMIT"))
+        self.kept.borrow_mut().before_commit()?;
+        self.guard(self.connection.execute_batch("COMMIT"))?;
+        self.kept.borrow_mut().after_commit();
+        Ok(())
     }
 
     /// [`Store::commit`], if the last one was [`HOLD_S`] or longer ago; `now_s` is the run's wall time.
@@ -233,7 +248,7 @@ impl Store {
     /// # Errors
     /// When the database refuses.
     pub(crate) fn commit_if_due(&self, now_s: f64) -> Result<(), StoreError> {
-        if now_s - self.committed_s.get() >= HOLD_S {
+        if now_s - self.committed_s.get() >= HOLD_S.max(self.kept.borrow().hold_s()) {
             self.note_elapsed(now_s)?;
             self.commit()?;
             self.committed_s.set(now_s);

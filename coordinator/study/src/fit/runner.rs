@@ -7,10 +7,11 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
-use starlings_fleet::{Fleet, FleetError, Outcome, SetupId};
+use starlings_fleet::{Fleet, FleetError, Held, Outcome, SetupId};
 use starlings_models::{BuildSetup, Failure, Job, Prediction, Setup, Window};
 
 use super::timeouts::Timeouts;
+use crate::states::States;
 use crate::store::{JobRow, Store};
 use crate::trial::named;
 use crate::{RunError, Study};
@@ -28,7 +29,10 @@ pub(crate) struct AnalysisIndex {
 }
 
 /// A prediction per particle and window, or why there is none: a failure of the model, or the limit of wall time.
-pub(crate) type Results = Vec<Vec<Result<Prediction, Failure>>>;
+pub(crate) type Results = Vec<Vec<Predicted>>;
+
+/// A prediction, or why there is none.
+pub(crate) type Predicted = Result<Prediction<Held>, Failure>;
 
 /// Sends runs to a fleet and keeps their rows for the store.
 pub(crate) struct EnsembleRunner<'a> {
@@ -92,7 +96,7 @@ impl<'a> EnsembleRunner<'a> {
     }
 
     /// Runs the given particles over the windows and gives back what the study's channels measure of them. `theta` is p × r in
-    /// transformed units, `states[record]` is n × r or `None` at a record's start. Returns `[particle in the order
+    /// transformed units, `states[record]` has a state per particle or `None` at a record's start. Returns `[particle in the order
     /// given][window]`.
     ///
     /// # Errors
@@ -102,7 +106,7 @@ impl<'a> EnsembleRunner<'a> {
         at: AnalysisIndex,
         particles: &[usize],
         theta: &DMatrix<f64>,
-        states: &[Option<DMatrix<f64>>],
+        states: &[Option<States>],
         windows: &StepWindows,
     ) -> Result<Results, RunError> {
         let sent: StepWindows =
@@ -116,7 +120,7 @@ impl<'a> EnsembleRunner<'a> {
                 record: *record as u32,
                 window: Arc::clone(window),
                 theta: study.theta_for(*record, column.as_slice()),
-                state: states[*record].as_ref().map(|x| x.column(particle).iter().copied().collect()),
+                state: states[*record].as_ref().map(|x| x.held(particle)),
             }
         };
         let n_job = particles.len() * sent.len();
@@ -170,7 +174,7 @@ impl<'a> EnsembleRunner<'a> {
             }
         }
         self.total += jobs.len() as u64;
-        let outcomes = self.fleet.run_mixed(jobs).map_err(|error| told(self.study, error, |_| None))?;
+        let outcomes = self.fleet.run_held(jobs).map_err(|error| told(self.study, error, |_| None))?;
         let mut outcomes = outcomes.into_iter();
         let mut results = Vec::with_capacity(setups.len());
         for particle in 0..setups.len() {
@@ -195,7 +199,7 @@ impl<'a> EnsembleRunner<'a> {
     }
 
     /// The outputs that the study asked for, of those that the solver gave.
-    fn picked(&self, record: usize, window: &Window, prediction: Prediction) -> Prediction {
+    fn picked(&self, record: usize, window: &Window, prediction: Prediction<Held>) -> Prediction<Held> {
         let outputs = self.study.picked(record, window, prediction.outputs);
         Prediction { outputs, ..prediction }
     }
@@ -205,11 +209,11 @@ impl<'a> EnsembleRunner<'a> {
         &mut self,
         at: AnalysisIndex,
         n_job: usize,
-        job: impl Fn(usize) -> Job,
-    ) -> Result<Vec<Outcome>, RunError> {
+        job: impl Fn(usize) -> Job<Held>,
+    ) -> Result<Vec<Outcome<Held>>, RunError> {
         // The forward run with the estimate decides nothing about a sigma point: it is tried anew.
         let mut timeouts = self.timeouts.as_mut().filter(|_| at.pass > 0);
-        let mut known: Vec<Option<Outcome>> = match &timeouts {
+        let mut known: Vec<Option<Outcome<Held>>> = match &timeouts {
             Some(timeouts) if !timeouts.is_empty() => {
                 (0..n_job).map(|index| timeouts.known(&self.setup, &job(index))).collect()
             }
@@ -219,7 +223,7 @@ impl<'a> EnsembleRunner<'a> {
         if open.is_empty() {
             return Ok(known.into_iter().flatten().collect());
         }
-        let outcomes = self.fleet.run(self.setup, open.iter().map(|index| job(*index)).collect());
+        let outcomes = self.fleet.run_held(open.iter().map(|index| (self.setup, job(*index))).collect());
         let values = |at: usize| open.get(at).map(|index| named(self.study, &job(*index).theta));
         for (index, outcome) in open.iter().zip(outcomes.map_err(|error| told(self.study, error, values))?) {
             if let (Some(timeouts), Err(Failure::Timeout(timeout))) = (&mut timeouts, &outcome.result) {
@@ -233,13 +237,13 @@ impl<'a> EnsembleRunner<'a> {
     /// A prediction of another length is an error of the run, not a failure of the particle.
     fn check(
         &self,
-        prediction: &Prediction,
+        prediction: &Prediction<Held>,
         record: usize,
         particle: usize,
         theta: &DMatrix<f64>,
         window: &Window,
     ) -> Result<(), RunError> {
-        let (outputs, state) = (prediction.outputs.len(), prediction.state.len());
+        let (outputs, state) = (prediction.outputs.len(), prediction.state.n_state());
         let reason = if outputs != window.observed.len() {
             format!("{outputs} predicted values where {} were asked for", window.observed.len())
         } else if let Some(wanted) = self.n_state.filter(|n| *n != state) {
@@ -252,7 +256,7 @@ impl<'a> EnsembleRunner<'a> {
         Err(RunError::NoAnswer { particle, record: self.study.records[record].name.clone(), values, reason })
     }
 
-    fn row(&self, at: AnalysisIndex, record: usize, particle: usize, outcome: &Outcome) -> JobRow {
+    fn row(&self, at: AnalysisIndex, record: usize, particle: usize, outcome: &Outcome<Held>) -> JobRow {
         JobRow {
             pass: at.pass,
             step: at.step,

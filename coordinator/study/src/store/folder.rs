@@ -85,6 +85,11 @@ impl RunFolder {
         Ok(Self { path: path.to_owned(), store: Store::open_to_read(&path.join(DATABASE))?, _lock: None })
     }
 
+    /// Where the states of particles stand that are too large for the database.
+    pub(crate) fn states(&self) -> PathBuf {
+        self.path.join("states")
+    }
+
     /// What the folder is for.
     ///
     /// # Errors
@@ -105,6 +110,7 @@ impl RunFolder {
     pub(crate) fn finish(&mut self, study: &Study, fit: &Fit, summary: &Summary) -> Result<(), StoreError> {
         let posterior =
             posterior::to_csv(study, &fit.posterior).map_err(|e| self.store.damaged("posterior", e))?;
+        self.store.forget_states()?;
         self.store.set_meta("posterior", &posterior)?;
         self.store.set_meta("summary", &json(summary))?;
         // The log stays open while another process reads the database; the run is finished all the same.
