@@ -2,6 +2,8 @@
 //!
 //! What arrives is checked by its name, piece by piece. Next file to read: `inbox`, for when states are asked for.
 
+use std::sync::Arc;
+
 use starlings_models::{ParticleError, Prediction};
 use starlings_proto::convert::floats;
 use starlings_proto::convert::state::{
@@ -12,10 +14,13 @@ use starlings_proto::generated::{self, fleet_client::FleetClient};
 use starlings_proto::words::status_text;
 use starlings_proto::{Lease, MAX_INLINE_STATE, State, StateId, StateNaming, digest};
 use tokio::runtime::Handle;
-use tokio::sync::{mpsc, oneshot};
+use tokio::sync::{Semaphore, mpsc, oneshot};
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::transport::Channel;
 use tonic::{Status, Streaming};
+
+/// States that are sent at the same time: what they leave of the connection's window is for the messages.
+const LANES: usize = 2;
 
 /// Pieces made ahead of what the network has taken.
 const AHEAD: usize = 4;
@@ -25,6 +30,7 @@ const AHEAD: usize = 4;
 pub(crate) struct Transfers {
     client: FleetClient<Channel>,
     runtime: Handle,
+    lanes: Arc<Semaphore>,
     epoch: u64,
     nonce: u64,
 }
@@ -32,7 +38,7 @@ pub(crate) struct Transfers {
 impl Transfers {
     /// The way over a connection whose worker is taken; called where the network lives.
     pub(crate) fn new(client: FleetClient<Channel>, epoch: u64, nonce: u64) -> Self {
-        Self { client, runtime: Handle::current(), epoch, nonce }
+        Self { client, runtime: Handle::current(), lanes: Arc::new(Semaphore::new(LANES)), epoch, nonce }
     }
 
     /// Asks for a state; its values come when they are read.
@@ -61,8 +67,10 @@ impl Transfers {
     fn put(&self, lease: Lease, values: &[f64]) -> Result<StateId, ParticleError> {
         let (pieces, outgoing) = mpsc::channel(AHEAD);
         let (answer, answered) = oneshot::channel();
-        let mut client = self.client.clone();
+        let (mut client, lanes) = (self.client.clone(), Arc::clone(&self.lanes));
         self.runtime.spawn(async move {
+            // It is never closed.
+            let _lane = lanes.acquire().await;
             let _ = answer.send(client.put(ReceiverStream::new(outgoing)).await);
         });
         let name = send(pieces, PutHead { n_state: values.len(), lease, nonce: self.nonce }, values);
