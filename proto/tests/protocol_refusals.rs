@@ -7,7 +7,7 @@ use starlings_models::{Job, Prediction, Setup, Signal, Window};
 use starlings_proto::{
     FromWorker, JobEncoder, Lease, LeaseOutcome, MAX_INLINE_STATE, MAX_SLOTS, MAX_STATE, ProtocolError,
     ReceivedWindows, SentWindows, State, ToWorker,
-    convert::job::{check_size, check_state},
+    convert::{job::check_size, state::check_state},
     encode_setup, generated,
 };
 

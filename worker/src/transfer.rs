@@ -135,6 +135,7 @@ fn wrong(error: &dyn std::fmt::Display) -> String {
 }
 
 /// Sends a state piece by piece; its name, unless the stream ended before it.
+#[expect(clippy::needless_pass_by_value, reason = "the stream ends with it")]
 fn send(pieces: mpsc::Sender<generated::Chunk>, head: PutHead, values: &[f64]) -> Option<StateId> {
     let mut naming = StateNaming::of(values.len());
     pieces.blocking_send(head.encode()).ok()?;

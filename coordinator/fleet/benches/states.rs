@@ -87,12 +87,12 @@ fn median(sorted: &[Duration]) -> Duration {
 fn pieces() {
     let values: Vec<f64> = (0..VALUES).map(|i| i as f64).collect();
     let best = |work: &mut dyn FnMut()| {
-        let time = |()| {
+        let mut time = || {
             let started = Instant::now();
             work();
             started.elapsed()
         };
-        let fastest = (0..20).map(|_| time(())).min().unwrap_or_default();
+        let fastest = (0..20).map(|_| time()).min().unwrap_or_default();
         8.0 * VALUES as f64 / fastest.as_secs_f64() / 1e9
     };
     let bytes = starlings_proto::convert::floats::encode(&values);
@@ -213,7 +213,10 @@ fn raw(cycles: usize) -> Result<Vec<Duration>, Failure> {
         std::thread::scope(|scope| {
             for (end, _) in &ends {
                 let (mut write, mut read) = (end, end);
-                scope.spawn(move || (0..blocks).try_for_each(|_| write.write_all(&[1; BLOCK])));
+                scope.spawn(move || {
+                    let bytes = vec![1; BLOCK];
+                    (0..blocks).try_for_each(|_| write.write_all(&bytes))
+                });
                 scope.spawn(move || {
                     let mut bytes = vec![0; BLOCK];
                     (0..blocks).try_for_each(|_| read.read_exact(&mut bytes))

@@ -6,6 +6,8 @@ use std::path::PathBuf;
 use starlings_proto::ProtocolError;
 use starlings_states::StateError;
 
+use crate::dispatcher::BatchError;
+
 /// A failure of the fleet as a whole; a failed job is an [`super::Outcome`].
 #[derive(Debug, thiserror::Error)]
 pub enum FleetError {
@@ -98,6 +100,31 @@ pub enum FleetError {
     /// The network thread ended although nobody closed the fleet.
     #[error("the fleet's network stopped: {0}")]
     Stopped(String),
+}
+
+impl FleetError {
+    /// Why a batch ended, of a fleet that listens there.
+    pub(crate) fn of(error: BatchError, address: Option<SocketAddr>) -> Self {
+        match error {
+            BatchError::Cancelled => Self::Cancelled,
+            BatchError::NoWorkers { waited, missing } => {
+                Self::NoWorkers { address, waited: waited.as_secs_f64(), missing }
+            }
+            BatchError::SetupFailed { reason } => Self::SetupFailed { reason },
+            BatchError::LocalWorkers(reason) => Self::LocalWorkers(reason),
+            BatchError::Stopped(reason) => Self::Stopped(reason),
+            BatchError::State(reason) => Self::State(reason),
+            BatchError::Unavailable { waited, reasons } => {
+                Self::Unavailable { waited: waited.as_secs_f64(), reasons }
+            }
+            BatchError::NoControl { particle, record, parameters, reason, .. } => {
+                Self::NoControl { particle, record, parameters, reason }
+            }
+            BatchError::NoAnswer { index, particle, record, reason } => {
+                Self::NoAnswer { job: index, particle, record, reason }
+            }
+        }
+    }
 }
 
 impl From<StateError> for FleetError {

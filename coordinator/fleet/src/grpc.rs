@@ -11,15 +11,15 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use starlings_models::{BuildSetup, Job, Setup};
-use starlings_proto::convert::job::{check_size, check_state};
-use starlings_proto::{JobEncoder, MAX_MESSAGE, SetupId, State, encode_setup, own_build};
+use starlings_proto::{MAX_MESSAGE, SetupId, encode_setup, own_build};
 use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
 use tokio_util::sync::CancellationToken;
 
-use super::dispatcher::{BatchError, Event, Rules};
+use super::dispatcher::{Event, Rules};
 use super::hub::{Hub, Reply, Submission};
 use super::network::{self, Ways};
-use super::{Fleet, FleetError, FleetEvent, Held, Outcome, StateError, StateStore};
+use super::travel::submission;
+use super::{Fleet, FleetError, FleetEvent, Held, Outcome, StateStore};
 
 /// How often a waiting caller checks that the network thread lives.
 const ALIVE_CHECK: Duration = Duration::from_secs(1);
@@ -169,7 +169,7 @@ impl GrpcFleet {
     fn wait(&self, replies: &mpsc::Receiver<Reply>) -> Result<Vec<Outcome<Held>>, FleetError> {
         loop {
             match replies.recv_timeout(ALIVE_CHECK) {
-                Ok(reply) => return reply.map_err(|error| self.explain(error)),
+                Ok(reply) => return reply.map_err(|error| FleetError::of(error, self.address)),
                 Err(RecvTimeoutError::Disconnected) => {
                     // The batch was dropped by a network that is about to end: what it says then is the reason.
                     let deadline = Instant::now() + ALIVE_CHECK;
@@ -189,58 +189,18 @@ impl GrpcFleet {
 
     /// Runs jobs whose states may be in the store; those of the outcomes are there where they are large.
     fn run_all(&self, jobs: Vec<(SetupId, Job<Held>)>) -> Result<Vec<Outcome<Held>>, FleetError> {
-        for (_, job) in &jobs {
-            check_size(job).map_err(FleetError::TooLarge)?;
-            check_state(job.state.as_ref().map_or(0, Held::n_state)).map_err(FleetError::TooLarge)?;
-        }
         if !self.hub.knows(jobs.iter().map(|(setup, _)| setup)) {
             return Err(FleetError::UnknownSetup);
         }
-        let mut states = Vec::new();
-        let mut travelling = |held: Held| {
-            Ok(match held.into_travelling(self.hub.states())? {
-                Held::Values(values) => State::Values(values),
-                Held::Stored(state) => {
-                    let id = state.id();
-                    states.push(state);
-                    State::Named(id)
-                }
-            })
-        };
-        let jobs = jobs.into_iter().map(|(setup, job)| Ok((setup, job.try_map(&mut travelling)?)));
-        let jobs = jobs.collect::<Result<Vec<_>, StateError>>()?;
         let (reply, replies) = mpsc::channel();
         // Here and not under the hub's lock.
-        let encoder = JobEncoder::of(jobs.iter().map(|(_, job)| job));
-        let sent = self.batches.send(Submission { jobs, _states: states, encoder, reply });
-        sent.map_err(|_| FleetError::Stopped(self.hub.why_stopped()))?;
+        let batch = submission(jobs, self.hub.states(), reply)?;
+        self.batches.send(batch).map_err(|_| FleetError::Stopped(self.hub.why_stopped()))?;
         self.wait(&replies)
     }
 
     fn has_ended(&self) -> bool {
         self.network.as_ref().is_none_or(JoinHandle::is_finished)
-    }
-
-    fn explain(&self, error: BatchError) -> FleetError {
-        match error {
-            BatchError::Cancelled => FleetError::Cancelled,
-            BatchError::NoWorkers { waited, missing } => {
-                FleetError::NoWorkers { address: self.address, waited: waited.as_secs_f64(), missing }
-            }
-            BatchError::SetupFailed { reason } => FleetError::SetupFailed { reason },
-            BatchError::LocalWorkers(reason) => FleetError::LocalWorkers(reason),
-            BatchError::Stopped(reason) => FleetError::Stopped(reason),
-            BatchError::State(reason) => FleetError::State(reason),
-            BatchError::Unavailable { waited, reasons } => {
-                FleetError::Unavailable { waited: waited.as_secs_f64(), reasons }
-            }
-            BatchError::NoControl { particle, record, parameters, reason, .. } => {
-                FleetError::NoControl { particle, record, parameters, reason }
-            }
-            BatchError::NoAnswer { index, particle, record, reason } => {
-                FleetError::NoAnswer { job: index, particle, record, reason }
-            }
-        }
     }
 }
 

@@ -9,6 +9,7 @@ mod state;
 mod states;
 #[cfg(test)]
 mod tests;
+mod transfers;
 
 use std::hash::{BuildHasher, Hasher};
 use std::sync::mpsc::Sender;

@@ -28,7 +28,9 @@ pub use in_process::InProcess;
 pub use local_workers::{LocalConfig, LocalWorkers};
 pub use starlings_models::Factory;
 pub use starlings_proto::{ProtocolError, SetupId};
-pub use starlings_states::{CHUNK_VALUES, Held, StateError, StateStore, StateWriter, StoredState, n_chunks};
+pub use starlings_states::{
+    CHUNK_VALUES, Held, StateError, StateStore, StateWriter, StoredState, hex, n_chunks,
+};
 pub use travel::travels;
 
 use starlings_models::{Failure, Job, Prediction, Setup};

@@ -1,10 +1,16 @@
-//! Whether a run fits in the messages between coordinator and workers, asked before there are any.
+//! What travels between coordinator and workers: whether a run can, and the jobs of a batch as they do.
 //!
 //! Next file to read: the module `convert` of `starlings-proto`, which holds the limits.
 
+use std::sync::mpsc::Sender;
+
 use starlings_models::{Job, Prediction};
-use starlings_proto::ProtocolError;
-use starlings_proto::convert::job::{check_size, check_state};
+use starlings_proto::convert::job::check_size;
+use starlings_proto::convert::state::check_state;
+use starlings_proto::{JobEncoder, ProtocolError, SetupId, State};
+
+use crate::hub::{Reply, Submission};
+use crate::{FleetError, Held, StateError, StateStore};
 
 /// Whether a job and its prediction can travel.
 ///
@@ -13,6 +19,33 @@ use starlings_proto::convert::job::{check_size, check_state};
 pub fn travels(job: &Job, prediction: &Prediction) -> Result<(), ProtocolError> {
     check_size(job)?;
     check_state(prediction.state.len())
+}
+
+/// A batch as it travels; large states are in the store and stay there until it is over.
+pub(crate) fn submission(
+    jobs: Vec<(SetupId, Job<Held>)>,
+    store: &StateStore,
+    reply: Sender<Reply>,
+) -> Result<Submission, FleetError> {
+    for (_, job) in &jobs {
+        check_size(job).map_err(FleetError::TooLarge)?;
+        check_state(job.state.as_ref().map_or(0, Held::n_state)).map_err(FleetError::TooLarge)?;
+    }
+    let mut states = Vec::new();
+    let mut travelling = |held: Held| {
+        Ok(match held.into_travelling(store)? {
+            Held::Values(values) => State::Values(values),
+            Held::Stored(state) => {
+                let id = state.id();
+                states.push(state);
+                State::Named(id)
+            }
+        })
+    };
+    let jobs = jobs.into_iter().map(|(setup, job)| Ok((setup, job.try_map(&mut travelling)?)));
+    let jobs = jobs.collect::<Result<Vec<_>, StateError>>()?;
+    let encoder = JobEncoder::of(jobs.iter().map(|(_, job)| job));
+    Ok(Submission { jobs, _states: states, encoder, reply })
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ mod fleet_kit;
 use std::time::Duration;
 
 use fleet_kit::{Proxy, ThreadWorker, any_port, factory, start_with};
-use starlings_fleet::{Fleet, FleetError, GrpcFleet, Held, Outcome, StateStore};
+use starlings_fleet::{Fleet, FleetError, GrpcFleet, Held, Outcome, StateStore, hex};
 use starlings_models::{Job, Prediction, Setup, Window};
 use starlings_worker::Factory;
 
@@ -130,7 +130,7 @@ fn a_state_that_is_damaged_in_its_folder_ends_the_batch_with_its_name() {
     let _worker = ThreadWorker::start(address, models());
     let setup = fleet.install(&Setup::default()).unwrap();
     let state = store.keep(jobs(1)[0].state.as_ref().unwrap()).unwrap();
-    let name = state.pieces()[1].iter().map(|byte| format!("{byte:02x}")).collect::<String>();
+    let name = hex(&state.pieces()[1]);
     std::fs::write(scratch.path().join(&name), vec![0; BYTES]).unwrap();
     let job = jobs(1).remove(0);
     let job =

@@ -222,14 +222,9 @@ fn a_hoarder_has_no_more_transfers_than_its_slots_can_need() {
             let put = tokio::spawn(async move { client.put(UnboundedReceiverStream::new(messages)).await });
             begun.push((sender, put));
             // The ones before wait for pieces; one that is refused ends.
-            match tokio::time::timeout(
-                std::time::Duration::from_millis(300),
-                &mut begun.last_mut().unwrap().1,
-            )
-            .await
-            {
-                Ok(ended) => break ended.unwrap().unwrap_err(),
-                Err(_) => {}
+            let last = &mut begun.last_mut().unwrap().1;
+            if let Ok(ended) = tokio::time::timeout(std::time::Duration::from_millis(300), last).await {
+                break ended.unwrap().unwrap_err();
             }
         };
         assert_eq!(refused.code(), Code::ResourceExhausted);

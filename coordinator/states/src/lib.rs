@@ -7,6 +7,7 @@
 mod error;
 mod folder;
 mod held;
+mod shared;
 pub mod store;
 mod stored;
 mod table;

@@ -1,33 +1,24 @@
 //! The store: pieces by name, in memory up to a limit, in the folder beyond it.
 //!
 //! When memory is full, what comes next goes to the folder: every piece is read once or twice and then dropped, so none is worth
-//! more than another. Files are written outside the lock and put into their place inside it. Next files to read: `table`, `stored`.
+//! more than another. Next files to read: `shared`, `stored`.
 
 use std::collections::HashSet;
 use std::path::Path;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
-use bytes::Bytes;
 use starlings_proto::StateId;
 use starlings_proto::convert::floats;
 use starlings_proto::convert::state::{CHUNK_VALUES, ChunkId};
 
 use crate::folder::Folder;
-use crate::table::Table;
+use crate::shared::{Shared, lock};
 use crate::{StateError, StateWriter, StoredState, hex};
 
 /// A store of states; clones are the same one.
 #[derive(Clone, Debug)]
 pub struct StateStore {
-    pub(crate) shared: Arc<Shared>,
-}
-
-/// What all clones and all states share.
-#[derive(Debug)]
-pub(crate) struct Shared {
-    memory: usize,
-    folder: Mutex<Option<Arc<Folder>>>,
-    table: Mutex<Table>,
+    shared: Arc<Shared>,
 }
 
 impl StateStore {
@@ -38,6 +29,11 @@ impl StateStore {
     pub fn new(memory: usize) -> Self {
         let shared = Shared { memory, folder: Mutex::default(), table: Mutex::default() };
         Self { shared: Arc::new(shared) }
+    }
+
+    /// The store that holds a state.
+    pub fn of(state: &StoredState) -> Self {
+        Self { shared: Arc::clone(state.shared()) }
     }
 
     /// Says which folder to use from now on; `false` where pieces stand in another one.
@@ -56,7 +52,7 @@ impl StateStore {
 
     /// Begins a state of so many values.
     pub fn writer(&self, n_state: usize) -> StateWriter {
-        StateWriter::new(self, n_state)
+        StateWriter::new(&self.shared, n_state)
     }
 
     /// Keeps a state that is in memory.
@@ -118,81 +114,4 @@ impl StateStore {
     pub fn n_pieces(&self) -> usize {
         self.shared.lock().chunks.len()
     }
-}
-
-impl Shared {
-    pub(crate) fn lock(&self) -> MutexGuard<'_, Table> {
-        lock(&self.table)
-    }
-
-    fn folder(&self) -> Arc<Folder> {
-        Arc::clone(lock(&self.folder).get_or_insert_with(|| Arc::new(Folder::temporary())))
-    }
-
-    /// Keeps a piece, or counts one more use of it.
-    pub(crate) fn put(&self, name: ChunkId, bytes: &Bytes) -> Result<(), StateError> {
-        {
-            let mut table = self.lock();
-            if table.again(&name) || table.remember(name, bytes, self.memory) {
-                return Ok(());
-            }
-        }
-        let folder = self.folder();
-        let written = folder.write(bytes)?;
-        let mut table = self.lock();
-        if table.again(&name) {
-            Folder::discard(&written);
-            return Ok(());
-        }
-        folder.place(&written, &name)?;
-        table.on_disk(name);
-        Ok(())
-    }
-
-    /// Takes note of a piece that the folder has already.
-    pub(crate) fn found(&self, name: ChunkId, bytes: usize) -> Result<(), StateError> {
-        let mut table = self.lock();
-        if !table.again(&name) {
-            self.folder().check(&name, bytes)?;
-            table.on_disk(name);
-        }
-        Ok(())
-    }
-
-    pub(crate) fn read(&self, name: &ChunkId) -> Result<Bytes, StateError> {
-        let held = self.lock().chunks.get(name).and_then(|entry| entry.bytes.clone());
-        held.map_or_else(|| self.folder().read(name), Ok)
-    }
-
-    /// Whether reading a piece takes no file.
-    pub(crate) fn is_in_memory(&self, name: &ChunkId) -> bool {
-        self.lock().chunks.get(name).is_some_and(|entry| entry.bytes.is_some())
-    }
-
-    /// Makes sure that the folder has a piece that is held.
-    pub(crate) fn persist(&self, name: &ChunkId) -> Result<(), StateError> {
-        let bytes = match self.lock().chunks.get(name) {
-            Some(entry) if !entry.on_disk => entry.bytes.clone(),
-            _ => None,
-        };
-        let Some(bytes) = bytes else { return Ok(()) };
-        let folder = self.folder();
-        let written = folder.write(&bytes)?;
-        let mut table = self.lock();
-        folder.place(&written, name)?;
-        if let Some(entry) = table.chunks.get_mut(name) {
-            entry.on_disk = true;
-        }
-        Ok(())
-    }
-
-    pub(crate) fn release(&self, names: &[ChunkId]) {
-        let mut table = self.lock();
-        let folder = lock(&self.folder).clone();
-        names.iter().for_each(|name| table.release(name, folder.as_deref()));
-    }
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,26 +1,17 @@
 //! A state that the store holds: its pieces stay for as long as somebody has it.
 
-use std::sync::{Arc, Weak};
+use std::sync::Arc;
 
 use bytes::Bytes;
 use starlings_proto::StateId;
 use starlings_proto::convert::state::{CHUNK_VALUES, ChunkId};
 
-use crate::store::Shared;
-use crate::{StateError, StateStore};
+use crate::StateError;
+use crate::shared::{Pieces, Shared};
 
 /// A state in the store; clones are the same one, and the last one takes its pieces with it.
 #[derive(Clone, Debug)]
 pub struct StoredState(Arc<Pieces>);
-
-/// The pieces of one state.
-#[derive(Debug)]
-pub(crate) struct Pieces {
-    pub(crate) store: Arc<Shared>,
-    pub(crate) id: StateId,
-    pub(crate) n_state: usize,
-    pub(crate) names: Vec<ChunkId>,
-}
 
 impl PartialEq for StoredState {
     fn eq(&self, other: &Self) -> bool {
@@ -43,9 +34,9 @@ impl StoredState {
         self.0.n_state
     }
 
-    /// The store that holds it.
-    pub fn store(&self) -> StateStore {
-        StateStore { shared: Arc::clone(&self.0.store) }
+    /// What holds it.
+    pub(crate) fn shared(&self) -> &Arc<Shared> {
+        &self.0.store
     }
 
     /// The names of its pieces, in their order.
@@ -107,18 +98,5 @@ impl StoredState {
     /// When the folder refuses.
     pub fn persist(&self) -> Result<(), StateError> {
         self.0.names.iter().try_for_each(|name| self.0.store.persist(name))
-    }
-}
-
-impl Drop for Pieces {
-    fn drop(&mut self) {
-        {
-            let mut table = self.store.lock();
-            // Another one of this name may have come since the last holder of this one went.
-            if table.named.get(&self.id).is_some_and(|held| std::ptr::eq(Weak::as_ptr(held), self)) {
-                table.named.remove(&self.id);
-            }
-        }
-        self.store.release(&self.names);
     }
 }

@@ -8,14 +8,13 @@ use starlings_proto::StateId;
 use starlings_proto::convert::state::ChunkId;
 
 use crate::folder::Folder;
-use crate::stored::Pieces;
 
-/// Guarded by the store's lock.
-#[derive(Debug, Default)]
-pub(crate) struct Table {
+/// Guarded by the store's lock. A state is a `P`.
+#[derive(Debug)]
+pub(crate) struct Table<P> {
     pub(crate) chunks: HashMap<ChunkId, Entry>,
     /// States that somebody holds.
-    pub(crate) named: HashMap<StateId, Weak<Pieces>>,
+    pub(crate) named: HashMap<StateId, Weak<P>>,
     /// Bytes of the pieces in memory.
     pub(crate) in_memory: usize,
     /// Most of them at one time.
@@ -33,7 +32,13 @@ pub(crate) struct Entry {
     pub(crate) on_disk: bool,
 }
 
-impl Table {
+impl<P> Default for Table<P> {
+    fn default() -> Self {
+        Self { chunks: HashMap::new(), named: HashMap::new(), in_memory: 0, most: 0 }
+    }
+}
+
+impl<P> Table<P> {
     /// Counts one more use of a piece that is there.
     pub(crate) fn again(&mut self, name: &ChunkId) -> bool {
         let Some(entry) = self.chunks.get_mut(name) else { return false };

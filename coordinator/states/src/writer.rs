@@ -6,9 +6,8 @@ use bytes::Bytes;
 use starlings_proto::StateNaming;
 use starlings_proto::convert::state::{ChunkId, chunk_values, n_chunks};
 
-use crate::store::Shared;
-use crate::stored::Pieces;
-use crate::{StateError, StateStore, StoredState};
+use crate::shared::{Pieces, Shared};
+use crate::{StateError, StoredState};
 
 /// A state on its way into the store.
 #[derive(Debug)]
@@ -20,8 +19,8 @@ pub struct StateWriter {
 }
 
 impl StateWriter {
-    pub(crate) fn new(store: &StateStore, n_state: usize) -> Self {
-        let store = Arc::clone(&store.shared);
+    pub(crate) fn new(store: &Arc<Shared>, n_state: usize) -> Self {
+        let store = Arc::clone(store);
         Self { store, n_state, names: Vec::new(), naming: StateNaming::of(n_state) }
     }
 

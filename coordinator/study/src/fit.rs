@@ -11,6 +11,7 @@ pub(crate) mod filter;
 pub(crate) mod free_run;
 pub(crate) mod resample;
 pub(crate) mod rescue;
+pub(crate) mod results;
 pub(crate) mod runner;
 mod schedule;
 pub(crate) mod settle;

@@ -6,7 +6,7 @@
 use std::sync::mpsc::Receiver;
 
 use starlings_estimators::{EstimatorError, Form, Gaussian};
-use starlings_fleet::{Fleet, FleetError, FleetEvent, StateError, StateStore};
+use starlings_fleet::{Fleet, FleetError, FleetEvent, StateError};
 use starlings_models::Failure;
 
 use super::constants::{self, HangsOn};
@@ -229,12 +229,8 @@ fn from_start_to_end(
     folder: &mut RunFolder,
     context: &mut RunContext<'_>,
 ) -> Result<Summary, RunError> {
-    let states = fleet.states().cloned().unwrap_or_else(|| StateStore::new(StateStore::MEMORY));
-    if !states.settle(&folder.states()) {
-        return Err(RunError::Internal("states of another run are in the fleet's store".to_owned()));
-    }
+    let states = folder.settle_states(fleet.states())?;
     let resumed = Snapshot::read(&folder.store, study.records.len(), &states)?;
-    states.sweep();
     context.earlier_s = folder.store.elapsed_s()?;
     folder.store.event(
         context.elapsed(),

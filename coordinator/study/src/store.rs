@@ -2,11 +2,12 @@
 //!
 //! Whatever is shown later — summary, report, export, resume — is read from here and from nowhere else. Each analysis is
 //! written in one piece with the snapshot that a resumed run starts from, and a few quick ones are committed together, so a run
-//! killed at any instant continues from a whole analysis at most [`HOLD_S`] before. Nothing here computes. Next file to read:
+//! killed at any instant continues from a whole analysis a moment before (`commit`). Nothing here computes. Next file to read:
 //! [`crate::store::snapshot`].
 
 mod call;
 mod changes;
+mod commit;
 mod error;
 pub mod folder;
 mod folder_error;
@@ -41,9 +42,6 @@ pub use purpose::{EXPLANATION, Purpose};
 pub use remembered::RunKey;
 pub use rows::{AnalysisRow, EstimateRow, InnovationRow, JobRow, PredictionRow};
 pub use table::table;
-
-/// Analyses are committed together for at most so long, in s: a commit costs about as much as the rows of an analysis.
-const HOLD_S: f64 = 0.05;
 
 /// Name under which the store keeps how far the run has come.
 const ELAPSED: &str = "elapsed_s";
@@ -227,33 +225,6 @@ impl Store {
             self.kept.borrow_mut().wrote(snapshot.stored());
         }
         self.guard(written)
-    }
-
-    /// Makes everything written so far durable.
-    ///
-    /// # Errors
-    /// When the database refuses.
-    pub(crate) fn commit(&self) -> Result<(), StoreError> {
-        if self.connection.is_autocommit() {
-            return Ok(());
-        }
-        self.kept.borrow_mut().before_commit()?;
-        self.guard(self.connection.execute_batch("COMMIT"))?;
-        self.kept.borrow_mut().after_commit();
-        Ok(())
-    }
-
-    /// [`Store::commit`], if the last one was [`HOLD_S`] or longer ago; `now_s` is the run's wall time.
-    ///
-    /// # Errors
-    /// When the database refuses.
-    pub(crate) fn commit_if_due(&self, now_s: f64) -> Result<(), StoreError> {
-        if now_s - self.committed_s.get() >= HOLD_S.max(self.kept.borrow().hold_s()) {
-            self.note_elapsed(now_s)?;
-            self.commit()?;
-            self.committed_s.set(now_s);
-        }
-        Ok(())
     }
 
     /// Writes the final forward run, replacing an earlier one.

@@ -3,7 +3,7 @@
 use bytes::Bytes;
 use starlings_models::{ModelFailure, ParticleError, Prediction, Timeout};
 
-use super::{Lease, ProtocolError, SetupId, State, floats, job::check_inline, required, setup_id, state};
+use super::{Lease, ProtocolError, SetupId, State, floats, required, setup_id, state};
 use crate::MAX_SLOTS;
 use crate::generated::{self, failure, from_worker::Kind, result::Outcome};
 
@@ -125,7 +125,7 @@ fn encode_answer(answer: LeaseOutcome) -> Result<Outcome, ProtocolError> {
     Ok(match answer {
         LeaseOutcome::Ran(Ok(prediction)) => {
             if let State::Values(values) = &prediction.state {
-                check_inline(values.len())?;
+                state::check_inline(values.len())?;
             }
             let (inside, state_id) = state::encode(Some(&prediction.state));
             Outcome::Prediction(generated::Prediction {

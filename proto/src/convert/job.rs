@@ -8,7 +8,7 @@ use starlings_models::{Job, Window};
 use super::window;
 use super::windows::{self, ReceivedWindows, SentWindows, WindowId};
 use super::{Lease, ProtocolError, SetupId, State, floats, required, state};
-use crate::{MAX_INLINE_STATE, MAX_MESSAGE, MAX_STATE, generated};
+use crate::{MAX_INLINE_STATE, MAX_MESSAGE, generated};
 
 /// Room left in a message for everything that is no array.
 const MESSAGE_MARGIN: usize = 64 * 1024;
@@ -96,24 +96,6 @@ pub fn check_size<S>(job: &Job<S>) -> Result<(), ProtocolError> {
         return Err(ProtocolError::Shape { field: "window", message });
     }
     Ok(())
-}
-
-/// Whether a state of so many values can travel.
-///
-/// # Errors
-/// [`ProtocolError::StateTooLarge`].
-pub fn check_state(values: usize) -> Result<(), ProtocolError> {
-    at_most(values, MAX_STATE)
-}
-
-/// Whether a state of so many values can travel inside a message.
-pub(super) fn check_inline(values: usize) -> Result<(), ProtocolError> {
-    at_most(values, MAX_INLINE_STATE)
-}
-
-fn at_most(values: usize, limit: usize) -> Result<(), ProtocolError> {
-    let bytes = values.saturating_mul(8);
-    if bytes > limit { Err(ProtocolError::StateTooLarge { bytes, limit }) } else { Ok(()) }
 }
 
 pub(super) fn decode_job(

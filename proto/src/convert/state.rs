@@ -5,9 +5,8 @@
 
 use bytes::Bytes;
 
-use super::job::{check_inline, check_state};
 use super::{Lease, ProtocolError, floats, hash, required};
-use crate::generated;
+use crate::{MAX_INLINE_STATE, MAX_STATE, generated};
 
 /// Bytes of a piece of a state; the last one has what is left.
 pub const CHUNK_BYTES: usize = 256 * 1024;
@@ -40,6 +39,24 @@ impl From<Vec<f64>> for State {
     fn from(values: Vec<f64>) -> Self {
         Self::Values(values)
     }
+}
+
+/// Whether a state of so many values can travel.
+///
+/// # Errors
+/// [`ProtocolError::StateTooLarge`].
+pub fn check_state(values: usize) -> Result<(), ProtocolError> {
+    at_most(values, MAX_STATE)
+}
+
+/// Whether a state of so many values can travel inside a message.
+pub(super) fn check_inline(values: usize) -> Result<(), ProtocolError> {
+    at_most(values, MAX_INLINE_STATE)
+}
+
+fn at_most(values: usize, limit: usize) -> Result<(), ProtocolError> {
+    let bytes = values.saturating_mul(8);
+    if bytes > limit { Err(ProtocolError::StateTooLarge { bytes, limit }) } else { Ok(()) }
 }
 
 /// Makes the name of a state from those of its pieces, in their order.
@@ -220,7 +237,9 @@ mod tests {
         let (a, b) = ([1; 32], [2; 32]);
         let name = |n: usize, pieces: &[ChunkId]| {
             let mut naming = StateNaming::of(n);
-            pieces.iter().for_each(|piece| naming.piece(piece));
+            for piece in pieces {
+                naming.piece(piece);
+            }
             naming.finish()
         };
         let of = name(40_000, &[a, b]);

@@ -1,26 +1,19 @@
 //! Large states of a batch: who may send and ask for them, and for how long they are held.
 //!
 //! A state that a worker put is held under its lease until the answer that names it, then until the caller has the outcomes; those of
-//! jobs are held by their batch, or by the copy of a job that is kept for control runs. Next file to read: [`crate::transfer`].
+//! jobs are held by their batch, or by the copy of a job that is kept for control runs. Next file to read: `transfers`.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
-use starlings_proto::convert::state::{Get, PutHead};
-use starlings_proto::{Lease, MAX_INLINE_STATE, State as Travelling};
+use starlings_proto::{Lease, State as Travelling};
 use starlings_states::{Held, StateStore, StoredState};
 use tonic::Status;
 
-use super::Hub;
-use super::state::State;
-use crate::dispatcher::{BatchError, ControlId, Event, WorkerId};
+use crate::dispatcher::{BatchError, ControlId, WorkerId};
 use crate::{Outcome, wire};
 
 /// Transfers of one worker at the same time, beyond one for each of its slots.
 const SPARE_TRANSFERS: usize = 8;
-
-/// Largest state, in values, where nobody knows how many the model has: 1 GiB.
-const UNKNOWN: usize = (1 << 30) / 8;
 
 /// Guarded by the hub's lock.
 pub(super) struct States {
@@ -35,24 +28,10 @@ pub(super) struct States {
 }
 
 /// A worker that may transfer states.
-struct Session {
+pub(super) struct Session {
     nonce: u64,
     transfers: usize,
     most: usize,
-}
-
-/// A transfer that is counted until it ends.
-pub(crate) struct Counted {
-    hub: Arc<Hub>,
-    worker: WorkerId,
-}
-
-impl Drop for Counted {
-    fn drop(&mut self) {
-        if let Some(session) = self.hub.lock().states.sessions.get_mut(&self.worker) {
-            session.transfers -= 1;
-        }
-    }
 }
 
 impl States {
@@ -81,6 +60,18 @@ impl States {
     pub(super) fn forget(&mut self) {
         self.put.clear();
         self.answered.clear();
+    }
+
+    /// Holds a state that arrived; gives back the one before under this lease.
+    pub(super) fn arrived(&mut self, lease: Lease, state: StoredState) -> Option<StoredState> {
+        self.put.insert(lease, state)
+    }
+
+    /// Counts one transfer less.
+    pub(super) fn ended(&mut self, worker: WorkerId) {
+        if let Some(session) = self.sessions.get_mut(&worker) {
+            session.transfers -= 1;
+        }
     }
 
     /// Holds the state of a job that is kept for control runs.
@@ -114,12 +105,14 @@ impl States {
         outcomes.into_iter().map(|outcome| outcome.try_map(held)).collect()
     }
 
-    fn session(&mut self, worker: WorkerId, nonce: u64) -> Result<&mut Session, Status> {
+    /// The session of a worker, if the nonce is its own.
+    pub(super) fn session(&mut self, worker: WorkerId, nonce: u64) -> Result<&mut Session, Status> {
         let session = self.sessions.get_mut(&worker).filter(|session| session.nonce == nonce);
         session.ok_or_else(|| Status::permission_denied("no worker with this session is connected"))
     }
 
-    fn count(&mut self, worker: WorkerId, nonce: u64) -> Result<(), Status> {
+    /// Counts one more transfer of a worker.
+    pub(super) fn count(&mut self, worker: WorkerId, nonce: u64) -> Result<(), Status> {
         let session = self.session(worker, nonce)?;
         if session.transfers == session.most {
             return Err(Status::resource_exhausted(format!(
@@ -129,71 +122,5 @@ impl States {
         }
         session.transfers += 1;
         Ok(())
-    }
-}
-
-impl State {
-    /// Whether a lease is open and its run may end in a state of so many values.
-    fn may_put(&self, head: &PutHead) -> Result<(), Status> {
-        let asked = self.asked(&head.lease).filter(|_| self.dispatcher.holds(&head.lease));
-        let (setup, _) = asked.ok_or_else(|| Status::failed_precondition("nobody waits for this run"))?;
-        let n_state = head.n_state;
-        let fits = match self.shapes.get(setup).and_then(|shape| shape.n_state) {
-            Some(wanted) if wanted != n_state => {
-                Err(format!("a state of {n_state} values where {wanted} belong"))
-            }
-            None if n_state > UNKNOWN => {
-                Err(format!("a state of {n_state} values, at most {UNKNOWN} are taken"))
-            }
-            _ if n_state * 8 <= MAX_INLINE_STATE => Err("a small state belongs into its result".to_owned()),
-            _ => Ok(()),
-        };
-        fits.map_err(Status::invalid_argument)
-    }
-}
-
-impl Hub {
-    /// Where states are kept.
-    pub(crate) fn states(&self) -> &StateStore {
-        &self.store
-    }
-
-    /// Whether a worker may put a state now.
-    pub(crate) fn begin_put(self: &Arc<Self>, head: &PutHead) -> Result<Counted, Status> {
-        let worker = WorkerId(head.lease.epoch);
-        let mut state = self.lock();
-        state.states.session(worker, head.nonce)?;
-        state.may_put(head)?;
-        state.states.count(worker, head.nonce)?;
-        Ok(Counted { hub: Arc::clone(self), worker })
-    }
-
-    /// Holds a state that arrived until the answer that names it.
-    pub(crate) fn end_put(&self, head: &PutHead, arrived: StoredState) -> Result<(), Status> {
-        let mut state = self.lock();
-        state.states.session(WorkerId(head.lease.epoch), head.nonce)?;
-        state.may_put(head)?;
-        let before = state.states.put.insert(head.lease, arrived);
-        drop(state);
-        // Its files go outside the lock.
-        drop(before);
-        Ok(())
-    }
-
-    /// The state that a worker asks for.
-    pub(crate) fn begin_get(self: &Arc<Self>, get: &Get) -> Result<(StoredState, Counted), Status> {
-        let worker = WorkerId(get.epoch);
-        let mut state = self.lock();
-        state.states.session(worker, get.nonce)?;
-        let found = state.states.store.get(&get.state);
-        let found = found.ok_or_else(|| Status::not_found("nobody holds a state of this name"))?;
-        state.states.count(worker, get.nonce)?;
-        drop(state);
-        Ok((found, Counted { hub: Arc::clone(self), worker }))
-    }
-
-    /// A state cannot be kept or read here: the batch ends.
-    pub(crate) fn state_lost(&self, reason: String) {
-        self.handle(Event::Abort(BatchError::State(reason)));
     }
 }

@@ -10,29 +10,12 @@ use nalgebra::{DMatrix, DVector};
 use starlings_fleet::{Fleet, FleetError, Held, Outcome, SetupId};
 use starlings_models::{BuildSetup, Failure, Job, Prediction, Setup, Window};
 
+pub(crate) use super::results::{AnalysisIndex, Predicted, Results, StepWindows};
 use super::timeouts::Timeouts;
 use crate::states::States;
 use crate::store::{JobRow, Store};
 use crate::trial::named;
 use crate::{RunError, Study};
-
-/// The windows of one step, one per record that still has data: (record, window).
-pub(crate) type StepWindows = Vec<(usize, Arc<Window>)>;
-
-/// The analysis that an ensemble belongs to; goes into the rows of the store.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct AnalysisIndex {
-    /// Pass, from 1; 0 for the final forward run.
-    pub(crate) pass: usize,
-    /// Analysis within the pass, from 0.
-    pub(crate) step: usize,
-}
-
-/// A prediction per particle and window, or why there is none: a failure of the model, or the limit of wall time.
-pub(crate) type Results = Vec<Vec<Predicted>>;
-
-/// A prediction, or why there is none.
-pub(crate) type Predicted = Result<Prediction<Held>, Failure>;
 
 /// Sends runs to a fleet and keeps their rows for the store.
 pub(crate) struct EnsembleRunner<'a> {

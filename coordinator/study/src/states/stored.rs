@@ -37,7 +37,7 @@ impl StoredStates {
         first: &StoredState,
         ended: impl Iterator<Item = Option<&'a Held>>,
     ) -> Result<Self, StateError> {
-        let (store, n_state) = (first.store(), first.n_state());
+        let (store, n_state) = (StateStore::of(first), first.n_state());
         let column = |held: Option<&Held>| match held {
             Some(Held::Stored(state)) => Ok(state.clone()),
             Some(Held::Values(values)) => store.keep(values),
@@ -85,7 +85,7 @@ impl StoredStates {
     /// The states of which every block is made by `work` from the block of this one.
     fn mapped(&self, threads: usize, work: &(dyn Fn(&mut DMatrix<f64>) + Sync)) -> Result<Self, StateError> {
         let Some(first) = self.columns.first() else { return Ok(self.clone()) };
-        let store = first.store();
+        let store = StateStore::of(first);
         let mut writers: Vec<StateWriter> = self.columns.iter().map(|_| store.writer(self.n_state)).collect();
         for first in (0..self.n_blocks()).step_by(threads) {
             let last = (first + threads).min(self.n_blocks());

@@ -8,6 +8,8 @@ use std::fs::{File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 
+use starlings_fleet::StateStore;
+
 use crate::store::{Program, Purpose, Store, StoreError};
 use crate::summary::Summary;
 use crate::{Fit, Study, posterior};
@@ -85,9 +87,18 @@ impl RunFolder {
         Ok(Self { path: path.to_owned(), store: Store::open_to_read(&path.join(DATABASE))?, _lock: None })
     }
 
-    /// Where the states of particles stand that are too large for the database.
-    pub(crate) fn states(&self) -> PathBuf {
-        self.path.join("states")
+    /// The store of a fleet, or a new one, with the folder for pieces that belongs to this run.
+    ///
+    /// # Errors
+    /// When the store holds pieces of another run.
+    pub(crate) fn settle_states(&self, states: Option<&StateStore>) -> Result<StateStore, StoreError> {
+        let states = states.cloned().unwrap_or_else(|| StateStore::new(StateStore::MEMORY));
+        if !states.settle(&self.path.join("states")) {
+            let text =
+                "the states of another run are still needed by this program: start the run in one of its own";
+            return Err(StoreError::Unusable(text.to_owned()));
+        }
+        Ok(states)
     }
 
     /// What the folder is for.

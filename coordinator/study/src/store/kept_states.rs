@@ -83,6 +83,7 @@ impl Store {
                 _ => return Err(self.damaged("snapshot", "the states of its particles do not fit together")),
             }
         }
+        kept.sweep();
         self.kept.borrow_mut().committed = found.iter().flat_map(|(.., columns)| columns).cloned().collect();
         Ok(found)
     }
@@ -141,7 +142,6 @@ mod tests {
         let states = StateStore::new(usize::MAX);
         assert!(states.settle(&path.join("states")));
         let snapshot = Snapshot::read(&store, 2, &states).expect("it is whole").expect("there is one");
-        states.sweep();
         (snapshot, states)
     }
 
