@@ -10,8 +10,10 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use starlings_coordinator::fleet::access::{Access, AccessFault};
-use starlings_coordinator::fleet::{FleetConfig, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers, Refused};
-use starlings_coordinator::study::Study;
+use starlings_coordinator::fleet::{
+    FleetConfig, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers, Refused, StateStore,
+};
+use starlings_coordinator::study::{Study, bytes_of};
 use tokio_util::sync::CancellationToken;
 
 use crate::console::note;
@@ -40,6 +42,17 @@ pub(crate) struct FleetArgs {
     /// Allow workers whose results differ, as of other builds or processors: a warning of the result instead of an error.
     #[arg(long)]
     mixed: bool,
+    /// Memory for states of particles that are larger than 256 KiB, such as "8 GiB"; what is beyond it stands in the run folder.
+    #[arg(long, value_name = "SIZE", default_value = "1 GiB", value_parser = memory)]
+    state_memory: usize,
+}
+
+/// Bytes of an amount such as `8 GiB`.
+fn memory(text: &str) -> Result<usize, String> {
+    let bytes = bytes_of(text).filter(|bytes| (0.0..1e18).contains(bytes));
+    bytes
+        .map(|bytes| bytes as usize)
+        .ok_or_else(|| "expected a number with its unit, such as \"8 GiB\"".to_owned())
 }
 
 /// What was asked for, checked.
@@ -54,6 +67,8 @@ pub(crate) struct Plan {
     n_worker: usize,
     /// Whether results of workers may differ.
     mixed: bool,
+    /// Bytes for large states.
+    state_memory: usize,
 }
 
 /// Where an access file goes.
@@ -84,7 +99,7 @@ impl FleetArgs {
             (Some(_), false) => Some(self.access_plan(out)?),
             _ => None,
         };
-        Ok(Plan { address, host, access, n_worker, mixed: self.mixed })
+        Ok(Plan { address, host, access, n_worker, mixed: self.mixed, state_memory: self.state_memory })
     }
 
     fn access_plan(&self, out: Option<&Out<'_>>) -> Result<AccessPlan, Failure> {
@@ -147,6 +162,7 @@ impl FleetSession {
         config.secrets = access.as_ref().map(|access| access.secrets().clone());
         (config.seed, config.mixed) = (study.seed, plan.mixed);
         config.timeout_factor = study.fleet.timeout_factor;
+        config.states = StateStore::new(plan.state_memory);
         let fleet = GrpcFleet::listen(config).map_err(Failure::run)?;
         let display = Arc::clone(display);
         let refused = fleet.refused();

@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use starlings_coordinator::fleet::{Arrived, Fleet, FleetError, InProcess, Outcome, SetupId, job_key};
+use starlings_coordinator::fleet::{Arrived, Fleet, FleetError, Held, InProcess, Outcome, SetupId, job_key};
 use starlings_coordinator::study::store::table;
 use starlings_models::{Job, Setup};
 use study_kit::{Case, Done, linear};
@@ -19,7 +19,7 @@ struct Telling {
     /// Outcomes that it may still tell of.
     left: usize,
     /// Runs made, by setup and parameters.
-    made: Vec<(SetupId, Job)>,
+    made: Vec<(SetupId, Job<Held>)>,
 }
 
 impl Telling {
@@ -33,18 +33,22 @@ impl Fleet for Telling {
         self.inner.install(setup)
     }
 
-    fn run_mixed(&mut self, jobs: Vec<(SetupId, Job)>) -> Result<Vec<Outcome>, FleetError> {
+    fn run_mixed(&mut self, _: Vec<(SetupId, Job)>) -> Result<Vec<Outcome>, FleetError> {
+        unreachable!("states are held")
+    }
+
+    fn run_held(&mut self, jobs: Vec<(SetupId, Job<Held>)>) -> Result<Vec<Outcome<Held>>, FleetError> {
         self.run_telling(jobs, &mut |_| ControlFlow::Continue(()))
     }
 
     fn run_telling(
         &mut self,
-        jobs: Vec<(SetupId, Job)>,
+        jobs: Vec<(SetupId, Job<Held>)>,
         arrived: Arrived<'_>,
-    ) -> Result<Vec<Outcome>, FleetError> {
-        let outcomes = self.inner.run_mixed(jobs.clone())?;
+    ) -> Result<Vec<Outcome<Held>>, FleetError> {
+        let outcomes = self.inner.run_held(jobs.clone())?;
         // The last first: whoever keeps them must go by their places.
-        let mut told: Vec<(usize, Outcome)> = outcomes.iter().cloned().enumerate().collect();
+        let mut told: Vec<(usize, Outcome<Held>)> = outcomes.iter().cloned().enumerate().collect();
         told.reverse();
         told.truncate(self.left);
         self.left -= told.len();

@@ -10,6 +10,7 @@ pub mod held;
 pub mod job;
 pub mod key;
 pub mod solver;
+pub mod state;
 pub mod to_worker;
 mod window;
 pub mod windows;
@@ -19,7 +20,8 @@ use starlings_models::Setup;
 pub use from_worker::{FromWorker, Hello, LeaseOutcome};
 pub use held::HeldRun;
 pub use job::JobEncoder;
-pub use key::{JobKey, JobKeys, job_key};
+pub use key::{InKey, JobKey, JobKeys, job_key};
+pub use state::{State, StateId, StateNaming};
 pub use to_worker::{ToWorker, Welcome};
 pub use windows::{ReceivedWindows, SentWindows};
 
@@ -64,11 +66,8 @@ pub enum ProtocolError {
     /// A job over a window that was not sent before it.
     #[error("a job names a window that was not sent before it")]
     UnknownWindow,
-    /// A state beyond [`crate::MAX_INLINE_STATE`].
-    #[error(
-        "the state has {bytes} bytes; more than {limit} cannot travel inside a job, and chunked transfer of states is not \
-         available yet"
-    )]
+    /// A state beyond [`crate::MAX_STATE`], or beyond [`crate::MAX_INLINE_STATE`] inside a message.
+    #[error("the state has {bytes} bytes; more than {limit} cannot travel")]
     StateTooLarge {
         /// Size of the state in bytes.
         bytes: usize,
@@ -118,10 +117,13 @@ pub fn decode_setup(id: &SetupId, json: &[u8]) -> Result<Setup, ProtocolError> {
 }
 
 pub(crate) fn setup_id(bytes: &[u8]) -> Result<SetupId, ProtocolError> {
-    bytes.try_into().map_err(|_| ProtocolError::Shape {
-        field: "setup id",
-        message: format!("has {} bytes, expected 32", bytes.len()),
-    })
+    hash(bytes, "setup id")
+}
+
+fn hash(bytes: &[u8], field: &'static str) -> Result<[u8; 32], ProtocolError> {
+    let shape =
+        |_| ProtocolError::Shape { field, message: format!("has {} bytes, expected 32", bytes.len()) };
+    bytes.try_into().map_err(shape)
 }
 
 pub(crate) fn required<T>(value: Option<T>, field: &'static str) -> Result<T, ProtocolError> {

@@ -18,15 +18,19 @@ pub mod words;
 pub use bytes::Bytes;
 pub(crate) use codec::Codec;
 pub use convert::{
-    FromWorker, HeldRun, Hello, JobEncoder, JobKey, JobKeys, Lease, LeaseOutcome, ProtocolError,
-    ReceivedWindows, SentWindows, SetupId, ToWorker, Welcome, decode_setup, digest, encode_setup, job_key,
+    FromWorker, HeldRun, Hello, InKey, JobEncoder, JobKey, JobKeys, Lease, LeaseOutcome, ProtocolError,
+    ReceivedWindows, SentWindows, SetupId, State, StateId, StateNaming, ToWorker, Welcome, decode_setup,
+    digest, encode_setup, job_key,
 };
 
 /// Number of the protocol; coordinator and worker must have the same.
 pub const PROTOCOL: u32 = 4;
 
-/// Largest state that travels inside a job or a prediction, bytes.
+/// Largest state that travels inside a job or a prediction, bytes; a larger one travels by itself, under a name.
 pub const MAX_INLINE_STATE: usize = 256 * 1024;
+
+/// Largest state that either side takes, bytes.
+pub const MAX_STATE: usize = 16 * 1024 * 1024 * 1024;
 
 /// Largest message either side accepts, bytes.
 pub const MAX_MESSAGE: usize = 16 * 1024 * 1024;

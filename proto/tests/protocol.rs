@@ -10,7 +10,7 @@ use starlings_models::{
 };
 use starlings_proto::{
     FromWorker, Hello, JobEncoder, Lease, LeaseOutcome, MAX_SLOTS, ProtocolError, ReceivedWindows,
-    SentWindows, ToWorker, Welcome, decode_setup, encode_setup, generated,
+    SentWindows, State, ToWorker, Welcome, decode_setup, encode_setup, generated,
 };
 
 fn any_float() -> impl Strategy<Value = f64> {
@@ -54,14 +54,14 @@ fn window() -> impl Strategy<Value = Window> {
     )
 }
 
-fn job() -> impl Strategy<Value = Job> {
+fn job() -> impl Strategy<Value = Job<State>> {
     (any::<u32>(), any::<u32>(), window(), floats(8), prop::option::of(floats(8))).prop_map(
         |(particle, record, window, theta, state)| Job {
             particle,
             record,
             window: Arc::new(window),
             theta,
-            state,
+            state: state.map(State::from),
         },
     )
 }
@@ -94,7 +94,7 @@ fn answer() -> impl Strategy<Value = LeaseOutcome> {
     prop_oneof![
         (floats(8), floats(8)).prop_map(|(outputs, state)| LeaseOutcome::Ran(Ok(Prediction {
             outputs,
-            state,
+            state: state.into(),
             cost: 0.25
         }))),
         failure().prop_map(|error| LeaseOutcome::Ran(Err(error))),
@@ -126,6 +126,11 @@ fn from_worker() -> impl Strategy<Value = FromWorker> {
 }
 
 /// Text in which every float shows its bits, so that NaN compares equal to the same NaN only.
+fn state_bits(state: &State) -> Vec<u64> {
+    let State::Values(values) = state else { panic!("a small state is inside") };
+    bits(values)
+}
+
 fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|v| v.to_bits()).collect()
 }
@@ -171,7 +176,7 @@ proptest! {
             prop_assert_eq!((got_lease, got_setup), (lease, setup));
             prop_assert_eq!((got.particle, got.record), (job.particle, job.record));
             prop_assert_eq!(bits(&got.theta), bits(&job.theta));
-            prop_assert_eq!(got.state.as_deref().map(bits), job.state.as_deref().map(bits));
+            prop_assert_eq!(got.state.as_ref().map(state_bits), job.state.as_ref().map(state_bits));
             prop_assert!(same_window(&got.window, &job.window));
         }
     }
@@ -185,7 +190,7 @@ proptest! {
                 FromWorker::Result { lease: b, answer: LeaseOutcome::Ran(Ok(back)), .. },
             ) => {
                 prop_assert_eq!(a, b);
-                prop_assert_eq!((bits(&sent.outputs), bits(&sent.state)), (bits(&back.outputs), bits(&back.state)));
+                prop_assert_eq!((bits(&sent.outputs), state_bits(&sent.state)), (bits(&back.outputs), state_bits(&back.state)));
             }
             (
                 FromWorker::Result { lease: a, answer: LeaseOutcome::Ran(Err(sent)), .. },

@@ -5,12 +5,14 @@ use std::sync::Arc;
 
 use starlings_models::{Job, Prediction, Setup, Signal, Window};
 use starlings_proto::{
-    FromWorker, JobEncoder, Lease, LeaseOutcome, MAX_INLINE_STATE, MAX_SLOTS, ProtocolError, ReceivedWindows,
-    SentWindows, ToWorker, convert::job::check_size, encode_setup, generated,
+    FromWorker, JobEncoder, Lease, LeaseOutcome, MAX_INLINE_STATE, MAX_SLOTS, MAX_STATE, ProtocolError,
+    ReceivedWindows, SentWindows, State, ToWorker,
+    convert::{job::check_size, state::check_state},
+    encode_setup, generated,
 };
 
 /// The message of a job whose window travels inside it.
-fn encode(lease: Lease, job: &Job) -> generated::ToWorker {
+fn encode(lease: Lease, job: &Job<State>) -> generated::ToWorker {
     JobEncoder::default().encode(lease, &[0; 32], job, &mut SentWindows::default()).1
 }
 
@@ -18,7 +20,7 @@ fn decode(message: generated::ToWorker) -> Result<ToWorker, ProtocolError> {
     ToWorker::decode(message, &mut ReceivedWindows::default())
 }
 
-fn small_job() -> Job {
+fn small_job() -> Job<State> {
     let window = Window { start: 0.0, times: vec![1.0], observed: vec![2.0], inputs: vec![] };
     Job { particle: 0, record: 0, window: Arc::new(window), theta: vec![], state: None }
 }
@@ -31,20 +33,34 @@ fn a_setup_with_an_infinite_constant_is_refused_before_it_travels() {
 }
 
 #[test]
-fn a_state_beyond_the_limit_is_refused_on_both_sides() {
+fn a_state_beyond_the_limit_inside_a_message_is_refused_on_both_sides() {
     let mut job = small_job();
-    job.state = Some(vec![0.0; MAX_INLINE_STATE / 8]);
-    assert_eq!(check_size(&job), Ok(()));
-    job.state = Some(vec![0.0; MAX_INLINE_STATE / 8 + 1]);
-    let error = check_size(&job).unwrap_err();
-    assert!(error.to_string().contains("chunked transfer of states is not available yet"), "{error}");
-
     let lease = Lease { epoch: 1, job: 1, attempt: 1 };
+    job.state = Some(vec![0.0; MAX_INLINE_STATE / 8].into());
+    assert!(matches!(decode(encode(lease, &job)), Ok(ToWorker::Job { job: got, .. }) if got == job));
+    job.state = Some(vec![0.0; MAX_INLINE_STATE / 8 + 1].into());
     let sent = encode(lease, &job);
     assert!(matches!(decode(sent), Err(ProtocolError::Job { lease: l, .. }) if l == lease));
     let prediction = Prediction { outputs: vec![], state: job.state.unwrap(), cost: 0.0 };
     let result = FromWorker::Result { lease, answer: LeaseOutcome::Ran(Ok(prediction)), cost: 0.0 };
     assert!(matches!(result.encode(), Err(ProtocolError::StateTooLarge { .. })));
+}
+
+#[test]
+fn a_state_that_travels_by_itself_is_named_both_ways() {
+    let lease = Lease { epoch: 1, job: 1, attempt: 1 };
+    let job = Job { state: Some(State::Named([7; 32])), ..small_job() };
+    assert!(matches!(decode(encode(lease, &job)), Ok(ToWorker::Job { job: got, .. }) if got == job));
+    let prediction = Prediction { outputs: vec![1.0], state: State::Named([8; 32]), cost: 0.5 };
+    let result = FromWorker::Result { lease, answer: LeaseOutcome::Ran(Ok(prediction)), cost: 0.5 };
+    assert_eq!(FromWorker::decode(result.clone().encode().unwrap()), Ok(result));
+}
+
+#[test]
+fn no_state_larger_than_the_protocol_allows_is_begun() {
+    assert_eq!(check_state(MAX_STATE / 8), Ok(()));
+    let error = check_state(MAX_STATE / 8 + 1).unwrap_err();
+    assert_eq!(error.to_string(), "the state has 17179869192 bytes; more than 17179869184 cannot travel");
 }
 
 #[test]

@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use prost::Message;
 use starlings_models::{Job, Signal, Window};
-use starlings_proto::{JobEncoder, Lease, ProtocolError, ReceivedWindows, SentWindows, ToWorker, generated};
+use starlings_proto::{
+    JobEncoder, Lease, ProtocolError, ReceivedWindows, SentWindows, State, ToWorker, generated,
+};
 
 fn through_bytes(message: &generated::ToWorker) -> generated::ToWorker {
     generated::ToWorker::decode(message.encode_to_vec().as_slice()).unwrap()
@@ -30,9 +32,9 @@ fn the_windows_of_a_batch_are_encoded_once_and_shared_by_its_messages() {
         let (particle, record, window) = (k as u32 / 2, k as u32 % 2, Arc::clone(&windows[k % 2]));
         Job { particle, record, window, theta: vec![k as f64], state: None }
     };
-    let jobs: Vec<Job> = (0..6).map(job).collect();
+    let jobs: Vec<Job<State>> = (0..6).map(job).collect();
     let mut encoder = JobEncoder::of(&jobs);
-    let mut times_of = |job: &Job| {
+    let mut times_of = |job: &Job<State>| {
         let (_, sent) = encoder.encode(LEASE, &[7; 32], job, &mut SentWindows::default());
         let Some(generated::to_worker::Kind::Job(message)) = sent.kind else { panic!("a job") };
         let Some(generated::job::Over::Window(window)) = message.over else { panic!("a small window") };
@@ -44,7 +46,7 @@ fn the_windows_of_a_batch_are_encoded_once_and_shared_by_its_messages() {
 }
 
 /// Jobs of two particles over a window of 16 000 bytes for each array.
-fn jobs_over_a_large_window() -> [Job; 2] {
+fn jobs_over_a_large_window() -> [Job<State>; 2] {
     let times: Vec<f64> = (0..2000).map(f64::from).collect();
     let signal = Signal { times: times.clone(), values: times.clone() };
     let window = Arc::new(Window { start: 0.0, observed: times.clone(), times, inputs: vec![signal] });

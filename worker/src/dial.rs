@@ -11,6 +11,7 @@ use tokio_stream::wrappers::UnboundedReceiverStream;
 use tonic::Streaming;
 
 use crate::held::Run;
+use crate::transfer::Transfers;
 use crate::way::{ATTEMPT, NoWay, Way};
 use crate::{WorkerConfig, WorkerError};
 
@@ -27,6 +28,8 @@ pub(crate) struct Connection {
     pub(crate) inbound: Streaming<generated::ToWorker>,
     /// The named windows that have arrived.
     pub(crate) windows: ReceivedWindows,
+    /// The way of large states.
+    pub(crate) transfers: Transfers,
 }
 
 pub(crate) enum Dialled {
@@ -136,6 +139,7 @@ async fn attach(way: &Way, hello: Hello) -> Result<Connection, Attempt> {
         .max_encoding_message_size(MAX_MESSAGE);
     let (outbox, outgoing) = mpsc::unbounded_channel();
     let failed = |text: &str| Attempt::Failed(text.to_owned());
+    let nonce = hello.nonce;
     let hello = FromWorker::Hello(hello).encode().map_err(|error| failed(&error.to_string()))?;
     let _ = outbox.send(hello);
     let silent = |status: &tonic::Status| failed(&(status_text(status) + way.hint()));
@@ -144,7 +148,10 @@ async fn attach(way: &Way, hello: Hello) -> Result<Connection, Attempt> {
     let mut windows = ReceivedWindows::default();
     let first = inbound.message().await.map_err(|s| failed(&status_text(&s)))?;
     match first.map(|message| ToWorker::decode(message, &mut windows)) {
-        Some(Ok(ToWorker::Welcome(welcome))) => Ok(Connection { welcome, outbox, inbound, windows }),
+        Some(Ok(ToWorker::Welcome(welcome))) => {
+            let transfers = Transfers::new(client, welcome.epoch, nonce);
+            Ok(Connection { welcome, outbox, inbound, windows, transfers })
+        }
         Some(Ok(ToWorker::Refuse(reason))) => Err(Attempt::Refused(reason)),
         Some(Ok(ToWorker::Drain(reason))) => Err(Attempt::Over(reason)),
         Some(Ok(_)) => Err(failed("it did not answer with a Welcome")),

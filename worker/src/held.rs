@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 use starlings_models::{Job, ParticleError, Prediction};
 use starlings_proto::convert::ended;
-use starlings_proto::{Bytes, HeldRun, JobKey, JobKeys, SetupId, job_key};
+use starlings_proto::{Bytes, HeldRun, JobKey, JobKeys, SetupId, State, job_key};
 
 /// How long a result that was sent may still be on its way, or in the coordinator and not written: above the silence at which either
 /// side takes the other for gone.
@@ -106,7 +106,7 @@ impl Held {
         &self,
         setup: SetupId,
         job: Arc<Job>,
-        result: &Result<Prediction, ParticleError>,
+        result: &Result<Prediction<State>, ParticleError>,
         cost: f64,
     ) -> bool {
         let kept = Kept { at: Instant::now(), setup, job, ended: ended::encode(result, cost).into() };
@@ -232,7 +232,12 @@ mod tests {
 
     fn keep(held: &Held, particle: u32) -> bool {
         let outputs = vec![f64::from(particle); 100];
-        held.keep([7; 32], job(particle), &Ok(Prediction { outputs, state: vec![], cost: 0.5 }), 0.5)
+        held.keep(
+            [7; 32],
+            job(particle),
+            &Ok(Prediction { outputs, state: State::default(), cost: 0.5 }),
+            0.5,
+        )
     }
 
     fn particles(held: &Held) -> Vec<f64> {

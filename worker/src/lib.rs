@@ -9,10 +9,12 @@ pub mod config;
 mod dial;
 mod held;
 mod idle;
+mod inbox;
 mod news;
 mod session;
 mod setups;
 mod slots;
+mod transfer;
 mod watch;
 mod way;
 

@@ -15,9 +15,11 @@ use crate::WorkerConfig;
 use crate::dial::Connection;
 use crate::held::Held;
 use crate::idle::Idle;
+use crate::inbox::Inbox;
 use crate::news::{News, Tell};
 use crate::setups::Setups;
-use crate::slots::{Asked, Slots, Task, answer};
+use crate::slots::{Asked, Slots, answer};
+use crate::transfer::Transfers;
 use crate::watch::Watch;
 
 /// How long a leaving worker waits for the coordinator to close the stream.
@@ -47,6 +49,7 @@ pub(crate) async fn serve(
     let mut beats = tokio::time::interval(Duration::from_secs_f64(connection.welcome.heartbeat));
     beats.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
     let mut silence = Silence::default();
+    let inbox = Inbox::new(config.slots);
     let mut watch = Watch::new(slots);
     loop {
         tokio::select! {
@@ -54,7 +57,7 @@ pub(crate) async fn serve(
             biased;
             message = connection.inbound.message() => {
                 silence.broken();
-                let place = Place { slots, setups, held, tell: &config.tell };
+                let place = Place { slots, setups, held, inbox: &inbox, transfers: &connection.transfers, tell: &config.tell };
                 match take(message, &connection.outbox, &mut connection.windows, &place) {
                     Ok(()) => {}
                     Err(Ended::Drained(reason)) => {
@@ -70,6 +73,7 @@ pub(crate) async fn serve(
             }
             _ = beats.tick() => {
                 let (running, queued) = slots.load();
+                let queued = queued + inbox.len() as u32;
                 send(&connection.outbox, FromWorker::Heartbeat { running, queued });
                 if let Some(idle) = &mut idle {
                     idle.look(slots);
@@ -116,7 +120,15 @@ struct Place<'a> {
     slots: &'a Slots,
     setups: &'a Setups,
     held: Option<&'a Held>,
+    inbox: &'a Inbox,
+    transfers: &'a Transfers,
     tell: &'a Tell,
+}
+
+impl Place<'_> {
+    fn asked(&self, lease: Lease, outbox: &UnboundedSender<generated::FromWorker>) -> Asked {
+        Asked { lease, outbox: outbox.clone(), transfers: self.transfers.clone() }
+    }
 }
 
 fn take(
@@ -125,19 +137,19 @@ fn take(
     windows: &mut ReceivedWindows,
     place: &Place<'_>,
 ) -> Result<(), Ended> {
-    let Place { slots, setups, held, tell } = *place;
+    let Place { slots, setups, held, inbox, tell, .. } = *place;
     let message = match message {
         Ok(Some(message)) => message,
         Ok(None) => return Err(Ended::Lost("the coordinator closed the connection".to_owned())),
         Err(status) => return Err(Ended::Lost(format!("the connection broke: {}", status_text(&status)))),
     };
     match ToWorker::decode(message, windows) {
-        Ok(ToWorker::Job { .. }) if slots.is_flooded() => {
+        Ok(ToWorker::Job { .. }) if slots.is_flooded(inbox.len()) => {
             return Err(Ended::Lost("the coordinator sent more jobs than can wait here".to_owned()));
         }
         Ok(ToWorker::Job { lease, setup, job }) => {
             if let Some(forward) = setups.get(&setup) {
-                slots.push(Task::new(Asked { lease, outbox: outbox.clone() }, setup, forward, job));
+                inbox.take(slots, place.asked(lease, outbox), setup, forward, job);
             } else {
                 // First the setup, so that the job that comes back finds it missing here; and once, however many of its jobs
                 // are on their way: a second time would stand for the setup that is sent again.
@@ -152,9 +164,12 @@ fn take(
             let outbox = outbox.clone();
             setups.order(id, setup, Box::new(move |result| send(&outbox, FromWorker::Setup { id, result })));
         }
-        Ok(ToWorker::Cancel { leases, stop }) => slots.withdraw(&leases, stop),
+        Ok(ToWorker::Cancel { leases, stop }) => {
+            inbox.withdraw(&leases, outbox);
+            slots.withdraw(&leases, stop);
+        }
         Ok(ToWorker::Adopt { runs, rest_is_void }) => {
-            let gone = slots.adopt(runs, outbox);
+            let gone = slots.adopt(runs, |lease| place.asked(lease, outbox));
             answer_held(gone, outbox, held);
             if rest_is_void {
                 slots.drop_void();
@@ -210,13 +225,13 @@ mod tests {
     use std::sync::Arc;
 
     use starlings_models::{BuildSetup, Job, Setup, Window};
-    use starlings_proto::{JobEncoder, Lease, SentWindows, encode_setup};
+    use starlings_proto::{JobEncoder, Lease, SentWindows, State, encode_setup};
     use tokio::sync::mpsc::unbounded_channel;
 
     use super::*;
 
     /// A run of the oscillator to time 1.
-    fn job() -> Job {
+    fn job() -> Job<State> {
         let window = Window { start: 0.0, times: vec![1.0], observed: vec![f64::NAN], inputs: vec![] };
         Job { particle: 0, record: 0, window: Arc::new(window), theta: vec![], state: None }
     }
@@ -234,8 +249,17 @@ mod tests {
         let (slots, setups) =
             (Slots::start(1, None).unwrap(), Setups::new(Arc::new(|setup: &Setup| setup.build())));
         let mut windows = ReceivedWindows::default();
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+        let (inbox, transfers) = (Inbox::new(1), Transfers::nowhere(runtime.handle()));
         let tell: Tell = Arc::new(|_| {});
-        let place = Place { slots: &slots, setups: &setups, held: None, tell: &tell };
+        let place = Place {
+            slots: &slots,
+            setups: &setups,
+            held: None,
+            inbox: &inbox,
+            transfers: &transfers,
+            tell: &tell,
+        };
         let mut take = |message| take(Ok(Some(message)), &outbox, &mut windows, &place).unwrap();
         let mut next = || FromWorker::decode(sent.blocking_recv().expect("an answer")).unwrap();
         let (id, json) = encode_setup(&oscillator()).unwrap();

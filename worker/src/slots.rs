@@ -29,6 +29,7 @@ const WAITING: usize = 128;
 const LEAST_WAITING: usize = 1024;
 
 /// The slots of this process.
+#[derive(Clone)]
 pub(crate) struct Slots {
     shared: Arc<Shared>,
     /// Jobs that may wait.
@@ -123,7 +124,7 @@ impl Slots {
         queue.tasks = kept;
         drop(queue);
         let withdrawn: VecDeque<Arc<Task>> = withdrawn;
-        for Asked { lease, outbox } in withdrawn.into_iter().filter_map(|task| task.asked().take()) {
+        for Asked { lease, outbox, .. } in withdrawn.into_iter().filter_map(|task| task.asked().take()) {
             answer(&outbox, lease, LeaseOutcome::Withdrawn, 0.0);
         }
     }
@@ -135,9 +136,9 @@ impl Slots {
         queue.running.iter().for_each(|task| drop(task.asked().take()));
     }
 
-    /// Whether so many jobs wait that no coordinator that keeps to its own rules sent them.
-    pub(crate) fn is_flooded(&self) -> bool {
-        self.shared.lock().tasks.len() >= self.most
+    /// Whether so many jobs wait, with those that wait for their states, that no coordinator that keeps to its own rules sent them.
+    pub(crate) fn is_flooded(&self, without_states: usize) -> bool {
+        self.shared.lock().tasks.len() + without_states >= self.most
     }
 
     /// Jobs being computed and jobs waiting.
@@ -185,6 +186,7 @@ impl Shared {
 
     fn work(&self) {
         while let Some(task) = self.next() {
+            task.begun();
             self.running.fetch_add(1, Ordering::Relaxed);
             let started = Instant::now();
             let spent = spent();
@@ -196,14 +198,14 @@ impl Shared {
             // A result that came all the same is as good as any; what a stopped run says of itself is not.
             if result.is_err() && task.stop.is_set() {
                 self.lock().running.retain(|running| !Arc::ptr_eq(running, &task));
-                if let Some(Asked { lease, outbox }) = task.asked().take() {
+                if let Some(Asked { lease, outbox, .. }) = task.asked().take() {
                     answer(&outbox, lease, LeaseOutcome::Withdrawn, cost);
                 }
                 continue;
             }
             let counter = if result.is_ok() { &self.predictions } else { &self.failures };
             counter.fetch_add(1, Ordering::Relaxed);
-            self.finished(&task, result, cost);
+            self.finished(task, result, cost);
         }
     }
 }

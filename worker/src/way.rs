@@ -253,3 +253,9 @@ fn dialled(endpoint: Endpoint, once: bool) -> Endpoint {
         .keep_alive_timeout(KEEP_ALIVE_PATIENCE)
         .keep_alive_while_idle(true)
 }
+
+/// A connection that is never made.
+#[cfg(test)]
+pub(crate) fn nowhere() -> Proven {
+    InterceptedService::new(Endpoint::from_static("http://nowhere").connect_lazy(), Proof(None))
+}

@@ -41,10 +41,11 @@ mod watch;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use starlings_proto::SetupId;
+use starlings_proto::{SetupId, StateId};
 
+use super::FleetEvent;
 use super::job_name::JobName;
-use super::{FleetEvent, Outcome};
+use super::wire::Outcome;
 use batch::{Batch, Lost};
 pub(crate) use doubt::Asked;
 pub(crate) use held::Taken;
@@ -142,6 +143,11 @@ impl Dispatcher {
     /// Outcomes of the running batch, or of one that ended in an error, that were not handed on before.
     pub(crate) fn arrived(&mut self) -> Vec<(usize, Outcome)> {
         self.batch.as_mut().map_or_else(|| std::mem::take(&mut self.left), Batch::arrived)
+    }
+
+    /// Whether an outcome of the running batch names a state. Without a batch nobody knows: whoever began it has the outcomes.
+    pub(crate) fn needs_state(&self, id: &StateId) -> bool {
+        self.batch.as_ref().is_none_or(|batch| batch.names_state(id))
     }
 
     /// Takes one event at time `now` (any fixed origin) and returns what has to be done about it.

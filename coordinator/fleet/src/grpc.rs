@@ -12,8 +12,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use starlings_models::{BuildSetup, Job, Setup};
-use starlings_proto::convert::job::check_size;
-use starlings_proto::{JobEncoder, MAX_MESSAGE, SetupId, encode_setup, own_build};
+use starlings_proto::{MAX_MESSAGE, SetupId, encode_setup, own_build};
 use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
 use tokio_util::sync::CancellationToken;
 
@@ -24,7 +23,8 @@ use super::handle::FleetHandle;
 use super::hub::{Hub, Reply, SetupShape, Submission};
 use super::identity::RunIdentity;
 use super::network::{self, Ways};
-use super::{Arrived, Fleet, FleetError, FleetEvent, Outcome, TELL_EVERY};
+use super::travel::submission;
+use super::{Arrived, Fleet, FleetError, FleetEvent, Held, Outcome, StateStore, TELL_EVERY};
 
 /// How long the caller of a batch that was dropped waits for the network's last words.
 const ALIVE_CHECK: Duration = Duration::from_secs(1);
@@ -63,6 +63,8 @@ pub struct FleetConfig {
     pub cancel: CancellationToken,
     /// Where events go.
     pub events: Sender<FleetEvent>,
+    /// Where states are kept that are too large to travel inside a message.
+    pub states: StateStore,
 }
 
 impl FleetConfig {
@@ -87,6 +89,7 @@ impl FleetConfig {
             build: own_build(),
             cancel,
             events,
+            states: StateStore::new(StateStore::MEMORY),
         }
     }
 }
@@ -120,8 +123,8 @@ impl GrpcFleet {
         };
         let started_again = address.is_some() && config.identity.incarnation > 1;
         let opens = if started_again { GRACE } else { Duration::ZERO };
-        let hub = Hub::new(config.run_name, config.build, config.identity, rules, opens, config.events);
-        let hub = Arc::new(hub);
+        let FleetConfig { run_name, build, identity, events, states, .. } = config;
+        let hub = Arc::new(Hub::new(run_name, build, identity, rules, opens, events, states));
         let stop = CancellationToken::new();
         let (batches, submitted) = unbounded_channel();
         let (adopted, ends) = unbounded_channel();
@@ -186,13 +189,14 @@ impl GrpcFleet {
         &self,
         replies: &mpsc::Receiver<Reply>,
         arrived: Arrived<'_>,
-    ) -> Result<Vec<Outcome>, FleetError> {
+    ) -> Result<Vec<Outcome<Held>>, FleetError> {
         loop {
             match replies.recv_timeout(TELL_EVERY) {
                 Ok(Ok(outcomes)) => return Ok(outcomes),
                 Ok(Err(error)) => {
                     let _ = arrived(self.hub.arrived());
-                    return Err(self.explain(error));
+                    let refused = self.refusals.summary();
+                    return Err(FleetError::of(error, self.address, self.is_open, refused));
                 }
                 Err(RecvTimeoutError::Disconnected) => {
                     // The batch was dropped by a network that is about to end: what it says then is the reason.
@@ -217,38 +221,6 @@ impl GrpcFleet {
 
     fn has_ended(&self) -> bool {
         self.network.as_ref().is_none_or(JoinHandle::is_finished)
-    }
-
-    fn explain(&self, error: BatchError) -> FleetError {
-        match error {
-            BatchError::Cancelled => FleetError::Cancelled,
-            BatchError::NoWorkers { waited, missing } => {
-                let missing =
-                    [Some(missing), self.refusals.summary()].into_iter().flatten().collect::<Vec<_>>();
-                let missing = missing.join("; ");
-                FleetError::NoWorkers {
-                    address: self.address,
-                    is_open: self.is_open,
-                    waited: waited.as_secs_f64(),
-                    missing,
-                }
-            }
-            BatchError::SetupFailed { reason } => FleetError::SetupFailed { reason },
-            BatchError::LocalWorkers(reason) => FleetError::LocalWorkers(reason),
-            BatchError::Stopped(reason) => FleetError::Stopped(reason),
-            BatchError::Unavailable { waited, reasons } => {
-                FleetError::Unavailable { waited: waited.as_secs_f64(), reasons }
-            }
-            BatchError::NoControl { particle, record, parameters, reason, .. } => {
-                FleetError::NoControl { particle, record, parameters, reason }
-            }
-            BatchError::Disagreement { particle, record, workers } => {
-                FleetError::Disagreement { particle, record, workers }
-            }
-            BatchError::NoAnswer { index, particle, record, reason } => {
-                FleetError::NoAnswer { job: index, particle, record, reason }
-            }
-        }
     }
 }
 
@@ -282,26 +254,33 @@ impl Fleet for GrpcFleet {
     }
 
     fn run_mixed(&mut self, jobs: Vec<(SetupId, Job)>) -> Result<Vec<Outcome>, FleetError> {
+        let held = |values| Ok::<_, FleetError>(Held::Values(values));
+        let jobs = jobs.into_iter().map(|(setup, job)| Ok((setup, job.try_map(held)?)));
+        let outcomes = self.run_held(jobs.collect::<Result<_, FleetError>>()?)?;
+        outcomes.into_iter().map(|outcome| Ok(outcome.try_map(Held::into_values)?)).collect()
+    }
+
+    fn run_held(&mut self, jobs: Vec<(SetupId, Job<Held>)>) -> Result<Vec<Outcome<Held>>, FleetError> {
         self.run_telling(jobs, &mut |_| ControlFlow::Continue(()))
     }
 
     fn run_telling(
         &mut self,
-        jobs: Vec<(SetupId, Job)>,
+        jobs: Vec<(SetupId, Job<Held>)>,
         arrived: Arrived<'_>,
-    ) -> Result<Vec<Outcome>, FleetError> {
-        for (_, job) in &jobs {
-            check_size(job).map_err(FleetError::TooLarge)?;
-        }
+    ) -> Result<Vec<Outcome<Held>>, FleetError> {
         if !self.hub.knows(jobs.iter().map(|(setup, _)| setup)) {
             return Err(FleetError::UnknownSetup);
         }
         let (reply, replies) = mpsc::channel();
         // Here and not under the hub's lock.
-        let encoder = JobEncoder::of(jobs.iter().map(|(_, job)| job));
-        let sent = self.batches.send(Submission { jobs, encoder, reply });
-        sent.map_err(|_| FleetError::Stopped(self.hub.why_stopped()))?;
+        let batch = submission(jobs, self.hub.states(), reply)?;
+        self.batches.send(batch).map_err(|_| FleetError::Stopped(self.hub.why_stopped()))?;
         self.wait(&replies, arrived)
+    }
+
+    fn states(&self) -> Option<&StateStore> {
+        Some(self.hub.states())
     }
 
     fn n_workers(&self) -> usize {

@@ -8,9 +8,11 @@ mod arrival;
 mod excluded;
 mod held;
 mod state;
+mod states;
 mod teller;
 #[cfg(test)]
 mod tests;
+mod transfers;
 
 use std::hash::{BuildHasher, Hasher};
 use std::sync::mpsc::Sender;
@@ -25,7 +27,7 @@ use super::dispatcher::message::hex;
 use super::dispatcher::{BatchError, Dispatcher, Event, Joining, Likeness, Rules, WorkerId};
 use super::identity::RunIdentity;
 use super::job_name::JobName;
-use super::{FleetEvent, Outcome};
+use super::{FleetEvent, Held, Outcome, StateStore};
 pub(super) use state::{Closed, SetupShape, Submission};
 use state::{Link, State};
 
@@ -33,7 +35,7 @@ use state::{Link, State};
 pub(super) type Outgoing = Result<generated::ToWorker, Status>;
 
 /// Answer to the caller of a batch.
-pub(super) type Reply = Result<Vec<Outcome>, BatchError>;
+pub(super) type Reply = Result<Vec<Outcome<Held>>, BatchError>;
 
 /// Shared by the network thread and the callers.
 pub(super) struct Hub {
@@ -44,6 +46,7 @@ pub(super) struct Hub {
     heartbeat: Duration,
     build: Option<[u8; 32]>,
     max_attempts: u32,
+    store: StateStore,
     /// Woken whenever a link ends.
     pub(super) link_ended: Notify,
 }
@@ -56,10 +59,12 @@ impl Hub {
         rules: Rules,
         opens: Duration,
         events: Sender<FleetEvent>,
+        store: StateStore,
     ) -> Self {
         // Epochs start anywhere, so that answers to an earlier coordinator on the same port carry none of this one's.
         let first_epoch = std::hash::RandomState::new().build_hasher().finish() >> 1;
-        let state = State::new(first_epoch, Dispatcher::new(rules).opening_at(opens), events);
+        let dispatcher = Dispatcher::new(rules).opening_at(opens);
+        let state = State::new(first_epoch, dispatcher, events, store.clone());
         Self {
             state: Mutex::new(state),
             started: Instant::now(),
@@ -68,6 +73,7 @@ impl Hub {
             heartbeat: rules.heartbeat,
             build,
             max_attempts: rules.max_attempts,
+            store,
             link_ended: Notify::new(),
         }
     }
@@ -99,8 +105,8 @@ impl Hub {
     }
 
     /// Outcomes that the caller of the batch was not told of before.
-    pub(super) fn arrived(&self) -> Vec<(usize, Outcome)> {
-        self.lock().dispatcher.arrived()
+    pub(super) fn arrived(&self) -> Vec<(usize, Outcome<Held>)> {
+        self.lock().arrived()
     }
 
     pub(super) fn counts(&self) -> (usize, usize) {
@@ -132,6 +138,7 @@ impl Hub {
         }
         let jobs = batch.jobs.iter().map(|(setup, job)| (*setup, JobName::of(job))).collect();
         state.handle(now, Event::Abort(BatchError::Cancelled));
+        state.states.forget();
         state.running = Some(batch);
         state.begin(now, jobs);
     }
@@ -157,6 +164,7 @@ impl Hub {
             incarnation: self.identity.incarnation,
         };
         let _ = link.send(Ok(ToWorker::welcome(welcome)));
+        state.states.joined(id, hello.nonce, hello.slots);
         let name = format!("{}@{}/{}", state.joined, hello.host, hello.pid);
         state.links.insert(id, Link::new(name.clone(), link, hello.pid, hello.nonce));
         let Hello { cores, slots, host, pid, nonce, build, .. } = hello;
@@ -188,6 +196,7 @@ impl Hub {
         let mut state = self.lock();
         state.links.remove(&worker);
         state.waiting.left(worker);
+        state.states.left(worker);
         state.handle(now, Event::Left { worker, reason, clean });
         drop(state);
         self.link_ended.notify_waiters();

@@ -15,7 +15,7 @@ pub(crate) struct JobName {
 
 impl JobName {
     /// The name of a job.
-    pub(crate) fn of(job: &Job) -> Self {
+    pub(crate) fn of<S>(job: &Job<S>) -> Self {
         let window = &job.window;
         let end = window.times.last().copied().unwrap_or(window.start);
         Self { particle: job.particle, record: job.record, span: [window.start, end].map(f64::to_bits) }

@@ -21,7 +21,9 @@ mod job_name;
 mod local_workers;
 mod network;
 mod service;
+mod transfer;
 mod travel;
+mod wire;
 
 pub use error::FleetError;
 pub use event::FleetEvent;
@@ -32,6 +34,9 @@ pub use in_process::InProcess;
 pub use local_workers::{LocalConfig, LocalWorkers};
 pub use starlings_models::Factory;
 pub use starlings_proto::{ProtocolError, SetupId, job_key};
+pub use starlings_states::{
+    CHUNK_VALUES, Held, StateError, StateStore, StateWriter, StoredState, hex, n_chunks,
+};
 pub use travel::travels;
 
 use std::ops::ControlFlow;
@@ -43,17 +48,32 @@ use starlings_models::{Failure, Job, Prediction, Setup};
 pub const TELL_EVERY: Duration = Duration::from_millis(500);
 
 /// Takes outcomes of jobs, each with the place of its job in the batch, while the batch goes on. A break ends the batch.
-pub type Arrived<'a> = &'a mut dyn FnMut(Vec<(usize, Outcome)>) -> ControlFlow<()>;
+pub type Arrived<'a> = &'a mut dyn FnMut(Vec<(usize, Outcome<Held>)>) -> ControlFlow<()>;
 
-/// How one job of a batch ended.
+/// How one job of a batch ended. The state of its prediction is an `S`, as that of its job.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Outcome {
+pub struct Outcome<S = Vec<f64>> {
     /// The prediction, or why there is none: the model's doing, or the limit of wall time. A failure of a place is never here.
-    pub result: Result<Prediction, Failure>,
+    pub result: Result<Prediction<S>, Failure>,
     /// How often the job was started; depends on the workers and must not enter an estimate.
     pub attempts: u32,
     /// The worker that answered last.
     pub worker: String,
+}
+
+impl<S> Outcome<S> {
+    /// The same outcome with its state as something else.
+    ///
+    /// # Errors
+    /// What `change` says.
+    pub fn try_map<T, E>(self, change: impl FnOnce(S) -> Result<T, E>) -> Result<Outcome<T>, E> {
+        let Self { result, attempts, worker } = self;
+        let result = match result {
+            Ok(prediction) => Ok(prediction.try_map(change)?),
+            Err(failure) => Err(failure),
+        };
+        Ok(Outcome { result, attempts, worker })
+    }
 }
 
 /// Anything that runs batches of jobs. Same jobs, same results, whatever runs them.
@@ -79,19 +99,34 @@ pub trait Fleet {
         self.run_mixed(jobs.into_iter().map(|job| (setup, job)).collect())
     }
 
-    /// As [`Fleet::run_mixed`], and tells of outcomes while the batch goes on: every [`TELL_EVERY`], also when there are none, of
+    /// [`Fleet::run_mixed`] for jobs whose states, and those of the outcomes, may be in the fleet's store.
+    ///
+    /// # Errors
+    /// As [`Fleet::run_mixed`], and when a state cannot be kept or read.
+    fn run_held(&mut self, jobs: Vec<(SetupId, Job<Held>)>) -> Result<Vec<Outcome<Held>>, FleetError> {
+        let jobs = jobs.into_iter().map(|(setup, job)| Ok((setup, job.try_map(Held::into_values)?)));
+        let outcomes = self.run_mixed(jobs.collect::<Result<_, StateError>>()?)?;
+        outcomes.into_iter().map(|outcome| outcome.try_map(|values| Ok(Held::Values(values)))).collect()
+    }
+
+    /// As [`Fleet::run_held`], and tells of outcomes while the batch goes on: every [`TELL_EVERY`], also when there are none, of
     /// those that were not told of before, and of the rest when it ends in an error. Of a batch that is over sooner nothing is told,
     /// and nothing by a fleet that runs in this process.
     ///
     /// # Errors
-    /// As [`Fleet::run_mixed`]; [`FleetError::Cancelled`] when the caller breaks off.
+    /// As [`Fleet::run_held`]; [`FleetError::Cancelled`] when the caller breaks off.
     fn run_telling(
         &mut self,
-        jobs: Vec<(SetupId, Job)>,
+        jobs: Vec<(SetupId, Job<Held>)>,
         arrived: Arrived<'_>,
-    ) -> Result<Vec<Outcome>, FleetError> {
+    ) -> Result<Vec<Outcome<Held>>, FleetError> {
         let _ = arrived;
-        self.run_mixed(jobs)
+        self.run_held(jobs)
+    }
+
+    /// Where large states are kept; `None` for a fleet that takes all states as values.
+    fn states(&self) -> Option<&StateStore> {
+        None
     }
 
     /// Number of workers now.

@@ -34,7 +34,7 @@ const KEEP_ALIVE: (Duration, Duration) = (Duration::from_secs(60), Duration::fro
 /// HTTP/2 windows per stream and per connection, bytes: enough for a long fat network.
 const WINDOWS: (u32, u32) = (4 * 1024 * 1024, 16 * 1024 * 1024);
 
-/// Calls of one connection at the same time: a worker makes one, and dials again before the last one has ended now and then.
+/// Calls of one connection at the same time: a worker makes one, and up to four for large states, two each way.
 const STREAMS: u32 = 16;
 
 /// The ways on which workers come.

@@ -7,11 +7,12 @@ use starlings_proto::generated::{self, fleet_server};
 use starlings_proto::words::status_text;
 use starlings_proto::{FromWorker, ToWorker};
 use tokio::sync::mpsc;
-use tokio_stream::wrappers::UnboundedReceiverStream;
+use tokio_stream::wrappers::{ReceiverStream, UnboundedReceiverStream};
 use tonic::{Request, Response, Status, Streaming};
 
 use super::dispatcher::{Event, WorkerId};
 use super::hub::{Closed, Hub, Outgoing};
+use super::transfer;
 
 /// How long a connection may stay open without a Hello.
 const HELLO_PATIENCE: Duration = Duration::from_secs(10);
@@ -23,6 +24,21 @@ pub(super) struct Service {
 #[tonic::async_trait]
 impl fleet_server::Fleet for Service {
     type WorkStream = UnboundedReceiverStream<Outgoing>;
+    type GetStream = ReceiverStream<Result<generated::Chunk, Status>>;
+
+    async fn put(
+        &self,
+        request: Request<Streaming<generated::Chunk>>,
+    ) -> Result<Response<generated::PutResult>, Status> {
+        transfer::put(&self.hub, request.into_inner()).await.map(Response::new)
+    }
+
+    async fn get(
+        &self,
+        request: Request<generated::GetRequest>,
+    ) -> Result<Response<Self::GetStream>, Status> {
+        transfer::get(&self.hub, request.get_ref()).map(Response::new)
+    }
 
     async fn work(
         &self,

@@ -6,7 +6,7 @@ mod fleet_kit;
 
 use std::sync::mpsc::Receiver;
 
-use fleet_kit::hand::{Hand, block_on, hello};
+use fleet_kit::hand::{Hand, block_on, hello, inside, squared};
 use fleet_kit::{
     Run, ThreadWorker, any_port, assert_exact, await_workers, factory, jobs, listen, listen_with, square,
 };
@@ -162,7 +162,8 @@ fn a_process_that_was_put_out_is_not_taken_again() {
         let end = loop {
             match liar.hear().await {
                 Some(ToWorker::Setup { id, .. }) => liar.say(FromWorker::Setup { id, result: Ok(()) }),
-                Some(ToWorker::Job { lease, mut job, .. }) => {
+                Some(ToWorker::Job { lease, job, .. }) => {
+                    let mut job = job.try_map(inside).unwrap();
                     job.theta[0] += 1.0;
                     liar.answer(lease, &job);
                 }
@@ -380,7 +381,7 @@ fn times_that_no_run_can_take_are_not_believed() {
         let (_, events) = beside(5, async |address| {
             let mut hand = Hand::dial(address, hello()).await;
             let (lease, job) = hand.take_jobs(1).await.remove(0);
-            let answer = LeaseOutcome::Ran(Ok(square(&job)));
+            let answer = LeaseOutcome::Ran(Ok(squared(&job)));
             hand.say(FromWorker::Result { lease, answer, cost });
             hand.say(FromWorker::Goodbye("done".to_owned()));
             while hand.hear().await.is_some() {}

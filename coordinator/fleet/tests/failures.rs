@@ -91,16 +91,6 @@ fn a_setup_that_no_worker_can_build_ends_the_run_with_its_text() {
 }
 
 #[test]
-fn a_state_too_large_for_a_job_is_refused_before_anything_is_sent() {
-    let (mut fleet, _events, _) = listen(any_port());
-    let setup = fleet.install(&Setup::default()).unwrap();
-    let mut jobs = jobs(1);
-    jobs[0].state = Some(vec![0.0; 40_000]);
-    let text = fleet.run(setup, jobs).unwrap_err().to_string();
-    assert!(text.contains("320000 bytes") && text.contains("not available yet"), "{text}");
-}
-
-#[test]
 fn a_window_without_times_is_refused_before_anything_is_sent() {
     let (mut fleet, _events, _) = listen(any_port());
     let setup = fleet.install(&Setup::default()).unwrap();

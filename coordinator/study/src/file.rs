@@ -6,7 +6,7 @@
 mod brackets;
 pub(super) mod layout;
 pub(super) mod locate;
-mod memory;
+pub(crate) mod memory;
 mod model;
 mod quantity;
 pub(super) mod read;

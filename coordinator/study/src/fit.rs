@@ -14,12 +14,12 @@ mod journal;
 mod kept;
 pub(crate) mod resample;
 pub(crate) mod rescue;
+pub(crate) mod results;
 pub(crate) mod runner;
 mod schedule;
 pub(crate) mod settle;
 pub(crate) mod stack;
 mod timeouts;
 
-pub use ensemble::recombine_by;
 pub use failures::{FailedRange, FailureCluster};
 pub use settle::LIMIT;

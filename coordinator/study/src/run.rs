@@ -151,7 +151,9 @@ fn from_start_to_end(
     folder: &mut RunFolder,
     context: &mut RunContext<'_>,
 ) -> Result<Summary, RunError> {
-    let resumed = Snapshot::read(&folder.store, study.records.len())?;
+    let states = folder.settle_states(fleet.states())?;
+    folder.store.reopen_arrived(&states)?;
+    let resumed = Snapshot::read(&folder.store, study.records.len(), &states)?;
     context.earlier_s = folder.store.elapsed_s()?;
     folder.store.event(
         context.elapsed(),
@@ -205,6 +207,7 @@ fn from_start_to_end(
     result.check_finite().map_err(RunError::NotFinite)?;
     folder.store.event(context.elapsed(), "run", "run finished")?;
     folder.finish(study, &fit, &result)?;
+    states.clear();
     Ok(result)
 }
 

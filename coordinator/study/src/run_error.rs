@@ -1,7 +1,7 @@
 //! Why a run ends without a result. Next file to read: [`crate::run`].
 
 use starlings_estimators::EstimatorError;
-use starlings_fleet::FleetError;
+use starlings_fleet::{FleetError, StateError};
 use starlings_models::Failure;
 
 use crate::Study;
@@ -17,6 +17,9 @@ pub enum RunError {
     /// The store failed.
     #[error(transparent)]
     Store(#[from] StoreError),
+    /// A large state of a particle cannot be kept or read.
+    #[error(transparent)]
+    State(#[from] StateError),
     /// The estimator could not go on.
     #[error(transparent)]
     Estimator(#[from] EstimatorError),

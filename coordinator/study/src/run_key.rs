@@ -2,7 +2,7 @@
 //!
 //! Next file to read: [`crate::store`], which keeps answers by it.
 
-use starlings_fleet::SetupId;
+use starlings_fleet::{Held, SetupId};
 use starlings_models::Job;
 use starlings_proto::JobKeys;
 
@@ -16,7 +16,7 @@ pub fn free(programs: &[u8; 32], setup: &SetupId, job: &Job) -> RunKey {
 }
 
 /// The key of a run that an observer may correct by what was observed: the programs and the whole job.
-pub(crate) fn observed(programs: &[u8; 32], keys: &mut JobKeys, setup: &SetupId, job: &Job) -> RunKey {
+pub(crate) fn observed(programs: &[u8; 32], keys: &mut JobKeys, setup: &SetupId, job: &Job<Held>) -> RunKey {
     let mut hasher = blake3::Hasher::new();
     hasher.update(programs);
     hasher.update(&keys.of(setup, job));

@@ -2,18 +2,20 @@
 //!
 //! Whatever is shown later — summary, report, export, resume — is read from here and from nowhere else. Each analysis is
 //! written in one piece with the snapshot that a resumed run starts from, and a few quick ones are committed together, so a run
-//! killed at any instant continues from a whole analysis at most [`HOLD_S`] before. Nothing here computes. Next file to read:
+//! killed at any instant continues from a whole analysis a moment before (`commit`). Nothing here computes. Next file to read:
 //! [`crate::store::snapshot`].
 
 mod arrived;
 mod call;
 mod changes;
+mod commit;
 mod elapsed;
 mod error;
 pub mod folder;
 mod folder_error;
 mod info;
 pub(super) mod json;
+mod kept_states;
 mod lock;
 mod make;
 mod meaning;
@@ -29,11 +31,12 @@ mod table;
 mod tests;
 mod told;
 
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 use std::path::{Path, PathBuf};
 
 use rusqlite::{Connection, OptionalExtension, Row, params};
 
+use kept_states::KeptStates;
 use schema::{SCHEMA_VERSION, insert_analysis, insert_jobs, insert_predictions};
 use snapshot::{Estimate, Snapshot};
 
@@ -45,9 +48,6 @@ pub use remembered::RunKey;
 pub use rows::{AnalysisRow, EstimateRow, InnovationRow, JobRow, PredictionRow};
 pub use table::table;
 
-/// Analyses are committed together for at most so long, in s: a commit costs about as much as the rows of an analysis.
-const HOLD_S: f64 = 0.05;
-
 /// An open run database.
 pub struct Store {
     path: PathBuf,
@@ -56,12 +56,16 @@ pub struct Store {
     committed_s: Cell<f64>,
     /// Whether there are runs of an analysis that is not made yet.
     holds_arrived: Cell<bool>,
+    /// Large states of the last snapshots.
+    kept: RefCell<KeptStates>,
 }
 
 impl Drop for Store {
     fn drop(&mut self) {
         // A destructor returns no error; what was committed before is kept.
         let _ = self.commit();
+        // What it names stands in the folder for a resume.
+        self.kept.get_mut().leave();
     }
 }
 
@@ -76,6 +80,7 @@ impl Store {
         store.guard(store.connection.execute_batch(remembered::TABLE))?;
         store.guard(store.connection.execute_batch(arrived::TABLE))?;
         store.holds_arrived.set(store.guard(arrived::any(&store.connection))?);
+        store.guard(store.connection.execute_batch(kept_states::TABLE))?;
         Ok(store)
     }
 
@@ -116,8 +121,13 @@ impl Store {
     fn connect(path: &Path, flags: rusqlite::OpenFlags) -> Result<Self, StoreError> {
         let connection = Connection::open_with_flags(path, flags)
             .map_err(|source| StoreError::Database { path: path.to_owned(), source })?;
-        let (committed_s, holds_arrived) = (Cell::new(f64::NEG_INFINITY), Cell::new(false));
-        Ok(Self { path: path.to_owned(), connection, committed_s, holds_arrived })
+        Ok(Self {
+            path: path.to_owned(),
+            connection,
+            committed_s: Cell::new(f64::NEG_INFINITY),
+            holds_arrived: Cell::new(false),
+            kept: RefCell::default(),
+        })
     }
 
     /// WAL with NORMAL keeps every committed transaction through a killed process at the price of one write each.
@@ -223,32 +233,9 @@ impl Store {
             let _ = self.commit();
         } else {
             self.holds_arrived.set(false);
+            self.kept.borrow_mut().wrote(snapshot.stored());
         }
         self.guard(written)
-    }
-
-    /// Makes everything written so far durable.
-    ///
-    /// # Errors
-    /// When the database refuses.
-    pub(crate) fn commit(&self) -> Result<(), StoreError> {
-        if self.connection.is_autocommit() {
-            return Ok(());
-        }
-        self.guard(self.connection.execute_batch("COMMIT"))
-    }
-
-    /// [`Store::commit`], if the last one was [`HOLD_S`] or longer ago; `now_s` is the run's wall time.
-    ///
-    /// # Errors
-    /// When the database refuses.
-    pub(crate) fn commit_if_due(&self, now_s: f64) -> Result<(), StoreError> {
-        if now_s - self.committed_s.get() >= HOLD_S {
-            self.note_elapsed(now_s)?;
-            self.commit()?;
-            self.committed_s.set(now_s);
-        }
-        Ok(())
     }
 
     /// Writes the final forward run, replacing an earlier one.

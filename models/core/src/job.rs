@@ -34,8 +34,10 @@ pub struct Window {
 }
 
 /// One run: this particle, these parameters, this window, from this state.
+///
+/// A model gets the values of the state; on its way to a worker a large state may stand as something else, `S`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Job {
+pub struct Job<S = Vec<f64>> {
     /// Index of the sigma point.
     pub particle: u32,
     /// Index of the record in the study.
@@ -45,18 +47,40 @@ pub struct Job {
     /// Parameter values in physical units, in the order of [`crate::Setup::parameters`].
     pub theta: Vec<f64>,
     /// State at `window.start`; `None` starts from the model's initial state.
-    pub state: Option<Vec<f64>>,
+    pub state: Option<S>,
 }
 
-/// What a run predicts.
+impl<S> Job<S> {
+    /// The same job with its state as something else.
+    ///
+    /// # Errors
+    /// What `change` says.
+    pub fn try_map<T, E>(self, change: impl FnOnce(S) -> Result<T, E>) -> Result<Job<T>, E> {
+        let Self { particle, record, window, theta, state } = self;
+        Ok(Job { particle, record, window, theta, state: state.map(change).transpose()? })
+    }
+}
+
+/// What a run predicts. Its state is an `S` as that of a [`Job`].
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Prediction {
+pub struct Prediction<S = Vec<f64>> {
     /// Predicted outputs, `n_obs × n_times`, laid out as [`Window::observed`]; recorded before any correction.
     pub outputs: Vec<f64>,
     /// State at the window's end, after the observer's correction.
-    pub state: Vec<f64>,
+    pub state: S,
     /// Wall time of the run in seconds, measured by the worker; zero from a bare model, which knows no clock.
     pub cost: f64,
+}
+
+impl<S> Prediction<S> {
+    /// The same prediction with its state as something else.
+    ///
+    /// # Errors
+    /// What `change` says.
+    pub fn try_map<T, E>(self, change: impl FnOnce(S) -> Result<T, E>) -> Result<Prediction<T>, E> {
+        let Self { outputs, state, cost } = self;
+        Ok(Prediction { outputs, state: change(state)?, cost })
+    }
 }
 
 /// What a worker runs. Native models and every adapter to an external solver implement it. Same job, same bits.

@@ -6,9 +6,9 @@ use super::ProtocolError;
 
 /// Little-endian bytes of the values.
 pub fn encode(values: &[f64]) -> Bytes {
-    let mut bytes = Vec::with_capacity(values.len() * 8);
-    for value in values {
-        bytes.extend_from_slice(&value.to_le_bytes());
+    let mut bytes = vec![0; values.len() * 8];
+    for (word, value) in bytes.as_chunks_mut::<8>().0.iter_mut().zip(values) {
+        *word = value.to_le_bytes();
     }
     bytes.into()
 }

@@ -4,7 +4,8 @@ use bytes::Bytes;
 use starlings_models::{ModelFailure, ParticleError, Prediction, Timeout};
 
 use super::held::{HeldRun, decode_held, encode_held};
-use super::{Lease, ProtocolError, SetupId, floats, job::check_state, required, setup_id};
+use super::state::{self, check_inline};
+use super::{Lease, ProtocolError, SetupId, State, floats, required, setup_id};
 use crate::MAX_SLOTS;
 use crate::generated::{self, failure, from_worker::Kind, result::Outcome};
 use crate::text::{self, cut};
@@ -37,7 +38,7 @@ pub struct Hello {
 #[derive(Clone, Debug, PartialEq)]
 pub enum LeaseOutcome {
     /// A prediction, or why there is none.
-    Ran(Result<Prediction, ParticleError>),
+    Ran(Result<Prediction<State>, ParticleError>),
     /// The job was withdrawn before it started.
     Withdrawn,
 }
@@ -136,19 +137,22 @@ fn decode_hello(hello: generated::Hello) -> Result<Hello, ProtocolError> {
 fn encode_answer(answer: LeaseOutcome) -> Result<Outcome, ProtocolError> {
     Ok(match answer {
         LeaseOutcome::Ran(ended) => {
-            check_state(ended.as_ref().map(|prediction| &*prediction.state).unwrap_or_default())?;
+            if let Ok(Prediction { state: State::Values(values), .. }) = &ended {
+                check_inline(values.len())?;
+            }
             encode_ended(&ended)
         }
         LeaseOutcome::Withdrawn => Outcome::Withdrawn(generated::Withdrawn {}),
     })
 }
 
-pub(super) fn encode_ended(ended: &Result<Prediction, ParticleError>) -> Outcome {
+pub(super) fn encode_ended(ended: &Result<Prediction<State>, ParticleError>) -> Outcome {
     match ended {
-        Ok(prediction) => Outcome::Prediction(generated::Prediction {
-            outputs: floats::encode(&prediction.outputs),
-            state: floats::encode(&prediction.state),
-        }),
+        Ok(prediction) => {
+            let (inside, state_id) = state::encode(Some(&prediction.state));
+            let (outputs, state) = (floats::encode(&prediction.outputs), inside.unwrap_or_default());
+            Outcome::Prediction(generated::Prediction { outputs, state, state_id })
+        }
         Err(error) => Outcome::Failure(generated::Failure { kind: Some(encode_failure(error.clone())) }),
     }
 }
@@ -163,22 +167,18 @@ fn decode_result(result: generated::Result) -> Result<FromWorker, ProtocolError>
         });
     }
     let (ended, cost) = decode_ended(result)?;
-    if let Ok(prediction) = &ended {
-        check_state(&prediction.state)?;
-    }
     Ok(FromWorker::Result { lease, answer: LeaseOutcome::Ran(ended), cost })
 }
 
-/// How a run ended, and its wall time in seconds; its state may have any length.
+/// How a run ended, and its wall time in seconds.
 pub(super) fn decode_ended(
     result: generated::Result,
-) -> Result<(Result<Prediction, ParticleError>, f64), ProtocolError> {
+) -> Result<(Result<Prediction<State>, ParticleError>, f64), ProtocolError> {
     let cost = seconds(result.cost_s);
     let ended = match required(result.outcome, "outcome")? {
         Outcome::Prediction(p) => {
-            let (outputs, state) =
-                (floats::decode(&p.outputs, "outputs")?, floats::decode(&p.state, "state")?);
-            Ok(Prediction { outputs, state, cost })
+            let state = state::decode(Some(&p.state), p.state_id.as_deref())?.unwrap_or_default();
+            Ok(Prediction { outputs: floats::decode(&p.outputs, "outputs")?, state, cost })
         }
         Outcome::Failure(failure) => Err(decode_failure(required(failure.kind, "failure kind")?)?),
         Outcome::Withdrawn(_) => return Err(ProtocolError::Missing("end of the run")),

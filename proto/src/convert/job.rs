@@ -7,7 +7,7 @@ use starlings_models::{Job, Window};
 
 use super::window;
 use super::windows::{self, ReceivedWindows, SentWindows, WindowId};
-use super::{Lease, ProtocolError, SetupId, floats, required};
+use super::{Lease, ProtocolError, SetupId, State, floats, required, state};
 use crate::{MAX_INLINE_STATE, MAX_MESSAGE, generated};
 
 /// Room left in a message for everything that is no array.
@@ -32,7 +32,7 @@ struct Encoded {
 
 impl JobEncoder {
     /// Encodes the windows of a batch ahead, so that giving its jobs away copies nothing.
-    pub fn of<'a>(jobs: impl IntoIterator<Item = &'a Job>) -> Self {
+    pub fn of<'a>(jobs: impl IntoIterator<Item = &'a Job<State>>) -> Self {
         let mut encoder = Self::default();
         for job in jobs {
             encoder.window(&job.window);
@@ -45,7 +45,7 @@ impl JobEncoder {
         &mut self,
         lease: Lease,
         setup: &SetupId,
-        job: &Job,
+        job: &Job<State>,
         sent: &mut SentWindows,
     ) -> (Option<generated::ToWorker>, generated::ToWorker) {
         let window = self.window(&job.window);
@@ -56,6 +56,7 @@ impl JobEncoder {
             }
             None => (None, generated::job::Over::Window(window.message.clone())),
         };
+        let (inside, named) = state::encode(job.state.as_ref());
         let message = generated::Job {
             lease: Some(lease.into()),
             setup: bytes::Bytes::copy_from_slice(setup),
@@ -63,7 +64,8 @@ impl JobEncoder {
             record: job.record,
             over: Some(over),
             theta: floats::encode(&job.theta),
-            state: job.state.as_deref().map(floats::encode),
+            state: inside,
+            state_id: named,
         };
         (ahead, generated::ToWorker { kind: Some(generated::to_worker::Kind::Job(message)) })
     }
@@ -76,13 +78,12 @@ impl JobEncoder {
     }
 }
 
-/// Whether a job can travel in one message and will be taken at the other end.
+/// Whether a job can travel and will be taken at the other end.
 ///
 /// # Errors
-/// [`ProtocolError::StateTooLarge`], or [`ProtocolError::Shape`] when the window has no times, its arrays do not fit together, or window
+/// [`ProtocolError::Shape`] when the window has no times, its arrays do not fit together, or window
 /// and parameters exceed a message.
-pub fn check_size(job: &Job) -> Result<(), ProtocolError> {
-    check_state(job.state.as_deref().unwrap_or_default())?;
+pub fn check_size<S>(job: &Job<S>) -> Result<(), ProtocolError> {
     let window = &job.window;
     window::check(window)?;
     let signals: usize = window.inputs.iter().map(|s| s.times.len() + s.values.len()).sum();
@@ -97,17 +98,10 @@ pub fn check_size(job: &Job) -> Result<(), ProtocolError> {
     Ok(())
 }
 
-pub(super) fn check_state(state: &[f64]) -> Result<(), ProtocolError> {
-    let bytes = state.len() * 8;
-    if bytes > MAX_INLINE_STATE {
-        return Err(ProtocolError::StateTooLarge { bytes, limit: MAX_INLINE_STATE });
-    }
-    Ok(())
-}
-
-pub(super) fn decode_job(job: &generated::Job, received: &ReceivedWindows) -> Result<Job, ProtocolError> {
-    let state = job.state.as_ref().map(|bytes| floats::decode(bytes, "state")).transpose()?;
-    check_state(state.as_deref().unwrap_or_default())?;
+pub(super) fn decode_job(
+    job: &generated::Job,
+    received: &ReceivedWindows,
+) -> Result<Job<State>, ProtocolError> {
     Ok(Job {
         particle: job.particle,
         record: job.record,
@@ -118,7 +112,7 @@ pub(super) fn decode_job(job: &generated::Job, received: &ReceivedWindows) -> Re
             }
         },
         theta: floats::decode(&job.theta, "theta")?,
-        state,
+        state: state::decode(job.state.as_deref(), job.state_id.as_deref())?,
     })
 }
 

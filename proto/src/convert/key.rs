@@ -1,17 +1,46 @@
 //! The key of a job: a hash of everything in it, by which its result is known again.
 //!
 //! A run depends on its job alone, so a result with the key of a job is the result of that job, whoever asked for it first. Both ends
-//! compute the key from the same arrays; it does not travel with a job. Next file to read: [`super::ended`].
+//! compute the key from the same arrays; it does not travel with a job. A state that travels inside its job has its part in the key by
+//! its hash, a larger one by its name. The size of a state decides which of the two it is, on both sides alike, so a job never has two
+//! keys, and no name is taken for a hash. Next file to read: [`super::ended`].
 
 use std::collections::HashMap;
 use std::sync::Arc;
 
 use starlings_models::{Job, Window};
 
-use super::{SetupId, floats, window, windows};
+use super::state::{self, StateId};
+use super::{SetupId, State, floats, window, windows};
+use crate::MAX_INLINE_STATE;
 
 /// BLAKE3 of a job with its setup: particle, record, window, parameters and state, bit by bit.
 pub type JobKey = [u8; 32];
+
+/// A state, in whatever form, as a part of a key.
+pub trait InKey {
+    /// The hash of its values where it is small, its name where it is large.
+    fn in_key(&self) -> [u8; 32];
+}
+
+impl InKey for Vec<f64> {
+    fn in_key(&self) -> [u8; 32] {
+        if self.len() * 8 > MAX_INLINE_STATE { state::name(self) } else { hash(self) }
+    }
+}
+
+impl InKey for State {
+    fn in_key(&self) -> [u8; 32] {
+        match self {
+            Self::Values(values) => values.in_key(),
+            Self::Named(id) => *id,
+        }
+    }
+}
+
+fn hash(values: &[f64]) -> StateId {
+    *blake3::hash(&floats::encode(values)).as_bytes()
+}
 
 /// Makes keys of jobs; the windows that they share are hashed once.
 #[derive(Debug, Default)]
@@ -22,7 +51,7 @@ pub struct JobKeys {
 
 impl JobKeys {
     /// The key of one job.
-    pub fn of(&mut self, setup: &SetupId, job: &Job) -> JobKey {
+    pub fn of<S: InKey>(&mut self, setup: &SetupId, job: &Job<S>) -> JobKey {
         let place = Arc::as_ptr(&job.window) as usize;
         let (_, over) = self
             .windows
@@ -35,16 +64,16 @@ impl JobKeys {
         hasher.update(over);
         hasher.update(&(job.theta.len() as u64).to_le_bytes());
         hasher.update(&floats::encode(&job.theta));
-        // By its own hash, so that a state has the same part in the key however it travels.
+        // Not by its values, so that a state has the same part in the key whatever form it has.
         if let Some(state) = &job.state {
-            hasher.update(blake3::hash(&floats::encode(state)).as_bytes());
+            hasher.update(&state.in_key());
         }
         *hasher.finalize().as_bytes()
     }
 }
 
 /// The key of one job.
-pub fn job_key(setup: &SetupId, job: &Job) -> JobKey {
+pub fn job_key<S: InKey>(setup: &SetupId, job: &Job<S>) -> JobKey {
     JobKeys::default().of(setup, job)
 }
 
@@ -91,6 +120,21 @@ mod tests {
         keys.sort_unstable();
         keys.dedup();
         assert_eq!(keys.len(), n);
+    }
+
+    #[test]
+    fn a_state_has_the_same_key_by_its_values_and_by_its_name_and_another_for_every_value() {
+        let large = |last: f64| {
+            let mut values = vec![0.5; MAX_INLINE_STATE / 8 + 1];
+            values.extend([last]);
+            values
+        };
+        let key = |state: State| job_key(&[7; 32], &job().try_map(|_| Ok::<_, ()>(state)).unwrap());
+        let of_values = job_key(&[7; 32], &Job { state: Some(large(1.0)), ..job() });
+        assert_eq!(key(State::Values(large(1.0))), of_values);
+        assert_eq!(key(State::Named(state::name(&large(1.0)))), of_values);
+        assert_ne!(key(State::Named(state::name(&large(2.0)))), of_values);
+        assert_eq!(key(State::Values(vec![1.0])), job_key(&[7; 32], &job()), "a small one");
     }
 
     #[test]

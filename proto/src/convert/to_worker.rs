@@ -5,7 +5,9 @@ use starlings_models::{Job, Setup};
 
 use super::held::{decode_adopted, encode_adopted};
 use super::key::JobKey;
-use super::{Lease, ProtocolError, ReceivedWindows, SetupId, decode_setup, job, required, setup_id, windows};
+use super::{
+    Lease, ProtocolError, ReceivedWindows, SetupId, State, decode_setup, job, required, setup_id, windows,
+};
 use crate::generated::{self, to_worker::Kind};
 use crate::text::cut;
 
@@ -49,7 +51,7 @@ pub enum ToWorker {
         /// The setup to run it with.
         setup: SetupId,
         /// The job.
-        job: Job,
+        job: Job<State>,
     },
     /// Withdraw these jobs.
     Cancel {

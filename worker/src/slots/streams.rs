@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use starlings_models::{ParticleError, Prediction};
 use starlings_proto::convert::ended;
-use starlings_proto::{FromWorker, HeldRun, JobKey, JobKeys, Lease, LeaseOutcome, generated, job_key};
+use starlings_proto::{
+    FromWorker, HeldRun, JobKey, JobKeys, Lease, LeaseOutcome, MAX_INLINE_STATE, State, generated,
+};
 use tokio::sync::mpsc::UnboundedSender;
 
 use super::{Asked, Shared, Slots, Task, answer};
@@ -26,7 +28,7 @@ impl Slots {
         queue.stream = Some(stream);
         queue.full = false;
         let (mut keys, all) = (JobKeys::default(), queue.running.iter().chain(&queue.tasks));
-        let keys = all.map(|task| keys.of(&task.setup, &task.job)).collect();
+        let keys = all.map(|task| task.key(&mut keys)).collect();
         drop(queue);
         self.shared.filled.notify_all();
         keys
@@ -36,7 +38,7 @@ impl Slots {
     pub(crate) fn adopt(
         &self,
         runs: Vec<(JobKey, Lease)>,
-        outbox: &UnboundedSender<generated::FromWorker>,
+        asked: impl Fn(Lease) -> Asked,
     ) -> Vec<(JobKey, Lease)> {
         let mut leases: HashMap<JobKey, Lease> = runs.into_iter().collect();
         if leases.is_empty() {
@@ -44,8 +46,8 @@ impl Slots {
         }
         let (mut keys, queue) = (JobKeys::default(), self.shared.lock());
         for task in queue.running.iter().chain(&queue.tasks) {
-            if let Some(lease) = leases.remove(&keys.of(&task.setup, &task.job)) {
-                *task.asked() = Some(Asked { lease, outbox: outbox.clone() });
+            if let Some(lease) = leases.remove(&task.key(&mut keys)) {
+                *task.asked() = Some(asked(lease));
             }
         }
         leases.into_iter().collect()
@@ -58,26 +60,52 @@ impl Slots {
 }
 
 impl Shared {
-    /// Answers a task that ran; held is the result whether there is somebody to answer or not.
-    pub(super) fn finished(&self, task: &Arc<Task>, result: Result<Prediction, ParticleError>, cost: f64) {
-        let has_room =
-            self.held.as_ref().is_none_or(|held| held.keep(task.setup, Arc::clone(&task.job), &result, cost));
+    /// Answers a task that ran; held is the result whether there is somebody to answer or not, unless it has a large state.
+    pub(super) fn finished(&self, task: Arc<Task>, result: Result<Prediction, ParticleError>, cost: f64) {
+        let inside = inside(&result);
+        let has_room = match (&self.held, &inside) {
+            (Some(held), Some(inside)) => held.keep(task.setup, Arc::clone(&task.job), inside, cost),
+            _ => true,
+        };
         let mut queue = self.lock();
-        queue.running.retain(|running| !Arc::ptr_eq(running, task));
+        queue.running.retain(|running| !Arc::ptr_eq(running, &task));
         // A stream that came meanwhile has been told all that is held.
         queue.full |= !has_room && queue.stream.is_none();
         let stream = queue.stream.clone();
         drop(queue);
-        match (task.asked().take(), stream) {
-            (Some(Asked { lease, outbox }), _) => answer(&outbox, lease, LeaseOutcome::Ran(result), cost),
-            (None, Some(stream)) => {
-                let ended = Some(ended::encode(&result, cost).into());
-                let run = HeldRun { key: job_key(&task.setup, &task.job), ended };
+        let asked = task.asked().take();
+        match (asked, stream, inside) {
+            (Some(Asked { lease, outbox, .. }), _, Some(inside)) => {
+                answer(&outbox, lease, LeaseOutcome::Ran(inside), cost);
+            }
+            (Some(Asked { lease, outbox, transfers }), _, None) => {
+                let is_wanted = !task.stop.is_set();
+                // What it began from is not needed for what it ended in.
+                drop(task);
+                let put = |prediction| transfers.sendable(lease, prediction);
+                let answered =
+                    if is_wanted { LeaseOutcome::Ran(result.and_then(put)) } else { LeaseOutcome::Withdrawn };
+                answer(&outbox, lease, answered, cost);
+            }
+            (None, Some(stream), Some(inside)) => {
+                let ended = Some(ended::encode(&inside, cost).into());
+                let run = HeldRun { key: task.key(&mut JobKeys::default()), ended };
                 if let Ok(message) = FromWorker::Held(vec![run]).encode() {
                     let _ = stream.send(message);
                 }
             }
-            (None, None) => {}
+            (None, ..) => {}
         }
+    }
+}
+
+/// How a run ended as it travels inside a message; `None` where its state is too large for that.
+fn inside(result: &Result<Prediction, ParticleError>) -> Option<Result<Prediction<State>, ParticleError>> {
+    match result {
+        Ok(prediction) if prediction.state.len() * 8 > MAX_INLINE_STATE => None,
+        Ok(prediction) => {
+            prediction.clone().try_map(|values| Ok::<_, ()>(State::Values(values))).ok().map(Ok)
+        }
+        Err(error) => Some(Err(error.clone())),
     }
 }

@@ -3,14 +3,21 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use starlings_models::{Forward, Job, ParticleError, Stop};
-use starlings_proto::{FromWorker, Lease, LeaseOutcome, SetupId, generated};
+use starlings_proto::{FromWorker, JobKey, JobKeys, Lease, LeaseOutcome, SetupId, generated};
+use tokio::sync::OwnedSemaphorePermit;
 use tokio::sync::mpsc::UnboundedSender;
+
+use crate::transfer::Transfers;
 
 /// One job with everything needed to run and answer it.
 pub(crate) struct Task {
     pub(crate) setup: SetupId,
     pub(crate) forward: Arc<dyn Forward>,
     pub(crate) job: Arc<Job>,
+    /// Its key, where that was made of the name of a large state.
+    key: Option<JobKey>,
+    /// What its large state takes of the room for jobs that have not started.
+    room: Mutex<Option<OwnedSemaphorePermit>>,
     /// The word that stops it.
     pub(super) stop: Stop,
     /// Who wants the answer. A stream that ends takes it away, and a later one may ask again.
@@ -22,11 +29,36 @@ pub(crate) struct Task {
 pub(crate) struct Asked {
     pub(crate) lease: Lease,
     pub(crate) outbox: UnboundedSender<generated::FromWorker>,
+    /// The way of a large end state.
+    pub(crate) transfers: Transfers,
 }
 
 impl Task {
     pub(crate) fn new(asked: Asked, setup: SetupId, forward: Arc<dyn Forward>, job: Job) -> Self {
-        Self { setup, forward, job: Arc::new(job), stop: Stop::default(), asked: Mutex::new(Some(asked)) }
+        let (job, stop, asked) = (Arc::new(job), Stop::default(), Mutex::new(Some(asked)));
+        Self { setup, forward, job, key: None, room: Mutex::default(), stop, asked }
+    }
+
+    /// The same for a job whose large state arrived by itself.
+    pub(crate) fn large(
+        asked: Asked,
+        setup: SetupId,
+        forward: Arc<dyn Forward>,
+        job: Job,
+        key: JobKey,
+        room: OwnedSemaphorePermit,
+    ) -> Self {
+        Self { key: Some(key), room: Mutex::new(Some(room)), ..Self::new(asked, setup, forward, job) }
+    }
+
+    /// The key of its job.
+    pub(super) fn key(&self, keys: &mut JobKeys) -> JobKey {
+        self.key.unwrap_or_else(|| keys.of(&self.setup, &self.job))
+    }
+
+    /// It waits no more: its place among those that do is free.
+    pub(super) fn begun(&self) {
+        drop(self.room.lock().unwrap_or_else(PoisonError::into_inner).take());
     }
 
     pub(super) fn asked(&self) -> MutexGuard<'_, Option<Asked>> {

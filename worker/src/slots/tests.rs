@@ -29,13 +29,15 @@ impl Forward for Endless {
 fn a_computing_job_is_stopped_when_that_is_asked_for_and_answered_as_withdrawn() {
     let (outbox, mut sent) = tokio::sync::mpsc::unbounded_channel();
     let slots = Slots::start(1, None).unwrap();
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+    let transfers = crate::transfer::Transfers::nowhere(runtime.handle());
     let lease = |job| Lease { epoch: 1, job, attempt: 1 };
     let window =
         starlings_models::Window { start: 0.0, times: vec![1.0], observed: vec![0.0], inputs: vec![] };
     let window = Arc::new(window);
     for number in 1..=3 {
         let job = Job { particle: 0, record: 0, window: Arc::clone(&window), theta: vec![], state: None };
-        let asked = Asked { lease: lease(number), outbox: outbox.clone() };
+        let asked = Asked { lease: lease(number), outbox: outbox.clone(), transfers: transfers.clone() };
         slots.push(Task::new(asked, [7; 32], Arc::new(Endless), job));
     }
     while slots.load().0 == 0 {

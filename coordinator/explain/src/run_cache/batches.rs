@@ -6,7 +6,7 @@ use std::collections::{HashMap, HashSet};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use starlings_fleet::{Outcome, SetupId};
+use starlings_fleet::{Held, Outcome, SetupId};
 use starlings_models::Job;
 use starlings_study::store::{JobRow, RunKey, Store, StoreError};
 use starlings_study::{Study, run_key};
@@ -192,7 +192,9 @@ impl RunCache<'_> {
             early: HashMap::new(),
             refused: None,
         };
-        let outcomes = self.fleet.run_telling(jobs, &mut |early| arrivals.take_early(early));
+        let outcomes = self
+            .fleet
+            .run_telling(jobs.into_iter().map(held).collect(), &mut |early| arrivals.take_early(early));
         let Arrivals { mut early, refused, .. } = arrivals;
         // The events are kept even if the runs end in an error.
         self.keep_events()?;
@@ -243,7 +245,7 @@ struct Arrivals<'a> {
 
 impl Arrivals<'_> {
     /// Remembers results; one that cannot be remembered ends the batch.
-    fn take_early(&mut self, outcomes: Vec<(usize, Outcome)>) -> ControlFlow<()> {
+    fn take_early(&mut self, outcomes: Vec<(usize, Outcome<Held>)>) -> ControlFlow<()> {
         match self.remember(outcomes) {
             Ok(()) => ControlFlow::Continue(()),
             Err(error) => {
@@ -253,7 +255,7 @@ impl Arrivals<'_> {
         }
     }
 
-    fn remember(&mut self, outcomes: Vec<(usize, Outcome)>) -> Result<(), ExplainError> {
+    fn remember(&mut self, outcomes: Vec<(usize, Outcome<Held>)>) -> Result<(), ExplainError> {
         if outcomes.is_empty() {
             return Ok(());
         }
@@ -270,6 +272,12 @@ impl Arrivals<'_> {
     }
 }
 
+/// A job as a fleet takes it that may keep states for its caller: nobody reads those of whole records.
+fn held((setup, job): (SetupId, Job)) -> (SetupId, Job<Held>) {
+    let Job { particle, record, window, theta, state } = job;
+    (setup, Job { particle, record, window, theta, state: state.map(Held::Values) })
+}
+
 /// The row and the result to remember of a run.
 ///
 /// # Errors
@@ -278,7 +286,7 @@ fn remembered(
     study: &Study,
     batch: usize,
     requested: &RequestedRun,
-    outcome: Outcome,
+    outcome: Outcome<Held>,
 ) -> Result<(JobRow, RememberedRun), ExplainError> {
     let RequestedRun { record, particle, n_value, .. } = *requested;
     let row = JobRow {

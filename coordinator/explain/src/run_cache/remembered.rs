@@ -17,9 +17,9 @@ pub(crate) type RememberedRun = Result<Arc<Vec<f64>>, String>;
 ///
 /// # Errors
 /// When the prediction has another length than was requested, which is a fault of the worker and not of the model.
-pub(crate) fn from_outcome(
+pub(crate) fn from_outcome<S>(
     study: &Study,
-    outcome: Outcome,
+    outcome: Outcome<S>,
     particle: u32,
     record: usize,
     n_value: usize,

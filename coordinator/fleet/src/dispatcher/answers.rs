@@ -4,13 +4,14 @@
 
 use std::time::Duration;
 
-use starlings_models::{Failure, ParticleError, Prediction};
+use starlings_models::{Failure, ParticleError};
 use starlings_proto::{Lease, LeaseOutcome};
 
 use super::Dispatcher;
 use super::batch::{Doubt, Ended};
 use super::message::{BatchError, Command, WorkerId};
 use crate::FleetEvent;
+use crate::wire::Prediction;
 
 impl Dispatcher {
     pub(super) fn answered(

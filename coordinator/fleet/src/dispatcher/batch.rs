@@ -9,13 +9,13 @@ mod results;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use starlings_models::{Failure, Prediction};
+use starlings_models::Failure;
 use starlings_proto::SetupId;
 
 use super::message::{ControlId, WorkerId};
 use super::queue::{Queue, RetryKey};
-use crate::Outcome;
 use crate::job_name::JobName;
+use crate::wire::{Outcome, Prediction};
 
 /// What the loss of a worker means for a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -8,7 +8,7 @@
 
 use std::time::Duration;
 
-use starlings_models::{ParticleError, Prediction};
+use starlings_models::ParticleError;
 use starlings_proto::{LeaseOutcome, SetupId};
 
 use super::Dispatcher;
@@ -17,6 +17,7 @@ use super::opinion::{Opinion, Said, alike};
 use super::repeats::{Contributor, Dispute, MOST};
 use super::roster::Worker;
 use super::schedule::lease;
+use crate::wire::Prediction;
 
 impl Dispatcher {
     /// How runs of a job are compared; not at all where that was not asked for.

@@ -8,13 +8,14 @@
 
 use std::time::Duration;
 
-use starlings_models::{Failure, ModelFailure, ParticleError, Prediction};
+use starlings_models::{Failure, ModelFailure, ParticleError};
 use starlings_proto::Lease;
 
 use super::Dispatcher;
 use super::batch::{Batch, Doubt, Ended};
 use super::message::{BatchError, Command, ControlId, WorkerId};
 use super::schedule::lease;
+use crate::wire::Prediction;
 
 impl Dispatcher {
     /// An abnormal end: tried once more, and then decided by a control run in the same place.
@@ -107,6 +108,12 @@ impl Dispatcher {
                 self.set_aside(now, id, &format!("a run that worked before fails there: {fault}"));
             }
         }
+    }
+
+    /// Whether a lease is open: its worker may still answer for its job.
+    pub(crate) fn holds(&self, lease: &Lease) -> bool {
+        let worker = self.workers.get(&WorkerId(lease.epoch));
+        worker.is_some_and(|worker| worker.leases().any(|held| held == *lease))
     }
 
     /// What a lease of the running batch asks for.

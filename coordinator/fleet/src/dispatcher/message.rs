@@ -5,8 +5,9 @@ use std::time::Duration;
 
 use starlings_proto::{Lease, LeaseOutcome, SetupId};
 
+use crate::FleetEvent;
 use crate::job_name::JobName;
-use crate::{FleetEvent, Outcome};
+use crate::wire::Outcome;
 
 /// Number of a worker's stream: the epoch of its leases. A process that connects again gets a new one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -153,6 +154,8 @@ pub(crate) enum BatchError {
     LocalWorkers(String),
     /// The network ended although nobody closed the fleet.
     Stopped(String),
+    /// A state cannot be kept or read: why.
+    State(String),
     /// Every worker that could take a job was set aside for too long.
     Unavailable {
         /// How long.

@@ -13,12 +13,13 @@ mod waiting;
 
 use std::time::Duration;
 
-use starlings_models::{ModelFailure, ParticleError, Prediction};
+use starlings_models::{ModelFailure, ParticleError};
 use starlings_proto::{Lease, LeaseOutcome, SetupId};
 
 use super::{BatchError, Command, ControlId, Dispatcher, Event, Joining, Rules, Worker, WorkerId};
+use crate::FleetEvent;
 use crate::job_name::JobName;
-use crate::{FleetEvent, Outcome};
+use crate::wire::{Outcome, Prediction};
 
 const SETUP: SetupId = [7; 32];
 
@@ -70,7 +71,7 @@ fn submit_mixed(setups: &[u8]) -> Event {
 }
 
 fn prediction(index: usize) -> Prediction {
-    Prediction { outputs: vec![index as f64], state: vec![], cost: 0.0 }
+    Prediction { outputs: vec![index as f64], state: vec![].into(), cost: 0.0 }
 }
 
 fn answered(lease: Lease, answer: LeaseOutcome, cost: f64) -> Event {

@@ -3,35 +3,47 @@
 //! A prediction of another shape, or with a value that is not finite, is no answer and no failure of the model: the worker that
 //! sent it is at fault. Next file to read: [`super::state`].
 
-use starlings_models::{Job, ParticleError, Prediction};
-use starlings_proto::{Lease, LeaseOutcome, SetupId};
+use starlings_models::ParticleError;
+use starlings_proto::{Lease, LeaseOutcome, SetupId, State as Travelling, StateId};
 
 use super::state::State;
 use crate::dispatcher::Asked;
+use crate::wire::{Job, Prediction};
 
 impl State {
-    /// An answer, or what is wrong with it as a failure of its worker. One that nobody waits for is left as it is.
-    pub(super) fn checked(&self, lease: &Lease, answer: LeaseOutcome) -> LeaseOutcome {
-        self.checked_for(self.asked(lease), answer)
+    /// An answer, or what is wrong with it as a failure of its worker. One that nobody waits for is left as it is. A state that was
+    /// put under its lease is held from here on where the answer names it, and gone where not.
+    pub(super) fn checked(&mut self, lease: &Lease, answer: LeaseOutcome) -> LeaseOutcome {
+        let put = self.states.take(lease).filter(|put| named(&answer) == Some(&put.id()));
+        let answer = self.checked_for(self.asked(lease), answer, put.is_some());
+        if named(&answer).is_some() {
+            self.states.hold(put);
+        }
+        answer
     }
 
-    /// The same for a job of the running batch.
+    /// The same for a job of the running batch whose result was brought along: nothing was put for it.
     pub(super) fn checked_at(&self, index: usize, answer: LeaseOutcome) -> LeaseOutcome {
-        self.checked_for(self.running.as_ref().and_then(|running| running.jobs.get(index)), answer)
+        self.checked_for(self.running.as_ref().and_then(|running| running.jobs.get(index)), answer, false)
     }
 
-    fn checked_for(&self, asked: Option<&(SetupId, Job)>, answer: LeaseOutcome) -> LeaseOutcome {
+    fn checked_for(
+        &self,
+        asked: Option<&(SetupId, Job)>,
+        answer: LeaseOutcome,
+        was_put: bool,
+    ) -> LeaseOutcome {
         let LeaseOutcome::Ran(Ok(prediction)) = &answer else { return answer };
         let Some((setup, job)) = asked else { return answer };
         let n_state = self.shapes.get(setup).and_then(|shape| shape.n_state);
-        match fault(prediction, job, n_state) {
+        match fault(prediction, job, n_state, was_put) {
             Some(fault) => LeaseOutcome::Ran(Err(ParticleError::Infrastructure(fault))),
             None => answer,
         }
     }
 
     /// The job that a lease asks for, with its setup.
-    fn asked(&self, lease: &Lease) -> Option<&(SetupId, Job)> {
+    pub(super) fn asked(&self, lease: &Lease) -> Option<&(SetupId, Job)> {
         match self.dispatcher.asked(lease)? {
             Asked::Job(index) => self.running.as_ref()?.jobs.get(index),
             Asked::Control(control) => self.kept.get(&control),
@@ -39,17 +51,35 @@ impl State {
     }
 }
 
+/// The name of the state that an answer says its run ended in.
+pub(super) fn named(answer: &LeaseOutcome) -> Option<&StateId> {
+    match answer {
+        LeaseOutcome::Ran(Ok(Prediction { state: Travelling::Named(id), .. })) => Some(id),
+        _ => None,
+    }
+}
+
 /// What is wrong with a prediction; nothing where it is sound.
-fn fault(prediction: &Prediction, job: &Job, n_state: Option<usize>) -> Option<String> {
+fn fault(prediction: &Prediction, job: &Job, n_state: Option<usize>, was_put: bool) -> Option<String> {
     let Prediction { outputs, state, .. } = prediction;
     let wanted = job.window.observed.len();
     if outputs.len() != wanted {
         return Some(format!("it sent {} predicted values where {wanted} belong", outputs.len()));
     }
-    if let Some(wanted) = n_state.filter(|n| *n != state.len()) {
-        return Some(format!("it sent a state of {} values where {wanted} belong", state.len()));
+    let inside = match state {
+        Travelling::Values(values) => values,
+        // It was checked when it was put.
+        Travelling::Named(_) if was_put => return spoiled(outputs),
+        Travelling::Named(_) => return Some("it names a state that it did not send".to_owned()),
+    };
+    if let Some(wanted) = n_state.filter(|n| *n != inside.len()) {
+        return Some(format!("it sent a state of {} values where {wanted} belong", inside.len()));
     }
-    let spoiled = outputs.iter().chain(state).find(|value| !value.is_finite())?;
+    spoiled(outputs).or_else(|| spoiled(inside))
+}
+
+fn spoiled(values: &[f64]) -> Option<String> {
+    let spoiled = values.iter().find(|value| !value.is_finite())?;
     Some(format!("it sent {spoiled} as a value of a run that it calls a success"))
 }
 
@@ -64,11 +94,19 @@ mod tests {
         let window = Window { start: 0.0, times: vec![1.0, 2.0], observed: vec![0.0; 2], inputs: vec![] };
         let job = Job { particle: 0, record: 0, window: window.into(), theta: vec![], state: None };
         let of = |outputs: &[f64], state: &[f64], n_state| {
-            fault(&Prediction { outputs: outputs.to_vec(), state: state.to_vec(), cost: 0.0 }, &job, n_state)
+            fault(
+                &Prediction { outputs: outputs.to_vec(), state: state.to_vec().into(), cost: 0.0 },
+                &job,
+                n_state,
+                false,
+            )
         };
         assert_eq!(of(&[1.0, 2.0], &[3.0], Some(1)), None);
         assert_eq!(of(&[1.0, 2.0], &[3.0], None), None, "nobody knows the model's states");
         let says = |fault: Option<String>| fault.expect("it is wrong");
+        let named = Prediction { outputs: vec![1.0, 2.0], state: Travelling::Named([7; 32]), cost: 0.0 };
+        assert_eq!(fault(&named, &job, Some(100_000), true), None);
+        assert_eq!(says(fault(&named, &job, None, false)), "it names a state that it did not send");
         assert_eq!(says(of(&[1.0], &[], None)), "it sent 1 predicted values where 2 belong");
         assert_eq!(says(of(&[1.0, 2.0], &[3.0, 4.0], Some(1))), "it sent a state of 2 values where 1 belong");
         assert_eq!(

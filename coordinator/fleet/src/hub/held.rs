@@ -6,7 +6,6 @@
 use std::collections::HashMap;
 use std::time::Duration;
 
-use starlings_models::Job;
 use starlings_proto::convert::ended;
 use starlings_proto::{Bytes, HeldRun, JobKey, JobKeys, Lease, LeaseOutcome, SetupId, ToWorker};
 
@@ -14,6 +13,7 @@ use super::state::State;
 use crate::FleetEvent;
 use crate::dispatcher::{Event, Taken, WorkerId};
 use crate::job_name::JobName;
+use crate::wire::Job;
 
 /// Bytes of results that wait for a batch at most.
 const MOST: usize = 256 * 1024 * 1024;

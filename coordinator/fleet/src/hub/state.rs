@@ -6,18 +6,20 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::mpsc::Sender;
 use std::time::Duration;
 
-use starlings_models::Job;
 use starlings_proto::{
     Bytes, Hello, JobEncoder, Lease, PROTOCOL, SentWindows, SetupId, ToWorker, VERSION, generated,
 };
 use tokio::sync::mpsc::UnboundedSender;
 
+use super::arrival::named;
 use super::excluded::Excluded;
 use super::held::Waiting;
+use super::states::States;
 use super::teller::Teller;
 use super::{Outgoing, Reply};
-use crate::FleetEvent;
 use crate::dispatcher::{BatchError, Command, ControlId, Dispatcher, Event, WorkerId};
+use crate::wire::{self, Job};
+use crate::{FleetEvent, Held, Outcome, StateStore, StoredState};
 
 /// Workers of one coordinator at most.
 const MAX_WORKERS: usize = 4096;
@@ -34,6 +36,8 @@ pub(super) struct State {
     pub(super) running: Option<Submission>,
     /// Jobs that are known to work, for control runs.
     pub(super) kept: BTreeMap<ControlId, (SetupId, Job)>,
+    /// Large states of jobs and answers.
+    pub(super) states: States,
     pub(super) events: Teller,
     /// The time of the last event.
     now: Duration,
@@ -96,13 +100,20 @@ pub(crate) enum Closed {
 /// A batch and who waits for it.
 pub(crate) struct Submission {
     pub(crate) jobs: Vec<(SetupId, Job)>,
+    /// The states that the jobs name.
+    pub(crate) _states: Vec<StoredState>,
     /// Holds the windows of the jobs as they travel.
     pub(crate) encoder: JobEncoder,
     pub(crate) reply: Sender<Reply>,
 }
 
 impl State {
-    pub(super) fn new(first_epoch: u64, dispatcher: Dispatcher, events: Sender<FleetEvent>) -> Self {
+    pub(super) fn new(
+        first_epoch: u64,
+        dispatcher: Dispatcher,
+        events: Sender<FleetEvent>,
+        store: StateStore,
+    ) -> Self {
         Self {
             dispatcher,
             links: BTreeMap::new(),
@@ -110,6 +121,7 @@ impl State {
             shapes: BTreeMap::new(),
             running: None,
             kept: BTreeMap::new(),
+            states: States::new(store),
             events: Teller::new(events),
             now: Duration::ZERO,
             first_epoch,
@@ -146,15 +158,22 @@ impl State {
 
     pub(super) fn handle(&mut self, now: Duration, event: Event) {
         self.now = now;
+        let mut ended_in = None;
         let event = match event {
             Event::Answered { worker, lease, answer, cost } => {
-                let answer = self.checked(&lease, answer);
+                let own = lease.epoch == worker.0;
+                let answer = if own { self.checked(&lease, answer) } else { answer };
+                ended_in = named(&answer).copied();
                 Event::Answered { worker, lease, answer, cost }
             }
             other => other,
         };
         for command in self.dispatcher.step(now, event) {
             self.carry_out(command);
+        }
+        // The state of a run that was made twice, or in vain, is nobody's.
+        if let Some(id) = ended_in.filter(|id| !self.dispatcher.needs_state(id)) {
+            self.states.let_go(&id);
         }
         self.end_if_abandoned(now);
     }
@@ -202,10 +221,14 @@ impl State {
             }
             Command::Keep { control, index } => {
                 let job = self.running.as_ref().and_then(|running| running.jobs.get(index));
-                self.kept.extend(job.map(|job| (control, job.clone())));
+                if let Some(job) = job {
+                    self.states.keep(control, &job.1);
+                    self.kept.insert(control, job.clone());
+                }
             }
             Command::Forget { control } => {
                 self.kept.remove(&control);
+                self.states.forget_kept(control);
             }
             Command::Cancel { worker, leases, stop } => self.send(worker, ToWorker::cancel(&leases, stop)),
             Command::PutOut { worker, reason } => self.put_out(worker, &reason),
@@ -213,7 +236,12 @@ impl State {
             Command::Close { worker } => {
                 self.links.remove(&worker);
             }
-            Command::BatchDone(outcomes) => self.reply(Ok(outcomes)),
+            Command::BatchDone(outcomes) => {
+                let lost = || BatchError::State("the state of a run that had ended is gone".to_owned());
+                let held = outcomes.into_iter().map(|outcome| self.states.held(outcome));
+                let outcomes = held.collect::<Option<Vec<_>>>().ok_or_else(lost);
+                self.reply(outcomes);
+            }
             Command::BatchFailed(mut error) => {
                 if let BatchError::NoControl { index, parameters, .. } = &mut error {
                     let named = self.parameters(*index);
@@ -261,11 +289,30 @@ impl State {
         let Some(link) = self.links.remove(&worker) else { return };
         link.send(ToWorker::drain(reason));
         self.excluded.add(link.nonce, reason);
+        // What it answered is made again.
+        let Self { states, dispatcher, .. } = self;
+        states.keep_needed(|id| dispatcher.needs_state(id));
     }
 
     pub(super) fn reply(&mut self, reply: Reply) {
         if let Some(running) = self.running.take() {
+            // Who is told of an error asks for what had arrived.
+            if reply.is_ok() {
+                self.states.forget();
+            }
             let _ = running.reply.send(reply);
         }
+    }
+
+    /// Outcomes that the caller of the batch was not told of before, of one that ended in an error too.
+    pub(super) fn arrived(&mut self) -> Vec<(usize, Outcome<Held>)> {
+        let arrived = self.dispatcher.arrived().into_iter();
+        let held = |(index, outcome): (usize, wire::Outcome)| Some((index, self.states.held(outcome)?));
+        // One whose state is gone is made again.
+        let arrived = arrived.filter_map(held).collect();
+        if self.running.is_none() {
+            self.states.forget();
+        }
+        arrived
     }
 }

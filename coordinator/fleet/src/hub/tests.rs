@@ -35,7 +35,8 @@ fn hub(build: Option<[u8; 32]>) -> (Hub, Receiver<FleetEvent>) {
     let (sender, events) = mpsc::channel();
     let (heartbeat, patience) = (Duration::from_secs(8), Duration::from_secs(300));
     let rules = Rules { heartbeat, patience, max_attempts: 5, comparing: None, timeout_factor: None };
-    (Hub::new("test".to_owned(), build, RunIdentity::new(), rules, Duration::ZERO, sender), events)
+    let store = StateStore::new(0);
+    (Hub::new("test".to_owned(), build, RunIdentity::new(), rules, Duration::ZERO, sender, store), events)
 }
 
 fn batch(hub: &Hub) -> (Submission, Receiver<Reply>) {
@@ -51,7 +52,10 @@ fn batch(hub: &Hub) -> (Submission, Receiver<Reply>) {
         state: None,
     };
     let (reply, replies) = mpsc::channel();
-    (Submission { jobs: vec![(setup, job)], encoder: JobEncoder::default(), reply }, replies)
+    (
+        Submission { jobs: vec![(setup, job)], _states: Vec::new(), encoder: JobEncoder::default(), reply },
+        replies,
+    )
 }
 
 #[test]

@@ -2,8 +2,11 @@
 
 use std::net::SocketAddr;
 
+use starlings_models::Prediction;
 use starlings_proto::generated::{self, fleet_client::FleetClient};
-use starlings_proto::{FromWorker, Hello, Lease, LeaseOutcome, PROTOCOL, ReceivedWindows, ToWorker, VERSION};
+use starlings_proto::{
+    FromWorker, Hello, Lease, LeaseOutcome, PROTOCOL, ReceivedWindows, State, ToWorker, VERSION,
+};
 use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
 use tokio_stream::wrappers::UnboundedReceiverStream;
 use tonic::Streaming;
@@ -47,7 +50,7 @@ impl Hand {
         while jobs.len() < n {
             match self.hear().await.expect("still connected") {
                 ToWorker::Setup { id, .. } => self.say(FromWorker::Setup { id, result: Ok(()) }),
-                ToWorker::Job { lease, job, .. } => jobs.push((lease, job)),
+                ToWorker::Job { lease, job, .. } => jobs.push((lease, job.try_map(inside).unwrap())),
                 _ => {}
             }
         }
@@ -60,8 +63,18 @@ impl Hand {
     }
 
     pub fn answer(&self, lease: Lease, job: &starlings_models::Job) {
-        self.say(FromWorker::Result { lease, answer: LeaseOutcome::Ran(Ok(square(job))), cost: 1.0 });
+        self.say(FromWorker::Result { lease, answer: LeaseOutcome::Ran(Ok(squared(job))), cost: 1.0 });
     }
+}
+
+/// The exact answer to a job, as it travels.
+pub fn squared(job: &starlings_models::Job) -> Prediction<State> {
+    square(job).try_map(|values| Ok::<_, ()>(State::from(values))).unwrap()
+}
+
+/// A state that came inside its job.
+pub fn inside(state: State) -> Result<Vec<f64>, State> {
+    if let State::Values(values) = state { Ok(values) } else { Err(state) }
 }
 
 pub fn hello() -> Hello {

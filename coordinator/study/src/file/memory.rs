@@ -7,8 +7,8 @@ use toml::Spanned;
 use super::table::{Node, number, wrong_type};
 use crate::problem::Source;
 
-/// Bytes, or a text such as `2 GiB`.
-pub(super) fn memory(source: &Source, node: &Node<'_>) -> Option<u64> {
+/// Bytes of a text such as `2 GiB`.
+pub fn bytes_of(words: &str) -> Option<f64> {
     const UNITS: [(&str, f64); 9] = [
         ("B", 1.0),
         ("kB", 1e3),
@@ -20,11 +20,16 @@ pub(super) fn memory(source: &Source, node: &Node<'_>) -> Option<u64> {
         ("GiB", 1_073_741_824.0),
         ("TiB", 1_099_511_627_776.0),
     ];
+    let split = words.find(|c: char| c.is_alphabetic()).unwrap_or(words.len());
+    let (value, unit) = (words[..split].trim(), words[split..].trim());
+    let factor = UNITS.iter().find(|(name, _)| name.eq_ignore_ascii_case(unit)).map(|(_, factor)| factor);
+    value.parse::<f64>().ok().zip(factor).map(|(value, factor)| value * factor)
+}
+
+/// Bytes, or a text such as `2 GiB`.
+pub(super) fn memory(source: &Source, node: &Node<'_>) -> Option<u64> {
     let bytes = if let Some(words) = node.get_ref().as_str() {
-        let split = words.find(|c: char| c.is_alphabetic()).unwrap_or(words.len());
-        let (value, unit) = (words[..split].trim(), words[split..].trim());
-        let factor = UNITS.iter().find(|(name, _)| name.eq_ignore_ascii_case(unit)).map(|(_, factor)| factor);
-        value.parse::<f64>().ok().zip(factor).map(|(value, factor)| value * factor)
+        bytes_of(words)
     } else if node.get_ref().is_integer() || node.get_ref().is_float() {
         number(source, node, "`memory`").map(Spanned::into_inner)
     } else {

@@ -69,7 +69,7 @@ fn step(
     let Forecast { mut particles, results, rescued } =
         forecast(runner, filter, particles(now), &mut now.states, &windows, at)?;
     for (index, (record, _)) in windows.iter().enumerate() {
-        now.states[*record] = Some(stack_states(&results, index));
+        now.states[*record] = Some(stack_states(&results, index)?);
     }
     let mut predictions = stack_outputs(&results, &windows);
     if schedule.resample && rescued == 0 {
@@ -84,7 +84,7 @@ fn step(
     let noise = noise(schedule.study, &windows, schedule.anneal(now.figures.pass));
     let (particles, analysis) =
         filter.analysis(&particles, &predictions, &Data { values: &values, noise: &noise })?;
-    recombine(&mut now.states, &analysis.transform, runner.threads);
+    recombine(&mut now.states, &analysis.transform, runner.threads)?;
     for (record, states) in now.states.iter_mut().enumerate() {
         if schedule.windows[record].len() <= at.step + 1 {
             *states = None;

@@ -1,14 +1,15 @@
 //! The runs of a fit that are done while their batch still goes on, kept in the store so that a resume does not repeat them.
 //!
 //! A batch that is over within [`starlings_fleet::TELL_EVERY`] is never written: making it again costs less than that. Timeouts are
-//! decisions that outlive their analysis and are kept by [`super::timeouts`]. Next file to read: [`super::runner`].
+//! decisions that outlive their analysis and are kept by [`super::timeouts`]. A large state is kept by its name, with its pieces in the
+//! run folder. Next file to read: [`super::runner`].
 
 use std::collections::HashSet;
 
-use starlings_fleet::{Outcome, SetupId};
-use starlings_models::{Failure, Job, ParticleError};
-use starlings_proto::JobKeys;
+use starlings_fleet::{Held, Outcome, SetupId, StoredState};
+use starlings_models::{Failure, Job, ParticleError, Prediction};
 use starlings_proto::convert::ended;
+use starlings_proto::{JobKeys, State};
 
 use crate::run_key;
 use crate::store::{ArrivedRun, RunKey, Store, StoreError};
@@ -45,16 +46,24 @@ impl<'a> Journal<'a> {
         &mut self,
         keys: &mut JobKeys,
         setup: &SetupId,
-        job: &Job,
-    ) -> Result<Option<Outcome>, StoreError> {
+        job: &Job<Held>,
+    ) -> Result<Option<Outcome<Held>>, StoreError> {
         let key = run_key::observed(&self.programs, keys, setup, job);
         if !self.known.remove(&key) {
             return Ok(None);
         }
-        let Some(ArrivedRun { attempts, worker, body }) = self.store.arrived(&key)? else { return Ok(None) };
+        let Some(ArrivedRun { attempts, worker, body, state }) = self.store.arrived(&key)? else {
+            return Ok(None);
+        };
         let (result, _) = ended::decode(&body).map_err(|error| self.store.damaged("run", error))?;
-        let result = match result {
-            Ok(prediction) => Ok(prediction),
+        let held = |ended| match ended {
+            State::Values(values) => Ok(Held::Values(values)),
+            State::Named(id) => state.filter(|state| state.id() == id).map(Held::Stored).ok_or(()),
+        };
+        let result = match result.map(|prediction| prediction.try_map(held)) {
+            Ok(Ok(prediction)) => Ok(prediction),
+            // Its state is gone: it is made again.
+            Ok(Err(())) => return Ok(None),
             Err(ParticleError::Model(failed)) => Err(Failure::Model(failed)),
             Err(ParticleError::Timeout(late)) => Err(Failure::Timeout(late)),
             Err(other) => return Err(self.store.damaged("run", other)),
@@ -69,18 +78,32 @@ impl<'a> Journal<'a> {
     pub(super) fn keep(
         &self,
         keys: &mut JobKeys,
-        arrived: impl IntoIterator<Item = (SetupId, Job, Outcome)>,
+        arrived: impl IntoIterator<Item = (SetupId, Job<Held>, Outcome<Held>)>,
     ) -> Result<(), StoreError> {
-        let row = |(setup, job, outcome): (SetupId, Job, Outcome)| {
+        let row = |(setup, job, outcome): (SetupId, Job<Held>, Outcome<Held>)| {
             let Outcome { result, attempts, worker } = outcome;
-            let result = result.map_err(|failure| match failure {
-                Failure::Model(failed) => ParticleError::Model(failed),
-                Failure::Timeout(late) => ParticleError::Timeout(late),
-            });
+            let mut state = None;
+            let result =
+                result.map(|prediction| travelling(prediction, &mut state)).map_err(
+                    |failure| match failure {
+                        Failure::Model(failed) => ParticleError::Model(failed),
+                        Failure::Timeout(late) => ParticleError::Timeout(late),
+                    },
+                );
             let cost = result.as_ref().map_or(0.0, |prediction| prediction.cost);
             let key = run_key::observed(&self.programs, keys, &setup, &job);
-            (key, ArrivedRun { attempts, worker, body: ended::encode(&result, cost) })
+            (key, ArrivedRun { attempts, worker, body: ended::encode(&result, cost), state })
         };
         self.store.keep_arrived(&arrived.into_iter().map(row).collect::<Vec<_>>())
     }
+}
+
+/// A prediction as its bytes are kept, and the state that they name.
+fn travelling(prediction: Prediction<Held>, stored: &mut Option<StoredState>) -> Prediction<State> {
+    let Prediction { outputs, state, cost } = prediction;
+    let state = match state {
+        Held::Values(values) => State::Values(values),
+        Held::Stored(state) => State::Named(stored.insert(state).id()),
+    };
+    Prediction { outputs, state, cost }
 }

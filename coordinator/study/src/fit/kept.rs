@@ -4,12 +4,12 @@
 
 use std::ops::ControlFlow;
 
-use starlings_fleet::{Fleet, FleetError, Outcome, SetupId};
+use starlings_fleet::{Fleet, FleetError, Held, Outcome, SetupId};
 use starlings_models::{Failure, Job};
 use starlings_proto::JobKeys;
 
 use super::journal::Journal;
-use super::runner::AnalysisIndex;
+use super::results::AnalysisIndex;
 use super::timeouts::Timeouts;
 use crate::RunError;
 use crate::store::{Store, StoreError};
@@ -44,8 +44,8 @@ impl<'a> Kept<'a> {
         fleet: &mut dyn Fleet,
         at: AnalysisIndex,
         n_job: usize,
-        job: impl Fn(usize) -> (SetupId, Job),
-    ) -> Result<Vec<Outcome>, RunError> {
+        job: impl Fn(usize) -> (SetupId, Job<Held>),
+    ) -> Result<Vec<Outcome<Held>>, RunError> {
         let mut keys = JobKeys::default();
         let mut known = self.known(&mut keys, at, n_job, &job)?;
         let open: Vec<usize> = (0..n_job).filter(|index| known[*index].is_none()).collect();
@@ -54,8 +54,8 @@ impl<'a> Kept<'a> {
         }
         let mut refused = None;
         let (journal, lasts) = (&self.journal, at.is_of_fit());
-        let mut arrived = |outcomes: Vec<(usize, Outcome)>| {
-            let decided = |outcome: &Outcome| matches!(outcome.result, Err(Failure::Timeout(_)));
+        let mut arrived = |outcomes: Vec<(usize, Outcome<Held>)>| {
+            let decided = |outcome: &Outcome<Held>| matches!(outcome.result, Err(Failure::Timeout(_)));
             let outcomes = outcomes.into_iter().filter(|(_, outcome)| lasts || !decided(outcome));
             let named = outcomes.map(|(index, outcome)| {
                 let (setup, job) = job(open[index]);
@@ -89,8 +89,8 @@ impl<'a> Kept<'a> {
         keys: &mut JobKeys,
         at: AnalysisIndex,
         n_job: usize,
-        job: &impl Fn(usize) -> (SetupId, Job),
-    ) -> Result<Vec<Option<Outcome>>, StoreError> {
+        job: &impl Fn(usize) -> (SetupId, Job<Held>),
+    ) -> Result<Vec<Option<Outcome<Held>>>, StoreError> {
         // The forward run with the estimate decides nothing about a sigma point: it is tried anew.
         let decided = at.is_of_fit() && !self.timeouts.is_empty();
         if !decided && self.journal.is_empty() {

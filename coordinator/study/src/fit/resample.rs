@@ -5,16 +5,19 @@
 //! corrected the state by the datum, are mixed as the states are. Source: Moireau & Chapelle (2011), Verdandi's treatment of
 //! the canonical and star sets.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 use starlings_estimators::{Filter, Particles, Resampled};
-use starlings_models::Window;
+use starlings_fleet::StateError;
+use starlings_models::{Quantity, Window};
 
 use super::ensemble::recombine;
 use super::runner::{AnalysisIndex, EnsembleRunner, StepWindows};
 use super::stack::stack_outputs;
 use crate::expand::INITIAL;
+use crate::states::States;
 use crate::{RunError, Study};
 
 /// Weight of an initial value while its record runs, beside the states that follow from it.
@@ -25,22 +28,30 @@ const INITIAL_WEIGHT: f64 = 1e-3;
 /// Rows are made commensurable: each state quantity by its size in the ensemble mean, each parameter by its prior sd. Initial
 /// values act through the states while their record runs, so they have a small weight then; with none, an initial value that no
 /// longer shows in its state would be mixed at random.
+///
+/// States are gone through twice, a block of rows at a time, whether they are in memory or in the store.
 fn gram(
     study: &Study,
     weights: &DVector<f64>,
     particles: &Particles,
-    states: &[Option<DMatrix<f64>>],
-) -> DMatrix<f64> {
+    states: &[Option<States>],
+) -> Result<DMatrix<f64>, StateError> {
     let mut gram = DMatrix::zeros(weights.len(), weights.len());
     for x in states.iter().flatten() {
-        let mut first = 0;
-        for quantity in &study.spec.states {
-            let block = x.rows(first, quantity.size).into_owned();
-            let mean = &block * weights;
-            let size = (mean.norm_squared() / quantity.size as f64).sqrt();
-            add(&mut gram, &block, weights, if size > 0.0 { size } else { 1.0 });
-            first += quantity.size;
-        }
+        let mut squares = vec![0.0; study.spec.states.len()];
+        x.for_each_block(|first, rows| {
+            for (index, part) in parts(study, first, rows.nrows()) {
+                squares[index] += (rows.rows(part.start, part.len()) * weights).norm_squared();
+            }
+        })?;
+        let size = |(quantity, sum): (&Quantity, f64)| (sum / quantity.size as f64).sqrt();
+        let sizes: Vec<f64> = study.spec.states.iter().zip(squares).map(size).collect();
+        x.for_each_block(|first, rows| {
+            for (index, part) in parts(study, first, rows.nrows()) {
+                let scale = if sizes[index] > 0.0 { sizes[index] } else { 1.0 };
+                add(&mut gram, &rows.rows(part.start, part.len()).into_owned(), weights, scale);
+            }
+        })?;
     }
     for (j, entry) in study.theta.iter().enumerate() {
         let initial = study.parameters[entry.parameter].name.starts_with(INITIAL);
@@ -48,7 +59,20 @@ fn gram(
         let share = if initial && running { INITIAL_WEIGHT } else { 1.0 };
         add(&mut gram, &particles.theta.rows(j, 1).into_owned(), weights, entry.prior_sd / share);
     }
-    gram
+    Ok(gram)
+}
+
+/// Which rows of a block belong to which quantity, where the block's first row is number `first`.
+fn parts(study: &Study, first: usize, rows: usize) -> Vec<(usize, Range<usize>)> {
+    let mut end = 0;
+    let part = |(index, quantity): (usize, &Quantity)| {
+        let start = end;
+        end += quantity.size;
+        let within = |row: usize| row.clamp(first, first + rows) - first;
+        let part = within(start)..within(end);
+        (!part.is_empty()).then_some((index, part))
+    };
+    study.spec.states.iter().enumerate().filter_map(part).collect()
 }
 
 fn add(gram: &mut DMatrix<f64>, rows: &DMatrix<f64>, weights: &DVector<f64>, scale: f64) {
@@ -83,13 +107,13 @@ pub(crate) fn redraw(
     windows: &StepWindows,
     particles: &Particles,
     predictions: &DMatrix<f64>,
-    states: &mut Vec<Option<DMatrix<f64>>>,
+    states: &mut Vec<Option<States>>,
 ) -> Result<Option<Redrawn>, RunError> {
     let study = runner.study();
     let Resampled { particles: redrawn, transform, dropped } =
-        filter.resample(particles, &gram(study, filter.weights(), particles, states))?;
+        filter.resample(particles, &gram(study, filter.weights(), particles, states)?)?;
     let mut mixed = states.clone();
-    recombine(&mut mixed, &transform, runner.threads);
+    recombine(&mut mixed, &transform, runner.threads)?;
     let mut observed = predictions * transform;
     // Where an observer has corrected the state by the datum, an output of that state is no prediction of it.
     if study.observer_is_off() && !observe_again(runner, at, &redrawn.theta, &mixed, windows, &mut observed)?
@@ -105,7 +129,7 @@ fn observe_again(
     runner: &mut EnsembleRunner<'_>,
     at: AnalysisIndex,
     theta: &DMatrix<f64>,
-    states: &[Option<DMatrix<f64>>],
+    states: &[Option<States>],
     windows: &StepWindows,
     predictions: &mut DMatrix<f64>,
 ) -> Result<bool, RunError> {

@@ -4,11 +4,11 @@
 //! A point that fails even close to the mean is dropped where the others still span the parameters. Both are reported as lost
 //! information. Next file to read: [`super::filter`].
 
-use nalgebra::DMatrix;
 use starlings_estimators::{Filter, Particles};
 
-use super::runner::{AnalysisIndex, EnsembleRunner, Results, StepWindows};
+use super::runner::{AnalysisIndex, EnsembleRunner, Predicted, Results, StepWindows};
 use crate::RunError;
+use crate::states::States;
 
 /// Distances from the mean at which a failed sigma point is tried again, as fractions of its own.
 const DISTANCES: [f64; 5] = [0.5, 0.25, 0.125, 0.0625, 0.03125];
@@ -25,7 +25,7 @@ pub(crate) struct Forecast {
 
 /// Runs all particles over the step's windows and rescues those that fail.
 ///
-/// `states[record]` (n × r, at the windows' start) is pulled along with the parameters.
+/// `states[record]` (at the windows' start) is pulled along with the parameters.
 ///
 /// # Errors
 /// When the fleet fails, or too few particles survive for an analysis; the message says which parameters could not be run.
@@ -33,7 +33,7 @@ pub(crate) fn forecast(
     runner: &mut EnsembleRunner<'_>,
     filter: &dyn Filter,
     particles: Particles,
-    states: &mut [Option<DMatrix<f64>>],
+    states: &mut [Option<States>],
     windows: &StepWindows,
     at: AnalysisIndex,
 ) -> Result<Forecast, RunError> {
@@ -53,7 +53,7 @@ fn rescue(
     runner: &mut EnsembleRunner<'_>,
     filter: &dyn Filter,
     forecast: &mut Forecast,
-    states: &mut [Option<DMatrix<f64>>],
+    states: &mut [Option<States>],
     windows: &StepWindows,
     at: AnalysisIndex,
     particle: usize,
@@ -62,7 +62,7 @@ fn rescue(
     for distance in DISTANCES {
         let (pulled, transform) = filter.pull(&forecast.particles, particle, distance);
         for x in states.iter_mut().flatten() {
-            *x = &*x * &transform;
+            x.pull(&transform)?;
         }
         forecast.particles = pulled;
         let mut retried = runner.run(at, &[particle], &forecast.particles.theta, states, windows)?;
@@ -86,11 +86,7 @@ fn rescue(
 }
 
 /// The first failure among a particle's windows, with its record.
-fn cause(
-    runner: &EnsembleRunner<'_>,
-    windows: &StepWindows,
-    of_particle: &[Result<starlings_models::Prediction, starlings_models::Failure>],
-) -> String {
+fn cause(runner: &EnsembleRunner<'_>, windows: &StepWindows, of_particle: &[Predicted]) -> String {
     let mut failed =
         windows.iter().zip(of_particle).filter_map(|((record, _), r)| Some((*record, r.as_ref().err()?)));
     let Some((record, error)) = failed.next() else { return String::new() };

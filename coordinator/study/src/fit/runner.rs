@@ -7,37 +7,17 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
-use starlings_fleet::{Fleet, Outcome, SetupId};
-use starlings_models::{BuildSetup, Failure, Job, Prediction, Setup, Window};
+use starlings_fleet::{Fleet, Held, Outcome, SetupId};
+use starlings_models::{BuildSetup, Job, Prediction, Setup, Window};
 
 use super::failures::{FailureCluster, Failures};
 use super::kept::Kept;
+pub(crate) use super::results::{AnalysisIndex, Predicted, Results, StepWindows};
+use crate::states::States;
 use crate::store::snapshot::Counts;
 use crate::store::{JobRow, Store};
 use crate::trial::named;
 use crate::{RunError, Study};
-
-/// The windows of one step, one per record that still has data: (record, window).
-pub(crate) type StepWindows = Vec<(usize, Arc<Window>)>;
-
-/// The analysis that an ensemble belongs to; goes into the rows of the store.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct AnalysisIndex {
-    /// Pass, from 1; 0 for the final forward run.
-    pub(crate) pass: usize,
-    /// Analysis within the pass, from 0.
-    pub(crate) step: usize,
-}
-
-impl AnalysisIndex {
-    /// Whether a fit makes it, and not the forward run.
-    pub(super) fn is_of_fit(self) -> bool {
-        self.pass > 0
-    }
-}
-
-/// A prediction per particle and window, or why there is none: a failure of the model, or the limit of wall time.
-pub(crate) type Results = Vec<Vec<Result<Prediction, Failure>>>;
 
 /// Sends runs to a fleet and keeps their rows for the store.
 pub(crate) struct EnsembleRunner<'a> {
@@ -103,7 +83,7 @@ impl<'a> EnsembleRunner<'a> {
     }
 
     /// Runs the given particles over the windows and gives back what the study's channels measure of them. `theta` is p × r in
-    /// transformed units, `states[record]` is n × r or `None` at a record's start. Returns `[particle in the order
+    /// transformed units, `states[record]` has a state per particle or `None` at a record's start. Returns `[particle in the order
     /// given][window]`.
     ///
     /// # Errors
@@ -113,7 +93,7 @@ impl<'a> EnsembleRunner<'a> {
         at: AnalysisIndex,
         particles: &[usize],
         theta: &DMatrix<f64>,
-        states: &[Option<DMatrix<f64>>],
+        states: &[Option<States>],
         windows: &StepWindows,
     ) -> Result<Results, RunError> {
         let sent: StepWindows =
@@ -127,7 +107,7 @@ impl<'a> EnsembleRunner<'a> {
                 record: *record as u32,
                 window: Arc::clone(window),
                 theta: study.theta_for(*record, column.as_slice()),
-                state: states[*record].as_ref().map(|x| x.column(particle).iter().copied().collect()),
+                state: states[*record].as_ref().map(|x| x.held(particle)),
             };
             (setup, job)
         };
@@ -186,7 +166,7 @@ impl<'a> EnsembleRunner<'a> {
     fn gather(
         &mut self,
         at: AnalysisIndex,
-        outcomes: Vec<Outcome>,
+        outcomes: Vec<Outcome<Held>>,
         particles: impl Iterator<Item = (usize, usize)>,
         theta: &DMatrix<f64>,
         windows: &StepWindows,
@@ -231,11 +211,11 @@ impl<'a> EnsembleRunner<'a> {
         &mut self,
         at: AnalysisIndex,
         n_job: usize,
-        job: impl Fn(usize) -> (SetupId, Job),
-    ) -> Result<Vec<Outcome>, RunError> {
+        job: impl Fn(usize) -> (SetupId, Job<Held>),
+    ) -> Result<Vec<Outcome<Held>>, RunError> {
         let ran = match &mut self.kept {
             Some(kept) => kept.run(self.fleet, at, n_job, &job),
-            None => self.fleet.run_mixed((0..n_job).map(&job).collect()).map_err(RunError::from),
+            None => self.fleet.run_held((0..n_job).map(&job).collect()).map_err(RunError::from),
         };
         ran.map_err(|error| error.naming(self.study, |at| (at < n_job).then(|| job(at).1.theta)))
     }
@@ -243,13 +223,13 @@ impl<'a> EnsembleRunner<'a> {
     /// A prediction of another length is an error of the run, not a failure of the particle.
     fn check(
         &self,
-        prediction: &Prediction,
+        prediction: &Prediction<Held>,
         record: usize,
         particle: usize,
         theta: &DMatrix<f64>,
         window: &Window,
     ) -> Result<(), RunError> {
-        let (outputs, state) = (prediction.outputs.len(), prediction.state.len());
+        let (outputs, state) = (prediction.outputs.len(), prediction.state.n_state());
         let reason = if outputs != window.observed.len() {
             format!("{outputs} predicted values where {} were asked for", window.observed.len())
         } else if let Some(wanted) = self.n_state.filter(|n| *n != state) {
@@ -262,7 +242,7 @@ impl<'a> EnsembleRunner<'a> {
         Err(RunError::NoAnswer { particle, record: self.study.records[record].name.clone(), values, reason })
     }
 
-    fn row(&self, at: AnalysisIndex, record: usize, particle: usize, outcome: &Outcome) -> JobRow {
+    fn row(&self, at: AnalysisIndex, record: usize, particle: usize, outcome: &Outcome<Held>) -> JobRow {
         JobRow {
             pass: at.pass,
             step: at.step,

@@ -9,7 +9,7 @@
 
 use nalgebra::DMatrix;
 
-use super::runner::{AnalysisIndex, EnsembleRunner, StepWindows};
+use super::runner::{AnalysisIndex, EnsembleRunner, Predicted, StepWindows};
 use super::schedule::{Reported, Schedule};
 use crate::store::snapshot::{Ensemble, Snapshot};
 use crate::{Move, RunError, posterior};
@@ -124,7 +124,7 @@ impl<'a> Search<'a> {
     }
 
     /// Squared whitened misfit of one point over all records; infinite where a run failed.
-    fn misfit(&self, of_point: &[Result<starlings_models::Prediction, starlings_models::Failure>]) -> f64 {
+    fn misfit(&self, of_point: &[Predicted]) -> f64 {
         let mut sum = 0.0;
         for ((record, window), result) in self.windows.iter().zip(of_point) {
             let Ok(prediction) = result else { return f64::INFINITY };

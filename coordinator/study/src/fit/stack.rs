@@ -2,7 +2,10 @@
 
 use nalgebra::DMatrix;
 
+use starlings_fleet::StateError;
+
 use super::runner::{Results, StepWindows};
+use crate::states::States;
 
 /// Stacks the predictions of all particles: m × r, rows by window, then time, then output. A failed particle's column is
 /// zero and must be masked by the caller.
@@ -15,14 +18,10 @@ pub(crate) fn stack_outputs(results: &Results, windows: &StepWindows) -> DMatrix
     DMatrix::from_fn(m, columns.len(), |row, column| columns[column].get(row).copied().unwrap_or(0.0))
 }
 
-/// The states of all particles at the end of window `index`: n × r. A failed particle's column is zero.
-pub(crate) fn stack_states(results: &Results, index: usize) -> DMatrix<f64> {
-    let n = results.iter().filter_map(|w| w[index].as_ref().ok()).map(|p| p.state.len()).max().unwrap_or(0);
-    let mut x = DMatrix::zeros(n, results.len());
-    for (column, windows) in results.iter().enumerate() {
-        if let Ok(p) = &windows[index] {
-            x.column_mut(column).copy_from_slice(&p.state);
-        }
-    }
-    x
+/// The states of all particles at the end of window `index`. That of a failed particle is zero.
+///
+/// # Errors
+/// When the store of states fails.
+pub(crate) fn stack_states(results: &Results, index: usize) -> Result<States, StateError> {
+    States::gather(results.iter().map(|windows| windows[index].as_ref().ok().map(|p| &p.state)))
 }

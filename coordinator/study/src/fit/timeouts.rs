@@ -6,7 +6,7 @@
 
 use std::collections::HashMap;
 
-use starlings_fleet::{Outcome, SetupId};
+use starlings_fleet::{Held, Outcome, SetupId};
 use starlings_models::{Job, Timeout};
 use starlings_proto::JobKeys;
 
@@ -49,7 +49,7 @@ impl<'a> Timeouts<'a> {
     }
 
     /// The timeout of a job as its outcome, if it was decided before.
-    pub(super) fn known(&self, setup: &SetupId, job: &Job) -> Option<Outcome> {
+    pub(super) fn known(&self, setup: &SetupId, job: &Job<Held>) -> Option<Outcome<Held>> {
         let timeout =
             self.known.get(&run_key::observed(&self.programs, &mut JobKeys::default(), setup, job))?;
         Some(Outcome { result: Err(timeout.clone().into()), attempts: 0, worker: String::new() })
@@ -59,7 +59,12 @@ impl<'a> Timeouts<'a> {
     ///
     /// # Errors
     /// When the store refuses.
-    pub(super) fn keep(&mut self, setup: &SetupId, job: &Job, timeout: &Timeout) -> Result<(), StoreError> {
+    pub(super) fn keep(
+        &mut self,
+        setup: &SetupId,
+        job: &Job<Held>,
+        timeout: &Timeout,
+    ) -> Result<(), StoreError> {
         let key = run_key::observed(&self.programs, &mut JobKeys::default(), setup, job);
         self.store.remember_runs([(&key, encode(timeout).as_slice())], &[])?;
         self.known.insert(key, timeout.clone());

@@ -7,11 +7,11 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 use starlings_estimators::{EstimatorError, Points, SigmaSet, sigma_point_sensitivities};
-use starlings_models::{Failure, Prediction, Window};
+use starlings_models::Window;
 
 use super::IdentifyError;
 use crate::Study;
-use crate::fit::runner::{AnalysisIndex, EnsembleRunner, Results, StepWindows};
+use crate::fit::runner::{AnalysisIndex, EnsembleRunner, Predicted, Results, StepWindows};
 
 /// Least distance of the points from their centre, in prior sd: closer, rounding inside the model would show.
 const CLOSEST: f64 = 1e-3;
@@ -109,7 +109,7 @@ pub fn windows(study: &Study, seen: Seen) -> StepWindows {
 pub fn outputs(
     study: &Study,
     windows: &StepWindows,
-    results: &[Result<Prediction, Failure>],
+    results: &[Predicted],
     rows: &[Row],
 ) -> Option<DVector<f64>> {
     let n_out = study.setup.outputs.len();

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use starlings_fleet::StateError;
+
 /// Why the store cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
@@ -27,6 +29,9 @@ pub enum StoreError {
         /// Where in it.
         reason: String,
     },
+    /// A state of a particle cannot be written or read.
+    #[error(transparent)]
+    State(#[from] StateError),
     /// A stored value cannot be read back.
     #[error("{path} holds a damaged {what}: {reason}")]
     Damaged {

@@ -7,6 +7,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use starlings_fleet::StateStore;
+
 use crate::store::{Program, Purpose, Store, StoreError};
 use crate::summary::Summary;
 use crate::{Fit, Study, posterior};
@@ -85,6 +87,20 @@ impl RunFolder {
         Ok(Self { path: path.to_owned(), store: Store::open_to_read(&path.join(DATABASE))?, _lock: None })
     }
 
+    /// The store of a fleet, or a new one, with the folder for pieces that belongs to this run.
+    ///
+    /// # Errors
+    /// When the store holds pieces of another run.
+    pub(crate) fn settle_states(&self, states: Option<&StateStore>) -> Result<StateStore, StoreError> {
+        let states = states.cloned().unwrap_or_else(|| StateStore::new(StateStore::MEMORY));
+        if !states.settle(&self.path.join("states")) {
+            let text =
+                "the states of another run are still needed by this program: start the run in one of its own";
+            return Err(StoreError::Unusable(text.to_owned()));
+        }
+        Ok(states)
+    }
+
     /// What the folder is for.
     ///
     /// # Errors
@@ -105,6 +121,7 @@ impl RunFolder {
     pub(crate) fn finish(&mut self, study: &Study, fit: &Fit, summary: &Summary) -> Result<(), StoreError> {
         let posterior =
             posterior::to_csv(study, &fit.posterior).map_err(|e| self.store.damaged("posterior", e))?;
+        self.store.forget_states()?;
         self.store.set_meta("posterior", &posterior)?;
         self.store.set_meta("summary", &json(summary))?;
         self.store.forget_arrived()?;

@@ -1,14 +1,18 @@
 //! What a killed run continues from: the state of the estimator and of every particle after the last analysis.
 //!
-//! Small values are one JSON text, states are little-endian f64 blobs, so a resumed run sees the same bits. Next file to
-//! read: [`crate::run`].
+//! Small values are one JSON text, states are little-endian f64 blobs, so a resumed run sees the same bits. Of states in the store of
+//! the fleet the database has the names of their pieces, which stand in the run folder ([`super::kept_states`]). Next file to read:
+//! [`crate::run`].
 
 use nalgebra::DMatrix;
 use rusqlite::{Connection, OptionalExtension, params};
 use serde::{Deserialize, Serialize};
 use starlings_estimators::{BatchState, Gaussian};
+use starlings_fleet::{StateStore, StoredState};
 use starlings_proto::convert::floats;
 
+use crate::states::States;
+use crate::states::stored::StoredStates;
 use crate::store::{Store, StoreError};
 
 /// A column-major matrix as plain data.
@@ -139,8 +143,8 @@ pub struct Snapshot<E = Estimate> {
     pub figures: Figures,
     /// What it continues from.
     pub estimate: E,
-    /// One n_state × r matrix per record; `None` before its first window and after its last.
-    pub states: Vec<Option<DMatrix<f64>>>,
+    /// The states of the particles, by record; `None` before its first window and after its last.
+    pub states: Vec<Option<States>>,
 }
 
 impl<E: Clone + Into<Estimate>> Snapshot<E> {
@@ -152,14 +156,35 @@ impl<E: Clone + Into<Estimate>> Snapshot<E> {
             .prepare_cached("INSERT OR REPLACE INTO snapshot (id, head) VALUES (1, ?1)")?
             .execute(params![head])?;
         connection.prepare_cached("DELETE FROM snapshot_states")?.execute([])?;
+        connection.prepare_cached("DELETE FROM snapshot_pieces")?.execute([])?;
         for (record, states) in self.states.iter().enumerate() {
-            if let Some(x) = states {
-                connection
-                    .prepare_cached("INSERT INTO snapshot_states VALUES (?1, ?2, ?3, ?4)")?
-                    .execute(params![record, x.nrows(), x.ncols(), &floats::encode(x.as_slice())[..]])?;
+            match states {
+                None => {}
+                Some(States::Dense(x)) => {
+                    connection
+                        .prepare_cached("INSERT INTO snapshot_states VALUES (?1, ?2, ?3, ?4)")?
+                        .execute(params![record, x.nrows(), x.ncols(), &floats::encode(x.as_slice())[..]])?;
+                }
+                Some(States::Stored(x)) => {
+                    let mut insert =
+                        connection.prepare_cached("INSERT INTO snapshot_pieces VALUES (?1, ?2, ?3, ?4)")?;
+                    for (particle, state) in x.columns().iter().enumerate() {
+                        let names = state.pieces().as_flattened();
+                        insert.execute(params![record, particle, state.n_state(), names])?;
+                    }
+                }
             }
         }
         Ok(())
+    }
+
+    /// The states that it needs in the store.
+    pub(super) fn stored(&self) -> Vec<StoredState> {
+        let stored = self.states.iter().flatten().filter_map(|states| match states {
+            States::Stored(states) => Some(states.columns()),
+            States::Dense(_) => None,
+        });
+        stored.flatten().cloned().collect()
     }
 }
 
@@ -179,11 +204,12 @@ impl Snapshot {
         Ok(counted.counts.rescued)
     }
 
-    /// The last snapshot of a run, if an analysis was stored; `n_record` is the number of records of the study.
+    /// The last snapshot of a run, if an analysis was stored; `n_record` is the number of records of the study. Large states are those
+    /// that `kept` has in its folder.
     ///
     /// # Errors
-    /// When the database refuses or its content is damaged.
-    pub fn read(store: &Store, n_record: usize) -> Result<Option<Self>, StoreError> {
+    /// When the database refuses, its content is damaged, or a piece of a state is missing.
+    pub fn read(store: &Store, n_record: usize, kept: &StateStore) -> Result<Option<Self>, StoreError> {
         let head: Option<String> = store.guard(
             store.connection().query_row("SELECT head FROM snapshot", [], |row| row.get(0)).optional(),
         )?;
@@ -206,7 +232,12 @@ impl Snapshot {
             let slot =
                 states.get_mut(record).ok_or_else(|| store.damaged("snapshot", "an unknown record"))?;
             let values = values.ok_or_else(|| store.damaged("snapshot", "a state of the wrong length"))?;
-            *slot = Some(DMatrix::from_column_slice(n, r, &values));
+            *slot = Some(DMatrix::from_column_slice(n, r, &values).into());
+        }
+        for (record, n_state, columns) in store.kept_states(kept)? {
+            let slot =
+                states.get_mut(record).ok_or_else(|| store.damaged("snapshot", "an unknown record"))?;
+            *slot = Some(States::Stored(StoredStates::of(n_state, columns)));
         }
         Ok(Some(Self { figures: head.figures, estimate: head.estimate, states }))
     }

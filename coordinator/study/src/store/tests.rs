@@ -27,7 +27,7 @@ fn snapshot(step: usize) -> Snapshot {
     let figures = Figures { step, n_used: step, ..Figures::default() };
     let (centre, scale) = (Vec::new(), Vec::new());
     let estimate = Ensemble { theta: Matrix::default(), centre, scale, cost: None, narrow: 1.0 }.into();
-    Snapshot { figures, estimate, states: vec![Some(DMatrix::from_element(8, 3, step as f64))] }
+    Snapshot { figures, estimate, states: vec![Some(DMatrix::from_element(8, 3, step as f64).into())] }
 }
 
 /// One analysis, committed as those of a slow run are.
@@ -78,7 +78,9 @@ fn a_full_disk_is_told_with_its_remedy_and_keeps_every_committed_analysis() {
     }
     drop(store);
     let store = Store::open(&path).expect("the store opens again");
-    let kept = Snapshot::read(&store, 1).expect("readable").expect("a snapshot");
+    let kept = Snapshot::read(&store, 1, &starlings_fleet::StateStore::new(0))
+        .expect("readable")
+        .expect("a snapshot");
     assert_eq!(kept.figures.step, step, "the snapshot is that of the last finished analysis");
     assert_eq!(table(&store, "analyses", "step").expect("rows").len(), step);
     store.analysis(&row(step), &snapshot(step + 1)).expect("with room again it goes on");

@@ -10,7 +10,8 @@ use serde::de::{Deserializer, SeqAccess, Visitor};
 use starlings_models_core::SetupError;
 use starlings_models_core::layout::fault;
 
-use crate::MOST_CELLS;
+/// Most cells: a million is a state of 16 MB; more would be a slip.
+const MOST_CELLS: usize = 1_000_000;
 
 /// Shortest accepted step in s: in it a wave of 10 m/s passes 10 µm, less than any cell that the model is meant for, and a
 /// second of recording takes a million steps; shorter ones would keep a long recording running without end.

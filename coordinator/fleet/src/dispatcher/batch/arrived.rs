@@ -3,7 +3,7 @@
 //! Next file to read: [`super::super::schedule`], which ends a batch.
 
 use super::Batch;
-use crate::Outcome;
+use crate::wire::Outcome;
 
 impl Batch {
     /// Copies of the outcomes that were not handed on before, each with the place of its job.

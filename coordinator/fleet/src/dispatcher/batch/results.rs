@@ -3,10 +3,12 @@
 //! Next file to read: [`crate::dispatcher::canary`].
 
 use starlings_models::Failure;
+use starlings_proto::{State as Travelling, StateId};
 
 use super::{Batch, Ended};
 use crate::dispatcher::message::WorkerId;
 use crate::dispatcher::opinion::Said;
+use crate::wire::Prediction;
 
 impl Batch {
     /// Whether a job has an outcome.
@@ -23,6 +25,15 @@ impl Batch {
             Err(Failure::Timeout(_)) => return None,
         };
         Some((job.by?, said))
+    }
+
+    /// Whether an outcome names a state.
+    pub(in crate::dispatcher) fn names_state(&self, id: &StateId) -> bool {
+        let named = |job: &super::State| match &job.outcome.as_ref()?.result {
+            Ok(Prediction { state: Travelling::Named(named), .. }) => Some(named == id),
+            _ => None,
+        };
+        self.jobs.iter().any(|job| named(job) == Some(true))
     }
 
     /// The jobs that ended with what this worker answered.

@@ -18,7 +18,7 @@ pub(super) fn comparing(slots: &[u32], mixed: bool) -> Stage {
 
 /// The right answer times a factor.
 fn scaled(index: usize, factor: f64) -> Prediction {
-    Prediction { outputs: vec![(index as f64 + 1.0) * factor], state: vec![], cost: 0.0 }
+    Prediction { outputs: vec![(index as f64 + 1.0) * factor], state: vec![].into(), cost: 0.0 }
 }
 
 /// Answers all leases, the oldest first, as `answer` says of the worker, the job and how many it answered before; gives all

@@ -4,12 +4,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use proptest::prelude::*;
-use starlings_models::{ParticleError, Prediction, Timeout};
+use starlings_models::{ParticleError, Timeout};
 use starlings_proto::{Lease, LeaseOutcome, SetupId};
 
 use super::super::{RULES, answered, crash, joining, left, place, prediction, setup, solver, submit_mixed};
+use crate::FleetEvent;
 use crate::dispatcher::{BatchError, Command, ControlId, Dispatcher, Event, WorkerId};
-use crate::{FleetEvent, Outcome};
+use crate::wire::{Outcome, Prediction};
 
 /// One thing that the world does; numbers choose among what is possible then.
 #[derive(Clone, Debug)]

@@ -1,0 +1,247 @@
+//! What a large state costs: the states of all particles to two real worker processes and back, beside the raw socket.
+//!
+//! `cargo bench -p starlings-fleet --bench states -- [--quick] [--large]`. The program starts itself as worker and as the echo that is
+//! the limit of the same run. The model hands its state on, so that all of a cycle is transport: from the store through the
+//! network to the model and back into the store.
+#![allow(clippy::print_stdout, missing_docs)]
+
+use std::io::{Read, Write};
+use std::os::fd::OwnedFd;
+use std::os::unix::net::UnixStream;
+use std::process::{Child, Command, Stdio};
+use std::sync::{Arc, mpsc};
+use std::time::{Duration, Instant};
+
+use starlings_fleet::{
+    Fleet, FleetConfig, FleetEvent, GrpcFleet, Held, LocalConfig, LocalWorkers, SetupId, StateStore,
+    StoredState,
+};
+use starlings_models::{Forward, Job, ParticleError, Prediction, Setup, SetupError, Spec, Window};
+use starlings_worker::WorkerConfig;
+use tokio_util::sync::CancellationToken;
+
+type Failure = Box<dyn std::error::Error>;
+
+/// Particles of one cycle.
+const PARTICLES: usize = 22;
+
+/// Values of a state of 8 MB.
+const VALUES: usize = 1_000_000;
+
+/// Values of a state of 256 MB.
+const LARGE: usize = 32_000_000;
+
+/// Memory for states of 256 MB each.
+const LARGE_MEMORY: usize = 256_000_000;
+
+const WORKERS: usize = 2;
+
+/// Bytes written to a raw socket at a time.
+const BLOCK: usize = 256 * 1024;
+
+fn main() -> Result<(), Failure> {
+    let args = std::env::args().skip(1).collect::<Vec<_>>();
+    let has = |flag: &str| args.iter().any(|a| a == flag);
+    if has("--echo") {
+        return echo();
+    }
+    if has("--connect") {
+        let mut config = WorkerConfig::new(starlings_proto::INHERITED);
+        config.once = true;
+        config.factory = Arc::new(build);
+        starlings_worker::run(config)?;
+        return Ok(());
+    }
+    let cycles = if has("--quick") { 3 } else { 15 };
+    let bytes = (2 * 8 * VALUES * PARTICLES) as f64;
+    let rate = |wall: Duration| bytes / wall.as_secs_f64() / 1e9;
+    pieces();
+    let raw = raw(cycles)?;
+    println!("{PARTICLES} states of 8 MB there and back, {WORKERS} workers, GB/s both ways");
+    println!("  raw socket pairs   p50 {:.2}  best {:.2}", rate(median(&raw)), rate(raw[0]));
+    for (name, memory) in [("memory", usize::MAX), ("a folder", 0)] {
+        let walls = states(VALUES, PARTICLES, memory, cycles)?;
+        let (p50, best) = (rate(median(&walls)), rate(walls[0]));
+        println!(
+            "  states in {name:<9} p50 {p50:.2}  best {best:.2}  of the socket {:.2}",
+            p50 / rate(median(&raw))
+        );
+    }
+    if has("--large") {
+        let walls = states(LARGE, 4, LARGE_MEMORY, 1)?;
+        let gb = 2.0 * 8.0 * 4.0 * LARGE as f64 / 1e9;
+        println!(
+            "4 states of 256 MB, --state-memory 256 MB: {:.2} GB/s, peak of the coordinator {} MB",
+            gb / walls[0].as_secs_f64(),
+            peak_mb()
+        );
+    }
+    Ok(())
+}
+
+fn median(sorted: &[Duration]) -> Duration {
+    sorted[sorted.len() / 2]
+}
+
+/// What happens to every piece on its way, on one thread.
+fn pieces() {
+    let values: Vec<f64> = (0..VALUES).map(|i| i as f64).collect();
+    let best = |work: &mut dyn FnMut()| {
+        let mut time = || {
+            let started = Instant::now();
+            work();
+            started.elapsed()
+        };
+        let fastest = (0..20).map(|_| time()).min().unwrap_or_default();
+        8.0 * VALUES as f64 / fastest.as_secs_f64() / 1e9
+    };
+    let bytes = starlings_proto::convert::floats::encode(&values);
+    let hash = best(&mut || {
+        for piece in bytes.chunks(BLOCK) {
+            std::hint::black_box(starlings_proto::digest(piece));
+        }
+    });
+    let encode = best(&mut || {
+        for piece in values.chunks(BLOCK / 8) {
+            std::hint::black_box(starlings_proto::convert::floats::encode(piece));
+        }
+    });
+    println!("pieces of 256 KiB on one thread, GB/s: BLAKE3 {hash:.1}, values to bytes {encode:.1}");
+}
+
+/// Wall times of cycles, fastest first.
+fn states(values: usize, particles: usize, memory: usize, cycles: usize) -> Result<Vec<Duration>, Failure> {
+    let store = StateStore::new(memory);
+    let (sender, events) = mpsc::channel();
+    let mut config = FleetConfig::new(None, "bench", CancellationToken::new(), sender);
+    config.states = store.clone();
+    let mut fleet = GrpcFleet::listen(config)?;
+    let program = std::env::current_exe()?;
+    let workers =
+        LocalWorkers::spawn(LocalConfig { program, args: vec![], n: WORKERS, fleet: fleet.handle() })?;
+    for _ in 0..WORKERS {
+        while !matches!(events.recv_timeout(Duration::from_secs(30))?, FleetEvent::WorkerJoined { .. }) {}
+    }
+    let setup = fleet.install(&Setup::default())?;
+    let mut now = (0..particles).map(|k| start(&store, values, k)).collect::<Result<Vec<_>, Failure>>()?;
+    let first: Vec<_> = now.iter().map(StoredState::id).collect();
+    let mut walls = Vec::new();
+    for cycle in 0..=cycles {
+        let started = Instant::now();
+        now = run(&mut fleet, setup, &now)?;
+        // The first one warms up.
+        if cycle > 0 || cycles == 1 {
+            walls.push(started.elapsed());
+        }
+    }
+    if !now.iter().map(StoredState::id).eq(first) {
+        return Err("a state is not the one that was sent".into());
+    }
+    drop(workers);
+    fleet.close();
+    walls.sort_unstable();
+    Ok(walls)
+}
+
+/// A state piece by piece, so that no more than a piece of it is in memory beside the store.
+fn start(store: &StateStore, values: usize, particle: usize) -> Result<StoredState, Failure> {
+    let mut writer = store.writer(values);
+    let mut first = 0;
+    while writer.wanted() > 0 {
+        let piece: Vec<f64> = (first..first + writer.wanted()).map(|i| (i + particle) as f64).collect();
+        first += piece.len();
+        writer.push(starlings_proto::convert::floats::encode(&piece))?;
+    }
+    Ok(writer.finish()?)
+}
+
+fn run(fleet: &mut GrpcFleet, setup: SetupId, states: &[StoredState]) -> Result<Vec<StoredState>, Failure> {
+    let window = Arc::new(Window { start: 0.0, times: vec![1.0], observed: vec![2.0], inputs: vec![] });
+    let job = |(k, state): (usize, &StoredState)| {
+        let (window, state) = (Arc::clone(&window), Some(Held::Stored(state.clone())));
+        (setup, Job { particle: k as u32, record: 0, window, theta: vec![], state })
+    };
+    let outcomes = fleet.run_held(states.iter().enumerate().map(job).collect())?;
+    let state = |outcome: starlings_fleet::Outcome<Held>| match outcome.result?.state {
+        Held::Stored(state) => Ok(state),
+        Held::Values(_) => Err("a large state came as values".into()),
+    };
+    outcomes.into_iter().map(state).collect()
+}
+
+/// A model that ends where it starts.
+struct Still(Spec);
+
+impl Forward for Still {
+    fn spec(&self) -> &Spec {
+        &self.0
+    }
+
+    fn run(&self, job: &Job) -> Result<Prediction, ParticleError> {
+        Ok(Prediction { outputs: vec![0.0], state: job.state.clone().unwrap_or_default(), cost: 0.0 })
+    }
+}
+
+#[expect(clippy::unnecessary_wraps, reason = "as a factory is called")]
+fn build(_: &Setup) -> Result<Box<dyn Forward>, SetupError> {
+    Ok(Box::new(Still(Spec { restart: true, ..Spec::default() })))
+}
+
+/// Ends the echo process with the measurement.
+struct Echo(Child);
+
+impl Drop for Echo {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// Wall times of the same bytes there and back over pairs of sockets, fastest first.
+fn raw(cycles: usize) -> Result<Vec<Duration>, Failure> {
+    let mut ends = Vec::new();
+    for _ in 0..WORKERS {
+        let (own, its) = UnixStream::pair()?;
+        let mut command = Command::new(std::env::current_exe()?);
+        command.arg("--echo").stdin(Stdio::from(OwnedFd::from(its)));
+        ends.push((own, Echo(command.spawn()?)));
+    }
+    let blocks = 8 * VALUES * PARTICLES / WORKERS / BLOCK;
+    let mut walls = Vec::new();
+    for _ in 0..=cycles {
+        let started = Instant::now();
+        std::thread::scope(|scope| {
+            for (end, _) in &ends {
+                let (mut write, mut read) = (end, end);
+                scope.spawn(move || {
+                    let bytes = vec![1; BLOCK];
+                    (0..blocks).try_for_each(|_| write.write_all(&bytes))
+                });
+                scope.spawn(move || {
+                    let mut bytes = vec![0; BLOCK];
+                    (0..blocks).try_for_each(|_| read.read_exact(&mut bytes))
+                });
+            }
+        });
+        walls.push(started.elapsed());
+    }
+    walls.sort_unstable();
+    Ok(walls)
+}
+
+fn echo() -> Result<(), Failure> {
+    use std::os::fd::AsFd;
+    let mut end = UnixStream::from(std::io::stdin().as_fd().try_clone_to_owned()?);
+    let mut bytes = vec![0; BLOCK];
+    while end.read_exact(&mut bytes).is_ok() {
+        end.write_all(&bytes)?;
+    }
+    Ok(())
+}
+
+/// Most memory that this process held, MB.
+fn peak_mb() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    line.and_then(|line| line.trim().split(' ').next()?.parse::<u64>().ok()).map_or(0, |kib| kib / 1000)
+}

@@ -1,0 +1,135 @@
+//! Large states of a batch: who may send and ask for them, and for how long they are held.
+//!
+//! A state that a worker put is held under its lease until the answer that names it, then for as long as the run's outcome is of that
+//! answer, until the caller has it: what came of a repeated run, or of the loser of a race, goes with its answer. Those of jobs are held by their batch, or by the copy of a job that is kept for control runs. Next file to read: `transfers`.
+
+use std::collections::BTreeMap;
+
+use starlings_proto::{Lease, State as Travelling, StateId};
+use starlings_states::{Held, StateStore, StoredState};
+use tonic::Status;
+
+use crate::dispatcher::{ControlId, WorkerId};
+use crate::{Outcome, wire};
+
+/// Transfers of one worker at the same time, beyond one for each of its slots.
+const SPARE_TRANSFERS: usize = 8;
+
+/// Guarded by the hub's lock.
+pub(super) struct States {
+    pub(super) store: StateStore,
+    sessions: BTreeMap<WorkerId, Session>,
+    /// Put and not yet named by an answer.
+    put: BTreeMap<Lease, StoredState>,
+    /// Named by answers of the running batch.
+    answered: BTreeMap<StateId, StoredState>,
+    /// Of jobs that are kept for control runs.
+    kept: BTreeMap<ControlId, StoredState>,
+}
+
+/// A worker that may transfer states.
+pub(super) struct Session {
+    nonce: u64,
+    transfers: usize,
+    most: usize,
+}
+
+impl States {
+    pub(super) fn new(store: StateStore) -> Self {
+        Self {
+            store,
+            sessions: BTreeMap::new(),
+            put: BTreeMap::new(),
+            answered: BTreeMap::new(),
+            kept: BTreeMap::new(),
+        }
+    }
+
+    pub(super) fn joined(&mut self, worker: WorkerId, nonce: u64, slots: u32) {
+        let most = slots as usize + SPARE_TRANSFERS;
+        self.sessions.insert(worker, Session { nonce, transfers: 0, most });
+    }
+
+    /// A worker is gone, and what it put and did not name.
+    pub(super) fn left(&mut self, worker: WorkerId) {
+        self.sessions.remove(&worker);
+        self.put.retain(|lease, _| lease.epoch != worker.0);
+    }
+
+    /// A batch is over, or another one begins: nothing of the earlier one is named any more.
+    pub(super) fn forget(&mut self) {
+        self.put.clear();
+        self.answered.clear();
+    }
+
+    /// Holds a state that arrived; gives back the one before under this lease.
+    pub(super) fn arrived(&mut self, lease: Lease, state: StoredState) -> Option<StoredState> {
+        self.put.insert(lease, state)
+    }
+
+    /// Counts one transfer less.
+    pub(super) fn ended(&mut self, worker: WorkerId) {
+        if let Some(session) = self.sessions.get_mut(&worker) {
+            session.transfers -= 1;
+        }
+    }
+
+    /// Holds the state of a job that is kept for control runs.
+    pub(super) fn keep(&mut self, control: ControlId, job: &wire::Job) {
+        if let Some(Travelling::Named(id)) = &job.state {
+            self.kept.extend(self.store.get(id).map(|state| (control, state)));
+        }
+    }
+
+    pub(super) fn forget_kept(&mut self, control: ControlId) {
+        self.kept.remove(&control);
+    }
+
+    /// The state that was put under a lease and is not yet named.
+    pub(super) fn take(&mut self, lease: &Lease) -> Option<StoredState> {
+        self.put.remove(lease)
+    }
+
+    /// Holds a state that an answer names, until the caller has it.
+    pub(super) fn hold(&mut self, named: Option<StoredState>) {
+        self.answered.extend(named.map(|state| (state.id(), state)));
+    }
+
+    /// Holds a state no longer that an answer named.
+    pub(super) fn let_go(&mut self, id: &StateId) {
+        self.answered.remove(id);
+    }
+
+    /// Holds only those of the states that answers named.
+    pub(super) fn keep_needed(&mut self, is_needed: impl Fn(&StateId) -> bool) {
+        self.answered.retain(|id, _| is_needed(id));
+    }
+
+    /// An outcome with its state, unless that is gone.
+    pub(super) fn held(&self, outcome: wire::Outcome) -> Option<Outcome<Held>> {
+        let held = |state| match state {
+            Travelling::Values(values) => Ok(Held::Values(values)),
+            Travelling::Named(id) => self.answered.get(&id).cloned().map(Held::Stored).ok_or(()),
+        };
+        outcome.try_map(held).ok()
+    }
+
+    /// The session of a worker, if the nonce is its own.
+    pub(super) fn session(&mut self, worker: WorkerId, nonce: u64) -> Result<&mut Session, Status> {
+        let session = self.sessions.get_mut(&worker).filter(|session| session.nonce == nonce);
+        session.ok_or_else(|| Status::permission_denied("no worker with this session is connected"))
+    }
+
+    /// Counts one more transfer of a worker.
+    pub(super) fn count(&mut self, worker: WorkerId, nonce: u64) -> Result<(), Status> {
+        let session = self.session(worker, nonce)?;
+        if session.transfers == session.most {
+            return Err(Status::resource_exhausted(format!(
+                "{} states are on their way already",
+                session.most
+            )));
+        }
+        session.transfers += 1;
+        Ok(())
+    }
+}

@@ -1,0 +1,108 @@
+//! Large states on their way between workers and the store: one stream each, beside the workers' own.
+//!
+//! Everything that arrives is checked before it is kept: that the worker has a session and the run a lease, lengths, values, and by
+//! the name that all of it came as it went. Next file to read: `hub/states.rs`.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use starlings_proto::convert::state::{
+    Get, PutHead, decode_chunk, encode_chunk, encode_head, encode_put_result,
+};
+use starlings_proto::generated;
+use starlings_states::{StateError, StateWriter, StoredState};
+use tokio::sync::mpsc;
+use tokio_stream::wrappers::ReceiverStream;
+use tonic::{Status, Streaming};
+
+use super::hub::Hub;
+
+/// Pieces that are read ahead of what the network has taken.
+const AHEAD: usize = 2;
+
+/// How long a worker may leave a put without its next piece.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Takes a state into the store.
+pub(super) async fn put(
+    hub: &Arc<Hub>,
+    mut inbound: Streaming<generated::Chunk>,
+) -> Result<generated::PutResult, Status> {
+    let invalid = |error: &dyn std::fmt::Display| Status::invalid_argument(error.to_string());
+    let first = next(&mut inbound).await?.ok_or_else(|| Status::invalid_argument("a put without a head"))?;
+    let head = PutHead::decode(&first).map_err(|error| invalid(&error))?;
+    let _counted = hub.begin_put(&head)?;
+    let mut writer = hub.states().writer(head.n_state);
+    while let Some(message) = next(&mut inbound).await? {
+        let bytes = decode_chunk(message, writer.wanted()).map_err(|error| invalid(&error))?;
+        let (words, _) = bytes.as_chunks::<8>();
+        if let Some(spoiled) = words.iter().map(|w| f64::from_le_bytes(*w)).find(|value| !value.is_finite()) {
+            return Err(Status::invalid_argument(format!("{spoiled} is a value of the state")));
+        }
+        writer = keep(hub, writer, bytes).await?;
+    }
+    let state = writer.finish().map_err(|error| invalid(&error))?;
+    let result = encode_put_result(&state.id());
+    hub.end_put(&head, state)?;
+    Ok(result)
+}
+
+async fn next(inbound: &mut Streaming<generated::Chunk>) -> Result<Option<generated::Chunk>, Status> {
+    let message = tokio::time::timeout(PATIENCE, inbound.message()).await;
+    message.map_err(|_| Status::deadline_exceeded("the next piece of the state did not come"))?
+}
+
+/// Keeps a piece: on this thread where it goes into memory, else on one that may wait for the disk.
+async fn keep(hub: &Arc<Hub>, mut writer: StateWriter, bytes: bytes::Bytes) -> Result<StateWriter, Status> {
+    let pushed = if hub.states().has_room(bytes.len()) {
+        writer.push(bytes).map(|()| writer)
+    } else {
+        on_disk(move || writer.push(bytes).map(|()| writer)).await?
+    };
+    pushed.map_err(|error| lost(hub, &error))
+}
+
+/// Gives a state to a worker.
+pub(super) fn get(
+    hub: &Arc<Hub>,
+    request: &generated::GetRequest,
+) -> Result<ReceiverStream<Result<generated::Chunk, Status>>, Status> {
+    let get = Get::decode(request).map_err(|error| Status::invalid_argument(error.to_string()))?;
+    let (state, counted) = hub.begin_get(&get)?;
+    let (sender, pieces) = mpsc::channel(AHEAD);
+    let hub = Arc::clone(hub);
+    tokio::spawn(async move {
+        let _counted = counted;
+        let mut given = sender.send(Ok(encode_head(state.n_state()))).await.is_ok();
+        for index in 0..state.pieces().len() {
+            // Nobody reads what comes.
+            if !given {
+                return;
+            }
+            let message = piece(&hub, &state, index).await.map(encode_chunk);
+            let ended = message.is_err();
+            given = sender.send(message).await.is_ok() && !ended;
+        }
+    });
+    Ok(ReceiverStream::new(pieces))
+}
+
+async fn piece(hub: &Arc<Hub>, state: &StoredState, index: usize) -> Result<bytes::Bytes, Status> {
+    let read = if state.is_in_memory(index) {
+        state.piece(index)
+    } else {
+        let state = state.clone();
+        on_disk(move || state.piece(index)).await?
+    };
+    read.map_err(|error| lost(hub, &error))
+}
+
+async fn on_disk<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, Status> {
+    tokio::task::spawn_blocking(work).await.map_err(|_| Status::internal("a thread of the coordinator ended"))
+}
+
+/// A state that this side cannot keep or read is no worker's fault: the batch ends with the reason.
+fn lost(hub: &Arc<Hub>, error: &StateError) -> Status {
+    hub.state_lost(error.to_string());
+    Status::unavailable(error.to_string())
+}

@@ -1,0 +1,14 @@
+//! Jobs and what comes of them as they travel: their states are values or names.
+//!
+//! Next file to read: [`super::grpc`], which makes names of large states and states of names.
+
+use starlings_proto::State;
+
+/// A job as it travels.
+pub(crate) type Job = starlings_models::Job<State>;
+
+/// A prediction as it travels.
+pub(crate) type Prediction = starlings_models::Prediction<State>;
+
+/// How a job of a batch ended, as the dispatcher knows it.
+pub(crate) type Outcome = super::Outcome<State>;

@@ -1,0 +1,161 @@
+//! States of any size: they travel both ways to the last bit, in bounded memory, and nothing of them stays.
+#![allow(clippy::unwrap_used)]
+
+mod fleet_kit;
+
+use std::time::Duration;
+
+use fleet_kit::{Proxy, ThreadWorker, any_port, factory, listen_with};
+use starlings_fleet::{Fleet, FleetError, GrpcFleet, Held, Outcome, StateStore, hex};
+use starlings_models::{Job, Prediction, Setup, Window};
+use starlings_worker::Factory;
+
+/// Values of a state that is no multiple of a piece.
+const N: usize = 100_003;
+
+/// Bytes of one state.
+const BYTES: usize = N * 8;
+
+/// Every value depends on the one before the run, its place and the particle.
+fn moved(job: &Job) -> Prediction {
+    let from = job.state.as_deref().expect("every job has a state");
+    let p = f64::from(job.particle);
+    let state = from.iter().enumerate().map(|(i, x)| x * 1.000_001 + p / (1.0 + i as f64)).collect();
+    Prediction { outputs: vec![from.iter().sum::<f64>() + p; 2], state, cost: 0.0 }
+}
+
+fn models() -> Factory {
+    factory(|job| Ok(moved(job)))
+}
+
+fn jobs(n: u32) -> Vec<Job> {
+    let window = Window { start: 0.0, times: vec![1.0], observed: vec![f64::NAN; 2], inputs: vec![] };
+    let window = std::sync::Arc::new(window);
+    let state = |k: u32| {
+        let mut x: Vec<f64> = (0..N).map(|i| ((i * 31 + k as usize) % 1009) as f64 / 7.0).collect();
+        (x[1], x[2]) = (-0.0, f64::MIN_POSITIVE / 4.0);
+        x
+    };
+    let job =
+        |k| Job { particle: k, record: 0, window: window.clone(), theta: vec![], state: Some(state(k)) };
+    (0..n).map(job).collect()
+}
+
+fn assert_moved(outcomes: &[Outcome], jobs: &[Job]) {
+    assert_eq!(outcomes.len(), jobs.len());
+    for (outcome, job) in outcomes.iter().zip(jobs) {
+        let (got, wanted) = (outcome.result.as_ref().unwrap(), moved(job));
+        let bits = |values: &[f64]| values.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+        assert_eq!(bits(&got.outputs), bits(&wanted.outputs));
+        assert!(bits(&got.state) == bits(&wanted.state), "particle {}", job.particle);
+    }
+}
+
+fn fleet(memory: usize) -> (GrpcFleet, StateStore) {
+    let store = StateStore::new(memory);
+    let own = store.clone();
+    let (fleet, _events, _) = listen_with(any_port(), move |config| config.states = own);
+    (fleet, store)
+}
+
+#[test]
+fn large_states_travel_both_ways_to_the_last_bit_in_memory_and_beyond_it() {
+    for memory in [usize::MAX, 5 * BYTES, 0] {
+        let (mut fleet, store) = fleet(memory);
+        let address = fleet.address().unwrap();
+        let _workers = [1, 2].map(|_| ThreadWorker::start(address, models()));
+        let setup = fleet.install(&Setup::default()).unwrap();
+        let jobs = jobs(7);
+        assert_moved(&fleet.run(setup, jobs.clone()).unwrap(), &jobs);
+        assert!(store.in_memory().1 <= memory);
+        // The outcomes were values: nothing is needed any more, unless for a control run.
+        drop(fleet);
+        assert_eq!((store.n_pieces(), store.in_memory().0), (0, 0));
+    }
+}
+
+#[test]
+fn states_in_the_store_go_from_batch_to_batch_without_their_values() {
+    let (mut fleet, store) = fleet(3 * BYTES);
+    let address = fleet.address().unwrap();
+    let _workers = [1, 2].map(|_| ThreadWorker::start(address, models()));
+    let setup = fleet.install(&Setup::default()).unwrap();
+    let mut now = jobs(6);
+    let mut held: Vec<Job<Held>> =
+        now.iter().cloned().map(|job| job.try_map(|x| Ok::<_, ()>(x.into())).unwrap()).collect();
+    for _ in 0..3 {
+        let outcomes = fleet.run_held(held.iter().map(|job| (setup, job.clone())).collect()).unwrap();
+        for ((job, held), outcome) in now.iter_mut().zip(&mut held).zip(outcomes) {
+            let state = outcome.result.unwrap().state;
+            assert!(matches!(state, Held::Stored(_)), "a large state is in the store");
+            job.state = Some(moved(job).state);
+            held.state = Some(state);
+        }
+    }
+    for (job, held) in now.iter().zip(held) {
+        assert!(held.state.unwrap().into_values().unwrap() == *job.state.as_ref().unwrap());
+    }
+    assert!(store.in_memory().1 <= 3 * BYTES);
+}
+
+#[test]
+fn a_connection_that_is_cut_while_states_travel_loses_none() {
+    let (mut fleet, store) = fleet(usize::MAX);
+    let proxy = Proxy::to(fleet.address().unwrap());
+    let cut = proxy.address;
+    let _workers = [1, 2].map(|_| ThreadWorker::start(cut, models()));
+    let setup = fleet.install(&Setup::default()).unwrap();
+    let jobs = jobs(40);
+    let run = std::thread::spawn({
+        let jobs = jobs.clone();
+        move || (fleet.run(setup, jobs).unwrap(), fleet)
+    });
+    // Whenever the cut falls, the outcome is the same.
+    for _ in 0..3 {
+        std::thread::sleep(Duration::from_millis(40));
+        proxy.cut();
+    }
+    let (outcomes, fleet) = run.join().unwrap();
+    assert_moved(&outcomes, &jobs);
+    drop(fleet);
+    assert_eq!(store.n_pieces(), 0);
+}
+
+#[test]
+fn a_state_that_is_damaged_in_its_folder_ends_the_batch_with_its_name() {
+    let scratch = tempfile::tempdir().unwrap();
+    let (mut fleet, store) = fleet(0);
+    assert!(store.settle(scratch.path()));
+    let address = fleet.address().unwrap();
+    let _worker = ThreadWorker::start(address, models());
+    let setup = fleet.install(&Setup::default()).unwrap();
+    let state = store.keep(jobs(1)[0].state.as_ref().unwrap()).unwrap();
+    let name = hex(&state.pieces()[1]);
+    std::fs::write(scratch.path().join(&name), vec![0; BYTES]).unwrap();
+    let job = jobs(1).remove(0);
+    let job =
+        Job { particle: 0, record: 0, window: job.window, theta: vec![], state: Some(Held::Stored(state)) };
+    let error = fleet.run_held(vec![(setup, job)]).unwrap_err();
+    assert!(matches!(&error, FleetError::State(text) if text.contains(&name)), "{error}");
+}
+
+#[test]
+fn a_run_that_ends_in_a_large_state_which_is_not_finite_is_the_workers_fault() {
+    let (mut fleet, _store) = fleet(usize::MAX);
+    let address = fleet.address().unwrap();
+    let spoiled = factory(|job| {
+        let mut prediction = moved(job);
+        prediction.state[70_000] = f64::NAN;
+        Ok(prediction)
+    });
+    let _bad = ThreadWorker::start(address, spoiled);
+    let setup = fleet.install(&Setup::default()).unwrap();
+    let jobs = jobs(3);
+    let run = std::thread::spawn({
+        let jobs = jobs.clone();
+        move || (fleet.run(setup, jobs).unwrap(), fleet)
+    });
+    std::thread::sleep(Duration::from_millis(200));
+    let _good = ThreadWorker::start(address, models());
+    assert_moved(&run.join().unwrap().0, &jobs);
+}

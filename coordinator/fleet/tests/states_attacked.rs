@@ -1,0 +1,246 @@
+//! Clients that ask for states and send them by hand: strangers, liars, hoarders.
+#![allow(clippy::unwrap_used)]
+
+mod fleet_kit;
+
+use std::net::SocketAddr;
+
+use fleet_kit::{any_port, listen_with};
+use starlings_fleet::{Fleet, Held, StateStore};
+use starlings_models::{Job, Setup, Window};
+use starlings_proto::convert::state::{
+    CHUNK_BYTES, Get, PutHead, decode_put_result, encode_chunk, encode_head,
+};
+use starlings_proto::generated::{self, fleet_client::FleetClient};
+use starlings_proto::{
+    FromWorker, Hello, Lease, LeaseOutcome, PROTOCOL, ReceivedWindows, State, StateId, ToWorker, VERSION,
+};
+use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
+use tokio_stream::wrappers::UnboundedReceiverStream;
+use tonic::transport::Channel;
+use tonic::{Code, Streaming};
+
+const NONCE: u64 = 42;
+
+/// Values of the model's state, as the setup below says: two pieces.
+const N: usize = 40_000;
+
+/// A worker played by hand, with a job in hand.
+struct Hand {
+    client: FleetClient<Channel>,
+    outbox: UnboundedSender<generated::FromWorker>,
+    inbound: Streaming<generated::ToWorker>,
+    windows: ReceivedWindows,
+}
+
+impl Hand {
+    async fn dial(address: SocketAddr, nonce: u64) -> Self {
+        let mut client = FleetClient::connect(format!("http://{address}")).await.unwrap();
+        let (outbox, outgoing) = unbounded_channel();
+        let (version, host) = (VERSION.to_owned(), "hand".to_owned());
+        let hello =
+            Hello { protocol: PROTOCOL, version, cores: 1, slots: 1, host, pid: 1, nonce, build: None };
+        outbox.send(FromWorker::Hello(hello).encode().unwrap()).unwrap();
+        let inbound = client.work(UnboundedReceiverStream::new(outgoing)).await.unwrap().into_inner();
+        Self { client, outbox, inbound, windows: ReceivedWindows::default() }
+    }
+
+    fn say(&self, message: FromWorker) {
+        self.outbox.send(message.encode().unwrap()).unwrap();
+    }
+
+    async fn hear(&mut self) -> ToWorker {
+        let message = self.inbound.message().await.unwrap().expect("still connected");
+        ToWorker::decode(message, &mut self.windows).unwrap()
+    }
+
+    /// Builds the setup and takes a job.
+    async fn job(&mut self) -> (Lease, StateId) {
+        loop {
+            match self.hear().await {
+                ToWorker::Setup { id, .. } => self.say(FromWorker::Setup { id, result: Ok(()) }),
+                ToWorker::Job { lease, job, .. } => {
+                    let Some(State::Named(id)) = job.state else { panic!("a large state has a name") };
+                    return (lease, id);
+                }
+                _ => {}
+            }
+        }
+    }
+
+    async fn put(&mut self, messages: Vec<generated::Chunk>) -> Result<StateId, tonic::Status> {
+        let answer = self.client.put(tokio_stream::iter(messages)).await?;
+        Ok(decode_put_result(answer.get_ref()).unwrap())
+    }
+
+    async fn get(&mut self, epoch: u64, nonce: u64, state: StateId) -> Result<usize, tonic::Status> {
+        let mut pieces = self.client.get(Get { epoch, nonce, state }.encode()).await?.into_inner();
+        let mut bytes = 0;
+        while let Some(piece) = pieces.message().await? {
+            bytes += piece.data.len();
+        }
+        Ok(bytes)
+    }
+
+    fn answer(&self, lease: Lease, state: StateId) {
+        let prediction =
+            starlings_models::Prediction { outputs: vec![1.0], state: State::Named(state), cost: 0.0 };
+        self.say(FromWorker::Result { lease, answer: LeaseOutcome::Ran(Ok(prediction)), cost: 0.1 });
+    }
+}
+
+fn pieces(value: f64) -> Vec<generated::Chunk> {
+    let bytes: Vec<u8> = std::iter::repeat_n(value.to_le_bytes(), N).flatten().collect();
+    bytes.chunks(CHUNK_BYTES).map(|piece| encode_chunk(piece.to_vec().into())).collect()
+}
+
+fn state(head: PutHead, value: f64) -> Vec<generated::Chunk> {
+    std::iter::once(head.encode()).chain(pieces(value)).collect()
+}
+
+/// Runs one job with a large state while `attack` plays its worker; gives the state that came of it.
+fn under(attack: impl AsyncFnOnce(SocketAddr)) -> (Vec<f64>, StateStore) {
+    let store = StateStore::new(1 << 30);
+    let own = store.clone();
+    let (mut fleet, _events, _) = listen_with(any_port(), move |config| config.states = own);
+    let address = fleet.address().unwrap();
+    let run = std::thread::spawn(move || {
+        // A setup that this side cannot build: it does not know how long a state is.
+        let setup = fleet.install(&Setup::default()).unwrap();
+        let window = Window { start: 0.0, times: vec![1.0], observed: vec![f64::NAN], inputs: vec![] };
+        let state = Some(Held::Values(vec![0.5; N]));
+        let job = Job { particle: 0, record: 0, window: window.into(), theta: vec![], state };
+        let outcome = fleet.run_held(vec![(setup, job)]).unwrap().remove(0);
+        let values = outcome.result.unwrap().state.into_values().unwrap();
+        fleet.close();
+        values
+    });
+    tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap().block_on(async {
+        attack(address).await;
+    });
+    (run.join().unwrap(), store)
+}
+
+#[test]
+fn a_stranger_neither_gets_nor_puts_a_state() {
+    let (values, store) = under(async |address| {
+        let mut hand = Hand::dial(address, NONCE).await;
+        let (lease, id) = hand.job().await;
+        let mut stranger =
+            Hand { client: FleetClient::connect(format!("http://{address}")).await.unwrap(), ..hand };
+        for (epoch, nonce) in [(lease.epoch, NONCE + 1), (lease.epoch + 1, NONCE), (0, 0)] {
+            let refused = stranger.get(epoch, nonce, id).await.unwrap_err();
+            assert_eq!(refused.code(), Code::PermissionDenied);
+            let head = PutHead { n_state: N, lease: Lease { epoch, ..lease }, nonce };
+            let refused = stranger.put(state(head, 1.0)).await.unwrap_err();
+            assert_eq!(refused.code(), Code::PermissionDenied);
+        }
+        assert_eq!(stranger.get(lease.epoch, NONCE, [9; 32]).await.unwrap_err().code(), Code::NotFound);
+        assert_eq!(stranger.get(lease.epoch, NONCE, id).await.unwrap(), N * 8);
+        let id = stranger.put(state(PutHead { n_state: N, lease, nonce: NONCE }, 2.0)).await.unwrap();
+        stranger.answer(lease, id);
+        while !matches!(stranger.hear().await, ToWorker::Drain(_)) {}
+    });
+    assert!(values == vec![2.0; N]);
+    assert_eq!(store.n_pieces(), 0);
+}
+
+#[test]
+fn what_is_put_wrongly_is_refused_and_leaves_nothing() {
+    let (values, store) = under(async |address| {
+        let mut hand = Hand::dial(address, NONCE).await;
+        let (lease, _) = hand.job().await;
+        let head = PutHead { n_state: N, lease, nonce: NONCE };
+        let with = |change: &dyn Fn(&mut Vec<generated::Chunk>)| {
+            let mut messages = state(head, 3.0);
+            change(&mut messages);
+            messages
+        };
+        let other = |job, attempt| PutHead { lease: Lease { job, attempt, ..lease }, ..head }.encode();
+        let wrong = [
+            (with(&|m| m.truncate(0)), Code::InvalidArgument),
+            (with(&|m| m[0] = other(lease.job + 1, lease.attempt)), Code::FailedPrecondition),
+            (with(&|m| m[0] = other(lease.job, lease.attempt + 1)), Code::FailedPrecondition),
+            (with(&|m| drop(m.remove(0))), Code::InvalidArgument),
+            (with(&|m| m[0] = encode_head(N)), Code::InvalidArgument),
+            (with(&|m| m[0] = PutHead { n_state: 10, ..head }.encode()), Code::InvalidArgument),
+            (with(&|m| m[0] = PutHead { n_state: 1 << 28, ..head }.encode()), Code::InvalidArgument),
+            (with(&|m| m[0] = PutHead { n_state: usize::MAX / 2, ..head }.encode()), Code::InvalidArgument),
+            (with(&|m| drop(m.pop())), Code::InvalidArgument),
+            (with(&|m| m.push(encode_chunk(vec![0; 8].into()))), Code::InvalidArgument),
+            (with(&|m| m.swap(1, 2)), Code::InvalidArgument),
+            (with(&|m| m[1] = encode_head(N)), Code::InvalidArgument),
+            (with(&|m| m[2] = pieces(f64::NAN).remove(1)), Code::InvalidArgument),
+            (with(&|m| m[1] = pieces(f64::INFINITY).remove(0)), Code::InvalidArgument),
+        ];
+        for (index, (messages, code)) in wrong.into_iter().enumerate() {
+            assert_eq!(hand.put(messages).await.unwrap_err().code(), code, "number {index}");
+        }
+        // The second one under a lease counts.
+        hand.put(state(head, 4.0)).await.unwrap();
+        let id = hand.put(state(head, 5.0)).await.unwrap();
+        hand.answer(lease, id);
+        while !matches!(hand.hear().await, ToWorker::Drain(_)) {}
+    });
+    assert!(values == vec![5.0; N]);
+    assert_eq!(store.n_pieces(), 0);
+}
+
+#[test]
+fn a_liar_about_its_state_is_set_aside_and_the_job_runs_elsewhere() {
+    let (values, store) = under(async |address| {
+        let mut liar = Hand::dial(address, 1).await;
+        let (lease, given) = liar.job().await;
+        // The state that it was given is not one that it sent.
+        liar.answer(lease, given);
+        let mut thief = Hand::dial(address, 2).await;
+        let (theirs, _) = thief.job().await;
+        // Nor does a state under another one's lease count.
+        let head = PutHead { n_state: N, lease: theirs, nonce: 1 };
+        assert_eq!(liar.put(state(head, 6.0)).await.unwrap_err().code(), Code::PermissionDenied);
+        let id = thief.put(state(PutHead { nonce: 2, ..head }, 7.0)).await.unwrap();
+        liar.answer(theirs, id);
+        thief.answer(theirs, id);
+        while !matches!(thief.hear().await, ToWorker::Drain(_)) {}
+    });
+    assert!(values == vec![7.0; N]);
+    assert_eq!(store.n_pieces(), 0);
+}
+
+#[test]
+fn a_hoarder_has_no_more_transfers_than_its_slots_can_need() {
+    let (values, store) = under(async |address| {
+        let mut hand = Hand::dial(address, NONCE).await;
+        let (lease, _) = hand.job().await;
+        let head = PutHead { n_state: N, lease, nonce: NONCE };
+        let mut begun = Vec::new();
+        let refused = loop {
+            assert!(begun.len() < 100, "nobody stops it");
+            let (sender, messages) = unbounded_channel();
+            sender.send(head.encode()).unwrap();
+            let mut client = hand.client.clone();
+            let put = tokio::spawn(async move { client.put(UnboundedReceiverStream::new(messages)).await });
+            begun.push((sender, put));
+            // The ones before wait for pieces; one that is refused ends.
+            let last = &mut begun.last_mut().unwrap().1;
+            if let Ok(ended) = tokio::time::timeout(std::time::Duration::from_millis(300), last).await {
+                break ended.unwrap().unwrap_err();
+            }
+        };
+        assert_eq!(refused.code(), Code::ResourceExhausted);
+        for (_, put) in begun {
+            put.abort();
+        }
+        // What was begun and given up is counted no more.
+        let id = loop {
+            match hand.put(state(head, 8.0)).await {
+                Ok(id) => break id,
+                Err(status) => assert_eq!(status.code(), Code::ResourceExhausted),
+            }
+        };
+        hand.answer(lease, id);
+        while !matches!(hand.hear().await, ToWorker::Drain(_)) {}
+    });
+    assert!(values == vec![8.0; N]);
+    assert_eq!(store.n_pieces(), 0);
+}

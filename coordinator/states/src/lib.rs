@@ -1,0 +1,33 @@
+//! States of particles that are too large to travel inside a message: kept in pieces by name, in memory up to a limit and in a
+//! folder beyond it.
+//!
+//! A [`StateStore`] holds every piece for as long as a [`StoredState`] needs it; equal pieces are held once. Nothing here knows
+//! jobs, workers or studies, and nothing computes. Next file to read: [`store`].
+
+mod error;
+mod folder;
+mod held;
+mod shared;
+pub mod store;
+mod stored;
+mod table;
+#[cfg(test)]
+mod tests;
+mod writer;
+
+pub use error::StateError;
+pub use held::Held;
+pub use starlings_proto::StateId;
+pub use starlings_proto::convert::state::{CHUNK_VALUES, ChunkId, n_chunks};
+pub use store::StateStore;
+pub use stored::StoredState;
+pub use writer::StateWriter;
+
+/// A name in hexadecimal.
+pub fn hex(name: &[u8; 32]) -> String {
+    use std::fmt::Write as _;
+    name.iter().fold(String::with_capacity(64), |mut text, byte| {
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}

@@ -1,0 +1,122 @@
+//! What a store, its states and its writers share: the table of pieces and the folder.
+//!
+//! Files are written outside the lock and put into their place inside it. Next files to read: `table`, `folder`.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+
+use bytes::Bytes;
+use starlings_proto::StateId;
+use starlings_proto::convert::state::ChunkId;
+
+use crate::StateError;
+use crate::folder::Folder;
+use crate::table::Table;
+
+/// What all clones and all states share.
+#[derive(Debug)]
+pub(crate) struct Shared {
+    pub(crate) memory: usize,
+    pub(crate) folder: Mutex<Option<Arc<Folder>>>,
+    pub(crate) table: Mutex<Table<Pieces>>,
+}
+
+/// The pieces of one state.
+#[derive(Debug)]
+pub(crate) struct Pieces {
+    pub(crate) store: Arc<Shared>,
+    pub(crate) id: StateId,
+    pub(crate) n_state: usize,
+    pub(crate) names: Vec<ChunkId>,
+}
+
+impl Shared {
+    pub(crate) fn lock(&self) -> MutexGuard<'_, Table<Pieces>> {
+        lock(&self.table)
+    }
+
+    pub(crate) fn folder(&self) -> Arc<Folder> {
+        Arc::clone(lock(&self.folder).get_or_insert_with(|| Arc::new(Folder::temporary())))
+    }
+
+    /// Keeps a piece, or counts one more use of it.
+    pub(crate) fn put(&self, name: ChunkId, bytes: &Bytes) -> Result<(), StateError> {
+        {
+            let mut table = self.lock();
+            if table.again(&name) || table.remember(name, bytes, self.memory) {
+                return Ok(());
+            }
+        }
+        let folder = self.folder();
+        let written = folder.write(bytes)?;
+        let mut table = self.lock();
+        if table.again(&name) {
+            Folder::discard(&written);
+            return Ok(());
+        }
+        folder.place(&written, &name)?;
+        table.on_disk(name);
+        Ok(())
+    }
+
+    /// Takes note of a piece that the folder has already.
+    pub(crate) fn found(&self, name: ChunkId, bytes: usize) -> Result<(), StateError> {
+        let mut table = self.lock();
+        if !table.again(&name) {
+            self.folder().check(&name, bytes)?;
+            table.on_disk(name);
+        }
+        Ok(())
+    }
+
+    pub(crate) fn read(&self, name: &ChunkId) -> Result<Bytes, StateError> {
+        let held = self.lock().chunks.get(name).and_then(|entry| entry.bytes.clone());
+        held.map_or_else(|| self.folder().read(name), Ok)
+    }
+
+    /// Whether reading a piece takes no file.
+    pub(crate) fn is_in_memory(&self, name: &ChunkId) -> bool {
+        self.lock().chunks.get(name).is_some_and(|entry| entry.bytes.is_some())
+    }
+
+    /// Makes sure that the folder has a piece that is held.
+    pub(crate) fn persist(&self, name: &ChunkId) -> Result<(), StateError> {
+        let bytes = match self.lock().chunks.get(name) {
+            Some(entry) if !entry.on_disk => entry.bytes.clone(),
+            _ => None,
+        };
+        let Some(bytes) = bytes else { return Ok(()) };
+        let folder = self.folder();
+        let written = folder.write(&bytes)?;
+        let mut table = self.lock();
+        folder.place(&written, name)?;
+        if let Some(entry) = table.chunks.get_mut(name) {
+            entry.on_disk = true;
+        }
+        Ok(())
+    }
+
+    pub(crate) fn release(&self, names: &[ChunkId]) {
+        let mut table = self.lock();
+        let folder = lock(&self.folder).clone();
+        for name in names {
+            table.release(name, folder.as_deref());
+        }
+    }
+}
+
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Drop for Pieces {
+    fn drop(&mut self) {
+        {
+            let mut table = self.store.lock();
+            // Another one of this name may have come since the last holder of this one went.
+            if table.named.get(&self.id).is_some_and(|held| std::ptr::eq(Weak::as_ptr(held), self)) {
+                table.named.remove(&self.id);
+            }
+        }
+        self.store.release(&self.names);
+    }
+}

@@ -1,0 +1,85 @@
+//! Which pieces there are, where each of them is and how many states need it.
+
+use std::collections::HashMap;
+use std::sync::Weak;
+
+use bytes::Bytes;
+use starlings_proto::StateId;
+use starlings_proto::convert::state::ChunkId;
+
+use crate::folder::Folder;
+
+/// Guarded by the store's lock. A state is a `P`.
+#[derive(Debug)]
+pub(crate) struct Table<P> {
+    pub(crate) chunks: HashMap<ChunkId, Entry>,
+    /// States that somebody holds.
+    pub(crate) named: HashMap<StateId, Weak<P>>,
+    /// Bytes of the pieces in memory.
+    pub(crate) in_memory: usize,
+    /// Most of them at one time.
+    pub(crate) most: usize,
+}
+
+/// A piece.
+#[derive(Debug)]
+pub(crate) struct Entry {
+    /// How many states, or places in one state, need it.
+    refs: usize,
+    /// Where it is in memory.
+    pub(crate) bytes: Option<Bytes>,
+    /// Whether the folder has it, and it goes with the last use.
+    pub(crate) on_disk: bool,
+}
+
+impl<P> Default for Table<P> {
+    fn default() -> Self {
+        Self { chunks: HashMap::new(), named: HashMap::new(), in_memory: 0, most: 0 }
+    }
+}
+
+impl<P> Table<P> {
+    /// Counts one more use of a piece that is there.
+    pub(crate) fn again(&mut self, name: &ChunkId) -> bool {
+        let Some(entry) = self.chunks.get_mut(name) else { return false };
+        entry.refs += 1;
+        true
+    }
+
+    /// Takes a piece that is not there into memory where the limit allows it.
+    pub(crate) fn remember(&mut self, name: ChunkId, bytes: &Bytes, limit: usize) -> bool {
+        if self.in_memory + bytes.len() > limit {
+            return false;
+        }
+        self.in_memory += bytes.len();
+        self.most = self.most.max(self.in_memory);
+        self.chunks.insert(name, Entry { refs: 1, bytes: Some(bytes.clone()), on_disk: false });
+        true
+    }
+
+    /// Takes note of a piece that is not there yet and stands in the folder.
+    pub(crate) fn on_disk(&mut self, name: ChunkId) {
+        self.chunks.insert(name, Entry { refs: 1, bytes: None, on_disk: true });
+    }
+
+    /// Has the file of a piece stay when its last use is given up.
+    pub(crate) fn leave(&mut self, name: &ChunkId) {
+        if let Some(entry) = self.chunks.get_mut(name) {
+            entry.on_disk = false;
+        }
+    }
+
+    /// Gives up one use of a piece; it goes with its last one.
+    pub(crate) fn release(&mut self, name: &ChunkId, folder: Option<&Folder>) {
+        let Some(entry) = self.chunks.get_mut(name) else { return };
+        entry.refs -= 1;
+        if entry.refs > 0 {
+            return;
+        }
+        self.in_memory -= entry.bytes.as_ref().map_or(0, Bytes::len);
+        if let Some(folder) = folder.filter(|_| entry.on_disk) {
+            folder.remove(name);
+        }
+        self.chunks.remove(name);
+    }
+}

@@ -1,0 +1,130 @@
+//! A model whose state is too large for a message: the posterior is, byte by byte, that of the same run in memory.
+#![allow(clippy::unwrap_used)]
+mod study_kit;
+
+use std::fmt::Write as _;
+use std::net::Ipv4Addr;
+use std::path::Path;
+use std::sync::{Arc, mpsc};
+
+use starlings_coordinator::fleet::{Factory, Fleet, FleetConfig, GrpcFleet, InProcess, StateStore};
+use starlings_models::{
+    BuildSetup, Forward, Job, ModelFailure, ParticleError, Prediction, Setup, SetupError, Spec,
+};
+use starlings_worker::WorkerConfig;
+use study_kit::{Case, Done};
+use tokio_util::sync::CancellationToken;
+
+/// Rings of the tube: a state of 40 001 values, two pieces.
+const CELLS: usize = 20_000;
+
+/// Bytes of a state.
+const STATE: usize = (2 * CELLS + 1) * 8;
+
+/// An elastic tube of which only the pressure at the inlet is seen.
+fn tube(estimator: &str) -> Case {
+    let study = format!(
+        r#"
+[study]
+name = "long-tube"
+[model]
+kind = "fsi-tube"
+[model.layout]
+cells = {CELLS}
+regions = 2
+[[parameters]]
+name = "E1"
+unit = "dyn/cm^2"
+prior = {{ transform = "log2", median = 5e6, sd = 0.5 }}
+[[parameters]]
+name = "E2"
+unit = "dyn/cm^2"
+prior = {{ transform = "log2", median = 5e6, sd = 0.5 }}
+[[records]]
+name = "rise"
+file = "pressure.csv"
+time = "time"
+inputs = {{ flow = "flow.csv:flow" }}
+channels = [ {{ column = "p", output = "inlet_pressure", unit = "dyn/cm^2", noise = 1e4 }} ]
+[estimator]
+{estimator}
+"#
+    );
+    let mut pressure = "time,p\n".to_owned();
+    let mut flow = "time,flow\n".to_owned();
+    for step in 0..=12 {
+        let t = f64::from(step) * 0.001;
+        writeln!(flow, "{t},{}", 3.0 * f64::from(step)).unwrap();
+        if step > 0 && step % 3 == 0 {
+            writeln!(pressure, "{t},{}", 106_657.6 + 4e5 * t).unwrap();
+        }
+    }
+    Case::new(&study, &[("pressure.csv", pressure), ("flow.csv", flow)])
+}
+
+/// The tube, which has no solution where its first region is too stiff.
+struct Walled(Box<dyn Forward>, f64);
+
+impl Forward for Walled {
+    fn spec(&self) -> &Spec {
+        self.0.spec()
+    }
+
+    fn run(&self, job: &Job) -> Result<Prediction, ParticleError> {
+        if job.theta[0] > self.1 {
+            return Err(ModelFailure::Solver("too stiff".to_owned()).into());
+        }
+        self.0.run(job)
+    }
+}
+
+fn factory(wall: f64) -> Factory {
+    Arc::new(move |setup: &Setup| -> Result<Box<dyn Forward>, SetupError> {
+        Ok(Box::new(Walled(setup.build()?, wall)))
+    })
+}
+
+/// A run on two workers over the network, with so much memory for states.
+fn over_the_network(case: &Case, path: &Path, wall: f64, memory: usize) -> (Done, StateStore) {
+    let store = StateStore::new(memory);
+    let (sender, _events) = mpsc::channel();
+    let cancel = CancellationToken::new();
+    let mut config = FleetConfig::new(Some((Ipv4Addr::LOCALHOST, 0).into()), "test", cancel, sender);
+    config.states = store.clone();
+    let mut fleet = GrpcFleet::listen(config).unwrap();
+    let address = fleet.address().unwrap();
+    let workers = [1, 2].map(|_| {
+        let mut config = WorkerConfig::new(address.to_string());
+        config.factory = factory(wall);
+        std::thread::spawn(move || starlings_worker::run(config))
+    });
+    let done = case.go(path, &mut fleet).unwrap();
+    assert!(fleet.states().is_some());
+    fleet.close();
+    for worker in workers {
+        worker.join().unwrap().unwrap();
+    }
+    (done, store)
+}
+
+#[test]
+fn the_posterior_is_that_of_the_same_run_in_memory() {
+    // An affine set, one that is redrawn, and points that fail and are pulled.
+    for (estimator, wall, rescued) in [
+        ("passes = 1", f64::INFINITY, false),
+        ("passes = 1\npoints = \"star\"", f64::INFINITY, false),
+        ("passes = 1\npoints = \"star\"", 6.5e6, true),
+    ] {
+        let case = tube(estimator);
+        let small = case.run_on(&mut InProcess::new(2).with_factory(factory(wall))).unwrap();
+        assert_eq!(small.summary.runs.rescued > 0, rescued, "{estimator}");
+        for memory in [1 << 30, 2 * STATE] {
+            let path = case.fresh();
+            let (large, store) = over_the_network(&case, &path, wall, memory);
+            assert_eq!(small.csv, large.csv, "{estimator}, {memory} bytes");
+            assert!((1..=memory).contains(&store.in_memory().1), "it was used and bounded");
+            assert_eq!(store.n_pieces(), 0, "a finished run needs none");
+            assert!(!path.join("states").exists());
+        }
+    }
+}
