@@ -119,6 +119,7 @@ async fn fetch(
 
 impl Drop for Inbox {
     fn drop(&mut self) {
+        self.transfers.end();
         lock(&self.waiting).values().for_each(AbortHandle::abort);
     }
 }

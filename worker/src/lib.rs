@@ -11,6 +11,7 @@ mod inbox;
 mod session;
 mod setups;
 mod slots;
+mod spare;
 mod transfer;
 
 use std::sync::Arc;

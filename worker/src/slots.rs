@@ -12,7 +12,7 @@ use std::time::Instant;
 use starlings_models::{Forward, Job, ModelFailure, ParticleError};
 use starlings_proto::spent::spent;
 use starlings_proto::words::panic_text;
-use starlings_proto::{FromWorker, Lease, LeaseOutcome, generated};
+use starlings_proto::{FromWorker, Lease, LeaseOutcome, MAX_INLINE_STATE, generated};
 use tokio::sync::OwnedSemaphorePermit;
 use tokio::sync::mpsc::UnboundedSender;
 
@@ -152,7 +152,9 @@ impl Shared {
             self.running.fetch_sub(1, Ordering::Relaxed);
             let counter = if result.is_ok() { &self.predictions } else { &self.failures };
             counter.fetch_add(1, Ordering::Relaxed);
-            drop(job);
+            if job.state.as_ref().is_some_and(|state| state.len() * 8 > MAX_INLINE_STATE) {
+                transfers.recycle(job.state.unwrap_or_default());
+            }
             let result = result.and_then(|prediction| transfers.sendable(lease, prediction));
             answer(&outbox, lease, LeaseOutcome::Ran(result), cost);
         }
