@@ -32,7 +32,7 @@ pub(crate) struct FleetArgs {
     /// Allow --listen beyond loopback although the connection is neither encrypted nor authenticated.
     #[arg(long)]
     insecure: bool,
-    /// Memory for states of particles that are larger than 256 KiB, such as "8 GiB"; what is beyond it stands in the run folder.
+    /// Memory for states of particles that are larger than 256 KiB, such as "8 GiB"; what is beyond it goes to the disk.
     #[arg(long, value_name = "SIZE", default_value = "1 GiB", value_parser = memory)]
     state_memory: usize,
 }
