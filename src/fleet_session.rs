@@ -42,7 +42,7 @@ pub(crate) struct FleetArgs {
     /// Allow workers whose results differ, as of other builds or processors: a warning of the result instead of an error.
     #[arg(long)]
     mixed: bool,
-    /// Memory for states of particles that are larger than 256 KiB, such as "8 GiB"; what is beyond it stands in the run folder.
+    /// Memory for states of particles that are larger than 256 KiB, such as "8 GiB"; what is beyond it goes to the disk.
     #[arg(long, value_name = "SIZE", default_value = "1 GiB", value_parser = memory)]
     state_memory: usize,
 }

@@ -35,8 +35,9 @@ pub const MAX_STATE: usize = 16 * 1024 * 1024 * 1024;
 /// Largest message either side accepts, bytes.
 pub const MAX_MESSAGE: usize = 16 * 1024 * 1024;
 
-/// HTTP/2 frame size either side accepts, bytes; the default of 16 KiB halves the transport rate of large windows.
-pub const FRAME_SIZE: u32 = 256 * 1024;
+/// HTTP/2 frame size either side accepts, bytes: a piece of a state is one frame. The default of 16 KiB halves the transport rate of large
+/// windows.
+pub const FRAME_SIZE: u32 = 1024 * 1024;
 
 /// Largest number of slots of one worker: each is a thread.
 pub const MAX_SLOTS: usize = 4096;

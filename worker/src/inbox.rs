@@ -22,6 +22,7 @@ const ROOM: u32 = 64 * 1024;
 
 /// The jobs of one session that wait for their states.
 pub(crate) struct Inbox {
+    transfers: Transfers,
     lanes: Arc<Semaphore>,
     room: Arc<Semaphore>,
     most: u32,
@@ -30,14 +31,20 @@ pub(crate) struct Inbox {
 
 impl Inbox {
     /// An empty one for so many slots.
-    pub(crate) fn new(slots: usize) -> Self {
+    pub(crate) fn new(transfers: Transfers, slots: usize) -> Self {
         let most = ROOM.saturating_mul(slots.max(1) as u32).min(Semaphore::MAX_PERMITS as u32);
         Self {
+            transfers,
             lanes: Arc::new(Semaphore::new(LANES)),
             room: Arc::new(Semaphore::new(most as usize)),
             most,
             waiting: Arc::default(),
         }
+    }
+
+    /// Who wants the answer to a job of this session.
+    pub(crate) fn asked(&self, lease: Lease, outbox: &UnboundedSender<generated::FromWorker>) -> Asked {
+        Asked { lease, outbox: outbox.clone(), transfers: self.transfers.clone() }
     }
 
     /// Brings a job to the slots, with its state.
@@ -122,6 +129,7 @@ async fn fetch(
 
 impl Drop for Inbox {
     fn drop(&mut self) {
+        self.transfers.end();
         lock(&self.waiting).values().for_each(AbortHandle::abort);
     }
 }

@@ -14,6 +14,7 @@ mod news;
 mod session;
 mod setups;
 mod slots;
+mod spare;
 mod transfer;
 mod watch;
 mod way;

@@ -18,8 +18,7 @@ use crate::idle::Idle;
 use crate::inbox::Inbox;
 use crate::news::{News, Tell};
 use crate::setups::Setups;
-use crate::slots::{Asked, Slots, answer};
-use crate::transfer::Transfers;
+use crate::slots::{Slots, answer};
 use crate::watch::Watch;
 
 /// How long a leaving worker waits for the coordinator to close the stream.
@@ -49,7 +48,7 @@ pub(crate) async fn serve(
     let mut beats = tokio::time::interval(Duration::from_secs_f64(connection.welcome.heartbeat));
     beats.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
     let mut silence = Silence::default();
-    let inbox = Inbox::new(config.slots);
+    let inbox = Inbox::new(connection.transfers.clone(), config.slots);
     let mut watch = Watch::new(slots);
     loop {
         tokio::select! {
@@ -121,14 +120,7 @@ struct Place<'a> {
     setups: &'a Setups,
     held: Option<&'a Held>,
     inbox: &'a Inbox,
-    transfers: &'a Transfers,
     tell: &'a Tell,
-}
-
-impl Place<'_> {
-    fn asked(&self, lease: Lease, outbox: &UnboundedSender<generated::FromWorker>) -> Asked {
-        Asked { lease, outbox: outbox.clone(), transfers: self.transfers.clone() }
-    }
 }
 
 fn take(
@@ -137,7 +129,7 @@ fn take(
     windows: &mut ReceivedWindows,
     place: &Place<'_>,
 ) -> Result<(), Ended> {
-    let Place { slots, setups, held, inbox, tell, .. } = *place;
+    let Place { slots, setups, held, inbox, tell } = *place;
     let message = match message {
         Ok(Some(message)) => message,
         Ok(None) => return Err(Ended::Lost("the coordinator closed the connection".to_owned())),
@@ -149,7 +141,7 @@ fn take(
         }
         Ok(ToWorker::Job { lease, setup, job }) => {
             if let Some(forward) = setups.get(&setup) {
-                inbox.take(slots, place.asked(lease, outbox), setup, forward, job);
+                inbox.take(slots, inbox.asked(lease, outbox), setup, forward, job);
             } else {
                 // First the setup, so that the job that comes back finds it missing here; and once, however many of its jobs
                 // are on their way: a second time would stand for the setup that is sent again.
@@ -169,7 +161,7 @@ fn take(
             slots.withdraw(&leases, stop);
         }
         Ok(ToWorker::Adopt { runs, rest_is_void }) => {
-            let gone = slots.adopt(runs, |lease| place.asked(lease, outbox));
+            let gone = slots.adopt(runs, |lease| inbox.asked(lease, outbox));
             answer_held(gone, outbox, held);
             if rest_is_void {
                 slots.drop_void();
@@ -229,6 +221,7 @@ mod tests {
     use tokio::sync::mpsc::unbounded_channel;
 
     use super::*;
+    use crate::transfer::Transfers;
 
     /// A run of the oscillator to time 1.
     fn job() -> Job<State> {
@@ -250,16 +243,9 @@ mod tests {
             (Slots::start(1, None).unwrap(), Setups::new(Arc::new(|setup: &Setup| setup.build())));
         let mut windows = ReceivedWindows::default();
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
-        let (inbox, transfers) = (Inbox::new(1), Transfers::nowhere(runtime.handle()));
+        let inbox = Inbox::new(Transfers::nowhere(runtime.handle()), 1);
         let tell: Tell = Arc::new(|_| {});
-        let place = Place {
-            slots: &slots,
-            setups: &setups,
-            held: None,
-            inbox: &inbox,
-            transfers: &transfers,
-            tell: &tell,
-        };
+        let place = Place { slots: &slots, setups: &setups, held: None, inbox: &inbox, tell: &tell };
         let mut take = |message| take(Ok(Some(message)), &outbox, &mut windows, &place).unwrap();
         let mut next = || FromWorker::decode(sent.blocking_recv().expect("an answer")).unwrap();
         let (id, json) = encode_setup(&oscillator()).unwrap();

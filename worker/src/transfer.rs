@@ -16,8 +16,10 @@ use starlings_proto::{Lease, MAX_INLINE_STATE, State, StateId, StateNaming, dige
 use tokio::runtime::Handle;
 use tokio::sync::{Semaphore, mpsc, oneshot};
 use tokio_stream::wrappers::ReceiverStream;
+use tokio_util::sync::CancellationToken;
 use tonic::{Status, Streaming};
 
+use crate::spare::Spare;
 use crate::way::Proven;
 
 /// States that are sent at the same time: what they leave of the connection's window is for the messages.
@@ -32,6 +34,8 @@ pub(crate) struct Transfers {
     client: FleetClient<Proven>,
     runtime: Handle,
     lanes: Arc<Semaphore>,
+    ended: CancellationToken,
+    spare: Spare,
     epoch: u64,
     nonce: u64,
 }
@@ -39,7 +43,20 @@ pub(crate) struct Transfers {
 impl Transfers {
     /// The way over a connection whose worker is taken; called where the network lives.
     pub(crate) fn new(client: FleetClient<Proven>, epoch: u64, nonce: u64) -> Self {
-        Self { client, runtime: Handle::current(), lanes: Arc::new(Semaphore::new(LANES)), epoch, nonce }
+        Self {
+            client,
+            runtime: Handle::current(),
+            lanes: Arc::new(Semaphore::new(LANES)),
+            ended: CancellationToken::new(),
+            spare: Spare::default(),
+            epoch,
+            nonce,
+        }
+    }
+
+    /// The session is over: nothing that is on its way is waited for.
+    pub(crate) fn end(&self) {
+        self.ended.cancel();
     }
 
     /// A way on which nothing travels.
@@ -55,7 +72,7 @@ impl Transfers {
         let mut inbound = self.client.clone().get(request).await.map_err(|s| lost(&s))?.into_inner();
         let head = next(&mut inbound).await?;
         let n_state = decode_head(&head).map_err(|error| wrong(&error))?;
-        Ok(Incoming { state, n_state, inbound })
+        Ok(Incoming { state, n_state, inbound, spare: self.spare.clone() })
     }
 
     /// What a run predicts, ready to be sent: a large end state has arrived at the coordinator by then. For a thread that computes.
@@ -68,18 +85,30 @@ impl Transfers {
             if values.len() * 8 <= MAX_INLINE_STATE {
                 return Ok(State::Values(values));
             }
-            self.put(lease, &values).map(State::Named)
+            let put = self.put(lease, &values).map(State::Named);
+            self.recycle(values);
+            put
         })
+    }
+
+    /// Takes the memory of a state that is no longer needed, for one that comes.
+    pub(crate) fn recycle(&self, values: Vec<f64>) {
+        self.spare.give(values);
     }
 
     fn put(&self, lease: Lease, values: &[f64]) -> Result<StateId, ParticleError> {
         let (pieces, outgoing) = mpsc::channel(AHEAD);
         let (answer, answered) = oneshot::channel();
-        let (mut client, lanes) = (self.client.clone(), Arc::clone(&self.lanes));
+        let (mut client, lanes, ended) = (self.client.clone(), Arc::clone(&self.lanes), self.ended.clone());
         self.runtime.spawn(async move {
-            // It is never closed.
-            let _lane = lanes.acquire().await;
-            let _ = answer.send(client.put(ReceiverStream::new(outgoing)).await);
+            let sent = async {
+                // It is never closed.
+                let _lane = lanes.acquire().await;
+                client.put(ReceiverStream::new(outgoing)).await
+            };
+            if let Some(result) = ended.run_until_cancelled(sent).await {
+                let _ = answer.send(result);
+            }
         });
         let name = send(pieces, PutHead { n_state: values.len(), lease, nonce: self.nonce }, values);
         let refused =
@@ -102,13 +131,14 @@ pub(crate) struct Incoming {
     /// Number of its values.
     pub(crate) n_state: usize,
     inbound: Streaming<generated::Chunk>,
+    spare: Spare,
 }
 
 impl Incoming {
     /// Its values.
     pub(crate) async fn read(mut self) -> Result<Vec<f64>, String> {
         let n_state = self.n_state;
-        let mut values = Vec::new();
+        let mut values = self.spare.take();
         values.try_reserve_exact(n_state).map_err(|_| {
             format!(
                 "this machine has no memory for its state of {} MB",

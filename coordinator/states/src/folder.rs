@@ -1,6 +1,7 @@
 //! The folder that holds pieces beyond the limit of memory, and those that a resumed run needs: a file per piece, by its name.
 
 use std::collections::HashSet;
+use std::hash::{BuildHasher, Hasher, RandomState};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -29,11 +30,16 @@ impl Folder {
         Self { path: path.to_owned(), temporary: false, partial: AtomicU64::new(0) }
     }
 
-    /// A folder among the system's temporary ones, which goes with this value.
+    /// A folder among the system's temporary ones, which goes with this value. Nobody else can have made it before.
     pub(crate) fn temporary() -> Self {
-        static COUNT: AtomicU64 = AtomicU64::new(0);
-        let (pid, count) = (std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
-        let path = std::env::temp_dir().join(format!("starlings-states-{pid}-{count}"));
+        let path = loop {
+            let name = format!("starlings-states-{:016x}", RandomState::new().build_hasher().finish());
+            let path = std::env::temp_dir().join(name);
+            // Whatever else is wrong is told when a piece is written.
+            if private(&path, false).map_err(|error| error.kind()) != Err(ErrorKind::AlreadyExists) {
+                break path;
+            }
+        };
         Self { path, temporary: true, partial: AtomicU64::new(0) }
     }
 
@@ -59,7 +65,7 @@ impl Folder {
             if error.kind() != ErrorKind::NotFound {
                 return Err(error);
             }
-            private(&self.path)?;
+            private(&self.path, true)?;
             std::fs::write(&path, bytes)
         });
         written.map_err(Self::failed("write", &path)).inspect_err(|_| {
@@ -127,9 +133,9 @@ impl Folder {
 }
 
 /// Makes a folder that other users cannot look into: a state is data of the study.
-fn private(path: &Path) -> std::io::Result<()> {
+fn private(path: &Path, with_parents: bool) -> std::io::Result<()> {
     let mut builder = std::fs::DirBuilder::new();
-    builder.recursive(true);
+    builder.recursive(with_parents);
     #[cfg(unix)]
     std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
     builder.create(path)

@@ -81,7 +81,9 @@ impl Shared {
             (Some(Asked { lease, outbox, transfers }), _, None) => {
                 let is_wanted = !task.stop.is_set();
                 // What it began from is not needed for what it ended in.
-                drop(task);
+                if let Some(state) = task.into_large_state() {
+                    transfers.recycle(state);
+                }
                 let put = |prediction| transfers.sendable(lease, prediction);
                 let answered =
                     if is_wanted { LeaseOutcome::Ran(result.and_then(put)) } else { LeaseOutcome::Withdrawn };

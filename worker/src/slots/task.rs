@@ -56,6 +56,12 @@ impl Task {
         self.key.unwrap_or_else(|| keys.of(&self.setup, &self.job))
     }
 
+    /// The large state that it began from, unless somebody has the task too.
+    pub(super) fn into_large_state(self: Arc<Self>) -> Option<Vec<f64>> {
+        let task = Arc::into_inner(self).filter(|task| task.key.is_some())?;
+        Arc::into_inner(task.job)?.state
+    }
+
     /// It waits no more: its place among those that do is free.
     pub(super) fn begun(&self) {
         drop(self.room.lock().unwrap_or_else(PoisonError::into_inner).take());
