@@ -17,8 +17,9 @@ use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
 use tokio_util::sync::CancellationToken;
 
 use super::access::Secrets;
-use super::dispatcher::{BatchError, Event, Rules};
-use super::door::{Door, Refusals};
+use super::dispatcher::{BatchError, Rules};
+use super::door::{Door, Refusals, Refused};
+use super::handle::FleetHandle;
 use super::hub::{Hub, Reply, Submission};
 use super::network::{self, Ways};
 use super::{Fleet, FleetError, FleetEvent, Outcome};
@@ -84,46 +85,6 @@ pub struct GrpcFleet {
     is_open: bool,
 }
 
-/// Lets the supervisor of local workers end a fleet's wait.
-#[derive(Clone)]
-pub struct FleetHandle {
-    hub: Arc<Hub>,
-    adopted: UnboundedSender<UnixStream>,
-}
-
-impl FleetHandle {
-    /// Says that the local workers are given up: a batch without other workers ends with this reason.
-    pub(crate) fn give_up(&self, reason: String) {
-        self.hub.give_up(reason);
-    }
-
-    /// Says that all workers are processes of this machine: a setup that they cannot build ends a batch at once.
-    pub fn local_only(&self) {
-        self.hub.handle(Event::LocalOnly);
-    }
-
-    /// How many workers may be lost under one job.
-    pub(crate) fn max_attempts(&self) -> u32 {
-        self.hub.max_attempts()
-    }
-
-    /// Asks the workers with these process numbers to leave.
-    pub(crate) fn dismiss(&self, pids: &[u32]) {
-        self.hub.dismiss(pids);
-    }
-
-    /// Takes this end of a pair of sockets, of which a process that this one started holds the other, as the way to a worker.
-    pub(crate) fn adopt(&self, end: UnixStream) {
-        // A network that ended has told why.
-        let _ = self.adopted.send(end);
-    }
-
-    /// Passes an event on.
-    pub(crate) fn tell(&self, event: FleetEvent) {
-        self.hub.tell(event);
-    }
-}
-
 impl GrpcFleet {
     /// Listens and starts the network thread.
     ///
@@ -185,12 +146,12 @@ impl GrpcFleet {
 
     /// How many callers were refused, and the last of them with the reason; `None` where none was.
     pub fn refused(&self) -> Refused {
-        Refused(Arc::clone(&self.refusals))
+        Refused::new(Arc::clone(&self.refusals))
     }
 
     /// For the supervisor of local workers.
     pub fn handle(&self) -> FleetHandle {
-        FleetHandle { hub: Arc::clone(&self.hub), adopted: self.adopted.clone() }
+        FleetHandle::new(Arc::clone(&self.hub), self.adopted.clone())
     }
 
     /// Asks all workers to leave, waits shortly for them, and stops the network. Dropping does the same.
@@ -250,17 +211,6 @@ impl GrpcFleet {
                 FleetError::NoAnswer { job: index, particle, record, reason }
             }
         }
-    }
-}
-
-/// The callers that a fleet refused, for whoever waits for workers.
-#[derive(Clone)]
-pub struct Refused(Arc<Refusals>);
-
-impl Refused {
-    /// How many there were, and the last of them with the reason; nothing where there was none.
-    pub fn summary(&self) -> Option<String> {
-        self.0.summary()
     }
 }
 

@@ -1,0 +1,54 @@
+//! What the supervisor of local workers does to the fleet. Next file to read: [`super::local_workers`].
+
+use std::os::unix::net::UnixStream;
+use std::sync::Arc;
+
+use tokio::sync::mpsc::UnboundedSender;
+
+use super::FleetEvent;
+use super::dispatcher::Event;
+use super::hub::Hub;
+
+/// Lets the supervisor of local workers end a fleet's wait.
+#[derive(Clone)]
+pub struct FleetHandle {
+    hub: Arc<Hub>,
+    adopted: UnboundedSender<UnixStream>,
+}
+
+impl FleetHandle {
+    pub(crate) fn new(hub: Arc<Hub>, adopted: UnboundedSender<UnixStream>) -> Self {
+        Self { hub, adopted }
+    }
+
+    /// Says that the local workers are given up: a batch without other workers ends with this reason.
+    pub(crate) fn give_up(&self, reason: String) {
+        self.hub.give_up(reason);
+    }
+
+    /// Says that all workers are processes of this machine: a setup that they cannot build ends a batch at once.
+    pub fn local_only(&self) {
+        self.hub.handle(Event::LocalOnly);
+    }
+
+    /// How many workers may be lost under one job.
+    pub(crate) fn max_attempts(&self) -> u32 {
+        self.hub.max_attempts()
+    }
+
+    /// Asks the workers with these process numbers to leave.
+    pub(crate) fn dismiss(&self, pids: &[u32]) {
+        self.hub.dismiss(pids);
+    }
+
+    /// Takes this end of a pair of sockets, of which a process that this one started holds the other, as the way to a worker.
+    pub(crate) fn adopt(&self, end: UnixStream) {
+        // A network that ended has told why.
+        let _ = self.adopted.send(end);
+    }
+
+    /// Passes an event on.
+    pub(crate) fn tell(&self, event: FleetEvent) {
+        self.hub.tell(event);
+    }
+}
