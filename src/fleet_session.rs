@@ -3,14 +3,13 @@
 //! Shared by every command that runs the model on the fleet. Next file to read: [`crate::run`].
 
 use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
-use std::sync::{Arc, mpsc};
-use std::time::Duration;
-
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock, mpsc};
+use std::time::Duration;
 
 use clap::Args;
 use starlings_coordinator::fleet::access::{Access, AccessFault};
-use starlings_coordinator::fleet::{FleetConfig, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers, Refused};
+use starlings_coordinator::fleet::{FleetConfig, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers};
 use starlings_coordinator::study::Study;
 use tokio_util::sync::CancellationToken;
 
@@ -120,6 +119,8 @@ pub(crate) struct FleetSession {
     pub(crate) fleet: GrpcFleet,
     local: Option<LocalWorkers>,
     access: Option<Access>,
+    /// How to start workers, once they may come from elsewhere.
+    invitation: Arc<OnceLock<String>>,
     /// What happened, for the store.
     pub(crate) events: mpsc::Receiver<FleetEvent>,
     watcher: std::thread::JoinHandle<()>,
@@ -150,8 +151,13 @@ impl FleetSession {
         let fleet = GrpcFleet::listen(config).map_err(Failure::run)?;
         let display = Arc::clone(display);
         let refused = fleet.refused();
-        let watcher = std::thread::spawn(move || relay(heard, &kept, &display, &refused));
-        Ok(Self { fleet, local: None, access, events, watcher })
+        let invitation = Arc::<OnceLock<String>>::default();
+        let told = Arc::clone(&invitation);
+        let watcher = std::thread::spawn(move || {
+            let missing = || [refused.summary(), told.get().cloned()];
+            relay(heard, &kept, &display, missing);
+        });
+        Ok(Self { fleet, local: None, access, invitation, events, watcher })
     }
 
     /// Starts the local workers, or says how to start others; `folder` is the run folder, where there is one.
@@ -191,8 +197,10 @@ impl FleetSession {
             None => {
                 note(format_args!(
                     "warning: --insecure: nothing is encrypted, and whoever reaches {address} joins this run, reads its data and can \
-                     decide its result\nlistening on {address}; start workers with: starlings worker --connect {address} --insecure"
+                     decide its result"
                 ));
+                let start = format!("starlings worker --connect {address} --insecure");
+                self.say_how(format!("listening on {address}; start workers with: {start}"));
                 return Ok(());
             }
         };
@@ -202,8 +210,13 @@ impl FleetSession {
         let absolute = std::path::absolute(&file).unwrap_or(file);
         let name = absolute.to_string_lossy();
         let name = shell_words::quote(&name);
-        note(format_args!("listening on {address}; start workers with: starlings worker --access {name}"));
+        self.say_how(format!("listening on {address}; start workers with: starlings worker --access {name}"));
         Ok(())
+    }
+
+    fn say_how(&self, invitation: String) {
+        note(&invitation);
+        let _ = self.invitation.set(invitation);
     }
 
     /// Ends the fleet and its workers.
@@ -225,12 +238,14 @@ fn relay(
     heard: mpsc::Receiver<FleetEvent>,
     kept: &mpsc::Sender<FleetEvent>,
     display: &Display,
-    refused: &Refused,
+    missing: impl Fn() -> [Option<String>; 2],
 ) {
     for event in heard {
         if event.is_notable() {
-            let refused = refused.summary().filter(|_| matches!(event, FleetEvent::Waiting { .. }));
-            display.say(&refused.map_or(event.to_string(), |refused| format!("{event}; {refused}")));
+            let waits = matches!(event, FleetEvent::Waiting { .. });
+            let more = missing().into_iter().flatten().filter(|_| waits);
+            let said: Vec<String> = std::iter::once(event.to_string()).chain(more).collect();
+            display.say(&said.join("; "));
         } else {
             tracing::info!(kind = event.kind(), "{event}");
         }

@@ -19,7 +19,7 @@ use tokio_util::sync::CancellationToken;
 
 use super::access::Secrets;
 use super::dispatcher::{BatchError, Comparing, Event, Likeness, Rules};
-use super::door::{Door, Refusals};
+use super::door::{Door, Refusals, Refused};
 use super::handle::FleetHandle;
 use super::hub::{Hub, Reply, SetupShape, Submission};
 use super::identity::RunIdentity;
@@ -169,7 +169,7 @@ impl GrpcFleet {
 
     /// How many callers were refused, and the last of them with the reason; `None` where none was.
     pub fn refused(&self) -> Refused {
-        Refused(Arc::clone(&self.refusals))
+        Refused::new(Arc::clone(&self.refusals))
     }
 
     /// For the supervisor of local workers.
@@ -249,17 +249,6 @@ impl GrpcFleet {
                 FleetError::NoAnswer { job: index, particle, record, reason }
             }
         }
-    }
-}
-
-/// The callers that a fleet refused, for whoever waits for workers.
-#[derive(Clone)]
-pub struct Refused(Arc<Refusals>);
-
-impl Refused {
-    /// How many there were, and the last of them with the reason; nothing where there was none.
-    pub fn summary(&self) -> Option<String> {
-        self.0.summary()
     }
 }
 

@@ -23,9 +23,10 @@ mod network;
 mod service;
 mod travel;
 
+pub use door::Refused;
 pub use error::FleetError;
 pub use event::FleetEvent;
-pub use grpc::{FleetConfig, GrpcFleet, Refused};
+pub use grpc::{FleetConfig, GrpcFleet};
 pub use handle::FleetHandle;
 pub use identity::RunIdentity;
 pub use in_process::InProcess;
