@@ -16,7 +16,8 @@ use starlings_proto::{JobEncoder, MAX_MESSAGE, SetupId, encode_setup, own_build}
 use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
 use tokio_util::sync::CancellationToken;
 
-use super::dispatcher::{BatchError, Comparing, Event, Likeness, Rules};
+use super::dispatcher::{Comparing, Event, Likeness, Rules};
+use super::explained::explained;
 use super::hub::{Hub, Reply, SetupShape, Submission};
 use super::network::{self, Ways};
 use super::{Fleet, FleetError, FleetEvent, Outcome};
@@ -177,7 +178,7 @@ impl GrpcFleet {
     fn wait(&self, replies: &mpsc::Receiver<Reply>) -> Result<Vec<Outcome>, FleetError> {
         loop {
             match replies.recv_timeout(ALIVE_CHECK) {
-                Ok(reply) => return reply.map_err(|error| self.explain(error)),
+                Ok(reply) => return reply.map_err(|error| explained(error, self.address)),
                 Err(RecvTimeoutError::Disconnected) => {
                     // The batch was dropped by a network that is about to end: what it says then is the reason.
                     let deadline = Instant::now() + ALIVE_CHECK;
@@ -197,30 +198,6 @@ impl GrpcFleet {
 
     fn has_ended(&self) -> bool {
         self.network.as_ref().is_none_or(JoinHandle::is_finished)
-    }
-
-    fn explain(&self, error: BatchError) -> FleetError {
-        match error {
-            BatchError::Cancelled => FleetError::Cancelled,
-            BatchError::NoWorkers { waited, missing } => {
-                FleetError::NoWorkers { address: self.address, waited: waited.as_secs_f64(), missing }
-            }
-            BatchError::SetupFailed { reason } => FleetError::SetupFailed { reason },
-            BatchError::LocalWorkers(reason) => FleetError::LocalWorkers(reason),
-            BatchError::Stopped(reason) => FleetError::Stopped(reason),
-            BatchError::Unavailable { waited, reasons } => {
-                FleetError::Unavailable { waited: waited.as_secs_f64(), reasons }
-            }
-            BatchError::NoControl { particle, record, parameters, reason, .. } => {
-                FleetError::NoControl { particle, record, parameters, reason }
-            }
-            BatchError::Disagreement { particle, record, workers } => {
-                FleetError::Disagreement { particle, record, workers }
-            }
-            BatchError::NoAnswer { index, particle, record, reason } => {
-                FleetError::NoAnswer { job: index, particle, record, reason }
-            }
-        }
     }
 }
 

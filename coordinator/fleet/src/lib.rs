@@ -10,6 +10,7 @@ mod dispatcher;
 mod error;
 mod event;
 mod event_text;
+mod explained;
 mod grpc;
 mod hub;
 mod in_process;
