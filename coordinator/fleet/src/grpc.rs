@@ -20,6 +20,7 @@ use tokio_util::sync::CancellationToken;
 use super::access::Secrets;
 use super::dispatcher::{BatchError, Comparing, Event, Likeness, Rules};
 use super::door::{Door, Refusals, Refused};
+use super::explained::{Listening, explained};
 use super::handle::FleetHandle;
 use super::hub::{Hub, Reply, SetupShape, Submission};
 use super::identity::RunIdentity;
@@ -192,7 +193,7 @@ impl GrpcFleet {
                 Ok(Ok(outcomes)) => return Ok(outcomes),
                 Ok(Err(error)) => {
                     let _ = arrived(self.hub.arrived());
-                    return Err(self.explain(error));
+                    return Err(explained(error, self.listening()));
                 }
                 Err(RecvTimeoutError::Disconnected) => {
                     // The batch was dropped by a network that is about to end: what it says then is the reason.
@@ -219,36 +220,8 @@ impl GrpcFleet {
         self.network.as_ref().is_none_or(JoinHandle::is_finished)
     }
 
-    fn explain(&self, error: BatchError) -> FleetError {
-        match error {
-            BatchError::Cancelled => FleetError::Cancelled,
-            BatchError::NoWorkers { waited, missing } => {
-                let missing =
-                    [Some(missing), self.refusals.summary()].into_iter().flatten().collect::<Vec<_>>();
-                let missing = missing.join("; ");
-                FleetError::NoWorkers {
-                    address: self.address,
-                    is_open: self.is_open,
-                    waited: waited.as_secs_f64(),
-                    missing,
-                }
-            }
-            BatchError::SetupFailed { reason } => FleetError::SetupFailed { reason },
-            BatchError::LocalWorkers(reason) => FleetError::LocalWorkers(reason),
-            BatchError::Stopped(reason) => FleetError::Stopped(reason),
-            BatchError::Unavailable { waited, reasons } => {
-                FleetError::Unavailable { waited: waited.as_secs_f64(), reasons }
-            }
-            BatchError::NoControl { particle, record, parameters, reason, .. } => {
-                FleetError::NoControl { particle, record, parameters, reason }
-            }
-            BatchError::Disagreement { particle, record, workers } => {
-                FleetError::Disagreement { particle, record, workers }
-            }
-            BatchError::NoAnswer { index, particle, record, reason } => {
-                FleetError::NoAnswer { job: index, particle, record, reason }
-            }
-        }
+    fn listening(&self) -> Listening {
+        Listening { address: self.address, is_open: self.is_open, refused: self.refusals.summary() }
     }
 }
 

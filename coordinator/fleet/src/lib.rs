@@ -12,6 +12,7 @@ mod door;
 mod error;
 mod event;
 mod event_text;
+mod explained;
 mod grpc;
 mod handle;
 mod hub;
