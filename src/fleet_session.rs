@@ -9,8 +9,13 @@ use std::time::Duration;
 
 use clap::Args;
 use starlings_coordinator::fleet::access::{Access, AccessFault};
-use starlings_coordinator::fleet::{FleetConfig, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers};
+use starlings_coordinator::fleet::{
+    Bound, FleetConfig, FleetError, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers, RunIdentity,
+};
 use starlings_coordinator::study::Study;
+use starlings_coordinator::study::store::Store;
+use starlings_coordinator::study::trial::{FleetTrialError, trial_on_fleet};
+use starlings_estimators::Kind;
 use tokio_util::sync::CancellationToken;
 
 use crate::console::note;
@@ -66,7 +71,19 @@ enum AccessPlan {
 /// Name of the access file in a run folder.
 const ACCESS: &str = "access.json";
 
+impl Plan {
+    /// Takes the address, before anything is written: a port in use must leave nothing behind.
+    pub(crate) fn bind(&self) -> Result<Option<Bound>, Failure> {
+        self.address.map(Bound::new).transpose().map_err(Failure::run)
+    }
+}
+
 impl FleetArgs {
+    /// Whether runs are made on this machine, by workers that this process starts.
+    pub(crate) fn is_here(&self) -> bool {
+        self.listen.is_none()
+    }
+
     /// Checks the arguments; nothing is started yet. `out` is the run folder where it is named, `None` for a command that makes
     /// none.
     pub(crate) fn plan(&self, study: &Study, out: Option<&Out<'_>>) -> Result<Plan, Failure> {
@@ -127,13 +144,20 @@ pub(crate) struct FleetSession {
 }
 
 impl FleetSession {
-    /// Listens for workers; none is started yet.
-    pub(crate) fn listen(study: &Study, plan: &Plan, display: &Arc<Display>) -> Result<Self, Failure> {
+    /// Listens for workers of this start of a run, where the plan's address was taken; none is started yet.
+    pub(crate) fn listen(
+        study: &Study,
+        plan: &Plan,
+        bound: Option<Bound>,
+        identity: RunIdentity,
+        display: &Arc<Display>,
+    ) -> Result<Self, Failure> {
         let cancel = CancellationToken::new();
         interrupt::cancels(&cancel);
         let (sender, heard) = mpsc::channel();
         let (kept, events) = mpsc::channel();
-        let mut config = FleetConfig::new(plan.address, &study.name, cancel, sender);
+        let mut config = FleetConfig::new(None, &study.name, cancel, sender);
+        config.identity = identity;
         if let Some(patience) = study.fleet.patience {
             config.patience = Duration::try_from_secs_f64(patience).map_err(Failure::input)?;
         }
@@ -148,14 +172,15 @@ impl FleetSession {
         config.secrets = access.as_ref().map(|access| access.secrets().clone());
         (config.seed, config.mixed) = (study.seed, plan.mixed);
         config.timeout_factor = study.fleet.timeout_factor;
-        let fleet = GrpcFleet::listen(config).map_err(Failure::run)?;
+        let fleet = GrpcFleet::listen_on(bound, config).map_err(Failure::run)?;
         let display = Arc::clone(display);
         let refused = fleet.refused();
+        let listens = fleet.address().is_some();
         let invitation = Arc::<OnceLock<String>>::default();
         let told = Arc::clone(&invitation);
         let watcher = std::thread::spawn(move || {
             let missing = || [refused.summary(), told.get().cloned()];
-            relay(heard, &kept, &display, missing);
+            relay(heard, &kept, &display, listens, missing);
         });
         Ok(Self { fleet, local: None, access, invitation, events, watcher })
     }
@@ -208,8 +233,7 @@ impl FleetSession {
             access.publish(&file, run, address, plan.host.as_deref()).map_err(|fault| failed(&fault))?;
         }
         let absolute = std::path::absolute(&file).unwrap_or(file);
-        let name = absolute.to_string_lossy();
-        let name = shell_words::quote(&name);
+        let name = shell_words::quote(&absolute.to_string_lossy()).into_owned();
         self.say_how(format!("listening on {address}; start workers with: starlings worker --access {name}"));
         Ok(())
     }
@@ -217,6 +241,23 @@ impl FleetSession {
     fn say_how(&self, invitation: String) {
         note(&invitation);
         let _ = self.invitation.set(invitation);
+    }
+
+    /// Tries a study on workers elsewhere, where it is not tried here.
+    pub(crate) fn trial(
+        &mut self,
+        study: &mut Study,
+        kind: Option<&Kind>,
+        store: Option<&Store>,
+    ) -> Result<(), Failure> {
+        note(format_args!("the first runs are a trial on the workers: on this machine no solver is started"));
+        trial_on_fleet(study, kind, &mut self.fleet, store).map_err(|error| match error {
+            FleetTrialError::Fleet(FleetError::Cancelled) => {
+                interrupt::failure("nothing is kept of it: start again")
+            }
+            FleetTrialError::Trial(error) => Failure::input(error),
+            error => Failure::run(error),
+        })
     }
 
     /// Ends the fleet and its workers.
@@ -233,15 +274,17 @@ impl FleetSession {
     }
 }
 
-/// Shows the events that people should see at once and hands all of them on to the store.
+/// Shows the events that people should see at once and hands all of them on to the store. Where workers come from elsewhere, people
+/// see who comes and goes.
 fn relay(
     heard: mpsc::Receiver<FleetEvent>,
     kept: &mpsc::Sender<FleetEvent>,
     display: &Display,
+    listens: bool,
     missing: impl Fn() -> [Option<String>; 2],
 ) {
     for event in heard {
-        if event.is_notable() {
+        if event.is_notable() || listens && event.is_of_roster() {
             let waits = matches!(event, FleetEvent::Waiting { .. });
             let more = missing().into_iter().flatten().filter(|_| waits);
             let said: Vec<String> = std::iter::once(event.to_string()).chain(more).collect();

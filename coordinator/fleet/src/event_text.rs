@@ -4,6 +4,9 @@ use std::fmt;
 
 use super::FleetEvent;
 
+/// Why workers leave at the end.
+pub(super) const OVER: &str = "the run is over";
+
 impl FleetEvent {
     /// A short name of the kind of event.
     pub fn kind(&self) -> &'static str {
@@ -53,6 +56,15 @@ impl FleetEvent {
                 | Self::LocalWorkerRestarted { .. }
                 | Self::LocalWorkerGivenUp { .. }
         )
+    }
+
+    /// Whether somebody who started workers elsewhere should see it: who came, who went, who is used again.
+    pub fn is_of_roster(&self) -> bool {
+        match self {
+            Self::WorkerJoined { .. } | Self::WorkerBack { .. } => true,
+            Self::WorkerLeft { reason, .. } => reason != OVER,
+            _ => false,
+        }
     }
 
     /// Whether the event belongs into the run's record; progress is only for the moment.

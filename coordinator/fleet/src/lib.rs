@@ -7,6 +7,8 @@
 //! ends with a [`FleetError`]. Whoever dials passes the [`door`]. Next file to read: [`dispatcher`].
 
 pub mod access;
+mod bound;
+mod config;
 mod dispatcher;
 mod door;
 mod error;
@@ -24,10 +26,12 @@ mod network;
 mod service;
 mod travel;
 
+pub use bound::Bound;
+pub use config::FleetConfig;
 pub use door::Refused;
 pub use error::FleetError;
 pub use event::FleetEvent;
-pub use grpc::{FleetConfig, GrpcFleet};
+pub use grpc::GrpcFleet;
 pub use handle::FleetHandle;
 pub use identity::RunIdentity;
 pub use in_process::InProcess;

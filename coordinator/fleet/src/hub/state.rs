@@ -12,12 +12,14 @@ use starlings_proto::{
 };
 use tokio::sync::mpsc::UnboundedSender;
 
+use super::doorway::Doorway;
 use super::excluded::Excluded;
-use super::held::Waiting;
 use super::teller::Teller;
+use super::waiting::Waiting;
 use super::{Outgoing, Reply};
 use crate::FleetEvent;
 use crate::dispatcher::{BatchError, Command, ControlId, Dispatcher, Event, WorkerId};
+use crate::event_text::OVER;
 
 /// Workers of one coordinator at most.
 const MAX_WORKERS: usize = 4096;
@@ -46,6 +48,7 @@ pub(super) struct State {
     /// Runs that workers brought along.
     pub(super) waiting: Waiting,
     pub(super) excluded: Excluded,
+    pub(super) doorway: Doorway,
 }
 
 /// Names and sizes of what a setup runs, as far as they are known without building it.
@@ -120,6 +123,7 @@ impl State {
             other_builds: BTreeSet::new(),
             waiting: Waiting::default(),
             excluded: Excluded::default(),
+            doorway: Doorway::default(),
         }
     }
 
@@ -139,7 +143,7 @@ impl State {
             return Err(Closed::Refused(reason));
         }
         if self.draining {
-            return Err(Closed::Over("the run is over".to_owned()));
+            return Err(Closed::Over(OVER.to_owned()));
         }
         Ok(())
     }
@@ -220,9 +224,12 @@ impl State {
                     let listed = named.iter().map(|(name, value)| format!("{name} = {value}"));
                     *parameters = listed.collect::<Vec<_>>().join(", ");
                 }
+                if let BatchError::NoWorkers { missing, .. } = &mut error {
+                    missing.push_str(&self.turned_away());
+                }
                 self.reply(Err(error));
             }
-            Command::Notice(event) => self.tell(event),
+            Command::Notice(event) => self.notify(event),
             Command::GivenUp { index, mut notice } => {
                 if let FleetEvent::JobFailed { parameters, .. } = &mut notice {
                     *parameters = self.parameters(index);
