@@ -6,6 +6,7 @@
 pub mod ended;
 pub mod floats;
 pub mod from_worker;
+pub mod held;
 pub mod job;
 pub mod key;
 pub mod solver;
@@ -16,6 +17,7 @@ pub mod windows;
 use starlings_models::Setup;
 
 pub use from_worker::{FromWorker, Hello, LeaseOutcome};
+pub use held::HeldRun;
 pub use job::JobEncoder;
 pub use key::{JobKey, JobKeys, job_key};
 pub use to_worker::{ToWorker, Welcome};

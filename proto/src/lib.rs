@@ -13,12 +13,12 @@ pub mod words;
 pub use bytes::Bytes;
 pub(crate) use codec::Codec;
 pub use convert::{
-    FromWorker, Hello, JobEncoder, JobKey, JobKeys, Lease, LeaseOutcome, ProtocolError, ReceivedWindows,
-    SentWindows, SetupId, ToWorker, Welcome, decode_setup, digest, encode_setup, job_key,
+    FromWorker, HeldRun, Hello, JobEncoder, JobKey, JobKeys, Lease, LeaseOutcome, ProtocolError,
+    ReceivedWindows, SentWindows, SetupId, ToWorker, Welcome, decode_setup, digest, encode_setup, job_key,
 };
 
 /// Number of the protocol; coordinator and worker must have the same.
-pub const PROTOCOL: u32 = 3;
+pub const PROTOCOL: u32 = 4;
 
 /// Largest state that travels inside a job or a prediction, bytes.
 pub const MAX_INLINE_STATE: usize = 256 * 1024;

@@ -223,7 +223,14 @@ proptest! {
 
 #[test]
 fn the_coordinator_s_messages_arrive_as_sent() {
-    let welcome = Welcome { protocol: 1, run: "pig".to_owned(), heartbeat: 8.0, epoch: 5 };
+    let welcome = Welcome {
+        protocol: 1,
+        run: "pig".to_owned(),
+        heartbeat: 8.0,
+        epoch: 5,
+        run_id: [7; 16],
+        incarnation: 3,
+    };
     let leases = vec![Lease { epoch: 5, job: 1, attempt: 1 }, Lease { epoch: 5, job: 2, attempt: 3 }];
     let pairs = [
         (ToWorker::welcome(welcome.clone()), ToWorker::Welcome(welcome)),

@@ -1,12 +1,16 @@
 //! What a worker is told when it starts.
 
 use std::hash::{BuildHasher, Hasher};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
 use starlings_models::{BuildSetup, Factory, Setup};
 use starlings_proto::{Hello, PROTOCOL, VERSION, own_build};
 use tokio_util::sync::CancellationToken;
+
+use crate::held::HoldLimits;
+use crate::news::Tell;
 
 /// What a worker is told when it starts.
 #[derive(Clone)]
@@ -28,6 +32,12 @@ pub struct WorkerConfig {
     pub host: String,
     /// BLAKE3 of the executable told to the coordinator; `None` when unknown.
     pub build: Option<[u8; 32]>,
+    /// How much of what it has computed it holds while nobody is connected.
+    pub hold: HoldLimits,
+    /// The folder for what does not fit into memory.
+    pub scratch: PathBuf,
+    /// Takes news for whoever watches.
+    pub tell: Tell,
 }
 
 impl WorkerConfig {
@@ -42,6 +52,9 @@ impl WorkerConfig {
             factory: Arc::new(Setup::build),
             host: host_name(),
             build: own_build(),
+            hold: HoldLimits::default(),
+            scratch: std::env::temp_dir(),
+            tell: Arc::new(|_| {}),
         }
     }
 

@@ -17,6 +17,7 @@ use tonic::Streaming;
 use tonic::transport::{Channel, Endpoint, Uri};
 use tower::service_fn;
 
+use crate::held::Run;
 use crate::{WorkerConfig, WorkerError};
 
 /// Longest time for one attempt.
@@ -136,14 +137,26 @@ fn endpoint(config: &WorkerConfig) -> Result<Endpoint, WorkerError> {
 }
 
 /// Dials until a coordinator welcomes, refuses, or patience ends.
-pub(crate) async fn dial(config: &WorkerConfig, way: &Way, hello: &Hello) -> Result<Dialled, WorkerError> {
+///
+/// `seen` is the run that was served last: an earlier start of it is not served.
+///
+/// # Errors
+/// When nobody answers within the patience, or the coordinator refuses.
+pub(crate) async fn dial(
+    config: &WorkerConfig,
+    way: &Way,
+    hello: &Hello,
+    seen: Option<Run>,
+) -> Result<Dialled, WorkerError> {
     let started = Instant::now();
     let mut wait = FIRST_WAIT;
     let mut told = false;
     loop {
         let attempt = async {
             let patience = tokio::time::timeout(ATTEMPT, attach(way, hello.clone()));
-            patience.await.unwrap_or_else(|_| Err(Attempt::Failed("no answer to Hello".to_owned())))
+            let attached = patience.await;
+            let attached = attached.unwrap_or_else(|_| Err(Attempt::Failed("no answer to Hello".to_owned())));
+            attached.and_then(|connection| current(connection, seen))
         };
         let last = tokio::select! {
             () = config.cancel.cancelled() => return Ok(Dialled::Cancelled),
@@ -177,6 +190,19 @@ pub(crate) async fn dial(config: &WorkerConfig, way: &Way, hello: &Hello) -> Res
             () = tokio::time::sleep(wait.mul_f64(spread).min(config.patience.saturating_sub(waited))) => {}
         }
         wait = (wait * 3 / 2).min(LONGEST_WAIT);
+    }
+}
+
+/// Refuses a coordinator whose run was started again since it began.
+fn current(connection: Connection, seen: Option<Run>) -> Result<Connection, Attempt> {
+    let Welcome { run, run_id, incarnation, .. } = &connection.welcome;
+    match seen.filter(|seen| seen.id == *run_id && seen.incarnation > *incarnation) {
+        None => Ok(connection),
+        Some(seen) => Err(Attempt::Failed(format!(
+            "the coordinator there is start {incarnation} of the run `{run}`, and this worker has worked for start {} of it: end the \
+             earlier one",
+            seen.incarnation
+        ))),
     }
 }
 

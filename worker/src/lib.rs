@@ -7,19 +7,27 @@
 
 pub mod config;
 mod dial;
+mod held;
+mod news;
 mod session;
 mod setups;
 mod slots;
+mod task;
+mod watch;
 
 use std::sync::Arc;
 use std::time::Instant;
 
 pub use config::WorkerConfig;
-use dial::Dialled;
+use dial::{Connection, Dialled};
+pub use held::HoldLimits;
+use held::{Held, Run};
+pub use news::{News, Tell};
 use session::Ended;
 use slots::Slots;
 pub use starlings_models::Factory;
-pub use starlings_proto::{LIFELINE, MAX_SLOTS};
+use starlings_proto::{FromWorker, HeldRun, Welcome};
+pub use starlings_proto::{INHERITED, LIFELINE, MAX_SLOTS};
 
 /// What a worker did until it ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -88,22 +96,29 @@ pub fn run(config: WorkerConfig) -> Result<WorkerReport, WorkerError> {
     if config.slots > MAX_SLOTS {
         return Err(WorkerError::TooManySlots { slots: config.slots });
     }
-    let slots = Slots::start(config.slots.max(1)).map_err(WorkerError::Start)?;
+    // One that ends with its connection has nobody to bring results to.
+    let lasts = !config.once && config.connect != INHERITED;
+    let held = lasts.then(|| Arc::new(Held::new(config.hold, &config.scratch)));
+    let slots = Slots::start(config.slots.max(1), held.clone()).map_err(WorkerError::Start)?;
     let runtime =
         tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(WorkerError::Start)?;
-    let result = runtime.block_on(serve(&config, &slots));
+    let result = runtime.block_on(serve(&config, &slots, held.as_deref()));
     slots.close();
     runtime.shutdown_background();
     result
 }
 
-async fn serve(config: &WorkerConfig, slots: &Slots) -> Result<WorkerReport, WorkerError> {
+async fn serve(
+    config: &WorkerConfig,
+    slots: &Slots,
+    held: Option<&Held>,
+) -> Result<WorkerReport, WorkerError> {
     let way = dial::way(config)?;
     let setups = setups::Setups::new(Arc::clone(&config.factory));
     let hello = config.hello();
     let mut sessions = 0;
     loop {
-        let connection = match dial::dial(config, &way, &hello).await? {
+        let connection = match dial::dial(config, &way, &hello, held.and_then(Held::run)).await? {
             Dialled::Cancelled => return Ok(report(slots, sessions, "cancelled before it was connected")),
             Dialled::Over(reason) => return Ok(report(slots, sessions, &reason)),
             Dialled::Connected(connection) => connection,
@@ -111,8 +126,15 @@ async fn serve(config: &WorkerConfig, slots: &Slots) -> Result<WorkerReport, Wor
         sessions += 1;
         tracing::info!(run = connection.welcome.run, address = config.connect, "joined");
         let stayed_since = Instant::now();
-        let ended = session::serve(*connection, slots, &setups, config).await;
-        slots.forget_queue();
+        begin(config, slots, held, &connection);
+        let ended = session::serve(*connection, slots, &setups, held, config).await;
+        match held {
+            Some(held) if matches!(ended, Ended::Lost(_)) => {
+                slots.detach();
+                held.disconnected();
+            }
+            _ => slots.forget(),
+        }
         tracing::info!(?ended, seconds = stayed_since.elapsed().as_secs_f64(), "left");
         match ended {
             Ended::Drained(reason) => return Ok(report(slots, sessions, &reason)),
@@ -120,10 +142,43 @@ async fn serve(config: &WorkerConfig, slots: &Slots) -> Result<WorkerReport, Wor
             Ended::Lost(reason) if config.once || way.is_inherited() => {
                 return Ok(report(slots, sessions, &reason));
             }
-            Ended::Lost(_) => {}
+            Ended::Lost(reason) => {
+                let (running, queued) = slots.load();
+                (config.tell)(&News::Lost { reason, computing: (running + queued) as usize });
+            }
         }
     }
 }
+
+/// Tells a coordinator what is held for its run, or forgets it where it is for another one.
+fn begin(config: &WorkerConfig, slots: &Slots, held: Option<&Held>, connection: &Connection) {
+    let Welcome { run, run_id, incarnation, .. } = &connection.welcome;
+    let (run, address) = (run.clone(), config.connect.clone());
+    (config.tell)(&News::Connected { run, address, slots: config.slots.max(1) });
+    let Some(held) = held else { return };
+    if !held.connected(Run { id: *run_id, incarnation: *incarnation }) {
+        slots.forget();
+    }
+    let outbox = &connection.outbox;
+    let going_on = slots.attach(outbox.clone());
+    let (mut portions, computing) = (held.portions(PORTION), going_on.len());
+    let finished = portions.iter().map(Vec::len).sum();
+    if finished + computing == 0 {
+        return;
+    }
+    if portions.is_empty() {
+        portions.push(Vec::new());
+    }
+    // What goes on is in the first message: it is given away otherwise.
+    portions[0].extend(going_on.into_iter().map(|key| HeldRun { key, ended: None }));
+    for runs in portions {
+        session::send(outbox, FromWorker::Held(runs));
+    }
+    (config.tell)(&News::Delivered { finished, computing });
+}
+
+/// Bytes of results in one message.
+const PORTION: usize = 1 << 20;
 
 fn report(slots: &Slots, sessions: u64, reason: &str) -> WorkerReport {
     let (predictions, failures) = slots.answered();

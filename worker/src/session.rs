@@ -3,15 +3,22 @@
 use std::time::Duration;
 
 use starlings_models::ParticleError;
+use starlings_proto::convert::ended;
 use starlings_proto::words::status_text;
-use starlings_proto::{FromWorker, LeaseOutcome, ProtocolError, ReceivedWindows, ToWorker, generated};
+use starlings_proto::{
+    FromWorker, JobKey, Lease, LeaseOutcome, ProtocolError, ReceivedWindows, ToWorker, generated,
+};
 use tokio::sync::mpsc::UnboundedSender;
 use tonic::Streaming;
 
 use crate::WorkerConfig;
 use crate::dial::Connection;
+use crate::held::Held;
+use crate::news::{News, Tell};
 use crate::setups::Setups;
-use crate::slots::{Slots, Task, answer};
+use crate::slots::Slots;
+use crate::task::{Asked, Task, answer};
+use crate::watch::Watch;
 
 /// How long a leaving worker waits for the coordinator to close the stream.
 const GOODBYE_PATIENCE: Duration = Duration::from_secs(1);
@@ -31,18 +38,21 @@ pub(crate) async fn serve(
     mut connection: Connection,
     slots: &Slots,
     setups: &Setups,
+    held: Option<&Held>,
     config: &WorkerConfig,
 ) -> Ended {
     let mut beats = tokio::time::interval(Duration::from_secs_f64(connection.welcome.heartbeat));
     beats.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
     let mut silence = Silence::default();
+    let mut watch = Watch::new(slots);
     loop {
         tokio::select! {
             // Messages first: a flood of jobs must not be mistaken for silence.
             biased;
             message = connection.inbound.message() => {
                 silence.broken();
-                match take(message, &connection.outbox, &mut connection.windows, slots, setups) {
+                let place = Place { slots, setups, held, tell: &config.tell };
+                match take(message, &connection.outbox, &mut connection.windows, &place) {
                     Ok(()) => {}
                     Err(Ended::Drained(reason)) => {
                         goodbye(&connection.outbox, &mut connection.inbound, &reason).await;
@@ -58,6 +68,7 @@ pub(crate) async fn serve(
             _ = beats.tick() => {
                 let (running, queued) = slots.load();
                 send(&connection.outbox, FromWorker::Heartbeat { running, queued });
+                watch.look(slots, &config.tell);
                 // A worker that serves once does not dial again: only the end of its connection ends its session.
                 if let Some(reason) = silence.after_beat().filter(|_| !config.once) {
                     return Ended::Lost(reason);
@@ -89,13 +100,21 @@ impl Silence {
     }
 }
 
+/// What a message acts on.
+struct Place<'a> {
+    slots: &'a Slots,
+    setups: &'a Setups,
+    held: Option<&'a Held>,
+    tell: &'a Tell,
+}
+
 fn take(
     message: Result<Option<generated::ToWorker>, tonic::Status>,
     outbox: &UnboundedSender<generated::FromWorker>,
     windows: &mut ReceivedWindows,
-    slots: &Slots,
-    setups: &Setups,
+    place: &Place<'_>,
 ) -> Result<(), Ended> {
+    let Place { slots, setups, held, tell } = *place;
     let message = match message {
         Ok(Some(message)) => message,
         Ok(None) => return Err(Ended::Lost("the coordinator closed the connection".to_owned())),
@@ -104,7 +123,7 @@ fn take(
     match ToWorker::decode(message, windows) {
         Ok(ToWorker::Job { lease, setup, job }) => {
             if let Some(forward) = setups.get(&setup) {
-                slots.push(Task { lease, forward, job, outbox: outbox.clone() });
+                slots.push(Task::new(Asked { lease, outbox: outbox.clone() }, setup, forward, job));
             } else {
                 // First the setup, so that the job that comes back finds it missing here; and once, however many of its jobs
                 // are on their way: a second time would stand for the setup that is sent again.
@@ -120,6 +139,14 @@ fn take(
             setups.order(id, setup, Box::new(move |result| send(&outbox, FromWorker::Setup { id, result })));
         }
         Ok(ToWorker::Cancel(leases)) => slots.withdraw(&leases),
+        Ok(ToWorker::Adopt { runs, rest_is_void }) => {
+            let gone = slots.adopt(runs, outbox);
+            answer_held(gone, outbox, held);
+            if rest_is_void {
+                slots.drop_void();
+            }
+        }
+        Ok(ToWorker::Notice(text)) => tell(&News::Told(text)),
         Ok(ToWorker::Drain(reason)) => return Err(Ended::Drained(reason)),
         Ok(ToWorker::Window | ToWorker::Heartbeat | ToWorker::Welcome(_) | ToWorker::Refuse(_)) => {}
         Err(error) => return Err(Ended::Lost(format!("the coordinator sent a malformed message: {error}"))),
@@ -127,11 +154,27 @@ fn take(
     Ok(())
 }
 
+/// Answers leases for runs that ended before they came.
+fn answer_held(
+    runs: Vec<(JobKey, Lease)>,
+    outbox: &UnboundedSender<generated::FromWorker>,
+    held: Option<&Held>,
+) {
+    let keys = runs.iter().map(|(key, _)| *key).collect::<Vec<_>>();
+    let known = held.map(|held| held.ended(&keys)).unwrap_or_default();
+    for (key, lease) in runs {
+        match known.get(&key).map(|bytes| ended::decode(bytes)) {
+            Some(Ok((result, cost))) => answer(outbox, lease, LeaseOutcome::Ran(result), cost),
+            _ => answer(outbox, lease, LeaseOutcome::Withdrawn, 0.0),
+        }
+    }
+}
+
 fn refuse(outbox: &UnboundedSender<generated::FromWorker>, lease: starlings_proto::Lease, reason: String) {
     answer(outbox, lease, LeaseOutcome::Ran(Err(ParticleError::BadJob(reason))), 0.0);
 }
 
-fn send(outbox: &UnboundedSender<generated::FromWorker>, message: FromWorker) {
+pub(crate) fn send(outbox: &UnboundedSender<generated::FromWorker>, message: FromWorker) {
     if let Ok(message) = message.encode() {
         let _ = outbox.send(message);
     }
@@ -175,9 +218,11 @@ mod tests {
     fn jobs_of_a_forgotten_setup_all_come_back_and_its_loss_is_told_once() {
         let (outbox, mut sent) = unbounded_channel();
         let (slots, setups) =
-            (Slots::start(1).unwrap(), Setups::new(Arc::new(|setup: &Setup| setup.build())));
+            (Slots::start(1, None).unwrap(), Setups::new(Arc::new(|setup: &Setup| setup.build())));
         let mut windows = ReceivedWindows::default();
-        let mut take = |message| take(Ok(Some(message)), &outbox, &mut windows, &slots, &setups).unwrap();
+        let tell: Tell = Arc::new(|_| {});
+        let place = Place { slots: &slots, setups: &setups, held: None, tell: &tell };
+        let mut take = |message| take(Ok(Some(message)), &outbox, &mut windows, &place).unwrap();
         let mut next = || FromWorker::decode(sent.blocking_recv().expect("an answer")).unwrap();
         let (id, json) = encode_setup(&oscillator()).unwrap();
         let mut encoder = JobEncoder::default();

@@ -2,35 +2,31 @@
 //!
 //! A panicking model is a failed job, not a dead worker. The wall time of each run is measured here.
 
-use std::collections::VecDeque;
+use std::collections::{HashMap, VecDeque};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Instant;
 
-use starlings_models::{Forward, Job, ModelFailure, ParticleError};
+use starlings_models::{ModelFailure, ParticleError, Prediction};
+use starlings_proto::convert::ended;
 use starlings_proto::spent::spent;
 use starlings_proto::words::panic_text;
-use starlings_proto::{FromWorker, Lease, LeaseOutcome, generated};
+use starlings_proto::{FromWorker, HeldRun, JobKey, JobKeys, Lease, LeaseOutcome, generated, job_key};
 use tokio::sync::mpsc::UnboundedSender;
 
-/// One job with everything needed to run and answer it. The outbox belongs to the stream that gave the lease: once that
-/// stream is gone, so is the answer.
-pub(crate) struct Task {
-    pub(crate) lease: Lease,
-    pub(crate) forward: Arc<dyn Forward>,
-    pub(crate) job: Job,
-    pub(crate) outbox: UnboundedSender<generated::FromWorker>,
-}
+use crate::held::Held;
+use crate::task::{Asked, Task, answer};
 
 /// The slots of this process.
 pub(crate) struct Slots {
     shared: Arc<Shared>,
 }
 
-#[derive(Default)]
 struct Shared {
+    /// Where results are held; `None` in a worker that ends with its connection.
+    held: Option<Arc<Held>>,
     queue: Mutex<Queue>,
     filled: Condvar,
     running: AtomicU32,
@@ -40,21 +36,37 @@ struct Shared {
 
 #[derive(Default)]
 struct Queue {
-    tasks: VecDeque<Task>,
+    tasks: VecDeque<Arc<Task>>,
+    running: Vec<Arc<Task>>,
+    /// No task is begun: no more results can be held.
+    full: bool,
     closed: bool,
+    /// The stream of now, for results that an earlier one asked for.
+    stream: Option<UnboundedSender<generated::FromWorker>>,
 }
 
 impl Slots {
     /// Starts the threads, or none: those that started end again when the system gives no more.
-    pub(crate) fn start(n: usize) -> std::io::Result<Self> {
-        Self::start_with(n, |slot, work| std::thread::Builder::new().name(format!("slot-{slot}")).spawn(work))
+    pub(crate) fn start(n: usize, held: Option<Arc<Held>>) -> std::io::Result<Self> {
+        Self::start_with(n, held, |slot, work| {
+            std::thread::Builder::new().name(format!("slot-{slot}")).spawn(work)
+        })
     }
 
     fn start_with(
         n: usize,
+        held: Option<Arc<Held>>,
         spawn: impl Fn(usize, Box<dyn FnOnce() + Send>) -> std::io::Result<JoinHandle<()>>,
     ) -> std::io::Result<Self> {
-        let slots = Self { shared: Arc::default() };
+        let shared = Shared {
+            held,
+            queue: Mutex::default(),
+            filled: Condvar::new(),
+            running: AtomicU32::new(0),
+            predictions: AtomicU64::new(0),
+            failures: AtomicU64::new(0),
+        };
+        let slots = Self { shared: Arc::new(shared) };
         let mut started = Vec::with_capacity(n);
         for slot in 0..n {
             let shared = Arc::clone(&slots.shared);
@@ -74,25 +86,72 @@ impl Slots {
     }
 
     pub(crate) fn push(&self, task: Task) {
-        self.shared.lock().tasks.push_back(task);
+        self.shared.lock().tasks.push_back(Arc::new(task));
         self.shared.filled.notify_one();
     }
 
     /// Answers the given leases as withdrawn where they have not started.
     pub(crate) fn withdraw(&self, leases: &[Lease]) {
         let mut queue = self.shared.lock();
-        let (withdrawn, kept) = queue.tasks.drain(..).partition(|task| leases.contains(&task.lease));
+        let (withdrawn, kept) = queue.tasks.drain(..).partition(|task| task.has_lease(leases));
         queue.tasks = kept;
         drop(queue);
-        let withdrawn: VecDeque<Task> = withdrawn;
-        for task in withdrawn {
-            answer(&task.outbox, task.lease, LeaseOutcome::Withdrawn, 0.0);
+        let withdrawn: VecDeque<Arc<Task>> = withdrawn;
+        for Asked { lease, outbox } in withdrawn.into_iter().filter_map(|task| task.asked().take()) {
+            answer(&outbox, lease, LeaseOutcome::Withdrawn, 0.0);
         }
     }
 
-    /// Drops what waits, as when its stream is gone.
-    pub(crate) fn forget_queue(&self) {
-        self.shared.lock().tasks.clear();
+    /// Drops what waits, and what is computed is for nobody, as when its run is over.
+    pub(crate) fn forget(&self) {
+        let mut queue = self.shared.lock();
+        queue.tasks.clear();
+        queue.running.iter().for_each(|task| drop(task.asked().take()));
+    }
+
+    /// Its stream is gone: what was begun and what waits goes on, and its results are held.
+    pub(crate) fn detach(&self) {
+        let mut queue = self.shared.lock();
+        queue.stream = None;
+        let all = queue.tasks.iter().chain(&queue.running);
+        all.for_each(|task| drop(task.asked().take()));
+    }
+
+    /// A stream of the same run is there: the keys of what an earlier one asked for and is not finished. What finishes from now on is
+    /// told to it.
+    pub(crate) fn attach(&self, stream: UnboundedSender<generated::FromWorker>) -> Vec<JobKey> {
+        let mut queue = self.shared.lock();
+        queue.stream = Some(stream);
+        queue.full = false;
+        let (mut keys, all) = (JobKeys::default(), queue.running.iter().chain(&queue.tasks));
+        let keys = all.map(|task| keys.of(&task.setup, &task.job)).collect();
+        drop(queue);
+        self.shared.filled.notify_all();
+        keys
+    }
+
+    /// Gives leases to what an earlier stream asked for; those that are left over are neither computed nor wait.
+    pub(crate) fn adopt(
+        &self,
+        runs: Vec<(JobKey, Lease)>,
+        outbox: &UnboundedSender<generated::FromWorker>,
+    ) -> Vec<(JobKey, Lease)> {
+        let mut leases: HashMap<JobKey, Lease> = runs.into_iter().collect();
+        if leases.is_empty() {
+            return Vec::new();
+        }
+        let (mut keys, queue) = (JobKeys::default(), self.shared.lock());
+        for task in queue.running.iter().chain(&queue.tasks) {
+            if let Some(lease) = leases.remove(&keys.of(&task.setup, &task.job)) {
+                *task.asked() = Some(Asked { lease, outbox: outbox.clone() });
+            }
+        }
+        leases.into_iter().collect()
+    }
+
+    /// Drops what waits and nobody asks for any more.
+    pub(crate) fn drop_void(&self) {
+        self.shared.lock().tasks.retain(|task| task.asked().is_some());
     }
 
     /// Jobs being computed and jobs waiting.
@@ -120,13 +179,16 @@ impl Shared {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn next(&self) -> Option<Task> {
+    fn next(&self) -> Option<Arc<Task>> {
         let mut queue = self.lock();
         loop {
             if queue.closed {
                 return None;
             }
-            if let Some(task) = queue.tasks.pop_front() {
+            if !queue.full
+                && let Some(task) = queue.tasks.pop_front()
+            {
+                queue.running.push(Arc::clone(&task));
                 return Some(task);
             }
             queue = self.filled.wait(queue).unwrap_or_else(PoisonError::into_inner);
@@ -134,33 +196,44 @@ impl Shared {
     }
 
     fn work(&self) {
-        while let Some(Task { lease, forward, job, outbox }) = self.next() {
+        while let Some(task) = self.next() {
             self.running.fetch_add(1, Ordering::Relaxed);
             let started = Instant::now();
-            let result = catch_unwind(AssertUnwindSafe(|| forward.run_within(&job, &spent())))
+            let result = catch_unwind(AssertUnwindSafe(|| task.forward.run_within(&task.job, &spent())))
                 .unwrap_or_else(|panic| Err(ModelFailure::Solver(panic_text(panic.as_ref())).into()));
             let cost = started.elapsed().as_secs_f64();
             self.running.fetch_sub(1, Ordering::Relaxed);
             let counter = if result.is_ok() { &self.predictions } else { &self.failures };
             counter.fetch_add(1, Ordering::Relaxed);
-            answer(&outbox, lease, LeaseOutcome::Ran(result), cost);
+            self.finished(&task, result, cost);
         }
     }
-}
 
-/// Answers a lease; an answer that does not fit in a message becomes a failure that says so.
-pub(crate) fn answer(
-    outbox: &UnboundedSender<generated::FromWorker>,
-    lease: Lease,
-    answer: LeaseOutcome,
-    cost: f64,
-) {
-    let message = FromWorker::Result { lease, answer, cost }.encode().or_else(|error| {
-        let answer = LeaseOutcome::Ran(Err(ParticleError::BadJob(error.to_string())));
-        FromWorker::Result { lease, answer, cost }.encode()
-    });
-    if let Ok(message) = message {
-        let _ = outbox.send(message);
+    /// Answers a task that ran; held is the result whether there is somebody to answer or not.
+    fn finished(&self, task: &Arc<Task>, result: Result<Prediction, ParticleError>, cost: f64) {
+        let has_room =
+            self.held.as_ref().is_none_or(|held| held.keep(task.setup, Arc::clone(&task.job), &result, cost));
+        let mut queue = self.lock();
+        queue.running.retain(|running| !Arc::ptr_eq(running, task));
+        // A stream that came meanwhile has been told all that is held.
+        if !has_room && queue.stream.is_none() && !std::mem::replace(&mut queue.full, true) {
+            tracing::warn!(
+                "no further run is begun until the coordinator is back: no more results can be held"
+            );
+        }
+        let stream = queue.stream.clone();
+        drop(queue);
+        match (task.asked().take(), stream) {
+            (Some(Asked { lease, outbox }), _) => answer(&outbox, lease, LeaseOutcome::Ran(result), cost),
+            (None, Some(stream)) => {
+                let ended = Some(ended::encode(&result, cost).into());
+                let run = HeldRun { key: job_key(&task.setup, &task.job), ended };
+                if let Ok(message) = FromWorker::Held(vec![run]).encode() {
+                    let _ = stream.send(message);
+                }
+            }
+            (None, None) => {}
+        }
     }
 }
 
@@ -181,7 +254,7 @@ mod tests {
                 ended.fetch_add(1, Ordering::Relaxed);
             }))
         };
-        assert!(Slots::start_with(5, spawn).is_err());
+        assert!(Slots::start_with(5, None, spawn).is_err());
         assert_eq!(ended.load(Ordering::Relaxed), 3);
     }
 }

@@ -20,6 +20,7 @@ mod answers;
 mod aside;
 pub(crate) mod batch;
 mod doubt;
+mod held;
 pub(crate) mod message;
 mod proven;
 mod queue;
@@ -39,6 +40,7 @@ use super::job_name::JobName;
 use super::{FleetEvent, Outcome};
 use batch::{Batch, Lost};
 pub(crate) use doubt::Asked;
+pub(crate) use held::Taken;
 pub(crate) use message::{BatchError, Command, ControlId, Event, Joining, WorkerId};
 use proven::Proven;
 use roster::{SetupState, Worker};
@@ -70,6 +72,11 @@ pub(crate) struct Dispatcher {
     run_times: RunTimes,
     proven: Proven,
     local_only: bool,
+    /// No job is given away before: workers of an earlier start may come back with them.
+    opens: Duration,
+    /// No job is given away while it is looked for what workers brought along.
+    pub(crate) is_matching: bool,
+    now: Duration,
     /// Outcomes of a batch that ended in an error, of which its caller was not told.
     left: Vec<(usize, Outcome)>,
     out: Vec<Command>,
@@ -90,9 +97,17 @@ impl Dispatcher {
             run_times: RunTimes::default(),
             proven: Proven::default(),
             local_only: false,
+            opens: Duration::ZERO,
+            is_matching: false,
+            now: Duration::ZERO,
             left: Vec::new(),
             out: Vec::new(),
         }
+    }
+
+    /// The same, which gives no job away before this time.
+    pub(crate) fn opening_at(self, opens: Duration) -> Self {
+        Self { opens, ..self }
     }
 
     /// Number of workers.
@@ -112,6 +127,7 @@ impl Dispatcher {
 
     /// Takes one event at time `now` (any fixed origin) and returns what has to be done about it.
     pub(crate) fn step(&mut self, now: Duration, event: Event) -> Vec<Command> {
+        self.now = now;
         match event {
             Event::Joined(joining) => self.joined(now, &joining),
             Event::Left { worker, reason, clean } => self.lose(worker, &reason, clean),

@@ -111,6 +111,15 @@ pub enum FleetEvent {
         /// How the last one ended.
         reason: String,
     },
+    /// A worker that was connected before brought along what it had done meanwhile.
+    RunsBrought {
+        /// Its name.
+        worker: String,
+        /// Runs that it had finished, which count.
+        finished: usize,
+        /// Runs that it still makes.
+        computing: usize,
+    },
     /// An answer to a lease that has ended; ignored.
     LateAnswer {
         /// Who sent it.

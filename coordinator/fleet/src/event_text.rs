@@ -4,6 +4,9 @@ use std::fmt;
 
 use super::FleetEvent;
 
+/// Why workers leave at the end.
+pub(super) const OVER: &str = "the run is over";
+
 impl FleetEvent {
     /// A short name of the kind of event.
     pub fn kind(&self) -> &'static str {
@@ -19,6 +22,7 @@ impl FleetEvent {
             Self::ControlRun { .. } => "control-run",
             Self::JobRetried { .. } => "job-retried",
             Self::JobFailed { .. } => "job-failed",
+            Self::RunsBrought { .. } => "runs-brought",
             Self::LateAnswer { .. } => "late-answer",
             Self::Waiting { .. } => "waiting",
             Self::Progress { .. } => "progress",
@@ -34,12 +38,22 @@ impl FleetEvent {
             Self::WorkerRefused { .. }
                 | Self::OtherBuild { .. }
                 | Self::SetupFailed { .. }
+                | Self::RunsBrought { .. }
                 | Self::WorkerSetAside { .. }
                 | Self::JobFailed { .. }
                 | Self::Waiting { .. }
                 | Self::LocalWorkerRestarted { .. }
                 | Self::LocalWorkerGivenUp { .. }
         )
+    }
+
+    /// Whether somebody who started workers elsewhere should see it: who came, who went, who is used again.
+    pub fn is_of_roster(&self) -> bool {
+        match self {
+            Self::WorkerJoined { .. } | Self::WorkerBack { .. } => true,
+            Self::WorkerLeft { reason, .. } => reason != OVER,
+            _ => false,
+        }
     }
 
     /// Whether the event belongs into the run's record; progress is only for the moment.
@@ -89,6 +103,12 @@ impl fmt::Display for FleetEvent {
                 write!(
                     f,
                     "particle {particle}, record {record}{with}: given up after {attempts} attempt{s}: {reason}"
+                )
+            }
+            Self::RunsBrought { worker, finished, computing } => {
+                write!(
+                    f,
+                    "worker {worker} brought {finished} finished runs along and goes on with {computing}"
                 )
             }
             Self::LateAnswer { worker, job } => {

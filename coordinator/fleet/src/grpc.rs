@@ -3,7 +3,7 @@
 //! The network lives on a thread of its own, so a caller that thinks for minutes between two batches delays no heartbeat. Next file to
 //! read: [`super::hub`], then [`super::network`].
 
-use std::net::{SocketAddr, TcpListener};
+use std::net::SocketAddr;
 use std::ops::ControlFlow;
 use std::os::unix::net::UnixStream;
 use std::sync::Arc;
@@ -17,14 +17,20 @@ use starlings_proto::{JobEncoder, MAX_MESSAGE, SetupId, encode_setup, own_build}
 use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
 use tokio_util::sync::CancellationToken;
 
+use super::bound::Bound;
 use super::dispatcher::{BatchError, Event, Rules};
 use super::handle::FleetHandle;
 use super::hub::{Hub, Reply, Submission};
+use super::identity::RunIdentity;
 use super::network::{self, Ways};
 use super::{Arrived, Fleet, FleetError, FleetEvent, Outcome, TELL_EVERY};
 
 /// How long the caller of a batch that was dropped waits for the network's last words.
 const ALIVE_CHECK: Duration = Duration::from_secs(1);
+
+/// How long a run that is continued waits for the workers of its earlier start, which dial every two seconds, before it gives away
+/// jobs that they may have done.
+const GRACE: Duration = Duration::from_millis(2500);
 
 /// How a fleet listens and when it loses patience.
 #[derive(Clone, Debug)]
@@ -39,6 +45,8 @@ pub struct FleetConfig {
     pub patience: Duration,
     /// How many workers may be lost under one job before it is given up.
     pub max_attempts: u32,
+    /// The run: workers of an earlier start of it bring along what they have done.
+    pub identity: RunIdentity,
     /// BLAKE3 of this executable: a worker of another one is told of. `None`: none is.
     pub build: Option<[u8; 32]>,
     /// Ends [`Fleet::run`] promptly with [`FleetError::Cancelled`].
@@ -61,6 +69,7 @@ impl FleetConfig {
             heartbeat: Duration::from_secs(8),
             patience: Duration::from_secs(300),
             max_attempts: 5,
+            identity: RunIdentity::new(),
             build: own_build(),
             cancel,
             events,
@@ -84,18 +93,29 @@ impl GrpcFleet {
     /// # Errors
     /// [`FleetError::Bind`] when the address is taken or does not exist; [`FleetError::Stopped`] when no thread can start.
     pub fn listen(config: FleetConfig) -> Result<Self, FleetError> {
-        let listener = config.address.map(listen).transpose()?;
-        let address = listener.as_ref().map(|(_, address)| *address);
+        let bound = config.address.map(Bound::new).transpose()?;
+        Self::listen_on(bound, config)
+    }
+
+    /// The same on an address that was taken before, if any: the one in `config` is not looked at.
+    ///
+    /// # Errors
+    /// [`FleetError::Stopped`] when no thread can start.
+    pub fn listen_on(bound: Option<Bound>, config: FleetConfig) -> Result<Self, FleetError> {
+        let address = bound.as_ref().map(|bound| bound.address);
         let rules = Rules {
             heartbeat: config.heartbeat,
             patience: config.patience,
             max_attempts: config.max_attempts,
         };
-        let hub = Arc::new(Hub::new(config.run_name, config.build, rules, config.events));
+        let started_again = address.is_some() && config.identity.incarnation > 1;
+        let opens = if started_again { GRACE } else { Duration::ZERO };
+        let hub = Hub::new(config.run_name, config.build, config.identity, rules, opens, config.events);
+        let hub = Arc::new(hub);
         let stop = CancellationToken::new();
         let (batches, submitted) = unbounded_channel();
         let (adopted, ends) = unbounded_channel();
-        let ways = Ways { listener: listener.map(|(listener, _)| listener), adopted: ends };
+        let ways = Ways { listener: bound.map(|bound| bound.listener), adopted: ends };
         let network = {
             let (hub, cancel, stop) = (Arc::clone(&hub), config.cancel.clone(), stop.clone());
             let heartbeat = config.heartbeat;
@@ -244,15 +264,6 @@ impl Drop for GrpcFleet {
             }
         }
     }
-}
-
-/// Listens on the address, and says which port was picked.
-fn listen(address: SocketAddr) -> Result<(TcpListener, SocketAddr), FleetError> {
-    let bind = |source| FleetError::Bind { address, source };
-    let listener = TcpListener::bind(address).map_err(bind)?;
-    listener.set_nonblocking(true).map_err(bind)?;
-    let address = listener.local_addr().map_err(bind)?;
-    Ok((listener, address))
 }
 
 #[cfg(test)]

@@ -5,21 +5,27 @@
 //! read: `state`, then [`super::service`], which brings the workers' events.
 
 mod arrival;
+mod doorway;
+mod held;
 mod state;
+mod telling;
 #[cfg(test)]
 mod tests;
+mod waiting;
 
 use std::hash::{BuildHasher, Hasher};
 use std::sync::mpsc::Sender;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use starlings_proto::{Bytes, Hello, PROTOCOL, SetupId, ToWorker, Welcome, generated};
+use starlings_proto::{Bytes, HeldRun, Hello, PROTOCOL, SetupId, ToWorker, Welcome, generated};
 use tokio::sync::{Notify, mpsc::UnboundedSender};
 use tonic::Status;
 
 use super::dispatcher::message::hex;
-use super::dispatcher::{BatchError, Event, Joining, Rules, WorkerId};
+use super::dispatcher::{BatchError, Dispatcher, Event, Joining, Rules, WorkerId};
+use super::event_text::OVER;
+use super::identity::RunIdentity;
 use super::job_name::JobName;
 use super::{FleetEvent, Outcome};
 pub(super) use state::{Closed, Submission};
@@ -36,6 +42,7 @@ pub(super) struct Hub {
     state: Mutex<State>,
     started: Instant,
     run_name: String,
+    identity: RunIdentity,
     heartbeat: Duration,
     build: Option<[u8; 32]>,
     max_attempts: u32,
@@ -47,16 +54,19 @@ impl Hub {
     pub(super) fn new(
         run_name: String,
         build: Option<[u8; 32]>,
+        identity: RunIdentity,
         rules: Rules,
+        opens: Duration,
         events: Sender<FleetEvent>,
     ) -> Self {
         // Epochs start anywhere, so that answers to an earlier coordinator on the same port carry none of this one's.
         let first_epoch = std::hash::RandomState::new().build_hasher().finish() >> 1;
-        let state = State::new(first_epoch, rules, events);
+        let state = State::new(first_epoch, Dispatcher::new(rules).opening_at(opens), events);
         Self {
             state: Mutex::new(state),
             started: Instant::now(),
             run_name,
+            identity,
             heartbeat: rules.heartbeat,
             build,
             max_attempts: rules.max_attempts,
@@ -65,7 +75,11 @@ impl Hub {
     }
 
     pub(super) fn tell(&self, event: FleetEvent) {
-        let _ = self.lock().events.send(event);
+        let mut state = self.lock();
+        if let FleetEvent::Listening { address } = event {
+            state.doorway.address = Some(address);
+        }
+        let _ = state.events.send(event);
     }
 
     pub(super) fn handle(&self, event: Event) {
@@ -122,7 +136,7 @@ impl Hub {
         let jobs = batch.jobs.iter().map(|(setup, job)| (*setup, JobName::of(job))).collect();
         state.handle(now, Event::Abort(BatchError::Cancelled));
         state.running = Some(batch);
-        state.handle(now, Event::Submit { jobs });
+        state.begin(now, jobs);
     }
 
     /// Takes a worker or says why not. The first message on its link is the welcome.
@@ -131,7 +145,7 @@ impl Hub {
         let mut state = self.decide();
         if let Err(closed) = state.admit(&hello) {
             if let Closed::Refused(reason) = closed.clone() {
-                let _ = state.events.send(FleetEvent::WorkerRefused { host: hello.host, reason });
+                state.notify(FleetEvent::WorkerRefused { host: hello.host, reason });
             }
             return Err(closed);
         }
@@ -142,10 +156,12 @@ impl Hub {
             run: self.run_name.clone(),
             heartbeat: self.heartbeat.as_secs_f64(),
             epoch: id.0,
+            run_id: self.identity.id,
+            incarnation: self.identity.incarnation,
         };
         let _ = link.send(Ok(ToWorker::welcome(welcome)));
-        state.links.insert(id, Link::new(link, hello.pid));
         let name = format!("{}@{}/{}", state.joined, hello.host, hello.pid);
+        state.links.insert(id, Link::new(name.clone(), link, hello.pid));
         let Hello { cores, slots, host, pid, nonce, build, .. } = hello;
         let other = state.other_build(self.build, build).map(|(own, build)| FleetEvent::OtherBuild {
             worker: name.clone(),
@@ -160,6 +176,12 @@ impl Hub {
         Ok(id)
     }
 
+    /// Takes runs that a worker brings along from an earlier connection of the same run.
+    pub(super) fn bring(&self, worker: WorkerId, runs: Vec<HeldRun>) {
+        let now = self.started.elapsed();
+        self.decide().bring(now, worker, runs);
+    }
+
     pub(super) fn leave(&self, worker: WorkerId, reason: String, clean: bool) {
         let now = self.started.elapsed();
         // After a panic under the lock there is nothing left to decide: the next tick ends the fleet.
@@ -168,6 +190,7 @@ impl Hub {
         }
         let mut state = self.lock();
         state.links.remove(&worker);
+        state.waiting.left(worker);
         state.handle(now, Event::Left { worker, reason, clean });
         drop(state);
         self.link_ended.notify_waiters();
@@ -199,7 +222,7 @@ impl Hub {
     /// Asks the workers with these process numbers to leave.
     pub(super) fn dismiss(&self, pids: &[u32]) {
         for link in self.lock().links.values().filter(|link| pids.contains(&link.pid)) {
-            let _ = link.sender.send(Ok(ToWorker::drain("the run is over")));
+            let _ = link.sender.send(Ok(ToWorker::drain(OVER)));
         }
     }
 

@@ -6,6 +6,7 @@
 //! model fails is an [`Outcome`] whose result is an error. A failure of a place sets a worker aside; when none is left the batch
 //! ends with a [`FleetError`]. Next file to read: [`dispatcher`].
 
+mod bound;
 mod dispatcher;
 mod error;
 mod event;
@@ -13,6 +14,7 @@ mod event_text;
 mod grpc;
 mod handle;
 mod hub;
+mod identity;
 mod in_process;
 mod job_name;
 mod local_workers;
@@ -20,10 +22,12 @@ mod network;
 mod service;
 mod travel;
 
+pub use bound::Bound;
 pub use error::FleetError;
 pub use event::FleetEvent;
 pub use grpc::{FleetConfig, GrpcFleet};
 pub use handle::FleetHandle;
+pub use identity::RunIdentity;
 pub use in_process::InProcess;
 pub use local_workers::{LocalConfig, LocalWorkers};
 pub use starlings_models::Factory;

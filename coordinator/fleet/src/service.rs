@@ -78,7 +78,9 @@ async fn read(hub: Arc<Hub>, worker: WorkerId, mut inbound: Streaming<generated:
             Ok(Some(message)) => match FromWorker::decode(message) {
                 Ok(FromWorker::Goodbye(reason)) => break (reason, true),
                 Ok(message) => {
-                    if let Some(event) = event(worker, message) {
+                    if let FromWorker::Held(runs) = message {
+                        hub.bring(worker, runs);
+                    } else if let Some(event) = event(worker, message) {
                         hub.handle(event);
                     }
                 }
@@ -96,6 +98,6 @@ fn event(worker: WorkerId, message: FromWorker) -> Option<Event> {
         FromWorker::Setup { id: setup, result: Err(reason) } => Event::SetupFailed { worker, setup, reason },
         FromWorker::Result { lease, answer, cost } => Event::Answered { worker, lease, answer, cost },
         FromWorker::Heartbeat { .. } => Event::Heard { worker },
-        FromWorker::Hello(_) | FromWorker::Goodbye(_) => return None,
+        FromWorker::Hello(_) | FromWorker::Goodbye(_) | FromWorker::Held(_) => return None,
     })
 }

@@ -3,6 +3,7 @@
 use bytes::Bytes;
 use starlings_models::{ModelFailure, ParticleError, Prediction, Timeout};
 
+use super::held::{HeldRun, decode_held, encode_held};
 use super::{Lease, ProtocolError, SetupId, floats, job::check_state, required, setup_id};
 use crate::MAX_SLOTS;
 use crate::generated::{self, failure, from_worker::Kind, result::Outcome};
@@ -67,6 +68,8 @@ pub enum FromWorker {
     },
     /// The worker leaves on purpose.
     Goodbye(String),
+    /// What it finished or still makes for an earlier connection of the same run.
+    Held(Vec<HeldRun>),
 }
 
 impl FromWorker {
@@ -86,6 +89,7 @@ impl FromWorker {
             }
             Self::Heartbeat { running, queued } => Kind::Heartbeat(generated::Heartbeat { running, queued }),
             Self::Goodbye(reason) => Kind::Goodbye(generated::Goodbye { reason }),
+            Self::Held(runs) => Kind::Held(encode_held(runs)),
         };
         Ok(generated::FromWorker { kind: Some(kind) })
     }
@@ -101,6 +105,7 @@ impl FromWorker {
             Kind::Result(result) => decode_result(result)?,
             Kind::Heartbeat(h) => Self::Heartbeat { running: h.running, queued: h.queued },
             Kind::Goodbye(g) => Self::Goodbye(g.reason),
+            Kind::Held(held) => Self::Held(decode_held(held)?),
         })
     }
 }

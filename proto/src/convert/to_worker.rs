@@ -3,6 +3,8 @@
 use bytes::Bytes;
 use starlings_models::{Job, Setup};
 
+use super::held::{decode_adopted, encode_adopted};
+use super::key::JobKey;
 use super::{Lease, ProtocolError, ReceivedWindows, SetupId, decode_setup, job, required, setup_id, windows};
 use crate::generated::{self, to_worker::Kind};
 
@@ -17,6 +19,10 @@ pub struct Welcome {
     pub heartbeat: f64,
     /// Number of this stream, carried by every lease given on it.
     pub epoch: u64,
+    /// Drawn once per run.
+    pub run_id: [u8; 16],
+    /// How often the run was started, from 1.
+    pub incarnation: u64,
 }
 
 /// A checked message to a worker. Jobs are encoded by [`super::JobEncoder`], everything else by the functions here.
@@ -50,13 +56,23 @@ pub enum ToWorker {
     Heartbeat,
     /// The run is over: leave.
     Drain(String),
+    /// Leases for runs that the worker still makes.
+    Adopt {
+        /// The runs.
+        runs: Vec<(JobKey, Lease)>,
+        /// What waits in the worker and has no lease on this stream is of no use.
+        rest_is_void: bool,
+    },
+    /// For whoever watches the worker.
+    Notice(String),
 }
 
 impl ToWorker {
     /// The message for [`ToWorker::Welcome`].
     pub fn welcome(welcome: Welcome) -> generated::ToWorker {
-        let Welcome { protocol, run, heartbeat, epoch } = welcome;
-        message(Kind::Welcome(generated::Welcome { protocol, run, heartbeat, epoch }))
+        let Welcome { protocol, run, heartbeat, epoch, run_id, incarnation } = welcome;
+        let run_id = Bytes::copy_from_slice(&run_id);
+        message(Kind::Welcome(generated::Welcome { protocol, run, heartbeat, epoch, run_id, incarnation }))
     }
 
     /// The message for [`ToWorker::Refuse`].
@@ -84,6 +100,16 @@ impl ToWorker {
         message(Kind::Drain(generated::Drain { reason: reason.to_owned() }))
     }
 
+    /// The message for [`ToWorker::Adopt`].
+    pub fn adopt(runs: &[(JobKey, Lease)], rest_is_void: bool) -> generated::ToWorker {
+        message(Kind::Adopt(encode_adopted(runs, rest_is_void)))
+    }
+
+    /// The message for [`ToWorker::Notice`].
+    pub fn notice(text: &str) -> generated::ToWorker {
+        message(Kind::Notice(generated::Notice { text: text.to_owned() }))
+    }
+
     /// Checks a message that arrived on a stream of which these windows were `received` before.
     ///
     /// # Errors
@@ -107,6 +133,11 @@ impl ToWorker {
             Kind::Cancel(c) => Self::Cancel(c.leases.into_iter().map(Into::into).collect()),
             Kind::Heartbeat(_) => Self::Heartbeat,
             Kind::Drain(d) => Self::Drain(d.reason),
+            Kind::Adopt(a) => {
+                let rest_is_void = a.rest_is_void;
+                Self::Adopt { runs: decode_adopted(a)?, rest_is_void }
+            }
+            Kind::Notice(n) => Self::Notice(n.text),
         })
     }
 }
@@ -116,14 +147,18 @@ fn message(kind: Kind) -> generated::ToWorker {
 }
 
 fn decode_welcome(welcome: generated::Welcome) -> Result<Welcome, ProtocolError> {
-    let generated::Welcome { protocol, run, heartbeat, epoch } = welcome;
+    let generated::Welcome { protocol, run, heartbeat, epoch, run_id, incarnation } = welcome;
     if !(heartbeat > 0.0 && heartbeat < 1e6) {
         return Err(ProtocolError::Shape {
             field: "heartbeat",
             message: format!("{heartbeat} s, expected a positive time"),
         });
     }
-    Ok(Welcome { protocol, run, heartbeat, epoch })
+    let run_id = run_id.as_ref().try_into().map_err(|_| ProtocolError::Shape {
+        field: "run id",
+        message: format!("has {} bytes, expected 16", run_id.len()),
+    })?;
+    Ok(Welcome { protocol, run, heartbeat, epoch, run_id, incarnation })
 }
 
 fn decode_job(wire_job: &generated::Job, received: &ReceivedWindows) -> Result<ToWorker, ProtocolError> {

@@ -56,6 +56,24 @@ impl Queue {
         Some(index)
     }
 
+    /// Takes out a job that waits; false where it does not.
+    pub(super) fn remove(&mut self, index: usize, key: RetryKey) -> bool {
+        if let Some(jobs) = self.retries.get_mut(&key)
+            && let Some(at) = jobs.iter().position(|job| *job == index)
+        {
+            jobs.remove(at);
+            return true;
+        }
+        let fresh = &mut self.fresh[key.setup];
+        let Ok(at) = fresh.binary_search(&index) else { return false };
+        fresh.remove(at);
+        self.heads.retain(|_, setup| *setup != key.setup);
+        if let Some(&next) = fresh.front() {
+            self.heads.insert(next, key.setup);
+        }
+        true
+    }
+
     /// Puts a job back.
     pub(super) fn put_back(&mut self, index: usize, key: RetryKey) {
         self.retries.entry(key).or_default().push_back(index);

@@ -171,6 +171,12 @@ impl Worker {
         held
     }
 
+    /// Ends the lease of a job, whatever its attempt.
+    pub(super) fn take_back(&mut self, job: u64) -> Option<Lease> {
+        let held = self.held.remove(&job)?;
+        Some(Lease { epoch: self.id.0, job, attempt: held.attempt })
+    }
+
     pub(super) fn leases(&self) -> impl Iterator<Item = Lease> + '_ {
         self.held.iter().map(|(&job, held)| Lease { epoch: self.id.0, job, attempt: held.attempt })
     }

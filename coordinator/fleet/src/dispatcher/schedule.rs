@@ -18,7 +18,9 @@ impl Dispatcher {
         self.settle_failures();
         // Before jobs are assigned: a place on trial makes one run at a time, and this one tells more.
         self.control();
-        self.assign();
+        if self.now >= self.opens && !self.is_matching {
+            self.assign();
+        }
         self.recall();
         if let Some(batch) = self.batch.take_if(|batch| batch.is_done()) {
             self.starved = None;
@@ -139,7 +141,13 @@ fn next_setup(workers: &BTreeMap<WorkerId, Worker>, batch: &Batch) -> Option<usi
 
 /// Assigns a job to a worker.
 pub(super) fn lease(worker: &mut Worker, batch: &mut Batch, index: usize) -> Command {
+    let lease = hold(worker, batch, index);
+    Command::SendJob { worker: worker.id, lease, index }
+}
+
+/// Counts a job as held by a worker.
+pub(super) fn hold(worker: &mut Worker, batch: &mut Batch, index: usize) -> Lease {
     let lease = Lease { epoch: worker.id.0, job: batch.job_number(index), attempt: batch.start(index) };
     worker.hold(lease);
-    Command::SendJob { worker: worker.id, lease, index }
+    lease
 }

@@ -12,8 +12,17 @@ use crate::dispatcher::Asked;
 impl State {
     /// An answer, or what is wrong with it as a failure of its worker. One that nobody waits for is left as it is.
     pub(super) fn checked(&self, lease: &Lease, answer: LeaseOutcome) -> LeaseOutcome {
+        self.checked_for(self.asked(lease), answer)
+    }
+
+    /// The same for a job of the running batch.
+    pub(super) fn checked_at(&self, index: usize, answer: LeaseOutcome) -> LeaseOutcome {
+        self.checked_for(self.running.as_ref().and_then(|running| running.jobs.get(index)), answer)
+    }
+
+    fn checked_for(&self, asked: Option<&(SetupId, Job)>, answer: LeaseOutcome) -> LeaseOutcome {
         let LeaseOutcome::Ran(Ok(prediction)) = &answer else { return answer };
-        let Some((setup, job)) = self.asked(lease) else { return answer };
+        let Some((setup, job)) = asked else { return answer };
         let n_state = self.shapes.get(setup).and_then(|shape| shape.n_state);
         match fault(prediction, job, n_state) {
             Some(fault) => LeaseOutcome::Ran(Err(ParticleError::Infrastructure(fault))),

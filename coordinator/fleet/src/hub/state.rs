@@ -12,9 +12,12 @@ use starlings_proto::{
 };
 use tokio::sync::mpsc::UnboundedSender;
 
+use super::doorway::Doorway;
+use super::waiting::Waiting;
 use super::{Outgoing, Reply};
 use crate::FleetEvent;
-use crate::dispatcher::{BatchError, Command, ControlId, Dispatcher, Event, Rules, WorkerId};
+use crate::dispatcher::{BatchError, Command, ControlId, Dispatcher, Event, WorkerId};
+use crate::event_text::OVER;
 
 /// Guarded by the hub's lock.
 pub(super) struct State {
@@ -32,6 +35,9 @@ pub(super) struct State {
     pub(super) given_up: Option<String>,
     pub(super) stopped: Option<String>,
     pub(super) other_builds: BTreeSet<[u8; 32]>,
+    /// Runs that workers brought along.
+    pub(super) waiting: Waiting,
+    pub(super) doorway: Doorway,
 }
 
 /// Names and sizes of what a setup runs, as far as they are known without building it.
@@ -44,6 +50,7 @@ pub(super) struct SetupShape {
 
 /// The way to one worker.
 pub(super) struct Link {
+    pub(super) name: String,
     pub(super) sender: UnboundedSender<Outgoing>,
     pub(super) pid: u32,
     /// Windows that were sent on it.
@@ -51,8 +58,8 @@ pub(super) struct Link {
 }
 
 impl Link {
-    pub(super) fn new(sender: UnboundedSender<Outgoing>, pid: u32) -> Self {
-        Self { sender, pid, windows: SentWindows::default() }
+    pub(super) fn new(name: String, sender: UnboundedSender<Outgoing>, pid: u32) -> Self {
+        Self { name, sender, pid, windows: SentWindows::default() }
     }
 
     fn give(&mut self, encoder: &mut JobEncoder, lease: Lease, (setup, job): &(SetupId, Job)) {
@@ -86,9 +93,9 @@ pub(crate) struct Submission {
 }
 
 impl State {
-    pub(super) fn new(first_epoch: u64, rules: Rules, events: Sender<FleetEvent>) -> Self {
+    pub(super) fn new(first_epoch: u64, dispatcher: Dispatcher, events: Sender<FleetEvent>) -> Self {
         Self {
-            dispatcher: Dispatcher::new(rules),
+            dispatcher,
             links: BTreeMap::new(),
             setups: BTreeMap::new(),
             shapes: BTreeMap::new(),
@@ -101,6 +108,8 @@ impl State {
             given_up: None,
             stopped: None,
             other_builds: BTreeSet::new(),
+            waiting: Waiting::default(),
+            doorway: Doorway::default(),
         }
     }
 
@@ -113,7 +122,7 @@ impl State {
             )));
         }
         if self.draining {
-            return Err(Closed::Over("the run is over".to_owned()));
+            return Err(Closed::Over(OVER.to_owned()));
         }
         Ok(())
     }
@@ -153,7 +162,7 @@ impl State {
         self.other_builds.insert(pair.1).then_some(pair)
     }
 
-    fn carry_out(&mut self, command: Command) {
+    pub(super) fn carry_out(&mut self, command: Command) {
         match command {
             Command::SendSetup { worker, setup } => {
                 if let Some(json) = self.setups.get(&setup) {
@@ -191,9 +200,12 @@ impl State {
                     let listed = named.iter().map(|(name, value)| format!("{name} = {value}"));
                     *parameters = listed.collect::<Vec<_>>().join(", ");
                 }
+                if let BatchError::NoWorkers { missing, .. } = &mut error {
+                    missing.push_str(&self.turned_away());
+                }
                 self.reply(Err(error));
             }
-            Command::Notice(event) => self.tell(event),
+            Command::Notice(event) => self.notify(event),
             Command::GivenUp { index, mut notice } => {
                 if let FleetEvent::JobFailed { parameters, .. } = &mut notice {
                     *parameters = self.parameters(index);
@@ -203,7 +215,7 @@ impl State {
         }
     }
 
-    fn tell(&self, event: FleetEvent) {
+    pub(super) fn tell(&self, event: FleetEvent) {
         tracing::debug!(?event, "fleet");
         let _ = self.events.send(event);
     }
@@ -216,10 +228,15 @@ impl State {
         names.cloned().zip(job.theta.iter().copied()).collect()
     }
 
-    fn send(&self, worker: WorkerId, message: generated::ToWorker) {
+    pub(super) fn send(&self, worker: WorkerId, message: generated::ToWorker) {
         if let Some(link) = self.links.get(&worker) {
             link.send(message);
         }
+    }
+
+    /// What a worker is called in events.
+    pub(super) fn name(&self, worker: WorkerId) -> String {
+        self.links.get(&worker).map_or_else(String::new, |link| link.name.clone())
     }
 
     pub(super) fn reply(&mut self, reply: Reply) {

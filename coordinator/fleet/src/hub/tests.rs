@@ -34,7 +34,8 @@ fn hello(pid: u32, build: Option<[u8; 32]>) -> Hello {
 fn hub(build: Option<[u8; 32]>) -> (Hub, Receiver<FleetEvent>) {
     let (sender, events) = mpsc::channel();
     let (heartbeat, patience) = (Duration::from_secs(8), Duration::from_secs(300));
-    (Hub::new("test".to_owned(), build, Rules { heartbeat, patience, max_attempts: 5 }, sender), events)
+    let rules = Rules { heartbeat, patience, max_attempts: 5 };
+    (Hub::new("test".to_owned(), build, RunIdentity::new(), rules, Duration::ZERO, sender), events)
 }
 
 fn batch(hub: &Hub) -> (Submission, Receiver<Reply>) {

@@ -1,0 +1,72 @@
+//! What a worker says to whoever watches it: a line whenever something changes.
+//!
+//! Next file to read: [`crate::session`].
+
+use std::fmt;
+use std::sync::Arc;
+
+/// Something that changed.
+#[derive(Clone, Debug, PartialEq)]
+pub enum News {
+    /// A coordinator has taken the worker.
+    Connected {
+        /// Name of its run.
+        run: String,
+        /// Where it is.
+        address: String,
+        /// Runs at the same time.
+        slots: usize,
+    },
+    /// It came back to a run that it knew.
+    Delivered {
+        /// Results that it held.
+        finished: usize,
+        /// Runs that it goes on with.
+        computing: usize,
+    },
+    /// Jobs came after there were none.
+    Working,
+    /// There have been no jobs for a while.
+    Idle {
+        /// Runs answered so far.
+        answered: u64,
+    },
+    /// The connection is gone, and it dials again.
+    Lost {
+        /// Why.
+        reason: String,
+        /// Runs that it goes on with meanwhile.
+        computing: usize,
+    },
+    /// The coordinator says something.
+    Told(String),
+}
+
+impl fmt::Display for News {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Connected { run, address, slots } => {
+                let s = if *slots == 1 { "" } else { "s" };
+                write!(f, "connected to {address} for the run `{run}`, {slots} slot{s}")
+            }
+            Self::Delivered { finished, computing } => {
+                write!(
+                    f,
+                    "delivered {finished} results that were held; {computing} runs are still being made"
+                )
+            }
+            Self::Working => write!(f, "working"),
+            Self::Idle { answered } => write!(f, "idle: no jobs, {answered} runs answered so far"),
+            Self::Lost { reason, computing } => {
+                write!(
+                    f,
+                    "lost the coordinator: {reason}; dialling again, {computing} runs go on and results are held"
+                )
+            }
+            Self::Told(text) => write!(f, "{text}"),
+        }
+    }
+}
+
+/// Takes news.
+pub type Tell = Arc<dyn Fn(&News) + Send + Sync>;
