@@ -9,6 +9,7 @@ pub(crate) mod batch;
 mod ensemble;
 pub(crate) mod filter;
 pub(crate) mod free_run;
+mod index;
 mod journal;
 mod kept;
 pub(crate) mod resample;
