@@ -31,6 +31,13 @@ explain-battery:
 faults:
     PATH="$PWD/target/solvers/bin:$PATH" STARLINGS_WRITE_PAGES=1 cargo test --test faults -- --ignored --nocapture
 
+# Deaths of coordinators and workers, timed: resume with ten thousand runs, workers back, losses noticed, none where all are busy. A
+# quarter of an hour; DEATHS_MINUTES shortens the last.
+deaths:
+    cargo test --release -p starlings-coordinator --test arrivals -- --ignored --nocapture
+    cargo test --release --test coordinator_death -- --ignored --nocapture
+    cargo test --release -p starlings-fleet --test noticing -- --ignored --nocapture --test-threads 1
+
 # The examples of docs/extending.md: applied to a copy, built and tested.
 extending:
     .ci/extending

@@ -7,8 +7,13 @@ use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
 use clap::Args;
-use starlings_coordinator::fleet::{FleetConfig, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers};
+use starlings_coordinator::fleet::{
+    Bound, FleetConfig, FleetError, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers, RunIdentity,
+};
 use starlings_coordinator::study::Study;
+use starlings_coordinator::study::store::Store;
+use starlings_coordinator::study::trial::{FleetTrialError, trial_on_fleet};
+use starlings_estimators::Kind;
 use tokio_util::sync::CancellationToken;
 
 use crate::console::note;
@@ -40,7 +45,19 @@ pub(crate) struct Plan {
     n_worker: usize,
 }
 
+impl Plan {
+    /// Takes the address, before anything is written: a port in use must leave nothing behind.
+    pub(crate) fn bind(&self) -> Result<Option<Bound>, Failure> {
+        self.address.map(Bound::new).transpose().map_err(Failure::run)
+    }
+}
+
 impl FleetArgs {
+    /// Whether runs are made on this machine, by workers that this process starts.
+    pub(crate) fn is_here(&self) -> bool {
+        self.listen.is_none()
+    }
+
     /// Checks the arguments; nothing is started yet.
     pub(crate) fn plan(&self, study: &Study) -> Result<Plan, Failure> {
         let n_worker = self.workers.unwrap_or(study.fleet.workers);
@@ -78,22 +95,29 @@ pub(crate) struct FleetSession {
 }
 
 impl FleetSession {
-    /// Listens for workers; none is started yet.
-    pub(crate) fn listen(study: &Study, plan: &Plan, display: &Arc<Display>) -> Result<Self, Failure> {
+    /// Listens for workers of this start of a run, where the plan's address was taken; none is started yet.
+    pub(crate) fn listen(
+        study: &Study,
+        bound: Option<Bound>,
+        identity: RunIdentity,
+        display: &Arc<Display>,
+    ) -> Result<Self, Failure> {
         let cancel = CancellationToken::new();
         interrupt::cancels(&cancel);
         let (sender, heard) = mpsc::channel();
         let (kept, events) = mpsc::channel();
-        let mut config = FleetConfig::new(plan.address, &study.name, cancel, sender);
+        let mut config = FleetConfig::new(None, &study.name, cancel, sender);
+        config.identity = identity;
         if let Some(patience) = study.fleet.patience {
             config.patience = Duration::try_from_secs_f64(patience).map_err(Failure::input)?;
         }
         if let Some(attempts) = study.fleet.max_attempts {
             config.max_attempts = attempts;
         }
-        let fleet = GrpcFleet::listen(config).map_err(Failure::run)?;
+        let fleet = GrpcFleet::listen_on(bound, config).map_err(Failure::run)?;
         let display = Arc::clone(display);
-        let watcher = std::thread::spawn(move || relay(heard, &kept, &display));
+        let listens = fleet.address().is_some();
+        let watcher = std::thread::spawn(move || relay(heard, &kept, &display, listens));
         Ok(Self { fleet, local: None, events, watcher })
     }
 
@@ -118,6 +142,23 @@ impl FleetSession {
         Ok(())
     }
 
+    /// Tries a study on workers elsewhere, where it is not tried here.
+    pub(crate) fn trial(
+        &mut self,
+        study: &mut Study,
+        kind: Option<&Kind>,
+        store: Option<&Store>,
+    ) -> Result<(), Failure> {
+        note(format_args!("the first runs are a trial on the workers: on this machine no solver is started"));
+        trial_on_fleet(study, kind, &mut self.fleet, store).map_err(|error| match error {
+            FleetTrialError::Fleet(FleetError::Cancelled) => {
+                interrupt::failure("nothing is kept of it: start again")
+            }
+            FleetTrialError::Trial(error) => Failure::input(error),
+            error => Failure::run(error),
+        })
+    }
+
     /// Ends the fleet and its workers.
     pub(crate) fn close(self) {
         let Self { fleet, local, watcher, .. } = self;
@@ -128,10 +169,16 @@ impl FleetSession {
     }
 }
 
-/// Shows the events that people should see at once and hands all of them on to the store.
-fn relay(heard: mpsc::Receiver<FleetEvent>, kept: &mpsc::Sender<FleetEvent>, display: &Display) {
+/// Shows the events that people should see at once and hands all of them on to the store. Where workers come from elsewhere, people
+/// see who comes and goes.
+fn relay(
+    heard: mpsc::Receiver<FleetEvent>,
+    kept: &mpsc::Sender<FleetEvent>,
+    display: &Display,
+    listens: bool,
+) {
     for event in heard {
-        if event.is_notable() {
+        if event.is_notable() || listens && event.is_of_roster() {
             display.say(&event.to_string());
         } else {
             tracing::info!(kind = event.kind(), "{event}");

@@ -43,6 +43,13 @@ pub(crate) fn open(
     RunFolder::create(purpose, &path, study, &command, &stamp).map_err(|error| failed(&error))
 }
 
+/// Removes a folder that was made for a command whose study cannot be run; one that was there before stays.
+pub(crate) fn give_up(folder: RunFolder, resume: Resume) {
+    if !resume.resume {
+        folder.discard();
+    }
+}
+
 fn failed(error: &FolderError) -> Failure {
     if error.is_input() { Failure::input(error) } else { Failure::run(error) }
 }

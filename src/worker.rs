@@ -1,13 +1,14 @@
 //! `starlings worker`: dial a coordinator and run its jobs until it says goodbye.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use clap::Parser;
 use starlings_models::SolverDef;
-use starlings_worker::{MAX_SLOTS, WorkerConfig, WorkerError};
+use starlings_worker::{INHERITED, MAX_SLOTS, Tell, WorkerConfig, WorkerError};
 use tokio_util::sync::CancellationToken;
 
-use crate::console::{cancel_on_signal, line};
+use crate::console::{cancel_on_signal, line, note};
 use crate::failure::Failure;
 use crate::solvers::{adapter_names, solvers};
 
@@ -63,6 +64,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         patience,
         cancel,
         factory: solvers.factory(),
+        tell: tell(connect),
         ..WorkerConfig::new(connect.clone())
     };
     let report = starlings_worker::run(config).map_err(|error| match error {
@@ -71,6 +73,14 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     })?;
     tracing::info!(predictions = report.predictions, failures = report.failures, reason = ?report.reason, "done");
     Ok(())
+}
+
+/// Lines for whoever watches a worker; one that a coordinator of this machine started says nothing.
+fn tell(connect: &str) -> Tell {
+    if connect == INHERITED {
+        return Arc::new(|_| {});
+    }
+    Arc::new(|news| note(format_args!("{} worker: {news}", jiff::Timestamp::now().strftime("%H:%M:%SZ"))))
 }
 
 /// A command line in parts; there must be a program.
