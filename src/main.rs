@@ -9,6 +9,7 @@ mod check;
 mod conformance;
 mod console;
 mod csv_file;
+mod disk;
 mod effects;
 mod explain;
 mod export;

@@ -7,6 +7,7 @@ use starlings_coordinator::study::store::Purpose;
 use starlings_coordinator::study::store::folder::Call;
 use starlings_coordinator::study::{FolderError, RunFolder, Study};
 
+use crate::disk;
 use crate::failure::Failure;
 
 /// Whether an interrupted command goes on.
@@ -34,6 +35,7 @@ pub(crate) fn open(
     };
     let default = || Path::new("runs").join(format!("{}{kind}-{stamp}", study.name));
     let path: PathBuf = out.map_or_else(default, Path::to_owned);
+    disk::check(study, &path)?;
     let command = std::env::args().skip(1).collect::<Vec<_>>().join(" ");
     let command = format!("starlings {command}");
     if resume.resume {

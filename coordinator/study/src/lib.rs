@@ -19,6 +19,7 @@ mod plan;
 pub mod posterior;
 mod problem;
 mod record;
+mod room;
 pub mod run;
 pub mod run_key;
 mod solver_host;
