@@ -90,12 +90,7 @@ impl fmt::Display for FleetEvent {
                 )
             }
             Self::WorkerRefused { host, reason } => write!(f, "a worker from {host} was refused: {reason}"),
-            Self::CallerRefused { from, reason, count: 1 } => {
-                write!(f, "a caller from {from} was refused: {reason}")
-            }
-            Self::CallerRefused { from, reason, count } => {
-                write!(f, "{count} callers were refused, last one from {from}: {reason}")
-            }
+            Self::CallerRefused { from, reason, count } => f.write_str(&refused(from, reason, *count)),
             Self::WorkerLeft { worker, reason, requeued: 0 } => write!(f, "worker {worker} left: {reason}"),
             Self::WorkerLeft { worker, reason, requeued } => {
                 write!(f, "worker {worker} left: {reason}; {requeued} of its runs go to others")
@@ -193,6 +188,14 @@ fn comparing(event: &FleetEvent, f: &mut fmt::Formatter<'_>) -> fmt::Result {
             write!(f, "{count} more events of the kind {of} were not told one by one; the last: {last}")
         }
         _ => Ok(()),
+    }
+}
+
+/// Who was refused, and why.
+fn refused(from: &str, reason: &str, count: u64) -> String {
+    match count {
+        1 => format!("a caller from {from} was refused: {reason}"),
+        n => format!("{n} callers were refused, last one from {from}: {reason}"),
     }
 }
 
