@@ -137,7 +137,7 @@ impl Dispatcher {
                 }
                 return;
             }
-            LeaseOutcome::Withdrawn => return self.no_opinion(id, index),
+            LeaseOutcome::Withdrawn => return,
         };
         self.works(id);
         self.compare(id, index, said);

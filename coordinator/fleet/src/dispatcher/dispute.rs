@@ -136,6 +136,7 @@ impl Dispatcher {
             }
         }
         self.repeats.contributors.remove(&id);
+        self.send_reopened();
         let (name, build, taken) = self.workers.get(&id).map_or_else(
             || (called.to_owned(), String::new(), 0),
             |worker| (worker.name.clone(), worker.build.clone(), worker.taken),
@@ -152,6 +153,18 @@ impl Dispatcher {
         if self.workers.contains_key(&id) {
             self.out.push(Command::PutOut { worker: id, reason: reason.to_owned() });
             self.lose(id, reason, true);
+        }
+    }
+
+    /// Sends the setups of jobs that are open again to the workers that came, or forgot them, when none was.
+    fn send_reopened(&mut self) {
+        let Some(batch) = &self.batch else { return };
+        for worker in self.workers.values_mut() {
+            for &setup in batch.open_setups() {
+                if !worker.setups.contains_key(&setup) && worker.wants(setup, self.now) {
+                    self.out.push(Command::SendSetup { worker: worker.id, setup });
+                }
+            }
         }
     }
 

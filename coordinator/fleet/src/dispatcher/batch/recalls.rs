@@ -11,7 +11,11 @@ impl Batch {
     pub(in crate::dispatcher) fn may_recall(&self, job: u64, setups: &BTreeSet<SetupId>) -> bool {
         self.index_of(job).is_some_and(|index| {
             let job = &self.jobs[index];
-            !job.recalled && job.doubt.is_none() && setups.contains(self.setup_of(index))
+            // A repeat goes nowhere else.
+            !job.recalled
+                && job.doubt.is_none()
+                && job.outcome.is_none()
+                && setups.contains(self.setup_of(index))
         })
     }
 

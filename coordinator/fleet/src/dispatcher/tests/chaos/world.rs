@@ -8,7 +8,7 @@ use starlings_models::{ParticleError, Prediction, Timeout};
 use starlings_proto::{Lease, LeaseOutcome, SetupId};
 
 use super::super::{RULES, answered, crash, joining, left, place, prediction, setup, solver, submit_mixed};
-use crate::dispatcher::{BatchError, Command, ControlId, Dispatcher, Event, WorkerId};
+use crate::dispatcher::{BatchError, Command, Comparing, ControlId, Dispatcher, Event, Rules, WorkerId};
 use crate::{FleetEvent, Outcome};
 
 /// One thing that the world does; numbers choose among what is possible then.
@@ -70,10 +70,20 @@ pub(super) struct World {
 }
 
 impl World {
+    /// The same with results that are compared.
+    pub(super) fn comparing(setups: &[u8], local: bool) -> Self {
+        let comparing = Some(Comparing { seed: 3, mixed: false });
+        Self::with(Rules { comparing, timeout_factor: Some(4.0), ..RULES }, setups, local)
+    }
+
     /// One job per setup number.
     pub(super) fn new(setups: &[u8], local: bool) -> Self {
+        Self::with(RULES, setups, local)
+    }
+
+    fn with(rules: Rules, setups: &[u8], local: bool) -> Self {
         let mut world = Self {
-            dispatcher: Dispatcher::new(RULES),
+            dispatcher: Dispatcher::new(rules),
             now: Duration::ZERO,
             next_id: 0,
             alive: BTreeSet::new(),
@@ -115,7 +125,12 @@ impl World {
                 assert!(self.alive.contains(&worker.0), "a job is sent only to a live worker");
                 let twice = self.open.values().any(|(_, open)| *open == index);
                 let again = self.duplicated.contains(&index) || self.answered.contains(&index);
-                assert!(!twice || again, "a job has one lease at a time, unless it is slow or compared");
+                let stopped =
+                    self.open.values().all(|(lease, open)| *open != index || self.withdrawn.contains(lease));
+                assert!(
+                    !twice || again || stopped,
+                    "a job has one lease at a time, unless it is slow or compared"
+                );
                 let held = self.open.insert((worker.0, lease.job), (lease, index));
                 assert!(held.is_none(), "a worker has one lease of a job at a time");
             }
