@@ -250,7 +250,6 @@ impl FleetSession {
         kind: Option<&Kind>,
         store: Option<&Store>,
     ) -> Result<(), Failure> {
-        note(format_args!("the first runs are a trial on the workers: on this machine no solver is started"));
         trial_on_fleet(study, kind, &mut self.fleet, store).map_err(|error| match error {
             FleetTrialError::Fleet(FleetError::Cancelled) => {
                 interrupt::failure("nothing is kept of it: start again")

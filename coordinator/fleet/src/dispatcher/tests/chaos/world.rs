@@ -8,7 +8,9 @@ use starlings_models::{ParticleError, Prediction, Timeout};
 use starlings_proto::{Lease, LeaseOutcome, SetupId};
 
 use super::super::{RULES, answered, crash, joining, left, place, prediction, setup, solver, submit_mixed};
-use crate::dispatcher::{BatchError, Command, Comparing, ControlId, Dispatcher, Event, Rules, WorkerId};
+use crate::dispatcher::{
+    BatchError, Command, Comparing, ControlId, Dispatcher, Event, Rules, Taken, WorkerId,
+};
 use crate::{FleetEvent, Outcome};
 
 /// One thing that the world does; numbers choose among what is possible then.
@@ -25,6 +27,8 @@ pub(super) enum Act {
     Place(usize),
     Late(usize),
     Repeat(usize),
+    /// A worker comes along with a job, finished or still being made.
+    Bring(usize, usize, bool),
     Wait(u64),
 }
 
@@ -41,6 +45,7 @@ pub(super) fn act() -> impl Strategy<Value = Act> {
         2 => any::<usize>().prop_map(Act::Place),
         1 => any::<usize>().prop_map(Act::Late),
         2 => any::<usize>().prop_map(Act::Repeat),
+        2 => (any::<usize>(), any::<usize>(), any::<bool>()).prop_map(|(who, which, done)| Act::Bring(who, which, done)),
         1 => (1_u64..30).prop_map(Act::Wait),
     ]
 }
@@ -242,6 +247,7 @@ impl World {
                     self.event(answered(lease, LeaseOutcome::Ran(Ok(prediction(usize::MAX))), 1.0));
                 }
             }
+            Act::Bring(who, which, is_finished) => self.bring(who, which, is_finished),
             Act::Wait(seconds) => {
                 self.now += Duration::from_secs(seconds);
                 self.event(Event::Tick);
@@ -250,6 +256,26 @@ impl World {
         for &worker in &self.alive {
             let open = self.open.keys().filter(|(of, _)| *of == worker).count();
             assert_eq!(self.dispatcher.in_flight(WorkerId(worker)), open, "credit follows the open leases");
+        }
+    }
+
+    fn bring(&mut self, who: usize, which: usize, is_finished: bool) {
+        let Some(worker) = choose(&self.alive, who) else { return };
+        let index = which % self.setups.len();
+        let answer = is_finished.then(|| (LeaseOutcome::Ran(Ok(prediction(index))), 1.0));
+        let (taken, commands) = self.dispatcher.held(self.now, WorkerId(worker), index, answer);
+        let before =
+            self.open.iter().find(|(_, (_, open))| *open == index).map(|(key, (lease, _))| (*key, *lease));
+        if let (Some((key, lease)), true) = (before, taken != Taken::No) {
+            assert!(!self.controls.contains(&key), "what is in doubt is decided by runs of its own");
+            self.open.remove(&key);
+            self.past.push(lease);
+        }
+        if let Taken::Lease(lease) = taken {
+            self.open.insert((worker, lease.job), (lease, index));
+        }
+        for command in commands {
+            self.obey(command);
         }
     }
 
