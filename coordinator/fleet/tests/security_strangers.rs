@@ -44,7 +44,7 @@ async fn call(channel: Channel, token: Option<&str>) -> Status {
     if let Some(token) = token {
         request.metadata_mut().insert(TOKEN_KEY, token.parse().unwrap());
     }
-    FleetClient::new(channel).work(request).await.err().expect("it is refused")
+    FleetClient::new(channel).work(request).await.expect_err("it is refused")
 }
 
 fn refused(door: &Guarded, token: Option<&str>) -> Status {
