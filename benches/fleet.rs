@@ -2,13 +2,15 @@
 //!
 //! `cargo bench --bench fleet -- [--json] [--quick]`. The program starts itself as worker and as the plain TCP echo that is
 //! the floor of the same run. No statistics framework: a cycle is a barrier over three processes, not a function call.
-//! Next file to read: `fleet/screening.rs`, for batches of many setups.
+//! Next files to read: `fleet/screening.rs`, for batches of many setups; `fleet/tls.rs`.
 #![allow(clippy::print_stdout, missing_docs)]
 
 #[path = "fleet/local.rs"]
 mod local_fleet;
 #[path = "fleet/screening.rs"]
 mod screening;
+#[path = "fleet/tls.rs"]
+mod tls;
 
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
@@ -22,6 +24,7 @@ use starlings_models::{
     BuildSetup, Forward, Job, ModelDef, ParticleError, Prediction, Setup, SetupError, Spec, Window,
 };
 use starlings_worker::WorkerConfig;
+use tls::Tls;
 
 type Failure = Box<dyn std::error::Error>;
 
@@ -46,7 +49,11 @@ fn main() -> Result<(), Failure> {
         return echo(&address);
     }
     if let Some(address) = after("--connect") {
-        return work(address);
+        return work(WorkerConfig::new(address));
+    }
+    if let Some(file) = after("--access") {
+        let access = Some(file.into());
+        return work(WorkerConfig { access, ..WorkerConfig::new(String::new()) });
     }
     let has = |flag: &str| args.iter().any(|a| a == flag);
     let figures = measure(if has("--quick") { 10 } else { 1 })?;
@@ -66,8 +73,12 @@ struct Figures {
     /// Number of jobs × 10 ms over (workers × wall time of the batch).
     efficiency_10ms: f64,
     screening: Screening,
+    tls: Tls,
     raw_tcp_cycle_p50_ms: f64,
 }
+
+/// Turns of the comparison of TLS with a plain connection.
+const TURNS: usize = 20;
 
 impl Figures {
     fn ratio(&self) -> f64 {
@@ -80,11 +91,16 @@ impl Figures {
         } = self;
         let Screening { cold, warm, run_ms, build_ms } = &self.screening;
         let ratio = self.ratio();
+        let Tls { plain, sealed } = &self.tls;
+        let (busy, busy_tls, noop, noop_tls) = (plain.busy_ms, sealed.busy_ms, plain.noop_ms, sealed.noop_ms);
+        let cost = self.tls.cost();
         format!(
             "{{\"cycle_p50_ms\":{cycle_p50_ms:.4},\"cycle_p99_ms\":{cycle_p99_ms:.4},\"bag_jobs_per_s\":{bag_jobs_per_s:.0},\
              \"efficiency_10ms\":{efficiency_10ms:.4},\"efficiency_screening_cold\":{cold:.4},\
              \"efficiency_screening_warm\":{warm:.4},\"screening_run_ms\":{run_ms:.3},\
-             \"screening_build_ms\":{build_ms:.4},\"raw_tcp_cycle_p50_ms\":{raw_tcp_cycle_p50_ms:.4},\
+             \"screening_build_ms\":{build_ms:.4},\"cycle_10ms_plain_ms\":{busy:.3},\"cycle_10ms_tls_ms\":{busy_tls:.3},\
+             \"cycle_tcp_plain_ms\":{noop:.4},\"cycle_tcp_tls_ms\":{noop_tls:.4},\"tls_cost\":{cost:.4},\
+             \"raw_tcp_cycle_p50_ms\":{raw_tcp_cycle_p50_ms:.4},\
              \"ratio\":{ratio:.2},\"workers\":{WORKERS},\"particles\":{PARTICLES}}}"
         )
     }
@@ -95,7 +111,8 @@ impl Figures {
              the same bytes over plain TCP        p50 {:.3} ms   ratio {:.1}\n\
              bag of no-op jobs                    {:.0} jobs/s\n\
              busy jobs of 10 ms                   {:.1} % efficiency\n\
-             screening of {} setups               {:.1} % cold, {:.1} % warm, {:.2} ms a run, {:.3} ms to build one\n",
+             screening of {} setups               {:.1} % cold, {:.1} % warm, {:.2} ms a run, {:.3} ms to build one\n\
+             over TCP, cycle of 10 ms runs        plain {:.2} ms, TLS {:.2} ms: TLS costs {:.1} %; of no-op runs {:.3} and {:.3} ms\n",
             self.cycle_p50_ms,
             self.cycle_p99_ms,
             self.raw_tcp_cycle_p50_ms,
@@ -107,6 +124,11 @@ impl Figures {
             100.0 * self.screening.warm,
             self.screening.run_ms,
             self.screening.build_ms,
+            self.tls.plain.busy_ms,
+            self.tls.sealed.busy_ms,
+            100.0 * self.tls.cost(),
+            self.tls.plain.noop_ms,
+            self.tls.sealed.noop_ms,
         )
     }
 }
@@ -137,6 +159,7 @@ fn measure(divisor: usize) -> Result<Figures, Failure> {
         bag_jobs_per_s: n_bag as f64 / bag.as_secs_f64(),
         efficiency_10ms: n_busy as f64 * BUSY.as_secs_f64() / (WORKERS as f64 * wall.as_secs_f64()),
         screening,
+        tls: tls::measure((TURNS / divisor).max(1))?,
         raw_tcp_cycle_p50_ms: 1e3 * raw_tcp(2000 / divisor)?,
     })
 }
@@ -215,8 +238,7 @@ fn build(setup: &Setup) -> Result<Box<dyn Forward>, SetupError> {
     Ok(Box::new(Bench { spec, spin }))
 }
 
-fn work(address: String) -> Result<(), Failure> {
-    let mut config = WorkerConfig::new(address);
+fn work(mut config: WorkerConfig) -> Result<(), Failure> {
     config.once = true;
     config.factory = Arc::new(build);
     starlings_worker::run(config)?;

@@ -21,7 +21,7 @@ use crate::console::{line, note};
 use crate::failure::Failure;
 use crate::fleet_session::{FleetArgs, FleetSession, Out};
 use crate::interrupt;
-use crate::load::load;
+use crate::load::{is_outside, load_where};
 use crate::progress::Display;
 use crate::run_folder;
 
@@ -83,21 +83,30 @@ impl Args {
 /// Explains the study's misfit.
 pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     interrupt::watch();
-    let study = load(&args.study)?;
+    let mut study = load_where(&args.study, args.fleet.is_here())?;
     let plan = args.fleet.plan(&study, Some(&Out(args.out.as_deref())))?;
     let options = args.options(&study);
     check(&study, &options).map_err(Failure::input)?;
-    trial(&study).map_err(Failure::input)?;
-    // Listen before the folder is made: a port in use must leave nothing behind.
-    let display = Arc::new(Display::new(args.json));
-    let mut session = FleetSession::listen(&study, &plan, &display)?;
+    let is_away = is_outside(&study) && !args.fleet.is_here();
+    if !is_away {
+        trial(&study).map_err(Failure::input)?;
+    }
+    let bound = plan.bind()?;
     let folder = run_folder::open(Purpose::Explanation, &study, args.out.as_deref(), args.resume)?;
     if load_findings(&folder.store).map_err(Failure::run)?.is_some() {
         let path = folder.path.display();
         note(format_args!("the explanation in {path} is finished already; writing its files again"));
         return write(&folder, args.json);
     }
+    let display = Arc::new(Display::new(args.json));
+    let identity = folder.store.begin().map_err(Failure::run)?;
+    let mut session = FleetSession::listen(&study, &plan, bound, identity, &display)?;
     session.start_workers(&study, &plan, Some(&folder.path))?;
+    if is_away && let Err(failure) = session.trial(&mut study, None, Some(&folder.store)) {
+        session.close();
+        run_folder::give_up(folder, args.resume);
+        return Err(failure);
+    }
     let mut watch = |stage: &Stage| display.stage(stage);
     let clock = move || started.elapsed().as_secs_f64();
     let earlier_s = folder.store.elapsed_s().map_err(Failure::run)?;

@@ -2,22 +2,25 @@
 //!
 //! Shared by every command that runs the model on the fleet. Next file to read: [`crate::run`].
 
-use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
-use std::sync::{Arc, mpsc};
-use std::time::Duration;
-
+use std::net::{IpAddr, SocketAddr};
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock, mpsc};
+use std::time::Duration;
 
 use clap::Args;
 use starlings_coordinator::fleet::access::{Access, AccessFault};
 use starlings_coordinator::fleet::{
-    FleetConfig, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers, Refused, StateStore,
+    Bound, FleetConfig, FleetError, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers, RunIdentity, StateStore,
 };
-use starlings_coordinator::study::{Study, bytes_of};
+use starlings_coordinator::study::Study;
+use starlings_coordinator::study::store::Store;
+use starlings_coordinator::study::trial::{FleetTrialError, trial_on_fleet};
+use starlings_estimators::Kind;
 use tokio_util::sync::CancellationToken;
 
 use crate::console::note;
 use crate::failure::Failure;
+use crate::fleet_values::{address, memory};
 use crate::interrupt;
 use crate::load::end_solvers;
 use crate::progress::Display;
@@ -47,14 +50,6 @@ pub(crate) struct FleetArgs {
     state_memory: usize,
 }
 
-/// Bytes of an amount such as `8 GiB`.
-fn memory(text: &str) -> Result<usize, String> {
-    let bytes = bytes_of(text).filter(|bytes| (0.0..1e18).contains(bytes));
-    bytes
-        .map(|bytes| bytes as usize)
-        .ok_or_else(|| "expected a number with its unit, such as \"8 GiB\"".to_owned())
-}
-
 /// What was asked for, checked.
 pub(crate) struct Plan {
     /// Where to listen; `None` for local workers, which have their connections from this process.
@@ -82,7 +77,19 @@ enum AccessPlan {
 /// Name of the access file in a run folder.
 const ACCESS: &str = "access.json";
 
+impl Plan {
+    /// Takes the address, before anything is written: a port in use must leave nothing behind.
+    pub(crate) fn bind(&self) -> Result<Option<Bound>, Failure> {
+        self.address.map(Bound::new).transpose().map_err(Failure::run)
+    }
+}
+
 impl FleetArgs {
+    /// Whether runs are made on this machine, by workers that this process starts.
+    pub(crate) fn is_here(&self) -> bool {
+        self.listen.is_none()
+    }
+
     /// Checks the arguments; nothing is started yet. `out` is the run folder where it is named, `None` for a command that makes
     /// none.
     pub(crate) fn plan(&self, study: &Study, out: Option<&Out<'_>>) -> Result<Plan, Failure> {
@@ -118,14 +125,6 @@ impl FleetArgs {
 /// The run folder of a command, where it was named.
 pub(crate) struct Out<'a>(pub(crate) Option<&'a Path>);
 
-/// Where to listen, as it was asked for.
-fn address(text: &str) -> Result<SocketAddr, Failure> {
-    text.to_socket_addrs()
-        .ok()
-        .and_then(|mut all| all.next())
-        .ok_or_else(|| Failure::input(format!("--listen {text}: expected HOST:PORT, such as 127.0.0.1:7000")))
-}
-
 fn failed(fault: &AccessFault) -> Failure {
     if fault.is_input() { Failure::input(format!("--access: {fault}")) } else { Failure::run(fault) }
 }
@@ -135,19 +134,28 @@ pub(crate) struct FleetSession {
     pub(crate) fleet: GrpcFleet,
     local: Option<LocalWorkers>,
     access: Option<Access>,
+    /// How to start workers, once they may come from elsewhere.
+    invitation: Arc<OnceLock<String>>,
     /// What happened, for the store.
     pub(crate) events: mpsc::Receiver<FleetEvent>,
     watcher: std::thread::JoinHandle<()>,
 }
 
 impl FleetSession {
-    /// Listens for workers; none is started yet.
-    pub(crate) fn listen(study: &Study, plan: &Plan, display: &Arc<Display>) -> Result<Self, Failure> {
+    /// Listens for workers of this start of a run, where the plan's address was taken; none is started yet.
+    pub(crate) fn listen(
+        study: &Study,
+        plan: &Plan,
+        bound: Option<Bound>,
+        identity: RunIdentity,
+        display: &Arc<Display>,
+    ) -> Result<Self, Failure> {
         let cancel = CancellationToken::new();
         interrupt::cancels(&cancel);
         let (sender, heard) = mpsc::channel();
         let (kept, events) = mpsc::channel();
-        let mut config = FleetConfig::new(plan.address, &study.name, cancel, sender);
+        let mut config = FleetConfig::new(None, &study.name, cancel, sender);
+        config.identity = identity;
         if let Some(patience) = study.fleet.patience {
             config.patience = Duration::try_from_secs_f64(patience).map_err(Failure::input)?;
         }
@@ -163,11 +171,17 @@ impl FleetSession {
         (config.seed, config.mixed) = (study.seed, plan.mixed);
         config.timeout_factor = study.fleet.timeout_factor;
         config.states = StateStore::new(plan.state_memory);
-        let fleet = GrpcFleet::listen(config).map_err(Failure::run)?;
+        let fleet = GrpcFleet::listen_on(bound, config).map_err(Failure::run)?;
         let display = Arc::clone(display);
         let refused = fleet.refused();
-        let watcher = std::thread::spawn(move || relay(heard, &kept, &display, &refused));
-        Ok(Self { fleet, local: None, access, events, watcher })
+        let listens = fleet.address().is_some();
+        let invitation = Arc::<OnceLock<String>>::default();
+        let told = Arc::clone(&invitation);
+        let watcher = std::thread::spawn(move || {
+            let missing = || [refused.summary(), told.get().cloned()];
+            relay(heard, &kept, &display, listens, missing);
+        });
+        Ok(Self { fleet, local: None, access, invitation, events, watcher })
     }
 
     /// Starts the local workers, or says how to start others; `folder` is the run folder, where there is one.
@@ -207,8 +221,10 @@ impl FleetSession {
             None => {
                 note(format_args!(
                     "warning: --insecure: nothing is encrypted, and whoever reaches {address} joins this run, reads its data and can \
-                     decide its result\nlistening on {address}; start workers with: starlings worker --connect {address} --insecure"
+                     decide its result"
                 ));
+                let start = format!("starlings worker --connect {address} --insecure");
+                self.say_how(format!("listening on {address}; start workers with: {start}"));
                 return Ok(());
             }
         };
@@ -216,10 +232,30 @@ impl FleetSession {
             access.publish(&file, run, address, plan.host.as_deref()).map_err(|fault| failed(&fault))?;
         }
         let absolute = std::path::absolute(&file).unwrap_or(file);
-        let name = absolute.to_string_lossy();
-        let name = shell_words::quote(&name);
-        note(format_args!("listening on {address}; start workers with: starlings worker --access {name}"));
+        let name = shell_words::quote(&absolute.to_string_lossy()).into_owned();
+        self.say_how(format!("listening on {address}; start workers with: starlings worker --access {name}"));
         Ok(())
+    }
+
+    fn say_how(&self, invitation: String) {
+        note(&invitation);
+        let _ = self.invitation.set(invitation);
+    }
+
+    /// Tries a study on workers elsewhere, where it is not tried here.
+    pub(crate) fn trial(
+        &mut self,
+        study: &mut Study,
+        kind: Option<&Kind>,
+        store: Option<&Store>,
+    ) -> Result<(), Failure> {
+        trial_on_fleet(study, kind, &mut self.fleet, store).map_err(|error| match error {
+            FleetTrialError::Fleet(FleetError::Cancelled) => {
+                interrupt::failure("nothing is kept of it: start again")
+            }
+            FleetTrialError::Trial(error) => Failure::input(error),
+            error => Failure::run(error),
+        })
     }
 
     /// Ends the fleet and its workers.
@@ -236,17 +272,21 @@ impl FleetSession {
     }
 }
 
-/// Shows the events that people should see at once and hands all of them on to the store.
+/// Shows the events that people should see at once and hands all of them on to the store. Where workers come from elsewhere, people
+/// see who comes and goes.
 fn relay(
     heard: mpsc::Receiver<FleetEvent>,
     kept: &mpsc::Sender<FleetEvent>,
     display: &Display,
-    refused: &Refused,
+    listens: bool,
+    missing: impl Fn() -> [Option<String>; 2],
 ) {
     for event in heard {
-        if event.is_notable() {
-            let refused = refused.summary().filter(|_| matches!(event, FleetEvent::Waiting { .. }));
-            display.say(&refused.map_or(event.to_string(), |refused| format!("{event}; {refused}")));
+        if event.is_notable() || listens && event.is_of_roster() {
+            let waits = matches!(event, FleetEvent::Waiting { .. });
+            let more = missing().into_iter().flatten().filter(|_| waits);
+            let said: Vec<String> = std::iter::once(event.to_string()).chain(more).collect();
+            display.say(&said.join("; "));
         } else {
             tracing::info!(kind = event.kind(), "{event}");
         }

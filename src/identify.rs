@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::Parser;
+use starlings_coordinator::fleet::RunIdentity;
 use starlings_coordinator::report::identify_page;
 use starlings_coordinator::study::Study;
 use starlings_coordinator::study::identify::{At, Identification, IdentifyError, identify};
@@ -15,7 +16,7 @@ use crate::csv_file::{self, StudyLocation};
 use crate::failure::Failure;
 use crate::fleet_session::{FleetArgs, FleetSession};
 use crate::interrupt;
-use crate::load::load;
+use crate::load::{is_outside, load_where};
 use crate::progress::Display;
 use crate::run::hangs_on;
 
@@ -48,16 +49,22 @@ pub(crate) struct Args {
 
 /// Runs the ensemble and prints what it says.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    let mut study = load(&args.study)?;
+    let mut study = load_where(&args.study, args.fleet.is_here())?;
     let plan = args.fleet.plan(&study, None)?;
     let outputs = [("--html", &args.html), ("--csv", &args.csv)];
     csv_file::check_outputs(&outputs, &study.text, &StudyLocation::Known(&study.file))?;
     let at = At::from_argument(&args.at);
     at.centre(&study).map_err(Failure::input)?;
-    dry_run(&mut study, &BATCH, Depth::First).map_err(Failure::input)?;
+    let is_away = is_outside(&study) && !args.fleet.is_here();
+    if !is_away {
+        dry_run(&mut study, &BATCH, Depth::First).map_err(Failure::input)?;
+    }
     let display = Arc::new(Display::new(args.json));
-    let mut session = FleetSession::listen(&study, &plan, &display)?;
+    let mut session = FleetSession::listen(&study, &plan, plan.bind()?, RunIdentity::new(), &display)?;
     session.start_workers(&study, &plan, None)?;
+    if is_away {
+        session.trial(&mut study, Some(&BATCH), None)?;
+    }
     if !args.json {
         let records = study.records.iter().filter(|record| record.is_trained()).count();
         let runs = (2 * study.parameters.len() + 1) * records;

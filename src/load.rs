@@ -7,7 +7,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use starlings_coordinator::study::{SolverHost, Study, Undescribed};
-use starlings_models::SetupError;
+use starlings_models::{BuildSetup, SOLVER, Setup, SetupError};
 use starlings_solver::Solvers;
 use starlings_solver::{adapters, faults};
 
@@ -19,6 +19,26 @@ static HERE: Mutex<Option<Solvers>> = Mutex::new(None);
 
 /// Reads and checks a study; a solver that it names is started here and asked what it is.
 pub(crate) fn load(path: &Path) -> Result<Study, Failure> {
+    load_where(path, true)
+}
+
+/// The same; where the runs are made elsewhere, no solver is started on this machine.
+pub(crate) fn load_where(path: &Path, here: bool) -> Result<Study, Failure> {
+    if !here {
+        let describe = |_: &_| {
+            Err(Undescribed {
+                reason: "with --listen no solver is started on this machine".to_owned(),
+                last_words: None,
+                is_absent: true,
+            })
+        };
+        let host = SolverHost::asking(describe, Arc::new(Setup::build)).inspecting(faults).by(adapters());
+        return Ok(Study::load_with(path, &host)?);
+    }
+    load_here(path)
+}
+
+fn load_here(path: &Path) -> Result<Study, Failure> {
     let describe = |def: &_| {
         here()?.describe(def).map_err(|error| Undescribed {
             reason: error.to_string(),
@@ -29,6 +49,11 @@ pub(crate) fn load(path: &Path) -> Result<Study, Failure> {
     let factory = Arc::new(|setup: &_| here().map_err(SetupError::Invalid)?.build(setup));
     let host = SolverHost::asking(describe, factory).inspecting(faults).by(adapters());
     Ok(Study::load_with(path, &host)?)
+}
+
+/// Whether the model of a study is a program of its own.
+pub(crate) fn is_outside(study: &Study) -> bool {
+    study.setup.model.kind == SOLVER
 }
 
 /// Ends the solvers of this process; one that is needed again starts again.

@@ -15,7 +15,7 @@ use crate::console::{line, note, number, table};
 use crate::failure::Failure;
 use crate::fleet_session::{FleetArgs, FleetSession, Out};
 use crate::interrupt;
-use crate::load::load;
+use crate::load::{is_outside, load_where};
 use crate::progress::Display;
 use crate::run_folder;
 
@@ -42,13 +42,14 @@ pub(crate) struct Args {
 /// Runs the study.
 pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     interrupt::watch();
-    let mut study = load(&args.study)?;
+    let mut study = load_where(&args.study, args.fleet.is_here())?;
     let plan = args.fleet.plan(&study, Some(&Out(args.out.as_deref())))?;
     let kind = study.estimator.kind;
-    dry_run(&mut study, kind, Depth::First).map_err(Failure::input)?;
-    // Listen before the folder is made: a port in use must leave nothing behind.
-    let display = Arc::new(Display::new(args.json));
-    let mut session = FleetSession::listen(&study, &plan, &display)?;
+    let is_away = is_outside(&study) && !args.fleet.is_here();
+    if !is_away {
+        dry_run(&mut study, kind, Depth::First).map_err(Failure::input)?;
+    }
+    let bound = plan.bind()?;
     let mut folder = run_folder::open(Purpose::Run, &study, args.out.as_deref(), args.resume)?;
     if let Some(summary) = folder.summary().map_err(Failure::run)? {
         note(format_args!(
@@ -58,7 +59,15 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
         report::write_files(&folder).map_err(Failure::run)?;
         return print(&summary, &folder.path, args.json);
     }
+    let display = Arc::new(Display::new(args.json));
+    let identity = folder.store.begin().map_err(Failure::run)?;
+    let mut session = FleetSession::listen(&study, &plan, bound, identity, &display)?;
     session.start_workers(&study, &plan, Some(&folder.path))?;
+    if is_away && let Err(failure) = session.trial(&mut study, Some(kind), Some(&folder.store)) {
+        session.close();
+        run_folder::give_up(folder, args.resume);
+        return Err(failure);
+    }
     let mut watch = |p: &Progress| display.step(p);
     let clock = move || started.elapsed().as_secs_f64();
     let mut context = RunContext {

@@ -7,6 +7,7 @@ use starlings_coordinator::study::store::Purpose;
 use starlings_coordinator::study::store::folder::Call;
 use starlings_coordinator::study::{FolderError, RunFolder, Study};
 
+use crate::disk;
 use crate::failure::Failure;
 
 /// Whether an interrupted command goes on.
@@ -34,6 +35,7 @@ pub(crate) fn open(
     };
     let default = || Path::new("runs").join(format!("{}{kind}-{stamp}", study.name));
     let path: PathBuf = out.map_or_else(default, Path::to_owned);
+    disk::check(study, &path)?;
     let command = std::env::args().skip(1).collect::<Vec<_>>().join(" ");
     let command = format!("starlings {command}");
     if resume.resume {
@@ -41,6 +43,13 @@ pub(crate) fn open(
         return RunFolder::resume(purpose, &path, study, &call).map_err(|error| failed(&error));
     }
     RunFolder::create(purpose, &path, study, &command, &stamp).map_err(|error| failed(&error))
+}
+
+/// Removes a folder that was made for a command whose study cannot be run; one that was there before stays.
+pub(crate) fn give_up(folder: RunFolder, resume: Resume) {
+    if !resume.resume {
+        folder.discard();
+    }
 }
 
 fn failed(error: &FolderError) -> Failure {

@@ -5,14 +5,15 @@
 mod contact;
 mod permit;
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use clap::Parser;
 use starlings_models::SolverDef;
-use starlings_worker::{MAX_SLOTS, WorkerConfig, WorkerError};
+use starlings_worker::{MAX_SLOTS, Tell, WorkerConfig, WorkerError};
 use tokio_util::sync::CancellationToken;
 
-use crate::console::{cancel_on_signal, line};
+use crate::console::{cancel_on_signal, line, note};
 use crate::failure::Failure;
 use crate::solvers::{adapter_names, solvers};
 use contact::ContactArgs;
@@ -72,8 +73,16 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     cancel_on_signal(&cancel);
     let slots = args.slots.unwrap_or(cores);
     let solvers = solvers()?.with_cores_after(args.place.saturating_mul(slots)).permitting(permit);
-    let config =
-        WorkerConfig { slots, once: args.once, patience, cancel, factory: solvers.factory(), ..contact };
+    let tell: Tell = if args.contact.is_inherited() { Arc::new(|_| {}) } else { tell() };
+    let config = WorkerConfig {
+        slots,
+        once: args.once,
+        patience,
+        cancel,
+        factory: solvers.factory(),
+        tell,
+        ..contact
+    };
     let report = starlings_worker::run(config).map_err(|error| match error {
         WorkerError::BadAddress { .. } => Failure::input(format!("--connect: {error}")),
         WorkerError::Access(_) | WorkerError::Ended { .. } => Failure::input(format!("--access: {error}")),
@@ -81,6 +90,11 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     })?;
     tracing::info!(predictions = report.predictions, failures = report.failures, reason = ?report.reason, "done");
     Ok(())
+}
+
+/// Lines for whoever watches a worker.
+fn tell() -> Tell {
+    Arc::new(|news| note(format_args!("{} worker: {news}", jiff::Timestamp::now().strftime("%H:%M:%SZ"))))
 }
 
 /// Starts the solver, asks what it is and prints the answer.

@@ -197,14 +197,17 @@ fn begin(config: &WorkerConfig, slots: &Slots, held: Option<&Held>, connection: 
     }
     let outbox = &connection.outbox;
     let going_on = slots.attach(outbox.clone());
-    let (portions, computing) = (held.portions(PORTION), going_on.len());
+    let (mut portions, computing) = (held.portions(PORTION), going_on.len());
     let finished = portions.iter().map(Vec::len).sum();
     if finished + computing == 0 {
         return;
     }
-    // First what goes on: it is given away otherwise.
-    let going_on = going_on.into_iter().map(|key| HeldRun { key, ended: None }).collect();
-    for runs in std::iter::once(going_on).chain(portions) {
+    if portions.is_empty() {
+        portions.push(Vec::new());
+    }
+    // What goes on is in the first message: it is given away otherwise.
+    portions[0].extend(going_on.into_iter().map(|key| HeldRun { key, ended: None }));
+    for runs in portions {
         session::send(outbox, FromWorker::Held(runs));
     }
     (config.tell)(&News::Delivered { finished, computing });

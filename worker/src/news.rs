@@ -38,8 +38,6 @@ pub enum News {
         /// Runs that it goes on with meanwhile.
         computing: usize,
     },
-    /// No more results can be held, so that no further run is begun.
-    Full,
     /// The coordinator says something.
     Told(String),
 }
@@ -65,10 +63,6 @@ impl fmt::Display for News {
                     "lost the coordinator: {reason}; dialling again, {computing} runs go on and results are held"
                 )
             }
-            Self::Full => write!(
-                f,
-                "no further run is begun: no more results can be held until the coordinator is back"
-            ),
             Self::Told(text) => write!(f, "{text}"),
         }
     }

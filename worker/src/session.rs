@@ -56,7 +56,7 @@ pub(crate) async fn serve(
             biased;
             message = connection.inbound.message() => {
                 silence.broken();
-                let place = Place { slots, setups, held, inbox: &inbox, transfers: &connection.transfers, tell: &config.tell };
+                let place = Place { slots, setups, held, inbox: &inbox, tell: &config.tell };
                 match take(message, &connection.outbox, &mut connection.windows, &place) {
                     Ok(()) => {}
                     Err(Ended::Drained(reason)) => {

@@ -126,8 +126,7 @@ impl Way {
     /// Where it leads, for messages.
     pub(crate) fn name(&self) -> String {
         match self {
-            Self::Plain { address, .. } => address.clone(),
-            Self::Access { address: Some(address), .. } => address.clone(),
+            Self::Plain { address, .. } | Self::Access { address: Some(address), .. } => address.clone(),
             Self::Access { file, .. } => match AccessFile::read(file) {
                 Ok(read) => format!("{} (as {} says)", read.addresses.join(" or "), file.display()),
                 Err(_) => format!("the address in {}", file.display()),

@@ -93,6 +93,7 @@ fn finish(cache: &mut RunCache<'_>, diagnosis: &Diagnosis<'_, '_>) -> Result<Fin
     }
     cache.stage("add", "");
     let mut warnings = warnings::warnings(cache, found, decision);
+    warnings.extend(cache.told_of_workers()?);
     let explained = match added {
         Some(judged) => {
             let left_out = &judged.fit.variant.left_out;

@@ -19,7 +19,7 @@ use nalgebra::DVector;
 use starlings_fleet::{Fleet, FleetEvent};
 use starlings_models::Window;
 use starlings_study::Study;
-use starlings_study::store::{RunKey, Store};
+use starlings_study::store::{RunKey, Store, StoreError};
 
 use self::lru::LruCache;
 use crate::error::ExplainError;
@@ -147,6 +147,14 @@ impl<'a> RunCache<'a> {
     /// The fleet, for runs that are not over whole records.
     pub(crate) fn fleet(&mut self) -> &mut dyn Fleet {
         self.fleet
+    }
+
+    /// Warnings about workers whose results were not those of others.
+    ///
+    /// # Errors
+    /// When the store cannot be read.
+    pub(crate) fn told_of_workers(&self) -> Result<Vec<String>, StoreError> {
+        self.store.told_of_workers()
     }
 
     /// The folder of the run.

@@ -22,6 +22,7 @@ use super::access::Secrets;
 pub(super) use check::Check;
 use connection::Connection;
 pub(super) use refusals::Refusals;
+pub use refusals::Refused;
 use refusals::Why;
 use strangers::{Caller, Strangers};
 

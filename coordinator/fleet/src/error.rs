@@ -6,8 +6,6 @@ use std::path::PathBuf;
 use starlings_proto::ProtocolError;
 use starlings_states::StateError;
 
-use crate::dispatcher::BatchError;
-
 /// A failure of the fleet as a whole; a failed job is an [`super::Outcome`].
 #[derive(Debug, thiserror::Error)]
 pub enum FleetError {
@@ -119,40 +117,6 @@ pub enum FleetError {
     /// The network thread ended although nobody closed the fleet.
     #[error("the fleet's network stopped: {0}")]
     Stopped(String),
-}
-
-impl FleetError {
-    /// Why a batch ended, of a fleet that listens there, takes whoever comes or not, and refused these.
-    pub(crate) fn of(
-        error: BatchError,
-        address: Option<SocketAddr>,
-        is_open: bool,
-        refused: Option<String>,
-    ) -> Self {
-        match error {
-            BatchError::Cancelled => Self::Cancelled,
-            BatchError::NoWorkers { waited, missing } => {
-                let missing = [Some(missing), refused].into_iter().flatten().collect::<Vec<_>>().join("; ");
-                Self::NoWorkers { address, is_open, waited: waited.as_secs_f64(), missing }
-            }
-            BatchError::SetupFailed { reason } => Self::SetupFailed { reason },
-            BatchError::LocalWorkers(reason) => Self::LocalWorkers(reason),
-            BatchError::Stopped(reason) => Self::Stopped(reason),
-            BatchError::State(reason) => Self::State(reason),
-            BatchError::Unavailable { waited, reasons } => {
-                Self::Unavailable { waited: waited.as_secs_f64(), reasons }
-            }
-            BatchError::NoControl { particle, record, parameters, reason, .. } => {
-                Self::NoControl { particle, record, parameters, reason }
-            }
-            BatchError::Disagreement { particle, record, workers } => {
-                Self::Disagreement { particle, record, workers }
-            }
-            BatchError::NoAnswer { index, particle, record, reason } => {
-                Self::NoAnswer { job: index, particle, record, reason }
-            }
-        }
-    }
 }
 
 impl From<StateError> for FleetError {

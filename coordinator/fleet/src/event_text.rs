@@ -4,6 +4,9 @@ use std::fmt;
 
 use super::FleetEvent;
 
+/// Why workers leave at the end.
+pub(super) const OVER: &str = "the run is over";
+
 impl FleetEvent {
     /// A short name of the kind of event.
     pub fn kind(&self) -> &'static str {
@@ -55,6 +58,15 @@ impl FleetEvent {
         )
     }
 
+    /// Whether somebody who started workers elsewhere should see it: who came, who went, who is used again.
+    pub fn is_of_roster(&self) -> bool {
+        match self {
+            Self::WorkerJoined { .. } | Self::WorkerBack { .. } => true,
+            Self::WorkerLeft { reason, .. } => reason != OVER,
+            _ => false,
+        }
+    }
+
     /// Whether the event belongs into the run's record; progress is only for the moment.
     pub fn is_lasting(&self) -> bool {
         !matches!(self, Self::Progress { .. })
@@ -78,12 +90,7 @@ impl fmt::Display for FleetEvent {
                 )
             }
             Self::WorkerRefused { host, reason } => write!(f, "a worker from {host} was refused: {reason}"),
-            Self::CallerRefused { from, reason, count: 1 } => {
-                write!(f, "a caller from {from} was refused: {reason}")
-            }
-            Self::CallerRefused { from, reason, count } => {
-                write!(f, "{count} callers were refused, last one from {from}: {reason}")
-            }
+            Self::CallerRefused { from, reason, count } => f.write_str(&refused(from, reason, *count)),
             Self::WorkerLeft { worker, reason, requeued: 0 } => write!(f, "worker {worker} left: {reason}"),
             Self::WorkerLeft { worker, reason, requeued } => {
                 write!(f, "worker {worker} left: {reason}; {requeued} of its runs go to others")
@@ -116,42 +123,15 @@ impl fmt::Display for FleetEvent {
                     "worker {worker} brought {finished} finished runs along and goes on with {computing}"
                 )
             }
-            Self::WorkerExcluded { worker, build, reason, again, earlier } => {
-                let build =
-                    if build.is_empty() { String::new() } else { format!(" (build {})", short(build)) };
-                let earlier = if *earlier == 0 {
-                    String::new()
-                } else {
-                    format!("; {earlier} of its runs were used before")
-                };
-                write!(
-                    f,
-                    "worker {worker}{build} is put out: {reason}; {again} of its runs are made again{earlier}"
-                )
-            }
-            Self::WorkersDiffer { what } => {
-                write!(f, "workers give different results for one run, which is allowed here: {what}")
-            }
-            Self::NotReproducible { what } => {
-                write!(
-                    f,
-                    "the solver gives another result when it is asked again, so its runs are not compared: {what}"
-                )
-            }
-            Self::JobDuplicated { particle, record, slow, worker } => {
-                write!(
-                    f,
-                    "particle {particle}, record {record}: takes long on worker {slow}, given to worker {worker} too"
-                )
-            }
-            Self::Untold { of, count, last } => {
-                write!(f, "{count} more events of the kind {of} were not told one by one; the last: {last}")
-            }
+            Self::WorkerExcluded { .. }
+            | Self::WorkersDiffer { .. }
+            | Self::NotReproducible { .. }
+            | Self::JobDuplicated { .. }
+            | Self::Untold { .. } => comparing(self, f),
             Self::LateAnswer { worker, job } => {
                 write!(f, "worker {worker} answered run {job} too late; ignored")
             }
-            Self::Waiting { seconds, missing } => write!(f, "waiting for {seconds:.0} s: {missing}"),
-            Self::Progress { done, total } => write!(f, "{done} of {total} runs"),
+            Self::Waiting { .. } | Self::Progress { .. } => going(self, f),
             Self::LocalWorkerRestarted { pid, reason } => {
                 write!(f, "local worker process {pid} ended ({reason}) and was started again")
             }
@@ -162,6 +142,60 @@ impl fmt::Display for FleetEvent {
                 )
             }
         }
+    }
+}
+
+/// How a batch goes on.
+fn going(event: &FleetEvent, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    match event {
+        FleetEvent::Waiting { seconds, missing } => write!(f, "waiting for {seconds:.0} s: {missing}"),
+        FleetEvent::Progress { done, total } => write!(f, "{done} of {total} runs"),
+        _ => Ok(()),
+    }
+}
+
+/// What follows from comparing workers, and what was only counted.
+fn comparing(event: &FleetEvent, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    match event {
+        FleetEvent::WorkerExcluded { worker, build, reason, again, earlier } => {
+            let build = if build.is_empty() { String::new() } else { format!(" (build {})", short(build)) };
+            let earlier = if *earlier == 0 {
+                String::new()
+            } else {
+                format!("; {earlier} of its runs were used before")
+            };
+            write!(
+                f,
+                "worker {worker}{build} is put out: {reason}; {again} of its runs are made again{earlier}"
+            )
+        }
+        FleetEvent::WorkersDiffer { what } => {
+            write!(f, "workers give different results for one run, which is allowed here: {what}")
+        }
+        FleetEvent::NotReproducible { what } => {
+            write!(
+                f,
+                "the solver gives another result when it is asked again, so its runs are not compared: {what}"
+            )
+        }
+        FleetEvent::JobDuplicated { particle, record, slow, worker } => {
+            write!(
+                f,
+                "particle {particle}, record {record}: takes long on worker {slow}, given to worker {worker} too"
+            )
+        }
+        FleetEvent::Untold { of, count, last } => {
+            write!(f, "{count} more events of the kind {of} were not told one by one; the last: {last}")
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Who was refused, and why.
+fn refused(from: &str, reason: &str, count: u64) -> String {
+    match count {
+        1 => format!("a caller from {from} was refused: {reason}"),
+        n => format!("{n} callers were refused, last one from {from}: {reason}"),
     }
 }
 

@@ -3,25 +3,26 @@
 //! The network lives on a thread of its own, so a caller that thinks for minutes between two batches delays no heartbeat. Next file to
 //! read: [`super::hub`], then [`super::network`].
 
-use std::net::{SocketAddr, TcpListener};
+use std::net::SocketAddr;
 use std::ops::ControlFlow;
 use std::os::unix::net::UnixStream;
 use std::sync::Arc;
-use std::sync::mpsc::{self, RecvTimeoutError, Sender};
+use std::sync::mpsc::{self, RecvTimeoutError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use starlings_models::{BuildSetup, Job, Setup};
-use starlings_proto::{MAX_MESSAGE, SetupId, encode_setup, own_build};
+use starlings_proto::{MAX_MESSAGE, SetupId, encode_setup};
 use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
 use tokio_util::sync::CancellationToken;
 
-use super::access::Secrets;
+use super::bound::Bound;
+use super::config::FleetConfig;
 use super::dispatcher::{BatchError, Comparing, Event, Likeness, Rules};
-use super::door::{Door, Refusals};
+use super::door::{Door, Refusals, Refused};
+use super::explained::{Listening, explained};
 use super::handle::FleetHandle;
 use super::hub::{Hub, Reply, SetupShape, Submission};
-use super::identity::RunIdentity;
 use super::network::{self, Ways};
 use super::travel::submission;
 use super::{Arrived, Fleet, FleetError, FleetEvent, Held, Outcome, StateStore, TELL_EVERY};
@@ -32,67 +33,6 @@ const ALIVE_CHECK: Duration = Duration::from_secs(1);
 /// How long a run that is continued waits for the workers of its earlier start, which dial every two seconds, before it gives away
 /// jobs that they may have done.
 const GRACE: Duration = Duration::from_millis(2500);
-
-/// How a fleet listens and when it loses patience.
-#[derive(Clone, Debug)]
-pub struct FleetConfig {
-    /// Where to listen, port 0 picks a free one; `None`: nowhere, for a fleet of processes that this one starts.
-    pub address: Option<SocketAddr>,
-    /// What proves this coordinator to workers and workers to it where it listens; without it, connections are plain and whoever
-    /// reaches the address is taken.
-    pub secrets: Option<Secrets>,
-    /// Name of the run, told to workers.
-    pub run_name: String,
-    /// Time between heartbeats; a worker silent for twice as long is lost.
-    pub heartbeat: Duration,
-    /// How long a batch waits without any usable worker before it is an error.
-    pub patience: Duration,
-    /// How many workers may be lost under one job before it is given up.
-    pub max_attempts: u32,
-    /// The run: workers of an earlier start of it bring along what they have done.
-    pub identity: RunIdentity,
-    /// How results of workers are compared: what draws the runs that are repeated, the study's seed.
-    pub seed: u64,
-    /// Whether workers whose results differ are allowed, and only told of.
-    pub mixed: bool,
-    /// A run that takes so many times the usual time is given up as a timeout; none is without it.
-    pub timeout_factor: Option<f64>,
-    /// BLAKE3 of this executable: a worker of another one is told of. `None`: none is.
-    pub build: Option<[u8; 32]>,
-    /// Ends [`Fleet::run`] promptly with [`FleetError::Cancelled`].
-    pub cancel: CancellationToken,
-    /// Where events go.
-    pub events: Sender<FleetEvent>,
-    /// Where states are kept that are too large to travel inside a message.
-    pub states: StateStore,
-}
-
-impl FleetConfig {
-    /// The usual numbers: heartbeat 8 s, patience 5 minutes, five losses per job.
-    pub fn new(
-        address: impl Into<Option<SocketAddr>>,
-        run_name: &str,
-        cancel: CancellationToken,
-        events: Sender<FleetEvent>,
-    ) -> Self {
-        Self {
-            address: address.into(),
-            secrets: None,
-            run_name: run_name.to_owned(),
-            heartbeat: Duration::from_secs(8),
-            patience: Duration::from_secs(300),
-            max_attempts: 5,
-            identity: RunIdentity::new(),
-            seed: 0,
-            mixed: false,
-            timeout_factor: None,
-            build: own_build(),
-            cancel,
-            events,
-            states: StateStore::new(StateStore::MEMORY),
-        }
-    }
-}
 
 /// Workers that dial in.
 pub struct GrpcFleet {
@@ -112,8 +52,16 @@ impl GrpcFleet {
     /// # Errors
     /// [`FleetError::Bind`] when the address is taken or does not exist; [`FleetError::Stopped`] when no thread can start.
     pub fn listen(config: FleetConfig) -> Result<Self, FleetError> {
-        let listener = config.address.map(listen).transpose()?;
-        let address = listener.as_ref().map(|(_, address)| *address);
+        let bound = config.address.map(Bound::new).transpose()?;
+        Self::listen_on(bound, config)
+    }
+
+    /// The same on an address that was taken before, if any: the one in `config` is not looked at.
+    ///
+    /// # Errors
+    /// [`FleetError::Stopped`] when no thread can start.
+    pub fn listen_on(bound: Option<Bound>, config: FleetConfig) -> Result<Self, FleetError> {
+        let address = bound.as_ref().map(|bound| bound.address);
         let rules = Rules {
             heartbeat: config.heartbeat,
             patience: config.patience,
@@ -137,8 +85,8 @@ impl GrpcFleet {
                 }
             })
         };
-        let door = listener
-            .map(|(listener, _)| Door::new(listener, config.secrets.as_ref(), Arc::clone(&refusals)))
+        let door = bound
+            .map(|bound| Door::new(bound.listener, config.secrets.as_ref(), Arc::clone(&refusals)))
             .transpose()
             .map_err(FleetError::Secrets)?;
         let ways = Ways { door, adopted: ends };
@@ -172,7 +120,7 @@ impl GrpcFleet {
 
     /// How many callers were refused, and the last of them with the reason; `None` where none was.
     pub fn refused(&self) -> Refused {
-        Refused(Arc::clone(&self.refusals))
+        Refused::new(Arc::clone(&self.refusals))
     }
 
     /// For the supervisor of local workers.
@@ -195,8 +143,7 @@ impl GrpcFleet {
                 Ok(Ok(outcomes)) => return Ok(outcomes),
                 Ok(Err(error)) => {
                     let _ = arrived(self.hub.arrived());
-                    let refused = self.refusals.summary();
-                    return Err(FleetError::of(error, self.address, self.is_open, refused));
+                    return Err(explained(error, self.listening()));
                 }
                 Err(RecvTimeoutError::Disconnected) => {
                     // The batch was dropped by a network that is about to end: what it says then is the reason.
@@ -222,16 +169,9 @@ impl GrpcFleet {
     fn has_ended(&self) -> bool {
         self.network.as_ref().is_none_or(JoinHandle::is_finished)
     }
-}
 
-/// The callers that a fleet refused, for whoever waits for workers.
-#[derive(Clone)]
-pub struct Refused(Arc<Refusals>);
-
-impl Refused {
-    /// How many there were, and the last of them with the reason; nothing where there was none.
-    pub fn summary(&self) -> Option<String> {
-        self.0.summary()
+    fn listening(&self) -> Listening {
+        Listening { address: self.address, is_open: self.is_open, refused: self.refusals.summary() }
     }
 }
 
@@ -254,9 +194,8 @@ impl Fleet for GrpcFleet {
     }
 
     fn run_mixed(&mut self, jobs: Vec<(SetupId, Job)>) -> Result<Vec<Outcome>, FleetError> {
-        let held = |values| Ok::<_, FleetError>(Held::Values(values));
-        let jobs = jobs.into_iter().map(|(setup, job)| Ok((setup, job.try_map(held)?)));
-        let outcomes = self.run_held(jobs.collect::<Result<_, FleetError>>()?)?;
+        let jobs = jobs.into_iter().map(|(setup, job)| (setup, job.map(Held::Values)));
+        let outcomes = self.run_held(jobs.collect())?;
         outcomes.into_iter().map(|outcome| Ok(outcome.try_map(Held::into_values)?)).collect()
     }
 
@@ -312,15 +251,6 @@ fn likeness(setup: &Setup) -> Likeness {
         Some(Some(described)) if described.deterministic => Likeness::Promised,
         Some(_) => Likeness::None,
     }
-}
-
-/// Listens on the address, and says which port was picked.
-fn listen(address: SocketAddr) -> Result<(TcpListener, SocketAddr), FleetError> {
-    let bind = |source| FleetError::Bind { address, source };
-    let listener = TcpListener::bind(address).map_err(bind)?;
-    listener.set_nonblocking(true).map_err(bind)?;
-    let address = listener.local_addr().map_err(bind)?;
-    Ok((listener, address))
 }
 
 #[cfg(test)]

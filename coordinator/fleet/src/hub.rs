@@ -5,14 +5,18 @@
 //! read: `state`, then [`super::service`], which brings the workers' events.
 
 mod arrival;
+mod doorway;
 mod excluded;
 mod held;
+mod replies;
 mod state;
 mod states;
 mod teller;
+mod telling;
 #[cfg(test)]
 mod tests;
 mod transfers;
+mod waiting;
 
 use std::hash::{BuildHasher, Hasher};
 use std::sync::mpsc::Sender;
@@ -25,6 +29,7 @@ use tonic::Status;
 
 use super::dispatcher::message::hex;
 use super::dispatcher::{BatchError, Dispatcher, Event, Joining, Likeness, Rules, WorkerId};
+use super::event_text::OVER;
 use super::identity::RunIdentity;
 use super::job_name::JobName;
 use super::{FleetEvent, Held, Outcome, StateStore};
@@ -80,7 +85,11 @@ impl Hub {
 
     pub(super) fn tell(&self, event: FleetEvent) {
         let now = self.started.elapsed();
-        self.lock().events.tell(now, event);
+        let mut state = self.lock();
+        if let FleetEvent::Listening { address } = event {
+            state.doorway.address = Some(address);
+        }
+        state.events.tell(now, event);
     }
 
     pub(super) fn handle(&self, event: Event) {
@@ -149,7 +158,7 @@ impl Hub {
         let mut state = self.decide();
         if let Err(closed) = state.admit(&hello) {
             if let Closed::Refused(reason) = closed.clone() {
-                state.events.tell(now, FleetEvent::WorkerRefused { host: hello.host, reason });
+                state.notify(FleetEvent::WorkerRefused { host: hello.host, reason });
             }
             return Err(closed);
         }
@@ -230,7 +239,7 @@ impl Hub {
     /// Asks the workers with these process numbers to leave.
     pub(super) fn dismiss(&self, pids: &[u32]) {
         for link in self.lock().links.values().filter(|link| pids.contains(&link.pid)) {
-            let _ = link.sender.send(Ok(ToWorker::drain("the run is over")));
+            let _ = link.sender.send(Ok(ToWorker::drain(OVER)));
         }
     }
 

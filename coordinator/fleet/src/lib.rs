@@ -7,11 +7,14 @@
 //! ends with a [`FleetError`]. Whoever dials passes the [`door`]. Next file to read: [`dispatcher`].
 
 pub mod access;
+mod bound;
+mod config;
 mod dispatcher;
 mod door;
 mod error;
 mod event;
 mod event_text;
+mod explained;
 mod grpc;
 mod handle;
 mod hub;
@@ -25,9 +28,12 @@ mod transfer;
 mod travel;
 mod wire;
 
+pub use bound::Bound;
+pub use config::FleetConfig;
+pub use door::Refused;
 pub use error::FleetError;
 pub use event::FleetEvent;
-pub use grpc::{FleetConfig, GrpcFleet, Refused};
+pub use grpc::GrpcFleet;
 pub use handle::FleetHandle;
 pub use identity::RunIdentity;
 pub use in_process::InProcess;

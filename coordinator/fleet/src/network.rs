@@ -18,6 +18,7 @@ use tonic::transport::Server;
 
 use super::dispatcher::{BatchError, Event};
 use super::door::Door;
+use super::event_text::OVER;
 use super::hub::{Hub, Submission};
 use super::service::Service;
 
@@ -156,7 +157,7 @@ async fn abort_on_cancel(hub: Arc<Hub>, cancel: CancellationToken) {
 async fn drained(hub: &Hub, stop: &CancellationToken) {
     stop.cancelled().await;
     hub.handle(Event::Abort(BatchError::Cancelled));
-    hub.drain("the run is over");
+    hub.drain(OVER);
     let empty = async {
         loop {
             let mut ended = std::pin::pin!(hub.link_ended.notified());

@@ -44,7 +44,7 @@ async fn call(channel: Channel, token: Option<&str>) -> Status {
     if let Some(token) = token {
         request.metadata_mut().insert(TOKEN_KEY, token.parse().unwrap());
     }
-    FleetClient::new(channel).work(request).await.err().expect("it is refused")
+    FleetClient::new(channel).work(request).await.expect_err("it is refused")
 }
 
 fn refused(door: &Guarded, token: Option<&str>) -> Status {
@@ -109,6 +109,31 @@ fn a_tls_client_without_a_token_joins_nothing_and_learns_nothing() {
     let mut door = Guarded::new();
     let status = refused(&door, None);
     assert_learns_nothing(&door, &status);
+    assert_serves(&mut door);
+}
+
+#[test]
+fn a_state_is_neither_taken_from_nor_given_to_a_caller_without_the_token() {
+    let mut door = Guarded::new();
+    let put = |door: &Guarded| {
+        let endpoint = endpoint(door);
+        async move {
+            let mut client = FleetClient::new(endpoint.connect().await.unwrap());
+            client.put(tokio_stream::pending::<generated::Chunk>()).await.expect_err("it is refused")
+        }
+    };
+    let get = |door: &Guarded| {
+        let endpoint = endpoint(door);
+        async move {
+            let mut client = FleetClient::new(endpoint.connect().await.unwrap());
+            client.get(generated::GetRequest::default()).await.expect_err("it is refused")
+        }
+    };
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+    let refused = runtime.block_on(put(&door));
+    assert_learns_nothing(&door, &refused);
+    let refused = runtime.block_on(get(&door));
+    assert_learns_nothing(&door, &refused);
     assert_serves(&mut door);
 }
 

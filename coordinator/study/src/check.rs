@@ -30,6 +30,7 @@ use self::built::CheckedModel;
 use self::parameters::initial_medians;
 use self::settings::{estimator, fleet};
 use self::solver::DescribedSolver;
+pub(crate) use self::solver::UNTRIED;
 use super::checked::{Record, Study};
 use super::expand;
 use super::field::field_of;

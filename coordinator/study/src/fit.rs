@@ -10,6 +10,7 @@ mod ensemble;
 mod failures;
 pub(crate) mod filter;
 pub(crate) mod free_run;
+mod index;
 mod journal;
 mod kept;
 pub(crate) mod resample;

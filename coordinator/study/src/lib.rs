@@ -21,6 +21,7 @@ mod plan;
 pub mod posterior;
 mod problem;
 mod record;
+mod room;
 pub mod run;
 mod run_error;
 pub mod run_key;

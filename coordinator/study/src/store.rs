@@ -13,6 +13,7 @@ mod elapsed;
 mod error;
 pub mod folder;
 mod folder_error;
+mod identity;
 mod info;
 pub(super) mod json;
 mod kept_states;

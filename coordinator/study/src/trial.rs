@@ -3,6 +3,7 @@
 //! Next file to read: [`mod@dry_run`], which makes the runs of a fit.
 
 pub mod dry_run;
+pub mod on_fleet;
 
 use std::sync::Arc;
 
@@ -15,6 +16,7 @@ use starlings_proto::spent::spent;
 
 use super::{Study, posterior};
 pub use dry_run::{Depth, dry_run};
+pub use on_fleet::{FleetTrialError, trial_on_fleet};
 
 /// The result of the trial for one channel.
 #[derive(Clone, Debug, PartialEq)]
@@ -104,13 +106,17 @@ pub fn trial(study: &Study) -> Result<Vec<TrialChannel>, TrialError> {
     if !study.runs_here {
         return Ok(Vec::new());
     }
-    let model = study.solver_host.build(&study.setup)?;
+    trial_by(study, &*study.solver_host.build(&study.setup)?)
+}
+
+/// The trial by a model that is built.
+fn trial_by(study: &Study, model: &dyn Forward) -> Result<Vec<TrialChannel>, TrialError> {
     let prior = posterior::prior(study);
     let mut channels = Vec::new();
     for (index, record) in study.records.iter().enumerate() {
         let window = Arc::new(study.whole(index, false));
         let theta = study.theta_for(index, prior.mean.as_slice());
-        let ran = run(&*model, index, &window, &theta, None);
+        let ran = run(model, index, &window, &theta, None);
         let mut prediction = ran.map_err(|fault| match fault {
             Fault::Run(source) => {
                 let (values, remedy) = (named(study, &theta), remedy(&source, &window));

@@ -9,6 +9,7 @@ mod outline;
 mod parts;
 mod replay;
 mod rows;
+mod run;
 mod split;
 pub mod table;
 
@@ -26,33 +27,7 @@ pub use outline::{check_effects, outline};
 pub use parts::spec;
 use parts::{Parts, check_initial, check_observer};
 use rows::Rows;
-
-/// One run, as the program is asked for it.
-#[derive(Clone, Copy, Debug)]
-pub struct Run<'a> {
-    /// Index of the sigma point.
-    pub particle: u32,
-    /// Index of the record.
-    pub record: u32,
-    /// Parameters in the order and the units of the description.
-    pub parameters: &'a [f64],
-    /// Initial values that are estimated or fixed, by the name of the state's component; for runs without `state`.
-    pub initial: &'a [(String, f64)],
-    /// Names of the outputs that are asked for; a field takes as many rows as it has components.
-    pub outputs: &'a [String],
-    /// Start, times and inputs; the observed values are those of `outputs`.
-    pub window: &'a Window,
-    /// The observer.
-    pub observer: &'a ObserverDef,
-    /// State at the start, in the order of the description.
-    pub state: Option<&'a [f64]>,
-    /// Terms added to the rates of hosted states.
-    pub terms: &'a [Addition],
-    /// Values of names in the terms that are no quantities of the program.
-    pub constants: &'a [(String, f64)],
-    /// Tells when nobody wants the answer any more; the program is then ended.
-    pub stop: Option<&'a Stop>,
-}
+pub use run::Run;
 
 /// What the program predicts.
 #[derive(Clone, Debug, Default, PartialEq)]

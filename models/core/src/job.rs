@@ -52,6 +52,12 @@ pub struct Job<S = Vec<f64>> {
 
 impl<S> Job<S> {
     /// The same job with its state as something else.
+    pub fn map<T>(self, change: impl FnOnce(S) -> T) -> Job<T> {
+        let Self { particle, record, window, theta, state } = self;
+        Job { particle, record, window, theta, state: state.map(change) }
+    }
+
+    /// The same job with its state as something else.
     ///
     /// # Errors
     /// What `change` says.

@@ -7,13 +7,13 @@
 
 mod answer;
 mod connect;
+mod within;
 
-use std::pin::pin;
 use std::process::ChildStdin;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use starlings_models::{Description, ModelFailure, ParticleError, Run, Solved, SolverDef, Stop};
+use starlings_models::{Description, ModelFailure, ParticleError, Run, Solved, SolverDef};
 use starlings_proto::ProtocolError;
 use starlings_proto::convert::solver::{Reply, decode_reply, encode_run};
 use starlings_proto::generated_solver::solver_client::SolverClient;
@@ -23,6 +23,7 @@ use tonic::transport::Channel;
 
 pub use connect::SOCKET;
 use connect::{SolverAddress, connect};
+use within::within;
 
 use super::SolverError;
 use super::error::tail_text;
@@ -30,12 +31,9 @@ use super::process::{Launch, Process, ending, is_killed};
 use super::scratch::Scratch;
 use super::site::Site;
 use super::stopped::stopped;
-use super::stopwatch::{Stopwatch, Time};
 
 /// How long a run that is given up on purpose may go on.
 const LEFT_AFTER: Duration = Duration::from_millis(2);
-/// How often it is looked whether anybody still wants the answer.
-const STOP_LOOK: Duration = Duration::from_millis(100);
 /// How long a program that broke its connection may take to end, as a launcher of ranks does, so that its ending can be told.
 const LAST_WORDS: Duration = Duration::from_secs(5);
 /// The same of one that only broke the protocol and need not end.
@@ -264,31 +262,6 @@ impl Instance {
     fn homeless(&self) -> String {
         let gone = self.is_homeless().then(|| self.scratch.path().display());
         gone.map(|folder| format!("; its folder {folder} was removed meanwhile")).unwrap_or_default()
-    }
-}
-
-/// An answer within so much time, in which the program was not stopped.
-async fn within<T>(
-    patience: Duration,
-    stop: Option<&Stop>,
-    process: Option<&Process>,
-    answer: impl Future<Output = T>,
-) -> Result<T, How> {
-    let mut watch = Stopwatch::start(patience, Instant::now());
-    let mut answer = pin!(answer);
-    loop {
-        if stop.is_some_and(Stop::is_set) {
-            return Err(How::Unwanted);
-        }
-        match watch.look(Instant::now(), || process.is_some_and(Process::is_stopped)) {
-            Time::Left(left) => {
-                if let Ok(answer) = tokio::time::timeout(left.min(STOP_LOOK), &mut answer).await {
-                    return Ok(answer);
-                }
-            }
-            Time::Up => return Err(How::Silent),
-            Time::Stopped => return Err(How::Stopped),
-        }
     }
 }
 

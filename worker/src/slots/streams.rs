@@ -70,7 +70,11 @@ impl Shared {
         let mut queue = self.lock();
         queue.running.retain(|running| !Arc::ptr_eq(running, &task));
         // A stream that came meanwhile has been told all that is held.
-        queue.full |= !has_room && queue.stream.is_none();
+        if !has_room && queue.stream.is_none() && !std::mem::replace(&mut queue.full, true) {
+            tracing::warn!(
+                "no further run is begun until the coordinator is back: no more results can be held"
+            );
+        }
         let stream = queue.stream.clone();
         drop(queue);
         let asked = task.asked().take();

@@ -192,9 +192,9 @@ impl RunCache<'_> {
             early: HashMap::new(),
             refused: None,
         };
-        let outcomes = self
-            .fleet
-            .run_telling(jobs.into_iter().map(held).collect(), &mut |early| arrivals.take_early(early));
+        // Nobody reads the states that whole records end in.
+        let held = jobs.into_iter().map(|(setup, job)| (setup, job.map(Held::Values)));
+        let outcomes = self.fleet.run_telling(held.collect(), &mut |early| arrivals.take_early(early));
         let Arrivals { mut early, refused, .. } = arrivals;
         // The events are kept even if the runs end in an error.
         self.keep_events()?;
@@ -270,12 +270,6 @@ impl Arrivals<'_> {
         self.early.extend(runs);
         Ok(())
     }
-}
-
-/// A job as a fleet takes it that may keep states for its caller: nobody reads those of whole records.
-fn held((setup, job): (SetupId, Job)) -> (SetupId, Job<Held>) {
-    let Job { particle, record, window, theta, state } = job;
-    (setup, Job { particle, record, window, theta, state: state.map(Held::Values) })
 }
 
 /// The row and the result to remember of a run.

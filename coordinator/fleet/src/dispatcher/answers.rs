@@ -26,6 +26,9 @@ impl Dispatcher {
         let is_shared = self.is_shared(index);
         let Some(batch) = &mut self.batch else { return };
         if self.repeats.open.remove(&(id, index)) || batch.is_finished(index) {
+            if answer == LeaseOutcome::Withdrawn && !asked_back {
+                self.no_opinion(id, index);
+            }
             return self.repeated(now, id, index, answer);
         }
         match answer {

@@ -5,9 +5,10 @@
 mod arrived;
 mod held;
 mod notices;
+mod recalls;
 mod results;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use starlings_models::Failure;
 use starlings_proto::SetupId;
@@ -269,20 +270,6 @@ impl Batch {
         let (attempts, (id, name)) = (self.attempts(index) + 1, by);
         self.jobs[index].by = Some(id);
         self.end(index, Outcome { result, attempts, worker: name.to_owned() });
-    }
-
-    /// A job is recalled only for one of these setups, and at most once, so that it cannot be sent to and fro without end.
-    pub(super) fn may_recall(&self, job: u64, setups: &BTreeSet<SetupId>) -> bool {
-        self.index_of(job).is_some_and(|index| {
-            let job = &self.jobs[index];
-            !job.recalled && job.doubt.is_none() && setups.contains(self.setup_of(index))
-        })
-    }
-
-    pub(super) fn mark_recalled(&mut self, job: u64) {
-        if let Some(index) = self.index_of(job) {
-            self.jobs[index].recalled = true;
-        }
     }
 
     /// Attempts that ended with a lost worker or a failure; those that a place could not make are none.

@@ -14,7 +14,7 @@ use starlings_proto::{LeaseOutcome, SetupId};
 use super::Dispatcher;
 use super::message::{Likeness, WorkerId};
 use super::opinion::{Opinion, Said, alike};
-use super::repeats::{Contributor, Dispute, MOST};
+use super::repeats::{Contributor, Dispute, MOST, draws};
 use super::roster::Worker;
 use super::schedule::lease;
 use crate::wire::Prediction;
@@ -44,7 +44,7 @@ impl Dispatcher {
             repeats.contributors.entry(id).or_insert_with(new);
         }
         let is_first = !repeats.compared.contains(&(id, setup)) && repeats.affords();
-        if is_first || repeats.draws(comparing.seed, batch.job_number(index)) {
+        if is_first || draws(comparing.seed, batch.job_number(index)) {
             repeats.compared.insert((id, setup));
             repeats.sampled.push_back(index);
         }
@@ -138,7 +138,7 @@ impl Dispatcher {
                 }
                 return;
             }
-            LeaseOutcome::Withdrawn => return self.no_opinion(id, index),
+            LeaseOutcome::Withdrawn => return,
         };
         self.works(id);
         self.compare(id, index, said);

@@ -86,14 +86,18 @@ impl Dispatcher {
             self.out.push(Command::Notice(event(difference(opinions))));
         }
         self.repeats.disputes.remove(&index);
-        opinions.iter().for_each(|opinion| self.trusted(opinion.by));
+        for opinion in opinions {
+            self.trusted(opinion.by);
+        }
     }
 
     /// Puts workers out; what they answered in this batch is made again.
     fn convict(&mut self, index: usize, opinions: &[Opinion], wrong: &BTreeSet<WorkerId>) {
         self.repeats.disputes.remove(&index);
         let right = opinions.iter().filter(|o| !wrong.contains(&o.by)).collect::<Vec<_>>();
-        right.iter().for_each(|opinion| self.trusted(opinion.by));
+        for opinion in &right {
+            self.trusted(opinion.by);
+        }
         for &id in wrong {
             let Some(batch) = &self.batch else { return };
             let of_it = opinions.iter().filter(|o| o.by == id);
@@ -110,11 +114,11 @@ impl Dispatcher {
                 name.record,
                 difference(&told)
             );
-            self.put_out(id, &told[0].name, reason);
+            self.put_out(id, &told[0].name, &reason);
         }
     }
 
-    fn put_out(&mut self, id: WorkerId, called: &str, reason: String) {
+    fn put_out(&mut self, id: WorkerId, called: &str, reason: &str) {
         let Some(batch) = &mut self.batch else { return };
         let again = batch.made_by(id);
         for &index in &again {
@@ -132,6 +136,7 @@ impl Dispatcher {
             }
         }
         self.repeats.contributors.remove(&id);
+        self.send_reopened();
         let (name, build, taken) = self.workers.get(&id).map_or_else(
             || (called.to_owned(), String::new(), 0),
             |worker| (worker.name.clone(), worker.build.clone(), worker.taken),
@@ -140,14 +145,26 @@ impl Dispatcher {
         let notice = FleetEvent::WorkerExcluded {
             worker: name,
             build,
-            reason: reason.clone(),
+            reason: reason.to_owned(),
             again: again.len(),
             earlier,
         };
         self.out.push(Command::Notice(notice));
         if self.workers.contains_key(&id) {
-            self.out.push(Command::PutOut { worker: id, reason: reason.clone() });
-            self.lose(id, &reason, true);
+            self.out.push(Command::PutOut { worker: id, reason: reason.to_owned() });
+            self.lose(id, reason, true);
+        }
+    }
+
+    /// Sends the setups of jobs that are open again to the workers that came, or forgot them, when none was.
+    fn send_reopened(&mut self) {
+        let Some(batch) = &self.batch else { return };
+        for worker in self.workers.values_mut() {
+            for &setup in batch.open_setups() {
+                if !worker.setups.contains_key(&setup) && worker.wants(setup, self.now) {
+                    self.out.push(Command::SendSetup { worker: worker.id, setup });
+                }
+            }
         }
     }
 

@@ -36,7 +36,7 @@ const REPEAT_SHORTEST: Duration = Duration::from_secs(30);
 struct Slow {
     index: usize,
     age: Duration,
-    slow: bool,
+    everywhere: bool,
 }
 
 impl Dispatcher {
@@ -132,13 +132,13 @@ fn candidates(workers: &[&Worker], batch: &Batch, now: Duration, usual: f64) -> 
             let open = |index: &usize| !batch.is_finished(*index) && !worker.has_dropped(job);
             let Some(index) = batch.index_of(job).filter(open) else { continue };
             let slow = age > limit(SHORTEST, FACTOR, usual, rounds);
-            let entry = held.entry(index).or_insert((0, Slow { index, age, slow: true }));
+            let entry = held.entry(index).or_insert((0, Slow { index, age, everywhere: true }));
             entry.0 += 1;
-            entry.1.slow &= slow;
+            entry.1.everywhere &= slow;
             entry.1.age = entry.1.age.min(age);
         }
     }
-    let slow = held.into_values().filter(|(n, slow)| slow.slow && *n < MOST);
+    let slow = held.into_values().filter(|(n, slow)| slow.everywhere && *n < MOST);
     let mut slow = slow.map(|(_, slow)| slow).collect::<Vec<_>>();
     slow.sort_by_key(|slow| std::cmp::Reverse(slow.age));
     slow

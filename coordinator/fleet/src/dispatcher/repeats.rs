@@ -79,11 +79,6 @@ impl Repeats {
         self.likeness.get(setup).copied().unwrap_or(Likeness::Exact)
     }
 
-    /// Whether a job is drawn to be repeated.
-    pub(super) fn draws(&self, seed: u64, job: u64) -> bool {
-        mixed(seed ^ mixed(job)) % SAMPLED == 0
-    }
-
     /// Whether one more repeat stays within its share of the runs.
     pub(super) fn affords(&self) -> bool {
         (self.n_repeat + 1) * MOST <= self.n_run
@@ -99,6 +94,11 @@ impl Repeats {
         self.open.retain(|(by, _)| *by != worker);
         self.compared.retain(|(by, _)| *by != worker);
     }
+}
+
+/// Whether a job is drawn to be repeated.
+pub(super) fn draws(seed: u64, job: u64) -> bool {
+    mixed(seed ^ mixed(job)).is_multiple_of(SAMPLED)
 }
 
 /// Bits that look like drawn ones (splitmix64).

@@ -1,5 +1,7 @@
 //! What the dispatcher knows of each worker: its slots, its leases, its setups, how long its jobs take.
 
+mod leases;
+
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -205,86 +207,12 @@ impl Worker {
         );
     }
 
-    /// Marks a lease whose answer does not matter any more.
-    pub(super) fn drop_lease(&mut self, job: u64) {
-        if let Some(held) = self.held.get_mut(&job) {
-            held.dropped = true;
-        }
-    }
-
-    /// Whether the answer of a lease does not matter any more.
-    pub(super) fn has_dropped(&self, job: u64) -> bool {
-        self.held.get(&job).is_some_and(|held| held.dropped)
-    }
-
-    /// Time in which nothing could happen is no time of its runs.
-    pub(super) fn stood_still(&mut self, gap: Duration, now: Duration) {
-        self.last_heard = (self.last_heard + gap).min(now);
-        for held in self.held.values_mut() {
-            held.since = (held.since + gap).min(now);
-            held.running_since = held.running_since.map(|since| (since + gap).min(now));
-        }
-    }
-
-    /// Whether it has a lease of this job.
-    pub(super) fn holds(&self, job: u64) -> bool {
-        self.held.contains_key(&job)
-    }
-
-    /// Its lease of this job.
-    pub(super) fn lease_of(&self, job: u64) -> Option<Lease> {
-        let held = self.held.get(&job)?;
-        Some(Lease { epoch: self.id.0, job, attempt: held.attempt })
-    }
-
-    /// Its leases, each with its age and the number of runs per slot that were to be made before it ended.
-    pub(super) fn ages(&self, now: Duration) -> Vec<(u64, Duration, usize)> {
-        let age = |job: &u64| self.held.get(job).map_or(now, |held| held.since);
-        let aged = self.leases_in_order().into_iter().enumerate();
-        aged.map(|(i, job)| (job, now.saturating_sub(age(&job)), i / self.slots + 1)).collect()
-    }
-
     /// Its name, with its build where that is known.
     pub(super) fn called(&self) -> String {
         match self.build.get(..12) {
             Some(build) => format!("{} (build {build})", self.name),
             None => self.name.clone(),
         }
-    }
-
-    /// Ends a lease; `None` when it is not held.
-    pub(super) fn release(&mut self, job: u64, attempt: u32) -> Option<Released> {
-        self.held.get(&job).filter(|held| held.attempt == attempt)?;
-        self.answers += 1;
-        self.overtaken = 0;
-        self.held.remove(&job).map(|held| Released { recalled: held.recalled, dropped: held.dropped })
-    }
-
-    /// Ends the lease of a job, whatever its attempt.
-    pub(super) fn take_back(&mut self, job: u64) -> Option<Lease> {
-        let held = self.held.remove(&job)?;
-        Some(Lease { epoch: self.id.0, job, attempt: held.attempt })
-    }
-
-    pub(super) fn leases(&self) -> impl Iterator<Item = Lease> + '_ {
-        self.held.iter().map(|(&job, held)| Lease { epoch: self.id.0, job, attempt: held.attempt })
-    }
-
-    /// Jobs held, oldest lease first. Workers start jobs in this order, so the first ones were running.
-    pub(super) fn leases_in_order(&self) -> Vec<u64> {
-        let mut jobs = self.held.iter().map(|(&job, held)| (held.order, job)).collect::<Vec<_>>();
-        jobs.sort_unstable();
-        jobs.into_iter().map(|(_, job)| job).collect()
-    }
-
-    /// Marks the youngest lease that waits behind the running ones and `may` be called back.
-    pub(super) fn youngest(&mut self, may: impl Fn(u64) -> bool) -> Option<Lease> {
-        let waiting = self.leases_in_order().split_off(self.slots.min(self.load()));
-        let open = |job: &u64| may(*job) && self.held.get(job).is_some_and(|held| !held.recalled);
-        let job = waiting.into_iter().rfind(open)?;
-        let held = self.held.get_mut(&job)?;
-        held.recalled = true;
-        Some(Lease { epoch: self.id.0, job, attempt: held.attempt })
     }
 
     pub(super) fn learn_cost(&mut self, seconds: f64) {

@@ -9,6 +9,7 @@ mod leases;
 mod losses;
 mod mixed;
 mod recall;
+mod repeats;
 mod waiting;
 
 use std::time::Duration;

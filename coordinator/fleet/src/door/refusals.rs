@@ -125,6 +125,21 @@ impl Refusals {
     }
 }
 
+/// The callers that a fleet refused, for whoever waits for workers.
+#[derive(Clone)]
+pub struct Refused(Arc<Refusals>);
+
+impl Refused {
+    pub(crate) fn new(refusals: Arc<Refusals>) -> Self {
+        Self(refusals)
+    }
+
+    /// How many there were, and the last of them with the reason; nothing where there was none.
+    pub fn summary(&self) -> Option<String> {
+        self.0.summary()
+    }
+}
+
 fn is_power_of_ten(n: u64) -> bool {
     n > 0 && 10_u64.pow(n.ilog10()) == n
 }

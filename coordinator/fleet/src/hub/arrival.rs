@@ -4,11 +4,11 @@
 //! sent it is at fault. Next file to read: [`super::state`].
 
 use starlings_models::ParticleError;
-use starlings_proto::{Lease, LeaseOutcome, SetupId, State as Travelling, StateId};
+use starlings_proto::{Lease, LeaseOutcome, SetupId, State as Travelling};
 
 use super::state::State;
 use crate::dispatcher::Asked;
-use crate::wire::{Job, Prediction};
+use crate::wire::{Job, Prediction, named};
 
 impl State {
     /// An answer, or what is wrong with it as a failure of its worker. One that nobody waits for is left as it is. A state that was
@@ -48,14 +48,6 @@ impl State {
             Asked::Job(index) => self.running.as_ref()?.jobs.get(index),
             Asked::Control(control) => self.kept.get(&control),
         }
-    }
-}
-
-/// The name of the state that an answer says its run ended in.
-pub(super) fn named(answer: &LeaseOutcome) -> Option<&StateId> {
-    match answer {
-        LeaseOutcome::Ran(Ok(Prediction { state: Travelling::Named(id), .. })) => Some(id),
-        _ => None,
     }
 }
 

@@ -7,58 +7,17 @@ use std::collections::HashMap;
 use std::time::Duration;
 
 use starlings_proto::convert::ended;
-use starlings_proto::{Bytes, HeldRun, JobKey, JobKeys, Lease, LeaseOutcome, SetupId, ToWorker};
+use starlings_proto::{HeldRun, JobKey, JobKeys, Lease, LeaseOutcome, SetupId, ToWorker};
 
 use super::state::State;
+use super::waiting::Run;
 use crate::FleetEvent;
 use crate::dispatcher::{Event, Taken, WorkerId};
 use crate::job_name::JobName;
 use crate::wire::Job;
 
-/// Bytes of results that wait for a batch at most.
-const MOST: usize = 256 * 1024 * 1024;
-
 /// Batches for which a run waits: the one that a resumed run goes on with, and the rest of it where its first particles are rescued.
 const BATCHES: u32 = 2;
-
-/// Runs that wait for the batch that needs them.
-#[derive(Default)]
-pub(super) struct Waiting {
-    runs: HashMap<JobKey, Run>,
-    bytes: usize,
-    /// The jobs of the running batch by their keys, once a worker brought something along.
-    places: Option<HashMap<JobKey, usize>>,
-}
-
-struct Run {
-    worker: WorkerId,
-    ended: Option<Bytes>,
-    /// Batches that did not need it.
-    passed: u32,
-}
-
-impl Waiting {
-    fn put(&mut self, key: JobKey, run: Run) {
-        let bytes = run.ended.as_ref().map_or(0, Bytes::len);
-        if self.bytes + bytes > MOST {
-            return;
-        }
-        self.bytes += bytes;
-        if let Some(old) = self.runs.insert(key, run) {
-            self.bytes -= old.ended.map_or(0, |ended| ended.len());
-        }
-    }
-
-    /// What a worker still made is lost with it; what it had finished is not.
-    pub(super) fn left(&mut self, worker: WorkerId) {
-        self.runs.retain(|_, run| run.worker != worker || run.ended.is_some());
-    }
-
-    fn take_all(&mut self) -> HashMap<JobKey, Run> {
-        self.bytes = 0;
-        std::mem::take(&mut self.runs)
-    }
-}
 
 /// What came of the runs that one worker brought along.
 #[derive(Default)]

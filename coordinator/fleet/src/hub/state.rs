@@ -11,15 +11,16 @@ use starlings_proto::{
 };
 use tokio::sync::mpsc::UnboundedSender;
 
-use super::arrival::named;
+use super::doorway::Doorway;
 use super::excluded::Excluded;
-use super::held::Waiting;
 use super::states::States;
 use super::teller::Teller;
+use super::waiting::Waiting;
 use super::{Outgoing, Reply};
 use crate::dispatcher::{BatchError, Command, ControlId, Dispatcher, Event, WorkerId};
-use crate::wire::{self, Job};
-use crate::{FleetEvent, Held, Outcome, StateStore, StoredState};
+use crate::event_text::OVER;
+use crate::wire::{Job, named};
+use crate::{FleetEvent, StateStore, StoredState};
 
 /// Workers of one coordinator at most.
 const MAX_WORKERS: usize = 4096;
@@ -50,6 +51,7 @@ pub(super) struct State {
     /// Runs that workers brought along.
     pub(super) waiting: Waiting,
     pub(super) excluded: Excluded,
+    pub(super) doorway: Doorway,
 }
 
 /// Names and sizes of what a setup runs, as far as they are known without building it.
@@ -132,6 +134,7 @@ impl State {
             other_builds: BTreeSet::new(),
             waiting: Waiting::default(),
             excluded: Excluded::default(),
+            doorway: Doorway::default(),
         }
     }
 
@@ -151,7 +154,7 @@ impl State {
             return Err(Closed::Refused(reason));
         }
         if self.draining {
-            return Err(Closed::Over("the run is over".to_owned()));
+            return Err(Closed::Over(OVER.to_owned()));
         }
         Ok(())
     }
@@ -248,9 +251,12 @@ impl State {
                     let listed = named.iter().map(|(name, value)| format!("{name} = {value}"));
                     *parameters = listed.collect::<Vec<_>>().join(", ");
                 }
+                if let BatchError::NoWorkers { missing, .. } = &mut error {
+                    missing.push_str(&self.turned_away());
+                }
                 self.reply(Err(error));
             }
-            Command::Notice(event) => self.tell(event),
+            Command::Notice(event) => self.notify(event),
             Command::GivenUp { index, mut notice } => {
                 if let FleetEvent::JobFailed { parameters, .. } = &mut notice {
                     *parameters = self.parameters(index);
@@ -282,37 +288,5 @@ impl State {
     /// What a worker is called in events.
     pub(super) fn name(&self, worker: WorkerId) -> String {
         self.links.get(&worker).map_or_else(String::new, |link| link.name.clone())
-    }
-
-    /// Ends a worker's session for good: it is told why, and its process is not taken again.
-    fn put_out(&mut self, worker: WorkerId, reason: &str) {
-        let Some(link) = self.links.remove(&worker) else { return };
-        link.send(ToWorker::drain(reason));
-        self.excluded.add(link.nonce, reason);
-        // What it answered is made again.
-        let Self { states, dispatcher, .. } = self;
-        states.keep_needed(|id| dispatcher.needs_state(id));
-    }
-
-    pub(super) fn reply(&mut self, reply: Reply) {
-        if let Some(running) = self.running.take() {
-            // Who is told of an error asks for what had arrived.
-            if reply.is_ok() {
-                self.states.forget();
-            }
-            let _ = running.reply.send(reply);
-        }
-    }
-
-    /// Outcomes that the caller of the batch was not told of before, of one that ended in an error too.
-    pub(super) fn arrived(&mut self) -> Vec<(usize, Outcome<Held>)> {
-        let arrived = self.dispatcher.arrived().into_iter();
-        let held = |(index, outcome): (usize, wire::Outcome)| Some((index, self.states.held(outcome)?));
-        // One whose state is gone is made again.
-        let arrived = arrived.filter_map(held).collect();
-        if self.running.is_none() {
-            self.states.forget();
-        }
-        arrived
     }
 }

@@ -11,7 +11,7 @@ use std::sync::{Arc, Condvar, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use starlings_fleet::{FleetConfig, FleetEvent, GrpcFleet, Outcome};
+use starlings_fleet::{FleetConfig, FleetEvent, GrpcFleet, Outcome, RunIdentity};
 use starlings_models::{Forward, Job, ParticleError, Prediction, Setup, SetupError, Spec, Window};
 use starlings_worker::{Factory, WorkerConfig, WorkerError, WorkerReport};
 use tokio_util::sync::CancellationToken;
@@ -102,6 +102,14 @@ pub fn private() -> (GrpcFleet, Receiver<FleetEvent>, CancellationToken) {
     start(None, |_| {})
 }
 
+/// A fleet of this start of a run.
+pub fn incarnation(id: u8, incarnation: u64) -> (GrpcFleet, Receiver<FleetEvent>) {
+    let (sender, events) = mpsc::channel();
+    let mut config = FleetConfig::new(any_port(), "test", CancellationToken::new(), sender);
+    config.identity = RunIdentity { id: [id; 16], incarnation };
+    (GrpcFleet::listen(config).expect("a free port"), events)
+}
+
 fn start(
     address: Option<SocketAddr>,
     change: impl FnOnce(&mut FleetConfig),
@@ -157,8 +165,10 @@ impl ThreadWorker {
 /// A way to a server that can be cut like a cable; afterwards it passes new connections again.
 pub struct Proxy {
     pub address: SocketAddr,
+    server: Arc<Mutex<SocketAddr>>,
     ends: Arc<Mutex<Vec<TcpStream>>>,
     silent: Arc<Silent>,
+    mute: Arc<Silent>,
 }
 
 /// Whether what the server says is held back.
@@ -169,6 +179,11 @@ struct Silent {
 }
 
 impl Silent {
+    fn hold(&self, held: bool) {
+        *self.held.lock().unwrap() = held;
+        self.changed.notify_all();
+    }
+
     fn wait(&self) {
         let held = self.held.lock().unwrap();
         drop(self.changed.wait_while(held, |held| *held).unwrap());
@@ -179,27 +194,42 @@ impl Proxy {
     pub fn to(server: SocketAddr) -> Self {
         let listener = TcpListener::bind(any_port()).expect("a free port");
         let address = listener.local_addr().expect("bound");
+        let server = Arc::new(Mutex::new(server));
+        let way = Arc::clone(&server);
         let ends = Arc::new(Mutex::new(vec![]));
         let shared = Arc::clone(&ends);
         let silent = Arc::<Silent>::default();
         let quiet = Arc::clone(&silent);
+        let mute = Arc::<Silent>::default();
+        let muted = Arc::clone(&mute);
         std::thread::spawn(move || {
             for near in listener.incoming().map_while(Result::ok) {
+                let server = *way.lock().unwrap();
                 let Ok(far) = TcpStream::connect(server) else { continue };
                 shared.lock().unwrap().extend([near.try_clone().unwrap(), far.try_clone().unwrap()]);
                 let (near2, far2) = (near.try_clone().unwrap(), far.try_clone().unwrap());
-                let quiet = Arc::clone(&quiet);
-                std::thread::spawn(move || pump(near, far, || {}));
+                let (quiet, muted) = (Arc::clone(&quiet), Arc::clone(&muted));
+                std::thread::spawn(move || pump(near, far, || muted.wait()));
                 std::thread::spawn(move || pump(far2, near2, || quiet.wait()));
             }
         });
-        Self { address, ends, silent }
+        Self { address, server, ends, silent, mute }
     }
 
     /// Holds back what the server says, or lets it go; the other direction passes.
     pub fn silence(&self, held: bool) {
-        *self.silent.held.lock().unwrap() = held;
-        self.silent.changed.notify_all();
+        self.silent.hold(held);
+    }
+
+    /// Holds back what the clients say, for good.
+    pub fn mute(&self) {
+        self.mute.hold(true);
+    }
+
+    /// Cuts it, and passes new connections to another server.
+    pub fn lead_to(&self, server: SocketAddr) {
+        *self.server.lock().unwrap() = server;
+        self.cut();
     }
 
     pub fn cut(&self) {

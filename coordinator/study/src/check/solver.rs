@@ -20,6 +20,9 @@ use crate::file::StudyFile;
 use crate::file::solver::{ProgramQuantity, ProgramSection};
 use crate::problem::Source;
 
+/// What is said of a solver that is not tried before its study runs.
+pub(crate) const UNTRIED: &str = "no trial run is made here";
+
 /// A solver with its description.
 pub(crate) struct DescribedSolver {
     pub(crate) def: SolverDef,
@@ -260,8 +263,7 @@ pub(crate) fn check(source: &Source, file: &StudyFile, known: Option<&DescribedS
     }
     if !known.is_here {
         warnings.push(format!(
-            "the solver `{name}` is described by a file: no trial run is made here, and nothing has asked it whether the file \
-             is right."
+            "the solver `{name}` is described by a file: {UNTRIED}, and nothing has asked it whether the file is right."
         ));
     }
     warnings

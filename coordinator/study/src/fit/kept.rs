@@ -8,8 +8,8 @@ use starlings_fleet::{Fleet, FleetError, Held, Outcome, SetupId};
 use starlings_models::{Failure, Job};
 use starlings_proto::JobKeys;
 
+use super::index::AnalysisIndex;
 use super::journal::Journal;
-use super::results::AnalysisIndex;
 use super::timeouts::Timeouts;
 use crate::RunError;
 use crate::store::{Store, StoreError};

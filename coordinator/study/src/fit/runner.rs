@@ -11,8 +11,9 @@ use starlings_fleet::{Fleet, Held, Outcome, SetupId};
 use starlings_models::{BuildSetup, Job, Prediction, Setup, Window};
 
 use super::failures::{FailureCluster, Failures};
+pub(crate) use super::index::AnalysisIndex;
 use super::kept::Kept;
-pub(crate) use super::results::{AnalysisIndex, Predicted, Results, StepWindows};
+pub(crate) use super::results::{Predicted, Results, StepWindows};
 use crate::states::States;
 use crate::store::snapshot::Counts;
 use crate::store::{JobRow, Store};

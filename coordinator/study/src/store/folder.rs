@@ -101,6 +101,17 @@ impl RunFolder {
         Ok(states)
     }
 
+    /// Removes a run that came to nothing, and its folder where that is empty then.
+    pub fn discard(self) {
+        let Self { path, store, _lock } = self;
+        drop(store);
+        make::remove(&path.join(DATABASE));
+        // What cannot be removed is in the way of nothing: the next start says what it finds.
+        let _ = std::fs::remove_file(path.join(FROZEN));
+        drop(_lock);
+        let _ = std::fs::remove_dir(path);
+    }
+
     /// What the folder is for.
     ///
     /// # Errors

@@ -153,7 +153,7 @@ impl Store {
 #[cfg(test)]
 mod tests {
     use super::super::snapshot::{Ensemble, Figures, Matrix, Snapshot};
-    use super::super::{AnalysisRow, Store};
+    use super::super::{AnalysisRow, ArrivedRun, Store};
     use super::*;
     use crate::states::States;
     use crate::states::stored::StoredStates;
@@ -224,6 +224,44 @@ mod tests {
         assert_eq!(states.n_pieces(), 6);
         store.forget_states().expect("room");
         assert_eq!((states.n_pieces(), files()), (0, 0));
+    }
+
+    #[test]
+    fn a_run_that_arrived_with_a_large_state_is_found_again_until_its_analysis_is_stored() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let store = Store::create(&folder.path().join("run.db"), &[]).expect("a store");
+        let states = StateStore::new(usize::MAX);
+        states.settle(&folder.path().join("states"));
+        let files = || std::fs::read_dir(folder.path().join("states")).expect("a folder").count();
+        let (key, values) = ([7; 32], (0..N).map(|i| i as f64 / 3.0).collect::<Vec<_>>());
+        let state = Some(states.keep(&values).expect("room"));
+        let run = ArrivedRun { attempts: 1, worker: "w".to_owned(), body: vec![1], state };
+        store.keep_arrived(&[(key, run)]).expect("room");
+        assert_eq!(files(), 2);
+        // Killed here, a resume has it, and leaves it when it ends in order.
+        let (again, fresh) =
+            (Store::open(&folder.path().join("run.db")).expect("it opens"), StateStore::new(0));
+        fresh.settle(&folder.path().join("states"));
+        again.reopen_arrived(&fresh).expect("it is whole");
+        fresh.sweep();
+        let found = again.arrived(&key).expect("readable").expect("it is there");
+        assert!(found.state.expect("in the folder").values().expect("readable") == values);
+        drop(again);
+        assert_eq!(files(), 2);
+        // With a piece missing it is made again.
+        let (third, fresh) =
+            (Store::open(&folder.path().join("run.db")).expect("it opens"), StateStore::new(0));
+        fresh.settle(&tempfile::tempdir().expect("a folder").path().join("states"));
+        third.reopen_arrived(&fresh).expect("no error");
+        assert_eq!(third.arrived(&key).expect("readable").and_then(|run| run.state), None);
+        drop(third);
+        store.analysis(&row(0), &snapshot(&states, 0)).expect("room");
+        assert_eq!(files(), 2, "the row that names it stands until the commit");
+        store.commit().expect("room");
+        assert_eq!((files(), states.n_pieces()), (6, 6), "those of the snapshot alone");
+        assert_eq!(store.arrived_keys().expect("readable").len(), 0);
+        drop(store);
+        assert_eq!(files(), 6, "an end in order leaves what a resume needs");
     }
 
     #[test]

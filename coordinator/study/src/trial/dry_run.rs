@@ -10,7 +10,7 @@ use starlings_estimators::{Form, Kind};
 use starlings_models::external::table::is_transposed;
 use starlings_models::{Forward, Prediction, Window};
 
-use super::{Fault, TrialChannel, TrialError, named, run, trial};
+use super::{Fault, TrialChannel, TrialError, named, run, trial_by};
 use crate::{Study, posterior};
 
 /// Windows of a record that are run where not all are.
@@ -25,22 +25,32 @@ pub enum Depth {
     First,
 }
 
-/// The trial of [`trial`] and then the runs of a fit by `kind`; notes in the study whether whole records must be run. None
+/// The trial of [`super::trial()`] and then the runs of a fit by `kind`; notes in the study whether whole records must be run. None
 /// where the model cannot be run in this process.
 ///
 /// # Errors
-/// As [`trial`], and when a run of the fit fails though the whole record does not.
+/// As [`super::trial()`], and when a run of the fit fails though the whole record does not.
 pub fn dry_run(study: &mut Study, kind: &Kind, depth: Depth) -> Result<Vec<TrialChannel>, TrialError> {
-    let channels = trial(study)?;
     if !study.runs_here {
-        return Ok(channels);
+        return Ok(Vec::new());
     }
     let model = study.solver_host.build(&study.setup)?;
+    dry_run_by(study, kind, depth, &*model)
+}
+
+/// The same by a model that is built.
+pub(super) fn dry_run_by(
+    study: &mut Study,
+    kind: &Kind,
+    depth: Depth,
+    model: &dyn Forward,
+) -> Result<Vec<TrialChannel>, TrialError> {
+    let channels = trial_by(study, model)?;
     for record in 0..study.records.len() {
         if !study.records[record].is_trained() {
             continue;
         }
-        let of_record = DryRun::new(study, &*model, record);
+        let of_record = DryRun::new(study, model, record);
         let told = match kind.form {
             Form::Windows(_) => of_record.windows(depth).map(|()| None)?,
             Form::WholeRecords => of_record.training_span()?,

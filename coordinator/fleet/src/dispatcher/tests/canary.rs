@@ -1,7 +1,5 @@
 //! Results of workers compared: who is asked, who is put out, what is made again.
 
-use proptest::prelude::*;
-
 use super::*;
 use crate::dispatcher::{Comparing, Likeness};
 
@@ -17,7 +15,7 @@ pub(super) fn comparing(slots: &[u32], mixed: bool) -> Stage {
 }
 
 /// The right answer times a factor.
-fn scaled(index: usize, factor: f64) -> Prediction {
+pub(super) fn scaled(index: usize, factor: f64) -> Prediction {
     Prediction { outputs: vec![(index as f64 + 1.0) * factor], state: vec![].into(), cost: 0.0 }
 }
 
@@ -41,7 +39,7 @@ fn played(
     all
 }
 
-fn put_out(commands: &[Command]) -> Vec<u64> {
+pub(super) fn put_out(commands: &[Command]) -> Vec<u64> {
     let out = commands.iter().filter_map(|command| match command {
         Command::PutOut { worker, .. } => Some(worker.0),
         _ => None,
@@ -49,11 +47,11 @@ fn put_out(commands: &[Command]) -> Vec<u64> {
     out.collect()
 }
 
-fn failed_with(commands: &[Command]) -> Option<&BatchError> {
+pub(super) fn failed_with(commands: &[Command]) -> Option<&BatchError> {
     commands.iter().find_map(|c| if let Command::BatchFailed(error) = c { Some(error) } else { None })
 }
 
-fn assert_right(commands: &[Command]) {
+pub(super) fn assert_right(commands: &[Command]) {
     let outcomes = outcomes(commands).expect("the batch ended");
     for (index, outcome) in outcomes.iter().enumerate() {
         assert_eq!(outcome.result, Ok(scaled(index, 1.0)));
@@ -239,54 +237,4 @@ fn workers_of_this_machine_are_sampled_only() {
     let first = stage.step(submit(20));
     let all = played(&mut stage, first, |_, index, _| Ok(scaled(index, 1.0)));
     assert_eq!(sent(&all).len(), 20);
-}
-
-#[test]
-fn a_repeat_that_never_comes_back_does_not_hold_the_batch() {
-    let mut stage = comparing(&[1, 1], false);
-    let first = stage.step(submit(2));
-    let jobs = sent(&first);
-    // The second one only beats.
-    let mut open = stage.jobs(ran(jobs[0].0, Ok(scaled(jobs[0].1, 1.0))));
-    let mut ended = false;
-    for _ in 0..200 {
-        for (lease, index) in std::mem::take(&mut open) {
-            if lease.epoch == 1 {
-                open.extend(stage.jobs(ran(lease, Ok(scaled(index, 1.0)))));
-            }
-        }
-        let commands = stage.seconds(1, &[1, 2]);
-        ended |= outcomes(&commands).is_some();
-        open.extend(sent(&commands));
-    }
-    assert!(ended, "the first one made all");
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(256))]
-
-    /// Honest workers are more than liars, each lie its own: what comes out is right, and only liars are put out.
-    #[test]
-    fn liars_never_change_an_outcome(
-        n_liar in 0_usize..3,
-        slots in prop::collection::vec(1_u32..3, 5),
-        n_job in 1_u32..60,
-        order in prop::collection::vec(any::<usize>(), 400),
-    ) {
-        let mut stage = comparing(&slots, false);
-        let mut commands = stage.step(submit(n_job));
-        let mut open = sent(&commands);
-        let mut order = order.into_iter().chain(std::iter::repeat(0));
-        let mut out = put_out(&commands);
-        while !open.is_empty() {
-            let (lease, index) = open.remove(order.next().expect("endless") % open.len());
-            let lie = if lease.epoch as usize <= n_liar { 1.0 - 0.001 * lease.epoch as f64 } else { 1.0 };
-            commands = stage.step(ran(lease, Ok(scaled(index, lie))));
-            out.extend(put_out(&commands));
-            open.retain(|(lease, _)| !out.contains(&lease.epoch));
-            open.extend(sent(&commands));
-        }
-        assert_right(&commands);
-        prop_assert!(out.iter().all(|who| *who as usize <= n_liar), "{out:?}");
-    }
 }

@@ -51,6 +51,31 @@ proptest! {
         prop_assert!(outcomes(&world.dispatcher.step(world.now, Event::Tick)).is_none());
     }
 
+    /// The same where results are compared: workers that fail now and then are put out, jobs are made again, and it ends all the same.
+    #[test]
+    fn every_job_ends_exactly_once_where_results_are_compared(
+        setups in prop::collection::vec(0_u8..4, 1..40),
+        local in any::<bool>(),
+        acts in prop::collection::vec(act(), 0..300),
+    ) {
+        let mut world = World::comparing(&setups, local);
+        for act in &acts {
+            if world.ended.is_some() {
+                break;
+            }
+            world.act(act);
+        }
+        if world.ended.is_none() {
+            world.finish();
+        }
+        if let Ok(outcomes) = world.ended.expect("finish ends it") {
+            prop_assert_eq!(outcomes.len(), setups.len());
+            for (index, outcome) in outcomes.iter().enumerate() {
+                prop_assert!(outcome.result.as_ref().map_or(true, |result| *result == prediction(index)));
+            }
+        }
+    }
+
     /// What a run of a job gives depends on the job alone; places fail now and then, workers leave and come.
     #[test]
     fn infrastructure_never_changes_an_outcome(

@@ -9,7 +9,9 @@ use starlings_proto::{Lease, LeaseOutcome, SetupId};
 
 use super::super::{RULES, answered, crash, joining, left, place, prediction, setup, solver, submit_mixed};
 use crate::FleetEvent;
-use crate::dispatcher::{BatchError, Command, ControlId, Dispatcher, Event, WorkerId};
+use crate::dispatcher::{
+    BatchError, Command, Comparing, ControlId, Dispatcher, Event, Rules, Taken, WorkerId,
+};
 use crate::wire::{Outcome, Prediction};
 
 /// One thing that the world does; numbers choose among what is possible then.
@@ -26,6 +28,8 @@ pub(super) enum Act {
     Place(usize),
     Late(usize),
     Repeat(usize),
+    /// A worker comes along with a job, finished or still being made.
+    Bring(usize, usize, bool),
     Wait(u64),
 }
 
@@ -42,6 +46,7 @@ pub(super) fn act() -> impl Strategy<Value = Act> {
         2 => any::<usize>().prop_map(Act::Place),
         1 => any::<usize>().prop_map(Act::Late),
         2 => any::<usize>().prop_map(Act::Repeat),
+        2 => (any::<usize>(), any::<usize>(), any::<bool>()).prop_map(|(who, which, done)| Act::Bring(who, which, done)),
         1 => (1_u64..30).prop_map(Act::Wait),
     ]
 }
@@ -71,10 +76,20 @@ pub(super) struct World {
 }
 
 impl World {
+    /// The same with results that are compared.
+    pub(super) fn comparing(setups: &[u8], local: bool) -> Self {
+        let comparing = Some(Comparing { seed: 3, mixed: false });
+        Self::with(Rules { comparing, timeout_factor: Some(4.0), ..RULES }, setups, local)
+    }
+
     /// One job per setup number.
     pub(super) fn new(setups: &[u8], local: bool) -> Self {
+        Self::with(RULES, setups, local)
+    }
+
+    fn with(rules: Rules, setups: &[u8], local: bool) -> Self {
         let mut world = Self {
-            dispatcher: Dispatcher::new(RULES),
+            dispatcher: Dispatcher::new(rules),
             now: Duration::ZERO,
             next_id: 0,
             alive: BTreeSet::new(),
@@ -116,7 +131,12 @@ impl World {
                 assert!(self.alive.contains(&worker.0), "a job is sent only to a live worker");
                 let twice = self.open.values().any(|(_, open)| *open == index);
                 let again = self.duplicated.contains(&index) || self.answered.contains(&index);
-                assert!(!twice || again, "a job has one lease at a time, unless it is slow or compared");
+                let stopped =
+                    self.open.values().all(|(lease, open)| *open != index || self.withdrawn.contains(lease));
+                assert!(
+                    !twice || again || stopped,
+                    "a job has one lease at a time, unless it is slow or compared"
+                );
                 let held = self.open.insert((worker.0, lease.job), (lease, index));
                 assert!(held.is_none(), "a worker has one lease of a job at a time");
             }
@@ -228,6 +248,7 @@ impl World {
                     self.event(answered(lease, LeaseOutcome::Ran(Ok(prediction(usize::MAX))), 1.0));
                 }
             }
+            Act::Bring(who, which, is_finished) => self.bring(who, which, is_finished),
             Act::Wait(seconds) => {
                 self.now += Duration::from_secs(seconds);
                 self.event(Event::Tick);
@@ -236,6 +257,26 @@ impl World {
         for &worker in &self.alive {
             let open = self.open.keys().filter(|(of, _)| *of == worker).count();
             assert_eq!(self.dispatcher.in_flight(WorkerId(worker)), open, "credit follows the open leases");
+        }
+    }
+
+    fn bring(&mut self, who: usize, which: usize, is_finished: bool) {
+        let Some(worker) = choose(&self.alive, who) else { return };
+        let index = which % self.setups.len();
+        let answer = is_finished.then(|| (LeaseOutcome::Ran(Ok(prediction(index))), 1.0));
+        let (taken, commands) = self.dispatcher.held(self.now, WorkerId(worker), index, answer);
+        let before =
+            self.open.iter().find(|(_, (_, open))| *open == index).map(|(key, (lease, _))| (*key, *lease));
+        if let (Some((key, lease)), true) = (before, taken != Taken::No) {
+            assert!(!self.controls.contains(&key), "what is in doubt is decided by runs of its own");
+            self.open.remove(&key);
+            self.past.push(lease);
+        }
+        if let Taken::Lease(lease) = taken {
+            self.open.insert((worker, lease.job), (lease, index));
+        }
+        for command in commands {
+            self.obey(command);
         }
     }
 

@@ -1,0 +1,37 @@
+//! About how many bytes a run of a study writes, before it is made.
+//!
+//! Next file to read: [`crate::store`].
+
+use starlings_estimators::{Form, SigmaSet};
+
+use crate::Study;
+
+/// Bytes of a row of the table of jobs, of estimates and of innovations, with their share of the file's structure.
+const ROWS: [u64; 3] = [110, 130, 110];
+
+/// Passes of a filter that goes on until it has settled; most do so sooner.
+const PASSES: usize = 6;
+
+impl Study {
+    /// Bytes that a run writes, to within a factor of a few: rows of every analysis, the final predictions, and the states that a
+    /// resume starts from, twice while they are replaced.
+    pub fn bytes_of_a_run(&self) -> u64 {
+        let p = self.theta.len();
+        let particles = SigmaSet::new(self.estimator.points, p).map_or(p + 1, |set| set.n_particle());
+        let times: usize = self.records.iter().map(|record| record.times.len()).sum();
+        let values = (times * self.setup.outputs.len()) as u64;
+        let records = self.records.len();
+        let (analyses, passes) = match self.estimator.kind.form {
+            Form::Windows(_) => {
+                let longest = (0..records).map(|record| self.windows(record).len()).max().unwrap_or(0);
+                (longest, self.estimator.passes.unwrap_or(PASSES))
+            }
+            Form::WholeRecords => (1, self.estimator.max_iterations),
+        };
+        let [job, estimate, innovation] = ROWS;
+        let of_analysis = (particles * records) as u64 * job + p as u64 * estimate;
+        let rows = (passes * analyses) as u64 * of_analysis + passes as u64 * values * innovation;
+        let states = (self.spec.n_state() * particles * records * 8) as u64;
+        rows + values * innovation + 2 * states
+    }
+}
