@@ -2,18 +2,24 @@
 //!
 //! A coordinator that is killed loses what it had not written yet, and a connection that breaks what was on its way; both come back
 //! from here by the keys of their jobs. In memory up to a limit, then in a file without a name in the scratch folder; when that is full
-//! too, no further run is started. Next file to read: [`crate::slots`].
+//! too, no further run is started. Results with large states are told of as runs that go on, and put when there is a lease for them
+//! ([`large`]). Next file to read: [`crate::slots`].
+
+mod kept;
+pub(crate) mod large;
+mod portions;
 
 use std::collections::{HashMap, VecDeque};
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, Write};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use starlings_models::{Job, ParticleError, Prediction};
-use starlings_proto::convert::ended;
-use starlings_proto::{Bytes, HeldRun, JobKey, JobKeys, SetupId, State, job_key};
+use kept::Kept;
+pub(crate) use kept::{Ended, Of};
+use portions::Portions;
+use starlings_proto::{HeldRun, JobKey, JobKeys};
 
 /// How long a result that was sent may still be on its way, or in the coordinator and not written: above the silence at which either
 /// side takes the other for gone.
@@ -59,21 +65,8 @@ struct Shared {
     file: Option<File>,
     on_disk: u64,
     n_on_disk: usize,
-}
-
-/// A run that ended, with what its key is made of.
-struct Kept {
-    at: Instant,
-    setup: SetupId,
-    job: Arc<Job>,
-    ended: Bytes,
-}
-
-impl Kept {
-    fn bytes(&self) -> usize {
-        let numbers = self.job.theta.len() + self.job.state.as_ref().map_or(0, Vec::len);
-        self.ended.len() + 8 * numbers + size_of::<Self>()
-    }
+    /// Those whose states are in files of their own.
+    spilled: Vec<Kept>,
 }
 
 impl Held {
@@ -102,14 +95,8 @@ impl Held {
     }
 
     /// Keeps how a run ended. False when nothing more can be held.
-    pub(crate) fn keep(
-        &self,
-        setup: SetupId,
-        job: Arc<Job>,
-        result: &Result<Prediction<State>, ParticleError>,
-        cost: f64,
-    ) -> bool {
-        let kept = Kept { at: Instant::now(), setup, job, ended: ended::encode(result, cost).into() };
+    pub(crate) fn keep(&self, of: Of, ended: Ended) -> bool {
+        let kept = Kept { at: Instant::now(), of, ended };
         let mut shared = self.lock();
         shared.bytes += kept.bytes();
         shared.runs.push_back(kept);
@@ -122,7 +109,7 @@ impl Held {
             return true;
         }
         while shared.bytes > self.limits.memory {
-            if shared.on_disk >= self.limits.disk || shared.spill(&self.scratch).is_err() {
+            if shared.on_disk() >= self.limits.disk || shared.spill(&self.scratch).is_err() {
                 return false;
             }
         }
@@ -133,27 +120,39 @@ impl Held {
     /// what is sent always is.
     pub(crate) fn portions(&self, bytes: usize) -> Vec<Vec<HeldRun>> {
         let mut shared = self.lock();
-        let mut portions = Portions { most: bytes, all: Vec::new(), last: 0 };
+        let mut portions = Portions::of(bytes);
         if let Err(error) = shared.unspill(|run| portions.add(run)) {
             tracing::warn!(
                 "results that were held on disk cannot be read, their runs are made again: {error}"
             );
         }
         let (now, mut keys) = (Instant::now(), JobKeys::default());
+        let spilled = std::mem::take(&mut shared.spilled);
+        shared.bytes += spilled.iter().map(Kept::bytes).sum::<usize>();
+        shared.runs.extend(spilled);
         for kept in &mut shared.runs {
             kept.at = now;
-            portions.add(HeldRun { key: keys.of(&kept.setup, &kept.job), ended: Some(kept.ended.clone()) });
+            if let Ended::Inside(bytes) = &kept.ended {
+                portions.add(HeldRun { key: kept.of.key(&mut keys), ended: Some(bytes.clone()) });
+            }
         }
-        portions.all
+        portions.all()
+    }
+
+    /// The keys of all that is held with large states.
+    pub(crate) fn large(&self) -> Vec<JobKey> {
+        let (mut keys, shared) = (JobKeys::default(), self.lock());
+        let large = shared.runs.iter().chain(&shared.spilled).filter(|kept| kept.large().is_some());
+        large.map(|kept| kept.of.key(&mut keys)).collect()
     }
 
     /// How runs ended, by the keys of their jobs, as far as they are held in memory.
-    pub(crate) fn ended(&self, wanted: &[JobKey]) -> HashMap<JobKey, Bytes> {
+    pub(crate) fn ended(&self, wanted: &[JobKey]) -> HashMap<JobKey, Ended> {
         if wanted.is_empty() {
             return HashMap::new();
         }
         let (mut keys, shared) = (JobKeys::default(), self.lock());
-        let all = shared.runs.iter().map(|kept| (keys.of(&kept.setup, &kept.job), kept.ended.clone()));
+        let all = shared.runs.iter().map(|kept| (kept.of.key(&mut keys), kept.ended.clone()));
         all.filter(|(key, _)| wanted.contains(key)).collect()
     }
 
@@ -163,16 +162,32 @@ impl Held {
 }
 
 impl Shared {
-    /// Moves the oldest run to the file.
+    /// Bytes in files.
+    fn on_disk(&self) -> u64 {
+        let large = self.runs.iter().chain(&self.spilled).filter_map(Kept::large);
+        self.on_disk + large.map(|large| large.bytes().1).sum::<u64>()
+    }
+
+    /// Moves the oldest run to a file.
     fn spill(&mut self, scratch: &Path) -> io::Result<()> {
         let Some(oldest) = self.runs.front() else { return Ok(()) };
+        let ended = match &oldest.ended {
+            Ended::Inside(bytes) => bytes.clone(),
+            Ended::Large(large) => {
+                let bytes = oldest.bytes();
+                large.spill(scratch)?;
+                self.bytes -= bytes;
+                self.spilled.extend(self.runs.pop_front());
+                return Ok(());
+            }
+        };
         let file = match &mut self.file {
             Some(file) => file,
             none => none.insert(tempfile::tempfile_in(scratch)?),
         };
-        let key = job_key(&oldest.setup, &oldest.job);
-        file.write_all(&[&key[..], &(oldest.ended.len() as u64).to_le_bytes(), &oldest.ended].concat())?;
-        self.on_disk += (key.len() + 8 + oldest.ended.len()) as u64;
+        let key = oldest.of.key(&mut JobKeys::default());
+        file.write_all(&[&key[..], &(ended.len() as u64).to_le_bytes(), &ended].concat())?;
+        self.on_disk += (key.len() + 8 + ended.len()) as u64;
         self.n_on_disk += 1;
         self.bytes -= oldest.bytes();
         self.runs.pop_front();
@@ -198,29 +213,15 @@ impl Shared {
     }
 }
 
-/// Runs in portions for messages.
-struct Portions {
-    most: usize,
-    all: Vec<Vec<HeldRun>>,
-    last: usize,
-}
-
-impl Portions {
-    fn add(&mut self, run: HeldRun) {
-        let bytes = run.key.len() + run.ended.as_ref().map_or(0, Bytes::len);
-        if self.all.is_empty() || self.last + bytes > self.most {
-            self.all.push(Vec::new());
-            self.last = 0;
-        }
-        self.last += bytes;
-        self.all.last_mut().into_iter().for_each(|portion| portion.push(run.clone()));
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use starlings_models::Window;
+    use std::sync::Arc;
 
+    use starlings_models::{Job, Prediction, Window};
+    use starlings_proto::convert::ended;
+    use starlings_proto::{State, job_key};
+
+    use super::large::Large;
     use super::*;
 
     const RUN: Run = Run { id: [1; 16], incarnation: 1 };
@@ -232,12 +233,8 @@ mod tests {
 
     fn keep(held: &Held, particle: u32) -> bool {
         let outputs = vec![f64::from(particle); 100];
-        held.keep(
-            [7; 32],
-            job(particle),
-            &Ok(Prediction { outputs, state: State::default(), cost: 0.5 }),
-            0.5,
-        )
+        let prediction = Prediction { outputs, state: State::default(), cost: 0.5 };
+        held.keep(Of::Job([7; 32], job(particle)), Ended::inside(&Ok(prediction), 0.5))
     }
 
     fn particles(held: &Held) -> Vec<f64> {
@@ -270,5 +267,27 @@ mod tests {
         assert!((1..4).contains(&last.len()), "{last:?}");
         assert!(!held.connected(Run { id: [2; 16], incarnation: 1 }));
         assert_eq!(held.portions(1000).len(), 0);
+    }
+
+    #[test]
+    fn large_states_wait_in_files_of_their_own_and_count() {
+        let held = Held::new(HoldLimits { memory: 9000, disk: 40_000 }, &std::env::temp_dir());
+        let keep = |n: u8| {
+            let prediction = Prediction { outputs: vec![1.0], state: vec![f64::from(n); 1000], cost: 0.5 };
+            held.keep(Of::Key([n; 32]), Ended::Large(Arc::new(Large::new(prediction))))
+        };
+        held.connected(RUN);
+        assert!((0..5).all(keep), "what was sent makes room");
+        assert_eq!(held.large(), [[4; 32]]);
+        held.disconnected();
+        let most = (10..).take_while(|n| keep(*n)).count();
+        assert!((4..8).contains(&most), "{most}");
+        held.connected(Run { incarnation: 2, ..RUN });
+        assert_eq!(held.portions(1000).len(), 0, "none fits into a message");
+        let mut all = held.large();
+        all.sort_unstable();
+        let last = 10 + most as u8;
+        assert_eq!(all, std::iter::once(4).chain(10..=last).map(|n| [n; 32]).collect::<Vec<_>>());
+        assert!(matches!(held.ended(&[[10; 32]]).get(&[10; 32]), Some(Ended::Large(_))));
     }
 }

@@ -196,9 +196,12 @@ fn begin(config: &WorkerConfig, slots: &Slots, held: Option<&Held>, connection: 
         slots.forget();
     }
     let outbox = &connection.outbox;
-    let going_on = slots.attach(outbox.clone());
+    let mut going_on = slots.attach(outbox.clone());
     let (mut portions, computing) = (held.portions(PORTION), going_on.len());
-    let finished = portions.iter().map(Vec::len).sum();
+    let large = held.large();
+    let finished = portions.iter().map(Vec::len).sum::<usize>() + large.len();
+    // They are put when there is a lease for them.
+    going_on.extend(large);
     if finished + computing == 0 {
         return;
     }

@@ -1,5 +1,6 @@
 //! One session with a coordinator: from its Welcome until it drains, vanishes, or the worker is cancelled.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use starlings_models::ParticleError;
@@ -13,12 +14,13 @@ use tonic::Streaming;
 
 use crate::WorkerConfig;
 use crate::dial::Connection;
-use crate::held::Held;
+use crate::held::large::Large;
+use crate::held::{self, Held};
 use crate::idle::Idle;
 use crate::inbox::Inbox;
 use crate::news::{News, Tell};
 use crate::setups::Setups;
-use crate::slots::{Slots, answer};
+use crate::slots::{Asked, Slots, answer};
 use crate::watch::Watch;
 
 /// How long a leaving worker waits for the coordinator to close the stream.
@@ -162,7 +164,7 @@ fn take(
         }
         Ok(ToWorker::Adopt { runs, rest_is_void }) => {
             let gone = slots.adopt(runs, |lease| inbox.asked(lease, outbox));
-            answer_held(gone, outbox, held);
+            answer_held(gone, outbox, held, inbox);
             if rest_is_void {
                 slots.drop_void();
             }
@@ -180,13 +182,38 @@ fn answer_held(
     runs: Vec<(JobKey, Lease)>,
     outbox: &UnboundedSender<generated::FromWorker>,
     held: Option<&Held>,
+    inbox: &Inbox,
 ) {
     let keys = runs.iter().map(|(key, _)| *key).collect::<Vec<_>>();
     let known = held.map(|held| held.ended(&keys)).unwrap_or_default();
+    let mut to_put = Vec::new();
     for (key, lease) in runs {
-        match known.get(&key).map(|bytes| ended::decode(bytes)) {
-            Some(Ok((result, cost))) => answer(outbox, lease, LeaseOutcome::Ran(result), cost),
-            _ => answer(outbox, lease, LeaseOutcome::Withdrawn, 0.0),
+        match known.get(&key) {
+            Some(held::Ended::Large(large)) => to_put.push((Arc::clone(large), inbox.asked(lease, outbox))),
+            Some(held::Ended::Inside(bytes)) => match ended::decode(bytes) {
+                Ok((result, cost)) => answer(outbox, lease, LeaseOutcome::Ran(result), cost),
+                Err(_) => answer(outbox, lease, LeaseOutcome::Withdrawn, 0.0),
+            },
+            None => answer(outbox, lease, LeaseOutcome::Withdrawn, 0.0),
+        }
+    }
+    put_held(to_put);
+}
+
+/// Puts held states, and answers for them, on a thread that waits for the network.
+fn put_held(runs: Vec<(Arc<Large>, Asked)>) {
+    if runs.is_empty() {
+        return;
+    }
+    let leases: Vec<_> = runs.iter().map(|(_, asked)| (asked.lease, asked.outbox.clone())).collect();
+    let put = move || {
+        for (large, Asked { lease, outbox, transfers }) in runs {
+            answer(&outbox, lease, LeaseOutcome::Ran(large.put(&transfers, lease)), large.cost());
+        }
+    };
+    if std::thread::Builder::new().name("held-states".to_owned()).spawn(put).is_err() {
+        for (lease, outbox) in leases {
+            answer(&outbox, lease, LeaseOutcome::Withdrawn, 0.0);
         }
     }
 }
@@ -214,8 +241,6 @@ async fn goodbye(
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use starlings_models::{BuildSetup, Job, Setup, Window};
     use starlings_proto::{JobEncoder, Lease, SentWindows, State, encode_setup};
     use tokio::sync::mpsc::unbounded_channel;

@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 
-use starlings_models::{ParticleError, Prediction};
+use starlings_models::ParticleError;
 use starlings_proto::convert::floats;
 use starlings_proto::convert::state::{
     CHUNK_VALUES, Get, PutHead, chunk_values, decode_chunk, decode_head, decode_put_result, encode_chunk,
@@ -12,7 +12,7 @@ use starlings_proto::convert::state::{
 };
 use starlings_proto::generated::{self, fleet_client::FleetClient};
 use starlings_proto::words::status_text;
-use starlings_proto::{Lease, MAX_INLINE_STATE, State, StateId, StateNaming, digest};
+use starlings_proto::{Lease, StateId, StateNaming, digest};
 use tokio::runtime::Handle;
 use tokio::sync::{Semaphore, mpsc, oneshot};
 use tokio_stream::wrappers::ReceiverStream;
@@ -75,28 +75,13 @@ impl Transfers {
         Ok(Incoming { state, n_state, inbound, spare: self.spare.clone() })
     }
 
-    /// What a run predicts, ready to be sent: a large end state has arrived at the coordinator by then. For a thread that computes.
-    pub(crate) fn sendable(
-        &self,
-        lease: Lease,
-        prediction: Prediction,
-    ) -> Result<Prediction<State>, ParticleError> {
-        prediction.try_map(|values| {
-            if values.len() * 8 <= MAX_INLINE_STATE {
-                return Ok(State::Values(values));
-            }
-            let put = self.put(lease, &values).map(State::Named);
-            self.recycle(values);
-            put
-        })
-    }
-
     /// Takes the memory of a state that is no longer needed, for one that comes.
     pub(crate) fn recycle(&self, values: Vec<f64>) {
         self.spare.give(values);
     }
 
-    fn put(&self, lease: Lease, values: &[f64]) -> Result<StateId, ParticleError> {
+    /// Sends a state; it has arrived at the coordinator by then. For a thread that may wait.
+    pub(crate) fn put(&self, lease: Lease, values: &[f64]) -> Result<StateId, ParticleError> {
         let (pieces, outgoing) = mpsc::channel(AHEAD);
         let (answer, answered) = oneshot::channel();
         let (mut client, lanes, ended) = (self.client.clone(), Arc::clone(&self.lanes), self.ended.clone());

@@ -130,6 +130,41 @@ fn what_is_done_while_nobody_is_there_waits_in_memory_and_then_on_disk() {
 }
 
 #[test]
+fn a_large_state_that_a_run_ended_in_while_nobody_was_there_is_put_for_the_next_start() {
+    let gate = Gate::open_to(0);
+    let (first, events) = incarnation(7, 1);
+    let proxy = Proxy::to(first.address().unwrap());
+    let (told, news) = mpsc::channel();
+    let worker = ThreadWorker::start_with(proxy.address, gate.factory(), |config| {
+        // One state in memory, the others on disk.
+        config.hold = HoldLimits { memory: 500_000, disk: 1 << 30 };
+        config.tell = Arc::new(move |news| drop(told.send(news.clone())));
+    });
+    await_workers(&events, 1);
+    let mut batch = jobs(4);
+    for job in &mut batch {
+        // The state at the end is the one at the start.
+        job.state = Some((0..50_000).map(|i| f64::from(job.particle) + f64::from(i) / 7.0).collect());
+    }
+    abandon(first, batch.clone());
+    gate.wait(|made| made.runs.len() == 1);
+    proxy.lead_to("127.0.0.1:1".parse().unwrap());
+    while !matches!(news.recv_timeout(Duration::from_secs(60)).unwrap(), News::Lost { .. }) {}
+    gate.open(usize::MAX);
+    // What had all of its state goes on; what had not is forgotten.
+    gate.wait(|made| made.ended >= 1);
+    let (mut second, events) = incarnation(7, 2);
+    proxy.lead_to(second.address().unwrap());
+    let setup = second.install(&Setup::default()).unwrap();
+    assert_exact(&second.run(setup, batch.clone()).unwrap(), &batch);
+    let brought = await_event(&events, |event| matches!(event, FleetEvent::RunsBrought { .. }));
+    assert!(matches!(brought, FleetEvent::RunsBrought { finished: 0, computing: 1.., .. }), "{brought}");
+    assert_eq!(gate.runs().iter().filter(|particle| **particle == 0).count(), 1, "{:?}", gate.runs());
+    worker.cancel.cancel();
+    worker.end().unwrap();
+}
+
+#[test]
 fn another_run_gets_nothing_of_what_was_done_for_the_first() {
     let gate = Gate::open_to(usize::MAX);
     let (mut first, events) = incarnation(7, 1);

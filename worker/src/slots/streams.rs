@@ -11,6 +11,8 @@ use starlings_proto::{
 use tokio::sync::mpsc::UnboundedSender;
 
 use super::{Asked, Shared, Slots, Task, answer};
+use crate::held::Ended;
+use crate::held::large::Large;
 
 impl Slots {
     /// Its stream is gone: what was begun and what waits goes on, and its results are held.
@@ -28,7 +30,7 @@ impl Slots {
         queue.stream = Some(stream);
         queue.full = false;
         let (mut keys, all) = (JobKeys::default(), queue.running.iter().chain(&queue.tasks));
-        let keys = all.map(|task| task.key(&mut keys)).collect();
+        let keys = all.map(|task| task.of().key(&mut keys)).collect();
         drop(queue);
         self.shared.filled.notify_all();
         keys
@@ -46,7 +48,7 @@ impl Slots {
         }
         let (mut keys, queue) = (JobKeys::default(), self.shared.lock());
         for task in queue.running.iter().chain(&queue.tasks) {
-            if let Some(lease) = leases.remove(&task.key(&mut keys)) {
+            if let Some(lease) = leases.remove(&task.of().key(&mut keys)) {
                 *task.asked() = Some(asked(lease));
             }
         }
@@ -60,58 +62,68 @@ impl Slots {
 }
 
 impl Shared {
-    /// Answers a task that ran; held is the result whether there is somebody to answer or not, unless it has a large state.
+    /// Answers a task that ran; held is the result whether there is somebody to answer or not.
     pub(super) fn finished(&self, task: Arc<Task>, result: Result<Prediction, ParticleError>, cost: f64) {
-        let inside = inside(&result);
-        let has_room = match (&self.held, &inside) {
-            (Some(held), Some(inside)) => held.keep(task.setup, Arc::clone(&task.job), inside, cost),
-            _ => true,
-        };
+        match result {
+            Ok(prediction) if prediction.state.len() * 8 > MAX_INLINE_STATE => {
+                self.ended_large(task, Arc::new(Large::new(Prediction { cost, ..prediction })));
+            }
+            Ok(prediction) => {
+                let Prediction { outputs, state, cost: own } = prediction;
+                let prediction = Prediction { outputs, state: State::Values(state), cost: own };
+                self.ended_small(&task, Ok(prediction), cost);
+            }
+            Err(error) => self.ended_small(&task, Err(error), cost),
+        }
+    }
+
+    fn ended_small(&self, task: &Arc<Task>, result: Result<Prediction<State>, ParticleError>, cost: f64) {
+        let stream = self.over(task, || Ended::inside(&result, cost));
+        match (task.asked().take(), stream) {
+            (Some(Asked { lease, outbox, .. }), _) => answer(&outbox, lease, LeaseOutcome::Ran(result), cost),
+            (None, Some(stream)) => {
+                let ended = Some(ended::encode(&result, cost).into());
+                let run = HeldRun { key: task.of().key(&mut JobKeys::default()), ended };
+                if let Ok(message) = FromWorker::Held(vec![run]).encode() {
+                    let _ = stream.send(message);
+                }
+            }
+            (None, None) => {}
+        }
+    }
+
+    /// A stream that came meanwhile knows the run as one that goes on: it asks for the result.
+    fn ended_large(&self, task: Arc<Task>, large: Arc<Large>) {
+        self.over(&task, || Ended::Large(Arc::clone(&large)));
+        let Some(Asked { lease, outbox, transfers }) = task.asked().take() else { return };
+        let (is_wanted, cost) = (!task.stop.is_set(), large.cost());
+        // What it began from is not needed for what it ended in.
+        if let Some(state) = task.into_large_state() {
+            transfers.recycle(state);
+        }
+        let answered =
+            if is_wanted { LeaseOutcome::Ran(large.put(&transfers, lease)) } else { LeaseOutcome::Withdrawn };
+        answer(&outbox, lease, answered, cost);
+        if let Some(state) = Arc::into_inner(large).and_then(Large::into_memory) {
+            transfers.recycle(state);
+        }
+    }
+
+    /// Holds how a task ended, which computes no more; the stream of now.
+    fn over(
+        &self,
+        task: &Arc<Task>,
+        ended: impl FnOnce() -> Ended,
+    ) -> Option<UnboundedSender<generated::FromWorker>> {
+        let has_room = self.held.as_ref().is_none_or(|held| held.keep(task.of(), ended()));
         let mut queue = self.lock();
-        queue.running.retain(|running| !Arc::ptr_eq(running, &task));
+        queue.running.retain(|running| !Arc::ptr_eq(running, task));
         // A stream that came meanwhile has been told all that is held.
         if !has_room && queue.stream.is_none() && !std::mem::replace(&mut queue.full, true) {
             tracing::warn!(
                 "no further run is begun until the coordinator is back: no more results can be held"
             );
         }
-        let stream = queue.stream.clone();
-        drop(queue);
-        let asked = task.asked().take();
-        match (asked, stream, inside) {
-            (Some(Asked { lease, outbox, .. }), _, Some(inside)) => {
-                answer(&outbox, lease, LeaseOutcome::Ran(inside), cost);
-            }
-            (Some(Asked { lease, outbox, transfers }), _, None) => {
-                let is_wanted = !task.stop.is_set();
-                // What it began from is not needed for what it ended in.
-                if let Some(state) = task.into_large_state() {
-                    transfers.recycle(state);
-                }
-                let put = |prediction| transfers.sendable(lease, prediction);
-                let answered =
-                    if is_wanted { LeaseOutcome::Ran(result.and_then(put)) } else { LeaseOutcome::Withdrawn };
-                answer(&outbox, lease, answered, cost);
-            }
-            (None, Some(stream), Some(inside)) => {
-                let ended = Some(ended::encode(&inside, cost).into());
-                let run = HeldRun { key: task.key(&mut JobKeys::default()), ended };
-                if let Ok(message) = FromWorker::Held(vec![run]).encode() {
-                    let _ = stream.send(message);
-                }
-            }
-            (None, ..) => {}
-        }
-    }
-}
-
-/// How a run ended as it travels inside a message; `None` where its state is too large for that.
-fn inside(result: &Result<Prediction, ParticleError>) -> Option<Result<Prediction<State>, ParticleError>> {
-    match result {
-        Ok(prediction) if prediction.state.len() * 8 > MAX_INLINE_STATE => None,
-        Ok(prediction) => {
-            prediction.clone().try_map(|values| Ok::<_, ()>(State::Values(values))).ok().map(Ok)
-        }
-        Err(error) => Some(Err(error.clone())),
+        queue.stream.clone()
     }
 }

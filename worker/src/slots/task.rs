@@ -3,10 +3,11 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use starlings_models::{Forward, Job, ParticleError, Stop};
-use starlings_proto::{FromWorker, JobKey, JobKeys, Lease, LeaseOutcome, SetupId, generated};
+use starlings_proto::{FromWorker, JobKey, Lease, LeaseOutcome, SetupId, generated};
 use tokio::sync::OwnedSemaphorePermit;
 use tokio::sync::mpsc::UnboundedSender;
 
+use crate::held::Of;
 use crate::transfer::Transfers;
 
 /// One job with everything needed to run and answer it.
@@ -51,9 +52,9 @@ impl Task {
         Self { key: Some(key), room: Mutex::new(Some(room)), ..Self::new(asked, setup, forward, job) }
     }
 
-    /// The key of its job.
-    pub(super) fn key(&self, keys: &mut JobKeys) -> JobKey {
-        self.key.unwrap_or_else(|| keys.of(&self.setup, &self.job))
+    /// The key of its job, or what it is made of.
+    pub(super) fn of(&self) -> Of {
+        self.key.map_or_else(|| Of::Job(self.setup, Arc::clone(&self.job)), Of::Key)
     }
 
     /// The large state that it began from, unless somebody has the task too.
