@@ -10,7 +10,7 @@ pub(super) fn explained(error: BatchError, address: Option<SocketAddr>) -> Fleet
     match error {
         BatchError::Cancelled => FleetError::Cancelled,
         BatchError::NoWorkers { waited, missing } => {
-            FleetError::NoWorkers { address: address, waited: waited.as_secs_f64(), missing }
+            FleetError::NoWorkers { address, waited: waited.as_secs_f64(), missing }
         }
         BatchError::SetupFailed { reason } => FleetError::SetupFailed { reason },
         BatchError::LocalWorkers(reason) => FleetError::LocalWorkers(reason),
