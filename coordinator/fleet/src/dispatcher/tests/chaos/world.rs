@@ -143,7 +143,12 @@ impl World {
                 assert!(self.kept.contains(&control), "a control run is one that is kept");
                 assert!(self.alive.contains(&worker.0), "a control run is made by a live worker");
                 let index = (lease.job - 1) as usize;
-                assert!(self.open.values().all(|(_, open)| *open != index), "a job has one lease at a time");
+                let stopped =
+                    |(lease, open): &(Lease, usize)| *open != index || self.withdrawn.contains(lease);
+                assert!(
+                    self.open.values().all(stopped),
+                    "a job has one lease at a time that is not called back"
+                );
                 self.controls.insert((worker.0, lease.job));
                 self.open.insert((worker.0, lease.job), (lease, index));
             }
