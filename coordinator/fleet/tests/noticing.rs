@@ -1,5 +1,5 @@
 //! How soon a lost worker is noticed, and that a busy one is not taken for lost: at the usual heartbeat of 8 s.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 mod fleet_kit;
 
