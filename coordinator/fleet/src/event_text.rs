@@ -136,10 +136,8 @@ impl fmt::Display for FleetEvent {
                 write!(f, "local worker process {pid} ended ({reason}) and was started again")
             }
             Self::LocalWorkerGivenUp { pid, deaths, reason } => {
-                write!(
-                    f,
-                    "local worker process {pid} ended ({reason}) and is not started again after {deaths} deaths in a row"
-                )
+                let after = format!("after {deaths} deaths in a row");
+                write!(f, "local worker process {pid} ended ({reason}) and is not started again {after}")
             }
         }
     }

@@ -22,7 +22,8 @@ impl State {
             }
             FleetEvent::Waiting { missing, .. } => {
                 if let (true, Some(address)) = (self.links.is_empty(), self.doorway.address) {
-                    missing.push_str(&format!(" at {address}"));
+                    missing.push_str(" at ");
+                    missing.push_str(&address.to_string());
                 }
                 missing.push_str(&self.turned_away());
             }

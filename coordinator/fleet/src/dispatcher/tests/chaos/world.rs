@@ -246,12 +246,7 @@ impl World {
             Act::Crash(which) => self.answer(which, |_| LeaseOutcome::Ran(Err(crash("crash"))), 1.0),
             Act::Place(which) => self.answer(which, |_| LeaseOutcome::Ran(Err(place("disk full"))), 1.0),
             Act::Late(which) => self.answer(which, |_| LeaseOutcome::Ran(Err(late().into())), 1.0),
-            Act::Repeat(which) => {
-                if !self.past.is_empty() {
-                    let lease = self.past[which % self.past.len()];
-                    self.event(answered(lease, LeaseOutcome::Ran(Ok(prediction(usize::MAX))), 1.0));
-                }
-            }
+            Act::Repeat(which) => self.repeat(which),
             Act::Bring(who, which, is_finished) => self.bring(who, which, is_finished),
             Act::Wait(seconds) => {
                 self.now += Duration::from_secs(seconds);
@@ -261,6 +256,13 @@ impl World {
         for &worker in &self.alive {
             let open = self.open.keys().filter(|(of, _)| *of == worker).count();
             assert_eq!(self.dispatcher.in_flight(WorkerId(worker)), open, "credit follows the open leases");
+        }
+    }
+
+    fn repeat(&mut self, which: usize) {
+        if !self.past.is_empty() {
+            let lease = self.past[which % self.past.len()];
+            self.event(answered(lease, LeaseOutcome::Ran(Ok(prediction(usize::MAX))), 1.0));
         }
     }
 
