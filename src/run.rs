@@ -46,7 +46,9 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     let plan = args.fleet.plan(&study, Some(&Out(args.out.as_deref())))?;
     let kind = study.estimator.kind;
     let is_away = is_outside(&study) && !args.fleet.is_here();
-    if !is_away {
+    // What a solver answers for is found out by the trial, and may be needed again.
+    let is_known = !is_outside(&study) && args.resume.was_tried(args.out.as_deref());
+    if !is_away && !is_known {
         dry_run(&mut study, kind, Depth::First).map_err(Failure::input)?;
     }
     let bound = plan.bind()?;

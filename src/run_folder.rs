@@ -21,6 +21,13 @@ pub(crate) struct Resume {
     other_build: bool,
 }
 
+impl Resume {
+    /// Whether the model was tried before in this folder, by this program: a run folder is made after the trial.
+    pub(crate) fn was_tried(self, out: Option<&Path>) -> bool {
+        self.resume && !self.other_build && out.is_some_and(|out| out.join("run.db").is_file())
+    }
+}
+
 /// Opens the folder `out`, or one under `runs` with the names of the study and of the command and the time of now.
 pub(crate) fn open(
     purpose: Purpose,

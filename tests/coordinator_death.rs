@@ -1,6 +1,6 @@
 //! A coordinator that is killed: its folder is free again, its workers come back and bring along what they have done.
 
-#![allow(clippy::unwrap_used)] // a failed unwrap is a failed test
+#![allow(clippy::unwrap_used, clippy::print_stdout)] // a failed unwrap is a failed test; timings are printed
 
 mod common;
 mod small_kit;
@@ -79,7 +79,7 @@ fn said(child: Child) -> String {
 }
 
 /// Runs that a worker says at its end to have made.
-fn made(said: &str) -> usize {
+fn made(said: &str) -> i64 {
     let number = said.split("predictions=").nth(1).unwrap_or_else(|| panic!("it does not say: {said}"));
     number.split(|c: char| !c.is_ascii_digit()).next().unwrap().parse().unwrap()
 }
@@ -111,10 +111,10 @@ fn workers_outlive_their_coordinator_and_no_run_is_made_twice() {
     for words in ["connected to", "lost the coordinator", "delivered", "results that were held"] {
         assert!(said.iter().all(|said| said.contains(words)), "`{words}` is missing: {said:?}");
     }
-    let made: usize = said.iter().map(|said| made(said)).sum();
+    let made: i64 = said.iter().map(|said| made(said)).sum();
     let rows = count(&broken, "SELECT count(*) FROM jobs");
     assert_eq!(rows, count(&whole, "SELECT count(*) FROM jobs"));
-    assert_eq!(made as i64, rows, "each run has its row, and was made once: {said:?}\n{text}");
+    assert_eq!(made, rows, "each run has its row, and was made once: {said:?}\n{text}");
 }
 
 #[test]

@@ -257,3 +257,12 @@ fn a_wait_for_workers_names_the_access_file_and_the_last_refused_caller() {
         assert!(said.contains(words), "`{words}` is missing in {said}");
     }
 }
+
+#[test]
+fn a_study_without_a_solver_pins_none() {
+    let mut call = starlings();
+    call.args(["worker", "--access", "none.json", "--solver-from"])
+        .arg(repository("examples/oscillator/study.toml"));
+    let (code, _, said) = output(&mut call);
+    assert!(code == 2 && said.contains("runs in no program of its own"), "{said}");
+}

@@ -16,7 +16,6 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 use access_kit::{Started, worker};
-use common::{repository, starlings};
 use kit::Folder;
 use starlings_coordinator::fleet::access::Secrets;
 use starlings_coordinator::fleet::{Fleet, FleetConfig, FleetEvent, GrpcFleet};
@@ -298,15 +297,4 @@ fn a_run_with_local_workers_runs_the_command_of_its_study() {
     let out = folder.path().join("run");
     let summary = common::run(&folder.path().join("study.toml"), &out, 1);
     assert_eq!(summary["runs"]["failed"], 0);
-}
-
-#[test]
-fn a_study_without_a_solver_pins_none() {
-    let place = Place::new();
-    std::fs::write(place.access(), "").unwrap();
-    let study = repository("examples/oscillator/study.toml");
-    let mut call = starlings();
-    call.args(["worker", "--access"]).arg(place.access()).arg("--solver-from").arg(&study);
-    let (code, _, said) = common::output(&mut call);
-    assert!(code == 2 && said.contains("runs in no program of its own"), "{said}");
 }

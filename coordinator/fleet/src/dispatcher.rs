@@ -205,7 +205,7 @@ impl Dispatcher {
             let Some(batch) = &mut self.batch else { break };
             let Some(index) = batch.index_of(job) else { continue };
             // What it repeated, or others have too, does not depend on it.
-            let shared = || self.workers.values().any(|w| w.holds(job));
+            let shared = || self.workers.values().any(|w| w.holds(job) && !w.has_dropped(job));
             let repeated = self.repeats.open.contains(&(id, index)) || worker.has_dropped(job);
             if repeated || batch.is_finished(index) || (self.duplicated.contains(&index) && shared()) {
                 continue;

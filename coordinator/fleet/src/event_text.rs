@@ -132,16 +132,22 @@ impl fmt::Display for FleetEvent {
                 write!(f, "worker {worker} answered run {job} too late; ignored")
             }
             Self::Waiting { .. } | Self::Progress { .. } => going(self, f),
-            Self::LocalWorkerRestarted { pid, reason } => {
-                write!(f, "local worker process {pid} ended ({reason}) and was started again")
-            }
-            Self::LocalWorkerGivenUp { pid, deaths, reason } => {
-                write!(
-                    f,
-                    "local worker process {pid} ended ({reason}) and is not started again after {deaths} deaths in a row"
-                )
-            }
+            Self::LocalWorkerRestarted { .. } | Self::LocalWorkerGivenUp { .. } => local(self, f),
         }
+    }
+}
+
+/// What became of a process that this one started.
+fn local(event: &FleetEvent, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    match event {
+        FleetEvent::LocalWorkerRestarted { pid, reason } => {
+            write!(f, "local worker process {pid} ended ({reason}) and was started again")
+        }
+        FleetEvent::LocalWorkerGivenUp { pid, deaths, reason } => {
+            let after = format!("after {deaths} deaths in a row");
+            write!(f, "local worker process {pid} ended ({reason}) and is not started again {after}")
+        }
+        _ => Ok(()),
     }
 }
 

@@ -1,5 +1,5 @@
 //! How soon a lost worker is noticed, and that a busy one is not taken for lost: at the usual heartbeat of 8 s.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 mod fleet_kit;
 
@@ -92,11 +92,15 @@ fn no_worker_is_taken_for_lost_while_every_core_is_busy_and_the_caller_thinks_fo
         }
     }
     over.store(true, Ordering::Relaxed);
-    busy.into_iter().for_each(|thread| thread.join().unwrap());
+    for thread in busy {
+        thread.join().unwrap();
+    }
     let lost = |event: &FleetEvent| matches!(event, FleetEvent::WorkerLeft { .. });
     let left: Vec<FleetEvent> = events.try_iter().filter(lost).collect();
     assert!(left.is_empty(), "{left:?}");
     println!("{minutes} minutes, {} busy threads on {cores} cores: no worker was lost", 2 * cores + 1);
     fleet.close();
-    workers.into_iter().for_each(|worker| drop(worker.end().unwrap()));
+    for worker in workers {
+        worker.end().unwrap();
+    }
 }

@@ -64,7 +64,7 @@ impl Large {
                 "its end state was held on disk and cannot be read: {error}"
             ))
         };
-        let state = State::Named(transfers.put(lease, &*self.values().map_err(unreadable)?)?);
+        let state = State::Named(transfers.put(lease, &self.values().map_err(unreadable)?)?);
         Ok(Prediction { outputs: self.outputs.clone(), state, cost: self.cost })
     }
 

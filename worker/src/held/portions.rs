@@ -26,6 +26,8 @@ impl Portions {
             self.last = 0;
         }
         self.last += bytes;
-        self.all.last_mut().into_iter().for_each(|portion| portion.push(run.clone()));
+        if let Some(portion) = self.all.last_mut() {
+            portion.push(run);
+        }
     }
 }

@@ -131,7 +131,8 @@ impl Dispatcher {
             self.repeats.disputes.remove(&index);
             // Whoever still has it, as the loser of a race, answers it or gives it back.
             let job = batch.job_number(index);
-            if self.workers.values().all(|w| w.id == id || !w.holds(job)) {
+            let has = |w: &Worker| w.id != id && w.holds(job) && !w.has_dropped(job);
+            if !self.workers.values().any(has) {
                 batch.requeue(index);
             }
         }

@@ -14,6 +14,7 @@ use starlings_proto::Lease;
 use super::Dispatcher;
 use super::batch::{Batch, Doubt, Ended};
 use super::message::{BatchError, Command, ControlId, WorkerId};
+use super::roster::Worker;
 use super::schedule::lease;
 use crate::wire::Prediction;
 
@@ -52,7 +53,9 @@ impl Dispatcher {
             return;
         }
         for (index, by) in batch.parked().clone() {
-            let place = self.workers.get_mut(&by).filter(|w| w.may_control(batch.setup_of(index)));
+            let job = batch.job_number(index);
+            let may = |w: &&mut Worker| w.may_control(batch.setup_of(index)) && !w.holds(job);
+            let place = self.workers.get_mut(&by).filter(may);
             let Some(worker) = place else {
                 // It fails once more in another place, and that one is asked.
                 if self.proven.knows(batch.name(index)) {

@@ -84,9 +84,9 @@ impl Queue {
         self.retries.iter().filter(|(_, jobs)| !jobs.is_empty()).map(|(&key, _)| key).collect()
     }
 
-    /// Whether a job with this key waits.
-    pub(super) fn has(&self, key: RetryKey) -> bool {
-        self.retries.get(&key).is_some_and(|jobs| !jobs.is_empty())
+    /// The first job with this key.
+    pub(super) fn first_retry(&self, key: RetryKey) -> Option<usize> {
+        self.retries.get(&key)?.front().copied()
     }
 
     /// Takes the first job with this key.

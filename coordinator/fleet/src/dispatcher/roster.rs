@@ -253,14 +253,14 @@ impl Worker {
     }
 }
 
-/// The worker with the fewest leases per slot among those that are ready and have room; the earlier one of equals.
+/// The worker with the fewest leases per slot among those that `may`, are ready and have room; the earlier one of equals.
 pub(super) fn least_loaded<'a>(
     workers: &'a mut BTreeMap<WorkerId, Worker>,
     setup: &SetupId,
-    avoided: Option<WorkerId>,
+    may: impl Fn(&Worker) -> bool,
 ) -> Option<&'a mut Worker> {
     workers
         .values_mut()
-        .filter(|w| Some(w.id) != avoided && w.has_room() && w.is_ready(setup))
+        .filter(|w| may(w) && w.has_room() && w.is_ready(setup))
         .min_by(|a, b| (a.load() * b.slots).cmp(&(b.load() * a.slots)))
 }

@@ -76,18 +76,19 @@ impl Dispatcher {
         let Some(batch) = &mut self.batch else { return };
         for key in batch.queue.retries() {
             let setup = *batch.setup(key.setup);
-            while batch.queue.has(key) {
-                let Some(worker) = roster::least_loaded(&mut self.workers, &setup, key.avoided) else {
-                    break;
-                };
-                let Some(index) = batch.queue.next_retry(key) else { break };
+            while let Some(index) = batch.queue.first_retry(key) {
+                // One that was told to stop it and has not answered has it still.
+                let job = batch.job_number(index);
+                let may = |w: &Worker| Some(w.id) != key.avoided && !w.holds(job);
+                let Some(worker) = roster::least_loaded(&mut self.workers, &setup, may) else { break };
+                batch.queue.next_retry(key);
                 self.out.push(lease(worker, batch, index, self.now));
             }
         }
         // The earliest fresh job whose setup is built on a worker with room; jobs of setups still being built let it pass.
         while let Some(setup) = next_setup(&self.workers, batch) {
             let id = *batch.setup(setup);
-            let Some(worker) = roster::least_loaded(&mut self.workers, &id, None) else { break };
+            let Some(worker) = roster::least_loaded(&mut self.workers, &id, |_| true) else { break };
             let Some(index) = batch.queue.next_fresh(setup) else { break };
             self.out.push(lease(worker, batch, index, self.now));
         }

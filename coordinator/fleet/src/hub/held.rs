@@ -42,7 +42,9 @@ impl State {
             return;
         }
         let mut runs = self.waiting.take_all();
-        runs.values_mut().for_each(|run| run.passed += 1);
+        for run in runs.values_mut() {
+            run.passed += 1;
+        }
         self.match_held(now, runs.into_iter().collect());
         self.dispatcher.is_matching = false;
         self.handle(now, Event::Tick);
@@ -59,7 +61,7 @@ impl State {
                 }
                 continue;
             };
-            match self.take(now, run, index) {
+            match self.take(now, &run, index) {
                 Taken::Answer => count.finished += 1,
                 Taken::Lease(lease) => count.adopted.push((key, lease)),
                 Taken::No => {}
@@ -84,7 +86,7 @@ impl State {
         places.get(key).copied()
     }
 
-    fn take(&mut self, now: Duration, run: Run, index: usize) -> Taken {
+    fn take(&mut self, now: Duration, run: &Run, index: usize) -> Taken {
         let answer = match run.ended.as_deref().map(ended::decode) {
             None => None,
             Some(Ok((result, cost))) => Some((self.checked_at(index, LeaseOutcome::Ran(result)), cost)),

@@ -23,7 +23,8 @@ impl State {
             }
             FleetEvent::Waiting { missing, .. } => {
                 if let (true, Some(address)) = (self.links.is_empty(), self.doorway.address) {
-                    missing.push_str(&format!(" at {address}"));
+                    missing.push_str(" at ");
+                    missing.push_str(&address.to_string());
                 }
                 missing.push_str(&self.turned_away());
             }
@@ -45,7 +46,7 @@ impl State {
     /// Ends a worker's session for good: it is told why, and its process is not taken again.
     pub(super) fn put_out(&mut self, worker: WorkerId, reason: &str) {
         let Some(link) = self.links.remove(&worker) else { return };
-        link.send(ToWorker::drain(reason));
+        let _ = link.sender.send(Ok(ToWorker::drain(reason)));
         self.excluded.add(link.nonce, reason);
         // What it answered is made again.
         let Self { states, dispatcher, .. } = self;

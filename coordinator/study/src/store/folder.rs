@@ -103,12 +103,12 @@ impl RunFolder {
 
     /// Removes a run that came to nothing, and its folder where that is empty then.
     pub fn discard(self) {
-        let Self { path, store, _lock } = self;
+        let Self { path, store, _lock: lock } = self;
         drop(store);
         make::remove(&path.join(DATABASE));
         // What cannot be removed is in the way of nothing: the next start says what it finds.
         let _ = std::fs::remove_file(path.join(FROZEN));
-        drop(_lock);
+        drop(lock);
         let _ = std::fs::remove_dir(path);
     }
 

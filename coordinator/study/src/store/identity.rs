@@ -2,8 +2,6 @@
 //!
 //! Next file to read: [`starlings_fleet::RunIdentity`].
 
-use std::fmt::Write as _;
-
 use starlings_fleet::RunIdentity;
 
 use super::{Store, StoreError};
@@ -21,20 +19,12 @@ impl Store {
     /// When the database refuses or its content is damaged.
     pub fn begin(&self) -> Result<RunIdentity, StoreError> {
         self.commit()?;
-        let id = match self.meta(RUN_ID)? {
-            Some(text) => {
-                let number = u128::from_str_radix(&text, 16).map_err(|e| self.damaged("run id", e))?;
-                number.to_be_bytes()
-            }
-            None => {
-                let id = RunIdentity::new().id;
-                let text = id.iter().fold(String::new(), |mut text, byte| {
-                    let _ = write!(text, "{byte:02x}");
-                    text
-                });
-                self.set_meta(RUN_ID, &text)?;
-                id
-            }
+        let id = if let Some(text) = self.meta(RUN_ID)? {
+            u128::from_str_radix(&text, 16).map_err(|e| self.damaged("run id", e))?.to_be_bytes()
+        } else {
+            let id = RunIdentity::new().id;
+            self.set_meta(RUN_ID, &format!("{:032x}", u128::from_be_bytes(id)))?;
+            id
         };
         let starts = self.meta(STARTS)?.map_or(Ok(0), |text| text.parse::<u64>());
         let incarnation = starts.map_err(|e| self.damaged("number of starts", e))? + 1;

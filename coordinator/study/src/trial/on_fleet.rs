@@ -1,7 +1,7 @@
 //! The trial of a study whose model runs on workers elsewhere: the same runs, made by the fleet, since nothing of a solver is started
 //! where the coordinator listens.
 //!
-//! What the trial finds is stored, so that a resumed run does not make it again. Next file to read: [`super::dry_run`].
+//! What the trial finds is stored, so that a resumed run does not make it again. Next file to read: [`mod@super::dry_run`].
 
 use std::sync::{Mutex, PoisonError};
 

@@ -1,8 +1,10 @@
 //! Random joins, losses, answers, failures and silences: every job ends exactly once, no credit is lost, and it ends.
 
+mod act;
 mod world;
 
-use world::{Act, World, act, late};
+use act::{Act, act};
+use world::{World, late};
 
 use proptest::prelude::*;
 use starlings_models::{Failure, ParticleError};

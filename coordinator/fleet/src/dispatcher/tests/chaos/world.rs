@@ -3,53 +3,16 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use proptest::prelude::*;
 use starlings_models::{ParticleError, Timeout};
 use starlings_proto::{Lease, LeaseOutcome, SetupId};
 
 use super::super::{RULES, answered, crash, joining, left, place, prediction, setup, solver, submit_mixed};
+use super::act::Act;
 use crate::FleetEvent;
 use crate::dispatcher::{
     BatchError, Command, Comparing, ControlId, Dispatcher, Event, Rules, Taken, WorkerId,
 };
 use crate::wire::{Outcome, Prediction};
-
-/// One thing that the world does; numbers choose among what is possible then.
-#[derive(Clone, Debug)]
-pub(super) enum Act {
-    Join(u32),
-    Reconnect(usize),
-    Lose(usize, bool),
-    BuildSetup(usize, bool),
-    ForgetSetup(usize),
-    Answer(usize, f64),
-    Fail(usize),
-    Crash(usize),
-    Place(usize),
-    Late(usize),
-    Repeat(usize),
-    /// A worker comes along with a job, finished or still being made.
-    Bring(usize, usize, bool),
-    Wait(u64),
-}
-
-pub(super) fn act() -> impl Strategy<Value = Act> {
-    prop_oneof![
-        2 => (1_u32..4).prop_map(Act::Join),
-        1 => any::<usize>().prop_map(Act::Reconnect),
-        2 => (any::<usize>(), any::<bool>()).prop_map(|(who, clean)| Act::Lose(who, clean)),
-        4 => (any::<usize>(), prop::bool::weighted(0.8)).prop_map(|(who, ok)| Act::BuildSetup(who, ok)),
-        1 => any::<usize>().prop_map(Act::ForgetSetup),
-        12 => (any::<usize>(), prop::sample::select(vec![1e-6, 1e-3, 1.0])).prop_map(|(which, cost)| Act::Answer(which, cost)),
-        3 => any::<usize>().prop_map(Act::Fail),
-        3 => any::<usize>().prop_map(Act::Crash),
-        2 => any::<usize>().prop_map(Act::Place),
-        1 => any::<usize>().prop_map(Act::Late),
-        2 => any::<usize>().prop_map(Act::Repeat),
-        2 => (any::<usize>(), any::<usize>(), any::<bool>()).prop_map(|(who, which, done)| Act::Bring(who, which, done)),
-        1 => (1_u64..30).prop_map(Act::Wait),
-    ]
-}
 
 /// Workers as the dispatcher's commands make them: what each was sent and has not answered.
 pub(super) struct World {
@@ -144,7 +107,12 @@ impl World {
                 assert!(self.kept.contains(&control), "a control run is one that is kept");
                 assert!(self.alive.contains(&worker.0), "a control run is made by a live worker");
                 let index = (lease.job - 1) as usize;
-                assert!(self.open.values().all(|(_, open)| *open != index), "a job has one lease at a time");
+                let stopped =
+                    |(lease, open): &(Lease, usize)| *open != index || self.withdrawn.contains(lease);
+                assert!(
+                    self.open.values().all(stopped),
+                    "a job has one lease at a time that is not called back"
+                );
                 self.controls.insert((worker.0, lease.job));
                 self.open.insert((worker.0, lease.job), (lease, index));
             }
@@ -242,12 +210,7 @@ impl World {
             Act::Crash(which) => self.answer(which, |_| LeaseOutcome::Ran(Err(crash("crash"))), 1.0),
             Act::Place(which) => self.answer(which, |_| LeaseOutcome::Ran(Err(place("disk full"))), 1.0),
             Act::Late(which) => self.answer(which, |_| LeaseOutcome::Ran(Err(late().into())), 1.0),
-            Act::Repeat(which) => {
-                if !self.past.is_empty() {
-                    let lease = self.past[which % self.past.len()];
-                    self.event(answered(lease, LeaseOutcome::Ran(Ok(prediction(usize::MAX))), 1.0));
-                }
-            }
+            Act::Repeat(which) => self.repeat(which),
             Act::Bring(who, which, is_finished) => self.bring(who, which, is_finished),
             Act::Wait(seconds) => {
                 self.now += Duration::from_secs(seconds);
@@ -257,6 +220,13 @@ impl World {
         for &worker in &self.alive {
             let open = self.open.keys().filter(|(of, _)| *of == worker).count();
             assert_eq!(self.dispatcher.in_flight(WorkerId(worker)), open, "credit follows the open leases");
+        }
+    }
+
+    fn repeat(&mut self, which: usize) {
+        if !self.past.is_empty() {
+            let lease = self.past[which % self.past.len()];
+            self.event(answered(lease, LeaseOutcome::Ran(Ok(prediction(usize::MAX))), 1.0));
         }
     }
 

@@ -1,0 +1,40 @@
+//! What can happen to a dispatcher, drawn at random.
+
+use proptest::prelude::*;
+
+/// One thing that the world does; numbers choose among what is possible then.
+#[derive(Clone, Debug)]
+pub(super) enum Act {
+    Join(u32),
+    Reconnect(usize),
+    Lose(usize, bool),
+    BuildSetup(usize, bool),
+    ForgetSetup(usize),
+    Answer(usize, f64),
+    Fail(usize),
+    Crash(usize),
+    Place(usize),
+    Late(usize),
+    Repeat(usize),
+    /// A worker comes along with a job, finished or still being made.
+    Bring(usize, usize, bool),
+    Wait(u64),
+}
+
+pub(super) fn act() -> impl Strategy<Value = Act> {
+    prop_oneof![
+        2 => (1_u32..4).prop_map(Act::Join),
+        1 => any::<usize>().prop_map(Act::Reconnect),
+        2 => (any::<usize>(), any::<bool>()).prop_map(|(who, clean)| Act::Lose(who, clean)),
+        4 => (any::<usize>(), prop::bool::weighted(0.8)).prop_map(|(who, ok)| Act::BuildSetup(who, ok)),
+        1 => any::<usize>().prop_map(Act::ForgetSetup),
+        12 => (any::<usize>(), prop::sample::select(vec![1e-6, 1e-3, 1.0])).prop_map(|(which, cost)| Act::Answer(which, cost)),
+        3 => any::<usize>().prop_map(Act::Fail),
+        3 => any::<usize>().prop_map(Act::Crash),
+        2 => any::<usize>().prop_map(Act::Place),
+        1 => any::<usize>().prop_map(Act::Late),
+        2 => any::<usize>().prop_map(Act::Repeat),
+        2 => (any::<usize>(), any::<usize>(), any::<bool>()).prop_map(|(who, which, done)| Act::Bring(who, which, done)),
+        1 => (1_u64..30).prop_map(Act::Wait),
+    ]
+}
