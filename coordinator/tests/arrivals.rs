@@ -124,10 +124,20 @@ fn a_batch_that_is_cut_short_many_times_makes_each_run_once() {
     assert_eq!(made.len(), unharmed.made.len());
 }
 
+/// The same with parameters that all recordings share: without a starting value for each.
+fn shared(n: usize) -> Case {
+    let (times, z) = linear::data(12, 8);
+    let one = |i: usize| linear::record(&format!("r{i}"), "line.csv", linear::NOISE, "");
+    let study = linear::study_of("kind = \"batch\"", &(0..n).map(one).collect::<String>());
+    let (head, tail) = study.split_once("[[parameters]]\nname = \"initial:x\"").unwrap();
+    let tail = tail.split_once('\n').unwrap().1.split_once('\n').unwrap().1;
+    Case::new(&format!("{head}{tail}"), &[("line.csv", linear::file(&times, &z))])
+}
+
 /// How long a resume takes that finds so many runs.
 fn resumed_after(n_run: usize) {
-    // Four runs of each recording: the coordinator dies in the middle of the first ensemble.
-    let case = records(n_run / 4 + n_run / 40);
+    // Three runs or more of each recording: the coordinator dies in the middle of the first ensemble.
+    let case = shared(n_run / 2);
     let path = case.fresh();
     let started = Instant::now();
     case.study();
