@@ -128,10 +128,24 @@ fn a_batch_that_is_cut_short_many_times_makes_each_run_once() {
     assert_eq!(made.len(), unharmed.made.len());
 }
 
+/// The same with parameters that all recordings share: without a starting value for each.
+fn shared(n: usize) -> Case {
+    let (times, z) = linear::data(12, 8);
+    let one = |i: usize| linear::record(&format!("r{i}"), "line.csv", linear::NOISE, "");
+    let study = linear::study_of("kind = \"batch\"", &(0..n).map(one).collect::<String>());
+    let (head, tail) = study.split_once("[[parameters]]\nname = \"initial:x\"").unwrap();
+    let tail = tail.split_once('\n').unwrap().1.split_once('\n').unwrap().1;
+    Case::new(&format!("{head}{tail}"), &[("line.csv", linear::file(&times, &z))])
+}
+
 /// How long a resume takes that finds so many runs.
 fn resumed_after(n_run: usize) {
-    let case = records(n_run / 4);
+    // Three runs or more of each recording: the coordinator dies in the middle of the first ensemble.
+    let case = shared(n_run / 2);
     let path = case.fresh();
+    let started = Instant::now();
+    case.study();
+    println!("the study is read in {:.2} s", started.elapsed().as_secs_f64());
     let started = Instant::now();
     assert!(case.go(&path, &mut Telling::new(500, n_run)).is_err());
     println!("{n_run} runs made and kept in {:.2} s", started.elapsed().as_secs_f64());
