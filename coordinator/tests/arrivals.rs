@@ -123,7 +123,7 @@ fn a_batch_that_is_cut_short_many_times_makes_each_run_once() {
         assert!(made.len() <= unharmed.made.len(), "it goes on for ever");
     };
     assert_eq!(done.csv, whole.csv);
-    let key = |(setup, job): &(SetupId, Job)| job_key(setup, job);
+    let key = |(setup, job): &(SetupId, Job<Held>)| job_key(setup, job);
     assert_eq!(made.iter().map(key).collect::<BTreeSet<_>>(), unharmed.made.iter().map(key).collect());
     assert_eq!(made.len(), unharmed.made.len());
 }
