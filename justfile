@@ -31,6 +31,10 @@ explain-battery:
 faults:
     PATH="$PWD/target/solvers/bin:$PATH" STARLINGS_WRITE_PAGES=1 cargo test --test faults -- --ignored --nocapture
 
+# Every fuzz target for FUZZ_SECONDS each, 600 by default (cargo install cargo-fuzz; a stable compiler is told to take the fuzzer's flags).
+fuzz:
+    for target in $(cd fuzz && RUSTC_BOOTSTRAP=1 cargo fuzz list); do (cd fuzz && RUSTC_BOOTSTRAP=1 cargo fuzz run -s none "$target" -- -max_total_time="${FUZZ_SECONDS:-600}" -rss_limit_mb=2048) || exit 1; done
+
 # The examples of docs/extending.md: applied to a copy, built and tested.
 extending:
     .ci/extending
