@@ -2,5 +2,5 @@
 
 /// Reads a mesh in the Object File Format, and makes a surface of it.
 pub fn mesh(text: &str) {
-    crate::record::mesh(text);
+    crate::record::fuzzing::mesh(text);
 }

@@ -5,6 +5,8 @@
 mod channel;
 mod csv;
 mod derived;
+#[cfg(fuzzing)]
+pub(crate) mod fuzzing;
 mod input;
 mod noise;
 mod off;
@@ -285,16 +287,5 @@ fn plain(error: &std::io::Error) -> String {
         std::io::ErrorKind::PermissionDenied => "permission denied".to_owned(),
         std::io::ErrorKind::IsADirectory => "it is a folder".to_owned(),
         _ => error.to_string(),
-    }
-}
-
-/// Reads a mesh and asks for a place on it.
-#[cfg(fuzzing)]
-pub(crate) fn mesh(text: &str) {
-    let Ok(off::Off { vertices, triangles }) = off::read(text) else { return };
-    for open_ends in [0, 2] {
-        if let Ok(mesh) = starlings_models::surface::Mesh::new(vertices.clone(), triangles.clone(), open_ends) {
-            assert!(mesh.foot([0.5, -0.25, 2.0]).is_some());
-        }
     }
 }
