@@ -2,7 +2,8 @@
 //!
 //! `proto/fleet.proto` says what travels between coordinator and worker, `proto/solver.proto` between a worker and a solver
 //! outside, in which unit and shape. [`generated`] and [`generated_solver`] are generated from them; [`convert`] alone looks inside
-//! and checks and translates them; [`socket`] is the connection of workers that one process started. No scheduling here. Next file to read: [`convert`].
+//! and checks and translates them; [`socket`] is the connection of workers that one process started. No scheduling here. Next file
+//! to read: [`convert`].
 
 pub mod adapters;
 mod codec;

@@ -38,7 +38,7 @@ pub(crate) struct EnsembleRunner<'a> {
     setup: SetupId,
     /// One row per run since the last [`EnsembleRunner::take_rows`].
     rows: Vec<JobRow>,
-    /// Runs so far; none of them rescues anything here.
+    /// Runs so far; `rescued` stays zero, since only the filter knows.
     pub(crate) counts: Counts,
     /// Threads that recombine states; one by default.
     pub(crate) threads: usize,
