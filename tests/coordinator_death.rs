@@ -67,9 +67,12 @@ fn coordinator(study: &Path, out: &Path, address: SocketAddr, more: &[&str]) -> 
     command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
 }
 
-fn worker(address: SocketAddr) -> Child {
+/// A worker that has the access file of a run folder.
+fn worker(out: &Path) -> Child {
+    let access = out.join("access.json");
+    wait_until("there is an access file", || access.exists());
     let mut command = starlings();
-    command.args(["-v", "worker", "--slots", "1", "--connect", &address.to_string()]);
+    command.args(["-v", "worker", "--slots", "1", "--access"]).arg(access);
     command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
 }
 
@@ -98,7 +101,7 @@ fn workers_outlive_their_coordinator_and_no_run_is_made_twice() {
     run(&study, &whole, 2);
     let address = free_address();
     let mut first = coordinator(&study, &broken, address, &[]);
-    let workers = [worker(address), worker(address)];
+    let workers = [worker(&broken), worker(&broken)];
     wait_until("some runs are in the store", || count(&broken, "SELECT count(*) FROM arrived_runs") > 4);
     kill(&mut first);
     let mut second = coordinator(&study, &broken, address, &["--resume"]);
@@ -124,7 +127,7 @@ fn the_second_coordinator_in_a_folder_is_told_who_the_first_is() {
     let mut first = coordinator(&study, &out, free_address(), &[]);
     // It says where it listens once the folder is its own.
     let mut lines = BufReader::new(first.stderr.take().unwrap()).lines().map_while(Result::ok);
-    lines.find(|line| line.contains("--connect")).unwrap();
+    lines.find(|line| line.contains("listening on")).unwrap();
     let who = format!("(process {} on ", first.id());
     for (command, more) in [("run", None), ("run", Some("--resume")), ("explain", Some("--resume"))] {
         let mut second = starlings();
@@ -151,7 +154,7 @@ fn ten_workers_are_back_within_ten_seconds_of_a_resume() {
     let out = dir.path().join("out");
     let address = free_address();
     let mut first = coordinator(&study, &out, address, &[]);
-    let mut workers: Vec<Child> = (0..10).map(|_| worker(address)).collect();
+    let mut workers: Vec<Child> = (0..10).map(|_| worker(&out)).collect();
     wait_until("runs are in the store", || count(&out, "SELECT count(*) FROM arrived_runs") > 100);
     kill(&mut first);
     let kept = count(&out, "SELECT count(*) FROM arrived_runs");

@@ -103,7 +103,7 @@ fn of_two_workers_one_of_which_lies_neither_is_believed_and_both_are_named() {
     let (mut fleet, events, _) = listen(any_port());
     let address = fleet.address().unwrap();
     let named = |host: &str, factor: f64| {
-        let factory = factory(move |job| changed(job, |p| p.outputs.iter_mut().for_each(|v| *v *= factor)));
+        let factory = factory(move |job| changed(job, |p| p.outputs[1] *= factor));
         let host = host.to_owned();
         ThreadWorker::start_with(address, factory, |config| config.host = host)
     };

@@ -53,7 +53,10 @@ impl Dispatcher {
     /// A job that failed on one worker and has a prediction of another: one of them is wrong.
     pub(super) fn succeeded_where_another_failed(&mut self, id: WorkerId, index: usize, said: &Prediction) {
         let failed = self.batch.as_ref().and_then(|batch| batch.failed_before(index));
-        if let Some((other, why)) = failed.filter(|_| self.likeness(index) != Likeness::None) {
+        let counts = |(by, _): &(WorkerId, String)| {
+            self.likeness(index) != Likeness::None && !self.repeats.wrong.contains(by)
+        };
+        if let Some((other, why)) = failed.filter(counts) {
             self.dispute(index, [(other, Err(why)), (id, Ok(said.clone()))]);
         }
     }
@@ -178,7 +181,8 @@ impl Dispatcher {
     }
 
     fn opine(&mut self, index: usize, by: WorkerId, said: Said) {
-        let gone = || self.repeats.contributors.get(&by).map_or_else(String::new, |c| c.name.clone());
+        let left = || "a worker that left".to_owned();
+        let gone = || self.repeats.contributors.get(&by).map_or_else(left, |c| c.name.clone());
         let name = self.workers.get(&by).map_or_else(gone, Worker::called);
         let Some(dispute) = self.repeats.disputes.get_mut(&index) else { return };
         dispute.opinions.push(Opinion { by, name, said });

@@ -51,7 +51,12 @@ impl Dispatcher {
             Verdict::Open => {
                 let known = opinions.iter().map(|o| o.by).collect::<BTreeSet<_>>();
                 let others = |w: &Worker| !known.contains(&w.id) && known.len() < JURY;
-                if self.ask(index, others) || self.ask(index, |_| true) {
+                // One that still builds the setup is asked when it has it.
+                let is_coming = |w: &Worker| others(w) && w.will_take(&setup) && !w.takes(&setup);
+                if self.ask(index, others)
+                    || self.workers.values().any(is_coming)
+                    || self.ask(index, |_| true)
+                {
                     return;
                 }
                 match last_verdict(&opinions, |id| self.workers.contains_key(&id)) {
@@ -137,6 +142,7 @@ impl Dispatcher {
             }
         }
         self.repeats.contributors.remove(&id);
+        self.repeats.hear_no_more(id);
         self.send_reopened();
         let (name, build, taken) = self.workers.get(&id).map_or_else(
             || (called.to_owned(), String::new(), 0),

@@ -61,6 +61,8 @@ pub(super) struct Repeats {
     /// Jobs of this batch to repeat.
     pub(super) sampled: VecDeque<usize>,
     pub(super) disputes: BTreeMap<usize, Dispute>,
+    /// Workers that were wrong in this batch.
+    pub(super) wrong: BTreeSet<WorkerId>,
     /// Setups of which a difference was told.
     pub(super) told: BTreeSet<SetupId>,
 }
@@ -72,6 +74,7 @@ impl Repeats {
         self.contributors.clear();
         self.sampled.clear();
         self.disputes.clear();
+        self.wrong.clear();
     }
 
     /// How runs of a setup are compared.
@@ -87,6 +90,15 @@ impl Repeats {
     /// Whether a job of this batch is being repeated.
     pub(super) fn repeats(&self, index: usize) -> bool {
         self.open.iter().any(|(_, job)| *job == index)
+    }
+
+    /// A worker was wrong: what it says elsewhere is no opinion, and where only one is left there is no dispute.
+    pub(super) fn hear_no_more(&mut self, worker: WorkerId) {
+        self.wrong.insert(worker);
+        self.disputes.retain(|_, dispute| {
+            dispute.opinions.retain(|opinion| opinion.by != worker);
+            dispute.opinions.len() > 1
+        });
     }
 
     /// A worker is gone: its repeats are.

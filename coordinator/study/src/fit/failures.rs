@@ -19,6 +19,9 @@ const OTHERS: &str = "other failures";
 /// Distance of two means, in standard deviations, from which a parameter is said to separate.
 const SEPARATES: f64 = 1.0;
 
+/// The same in standard errors, without which a few runs would separate by chance.
+const SIGNIFICANT: f64 = 3.0;
+
 /// Failed runs of one kind.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FailureCluster {
@@ -70,15 +73,12 @@ impl Spread {
         self.range = [self.range[0].min(value), self.range[1].max(value)];
     }
 
-    fn variance(&self) -> f64 {
-        self.squares / self.n.max(1.0)
-    }
-
-    /// Distance of the means in standard deviations of both.
+    /// Distance of the means in standard deviations within both; zero where it could be chance (the two-sample t statistic).
     fn distance(&self, other: &Self) -> f64 {
-        let sd = f64::midpoint(self.variance(), other.variance()).sqrt();
         let apart = (self.mean - other.mean).abs();
-        if apart == 0.0 { 0.0 } else { apart / sd }
+        let sd = ((self.squares + other.squares) / (self.n + other.n - 2.0).max(1.0)).sqrt();
+        let standard_error = sd * (1.0 / self.n + 1.0 / other.n).sqrt();
+        if apart > SIGNIFICANT * standard_error { apart / sd } else { 0.0 }
     }
 }
 
