@@ -93,7 +93,7 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     if !is_away && !is_known {
         trial(&study).map_err(Failure::input)?;
     }
-    let bound = plan.bind()?;
+    let entrance = plan.enter()?;
     let folder = run_folder::open(Purpose::Explanation, &study, args.out.as_deref(), args.resume)?;
     if load_findings(&folder.store).map_err(Failure::run)?.is_some() {
         let path = folder.path.display();
@@ -102,7 +102,7 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     }
     let display = Arc::new(Display::new(args.json));
     let identity = folder.store.begin().map_err(Failure::run)?;
-    let mut session = FleetSession::listen(&study, &plan, bound, identity, &display)?;
+    let mut session = FleetSession::listen(&study, &plan, entrance, identity, &display)?;
     session.start_workers(&study, &plan, Some(&folder.path))?;
     if is_away && let Err(failure) = session.trial(&mut study, None, Some(&folder.store)) {
         session.close();

@@ -77,10 +77,23 @@ enum AccessPlan {
 /// Name of the access file in a run folder.
 const ACCESS: &str = "access.json";
 
+/// What a command takes before it writes anything: an address or an access file in use must leave nothing behind.
+pub(crate) struct Entrance {
+    bound: Option<Bound>,
+    access: Option<Access>,
+}
+
 impl Plan {
-    /// Takes the address, before anything is written: a port in use must leave nothing behind.
-    pub(crate) fn bind(&self) -> Result<Option<Bound>, Failure> {
-        self.address.map(Bound::new).transpose().map_err(Failure::run)
+    /// Takes the address and the secrets of the access file.
+    pub(crate) fn enter(&self) -> Result<Entrance, Failure> {
+        let bound = self.address.map(Bound::new).transpose().map_err(Failure::run)?;
+        let file = match &self.access {
+            None => return Ok(Entrance { bound, access: None }),
+            Some(AccessPlan::File(file)) => Some(file.as_path()),
+            Some(AccessPlan::RunFolder) => None,
+        };
+        let access = Access::at(file).map_err(|fault| failed(&fault))?;
+        Ok(Entrance { bound, access: Some(access) })
     }
 }
 
@@ -142,11 +155,11 @@ pub(crate) struct FleetSession {
 }
 
 impl FleetSession {
-    /// Listens for workers of this start of a run, where the plan's address was taken; none is started yet.
+    /// Listens for workers of this start of a run, where an address was taken; none is started yet.
     pub(crate) fn listen(
         study: &Study,
         plan: &Plan,
-        bound: Option<Bound>,
+        entrance: Entrance,
         identity: RunIdentity,
         display: &Arc<Display>,
     ) -> Result<Self, Failure> {
@@ -162,11 +175,7 @@ impl FleetSession {
         if let Some(attempts) = study.fleet.max_attempts {
             config.max_attempts = attempts;
         }
-        let access = match &plan.access {
-            None => None,
-            Some(AccessPlan::File(file)) => Some(Access::at(Some(file)).map_err(|fault| failed(&fault))?),
-            Some(AccessPlan::RunFolder) => Some(Access::at(None).map_err(|fault| failed(&fault))?),
-        };
+        let Entrance { bound, access } = entrance;
         config.secrets = access.as_ref().map(|access| access.secrets().clone());
         (config.seed, config.mixed) = (study.seed, plan.mixed);
         config.timeout_factor = study.fleet.timeout_factor;

@@ -60,7 +60,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         dry_run(&mut study, &BATCH, Depth::First).map_err(Failure::input)?;
     }
     let display = Arc::new(Display::new(args.json));
-    let mut session = FleetSession::listen(&study, &plan, plan.bind()?, RunIdentity::new(), &display)?;
+    let mut session = FleetSession::listen(&study, &plan, plan.enter()?, RunIdentity::new(), &display)?;
     session.start_workers(&study, &plan, None)?;
     if is_away {
         session.trial(&mut study, Some(&BATCH), None)?;

@@ -51,7 +51,7 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     if !is_away && !is_known {
         dry_run(&mut study, kind, Depth::First).map_err(Failure::input)?;
     }
-    let bound = plan.bind()?;
+    let entrance = plan.enter()?;
     let mut folder = run_folder::open(Purpose::Run, &study, args.out.as_deref(), args.resume)?;
     if let Some(summary) = folder.summary().map_err(Failure::run)? {
         note(format_args!(
@@ -63,7 +63,7 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     }
     let display = Arc::new(Display::new(args.json));
     let identity = folder.store.begin().map_err(Failure::run)?;
-    let mut session = FleetSession::listen(&study, &plan, bound, identity, &display)?;
+    let mut session = FleetSession::listen(&study, &plan, entrance, identity, &display)?;
     session.start_workers(&study, &plan, Some(&folder.path))?;
     if is_away && let Err(failure) = session.trial(&mut study, Some(kind), Some(&folder.store)) {
         session.close();

@@ -40,7 +40,7 @@ outputs = [ {{ name = "y", value = "x" }} ]
 [[model.states]]
 name = "x"
 initial = 0.3
-rate = "a + b*t + sin(9000*t)"
+rate = "a + b*t + sin(150000*t)"
 [[parameters]]
 name = "a"
 prior = {{ transform = "linear", median = 0.5, sd = 1.0 }}
@@ -102,7 +102,7 @@ fn workers_outlive_their_coordinator_and_no_run_is_made_twice() {
     let address = free_address();
     let mut first = coordinator(&study, &broken, address, &[]);
     let workers = [worker(&broken), worker(&broken)];
-    wait_until("some runs are in the store", || count(&broken, "SELECT count(*) FROM arrived_runs") > 4);
+    wait_until("some runs are in the store", || count(&broken, "SELECT count(*) FROM arrived_runs") > 20);
     kill(&mut first);
     let mut second = coordinator(&study, &broken, address, &["--resume"]);
     let mut text = String::new();
@@ -117,7 +117,9 @@ fn workers_outlive_their_coordinator_and_no_run_is_made_twice() {
     let made: i64 = said.iter().map(|said| made(said)).sum();
     let rows = count(&broken, "SELECT count(*) FROM jobs");
     assert_eq!(rows, count(&whole, "SELECT count(*) FROM jobs"));
-    assert_eq!(made, rows, "each run has its row, and was made once: {said:?}\n{text}");
+    // Beside those that are made again to be compared: the first one of each worker, twice, and of the others two in a hundred.
+    let repeated = made - rows;
+    assert!((0..=4 + rows / 50).contains(&repeated), "{repeated} runs were made again: {said:?}\n{text}");
 }
 
 #[test]

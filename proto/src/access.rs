@@ -142,8 +142,16 @@ impl AccessFile {
             }
             error => error.into(),
         })?;
+        Self::from_text(path, &text)
+    }
+
+    /// The content of one.
+    ///
+    /// # Errors
+    /// When it is none, of which `path` is named.
+    pub fn from_text(path: &Path, text: &str) -> Result<Self, AccessError> {
         let malformed = |reason: String| AccessError::Malformed { path: path.to_owned(), reason };
-        let value: Value = serde_json::from_str(&text).map_err(|error| malformed(error.to_string()))?;
+        let value: Value = serde_json::from_str(text).map_err(|error| malformed(error.to_string()))?;
         match value.get(FORMAT_KEY).and_then(Value::as_u64) {
             None => return Err(malformed(format!("it has no number `{FORMAT_KEY}`"))),
             Some(FORMAT) => {}

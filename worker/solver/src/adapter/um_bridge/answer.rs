@@ -10,7 +10,7 @@ use starlings_models::Spec;
 ///
 /// # Errors
 /// What is wrong with the answer, as the end of a sentence about the server.
-pub(super) fn rows(answer: &Value, spec: &Spec, n_times: usize) -> Result<Vec<f64>, String> {
+pub(crate) fn rows(answer: &Value, spec: &Spec, n_times: usize) -> Result<Vec<f64>, String> {
     let vector = |value: &Value| -> Option<Vec<f64>> {
         let number = |v: &Value| if v.is_null() { Some(f64::NAN) } else { v.as_f64() };
         value.as_array()?.iter().map(number).collect()

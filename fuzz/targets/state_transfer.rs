@@ -1,0 +1,40 @@
+//! The messages of a state's way: the head of a put, the request for one, its pieces, the answer.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use prost::Message;
+use starlings_proto::convert::state::{
+    Get, PutHead, chunk_values, decode_chunk, decode_head, decode_put_result, encode_put_result,
+};
+use starlings_proto::generated;
+
+fuzz_target!(|bytes: &[u8]| {
+    if let Ok(message) = generated::GetRequest::decode(bytes)
+        && let Ok(get) = Get::decode(&message)
+    {
+        assert_eq!(Get::decode(&get.encode()), Ok(get));
+    }
+    if let Ok(message) = generated::PutResult::decode(bytes)
+        && let Ok(state) = decode_put_result(&message)
+    {
+        assert_eq!(decode_put_result(&encode_put_result(&state)), Ok(state));
+    }
+    if let Ok(message) = generated::Chunk::decode(bytes)
+        && let Ok(head) = PutHead::decode(&message)
+    {
+        assert_eq!(PutHead::decode(&head.encode()), Ok(head));
+    }
+    // A whole stream: messages one after the other, each after its length.
+    let mut rest = bytes;
+    let mut next = || generated::Chunk::decode_length_delimited(&mut rest).ok();
+    let Some(Ok(n_state)) = next().map(|head| decode_head(&head)) else { return };
+    let mut index = 0;
+    while let Some(message) = next() {
+        let values = chunk_values(n_state, index);
+        match decode_chunk(message, values) {
+            Ok(piece) => assert_eq!(piece.len(), 8 * values),
+            Err(_) => break,
+        }
+        index += 1;
+    }
+});
