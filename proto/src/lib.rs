@@ -7,6 +7,7 @@
 
 pub mod access;
 pub mod adapters;
+pub mod awake;
 mod codec;
 pub mod convert;
 pub mod private_file;

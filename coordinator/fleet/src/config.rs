@@ -23,7 +23,7 @@ pub struct FleetConfig {
     pub secrets: Option<Secrets>,
     /// Name of the run, told to workers.
     pub run_name: String,
-    /// Time between heartbeats; a worker silent for twice as long is lost.
+    /// Time between heartbeats; a worker that is silent for two of them is lost.
     pub heartbeat: Duration,
     /// How long a batch waits without any usable worker before it is an error.
     pub patience: Duration,

@@ -60,7 +60,7 @@ use watch::{Overdue, Starved};
 /// The numbers that the rules need.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Rules {
-    /// Time between heartbeats; a worker silent for twice as long is lost.
+    /// Time between heartbeats; a worker that is silent for two of them is lost.
     pub heartbeat: Duration,
     /// How long a batch may wait without any worker that can take a job.
     pub patience: Duration,

@@ -56,8 +56,7 @@ fn a_closed_connection_is_noticed_within_a_second_and_silence_within_sixteen() {
     proxy.mute();
     let after = lost_after(&events, since);
     println!("silence is noticed after {:.2} s", after.as_secs_f64());
-    // Two heartbeats and the time between two looks at the clock.
-    assert!(after < Duration::from_millis(16_500), "{after:?}");
+    assert!(after <= Duration::from_secs(16), "{after:?}");
     worker.cancel.cancel();
     let _ = worker.end();
 }

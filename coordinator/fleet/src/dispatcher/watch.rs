@@ -24,6 +24,9 @@ pub(super) struct Starved {
     next_notice: Duration,
 }
 
+/// Heartbeats of silence after which a worker is lost: with the time between two looks at the clock no more than two.
+const SILENT: f64 = 1.95;
+
 /// The job that has been computing for longest, and when to say so next.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Overdue {
@@ -40,7 +43,7 @@ impl Dispatcher {
             // This process stood still (suspended, or starved of processor time): what workers sent meanwhile is unread.
             self.workers.values_mut().for_each(|w| w.stood_still(gap, now));
         }
-        let limit = self.rules.heartbeat * 2;
+        let limit = self.rules.heartbeat.mul_f64(SILENT);
         let silent = self.workers.values().filter(|w| now.saturating_sub(w.last_heard) > limit);
         for id in silent.map(|w| w.id).collect::<Vec<_>>() {
             let reason = format!("silent for more than {:.0} s", limit.as_secs_f64());
