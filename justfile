@@ -31,6 +31,11 @@ explain-battery:
 faults:
     PATH="$PWD/target/solvers/bin:$PATH" STARLINGS_WRITE_PAGES=1 cargo test --test faults -- --ignored --nocapture
 
+# A thousand faults in running studies on three workers, and docs/chaos.md: ten minutes. CHAOS_FAULTS, STARLINGS_CHAOS_SEED choose, CHAOS_AT_A_TIME studies
+# at a time. Needs namespaces (`unshare`, `ip`) and the Python package in target/solvers (.ci/solvers).
+chaos:
+    STARLINGS_WRITE_PAGES=1 cargo test --test chaos -- --ignored --nocapture
+
 # Every fuzz target for FUZZ_SECONDS each, 600 by default (cargo install cargo-fuzz; a stable compiler is told to take the fuzzer's flags).
 fuzz:
     cargo run --manifest-path fuzz/Cargo.toml --example seeds

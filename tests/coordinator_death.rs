@@ -5,57 +5,16 @@
 mod common;
 mod small_kit;
 
-use std::fmt::Write as _;
 use std::io::{BufRead, BufReader, Read};
 use std::net::{SocketAddr, TcpListener};
 use std::path::Path;
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
+use common::studies::slow;
 use common::{bytes, kill, output, run, starlings, wait_until};
 use rusqlite::Connection;
 use small_kit::same;
-
-/// A study of native runs that take about a tenth of a second each: `records` recordings, in a folder of its own.
-fn slow(records: usize) -> (tempfile::TempDir, std::path::PathBuf) {
-    let dir = tempfile::tempdir().unwrap();
-    let data: String = (0..8).fold("time,y\n".to_owned(), |mut text, i| {
-        let t = 0.5 * f64::from(i);
-        let _ = writeln!(text, "{t},{}", 0.3 + 0.9 * t - 0.2 * t * t);
-        text
-    });
-    std::fs::write(dir.path().join("data.csv"), data).unwrap();
-    let records = (0..records).fold(String::new(), |mut text, i| {
-        let channel = "{ column = \"y\", output = \"y\", noise = 0.1 }";
-        let _ = write!(text, "[[records]]\nname = \"r{i}\"\nfile = \"data.csv\"\nchannels = [{channel}]\n");
-        text
-    });
-    // The fast term costs steps of integration and moves nothing.
-    let study = format!(
-        r#"[study]
-name = "slow"
-[model]
-kind = "equations"
-outputs = [ {{ name = "y", value = "x" }} ]
-[[model.states]]
-name = "x"
-initial = 0.3
-rate = "a + b*t + sin(150000*t)"
-[[parameters]]
-name = "a"
-prior = {{ transform = "linear", median = 0.5, sd = 1.0 }}
-[[parameters]]
-name = "b"
-prior = {{ transform = "linear", median = 0.0, sd = 1.0 }}
-{records}
-[estimator]
-kind = "batch"
-"#
-    );
-    let file = dir.path().join("study.toml");
-    std::fs::write(&file, study).unwrap();
-    (dir, file)
-}
 
 fn free_address() -> SocketAddr {
     TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap()
@@ -96,7 +55,8 @@ fn count(out: &Path, sql: &str) -> i64 {
 
 #[test]
 fn workers_outlive_their_coordinator_and_no_run_is_made_twice() {
-    let (dir, study) = slow(10);
+    let dir = tempfile::tempdir().unwrap();
+    let study = slow(dir.path(), 10);
     let (whole, broken) = (dir.path().join("whole"), dir.path().join("broken"));
     run(&study, &whole, 2);
     let address = free_address();
@@ -152,7 +112,8 @@ fn the_second_coordinator_in_a_folder_is_told_who_the_first_is() {
 #[test]
 #[ignore = "times a release build: `just deaths`"]
 fn ten_workers_are_back_within_ten_seconds_of_a_resume() {
-    let (dir, study) = slow(200);
+    let dir = tempfile::tempdir().unwrap();
+    let study = slow(dir.path(), 200);
     let out = dir.path().join("out");
     let address = free_address();
     let mut first = coordinator(&study, &out, address, &[]);

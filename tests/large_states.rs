@@ -4,52 +4,11 @@
 
 mod common;
 
-use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Stdio};
 
+use common::studies::long_tube;
 use common::{analyses, bytes, kill, output, starlings, wait_until};
-
-/// A tube of 20 000 rings, whose state has 320 kB, seen through the pressure at its inlet.
-fn study(folder: &Path) -> PathBuf {
-    let text = r#"
-[study]
-name = "long-tube"
-[model]
-kind = "fsi-tube"
-[model.layout]
-cells = 20000
-regions = 2
-[[parameters]]
-name = "E1"
-unit = "dyn/cm^2"
-prior = { transform = "log2", median = 5e6, sd = 0.5 }
-[[parameters]]
-name = "E2"
-unit = "dyn/cm^2"
-prior = { transform = "log2", median = 5e6, sd = 0.5 }
-[[records]]
-name = "rise"
-file = "pressure.csv"
-time = "time"
-inputs = { flow = "flow.csv:flow" }
-channels = [ { column = "p", output = "inlet_pressure", unit = "dyn/cm^2", noise = 1e4 } ]
-[estimator]
-passes = 1
-"#;
-    let (mut pressure, mut flow) = ("time,p\n".to_owned(), "time,flow\n".to_owned());
-    for step in 0..=80 {
-        let t = f64::from(step) * 0.001;
-        writeln!(flow, "{t},{}", 3.0 * f64::from(step.min(20))).unwrap();
-        if step > 0 && step % 2 == 0 {
-            writeln!(pressure, "{t},{}", 106_657.6 + 4e5 * t).unwrap();
-        }
-    }
-    std::fs::write(folder.join("study.toml"), text).unwrap();
-    std::fs::write(folder.join("pressure.csv"), pressure).unwrap();
-    std::fs::write(folder.join("flow.csv"), flow).unwrap();
-    folder.join("study.toml")
-}
 
 fn run(study: &Path, out: &Path, more: &[&str]) -> Command {
     let mut command = starlings();
@@ -60,7 +19,8 @@ fn run(study: &Path, out: &Path, more: &[&str]) -> Command {
 #[test]
 fn a_coordinator_killed_with_large_states_resumes_to_the_same_bytes_and_leaves_none_of_them() {
     let dir = tempfile::tempdir().unwrap();
-    let (study, whole, broken) = (study(dir.path()), dir.path().join("whole"), dir.path().join("broken"));
+    let (study, whole, broken) =
+        (long_tube(dir.path(), 80), dir.path().join("whole"), dir.path().join("broken"));
     let (code, _, stderr) = output(&mut run(&study, &whole, &[]));
     assert_eq!(code, 0, "{stderr}");
     assert!(!whole.join("states").exists());
@@ -81,7 +41,7 @@ fn a_coordinator_killed_with_large_states_resumes_to_the_same_bytes_and_leaves_n
 #[test]
 fn a_resume_without_a_piece_of_its_states_says_which() {
     let dir = tempfile::tempdir().unwrap();
-    let (study, out) = (study(dir.path()), dir.path().join("out"));
+    let (study, out) = (long_tube(dir.path(), 80), dir.path().join("out"));
     let mut child = run(&study, &out, &[]).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     wait_until("some analyses", || analyses(&out) > 3);
     kill(&mut child);
@@ -99,7 +59,7 @@ fn an_amount_of_memory_that_is_none_is_refused() {
     for amount in ["much", "8", "-1 GB", "1 XB"] {
         let out = dir.path().join("out");
         let (code, _, stderr) =
-            output(&mut run(&study(dir.path()), &out, &[&format!("--state-memory={amount}")]));
+            output(&mut run(&long_tube(dir.path(), 80), &out, &[&format!("--state-memory={amount}")]));
         assert_eq!(code, 2, "{stderr}");
         assert!(stderr.contains("such as \"8 GiB\""), "{stderr}");
     }

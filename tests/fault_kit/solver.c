@@ -1,6 +1,7 @@
 /* A decay that is measured, y = a exp(-k t), with a fault at a run that is told in advance: the runs of all programs are counted
  * in one file, so that the moment is the same on every machine. Reads params.txt, writes result.csv, as a solver through files.
- * FAULT_DIR holds `count` and, where there is to be a fault, `plan`: its kind, the first and the last run that it meets. */
+ * FAULT_DIR holds `count` and, where there is to be a fault, `plan`: its kind, the first and the last run that it meets. With
+ * FAULT_PAUSE a run takes so many milliseconds more, in which its parameters stand in `running.` and the number of the process. */
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
@@ -108,6 +109,21 @@ static void meet(const char *kind, const char *own) {
     }
 }
 
+static void linger(double k, double a) {
+    const char *pause = getenv("FAULT_PAUSE");
+    char name[64], path[4096];
+    if (!pause) return;
+    snprintf(name, sizeof name, "running.%d", getpid());
+    snprintf(path, sizeof path, "%s", in_folder(name));
+    FILE *file = fopen(path, "w");
+    if (!file || fprintf(file, "%.17g %.17g\n", k, a) < 0 || fclose(file) != 0) {
+        perror(name);
+        exit(1);
+    }
+    usleep(1000 * atoi(pause));
+    unlink(path);
+}
+
 int main(int n_argument, char **arguments) {
     double k, a;
     long n = count(), first, last;
@@ -124,6 +140,7 @@ int main(int n_argument, char **arguments) {
         return 1;
     }
     fclose(in);
+    linger(k, a);
     FILE *out = fopen("result.csv", "w");
     if (!out) {
         perror("result.csv");

@@ -6,6 +6,7 @@ import os
 import shutil
 import signal
 import sys
+import time
 
 import starlings
 from starlings import Quantity
@@ -88,6 +89,17 @@ def meet(kind):
         os.kill(os.getppid(), signal.SIGSTOP)
 
 
+def linger(p):
+    """Takes so much longer, as solver.c does."""
+    pause = os.environ.get("FAULT_PAUSE")
+    if pause:
+        path = os.path.join(FOLDER, f"running.{os.getpid()}")
+        with open(path, "w") as file:
+            file.write(f"{p.k!r} {p.a!r}\n")
+        time.sleep(1e-3 * float(pause))
+        os.unlink(path)
+
+
 class Decay(starlings.Solver):
     """y = a exp(-k t)."""
 
@@ -108,6 +120,7 @@ class Decay(starlings.Solver):
         if int(first) <= n <= int(last) and rank == (n % COMM.size if COMM else 0):
             meet(kind)
         p = window.p
+        linger(p)
         return [p.a * math.exp(-p.k * t) for t in window.times]
 
 

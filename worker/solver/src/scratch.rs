@@ -111,6 +111,8 @@ impl Scratch {
             notice.keep_folder(&self.folder);
         }
         self.is_kept = true;
+        // The failure that names it may be lost on its way to the coordinator.
+        tracing::info!(folder = %self.folder.display(), "the folder of a failed run is kept");
         Kept::This(self.folder.clone())
     }
 }

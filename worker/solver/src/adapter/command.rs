@@ -40,7 +40,7 @@ use program::{End, Output};
 use results::RunResults;
 use rule::{Rule, lies_inside};
 use template::{OWN_NAMES, Templates};
-use traces::{kept, said};
+use traces::{kept, lacks_room, said};
 
 /// What it says of itself.
 pub(crate) const DEF: AdapterDef = AdapterDef {
@@ -215,7 +215,7 @@ impl PerRun {
         };
         Err(match end {
             End::Late => Failed::Late(what),
-            End::Ended(_) if !killed => Failed::Program(what),
+            End::Ended(_) if !killed && !lacks_room(&tail) => Failed::Program(what),
             End::Ended(_) | End::Stopped | End::Unwanted => Failed::Host(what),
         })
     }

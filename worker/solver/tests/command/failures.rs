@@ -25,6 +25,15 @@ fn a_program_that_says_nothing_on_its_standard_error_is_quoted_from_its_standard
 }
 
 #[test]
+fn a_program_that_says_that_a_disk_is_full_is_no_fault_of_its_parameters() {
+    for words in ["result.csv: No space left on device", "result.csv: Disk quota exceeded"] {
+        let says = Bench::new(&format!("echo '{words}' >&2; exit 1"), &[]).run(1.0, &[1.0]).unwrap_err();
+        assert!(says.starts_with("it could not be run: the solver `sh` exited with status 1"), "{says}");
+        assert!(says.ends_with(words), "{says}");
+    }
+}
+
+#[test]
 fn a_program_that_never_ends_is_ended_with_its_children() {
     let mut bench = Bench::new("sleep 600 & echo $! > \"$1\"; echo still here >&2; wait", &[]);
     let pid = bench.folder.path().join("pid");

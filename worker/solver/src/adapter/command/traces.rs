@@ -25,6 +25,12 @@ pub(super) fn said(process: &mut Process, output: &Output) -> String {
     last.join("\n")
 }
 
+/// Whether a program says, in the words of the system, that a disk has no room: then the place is at fault, and not the parameters. A
+/// control run cannot tell, since the folders of other runs come and go beside it.
+pub(super) fn lacks_room(said: &str) -> bool {
+    ["No space left on device", "Disk quota exceeded"].iter().any(|words| said.contains(words))
+}
+
 /// Keeps the folder of a run that failed, with what the program was told and wrote; says where it is.
 pub(super) fn kept(scratch: Scratch, failure: &str, told: &str, output: &Output) -> String {
     match scratch.keep(failure) {
