@@ -74,7 +74,8 @@ impl Hand {
     }
 
     async fn get(&mut self, epoch: u64, nonce: u64, state: StateId) -> Result<usize, tonic::Status> {
-        let mut pieces = self.client.get(Get { epoch, nonce, state }.encode()).await?.into_inner();
+        let mut pieces =
+            self.client.get(Get { epoch, nonce, state, names: false }.encode()).await?.into_inner();
         let mut bytes = 0;
         while let Some(piece) = pieces.message().await? {
             bytes += piece.data.len();
