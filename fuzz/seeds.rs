@@ -11,6 +11,7 @@ use starlings_models::{
 use starlings_proto::access::{AccessFile, Token};
 use starlings_proto::convert::solver::description::encode_description;
 use starlings_proto::convert::solver::{Reply, encode_reply, encode_run};
+use starlings_proto::convert::piece_names::encode_names;
 use starlings_proto::convert::state::{CHUNK_VALUES, Get, PutHead, encode_chunk, encode_head, encode_put_result};
 use starlings_proto::convert::{HeldRun, ended};
 use starlings_proto::{
@@ -87,19 +88,26 @@ fn messages() -> Result<(), Box<dyn std::error::Error>> {
         write("kept_run", &format!("end-{i}"), &ended::encode(&outcome, 0.25))?;
         from_worker.push(FromWorker::Result { lease: LEASE, answer: LeaseOutcome::Ran(outcome), cost: 0.25 });
     }
+    from_worker.push(FromWorker::SharesStates);
+    for made in [Ok(vec![[1; 32], [2; 32]]), Err("no room".to_owned())] {
+        from_worker.push(FromWorker::Recombined { lease: LEASE, made });
+    }
     for (i, message) in from_worker.into_iter().enumerate() {
         write("from_worker", &format!("kind-{i}"), &message.encode()?.encode_to_vec())?;
     }
     to_worker()?;
     solver()?;
 
-    write("state_transfer", "get", &Get { epoch: 1, nonce: 42, state: [7; 32] }.encode().encode_to_vec())?;
+    write("state_transfer", "get", &Get { epoch: 1, nonce: 42, state: [7; 32], names: true }.encode().encode_to_vec())?;
     write("state_transfer", "answer", &encode_put_result(&[7; 32]).encode_to_vec())?;
     write("state_transfer", "head", &PutHead { n_state: 3, lease: LEASE, nonce: 42 }.encode().encode_to_vec())?;
     let mut stream = encode_head(CHUNK_VALUES + 1).encode_length_delimited_to_vec();
     stream.extend(encode_chunk(vec![0; 8 * CHUNK_VALUES].into()).encode_length_delimited_to_vec());
     stream.extend(encode_chunk(vec![0; 8].into()).encode_length_delimited_to_vec());
     write("state_transfer", "stream", &stream)?;
+    let mut named = encode_head(CHUNK_VALUES + 1).encode_length_delimited_to_vec();
+    named.extend(encode_names(&[[1; 32], [2; 32]]).encode_length_delimited_to_vec());
+    write("state_transfer", "names", &named)?;
     Ok(())
 }
 
@@ -119,6 +127,7 @@ fn to_worker() -> Result<(), Box<dyn std::error::Error>> {
         epoch: 1,
         run_id: [5; 16],
         incarnation: 1,
+        probe: Some([6; 32]),
     };
     let mut stream = vec![ToWorker::welcome(welcome), ToWorker::setup(&id, json)];
     let mut sent = SentWindows::default();
@@ -135,6 +144,7 @@ fn to_worker() -> Result<(), Box<dyn std::error::Error>> {
         ToWorker::heartbeat(),
         ToWorker::adopt(&[([9; 32], LEASE)], true),
         ToWorker::notice("hear, hear"),
+        ToWorker::recombine(LEASE, 3, &[[1; 32], [2; 32]], vec![0; 32].into()),
         ToWorker::drain("the run is over"),
         ToWorker::refuse("another version"),
     ]);

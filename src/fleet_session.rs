@@ -2,15 +2,18 @@
 //!
 //! Shared by every command that runs the model on the fleet. Next file to read: [`crate::run`].
 
+mod plan;
+mod relay;
+
 use std::net::{IpAddr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock, mpsc};
 use std::time::Duration;
 
 use clap::Args;
-use starlings_coordinator::fleet::access::{Access, AccessFault};
+use starlings_coordinator::fleet::access::Access;
 use starlings_coordinator::fleet::{
-    Bound, FleetConfig, FleetError, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers, RunIdentity, StateStore,
+    FleetConfig, FleetError, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers, PlaceName, RunIdentity,
 };
 use starlings_coordinator::study::Study;
 use starlings_coordinator::study::store::Store;
@@ -25,6 +28,8 @@ use crate::interrupt;
 use crate::load::end_solvers;
 use crate::progress::Display;
 use crate::solvers::own_program;
+use plan::{ACCESS, AccessPlan, Entrance, Plan, failed};
+use relay::relay;
 
 /// Which workers run the model.
 #[derive(Args)]
@@ -48,53 +53,10 @@ pub(crate) struct FleetArgs {
     /// Memory for states of particles that are larger than 256 KiB, such as "8 GiB"; what is beyond it goes to the disk.
     #[arg(long, value_name = "SIZE", default_value = "1 GiB", value_parser = memory)]
     state_memory: usize,
-}
-
-/// What was asked for, checked.
-pub(crate) struct Plan {
-    /// Where to listen; `None` for local workers, which have their connections from this process.
-    address: Option<SocketAddr>,
-    /// The name of the host to listen on, where it was given by name.
-    host: Option<String>,
-    /// Where the access file goes; `None` without one.
-    access: Option<AccessPlan>,
-    /// Workers to start where it does not listen.
-    n_worker: usize,
-    /// Whether results of workers may differ.
-    mixed: bool,
-    /// Bytes for large states.
-    state_memory: usize,
-}
-
-/// Where an access file goes.
-enum AccessPlan {
-    /// Here.
-    File(PathBuf),
-    /// Into the run folder, which is made later.
-    RunFolder,
-}
-
-/// Name of the access file in a run folder.
-const ACCESS: &str = "access.json";
-
-/// What a command takes before it writes anything: an address or an access file in use must leave nothing behind.
-pub(crate) struct Entrance {
-    bound: Option<Bound>,
-    access: Option<Access>,
-}
-
-impl Plan {
-    /// Takes the address and the secrets of the access file.
-    pub(crate) fn enter(&self) -> Result<Entrance, Failure> {
-        let bound = self.address.map(Bound::new).transpose().map_err(Failure::run)?;
-        let file = match &self.access {
-            None => return Ok(Entrance { bound, access: None }),
-            Some(AccessPlan::File(file)) => Some(file.as_path()),
-            Some(AccessPlan::RunFolder) => None,
-        };
-        let access = Access::at(file).map_err(|fault| failed(&fault))?;
-        Ok(Entrance { bound, access: Some(access) })
-    }
+    /// Folder on a file system that all machines see: states of particles that are larger than 256 KiB stand there, and workers
+    /// that name it too read, write and mix them there.
+    #[arg(long, value_name = "FOLDER", conflicts_with = "state_memory")]
+    states: Option<PlaceName>,
 }
 
 impl FleetArgs {
@@ -119,7 +81,8 @@ impl FleetArgs {
             (Some(_), false) => Some(self.access_plan(out)?),
             _ => None,
         };
-        Ok(Plan { address, host, access, n_worker, mixed: self.mixed, state_memory: self.state_memory })
+        let (mixed, state_memory, states) = (self.mixed, self.state_memory, self.states.clone());
+        Ok(Plan { address, host, access, n_worker, mixed, state_memory, states, keeps_states: false })
     }
 
     fn access_plan(&self, out: Option<&Out<'_>>) -> Result<AccessPlan, Failure> {
@@ -137,10 +100,6 @@ impl FleetArgs {
 
 /// The run folder of a command, where it was named.
 pub(crate) struct Out<'a>(pub(crate) Option<&'a Path>);
-
-fn failed(fault: &AccessFault) -> Failure {
-    if fault.is_input() { Failure::input(format!("--access: {fault}")) } else { Failure::run(fault) }
-}
 
 /// The fleet of one run, its local workers, and the way of its events to the store.
 pub(crate) struct FleetSession {
@@ -179,7 +138,7 @@ impl FleetSession {
         config.secrets = access.as_ref().map(|access| access.secrets().clone());
         (config.seed, config.mixed) = (study.seed, plan.mixed);
         config.timeout_factor = study.fleet.timeout_factor;
-        config.states = StateStore::new(plan.state_memory);
+        config.states = plan.store(&config.identity);
         let fleet = GrpcFleet::listen_on(bound, config).map_err(Failure::run)?;
         let display = Arc::clone(display);
         let refused = fleet.refused();
@@ -206,9 +165,12 @@ impl FleetSession {
         // Their places are the workers'.
         end_solvers();
         let slots = study.fleet.slots.unwrap_or(1).to_string();
+        let mut args =
+            ["worker", "--allow-commands-from-study", "--slots", &slots].map(str::to_owned).to_vec();
+        args.extend(plan.states.iter().flat_map(|place| ["--states".to_owned(), place.to_string()]));
         let config = LocalConfig {
             program: own_program().map_err(Failure::run)?,
-            args: ["worker", "--allow-commands-from-study", "--slots", &slots].map(str::to_owned).to_vec(),
+            args,
             n: plan.n_worker,
             fleet: self.fleet.handle(),
         };
@@ -232,7 +194,8 @@ impl FleetSession {
                     "warning: --insecure: nothing is encrypted, and whoever reaches {address} joins this run, reads its data and can \
                      decide its result"
                 ));
-                let start = format!("starlings worker --connect {address} --insecure");
+                let start =
+                    format!("starlings worker --connect {address} --insecure{}", plan.states_option());
                 self.say_how(format!("listening on {address}; start workers with: {start}"));
                 return Ok(());
             }
@@ -242,7 +205,10 @@ impl FleetSession {
         }
         let absolute = std::path::absolute(&file).unwrap_or(file);
         let name = shell_words::quote(&absolute.to_string_lossy()).into_owned();
-        self.say_how(format!("listening on {address}; start workers with: starlings worker --access {name}"));
+        self.say_how(format!(
+            "listening on {address}; start workers with: starlings worker --access {name}{}",
+            plan.states_option()
+        ));
         Ok(())
     }
 
@@ -278,30 +244,5 @@ impl FleetSession {
         drop(local);
         // The relay ends with the last sender of events; a panic in it has been printed already.
         let _ = watcher.join();
-    }
-}
-
-/// Shows the events that people should see at once and hands all of them on to the store. Where workers come from elsewhere, people
-/// see who comes and goes.
-fn relay(
-    heard: mpsc::Receiver<FleetEvent>,
-    kept: &mpsc::Sender<FleetEvent>,
-    display: &Display,
-    listens: bool,
-    missing: impl Fn() -> [Option<String>; 2],
-) {
-    for event in heard {
-        if event.is_notable() || listens && event.is_of_roster() {
-            let waits = matches!(event, FleetEvent::Waiting { .. });
-            let more = missing().into_iter().flatten().filter(|_| waits);
-            let said: Vec<String> = std::iter::once(event.to_string()).chain(more).collect();
-            display.say(&said.join("; "));
-        } else {
-            tracing::info!(kind = event.kind(), "{event}");
-        }
-        if event.is_lasting() {
-            // The store stops listening at the end of the run; later events have no reader.
-            let _ = kept.send(event);
-        }
     }
 }

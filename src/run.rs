@@ -43,7 +43,7 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     interrupt::watch();
     let mut study = load_where(&args.study, args.fleet.is_here())?;
-    let plan = args.fleet.plan(&study, Some(&Out(args.out.as_deref())))?;
+    let plan = args.fleet.plan(&study, Some(&Out(args.out.as_deref())))?.keeping_states();
     let kind = study.estimator.kind;
     let is_away = is_outside(&study) && !args.fleet.is_here();
     // What a solver answers for is found out by the trial, and may be needed again.

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use clap::Parser;
 use starlings_models::SolverDef;
-use starlings_worker::{MAX_SLOTS, Tell, WorkerConfig, WorkerError};
+use starlings_worker::{MAX_SLOTS, PlaceName, Tell, WorkerConfig, WorkerError};
 use tokio_util::sync::CancellationToken;
 
 use crate::console::{cancel_on_signal, line, note};
@@ -44,6 +44,10 @@ pub(crate) struct Args {
     /// End when the coordinator's connection closes instead of dialling again.
     #[arg(long)]
     once: bool,
+    /// Folder for states of particles as this machine sees it, where the coordinator names the same one with its --states: states
+    /// that are larger than 256 KiB are read, written and mixed there.
+    #[arg(long, value_name = "FOLDER")]
+    states: Option<PlaceName>,
     /// Place among the workers that one coordinator started on this machine, by which their solvers find their cores.
     #[arg(long, default_value_t = 0, value_name = "I", hide = true)]
     place: usize,
@@ -81,6 +85,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         cancel,
         factory: solvers.factory(),
         tell,
+        states: args.states.clone(),
         ..contact
     };
     let report = starlings_worker::run(config).map_err(|error| match error {

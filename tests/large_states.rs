@@ -38,6 +38,71 @@ fn a_coordinator_killed_with_large_states_resumes_to_the_same_bytes_and_leaves_n
     assert!(!broken.join("states").exists(), "a finished run needs no state");
 }
 
+/// Names of what is in the folder that machines share: a folder for each run, with a file for each piece.
+fn shared(place: &Path) -> Vec<PathBuf> {
+    let inside = |path: &Path| std::fs::read_dir(path).unwrap().map(|entry| entry.unwrap().path());
+    inside(place).flat_map(|run| inside(&run).collect::<Vec<_>>()).collect()
+}
+
+/// Kills a process that this one started.
+fn kill_a_worker(coordinator: u32) {
+    let tasks = std::fs::read_dir(format!("/proc/{coordinator}/task")).unwrap();
+    let started = |task: PathBuf| std::fs::read_to_string(task.join("children")).unwrap_or_default();
+    let all: String = tasks.flatten().map(|task| started(task.path())).collect();
+    let worker = all.split_whitespace().next().expect("it has workers");
+    assert!(Command::new("kill").args(["-9", worker]).status().unwrap().success());
+}
+
+#[test]
+fn states_in_a_shared_folder_give_the_same_bytes_over_kills_of_workers_and_of_the_coordinator() {
+    let dir = tempfile::tempdir().unwrap();
+    let place = dir.path().join("shared");
+    std::fs::create_dir(&place).unwrap();
+    let (study, whole, broken) = (study(dir.path()), dir.path().join("whole"), dir.path().join("broken"));
+    let (code, _, stderr) = output(&mut run(&study, &whole, &[]));
+    assert_eq!(code, 0, "{stderr}");
+    let named = ["--states", place.to_str().unwrap()];
+    for (more, stop_at) in [(&[][..], 3), (&["--resume"], 12)] {
+        let mut command = run(&study, &broken, &[&named, more].concat());
+        let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        wait_until("an analysis more", || analyses(&broken) > stop_at - 2);
+        // Whatever it does just now, a run or a block.
+        kill_a_worker(child.id());
+        wait_until("some analyses", || analyses(&broken) > stop_at);
+        kill(&mut child);
+        assert!(!shared(&place).is_empty(), "the snapshot's pieces stand in the folder");
+        assert!(!broken.join("states").exists(), "and nowhere else");
+    }
+    let (code, _, stderr) = output(&mut run(&study, &broken, &[&named, &["--resume"][..]].concat()));
+    assert_eq!(code, 0, "{stderr}");
+    assert_eq!(bytes(&whole, "posterior.csv"), bytes(&broken, "posterior.csv"));
+    assert_eq!(std::fs::read_dir(&place).unwrap().count(), 0, "a finished run needs no state");
+}
+
+#[test]
+fn a_resume_without_the_shared_folder_of_its_states_says_what_is_missing() {
+    let dir = tempfile::tempdir().unwrap();
+    let place = dir.path().join("shared");
+    let (study, out) = (study(dir.path()), dir.path().join("out"));
+    let named = ["--states", place.to_str().unwrap()];
+    let mut child = run(&study, &out, &named).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    wait_until("some analyses", || analyses(&out) > 3);
+    kill(&mut child);
+    let (code, _, stderr) = output(&mut run(&study, &out, &["--resume"]));
+    assert_eq!(code, 1, "{stderr}");
+    assert!(stderr.contains("of a particle's state is missing: expected the file"), "{stderr}");
+    for wrong in ["s3://bucket/states", ""] {
+        let (code, _, stderr) = output(&mut run(&study, &out, &["--resume", "--states", wrong]));
+        assert_eq!(code, 2, "{stderr}");
+    }
+    // A folder that refuses is noticed before anything is run.
+    let file = dir.path().join("file");
+    std::fs::write(&file, "no folder").unwrap();
+    let (code, _, stderr) = output(&mut run(&study, &out, &["--resume", "--states", file.to_str().unwrap()]));
+    assert_eq!(code, 1, "{stderr}");
+    assert!(stderr.contains("for the states of particles"), "{stderr}");
+}
+
 #[test]
 fn a_resume_without_a_piece_of_its_states_says_which() {
     let dir = tempfile::tempdir().unwrap();

@@ -6,8 +6,11 @@ use std::fmt::Write as _;
 use std::net::Ipv4Addr;
 use std::path::Path;
 use std::sync::{Arc, mpsc};
+use std::time::Duration;
 
-use starlings_coordinator::fleet::{Factory, Fleet, FleetConfig, GrpcFleet, InProcess, StateStore};
+use starlings_coordinator::fleet::{
+    Factory, Fleet, FleetConfig, FleetEvent, GrpcFleet, InProcess, PlaceName, StateStore,
+};
 use starlings_models::{
     BuildSetup, Forward, Job, ModelFailure, ParticleError, Prediction, Setup, SetupError, Spec,
 };
@@ -86,20 +89,33 @@ fn factory(wall: f64) -> Factory {
     })
 }
 
-/// A run on two workers over the network, with so much memory for states.
-fn over_the_network(case: &Case, path: &Path, wall: f64, memory: usize) -> (Done, StateStore) {
-    let store = StateStore::new(memory);
-    let (sender, _events) = mpsc::channel();
+/// A run on two workers over the network, with so much memory for states, or in a folder that they share.
+fn over_the_network(
+    case: &Case,
+    path: &Path,
+    wall: f64,
+    memory: usize,
+    place: Option<&PlaceName>,
+) -> (Done, StateStore) {
+    let (sender, events) = mpsc::channel();
     let cancel = CancellationToken::new();
     let mut config = FleetConfig::new(Some((Ipv4Addr::LOCALHOST, 0).into()), "test", cancel, sender);
-    config.states = store.clone();
+    let folder = place.map(|place| place.of_run(&config.identity.id));
+    config.states = folder.map_or_else(|| StateStore::new(memory), StateStore::shared);
+    let store = config.states.clone();
     let mut fleet = GrpcFleet::listen(config).unwrap();
     let address = fleet.address().unwrap();
     let workers = [1, 2].map(|_| {
         let mut config = WorkerConfig::new(address.to_string());
         config.factory = factory(wall);
+        config.states = place.cloned();
         std::thread::spawn(move || starlings_worker::run(config))
     });
+    let mut sharing = if place.is_some() { 2 } else { 0 };
+    while sharing > 0 {
+        let event = events.recv_timeout(Duration::from_secs(60)).expect("the workers come");
+        sharing -= usize::from(matches!(event, FleetEvent::SharesStates { .. }));
+    }
     let done = case.go(path, &mut fleet).unwrap();
     assert!(fleet.states().is_some());
     fleet.close();
@@ -122,12 +138,19 @@ fn the_posterior_is_that_of_the_same_run_in_memory() {
         assert_eq!(small.summary.runs.rescued > 0, rescued, "{estimator}");
         for memory in [1 << 30, 2 * state(CELLS)] {
             let path = case.fresh();
-            let (large, store) = over_the_network(&case, &path, wall, memory);
+            let (large, store) = over_the_network(&case, &path, wall, memory, None);
             assert_eq!(small.csv, large.csv, "{estimator}, {memory} bytes");
             assert!((1..=memory).contains(&store.in_memory().1), "it was used and bounded");
             assert_eq!(store.n_pieces(), 0, "a finished run needs none");
             assert!(!path.join("states").exists());
         }
+        let shared = tempfile::tempdir().unwrap();
+        let place = shared.path().to_str().unwrap().parse().unwrap();
+        let (large, store) = over_the_network(&case, &case.fresh(), wall, 0, Some(&place));
+        assert_eq!(small.csv, large.csv, "{estimator}, in a folder");
+        assert_eq!(store.in_memory(), (0, 0));
+        drop(store);
+        assert_eq!(std::fs::read_dir(shared.path()).unwrap().count(), 0, "a finished run leaves nothing");
     }
 }
 
@@ -138,7 +161,7 @@ fn the_posterior_with_a_state_of_8_megabytes_is_that_of_the_same_run_in_memory()
     let case = tube(cells, "passes = 1");
     let small = case.run_on(&mut InProcess::new(2).with_factory(factory(f64::INFINITY))).unwrap();
     let memory = 2 * state(cells);
-    let (large, store) = over_the_network(&case, &case.fresh(), f64::INFINITY, memory);
+    let (large, store) = over_the_network(&case, &case.fresh(), f64::INFINITY, memory, None);
     assert_eq!(small.csv, large.csv);
     assert!((1..=memory).contains(&store.in_memory().1) && store.n_pieces() == 0);
 }

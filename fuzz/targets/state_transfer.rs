@@ -3,8 +3,9 @@
 
 use libfuzzer_sys::fuzz_target;
 use prost::Message;
+use starlings_proto::convert::piece_names::{decode_names, encode_names};
 use starlings_proto::convert::state::{
-    Get, PutHead, chunk_values, decode_chunk, decode_head, decode_put_result, encode_put_result,
+    Get, PutHead, chunk_values, decode_chunk, decode_head, decode_put_result, encode_put_result, n_chunks,
 };
 use starlings_proto::generated;
 
@@ -30,6 +31,17 @@ fuzz_target!(|bytes: &[u8]| {
     let Some(Ok(n_state)) = next().map(|head| decode_head(&head)) else { return };
     let mut index = 0;
     while let Some(message) = next() {
+        let missing = n_chunks(n_state).saturating_sub(index);
+        match decode_names(&message, missing) {
+            Ok(Some(names)) => {
+                assert!(names.len() <= missing);
+                assert_eq!(decode_names(&encode_names(&names), missing), Ok(Some(names.clone())));
+                index += names.len();
+                continue;
+            }
+            Ok(None) => {}
+            Err(_) => break,
+        }
         let values = chunk_values(n_state, index);
         match decode_chunk(message, values) {
             Ok(piece) => assert_eq!(piece.len(), 8 * values),

@@ -3,12 +3,14 @@
 //! The only module that looks inside [`crate::generated`] and [`crate::generated_solver`]. Every bit of every number survives both
 //! ways; a malformed message is a [`ProtocolError`], never a panic. Next files to read: [`from_worker`], [`to_worker`], [`job`].
 
+pub mod block;
 pub mod ended;
 pub mod floats;
 pub mod from_worker;
 pub mod held;
 pub mod job;
 pub mod key;
+pub mod piece_names;
 pub mod solver;
 pub mod state;
 pub mod to_worker;
@@ -17,6 +19,7 @@ pub mod windows;
 
 use starlings_models::Setup;
 
+pub use block::Block;
 pub use from_worker::{FromWorker, Hello, LeaseOutcome};
 pub use held::HeldRun;
 pub use job::JobEncoder;

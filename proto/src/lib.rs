@@ -19,9 +19,9 @@ pub mod words;
 pub use bytes::Bytes;
 pub(crate) use codec::Codec;
 pub use convert::{
-    FromWorker, HeldRun, Hello, InKey, JobEncoder, JobKey, JobKeys, Lease, LeaseOutcome, ProtocolError,
-    ReceivedWindows, SentWindows, SetupId, State, StateId, StateNaming, ToWorker, Welcome, decode_setup,
-    digest, encode_setup, job_key,
+    Block, FromWorker, HeldRun, Hello, InKey, JobEncoder, JobKey, JobKeys, Lease, LeaseOutcome,
+    ProtocolError, ReceivedWindows, SentWindows, SetupId, State, StateId, StateNaming, ToWorker, Welcome,
+    decode_setup, digest, encode_setup, job_key,
 };
 
 /// Number of the protocol; coordinator and worker must have the same.

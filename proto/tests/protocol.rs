@@ -127,6 +127,10 @@ fn from_worker() -> impl Strategy<Value = FromWorker> {
         (any::<[u8; 32]>(), prop::option::of(".*"))
             .prop_map(|(id, failure)| FromWorker::Setup { id, result: failure.map_or(Ok(()), Err) }),
         (lease(), answer()).prop_map(|(lease, answer)| FromWorker::Result { lease, answer, cost: 0.25 }),
+        Just(FromWorker::SharesStates),
+        (lease(), prop::collection::vec(any::<[u8; 32]>(), 0..4))
+            .prop_map(|(lease, pieces)| FromWorker::Recombined { lease, made: Ok(pieces) }),
+        (lease(), ".*").prop_map(|(lease, why)| FromWorker::Recombined { lease, made: Err(why) }),
         (any::<u32>(), any::<u32>()).prop_map(|(running, queued)| FromWorker::Heartbeat { running, queued }),
         ".*".prop_map(FromWorker::Goodbye),
     ]
@@ -242,10 +246,13 @@ fn the_coordinator_s_messages_arrive_as_sent() {
         epoch: 5,
         run_id: [7; 16],
         incarnation: 3,
+        probe: None,
     };
+    let shared = Welcome { probe: Some([8; 32]), ..welcome.clone() };
     let leases = vec![Lease { epoch: 5, job: 1, attempt: 1 }, Lease { epoch: 5, job: 2, attempt: 3 }];
     let pairs = [
         (ToWorker::welcome(welcome.clone()), ToWorker::Welcome(welcome)),
+        (ToWorker::welcome(shared.clone()), ToWorker::Welcome(shared)),
         (ToWorker::refuse("no"), ToWorker::Refuse("no".to_owned())),
         (ToWorker::cancel(&leases, false), ToWorker::Cancel { leases: leases.clone(), stop: false }),
         (ToWorker::cancel(&leases, true), ToWorker::Cancel { leases, stop: true }),
@@ -272,8 +279,15 @@ fn a_setup_arrives_as_sent_and_a_damaged_one_says_so() {
 #[test]
 fn heartbeats_of_no_length_or_no_end_are_refused() {
     for heartbeat in [0.0, -0.0, -1.0, 1e-300, 1e-3, 1e300, f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-        let welcome =
-            Welcome { protocol: 4, run: String::new(), heartbeat, epoch: 1, run_id: [0; 16], incarnation: 1 };
+        let welcome = Welcome {
+            protocol: 4,
+            run: String::new(),
+            heartbeat,
+            epoch: 1,
+            run_id: [0; 16],
+            incarnation: 1,
+            probe: None,
+        };
         let error = ToWorker::decode(ToWorker::welcome(welcome), &mut ReceivedWindows::default());
         assert!(
             matches!(error, Err(ProtocolError::Shape { field: "heartbeat", .. })),

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use starlings_models::{BuildSetup, Factory, Setup};
+use starlings_pieces::PlaceName;
 use starlings_proto::{Hello, PROTOCOL, VERSION, own_build};
 use tokio_util::sync::CancellationToken;
 
@@ -41,6 +42,8 @@ pub struct WorkerConfig {
     pub hold: HoldLimits,
     /// The folder for what does not fit into memory.
     pub scratch: PathBuf,
+    /// The folder for states that machines share, as this machine sees it; used where the coordinator's is the same.
+    pub states: Option<PlaceName>,
     /// Takes news for whoever watches.
     pub tell: Tell,
 }
@@ -61,6 +64,7 @@ impl WorkerConfig {
             build: own_build(),
             hold: HoldLimits::default(),
             scratch: std::env::temp_dir(),
+            states: None,
             tell: Arc::new(|_| {}),
         }
     }

@@ -3,6 +3,7 @@
 
 use std::time::{Duration, Instant};
 
+use starlings_pieces::PlaceName;
 use starlings_proto::generated::{self, fleet_client::FleetClient};
 use starlings_proto::words::status_text;
 use starlings_proto::{FromWorker, Hello, MAX_MESSAGE, ReceivedWindows, ToWorker, Welcome};
@@ -11,9 +12,10 @@ use tokio_stream::wrappers::UnboundedReceiverStream;
 use tonic::Streaming;
 
 use crate::held::Run;
+use crate::news::News;
 use crate::transfer::Transfers;
 use crate::way::{ATTEMPT, NoWay, Way};
-use crate::{WorkerConfig, WorkerError};
+use crate::{WorkerConfig, WorkerError, outbox, shared};
 
 /// Wait after the first refusal; grows by half each time, up to [`LONGEST_WAIT`].
 const FIRST_WAIT: Duration = Duration::from_millis(50);
@@ -30,6 +32,8 @@ pub(crate) struct Connection {
     pub(crate) windows: ReceivedWindows,
     /// The way of large states.
     pub(crate) transfers: Transfers,
+    /// What is to be said of the folder for states.
+    pub(crate) sharing: Option<News>,
 }
 
 pub(crate) enum Dialled {
@@ -75,7 +79,7 @@ pub(crate) async fn dial(
     let mut told = false;
     loop {
         let attempt = async {
-            let patience = tokio::time::timeout(ATTEMPT, attach(way, hello.clone()));
+            let patience = tokio::time::timeout(ATTEMPT, attach(way, hello.clone(), config.states.as_ref()));
             let attached = patience.await;
             let attached = attached.unwrap_or_else(|_| Err(Attempt::Failed("no answer to Hello".to_owned())));
             attached.and_then(|connection| current(connection, seen))
@@ -132,7 +136,7 @@ fn current(connection: Connection, seen: Option<Run>) -> Result<Connection, Atte
     }
 }
 
-async fn attach(way: &Way, hello: Hello) -> Result<Connection, Attempt> {
+async fn attach(way: &Way, hello: Hello, states: Option<&PlaceName>) -> Result<Connection, Attempt> {
     let channel = way.open().await?;
     let mut client = FleetClient::new(channel)
         .max_decoding_message_size(MAX_MESSAGE)
@@ -149,8 +153,12 @@ async fn attach(way: &Way, hello: Hello) -> Result<Connection, Attempt> {
     let first = inbound.message().await.map_err(|s| failed(&status_text(&s)))?;
     match first.map(|message| ToWorker::decode(message, &mut windows)) {
         Some(Ok(ToWorker::Welcome(welcome))) => {
-            let transfers = Transfers::new(client, welcome.epoch, nonce);
-            Ok(Connection { welcome, outbox, inbound, windows, transfers })
+            let (folder, sharing) = shared::find(states, &welcome).await;
+            if folder.is_some() {
+                outbox::send(&outbox, FromWorker::SharesStates);
+            }
+            let transfers = Transfers::new(client, welcome.epoch, nonce, folder);
+            Ok(Connection { welcome, outbox, inbound, windows, transfers, sharing })
         }
         Some(Ok(ToWorker::Refuse(reason))) => Err(Attempt::Refused(reason)),
         Some(Ok(ToWorker::Drain(reason))) => Err(Attempt::Over(reason)),

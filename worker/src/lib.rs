@@ -5,14 +5,18 @@
 //! is taken here. Next files to read: [`config`], then `session` for one session with a coordinator and `slots` for the threads
 //! that compute.
 
+mod blocks;
 pub mod config;
 mod dial;
 mod held;
 mod idle;
 mod inbox;
 mod news;
+mod outbox;
+mod pieces;
 mod session;
 mod setups;
+mod shared;
 mod slots;
 mod spare;
 mod transfer;
@@ -32,6 +36,7 @@ pub use news::{News, Tell};
 use session::Ended;
 use slots::Slots;
 pub use starlings_models::Factory;
+pub use starlings_pieces::PlaceName;
 pub use starlings_proto::access::AccessError;
 use starlings_proto::{FromWorker, HeldRun, Welcome};
 pub use starlings_proto::{INHERITED, LIFELINE, MAX_SLOTS};
@@ -191,6 +196,9 @@ fn begin(config: &WorkerConfig, slots: &Slots, held: Option<&Held>, connection: 
     let Welcome { run, run_id, incarnation, .. } = &connection.welcome;
     let (run, address) = (run.clone(), config.connect.clone());
     (config.tell)(&News::Connected { run, address, slots: config.slots.max(1) });
+    if let Some(news) = &connection.sharing {
+        (config.tell)(news);
+    }
     let Some(held) = held else { return };
     if !held.connected(Run { id: *run_id, incarnation: *incarnation }) {
         slots.forget();
@@ -211,7 +219,7 @@ fn begin(config: &WorkerConfig, slots: &Slots, held: Option<&Held>, connection: 
     // What goes on is in the first message: it is given away otherwise.
     portions[0].extend(going_on.into_iter().map(|key| HeldRun { key, ended: None }));
     for runs in portions {
-        session::send(outbox, FromWorker::Held(runs));
+        outbox::send(outbox, FromWorker::Held(runs));
     }
     (config.tell)(&News::Delivered { finished, computing });
 }

@@ -38,6 +38,18 @@ pub enum News {
         /// Runs that it goes on with meanwhile.
         computing: usize,
     },
+    /// It and the coordinator see the same folder for states.
+    Shares {
+        /// The folder.
+        place: String,
+    },
+    /// They do not, although it was named here and there.
+    DoesNotShare {
+        /// The folder, as it was named here.
+        place: String,
+        /// What is wrong with it.
+        reason: String,
+    },
     /// The coordinator says something.
     Told(String),
 }
@@ -62,6 +74,10 @@ impl fmt::Display for News {
                     f,
                     "lost the coordinator: {reason}; dialling again, {computing} runs go on and results are held"
                 )
+            }
+            Self::Shares { place } => write!(f, "states go through {place}"),
+            Self::DoesNotShare { place, reason } => {
+                write!(f, "states go over the connection: {place} is not the coordinator's folder ({reason})")
             }
             Self::Told(text) => write!(f, "{text}"),
         }

@@ -13,12 +13,14 @@ use tokio::sync::mpsc::UnboundedSender;
 use tonic::Streaming;
 
 use crate::WorkerConfig;
+use crate::blocks::Blocks;
 use crate::dial::Connection;
 use crate::held::large::Large;
 use crate::held::{self, Held};
 use crate::idle::Idle;
 use crate::inbox::Inbox;
 use crate::news::{News, Tell};
+use crate::outbox::send;
 use crate::setups::Setups;
 use crate::slots::{Asked, Slots, answer};
 use crate::watch::Watch;
@@ -51,6 +53,7 @@ pub(crate) async fn serve(
     beats.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
     let mut silence = Silence::default();
     let inbox = Inbox::new(connection.transfers.clone(), config.slots);
+    let blocks = Blocks::new(connection.transfers.shared(), config.slots);
     let mut watch = Watch::new(slots);
     loop {
         tokio::select! {
@@ -58,7 +61,7 @@ pub(crate) async fn serve(
             biased;
             message = connection.inbound.message() => {
                 silence.broken();
-                let place = Place { slots, setups, held, inbox: &inbox, tell: &config.tell };
+                let place = Place { slots, setups, held, inbox: &inbox, blocks: &blocks, tell: &config.tell };
                 match take(message, &connection.outbox, &mut connection.windows, &place) {
                     Ok(()) => {}
                     Err(Ended::Drained(reason)) => {
@@ -122,6 +125,7 @@ struct Place<'a> {
     setups: &'a Setups,
     held: Option<&'a Held>,
     inbox: &'a Inbox,
+    blocks: &'a Blocks,
     tell: &'a Tell,
 }
 
@@ -131,7 +135,7 @@ fn take(
     windows: &mut ReceivedWindows,
     place: &Place<'_>,
 ) -> Result<(), Ended> {
-    let Place { slots, setups, held, inbox, tell } = *place;
+    let Place { slots, setups, held, inbox, blocks, tell } = *place;
     let message = match message {
         Ok(Some(message)) => message,
         Ok(None) => return Err(Ended::Lost("the coordinator closed the connection".to_owned())),
@@ -169,6 +173,7 @@ fn take(
                 slots.drop_void();
             }
         }
+        Ok(ToWorker::Recombine { lease, block }) => blocks.take(lease, block, outbox),
         Ok(ToWorker::Notice(text)) => tell(&News::Told(text)),
         Ok(ToWorker::Drain(reason)) => return Err(Ended::Drained(reason)),
         Ok(ToWorker::Window | ToWorker::Heartbeat | ToWorker::Welcome(_) | ToWorker::Refuse(_)) => {}
@@ -222,12 +227,6 @@ fn refuse(outbox: &UnboundedSender<generated::FromWorker>, lease: starlings_prot
     answer(outbox, lease, LeaseOutcome::Ran(Err(ParticleError::BadJob(reason))), 0.0);
 }
 
-pub(crate) fn send(outbox: &UnboundedSender<generated::FromWorker>, message: FromWorker) {
-    if let Ok(message) = message.encode() {
-        let _ = outbox.send(message);
-    }
-}
-
 /// Says goodbye and waits shortly until the coordinator closes the stream, so that the message is not lost.
 async fn goodbye(
     outbox: &UnboundedSender<generated::FromWorker>,
@@ -270,7 +269,9 @@ mod tests {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
         let inbox = Inbox::new(Transfers::nowhere(runtime.handle()), 1);
         let tell: Tell = Arc::new(|_| {});
-        let place = Place { slots: &slots, setups: &setups, held: None, inbox: &inbox, tell: &tell };
+        let blocks = Blocks::new(None, 1);
+        let place =
+            Place { slots: &slots, setups: &setups, held: None, inbox: &inbox, blocks: &blocks, tell: &tell };
         let mut take = |message| take(Ok(Some(message)), &outbox, &mut windows, &place).unwrap();
         let mut next = || FromWorker::decode(sent.blocking_recv().expect("an answer")).unwrap();
         let (id, json) = encode_setup(&oscillator()).unwrap();

@@ -1,14 +1,15 @@
 //! The way of large states between a worker and its coordinator: one stream each, beside the messages.
 //!
-//! What arrives is checked by its name, piece by piece. Next file to read: `inbox`, for when states are asked for.
+//! Where both see one folder, the pieces stand there and only their names travel. What arrives is checked by its name, piece by piece.
+//! Next file to read: `inbox`, for when states are asked for.
 
 use std::sync::Arc;
 
 use starlings_models::ParticleError;
-use starlings_proto::convert::floats;
+use starlings_pieces::Folder;
+use starlings_proto::convert::piece_names::decode_names;
 use starlings_proto::convert::state::{
-    CHUNK_VALUES, Get, PutHead, chunk_values, decode_chunk, decode_head, decode_put_result, encode_chunk,
-    n_chunks,
+    ChunkId, Get, PutHead, chunk_values, decode_chunk, decode_head, decode_put_result, n_chunks,
 };
 use starlings_proto::generated::{self, fleet_client::FleetClient};
 use starlings_proto::words::status_text;
@@ -19,6 +20,7 @@ use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
 use tonic::{Status, Streaming};
 
+use crate::pieces;
 use crate::spare::Spare;
 use crate::way::Proven;
 
@@ -38,11 +40,17 @@ pub(crate) struct Transfers {
     spare: Spare,
     epoch: u64,
     nonce: u64,
+    shared: Option<Arc<Folder>>,
 }
 
 impl Transfers {
     /// The way over a connection whose worker is taken; called where the network lives.
-    pub(crate) fn new(client: FleetClient<Proven>, epoch: u64, nonce: u64) -> Self {
+    pub(crate) fn new(
+        client: FleetClient<Proven>,
+        epoch: u64,
+        nonce: u64,
+        shared: Option<Arc<Folder>>,
+    ) -> Self {
         Self {
             client,
             runtime: Handle::current(),
@@ -51,7 +59,13 @@ impl Transfers {
             spare: Spare::default(),
             epoch,
             nonce,
+            shared,
         }
+    }
+
+    /// The folder of states that the coordinator sees too.
+    pub(crate) fn shared(&self) -> Option<Arc<Folder>> {
+        self.shared.clone()
     }
 
     /// The session is over: nothing that is on its way is waited for.
@@ -63,16 +77,25 @@ impl Transfers {
     #[cfg(test)]
     pub(crate) fn nowhere(runtime: &Handle) -> Self {
         let _inside = runtime.enter();
-        Self::new(FleetClient::new(crate::way::nowhere()), 1, 1)
+        Self::new(FleetClient::new(crate::way::nowhere()), 1, 1, None)
     }
 
     /// Asks for a state; its values come when they are read.
     pub(crate) async fn ask(&self, state: StateId) -> Result<Incoming, String> {
-        let request = Get { epoch: self.epoch, nonce: self.nonce, state }.encode();
+        let (n_state, inbound) = self.open(state, self.shared.is_some()).await?;
+        Ok(Incoming { state, n_state, inbound, way: self.clone() })
+    }
+
+    /// The number of values of a state, and the way on which they come, or the names of its pieces.
+    async fn open(
+        &self,
+        state: StateId,
+        names: bool,
+    ) -> Result<(usize, Streaming<generated::Chunk>), String> {
+        let request = Get { epoch: self.epoch, nonce: self.nonce, state, names }.encode();
         let mut inbound = self.client.clone().get(request).await.map_err(|s| lost(&s))?.into_inner();
         let head = next(&mut inbound).await?;
-        let n_state = decode_head(&head).map_err(|error| wrong(&error))?;
-        Ok(Incoming { state, n_state, inbound, spare: self.spare.clone() })
+        Ok((decode_head(&head).map_err(|error| wrong(&error))?, inbound))
     }
 
     /// Takes the memory of a state that is no longer needed, for one that comes.
@@ -82,6 +105,24 @@ impl Transfers {
 
     /// Sends a state; it has arrived at the coordinator by then. For a thread that may wait.
     pub(crate) fn put(&self, lease: Lease, values: &[f64]) -> Result<StateId, ParticleError> {
+        let head = PutHead { n_state: values.len(), lease, nonce: self.nonce };
+        if let Some(folder) = &self.shared {
+            let named = pieces::write(folder, values)
+                .and_then(|names| self.send(|pieces| pieces::send_names(&pieces, head, &names)));
+            match named {
+                Ok(state) => return Ok(state),
+                Err(reason) => tracing::debug!(reason, "a state goes over the connection"),
+            }
+        }
+        let sent = self.send(|pieces| pieces::send(&pieces, head, values));
+        sent.map_err(|reason| ParticleError::Infrastructure(format!("its end state was not taken: {reason}")))
+    }
+
+    /// Puts what `send` says, which returns the name that the coordinator must answer with.
+    fn send(
+        &self,
+        send: impl FnOnce(mpsc::Sender<generated::Chunk>) -> Option<StateId>,
+    ) -> Result<StateId, String> {
         let (pieces, outgoing) = mpsc::channel(AHEAD);
         let (answer, answered) = oneshot::channel();
         let (mut client, lanes, ended) = (self.client.clone(), Arc::clone(&self.lanes), self.ended.clone());
@@ -95,18 +136,11 @@ impl Transfers {
                 let _ = answer.send(result);
             }
         });
-        let name = send(pieces, PutHead { n_state: values.len(), lease, nonce: self.nonce }, values);
-        let refused =
-            |text: String| ParticleError::Infrastructure(format!("its end state was not taken: {text}"));
-        let lost = || refused("the connection is gone".to_owned());
-        let result = answered.blocking_recv().map_err(|_| lost())?;
-        let result = result.map_err(|status| refused(status_text(&status)))?;
-        let taken = decode_put_result(result.get_ref()).map_err(|error| refused(error.to_string()))?;
-        if Some(taken) == name {
-            Ok(taken)
-        } else {
-            Err(refused("another one arrived than was sent".to_owned()))
-        }
+        let name = send(pieces);
+        let result = answered.blocking_recv().map_err(|_| "the connection is gone".to_owned())?;
+        let result = result.map_err(|status| status_text(&status))?;
+        let taken = decode_put_result(result.get_ref()).map_err(|error| error.to_string())?;
+        if Some(taken) == name { Ok(taken) } else { Err("another one arrived than was sent".to_owned()) }
     }
 }
 
@@ -116,23 +150,76 @@ pub(crate) struct Incoming {
     /// Number of its values.
     pub(crate) n_state: usize,
     inbound: Streaming<generated::Chunk>,
-    spare: Spare,
+    way: Transfers,
 }
 
 impl Incoming {
     /// Its values.
     pub(crate) async fn read(mut self) -> Result<Vec<f64>, String> {
+        let Some(folder) = self.way.shared.clone() else { return self.whole(None).await };
+        let first = next(&mut self.inbound).await?;
+        if first.names.is_empty() {
+            return self.whole(Some(first)).await;
+        }
+        let names = self.names(&first).await?;
+        let values = self.room()?;
         let n_state = self.n_state;
-        let mut values = self.spare.take();
-        values.try_reserve_exact(n_state).map_err(|_| {
-            format!(
-                "this machine has no memory for its state of {} MB",
-                n_state.saturating_mul(8) / 1_000_000
-            )
-        })?;
+        let read = tokio::task::spawn_blocking(move || pieces::read(&folder, &names, n_state, values));
+        match read.await.map_err(|_| wrong(&"its thread ended"))? {
+            Ok(values) => Ok(values),
+            // The coordinator finds out whether it can read what this worker cannot, or says which file is missing.
+            Err(reason) => {
+                tracing::debug!(reason, "a state is asked for over the connection");
+                (self.n_state, self.inbound) = self.way.open(self.state, false).await?;
+                self.whole(None).await
+            }
+        }
+    }
+
+    /// The names of all its pieces, of which the first ones have come.
+    async fn names(&mut self, first: &generated::Chunk) -> Result<Vec<ChunkId>, String> {
+        let wanted = n_chunks(self.n_state);
+        let of = |message: &generated::Chunk, had: usize| match decode_names(message, wanted - had) {
+            Ok(Some(names)) => Ok(names),
+            Ok(None) => Err(wrong(&"a piece came among names")),
+            Err(error) => Err(wrong(&error)),
+        };
+        let mut names = of(first, 0)?;
+        while names.len() < wanted {
+            let message = next(&mut self.inbound).await?;
+            names.extend(of(&message, names.len())?);
+        }
+        let mut naming = StateNaming::of(self.n_state);
+        for name in &names {
+            naming.piece(name);
+        }
+        if naming.finish() == self.state {
+            Ok(names)
+        } else {
+            Err(wrong(&"its pieces are not those of its name"))
+        }
+    }
+
+    /// Memory for its values.
+    fn room(&self) -> Result<Vec<f64>, String> {
+        let mut values = self.way.spare.take();
+        let mb = self.n_state.saturating_mul(8) / 1_000_000;
+        values
+            .try_reserve_exact(self.n_state)
+            .map_err(|_| format!("this machine has no memory for its state of {mb} MB"))?;
+        Ok(values)
+    }
+
+    /// Its values, piece by piece over the connection.
+    async fn whole(mut self, mut first: Option<generated::Chunk>) -> Result<Vec<f64>, String> {
+        let n_state = self.n_state;
+        let mut values = self.room()?;
         let mut naming = StateNaming::of(n_state);
         for index in 0..n_chunks(n_state) {
-            let message = next(&mut self.inbound).await?;
+            let message = match first.take() {
+                Some(message) => message,
+                None => next(&mut self.inbound).await?,
+            };
             let bytes = decode_chunk(message, chunk_values(n_state, index)).map_err(|error| wrong(&error))?;
             naming.piece(&digest(&bytes));
             values.extend(bytes.as_chunks::<8>().0.iter().map(|word| f64::from_le_bytes(*word)));
@@ -155,17 +242,4 @@ fn lost(status: &Status) -> String {
 
 fn wrong(error: &dyn std::fmt::Display) -> String {
     format!("its state did not arrive whole: {error}")
-}
-
-/// Sends a state piece by piece; its name, unless the stream ended before it.
-#[expect(clippy::needless_pass_by_value, reason = "the stream ends with it")]
-fn send(pieces: mpsc::Sender<generated::Chunk>, head: PutHead, values: &[f64]) -> Option<StateId> {
-    let mut naming = StateNaming::of(values.len());
-    pieces.blocking_send(head.encode()).ok()?;
-    for piece in values.chunks(CHUNK_VALUES) {
-        let bytes = floats::encode(piece);
-        naming.piece(&digest(&bytes));
-        pieces.blocking_send(encode_chunk(bytes)).ok()?;
-    }
-    Some(naming.finish())
 }

@@ -1,9 +1,12 @@
 //! What a large state costs: the states of all particles to two real worker processes and back, beside the raw socket.
 //!
-//! `cargo bench -p starlings-fleet --bench states -- [--quick] [--large]`. The program starts itself as worker and as the echo that is
+//! `cargo bench -p starlings-fleet --bench states -- [--quick] [--large] [--shared]`. The program starts itself as worker and as the echo that is
 //! the limit of the same run. The model hands its state on, so that all of a cycle is transport: from the store through the
 //! network to the model and back into the store.
 #![allow(clippy::print_stdout, missing_docs)]
+
+#[path = "states/shared.rs"]
+mod shared;
 
 use std::io::{Read, Write};
 use std::os::fd::OwnedFd;
@@ -49,10 +52,14 @@ fn main() -> Result<(), Failure> {
         let mut config = WorkerConfig::new(starlings_proto::INHERITED);
         config.once = true;
         config.factory = Arc::new(build);
+        config.states = shared::place(&args)?;
         starlings_worker::run(config)?;
         return Ok(());
     }
     let cycles = if has("--quick") { 3 } else { 15 };
+    if has("--shared") {
+        return shared::bench(cycles, has("--large"));
+    }
     let bytes = (2 * 8 * VALUES * PARTICLES) as f64;
     let rate = |wall: Duration| bytes / wall.as_secs_f64() / 1e9;
     pieces();
@@ -112,16 +119,7 @@ fn pieces() {
 /// Wall times of cycles, fastest first.
 fn states(values: usize, particles: usize, memory: usize, cycles: usize) -> Result<Vec<Duration>, Failure> {
     let store = StateStore::new(memory);
-    let (sender, events) = mpsc::channel();
-    let mut config = FleetConfig::new(None, "bench", CancellationToken::new(), sender);
-    config.states = store.clone();
-    let mut fleet = GrpcFleet::listen(config)?;
-    let program = std::env::current_exe()?;
-    let workers =
-        LocalWorkers::spawn(LocalConfig { program, args: vec![], n: WORKERS, fleet: fleet.handle() })?;
-    for _ in 0..WORKERS {
-        while !matches!(events.recv_timeout(Duration::from_secs(30))?, FleetEvent::WorkerJoined { .. }) {}
-    }
+    let (mut fleet, workers) = fleet(&store, None)?;
     let setup = fleet.install(&Setup::default())?;
     let mut now = (0..particles).map(|k| start(&store, values, k)).collect::<Result<Vec<_>, Failure>>()?;
     let first: Vec<_> = now.iter().map(StoredState::id).collect();
@@ -141,6 +139,27 @@ fn states(values: usize, particles: usize, memory: usize, cycles: usize) -> Resu
     fleet.close();
     walls.sort_unstable();
     Ok(walls)
+}
+
+/// A fleet with this store, and its workers; with those that share the place.
+fn fleet(store: &StateStore, place: Option<&str>) -> Result<(GrpcFleet, LocalWorkers), Failure> {
+    let (sender, events) = mpsc::channel();
+    let mut config = FleetConfig::new(None, "bench", CancellationToken::new(), sender);
+    config.states = store.clone();
+    config.identity.id = shared::RUN;
+    let fleet = GrpcFleet::listen(config)?;
+    let program = std::env::current_exe()?;
+    let args = place.map(|place| vec!["--states".to_owned(), place.to_owned()]).unwrap_or_default();
+    let workers = LocalWorkers::spawn(LocalConfig { program, args, n: WORKERS, fleet: fleet.handle() })?;
+    for _ in 0..WORKERS {
+        let is_here = |event: &FleetEvent| match event {
+            FleetEvent::SharesStates { .. } => place.is_some(),
+            FleetEvent::WorkerJoined { .. } => place.is_none(),
+            _ => false,
+        };
+        while !is_here(&events.recv_timeout(Duration::from_secs(30))?) {}
+    }
+    Ok((fleet, workers))
 }
 
 /// A state piece by piece, so that no more than a piece of it is in memory beside the store.

@@ -140,6 +140,11 @@ impl Dispatcher {
         self.workers.values().map(|w| w.slots).sum()
     }
 
+    /// Whether all workers are processes of this machine that were started for the run.
+    pub(crate) fn is_local_only(&self) -> bool {
+        self.local_only
+    }
+
     /// Outcomes of the running batch, or of one that ended in an error, that were not handed on before.
     pub(crate) fn arrived(&mut self) -> Vec<(usize, Outcome)> {
         self.batch.as_mut().map_or_else(|| std::mem::take(&mut self.left), Batch::arrived)

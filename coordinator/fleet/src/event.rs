@@ -39,6 +39,11 @@ pub enum FleetEvent {
         /// BLAKE3 of the coordinator's.
         own: String,
     },
+    /// A worker sees the folder for states: they do not travel to it and from it.
+    SharesStates {
+        /// Its name.
+        worker: String,
+    },
     /// A worker is refused.
     WorkerRefused {
         /// Its host.

@@ -14,6 +14,7 @@ impl FleetEvent {
             Self::Listening { .. } => "listening",
             Self::WorkerJoined { .. } => "worker-joined",
             Self::OtherBuild { .. } => "other-build",
+            Self::SharesStates { .. } => "shares-states",
             Self::WorkerRefused { .. } => "worker-refused",
             Self::CallerRefused { .. } => "caller-refused",
             Self::WorkerLeft { .. } => "worker-left",
@@ -61,7 +62,7 @@ impl FleetEvent {
     /// Whether somebody who started workers elsewhere should see it: who came, who went, who is used again.
     pub fn is_of_roster(&self) -> bool {
         match self {
-            Self::WorkerJoined { .. } | Self::WorkerBack { .. } => true,
+            Self::WorkerJoined { .. } | Self::SharesStates { .. } | Self::WorkerBack { .. } => true,
             Self::WorkerLeft { reason, .. } => reason != OVER,
             _ => false,
         }
@@ -89,6 +90,7 @@ impl fmt::Display for FleetEvent {
                     short(own)
                 )
             }
+            Self::SharesStates { worker } => write!(f, "worker {worker} shares the folder for states"),
             Self::WorkerRefused { host, reason } => write!(f, "a worker from {host} was refused: {reason}"),
             Self::CallerRefused { from, reason, count } => f.write_str(&refused(from, reason, *count)),
             Self::WorkerLeft { worker, reason, requeued: 0 } => write!(f, "worker {worker} left: {reason}"),

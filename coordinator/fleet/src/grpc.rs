@@ -25,8 +25,10 @@ use super::explained::{Listening, explained};
 use super::handle::FleetHandle;
 use super::hub::{Hub, Reply, SetupShape, Submission};
 use super::network::{self, Ways};
+use super::probe::probe;
+use super::recombination::{Compared, Recombine};
 use super::travel::submission;
-use super::{Arrived, Fleet, FleetError, FleetEvent, Held, Outcome, StateStore, TELL_EVERY};
+use super::{Arrived, Fleet, FleetError, FleetEvent, Held, Outcome, StateStore, StoredState, TELL_EVERY};
 
 /// How long the caller of a batch that was dropped waits for the network's last words.
 const ALIVE_CHECK: Duration = Duration::from_secs(1);
@@ -37,7 +39,7 @@ const GRACE: Duration = Duration::from_millis(2500);
 
 /// Workers that dial in.
 pub struct GrpcFleet {
-    hub: Arc<Hub>,
+    pub(super) hub: Arc<Hub>,
     address: Option<SocketAddr>,
     adopted: UnboundedSender<UnixStream>,
     batches: UnboundedSender<Submission>,
@@ -45,6 +47,10 @@ pub struct GrpcFleet {
     network: Option<JoinHandle<Result<(), String>>>,
     refusals: Arc<Refusals>,
     is_open: bool,
+    pub(super) cancel: CancellationToken,
+    /// Whether results of workers are compared.
+    pub(super) compares: bool,
+    pub(super) compared: Compared,
 }
 
 impl GrpcFleet {
@@ -73,7 +79,8 @@ impl GrpcFleet {
         let started_again = address.is_some() && config.identity.incarnation > 1;
         let opens = if started_again { GRACE } else { Duration::ZERO };
         let FleetConfig { run_name, build, identity, events, states, .. } = config;
-        let hub = Arc::new(Hub::new(run_name, build, identity, rules, opens, events, states));
+        let probe = probe(&states)?;
+        let hub = Arc::new(Hub::new(run_name, build, identity, rules, opens, events, (states, probe)));
         let stop = CancellationToken::new();
         let (batches, submitted) = unbounded_channel();
         let (adopted, ends) = unbounded_channel();
@@ -111,6 +118,9 @@ impl GrpcFleet {
             network: Some(network),
             refusals,
             is_open: config.secrets.is_none(),
+            cancel: config.cancel,
+            compares: !config.mixed,
+            compared: Compared::default(),
         })
     }
 
@@ -172,7 +182,7 @@ impl GrpcFleet {
         }
     }
 
-    fn has_ended(&self) -> bool {
+    pub(super) fn has_ended(&self) -> bool {
         self.network.as_ref().is_none_or(JoinHandle::is_finished)
     }
 
@@ -218,10 +228,15 @@ impl Fleet for GrpcFleet {
             return Err(FleetError::UnknownSetup);
         }
         let (reply, replies) = mpsc::channel();
+        self.hub.states().tidy();
         // Here and not under the hub's lock.
         let batch = submission(jobs, self.hub.states(), reply)?;
         self.batches.send(batch).map_err(|_| FleetError::Stopped(self.hub.why_stopped()))?;
         self.wait(&replies, arrived)
+    }
+
+    fn recombine(&mut self, work: &Recombine<'_>) -> Result<Option<Vec<StoredState>>, FleetError> {
+        self.mix(work)
     }
 
     fn states(&self) -> Option<&StateStore> {

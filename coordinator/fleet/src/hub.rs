@@ -5,9 +5,11 @@
 //! read: `state`, then [`super::service`], which brings the workers' events.
 
 mod arrival;
+mod blocks;
 mod doorway;
 mod excluded;
 mod held;
+mod mixing;
 mod replies;
 mod state;
 mod states;
@@ -32,7 +34,8 @@ use super::dispatcher::{BatchError, Dispatcher, Event, Joining, Likeness, Rules,
 use super::event_text::OVER;
 use super::identity::RunIdentity;
 use super::job_name::JobName;
-use super::{FleetEvent, Held, Outcome, StateStore};
+use super::{FleetEvent, Held, Outcome, StateStore, StoredState};
+pub(super) use blocks::{Made, Work};
 pub(super) use state::{Closed, SetupShape, Submission};
 use state::{Link, State};
 
@@ -52,6 +55,8 @@ pub(super) struct Hub {
     build: Option<[u8; 32]>,
     max_attempts: u32,
     store: StateStore,
+    /// By which workers find out whether they share its folder.
+    probe: Option<StoredState>,
     /// Woken whenever a link ends.
     pub(super) link_ended: Notify,
 }
@@ -64,7 +69,7 @@ impl Hub {
         rules: Rules,
         opens: Duration,
         events: Sender<FleetEvent>,
-        store: StateStore,
+        (store, probe): (StateStore, Option<StoredState>),
     ) -> Self {
         // Epochs start anywhere, so that answers to an earlier coordinator on the same port carry none of this one's.
         let first_epoch = std::hash::RandomState::new().build_hasher().finish() >> 1;
@@ -79,6 +84,7 @@ impl Hub {
             build,
             max_attempts: rules.max_attempts,
             store,
+            probe,
             link_ended: Notify::new(),
         }
     }
@@ -171,6 +177,7 @@ impl Hub {
             epoch: id.0,
             run_id: self.identity.id,
             incarnation: self.identity.incarnation,
+            probe: self.probe.as_ref().map(|probe| probe.pieces()[0]),
         };
         let _ = link.send(Ok(ToWorker::welcome(welcome)));
         state.states.joined(id, hello.nonce, hello.slots);
@@ -206,9 +213,16 @@ impl Hub {
         state.links.remove(&worker);
         state.waiting.left(worker);
         state.states.left(worker);
+        state.blocks.left(worker);
+        state.give_blocks();
         state.handle(now, Event::Left { worker, reason, clean });
         drop(state);
         self.link_ended.notify_waiters();
+    }
+
+    /// Whether all workers are processes that this one started.
+    pub(super) fn is_local_only(&self) -> bool {
+        self.lock().dispatcher.is_local_only()
     }
 
     /// The local worker processes are given up: ends the batch unless other workers are there.

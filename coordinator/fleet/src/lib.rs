@@ -23,6 +23,8 @@ mod in_process;
 mod job_name;
 mod local_workers;
 mod network;
+mod probe;
+mod recombination;
 mod service;
 mod transfer;
 mod travel;
@@ -38,10 +40,11 @@ pub use handle::FleetHandle;
 pub use identity::RunIdentity;
 pub use in_process::InProcess;
 pub use local_workers::{LocalConfig, LocalWorkers};
+pub use recombination::{Piece, Recombine};
 pub use starlings_models::Factory;
 pub use starlings_proto::{ProtocolError, SetupId, job_key};
 pub use starlings_states::{
-    CHUNK_VALUES, Held, StateError, StateStore, StateWriter, StoredState, hex, n_chunks,
+    CHUNK_VALUES, Folder, Held, PlaceName, StateError, StateStore, StateWriter, StoredState, hex, n_chunks,
 };
 pub use travel::travels;
 
@@ -128,6 +131,15 @@ pub trait Fleet {
     ) -> Result<Vec<Outcome<Held>>, FleetError> {
         let _ = arrived;
         self.run_held(jobs)
+    }
+
+    /// The states after an analysis, made where the states are; `None` where the caller has to make them.
+    ///
+    /// # Errors
+    /// When a state cannot be kept or read; [`FleetError::Cancelled`].
+    fn recombine(&mut self, work: &Recombine<'_>) -> Result<Option<Vec<StoredState>>, FleetError> {
+        let _ = work;
+        Ok(None)
     }
 
     /// Where large states are kept; `None` for a fleet that takes all states as values.

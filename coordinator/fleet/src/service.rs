@@ -96,6 +96,10 @@ async fn read(hub: Arc<Hub>, worker: WorkerId, mut inbound: Streaming<generated:
                 Ok(message) => {
                     if let FromWorker::Held(runs) = message {
                         hub.bring(worker, runs);
+                    } else if let FromWorker::SharesStates = message {
+                        hub.shares_states(worker);
+                    } else if let FromWorker::Recombined { lease, made } = message {
+                        hub.recombined(worker, lease, made);
                     } else if let Some(event) = event(worker, message) {
                         hub.handle(event);
                     }
@@ -114,6 +118,10 @@ fn event(worker: WorkerId, message: FromWorker) -> Option<Event> {
         FromWorker::Setup { id: setup, result: Err(reason) } => Event::SetupFailed { worker, setup, reason },
         FromWorker::Result { lease, answer, cost } => Event::Answered { worker, lease, answer, cost },
         FromWorker::Heartbeat { .. } => Event::Heard { worker },
-        FromWorker::Hello(_) | FromWorker::Goodbye(_) | FromWorker::Held(_) => return None,
+        FromWorker::Hello(_)
+        | FromWorker::Goodbye(_)
+        | FromWorker::Held(_)
+        | FromWorker::SharesStates
+        | FromWorker::Recombined { .. } => return None,
     })
 }

@@ -6,8 +6,9 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use starlings_proto::convert::piece_names::{NAMES, decode_names, encode_names};
 use starlings_proto::convert::state::{
-    Get, PutHead, decode_chunk, encode_chunk, encode_head, encode_put_result,
+    ChunkId, Get, PutHead, decode_chunk, encode_chunk, encode_head, encode_put_result,
 };
 use starlings_proto::generated;
 use starlings_states::{StateError, StateWriter, StoredState};
@@ -34,6 +35,10 @@ pub(super) async fn put(
     let _counted = hub.begin_put(&head)?;
     let mut writer = hub.states().writer(head.n_state);
     while let Some(message) = next(&mut inbound).await? {
+        if let Some(names) = decode_names(&message, writer.missing()).map_err(|error| invalid(&error))? {
+            writer = find(hub, writer, names).await?;
+            continue;
+        }
         let bytes = decode_chunk(message, writer.wanted()).map_err(|error| invalid(&error))?;
         let (words, _) = bytes.as_chunks::<8>();
         if let Some(spoiled) = words.iter().map(|w| f64::from_le_bytes(*w)).find(|value| !value.is_finite()) {
@@ -62,7 +67,19 @@ async fn keep(hub: &Arc<Hub>, mut writer: StateWriter, bytes: bytes::Bytes) -> R
     pushed.map_err(|error| lost(hub, &error))
 }
 
-/// Gives a state to a worker.
+/// Takes pieces that stand in the shared folder. One that does not is no fault of this side: the worker sends its state instead.
+async fn find(hub: &Arc<Hub>, mut writer: StateWriter, names: Vec<ChunkId>) -> Result<StateWriter, Status> {
+    if !hub.states().is_shared() {
+        return Err(Status::failed_precondition("no folder for states is shared"));
+    }
+    let found = on_disk(move || {
+        let found = names.into_iter().try_for_each(|name| writer.push_existing(name));
+        found.map(|()| writer)
+    });
+    found.await?.map_err(|error| Status::failed_precondition(error.to_string()))
+}
+
+/// Gives a state to a worker, or, where it shares the folder, the names of its pieces.
 pub(super) fn get(
     hub: &Arc<Hub>,
     request: &generated::GetRequest,
@@ -70,10 +87,19 @@ pub(super) fn get(
     let get = Get::decode(request).map_err(|error| Status::invalid_argument(error.to_string()))?;
     let (state, counted) = hub.begin_get(&get)?;
     let (sender, pieces) = mpsc::channel(AHEAD);
+    let by_names = get.names && hub.states().is_shared();
     let hub = Arc::clone(hub);
     tokio::spawn(async move {
         let _counted = counted;
         let mut given = sender.send(Ok(encode_head(state.n_state()))).await.is_ok();
+        if by_names {
+            for names in state.pieces().chunks(NAMES) {
+                if sender.send(Ok(encode_names(names))).await.is_err() {
+                    return;
+                }
+            }
+            return;
+        }
         for index in 0..state.pieces().len() {
             // Nobody reads what comes.
             if !given {

@@ -33,7 +33,7 @@ pub(crate) fn submission(
     }
     let mut states = Vec::new();
     let mut travelling = |held: Held| {
-        Ok(match held.into_travelling(store)? {
+        Ok::<_, StateError>(match held.into_travelling(store)? {
             Held::Values(values) => State::Values(values),
             Held::Stored(state) => {
                 let id = state.id();

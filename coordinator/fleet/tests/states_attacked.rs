@@ -6,8 +6,9 @@ mod fleet_kit;
 use std::net::SocketAddr;
 
 use fleet_kit::{any_port, listen_with};
-use starlings_fleet::{Fleet, Held, StateStore};
+use starlings_fleet::{Fleet, Folder, Held, StateStore};
 use starlings_models::{Job, Setup, Window};
+use starlings_proto::convert::piece_names::encode_names;
 use starlings_proto::convert::state::{
     CHUNK_BYTES, Get, PutHead, decode_put_result, encode_chunk, encode_head,
 };
@@ -74,7 +75,8 @@ impl Hand {
     }
 
     async fn get(&mut self, epoch: u64, nonce: u64, state: StateId) -> Result<usize, tonic::Status> {
-        let mut pieces = self.client.get(Get { epoch, nonce, state }.encode()).await?.into_inner();
+        let mut pieces =
+            self.client.get(Get { epoch, nonce, state, names: false }.encode()).await?.into_inner();
         let mut bytes = 0;
         while let Some(piece) = pieces.message().await? {
             bytes += piece.data.len();
@@ -100,7 +102,11 @@ fn state(head: PutHead, value: f64) -> Vec<generated::Chunk> {
 
 /// Runs one job with a large state while `attack` plays its worker; gives the state that came of it.
 fn under(attack: impl AsyncFnOnce(SocketAddr)) -> (Vec<f64>, StateStore) {
-    let store = StateStore::new(1 << 30);
+    under_with(StateStore::new(1 << 30), attack)
+}
+
+/// The same with states in this store.
+fn under_with(store: StateStore, attack: impl AsyncFnOnce(SocketAddr)) -> (Vec<f64>, StateStore) {
     let own = store.clone();
     let (mut fleet, _events, _) = listen_with(any_port(), move |config| config.states = own);
     let address = fleet.address().unwrap();
@@ -172,6 +178,9 @@ fn what_is_put_wrongly_is_refused_and_leaves_nothing() {
             (with(&|m| m[1] = encode_head(N)), Code::InvalidArgument),
             (with(&|m| m[2] = pieces(f64::NAN).remove(1)), Code::InvalidArgument),
             (with(&|m| m[1] = pieces(f64::INFINITY).remove(0)), Code::InvalidArgument),
+            // Nothing is shared here.
+            (vec![head.encode(), encode_names(&[[1; 32]; 2])], Code::FailedPrecondition),
+            (vec![head.encode(), encode_names(&[[1; 32]; 3])], Code::InvalidArgument),
         ];
         for (index, (messages, code)) in wrong.into_iter().enumerate() {
             assert_eq!(hand.put(messages).await.unwrap_err().code(), code, "number {index}");
@@ -242,5 +251,40 @@ fn a_hoarder_has_no_more_transfers_than_its_slots_can_need() {
         while !matches!(hand.hear().await, ToWorker::Drain(_)) {}
     });
     assert!(values == vec![8.0; N]);
+    assert_eq!(store.n_pieces(), 0);
+}
+
+#[test]
+fn names_of_pieces_count_where_these_stand_in_the_shared_folder() {
+    let scratch = tempfile::tempdir().unwrap();
+    let path = scratch.path().join("run");
+    let store = StateStore::shared(Folder::at(&path));
+    let (values, store) = under_with(store, async |address| {
+        let mut hand = Hand::dial(address, NONCE).await;
+        let (lease, _) = hand.job().await;
+        let head = PutHead { n_state: N, lease, nonce: NONCE };
+        let bytes: Vec<Vec<u8>> = pieces(9.0).into_iter().map(|piece| piece.data.to_vec()).collect();
+        let names: Vec<[u8; 32]> = bytes.iter().map(|piece| starlings_proto::digest(piece)).collect();
+        let folder = Folder::at(&path);
+        let named = || vec![head.encode(), encode_names(&names)];
+        // None is there, then one; then the last one is too short.
+        assert_eq!(hand.put(named()).await.unwrap_err().code(), Code::FailedPrecondition);
+        folder.put(&names[0], &bytes[0]).unwrap();
+        assert_eq!(hand.put(named()).await.unwrap_err().code(), Code::FailedPrecondition);
+        folder.put(&names[1], &bytes[1][8..]).unwrap();
+        assert_eq!(hand.put(named()).await.unwrap_err().code(), Code::FailedPrecondition);
+        folder.put(&names[1], &bytes[1]).unwrap();
+        for wrong in [vec![names[1], names[0]], vec![names[0]], vec![names[0], names[1], names[1]]] {
+            assert!(hand.put(vec![head.encode(), encode_names(&wrong)]).await.is_err());
+        }
+        // Pieces and names may follow each other.
+        let id = hand
+            .put(vec![head.encode(), encode_chunk(bytes[0].clone().into()), encode_names(&names[1..])])
+            .await;
+        hand.answer(lease, id.unwrap());
+        while !matches!(hand.hear().await, ToWorker::Drain(_)) {}
+    });
+    assert!(values == vec![9.0; N]);
+    store.tidy();
     assert_eq!(store.n_pieces(), 0);
 }

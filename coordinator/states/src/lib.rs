@@ -5,7 +5,6 @@
 //! jobs, workers or studies, and nothing computes. Next file to read: [`store`].
 
 mod error;
-mod folder;
 mod held;
 mod shared;
 pub mod store;
@@ -17,17 +16,9 @@ mod writer;
 
 pub use error::StateError;
 pub use held::Held;
+pub use starlings_pieces::{Folder, PieceError, PlaceName, hex};
 pub use starlings_proto::StateId;
 pub use starlings_proto::convert::state::{CHUNK_VALUES, ChunkId, n_chunks};
 pub use store::StateStore;
 pub use stored::StoredState;
 pub use writer::StateWriter;
-
-/// A name in hexadecimal.
-pub fn hex(name: &[u8; 32]) -> String {
-    use std::fmt::Write as _;
-    name.iter().fold(String::with_capacity(64), |mut text, byte| {
-        let _ = write!(text, "{byte:02x}");
-        text
-    })
-}

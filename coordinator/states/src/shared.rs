@@ -1,15 +1,16 @@
 //! What a store, its states and its writers share: the table of pieces and the folder.
 //!
-//! Files are written outside the lock and put into their place inside it. Next files to read: `table`, `folder`.
+//! Files are written outside the lock and put into their place inside it. In a folder that workers write into as well no piece is
+//! removed while a run is on its way that may end in it: see [`Shared::tidy`]. Next file to read: `table`.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 use bytes::Bytes;
+use starlings_pieces::Folder;
 use starlings_proto::StateId;
 use starlings_proto::convert::state::ChunkId;
 
 use crate::StateError;
-use crate::folder::Folder;
 use crate::table::Table;
 
 /// What all clones and all states share.
@@ -18,6 +19,8 @@ pub(crate) struct Shared {
     pub(crate) memory: usize,
     pub(crate) folder: Mutex<Option<Arc<Folder>>>,
     pub(crate) table: Mutex<Table<Pieces>>,
+    /// Whether workers write into the folder and read from it.
+    pub(crate) for_workers: bool,
 }
 
 /// The pieces of one state.
@@ -47,10 +50,10 @@ impl Shared {
             }
         }
         let folder = self.folder();
-        let written = folder.write(bytes)?;
+        let written = folder.stage(bytes)?;
         let mut table = self.lock();
         if table.again(&name) {
-            Folder::discard(&written);
+            Folder::discard(written);
             return Ok(());
         }
         folder.place(&written, &name)?;
@@ -70,7 +73,7 @@ impl Shared {
 
     pub(crate) fn read(&self, name: &ChunkId) -> Result<Bytes, StateError> {
         let held = self.lock().chunks.get(name).and_then(|entry| entry.bytes.clone());
-        held.map_or_else(|| self.folder().read(name), Ok)
+        held.map_or_else(|| Ok(self.folder().read(name)?), Ok)
     }
 
     /// Whether reading a piece takes no file.
@@ -86,7 +89,7 @@ impl Shared {
         };
         let Some(bytes) = bytes else { return Ok(()) };
         let folder = self.folder();
-        let written = folder.write(&bytes)?;
+        let written = folder.stage(&bytes)?;
         let mut table = self.lock();
         folder.place(&written, name)?;
         if let Some(entry) = table.chunks.get_mut(name) {
@@ -99,7 +102,16 @@ impl Shared {
         let mut table = self.lock();
         let folder = lock(&self.folder).clone();
         for name in names {
-            table.release(name, folder.as_deref());
+            table.release(name, folder.as_deref().filter(|_| !self.for_workers));
+        }
+    }
+
+    /// Removes what nobody needs from a folder that workers write into. Called before the first run of a batch is given away: a worker
+    /// that finds out later that its end state has such a piece writes it again.
+    pub(crate) fn tidy(&self) {
+        let mut table = self.lock();
+        for name in table.unneeded() {
+            self.folder().remove(&name);
         }
     }
 }

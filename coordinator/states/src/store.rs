@@ -7,13 +7,13 @@ use std::collections::HashSet;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
+use starlings_pieces::{Folder, hex};
 use starlings_proto::StateId;
 use starlings_proto::convert::floats;
 use starlings_proto::convert::state::{CHUNK_VALUES, ChunkId};
 
-use crate::folder::Folder;
 use crate::shared::{Shared, lock};
-use crate::{StateError, StateWriter, StoredState, hex};
+use crate::{StateError, StateWriter, StoredState};
 
 /// A store of states; clones are the same one.
 #[derive(Clone, Debug)]
@@ -27,8 +27,29 @@ impl StateStore {
 
     /// An empty store of up to so many bytes in memory; the rest goes to a temporary folder unless [`StateStore::settle`] says where.
     pub fn new(memory: usize) -> Self {
-        let shared = Shared { memory, folder: Mutex::default(), table: Mutex::default() };
+        Self::with(memory, None, false)
+    }
+
+    /// An empty store in a folder that workers share: every piece stands there, and nothing is in memory.
+    pub fn shared(folder: Folder) -> Self {
+        Self::with(0, Some(Arc::new(folder)), true)
+    }
+
+    fn with(memory: usize, folder: Option<Arc<Folder>>, for_workers: bool) -> Self {
+        let shared = Shared { memory, folder: Mutex::new(folder), table: Mutex::default(), for_workers };
         Self { shared: Arc::new(shared) }
+    }
+
+    /// Whether workers may read pieces from the folder and write them there.
+    pub fn is_shared(&self) -> bool {
+        self.shared.for_workers
+    }
+
+    /// Removes what nobody needs any more from a folder that workers share; before a batch of runs is given away.
+    pub fn tidy(&self) {
+        if self.is_shared() {
+            self.shared.tidy();
+        }
     }
 
     /// The store that holds a state.
@@ -36,8 +57,11 @@ impl StateStore {
         Self { shared: Arc::clone(state.shared()) }
     }
 
-    /// Says which folder to use from now on; `false` where pieces stand in another one.
+    /// Says which folder to use from now on; `false` where pieces stand in another one. One that is shared stays what it is.
     pub fn settle(&self, path: &Path) -> bool {
+        if self.is_shared() {
+            return true;
+        }
         let table = self.shared.lock();
         let mut folder = lock(&self.shared.folder);
         if folder.as_ref().is_some_and(|folder| folder.is_at(path)) {

@@ -4,10 +4,9 @@ use std::collections::HashMap;
 use std::sync::Weak;
 
 use bytes::Bytes;
+use starlings_pieces::Folder;
 use starlings_proto::StateId;
 use starlings_proto::convert::state::ChunkId;
-
-use crate::folder::Folder;
 
 /// Guarded by the store's lock. A state is a `P`.
 #[derive(Debug)]
@@ -19,6 +18,8 @@ pub(crate) struct Table<P> {
     pub(crate) in_memory: usize,
     /// Most of them at one time.
     pub(crate) most: usize,
+    /// Pieces that stand in the folder and were given up by their last state.
+    given_up: Vec<ChunkId>,
 }
 
 /// A piece.
@@ -34,7 +35,7 @@ pub(crate) struct Entry {
 
 impl<P> Default for Table<P> {
     fn default() -> Self {
-        Self { chunks: HashMap::new(), named: HashMap::new(), in_memory: 0, most: 0 }
+        Self { chunks: HashMap::new(), named: HashMap::new(), in_memory: 0, most: 0, given_up: Vec::new() }
     }
 }
 
@@ -69,7 +70,14 @@ impl<P> Table<P> {
         }
     }
 
-    /// Gives up one use of a piece; it goes with its last one.
+    /// Takes the pieces that stand in the folder and are needed by no state.
+    pub(crate) fn unneeded(&mut self) -> Vec<ChunkId> {
+        let mut names = std::mem::take(&mut self.given_up);
+        names.retain(|name| !self.chunks.contains_key(name));
+        names
+    }
+
+    /// Gives up one use of a piece; it goes with its last one, or, without a folder to remove it from, with [`Table::unneeded`].
     pub(crate) fn release(&mut self, name: &ChunkId, folder: Option<&Folder>) {
         let Some(entry) = self.chunks.get_mut(name) else { return };
         entry.refs -= 1;
@@ -77,8 +85,10 @@ impl<P> Table<P> {
             return;
         }
         self.in_memory -= entry.bytes.as_ref().map_or(0, Bytes::len);
-        if let Some(folder) = folder.filter(|_| entry.on_disk) {
-            folder.remove(name);
+        match folder {
+            Some(folder) if entry.on_disk => folder.remove(name),
+            None if entry.on_disk => self.given_up.push(*name),
+            _ => {}
         }
         self.chunks.remove(name);
     }

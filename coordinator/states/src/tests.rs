@@ -115,7 +115,10 @@ fn a_damaged_and_a_missing_piece_are_named() {
     assert!(missing.contains(&name) && missing.contains("missing"), "{missing}");
     let again = StateStore::new(0);
     again.settle(scratch.path());
-    assert!(matches!(again.reopen(CHUNK_VALUES, state.pieces()), Err(StateError::Missing { .. })));
+    assert!(matches!(
+        again.reopen(CHUNK_VALUES, state.pieces()),
+        Err(StateError::Piece(PieceError::Missing { .. }))
+    ));
 }
 
 #[test]
@@ -135,4 +138,29 @@ fn threads_that_keep_and_drop_the_same_states_lose_none() {
         }
     });
     assert_eq!((store.n_pieces(), store.in_memory().0, folder_files(scratch.path()).len()), (0, 0, 0));
+}
+
+#[test]
+fn a_shared_folder_keeps_what_is_given_up_until_the_next_batch() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let path = scratch.path().join("run");
+    let store = StateStore::shared(Folder::at(&path));
+    assert!(store.settle(scratch.path()), "it stays where it is");
+    let (a, b) = (values(CHUNK_VALUES + 1, 1), values(CHUNK_VALUES + 1, 2));
+    let (first, second) = (store.keep(&a).expect("kept"), store.keep(&b).expect("kept"));
+    assert_eq!((store.in_memory(), folder_files(&path).len()), ((0, 0), 4));
+    let names = first.pieces().to_vec();
+    drop((first, second));
+    assert_eq!((store.n_pieces(), folder_files(&path).len()), (0, 4));
+    // A worker ends in a state that was given up meanwhile.
+    let mut writer = store.writer(a.len());
+    for name in names {
+        writer.push_existing(name).expect("it is there");
+    }
+    let again = writer.finish().expect("it is whole");
+    store.tidy();
+    assert_eq!(folder_files(&path).len(), 2);
+    assert!(is_same(&again.values().expect("it is there"), &a));
+    store.clear();
+    assert!(!path.exists());
 }

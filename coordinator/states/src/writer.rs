@@ -29,6 +29,11 @@ impl StateWriter {
         chunk_values(self.n_state, self.names.len())
     }
 
+    /// Pieces that are not there yet.
+    pub fn missing(&self) -> usize {
+        n_chunks(self.n_state).saturating_sub(self.names.len())
+    }
+
     /// Takes the next piece.
     ///
     /// # Errors
@@ -54,7 +59,10 @@ impl StateWriter {
     }
 
     /// Takes as the next piece one that the folder has already.
-    pub(crate) fn push_existing(&mut self, name: ChunkId) -> Result<(), StateError> {
+    ///
+    /// # Errors
+    /// When it is not there or has another length than the next piece must have.
+    pub fn push_existing(&mut self, name: ChunkId) -> Result<(), StateError> {
         let wanted = self.wanted() * 8;
         if wanted == 0 {
             return Err(self.misfit(0));

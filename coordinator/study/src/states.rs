@@ -8,7 +8,7 @@ pub(crate) mod stored;
 
 use nalgebra::DMatrix;
 use starlings_estimators::Recombination;
-use starlings_fleet::{Held, StateError};
+use starlings_fleet::{Fleet, FleetError, Held, StateError};
 
 use stored::StoredStates;
 
@@ -73,6 +73,25 @@ impl States {
             Self::Stored(states) => *states = states.recombined(transform, threads)?,
         }
         Ok(())
+    }
+
+    /// The same, by workers where they and the states are in one place.
+    ///
+    /// # Errors
+    /// When the store or the fleet fails.
+    pub(crate) fn recombine_on(
+        &mut self,
+        fleet: &mut dyn Fleet,
+        transform: &DMatrix<f64>,
+        threads: usize,
+    ) -> Result<(), FleetError> {
+        if let Self::Stored(states) = self
+            && let Some(mixed) = states.recombined_on(fleet, transform)?
+        {
+            *states = mixed;
+            return Ok(());
+        }
+        Ok(self.recombine(transform, threads)?)
     }
 
     /// X⁺ = X⁻T for a transform that pulls particles, with the product of matrices.

@@ -3,8 +3,9 @@
 use bytes::Bytes;
 use starlings_models::{ModelFailure, ParticleError, Prediction, Timeout};
 
+use super::block;
 use super::held::{HeldRun, decode_held, encode_held};
-use super::state::{self, check_inline};
+use super::state::{self, ChunkId, check_inline};
 use super::{Lease, ProtocolError, SetupId, State, floats, required, setup_id};
 use crate::MAX_SLOTS;
 use crate::generated::{self, failure, from_worker::Kind, result::Outcome};
@@ -75,6 +76,15 @@ pub enum FromWorker {
     Goodbye(String),
     /// What it finished or still makes for an earlier connection of the same run.
     Held(Vec<HeldRun>),
+    /// It shares the place of states that the Welcome told of.
+    SharesStates,
+    /// The names of the pieces that it made of a block of rows, or why it could not.
+    Recombined {
+        /// The lease answered.
+        lease: Lease,
+        /// What came of it.
+        made: Result<Vec<ChunkId>, String>,
+    },
 }
 
 impl FromWorker {
@@ -95,6 +105,8 @@ impl FromWorker {
             Self::Heartbeat { running, queued } => Kind::Heartbeat(generated::Heartbeat { running, queued }),
             Self::Goodbye(reason) => Kind::Goodbye(generated::Goodbye { reason }),
             Self::Held(runs) => Kind::Held(encode_held(runs)),
+            Self::SharesStates => Kind::SharesStates(generated::SharesStates {}),
+            Self::Recombined { lease, made } => Kind::Recombined(block::encode_made(lease, made)),
         };
         Ok(generated::FromWorker { kind: Some(kind) })
     }
@@ -113,6 +125,11 @@ impl FromWorker {
             Kind::Heartbeat(h) => Self::Heartbeat { running: h.running, queued: h.queued },
             Kind::Goodbye(g) => Self::Goodbye(cut(g.reason)),
             Kind::Held(held) => Self::Held(decode_held(held)?),
+            Kind::SharesStates(_) => Self::SharesStates,
+            Kind::Recombined(message) => {
+                let (lease, made) = block::decode_made(message)?;
+                Self::Recombined { lease, made }
+            }
         })
     }
 }

@@ -121,6 +121,8 @@ pub struct Get {
     pub nonce: u64,
     /// Name of the state.
     pub state: StateId,
+    /// The names of its pieces are enough.
+    pub names: bool,
 }
 
 impl PutHead {
@@ -128,7 +130,7 @@ impl PutHead {
     pub fn encode(self) -> generated::Chunk {
         let Self { n_state, lease, nonce } = self;
         let head = generated::StateHead { n_state: n_state as u64, lease: Some(lease.into()), nonce };
-        generated::Chunk { head: Some(head), data: Bytes::new() }
+        generated::Chunk { head: Some(head), data: Bytes::new(), names: Bytes::new() }
     }
 
     /// Checks the first message of a put, which has no values.
@@ -145,8 +147,8 @@ impl PutHead {
 impl Get {
     /// The request.
     pub fn encode(self) -> generated::GetRequest {
-        let Self { epoch, nonce, state } = self;
-        generated::GetRequest { epoch, nonce, state_id: Bytes::copy_from_slice(&state) }
+        let Self { epoch, nonce, state, names } = self;
+        generated::GetRequest { epoch, nonce, state_id: Bytes::copy_from_slice(&state), names }
     }
 
     /// Checks a request.
@@ -155,14 +157,14 @@ impl Get {
     /// When the name is none.
     pub fn decode(message: &generated::GetRequest) -> Result<Self, ProtocolError> {
         let state = hash(&message.state_id, "state id")?;
-        Ok(Self { epoch: message.epoch, nonce: message.nonce, state })
+        Ok(Self { epoch: message.epoch, nonce: message.nonce, state, names: message.names })
     }
 }
 
 /// The first message of an answer to a get, without values.
 pub fn encode_head(n_state: usize) -> generated::Chunk {
     let head = generated::StateHead { n_state: n_state as u64, lease: None, nonce: 0 };
-    generated::Chunk { head: Some(head), data: Bytes::new() }
+    generated::Chunk { head: Some(head), data: Bytes::new(), names: Bytes::new() }
 }
 
 /// The number of values of the state of which this is the first message.
@@ -172,7 +174,7 @@ pub fn encode_head(n_state: usize) -> generated::Chunk {
 pub fn decode_head(message: &generated::Chunk) -> Result<usize, ProtocolError> {
     let n_state = required(message.head.as_ref(), "head")?.n_state as usize;
     check_state(n_state)?;
-    if !message.data.is_empty() {
+    if !message.data.is_empty() || !message.names.is_empty() {
         let message = "the first message of a state has values".to_owned();
         return Err(ProtocolError::Shape { field: "data", message });
     }
@@ -181,7 +183,7 @@ pub fn decode_head(message: &generated::Chunk) -> Result<usize, ProtocolError> {
 
 /// A message with a piece of a state.
 pub fn encode_chunk(data: Bytes) -> generated::Chunk {
-    generated::Chunk { head: None, data }
+    generated::Chunk { head: None, data, names: Bytes::new() }
 }
 
 /// The bytes of a piece that must have so many values.
@@ -189,8 +191,8 @@ pub fn encode_chunk(data: Bytes) -> generated::Chunk {
 /// # Errors
 /// When it has another length, or a head.
 pub fn decode_chunk(message: generated::Chunk, values: usize) -> Result<Bytes, ProtocolError> {
-    if message.head.is_some() {
-        let message = "a second head in one state".to_owned();
+    if message.head.is_some() || !message.names.is_empty() {
+        let message = "a second head or names among the pieces of a state".to_owned();
         return Err(ProtocolError::Shape { field: "head", message });
     }
     let wanted = values * 8;

@@ -3,10 +3,12 @@
 use bytes::Bytes;
 use starlings_models::{Job, Setup};
 
+use super::block::{self, Block};
 use super::held::{decode_adopted, encode_adopted};
 use super::key::JobKey;
 use super::{
-    Lease, ProtocolError, ReceivedWindows, SetupId, State, decode_setup, job, required, setup_id, windows,
+    Lease, ProtocolError, ReceivedWindows, SetupId, State, decode_setup, hash, job, required, setup_id,
+    windows,
 };
 use crate::generated::{self, to_worker::Kind};
 use crate::text::cut;
@@ -26,6 +28,8 @@ pub struct Welcome {
     pub run_id: [u8; 16],
     /// How often the run was started, from 1.
     pub incarnation: u64,
+    /// Name of a piece in the run's folder of the place that machines share; `None` where none is shared.
+    pub probe: Option<[u8; 32]>,
 }
 
 /// A checked message to a worker. Jobs are encoded by [`super::JobEncoder`], everything else by the functions here.
@@ -73,14 +77,23 @@ pub enum ToWorker {
     },
     /// For whoever watches the worker.
     Notice(String),
+    /// A block of rows to mix in the shared folder.
+    Recombine {
+        /// The right to answer.
+        lease: Lease,
+        /// The block.
+        block: Block,
+    },
 }
 
 impl ToWorker {
     /// The message for [`ToWorker::Welcome`].
     pub fn welcome(welcome: Welcome) -> generated::ToWorker {
-        let Welcome { protocol, run, heartbeat, epoch, run_id, incarnation } = welcome;
+        let Welcome { protocol, run, heartbeat, epoch, run_id, incarnation, probe } = welcome;
         let run_id = Bytes::copy_from_slice(&run_id);
-        message(Kind::Welcome(generated::Welcome { protocol, run, heartbeat, epoch, run_id, incarnation }))
+        let probe = probe.map_or_else(Bytes::new, |name| Bytes::copy_from_slice(&name));
+        let welcome = generated::Welcome { protocol, run, heartbeat, epoch, run_id, incarnation, probe };
+        message(Kind::Welcome(welcome))
     }
 
     /// The message for [`ToWorker::Refuse`].
@@ -119,6 +132,16 @@ impl ToWorker {
         message(Kind::Notice(generated::Notice { text: text.to_owned() }))
     }
 
+    /// The message for [`ToWorker::Recombine`]; `transform` as [`super::floats::encode`] makes it.
+    pub fn recombine(
+        lease: Lease,
+        rows: usize,
+        pieces: &[[u8; 32]],
+        transform: Bytes,
+    ) -> generated::ToWorker {
+        message(Kind::Recombine(block::encode(lease, rows, pieces, transform)))
+    }
+
     /// Checks a message that arrived on a stream of which these windows were `received` before.
     ///
     /// # Errors
@@ -149,6 +172,10 @@ impl ToWorker {
                 Self::Adopt { runs: decode_adopted(a)?, rest_is_void }
             }
             Kind::Notice(n) => Self::Notice(cut(n.text)),
+            Kind::Recombine(message) => {
+                let (lease, block) = block::decode(&message)?;
+                Self::Recombine { lease, block }
+            }
         })
     }
 }
@@ -158,7 +185,7 @@ fn message(kind: Kind) -> generated::ToWorker {
 }
 
 fn decode_welcome(welcome: generated::Welcome) -> Result<Welcome, ProtocolError> {
-    let generated::Welcome { protocol, run, heartbeat, epoch, run_id, incarnation } = welcome;
+    let generated::Welcome { protocol, run, heartbeat, epoch, run_id, incarnation, probe } = welcome;
     if !(0.01..=3600.0).contains(&heartbeat) {
         return Err(ProtocolError::Shape {
             field: "heartbeat",
@@ -169,7 +196,8 @@ fn decode_welcome(welcome: generated::Welcome) -> Result<Welcome, ProtocolError>
         field: "run id",
         message: format!("has {} bytes, expected 16", run_id.len()),
     })?;
-    Ok(Welcome { protocol, run: cut(run), heartbeat, epoch, run_id, incarnation })
+    let probe = if probe.is_empty() { None } else { Some(hash(&probe, "probe")?) };
+    Ok(Welcome { protocol, run: cut(run), heartbeat, epoch, run_id, incarnation, probe })
 }
 
 fn decode_job(wire_job: &generated::Job, received: &ReceivedWindows) -> Result<ToWorker, ProtocolError> {

@@ -11,6 +11,7 @@ use starlings_proto::{
 };
 use tokio::sync::mpsc::UnboundedSender;
 
+use super::blocks::Blocks;
 use super::doorway::Doorway;
 use super::excluded::Excluded;
 use super::states::States;
@@ -39,6 +40,8 @@ pub(super) struct State {
     pub(super) kept: BTreeMap<ControlId, (SetupId, Job)>,
     /// Large states of jobs and answers.
     pub(super) states: States,
+    /// Blocks of rows that workers mix.
+    pub(super) blocks: Blocks,
     pub(super) events: Teller,
     /// The time of the last event.
     now: Duration,
@@ -124,6 +127,7 @@ impl State {
             running: None,
             kept: BTreeMap::new(),
             states: States::new(store),
+            blocks: Blocks::default(),
             events: Teller::new(events),
             now: Duration::ZERO,
             first_epoch,

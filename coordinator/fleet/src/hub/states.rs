@@ -50,6 +50,11 @@ impl States {
         self.sessions.insert(worker, Session { nonce, transfers: 0, most });
     }
 
+    /// Jobs that a worker runs at the same time.
+    pub(super) fn slots(&self, worker: WorkerId) -> Option<usize> {
+        Some(self.sessions.get(&worker)?.most - SPARE_TRANSFERS)
+    }
+
     /// A worker is gone, and what it put and did not name.
     pub(super) fn left(&mut self, worker: WorkerId) {
         self.sessions.remove(&worker);

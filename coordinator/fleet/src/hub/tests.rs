@@ -36,7 +36,10 @@ fn hub(build: Option<[u8; 32]>) -> (Hub, Receiver<FleetEvent>) {
     let (heartbeat, patience) = (Duration::from_secs(8), Duration::from_secs(300));
     let rules = Rules { heartbeat, patience, max_attempts: 5, comparing: None, timeout_factor: None };
     let store = StateStore::new(0);
-    (Hub::new("test".to_owned(), build, RunIdentity::new(), rules, Duration::ZERO, sender, store), events)
+    (
+        Hub::new("test".to_owned(), build, RunIdentity::new(), rules, Duration::ZERO, sender, (store, None)),
+        events,
+    )
 }
 
 fn batch(hub: &Hub) -> (Submission, Receiver<Reply>) {

@@ -3,6 +3,7 @@
 
 pub mod access;
 pub mod hand;
+pub mod shared;
 
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, Shutdown, SocketAddr, TcpListener, TcpStream};

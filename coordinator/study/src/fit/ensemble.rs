@@ -2,22 +2,24 @@
 
 use nalgebra::DMatrix;
 use starlings_estimators::Noise;
-use starlings_fleet::StateError;
+use starlings_fleet::FleetError;
 
-use super::runner::StepWindows;
+use super::runner::{EnsembleRunner, StepWindows};
 use crate::Study;
 use crate::states::States;
 
-/// X⁺ = X⁻T for the states of every record, by up to so many threads; the bits do not depend on their number.
+/// X⁺ = X⁻T for the states of every record; the bits do not depend on who makes it.
 ///
 /// # Errors
-/// When the store of states fails.
+/// When the store of states or the fleet fails.
 pub(super) fn recombine(
     states: &mut [Option<States>],
     transform: &DMatrix<f64>,
-    threads: usize,
-) -> Result<(), StateError> {
-    states.iter_mut().flatten().try_for_each(|x| x.recombine(transform, threads))
+    runner: &mut EnsembleRunner<'_>,
+) -> Result<(), FleetError> {
+    let threads = runner.threads;
+    let fleet = runner.fleet();
+    states.iter_mut().flatten().try_for_each(|x| x.recombine_on(fleet, transform, threads))
 }
 
 /// Noise sd of every row, in the order of the stacked predictions.

@@ -84,7 +84,7 @@ fn step(
     let noise = noise(schedule.study, &windows, schedule.anneal(now.figures.pass));
     let (particles, analysis) =
         filter.analysis(&particles, &predictions, &Data { values: &values, noise: &noise })?;
-    recombine(&mut now.states, &analysis.transform, runner.threads)?;
+    recombine(&mut now.states, &analysis.transform, runner)?;
     for (record, states) in now.states.iter_mut().enumerate() {
         if schedule.windows[record].len() <= at.step + 1 {
             *states = None;

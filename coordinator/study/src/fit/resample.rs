@@ -113,7 +113,7 @@ pub(crate) fn redraw(
     let Resampled { particles: redrawn, transform, dropped } =
         filter.resample(particles, &gram(study, filter.weights(), particles, states)?)?;
     let mut mixed = states.clone();
-    recombine(&mut mixed, &transform, runner.threads)?;
+    recombine(&mut mixed, &transform, runner)?;
     let mut observed = predictions * transform;
     // Where an observer has corrected the state by the datum, an output of that state is no prediction of it.
     if study.observer_is_off() && !observe_again(runner, at, &redrawn.theta, &mixed, windows, &mut observed)?

@@ -73,6 +73,11 @@ impl<'a> EnsembleRunner<'a> {
         Ok(self)
     }
 
+    /// Where the runs are made.
+    pub(super) fn fleet(&mut self) -> &mut (dyn Fleet + 'a) {
+        self.fleet
+    }
+
     /// A warning about the timeouts in the store, if there are any.
     pub(crate) fn timeouts(&self) -> Option<String> {
         self.kept.as_ref()?.warning()

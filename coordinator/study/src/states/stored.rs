@@ -3,8 +3,9 @@
 //! A few blocks are in memory at a time, whatever the size of the states.
 
 use nalgebra::DMatrix;
-use starlings_fleet::{Held, StateError, StateStore, StateWriter, StoredState, n_chunks};
-use starlings_proto::Bytes;
+use starlings_fleet::{
+    Fleet, FleetError, Held, Piece, Recombine, StateError, StateStore, StateWriter, StoredState, n_chunks,
+};
 use starlings_proto::convert::floats;
 
 use super::BLOCK;
@@ -21,9 +22,6 @@ pub struct StoredStates {
     n_state: usize,
     columns: Vec<StoredState>,
 }
-
-/// A piece of a state with its name.
-type Piece = ([u8; 32], Bytes);
 
 impl StoredStates {
     /// States of which each has so many values.
@@ -71,6 +69,19 @@ impl StoredStates {
         self.mapped(threads.clamp(1, THREADS), &work)
     }
 
+    /// X T by workers that share the place of the states; `None` where there are none.
+    pub(super) fn recombined_on(
+        &self,
+        fleet: &mut dyn Fleet,
+        transform: &DMatrix<f64>,
+    ) -> Result<Option<Self>, FleetError> {
+        let work = |x: &mut DMatrix<f64>| starlings_estimators::recombine(x, transform);
+        let own = |block: usize| self.pieces_of(block, &work);
+        let columns = &self.columns;
+        let mixed = fleet.recombine(&Recombine { columns, transform: transform.as_slice(), own: &own })?;
+        Ok(mixed.map(|columns| Self::of(self.n_state, columns)))
+    }
+
     /// X T with the product of matrices.
     pub(super) fn pulled(&self, transform: &DMatrix<f64>) -> Result<Self, StateError> {
         let work = |x: &mut DMatrix<f64>| {
@@ -99,22 +110,29 @@ impl StoredStates {
         Ok(Self::of(self.n_state, columns))
     }
 
+    /// The pieces of the block that `work` makes, by particle.
+    fn pieces_of(
+        &self,
+        block: usize,
+        work: &(dyn Fn(&mut DMatrix<f64>) + Sync),
+    ) -> Result<Vec<Piece>, StateError> {
+        let mut x = self.block(block)?;
+        work(&mut x);
+        let rows = x.nrows();
+        let piece = |values: &[f64]| {
+            let bytes = floats::encode(values);
+            (starlings_proto::digest(&bytes), bytes)
+        };
+        Ok(x.as_slice().chunks(rows).map(piece).collect())
+    }
+
     /// The pieces of some blocks, by block and particle; a thread for each, of which the caller's is one.
     fn made(
         &self,
         blocks: std::ops::Range<usize>,
         work: &(dyn Fn(&mut DMatrix<f64>) + Sync),
     ) -> Vec<Result<Vec<Piece>, StateError>> {
-        let make = |block: usize| {
-            let mut x = self.block(block)?;
-            work(&mut x);
-            let rows = x.nrows();
-            let piece = |values: &[f64]| {
-                let bytes = floats::encode(values);
-                (starlings_proto::digest(&bytes), bytes)
-            };
-            Ok(x.as_slice().chunks(rows).map(piece).collect())
-        };
+        let make = |block: usize| self.pieces_of(block, work);
         std::thread::scope(|scope| {
             let others: Vec<_> =
                 blocks.clone().skip(1).map(|block| scope.spawn(move || make(block))).collect();

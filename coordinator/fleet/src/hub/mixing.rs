@@ -1,0 +1,85 @@
+//! Blocks on their way between the caller who wants states mixed and the workers that share the folder.
+//!
+//! Next file to read: [`crate::recombination`], which is the caller.
+
+use std::time::Instant;
+
+use starlings_proto::Lease;
+use starlings_proto::convert::state::ChunkId;
+
+use super::Hub;
+use super::blocks::Work;
+use super::state::State;
+use crate::FleetEvent;
+use crate::dispatcher::{Event, WorkerId};
+
+impl State {
+    /// Gives blocks away to whoever has room.
+    pub(super) fn give_blocks(&mut self) {
+        while let Some((worker, message)) = self.blocks.give() {
+            self.send(worker, message);
+        }
+    }
+}
+
+impl Hub {
+    /// A worker has found the folder that is shared.
+    pub(crate) fn shares_states(&self, worker: WorkerId) {
+        let mut state = self.lock();
+        let Some(slots) = state.states.slots(worker).filter(|_| self.store.is_shared()) else { return };
+        if state.blocks.joined(worker, slots) {
+            let worker = state.name(worker);
+            state.tell(FleetEvent::SharesStates { worker });
+        }
+        state.give_blocks();
+    }
+
+    /// Workers that share the folder.
+    pub(crate) fn n_sharing(&self) -> usize {
+        self.lock().blocks.n_sharing()
+    }
+
+    /// Has blocks made; every one of them is told of once, unless [`Hub::end_mixing`] comes before.
+    pub(crate) fn begin_mixing(&self, work: Work) {
+        let mut state = self.lock();
+        state.blocks.begin(work);
+        state.give_blocks();
+    }
+
+    /// What is still being made is of no use.
+    pub(crate) fn end_mixing(&self) {
+        self.lock().blocks.stop();
+    }
+
+    /// Takes back blocks that do not come.
+    pub(crate) fn look_at_blocks(&self) {
+        self.lock().blocks.overdue(Instant::now());
+    }
+
+    /// A worker answers for a block; one that it was not given, or has no more, is ignored.
+    pub(crate) fn recombined(&self, worker: WorkerId, lease: Lease, made: Result<Vec<ChunkId>, String>) {
+        self.handle(Event::Heard { worker });
+        let mut state = self.lock();
+        let own = Some(lease).filter(|lease| lease.epoch == worker.0);
+        let Some(block) = own.and_then(|lease| state.blocks.answered(&lease)) else { return };
+        match made {
+            Ok(pieces) => state.blocks.end(block, Ok((worker, pieces))),
+            Err(reason) => {
+                tracing::warn!(worker = state.name(worker), block, reason, "a block was not mixed");
+                state.blocks.failed(worker, block);
+            }
+        }
+        state.give_blocks();
+    }
+
+    /// Puts a worker out that mixes otherwise than this process does.
+    pub(crate) fn mixes_wrong(&self, worker: WorkerId, block: usize) {
+        let reason = format!("block {block} of the states after an analysis is another one than here");
+        let mut state = self.lock();
+        let name = state.name(worker);
+        state.put_out(worker, &reason);
+        state.blocks.left(worker);
+        let build = String::new();
+        state.tell(FleetEvent::WorkerExcluded { worker: name, build, reason, again: 0, earlier: 0 });
+    }
+}

@@ -1,0 +1,35 @@
+//! Why a piece cannot be kept or read.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// What is wrong with a piece or with the place where it stands.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum PieceError {
+    /// The folder refuses.
+    #[error("cannot {what} {} for the states of particles: {source}", path.display())]
+    Folder {
+        /// What was tried.
+        what: &'static str,
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system said.
+        source: Arc<std::io::Error>,
+    },
+    /// A piece that is not there.
+    #[error("the piece {piece} of a particle's state is missing: expected the file {}", path.display())]
+    Missing {
+        /// Name of the piece, hexadecimal.
+        piece: String,
+        /// Where it was expected.
+        path: PathBuf,
+    },
+    /// A piece that is not what its name says.
+    #[error("the piece {piece} of a particle's state is damaged: the file {} holds something else", path.display())]
+    Damaged {
+        /// Name of the piece, hexadecimal.
+        piece: String,
+        /// Where it stands.
+        path: PathBuf,
+    },
+}

@@ -1,0 +1,24 @@
+//! Where pieces of large states stand: files by the hash of their bytes, in a folder of one process or in one that machines share.
+//!
+//! Coordinator and workers see this crate; nothing here knows states, jobs or messages. Next file to read: [`folder`], then
+//! [`place`] for what machines share.
+
+pub mod error;
+pub mod folder;
+pub mod place;
+
+pub use error::PieceError;
+pub use folder::{Folder, Staged};
+pub use place::PlaceName;
+
+/// Name of a piece: BLAKE3 of its bytes.
+pub type PieceName = [u8; 32];
+
+/// A name in hexadecimal.
+pub fn hex<const N: usize>(name: &[u8; N]) -> String {
+    use std::fmt::Write as _;
+    name.iter().fold(String::with_capacity(2 * N), |mut text, byte| {
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}

@@ -1,0 +1,42 @@
+//! A place that machines share, as people name it: a folder that all of them see under some path.
+//!
+//! Every run has a folder of its own in it, so that runs do not remove each other's pieces.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use crate::{Folder, hex};
+
+/// The name of a shared place.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PlaceName(PathBuf);
+
+impl FromStr for PlaceName {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text.is_empty() {
+            return Err("expected a folder that all machines see".to_owned());
+        }
+        if let Some((scheme, _)) = text.split_once("://") {
+            return Err(format!(
+                "states are shared through a folder that all machines see; {scheme} is none"
+            ));
+        }
+        let path = std::path::absolute(text).map_err(|error| error.to_string())?;
+        Ok(Self(path))
+    }
+}
+
+impl std::fmt::Display for PlaceName {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.0.display().fmt(f)
+    }
+}
+
+impl PlaceName {
+    /// The folder of one run, by the number that the run drew for itself. It is made when the first piece is written.
+    pub fn of_run(&self, run: &[u8; 16]) -> Folder {
+        Folder::at(&self.0.join(format!("starlings-{}", hex(run))))
+    }
+}

@@ -1,0 +1,65 @@
+//! The pieces of a state: sent one after the other, or written into the shared folder and read from it.
+
+use starlings_pieces::{Folder, PieceName};
+use starlings_proto::convert::floats;
+use starlings_proto::convert::piece_names::{NAMES, encode_names};
+use starlings_proto::convert::state::{CHUNK_VALUES, PutHead, encode_chunk};
+use starlings_proto::generated::Chunk;
+use starlings_proto::{StateId, StateNaming, digest};
+use tokio::sync::mpsc::Sender;
+
+/// Sends a state piece by piece; its name, unless the stream ended before it.
+pub(crate) fn send(pieces: &Sender<Chunk>, head: PutHead, values: &[f64]) -> Option<StateId> {
+    let mut naming = StateNaming::of(values.len());
+    pieces.blocking_send(head.encode()).ok()?;
+    for piece in values.chunks(CHUNK_VALUES) {
+        let bytes = floats::encode(piece);
+        naming.piece(&digest(&bytes));
+        pieces.blocking_send(encode_chunk(bytes)).ok()?;
+    }
+    Some(naming.finish())
+}
+
+/// Sends the names of the pieces of a state; its own name, unless the stream ended before it.
+pub(crate) fn send_names(pieces: &Sender<Chunk>, head: PutHead, names: &[PieceName]) -> Option<StateId> {
+    let mut naming = StateNaming::of(head.n_state);
+    pieces.blocking_send(head.encode()).ok()?;
+    for names in names.chunks(NAMES) {
+        for name in names {
+            naming.piece(name);
+        }
+        pieces.blocking_send(encode_names(names)).ok()?;
+    }
+    Some(naming.finish())
+}
+
+/// Writes a state into the folder, of which nobody else looks at the values: the names of its pieces.
+pub(crate) fn write(folder: &Folder, values: &[f64]) -> Result<Vec<PieceName>, String> {
+    let piece = |values: &[f64]| {
+        if let Some(spoiled) = values.iter().find(|value| !value.is_finite()) {
+            return Err(format!("{spoiled} is a value of the state"));
+        }
+        let bytes = floats::encode(values);
+        let name = digest(&bytes);
+        folder.put(&name, &bytes).map(|()| name).map_err(|error| error.to_string())
+    };
+    values.chunks(CHUNK_VALUES).map(piece).collect()
+}
+
+/// Reads a state of so many values from the folder into memory that is empty.
+pub(crate) fn read(
+    folder: &Folder,
+    names: &[PieceName],
+    n_state: usize,
+    mut values: Vec<f64>,
+) -> Result<Vec<f64>, String> {
+    for name in names {
+        let bytes = folder.read(name).map_err(|error| error.to_string())?;
+        values.extend(bytes.as_chunks::<8>().0.iter().map(|word| f64::from_le_bytes(*word)));
+    }
+    if values.len() == n_state {
+        Ok(values)
+    } else {
+        Err(format!("{} values where {n_state} belong", values.len()))
+    }
+}
