@@ -4,7 +4,7 @@
 
 mod common;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use common::studies::long_tube;
@@ -58,7 +58,8 @@ fn states_in_a_shared_folder_give_the_same_bytes_over_kills_of_workers_and_of_th
     let dir = tempfile::tempdir().unwrap();
     let place = dir.path().join("shared");
     std::fs::create_dir(&place).unwrap();
-    let (study, whole, broken) = (study(dir.path()), dir.path().join("whole"), dir.path().join("broken"));
+    let (study, whole, broken) =
+        (long_tube(dir.path(), 80), dir.path().join("whole"), dir.path().join("broken"));
     let (code, _, stderr) = output(&mut run(&study, &whole, &[]));
     assert_eq!(code, 0, "{stderr}");
     let named = ["--states", place.to_str().unwrap()];
@@ -83,7 +84,7 @@ fn states_in_a_shared_folder_give_the_same_bytes_over_kills_of_workers_and_of_th
 fn a_resume_without_the_shared_folder_of_its_states_says_what_is_missing() {
     let dir = tempfile::tempdir().unwrap();
     let place = dir.path().join("shared");
-    let (study, out) = (study(dir.path()), dir.path().join("out"));
+    let (study, out) = (long_tube(dir.path(), 80), dir.path().join("out"));
     let named = ["--states", place.to_str().unwrap()];
     let mut child = run(&study, &out, &named).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     wait_until("some analyses", || analyses(&out) > 3);
