@@ -7,7 +7,6 @@
 
 pub mod access;
 pub mod adapters;
-pub mod awake;
 mod codec;
 pub mod convert;
 pub mod private_file;

@@ -10,13 +10,12 @@ mod tests;
 
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Instant;
 
 use starlings_models::{ModelFailure, Until};
-use starlings_proto::awake::awaits;
 use starlings_proto::spent::spent;
 use starlings_proto::words::panic_text;
 use starlings_proto::{Lease, LeaseOutcome, generated};
@@ -28,9 +27,6 @@ pub(crate) use task::{Asked, Task, answer};
 /// Jobs that may wait per slot, twice what a coordinator sends ahead, and of the whole worker at least.
 const WAITING: usize = 128;
 const LEAST_WAITING: usize = 1024;
-
-/// Seconds of a run that is not much longer than waking a thread.
-const SHORT: f64 = 1e-3;
 
 /// The slots of this process.
 #[derive(Clone)]
@@ -45,10 +41,6 @@ struct Shared {
     held: Option<Arc<Held>>,
     queue: Mutex<Queue>,
     filled: Condvar,
-    /// Tasks that ever came.
-    pushed: AtomicU64,
-    /// Whether a thread waits awake for one: more would take each other's time.
-    awake: AtomicBool,
     running: AtomicU32,
     predictions: AtomicU64,
     failures: AtomicU64,
@@ -84,8 +76,6 @@ impl Slots {
             held,
             queue: Mutex::default(),
             filled: Condvar::new(),
-            pushed: AtomicU64::new(0),
-            awake: AtomicBool::new(false),
             running: AtomicU32::new(0),
             predictions: AtomicU64::new(0),
             failures: AtomicU64::new(0),
@@ -113,7 +103,6 @@ impl Slots {
     pub(crate) fn push(&self, task: Task) {
         let mut queue = self.shared.lock();
         queue.tasks.push_back(Arc::new(task));
-        self.shared.pushed.fetch_add(1, Ordering::Release);
         let waited_for = queue.idle > 0;
         drop(queue);
         // Each notice is a call of the system, also where nobody waits.
@@ -177,10 +166,8 @@ impl Shared {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The next task, or `None` at the end. After a short one the next may be close: it is awaited awake first.
-    fn next(&self, after_short: bool) -> Option<Arc<Task>> {
+    fn next(&self) -> Option<Arc<Task>> {
         let mut queue = self.lock();
-        let mut sleeps = !after_short;
         loop {
             if queue.closed {
                 return None;
@@ -191,32 +178,14 @@ impl Shared {
                 queue.running.push(Arc::clone(&task));
                 return Some(task);
             }
-            if !sleeps {
-                sleeps = true;
-                let before = self.pushed.load(Ordering::Acquire);
-                drop(queue);
-                self.await_awake(before);
-                queue = self.lock();
-                continue;
-            }
             queue.idle += 1;
             queue = self.filled.wait(queue).unwrap_or_else(PoisonError::into_inner);
             queue.idle -= 1;
         }
     }
 
-    /// Waits awake for more tasks than came `before`, unless another thread does.
-    fn await_awake(&self, before: u64) {
-        if self.awake.swap(true, Ordering::Relaxed) {
-            return;
-        }
-        awaits(|| self.pushed.load(Ordering::Acquire) != before);
-        self.awake.store(false, Ordering::Relaxed);
-    }
-
     fn work(&self) {
-        let mut was_short = false;
-        while let Some(task) = self.next(was_short) {
+        while let Some(task) = self.next() {
             task.begun();
             self.running.fetch_add(1, Ordering::Relaxed);
             let started = Instant::now();
@@ -225,7 +194,6 @@ impl Shared {
             let result = catch_unwind(AssertUnwindSafe(|| task.forward.run_within(&task.job, &until)))
                 .unwrap_or_else(|panic| Err(ModelFailure::Solver(panic_text(panic.as_ref())).into()));
             let cost = started.elapsed().as_secs_f64();
-            was_short = cost < SHORT;
             self.running.fetch_sub(1, Ordering::Relaxed);
             // A result that came all the same is as good as any; what a stopped run says of itself is not.
             if result.is_err() && task.stop.is_set() {

@@ -12,7 +12,6 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use starlings_models::{BuildSetup, Job, Setup};
-use starlings_proto::awake::awaits;
 use starlings_proto::{MAX_MESSAGE, SetupId, encode_setup};
 use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
 use tokio_util::sync::CancellationToken;
@@ -149,13 +148,8 @@ impl GrpcFleet {
         replies: &mpsc::Receiver<Reply>,
         arrived: Arrived<'_>,
     ) -> Result<Vec<Outcome<Held>>, FleetError> {
-        let mut reply = None;
-        awaits(|| {
-            reply = replies.try_recv().ok();
-            reply.is_some()
-        });
         loop {
-            match reply.take().map_or_else(|| replies.recv_timeout(TELL_EVERY), Ok) {
+            match replies.recv_timeout(TELL_EVERY) {
                 Ok(Ok(outcomes)) => return Ok(outcomes),
                 Ok(Err(error)) => {
                     let _ = arrived(self.hub.arrived());

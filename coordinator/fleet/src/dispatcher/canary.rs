@@ -2,8 +2,8 @@
 //!
 //! The first result of every worker is repeated on another one, and the batch waits for it; workers that are processes of this
 //! machine, started from one program, are spared that. Later one run in 64 is drawn by the study's seed and repeated elsewhere, as
-//! long as repeats stay below two per cent of the runs: while other jobs wait, so that it costs a run and not the end of a batch,
-//! or when the last one at an end of a batch is long ago. The loser of a race for a slow job is compared too. A repeat never is an outcome.
+//! long as repeats stay below two per cent of the runs and of their time: while other jobs wait, so that it costs a run and not the
+//! end of a batch, or when the last one at an end is long ago. The loser of a race for a slow job is compared too. A repeat never is an outcome.
 //! Next file to read: [`super::dispute`], for results that differ.
 
 use std::time::Duration;
@@ -37,13 +37,15 @@ impl Dispatcher {
         let Some(worker) = self.workers.get_mut(&id) else { return };
         worker.taken += 1;
         let (repeats, setup) = (&mut self.repeats, *batch.setup_of(index));
+        let seconds = self.run_times.last();
         repeats.n_run += 1;
+        repeats.run_time += seconds;
         repeats.since_last += 1;
         if !worker.compared && !self.local_only {
             let new = || Contributor { name: worker.called(), index, tried: [].into() };
             repeats.contributors.entry(id).or_insert_with(new);
         }
-        let is_first = !repeats.compared.contains(&(id, setup)) && repeats.affords();
+        let is_first = !repeats.compared.contains(&(id, setup)) && repeats.affords(seconds);
         if is_first || draws(comparing.seed, batch.job_number(index)) {
             repeats.compared.insert((id, setup));
             repeats.sampled.push_back(index);
@@ -99,8 +101,7 @@ impl Dispatcher {
         };
         let key = |w: &&mut Worker| w.load() * 1000 / w.slots;
         let Some(worker) = self.workers.values_mut().filter(fits).min_by_key(key) else { return false };
-        self.repeats.open.insert((worker.id, index));
-        self.repeats.n_repeat += 1;
+        self.repeats.repeating(worker.id, index, self.run_times.last());
         self.out.push(lease(worker, batch, index, self.now));
         true
     }
@@ -109,7 +110,8 @@ impl Dispatcher {
         let slots = self.slots() as u64;
         while let Some(&index) = self.repeats.sampled.front() {
             let Some(batch) = &self.batch else { return };
-            let Some((by, _)) = batch.said(index).filter(|_| self.repeats.affords()) else {
+            let Some((by, _)) = batch.said(index).filter(|_| self.repeats.affords(self.run_times.last()))
+            else {
                 self.repeats.sampled.pop_front();
                 continue;
             };

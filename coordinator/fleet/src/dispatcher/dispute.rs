@@ -78,8 +78,7 @@ impl Dispatcher {
         let key = |w: &&mut Worker| (asked(w), w.load() * 1000 / w.slots);
         let Some(worker) = self.workers.values_mut().filter(fits).min_by_key(key) else { return false };
         *dispute.asked.entry(worker.id).or_default() += 1;
-        self.repeats.open.insert((worker.id, index));
-        self.repeats.n_repeat += 1;
+        self.repeats.repeating(worker.id, index, self.run_times.last());
         self.out.push(lease(worker, batch, index, self.now));
         true
     }

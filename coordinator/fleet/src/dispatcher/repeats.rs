@@ -21,7 +21,7 @@ pub(crate) struct Comparing {
 /// One run in so many is repeated.
 const SAMPLED: u64 = 64;
 
-/// Of so many runs at most one is a repeat, beside the first ones of each worker.
+/// Of so many runs, and of so many seconds of theirs, at most one is a repeat, beside the first ones of each worker.
 pub(super) const MOST: u64 = 50;
 
 /// A worker whose results of this batch nobody has compared yet.
@@ -53,6 +53,9 @@ pub(super) struct Repeats {
     /// Runs with a prediction, and those of them that repeated another.
     pub(super) n_run: u64,
     pub(super) n_repeat: u64,
+    /// What they took together, seconds.
+    pub(super) run_time: f64,
+    pub(super) repeat_time: f64,
     /// Runs since one was repeated at the end of a batch.
     pub(super) since_last: u64,
     /// Leases of this batch that repeat a job.
@@ -82,9 +85,18 @@ impl Repeats {
         self.likeness.get(setup).copied().unwrap_or(Likeness::Exact)
     }
 
-    /// Whether one more repeat stays within its share of the runs.
-    pub(super) fn affords(&self) -> bool {
-        (self.n_repeat + 1) * MOST <= self.n_run
+    /// Whether one more repeat, of a run of so many seconds, stays within its share of the runs and of their time: a million short runs
+    /// pay for no long ones.
+    pub(super) fn affords(&self, seconds: f64) -> bool {
+        let most = MOST as f64;
+        (self.n_repeat + 1) * MOST <= self.n_run && (self.repeat_time + seconds) * most <= self.run_time
+    }
+
+    /// Takes note of a repeat of a run of so many seconds.
+    pub(super) fn repeating(&mut self, worker: WorkerId, index: usize, seconds: f64) {
+        self.open.insert((worker, index));
+        self.n_repeat += 1;
+        self.repeat_time += seconds;
     }
 
     /// Whether a job of this batch is being repeated.

@@ -19,6 +19,11 @@ impl RunTimes {
         self.latest.push_back(seconds);
     }
 
+    /// The last one, seconds; zero before the first run.
+    pub(super) fn last(&self) -> f64 {
+        self.latest.back().copied().unwrap_or(0.0)
+    }
+
     /// Runs known, up to those kept.
     pub(super) fn len(&self) -> usize {
         self.latest.len()

@@ -39,6 +39,33 @@ fn played(
     all
 }
 
+/// Answers all leases after so many seconds each; the leases beyond the jobs.
+fn played_at(stage: &mut Stage, first: Vec<Command>, n: usize, seconds: f64) -> usize {
+    let mut open = std::collections::VecDeque::from(sent(&first));
+    let mut n_lease = 0;
+    while let Some((lease, index)) = open.pop_front() {
+        n_lease += 1;
+        let ran = LeaseOutcome::Ran(Ok(scaled(index, 1.0)));
+        open.extend(sent(&stage.step(answered(lease, ran, seconds))));
+    }
+    n_lease - n
+}
+
+#[test]
+fn many_short_runs_do_not_pay_for_the_repeats_of_long_ones() {
+    let mut stage = comparing(&[1, 1], false);
+    let short = stage.step(submit(20_000));
+    assert!(played_at(&mut stage, short, 20_000, 1e-6) > 100, "short runs are repeated");
+    // Each setup is new, and the first run of a new one is repeated where that can be paid.
+    for i in 0..40 {
+        stage.step(Event::SetupDone { worker: WorkerId(1), setup: setup(i) });
+        stage.step(Event::SetupDone { worker: WorkerId(2), setup: setup(i) });
+    }
+    let setups: Vec<u8> = (0..40).collect();
+    let long = stage.step(submit_mixed(&setups));
+    assert!(played_at(&mut stage, long, 40, 0.01) < 2);
+}
+
 pub(super) fn put_out(commands: &[Command]) -> Vec<u64> {
     let out = commands.iter().filter_map(|command| match command {
         Command::PutOut { worker, .. } => Some(worker.0),
