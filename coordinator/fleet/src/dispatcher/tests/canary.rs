@@ -57,13 +57,13 @@ fn many_short_runs_do_not_pay_for_the_repeats_of_long_ones() {
     let short = stage.step(submit(20_000));
     assert!(played_at(&mut stage, short, 20_000, 1e-6) > 100, "short runs are repeated");
     // Each setup is new, and the first run of a new one is repeated where that can be paid.
-    for i in 0..40 {
+    for i in 0..200 {
         stage.step(Event::SetupDone { worker: WorkerId(1), setup: setup(i) });
         stage.step(Event::SetupDone { worker: WorkerId(2), setup: setup(i) });
     }
-    let setups: Vec<u8> = (0..40).collect();
+    let setups: Vec<u8> = (0..200).collect();
     let long = stage.step(submit_mixed(&setups));
-    assert!(played_at(&mut stage, long, 40, 0.01) < 2);
+    assert!(played_at(&mut stage, long, 200, 0.01) < 5);
 }
 
 pub(super) fn put_out(commands: &[Command]) -> Vec<u64> {
