@@ -5,6 +5,7 @@ mod canary;
 mod chaos;
 mod doubt;
 mod duplicate;
+mod held;
 mod leases;
 mod losses;
 mod mixed;
