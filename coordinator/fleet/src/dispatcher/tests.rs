@@ -1,6 +1,7 @@
 //! Events in, commands compared.
 
 mod aside;
+mod belief;
 mod canary;
 mod chaos;
 mod doubt;
