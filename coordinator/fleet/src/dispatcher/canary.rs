@@ -188,6 +188,11 @@ impl Dispatcher {
         dispute.opinions.push(Opinion { by, name, said });
     }
 
+    /// The build of a worker, in hexadecimal, and how many of its results were taken so far.
+    pub(crate) fn taken(&self, id: WorkerId) -> (String, u64) {
+        self.workers.get(&id).map_or_else(|| (String::new(), 0), |w| (w.build.clone(), w.taken))
+    }
+
     /// Results of this worker are those of others.
     pub(super) fn trusted(&mut self, id: WorkerId) {
         self.repeats.contributors.remove(&id);

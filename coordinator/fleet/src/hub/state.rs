@@ -9,17 +9,17 @@ use std::time::Duration;
 use starlings_proto::{
     Bytes, Hello, JobEncoder, Lease, PROTOCOL, SentWindows, SetupId, ToWorker, VERSION, generated,
 };
-use tokio::sync::mpsc::UnboundedSender;
 
+use super::Reply;
 use super::blocks::Blocks;
 use super::doorway::Doorway;
 use super::excluded::Excluded;
 use super::states::States;
 use super::teller::Teller;
 use super::waiting::Waiting;
-use super::{Outgoing, Reply};
 use crate::dispatcher::{BatchError, Command, ControlId, Dispatcher, Event, WorkerId};
 use crate::event_text::OVER;
+use crate::outbox::Outbox;
 use crate::wire::{Job, named};
 use crate::{FleetEvent, StateStore, StoredState};
 
@@ -68,7 +68,7 @@ pub(crate) struct SetupShape {
 /// The way to one worker.
 pub(super) struct Link {
     pub(super) name: String,
-    pub(super) sender: UnboundedSender<Outgoing>,
+    pub(super) outbox: Outbox,
     pub(super) pid: u32,
     pub(super) nonce: u64,
     /// Windows that were sent on it.
@@ -76,20 +76,15 @@ pub(super) struct Link {
 }
 
 impl Link {
-    pub(super) fn new(name: String, sender: UnboundedSender<Outgoing>, pid: u32, nonce: u64) -> Self {
-        Self { name, sender, pid, nonce, windows: SentWindows::default() }
+    pub(super) fn new(name: String, outbox: Outbox, pid: u32, nonce: u64) -> Self {
+        Self { name, outbox, pid, nonce, windows: SentWindows::default() }
     }
 
     fn give(&mut self, encoder: &mut JobEncoder, lease: Lease, (setup, job): &(SetupId, Job)) {
         let (window, job) = encoder.encode(lease, setup, job, &mut self.windows);
         for message in window.into_iter().chain([job]) {
-            self.send(message);
+            self.outbox.send(message);
         }
-    }
-
-    /// A link that is closing ends in `leave`, which returns its leases.
-    fn send(&self, message: generated::ToWorker) {
-        let _ = self.sender.send(Ok(message));
     }
 }
 
@@ -106,7 +101,7 @@ pub(crate) enum Closed {
 pub(crate) struct Submission {
     pub(crate) jobs: Vec<(SetupId, Job)>,
     /// The states that the jobs name.
-    pub(crate) _states: Vec<StoredState>,
+    pub(crate) states: Vec<StoredState>,
     /// Holds the windows of the jobs as they travel.
     pub(crate) encoder: JobEncoder,
     pub(crate) reply: Sender<Reply>,
@@ -285,7 +280,7 @@ impl State {
 
     pub(super) fn send(&self, worker: WorkerId, message: generated::ToWorker) {
         if let Some(link) = self.links.get(&worker) {
-            link.send(message);
+            link.outbox.send(message);
         }
     }
 
