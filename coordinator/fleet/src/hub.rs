@@ -27,9 +27,9 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use starlings_proto::{Bytes, HeldRun, Hello, PROTOCOL, SetupId, ToWorker, Welcome};
+use starlings_states::hex;
 use tokio::sync::Notify;
 
-use super::dispatcher::message::hex;
 use super::dispatcher::{BatchError, Dispatcher, Event, Joining, Likeness, Rules, WorkerId};
 use super::event_text::OVER;
 use super::identity::RunIdentity;

@@ -244,15 +244,8 @@ impl State {
                 let outcomes = held.collect::<Option<Vec<_>>>().ok_or_else(lost);
                 self.reply(outcomes);
             }
-            Command::BatchFailed(mut error) => {
-                if let BatchError::NoControl { index, parameters, .. } = &mut error {
-                    let named = self.parameters(*index);
-                    let listed = named.iter().map(|(name, value)| format!("{name} = {value}"));
-                    *parameters = listed.collect::<Vec<_>>().join(", ");
-                }
-                if let BatchError::NoWorkers { missing, .. } = &mut error {
-                    missing.push_str(&self.turned_away());
-                }
+            Command::BatchFailed(error) => {
+                let error = self.detailed(error);
                 self.reply(Err(error));
             }
             Command::Notice(event) => self.notify(event),
@@ -263,6 +256,20 @@ impl State {
                 self.tell(notice);
             }
         }
+    }
+
+    /// Why a batch ended, with what the dispatcher does not know.
+    fn detailed(&self, mut error: BatchError) -> BatchError {
+        match &mut error {
+            BatchError::NoControl { index, parameters, .. } => {
+                let named = self.parameters(*index);
+                let listed = named.iter().map(|(name, value)| format!("{name} = {value}"));
+                *parameters = listed.collect::<Vec<_>>().join(", ");
+            }
+            BatchError::NoWorkers { missing, .. } => missing.push_str(&self.turned_away()),
+            _ => {}
+        }
+        error
     }
 
     pub(super) fn tell(&mut self, event: FleetEvent) {

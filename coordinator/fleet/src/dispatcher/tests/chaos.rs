@@ -1,6 +1,7 @@
 //! Random joins, losses, answers, failures and silences: every job ends exactly once, no credit is lost, and it ends.
 
 mod act;
+mod draw;
 mod world;
 
 use act::{Act, act};

@@ -8,6 +8,7 @@ use starlings_proto::{Lease, LeaseOutcome, SetupId};
 
 use super::super::{RULES, answered, crash, joining, left, place, prediction, setup, solver, submit_mixed};
 use super::act::{Act, Brought};
+use super::draw::{choose, pick};
 use crate::FleetEvent;
 use crate::dispatcher::{
     BatchError, Command, Comparing, ControlId, Dispatcher, Event, Rules, Taken, WorkerId,
@@ -220,6 +221,11 @@ impl World {
                 self.event(Event::Tick);
             }
         }
+        self.assert_fair();
+    }
+
+    /// No worker is charged for what it does not have, or blamed for what it was asked for.
+    fn assert_fair(&self) {
         for &worker in &self.alive {
             let open = self.open.keys().filter(|(of, _)| *of == worker).count();
             assert_eq!(self.dispatcher.in_flight(WorkerId(worker)), open, "credit follows the open leases");
@@ -294,12 +300,4 @@ impl World {
 
 pub(super) fn late() -> Timeout {
     Timeout { limit: 1.0, says: "too late".to_owned() }
-}
-
-pub(super) fn choose<T: Ord + Copy>(from: &BTreeSet<T>, which: usize) -> Option<T> {
-    (!from.is_empty()).then(|| *from.iter().nth(which % from.len()).expect("within the length"))
-}
-
-pub(super) fn pick<K: Ord, V>(from: &BTreeMap<K, V>, which: usize) -> Option<(&K, &V)> {
-    (!from.is_empty()).then(|| from.iter().nth(which % from.len()).expect("within the length"))
 }
