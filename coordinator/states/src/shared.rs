@@ -109,7 +109,9 @@ impl Shared {
     pub(crate) fn release(&self, names: &[ChunkId]) {
         let is_left = {
             let mut table = self.lock();
-            names.iter().for_each(|name| table.release(name));
+            for name in names {
+                table.release(name);
+            }
             table.has_unneeded()
         };
         if is_left && !self.for_workers {
@@ -127,7 +129,9 @@ impl Shared {
                 return;
             }
             let Ok(folder) = self.folder() else { return };
-            names.iter().for_each(|name| folder.remove(name));
+            for name in &names {
+                folder.remove(name);
+            }
         }
     }
 }

@@ -93,7 +93,9 @@ impl<P> Table<P> {
     /// Takes so many pieces that stand in the folder and are needed by no state.
     pub(crate) fn unneeded(&mut self, most: usize) -> Vec<ChunkId> {
         let names: Vec<ChunkId> = self.given_up.iter().take(most).copied().collect();
-        names.iter().for_each(|name| _ = self.given_up.remove(name));
+        for name in &names {
+            self.given_up.remove(name);
+        }
         names
     }
 

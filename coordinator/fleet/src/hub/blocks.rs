@@ -156,7 +156,9 @@ impl Blocks {
         };
         let mut late: Vec<WorkerId> = self.given.iter().filter_map(late).collect();
         late.dedup();
-        late.iter().for_each(|worker| self.left(*worker));
+        for worker in &late {
+            self.left(*worker);
+        }
         late
     }
 }

@@ -35,7 +35,9 @@ mod tests {
         let mut excluded = Excluded::default();
         // The last ones drew the smallest numbers.
         let numbers: Vec<u64> = (0..=KEPT as u64).rev().collect();
-        numbers.iter().for_each(|number| excluded.add(*number, "it lies"));
+        for number in &numbers {
+            excluded.add(*number, "it lies");
+        }
         assert_eq!(excluded.why(numbers[0]), None);
         assert!(numbers[1..].iter().all(|number| excluded.why(*number) == Some("it was put out: it lies")));
         excluded.add(numbers[1], "it lies again");

@@ -63,7 +63,10 @@ impl States {
     /// A worker is gone, and what it put and did not name.
     pub(super) fn left(&mut self, worker: WorkerId) {
         self.sessions.remove(&worker);
-        self.gone.extend(self.put.extract_if(.., |lease, _| lease.epoch == worker.0).map(|(_, state)| state));
+        let put = std::mem::take(&mut self.put).into_iter();
+        let (its, others): (BTreeMap<_, _>, _) = put.partition(|(lease, _)| lease.epoch == worker.0);
+        self.put = others;
+        self.gone.extend(its.into_values());
     }
 
     /// A batch is over, or another one begins: nothing of the earlier one is named any more.
@@ -123,7 +126,10 @@ impl States {
 
     /// Holds only those of the states that answers named.
     pub(super) fn keep_needed(&mut self, is_needed: impl Fn(&StateId) -> bool) {
-        self.gone.extend(self.answered.extract_if(.., |id, _| !is_needed(id)).map(|(_, state)| state));
+        let answered = std::mem::take(&mut self.answered).into_iter();
+        let (needed, others): (_, BTreeMap<_, _>) = answered.partition(|(id, _)| is_needed(id));
+        self.answered = needed;
+        self.gone.extend(others.into_values());
     }
 
     /// An outcome with its state, unless that is gone.

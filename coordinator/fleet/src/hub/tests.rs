@@ -122,3 +122,33 @@ fn a_draining_fleet_says_that_the_run_is_over_and_not_that_the_worker_is_wrong()
     let old = Hello { version: "0.0.1".to_owned(), ..hello(2, None) };
     assert!(matches!(hub.join(old, link), Err(Closed::Refused(_))));
 }
+
+#[test]
+fn what_is_brought_along_waits_for_a_batch_while_its_worker_is_there_and_is_not_given_up() {
+    let (hub, _events) = hub(None);
+    let worker = |pid| hub.join(hello(pid, None), outbox().0).expect("it fits");
+    let waiting = || {
+        let mut keys: Vec<u8> = hub.lock().waiting.runs.keys().map(|key| key[0]).collect();
+        keys.sort_unstable();
+        keys
+    };
+    let run = |key: u8, is_made: bool| HeldRun {
+        key: [key; 32],
+        ended: is_made.then(|| Bytes::from_static(b"as it was")),
+    };
+    let (first, second) = (worker(1), worker(2));
+    hub.bring(first, vec![run(1, true), run(2, false)]);
+    hub.bring(second, vec![run(3, true)]);
+    assert_eq!(waiting(), [1, 2, 3]);
+    // The worker is told that what it still makes is of no use, and gives it up.
+    let (batch, _replies) = batch(&hub);
+    hub.submit(batch);
+    assert_eq!(waiting(), [1, 3]);
+    hub.bring(first, vec![run(4, true), run(5, false)]);
+    assert_eq!(waiting(), [1, 3, 4]);
+    hub.leave(first, "it is gone".to_owned(), false);
+    assert_eq!(waiting(), [3]);
+    // Nobody has heard of this one.
+    hub.bring(first, vec![run(6, true)]);
+    assert_eq!(waiting(), [3]);
+}
