@@ -4,8 +4,8 @@ mod act;
 mod draw;
 mod world;
 
-use act::{Act, act};
-use world::{World, late};
+use act::{Act, act, late};
+use world::World;
 
 use proptest::prelude::*;
 use starlings_models::{Failure, ParticleError};

@@ -1,6 +1,7 @@
 //! What can happen to a dispatcher, drawn at random.
 
 use proptest::prelude::*;
+use starlings_models::Timeout;
 
 /// One thing that the world does; numbers choose among what is possible then.
 #[derive(Clone, Debug)]
@@ -49,4 +50,9 @@ pub(super) fn act() -> impl Strategy<Value = Act> {
 
 fn brought() -> impl Strategy<Value = Brought> {
     prop::sample::select(vec![Brought::Computing, Brought::Made, Brought::Failed])
+}
+
+/// What a run says that was given up.
+pub(super) fn late() -> Timeout {
+    Timeout { limit: 1.0, says: "too late".to_owned() }
 }

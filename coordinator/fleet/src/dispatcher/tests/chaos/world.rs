@@ -3,11 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use starlings_models::{ParticleError, Timeout};
+use starlings_models::ParticleError;
 use starlings_proto::{Lease, LeaseOutcome, SetupId};
 
 use super::super::{RULES, answered, crash, joining, left, place, prediction, setup, solver, submit_mixed};
-use super::act::{Act, Brought};
+use super::act::{Act, Brought, late};
 use super::draw::{choose, pick};
 use crate::FleetEvent;
 use crate::dispatcher::{
@@ -296,8 +296,4 @@ impl World {
         }
         panic!("a batch with a good worker ends within a few events per job");
     }
-}
-
-pub(super) fn late() -> Timeout {
-    Timeout { limit: 1.0, says: "too late".to_owned() }
 }
