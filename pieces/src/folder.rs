@@ -1,67 +1,68 @@
 //! A folder of pieces: a file per piece, by its name. Whoever reads one checks it against its name.
+//!
+//! A state is data of the study: folder and files are the user's own (0700 and 0600), unless the folder says that it is a group's.
 
 use std::collections::HashSet;
-use std::hash::{BuildHasher, Hasher, RandomState};
-use std::io::ErrorKind;
+use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 use bytes::Bytes;
+use tempfile::{Builder, TempDir, TempPath};
 
+use crate::access::Access;
 use crate::{PieceError, PieceName, hex};
 
 /// End of the name of a file that is being written.
-const PARTIAL: &str = "partial";
+const PARTIAL: &str = ".partial";
 
 /// A folder of pieces. It is made when the first piece is written. Several processes may write into one.
 #[derive(Debug)]
 pub struct Folder {
     path: PathBuf,
+    access: Access,
     /// Whether it goes with this value.
-    temporary: bool,
-    /// What no other writer of the folder has in the names of its files.
-    token: u64,
-    partial: AtomicU64,
+    passing: bool,
+    /// What removes a temporary one.
+    _temporary: Option<TempDir>,
 }
 
-/// A piece that is written beside its place.
+/// A piece that is written beside its place; dropped, it is gone.
 #[derive(Debug)]
 #[must_use]
-pub struct Staged(PathBuf);
+pub struct Staged(TempPath);
 
 impl Folder {
-    fn new(path: PathBuf, temporary: bool) -> Self {
-        Self {
-            path,
-            temporary,
-            token: RandomState::new().build_hasher().finish(),
-            partial: AtomicU64::new(0),
-        }
+    fn new(path: PathBuf, access: Access) -> Self {
+        Self { path, access, passing: false, _temporary: None }
     }
 
-    /// A folder that stays.
+    /// A folder that stays, for nobody but the user.
     pub fn at(path: &Path) -> Self {
-        Self::new(path.to_owned(), false)
+        Self::new(path.to_owned(), Access::Own)
     }
 
-    /// A folder among the system's temporary ones, which goes with this value. Nobody else can have made it before.
-    pub fn temporary() -> Self {
-        let path = loop {
-            let name = format!("starlings-states-{:016x}", RandomState::new().build_hasher().finish());
-            let path = std::env::temp_dir().join(name);
-            // Whatever else is wrong is told when a piece is written.
-            if private(&path, false).map_err(|error| error.kind()) != Err(ErrorKind::AlreadyExists) {
-                break path;
-            }
-        };
-        Self::new(path, true)
+    /// A folder that stays, inside one that machines share: for the group of that one where it is a group's.
+    pub(crate) fn inside(place: &Path, name: &str) -> Self {
+        Self::new(place.join(name), Access::of(place))
+    }
+
+    /// A folder among the system's temporary ones, which goes with this value.
+    ///
+    /// # Errors
+    /// When none can be made.
+    pub fn temporary() -> Result<Self, PieceError> {
+        let mut builder = Builder::new();
+        builder.prefix("starlings-states-").permissions(Access::Own.of_folder());
+        let folder = builder.tempdir().map_err(Self::failed("make a folder in", &std::env::temp_dir()))?;
+        let path = folder.path().to_owned();
+        Ok(Self { path, access: Access::Own, passing: false, _temporary: Some(folder) })
     }
 
     /// The same, which goes with this value.
     #[must_use]
     pub fn passing(mut self) -> Self {
-        self.temporary = true;
+        self.passing = true;
         self
     }
 
@@ -89,33 +90,31 @@ impl Folder {
     /// # Errors
     /// When the folder refuses.
     pub fn stage(&self, bytes: &[u8]) -> Result<Staged, PieceError> {
-        let number = self.partial.fetch_add(1, Ordering::Relaxed);
-        let path = self.path.join(format!("{:016x}-{number}.{PARTIAL}", self.token));
-        let written = std::fs::write(&path, bytes).or_else(|error| {
+        let write = || {
+            let mut builder = Builder::new();
+            builder.suffix(PARTIAL).permissions(self.access.of_file());
+            let mut file = builder.tempfile_in(&self.path)?;
+            file.write_all(bytes)?;
+            self.access.open_up(file.path(), &self.access.of_file())?;
+            Ok(file.into_temp_path())
+        };
+        let written = write().or_else(|error: std::io::Error| {
             if error.kind() != ErrorKind::NotFound {
                 return Err(error);
             }
-            private(&self.path, true)?;
-            std::fs::write(&path, bytes)
+            self.access.make(&self.path)?;
+            write()
         });
-        written.map_err(Self::failed("write", &path)).inspect_err(|_| {
-            // The failure to write is returned.
-            let _ = std::fs::remove_file(&path);
-        })?;
-        Ok(Staged(path))
+        written.map(Staged).map_err(Self::failed("write into", &self.path))
     }
 
     /// Puts a written piece into its place.
     ///
     /// # Errors
     /// When the folder refuses.
-    pub fn place(&self, written: &Staged, name: &PieceName) -> Result<(), PieceError> {
-        std::fs::rename(&written.0, self.file(name)).map_err(Self::failed("write", &written.0))
-    }
-
-    /// Drops a written piece that is not needed after all.
-    pub fn discard(written: Staged) {
-        let _ = std::fs::remove_file(written.0);
+    pub fn place(&self, written: Staged, name: &PieceName) -> Result<(), PieceError> {
+        let path = self.file(name);
+        written.0.persist(&path).map_err(|refused| Self::failed("write", &path)(refused.error))
     }
 
     /// Writes a piece into its place, whether it is there or not: what stands there may be damaged.
@@ -123,8 +122,7 @@ impl Folder {
     /// # Errors
     /// When the folder refuses.
     pub fn put(&self, name: &PieceName, bytes: &[u8]) -> Result<(), PieceError> {
-        let written = self.stage(bytes)?;
-        self.place(&written, name).inspect_err(|_| Self::discard(written))
+        self.place(self.stage(bytes)?, name)
     }
 
     /// A piece, checked against its name.
@@ -180,18 +178,9 @@ impl Folder {
     }
 }
 
-/// Makes a folder that other users cannot look into: a state is data of the study.
-fn private(path: &Path, with_parents: bool) -> std::io::Result<()> {
-    let mut builder = std::fs::DirBuilder::new();
-    builder.recursive(with_parents);
-    #[cfg(unix)]
-    std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
-    builder.create(path)
-}
-
 impl Drop for Folder {
     fn drop(&mut self) {
-        if self.temporary {
+        if self.passing {
             self.clear();
         }
     }
@@ -208,8 +197,8 @@ mod tests {
         let (a, b) = (Folder::at(&path), Folder::at(&path));
         let name = |bytes: &[u8]| *blake3::hash(bytes).as_bytes();
         let (one, other) = (a.stage(b"one").expect("room"), b.stage(b"other").expect("room"));
-        a.place(&one, &name(b"one")).expect("room");
-        b.place(&other, &name(b"other")).expect("room");
+        a.place(one, &name(b"one")).expect("room");
+        b.place(other, &name(b"other")).expect("room");
         assert_eq!(b.read(&name(b"one")).expect("it is there"), "one");
         assert_eq!(a.read(&name(b"other")).expect("it is there"), "other");
         std::fs::write(path.join(hex(&name(b"one"))), b"two").expect("room");
@@ -218,5 +207,19 @@ mod tests {
         a.put(&name(b"one"), b"one").expect("room");
         assert_eq!(b.read(&name(b"one")).expect("it was written again"), "one");
         assert!(matches!(a.read(&[0; 32]), Err(PieceError::Missing { .. })));
+    }
+
+    #[test]
+    fn a_piece_that_is_not_placed_and_a_temporary_folder_leave_nothing() {
+        let scratch = tempfile::tempdir().expect("a folder");
+        let folder = Folder::at(scratch.path());
+        drop(folder.stage(b"one").expect("room"));
+        assert_eq!(std::fs::read_dir(scratch.path()).expect("readable").count(), 0);
+        let folder = Folder::temporary().expect("room");
+        folder.put(blake3::hash(b"one").as_bytes(), b"one").expect("room");
+        let path = folder.path().to_owned();
+        assert!(path.exists());
+        drop(folder);
+        assert!(!path.exists());
     }
 }

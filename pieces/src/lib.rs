@@ -3,6 +3,7 @@
 //! Coordinator and workers see this crate; nothing here knows states, jobs or messages. Next file to read: [`folder`], then
 //! [`place`] for what machines share.
 
+mod access;
 pub mod error;
 pub mod folder;
 pub mod place;

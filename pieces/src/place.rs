@@ -1,6 +1,8 @@
 //! A place that machines share, as people name it: a folder that all of them see under some path.
 //!
-//! Every run has a folder of its own in it, so that runs do not remove each other's pieces.
+//! Every run has a folder of its own in it, so that runs do not remove each other's pieces. Workers of other users read and write
+//! there only where the place is a group's, with the set-group-ID bit and writable by the group (`chmod 2770`), and all of them belong
+//! to it; whoever is of the group may then read the states of the study and spoil them, which is found when they are read.
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -37,6 +39,6 @@ impl std::fmt::Display for PlaceName {
 impl PlaceName {
     /// The folder of one run, by the number that the run drew for itself. It is made when the first piece is written.
     pub fn of_run(&self, run: &[u8; 16]) -> Folder {
-        Folder::at(&self.0.join(format!("starlings-{}", hex(run))))
+        Folder::inside(&self.0, &format!("starlings-{}", hex(run)))
     }
 }

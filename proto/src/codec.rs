@@ -1,14 +1,22 @@
-//! Messages to bytes and back as gRPC does it, with room for the whole message taken at once.
+//! Messages to bytes and back as gRPC does it, with room for the whole message taken at once and no piece of a state in a larger one.
 //!
 //! A window of a long recording is more than a megabyte: a buffer that grows while it is written ends twice as large, and as many
-//! of them wait as there are jobs ahead of a worker. Next file to read: [`crate::convert`].
+//! of them wait as there are jobs ahead of a worker. A piece that is kept keeps the whole message that it came in. Next file to read: [`crate::convert`].
 
+use std::any::TypeId;
 use std::marker::PhantomData;
 
 use prost::Message;
+use prost::bytes::Buf;
 use tonic::Status;
-use tonic::codec::{EncodeBuf, Encoder};
+use tonic::codec::{DecodeBuf, Decoder, EncodeBuf, Encoder};
 use tonic_prost::{ProstCodec, ProstDecoder};
+
+use crate::convert::state::CHUNK_BYTES;
+use crate::generated::Chunk;
+
+/// Bytes of a message with a piece of a state, or names of pieces, at most.
+const MOST_OF_PIECE: usize = CHUNK_BYTES + 1024;
 
 /// Encodes `T`, decodes `U`.
 #[derive(Debug)]
@@ -24,14 +32,14 @@ impl<T: Message + Send + 'static, U: Message + Default + Send + 'static> tonic::
     type Encode = T;
     type Decode = U;
     type Encoder = Whole<T>;
-    type Decoder = ProstDecoder<U>;
+    type Decoder = Fitting<U>;
 
     fn encoder(&mut self) -> Self::Encoder {
         Whole(PhantomData)
     }
 
     fn decoder(&mut self) -> Self::Decoder {
-        ProstCodec::<T, U>::default().decoder()
+        Fitting(ProstCodec::<T, U>::default().decoder())
     }
 }
 
@@ -46,5 +54,24 @@ impl<T: Message> Encoder for Whole<T> {
     fn encode(&mut self, item: T, buffer: &mut EncodeBuf<'_>) -> Result<(), Status> {
         buffer.reserve(item.encoded_len());
         item.encode(buffer).map_err(|error| Status::internal(error.to_string()))
+    }
+}
+
+/// Decodes messages; one with a piece of a state has nothing else in it.
+#[derive(Debug)]
+pub(crate) struct Fitting<U>(ProstDecoder<U>);
+
+impl<U: Message + Default + 'static> Decoder for Fitting<U> {
+    type Item = U;
+    type Error = Status;
+
+    fn decode(&mut self, source: &mut DecodeBuf<'_>) -> Result<Option<U>, Status> {
+        if TypeId::of::<U>() == TypeId::of::<Chunk>() && source.remaining() > MOST_OF_PIECE {
+            return Err(Status::invalid_argument(format!(
+                "a message of {} bytes for a piece of a state, at most {MOST_OF_PIECE} belong",
+                source.remaining()
+            )));
+        }
+        self.0.decode(source)
     }
 }

@@ -19,6 +19,7 @@
 mod answers;
 mod aside;
 pub(crate) mod batch;
+mod belief;
 mod canary;
 mod dispute;
 mod doubt;
@@ -51,8 +52,8 @@ pub(crate) use doubt::Asked;
 pub(crate) use held::Taken;
 pub(crate) use message::{BatchError, Command, ControlId, Event, Joining, Likeness, WorkerId};
 use proven::Proven;
-pub(crate) use repeats::Comparing;
 use repeats::Repeats;
+pub(crate) use repeats::{Comparing, draws};
 use roster::{SetupState, Worker};
 use run_times::RunTimes;
 use watch::{Overdue, Starved};
@@ -143,11 +144,6 @@ impl Dispatcher {
     /// Whether all workers are processes of this machine that were started for the run.
     pub(crate) fn is_local_only(&self) -> bool {
         self.local_only
-    }
-
-    /// Outcomes of the running batch, or of one that ended in an error, that were not handed on before.
-    pub(crate) fn arrived(&mut self) -> Vec<(usize, Outcome)> {
-        self.batch.as_mut().map_or_else(|| std::mem::take(&mut self.left), Batch::arrived)
     }
 
     /// Whether an outcome of the running batch names a state. Without a batch nobody knows: whoever began it has the outcomes.
@@ -282,8 +278,10 @@ impl Dispatcher {
     }
 
     fn abort(&mut self, error: BatchError) {
-        let Some(mut batch) = self.batch.take() else { return };
-        self.left = batch.arrived();
+        if self.batch.is_some() {
+            self.left = self.leftover(&error);
+        }
+        let Some(batch) = self.batch.take() else { return };
         for worker in self.workers.values() {
             let leases = worker.leases().filter(|l| batch.index_of(l.job).is_some()).collect::<Vec<_>>();
             if !leases.is_empty() {

@@ -119,7 +119,7 @@ impl GrpcFleet {
             is_open: config.secrets.is_none(),
             cancel: config.cancel,
             compares: !config.mixed,
-            compared: Compared::default(),
+            compared: Compared::drawn_by(config.seed),
         })
     }
 

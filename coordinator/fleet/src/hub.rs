@@ -9,6 +9,7 @@ mod blocks;
 mod doorway;
 mod excluded;
 mod held;
+mod locked;
 mod mixing;
 mod replies;
 mod state;
@@ -22,25 +23,23 @@ mod waiting;
 
 use std::hash::{BuildHasher, Hasher};
 use std::sync::mpsc::Sender;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use starlings_proto::{Bytes, HeldRun, Hello, PROTOCOL, SetupId, ToWorker, Welcome, generated};
-use tokio::sync::{Notify, mpsc::UnboundedSender};
-use tonic::Status;
+use starlings_proto::{Bytes, HeldRun, Hello, PROTOCOL, SetupId, ToWorker, Welcome};
+use starlings_states::hex;
+use tokio::sync::Notify;
 
-use super::dispatcher::message::hex;
 use super::dispatcher::{BatchError, Dispatcher, Event, Joining, Likeness, Rules, WorkerId};
 use super::event_text::OVER;
 use super::identity::RunIdentity;
 use super::job_name::JobName;
+use super::outbox::Outbox;
 use super::{FleetEvent, Held, Outcome, StateStore, StoredState};
 pub(super) use blocks::{Made, Work};
+use locked::Locked;
 pub(super) use state::{Closed, SetupShape, Submission};
 use state::{Link, State};
-
-/// What a link carries to its worker.
-pub(super) type Outgoing = Result<generated::ToWorker, Status>;
 
 /// Answer to the caller of a batch.
 pub(super) type Reply = Result<Vec<Outcome<Held>>, BatchError>;
@@ -98,8 +97,13 @@ impl Hub {
         state.events.tell(now, event);
     }
 
+    /// The time of an event that comes now.
+    fn now(&self) -> Duration {
+        self.started.elapsed()
+    }
+
     pub(super) fn handle(&self, event: Event) {
-        let now = self.started.elapsed();
+        let now = self.now();
         self.decide().handle(now, event);
     }
 
@@ -159,7 +163,7 @@ impl Hub {
     }
 
     /// Takes a worker or says why not. The first message on its link is the welcome.
-    pub(super) fn join(&self, hello: Hello, link: UnboundedSender<Outgoing>) -> Result<WorkerId, Closed> {
+    pub(super) fn join(&self, hello: Hello, link: Outbox) -> Result<WorkerId, Closed> {
         let now = self.started.elapsed();
         let mut state = self.decide();
         if let Err(closed) = state.admit(&hello) {
@@ -179,7 +183,7 @@ impl Hub {
             incarnation: self.identity.incarnation,
             probe: self.probe.as_ref().map(|probe| probe.pieces()[0]),
         };
-        let _ = link.send(Ok(ToWorker::welcome(welcome)));
+        link.send(ToWorker::welcome(welcome));
         state.states.joined(id, hello.nonce, hello.slots);
         let name = format!("{}@{}/{}", state.joined, hello.host, hello.pid);
         state.links.insert(id, Link::new(name.clone(), link, hello.pid, hello.nonce));
@@ -200,7 +204,11 @@ impl Hub {
     /// Takes runs that a worker brings along from an earlier connection of the same run.
     pub(super) fn bring(&self, worker: WorkerId, runs: Vec<HeldRun>) {
         let now = self.started.elapsed();
-        self.decide().bring(now, worker, runs);
+        let mut state = self.decide();
+        // One that was put out speaks in vain.
+        if state.links.contains_key(&worker) {
+            state.bring(now, worker, runs);
+        }
     }
 
     pub(super) fn leave(&self, worker: WorkerId, reason: String, clean: bool) {
@@ -235,7 +243,7 @@ impl Hub {
 
     pub(super) fn beat(&self) {
         for link in self.lock().links.values() {
-            let _ = link.sender.send(Ok(ToWorker::heartbeat()));
+            link.outbox.send(ToWorker::heartbeat());
         }
     }
 
@@ -246,14 +254,14 @@ impl Hub {
         state.events.tell_rest(now);
         state.draining = true;
         for link in state.links.values() {
-            let _ = link.sender.send(Ok(ToWorker::drain(reason)));
+            link.outbox.send(ToWorker::drain(reason));
         }
     }
 
     /// Asks the workers with these process numbers to leave.
     pub(super) fn dismiss(&self, pids: &[u32]) {
         for link in self.lock().links.values().filter(|link| pids.contains(&link.pid)) {
-            let _ = link.sender.send(Ok(ToWorker::drain(OVER)));
+            link.outbox.send(ToWorker::drain(OVER));
         }
     }
 
@@ -262,12 +270,12 @@ impl Hub {
     }
 
     /// The state, for a decision.
-    fn decide(&self) -> MutexGuard<'_, State> {
+    fn decide(&self) -> Locked<'_> {
         let state = self.state.lock();
-        state.expect("an earlier decision ended in a panic, so the fleet's state is broken")
+        Locked::new(state.expect("an earlier decision ended in a panic, so the fleet's state is broken"))
     }
 
-    fn lock(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    fn lock(&self) -> Locked<'_> {
+        Locked::new(self.state.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }

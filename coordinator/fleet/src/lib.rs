@@ -23,6 +23,7 @@ mod in_process;
 mod job_name;
 mod local_workers;
 mod network;
+mod outbox;
 mod probe;
 mod recombination;
 mod service;

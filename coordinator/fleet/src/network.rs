@@ -68,9 +68,7 @@ pub(super) fn run(
         tasks.spawn(beat(Arc::clone(hub), heartbeat));
         tasks.spawn(submit(Arc::clone(hub), submitted, cancel.clone()));
         tasks.spawn(abort_on_cancel(Arc::clone(hub), cancel.clone()));
-        let service = FleetServer::new(Service { hub: Arc::clone(hub) })
-            .max_decoding_message_size(MAX_MESSAGE)
-            .max_encoding_message_size(MAX_MESSAGE);
+        let service = service(hub);
         let server = || {
             Server::builder()
                 .http2_keepalive_interval(Some(KEEP_ALIVE.0))
@@ -108,6 +106,13 @@ pub(super) fn run(
     }
     runtime.shutdown_background();
     outcome
+}
+
+/// What answers workers.
+fn service(hub: &Arc<Hub>) -> FleetServer<Service> {
+    FleetServer::new(Service { hub: Arc::clone(hub) })
+        .max_decoding_message_size(MAX_MESSAGE)
+        .max_encoding_message_size(MAX_MESSAGE)
 }
 
 /// Why the fleet cannot go on without one of its tasks.

@@ -6,12 +6,13 @@ use std::time::Duration;
 use starlings_proto::generated::{self, fleet_server};
 use starlings_proto::words::status_text;
 use starlings_proto::{FromWorker, ToWorker};
-use tokio::sync::mpsc;
-use tokio_stream::wrappers::{ReceiverStream, UnboundedReceiverStream};
+use tokio_stream::wrappers::ReceiverStream;
+use tokio_util::sync::CancellationToken;
 use tonic::{Request, Response, Status, Streaming};
 
 use super::dispatcher::{Event, WorkerId};
-use super::hub::{Closed, Hub, Outgoing};
+use super::hub::{Closed, Hub};
+use super::outbox::{Unread, outbox};
 use super::transfer;
 
 /// How long a connection may stay open without a Hello.
@@ -23,7 +24,7 @@ pub(super) struct Service {
 
 #[tonic::async_trait]
 impl fleet_server::Fleet for Service {
-    type WorkStream = UnboundedReceiverStream<Outgoing>;
+    type WorkStream = Unread;
     type GetStream = ReceiverStream<Result<generated::Chunk, Status>>;
 
     async fn put(
@@ -54,20 +55,19 @@ impl fleet_server::Fleet for Service {
             Ok(_) => return Err(Status::invalid_argument("the first message must be a Hello")),
             Err(error) => return Err(Status::invalid_argument(error.to_string())),
         };
-        // Credits bound what waits in this channel: at most 64 jobs per slot.
-        let (link, outgoing) = mpsc::unbounded_channel();
+        let (link, outgoing) = outbox();
         match self.hub.join(hello, link.clone()) {
             Ok(worker) => {
-                tokio::spawn(read(Arc::clone(&self.hub), worker, inbound));
+                tokio::spawn(read(Arc::clone(&self.hub), worker, inbound, link.given_up()));
             }
             Err(Closed::Refused(reason)) => {
-                let _ = link.send(Ok(ToWorker::refuse(&reason)));
+                link.send(ToWorker::refuse(&reason));
             }
             Err(Closed::Over(reason)) => {
-                let _ = link.send(Ok(ToWorker::drain(&reason)));
+                link.send(ToWorker::drain(&reason));
             }
         }
-        Ok(Response::new(UnboundedReceiverStream::new(outgoing)))
+        Ok(Response::new(outgoing))
     }
 }
 
@@ -85,12 +85,23 @@ impl Drop for Leaving {
     }
 }
 
-/// Reads until the stream ends; its worker leaves with it.
-async fn read(hub: Arc<Hub>, worker: WorkerId, mut inbound: Streaming<generated::FromWorker>) {
+/// Reads until the stream ends or the worker is given up; it leaves with it.
+async fn read(
+    hub: Arc<Hub>,
+    worker: WorkerId,
+    mut inbound: Streaming<generated::FromWorker>,
+    given_up: CancellationToken,
+) {
+    let mut given_up = std::pin::pin!(given_up.cancelled());
     let reason = "its messages are no longer read".to_owned();
     let mut leaving = Leaving { hub: Arc::clone(&hub), worker, reason, clean: false };
     (leaving.reason, leaving.clean) = loop {
-        match inbound.message().await {
+        let message = tokio::select! {
+            biased;
+            () = &mut given_up => break ("it does not read what it is sent".to_owned(), false),
+            message = inbound.message() => message,
+        };
+        match message {
             Ok(Some(message)) => match FromWorker::decode(message) {
                 Ok(FromWorker::Goodbye(reason)) => break (reason, true),
                 Ok(message) => {

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use starlings_proto::convert::piece_names::{NAMES, decode_names, encode_names};
 use starlings_proto::convert::state::{
-    ChunkId, Get, PutHead, decode_chunk, encode_chunk, encode_head, encode_put_result,
+    CHUNK_BYTES, ChunkId, Get, PutHead, decode_chunk, encode_chunk, encode_head, encode_put_result,
 };
 use starlings_proto::generated;
 use starlings_states::{StateError, StateWriter, StoredState};
@@ -59,6 +59,8 @@ async fn next(inbound: &mut Streaming<generated::Chunk>) -> Result<Option<genera
 
 /// Keeps a piece: on this thread where it goes into memory, else on one that may wait for the disk.
 async fn keep(hub: &Arc<Hub>, mut writer: StateWriter, bytes: bytes::Bytes) -> Result<StateWriter, Status> {
+    // A short one would keep the buffer that it came in.
+    let bytes = if bytes.len() < CHUNK_BYTES { bytes::Bytes::copy_from_slice(&bytes) } else { bytes };
     let pushed = if hub.states().has_room(bytes.len()) {
         writer.push(bytes).map(|()| writer)
     } else {

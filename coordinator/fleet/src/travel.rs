@@ -45,7 +45,7 @@ pub(crate) fn submission(
     let jobs = jobs.into_iter().map(|(setup, job)| Ok((setup, job.try_map(&mut travelling)?)));
     let jobs = jobs.collect::<Result<Vec<_>, StateError>>()?;
     let encoder = JobEncoder::of(jobs.iter().map(|(_, job)| job));
-    Ok(Submission { jobs, _states: states, encoder, reply })
+    Ok(Submission { jobs, states, encoder, reply })
 }
 
 #[cfg(test)]

@@ -4,13 +4,14 @@
 mod fleet_kit;
 
 use std::sync::mpsc::Receiver;
+use std::time::Duration;
 
 use fleet_kit::hand::{Hand, block_on, hello, squared};
 use fleet_kit::{ThreadWorker, any_port, assert_exact, await_workers, factory, jobs, listen, square};
 use starlings_fleet::{Fleet, FleetEvent};
 use starlings_models::{Job, ParticleError, Setup};
 use starlings_proto::generated;
-use starlings_proto::{FromWorker, Hello, Lease, LeaseOutcome, ToWorker};
+use starlings_proto::{FromWorker, HeldRun, Hello, Lease, LeaseOutcome, ToWorker};
 
 /// Bytes of all events so far, as the store writes them.
 fn written(events: &Receiver<FleetEvent>) -> (usize, Vec<FleetEvent>) {
@@ -249,4 +250,34 @@ fn hellos_that_make_no_sense_are_refused_before_anything_is_kept_of_them() {
     });
     assert_eq!(fleet.n_workers(), 0);
     assert!(events.try_iter().all(|e| !matches!(e, FleetEvent::WorkerJoined { .. })));
+}
+
+#[test]
+fn a_worker_that_speaks_and_never_reads_is_put_away_before_it_fills_the_memory() {
+    let (mut fleet, events, _) = listen(any_port());
+    let address = fleet.address().unwrap();
+    let run = std::thread::spawn(move || {
+        let setup = fleet.install(&Setup::default()).unwrap();
+        (fleet.run(setup, jobs(5)).unwrap(), fleet)
+    });
+    let away = |event: FleetEvent| matches!(event, FleetEvent::WorkerLeft { reason, .. } if reason == "it does not read what it is sent");
+    block_on(async {
+        let mut hand = Hand::dial(address, hello()).await;
+        hand.take_jobs(1).await;
+        // It asks for answers without end: nobody needs what it brings along.
+        let flood = async {
+            while !events.try_iter().any(away) {
+                for _ in 0..1000 {
+                    hand.say(FromWorker::Held(vec![HeldRun { key: [7; 32], ended: None }]));
+                }
+                tokio::time::sleep(Duration::from_millis(1)).await;
+            }
+        };
+        tokio::time::timeout(Duration::from_secs(120), flood).await.expect("it is put away");
+    });
+    let honest = ThreadWorker::start(address, factory(|job| Ok(square(job))));
+    let (outcomes, fleet) = run.join().unwrap();
+    assert_exact(&outcomes, &jobs(5));
+    fleet.close();
+    honest.end().unwrap();
 }

@@ -10,7 +10,7 @@ use std::time::Duration;
 use fleet_kit::hand::{Hand, block_on, hello};
 use fleet_kit::shared::{Own, Shared};
 use fleet_kit::{ThreadWorker, await_workers, factory};
-use starlings_fleet::{Fleet, FleetError, FleetEvent, Held, hex};
+use starlings_fleet::{Fleet, FleetError, FleetEvent, Folder, Held, hex};
 use starlings_models::{Job, Prediction, Setup, Window};
 use starlings_proto::{Block, FromWorker, Hello, Lease, ToWorker};
 use starlings_worker::{Factory, News};
@@ -136,11 +136,16 @@ struct Played {
     events: Receiver<FleetEvent>,
 }
 
-/// Mixes on another thread; whatever is played, the states are right.
 fn while_mixing(play: impl AsyncFnOnce(Hand, Lease, Block) -> Option<Hand>) -> Played {
+    while_mixing_in(async |_: &Folder, _: &Own, hand, lease, block| play(hand, lease, block).await)
+}
+
+/// Mixes on another thread; whatever is played, also in the folder, the states are right.
+fn while_mixing_in(play: impl AsyncFnOnce(&Folder, &Own, Hand, Lease, Block) -> Option<Hand>) -> Played {
     let shared = Shared::new();
     let states = shared.states();
-    let own = Own::of(&states);
+    let (own, known) = (Own::of(&states), Own::of(&states));
+    let folder = Folder::at(&shared.path);
     block_on(async {
         let mut hand = sharing(&shared).await;
         let (place, address) = (shared.place.clone(), shared.fleet.address().unwrap());
@@ -149,7 +154,7 @@ fn while_mixing(play: impl AsyncFnOnce(Hand, Lease, Block) -> Option<Hand>) -> P
         let (lease, first) = block(&mut hand).await;
         let _worker = ThreadWorker::start_with(address, models(), |config| config.states = Some(place));
         await_sharing(&events).await;
-        let hand = play(hand, lease, first).await;
+        let hand = play(&folder, &known, hand, lease, first).await;
         let (mixed, own, fleet) = tokio::task::spawn_blocking(|| mixing.join().unwrap()).await.unwrap();
         own.assert_same(&mixed.unwrap().expect("the other worker shares the folder"));
         assert_eq!(store.in_memory(), (0, 0));
@@ -184,14 +189,41 @@ fn a_worker_that_cannot_mix_gives_its_blocks_to_others_and_gets_no_more() {
 
 #[test]
 fn a_worker_that_mixes_otherwise_is_put_out_and_all_is_mixed_again() {
-    let played = while_mixing(async |hand, lease, block| {
+    let played = while_mixing(async |mut hand, lease, block| {
         // Pieces that are there, and not those that belong there.
         hand.say(FromWorker::Recombined { lease, made: Ok(block.pieces) });
+        hand.stay_until_drained().await;
+        // It stays connected, and wants to go on.
+        hand.say(FromWorker::SharesStates);
         Some(hand)
     });
-    let fits = |event: &FleetEvent| matches!(event, FleetEvent::WorkerExcluded { .. });
-    let told = played.events.try_iter().find(fits).expect("it is told").to_string();
-    assert!(told.contains("after an analysis"), "{told}");
+    let told = excluded(&played);
+    assert!(told.contains("is another one than here; 0 of its blocks were used before"), "{told}");
+    assert_eq!(played.given, 0, "it is given nothing any more");
+}
+
+/// What was told of the worker that was put out; it is one no more.
+fn excluded(played: &Played) -> String {
+    let events: Vec<_> = played.events.try_iter().collect();
+    let left = |event: &FleetEvent| matches!(event, FleetEvent::WorkerLeft { reason, .. } if reason.contains("block"));
+    assert!(events.iter().any(left), "{events:?}");
+    let fits = |event: &&FleetEvent| matches!(event, FleetEvent::WorkerExcluded { .. });
+    events.iter().find(fits).expect("it is told").to_string()
+}
+
+#[test]
+fn a_worker_that_names_the_right_pieces_and_writes_others_is_put_out_and_all_is_mixed_again() {
+    let played = while_mixing_in(async |place: &Folder, own: &Own, mut hand, lease, _| {
+        let pieces = own.block(0).unwrap();
+        for (name, bytes) in &pieces {
+            place.put(name, &vec![1; bytes.len()]).unwrap();
+        }
+        let made = Ok(pieces.into_iter().map(|(name, _)| name).collect());
+        hand.say(FromWorker::Recombined { lease, made });
+        hand.stay_until_drained().await;
+        Some(hand)
+    });
+    assert!(excluded(&played).contains("is not what its names say"));
 }
 
 #[test]

@@ -3,10 +3,11 @@
 
 mod fleet_kit;
 
+use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
-use fleet_kit::{Proxy, ThreadWorker, any_port, factory, listen_with};
-use starlings_fleet::{Fleet, FleetError, GrpcFleet, Held, Outcome, StateStore, hex};
+use fleet_kit::{Proxy, ThreadWorker, any_port, await_event, factory, listen_with};
+use starlings_fleet::{Fleet, FleetError, FleetEvent, GrpcFleet, Held, Outcome, StateStore, hex};
 use starlings_models::{Job, Prediction, Setup, Window};
 use starlings_worker::Factory;
 
@@ -30,7 +31,7 @@ fn models() -> Factory {
 
 fn jobs(n: u32) -> Vec<Job> {
     let window = Window { start: 0.0, times: vec![1.0], observed: vec![f64::NAN; 2], inputs: vec![] };
-    let window = std::sync::Arc::new(window);
+    let window = Arc::new(window);
     let state = |k: u32| {
         let mut x: Vec<f64> = (0..N).map(|i| ((i * 31 + k as usize) % 1009) as f64 / 7.0).collect();
         (x[1], x[2]) = (-0.0, f64::MIN_POSITIVE / 4.0);
@@ -103,16 +104,21 @@ fn a_connection_that_is_cut_while_states_travel_loses_none() {
     let (mut fleet, store) = fleet(usize::MAX);
     let proxy = Proxy::to(fleet.address().unwrap());
     let cut = proxy.address;
-    let _workers = [1, 2].map(|_| ThreadWorker::start(cut, models()));
+    let (made, runs) = mpsc::channel();
+    let counting = factory(move |job| {
+        let _ = made.send(());
+        Ok(moved(job))
+    });
+    let _workers = [1, 2].map(|_| ThreadWorker::start(cut, Arc::clone(&counting)));
     let setup = fleet.install(&Setup::default()).unwrap();
     let jobs = jobs(40);
     let run = std::thread::spawn({
         let jobs = jobs.clone();
         move || (fleet.run(setup, jobs).unwrap(), fleet)
     });
-    // Whenever the cut falls, the outcome is the same.
+    // Whenever the cut falls, the outcome is the same; each falls while states of runs travel that were just made.
     for _ in 0..3 {
-        std::thread::sleep(Duration::from_millis(40));
+        (0..6).for_each(|_| runs.recv_timeout(Duration::from_secs(60)).expect("runs go on"));
         proxy.cut();
     }
     let (outcomes, fleet) = run.join().unwrap();
@@ -141,7 +147,7 @@ fn a_state_that_is_damaged_in_its_folder_ends_the_batch_with_its_name() {
 
 #[test]
 fn a_run_that_ends_in_a_large_state_which_is_not_finite_is_the_workers_fault() {
-    let (mut fleet, _store) = fleet(usize::MAX);
+    let (mut fleet, events, _) = listen_with(any_port(), |_| {});
     let address = fleet.address().unwrap();
     let spoiled = factory(|job| {
         let mut prediction = moved(job);
@@ -155,7 +161,7 @@ fn a_run_that_ends_in_a_large_state_which_is_not_finite_is_the_workers_fault() {
         let jobs = jobs.clone();
         move || (fleet.run(setup, jobs).unwrap(), fleet)
     });
-    std::thread::sleep(Duration::from_millis(200));
+    await_event(&events, |event| matches!(event, FleetEvent::WorkerSetAside { .. }));
     let _good = ThreadWorker::start(address, models());
     assert_moved(&run.join().unwrap().0, &jobs);
 }

@@ -5,6 +5,7 @@ mod fleet_kit;
 
 use std::net::SocketAddr;
 
+use fleet_kit::hand::{Hand, block_on, hello};
 use fleet_kit::{any_port, listen_with};
 use starlings_fleet::{Fleet, Folder, Held, StateStore};
 use starlings_models::{Job, Setup, Window};
@@ -13,82 +14,53 @@ use starlings_proto::convert::state::{
     CHUNK_BYTES, Get, PutHead, decode_put_result, encode_chunk, encode_head,
 };
 use starlings_proto::generated::{self, fleet_client::FleetClient};
-use starlings_proto::{
-    FromWorker, Hello, Lease, LeaseOutcome, PROTOCOL, ReceivedWindows, State, StateId, ToWorker, VERSION,
-};
-use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
+use starlings_proto::{FromWorker, Hello, Lease, LeaseOutcome, State, StateId, ToWorker};
+use tokio::sync::mpsc::unbounded_channel;
 use tokio_stream::wrappers::UnboundedReceiverStream;
-use tonic::transport::Channel;
-use tonic::{Code, Streaming};
+use tonic::{Code, Status};
 
 const NONCE: u64 = 42;
 
 /// Values of the model's state, as the setup below says: two pieces.
 const N: usize = 40_000;
 
-/// A worker played by hand, with a job in hand.
-struct Hand {
-    client: FleetClient<Channel>,
-    outbox: UnboundedSender<generated::FromWorker>,
-    inbound: Streaming<generated::ToWorker>,
-    windows: ReceivedWindows,
+async fn dial(address: SocketAddr, nonce: u64) -> Hand {
+    Hand::dial(address, Hello { nonce, ..hello() }).await
 }
 
-impl Hand {
-    async fn dial(address: SocketAddr, nonce: u64) -> Self {
-        let mut client = FleetClient::connect(format!("http://{address}")).await.unwrap();
-        let (outbox, outgoing) = unbounded_channel();
-        let (version, host) = (VERSION.to_owned(), "hand".to_owned());
-        let hello =
-            Hello { protocol: PROTOCOL, version, cores: 1, slots: 1, host, pid: 1, nonce, build: None };
-        outbox.send(FromWorker::Hello(hello).encode().unwrap()).unwrap();
-        let inbound = client.work(UnboundedReceiverStream::new(outgoing)).await.unwrap().into_inner();
-        Self { client, outbox, inbound, windows: ReceivedWindows::default() }
-    }
-
-    fn say(&self, message: FromWorker) {
-        self.outbox.send(message.encode().unwrap()).unwrap();
-    }
-
-    async fn hear(&mut self) -> ToWorker {
-        let message = self.inbound.message().await.unwrap().expect("still connected");
-        ToWorker::decode(message, &mut self.windows).unwrap()
-    }
-
-    /// Builds the setup and takes a job.
-    async fn job(&mut self) -> (Lease, StateId) {
-        loop {
-            match self.hear().await {
-                ToWorker::Setup { id, .. } => self.say(FromWorker::Setup { id, result: Ok(()) }),
-                ToWorker::Job { lease, job, .. } => {
-                    let Some(State::Named(id)) = job.state else { panic!("a large state has a name") };
-                    return (lease, id);
-                }
-                _ => {}
+/// Builds the setup and takes a job, with the name of its state.
+async fn job(hand: &mut Hand) -> (Lease, StateId) {
+    loop {
+        match hand.hear().await.expect("still connected") {
+            ToWorker::Setup { id, .. } => hand.say(FromWorker::Setup { id, result: Ok(()) }),
+            ToWorker::Job { lease, job, .. } => {
+                let Some(State::Named(id)) = job.state else { panic!("a large state has a name") };
+                return (lease, id);
             }
+            _ => {}
         }
     }
+}
 
-    async fn put(&mut self, messages: Vec<generated::Chunk>) -> Result<StateId, tonic::Status> {
-        let answer = self.client.put(tokio_stream::iter(messages)).await?;
-        Ok(decode_put_result(answer.get_ref()).unwrap())
-    }
+async fn put(hand: &mut Hand, messages: Vec<generated::Chunk>) -> Result<StateId, Status> {
+    let answer = hand.client.put(tokio_stream::iter(messages)).await?;
+    Ok(decode_put_result(answer.get_ref()).unwrap())
+}
 
-    async fn get(&mut self, epoch: u64, nonce: u64, state: StateId) -> Result<usize, tonic::Status> {
-        let mut pieces =
-            self.client.get(Get { epoch, nonce, state, names: false }.encode()).await?.into_inner();
-        let mut bytes = 0;
-        while let Some(piece) = pieces.message().await? {
-            bytes += piece.data.len();
-        }
-        Ok(bytes)
+async fn get(hand: &mut Hand, epoch: u64, nonce: u64, state: StateId) -> Result<usize, Status> {
+    let request = Get { epoch, nonce, state, names: false }.encode();
+    let mut pieces = hand.client.get(request).await?.into_inner();
+    let mut bytes = 0;
+    while let Some(piece) = pieces.message().await? {
+        bytes += piece.data.len();
     }
+    Ok(bytes)
+}
 
-    fn answer(&self, lease: Lease, state: StateId) {
-        let prediction =
-            starlings_models::Prediction { outputs: vec![1.0], state: State::Named(state), cost: 0.0 };
-        self.say(FromWorker::Result { lease, answer: LeaseOutcome::Ran(Ok(prediction)), cost: 0.1 });
-    }
+fn answer(hand: &Hand, lease: Lease, state: StateId) {
+    let prediction =
+        starlings_models::Prediction { outputs: vec![1.0], state: State::Named(state), cost: 0.0 };
+    hand.say(FromWorker::Result { lease, answer: LeaseOutcome::Ran(Ok(prediction)), cost: 0.1 });
 }
 
 fn pieces(value: f64) -> Vec<generated::Chunk> {
@@ -121,31 +93,29 @@ fn under_with(store: StateStore, attack: impl AsyncFnOnce(SocketAddr)) -> (Vec<f
         fleet.close();
         values
     });
-    tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap().block_on(async {
-        attack(address).await;
-    });
+    block_on(attack(address));
     (run.join().unwrap(), store)
 }
 
 #[test]
 fn a_stranger_neither_gets_nor_puts_a_state() {
     let (values, store) = under(async |address| {
-        let mut hand = Hand::dial(address, NONCE).await;
-        let (lease, id) = hand.job().await;
-        let mut stranger =
-            Hand { client: FleetClient::connect(format!("http://{address}")).await.unwrap(), ..hand };
+        let mut hand = dial(address, NONCE).await;
+        let (lease, id) = job(&mut hand).await;
+        let mut stranger = hand;
+        stranger.client = FleetClient::connect(format!("http://{address}")).await.unwrap();
         for (epoch, nonce) in [(lease.epoch, NONCE + 1), (lease.epoch + 1, NONCE), (0, 0)] {
-            let refused = stranger.get(epoch, nonce, id).await.unwrap_err();
+            let refused = get(&mut stranger, epoch, nonce, id).await.unwrap_err();
             assert_eq!(refused.code(), Code::PermissionDenied);
             let head = PutHead { n_state: N, lease: Lease { epoch, ..lease }, nonce };
-            let refused = stranger.put(state(head, 1.0)).await.unwrap_err();
+            let refused = put(&mut stranger, state(head, 1.0)).await.unwrap_err();
             assert_eq!(refused.code(), Code::PermissionDenied);
         }
-        assert_eq!(stranger.get(lease.epoch, NONCE, [9; 32]).await.unwrap_err().code(), Code::NotFound);
-        assert_eq!(stranger.get(lease.epoch, NONCE, id).await.unwrap(), N * 8);
-        let id = stranger.put(state(PutHead { n_state: N, lease, nonce: NONCE }, 2.0)).await.unwrap();
-        stranger.answer(lease, id);
-        while !matches!(stranger.hear().await, ToWorker::Drain(_)) {}
+        assert_eq!(get(&mut stranger, lease.epoch, NONCE, [9; 32]).await.unwrap_err().code(), Code::NotFound);
+        assert_eq!(get(&mut stranger, lease.epoch, NONCE, id).await.unwrap(), N * 8);
+        let id = put(&mut stranger, state(PutHead { n_state: N, lease, nonce: NONCE }, 2.0)).await.unwrap();
+        answer(&stranger, lease, id);
+        stranger.stay_until_drained().await;
     });
     assert!(values == vec![2.0; N]);
     assert_eq!(store.n_pieces(), 0);
@@ -154,8 +124,8 @@ fn a_stranger_neither_gets_nor_puts_a_state() {
 #[test]
 fn what_is_put_wrongly_is_refused_and_leaves_nothing() {
     let (values, store) = under(async |address| {
-        let mut hand = Hand::dial(address, NONCE).await;
-        let (lease, _) = hand.job().await;
+        let mut hand = dial(address, NONCE).await;
+        let (lease, _) = job(&mut hand).await;
         let head = PutHead { n_state: N, lease, nonce: NONCE };
         let with = |change: &dyn Fn(&mut Vec<generated::Chunk>)| {
             let mut messages = state(head, 3.0);
@@ -183,13 +153,17 @@ fn what_is_put_wrongly_is_refused_and_leaves_nothing() {
             (vec![head.encode(), encode_names(&[[1; 32]; 3])], Code::InvalidArgument),
         ];
         for (index, (messages, code)) in wrong.into_iter().enumerate() {
-            assert_eq!(hand.put(messages).await.unwrap_err().code(), code, "number {index}");
+            assert_eq!(put(&mut hand, messages).await.unwrap_err().code(), code, "number {index}");
         }
+        // Neither is a piece with much else beside it.
+        let much = with(&|m| m[1].names = vec![0; 1 << 20].into());
+        let refused = put(&mut hand, much).await.unwrap_err();
+        assert!(refused.message().contains("bytes for a piece of a state, at most"), "{refused}");
         // The second one under a lease counts.
-        hand.put(state(head, 4.0)).await.unwrap();
-        let id = hand.put(state(head, 5.0)).await.unwrap();
-        hand.answer(lease, id);
-        while !matches!(hand.hear().await, ToWorker::Drain(_)) {}
+        put(&mut hand, state(head, 4.0)).await.unwrap();
+        let id = put(&mut hand, state(head, 5.0)).await.unwrap();
+        answer(&hand, lease, id);
+        hand.stay_until_drained().await;
     });
     assert!(values == vec![5.0; N]);
     assert_eq!(store.n_pieces(), 0);
@@ -198,19 +172,19 @@ fn what_is_put_wrongly_is_refused_and_leaves_nothing() {
 #[test]
 fn a_liar_about_its_state_is_set_aside_and_the_job_runs_elsewhere() {
     let (values, store) = under(async |address| {
-        let mut liar = Hand::dial(address, 1).await;
-        let (lease, given) = liar.job().await;
+        let mut liar = dial(address, 1).await;
+        let (lease, given) = job(&mut liar).await;
         // The state that it was given is not one that it sent.
-        liar.answer(lease, given);
-        let mut thief = Hand::dial(address, 2).await;
-        let (theirs, _) = thief.job().await;
+        answer(&liar, lease, given);
+        let mut thief = dial(address, 2).await;
+        let (theirs, _) = job(&mut thief).await;
         // Nor does a state under another one's lease count.
         let head = PutHead { n_state: N, lease: theirs, nonce: 1 };
-        assert_eq!(liar.put(state(head, 6.0)).await.unwrap_err().code(), Code::PermissionDenied);
-        let id = thief.put(state(PutHead { nonce: 2, ..head }, 7.0)).await.unwrap();
-        liar.answer(theirs, id);
-        thief.answer(theirs, id);
-        while !matches!(thief.hear().await, ToWorker::Drain(_)) {}
+        assert_eq!(put(&mut liar, state(head, 6.0)).await.unwrap_err().code(), Code::PermissionDenied);
+        let id = put(&mut thief, state(PutHead { nonce: 2, ..head }, 7.0)).await.unwrap();
+        answer(&liar, theirs, id);
+        answer(&thief, theirs, id);
+        thief.stay_until_drained().await;
     });
     assert!(values == vec![7.0; N]);
     assert_eq!(store.n_pieces(), 0);
@@ -219,8 +193,8 @@ fn a_liar_about_its_state_is_set_aside_and_the_job_runs_elsewhere() {
 #[test]
 fn a_hoarder_has_no_more_transfers_than_its_slots_can_need() {
     let (values, store) = under(async |address| {
-        let mut hand = Hand::dial(address, NONCE).await;
-        let (lease, _) = hand.job().await;
+        let mut hand = dial(address, NONCE).await;
+        let (lease, _) = job(&mut hand).await;
         let head = PutHead { n_state: N, lease, nonce: NONCE };
         let mut begun = Vec::new();
         let refused = loop {
@@ -242,13 +216,13 @@ fn a_hoarder_has_no_more_transfers_than_its_slots_can_need() {
         }
         // What was begun and given up is counted no more.
         let id = loop {
-            match hand.put(state(head, 8.0)).await {
+            match put(&mut hand, state(head, 8.0)).await {
                 Ok(id) => break id,
                 Err(status) => assert_eq!(status.code(), Code::ResourceExhausted),
             }
         };
-        hand.answer(lease, id);
-        while !matches!(hand.hear().await, ToWorker::Drain(_)) {}
+        answer(&hand, lease, id);
+        hand.stay_until_drained().await;
     });
     assert!(values == vec![8.0; N]);
     assert_eq!(store.n_pieces(), 0);
@@ -260,29 +234,28 @@ fn names_of_pieces_count_where_these_stand_in_the_shared_folder() {
     let path = scratch.path().join("run");
     let store = StateStore::shared(Folder::at(&path));
     let (values, store) = under_with(store, async |address| {
-        let mut hand = Hand::dial(address, NONCE).await;
-        let (lease, _) = hand.job().await;
+        let mut hand = dial(address, NONCE).await;
+        let (lease, _) = job(&mut hand).await;
         let head = PutHead { n_state: N, lease, nonce: NONCE };
         let bytes: Vec<Vec<u8>> = pieces(9.0).into_iter().map(|piece| piece.data.to_vec()).collect();
         let names: Vec<[u8; 32]> = bytes.iter().map(|piece| starlings_proto::digest(piece)).collect();
         let folder = Folder::at(&path);
         let named = || vec![head.encode(), encode_names(&names)];
         // None is there, then one; then the last one is too short.
-        assert_eq!(hand.put(named()).await.unwrap_err().code(), Code::FailedPrecondition);
+        assert_eq!(put(&mut hand, named()).await.unwrap_err().code(), Code::FailedPrecondition);
         folder.put(&names[0], &bytes[0]).unwrap();
-        assert_eq!(hand.put(named()).await.unwrap_err().code(), Code::FailedPrecondition);
+        assert_eq!(put(&mut hand, named()).await.unwrap_err().code(), Code::FailedPrecondition);
         folder.put(&names[1], &bytes[1][8..]).unwrap();
-        assert_eq!(hand.put(named()).await.unwrap_err().code(), Code::FailedPrecondition);
+        assert_eq!(put(&mut hand, named()).await.unwrap_err().code(), Code::FailedPrecondition);
         folder.put(&names[1], &bytes[1]).unwrap();
         for wrong in [vec![names[1], names[0]], vec![names[0]], vec![names[0], names[1], names[1]]] {
-            assert!(hand.put(vec![head.encode(), encode_names(&wrong)]).await.is_err());
+            assert!(put(&mut hand, vec![head.encode(), encode_names(&wrong)]).await.is_err());
         }
         // Pieces and names may follow each other.
-        let id = hand
-            .put(vec![head.encode(), encode_chunk(bytes[0].clone().into()), encode_names(&names[1..])])
-            .await;
-        hand.answer(lease, id.unwrap());
-        while !matches!(hand.hear().await, ToWorker::Drain(_)) {}
+        let mixed = vec![head.encode(), encode_chunk(bytes[0].clone().into()), encode_names(&names[1..])];
+        let id = put(&mut hand, mixed).await.unwrap();
+        answer(&hand, lease, id);
+        hand.stay_until_drained().await;
     });
     assert!(values == vec![9.0; N]);
     store.tidy();

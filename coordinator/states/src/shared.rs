@@ -1,6 +1,7 @@
 //! What a store, its states and its writers share: the table of pieces and the folder.
 //!
-//! Files are written outside the lock and put into their place inside it. In a folder that workers write into as well no piece is
+//! Files are written, put into their place and removed outside the lock of the table, which those who decide have to wait for. What
+//! puts a file into its place and what removes one exclude each other by a lock of their own. In a folder that workers write into as well no piece is
 //! removed while a run is on its way that may end in it: see [`Shared::tidy`]. Next file to read: `table`.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
@@ -13,12 +14,17 @@ use starlings_proto::convert::state::ChunkId;
 use crate::StateError;
 use crate::table::Table;
 
+/// Files that are removed before others may come into their places.
+const AT_ONCE: usize = 64;
+
 /// What all clones and all states share.
 #[derive(Debug)]
 pub(crate) struct Shared {
     pub(crate) memory: usize,
     pub(crate) folder: Mutex<Option<Arc<Folder>>>,
     pub(crate) table: Mutex<Table<Pieces>>,
+    /// Held while files come into their places and go; taken before that of the table.
+    pub(crate) files: Mutex<()>,
     /// Whether workers write into the folder and read from it.
     pub(crate) for_workers: bool,
 }
@@ -37,8 +43,13 @@ impl Shared {
         lock(&self.table)
     }
 
-    pub(crate) fn folder(&self) -> Arc<Folder> {
-        Arc::clone(lock(&self.folder).get_or_insert_with(|| Arc::new(Folder::temporary())))
+    /// The folder; a temporary one where none was named.
+    pub(crate) fn folder(&self) -> Result<Arc<Folder>, StateError> {
+        let mut folder = lock(&self.folder);
+        if let Some(folder) = &*folder {
+            return Ok(Arc::clone(folder));
+        }
+        Ok(Arc::clone(folder.insert(Arc::new(Folder::temporary()?))))
     }
 
     /// Keeps a piece, or counts one more use of it.
@@ -49,31 +60,30 @@ impl Shared {
                 return Ok(());
             }
         }
-        let folder = self.folder();
+        let folder = self.folder()?;
         let written = folder.stage(bytes)?;
-        let mut table = self.lock();
-        if table.again(&name) {
-            Folder::discard(written);
+        let _files = lock(&self.files);
+        if self.lock().again(&name) {
             return Ok(());
         }
-        folder.place(&written, &name)?;
-        table.on_disk(name);
+        folder.place(written, &name)?;
+        self.lock().on_disk(name);
         Ok(())
     }
 
     /// Takes note of a piece that the folder has already.
     pub(crate) fn found(&self, name: ChunkId, bytes: usize) -> Result<(), StateError> {
-        let mut table = self.lock();
-        if !table.again(&name) {
-            self.folder().check(&name, bytes)?;
-            table.on_disk(name);
+        let _files = lock(&self.files);
+        if !self.lock().again(&name) {
+            self.folder()?.check(&name, bytes)?;
+            self.lock().on_disk(name);
         }
         Ok(())
     }
 
     pub(crate) fn read(&self, name: &ChunkId) -> Result<Bytes, StateError> {
         let held = self.lock().chunks.get(name).and_then(|entry| entry.bytes.clone());
-        held.map_or_else(|| Ok(self.folder().read(name)?), Ok)
+        held.map_or_else(|| Ok(self.folder()?.read(name)?), Ok)
     }
 
     /// Whether reading a piece takes no file.
@@ -88,30 +98,40 @@ impl Shared {
             _ => None,
         };
         let Some(bytes) = bytes else { return Ok(()) };
-        let folder = self.folder();
+        let folder = self.folder()?;
         let written = folder.stage(&bytes)?;
-        let mut table = self.lock();
-        folder.place(&written, name)?;
-        if let Some(entry) = table.chunks.get_mut(name) {
-            entry.on_disk = true;
-        }
+        let _files = lock(&self.files);
+        folder.place(written, name)?;
+        self.lock().placed(name);
         Ok(())
     }
 
     pub(crate) fn release(&self, names: &[ChunkId]) {
-        let mut table = self.lock();
-        let folder = lock(&self.folder).clone();
-        for name in names {
-            table.release(name, folder.as_deref().filter(|_| !self.for_workers));
+        let is_left = {
+            let mut table = self.lock();
+            for name in names {
+                table.release(name);
+            }
+            table.has_unneeded()
+        };
+        if is_left && !self.for_workers {
+            self.tidy();
         }
     }
 
-    /// Removes what nobody needs from a folder that workers write into. Called before the first run of a batch is given away: a worker
-    /// that finds out later that its end state has such a piece writes it again.
+    /// Removes what nobody needs from the folder. In one that workers write into that is done before the first run of a batch is given
+    /// away: a worker that finds out later that its end state has such a piece writes it again.
     pub(crate) fn tidy(&self) {
-        let mut table = self.lock();
-        for name in table.unneeded() {
-            self.folder().remove(&name);
+        loop {
+            let _files = lock(&self.files);
+            let names = self.lock().unneeded(AT_ONCE);
+            if names.is_empty() {
+                return;
+            }
+            let Ok(folder) = self.folder() else { return };
+            for name in &names {
+                folder.remove(name);
+            }
         }
     }
 }

@@ -36,7 +36,8 @@ impl StateStore {
     }
 
     fn with(memory: usize, folder: Option<Arc<Folder>>, for_workers: bool) -> Self {
-        let shared = Shared { memory, folder: Mutex::new(folder), table: Mutex::default(), for_workers };
+        let (table, files) = (Mutex::default(), Mutex::default());
+        let shared = Shared { memory, folder: Mutex::new(folder), table, files, for_workers };
         Self { shared: Arc::new(shared) }
     }
 
@@ -111,9 +112,11 @@ impl StateStore {
 
     /// Removes what an earlier process left in the folder and no state needs.
     pub fn sweep(&self) {
-        let table = self.shared.lock();
-        let names: HashSet<String> = table.chunks.keys().map(hex).collect();
-        self.shared.folder().keep_only(&names);
+        let _files = lock(&self.shared.files);
+        let names: HashSet<String> = self.shared.lock().chunks.keys().map(hex).collect();
+        if let Ok(folder) = self.shared.folder() {
+            folder.keep_only(&names);
+        }
     }
 
     /// Removes the folder: nothing in it is needed any more.
@@ -121,6 +124,14 @@ impl StateStore {
         if let Some(folder) = &*lock(&self.shared.folder) {
             folder.clear();
         }
+    }
+
+    /// Whether a piece that somebody wrote into the folder is what its name says.
+    ///
+    /// # Errors
+    /// When it is missing, damaged, or the folder refuses.
+    pub fn verify(&self, name: &ChunkId) -> Result<(), StateError> {
+        self.shared.read(name).map(drop)
     }
 
     /// Whether a piece of so many bytes goes into memory.

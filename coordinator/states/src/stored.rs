@@ -63,6 +63,12 @@ impl StoredState {
         self.0.store.is_in_memory(&self.0.names[index])
     }
 
+    /// Whether pieces of it stand in the folder: to drop its last clone takes time then.
+    pub fn is_on_disk(&self) -> bool {
+        let table = self.0.store.lock();
+        self.0.names.iter().any(|name| table.chunks.get(name).is_some_and(|entry| entry.on_disk))
+    }
+
     /// Writes the values of a piece into a slice of their number.
     ///
     /// # Errors

@@ -1,10 +1,9 @@
 //! Which pieces there are, where each of them is and how many states need it.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Weak;
 
 use bytes::Bytes;
-use starlings_pieces::Folder;
 use starlings_proto::StateId;
 use starlings_proto::convert::state::ChunkId;
 
@@ -19,7 +18,7 @@ pub(crate) struct Table<P> {
     /// Most of them at one time.
     pub(crate) most: usize,
     /// Pieces that stand in the folder and were given up by their last state.
-    given_up: Vec<ChunkId>,
+    given_up: HashSet<ChunkId>,
 }
 
 /// A piece.
@@ -35,7 +34,13 @@ pub(crate) struct Entry {
 
 impl<P> Default for Table<P> {
     fn default() -> Self {
-        Self { chunks: HashMap::new(), named: HashMap::new(), in_memory: 0, most: 0, given_up: Vec::new() }
+        Self {
+            chunks: HashMap::new(),
+            named: HashMap::new(),
+            in_memory: 0,
+            most: 0,
+            given_up: HashSet::new(),
+        }
     }
 }
 
@@ -58,9 +63,19 @@ impl<P> Table<P> {
         true
     }
 
-    /// Takes note of a piece that is not there yet and stands in the folder.
+    /// Counts one use of a piece that stands in the folder; it may have come into memory meanwhile.
     pub(crate) fn on_disk(&mut self, name: ChunkId) {
-        self.chunks.insert(name, Entry { refs: 1, bytes: None, on_disk: true });
+        let entry = self.chunks.entry(name).or_insert(Entry { refs: 0, bytes: None, on_disk: true });
+        (entry.refs, entry.on_disk) = (entry.refs + 1, true);
+        self.given_up.remove(&name);
+    }
+
+    /// Takes note that a piece stands in the folder too.
+    pub(crate) fn placed(&mut self, name: &ChunkId) {
+        if let Some(entry) = self.chunks.get_mut(name) {
+            entry.on_disk = true;
+            self.given_up.remove(name);
+        }
     }
 
     /// Has the file of a piece stay when its last use is given up.
@@ -70,25 +85,30 @@ impl<P> Table<P> {
         }
     }
 
-    /// Takes the pieces that stand in the folder and are needed by no state.
-    pub(crate) fn unneeded(&mut self) -> Vec<ChunkId> {
-        let mut names = std::mem::take(&mut self.given_up);
-        names.retain(|name| !self.chunks.contains_key(name));
+    /// Whether pieces stand in the folder that no state needed when they were given up.
+    pub(crate) fn has_unneeded(&self) -> bool {
+        !self.given_up.is_empty()
+    }
+
+    /// Takes so many pieces that stand in the folder and are needed by no state.
+    pub(crate) fn unneeded(&mut self, most: usize) -> Vec<ChunkId> {
+        let names: Vec<ChunkId> = self.given_up.iter().take(most).copied().collect();
+        for name in &names {
+            self.given_up.remove(name);
+        }
         names
     }
 
-    /// Gives up one use of a piece; it goes with its last one, or, without a folder to remove it from, with [`Table::unneeded`].
-    pub(crate) fn release(&mut self, name: &ChunkId, folder: Option<&Folder>) {
+    /// Gives up one use of a piece; it goes with its last one, and its file with [`Table::unneeded`].
+    pub(crate) fn release(&mut self, name: &ChunkId) {
         let Some(entry) = self.chunks.get_mut(name) else { return };
         entry.refs -= 1;
         if entry.refs > 0 {
             return;
         }
         self.in_memory -= entry.bytes.as_ref().map_or(0, Bytes::len);
-        match folder {
-            Some(folder) if entry.on_disk => folder.remove(name),
-            None if entry.on_disk => self.given_up.push(*name),
-            _ => {}
+        if entry.on_disk {
+            self.given_up.insert(*name);
         }
         self.chunks.remove(name);
     }

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use bytes::Bytes;
-use starlings_proto::StateNaming;
 use starlings_proto::convert::state::{ChunkId, chunk_values, n_chunks};
+use starlings_proto::{StateNaming, digest};
 
 use crate::shared::{Pieces, Shared};
 use crate::{StateError, StoredState};
@@ -39,7 +39,7 @@ impl StateWriter {
     /// # Errors
     /// When it has another length than the next piece must have, or memory is full and the folder refuses.
     pub fn push(&mut self, bytes: Bytes) -> Result<(), StateError> {
-        let name = *blake3::hash(&bytes).as_bytes();
+        let name = digest(&bytes);
         self.push_named(name, bytes)
     }
 

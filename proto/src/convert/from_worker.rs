@@ -40,7 +40,7 @@ pub struct Hello {
 pub enum LeaseOutcome {
     /// A prediction, or why there is none.
     Ran(Result<Prediction<State>, ParticleError>),
-    /// The job was withdrawn before it started.
+    /// The job is given back without an answer: it was called back before it started, or told to stop.
     Withdrawn,
 }
 

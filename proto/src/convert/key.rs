@@ -39,7 +39,7 @@ impl InKey for State {
 }
 
 fn hash(values: &[f64]) -> StateId {
-    *blake3::hash(&floats::encode(values)).as_bytes()
+    super::digest(&floats::encode(values))
 }
 
 /// Makes keys of jobs; the windows that they share are hashed once.

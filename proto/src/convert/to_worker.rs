@@ -86,6 +86,9 @@ pub enum ToWorker {
     },
 }
 
+/// What a message takes at least, with what is shared at most a little.
+const LEAST: usize = 1024;
+
 impl ToWorker {
     /// The message for [`ToWorker::Welcome`].
     pub fn welcome(welcome: Welcome) -> generated::ToWorker {
@@ -140,6 +143,18 @@ impl ToWorker {
         transform: Bytes,
     ) -> generated::ToWorker {
         message(Kind::Recombine(block::encode(lease, rows, pieces, transform)))
+    }
+
+    /// Bytes that a message takes for itself while it waits to be sent: texts and windows are shared with other messages.
+    pub fn weight(message: &generated::ToWorker) -> usize {
+        let own = match &message.kind {
+            Some(Kind::Job(job)) => job.theta.len() + job.state.as_ref().map_or(0, Bytes::len),
+            Some(Kind::Recombine(block)) => block.pieces.len(),
+            Some(Kind::Adopt(adopt)) => adopt.runs.len() * size_of::<(generated::Adopted, JobKey)>(),
+            Some(Kind::Cancel(cancel)) => cancel.leases.len() * size_of::<generated::Lease>(),
+            _ => 0,
+        };
+        LEAST + own
     }
 
     /// Checks a message that arrived on a stream of which these windows were `received` before.

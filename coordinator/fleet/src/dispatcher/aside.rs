@@ -49,7 +49,7 @@ impl Dispatcher {
         worker.aside = Some(aside);
         let notice = FleetEvent::WorkerSetAside { worker: name, reason: reason.to_owned(), seconds };
         self.out.push(Command::Notice(notice));
-        let leases: Vec<_> = worker.leases().collect();
+        let leases = worker.call_back_all();
         if !leases.is_empty() {
             self.out.push(Command::Cancel { worker: id, leases, stop: false });
         }

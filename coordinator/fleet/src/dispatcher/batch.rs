@@ -42,8 +42,8 @@ pub(super) struct Batch {
     parked: BTreeMap<usize, WorkerId>,
     /// Jobs with an outcome, in the order in which they ended.
     ended: Vec<usize>,
-    /// How many of them the caller was told of.
-    handed_on: usize,
+    /// Those of them that the caller was not told of.
+    untold: Vec<usize>,
     /// How many there were when progress was told last.
     told: usize,
 }
@@ -113,7 +113,7 @@ impl Batch {
             queue,
             parked: BTreeMap::new(),
             ended: Vec::new(),
-            handed_on: 0,
+            untold: Vec::new(),
             told: 0,
         }
     }
@@ -289,6 +289,7 @@ impl Batch {
         debug_assert!(job.outcome.is_none(), "a job ends once: its only lease is released before");
         if job.outcome.replace(outcome).is_none() {
             self.ended.push(index);
+            self.untold.push(index);
             self.open[job.setup] -= 1;
         }
     }

@@ -190,6 +190,11 @@ impl Dispatcher {
         dispute.opinions.push(Opinion { by, name, said });
     }
 
+    /// The build of a worker, in hexadecimal, and how many of its results were taken so far.
+    pub(crate) fn taken(&self, id: WorkerId) -> (String, u64) {
+        self.workers.get(&id).map_or_else(|| (String::new(), 0), |w| (w.build.clone(), w.taken))
+    }
+
     /// Results of this worker are those of others.
     pub(super) fn trusted(&mut self, id: WorkerId) {
         self.repeats.contributors.remove(&id);
@@ -200,17 +205,7 @@ impl Dispatcher {
 
     /// Whether nothing is left to compare before the batch may end.
     pub(super) fn is_compared(&self) -> bool {
-        let Some(batch) = &self.batch else { return true };
-        if !self.repeats.disputes.is_empty() || !self.repeats.open.is_empty() {
-            return false;
-        }
-        self.repeats.contributors.iter().all(|(id, contributor)| {
-            let (job, setup) = (batch.job_number(contributor.index), batch.setup_of(contributor.index));
-            // One that is still building the setup is waited for: the first worker that is ready may have done it all.
-            let could = |w: &Worker| {
-                w.id != *id && w.will_take(setup) && !w.holds(job) && !contributor.tried.contains(&w.id)
-            };
-            !self.workers.values().any(could)
-        })
+        let is_settled = self.repeats.disputes.is_empty() && self.repeats.open.is_empty();
+        is_settled && self.repeats.contributors.iter().all(|(id, first)| !self.may_be_compared(*id, first))
     }
 }

@@ -77,12 +77,12 @@ impl Dispatcher {
         let usual = self.run_times.median().unwrap_or(0.0);
         let mut late = Vec::new();
         for &(id, index) in &self.repeats.open {
-            let Some(worker) = self.workers.get(&id) else { continue };
+            let Some(worker) = self.workers.get_mut(&id) else { continue };
             let job = batch.job_number(index);
             let own = worker.ages(now).into_iter().find(|(held, _, _)| *held == job);
             if own.is_some_and(|(_, age, rounds)| age > limit(REPEAT_SHORTEST, REPEAT_FACTOR, usual, rounds))
             {
-                late.push((id, index, worker.lease_of(job)));
+                late.push((id, index, worker.call_back(job)));
             }
         }
         for (worker, index, lease) in late {
@@ -101,7 +101,7 @@ impl Dispatcher {
         let job = batch.job_number(index);
         let mut mute = Vec::new();
         for worker in self.workers.values_mut().filter(|w| w.id != winner) {
-            let Some(lease) = worker.lease_of(job) else { continue };
+            let Some(lease) = worker.call_back(job) else { continue };
             self.out.push(Command::Cancel { worker: worker.id, leases: vec![lease], stop: true });
             worker.overtaken += 1;
             if worker.overtaken >= OVERTAKEN {

@@ -1,7 +1,7 @@
 //! Runs that a worker brings along when it comes back: finished ones count as answers, those that it still makes become its leases.
 //!
-//! A worker that lost its coordinator, or the way to it, goes on with what it had. Whoever holds a lease for such a job at the moment
-//! gives it up: the other is ahead. Next file to read: [`super::answers`].
+//! A worker that lost its coordinator, or the way to it, goes on with what it had. Whoever else has such a job at the moment is told
+//! to stop it, since the other is ahead; its lease goes with its answer. Next file to read: [`super::answers`].
 
 use std::time::Duration;
 
@@ -45,19 +45,24 @@ impl Dispatcher {
     ) -> Taken {
         self.heard(now, id);
         let Some(batch) = &mut self.batch else { return Taken::No };
-        // A job in doubt is decided by runs of its own.
-        if !batch.is_plain(index) || !self.workers.contains_key(&id) {
+        // A job in doubt, or that failed before, is decided by runs of its own.
+        if !batch.is_plain(index) {
             return Taken::No;
         }
         let job = batch.job_number(index);
-        let holder = self.workers.values_mut().find_map(|w| Some((w.id, w.take_back(job)?)));
-        match holder {
-            Some((other, lease)) if other != id => {
-                self.out.push(Command::Cancel { worker: other, leases: vec![lease], stop: true });
-            }
-            Some(_) => {}
-            None if batch.unqueue(index) => {}
-            None => return Taken::No,
+        // What it was given since is answered by itself.
+        if self.workers.get(&id).is_none_or(|worker| worker.holds(job)) {
+            return Taken::No;
+        }
+        let mut is_held = false;
+        for other in self.workers.values_mut().filter(|w| !w.has_dropped(job)) {
+            let Some(lease) = other.lease_of(job) else { continue };
+            other.drop_lease(job);
+            is_held = true;
+            self.out.push(Command::Cancel { worker: other.id, leases: vec![lease], stop: true });
+        }
+        if !is_held && !batch.unqueue(index) {
+            return Taken::No;
         }
         let Some(worker) = self.workers.get_mut(&id) else { return Taken::No };
         let lease = schedule::hold(worker, batch, index, now);

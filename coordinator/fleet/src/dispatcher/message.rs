@@ -1,9 +1,9 @@
 //! What the dispatcher hears and what it asks for.
 
-use std::fmt::Write as _;
 use std::time::Duration;
 
 use starlings_proto::{Lease, LeaseOutcome, SetupId};
+use starlings_states::hex;
 
 use crate::FleetEvent;
 use crate::job_name::JobName;
@@ -46,14 +46,6 @@ impl Joining {
             build,
         }
     }
-}
-
-/// A hash in hexadecimal.
-pub(crate) fn hex(hash: &[u8; 32]) -> String {
-    hash.iter().fold(String::new(), |mut text, byte| {
-        let _ = write!(text, "{byte:02x}");
-        text
-    })
 }
 
 /// Something that happened.

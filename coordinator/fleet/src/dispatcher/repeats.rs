@@ -120,8 +120,8 @@ impl Repeats {
     }
 }
 
-/// Whether a job is drawn to be repeated.
-pub(super) fn draws(seed: u64, job: u64) -> bool {
+/// Whether what has this number is drawn to be made again: one in [`SAMPLED`] is.
+pub(crate) fn draws(seed: u64, job: u64) -> bool {
     mixed(seed ^ mixed(job)).is_multiple_of(SAMPLED)
 }
 

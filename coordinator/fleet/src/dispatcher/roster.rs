@@ -6,9 +6,10 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use starlings_proto::{Lease, SetupId};
+use starlings_states::hex;
 
 use super::aside::Aside;
-use super::message::{Joining, WorkerId, hex};
+use super::message::{Joining, WorkerId};
 
 /// Jobs per slot held by a worker whose jobs are long: one runs, one waits.
 const MIN_CREDIT: usize = 2;

@@ -1,10 +1,12 @@
 //! Events in, commands compared.
 
 mod aside;
+mod belief;
 mod canary;
 mod chaos;
 mod doubt;
 mod duplicate;
+mod held;
 mod leases;
 mod losses;
 mod mixed;

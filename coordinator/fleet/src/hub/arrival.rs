@@ -14,10 +14,15 @@ impl State {
     /// An answer, or what is wrong with it as a failure of its worker. One that nobody waits for is left as it is. A state that was
     /// put under its lease is held from here on where the answer names it, and gone where not.
     pub(super) fn checked(&mut self, lease: &Lease, answer: LeaseOutcome) -> LeaseOutcome {
-        let put = self.states.take(lease).filter(|put| named(&answer) == Some(&put.id()));
-        let answer = self.checked_for(self.asked(lease), answer, put.is_some());
-        if named(&answer).is_some() {
+        let put = self.states.take(lease);
+        let is_named =
+            |answer: &LeaseOutcome| put.as_ref().is_some_and(|put| named(answer) == Some(&put.id()));
+        let was_put = is_named(&answer);
+        let answer = self.checked_for(self.asked(lease), answer, was_put);
+        if is_named(&answer) {
             self.states.hold(put);
+        } else {
+            self.states.let_go_of(put);
         }
         answer
     }

@@ -1,7 +1,7 @@
 //! Blocks of rows that workers mix in the shared folder: who has which, and what becomes of those of a lost worker.
 //!
-//! A block is one piece of the states of all particles. A worker that is lost or cannot make one gives its blocks to the others;
-//! where nobody is left or one takes too long, the caller makes it, so that every block is told of once. Next file to read: `mixing`.
+//! A block is one piece of the states of all particles. A worker that is lost, cannot make one or answers nothing for too long gives its
+//! blocks to the others; where nobody is left the caller makes them, so that every block is told of once. Next file to read: `mixing`.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::mpsc::Sender;
@@ -16,7 +16,7 @@ use crate::dispatcher::WorkerId;
 /// Blocks that a worker has for each of its slots: one is made, one waits.
 const PER_SLOT: usize = 2;
 
-/// How long a worker may have a block while nothing else waits.
+/// How long a worker that has blocks may answer none.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// What came of a block.
@@ -51,6 +51,8 @@ pub(super) struct Blocks {
     work: Option<Work>,
     waiting: VecDeque<usize>,
     given: BTreeMap<Lease, (usize, Instant)>,
+    /// When workers answered last.
+    heard: BTreeMap<WorkerId, Instant>,
     /// Blocks given so far: the number of the next lease.
     count: u64,
 }
@@ -98,8 +100,15 @@ impl Blocks {
     }
 
     /// The block that a worker answers for; `None` where it has none under this lease.
-    pub(super) fn answered(&mut self, lease: &Lease) -> Option<usize> {
-        self.given.remove(lease).map(|(block, _)| block)
+    pub(super) fn answered(&mut self, lease: &Lease, now: Instant) -> Option<usize> {
+        let (block, _) = self.given.remove(lease)?;
+        self.heard.insert(WorkerId(lease.epoch), now);
+        Some(block)
+    }
+
+    /// Pieces of a block.
+    pub(super) fn n_pieces(&self) -> usize {
+        self.work.as_ref().map_or(0, |work| work.columns.len())
     }
 
     /// Tells what came of a block.
@@ -119,6 +128,7 @@ impl Blocks {
     /// A worker shares the folder no more; its blocks wait again.
     pub(super) fn left(&mut self, worker: WorkerId) {
         self.sharing.remove(&worker);
+        self.heard.remove(&worker);
         let its = |lease: &Lease| lease.epoch == worker.0;
         let back: Vec<usize> =
             self.given.iter().filter(|(lease, _)| its(lease)).map(|(_, (block, _))| *block).collect();
@@ -136,18 +146,20 @@ impl Blocks {
         }
     }
 
-    /// Takes back what workers have had for long while nothing else waits.
-    pub(super) fn overdue(&mut self, now: Instant) {
-        if !self.waiting.is_empty() {
-            return;
+    /// Gives up the workers that have blocks and have answered none for long; who they are.
+    pub(super) fn overdue(&mut self, now: Instant) -> Vec<WorkerId> {
+        let since =
+            |worker: &WorkerId, given: Instant| self.heard.get(worker).map_or(given, |at| given.max(*at));
+        let late = |(lease, (_, given)): (&Lease, &(usize, Instant))| {
+            let worker = WorkerId(lease.epoch);
+            (now.saturating_duration_since(since(&worker, *given)) > PATIENCE).then_some(worker)
+        };
+        let mut late: Vec<WorkerId> = self.given.iter().filter_map(late).collect();
+        late.dedup();
+        for worker in &late {
+            self.left(*worker);
         }
-        let is_late = |given: &Instant| now.saturating_duration_since(*given) > PATIENCE;
-        let late: Vec<usize> =
-            self.given.values().filter(|(_, given)| is_late(given)).map(|(block, _)| *block).collect();
-        self.given.retain(|_, (_, given)| !is_late(given));
-        for block in late {
-            self.end(block, Err(format!("a worker has had it for {} s", PATIENCE.as_secs())));
-        }
+        late
     }
 }
 
@@ -194,18 +206,18 @@ mod tests {
         let (mut blocks, heard) = blocks(5, &[A, B]);
         let first = given(&mut blocks);
         assert_eq!(first.iter().map(|(worker, _)| *worker).collect::<Vec<_>>(), [A, B, A, B]);
-        let zero = blocks.answered(&first[0].1).expect("it was given");
+        let zero = blocks.answered(&first[0].1, Instant::now()).expect("it was given");
         blocks.end(zero, Ok((A, vec![[0; 32]])));
-        assert_eq!(blocks.answered(&first[0].1), None, "once");
+        assert_eq!(blocks.answered(&first[0].1, Instant::now()), None, "once");
         blocks.left(A);
         assert_eq!(given(&mut blocks), [], "the other one has no room yet");
         for (_, lease) in [first[1], first[3]] {
-            let block = blocks.answered(&lease).expect("it was given");
+            let block = blocks.answered(&lease, Instant::now()).expect("it was given");
             blocks.end(block, Ok((B, vec![[0; 32]])));
         }
         assert_eq!(given(&mut blocks).len(), 2);
         assert_eq!(told(&heard), [(0, true), (1, true), (3, true)]);
-        assert_eq!(blocks.answered(&first[2].1), None, "its worker is gone");
+        assert_eq!(blocks.answered(&first[2].1, Instant::now()), None, "its worker is gone");
         blocks.left(B);
         let mut rest = told(&heard);
         rest.sort_unstable();
@@ -217,20 +229,30 @@ mod tests {
         let (mut blocks, heard) = blocks(3, &[A, B]);
         let first = given(&mut blocks);
         let (worker, lease) = first[0];
-        let block = blocks.answered(&lease).expect("it was given");
+        let block = blocks.answered(&lease, Instant::now()).expect("it was given");
         blocks.failed(worker, block);
         assert_eq!(blocks.n_sharing(), 1);
         assert!(given(&mut blocks).iter().all(|(worker, _)| *worker == B));
-        blocks.overdue(Instant::now() + 2 * PATIENCE);
-        assert_eq!(told(&heard), [], "something waits: the worker is busy, not stuck");
         let (_, lease) = first[1];
-        let block = blocks.answered(&lease).expect("it was given");
+        let later = Instant::now() + 2 * PATIENCE;
+        let block = blocks.answered(&lease, later).expect("it was given");
         blocks.end(block, Ok((B, vec![[0; 32]])));
         given(&mut blocks);
-        blocks.overdue(Instant::now());
+        assert_eq!(blocks.overdue(later + PATIENCE), [], "it answers now and then");
         assert_eq!(told(&heard), [(1, true)]);
-        blocks.overdue(Instant::now() + 2 * PATIENCE);
-        assert_eq!(told(&heard).len(), 2);
+    }
+
+    #[test]
+    fn one_that_answers_nothing_holds_up_neither_its_blocks_nor_those_that_wait() {
+        let (mut blocks, heard) = blocks(5, &[A, B]);
+        given(&mut blocks);
+        // Both are alive, and neither answers.
+        assert_eq!(blocks.overdue(Instant::now()), []);
+        assert_eq!(blocks.overdue(Instant::now() + 2 * PATIENCE), [A, B]);
+        assert_eq!(blocks.n_sharing(), 0);
+        let mut all = told(&heard);
+        all.sort_unstable();
+        assert_eq!(all, (0..5).map(|block| (block, false)).collect::<Vec<_>>(), "the caller makes them");
     }
 
     #[test]

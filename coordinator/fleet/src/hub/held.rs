@@ -56,7 +56,8 @@ impl State {
         for (key, run) in runs {
             let count = counts.entry(run.worker).or_default();
             let Some(index) = self.place(&key) else {
-                if run.passed < BATCHES {
+                // What was not finished is given up by its worker, which is told what is of use.
+                if run.passed < BATCHES && (run.ended.is_some() || !is_running) {
                     self.waiting.put(key, run);
                 }
                 continue;

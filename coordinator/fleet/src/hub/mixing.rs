@@ -26,7 +26,11 @@ impl Hub {
     /// A worker has found the folder that is shared.
     pub(crate) fn shares_states(&self, worker: WorkerId) {
         let mut state = self.lock();
-        let Some(slots) = state.states.slots(worker).filter(|_| self.store.is_shared()) else { return };
+        // One that was put out speaks in vain.
+        if !state.links.contains_key(&worker) || !self.store.is_shared() {
+            return;
+        }
+        let Some(slots) = state.states.slots(worker) else { return };
         if state.blocks.joined(worker, slots) {
             let worker = state.name(worker);
             state.tell(FleetEvent::SharesStates { worker });
@@ -53,16 +57,22 @@ impl Hub {
 
     /// Takes back blocks that do not come.
     pub(crate) fn look_at_blocks(&self) {
-        self.lock().blocks.overdue(Instant::now());
+        let mut state = self.lock();
+        for worker in state.blocks.overdue(Instant::now()) {
+            tracing::warn!(worker = state.name(worker), "it mixes no block that it was given");
+        }
+        state.give_blocks();
     }
 
     /// A worker answers for a block; one that it was not given, or has no more, is ignored.
     pub(crate) fn recombined(&self, worker: WorkerId, lease: Lease, made: Result<Vec<ChunkId>, String>) {
         self.handle(Event::Heard { worker });
         let mut state = self.lock();
-        let own = Some(lease).filter(|lease| lease.epoch == worker.0);
-        let Some(block) = own.and_then(|lease| state.blocks.answered(&lease)) else { return };
-        match made {
+        let own = Some(lease).filter(|lease| lease.epoch == worker.0 && state.links.contains_key(&worker));
+        let block = own.and_then(|lease| state.blocks.answered(&lease, Instant::now()));
+        let Some(block) = block else { return };
+        let wanted = state.blocks.n_pieces();
+        match made.and_then(|pieces| counted(pieces, wanted)) {
             Ok(pieces) => state.blocks.end(block, Ok((worker, pieces))),
             Err(reason) => {
                 tracing::warn!(worker = state.name(worker), block, reason, "a block was not mixed");
@@ -73,13 +83,29 @@ impl Hub {
     }
 
     /// Puts a worker out that mixes otherwise than this process does.
-    pub(crate) fn mixes_wrong(&self, worker: WorkerId, block: usize) {
-        let reason = format!("block {block} of the states after an analysis is another one than here");
+    pub(crate) fn mixes_wrong(&self, worker: WorkerId, reason: String) {
+        let now = self.now();
         let mut state = self.lock();
-        let name = state.name(worker);
+        let (worker_name, (build, earlier)) = (state.name(worker), state.dispatcher.taken(worker));
         state.put_out(worker, &reason);
         state.blocks.left(worker);
-        let build = String::new();
-        state.tell(FleetEvent::WorkerExcluded { worker: name, build, reason, again: 0, earlier: 0 });
+        let excluded = FleetEvent::WorkerExcluded {
+            worker: worker_name,
+            build,
+            reason: reason.clone(),
+            again: 0,
+            earlier,
+        };
+        state.tell(excluded);
+        // Its stream may stay open for as long as it likes.
+        state.handle(now, Event::Left { worker, reason, clean: true });
     }
+}
+
+/// As many pieces as a block has.
+fn counted(pieces: Vec<ChunkId>, wanted: usize) -> Result<Vec<ChunkId>, String> {
+    if pieces.len() == wanted {
+        return Ok(pieces);
+    }
+    Err(format!("it names {} pieces where {wanted} belong", pieces.len()))
 }

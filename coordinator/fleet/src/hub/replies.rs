@@ -13,6 +13,7 @@ impl State {
             if reply.is_ok() {
                 self.states.forget();
             }
+            self.states.let_go_of(running.states);
             let _ = running.reply.send(reply);
         }
     }

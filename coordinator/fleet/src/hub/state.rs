@@ -9,17 +9,17 @@ use std::time::Duration;
 use starlings_proto::{
     Bytes, Hello, JobEncoder, Lease, PROTOCOL, SentWindows, SetupId, ToWorker, VERSION, generated,
 };
-use tokio::sync::mpsc::UnboundedSender;
 
+use super::Reply;
 use super::blocks::Blocks;
 use super::doorway::Doorway;
 use super::excluded::Excluded;
 use super::states::States;
 use super::teller::Teller;
 use super::waiting::Waiting;
-use super::{Outgoing, Reply};
 use crate::dispatcher::{BatchError, Command, ControlId, Dispatcher, Event, WorkerId};
 use crate::event_text::OVER;
+use crate::outbox::Outbox;
 use crate::wire::{Job, named};
 use crate::{FleetEvent, StateStore, StoredState};
 
@@ -68,7 +68,7 @@ pub(crate) struct SetupShape {
 /// The way to one worker.
 pub(super) struct Link {
     pub(super) name: String,
-    pub(super) sender: UnboundedSender<Outgoing>,
+    pub(super) outbox: Outbox,
     pub(super) pid: u32,
     pub(super) nonce: u64,
     /// Windows that were sent on it.
@@ -76,20 +76,15 @@ pub(super) struct Link {
 }
 
 impl Link {
-    pub(super) fn new(name: String, sender: UnboundedSender<Outgoing>, pid: u32, nonce: u64) -> Self {
-        Self { name, sender, pid, nonce, windows: SentWindows::default() }
+    pub(super) fn new(name: String, outbox: Outbox, pid: u32, nonce: u64) -> Self {
+        Self { name, outbox, pid, nonce, windows: SentWindows::default() }
     }
 
     fn give(&mut self, encoder: &mut JobEncoder, lease: Lease, (setup, job): &(SetupId, Job)) {
         let (window, job) = encoder.encode(lease, setup, job, &mut self.windows);
         for message in window.into_iter().chain([job]) {
-            self.send(message);
+            self.outbox.send(message);
         }
-    }
-
-    /// A link that is closing ends in `leave`, which returns its leases.
-    fn send(&self, message: generated::ToWorker) {
-        let _ = self.sender.send(Ok(message));
     }
 }
 
@@ -106,7 +101,7 @@ pub(crate) enum Closed {
 pub(crate) struct Submission {
     pub(crate) jobs: Vec<(SetupId, Job)>,
     /// The states that the jobs name.
-    pub(crate) _states: Vec<StoredState>,
+    pub(crate) states: Vec<StoredState>,
     /// Holds the windows of the jobs as they travel.
     pub(crate) encoder: JobEncoder,
     pub(crate) reply: Sender<Reply>,
@@ -249,15 +244,8 @@ impl State {
                 let outcomes = held.collect::<Option<Vec<_>>>().ok_or_else(lost);
                 self.reply(outcomes);
             }
-            Command::BatchFailed(mut error) => {
-                if let BatchError::NoControl { index, parameters, .. } = &mut error {
-                    let named = self.parameters(*index);
-                    let listed = named.iter().map(|(name, value)| format!("{name} = {value}"));
-                    *parameters = listed.collect::<Vec<_>>().join(", ");
-                }
-                if let BatchError::NoWorkers { missing, .. } = &mut error {
-                    missing.push_str(&self.turned_away());
-                }
+            Command::BatchFailed(error) => {
+                let error = self.detailed(error);
                 self.reply(Err(error));
             }
             Command::Notice(event) => self.notify(event),
@@ -268,6 +256,20 @@ impl State {
                 self.tell(notice);
             }
         }
+    }
+
+    /// Why a batch ended, with what the dispatcher does not know.
+    fn detailed(&self, mut error: BatchError) -> BatchError {
+        match &mut error {
+            BatchError::NoControl { index, parameters, .. } => {
+                let named = self.parameters(*index);
+                let listed = named.iter().map(|(name, value)| format!("{name} = {value}"));
+                *parameters = listed.collect::<Vec<_>>().join(", ");
+            }
+            BatchError::NoWorkers { missing, .. } => missing.push_str(&self.turned_away()),
+            _ => {}
+        }
+        error
     }
 
     pub(super) fn tell(&mut self, event: FleetEvent) {
@@ -285,7 +287,7 @@ impl State {
 
     pub(super) fn send(&self, worker: WorkerId, message: generated::ToWorker) {
         if let Some(link) = self.links.get(&worker) {
-            link.send(message);
+            link.outbox.send(message);
         }
     }
 

@@ -1,5 +1,7 @@
 //! Large states of a batch: who may send and ask for them, and for how long they are held.
 //!
+//! What is held no longer is dropped after the hub's lock ([`super::locked`]).
+//!
 //! A state that a worker put is held under its lease until the answer that names it, then for as long as the run's outcome is of that
 //! answer, until the caller has it: what came of a repeated run, or of the loser of a race, goes with its answer. Those of jobs are held by their batch, or by the copy of a job that is kept for control runs. Next file to read: `transfers`.
 
@@ -25,6 +27,8 @@ pub(super) struct States {
     answered: BTreeMap<StateId, StoredState>,
     /// Of jobs that are kept for control runs.
     kept: BTreeMap<ControlId, StoredState>,
+    /// Held no longer.
+    gone: Vec<StoredState>,
 }
 
 /// A worker that may transfer states.
@@ -42,6 +46,7 @@ impl States {
             put: BTreeMap::new(),
             answered: BTreeMap::new(),
             kept: BTreeMap::new(),
+            gone: Vec::new(),
         }
     }
 
@@ -58,18 +63,31 @@ impl States {
     /// A worker is gone, and what it put and did not name.
     pub(super) fn left(&mut self, worker: WorkerId) {
         self.sessions.remove(&worker);
-        self.put.retain(|lease, _| lease.epoch != worker.0);
+        let put = std::mem::take(&mut self.put).into_iter();
+        let (its, others): (BTreeMap<_, _>, _) = put.partition(|(lease, _)| lease.epoch == worker.0);
+        self.put = others;
+        self.gone.extend(its.into_values());
     }
 
     /// A batch is over, or another one begins: nothing of the earlier one is named any more.
     pub(super) fn forget(&mut self) {
-        self.put.clear();
-        self.answered.clear();
+        self.gone.extend(std::mem::take(&mut self.put).into_values());
+        self.gone.extend(std::mem::take(&mut self.answered).into_values());
     }
 
-    /// Holds a state that arrived; gives back the one before under this lease.
-    pub(super) fn arrived(&mut self, lease: Lease, state: StoredState) -> Option<StoredState> {
-        self.put.insert(lease, state)
+    /// What is held no longer, to be dropped after the lock.
+    pub(super) fn gone(&mut self) -> Vec<StoredState> {
+        std::mem::take(&mut self.gone)
+    }
+
+    /// Drops states after the lock.
+    pub(super) fn let_go_of(&mut self, states: impl IntoIterator<Item = StoredState>) {
+        self.gone.extend(states);
+    }
+
+    /// Holds a state that arrived, in the place of one before under this lease.
+    pub(super) fn arrived(&mut self, lease: Lease, state: StoredState) {
+        self.gone.extend(self.put.insert(lease, state));
     }
 
     /// Counts one transfer less.
@@ -82,12 +100,13 @@ impl States {
     /// Holds the state of a job that is kept for control runs.
     pub(super) fn keep(&mut self, control: ControlId, job: &wire::Job) {
         if let Some(Travelling::Named(id)) = &job.state {
-            self.kept.extend(self.store.get(id).map(|state| (control, state)));
+            let before = self.store.get(id).and_then(|state| self.kept.insert(control, state));
+            self.gone.extend(before);
         }
     }
 
     pub(super) fn forget_kept(&mut self, control: ControlId) {
-        self.kept.remove(&control);
+        self.gone.extend(self.kept.remove(&control));
     }
 
     /// The state that was put under a lease and is not yet named.
@@ -97,17 +116,20 @@ impl States {
 
     /// Holds a state that an answer names, until the caller has it.
     pub(super) fn hold(&mut self, named: Option<StoredState>) {
-        self.answered.extend(named.map(|state| (state.id(), state)));
+        self.gone.extend(named.and_then(|state| self.answered.insert(state.id(), state)));
     }
 
     /// Holds a state no longer that an answer named.
     pub(super) fn let_go(&mut self, id: &StateId) {
-        self.answered.remove(id);
+        self.gone.extend(self.answered.remove(id));
     }
 
     /// Holds only those of the states that answers named.
     pub(super) fn keep_needed(&mut self, is_needed: impl Fn(&StateId) -> bool) {
-        self.answered.retain(|id, _| is_needed(id));
+        let answered = std::mem::take(&mut self.answered).into_iter();
+        let (needed, others): (_, BTreeMap<_, _>) = answered.partition(|(id, _)| is_needed(id));
+        self.answered = needed;
+        self.gone.extend(others.into_values());
     }
 
     /// An outcome with its state, unless that is gone.

@@ -1,8 +1,8 @@
 //! Events on their way out: what happens too often is counted and told in one.
 //!
 //! Workers cause events, and one that joins and leaves a thousand times a second must not fill a disk. Every kind has a store of
-//! tellings that fills up again with time; beyond it events are counted, and the count is told with the next one of the kind that
-//! is told, or once a minute. What says how a job ended is never left out.
+//! tellings that fills up again with time; beyond it events are counted. The count is told with the next one of the kind that is
+//! told, with one that comes a minute or more after the first that was counted, or at the end. What says how a job ended is never left out.
 
 use std::collections::BTreeMap;
 use std::sync::mpsc::Sender;

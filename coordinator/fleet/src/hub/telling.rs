@@ -15,7 +15,7 @@ impl State {
             FleetEvent::WorkerSetAside { worker, .. } | FleetEvent::WorkerBack { worker } => {
                 let worker = worker.clone();
                 if let Some(link) = self.links.values().find(|link| link.name == worker) {
-                    let _ = link.sender.send(Ok(ToWorker::notice(&event.to_string())));
+                    link.outbox.send(ToWorker::notice(&event.to_string()));
                 }
             }
             FleetEvent::WorkerRefused { host, reason } => {
@@ -46,7 +46,7 @@ impl State {
     /// Ends a worker's session for good: it is told why, and its process is not taken again.
     pub(super) fn put_out(&mut self, worker: WorkerId, reason: &str) {
         let Some(link) = self.links.remove(&worker) else { return };
-        let _ = link.sender.send(Ok(ToWorker::drain(reason)));
+        link.outbox.send(ToWorker::drain(reason));
         self.excluded.add(link.nonce, reason);
         // What it answered is made again.
         let Self { states, dispatcher, .. } = self;

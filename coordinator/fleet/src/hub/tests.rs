@@ -4,9 +4,9 @@ use std::sync::mpsc::{self, Receiver};
 
 use starlings_models::{ModelFailure, Setup, Window};
 use starlings_proto::{JobEncoder, LeaseOutcome, ReceivedWindows, encode_setup};
-use tokio::sync::mpsc::unbounded_channel;
 
 use super::*;
+use crate::outbox::outbox;
 
 impl Hub {
     /// Leaves the state as a panic in the middle of a decision does.
@@ -56,7 +56,7 @@ fn batch(hub: &Hub) -> (Submission, Receiver<Reply>) {
     };
     let (reply, replies) = mpsc::channel();
     (
-        Submission { jobs: vec![(setup, job)], _states: Vec::new(), encoder: JobEncoder::default(), reply },
+        Submission { jobs: vec![(setup, job)], states: Vec::new(), encoder: JobEncoder::default(), reply },
         replies,
     )
 }
@@ -64,7 +64,7 @@ fn batch(hub: &Hub) -> (Submission, Receiver<Reply>) {
 #[test]
 fn a_fleet_given_up_while_its_last_worker_was_still_linked_ends_when_it_leaves() {
     let (hub, _events) = hub(None);
-    let (link, _outgoing) = unbounded_channel();
+    let (link, _outgoing) = outbox();
     let worker = hub.join(hello(1, None), link).expect("it fits");
     let (batch, replies) = batch(&hub);
     hub.submit(batch);
@@ -77,18 +77,19 @@ fn a_fleet_given_up_while_its_last_worker_was_still_linked_ends_when_it_leaves()
 #[test]
 fn a_run_that_is_given_up_is_told_with_the_values_of_its_parameters() {
     let (hub, events) = hub(None);
-    let (link, mut outgoing) = unbounded_channel();
+    let (link, outgoing) = outbox();
     let worker = hub.join(hello(1, None), link).expect("it fits");
     let (batch, replies) = batch(&hub);
     let setup = batch.jobs[0].0;
     hub.submit(batch);
     hub.handle(Event::SetupDone { worker, setup });
-    let sent = std::iter::from_fn(|| outgoing.try_recv().ok());
-    let lease =
-        sent.flatten().find_map(|message| match ToWorker::decode(message, &mut ReceivedWindows::default()) {
+    let sent = std::iter::from_fn(|| outgoing.try_next());
+    let lease = sent.into_iter().find_map(|message| {
+        match ToWorker::decode(message, &mut ReceivedWindows::default()) {
             Ok(ToWorker::Job { lease, .. }) => Some(lease),
             _ => None,
-        });
+        }
+    });
     let answer = LeaseOutcome::Ran(Err(ModelFailure::Solver("diverged".to_owned()).into()));
     hub.handle(Event::Answered { worker, lease: lease.expect("it is sent"), answer, cost: 0.1 });
     assert!(replies.try_recv().is_ok(), "the batch has ended");
@@ -102,7 +103,7 @@ fn a_run_that_is_given_up_is_told_with_the_values_of_its_parameters() {
 #[test]
 fn another_build_of_the_same_version_is_told_once() {
     let (hub, events) = hub(Some([1; 32]));
-    let (link, _outgoing) = unbounded_channel();
+    let (link, _outgoing) = outbox();
     for (pid, build) in [(1, Some([1; 32])), (2, None), (3, Some([2; 32])), (4, Some([2; 32]))] {
         hub.join(hello(pid, build), link.clone()).expect("it fits");
     }
@@ -115,9 +116,39 @@ fn another_build_of_the_same_version_is_told_once() {
 fn a_draining_fleet_says_that_the_run_is_over_and_not_that_the_worker_is_wrong() {
     let (hub, events) = hub(None);
     hub.drain("the run is over");
-    let (link, _outgoing) = unbounded_channel();
+    let (link, _outgoing) = outbox();
     assert_eq!(hub.join(hello(1, None), link.clone()), Err(Closed::Over("the run is over".to_owned())));
     assert_eq!(events.try_iter().count(), 0);
     let old = Hello { version: "0.0.1".to_owned(), ..hello(2, None) };
     assert!(matches!(hub.join(old, link), Err(Closed::Refused(_))));
+}
+
+#[test]
+fn what_is_brought_along_waits_for_a_batch_while_its_worker_is_there_and_is_not_given_up() {
+    let (hub, _events) = hub(None);
+    let worker = |pid| hub.join(hello(pid, None), outbox().0).expect("it fits");
+    let waiting = || {
+        let mut keys: Vec<u8> = hub.lock().waiting.runs.keys().map(|key| key[0]).collect();
+        keys.sort_unstable();
+        keys
+    };
+    let run = |key: u8, is_made: bool| HeldRun {
+        key: [key; 32],
+        ended: is_made.then(|| Bytes::from_static(b"as it was")),
+    };
+    let (first, second) = (worker(1), worker(2));
+    hub.bring(first, vec![run(1, true), run(2, false)]);
+    hub.bring(second, vec![run(3, true)]);
+    assert_eq!(waiting(), [1, 2, 3]);
+    // The worker is told that what it still makes is of no use, and gives it up.
+    let (batch, _replies) = batch(&hub);
+    hub.submit(batch);
+    assert_eq!(waiting(), [1, 3]);
+    hub.bring(first, vec![run(4, true), run(5, false)]);
+    assert_eq!(waiting(), [1, 3, 4]);
+    hub.leave(first, "it is gone".to_owned(), false);
+    assert_eq!(waiting(), [3]);
+    // Nobody has heard of this one.
+    hub.bring(first, vec![run(6, true)]);
+    assert_eq!(waiting(), [3]);
 }

@@ -69,10 +69,7 @@ impl Hub {
         let mut state = self.lock();
         state.states.session(WorkerId(head.lease.epoch), head.nonce)?;
         state.may_put(head)?;
-        let before = state.states.arrived(head.lease, arrived);
-        drop(state);
-        // Its files go outside the lock.
-        drop(before);
+        state.states.arrived(head.lease, arrived);
         Ok(())
     }
 

@@ -36,20 +36,25 @@ impl Default for Waiting {
 }
 
 impl Waiting {
-    pub(super) fn put(&mut self, key: JobKey, run: Run) {
-        let bytes = run.bytes();
-        if self.bytes + bytes > self.most {
+    /// Keeps a run; one that is finished is not displaced by one that is not.
+    pub(super) fn put(&mut self, key: JobKey, mut run: Run) {
+        let before = self.runs.get(&key);
+        if before.is_some_and(|before| before.ended.is_some() && run.ended.is_none()) {
             return;
         }
-        self.bytes += bytes;
-        if let Some(old) = self.runs.insert(key, run) {
-            self.bytes -= old.bytes();
+        let kept = self.bytes - before.map_or(0, Run::bytes);
+        if kept + run.bytes() > self.most {
+            return;
         }
+        // What came lies in the message that brought it, with all else that it brought.
+        run.ended = run.ended.map(|ended| Bytes::copy_from_slice(&ended));
+        self.bytes = kept + run.bytes();
+        self.runs.insert(key, run);
     }
 
-    /// What a worker still made is lost with it; what it had finished is not.
+    /// What a worker brought along goes with it: nobody could be asked what it was made with. One that comes back brings it again.
     pub(super) fn left(&mut self, worker: WorkerId) {
-        self.runs.retain(|_, run| run.worker != worker || run.ended.is_some());
+        self.runs.retain(|_, run| run.worker != worker);
         self.bytes = self.runs.values().map(Run::bytes).sum();
     }
 
@@ -91,5 +96,35 @@ mod tests {
         waiting.left(WorkerId(2));
         assert_eq!((waiting.runs.len(), most - waiting.bytes), (2, room));
         assert_eq!((waiting.take_all().len(), waiting.bytes), (2, 0));
+    }
+
+    #[test]
+    fn a_small_part_of_a_large_message_does_not_keep_all_of_it() {
+        let mut waiting = Waiting::default();
+        let message = Bytes::from(vec![7; 1 << 20]);
+        waiting.put([1; 32], Run { worker: WorkerId(1), ended: Some(message.slice(5..15)), passed: 0 });
+        assert!(message.is_unique(), "nobody else holds the message");
+        assert_eq!(waiting.runs[&[1; 32]].ended.as_deref(), Some(&[7; 10][..]));
+    }
+
+    #[test]
+    fn what_waits_goes_with_the_worker_that_brought_it_and_a_finished_run_stays_before_an_unfinished_one() {
+        let mut waiting = Waiting::default();
+        let run = |worker, ended: Option<&'static [u8]>| Run {
+            worker: WorkerId(worker),
+            ended: ended.map(Bytes::from_static),
+            passed: 0,
+        };
+        waiting.put([1; 32], run(1, Some(b"made")));
+        waiting.put([1; 32], run(2, None));
+        assert_eq!(waiting.runs[&[1; 32]].worker, WorkerId(1));
+        waiting.put([2; 32], run(2, None));
+        waiting.put([2; 32], run(1, Some(b"made")));
+        assert_eq!(waiting.runs[&[2; 32]].worker, WorkerId(1));
+        let bytes = waiting.bytes;
+        waiting.put([2; 32], run(1, Some(b"made")));
+        assert_eq!(waiting.bytes, bytes, "once");
+        waiting.left(WorkerId(1));
+        assert_eq!((waiting.runs.len(), waiting.bytes), (0, 0));
     }
 }

@@ -10,11 +10,13 @@ use starlings_proto::{
 use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
 use tokio_stream::wrappers::UnboundedReceiverStream;
 use tonic::Streaming;
+use tonic::transport::Channel;
 
 use super::square;
 
 /// A worker played by hand.
 pub struct Hand {
+    pub client: FleetClient<Channel>,
     pub outbox: UnboundedSender<generated::FromWorker>,
     pub inbound: Streaming<generated::ToWorker>,
     windows: ReceivedWindows,
@@ -26,7 +28,7 @@ impl Hand {
         let (outbox, outgoing) = unbounded_channel();
         outbox.send(FromWorker::Hello(hello).encode().unwrap()).unwrap();
         let inbound = client.work(UnboundedReceiverStream::new(outgoing)).await.unwrap().into_inner();
-        Self { outbox, inbound, windows: ReceivedWindows::default() }
+        Self { client, outbox, inbound, windows: ReceivedWindows::default() }
     }
 
     pub fn say(&self, message: FromWorker) {

@@ -96,6 +96,15 @@ impl<'a> Journal<'a> {
         };
         self.store.keep_arrived(&arrived.into_iter().map(row).collect::<Vec<_>>())
     }
+
+    /// Forgets what arrived, also of earlier starts, at once.
+    ///
+    /// # Errors
+    /// When the store refuses.
+    pub(super) fn forget(&self) -> Result<(), StoreError> {
+        self.store.forget_arrived()?;
+        self.store.commit()
+    }
 }
 
 /// A prediction as its bytes are kept, and the state that they name.

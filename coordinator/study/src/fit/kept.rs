@@ -73,6 +73,10 @@ impl<'a> Kept<'a> {
         if let Some(error) = refused {
             return Err(error.into());
         }
+        if matches!(outcomes, Err(FleetError::Disagreement { .. })) {
+            // Who of them is wrong is not known, nor whose results were kept.
+            self.journal.forget()?;
+        }
         for (index, outcome) in open.iter().zip(outcomes.map_err(|error| placed(error, &open))?) {
             if let (true, Err(Failure::Timeout(timeout))) = (lasts, &outcome.result) {
                 let (setup, job) = job(*index);

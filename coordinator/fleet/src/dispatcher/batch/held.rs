@@ -6,10 +6,11 @@ use super::super::queue::RetryKey;
 use super::Batch;
 
 impl Batch {
-    /// Whether a job has no outcome and no doubt about its failure.
+    /// Whether a job has no outcome, and no attempt of it has failed.
     pub(in crate::dispatcher) fn is_plain(&self, index: usize) -> bool {
         let job = &self.jobs[index];
-        job.outcome.is_none() && job.doubt.is_none() && !self.parked.contains_key(&index)
+        let is_untried = job.earlier.is_none() && job.doubt.is_none();
+        job.outcome.is_none() && is_untried && !self.parked.contains_key(&index)
     }
 
     /// Takes out a job that waits for a worker; false where it does not wait.

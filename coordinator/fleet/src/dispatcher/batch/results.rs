@@ -48,11 +48,9 @@ impl Batch {
         let job = &mut self.jobs[index];
         if job.outcome.take().is_some() {
             (job.by, job.earlier, job.avoided) = (None, None, None);
-            if let Some(at) = self.ended.iter().position(|ended| *ended == index) {
-                self.ended.remove(at);
-                // Whoever was told of the outcome is told of the next one too, which takes its place.
-                self.handed_on -= usize::from(at < self.handed_on);
-            }
+            // Whoever was told of the outcome is told of the next one too, which takes its place.
+            self.ended.retain(|ended| *ended != index);
+            self.untold.retain(|untold| *untold != index);
             self.open[job.setup] += 1;
         }
     }

@@ -54,10 +54,16 @@ impl Worker {
         self.held.remove(&job).map(|held| Released { recalled: held.recalled, dropped: held.dropped })
     }
 
-    /// Ends the lease of a job, whatever its attempt.
-    pub(in crate::dispatcher) fn take_back(&mut self, job: u64) -> Option<Lease> {
-        let held = self.held.remove(&job)?;
-        Some(Lease { epoch: self.id.0, job, attempt: held.attempt })
+    /// Its lease of this job, which is called back from it: that it gives the job back is no surprise then.
+    pub(in crate::dispatcher) fn call_back(&mut self, job: u64) -> Option<Lease> {
+        self.held.get_mut(&job)?.recalled = true;
+        self.lease_of(job)
+    }
+
+    /// All its leases, which are called back.
+    pub(in crate::dispatcher) fn call_back_all(&mut self) -> Vec<Lease> {
+        self.held.values_mut().for_each(|held| held.recalled = true);
+        self.leases().collect()
     }
 
     pub(in crate::dispatcher) fn leases(&self) -> impl Iterator<Item = Lease> + '_ {

@@ -1,10 +1,11 @@
 //! Random joins, losses, answers, failures and silences: every job ends exactly once, no credit is lost, and it ends.
 
 mod act;
+mod draw;
 mod world;
 
-use act::{Act, act};
-use world::{World, late};
+use act::{Act, act, late};
+use world::World;
 
 use proptest::prelude::*;
 use starlings_models::{Failure, ParticleError};

@@ -124,3 +124,36 @@ fn waits(commands: &[Command]) -> Vec<String> {
     });
     told.collect()
 }
+
+/// Seconds until a batch with nothing left to run ends; an error fails.
+fn until_done(stage: &mut Stage, most: u64, alive: &[u64]) -> u64 {
+    for second in 1..=most {
+        let commands = stage.seconds(1, alive);
+        assert!(canary::failed_with(&commands).is_none(), "after {second} s: {commands:?}");
+        if outcomes(&commands).is_some() {
+            return second;
+        }
+    }
+    most
+}
+
+#[test]
+fn a_batch_whose_runs_are_all_made_does_not_starve_while_they_are_repeated() {
+    let mut stage = canary::comparing(&[1, 1], false);
+    let [(lease, 0)] = stage.jobs(submit(1))[..] else { panic!("one job") };
+    let made = answered(lease, LeaseOutcome::Ran(Ok(prediction(0))), 100.0);
+    let [(repeat, 0)] = stage.jobs(made)[..] else { panic!("its repeat") };
+    let long = 3 * RULES.patience.as_secs();
+    assert_eq!(until_done(&mut stage, long, &[1, 2]), long, "the repeat is waited for");
+    assert!(outcomes(&stage.step(ran(repeat, Ok(prediction(0))))).is_some());
+}
+
+#[test]
+fn a_batch_whose_runs_are_all_made_waits_for_a_slow_setup_as_long_as_patience_lasts() {
+    let mut stage = canary::comparing(&[1], false);
+    let [(lease, 0)] = stage.jobs(submit(1))[..] else { panic!("one job") };
+    stage.step(Event::Joined(joining(2, 1)));
+    assert!(outcomes(&stage.step(ran(lease, Ok(prediction(0))))).is_none(), "the other one may compare it");
+    let patience = RULES.patience.as_secs();
+    assert_eq!(until_done(&mut stage, 2 * patience, &[1, 2]), patience);
+}

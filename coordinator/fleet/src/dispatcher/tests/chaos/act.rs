@@ -1,6 +1,7 @@
 //! What can happen to a dispatcher, drawn at random.
 
 use proptest::prelude::*;
+use starlings_models::Timeout;
 
 /// One thing that the world does; numbers choose among what is possible then.
 #[derive(Clone, Debug)]
@@ -16,9 +17,17 @@ pub(super) enum Act {
     Place(usize),
     Late(usize),
     Repeat(usize),
-    /// A worker comes along with a job, finished or still being made.
-    Bring(usize, usize, bool),
+    /// A worker comes along with a job.
+    Bring(usize, usize, Brought),
     Wait(u64),
+}
+
+/// How far a job is that a worker comes along with.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Brought {
+    Computing,
+    Made,
+    Failed,
 }
 
 pub(super) fn act() -> impl Strategy<Value = Act> {
@@ -34,7 +43,16 @@ pub(super) fn act() -> impl Strategy<Value = Act> {
         2 => any::<usize>().prop_map(Act::Place),
         1 => any::<usize>().prop_map(Act::Late),
         2 => any::<usize>().prop_map(Act::Repeat),
-        2 => (any::<usize>(), any::<usize>(), any::<bool>()).prop_map(|(who, which, done)| Act::Bring(who, which, done)),
+        3 => (any::<usize>(), any::<usize>(), brought()).prop_map(|(who, which, how)| Act::Bring(who, which, how)),
         1 => (1_u64..30).prop_map(Act::Wait),
     ]
+}
+
+fn brought() -> impl Strategy<Value = Brought> {
+    prop::sample::select(vec![Brought::Computing, Brought::Made, Brought::Failed])
+}
+
+/// What a run says that was given up.
+pub(super) fn late() -> Timeout {
+    Timeout { limit: 1.0, says: "too late".to_owned() }
 }

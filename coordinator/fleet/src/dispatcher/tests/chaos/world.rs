@@ -3,11 +3,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use starlings_models::{ParticleError, Timeout};
+use starlings_models::ParticleError;
 use starlings_proto::{Lease, LeaseOutcome, SetupId};
 
 use super::super::{RULES, answered, crash, joining, left, place, prediction, setup, solver, submit_mixed};
-use super::act::Act;
+use super::act::{Act, Brought, late};
+use super::draw::{choose, pick};
 use crate::FleetEvent;
 use crate::dispatcher::{
     BatchError, Command, Comparing, ControlId, Dispatcher, Event, Rules, Taken, WorkerId,
@@ -33,6 +34,8 @@ pub(super) struct World {
     pub(super) duplicated: BTreeSet<usize>,
     /// Jobs that somebody answered with a prediction or a failure of the model.
     pub(super) answered: BTreeSet<usize>,
+    /// Answers that nobody had asked for.
+    pub(super) strays: u32,
     /// Workers that were put out.
     pub(super) put_out: BTreeSet<u64>,
     pub(super) ended: Option<Result<Vec<Outcome>, BatchError>>,
@@ -66,6 +69,7 @@ impl World {
             controls: BTreeSet::new(),
             duplicated: BTreeSet::new(),
             answered: BTreeSet::new(),
+            strays: 0,
             put_out: BTreeSet::new(),
             ended: None,
         };
@@ -211,39 +215,61 @@ impl World {
             Act::Place(which) => self.answer(which, |_| LeaseOutcome::Ran(Err(place("disk full"))), 1.0),
             Act::Late(which) => self.answer(which, |_| LeaseOutcome::Ran(Err(late().into())), 1.0),
             Act::Repeat(which) => self.repeat(which),
-            Act::Bring(who, which, is_finished) => self.bring(who, which, is_finished),
+            Act::Bring(who, which, how) => self.bring(who, which, how),
             Act::Wait(seconds) => {
                 self.now += Duration::from_secs(seconds);
                 self.event(Event::Tick);
             }
         }
+        self.assert_fair();
+    }
+
+    /// No worker is charged for what it does not have, or blamed for what it was asked for.
+    fn assert_fair(&self) {
         for &worker in &self.alive {
             let open = self.open.keys().filter(|(of, _)| *of == worker).count();
             assert_eq!(self.dispatcher.in_flight(WorkerId(worker)), open, "credit follows the open leases");
         }
+        let strays: u32 = self.dispatcher.workers.values().map(|worker| worker.strays).sum();
+        assert!(strays <= self.strays, "a worker is blamed for answers that it was asked for");
     }
 
     fn repeat(&mut self, which: usize) {
         if !self.past.is_empty() {
             let lease = self.past[which % self.past.len()];
+            self.strays += 1;
             self.event(answered(lease, LeaseOutcome::Ran(Ok(prediction(usize::MAX))), 1.0));
         }
     }
 
-    fn bring(&mut self, who: usize, which: usize, is_finished: bool) {
+    /// Whoever has the job meanwhile hears of it later, and has perhaps ended it before.
+    fn bring(&mut self, who: usize, which: usize, how: Brought) {
         let Some(worker) = choose(&self.alive, who) else { return };
         let index = which % self.setups.len();
-        let answer = is_finished.then(|| (LeaseOutcome::Ran(Ok(prediction(index))), 1.0));
+        let result = match how {
+            Brought::Computing => None,
+            Brought::Made => Some(Ok(prediction(index))),
+            Brought::Failed => Some(Err(solver("no"))),
+        };
+        let answer = result.map(|result| (LeaseOutcome::Ran(result), 1.0));
+        let is_finished = answer.is_some();
+        let of = |(_, (lease, open)): (_, &(Lease, usize))| (*open == index).then_some(*lease);
+        let before: Vec<Lease> = self.open.iter().filter_map(of).collect();
         let (taken, commands) = self.dispatcher.held(self.now, WorkerId(worker), index, answer);
-        let before =
-            self.open.iter().find(|(_, (_, open))| *open == index).map(|(key, (lease, _))| (*key, *lease));
-        if let (Some((key, lease)), true) = (before, taken != Taken::No) {
-            assert!(!self.controls.contains(&key), "what is in doubt is decided by runs of its own");
-            self.open.remove(&key);
-            self.past.push(lease);
-        }
         if let Taken::Lease(lease) = taken {
-            self.open.insert((worker, lease.job), (lease, index));
+            let own = self.open.insert((worker, lease.job), (lease, index));
+            assert!(own.is_none(), "a worker has one lease of a job at a time");
+        }
+        if taken != Taken::No {
+            self.answered.extend(is_finished.then_some(index));
+            let stopped = |lease: &Lease| {
+                let stops =
+                    |c: &Command| matches!(c, Command::Cancel { leases, .. } if leases.contains(lease));
+                self.withdrawn.contains(lease) || commands.iter().any(stops)
+            };
+            assert!(before.iter().all(stopped), "what another one brings along is stopped everywhere else");
+            let in_doubt = before.iter().any(|lease| self.controls.contains(&(lease.epoch, lease.job)));
+            assert!(!in_doubt, "what is in doubt is decided by runs of its own");
         }
         for command in commands {
             self.obey(command);
@@ -270,16 +296,4 @@ impl World {
         }
         panic!("a batch with a good worker ends within a few events per job");
     }
-}
-
-pub(super) fn late() -> Timeout {
-    Timeout { limit: 1.0, says: "too late".to_owned() }
-}
-
-pub(super) fn choose<T: Ord + Copy>(from: &BTreeSet<T>, which: usize) -> Option<T> {
-    (!from.is_empty()).then(|| *from.iter().nth(which % from.len()).expect("within the length"))
-}
-
-pub(super) fn pick<K: Ord, V>(from: &BTreeMap<K, V>, which: usize) -> Option<(&K, &V)> {
-    (!from.is_empty()).then(|| from.iter().nth(which % from.len()).expect("within the length"))
 }

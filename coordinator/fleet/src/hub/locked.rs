@@ -1,0 +1,48 @@
+//! The hub's lock: what is decided under it lets go of states whose files are removed after it.
+//!
+//! Files may take long to go, as on a shared file system, and a thread of the network that waits for them hears no heartbeat. Next file
+//! to read: [`super::state`].
+
+use std::ops::{Deref, DerefMut};
+use std::sync::MutexGuard;
+
+use starlings_states::StoredState;
+use tokio::runtime::Handle;
+
+use super::state::State;
+
+/// The state of the fleet, for as long as this thread alone has it.
+pub(super) struct Locked<'a>(Option<MutexGuard<'a, State>>);
+
+impl<'a> Locked<'a> {
+    pub(super) fn new(state: MutexGuard<'a, State>) -> Self {
+        Self(Some(state))
+    }
+}
+
+impl Deref for Locked<'_> {
+    type Target = State;
+
+    fn deref(&self) -> &State {
+        self.0.as_ref().expect("it is held until it is dropped")
+    }
+}
+
+impl DerefMut for Locked<'_> {
+    fn deref_mut(&mut self) -> &mut State {
+        self.0.as_mut().expect("it is held until it is dropped")
+    }
+}
+
+impl Drop for Locked<'_> {
+    fn drop(&mut self) {
+        let Some(mut state) = self.0.take() else { return };
+        let gone = state.states.gone();
+        drop(state);
+        let on_disk: Vec<StoredState> = gone.into_iter().filter(StoredState::is_on_disk).collect();
+        match Handle::try_current() {
+            Ok(runtime) if !on_disk.is_empty() => drop(runtime.spawn_blocking(|| drop(on_disk))),
+            _ => drop(on_disk),
+        }
+    }
+}
