@@ -10,6 +10,7 @@ pub mod adapters;
 pub mod awake;
 mod codec;
 pub mod convert;
+pub mod host;
 pub mod private_file;
 pub mod socket;
 pub mod spent;
