@@ -13,7 +13,7 @@ use starlings_coordinator::study::{Progress, RunContext, Summary, run as study_r
 
 use crate::console::{line, note, number, table};
 use crate::failure::Failure;
-use crate::fleet_session::{FleetArgs, FleetSession, Out};
+use crate::fleet_session::{Entrance, FleetArgs, FleetSession, Out};
 use crate::interrupt;
 use crate::load::{is_outside, load_where};
 use crate::progress::Display;
@@ -51,7 +51,7 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     if !is_away && !is_known {
         dry_run(&mut study, kind, Depth::First).map_err(Failure::input)?;
     }
-    let entrance = plan.enter()?;
+    let entrance = Entrance::take(&plan, args.out.as_deref())?;
     let mut folder = run_folder::open(Purpose::Run, &study, args.out.as_deref(), args.resume)?;
     if let Some(summary) = folder.summary().map_err(Failure::run)? {
         note(format_args!(
@@ -66,7 +66,7 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     let mut session = FleetSession::listen(&study, &plan, entrance, identity, &display)?;
     session.start_workers(&study, &plan, Some(&folder.path))?;
     if is_away && let Err(failure) = session.trial(&mut study, Some(kind), Some(&folder.store)) {
-        session.close();
+        session.close(false);
         run_folder::give_up(folder, args.resume);
         return Err(failure);
     }
@@ -81,7 +81,7 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     };
     let result = study_run::run(&study, &mut session.fleet, &mut folder, &mut context);
     display.finish();
-    session.close();
+    session.close(result.is_ok());
     let path = folder.path.display();
     let summary = result.map_err(|error| {
         let remedy = format!("the run so far is in {path}: continue it with --out {path} --resume");

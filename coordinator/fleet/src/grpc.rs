@@ -47,6 +47,8 @@ pub struct GrpcFleet {
     network: Option<JoinHandle<Result<(), String>>>,
     refusals: Arc<Refusals>,
     is_open: bool,
+    /// How workers are started.
+    start: Option<String>,
     pub(super) cancel: CancellationToken,
     /// Whether results of workers are compared.
     pub(super) compares: bool,
@@ -118,6 +120,7 @@ impl GrpcFleet {
             network: Some(network),
             refusals,
             is_open: config.secrets.is_none(),
+            start: None,
             cancel: config.cancel,
             compares: !config.mixed,
             compared: Compared::default(),
@@ -137,6 +140,16 @@ impl GrpcFleet {
     /// For the supervisor of local workers.
     pub fn handle(&self) -> FleetHandle {
         FleetHandle::new(Arc::clone(&self.hub), self.adopted.clone())
+    }
+
+    /// Tells workers, when they are asked to leave, that the run is not done.
+    pub fn break_off(&self) {
+        self.hub.break_off();
+    }
+
+    /// How workers are started, for the error of a wait for them.
+    pub fn started_by(&mut self, command: &str) {
+        self.start = Some(command.to_owned());
     }
 
     /// Asks all workers to leave, waits shortly for them, and stops the network. Dropping does the same.
@@ -187,7 +200,8 @@ impl GrpcFleet {
     }
 
     fn listening(&self) -> Listening {
-        Listening { address: self.address, is_open: self.is_open, refused: self.refusals.summary() }
+        let (address, is_open, start) = (self.address, self.is_open, self.start.clone());
+        Listening { address, is_open, start, refused: self.refusals.summary() }
     }
 }
 
