@@ -44,6 +44,11 @@ impl Plan {
         Self { keeps_states: true, ..self }
     }
 
+    /// The folder for large states that machines share, as it is named here.
+    pub(crate) fn place(&self) -> Option<String> {
+        self.states.as_ref().map(ToString::to_string)
+    }
+
     /// Where large states of a run are kept.
     pub(super) fn store(&self, run: &RunIdentity) -> StateStore {
         match &self.states {
