@@ -21,8 +21,11 @@ const AMPLE: u64 = 10 << 30;
 
 /// Refuses a disk that cannot hold what the run will write, and warns of one that is nearly full. A run that goes on writes what
 /// its folder does not hold yet, and nobody else needs to be spared for its sake.
-pub(crate) fn check(study: &Study, folder: &Path, goes_on: bool) -> Result<(), Failure> {
-    let (needed, margin) = (study.bytes_of_a_run(), if goes_on { 0 } else { MARGIN });
+pub(crate) fn check(study: &Study, folder: &Path, shares: bool, goes_on: bool) -> Result<(), Failure> {
+    // Twice while they are replaced, where they do not stand in a folder that machines share.
+    let elsewhere = if shares && study.has_large_states() { 2 * study.bytes_of_states() } else { 0 };
+    let needed = study.bytes_of_a_run().saturating_sub(elsewhere);
+    let margin = if goes_on { 0 } else { MARGIN };
     let written = if goes_on { size_of_files(folder) } else { 0 };
     judged(
         folder,
@@ -33,15 +36,14 @@ pub(crate) fn check(study: &Study, folder: &Path, goes_on: bool) -> Result<(), F
 }
 
 /// The same of the folder for states that machines share, of which a step needs three per particle.
-pub(crate) fn check_states(study: &Study, folder: &Path) -> Result<(), Failure> {
+pub(crate) fn check_states(study: &Study, place: Option<&str>, goes_on: bool) -> Result<(), Failure> {
+    // What is there of a run that goes on is known to nobody yet.
+    let Some(folder) = place.filter(|_| !goes_on).map(Path::new) else { return Ok(()) };
     // Smaller ones never stand there.
-    let needed = if study.has_large_states() { 3 * study.bytes_of_states() } else { 0 };
-    judged(
-        folder,
-        needed.saturating_sub(size_of_files(folder)),
-        0,
-        "free some space, or name another folder with --states",
-    )
+    if !study.has_large_states() {
+        return Ok(());
+    }
+    judged(folder, 3 * study.bytes_of_states(), 0, "free some space, or name another folder with --states")
 }
 
 /// Bytes of the files of a folder and of the folders in it.

@@ -18,6 +18,7 @@ use starlings_coordinator::study::trial::trial;
 use starlings_coordinator::study::{RunFolder, Study};
 
 use crate::console::{line, note};
+use crate::disk;
 use crate::failure::Failure;
 use crate::fleet_session::{Entrance, FleetArgs, FleetSession, Out};
 use crate::interrupt;
@@ -93,8 +94,15 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     if !is_away && !is_known {
         trial(&study).map_err(Failure::input)?;
     }
+    disk::check_states(&study, plan.place().as_deref(), !args.resume.is_first())?;
     let entrance = Entrance::take(&plan, args.out.as_deref())?;
-    let folder = run_folder::open(Purpose::Explanation, &study, args.out.as_deref(), args.resume)?;
+    let folder = run_folder::open(
+        Purpose::Explanation,
+        &study,
+        args.out.as_deref(),
+        plan.place().is_some(),
+        args.resume,
+    )?;
     if load_findings(&folder.store).map_err(Failure::run)?.is_some() {
         let path = folder.path.display();
         note(format_args!("the explanation in {path} is finished already; writing its files again"));

@@ -13,6 +13,7 @@ use starlings_estimators::BATCH;
 
 use crate::console::{line, note, number, table, text};
 use crate::csv_file::{self, StudyLocation};
+use crate::disk;
 use crate::failure::Failure;
 use crate::fleet_session::{Entrance, FleetArgs, FleetSession};
 use crate::interrupt;
@@ -59,6 +60,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if !is_away {
         dry_run(&mut study, &BATCH, Depth::First).map_err(Failure::input)?;
     }
+    disk::check_states(&study, plan.place().as_deref(), false)?;
     let display = Arc::new(Display::new(args.json));
     let mut session =
         FleetSession::listen(&study, &plan, Entrance::take(&plan, None)?, RunIdentity::new(), &display)?;

@@ -55,10 +55,9 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     }
     let entrance = Entrance::take(&plan, args.out.as_deref())?;
     let place = plan.place();
-    if let Some(place) = &place {
-        disk::check_states(&study, Path::new(place))?;
-    }
-    let mut folder = run_folder::open(Purpose::Run, &study, args.out.as_deref(), args.resume)?;
+    disk::check_states(&study, place.as_deref(), !args.resume.is_first())?;
+    let mut folder =
+        run_folder::open(Purpose::Run, &study, args.out.as_deref(), place.is_some(), args.resume)?;
     if let Some(summary) = folder.summary().map_err(Failure::run)? {
         note(format_args!(
             "the run in {} is finished already; writing its files again",

@@ -33,11 +33,13 @@ impl Resume {
     }
 }
 
-/// Opens the folder `out`, or one under `runs` with the names of the study and of the command and the time of now.
+/// Opens the folder `out`, or one under `runs` with the names of the study and of the command and the time of now; `shares` says that
+/// large states stand in a folder that machines share.
 pub(crate) fn open(
     purpose: Purpose,
     study: &Study,
     out: Option<&Path>,
+    shares: bool,
     resume: Resume,
 ) -> Result<RunFolder, Failure> {
     let stamp = jiff::Timestamp::now().strftime("%Y%m%d-%H%M%S").to_string();
@@ -47,7 +49,7 @@ pub(crate) fn open(
     };
     let default = || Path::new("runs").join(format!("{}{kind}-{stamp}", study.name));
     let path: PathBuf = out.map_or_else(default, Path::to_owned);
-    disk::check(study, &path, resume.resume)?;
+    disk::check(study, &path, shares, resume.resume)?;
     let command = std::env::args().skip(1).collect::<Vec<_>>().join(" ");
     let command = format!("starlings {command}");
     if resume.resume {
