@@ -241,7 +241,7 @@ impl FleetSession {
     /// Ends the fleet and its workers, and says to those whether the command is done.
     pub(crate) fn close(self, is_done: bool) {
         if !is_done {
-            self.fleet.break_off();
+            self.fleet.handle().break_off();
         }
         let Self { fleet, local, watcher, mut access, .. } = self;
         // Before the workers leave: one that stays looks there for what comes next.

@@ -6,6 +6,7 @@ use super::FleetError;
 use super::dispatcher::BatchError;
 
 /// Where workers can connect.
+#[derive(Clone)]
 pub(super) struct Listening {
     /// Nowhere where there is none.
     pub(super) address: Option<SocketAddr>,

@@ -40,15 +40,12 @@ const GRACE: Duration = Duration::from_millis(2500);
 /// Workers that dial in.
 pub struct GrpcFleet {
     pub(super) hub: Arc<Hub>,
-    address: Option<SocketAddr>,
     adopted: UnboundedSender<UnixStream>,
     batches: UnboundedSender<Submission>,
     stop: CancellationToken,
     network: Option<JoinHandle<Result<(), String>>>,
     refusals: Arc<Refusals>,
-    is_open: bool,
-    /// How workers are started.
-    start: Option<String>,
+    listening: Listening,
     pub(super) cancel: CancellationToken,
     /// Whether results of workers are compared.
     pub(super) compares: bool,
@@ -113,14 +110,12 @@ impl GrpcFleet {
         }
         Ok(Self {
             hub,
-            address,
             adopted,
             batches,
             stop,
             network: Some(network),
             refusals,
-            is_open: config.secrets.is_none(),
-            start: None,
+            listening: Listening { address, is_open: config.secrets.is_none(), start: None, refused: None },
             cancel: config.cancel,
             compares: !config.mixed,
             compared: Compared::default(),
@@ -129,7 +124,7 @@ impl GrpcFleet {
 
     /// Where workers can connect, with the port that was picked; `None` where none can.
     pub fn address(&self) -> Option<SocketAddr> {
-        self.address
+        self.listening.address
     }
 
     /// How many callers were refused, and the last of them with the reason; `None` where none was.
@@ -142,14 +137,9 @@ impl GrpcFleet {
         FleetHandle::new(Arc::clone(&self.hub), self.adopted.clone())
     }
 
-    /// Tells workers, when they are asked to leave, that the run is not done.
-    pub fn break_off(&self) {
-        self.hub.break_off();
-    }
-
     /// How workers are started, for the error of a wait for them.
     pub fn started_by(&mut self, command: &str) {
-        self.start = Some(command.to_owned());
+        self.listening.start = Some(command.to_owned());
     }
 
     /// Asks all workers to leave, waits shortly for them, and stops the network. Dropping does the same.
@@ -200,8 +190,7 @@ impl GrpcFleet {
     }
 
     fn listening(&self) -> Listening {
-        let (address, is_open, start) = (self.address, self.is_open, self.start.clone());
-        Listening { address, is_open, start, refused: self.refusals.summary() }
+        Listening { refused: self.refusals.summary(), ..self.listening.clone() }
     }
 }
 
