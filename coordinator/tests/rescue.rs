@@ -192,7 +192,7 @@ fn failures_stand_in_the_result_of_a_resumed_run_as_if_it_had_never_been_broken(
         // Every start makes a few batches more.
         let resumed = loop {
             starts += 1;
-            if let Ok(done) = case.go(&path, &mut Mortal::new(3 * starts)) {
+            if let Ok(done) = case.go(&path, &mut Mortal::new(starts)) {
                 break done;
             }
         };

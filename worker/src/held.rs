@@ -14,7 +14,6 @@ mod shared;
 mod tests;
 
 use std::collections::{HashMap, HashSet, VecDeque};
-use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
@@ -26,19 +25,13 @@ use large::Large;
 pub use shared::HoldLimits;
 pub(crate) use shared::Run;
 use shared::Shared;
-use starlings_proto::{Bytes, HeldRun, JobKey, JobKeys};
+use starlings_proto::{HeldRun, JobKey, JobKeys};
 
 /// Shared by the threads that compute and the one of the network.
 pub(crate) struct Held {
     limits: HoldLimits,
     scratch: PathBuf,
     shared: Mutex<Shared>,
-}
-
-/// Where a result is that a coordinator asks for.
-pub(crate) enum Found {
-    Memory(Ended),
-    Disk,
 }
 
 impl Held {
@@ -122,30 +115,24 @@ impl Held {
         large.map(|kept| kept.of.key(&mut keys)).collect()
     }
 
-    /// Where runs are that ended, by the keys of their jobs; large states among them are being put from now on.
-    pub(crate) fn claim(&self, wanted: &[JobKey]) -> HashMap<JobKey, Found> {
+    /// How runs ended that are in memory or have large states, by the keys of their jobs; the latter are being put from now on. What is
+    /// in the file was not told of as a run that goes on, so nobody asks for it.
+    pub(crate) fn claim(&self, wanted: &[JobKey]) -> HashMap<JobKey, Ended> {
         let wanted: HashSet<&JobKey> = wanted.iter().collect();
         if wanted.is_empty() {
             return HashMap::new();
         }
         let (mut keys, mut found, mut shared) = (JobKeys::default(), HashMap::new(), self.lock());
-        let on_disk = wanted.iter().filter(|key| shared.file.has(key));
-        found.extend(on_disk.map(|key| (**key, Found::Disk)));
         let mut put = Vec::new();
         for kept in &shared.runs {
             let key = kept.of.key(&mut keys);
             if wanted.contains(&key) {
                 put.extend(kept.large().cloned());
-                found.insert(key, Found::Memory(kept.ended.clone()));
+                found.insert(key, kept.ended.clone());
             }
         }
         put.iter().for_each(|large| shared.put(large, true, true));
         found
-    }
-
-    /// A result that is on disk.
-    pub(crate) fn read(&self, key: &JobKey) -> io::Result<Option<Bytes>> {
-        self.lock().file.read(key)
     }
 
     /// The coordinator needs nothing more of what it was told of and did not ask for.

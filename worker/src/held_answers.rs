@@ -1,4 +1,4 @@
-//! Answers to leases for runs that ended before the leases came: on a thread that waits for the disk and for the network.
+//! Answers to leases for runs that ended before the leases came: on a thread that waits for the network.
 //!
 //! Next file to read: [`crate::held`].
 
@@ -7,7 +7,7 @@ use std::sync::Arc;
 use starlings_proto::convert::ended;
 use starlings_proto::{JobKey, Lease, LeaseOutcome};
 
-use crate::held::{Ended, Found, Held};
+use crate::held::{Ended, Held};
 use crate::inbox::Inbox;
 use crate::outbox::Outbox;
 use crate::slots::Asked;
@@ -28,33 +28,31 @@ pub(crate) fn answer(
     let mut found = Vec::new();
     for (key, lease) in runs {
         match known.remove(&key) {
-            Some(place) => found.push((key, place, inbox.asked(lease, outbox))),
+            Some(ended) => found.push((ended, inbox.asked(lease, outbox))),
             None => outbox.answer(lease, LeaseOutcome::Withdrawn, 0.0),
         }
     }
     let Some(held) = held.filter(|_| !found.is_empty()).cloned() else { return };
-    let leases: Vec<_> = found.iter().map(|(_, _, asked)| asked.lease).collect();
-    let work = move || found.into_iter().for_each(|(key, place, asked)| one(&held, &key, place, asked));
+    let leases: Vec<_> = found.iter().map(|(_, asked)| asked.lease).collect();
+    let work = move || found.into_iter().for_each(|(ended, asked)| one(&held, ended, asked));
     if std::thread::Builder::new().name("held-answers".to_owned()).spawn(work).is_err() {
         leases.into_iter().for_each(|lease| outbox.answer(lease, LeaseOutcome::Withdrawn, 0.0));
     }
 }
 
-fn one(held: &Held, key: &JobKey, place: Found, asked: Asked) {
+fn one(held: &Held, ended: Ended, asked: Asked) {
     let Asked { lease, outbox, transfers } = asked;
-    let ended = match place {
-        Found::Memory(Ended::Large(large)) => {
+    let (answer, cost) = match ended {
+        Ended::Large(large) => {
             let put = large.put(&transfers, lease);
             held.was_put(&large, put.is_ok());
-            return outbox.answer_when_room(lease, LeaseOutcome::Ran(put), large.cost());
+            (LeaseOutcome::Ran(put), large.cost())
         }
-        Found::Memory(Ended::Inside(bytes)) => Some(bytes),
-        Found::Disk => held.read(key).ok().flatten(),
-    };
-    let (answer, cost) = match ended.as_deref().map(ended::decode) {
-        Some(Ok((result, cost))) => (LeaseOutcome::Ran(result), cost),
-        // It is made again.
-        Some(Err(_)) | None => (LeaseOutcome::Withdrawn, 0.0),
+        Ended::Inside(bytes) => match ended::decode(&bytes) {
+            Ok((result, cost)) => (LeaseOutcome::Ran(result), cost),
+            // It is made again.
+            Err(_) => (LeaseOutcome::Withdrawn, 0.0),
+        },
     };
     outbox.answer_when_room(lease, answer, cost);
 }

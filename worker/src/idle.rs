@@ -25,6 +25,11 @@ impl Idle {
         }
     }
 
+    /// A coordinator is there, which may have work.
+    pub(crate) fn begin(&mut self) {
+        self.since = Instant::now();
+    }
+
     /// The time that is left.
     pub(crate) fn left(&self) -> Duration {
         self.left_of(Duration::ZERO)

@@ -191,6 +191,7 @@ async fn serve(
         tracing::info!(run = connection.welcome.run, address = connection.address, "joined");
         let stayed_since = Instant::now();
         begin(config, slots, held, &connection);
+        idle.iter_mut().for_each(Idle::begin);
         let outbox = connection.outbox.clone();
         let ended = session::serve(*connection, slots, &setups, held, config, idle.as_mut()).await;
         outbox.end();
@@ -249,26 +250,21 @@ fn begin(config: &WorkerConfig, slots: &Slots, held: Option<&Arc<Held>>, connect
     }
 }
 
-/// Sends what is held, a portion when there is room for it.
-fn deliver(mut delivery: Delivery, mut going_on: Vec<JobKey>, outbox: Outbox) {
+/// Sends what goes on and what is held, a portion when there is room for it.
+fn deliver(mut delivery: Delivery, going_on: Vec<JobKey>, outbox: Outbox) {
     let mut first = delivery.next().unwrap_or_default();
-    // What goes on and what comes later is in the first messages: it is given away otherwise.
-    going_on.extend(delivery.keys());
-    for keys in going_on.chunks(PORTION / size_of::<JobKey>()) {
-        let mut runs = std::mem::take(&mut first);
-        runs.extend(keys.iter().map(|key| HeldRun { key: *key, ended: None }));
-        outbox.send(FromWorker::Held(runs));
-    }
-    if !first.is_empty() {
-        outbox.send(FromWorker::Held(first));
-    }
+    // What goes on is in the first message: it is given away otherwise.
+    first.extend(going_on.into_iter().map(|key| HeldRun { key, ended: None }));
+    outbox.send(FromWorker::Held(first));
     let rest = move || {
         if delivery.all(|runs| outbox.send_when_room(FromWorker::Held(runs))) {
             delivery.ended();
         }
     };
     if let Err(error) = std::thread::Builder::new().name("held-results".to_owned()).spawn(rest) {
-        tracing::warn!("results that are held are sent when they are asked for alone: {error}");
+        tracing::warn!(
+            "the rest of the results that are held is not sent, their runs are made again: {error}"
+        );
     }
 }
 

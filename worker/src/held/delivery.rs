@@ -24,20 +24,13 @@ impl Delivery {
         Self { held, most, memory, last: None }
     }
 
-    /// The keys of those that are still to come.
-    pub(crate) fn keys(&self) -> Vec<JobKey> {
-        let mut keys: Vec<_> = self.memory.iter().map(|run| run.key).collect();
-        keys.extend(self.held.lock().file.keys_after(self.last.as_ref()));
-        keys
-    }
-
-    /// The next one, where it is known to fit.
+    /// The next one.
     fn one(&mut self) -> Option<HeldRun> {
         if let Some(run) = self.memory.pop_front() {
             return Some(run);
         }
         let shared = self.held.lock();
-        let key = *shared.file.keys_after(self.last.as_ref()).next()?;
+        let key = shared.file.key_after(self.last.as_ref())?;
         match shared.file.read(&key) {
             Ok(ended) => {
                 self.last = Some(key);

@@ -43,10 +43,6 @@ impl HeldFile {
         self.places.len()
     }
 
-    pub(super) fn has(&self, key: &JobKey) -> bool {
-        self.places.contains_key(key)
-    }
-
     /// Adds a result, or leaves the file as it was.
     pub(super) fn add(&mut self, scratch: &Path, key: JobKey, ended: &[u8]) -> io::Result<()> {
         let file = match &mut self.file {
@@ -68,10 +64,10 @@ impl HeldFile {
         Ok(Some(bytes.into()))
     }
 
-    /// The keys after one, or all.
-    pub(super) fn keys_after(&self, last: Option<&JobKey>) -> impl Iterator<Item = &JobKey> {
+    /// The key after one, or the first.
+    pub(super) fn key_after(&self, last: Option<&JobKey>) -> Option<JobKey> {
         let after = last.map_or(Bound::Unbounded, Bound::Excluded);
-        self.places.range::<JobKey, _>((after, Bound::Unbounded)).map(|(key, _)| key)
+        self.places.range::<JobKey, _>((after, Bound::Unbounded)).map(|(key, _)| *key).next()
     }
 
     /// All of them have been sent.
@@ -106,7 +102,8 @@ mod tests {
             assert_eq!(held.read(&[3; 32]).unwrap().unwrap(), vec![3; 13]);
         }
         assert_eq!(held.read(&[9; 32]).unwrap(), None);
-        assert_eq!(held.keys_after(Some(&[2; 32])).collect::<Vec<_>>(), [&[3; 32], &[4; 32]]);
+        let after = |n: u8| held.key_after(Some(&[n; 32]));
+        assert_eq!((held.key_after(None), after(3), after(4)), (Some([0; 32]), Some([4; 32]), None));
         held.expire(Duration::ZERO);
         held.was_sent();
         held.expire(Duration::from_secs(1000));
