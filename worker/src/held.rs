@@ -131,7 +131,9 @@ impl Held {
                 found.insert(key, kept.ended.clone());
             }
         }
-        put.iter().for_each(|large| shared.put(large, true, true));
+        for large in &put {
+            shared.put(large, true, true);
+        }
         found
     }
 

@@ -36,7 +36,9 @@ pub(crate) fn answer(
     let leases: Vec<_> = found.iter().map(|(_, asked)| asked.lease).collect();
     let work = move || found.into_iter().for_each(|(ended, asked)| one(&held, ended, asked));
     if std::thread::Builder::new().name("held-answers".to_owned()).spawn(work).is_err() {
-        leases.into_iter().for_each(|lease| outbox.answer(lease, LeaseOutcome::Withdrawn, 0.0));
+        for lease in leases {
+            outbox.answer(lease, LeaseOutcome::Withdrawn, 0.0);
+        }
     }
 }
 

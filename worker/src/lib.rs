@@ -173,19 +173,14 @@ async fn serve(
     loop {
         let seen = held.and_then(|held| held.run());
         let mut patience = Patience::new(config.patience, idle.as_mut(), slots, owes, is_told);
-        let dialled = dial::dial(config, &way, &hello, &mut patience, seen).await?;
-        let dropped = told(patience.dropped());
-        let connection = match dialled {
-            Dialled::Idle => {
-                let reason = idle.map(|idle| idle.reason()).unwrap_or_default() + &dropped;
+        let connection = match dial::dial(config, &way, &hello, &mut patience, seen).await? {
+            Dialled::Connected(connection) => connection,
+            other => {
+                let dropped = told(patience.dropped());
+                let end = if dropped.is_empty() { "" } else { ";" };
+                let reason = unserved(&other, sessions, idle.as_ref()) + end + &dropped;
                 return Ok(report(slots, sessions, &reason));
             }
-            Dialled::Cancelled if sessions == 0 => {
-                return Ok(report(slots, sessions, "cancelled before it was connected"));
-            }
-            Dialled::Cancelled => return Ok(report(slots, sessions, &format!("cancelled{dropped}"))),
-            Dialled::Over(reason) => return Ok(report(slots, sessions, &reason)),
-            Dialled::Connected(connection) => connection,
         };
         sessions += 1;
         tracing::info!(run = connection.welcome.run, address = connection.address, "joined");
@@ -225,6 +220,16 @@ async fn serve(
                 (config.tell)(&News::Lost { reason, computing: (running + queued) as usize });
             }
         }
+    }
+}
+
+/// Why a worker ends that is not connected.
+fn unserved(dialled: &Dialled, sessions: u64, idle: Option<&Idle>) -> String {
+    match dialled {
+        Dialled::Idle => idle.map(Idle::reason).unwrap_or_default(),
+        Dialled::Over(reason) => reason.clone(),
+        Dialled::Cancelled if sessions == 0 => "cancelled before it was connected".to_owned(),
+        Dialled::Cancelled | Dialled::Connected(_) => "cancelled".to_owned(),
     }
 }
 

@@ -74,7 +74,9 @@ pub(crate) async fn serve(
             _ = beats.tick() => {
                 let (running, queued) = slots.load();
                 let queued = queued + inbox.len() as u32;
-                held.iter().for_each(|held| held.look());
+                if let Some(held) = held {
+                    held.look();
+                }
                 connection.outbox.send(FromWorker::Heartbeat { running, queued });
                 if let Some(idle) = &mut idle {
                     idle.look(slots, queued > 0 || blocks.are_given());

@@ -74,7 +74,8 @@ impl Shared {
         while self.memory() > limits.memory {
             let moved = self.on_disk() < limits.disk && self.spill(scratch).unwrap_or(false);
             // Of a coordinator that is there, what it has not asked for is made again.
-            if !moved && !(self.is_connected && self.remove_first(|_| true, &mut gone)) {
+            let makes_room = moved || self.is_connected && self.remove_first(|_| true, &mut gone);
+            if !makes_room {
                 return (self.is_connected, gone);
             }
         }

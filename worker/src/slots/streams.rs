@@ -59,6 +59,9 @@ impl Slots {
     }
 }
 
+/// Nobody needs what a task computed.
+struct RunIsOver;
+
 impl Shared {
     /// Answers a task that ran; held is the result whether there is somebody to answer or not.
     pub(super) fn finished(&self, task: Arc<Task>, result: Result<Prediction, ParticleError>, cost: f64) {
@@ -76,7 +79,7 @@ impl Shared {
     }
 
     fn ended_small(&self, task: &Arc<Task>, result: Result<Prediction<State>, ParticleError>, cost: f64) {
-        let Some(stream) = self.over(task, Ended::inside(&result, cost), false) else { return };
+        let Ok(stream) = self.over(task, Ended::inside(&result, cost), false) else { return };
         match (task.asked().take(), stream) {
             (Some(Asked { lease, outbox, .. }), _) => {
                 outbox.answer_when_room(lease, LeaseOutcome::Ran(result), cost);
@@ -93,7 +96,7 @@ impl Shared {
     /// A stream that came meanwhile knows the run as one that goes on: it asks for the result.
     fn ended_large(&self, task: Arc<Task>, large: Arc<Large>) {
         let is_put = task.asked().is_some();
-        if self.over(&task, Ended::Large(Arc::clone(&large)), is_put).is_none() {
+        if self.over(&task, Ended::Large(Arc::clone(&large)), is_put).is_err() {
             return;
         }
         let Some(Asked { lease, outbox, transfers }) = task.asked().take() else {
@@ -123,17 +126,17 @@ impl Shared {
         gone
     }
 
-    /// Holds how a task ended, which computes no more; the stream of now. Nothing where its run is over.
-    fn over(&self, task: &Arc<Task>, ended: Ended, is_put: bool) -> Option<Option<Outbox>> {
+    /// Holds how a task ended, which computes no more; the stream of now.
+    fn over(&self, task: &Arc<Task>, ended: Ended, is_put: bool) -> Result<Option<Outbox>, RunIsOver> {
         let is_it = |running: &Arc<Task>| Arc::ptr_eq(running, task);
         if !self.lock().running.iter().any(is_it) {
-            return None;
+            return Err(RunIsOver);
         }
         let has_room = self.held.as_ref().is_none_or(|held| held.keep(task.of(), ended, is_put));
         let mut queue = self.lock();
         queue.running.retain(|running| !is_it(running));
         Self::note_room(&mut queue, has_room);
-        Some(queue.stream.clone())
+        Ok(queue.stream.clone())
     }
 
     /// No further run is begun where no more can be held.

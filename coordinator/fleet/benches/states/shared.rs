@@ -75,7 +75,9 @@ fn cycle(
     }
     drop(workers);
     fleet.close();
-    walls.iter_mut().for_each(|walls| walls.sort_unstable());
+    for walls in &mut walls {
+        walls.sort_unstable();
+    }
     let [ran, mixed, own] = &walls;
     let own = if own.is_empty() { Duration::ZERO } else { median(own) };
     Ok((median(ran), median(mixed), own))
