@@ -18,8 +18,9 @@ use starlings_coordinator::study::trial::trial;
 use starlings_coordinator::study::{RunFolder, Study};
 
 use crate::console::{line, note};
+use crate::disk;
 use crate::failure::Failure;
-use crate::fleet_session::{FleetArgs, FleetSession, Out};
+use crate::fleet_session::{Entrance, FleetArgs, FleetSession, Out};
 use crate::interrupt;
 use crate::load::{is_outside, load_where};
 use crate::progress::Display;
@@ -93,8 +94,15 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     if !is_away && !is_known {
         trial(&study).map_err(Failure::input)?;
     }
-    let entrance = plan.enter()?;
-    let folder = run_folder::open(Purpose::Explanation, &study, args.out.as_deref(), args.resume)?;
+    disk::check_states(&study, plan.place().as_deref(), !args.resume.is_first())?;
+    let entrance = Entrance::take(&plan, args.out.as_deref())?;
+    let folder = run_folder::open(
+        Purpose::Explanation,
+        &study,
+        args.out.as_deref(),
+        plan.place().is_some(),
+        args.resume,
+    )?;
     if load_findings(&folder.store).map_err(Failure::run)?.is_some() {
         let path = folder.path.display();
         note(format_args!("the explanation in {path} is finished already; writing its files again"));
@@ -105,7 +113,7 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     let mut session = FleetSession::listen(&study, &plan, entrance, identity, &display)?;
     session.start_workers(&study, &plan, Some(&folder.path))?;
     if is_away && let Err(failure) = session.trial(&mut study, None, Some(&folder.store)) {
-        session.close();
+        session.close(false);
         run_folder::give_up(folder, args.resume);
         return Err(failure);
     }
@@ -115,7 +123,7 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     let mut context = Context { clock: &clock, watch: &mut watch, events: Some(&session.events), earlier_s };
     let result = explain(&study, &mut session.fleet, &folder.store, &mut context, &options);
     display.finish();
-    session.close();
+    session.close(result.is_ok());
     let found = result.map_err(|error| failed(&error, &folder.path))?;
     save_findings(&folder, &found).map_err(Failure::run)?;
     write(&folder, args.json)

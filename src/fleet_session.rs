@@ -2,10 +2,11 @@
 //!
 //! Shared by every command that runs the model on the fleet. Next file to read: [`crate::run`].
 
+mod entrance;
 mod plan;
 mod relay;
 
-use std::net::{IpAddr, SocketAddr};
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock, mpsc};
 use std::time::Duration;
@@ -23,12 +24,14 @@ use tokio_util::sync::CancellationToken;
 
 use crate::console::note;
 use crate::failure::Failure;
-use crate::fleet_values::{address, memory};
+use crate::fleet_values::{address, alone, host_of, memory};
 use crate::interrupt;
 use crate::load::end_solvers;
 use crate::progress::Display;
 use crate::solvers::own_program;
-use plan::{ACCESS, AccessPlan, Entrance, Plan, failed};
+pub(crate) use entrance::Entrance;
+use entrance::failed;
+use plan::{ACCESS, AccessPlan, Plan};
 use relay::relay;
 
 /// Which workers run the model.
@@ -75,8 +78,12 @@ impl FleetArgs {
             ));
         }
         let address = self.listen.as_deref().map(address).transpose()?;
-        let named = self.listen.as_deref().and_then(|text| Some(text.rsplit_once(':')?.0.to_owned()));
-        let host = named.filter(|host| host.trim_matches(['[', ']']).parse::<IpAddr>().is_err());
+        let host = self.listen.as_deref().and_then(host_of).map(str::to_owned);
+        if let (Some(host), Some(address)) = (&host, address)
+            && let Some(warning) = alone(host, address)
+        {
+            note(format_args!("warning: --listen: {warning}"));
+        }
         let access = match (address, self.insecure) {
             (Some(_), false) => Some(self.access_plan(out)?),
             _ => None,
@@ -87,9 +94,8 @@ impl FleetArgs {
 
     fn access_plan(&self, out: Option<&Out<'_>>) -> Result<AccessPlan, Failure> {
         match (&self.access, out) {
-            (Some(file), _) => Ok(AccessPlan::File(file.clone())),
-            (None, Some(Out(Some(folder)))) => Ok(AccessPlan::File(folder.join(ACCESS))),
-            (None, Some(Out(None))) => Ok(AccessPlan::RunFolder),
+            (Some(file), _) => Ok(AccessPlan::Named(file.clone())),
+            (None, Some(Out(folder))) => Ok(AccessPlan::RunFolder(folder.map(|folder| folder.join(ACCESS)))),
             (None, None) => Err(Failure::input(
                 "this command makes no run folder: say with --access FILE where the access file goes by which workers prove \
                  themselves",
@@ -187,8 +193,8 @@ impl FleetSession {
         folder: Option<&Path>,
     ) -> Result<(), Failure> {
         let file = match &plan.access {
-            Some(AccessPlan::File(file)) => file.clone(),
-            Some(AccessPlan::RunFolder) => folder.unwrap_or(Path::new(".")).join(ACCESS),
+            Some(AccessPlan::Named(file)) => file.clone(),
+            Some(AccessPlan::RunFolder(_)) => folder.unwrap_or(Path::new(".")).join(ACCESS),
             None => {
                 note(format_args!(
                     "warning: --insecure: nothing is encrypted, and whoever reaches {address} joins this run, reads its data and can \
@@ -196,7 +202,7 @@ impl FleetSession {
                 ));
                 let start =
                     format!("starlings worker --connect {address} --insecure{}", plan.states_option());
-                self.say_how(format!("listening on {address}; start workers with: {start}"));
+                self.say_how(address, &start);
                 return Ok(());
             }
         };
@@ -205,14 +211,13 @@ impl FleetSession {
         }
         let absolute = std::path::absolute(&file).unwrap_or(file);
         let name = shell_words::quote(&absolute.to_string_lossy()).into_owned();
-        self.say_how(format!(
-            "listening on {address}; start workers with: starlings worker --access {name}{}",
-            plan.states_option()
-        ));
+        self.say_how(address, &format!("starlings worker --access {name}{}", plan.states_option()));
         Ok(())
     }
 
-    fn say_how(&self, invitation: String) {
+    fn say_how(&mut self, address: SocketAddr, start: &str) {
+        self.fleet.started_by(start);
+        let invitation = format!("listening on {address}; start workers with: {start}");
         note(&invitation);
         let _ = self.invitation.set(invitation);
     }
@@ -233,8 +238,11 @@ impl FleetSession {
         })
     }
 
-    /// Ends the fleet and its workers.
-    pub(crate) fn close(self) {
+    /// Ends the fleet and its workers, and says to those whether the command is done.
+    pub(crate) fn close(self, is_done: bool) {
+        if !is_done {
+            self.fleet.handle().break_off();
+        }
         let Self { fleet, local, watcher, mut access, .. } = self;
         // Before the workers leave: one that stays looks there for what comes next.
         if let Some(access) = &mut access {

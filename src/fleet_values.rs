@@ -1,6 +1,6 @@
 //! What the values of options of the fleet mean.
 
-use std::net::{SocketAddr, ToSocketAddrs};
+use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
 
 use starlings_coordinator::study::bytes_of;
 
@@ -8,10 +8,31 @@ use crate::failure::Failure;
 
 /// Where to listen, as it was asked for.
 pub(crate) fn address(text: &str) -> Result<SocketAddr, Failure> {
-    text.to_socket_addrs()
-        .ok()
-        .and_then(|mut all| all.next())
+    let all: Vec<_> = text.to_socket_addrs().map(Iterator::collect).unwrap_or_default();
+    // A name may lead to this machine alone and to its network.
+    let others = all.iter().find(|address| !address.ip().is_loopback());
+    others
+        .or(all.first())
+        .copied()
         .ok_or_else(|| Failure::input(format!("--listen {text}: expected HOST:PORT, such as 127.0.0.1:7000")))
+}
+
+/// The host of where to listen, where it is named and not numbered.
+pub(crate) fn host_of(listen: &str) -> Option<&str> {
+    let host = listen.rsplit_once(':')?.0;
+    Some(host).filter(|host| host.trim_matches(['[', ']']).parse::<IpAddr>().is_err())
+}
+
+/// What to say of a name that leads to this machine alone; one that says so itself is meant so.
+pub(crate) fn alone(host: &str, address: SocketAddr) -> Option<String> {
+    let is_meant = host.is_empty() || host.eq_ignore_ascii_case("localhost");
+    (address.ip().is_loopback() && !is_meant).then(|| {
+        format!(
+            "{host} is {} here, which no other machine can reach: give an address of this machine, or 0.0.0.0:{} for all of them",
+            address.ip(),
+            address.port()
+        )
+    })
 }
 
 /// Bytes of an amount such as `8 GiB`.
@@ -20,4 +41,20 @@ pub(crate) fn memory(text: &str) -> Result<usize, String> {
     bytes
         .map(|bytes| bytes as usize)
         .ok_or_else(|| "expected a number with its unit, such as \"8 GiB\"".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_that_leads_to_this_machine_alone_is_told_and_one_that_means_it_is_not() {
+        let loopback = "127.0.1.1:7000".parse::<SocketAddr>().expect("an address");
+        let told = alone("login1", loopback).expect("it is told");
+        assert!(told.starts_with("login1 is 127.0.1.1 here") && told.contains("0.0.0.0:7000"), "{told}");
+        assert_eq!(alone("localhost", loopback), None);
+        assert_eq!(alone("login1", "10.0.0.7:7000".parse().expect("an address")), None);
+        assert_eq!(host_of("login1:7000"), Some("login1"));
+        assert_eq!([host_of("127.0.0.1:0"), host_of("[::1]:0")], [None, None]);
+    }
 }

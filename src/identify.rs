@@ -13,8 +13,9 @@ use starlings_estimators::BATCH;
 
 use crate::console::{line, note, number, table, text};
 use crate::csv_file::{self, StudyLocation};
+use crate::disk;
 use crate::failure::Failure;
-use crate::fleet_session::{FleetArgs, FleetSession};
+use crate::fleet_session::{Entrance, FleetArgs, FleetSession};
 use crate::interrupt;
 use crate::load::{is_outside, load_where};
 use crate::progress::Display;
@@ -59,8 +60,10 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if !is_away {
         dry_run(&mut study, &BATCH, Depth::First).map_err(Failure::input)?;
     }
+    disk::check_states(&study, plan.place().as_deref(), false)?;
     let display = Arc::new(Display::new(args.json));
-    let mut session = FleetSession::listen(&study, &plan, plan.enter()?, RunIdentity::new(), &display)?;
+    let mut session =
+        FleetSession::listen(&study, &plan, Entrance::take(&plan, None)?, RunIdentity::new(), &display)?;
     session.start_workers(&study, &plan, None)?;
     if is_away {
         session.trial(&mut study, Some(&BATCH), None)?;
@@ -75,7 +78,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     }
     let result = identify(&study, &mut session.fleet, &at);
     display.finish();
-    session.close();
+    session.close(result.is_ok());
     let found = result.map_err(|error| match error {
         IdentifyError::Run(cause) if cause.is_cancelled() => {
             interrupt::failure("nothing is kept of it: start again")

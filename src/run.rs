@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use clap::Parser;
+use starlings_coordinator::fleet::Fleet;
 use starlings_coordinator::report;
 use starlings_coordinator::study::constants::HangsOn;
 use starlings_coordinator::study::store::Purpose;
@@ -12,8 +13,9 @@ use starlings_coordinator::study::trial::{Depth, dry_run};
 use starlings_coordinator::study::{Progress, RunContext, Summary, run as study_run};
 
 use crate::console::{line, note, number, table};
+use crate::disk;
 use crate::failure::Failure;
-use crate::fleet_session::{FleetArgs, FleetSession, Out};
+use crate::fleet_session::{Entrance, FleetArgs, FleetSession, Out};
 use crate::interrupt;
 use crate::load::{is_outside, load_where};
 use crate::progress::Display;
@@ -51,8 +53,11 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     if !is_away && !is_known {
         dry_run(&mut study, kind, Depth::First).map_err(Failure::input)?;
     }
-    let entrance = plan.enter()?;
-    let mut folder = run_folder::open(Purpose::Run, &study, args.out.as_deref(), args.resume)?;
+    let entrance = Entrance::take(&plan, args.out.as_deref())?;
+    let place = plan.place();
+    disk::check_states(&study, place.as_deref(), !args.resume.is_first())?;
+    let mut folder =
+        run_folder::open(Purpose::Run, &study, args.out.as_deref(), place.is_some(), args.resume)?;
     if let Some(summary) = folder.summary().map_err(Failure::run)? {
         note(format_args!(
             "the run in {} is finished already; writing its files again",
@@ -62,11 +67,16 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
         return print(&summary, &folder.path, args.json);
     }
     let display = Arc::new(Display::new(args.json));
+    let moved = run_folder::moved(&folder, place.as_deref())?.unwrap_or_default();
     let identity = folder.store.begin().map_err(Failure::run)?;
     let mut session = FleetSession::listen(&study, &plan, entrance, identity, &display)?;
     session.start_workers(&study, &plan, Some(&folder.path))?;
     if is_away && let Err(failure) = session.trial(&mut study, Some(kind), Some(&folder.store)) {
-        session.close();
+        let states = session.fleet.states().cloned().filter(|_| args.resume.is_first());
+        session.close(false);
+        if let Some(states) = states {
+            states.clear();
+        }
         run_folder::give_up(folder, args.resume);
         return Err(failure);
     }
@@ -81,14 +91,15 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     };
     let result = study_run::run(&study, &mut session.fleet, &mut folder, &mut context);
     display.finish();
-    session.close();
+    session.close(result.is_ok());
     let path = folder.path.display();
     let summary = result.map_err(|error| {
         let remedy = format!("the run so far is in {path}: continue it with --out {path} --resume");
         if error.is_cancelled() {
             return interrupt::failure(&remedy);
         }
-        Failure::run(format!("{error}\n  {remedy}"))
+        let moved = if error.misses_a_piece() { &*moved } else { "" };
+        Failure::run(format!("{error}{moved}\n  {remedy}"))
     })?;
     report::write_files(&folder).map_err(Failure::run)?;
     print(&summary, &folder.path, args.json)

@@ -22,17 +22,24 @@ pub(crate) struct Resume {
 }
 
 impl Resume {
+    /// Whether the command begins anew.
+    pub(crate) fn is_first(self) -> bool {
+        !self.resume
+    }
+
     /// Whether the model was tried before in this folder, by this program: a run folder is made after the trial.
     pub(crate) fn was_tried(self, out: Option<&Path>) -> bool {
         self.resume && !self.other_build && out.is_some_and(|out| out.join("run.db").is_file())
     }
 }
 
-/// Opens the folder `out`, or one under `runs` with the names of the study and of the command and the time of now.
+/// Opens the folder `out`, or one under `runs` with the names of the study and of the command and the time of now; `shares` says that
+/// large states stand in a folder that machines share.
 pub(crate) fn open(
     purpose: Purpose,
     study: &Study,
     out: Option<&Path>,
+    shares: bool,
     resume: Resume,
 ) -> Result<RunFolder, Failure> {
     let stamp = jiff::Timestamp::now().strftime("%Y%m%d-%H%M%S").to_string();
@@ -42,7 +49,7 @@ pub(crate) fn open(
     };
     let default = || Path::new("runs").join(format!("{}{kind}-{stamp}", study.name));
     let path: PathBuf = out.map_or_else(default, Path::to_owned);
-    disk::check(study, &path)?;
+    disk::check(study, &path, shares, resume.resume)?;
     let command = std::env::args().skip(1).collect::<Vec<_>>().join(" ");
     let command = format!("starlings {command}");
     if resume.resume {
@@ -50,6 +57,24 @@ pub(crate) fn open(
         return RunFolder::resume(purpose, &path, study, &call).map_err(|error| failed(&error));
     }
     RunFolder::create(purpose, &path, study, &command, &stamp).map_err(|error| failed(&error))
+}
+
+/// Key of where large states of a run stand: the folder that machines share, empty where they stand in the run folder.
+const STATES: &str = "states_place";
+
+/// What to say where a piece of a state is missing in a run whose states stood elsewhere before; notes where they stand from now on.
+pub(crate) fn moved(folder: &RunFolder, place: Option<&str>) -> Result<Option<String>, Failure> {
+    let now = place.unwrap_or_default();
+    let before = folder.store.meta(STATES).map_err(Failure::run)?;
+    let Some(before) = before else {
+        folder.store.set_meta(STATES, now).map_err(Failure::run)?;
+        return Ok(None);
+    };
+    let own = folder.path.join("states");
+    Ok((before != now).then(|| match &*before {
+        "" => format!("; the run was begun without --states, and its states stand in {}: leave it out", own.display()),
+        before => format!("; the run was begun with --states {before}: name the same folder again, by its path on this machine"),
+    }))
 }
 
 /// Removes a folder that was made for a command whose study cannot be run; one that was there before stays.

@@ -38,7 +38,7 @@ pub(crate) struct Args {
     /// Runs at the same time; the number of cores without it.
     #[arg(long, value_name = "N")]
     slots: Option<usize>,
-    /// Seconds to keep dialling while nobody answers.
+    /// Seconds to keep dialling while nobody answers, and to keep the results that a coordinator may lack.
     #[arg(long, default_value_t = 600.0, value_name = "SECONDS", allow_negative_numbers = true)]
     patience: f64,
     /// End when the coordinator's connection closes instead of dialling again.

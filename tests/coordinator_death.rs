@@ -71,7 +71,10 @@ fn workers_outlive_their_coordinator_and_no_run_is_made_twice() {
     assert_eq!(bytes(&whole, "posterior.csv"), bytes(&broken, "posterior.csv"));
     assert_eq!(text.matches("finished runs along").count(), 2, "both come back: {text}");
     let said = workers.map(said);
-    for words in ["connected to", "lost the coordinator", "delivered", "results that were held"] {
+    let connected = format!("connected to {address} for the run `");
+    for words in
+        [&*connected, "lost the coordinator", "delivered", "results that were held", "ends: the run is over"]
+    {
         assert!(said.iter().all(|said| said.contains(words)), "`{words}` is missing: {said:?}");
     }
     let made: i64 = said.iter().map(|said| made(said)).sum();

@@ -92,6 +92,8 @@ fn a_resume_without_the_shared_folder_of_its_states_says_what_is_missing() {
     let (code, _, stderr) = output(&mut run(&study, &out, &["--resume"]));
     assert_eq!(code, 1, "{stderr}");
     assert!(stderr.contains("of a particle's state is missing: expected the file"), "{stderr}");
+    let remedy = format!("begun with --states {}: name the same folder again", place.display());
+    assert!(stderr.contains(&remedy), "{stderr}");
     for wrong in ["s3://bucket/states", ""] {
         let (code, _, stderr) = output(&mut run(&study, &out, &["--resume", "--states", wrong]));
         assert_eq!(code, 2, "{stderr}");

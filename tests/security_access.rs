@@ -252,6 +252,8 @@ fn a_wait_for_workers_names_the_access_file_and_the_last_refused_caller() {
         "no worker is connected",
         "one caller was refused",
         "does not speak TLS",
+        parts(&out)[0].to_str().unwrap(),
+        "`patience` under `[fleet]`",
         "starlings worker --access",
     ] {
         assert!(said.contains(words), "`{words}` is missing in {said}");

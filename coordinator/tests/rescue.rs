@@ -4,7 +4,7 @@ mod study_kit;
 
 use starlings_coordinator::fleet::InProcess;
 use starlings_coordinator::study::RunError;
-use study_kit::fleets::{At, Failing};
+use study_kit::fleets::{At, Failing, Mortal};
 use study_kit::{Case, Done, csv, grid, linear, normals};
 
 /// A decay whose rate k has an upper limit in the model, the wall: beyond it the logarithm is no number.
@@ -177,5 +177,28 @@ fn a_model_that_always_fails_ends_the_run_and_says_why() {
         let words =
             if estimator.contains("batch") { "cannot be run at the prior mean" } else { "made to fail" };
         assert!(text.contains(words), "{estimator}: {text}");
+    }
+}
+
+#[test]
+fn failures_stand_in_the_result_of_a_resumed_run_as_if_it_had_never_been_broken() {
+    for estimator in ["passes = 2", "kind = \"batch\"\nspread = 0.8"] {
+        let case = walled(estimator, 1.3);
+        let whole = case.run_on(&mut InProcess::new(1)).unwrap();
+        let failures = &whole.summary.failures;
+        assert!(!failures.is_empty(), "{estimator}");
+        let path = case.fresh();
+        let mut starts = 0;
+        // Every start makes a few batches more.
+        let resumed = loop {
+            starts += 1;
+            if let Ok(done) = case.go(&path, &mut Mortal::new(starts)) {
+                break done;
+            }
+        };
+        assert!(starts > 2, "{estimator}");
+        assert_eq!(&resumed.summary.failures, failures, "{estimator}");
+        assert_eq!(resumed.summary.warnings, whole.summary.warnings, "{estimator}");
+        assert_eq!(resumed.csv, whole.csv, "{estimator}");
     }
 }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum PieceError {
     /// The folder refuses.
-    #[error("cannot {what} {} for the states of particles: {source}", path.display())]
+    #[error("cannot {what} {} for the states of particles: {source}{}", path.display(), remedy(source))]
     Folder {
         /// What was tried.
         what: &'static str,
@@ -32,4 +32,16 @@ pub enum PieceError {
         /// Where it stands.
         path: PathBuf,
     },
+}
+
+fn remedy(source: &std::io::Error) -> &'static str {
+    match source.kind() {
+        std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded => {
+            "; its disk is full: free some space, or name a folder on another disk"
+        }
+        std::io::ErrorKind::PermissionDenied | std::io::ErrorKind::ReadOnlyFilesystem => {
+            "; name a folder that this user may write"
+        }
+        _ => "",
+    }
 }

@@ -166,7 +166,19 @@ impl AccessFile {
     /// # Errors
     /// When it cannot be written.
     pub fn write(&self, path: &Path) -> io::Result<()> {
-        private_file::write(path, &(serde_json::to_string_pretty(self)? + "\n"))
+        private_file::write(path, &self.text()?)
+    }
+
+    /// The same where nothing stands yet.
+    ///
+    /// # Errors
+    /// When something stands there, or it cannot be written.
+    pub fn write_new(&self, path: &Path) -> io::Result<()> {
+        private_file::write_new(path, &self.text()?)
+    }
+
+    fn text(&self) -> io::Result<String> {
+        Ok(serde_json::to_string_pretty(self)? + "\n")
     }
 }
 

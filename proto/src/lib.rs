@@ -9,6 +9,7 @@ pub mod access;
 pub mod adapters;
 mod codec;
 pub mod convert;
+pub mod host;
 pub mod private_file;
 pub mod socket;
 pub mod spent;

@@ -7,6 +7,9 @@ use std::io::{self, Read, Write};
 use std::os::unix::fs::{MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 
+use rustix::fs::OFlags;
+use tempfile::NamedTempFile;
+
 /// What its owner may do with such a file, and nobody else.
 const OWNER_ONLY: u32 = 0o600;
 
@@ -63,11 +66,9 @@ pub enum PrivateFileError {
 pub fn read(path: &Path) -> Result<String, PrivateFileError> {
     let unreadable = |source| PrivateFileError::Unreadable { path: path.to_owned(), source };
     let no_file = || PrivateFileError::NoFile { path: path.to_owned() };
-    // A pipe would be waited for when it is opened.
-    if !fs::metadata(path).map_err(unreadable)?.is_file() {
-        return Err(no_file());
-    }
-    let file = File::open(path).map_err(unreadable)?;
+    // A pipe would be waited for otherwise.
+    let unwaiting = OFlags::NONBLOCK.bits().cast_signed();
+    let file = OpenOptions::new().read(true).custom_flags(unwaiting).open(path).map_err(unreadable)?;
     // Asked of what was opened: a name can be given to another file meanwhile.
     check(path, &file.metadata().map_err(unreadable)?)?;
     let mut text = String::new();
@@ -98,13 +99,24 @@ fn check(path: &Path, found: &Metadata) -> Result<(), PrivateFileError> {
 /// # Errors
 /// When it cannot be written or renamed.
 pub fn write(path: &Path, text: &str) -> io::Result<()> {
-    let name = path.file_name().ok_or_else(|| io::Error::other("it has no name"))?.to_string_lossy();
-    let partial = path.with_file_name(format!(".{name}.{}.partial", std::process::id()));
-    // Left by a process of the same number that was killed.
-    let _ = fs::remove_file(&partial);
-    create(&partial, text).and_then(|_| fs::rename(&partial, path)).inspect_err(|_| {
-        let _ = fs::remove_file(&partial);
-    })
+    beside(path, text)?.persist(path).map(drop).map_err(|error| error.error)
+}
+
+/// The same where nothing stands yet.
+///
+/// # Errors
+/// When something stands there, or it cannot be written or renamed.
+pub fn write_new(path: &Path, text: &str) -> io::Result<()> {
+    beside(path, text)?.persist_noclobber(path).map(drop).map_err(|error| error.error)
+}
+
+/// A file with this text beside a place, which goes unless it is put there.
+fn beside(path: &Path, text: &str) -> io::Result<NamedTempFile> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut builder = tempfile::Builder::new();
+    let mut file = builder.prefix(".access-").suffix(".partial").tempfile_in(folder)?;
+    fill(file.as_file_mut(), text)?;
+    Ok(file)
 }
 
 /// Makes a file for its owner alone, where there is none yet, and keeps it open.
@@ -113,11 +125,15 @@ pub fn write(path: &Path, text: &str) -> io::Result<()> {
 /// When there is one, or it cannot be written.
 pub fn create(path: &Path, text: &str) -> io::Result<File> {
     let mut file = OpenOptions::new().read(true).write(true).create_new(true).mode(OWNER_ONLY).open(path)?;
+    fill(&mut file, text).inspect_err(|_| drop(fs::remove_file(path)))?;
+    Ok(file)
+}
+
+fn fill(file: &mut File, text: &str) -> io::Result<()> {
     // The mode at its making is what the system's mask leaves of it.
     file.set_permissions(Permissions::from_mode(OWNER_ONLY))?;
     file.write_all(text.as_bytes())?;
-    file.sync_all()?;
-    Ok(file)
+    file.sync_all()
 }
 
 #[cfg(test)]
@@ -155,6 +171,21 @@ mod tests {
         assert_eq!(fs::read_to_string(&other).unwrap(), "theirs");
         assert!(fs::symlink_metadata(&own).unwrap().is_file());
         assert_eq!(read(&own).unwrap(), "mine");
+    }
+
+    #[test]
+    fn a_named_pipe_is_refused_at_once_and_a_new_file_takes_no_place() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("pipe");
+        let made = std::process::Command::new("mkfifo").arg(&path).status().unwrap();
+        assert!(made.success());
+        // Nobody ever writes into it.
+        assert!(matches!(read(&path), Err(PrivateFileError::NoFile { .. })));
+        let error = write_new(&path, "mine").unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::AlreadyExists);
+        write_new(&folder.path().join("new"), "mine").unwrap();
+        assert_eq!(read(&folder.path().join("new")).unwrap(), "mine");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2, "nothing else is left");
     }
 
     #[test]

@@ -1,12 +1,11 @@
-//! What a command asks of its fleet, checked, and what it takes before it writes anything.
+//! What a command asks of its fleet, checked.
+//!
+//! Next file to read: [`super::entrance`].
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
-use starlings_coordinator::fleet::access::{Access, AccessFault};
-use starlings_coordinator::fleet::{Bound, PlaceName, RunIdentity, StateStore};
-
-use crate::failure::Failure;
+use starlings_coordinator::fleet::{PlaceName, RunIdentity, StateStore};
 
 /// What was asked for, checked.
 pub(crate) struct Plan {
@@ -30,25 +29,24 @@ pub(crate) struct Plan {
 
 /// Where an access file goes.
 pub(super) enum AccessPlan {
-    /// Here.
-    File(PathBuf),
-    /// Into the run folder, which is made later.
-    RunFolder,
+    /// Where the command line says.
+    Named(PathBuf),
+    /// Into the run folder, which may be made later: its path there, where the folder was named.
+    RunFolder(Option<PathBuf>),
 }
 
 /// Name of the access file in a run folder.
 pub(super) const ACCESS: &str = "access.json";
 
-/// What a command takes before it writes anything: an address or an access file in use must leave nothing behind.
-pub(crate) struct Entrance {
-    pub(super) bound: Option<Bound>,
-    pub(super) access: Option<Access>,
-}
-
 impl Plan {
     /// The same for a command that goes on from the states that it left in the shared folder.
     pub(crate) fn keeping_states(self) -> Self {
         Self { keeps_states: true, ..self }
+    }
+
+    /// The folder for large states that machines share, as it is named here.
+    pub(crate) fn place(&self) -> Option<String> {
+        self.states.as_ref().map(ToString::to_string)
     }
 
     /// Where large states of a run are kept.
@@ -65,20 +63,4 @@ impl Plan {
         let quoted = |place: &PlaceName| format!(" --states {}", shell_words::quote(&place.to_string()));
         self.states.as_ref().map(quoted).unwrap_or_default()
     }
-
-    /// Takes the address and the secrets of the access file.
-    pub(crate) fn enter(&self) -> Result<Entrance, Failure> {
-        let bound = self.address.map(Bound::new).transpose().map_err(Failure::run)?;
-        let file = match &self.access {
-            None => return Ok(Entrance { bound, access: None }),
-            Some(AccessPlan::File(file)) => Some(file.as_path()),
-            Some(AccessPlan::RunFolder) => None,
-        };
-        let access = Access::at(file).map_err(|fault| failed(&fault))?;
-        Ok(Entrance { bound, access: Some(access) })
-    }
-}
-
-pub(super) fn failed(fault: &AccessFault) -> Failure {
-    if fault.is_input() { Failure::input(format!("--access: {fault}")) } else { Failure::run(fault) }
 }

@@ -10,6 +10,9 @@ use starlings_worker::{INHERITED, WorkerConfig, check_address};
 use crate::console::note;
 use crate::failure::Failure;
 
+/// How long a worker that stays waits for work, where that is not said.
+const IDLE: Duration = Duration::from_secs(600);
+
 /// The way to the coordinator.
 #[derive(Args)]
 pub(crate) struct ContactArgs {
@@ -25,9 +28,10 @@ pub(crate) struct ContactArgs {
     /// When the run is over, wait for the next command that writes the access file and serve it too.
     #[arg(long, requires = "access", conflicts_with = "once")]
     stay: bool,
-    /// With --stay, end after so long without work, such as 90s, 10m or 1h30m.
-    #[arg(long, default_value = "10m", value_name = "TIME", value_parser = duration)]
-    idle: Duration,
+    /// With --stay, end after so long without work, such as 90s, 10m or 1h30m; 10m without it. Results that a lost coordinator may
+    /// not have are kept for --patience at least.
+    #[arg(long, value_name = "TIME", value_parser = duration, requires = "stay")]
+    idle: Option<Duration>,
 }
 
 impl ContactArgs {
@@ -49,7 +53,7 @@ impl ContactArgs {
                  coordinator and given this machine's computing time"
             ));
         }
-        let stay = self.stay.then_some(self.idle);
+        let stay = self.stay.then_some(self.idle.unwrap_or(IDLE));
         Ok(WorkerConfig { access: self.access.clone(), stay, ..WorkerConfig::new(connect) })
     }
 

@@ -8,9 +8,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use nalgebra::DMatrix;
 use starlings_pieces::{Folder, PieceName};
 use starlings_proto::convert::floats;
-use starlings_proto::{Block, FromWorker, Lease, digest, generated};
+use starlings_proto::{Block, FromWorker, Lease, digest};
 use tokio::sync::Semaphore;
-use tokio::sync::mpsc::UnboundedSender;
+
+use crate::outbox::Outbox;
 
 /// Blocks that may wait for each slot.
 const WAITING: usize = 8;
@@ -30,8 +31,13 @@ impl Blocks {
         Self { folder, lanes, given: Arc::default(), most }
     }
 
+    /// Whether some are being made or wait.
+    pub(crate) fn are_given(&self) -> bool {
+        self.given.load(Ordering::Relaxed) > 0
+    }
+
     /// Makes a block on a thread of its own, as soon as one of those before is made, and answers.
-    pub(crate) fn take(&self, lease: Lease, block: Block, outbox: &UnboundedSender<generated::FromWorker>) {
+    pub(crate) fn take(&self, lease: Lease, block: Block, outbox: &Outbox) {
         let Some(folder) = self.folder.clone() else {
             return answer(outbox, lease, Err("it shares no folder for states".to_owned()));
         };
@@ -50,12 +56,8 @@ impl Blocks {
     }
 }
 
-fn answer(
-    outbox: &UnboundedSender<generated::FromWorker>,
-    lease: Lease,
-    made: Result<Vec<PieceName>, String>,
-) {
-    crate::outbox::send(outbox, FromWorker::Recombined { lease, made });
+fn answer(outbox: &Outbox, lease: Lease, made: Result<Vec<PieceName>, String>) {
+    outbox.send(FromWorker::Recombined { lease, made });
 }
 
 /// The names of the pieces of X T, which stand in the folder then.

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use starlings_models::{BuildSetup, Factory, Setup};
 use starlings_pieces::PlaceName;
+use starlings_proto::host::host_name;
 use starlings_proto::{Hello, PROTOCOL, VERSION, own_build};
 use tokio_util::sync::CancellationToken;
 
@@ -60,7 +61,7 @@ impl WorkerConfig {
             patience: Duration::from_secs(60),
             cancel: CancellationToken::new(),
             factory: Arc::new(Setup::build),
-            host: host_name(),
+            host: host_name().unwrap_or_else(|| "unknown-host".to_owned()),
             build: own_build(),
             hold: HoldLimits::default(),
             scratch: std::env::temp_dir(),
@@ -81,10 +82,4 @@ impl WorkerConfig {
             build: self.build,
         }
     }
-}
-
-fn host_name() -> String {
-    let file = std::fs::read_to_string("/proc/sys/kernel/hostname").ok();
-    let name = file.or_else(|| std::env::var("HOSTNAME").ok()).or_else(|| std::env::var("COMPUTERNAME").ok());
-    name.map(|n| n.trim().to_owned()).filter(|n| !n.is_empty()).unwrap_or_else(|| "unknown-host".to_owned())
 }

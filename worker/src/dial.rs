@@ -7,15 +7,15 @@ use starlings_pieces::PlaceName;
 use starlings_proto::generated::{self, fleet_client::FleetClient};
 use starlings_proto::words::status_text;
 use starlings_proto::{FromWorker, Hello, MAX_MESSAGE, ReceivedWindows, ToWorker, Welcome};
-use tokio::sync::mpsc::{self, UnboundedSender};
-use tokio_stream::wrappers::UnboundedReceiverStream;
 use tonic::Streaming;
 
 use crate::held::Run;
 use crate::news::News;
+use crate::outbox::Outbox;
+use crate::patience::Patience;
 use crate::transfer::Transfers;
 use crate::way::{ATTEMPT, NoWay, Way};
-use crate::{WorkerConfig, WorkerError, outbox, shared};
+use crate::{WorkerConfig, WorkerError, shared};
 
 /// Wait after the first refusal; grows by half each time, up to [`LONGEST_WAIT`].
 const FIRST_WAIT: Duration = Duration::from_millis(50);
@@ -25,8 +25,10 @@ const LONGEST_WAIT: Duration = Duration::from_secs(2);
 
 /// An open stream whose Welcome has arrived.
 pub(crate) struct Connection {
+    /// Where the coordinator is.
+    pub(crate) address: String,
     pub(crate) welcome: Welcome,
-    pub(crate) outbox: UnboundedSender<generated::FromWorker>,
+    pub(crate) outbox: Outbox,
     pub(crate) inbound: Streaming<generated::ToWorker>,
     /// The named windows that have arrived.
     pub(crate) windows: ReceivedWindows,
@@ -70,17 +72,16 @@ pub(crate) async fn dial(
     config: &WorkerConfig,
     way: &Way,
     hello: &Hello,
-    patience: Duration,
+    patience: &mut Patience<'_>,
     seen: Option<Run>,
 ) -> Result<Dialled, WorkerError> {
     let stays = config.stay.is_some();
     let started = Instant::now();
     let mut wait = FIRST_WAIT;
-    let mut told = false;
     loop {
         let attempt = async {
-            let patience = tokio::time::timeout(ATTEMPT, attach(way, hello.clone(), config.states.as_ref()));
-            let attached = patience.await;
+            let attached = attach(way, hello.clone(), config.states.as_ref());
+            let attached = tokio::time::timeout(ATTEMPT, attached).await;
             let attached = attached.unwrap_or_else(|_| Err(Attempt::Failed("no answer to Hello".to_owned())));
             attached.and_then(|connection| current(connection, seen))
         };
@@ -95,29 +96,24 @@ pub(crate) async fn dial(
                 Err(Attempt::Failed(last) | Attempt::Over(last)) => last,
             },
         };
-        let waited = started.elapsed();
-        if waited >= patience || way.is_inherited() {
+        let left = patience.left();
+        if left.is_zero() || way.is_inherited() {
             if stays {
                 return Ok(Dialled::Idle);
             }
-            let address = way.name();
-            return Err(WorkerError::NoCoordinator { address, waited: waited.as_secs_f64(), last });
+            let (address, waited) = (way.name(), started.elapsed().as_secs_f64());
+            return Err(WorkerError::NoCoordinator { address, waited, last, dropped: patience.dropped() });
         }
-        if told {
+        if std::mem::replace(&mut patience.is_told, true) {
             tracing::debug!(last, "dialling again");
         } else {
-            told = true;
-            let (address, option) = (way.name(), if stays { "--idle" } else { "--patience" });
-            let seconds = patience.as_secs_f64().round();
-            tracing::warn!(
-                "no coordinator at {address} yet ({last}): dialling for up to {seconds} s (`{option}` sets the wait)"
-            );
+            (config.tell)(&News::Waiting { address: way.name(), last, left, option: patience.option() });
         }
         // Spread by the process's nonce, so that a thousand workers do not dial at the same moment.
         let spread = 0.5 + (hello.nonce % 1024) as f64 / 2048.0;
         tokio::select! {
             () = config.cancel.cancelled() => return Ok(Dialled::Cancelled),
-            () = tokio::time::sleep(wait.mul_f64(spread).min(patience.saturating_sub(waited))) => {}
+            () = tokio::time::sleep(wait.mul_f64(spread).min(left)) => {}
         }
         wait = (wait * 3 / 2).min(LONGEST_WAIT);
     }
@@ -137,17 +133,16 @@ fn current(connection: Connection, seen: Option<Run>) -> Result<Connection, Atte
 }
 
 async fn attach(way: &Way, hello: Hello, states: Option<&PlaceName>) -> Result<Connection, Attempt> {
-    let channel = way.open().await?;
+    let (channel, address) = way.open().await?;
     let mut client = FleetClient::new(channel)
         .max_decoding_message_size(MAX_MESSAGE)
         .max_encoding_message_size(MAX_MESSAGE);
-    let (outbox, outgoing) = mpsc::unbounded_channel();
+    let (outbox, outgoing) = Outbox::new();
     let failed = |text: &str| Attempt::Failed(text.to_owned());
     let nonce = hello.nonce;
-    let hello = FromWorker::Hello(hello).encode().map_err(|error| failed(&error.to_string()))?;
-    let _ = outbox.send(hello);
+    outbox.send(FromWorker::Hello(hello));
     let silent = |status: &tonic::Status| failed(&(status_text(status) + way.hint()));
-    let response = client.work(UnboundedReceiverStream::new(outgoing)).await.map_err(|s| silent(&s))?;
+    let response = client.work(outgoing).await.map_err(|s| silent(&s))?;
     let mut inbound = response.into_inner();
     let mut windows = ReceivedWindows::default();
     let first = inbound.message().await.map_err(|s| failed(&status_text(&s)))?;
@@ -155,10 +150,10 @@ async fn attach(way: &Way, hello: Hello, states: Option<&PlaceName>) -> Result<C
         Some(Ok(ToWorker::Welcome(welcome))) => {
             let (folder, sharing) = shared::find(states, &welcome).await;
             if folder.is_some() {
-                outbox::send(&outbox, FromWorker::SharesStates);
+                outbox.send(FromWorker::SharesStates);
             }
             let transfers = Transfers::new(client, welcome.epoch, nonce, folder);
-            Ok(Connection { welcome, outbox, inbound, windows, transfers, sharing })
+            Ok(Connection { address, welcome, outbox, inbound, windows, transfers, sharing })
         }
         Some(Ok(ToWorker::Refuse(reason))) => Err(Attempt::Refused(reason)),
         Some(Ok(ToWorker::Drain(reason))) => Err(Attempt::Over(reason)),

@@ -16,18 +16,28 @@ impl Idle {
         Self { limit, since: Instant::now(), answered: (0, 0) }
     }
 
-    /// Looks whether there was work since the last look.
-    pub(crate) fn look(&mut self, slots: &Slots) {
+    /// Looks whether there was work since the last look, in the slots or elsewhere.
+    pub(crate) fn look(&mut self, slots: &Slots, elsewhere: bool) {
         let answered = slots.answered();
-        if slots.load() != (0, 0) || answered != self.answered {
+        if elsewhere || slots.load() != (0, 0) || answered != self.answered {
             self.since = Instant::now();
             self.answered = answered;
         }
     }
 
+    /// A coordinator is there, which may have work.
+    pub(crate) fn begin(&mut self) {
+        self.since = Instant::now();
+    }
+
     /// The time that is left.
     pub(crate) fn left(&self) -> Duration {
-        self.limit.saturating_sub(self.since.elapsed())
+        self.left_of(Duration::ZERO)
+    }
+
+    /// The same where the limit is at least this.
+    pub(crate) fn left_of(&self, least: Duration) -> Duration {
+        self.limit.max(least).saturating_sub(self.since.elapsed())
     }
 
     /// Why the worker ends.

@@ -6,12 +6,12 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use starlings_models::{Forward, Job, ParticleError};
-use starlings_proto::{Lease, LeaseOutcome, SetupId, State, StateId, generated, job_key};
-use tokio::sync::mpsc::UnboundedSender;
+use starlings_proto::{Lease, LeaseOutcome, SetupId, State, StateId, job_key};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::task::AbortHandle;
 
-use crate::slots::{Asked, Slots, Task, answer};
+use crate::outbox::Outbox;
+use crate::slots::{Asked, Slots, Task};
 use crate::transfer::Transfers;
 
 /// States that are on their way at the same time: one is decoded while the next one crosses the network.
@@ -43,7 +43,7 @@ impl Inbox {
     }
 
     /// Who wants the answer to a job of this session.
-    pub(crate) fn asked(&self, lease: Lease, outbox: &UnboundedSender<generated::FromWorker>) -> Asked {
+    pub(crate) fn asked(&self, lease: Lease, outbox: &Outbox) -> Asked {
         Asked { lease, outbox: outbox.clone(), transfers: self.transfers.clone() }
     }
 
@@ -87,7 +87,7 @@ impl Inbox {
                 Ok((state, room)) => slots.push(task(asked, state, room)),
                 Err(reason) => {
                     let failed = LeaseOutcome::Ran(Err(ParticleError::Infrastructure(reason)));
-                    answer(&asked.outbox, lease, failed, 0.0);
+                    asked.outbox.answer(lease, failed, 0.0);
                 }
             }
         });
@@ -95,12 +95,12 @@ impl Inbox {
     }
 
     /// Answers the given leases as withdrawn where their states have not arrived.
-    pub(crate) fn withdraw(&self, leases: &[Lease], outbox: &UnboundedSender<generated::FromWorker>) {
+    pub(crate) fn withdraw(&self, leases: &[Lease], outbox: &Outbox) {
         for lease in leases {
             let waiting = lock(&self.waiting).remove(lease);
             if let Some(fetching) = waiting {
                 fetching.abort();
-                answer(outbox, *lease, LeaseOutcome::Withdrawn, 0.0);
+                outbox.answer(*lease, LeaseOutcome::Withdrawn, 0.0);
             }
         }
     }

@@ -9,10 +9,12 @@ mod blocks;
 pub mod config;
 mod dial;
 mod held;
+mod held_answers;
 mod idle;
 mod inbox;
 mod news;
 mod outbox;
+mod patience;
 mod pieces;
 mod session;
 mod setups;
@@ -30,15 +32,18 @@ use std::time::Instant;
 pub use config::WorkerConfig;
 use dial::{Connection, Dialled};
 pub use held::HoldLimits;
+use held::delivery::Delivery;
 use held::{Held, Run};
 use idle::Idle;
 pub use news::{News, Tell};
+use outbox::Outbox;
+use patience::Patience;
 use session::Ended;
 use slots::Slots;
 pub use starlings_models::Factory;
 pub use starlings_pieces::PlaceName;
 pub use starlings_proto::access::AccessError;
-use starlings_proto::{FromWorker, HeldRun, Welcome};
+use starlings_proto::{FromWorker, HeldRun, JobKey, Welcome};
 pub use starlings_proto::{INHERITED, LIFELINE, MAX_SLOTS};
 use way::Way;
 pub use way::check_address;
@@ -61,7 +66,7 @@ pub struct WorkerReport {
 pub enum WorkerError {
     /// No coordinator answered in time.
     #[error(
-        "no coordinator at {address} for {waited:.0} s ({last}): is it running, and is the address right?"
+        "no coordinator at {address} for {waited:.0} s ({last}): is it running, and is the address right?{}", told(*dropped)
     )]
     NoCoordinator {
         /// The address dialled.
@@ -70,6 +75,8 @@ pub enum WorkerError {
         waited: f64,
         /// What the last attempt said.
         last: String,
+        /// Results and runs of an earlier session that are lost with the worker.
+        dropped: usize,
     },
     /// The coordinator does not take this worker.
     #[error("the coordinator at {address} refused this worker: {reason}")]
@@ -115,6 +122,16 @@ pub enum WorkerError {
     Start(std::io::Error),
 }
 
+/// What is lost with a worker, as the end of a sentence.
+fn told(dropped: usize) -> String {
+    match dropped {
+        0 => String::new(),
+        n => format!(
+            " {n} of its runs, finished or begun, are dropped and made again by others (`--patience` sets how long a worker keeps them)"
+        ),
+    }
+}
+
 /// Serves coordinators at one address until the run is over, the worker is cancelled, or nobody answers any more.
 ///
 /// Returns at once when it ends, even while a job computes: its threads are left behind for the process to end.
@@ -132,58 +149,73 @@ pub fn run(config: WorkerConfig) -> Result<WorkerReport, WorkerError> {
     let slots = Slots::start(config.slots.max(1), held.clone()).map_err(WorkerError::Start)?;
     let runtime =
         tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(WorkerError::Start)?;
-    let result = runtime.block_on(serve(&config, &slots, held.as_deref()));
+    let result = runtime.block_on(serve(&config, &slots, held.as_ref()));
     slots.close();
     runtime.shutdown_background();
+    if let Ok(WorkerReport { reason, predictions, failures, .. }) = &result {
+        (config.tell)(&News::Ended { reason: reason.clone(), answered: predictions + failures });
+    }
     result
 }
 
 async fn serve(
     config: &WorkerConfig,
     slots: &Slots,
-    held: Option<&Held>,
+    held: Option<&Arc<Held>>,
 ) -> Result<WorkerReport, WorkerError> {
     let way = Way::of(config)?;
     let setups = setups::Setups::new(Arc::clone(&config.factory));
     let hello = config.hello();
     let mut sessions = 0;
     let mut idle = config.stay.map(Idle::new);
+    let mut owes = None;
+    let mut is_told = false;
     loop {
-        let patience = idle.as_ref().map_or(config.patience, Idle::left);
-        let connection = match dial::dial(config, &way, &hello, patience, held.and_then(Held::run)).await? {
-            Dialled::Idle => {
-                return Ok(report(slots, sessions, &idle.map(|idle| idle.reason()).unwrap_or_default()));
-            }
-            Dialled::Cancelled => return Ok(report(slots, sessions, "cancelled before it was connected")),
-            Dialled::Over(reason) => return Ok(report(slots, sessions, &reason)),
+        let seen = held.and_then(|held| held.run());
+        let mut patience = Patience::new(config.patience, idle.as_mut(), slots, owes, is_told);
+        let connection = match dial::dial(config, &way, &hello, &mut patience, seen).await? {
             Dialled::Connected(connection) => connection,
-        };
-        sessions += 1;
-        tracing::info!(run = connection.welcome.run, address = way.name(), "joined");
-        let stayed_since = Instant::now();
-        begin(config, slots, held, &connection);
-        let ended = session::serve(*connection, slots, &setups, held, config, idle.as_mut()).await;
-        match held {
-            Some(held) if matches!(ended, Ended::Lost(_)) => {
-                slots.detach();
-                held.disconnected();
-            }
-            _ => slots.forget(),
-        }
-        if let Some(idle) = &mut idle {
-            idle.look(slots);
-        }
-        tracing::info!(?ended, seconds = stayed_since.elapsed().as_secs_f64(), "left");
-        match ended {
-            Ended::Drained(reason) if config.stay.is_some() => {
-                tracing::info!(reason, "waiting for the next command");
-            }
-            Ended::Drained(reason) | Ended::Idle(reason) => return Ok(report(slots, sessions, &reason)),
-            Ended::Cancelled => return Ok(report(slots, sessions, "cancelled")),
-            Ended::Lost(reason) if config.once || way.is_inherited() => {
+            other => {
+                let dropped = told(patience.dropped());
+                let end = if dropped.is_empty() { "" } else { ";" };
+                let reason = unserved(&other, sessions, idle.as_ref()) + end + &dropped;
                 return Ok(report(slots, sessions, &reason));
             }
-            Ended::Lost(reason) => {
+        };
+        sessions += 1;
+        tracing::info!(run = connection.welcome.run, address = connection.address, "joined");
+        let stayed_since = Instant::now();
+        begin(config, slots, held, &connection);
+        idle.iter_mut().for_each(Idle::begin);
+        let outbox = connection.outbox.clone();
+        let ended = session::serve(*connection, slots, &setups, held, config, idle.as_mut()).await;
+        outbox.end();
+        if let Some(held) = held {
+            held.disconnected();
+        }
+        owes = held.map(AsRef::as_ref).filter(|_| matches!(ended, Ended::Lost(_)));
+        is_told = owes.is_none();
+        if owes.is_some() {
+            slots.detach();
+        } else {
+            slots.forget();
+        }
+        if let Some(idle) = &mut idle {
+            idle.look(slots, false);
+        }
+        tracing::info!(?ended, seconds = stayed_since.elapsed().as_secs_f64(), "left");
+        match (ended, &idle) {
+            (Ended::Drained(reason), Some(idle)) => {
+                (config.tell)(&News::Stays { reason, left: idle.left() });
+            }
+            (Ended::Drained(reason), None) | (Ended::Idle(reason), _) => {
+                return Ok(report(slots, sessions, &reason));
+            }
+            (Ended::Cancelled, _) => return Ok(report(slots, sessions, "cancelled")),
+            (Ended::Lost(reason), _) if config.once || way.is_inherited() => {
+                return Ok(report(slots, sessions, &reason));
+            }
+            (Ended::Lost(reason), _) => {
                 let (running, queued) = slots.load();
                 (config.tell)(&News::Lost { reason, computing: (running + queued) as usize });
             }
@@ -191,10 +223,20 @@ async fn serve(
     }
 }
 
+/// Why a worker ends that is not connected.
+fn unserved(dialled: &Dialled, sessions: u64, idle: Option<&Idle>) -> String {
+    match dialled {
+        Dialled::Idle => idle.map(Idle::reason).unwrap_or_default(),
+        Dialled::Over(reason) => reason.clone(),
+        Dialled::Cancelled if sessions == 0 => "cancelled before it was connected".to_owned(),
+        Dialled::Cancelled | Dialled::Connected(_) => "cancelled".to_owned(),
+    }
+}
+
 /// Tells a coordinator what is held for its run, or forgets it where it is for another one.
-fn begin(config: &WorkerConfig, slots: &Slots, held: Option<&Held>, connection: &Connection) {
+fn begin(config: &WorkerConfig, slots: &Slots, held: Option<&Arc<Held>>, connection: &Connection) {
     let Welcome { run, run_id, incarnation, .. } = &connection.welcome;
-    let (run, address) = (run.clone(), config.connect.clone());
+    let (run, address) = (run.clone(), connection.address.clone());
     (config.tell)(&News::Connected { run, address, slots: config.slots.max(1) });
     if let Some(news) = &connection.sharing {
         (config.tell)(news);
@@ -203,25 +245,32 @@ fn begin(config: &WorkerConfig, slots: &Slots, held: Option<&Held>, connection: 
     if !held.connected(Run { id: *run_id, incarnation: *incarnation }) {
         slots.forget();
     }
-    let outbox = &connection.outbox;
-    let mut going_on = slots.attach(outbox.clone());
-    let (mut portions, computing) = (held.portions(PORTION), going_on.len());
-    let large = held.large();
-    let finished = portions.iter().map(Vec::len).sum::<usize>() + large.len();
-    // They are put when there is a lease for them.
-    going_on.extend(large);
-    if finished + computing == 0 {
-        return;
+    let outbox = connection.outbox.clone();
+    let finished = held.len();
+    let going_on = slots.attach(outbox.clone());
+    let computing = going_on.len();
+    if finished + computing > 0 {
+        deliver(held.delivery(PORTION), [going_on, held.large()].concat(), outbox);
+        (config.tell)(&News::Delivered { finished, computing });
     }
-    if portions.is_empty() {
-        portions.push(Vec::new());
-    }
+}
+
+/// Sends what goes on and what is held, a portion when there is room for it.
+fn deliver(mut delivery: Delivery, going_on: Vec<JobKey>, outbox: Outbox) {
+    let mut first = delivery.next().unwrap_or_default();
     // What goes on is in the first message: it is given away otherwise.
-    portions[0].extend(going_on.into_iter().map(|key| HeldRun { key, ended: None }));
-    for runs in portions {
-        outbox::send(outbox, FromWorker::Held(runs));
+    first.extend(going_on.into_iter().map(|key| HeldRun { key, ended: None }));
+    outbox.send(FromWorker::Held(first));
+    let rest = move || {
+        if delivery.all(|runs| outbox.send_when_room(FromWorker::Held(runs))) {
+            delivery.ended();
+        }
+    };
+    if let Err(error) = std::thread::Builder::new().name("held-results".to_owned()).spawn(rest) {
+        tracing::warn!(
+            "the rest of the results that are held is not sent, their runs are made again: {error}"
+        );
     }
-    (config.tell)(&News::Delivered { finished, computing });
 }
 
 /// Bytes of results in one message.

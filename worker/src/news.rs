@@ -4,6 +4,7 @@
 
 use std::fmt;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// Something that changed.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,6 +24,31 @@ pub enum News {
         finished: usize,
         /// Runs that it goes on with.
         computing: usize,
+    },
+    /// Nobody answers yet.
+    Waiting {
+        /// Where it dials.
+        address: String,
+        /// What the last attempt said.
+        last: String,
+        /// For how long it goes on.
+        left: Duration,
+        /// The option that sets the wait.
+        option: &'static str,
+    },
+    /// The coordinator let it go, and it waits for the next command.
+    Stays {
+        /// The coordinator's word.
+        reason: String,
+        /// For how long it waits.
+        left: Duration,
+    },
+    /// It ends.
+    Ended {
+        /// Why.
+        reason: String,
+        /// Runs answered.
+        answered: u64,
     },
     /// Jobs came after there were none.
     Working,
@@ -67,6 +93,21 @@ impl fmt::Display for News {
                     "delivered {finished} results that were held; {computing} runs are still being made"
                 )
             }
+            Self::Waiting { address, last, left, option } => {
+                let seconds = left.as_secs_f64().round();
+                write!(
+                    f,
+                    "no coordinator at {address} yet ({last}): dialling for up to {seconds} s (`{option}` sets the wait)"
+                )
+            }
+            Self::Stays { reason, left } => {
+                let seconds = left.as_secs_f64().round();
+                write!(
+                    f,
+                    "{reason}: waiting for the next command for up to {seconds} s (`--idle` sets the wait)"
+                )
+            }
+            Self::Ended { reason, answered } => write!(f, "ends: {reason}; {answered} runs answered"),
             Self::Working => write!(f, "working"),
             Self::Idle { answered } => write!(f, "idle: no jobs, {answered} runs answered so far"),
             Self::Lost { reason, computing } => {

@@ -4,25 +4,21 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use starlings_models::ParticleError;
-use starlings_proto::convert::ended;
 use starlings_proto::words::status_text;
-use starlings_proto::{
-    FromWorker, JobKey, Lease, LeaseOutcome, ProtocolError, ReceivedWindows, ToWorker, generated,
-};
-use tokio::sync::mpsc::UnboundedSender;
+use starlings_proto::{FromWorker, LeaseOutcome, ProtocolError, ReceivedWindows, ToWorker, generated};
 use tonic::Streaming;
 
 use crate::WorkerConfig;
 use crate::blocks::Blocks;
 use crate::dial::Connection;
-use crate::held::large::Large;
-use crate::held::{self, Held};
+use crate::held::Held;
+use crate::held_answers;
 use crate::idle::Idle;
 use crate::inbox::Inbox;
 use crate::news::{News, Tell};
-use crate::outbox::send;
+use crate::outbox::Outbox;
 use crate::setups::Setups;
-use crate::slots::{Asked, Slots, answer};
+use crate::slots::Slots;
 use crate::watch::Watch;
 
 /// How long a leaving worker waits for the coordinator to close the stream.
@@ -45,7 +41,7 @@ pub(crate) async fn serve(
     mut connection: Connection,
     slots: &Slots,
     setups: &Setups,
-    held: Option<&Held>,
+    held: Option<&Arc<Held>>,
     config: &WorkerConfig,
     mut idle: Option<&mut Idle>,
 ) -> Ended {
@@ -78,9 +74,12 @@ pub(crate) async fn serve(
             _ = beats.tick() => {
                 let (running, queued) = slots.load();
                 let queued = queued + inbox.len() as u32;
-                send(&connection.outbox, FromWorker::Heartbeat { running, queued });
+                if let Some(held) = held {
+                    held.look();
+                }
+                connection.outbox.send(FromWorker::Heartbeat { running, queued });
                 if let Some(idle) = &mut idle {
-                    idle.look(slots);
+                    idle.look(slots, queued > 0 || blocks.are_given());
                     if idle.left().is_zero() {
                         let reason = idle.reason();
                         goodbye(&connection.outbox, &mut connection.inbound, &reason).await;
@@ -123,7 +122,7 @@ impl Silence {
 struct Place<'a> {
     slots: &'a Slots,
     setups: &'a Setups,
-    held: Option<&'a Held>,
+    held: Option<&'a Arc<Held>>,
     inbox: &'a Inbox,
     blocks: &'a Blocks,
     tell: &'a Tell,
@@ -131,7 +130,7 @@ struct Place<'a> {
 
 fn take(
     message: Result<Option<generated::ToWorker>, tonic::Status>,
-    outbox: &UnboundedSender<generated::FromWorker>,
+    outbox: &Outbox,
     windows: &mut ReceivedWindows,
     place: &Place<'_>,
 ) -> Result<(), Ended> {
@@ -152,15 +151,17 @@ fn take(
                 // First the setup, so that the job that comes back finds it missing here; and once, however many of its jobs
                 // are on their way: a second time would stand for the setup that is sent again.
                 if setups.miss(setup) {
-                    send(outbox, FromWorker::Setup { id: setup, result: Err("it is forgotten".to_owned()) });
+                    outbox.send(FromWorker::Setup { id: setup, result: Err("it is forgotten".to_owned()) });
                 }
-                answer(outbox, lease, LeaseOutcome::Withdrawn, 0.0);
+                outbox.answer(lease, LeaseOutcome::Withdrawn, 0.0);
             }
         }
-        Err(ProtocolError::Job { lease, source }) => refuse(outbox, lease, source.to_string()),
+        Err(ProtocolError::Job { lease, source }) => {
+            outbox.answer(lease, LeaseOutcome::Ran(Err(ParticleError::BadJob(source.to_string()))), 0.0);
+        }
         Ok(ToWorker::Setup { id, setup }) => {
             let outbox = outbox.clone();
-            setups.order(id, setup, Box::new(move |result| send(&outbox, FromWorker::Setup { id, result })));
+            setups.order(id, setup, Box::new(move |result| outbox.send(FromWorker::Setup { id, result })));
         }
         Ok(ToWorker::Cancel { leases, stop }) => {
             inbox.withdraw(&leases, outbox);
@@ -168,7 +169,7 @@ fn take(
         }
         Ok(ToWorker::Adopt { runs, rest_is_void }) => {
             let gone = slots.adopt(runs, |lease| inbox.asked(lease, outbox));
-            answer_held(gone, outbox, held, inbox);
+            held_answers::answer(gone, outbox, held, rest_is_void, inbox);
             if rest_is_void {
                 slots.drop_void();
             }
@@ -182,58 +183,9 @@ fn take(
     Ok(())
 }
 
-/// Answers leases for runs that ended before they came.
-fn answer_held(
-    runs: Vec<(JobKey, Lease)>,
-    outbox: &UnboundedSender<generated::FromWorker>,
-    held: Option<&Held>,
-    inbox: &Inbox,
-) {
-    let keys = runs.iter().map(|(key, _)| *key).collect::<Vec<_>>();
-    let known = held.map(|held| held.ended(&keys)).unwrap_or_default();
-    let mut to_put = Vec::new();
-    for (key, lease) in runs {
-        match known.get(&key) {
-            Some(held::Ended::Large(large)) => to_put.push((Arc::clone(large), inbox.asked(lease, outbox))),
-            Some(held::Ended::Inside(bytes)) => match ended::decode(bytes) {
-                Ok((result, cost)) => answer(outbox, lease, LeaseOutcome::Ran(result), cost),
-                Err(_) => answer(outbox, lease, LeaseOutcome::Withdrawn, 0.0),
-            },
-            None => answer(outbox, lease, LeaseOutcome::Withdrawn, 0.0),
-        }
-    }
-    put_held(to_put);
-}
-
-/// Puts held states, and answers for them, on a thread that waits for the network.
-fn put_held(runs: Vec<(Arc<Large>, Asked)>) {
-    if runs.is_empty() {
-        return;
-    }
-    let leases: Vec<_> = runs.iter().map(|(_, asked)| (asked.lease, asked.outbox.clone())).collect();
-    let put = move || {
-        for (large, Asked { lease, outbox, transfers }) in runs {
-            answer(&outbox, lease, LeaseOutcome::Ran(large.put(&transfers, lease)), large.cost());
-        }
-    };
-    if std::thread::Builder::new().name("held-states".to_owned()).spawn(put).is_err() {
-        for (lease, outbox) in leases {
-            answer(&outbox, lease, LeaseOutcome::Withdrawn, 0.0);
-        }
-    }
-}
-
-fn refuse(outbox: &UnboundedSender<generated::FromWorker>, lease: starlings_proto::Lease, reason: String) {
-    answer(outbox, lease, LeaseOutcome::Ran(Err(ParticleError::BadJob(reason))), 0.0);
-}
-
 /// Says goodbye and waits shortly until the coordinator closes the stream, so that the message is not lost.
-async fn goodbye(
-    outbox: &UnboundedSender<generated::FromWorker>,
-    inbound: &mut Streaming<generated::ToWorker>,
-    reason: &str,
-) {
-    send(outbox, FromWorker::Goodbye(reason.to_owned()));
+async fn goodbye(outbox: &Outbox, inbound: &mut Streaming<generated::ToWorker>, reason: &str) {
+    outbox.send(FromWorker::Goodbye(reason.to_owned()));
     let closed = async { while let Ok(Some(_)) = inbound.message().await {} };
     let _ = tokio::time::timeout(GOODBYE_PATIENCE, closed).await;
 }
@@ -242,7 +194,6 @@ async fn goodbye(
 mod tests {
     use starlings_models::{BuildSetup, Job, Setup, Window};
     use starlings_proto::{JobEncoder, Lease, SentWindows, State, encode_setup};
-    use tokio::sync::mpsc::unbounded_channel;
 
     use super::*;
     use crate::transfer::Transfers;
@@ -262,7 +213,7 @@ mod tests {
 
     #[test]
     fn jobs_of_a_forgotten_setup_all_come_back_and_its_loss_is_told_once() {
-        let (outbox, mut sent) = unbounded_channel();
+        let (outbox, mut sent) = Outbox::new();
         let (slots, setups) =
             (Slots::start(1, None).unwrap(), Setups::new(Arc::new(|setup: &Setup| setup.build())));
         let mut windows = ReceivedWindows::default();

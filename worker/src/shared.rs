@@ -10,8 +10,8 @@ use starlings_proto::Welcome;
 
 use crate::news::News;
 
-/// How long a folder may take to answer before it counts as not shared.
-const PATIENCE: Duration = Duration::from_secs(10);
+/// How long a folder may take to answer before it counts as not shared: below the time of an attempt to connect, which waits for it.
+const PATIENCE: Duration = Duration::from_secs(4);
 
 /// The folder of the run, where both see it; and what to say of it.
 pub(crate) async fn find(

@@ -18,11 +18,11 @@ use std::time::Instant;
 use starlings_models::{ModelFailure, Until};
 use starlings_proto::spent::spent;
 use starlings_proto::words::panic_text;
-use starlings_proto::{Lease, LeaseOutcome, generated};
-use tokio::sync::mpsc::UnboundedSender;
+use starlings_proto::{Lease, LeaseOutcome};
 
 use crate::held::Held;
-pub(crate) use task::{Asked, Task, answer};
+use crate::outbox::Outbox;
+pub(crate) use task::{Asked, Task};
 
 /// Jobs that may wait per slot, twice what a coordinator sends ahead, and of the whole worker at least.
 const WAITING: usize = 128;
@@ -56,7 +56,7 @@ struct Queue {
     full: bool,
     closed: bool,
     /// The stream of now, for results that an earlier one asked for.
-    stream: Option<UnboundedSender<generated::FromWorker>>,
+    stream: Option<Outbox>,
 }
 
 impl Slots {
@@ -125,15 +125,19 @@ impl Slots {
         drop(queue);
         let withdrawn: VecDeque<Arc<Task>> = withdrawn;
         for Asked { lease, outbox, .. } in withdrawn.into_iter().filter_map(|task| task.asked().take()) {
-            answer(&outbox, lease, LeaseOutcome::Withdrawn, 0.0);
+            outbox.answer(lease, LeaseOutcome::Withdrawn, 0.0);
         }
     }
 
-    /// Drops what waits, and what is computed is for nobody, as when its run is over.
+    /// Drops what waits and stops what is computed, as when its run is over; a result that comes all the same is nobody's.
     pub(crate) fn forget(&self) {
         let mut queue = self.shared.lock();
         queue.tasks.clear();
-        queue.running.iter().for_each(|task| drop(task.asked().take()));
+        (queue.stream, queue.full) = (None, false);
+        for task in queue.running.drain(..) {
+            task.asked().take();
+            task.stop.set();
+        }
     }
 
     /// Whether so many jobs wait, with those that wait for their states, that no coordinator that keeps to its own rules sent them.
@@ -199,7 +203,7 @@ impl Shared {
             if result.is_err() && task.stop.is_set() {
                 self.lock().running.retain(|running| !Arc::ptr_eq(running, &task));
                 if let Some(Asked { lease, outbox, .. }) = task.asked().take() {
-                    answer(&outbox, lease, LeaseOutcome::Withdrawn, cost);
+                    outbox.answer_when_room(lease, LeaseOutcome::Withdrawn, cost);
                 }
                 continue;
             }

@@ -4,6 +4,7 @@
 //! Next file to read: `inbox`, for when states are asked for.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use starlings_models::ParticleError;
 use starlings_pieces::Folder;
@@ -41,6 +42,8 @@ pub(crate) struct Transfers {
     epoch: u64,
     nonce: u64,
     shared: Option<Arc<Folder>>,
+    /// Whether it was told that the folder refuses.
+    is_told: Arc<AtomicBool>,
 }
 
 impl Transfers {
@@ -60,6 +63,16 @@ impl Transfers {
             epoch,
             nonce,
             shared,
+            is_told: Arc::default(),
+        }
+    }
+
+    /// Says once in a session that what should go through the folder goes over the connection.
+    fn refused(&self, reason: &str) {
+        if self.is_told.swap(true, Ordering::Relaxed) {
+            tracing::debug!(reason, "a state goes over the connection");
+        } else {
+            tracing::warn!("states go over the connection where the shared folder refuses: {reason}");
         }
     }
 
@@ -111,7 +124,7 @@ impl Transfers {
                 .and_then(|names| self.send(|pieces| pieces::send_names(&pieces, head, &names)));
             match named {
                 Ok(state) => return Ok(state),
-                Err(reason) => tracing::debug!(reason, "a state goes over the connection"),
+                Err(reason) => self.refused(&reason),
             }
         }
         let sent = self.send(|pieces| pieces::send(&pieces, head, values));
@@ -169,7 +182,7 @@ impl Incoming {
             Ok(values) => Ok(values),
             // The coordinator finds out whether it can read what this worker cannot, or says which file is missing.
             Err(reason) => {
-                tracing::debug!(reason, "a state is asked for over the connection");
+                self.way.refused(&reason);
                 (self.n_state, self.inbound) = self.way.open(self.state, false).await?;
                 self.whole(None).await
             }

@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use hyper_util::rt::TokioIo;
-use starlings_proto::access::{AccessFile, SERVER_NAME, TOKEN_KEY, Token};
+use starlings_proto::access::{AccessError, AccessFile, SERVER_NAME, TOKEN_KEY, Token};
 use starlings_proto::socket::SocketEnd;
 use starlings_proto::words::causes;
 use starlings_proto::{FRAME_SIZE, INHERITED};
@@ -101,9 +101,13 @@ impl Way {
             if let Some(address) = &address {
                 uri(address, "https")?;
             }
-            let read = AccessFile::read(file)?;
-            if read.ended && config.stay.is_none() {
-                return Err(WorkerError::Ended { file: file.clone(), run: read.run });
+            match AccessFile::read(file) {
+                Ok(read) if read.ended && config.stay.is_none() => {
+                    return Err(WorkerError::Ended { file: file.clone(), run: read.run });
+                }
+                // A coordinator may write it later.
+                Err(AccessError::Missing(_)) if config.stay.is_some() => {}
+                read => drop(read?),
             }
             let (file, once) = (file.clone(), config.once);
             return Ok(Self::Access { file, address, once, attempts: AtomicUsize::new(0) });
@@ -145,8 +149,8 @@ impl Way {
         }
     }
 
-    /// One attempt to connect.
-    pub(crate) async fn open(&self) -> Result<Proven, NoWay> {
+    /// One attempt to connect, and where it led.
+    pub(crate) async fn open(&self) -> Result<(Proven, String), NoWay> {
         let failed = |error: tonic::transport::Error| NoWay::Failed(causes(&error));
         let channel = match self {
             Self::Plain { endpoint, .. } => endpoint.connect().await.map_err(failed)?,
@@ -165,17 +169,17 @@ impl Way {
                 endpoint.connect_with_connector(service_fn(connect)).await.map_err(failed)?
             }
         };
-        Ok(InterceptedService::new(channel, Proof(None)))
+        Ok((InterceptedService::new(channel, Proof(None)), self.name()))
     }
 }
 
-/// Connects as an access file says now; with several addresses, to another one at every attempt.
+/// Connects as an access file says now, and says where; with several addresses, to another one at every attempt.
 async fn with_access(
     file: &std::path::Path,
     address: Option<&str>,
     once: bool,
     attempt: usize,
-) -> Result<Proven, NoWay> {
+) -> Result<(Proven, String), NoWay> {
     let failed = |text: String| NoWay::Failed(text);
     let access = AccessFile::read(file).map_err(|error| failed(error.to_string()))?;
     if access.ended {
@@ -199,7 +203,7 @@ async fn with_access(
             format!("{address}: {words}")
         })
     })?;
-    Ok(InterceptedService::new(connected, Proof::of(&access.token)))
+    Ok((InterceptedService::new(connected, Proof::of(&access.token)), address.to_owned()))
 }
 
 /// Whether the other side answered and failed the handshake.

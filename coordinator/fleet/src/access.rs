@@ -6,8 +6,10 @@
 
 mod addresses;
 mod secrets;
+#[cfg(test)]
+mod tests;
 
-use std::fs::{File, TryLockError};
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -45,6 +47,13 @@ pub enum AccessFault {
         /// The access file.
         path: PathBuf,
     },
+    /// Its name is that of a private part.
+    #[error(
+        "{}: the ending `{PRIVATE}` is for the private part of an access file: give a name such as {}",
+        .0.display(),
+        .0.with_extension("json").display()
+    )]
+    OwnPrivatePart(PathBuf),
     /// Another coordinator has it.
     #[error("{} is in use by another command: wait for its end, or give another --access FILE", .0.display())]
     InUse(PathBuf),
@@ -64,7 +73,11 @@ pub enum AccessFault {
 impl AccessFault {
     /// Whether what the user gave is at fault, and not the machine.
     pub fn is_input(&self) -> bool {
-        !matches!(self, Self::Unwritable { .. } | Self::Draw(_))
+        match self {
+            Self::Unwritable { source, .. } => source.kind() != io::ErrorKind::StorageFull,
+            Self::Draw(_) => false,
+            _ => true,
+        }
     }
 }
 
@@ -73,6 +86,8 @@ pub struct Access {
     secrets: Secrets,
     /// Held so that no other command takes the same secrets at the same time; `None` while they stand in no file.
     lock: Option<File>,
+    /// The private part, where it was made here and no access file stands beside it yet.
+    made: Option<PathBuf>,
     published: Option<(PathBuf, AccessFile)>,
 }
 
@@ -83,21 +98,41 @@ impl Access {
     /// When something else stands there, others can read it, or another command uses it.
     pub fn at(path: Option<&Path>) -> Result<Self, AccessFault> {
         if let Some(path) = path {
-            let found = match AccessFile::read(path) {
-                Err(AccessError::Missing(_)) => false,
-                other => other.map(|_| true)?,
-            };
+            if path.extension().is_some_and(|ending| ending == PRIVATE) {
+                return Err(AccessFault::OwnPrivatePart(path.to_owned()));
+            }
+            let found = stands(path)?;
             let private = private_part(path);
             if private.exists() {
-                let secrets = Secrets::read(&private)?;
+                // The other way round, another command could end in between and leave other secrets.
                 let lock = lock(&private, path)?;
-                return Ok(Self { secrets, lock: Some(lock), published: None });
+                let secrets = Secrets::read(&private)?;
+                return Ok(Self { secrets, lock: Some(lock), made: None, published: None });
             }
             if found {
                 return Err(AccessFault::Widowed { path: path.to_owned() });
             }
         }
-        Ok(Self { secrets: Secrets::draw()?, lock: None, published: None })
+        Ok(Self { secrets: Secrets::draw()?, lock: None, made: None, published: None })
+    }
+
+    /// Makes the private part of an access file that does not stand yet, so that it can be written and nobody else takes the name.
+    ///
+    /// # Errors
+    /// When it cannot be written, or another command was faster.
+    pub fn reserve(&mut self, path: &Path) -> Result<(), AccessFault> {
+        if self.lock.is_some() {
+            return Ok(());
+        }
+        let private = private_part(path);
+        let made = private_file::create(&private, &self.secrets.text());
+        drop(made.map_err(|source| match source.kind() {
+            io::ErrorKind::AlreadyExists => AccessFault::InUse(path.to_owned()),
+            _ => AccessFault::Unwritable { path: private.clone(), source },
+        })?);
+        self.lock = Some(lock(&private, path)?);
+        self.made = Some(private);
+        Ok(())
     }
 
     /// What the fleet shows and asks for.
@@ -116,22 +151,17 @@ impl Access {
         address: SocketAddr,
         given: Option<&str>,
     ) -> Result<(), AccessFault> {
-        let unwritable = |path: &Path| {
-            let path = path.to_owned();
-            move |source| AccessFault::Unwritable { path, source }
-        };
-        if self.lock.is_none() {
-            let private = private_part(path);
-            let made = private_file::create(&private, &self.secrets.text());
-            drop(made.map_err(|source| match source.kind() {
-                io::ErrorKind::AlreadyExists => AccessFault::InUse(path.to_owned()),
-                _ => unwritable(&private)(source),
-            })?);
-            self.lock = Some(lock(&private, path)?);
-        }
+        self.reserve(path)?;
         let (authority, token) = (&self.secrets.authority, self.secrets.token.clone());
         let file = AccessFile::new(run, addresses(address, given), authority, token);
-        file.write(path).map_err(unwritable(path))?;
+        // What came meanwhile is no access file of these secrets.
+        let is_new = self.made.is_some() || !stands(path)?;
+        let written = if is_new { file.write_new(path) } else { file.write(path) };
+        written.map_err(|source| match source.kind() {
+            io::ErrorKind::AlreadyExists => AccessFault::InUse(path.to_owned()),
+            _ => AccessFault::Unwritable { path: path.to_owned(), source },
+        })?;
+        self.made = None;
         self.published = Some((path.to_owned(), file));
         Ok(())
     }
@@ -150,97 +180,36 @@ impl Access {
 impl Drop for Access {
     fn drop(&mut self) {
         self.end();
+        if let Some(private) = self.made.take() {
+            // Nobody knows its secrets.
+            let _ = std::fs::remove_file(private);
+        }
     }
 }
 
-/// The private part of an access file: beside it, with the ending `key`.
+/// Ending of the name of a private part.
+const PRIVATE: &str = "key";
+
+/// The private part of an access file: beside it, with an ending of its own.
 fn private_part(path: &Path) -> PathBuf {
-    path.with_extension("key")
+    path.with_extension(PRIVATE)
+}
+
+/// Whether an access file stands there, and nothing else does.
+fn stands(path: &Path) -> Result<bool, AccessFault> {
+    match AccessFile::read(path) {
+        Err(AccessError::Missing(_)) => Ok(false),
+        other => Ok(other.map(|_| true)?),
+    }
 }
 
 fn lock(private: &Path, path: &Path) -> Result<File, AccessFault> {
-    let opened = File::open(private);
+    // Over a network a lock may need a file that can be written.
+    let opened = OpenOptions::new().read(true).write(true).open(private).or_else(|_| File::open(private));
     let file = opened.map_err(|source| AccessFault::Unwritable { path: private.to_owned(), source })?;
     match file.try_lock() {
         Err(TryLockError::WouldBlock) => Err(AccessFault::InUse(path.to_owned())),
         // Some network file systems have no locks.
         Ok(()) | Err(TryLockError::Error(_)) => Ok(file),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::fs;
-    use std::os::unix::fs::{MetadataExt, PermissionsExt};
-
-    use super::*;
-
-    fn listening() -> SocketAddr {
-        ([127, 0, 0, 1], 7000).into()
-    }
-
-    fn published(path: &Path) -> Access {
-        let mut access = Access::at(Some(path)).unwrap();
-        access.publish(path, "run", listening(), None).unwrap();
-        access
-    }
-
-    #[test]
-    fn the_next_command_has_the_secrets_of_the_first_and_only_one_at_a_time() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("access.json");
-        let first = published(&path);
-        let token = AccessFile::read(&path).unwrap().token;
-        assert!(matches!(Access::at(Some(&path)), Err(AccessFault::InUse(_))));
-        drop(first);
-        let ended = AccessFile::read(&path).unwrap();
-        assert!(ended.ended && ended.token.is(token.digits().as_bytes()));
-        let second = published(&path);
-        let again = AccessFile::read(&path).unwrap();
-        assert!(!again.ended && again.token.is(token.digits().as_bytes()));
-        assert_eq!(again.authority, ended.authority);
-        drop(second);
-        let elsewhere = folder.path().join("other.json");
-        drop(published(&elsewhere));
-        assert!(!AccessFile::read(&elsewhere).unwrap().token.is(token.digits().as_bytes()), "another run");
-    }
-
-    #[test]
-    fn both_parts_are_their_owners_alone_and_the_key_is_in_the_private_one_only() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("access.json");
-        let _access = published(&path);
-        for file in [&path, &private_part(&path)] {
-            assert_eq!(fs::metadata(file).unwrap().mode() & 0o777, 0o600, "{}", file.display());
-        }
-        let key = |file: &Path| fs::read_to_string(file).unwrap().contains("PRIVATE KEY");
-        assert!(!key(&path) && key(&private_part(&path)));
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2, "nothing else is left");
-    }
-
-    #[test]
-    fn what_is_no_access_file_is_not_overwritten() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("study.json");
-        private_file::write(&path, "{\"precious\": 1}").unwrap();
-        assert!(matches!(Access::at(Some(&path)), Err(AccessFault::Standing(_))));
-        let own = folder.path().join("access.json");
-        drop(published(&own));
-        fs::remove_file(private_part(&own)).unwrap();
-        let fault = Access::at(Some(&own)).err().unwrap();
-        assert!(matches!(fault, AccessFault::Widowed { .. }) && fault.is_input(), "{fault}");
-    }
-
-    #[test]
-    fn a_private_part_that_others_can_read_or_that_is_damaged_is_refused() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("access.json");
-        drop(published(&path));
-        let private = private_part(&path);
-        fs::set_permissions(&private, fs::Permissions::from_mode(0o644)).unwrap();
-        let fault = Access::at(Some(&path)).err().unwrap();
-        assert!(fault.to_string().contains("chmod 600"), "{fault}");
-        private_file::write(&private, "{}").unwrap();
-        assert!(matches!(Access::at(Some(&path)), Err(AccessFault::Damaged { .. })));
     }
 }

@@ -24,12 +24,14 @@ pub enum FleetError {
     #[error("cancelled")]
     Cancelled,
     /// No worker could take a job for too long.
-    #[error("waited {waited:.0} s for a worker{}", waited_for(*address, *is_open, missing))]
+    #[error("waited {waited:.0} s for a worker{}", waited_for(*address, *is_open, start.as_deref(), missing))]
     NoWorkers {
         /// Where workers can connect; `None` where only processes of this one work.
         address: Option<SocketAddr>,
         /// Whether whoever reaches the address is taken.
         is_open: bool,
+        /// The command that starts a worker, where it was told.
+        start: Option<String>,
         /// How long it was waited, seconds.
         waited: f64,
         /// What is missing.
@@ -130,20 +132,16 @@ fn in_brackets(text: &str) -> String {
 }
 
 /// Where a worker was expected, what is missing, and what to do.
-fn waited_for(address: Option<SocketAddr>, is_open: bool, missing: &str) -> String {
-    match address {
-        Some(address) if is_open => {
-            let start = format!("starlings worker --connect {address} --insecure");
-            format!(" at {address}: {missing}; start one with `{start}`")
-        }
-        Some(address) => {
-            let start = "starlings worker --access FILE";
-            format!(
-                " at {address}: {missing}; start one with `{start}`, where FILE is this run's access file"
-            )
-        }
-        None => format!(" on this machine: {missing}"),
-    }
+fn waited_for(address: Option<SocketAddr>, is_open: bool, start: Option<&str>, missing: &str) -> String {
+    let Some(address) = address else { return format!(" on this machine: {missing}") };
+    let start = match start {
+        Some(start) => format!("`{start}`"),
+        None if is_open => format!("`starlings worker --connect {address} --insecure`"),
+        None => "`starlings worker --access FILE`, where FILE is this run's access file".to_owned(),
+    };
+    format!(
+        " at {address}: {missing}; start one with {start}, or wait longer with `patience` under `[fleet]` of the study"
+    )
 }
 
 fn remedy(source: &std::io::Error, address: SocketAddr) -> String {

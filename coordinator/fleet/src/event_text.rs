@@ -7,6 +7,9 @@ use super::FleetEvent;
 /// Why workers leave at the end.
 pub(super) const OVER: &str = "the run is over";
 
+/// What a coordinator says to its workers that ends before its run is done.
+pub(super) const BROKEN_OFF: &str = "the command broke off before it was done, and may be started again, with --resume where that is possible";
+
 impl FleetEvent {
     /// A short name of the kind of event.
     pub fn kind(&self) -> &'static str {
@@ -63,7 +66,7 @@ impl FleetEvent {
     pub fn is_of_roster(&self) -> bool {
         match self {
             Self::WorkerJoined { .. } | Self::SharesStates { .. } | Self::WorkerBack { .. } => true,
-            Self::WorkerLeft { reason, .. } => reason != OVER,
+            Self::WorkerLeft { reason, .. } => reason != OVER && reason != BROKEN_OFF,
             _ => false,
         }
     }

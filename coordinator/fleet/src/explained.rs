@@ -6,22 +6,26 @@ use super::FleetError;
 use super::dispatcher::BatchError;
 
 /// Where workers can connect.
+#[derive(Clone)]
 pub(super) struct Listening {
     /// Nowhere where there is none.
     pub(super) address: Option<SocketAddr>,
     /// Whether nobody has to prove anything.
     pub(super) is_open: bool,
+    /// How workers are started.
+    pub(super) start: Option<String>,
     /// Who was refused, in words.
     pub(super) refused: Option<String>,
 }
 
 /// The error of a fleet.
-pub(super) fn explained(error: BatchError, Listening { address, is_open, refused }: Listening) -> FleetError {
+pub(super) fn explained(error: BatchError, listening: Listening) -> FleetError {
+    let Listening { address, is_open, start, refused } = listening;
     match error {
         BatchError::Cancelled => FleetError::Cancelled,
         BatchError::NoWorkers { waited, missing } => {
             let missing = [Some(missing), refused].into_iter().flatten().collect::<Vec<_>>().join("; ");
-            FleetError::NoWorkers { address, is_open, waited: waited.as_secs_f64(), missing }
+            FleetError::NoWorkers { address, is_open, start, waited: waited.as_secs_f64(), missing }
         }
         BatchError::SetupFailed { reason } => FleetError::SetupFailed { reason },
         BatchError::LocalWorkers(reason) => FleetError::LocalWorkers(reason),

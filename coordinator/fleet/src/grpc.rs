@@ -39,13 +39,12 @@ const GRACE: Duration = Duration::from_millis(2500);
 /// Workers that dial in.
 pub struct GrpcFleet {
     pub(super) hub: Arc<Hub>,
-    address: Option<SocketAddr>,
     adopted: UnboundedSender<UnixStream>,
     batches: UnboundedSender<Submission>,
     stop: CancellationToken,
     network: Option<JoinHandle<Result<(), String>>>,
     refusals: Arc<Refusals>,
-    is_open: bool,
+    listening: Listening,
     pub(super) cancel: CancellationToken,
     /// Whether results of workers are compared.
     pub(super) compares: bool,
@@ -110,13 +109,12 @@ impl GrpcFleet {
         }
         Ok(Self {
             hub,
-            address,
             adopted,
             batches,
             stop,
             network: Some(network),
             refusals,
-            is_open: config.secrets.is_none(),
+            listening: Listening { address, is_open: config.secrets.is_none(), start: None, refused: None },
             cancel: config.cancel,
             compares: !config.mixed,
             compared: Compared::drawn_by(config.seed),
@@ -125,7 +123,7 @@ impl GrpcFleet {
 
     /// Where workers can connect, with the port that was picked; `None` where none can.
     pub fn address(&self) -> Option<SocketAddr> {
-        self.address
+        self.listening.address
     }
 
     /// How many callers were refused, and the last of them with the reason; `None` where none was.
@@ -136,6 +134,11 @@ impl GrpcFleet {
     /// For the supervisor of local workers.
     pub fn handle(&self) -> FleetHandle {
         FleetHandle::new(Arc::clone(&self.hub), self.adopted.clone())
+    }
+
+    /// How workers are started, for the error of a wait for them.
+    pub fn started_by(&mut self, command: &str) {
+        self.listening.start = Some(command.to_owned());
     }
 
     /// Asks all workers to leave, waits shortly for them, and stops the network. Dropping does the same.
@@ -181,7 +184,7 @@ impl GrpcFleet {
     }
 
     fn listening(&self) -> Listening {
-        Listening { address: self.address, is_open: self.is_open, refused: self.refusals.summary() }
+        Listening { refused: self.refusals.summary(), ..self.listening.clone() }
     }
 }
 

@@ -33,6 +33,11 @@ impl FleetHandle {
         self.hub.handle(Event::LocalOnly);
     }
 
+    /// Tells workers, when they are asked to leave, that the run is not done.
+    pub fn break_off(&self) {
+        self.hub.break_off();
+    }
+
     /// How many workers may be lost under one job.
     pub(crate) fn max_attempts(&self) -> u32 {
         self.hub.max_attempts()

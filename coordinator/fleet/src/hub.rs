@@ -31,7 +31,7 @@ use starlings_states::hex;
 use tokio::sync::Notify;
 
 use super::dispatcher::{BatchError, Dispatcher, Event, Joining, Likeness, Rules, WorkerId};
-use super::event_text::OVER;
+use super::event_text::{BROKEN_OFF, OVER};
 use super::identity::RunIdentity;
 use super::job_name::JobName;
 use super::outbox::Outbox;
@@ -245,6 +245,16 @@ impl Hub {
         for link in self.lock().links.values() {
             link.outbox.send(ToWorker::heartbeat());
         }
+    }
+
+    /// The run is not done, which workers are told in the end.
+    pub(super) fn break_off(&self) {
+        self.lock().last_word = BROKEN_OFF;
+    }
+
+    /// What workers are told in the end.
+    pub(super) fn last_word(&self) -> &'static str {
+        self.lock().last_word
     }
 
     /// Asks all workers to leave and takes no new ones.

@@ -18,7 +18,6 @@ use tonic::transport::Server;
 
 use super::dispatcher::{BatchError, Event};
 use super::door::Door;
-use super::event_text::OVER;
 use super::hub::{Hub, Submission};
 use super::service::Service;
 
@@ -162,7 +161,7 @@ async fn abort_on_cancel(hub: Arc<Hub>, cancel: CancellationToken) {
 async fn drained(hub: &Hub, stop: &CancellationToken) {
     stop.cancelled().await;
     hub.handle(Event::Abort(BatchError::Cancelled));
-    hub.drain(OVER);
+    hub.drain(hub.last_word());
     let empty = async {
         loop {
             let mut ended = std::pin::pin!(hub.link_ended.notified());

@@ -202,3 +202,85 @@ fn an_earlier_start_of_the_same_run_is_not_served() {
     };
     assert!(last.contains("start 1 of the run `test`, and this worker has worked for start 2"), "{last}");
 }
+
+#[test]
+fn a_large_state_whose_way_broke_is_put_for_the_next_start_and_its_run_is_not_made_again() {
+    let gate = Gate::open_to(0);
+    let (first, events) = incarnation(7, 1);
+    let proxy = Proxy::to(first.address().unwrap());
+    let worker = ThreadWorker::start_with(proxy.address, gate.factory(), |config| {
+        // Less than one state has.
+        config.hold = HoldLimits { memory: 100_000, disk: 1 << 30 };
+    });
+    await_workers(&events, 1);
+    let mut batch = jobs(1);
+    batch[0].state = Some((0..50_000).map(|i| f64::from(i) / 7.0).collect());
+    abandon(first, batch.clone());
+    gate.wait(|made| made.runs.len() == 1);
+    // Its end state does not arrive.
+    proxy.mute();
+    gate.open(usize::MAX);
+    gate.wait(|made| made.ended == 1);
+    let (mut second, events) = incarnation(7, 2);
+    let setup = second.install(&Setup::default()).unwrap();
+    proxy.lead_to(second.address().unwrap());
+    proxy.unmute();
+    assert_exact(&second.run(setup, batch.clone()).unwrap(), &batch);
+    let brought = await_event(&events, |event| matches!(event, FleetEvent::RunsBrought { .. }));
+    assert!(matches!(brought, FleetEvent::RunsBrought { finished: 0, computing: 1, .. }), "{brought}");
+    assert_eq!(gate.runs(), [0]);
+    worker.cancel.cancel();
+    worker.end().unwrap();
+}
+
+#[test]
+fn a_worker_that_stays_is_not_idle_while_a_run_computes_or_a_result_is_held() {
+    let gate = Gate::open_to(0);
+    let (first, events) = incarnation(7, 1);
+    let proxy = Proxy::to(first.address().unwrap());
+    let (told, news) = mpsc::channel();
+    let idle = Duration::from_millis(300);
+    let worker = ThreadWorker::start_with(proxy.address, gate.factory(), |config| {
+        config.stay = Some(idle);
+        config.patience = Duration::from_secs(600);
+        config.tell = Arc::new(move |news| drop(told.send(news.clone())));
+    });
+    await_workers(&events, 1);
+    let batch = jobs(1);
+    abandon(first, batch.clone());
+    gate.wait(|made| made.runs.len() == 1);
+    proxy.lead_to("127.0.0.1:1".parse().unwrap());
+    while !matches!(news.recv_timeout(Duration::from_secs(60)).unwrap(), News::Lost { .. }) {}
+    // First it computes, then it holds the result: longer than it may be idle.
+    std::thread::sleep(4 * idle);
+    gate.open(usize::MAX);
+    gate.wait(|made| made.ended == 1);
+    std::thread::sleep(4 * idle);
+    let (mut second, _events) = incarnation(7, 2);
+    proxy.lead_to(second.address().unwrap());
+    let setup = second.install(&Setup::default()).unwrap();
+    assert_exact(&second.run(setup, batch.clone()).unwrap(), &batch);
+    assert_eq!(gate.runs(), [0]);
+    second.close();
+    let report = worker.end().unwrap();
+    assert!(report.reason.contains("had no work for 0.3 s"), "{}", report.reason);
+}
+
+#[test]
+fn a_worker_that_gives_up_says_how_many_runs_are_lost_with_it() {
+    let gate = Gate::open_to(usize::MAX);
+    let (mut first, events) = incarnation(7, 1);
+    let proxy = Proxy::to(first.address().unwrap());
+    let worker = ThreadWorker::start_with(proxy.address, gate.factory(), |config| {
+        config.patience = Duration::from_millis(100);
+    });
+    await_workers(&events, 1);
+    let setup = first.install(&Setup::default()).unwrap();
+    first.run(setup, jobs(3)).unwrap();
+    proxy.lead_to("127.0.0.1:1".parse().unwrap());
+    let error = worker.end().unwrap_err().to_string();
+    assert!(
+        error.contains("3 of its runs, finished or begun, are dropped") && error.contains("`--patience`"),
+        "{error}"
+    );
+}

@@ -19,3 +19,10 @@ pub enum StateError {
         bytes: usize,
     },
 }
+
+impl StateError {
+    /// Whether a piece is not where it belongs.
+    pub fn is_missing(&self) -> bool {
+        matches!(self, Self::Piece(PieceError::Missing { .. }))
+    }
+}

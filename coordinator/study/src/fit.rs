@@ -7,7 +7,6 @@
 
 pub(crate) mod batch;
 mod ensemble;
-mod failures;
 pub(crate) mod filter;
 pub(crate) mod free_run;
 mod index;
@@ -22,5 +21,4 @@ pub(crate) mod settle;
 pub(crate) mod stack;
 mod timeouts;
 
-pub use failures::{FailedRange, FailureCluster};
 pub use settle::LIMIT;

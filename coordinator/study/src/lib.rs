@@ -9,6 +9,7 @@ pub mod checked;
 pub mod constants;
 mod distances;
 mod expand;
+mod failures;
 pub mod field;
 mod file;
 mod fit;
@@ -37,8 +38,9 @@ pub mod variant;
 mod warnings;
 
 pub use checked::{EstimatorChoice, FleetChoice, Record, Study, ThetaEntry};
+pub use failures::{FailedRange, FailureCluster};
 pub use file::memory::bytes_of;
-pub use fit::{FailedRange, FailureCluster, LIMIT as MAX_PASSES};
+pub use fit::LIMIT as MAX_PASSES;
 pub use observer_gain::ObserverCourse;
 pub use problem::{Problem, StudyError};
 pub use run::{Fit, Move, Progress, RunContext};

@@ -3,6 +3,7 @@
 //! Next file to read: [`crate::store`].
 
 use starlings_estimators::{Form, SigmaSet};
+use starlings_proto::MAX_INLINE_STATE;
 
 use crate::Study;
 
@@ -31,7 +32,18 @@ impl Study {
         let [job, estimate, innovation] = ROWS;
         let of_analysis = (particles * records) as u64 * job + p as u64 * estimate;
         let rows = (passes * analyses) as u64 * of_analysis + passes as u64 * values * innovation;
-        let states = (self.spec.n_state() * particles * records * 8) as u64;
-        rows + values * innovation + 2 * states
+        rows + values * innovation + 2 * self.bytes_of_states()
+    }
+
+    /// Whether a state of the model travels by itself, in pieces.
+    pub fn has_large_states(&self) -> bool {
+        self.spec.n_state() * 8 > MAX_INLINE_STATE
+    }
+
+    /// Bytes of the states of all particles of all records.
+    pub fn bytes_of_states(&self) -> u64 {
+        let p = self.theta.len();
+        let particles = SigmaSet::new(self.estimator.points, p).map_or(p + 1, |set| set.n_particle());
+        (self.spec.n_state() * particles * self.records.len() * 8) as u64
     }
 }

@@ -9,7 +9,8 @@ use starlings_estimators::{Form, Gaussian};
 use starlings_fleet::{Fleet, FleetEvent};
 
 use super::constants::{self, HangsOn};
-use super::fit::{FailureCluster, batch, filter, free_run};
+use super::failures::FailureCluster;
+use super::fit::{batch, filter, free_run};
 use super::given_residuals::{self, GivenResiduals};
 use super::identify::IdentifyError;
 use super::store::{Store, StoreError};

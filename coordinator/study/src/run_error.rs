@@ -84,6 +84,14 @@ impl RunError {
         }
     }
 
+    /// Whether a piece of a particle's state is not where it belongs.
+    pub fn misses_a_piece(&self) -> bool {
+        match self {
+            Self::State(error) | Self::Store(StoreError::State(error)) => error.is_missing(),
+            _ => false,
+        }
+    }
+
     /// Whether the work was cancelled; false when it failed.
     pub fn is_cancelled(&self) -> bool {
         matches!(self, Self::Fleet(FleetError::Cancelled))

@@ -9,8 +9,8 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use super::constants::HangsOn;
+use super::failures::FailureCluster;
 use super::field::field_of;
-use super::fit::FailureCluster;
 use super::given_residuals::GivenResiduals;
 use super::observer_gain::ObserverFit;
 use super::posterior::{self, Estimate, estimates};

@@ -111,6 +111,11 @@ impl FromWorker {
         Ok(generated::FromWorker { kind: Some(kind) })
     }
 
+    /// What an encoded message takes on the wire, bytes.
+    pub fn wire_size(message: &generated::FromWorker) -> usize {
+        prost::Message::encoded_len(message)
+    }
+
     /// Checks a message that arrived.
     ///
     /// # Errors

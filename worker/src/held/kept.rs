@@ -13,9 +13,16 @@ use super::large::Large;
 
 /// A run that ended.
 pub(super) struct Kept {
+    /// When it ended, or was sent last.
     pub(super) at: Instant,
     pub(super) of: Of,
     pub(super) ended: Ended,
+    /// The coordinator has not its large state, as far as is known: it may ask for it.
+    pub(super) is_owed: bool,
+    /// Its large state is being put, which has it in memory.
+    pub(super) is_put: bool,
+    /// What it counts, bytes in memory.
+    pub(super) counted: usize,
 }
 
 /// The key of a job, or what it is made of.
@@ -50,7 +57,13 @@ impl Ended {
 }
 
 impl Kept {
-    /// In memory.
+    /// One that ends now.
+    pub(super) fn new(of: Of, ended: Ended, is_put: bool) -> Self {
+        let is_owed = matches!(ended, Ended::Large(_));
+        Self { at: Instant::now(), of, ended, is_owed, is_put, counted: 0 }
+    }
+
+    /// In memory for its own sake.
     pub(super) fn bytes(&self) -> usize {
         let of_job = match &self.of {
             Of::Key(_) => 0,
@@ -58,6 +71,7 @@ impl Kept {
         };
         let of_result = match &self.ended {
             Ended::Inside(bytes) => bytes.len(),
+            Ended::Large(_) if self.is_put => 0,
             Ended::Large(large) => large.bytes().0,
         };
         of_result + of_job + size_of::<Self>()

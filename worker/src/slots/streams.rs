@@ -5,14 +5,12 @@ use std::sync::Arc;
 
 use starlings_models::{ParticleError, Prediction};
 use starlings_proto::convert::ended;
-use starlings_proto::{
-    FromWorker, HeldRun, JobKey, JobKeys, Lease, LeaseOutcome, MAX_INLINE_STATE, State, generated,
-};
-use tokio::sync::mpsc::UnboundedSender;
+use starlings_proto::{FromWorker, HeldRun, JobKey, JobKeys, Lease, LeaseOutcome, MAX_INLINE_STATE, State};
 
-use super::{Asked, Shared, Slots, Task, answer};
+use super::{Asked, Queue, Shared, Slots, Task};
 use crate::held::Ended;
 use crate::held::large::Large;
+use crate::outbox::Outbox;
 
 impl Slots {
     /// Its stream is gone: what was begun and what waits goes on, and its results are held.
@@ -25,7 +23,7 @@ impl Slots {
 
     /// A stream of the same run is there: the keys of what an earlier one asked for and is not finished. What finishes from now on is
     /// told to it.
-    pub(crate) fn attach(&self, stream: UnboundedSender<generated::FromWorker>) -> Vec<JobKey> {
+    pub(crate) fn attach(&self, stream: Outbox) -> Vec<JobKey> {
         let mut queue = self.shared.lock();
         queue.stream = Some(stream);
         queue.full = false;
@@ -61,6 +59,9 @@ impl Slots {
     }
 }
 
+/// Nobody needs what a task computed.
+struct RunIsOver;
+
 impl Shared {
     /// Answers a task that ran; held is the result whether there is somebody to answer or not.
     pub(super) fn finished(&self, task: Arc<Task>, result: Result<Prediction, ParticleError>, cost: f64) {
@@ -78,15 +79,15 @@ impl Shared {
     }
 
     fn ended_small(&self, task: &Arc<Task>, result: Result<Prediction<State>, ParticleError>, cost: f64) {
-        let stream = self.over(task, || Ended::inside(&result, cost));
+        let Ok(stream) = self.over(task, Ended::inside(&result, cost), false) else { return };
         match (task.asked().take(), stream) {
-            (Some(Asked { lease, outbox, .. }), _) => answer(&outbox, lease, LeaseOutcome::Ran(result), cost),
+            (Some(Asked { lease, outbox, .. }), _) => {
+                outbox.answer_when_room(lease, LeaseOutcome::Ran(result), cost);
+            }
             (None, Some(stream)) => {
                 let ended = Some(ended::encode(&result, cost).into());
                 let run = HeldRun { key: task.of().key(&mut JobKeys::default()), ended };
-                if let Ok(message) = FromWorker::Held(vec![run]).encode() {
-                    let _ = stream.send(message);
-                }
+                stream.send_when_room(FromWorker::Held(vec![run]));
             }
             (None, None) => {}
         }
@@ -94,8 +95,14 @@ impl Shared {
 
     /// A stream that came meanwhile knows the run as one that goes on: it asks for the result.
     fn ended_large(&self, task: Arc<Task>, large: Arc<Large>) {
-        self.over(&task, || Ended::Large(Arc::clone(&large)));
-        let Some(Asked { lease, outbox, transfers }) = task.asked().take() else { return };
+        let is_put = task.asked().is_some();
+        if self.over(&task, Ended::Large(Arc::clone(&large)), is_put).is_err() {
+            return;
+        }
+        let Some(Asked { lease, outbox, transfers }) = task.asked().take() else {
+            self.was_put(&large, false);
+            return;
+        };
         let (is_wanted, cost) = (!task.stop.is_set(), large.cost());
         // What it began from is not needed for what it ended in.
         if let Some(state) = task.into_large_state() {
@@ -103,27 +110,42 @@ impl Shared {
         }
         let answered =
             if is_wanted { LeaseOutcome::Ran(large.put(&transfers, lease)) } else { LeaseOutcome::Withdrawn };
-        answer(&outbox, lease, answered, cost);
-        if let Some(state) = Arc::into_inner(large).and_then(Large::into_memory) {
+        let mut gone = self.was_put(&large, !matches!(answered, LeaseOutcome::Ran(Err(_))));
+        outbox.answer_when_room(lease, answered, cost);
+        gone.push(large);
+        for state in gone.into_iter().filter_map(Arc::into_inner).filter_map(Large::into_memory) {
             transfers.recycle(state);
         }
     }
 
+    /// A large state has been put, or not; the ones that nobody needs any more.
+    fn was_put(&self, large: &Arc<Large>, has_arrived: bool) -> Vec<Arc<Large>> {
+        let Some(held) = &self.held else { return Vec::new() };
+        let (has_room, gone) = held.was_put(large, has_arrived);
+        Self::note_room(&mut self.lock(), has_room);
+        gone
+    }
+
     /// Holds how a task ended, which computes no more; the stream of now.
-    fn over(
-        &self,
-        task: &Arc<Task>,
-        ended: impl FnOnce() -> Ended,
-    ) -> Option<UnboundedSender<generated::FromWorker>> {
-        let has_room = self.held.as_ref().is_none_or(|held| held.keep(task.of(), ended()));
+    fn over(&self, task: &Arc<Task>, ended: Ended, is_put: bool) -> Result<Option<Outbox>, RunIsOver> {
+        let is_it = |running: &Arc<Task>| Arc::ptr_eq(running, task);
+        if !self.lock().running.iter().any(is_it) {
+            return Err(RunIsOver);
+        }
+        let has_room = self.held.as_ref().is_none_or(|held| held.keep(task.of(), ended, is_put));
         let mut queue = self.lock();
-        queue.running.retain(|running| !Arc::ptr_eq(running, task));
+        queue.running.retain(|running| !is_it(running));
+        Self::note_room(&mut queue, has_room);
+        Ok(queue.stream.clone())
+    }
+
+    /// No further run is begun where no more can be held.
+    fn note_room(queue: &mut Queue, has_room: bool) {
         // A stream that came meanwhile has been told all that is held.
         if !has_room && queue.stream.is_none() && !std::mem::replace(&mut queue.full, true) {
             tracing::warn!(
                 "no further run is begun until the coordinator is back: no more results can be held"
             );
         }
-        queue.stream.clone()
     }
 }

@@ -2,12 +2,12 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use starlings_models::{Forward, Job, ParticleError, Stop};
-use starlings_proto::{FromWorker, JobKey, Lease, LeaseOutcome, SetupId, generated};
+use starlings_models::{Forward, Job, Stop};
+use starlings_proto::{JobKey, Lease, SetupId};
 use tokio::sync::OwnedSemaphorePermit;
-use tokio::sync::mpsc::UnboundedSender;
 
 use crate::held::Of;
+use crate::outbox::Outbox;
 use crate::transfer::Transfers;
 
 /// One job with everything needed to run and answer it.
@@ -29,7 +29,7 @@ pub(crate) struct Task {
 #[derive(Clone)]
 pub(crate) struct Asked {
     pub(crate) lease: Lease,
-    pub(crate) outbox: UnboundedSender<generated::FromWorker>,
+    pub(crate) outbox: Outbox,
     /// The way of a large end state.
     pub(crate) transfers: Transfers,
 }
@@ -74,21 +74,5 @@ impl Task {
 
     pub(super) fn has_lease(&self, leases: &[Lease]) -> bool {
         self.asked().as_ref().is_some_and(|asked| leases.contains(&asked.lease))
-    }
-}
-
-/// Answers a lease; an answer that does not fit in a message becomes a failure that says so.
-pub(crate) fn answer(
-    outbox: &UnboundedSender<generated::FromWorker>,
-    lease: Lease,
-    answer: LeaseOutcome,
-    cost: f64,
-) {
-    let message = FromWorker::Result { lease, answer, cost }.encode().or_else(|error| {
-        let answer = LeaseOutcome::Ran(Err(ParticleError::BadJob(error.to_string())));
-        FromWorker::Result { lease, answer, cost }.encode()
-    });
-    if let Ok(message) = message {
-        let _ = outbox.send(message);
     }
 }

@@ -25,20 +25,75 @@ impl Forward for Endless {
     }
 }
 
+/// A job of the particle 0.
+fn job() -> Job {
+    let window =
+        starlings_models::Window { start: 0.0, times: vec![1.0], observed: vec![0.0], inputs: vec![] };
+    Job { particle: 0, record: 0, window: Arc::new(window), theta: vec![], state: None }
+}
+
+/// Ends, when it is told to stop, with a result all the same.
+struct Stubborn;
+
+impl Forward for Stubborn {
+    fn spec(&self) -> &starlings_models::Spec {
+        Endless.spec()
+    }
+
+    fn run(&self, job: &Job) -> Result<starlings_models::Prediction, ParticleError> {
+        Endless.run(job)
+    }
+
+    fn run_within(
+        &self,
+        job: &Job,
+        until: &Until<'_>,
+    ) -> Result<starlings_models::Prediction, ParticleError> {
+        let _ = Endless.run_within(job, until);
+        Ok(starlings_models::Prediction { outputs: vec![1.0], state: vec![], cost: 0.0 })
+    }
+}
+
+#[test]
+fn a_run_that_is_over_stops_what_computes_and_nothing_of_it_is_kept_or_told_to_the_next_one() {
+    let (outbox, mut sent) = Outbox::new();
+    let held = Arc::new(Held::new(crate::HoldLimits::default(), &std::env::temp_dir()));
+    let slots = Slots::start(2, Some(Arc::clone(&held))).unwrap();
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+    let transfers = crate::transfer::Transfers::nowhere(runtime.handle());
+    let forwards: [Arc<dyn Forward>; 3] = [Arc::new(Endless), Arc::new(Stubborn), Arc::new(Endless)];
+    for (number, forward) in (1..).zip(forwards) {
+        let lease = Lease { epoch: 1, job: number, attempt: 1 };
+        let asked = Asked { lease, outbox: outbox.clone(), transfers: transfers.clone() };
+        slots.push(Task::new(asked, [7; 32], forward, job()));
+    }
+    while slots.load() != (2, 1) {
+        std::thread::yield_now();
+    }
+    slots.forget();
+    let (next, mut told) = Outbox::new();
+    assert_eq!(slots.attach(next.clone()), Vec::<starlings_proto::JobKey>::new());
+    while slots.load() != (0, 0) || slots.answered() != (1, 0) {
+        std::thread::yield_now();
+    }
+    slots.close();
+    drop((outbox, next));
+    // Both threads have ended with what they did.
+    drop(slots);
+    assert!(sent.blocking_recv().is_none() && told.blocking_recv().is_none());
+    assert_eq!(held.len(), 0);
+}
+
 #[test]
 fn a_computing_job_is_stopped_when_that_is_asked_for_and_answered_as_withdrawn() {
-    let (outbox, mut sent) = tokio::sync::mpsc::unbounded_channel();
+    let (outbox, mut sent) = Outbox::new();
     let slots = Slots::start(1, None).unwrap();
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
     let transfers = crate::transfer::Transfers::nowhere(runtime.handle());
     let lease = |job| Lease { epoch: 1, job, attempt: 1 };
-    let window =
-        starlings_models::Window { start: 0.0, times: vec![1.0], observed: vec![0.0], inputs: vec![] };
-    let window = Arc::new(window);
     for number in 1..=3 {
-        let job = Job { particle: 0, record: 0, window: Arc::clone(&window), theta: vec![], state: None };
         let asked = Asked { lease: lease(number), outbox: outbox.clone(), transfers: transfers.clone() };
-        slots.push(Task::new(asked, [7; 32], Arc::new(Endless), job));
+        slots.push(Task::new(asked, [7; 32], Arc::new(Endless), job()));
     }
     while slots.load().0 == 0 {
         std::thread::yield_now();

@@ -2,6 +2,8 @@
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
 
+use starlings_proto::host::host_name;
+
 /// The address as others dial it, the likeliest first; where it is every address of this machine: its name, the address from
 /// which it sends to others, and loopback. A wrong one does no harm: whoever answers there lacks the certificate.
 pub(super) fn addresses(address: SocketAddr, given: Option<&str>) -> Vec<String> {
@@ -19,11 +21,6 @@ pub(super) fn addresses(address: SocketAddr, given: Option<&str>) -> Vec<String>
     let mut seen = std::collections::BTreeSet::new();
     found.retain(|address| seen.insert(address.clone()));
     found
-}
-
-fn host_name() -> Option<String> {
-    let name = std::fs::read_to_string("/proc/sys/kernel/hostname").ok()?;
-    Some(name.trim().to_owned()).filter(|name| !name.is_empty())
 }
 
 /// The address of the interface that leads elsewhere. Nothing is sent: the system only looks the way up.

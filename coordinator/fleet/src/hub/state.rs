@@ -48,6 +48,8 @@ pub(super) struct State {
     pub(super) first_epoch: u64,
     pub(super) joined: u64,
     pub(super) draining: bool,
+    /// What workers are told when they are asked to leave.
+    pub(super) last_word: &'static str,
     pub(super) given_up: Option<String>,
     pub(super) stopped: Option<String>,
     pub(super) other_builds: BTreeSet<[u8; 32]>,
@@ -128,6 +130,7 @@ impl State {
             first_epoch,
             joined: 0,
             draining: false,
+            last_word: OVER,
             given_up: None,
             stopped: None,
             other_builds: BTreeSet::new(),
@@ -153,7 +156,7 @@ impl State {
             return Err(Closed::Refused(reason));
         }
         if self.draining {
-            return Err(Closed::Over(OVER.to_owned()));
+            return Err(Closed::Over(self.last_word.to_owned()));
         }
         Ok(())
     }

@@ -222,9 +222,14 @@ impl Proxy {
         self.silent.hold(held);
     }
 
-    /// Holds back what the clients say, for good.
+    /// Holds back what the clients say.
     pub fn mute(&self) {
         self.mute.hold(true);
+    }
+
+    /// Lets go what the clients say.
+    pub fn unmute(&self) {
+        self.mute.hold(false);
     }
 
     /// Cuts it, and passes new connections to another server.

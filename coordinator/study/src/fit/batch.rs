@@ -40,7 +40,10 @@ pub(crate) fn fit(
     let values: Vec<f64> = windows.iter().flat_map(|(_, w)| w.observed.iter().copied()).collect();
     let noise = noise(study, &windows, 1.0);
     let mut now = match resumed {
-        Some(snapshot) => snapshot.of_batch(store)?,
+        Some(snapshot) => {
+            runner.recall(snapshot.figures.failures.clone());
+            snapshot.of_batch(store)?
+        }
         None => begin(&batch, study),
     };
     while !now.estimate.state.converged && now.figures.step < batch.max_iterations {
@@ -124,6 +127,7 @@ fn run_ensemble(
     let before = runner.counts;
     let results = runner.run_from_start(at, theta, windows)?;
     now.figures.counts.add_since(before, runner.counts);
+    now.figures.failures = runner.learned();
     Ok(results)
 }
 

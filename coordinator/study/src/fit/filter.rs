@@ -31,7 +31,10 @@ pub(crate) fn fit(
     let study = runner.study();
     let schedule = Schedule::new(study, make)?;
     let mut now = match resumed {
-        Some(snapshot) => snapshot.of_filter(store)?,
+        Some(snapshot) => {
+            runner.recall(snapshot.figures.failures.clone());
+            snapshot.of_filter(store)?
+        }
         None => schedule.start(0, &posterior::prior(study)),
     };
     let mut reported = schedule.reported(&now)?;
@@ -93,6 +96,7 @@ fn step(
     advance(now, &particles, &analysis);
     now.figures.counts.add_since(before_runs, runner.counts);
     now.figures.counts.rescued += rescued;
+    now.figures.failures = runner.learned();
     let after = schedule.reported(now)?;
     let mut row = row(schedule.study, at, &windows, &analysis, before, &after);
     row.jobs = runner.take_rows();

@@ -80,7 +80,7 @@ impl<'a> Kept<'a> {
         for (index, outcome) in open.iter().zip(outcomes.map_err(|error| placed(error, &open))?) {
             if let (true, Err(Failure::Timeout(timeout))) = (lasts, &outcome.result) {
                 let (setup, job) = job(*index);
-                self.timeouts.keep(&setup, &job, timeout)?;
+                self.timeouts.keep(&mut keys, &setup, &job, timeout)?;
             }
             known[*index] = Some(outcome);
         }
@@ -102,13 +102,13 @@ impl<'a> Kept<'a> {
         }
         let mut known = Vec::with_capacity(n_job);
         for (setup, job) in (0..n_job).map(job) {
-            let timeout = if decided { self.timeouts.known(&setup, &job) } else { None };
+            let timeout = if decided { self.timeouts.known(keys, &setup, &job) } else { None };
             let outcome = match timeout {
                 Some(outcome) => Some(outcome),
                 None => self.journal.known(keys, &setup, &job)?,
             };
             if let Some(Err(Failure::Timeout(timeout))) = outcome.as_ref().map(|known| &known.result) {
-                self.timeouts.keep(&setup, &job, timeout)?;
+                self.timeouts.keep(keys, &setup, &job, timeout)?;
             }
             known.push(outcome);
         }

@@ -10,10 +10,10 @@ use nalgebra::{DMatrix, DVector};
 use starlings_fleet::{Fleet, Held, Outcome, SetupId};
 use starlings_models::{BuildSetup, Job, Prediction, Setup, Window};
 
-use super::failures::{FailureCluster, Failures};
 pub(crate) use super::index::AnalysisIndex;
 use super::kept::Kept;
 pub(crate) use super::results::{Predicted, Results, StepWindows};
+use crate::failures::{FailureCluster, Failures};
 use crate::states::States;
 use crate::store::snapshot::Counts;
 use crate::store::{JobRow, Store};
@@ -81,6 +81,16 @@ impl<'a> EnsembleRunner<'a> {
     /// A warning about the timeouts in the store, if there are any.
     pub(crate) fn timeouts(&self) -> Option<String> {
         self.kept.as_ref()?.warning()
+    }
+
+    /// How the runs ended so far, for a snapshot.
+    pub(crate) fn learned(&self) -> Failures {
+        self.failures.clone()
+    }
+
+    /// Goes on from how the runs before a resume ended.
+    pub(crate) fn recall(&mut self, failures: Failures) {
+        self.failures = failures;
     }
 
     /// Failed runs by message and place.

@@ -49,9 +49,13 @@ impl<'a> Timeouts<'a> {
     }
 
     /// The timeout of a job as its outcome, if it was decided before.
-    pub(super) fn known(&self, setup: &SetupId, job: &Job<Held>) -> Option<Outcome<Held>> {
-        let timeout =
-            self.known.get(&run_key::observed(&self.programs, &mut JobKeys::default(), setup, job))?;
+    pub(super) fn known(
+        &self,
+        keys: &mut JobKeys,
+        setup: &SetupId,
+        job: &Job<Held>,
+    ) -> Option<Outcome<Held>> {
+        let timeout = self.known.get(&run_key::observed(&self.programs, keys, setup, job))?;
         Some(Outcome { result: Err(timeout.clone().into()), attempts: 0, worker: String::new() })
     }
 
@@ -61,11 +65,12 @@ impl<'a> Timeouts<'a> {
     /// When the store refuses.
     pub(super) fn keep(
         &mut self,
+        keys: &mut JobKeys,
         setup: &SetupId,
         job: &Job<Held>,
         timeout: &Timeout,
     ) -> Result<(), StoreError> {
-        let key = run_key::observed(&self.programs, &mut JobKeys::default(), setup, job);
+        let key = run_key::observed(&self.programs, keys, setup, job);
         self.store.remember_runs([(&key, encode(timeout).as_slice())], &[])?;
         self.known.insert(key, timeout.clone());
         Ok(())
@@ -102,13 +107,14 @@ mod tests {
         let job = Job { particle: 0, record: 0, window: Arc::new(window), theta: vec![3.0], state: None };
         let setup = [7; 32];
         let late = Timeout { limit: 5.0, says: "it did not answer within 5 s".to_owned() };
+        let mut keys = JobKeys::default();
         let mut timeouts = Timeouts::read(&store).expect("none");
-        timeouts.keep(&setup, &job, &late).expect("room");
+        timeouts.keep(&mut keys, &setup, &job, &late).expect("room");
         let same = Timeouts::read(&store).expect("one");
-        assert!(same.known(&setup, &job).is_some());
+        assert!(same.known(&mut keys, &setup, &job).is_some());
         store.set_meta("program", r#"{"build": "another"}"#).expect("room");
         let other = Timeouts::read(&store).expect("one");
-        assert!(other.known(&setup, &job).is_none());
+        assert!(other.known(&mut keys, &setup, &job).is_none());
         assert!(!other.is_empty(), "it is told all the same: earlier analyses may rest on it");
     }
 }

@@ -30,11 +30,14 @@ pub struct ArrivedRun {
 impl Store {
     /// Keeps runs that arrived, and makes everything written before durable. The pieces of their states stand in the folder before
     /// the rows that name them. While those that came before have taken more than their share of the time, runs with large states
-    /// are left out.
+    /// are left out, and all of them while the states of a snapshot have.
     ///
     /// # Errors
     /// When the database refuses.
     pub fn keep_arrived(&self, runs: &[(RunKey, ArrivedRun)]) -> Result<(), StoreError> {
+        if self.kept.borrow().holds_back() {
+            return Ok(());
+        }
         self.commit()?;
         let rests = self.kept.borrow().rests();
         let runs = runs.iter().filter(|(_, run)| !rests || run.state.is_none()).collect::<Vec<_>>();

@@ -24,6 +24,21 @@ pub enum FolderError {
         /// ` (process 17 on host)`; empty where that is not known.
         by: String,
     },
+    /// Its file system keeps no locks, and another process may run in it.
+    #[error(
+        "another process may be running in this folder: its file system keeps no locks, and {} names process {pid} on {host}: wait for \
+         its end or stop it; if it is gone, remove {}",
+        path.display(),
+        path.display()
+    )]
+    MaybeLocked {
+        /// The file of the lock.
+        path: PathBuf,
+        /// The process that it names.
+        pid: u32,
+        /// Where that ran.
+        host: String,
+    },
     /// Its run never got as far as its first step.
     #[error("{0} holds no run that could be continued: remove the folder and start again without --resume")]
     NeverStarted(PathBuf),

@@ -10,6 +10,7 @@ use std::io::{self, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
+use starlings_proto::host::host_name;
 
 use super::folder_error::FolderError;
 
@@ -36,13 +37,13 @@ struct Holder {
 
 impl Holder {
     fn this() -> Self {
-        Self { host: host_name(), pid: std::process::id() }
+        Self { host: own_host(), pid: std::process::id() }
     }
 
     /// Whether it is certainly gone, or nobody.
     fn is_gone(&self) -> bool {
         // Of another machine nothing is known.
-        self.pid == 0 || self.host == host_name() && !Path::new(&format!("/proc/{}", self.pid)).exists()
+        self.pid == 0 || self.host == own_host() && !Path::new(&format!("/proc/{}", self.pid)).exists()
     }
 }
 
@@ -64,7 +65,7 @@ impl FolderLock {
                 Err(TryLockError::Error(_)) => {
                     let holder = read(&mut file);
                     if !holder.is_gone() && holder != Holder::this() {
-                        return Err(locked(folder, &mut file));
+                        return Err(FolderError::MaybeLocked { path, pid: holder.pid, host: holder.host });
                     }
                 }
             }
@@ -115,9 +116,8 @@ fn is_still(file: &File, path: &Path) -> io::Result<bool> {
     }
 }
 
-fn host_name() -> String {
-    let name = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
-    name.trim().to_owned()
+fn own_host() -> String {
+    host_name().unwrap_or_default()
 }
 
 #[cfg(test)]
@@ -129,7 +129,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let first = FolderLock::take(folder.path()).expect("nobody is there");
         let error = FolderLock::take(folder.path()).expect_err("somebody is there").to_string();
-        let who = format!("(process {} on {})", std::process::id(), host_name());
+        let who = format!("(process {} on {})", std::process::id(), own_host());
         assert!(error.contains(&who), "{error}");
         drop(first);
         assert!(!folder.path().join(NAME).exists(), "it leaves nothing");
@@ -151,7 +151,7 @@ mod tests {
         assert!(Holder::default().is_gone());
         assert!(!Holder::this().is_gone());
         // Beyond the largest process number of the system.
-        assert!(of(host_name(), u32::MAX).is_gone());
+        assert!(of(own_host(), u32::MAX).is_gone());
         assert!(!of("elsewhere".to_owned(), u32::MAX).is_gone());
     }
 }

@@ -11,6 +11,7 @@ use starlings_estimators::{BatchState, Gaussian};
 use starlings_fleet::{StateStore, StoredState};
 use starlings_proto::convert::floats;
 
+use crate::failures::Failures;
 use crate::states::States;
 use crate::states::stored::StoredStates;
 use crate::store::{Store, StoreError};
@@ -80,6 +81,9 @@ pub struct Figures {
     pub dropped: f64,
     /// Runs so far.
     pub counts: Counts,
+    /// How they ended and where they lie.
+    #[serde(default)]
+    pub failures: Failures,
 }
 
 /// The particles of a filter, and where its pass started.

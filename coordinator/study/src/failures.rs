@@ -1,7 +1,7 @@
 //! Failed runs by what they said and where they lie: how many, and which parameter tells them from the runs that worked.
 //!
 //! Messages that differ in numbers alone are of one class. Only sums are kept, however many runs there are. Next file to read:
-//! [`super::runner`].
+//! [`crate::fit::runner`].
 
 use std::collections::BTreeMap;
 
@@ -48,8 +48,9 @@ pub struct FailedRange {
     pub worked: Option<[f64; 2]>,
 }
 
-/// Sums over the values of a parameter.
-#[derive(Clone, Copy, Debug)]
+/// Sums over the values of a parameter. They are kept as bits, so that a resume goes on with the same sums.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(from = "[u64; 5]", into = "[u64; 5]")]
 struct Spread {
     n: f64,
     mean: f64,
@@ -82,9 +83,22 @@ impl Spread {
     }
 }
 
+impl From<[u64; 5]> for Spread {
+    fn from(bits: [u64; 5]) -> Self {
+        let [n, mean, squares, low, high] = bits.map(f64::from_bits);
+        Self { n, mean, squares, range: [low, high] }
+    }
+}
+
+impl From<Spread> for [u64; 5] {
+    fn from(Spread { n, mean, squares, range: [low, high] }: Spread) -> Self {
+        [n, mean, squares, low, high].map(f64::to_bits)
+    }
+}
+
 /// Runs by how they ended.
-#[derive(Debug, Default)]
-pub(crate) struct Failures {
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Failures {
     worked: Vec<Spread>,
     classes: BTreeMap<String, Vec<Spread>>,
 }
@@ -202,6 +216,8 @@ mod tests {
         let clusters = failures.clusters(&names);
         let of =
             |i: usize| (clusters[i].message.as_str(), clusters[i].runs, clusters[i].separates.as_deref());
+        let kept = serde_json::to_string(&failures).expect("numbers");
+        assert_eq!(serde_json::from_str::<Failures>(&kept).expect("the same"), failures);
         assert_eq!(of(0), ("more than # steps", 10, Some("k")));
         assert_eq!(of(1), ("not finite", 1, None));
         let k = &clusters[0].parameters[0];

@@ -1,0 +1,37 @@
+//! What a command takes before it writes anything: its address, and the name of its access file.
+
+use starlings_coordinator::fleet::Bound;
+use starlings_coordinator::fleet::access::{Access, AccessFault};
+
+use super::plan::{AccessPlan, Plan};
+use crate::failure::Failure;
+
+/// What was taken. What is in use by another command leaves nothing behind, and neither does one that ends before it listens.
+pub(crate) struct Entrance {
+    pub(super) bound: Option<Bound>,
+    pub(super) access: Option<Access>,
+}
+
+impl Entrance {
+    /// Takes the address and the secrets of the access file. `out` is the run folder, where it was named.
+    pub(crate) fn take(plan: &Plan, out: Option<&std::path::Path>) -> Result<Self, Failure> {
+        let bound = plan.address.map(Bound::new).transpose().map_err(Failure::run)?;
+        let file = match &plan.access {
+            None => return Ok(Self { bound, access: None }),
+            Some(AccessPlan::Named(file)) => Some(file.as_path()),
+            Some(AccessPlan::RunFolder(file)) => file.as_deref(),
+        };
+        let mut access = Access::at(file).map_err(|fault| failed(&fault))?;
+        // The run folder is made later.
+        if let Some(AccessPlan::Named(file)) = &plan.access
+            && !out.is_some_and(|out| file.starts_with(out))
+        {
+            access.reserve(file).map_err(|fault| failed(&fault))?;
+        }
+        Ok(Self { bound, access: Some(access) })
+    }
+}
+
+pub(super) fn failed(fault: &AccessFault) -> Failure {
+    if fault.is_input() { Failure::input(format!("--access: {fault}")) } else { Failure::run(fault) }
+}
