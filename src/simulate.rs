@@ -16,7 +16,8 @@ use crate::csv_file::{self, StudyLocation};
 use crate::failure::Failure;
 use crate::load::load;
 
-/// Run the study's model forward with chosen values and noise, and write the outputs as CSV.
+/// Run the study's model forward with chosen values and noise, and write the outputs as CSV. Noise of the model's states is drawn from
+/// the same seed.
 #[derive(Parser)]
 pub(crate) struct Args {
     /// The study file.

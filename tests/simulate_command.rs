@@ -139,3 +139,65 @@ fn a_twin_of_a_model_with_fields_is_a_recording_of_the_next_study() {
     assert_eq!(code, 0, "{stderr}");
     assert!(stdout.contains("displacement (24 of 25 components observed)"), "{stdout}");
 }
+
+/// A study of a walk that is drawn back, with so much noise and a solver.
+fn noisy_study(folder: &std::path::Path, noise: &str, solver: &str) -> std::path::PathBuf {
+    let rows: String = (0..200).map(|i| format!("{},0\n", f64::from(i) * 0.1)).collect();
+    std::fs::write(folder.join("data.csv"), format!("time,x\n{rows}")).unwrap();
+    let text = format!(
+        "[study]\nname = \"walk\"\n[model]\nkind = \"equations\"\noutputs = [ {{ name = \"x\", value = \"x\" }} ]\n{solver}\n\
+         [[model.states]]\nname = \"x\"\ninitial = 1\nrate = \"-k*x\"\nnoise = {noise}\n\
+         [[parameters]]\nname = \"k\"\nprior = {{ transform = \"log\", median = 1.0, factor = 2 }}\n\
+         [[records]]\nname = \"r\"\nfile = \"data.csv\"\nchannels = [ {{ column = \"x\", output = \"x\", noise = 0.1 }} ]\n\
+         [estimator]\nkind = \"batch\"\n"
+    );
+    let file = folder.join("study.toml");
+    std::fs::write(&file, text).unwrap();
+    file
+}
+
+#[test]
+fn noise_of_the_states_is_drawn_from_the_seed_and_a_fit_says_that_it_leaves_it_out() {
+    let dir = tempfile::tempdir().unwrap();
+    let study = noisy_study(
+        dir.path(),
+        "\"0.3*s\"",
+        "solver = { method = \"heun\", step = 0.01 }\nconstants = { s = 1 }",
+    );
+    let twin = |more: &[&str]| {
+        let (code, stdout, stderr) = output(starlings().arg("simulate").arg(&study).args(more));
+        assert_eq!(code, 0, "{stderr}");
+        stdout
+    };
+    let one = twin(&["--seed", "3"]);
+    assert_eq!(one, twin(&["--seed", "3"]));
+    assert_ne!(one, twin(&["--seed", "4"]));
+    let quiet = twin(&["--set", "s=0"]);
+    let last: f64 = quiet.lines().last().unwrap().split(',').nth(1).unwrap().parse().unwrap();
+    assert!((last - (-19.9_f64).exp()).abs() < 1e-6, "{last}");
+    let (code, stdout, stderr) = output(starlings().arg("check").arg(&study));
+    assert_eq!(code, 0, "{stderr}");
+    assert!(stdout.contains("the states' `noise` is left out of the runs of a fit"), "{stdout}");
+    let (code, _, stderr) = output(starlings().arg("simulate").arg(&study).args(["--periodic", "1"]));
+    assert_eq!(code, 2);
+    assert!(stderr.contains("a model with noise has no periodic start"), "{stderr}");
+}
+
+#[test]
+fn noise_that_cannot_be_simulated_is_refused_where_it_stands() {
+    let dir = tempfile::tempdir().unwrap();
+    let refused = |noise: &str, solver: &str| {
+        let study = noisy_study(dir.path(), noise, solver);
+        let (code, _, stderr) = output(starlings().arg("check").arg(study));
+        assert_eq!(code, 2, "{stderr}");
+        stderr
+    };
+    let stderr = refused("0.3", "");
+    assert!(stderr.contains("the noise of state `x` needs a solver for it"), "{stderr}");
+    let stderr = refused("0.3", "solver = { method = \"heun\" }");
+    assert!(stderr.contains("the method \"heun\" needs its `step`"), "{stderr}");
+    let stderr = refused("{ w = \"0.3*\" }", "solver = { method = \"heun\", step = 0.1 }");
+    assert!(stderr.contains("noise `w` of `x`") && stderr.contains("study.toml:"), "{stderr}");
+    let stderr = refused("[1]", "solver = { method = \"heun\", step = 0.1 }");
+    assert!(stderr.contains("a number or an expression in quotes"), "{stderr}");
+}

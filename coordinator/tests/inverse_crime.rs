@@ -100,6 +100,7 @@ impl Twin {
                 slope: &slope,
                 history: &NoHistory,
                 limits: &Limits::none(),
+                noise: None,
             };
             model.advance(segment, &theta, &mut x).unwrap();
             if !rows.is_empty() && (sample + 1) % 10 == 0 {

@@ -190,6 +190,7 @@ fn every_closed_step_agrees_with_the_integrated_rate() {
             slope: &slope,
             history: &NoHistory,
             limits: &Limits::none(),
+            noise: None,
         };
         let mut exact = vec![0.0; spec.n_state()];
         model.initial(&theta, &mut exact);

@@ -40,6 +40,10 @@ use super::record::{Context, Recordings};
 use super::solver_host::SolverHost;
 use crate::file::read::read;
 
+/// Why a fit of a stochastic model says less than it seems to.
+const NOISE_LEFT_OUT: &str = "the states' `noise` is left out of the runs of a fit, whose particles follow the rate alone: what the noise \
+    did to the recording counts as noise of the channels";
+
 impl Study {
     /// Reads and checks a study file and its recordings, which stand relative to it.
     ///
@@ -137,6 +141,9 @@ fn check(path: &Path, text: &str, solver_host: &SolverHost) -> Result<Study, Stu
     scales::check(&source, &file, &mut model, (&parameters, &records), solver_host, &mut warnings);
     source.verdict()?;
     check_setup(&source, &file, &model.setup, &records)?;
+    if model.setup.is_noisy() {
+        warnings.push(NOISE_LEFT_OUT.to_owned());
+    }
     warnings.extend(units::warnings(&file, &model, &records));
     let theta = expand::theta(&parameters, &records);
     Ok(Study {

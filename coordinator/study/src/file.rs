@@ -108,6 +108,8 @@ pub(super) struct StateSection {
     pub(super) initial: Spanned<String>,
     /// Terms of the rate by name; a single text has the empty name.
     pub(super) rate: Named<String>,
+    /// Amplitudes of white noise by source; a single text has the empty name.
+    pub(super) noise: Named<String>,
 }
 
 /// `[[parameters]]`.

@@ -36,7 +36,7 @@ pub struct Twin {
     /// Noise added on top to every output that the study observes: its standard deviation as a share of the output's
     /// largest amplitude, the difference of highest and lowest value over time, over all components of a field.
     pub noise_share: f64,
-    /// Seed of the noise.
+    /// Seed of the noise, that of the outputs and that of the model itself.
     pub seed: u64,
     /// Times at which the outputs are wanted; empty takes the record's.
     pub times: Vec<f64>,
@@ -108,6 +108,9 @@ pub fn simulate(study: &Study, twin: &Twin) -> Result<Recording, TwinError> {
         }
         None if !restarts => Vec::new(),
         None => run.initial(&window)?,
+        Some(_) if setup.is_noisy() => {
+            return Err(TwinError::Request("a model with noise has no periodic start".to_owned()));
+        }
         Some(period) => run.periodic(&mut window, period)?,
     };
     // Given as a state, a start without delays is the same to the last bit; with delays it lacks its past.
@@ -125,8 +128,9 @@ fn place(study: &Study, twin: &Twin) -> Result<(Setup, Vec<f64>), TwinError> {
     let prior = posterior::prior(study);
     let mut theta = study.theta_for(twin.record, prior.mean.as_slice());
     setup.outputs = components(&study.spec.outputs);
-    // The truth has no observer.
+    // The truth has no observer, and all of the model's noise.
     setup.observer = ObserverDef::default();
+    setup.noise = Some(twin.seed);
     let mut values = twin.values.clone();
     for (name, amplitude) in &twin.effects {
         values.push((amplitude_of(study, &mut setup, name)?, *amplitude));

@@ -252,6 +252,7 @@ fn step(model: &FsiTube, theta: &[f64], q: [f64; 2], x: &mut [f64]) {
         slope: &slope,
         history: &NoHistory,
         limits: &Limits::none(),
+        noise: None,
     };
     model.advance(segment, theta, x).unwrap();
 }

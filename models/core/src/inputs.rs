@@ -95,7 +95,15 @@ impl<'a> Inputs<'a> {
         while t0 < to {
             let next = self.enter(t0);
             let t1 = if next + rounding(next) >= to { to } else { next };
-            span(Segment { t0, t1, u0: &self.value, slope: &self.slope, history: self.window, limits })?;
+            span(Segment {
+                t0,
+                t1,
+                u0: &self.value,
+                slope: &self.slope,
+                history: self.window,
+                limits,
+                noise: None,
+            })?;
             t0 = t1;
         }
         Ok(())

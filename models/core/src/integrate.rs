@@ -1,7 +1,7 @@
 //! Numerical integration of a system of ordinary differential equations over one span.
 //!
 //! One file per method: [`dopri5`] for smooth problems, [`rosenbrock`] for stiff ones, [`fixed`] for a step that never
-//! adapts. The step control, the location of switching points and sliding along them are shared by the adaptive methods.
+//! adapts, [`stochastic`] for equations with noise. The step control, the location of switching points and sliding along them are shared by the adaptive methods.
 //! Nothing here knows a model or keeps memory between spans, so that a run depends on its job only. Next file to read: [`dopri5`].
 
 mod auto;
@@ -13,10 +13,12 @@ mod rosenbrock;
 mod sliding;
 mod span;
 mod stepper;
+mod stochastic;
 mod system;
 
 use dopri5::Dopri5;
 use rosenbrock::Rosenbrock;
+use stochastic::Sense;
 
 use crate::failure::ModelFailure;
 
@@ -51,6 +53,16 @@ pub enum Solver {
         /// Longest step, in the study's time unit.
         step: f64,
     },
+    /// Heun's method in equal steps no longer than `step`: noise in the sense of Stratonovich.
+    Heun {
+        /// Longest step, in the study's time unit.
+        step: f64,
+    },
+    /// The method of Euler and Maruyama in equal steps no longer than `step`: noise in the sense of Itô.
+    EulerMaruyama {
+        /// Longest step, in the study's time unit.
+        step: f64,
+    },
 }
 
 impl Default for Solver {
@@ -79,5 +91,7 @@ pub(crate) fn advance<S: System>(
             span::integrate(system, &mut Rosenbrock::new(n), span, x, tolerance).map(|_| ())
         }
         Solver::Fixed { step } => fixed::advance(system, span, x, step),
+        Solver::Heun { step } => stochastic::advance(system, span, x, step, Sense::Stratonovich),
+        Solver::EulerMaruyama { step } => stochastic::advance(system, span, x, step, Sense::Ito),
     }
 }

@@ -12,7 +12,7 @@ use crate::{Blocks, ModelFailure, Spec};
 
 pub use on_segment::advance_by;
 
-/// A dynamical system dx/dt = f(t, x, θ, u), y = h(t, x, θ, u).
+/// A dynamical system dx = f(t, x, θ, u) dt + b(t, x, θ, u) dW, y = h(t, x, θ, u).
 ///
 /// Slices: `x` and `dx` have [`Spec::n_state`] entries, `theta` one per [`Spec::parameters`], `y` [`Spec::n_output`].
 pub trait Model: Send + Sync {
@@ -31,6 +31,16 @@ pub trait Model: Send + Sync {
     /// Which integrator the default [`Model::advance`] uses.
     fn solver(&self) -> Solver {
         Solver::default()
+    }
+
+    /// Number of sources of white noise in the rate. A run without a seed leaves them out.
+    fn n_noise(&self) -> usize {
+        0
+    }
+
+    /// Writes the amplitudes of the sources of noise, b (n × [`Model::n_noise`], source by source): dx = f dt + b dW.
+    fn noise(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, b: &mut [f64]) {
+        let _ = (t, x, theta, u, b);
     }
 
     /// Number of switching functions; a model that wraps another adds its own to the inner model's.

@@ -3,6 +3,7 @@
 //! Next file to read: [`crate::model`].
 
 use crate::limits::Limits;
+use crate::noise::WhiteNoise;
 
 /// Access to input signals, and to what the model remembers of itself, at other times than now.
 pub trait History {
@@ -51,4 +52,6 @@ pub struct Segment<'a> {
     pub history: &'a dyn History,
     /// What the run may cost; a step that takes time counts itself.
     pub limits: &'a Limits<'a>,
+    /// Where the numbers of the model's noise come from; `None` leaves the noise out.
+    pub noise: Option<&'a WhiteNoise>,
 }

@@ -64,12 +64,24 @@ pub struct Setup {
     /// Steps that one run may take; [`crate::limits::MAX_STEPS`] where nothing is said. A solver counts its own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_steps: Option<u64>,
+    /// Seed of the model's noise; without one its noise is left out, and what runs is the drift alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise: Option<u64>,
     /// Seconds of computing that one run may take; [`crate::limits::TIMEOUT`] where nothing is said. A solver has its own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub timeout: Option<f64>,
 }
 
 impl Setup {
+    /// Whether the model's states have noise.
+    pub fn is_noisy(&self) -> bool {
+        self.model
+            .equations
+            .iter()
+            .flat_map(|equations| &equations.states)
+            .any(|state| !state.noise.is_empty())
+    }
+
     /// The effects with the built-in ones written out for a model of this specification; their unit labels, which no run
     /// reads, are those of a time in seconds.
     ///

@@ -1,7 +1,7 @@
 //! Runs a model over a window: predict, record, then correct.
 //!
 //! For each observation time: advance over the spans on which the inputs are linear, record the outputs, and only then let
-//! the observer see the observed values of that same time. No clock and no randomness: same job, same bits. A run over
+//! the observer see the observed values of that same time. No clock, and no randomness but the noise that the setup's seed and the job draw: same job, same bits. A run over
 //! consecutive windows equals one run over the whole. Next file to read: `inputs`, then `binding`.
 
 use crate::SetupError;
@@ -10,6 +10,7 @@ use crate::effect;
 use crate::inputs::Inputs;
 use crate::limits::{Limits, MAX_STEPS, TIMEOUT};
 use crate::memory::with_memories;
+use crate::noise::WhiteNoise;
 use crate::observer::{self, Correction, Observer, Wiring};
 use crate::past::Past;
 use crate::segment::Segment;
@@ -28,6 +29,8 @@ pub struct Simulator {
     binding: Binding,
     /// What stands in each predicted row.
     rows: Vec<Row>,
+    /// Seed of the model's noise; `None` leaves it out.
+    noise: Option<u64>,
     /// Steps of one run at most.
     max_steps: u64,
     /// Seconds of computing of one run at most.
@@ -58,7 +61,7 @@ impl Simulator {
         let observer = observer::build(&setup.observer, wiring)?;
         let max_steps = setup.max_steps.unwrap_or(MAX_STEPS);
         let timeout = setup.timeout.unwrap_or(TIMEOUT);
-        Ok(Self { model, spec, observer, binding, rows, max_steps, timeout })
+        Ok(Self { model, spec, observer, binding, rows, noise: setup.noise, max_steps, timeout })
     }
 
     /// The model's state at the window's start, and the past that led to it.
@@ -141,6 +144,7 @@ impl Simulator {
         let window = &*job.window;
         let theta = self.binding.theta(&job.theta, window.start)?;
         let mut inputs = Inputs::new(window);
+        let noise = self.noise.filter(|_| self.model.n_noise() > 0).map(|seed| WhiteNoise::of(seed, job));
         let (mut x, mut past) = self.start(job, &theta, inputs.drive(window.start))?;
         let mut y = vec![0.0; self.spec.n_output()];
         let mut outputs = Vec::with_capacity(window.observed.len());
@@ -149,7 +153,7 @@ impl Simulator {
         for (j, &t) in window.times.iter().enumerate() {
             inputs.walk([previous, t], limits, |segment| {
                 limits.take(1, segment.t0)?;
-                self.advance(&mut past, segment, &theta, &mut x)
+                self.advance(&mut past, Segment { noise: noise.as_ref(), ..segment }, &theta, &mut x)
             })?;
             let drive = Drive { history: &past, ..inputs.drive(t) };
             self.model.output(t, &x, &theta, drive, &mut y);

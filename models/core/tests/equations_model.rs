@@ -284,6 +284,7 @@ fn every_solver_runs_the_damped_oscillator_to_its_closed_form() {
             slope: &[0.0],
             history: &Square,
             limits: &Limits::none(),
+            noise: None,
         };
         model.advance(segment, &[1.0, 1.01, 1.0, 0.2], &mut x).unwrap();
         // Some hundred steps of tolerance 1e-8; h⁴/120 for the fixed step.

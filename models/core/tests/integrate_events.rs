@@ -40,7 +40,15 @@ fn run(model: &EquationsModel, end: f64, pieces: u32) -> Result<Vec<f64>, ModelF
     for i in 0..pieces {
         let (t0, t1) = (time(i), time(i + 1));
         model.advance(
-            Segment { t0, t1, u0: &[t0], slope: &[1.0], history: &Ramp, limits: &Limits::none() },
+            Segment {
+                t0,
+                t1,
+                u0: &[t0],
+                slope: &[1.0],
+                history: &Ramp,
+                limits: &Limits::none(),
+                noise: None,
+            },
             &[],
             &mut x,
         )?;

@@ -48,7 +48,8 @@ impl History for Never {
 
 fn run(model: &Ode, solver: Solver, [t0, t1]: [f64; 2], x0: &[f64]) -> Result<Vec<f64>, ModelFailure> {
     let mut x = x0.to_vec();
-    let segment = Segment { t0, t1, u0: &[1.0], slope: &[2.0], history: &Never, limits: &Limits::none() };
+    let segment =
+        Segment { t0, t1, u0: &[1.0], slope: &[2.0], history: &Never, limits: &Limits::none(), noise: None };
     advance_by(model, solver, segment, &[], &mut x).map(|()| x)
 }
 

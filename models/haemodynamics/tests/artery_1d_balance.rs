@@ -121,7 +121,15 @@ fn a_flow_that_no_vessel_carries_is_an_error_that_says_so() {
 fn advance(model: &Artery1d, theta: &[f64], x: &mut [f64], flow: f64) -> Result<(), ModelFailure> {
     let history = starlings_models_core::Drive::NONE.history;
     model.advance(
-        Segment { t0: 0.0, t1: 0.1, u0: &[flow], slope: &[0.0], history, limits: &Limits::none() },
+        Segment {
+            t0: 0.0,
+            t1: 0.1,
+            u0: &[flow],
+            slope: &[0.0],
+            history,
+            limits: &Limits::none(),
+            noise: None,
+        },
         theta,
         x,
     )

@@ -89,8 +89,15 @@ fn a_span_of_more_steps_than_anybody_waits_for_fails_at_its_start() {
     let mut x = vec![0.0; model.spec().n_state()];
     model.initial(&theta, &mut x);
     let limits = Limits::none();
-    let segment =
-        |t1: f64| Segment { t0: 2.0, t1, u0: &[0.0], slope: &[0.0], history: &NoHistory, limits: &limits };
+    let segment = |t1: f64| Segment {
+        t0: 2.0,
+        t1,
+        u0: &[0.0],
+        slope: &[0.0],
+        history: &NoHistory,
+        limits: &limits,
+        noise: None,
+    };
     // 2e8 steps.
     let failed = model.advance(segment(202.0), &theta, &mut x).unwrap_err();
     assert_eq!(failed, ModelFailure::TooManySteps { time: 2.0, limit: 100_000_000 });

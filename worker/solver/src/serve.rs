@@ -73,6 +73,7 @@ impl Served {
             effects,
             max_steps: None,
             timeout: None,
+            noise: None,
         };
         let theta =
             request.parameters.into_iter().chain(request.initial.iter().map(|(_, value)| *value)).collect();

@@ -19,7 +19,8 @@ pub(crate) fn expressions(file: &StudyFile) -> Vec<&Spanned<String>> {
     let model = file.model.equations.iter();
     let outputs = model.clone().flat_map(|e| &e.outputs).map(|o| &o.value);
     let states = model.flat_map(|e| &e.states).chain(file.effects.iter().flat_map(|e| &e.states));
-    let of_states = states.flat_map(|s| s.rate.iter().map(|(_, term)| term).chain([&s.initial]));
+    let of_states =
+        states.flat_map(|s| s.rate.iter().chain(&s.noise).map(|(_, term)| term).chain([&s.initial]));
     let terms = file.effects.iter().flat_map(|e| &e.adds).map(|(_, term)| term);
     outputs.chain(of_states).chain(terms).filter(|e| !e.get_ref().is_empty()).collect()
 }

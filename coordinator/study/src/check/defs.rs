@@ -46,30 +46,26 @@ fn state(section: &StateSection) -> StateDef {
         role: section.role,
         initial: section.initial.get_ref().clone(),
         rate: section.rate.iter().map(term).collect(),
+        noise: section.noise.iter().map(term).collect(),
         ..StateDef::default()
     }
 }
 
 fn solver(source: &Source, section: &SolverSection) -> SolverDef {
     let default = SolverDef::default();
-    let methods = [
-        ("auto", Method::Auto),
-        ("dopri5", Method::Dopri5),
-        ("rosenbrock", Method::Rosenbrock),
-        ("fixed", Method::Fixed),
-    ];
     let mut method = default.method;
     if let Some(word) = &section.method {
-        if let Some((_, known)) = methods.iter().find(|(name, _)| name == word.get_ref()) {
-            method = *known;
+        if let Some(known) = Method::ALL.into_iter().find(|known| known.name() == word.get_ref()) {
+            method = known;
         } else {
-            let valid: Vec<String> = methods.iter().map(|(name, _)| (*name).to_owned()).collect();
+            let valid: Vec<String> = Method::ALL.iter().map(|known| known.name().to_owned()).collect();
             source.report_unknown(word.span(), format!("unknown method `{}`", word.get_ref()), &valid);
         }
     }
-    if method == Method::Fixed && section.step.is_none() {
+    if method.has_fixed_step() && section.step.is_none() {
         let help = "give `step = ...` in the study's time unit";
-        source.report_with(section.span.clone(), "the method \"fixed\" needs its `step`", help);
+        let message = format!("the method \"{}\" needs its `step`", method.name());
+        source.report_with(section.span.clone(), message, help);
     }
     for (key, value) in [("rtol", &section.rtol), ("atol", &section.atol), ("step", &section.step)] {
         if let Some(value) = value.as_ref().filter(|v| *v.get_ref() <= 0.0) {

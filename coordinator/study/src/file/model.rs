@@ -92,7 +92,7 @@ fn constants(source: &Source, model: &Table<'_>) -> Named<f64> {
 }
 
 fn equations(source: &Source, model: &Table<'_>) -> EquationsSection {
-    let keys = ["name", "unit", "role", "initial", "rate"];
+    let keys = ["name", "unit", "role", "initial", "rate", "noise"];
     let states = model.tables("states", "[[model.states]]", &keys);
     if model.get("states").is_none() {
         model.missing("states", "at least one `[[model.states]]` with `name`, `initial` and `rate`");
@@ -154,22 +154,31 @@ fn state(source: &Source, t: &Table<'_>) -> StateSection {
         name: t.required_text("name", "how expressions call the state"),
         unit: unit(t),
         role: role(source, t),
-        initial: t.get("initial").and_then(|node| initial(source, node)).unwrap_or(zero),
+        initial: t.get("initial").and_then(|node| value(source, node, "`initial`")).unwrap_or(zero),
         rate: t.get("rate").map(|node| rate(source, t, node)).unwrap_or_default(),
+        noise: t.get("noise").map(|node| noise(source, t, node)).unwrap_or_default(),
     }
 }
 
 /// A number or an expression, as text.
-fn initial(source: &Source, node: &Node<'_>) -> Option<Spanned<String>> {
+fn value(source: &Source, node: &Node<'_>, what: &str) -> Option<Spanned<String>> {
     if node.get_ref().is_str() {
-        return text(source, node, "`initial`");
+        return text(source, node, what);
     }
     if node.get_ref().is_float() || node.get_ref().is_integer() {
-        return number(source, node, "`initial`")
-            .map(|n| Spanned::new(n.span(), format!("{:?}", n.get_ref())));
+        return number(source, node, what).map(|n| Spanned::new(n.span(), format!("{:?}", n.get_ref())));
     }
-    wrong_type(source, node, "`initial`", "a number or an expression in quotes");
+    wrong_type(source, node, what, "a number or an expression in quotes");
     None
+}
+
+/// One amplitude, or a table of amplitudes by source.
+fn noise(source: &Source, state: &Table<'_>, node: &Node<'_>) -> Named<String> {
+    if node.get_ref().is_table() {
+        return named_texts(source, &state.free_entries("noise"));
+    }
+    let unnamed = Spanned::new(node.span(), String::new());
+    value(source, node, "`noise`").map(|value| (unnamed, value)).into_iter().collect()
 }
 
 /// One expression, or a table of named terms.

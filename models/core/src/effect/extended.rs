@@ -187,6 +187,24 @@ impl Model for Extended {
         self.inner.solver()
     }
 
+    fn n_noise(&self) -> usize {
+        self.inner.n_noise()
+    }
+
+    fn noise(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, b: &mut [f64]) {
+        let at = Moment { t, x, theta, u, y: &[] };
+        let (y, rate) = self.outputs_and_rate(at);
+        let at = Moment { y: y.as_ref(), ..at };
+        let (n, inner_x) = (self.n_state, &x[..self.n_state]);
+        let mut inner = Scratch::new(n * self.inner.n_noise());
+        self.with_both(at, rate.as_ref(), |theta, u| self.inner.noise(t, inner_x, theta, u, inner.as_mut()));
+        // States of effects have no noise.
+        b.fill(0.0);
+        for (b, inner) in b.chunks_exact_mut(x.len()).zip(inner.as_ref().chunks_exact(n)) {
+            b[..n].copy_from_slice(inner);
+        }
+    }
+
     fn n_switch(&self) -> usize {
         self.inner.n_switch() + self.effects.iter().map(|effect| effect.n_switch()).sum::<usize>()
     }

@@ -28,6 +28,9 @@ pub(super) struct Built {
     /// For each rate, the states that it depends on.
     pub(super) depends: Vec<Vec<usize>>,
     pub(super) outputs: Vec<Program>,
+    /// Sources of white noise by name, and the amplitudes that are not zero: (state, source, amplitude).
+    pub(super) sources_of_noise: Vec<String>,
+    pub(super) noise: Vec<(usize, usize, Program)>,
     pub(super) switches: Vec<Program>,
     pub(super) memories: Vec<Memory>,
     /// For each memory, the state or output that it remembers.
@@ -83,6 +86,18 @@ pub(super) fn build(def: &EquationsDef, constants: &BTreeMap<String, f64>) -> Re
         })
         .map(|placed| compile(&placed))
         .collect::<Result<_, _>>()?;
+    let mut sources_of_noise = Vec::<String>::new();
+    let mut noise = Vec::new();
+    for (state, (source, placed)) in
+        parsed.noise.iter().enumerate().flat_map(|(i, all)| all.iter().map(move |one| (i, one)))
+    {
+        let known = sources_of_noise.iter().position(|name| name == source);
+        let at = known.unwrap_or_else(|| {
+            sources_of_noise.push(source.clone());
+            sources_of_noise.len() - 1
+        });
+        noise.push((state, at, compile(placed)?.1));
+    }
     let initial = parsed.initial(&names, &resolve, &known)?;
     let depends = rates.iter().map(|(e, _)| dependencies(e.node(), &names)).collect();
     let switches = switches(&rates, &names, &resolve)?;
@@ -94,6 +109,8 @@ pub(super) fn build(def: &EquationsDef, constants: &BTreeMap<String, f64>) -> Re
         rates: rates.into_iter().map(|(_, p)| p).collect(),
         depends,
         outputs: values.into_iter().map(|(_, p)| p).collect(),
+        sources_of_noise,
+        noise,
         switches,
         sources: memories.iter().map(|memory| source(&memory.of, def, &names)).collect(),
         memories,

@@ -65,6 +65,18 @@ pub(super) fn terms(def: &EquationsDef) -> Result<(), SetupError> {
             return Err(SetupError::Invalid(format!("state `{}` has no initial value", state.name)));
         }
         range(state.range, &format!("state `{}`", state.name))?;
+        let mut sources = BTreeSet::new();
+        if let Some((source, _)) = state.noise.iter().find(|(source, _)| !sources.insert(source)) {
+            return Err(SetupError::Twice(format!("{source} in the noise of {}", state.name)));
+        }
+        let takes_noise = matches!(def.solver.method, Method::Heun | Method::EulerMaruyama);
+        if !state.noise.is_empty() && !takes_noise {
+            return Err(SetupError::Invalid(format!(
+                "the noise of state `{}` needs a solver for it: `method = \"heun\"` (Stratonovich) or \
+                 `\"euler-maruyama\"` (Itô), with its `step`",
+                state.name
+            )));
+        }
         let mut seen = BTreeSet::new();
         if let Some((term, _)) = state.rate.iter().find(|(term, _)| !seen.insert(term)) {
             return Err(SetupError::Twice(format!("{term} in the rate of {}", state.name)));
@@ -92,8 +104,11 @@ pub(super) fn solver(def: &SolverDef) -> Result<Solver, SetupError> {
         (Method::Dopri5, _) => Ok(Solver::Dopri5(tolerance)),
         (Method::Rosenbrock, _) => Ok(Solver::Rosenbrock(tolerance)),
         (Method::Fixed, Some(step)) if positive(step) => Ok(Solver::Fixed { step }),
-        (Method::Fixed, _) => {
-            Err(SetupError::Invalid("the solver's method `fixed` needs a positive `step`".to_owned()))
+        (Method::Heun, Some(step)) if positive(step) => Ok(Solver::Heun { step }),
+        (Method::EulerMaruyama, Some(step)) if positive(step) => Ok(Solver::EulerMaruyama { step }),
+        (Method::Fixed | Method::Heun | Method::EulerMaruyama, _) => {
+            let name = def.method.name();
+            Err(SetupError::Invalid(format!("the solver's method `{name}` needs a positive `step`")))
         }
     }
 }

@@ -72,6 +72,11 @@ pub struct StateDef {
     pub initial: String,
     /// Rate as the sum of named terms, (name, expression); a rate given as one text is one term named as the state.
     pub rate: Vec<(String, String)>,
+    /// White noise in the rate as a sum over sources, (source, amplitude); an amplitude given as one text is that of a source named
+    /// as the state. States that name one source are moved by the same noise. An amplitude has the state's unit per square root of
+    /// the time unit.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub noise: Vec<(String, String)>,
 }
 
 impl Default for StateDef {
@@ -83,6 +88,7 @@ impl Default for StateDef {
             range: crate::bounds::unbounded(),
             initial: String::new(),
             rate: Vec::new(),
+            noise: Vec::new(),
         }
     }
 }
@@ -126,6 +132,33 @@ pub enum Method {
     Rosenbrock,
     /// Classic Runge–Kutta with a fixed step.
     Fixed,
+    /// Heun's method with a fixed step: noise in the sense of Stratonovich.
+    Heun,
+    /// The method of Euler and Maruyama with a fixed step: noise in the sense of Itô.
+    EulerMaruyama,
+}
+
+impl Method {
+    /// All methods, by the names that a study gives them.
+    pub const ALL: [Self; 6] =
+        [Self::Auto, Self::Dopri5, Self::Rosenbrock, Self::Fixed, Self::Heun, Self::EulerMaruyama];
+
+    /// Its name in a study.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Dopri5 => "dopri5",
+            Self::Rosenbrock => "rosenbrock",
+            Self::Fixed => "fixed",
+            Self::Heun => "heun",
+            Self::EulerMaruyama => "euler-maruyama",
+        }
+    }
+
+    /// Whether it goes in equal steps, whose length the study states.
+    pub fn has_fixed_step(self) -> bool {
+        matches!(self, Self::Fixed | Self::Heun | Self::EulerMaruyama)
+    }
 }
 
 /// How the equations are integrated.
@@ -138,7 +171,7 @@ pub struct SolverDef {
     pub rtol: f64,
     /// Absolute tolerance per step, in each state's unit.
     pub atol: f64,
-    /// Longest step of [`Method::Fixed`], in the study's time unit.
+    /// Longest step of a method with a fixed step, in the study's time unit.
     pub step: Option<f64>,
 }
 

@@ -85,6 +85,18 @@ impl Model for EquationsModel {
         self.built.solver
     }
 
+    fn n_noise(&self) -> usize {
+        self.built.sources_of_noise.len()
+    }
+
+    fn noise(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, b: &mut [f64]) {
+        let n = self.unit.len();
+        b.fill(0.0);
+        for (state, source, amplitude) in &self.built.noise {
+            b[source * n + state] = amplitude.eval(&At { t, x, theta, u, y: &[] });
+        }
+    }
+
     fn n_switch(&self) -> usize {
         self.built.switches.len()
     }

@@ -46,12 +46,15 @@ pub(super) fn fault(place: String, text: &str, error: ExpressionError) -> SetupE
 pub(super) struct Parsed {
     initial: Vec<Placed>,
     pub(super) rates: Vec<Vec<Placed>>,
+    /// For each state, its sources of noise and their amplitudes.
+    pub(super) noise: Vec<Vec<(String, Placed)>>,
     pub(super) outputs: Vec<Placed>,
 }
 
 impl Parsed {
     pub(super) fn new(def: &EquationsDef) -> Result<Self, SetupError> {
-        let mut parsed = Self { initial: Vec::new(), rates: Vec::new(), outputs: Vec::new() };
+        let mut parsed =
+            Self { initial: Vec::new(), rates: Vec::new(), noise: Vec::new(), outputs: Vec::new() };
         for state in &def.states {
             let name = &state.name;
             parsed.initial.push(Placed::parse(format!("initial value of `{name}`"), &state.initial)?);
@@ -65,6 +68,15 @@ impl Parsed {
                 terms.push(Placed::parse(place, text)?);
             }
             parsed.rates.push(terms);
+            let amplitude = |(source, text): &(String, String)| {
+                let place = if state.noise.len() == 1 && source == name {
+                    format!("noise of `{name}`")
+                } else {
+                    format!("noise `{source}` of `{name}`")
+                };
+                Ok((source.clone(), Placed::parse(place, text)?))
+            };
+            parsed.noise.push(state.noise.iter().map(amplitude).collect::<Result<_, SetupError>>()?);
         }
         for output in &def.outputs {
             parsed.outputs.push(Placed::parse(format!("output `{}`", output.name), &output.value)?);
@@ -92,7 +104,9 @@ impl Parsed {
         let mut list = Vec::new();
         let states =
             self.initial.iter().zip(&self.rates).flat_map(|(i, rate)| std::iter::once(i).chain(rate));
-        for (name, _) in states.chain(&self.outputs).flat_map(|placed| placed.expression.names()) {
+        let noise = self.noise.iter().flatten().map(|(_, amplitude)| amplitude);
+        for (name, _) in states.chain(&self.outputs).chain(noise).flat_map(|placed| placed.expression.names())
+        {
             if !list.contains(&name) && !names.is_taken(&name) {
                 list.push(name);
             }

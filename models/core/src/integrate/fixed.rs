@@ -6,6 +6,26 @@ use super::stepper::MAX_STEPS;
 use super::system::{System, not_finite};
 use crate::failure::ModelFailure;
 
+/// Number and length of equal steps over a span that are no longer than `step`.
+///
+/// # Errors
+/// When the span needs too many.
+pub(super) fn equal_steps<S: System>(
+    system: &S,
+    [start, end]: [f64; 2],
+    step: f64,
+) -> Result<(u64, f64), ModelFailure> {
+    // A step that divides the span but for rounding must not be cut in two.
+    let count = ((end - start) / step - 1e-9).ceil().max(1.0);
+    let limit = system.limits().in_one_span(MAX_STEPS);
+    if count > limit as f64 || count.is_nan() {
+        return Err(ModelFailure::TooManySteps { time: start, limit });
+    }
+    let h = (end - start) / count;
+    system.limits().foresee(h, start)?;
+    Ok((count as u64, h))
+}
+
 /// Advances `x` over the span in equal steps no longer than `step`.
 ///
 /// # Errors
@@ -17,18 +37,11 @@ pub(super) fn advance<S: System>(
     step: f64,
 ) -> Result<(), ModelFailure> {
     let n = x.len();
-    // A step that divides the span but for rounding must not be cut in two.
-    let count = ((end - start) / step - 1e-9).ceil().max(1.0);
-    let limit = system.limits().in_one_span(MAX_STEPS);
-    if count > limit as f64 || count.is_nan() {
-        return Err(ModelFailure::TooManySteps { time: start, limit });
-    }
-    let h = (end - start) / count;
-    system.limits().foresee(h, start)?;
+    let (count, h) = equal_steps(system, [start, end], step)?;
     let mut work = vec![0.0; 3 * n];
     let (k, rest) = work.split_at_mut(n);
     let (sum, stage) = rest.split_at_mut(n);
-    for i in 0..count as u64 {
+    for i in 0..count {
         let t = start + i as f64 * h;
         system.limits().take(1, t)?;
         sum.fill(0.0);

@@ -25,6 +25,21 @@ pub(crate) trait System {
         differences(self, t, x, f, dfdx, dfdt, scratch);
     }
 
+    /// Sources of white noise; only the methods for noise ask.
+    fn n_noise(&self) -> usize {
+        0
+    }
+
+    /// Writes the amplitudes of the noise, source by source.
+    fn noise(&mut self, t: f64, x: &[f64], b: &mut [f64]) {
+        let _ = (t, x, b);
+    }
+
+    /// Draws a standard normal number for each source.
+    fn draw(&mut self, normal: &mut [f64]) {
+        let _ = normal;
+    }
+
     /// What the run may cost.
     fn limits(&self) -> &Limits<'_>;
 

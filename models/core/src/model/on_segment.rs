@@ -88,6 +88,21 @@ impl<M: Model + ?Sized> System for OnSegment<'_, M> {
         }
     }
 
+    fn n_noise(&self) -> usize {
+        if self.segment.noise.is_some() { self.model.n_noise() } else { 0 }
+    }
+
+    fn noise(&mut self, t: f64, x: &[f64], b: &mut [f64]) {
+        self.set_time(t);
+        self.model.noise(t, x, self.theta, self.drive(), b);
+    }
+
+    fn draw(&mut self, normal: &mut [f64]) {
+        if let Some(noise) = self.segment.noise {
+            noise.draw(normal);
+        }
+    }
+
     fn limits(&self) -> &Limits<'_> {
         self.segment.limits
     }

@@ -130,8 +130,15 @@ mod tests {
         let values = times.iter().map(|t| 400.0 * (7.0 * t).sin()).collect();
         let record = Record(Signal { times, values });
         let source = Source { input: 0, shift: Some(0) };
-        let segment =
-            Segment { t0, t1, u0: &[0.0], slope: &[0.0], history: &record, limits: &Limits::none() };
+        let segment = Segment {
+            t0,
+            t1,
+            u0: &[0.0],
+            slope: &[0.0],
+            history: &record,
+            limits: &Limits::none(),
+            noise: None,
+        };
         bends(&[source], segment, &[shift])
     }
 

@@ -83,8 +83,15 @@ pub(crate) fn run(
     flow: [f64; 2],
 ) -> [f64; 2] {
     let slope = [(flow[1] - flow[0]) / (t1 - t0)];
-    let segment =
-        Segment { t0, t1, u0: &flow[..1], slope: &slope, history: &NoHistory, limits: &Limits::none() };
+    let segment = Segment {
+        t0,
+        t1,
+        u0: &flow[..1],
+        slope: &slope,
+        history: &NoHistory,
+        limits: &Limits::none(),
+        noise: None,
+    };
     let volumes = model.advance_counting(segment, theta, x).unwrap();
     [volumes.inflow, volumes.outflow]
 }

@@ -50,8 +50,15 @@ pub(crate) fn inflow(t: f64) -> f64 {
 /// Advances by one segment from inflow `q[0]` to `q[1]`.
 pub(crate) fn advance(model: &FsiTube, theta: &[f64], q: [f64; 2], dt: f64, x: &mut [f64]) {
     let slope = [(q[1] - q[0]) / dt];
-    let segment =
-        Segment { t0: 0.0, t1: dt, u0: &q[..1], slope: &slope, history: &NoHistory, limits: &Limits::none() };
+    let segment = Segment {
+        t0: 0.0,
+        t1: dt,
+        u0: &q[..1],
+        slope: &slope,
+        history: &NoHistory,
+        limits: &Limits::none(),
+        noise: None,
+    };
     model.advance(segment, theta, x).unwrap();
 }
 

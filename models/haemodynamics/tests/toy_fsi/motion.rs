@@ -19,7 +19,8 @@ fn advanced(toy: &Toy, x: &[f64], h: f64, flow: [f64; 2]) -> Vec<f64> {
     let n_input = toy.model.spec().inputs.len();
     let (u0, slope) = (&flow[..n_input], &flow[1..=n_input]);
     let mut x = x.to_vec();
-    let segment = Segment { t0: 0.0, t1: h, u0, slope, history: &NoHistory, limits: &Limits::none() };
+    let segment =
+        Segment { t0: 0.0, t1: h, u0, slope, history: &NoHistory, limits: &Limits::none(), noise: None };
     toy.model.advance(segment, &toy.theta, &mut x).unwrap();
     x
 }

@@ -135,7 +135,7 @@ fn error_of_a_run(
     for step in 0..n {
         let t0 = step as f64 * dt;
         let (u0, slope, history) = (&[0.0][..], &[0.0][..], Drive::NONE.history);
-        let segment = Segment { t0, t1: t0 + dt, u0, slope, history, limits: &Limits::none() };
+        let segment = Segment { t0, t1: t0 + dt, u0, slope, history, limits: &Limits::none(), noise: None };
         toy.model.advance(segment, &toy.theta, x.as_mut_slice()).unwrap();
         let drive = Drive { value: u0, slope, ..Drive::NONE };
         toy.model.output(t0 + dt, x.as_slice(), &toy.theta, drive, &mut predicted);
