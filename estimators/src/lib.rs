@@ -21,6 +21,7 @@ mod filter;
 mod gaussian;
 mod gram;
 mod identifiability;
+pub mod inference;
 mod information;
 mod kind;
 mod least_squares;

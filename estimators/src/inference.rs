@@ -1,0 +1,36 @@
+//! Dynamical inference: drift and noise of stochastic differential equations from a recording, without a search.
+//!
+//! ẋ = f(x, t) + D^{1/2} ξ with f linear in unknown coefficients: their posterior is a formula over sums that add up over blocks of
+//! the recording and over machines (Smelyanskiy, Luchinsky et al., "Physics-based methods of failure analysis and diagnostics in
+//! human space flight", section 1.2). The order of the files is that of the work: `basis.rs` (functions), `stream.rs` and
+//! `sums.rs` (one pass over the data), `structure.rs` (which function in which equation), `fit.rs` and `posterior.rs`.
+//! Deliberately no simulation here, and no nonlinear parameter inside a function.
+
+mod basis;
+mod diffusion;
+mod error;
+mod fit;
+mod function;
+mod functions;
+mod lagged;
+mod normal;
+mod polynomial;
+mod posterior;
+mod prior;
+mod quantiles;
+mod stream;
+mod structure;
+mod sums;
+
+pub use basis::{Basis, Rule};
+pub use diffusion::Diffusion;
+pub use error::InferenceError;
+pub use fit::Fit;
+pub use function::Function;
+pub use functions::{Columns, Functions, Samples};
+pub use polynomial::Polynomial;
+pub use posterior::{Estimate, Posterior, Value};
+pub use prior::Prior;
+pub use stream::Stream;
+pub use structure::{Coefficient, Place, Structure};
+pub use sums::Sums;
