@@ -44,38 +44,25 @@ impl Diffusion {
             let equation = structure.equations().first().cloned().unwrap_or_default();
             return Err(InferenceError::TooFew { n_step: 0, n_unknown: structure.n_coefficient(), equation });
         }
-        self.estimate(sums, structure, &structure.matrix(&[], &[]), &DMatrix::zeros(n, n), false)
+        let known = structure.matrix(&[], &[]);
+        noisy(sums, structure, &known)?;
+        self.estimate(sums, structure, &sums.residuals(&known))
     }
 
-    /// D from the residuals of C and what the uncertainty of C adds to their squares.
+    /// D from the sum of the products of residuals, L x L.
     pub(crate) fn estimate(
         &self,
         sums: &Sums,
         structure: &Structure,
-        drift: &DMatrix<f64>,
-        spread: &DMatrix<f64>,
-        lag_corrected: bool,
+        products: &DMatrix<f64>,
     ) -> Result<DMatrix<f64>, InferenceError> {
-        let squares = sums.residuals(drift);
-        let speeds = sums.q().diagonal() + (drift * sums.phi() * drift.transpose()).diagonal();
-        let noiseless = |l: usize| squares[(l, l)] <= NOISELESS * speeds[l];
-        if !squares.iter().all(|v| v.is_finite()) {
-            return Err(InferenceError::Overflow { what: "the squares of the residuals" });
-        }
-        if (0..squares.nrows()).any(noiseless) {
-            return Err(indefinite(structure, noiseless));
-        }
-        let mut noise = (squares + spread) * (sums.step() / sums.n_step() as f64);
-        if lag_corrected && sums.n_pair() > 0 {
-            let lagged = sums.lagged_residuals(drift) * (sums.step() / sums.n_pair() as f64);
-            noise += &lagged + lagged.transpose();
-        }
-        let n = noise.nrows();
-        match self {
-            Self::Full | Self::Known(_) => {}
-            Self::Diagonal => noise = DMatrix::from_diagonal(&noise.diagonal()),
-            Self::Isotropic => noise = DMatrix::from_diagonal_element(n, n, noise.trace() / n as f64),
-        }
+        let mean = products * (sums.step() / sums.n_step() as f64);
+        let n = mean.nrows();
+        let noise = match self {
+            Self::Full | Self::Known(_) => (&mean + mean.transpose()) * 0.5,
+            Self::Diagonal => DMatrix::from_diagonal(&mean.diagonal()),
+            Self::Isotropic => DMatrix::from_diagonal_element(n, n, mean.trace() / n as f64),
+        };
         definite(&noise, structure)?;
         Ok(noise)
     }
@@ -89,6 +76,20 @@ impl Diffusion {
             Self::Isotropic => Some(per_equation * sums.n_state() as f64),
         }
     }
+}
+
+/// Whether every equation leaves residuals beyond rounding.
+pub(crate) fn noisy(sums: &Sums, structure: &Structure, drift: &DMatrix<f64>) -> Result<(), InferenceError> {
+    let squares = sums.residuals(drift);
+    let speeds = sums.q().diagonal() + (drift * sums.phi() * drift.transpose()).diagonal();
+    if !squares.iter().chain(&speeds).all(|v| v.is_finite()) {
+        return Err(InferenceError::Overflow { what: "the squares of the residuals" });
+    }
+    let noiseless = |l: usize| squares[(l, l)] <= NOISELESS * speeds[l];
+    if (0..squares.nrows()).any(noiseless) {
+        return Err(indefinite(structure, noiseless));
+    }
+    Ok(())
 }
 
 /// D⁻¹.

@@ -10,15 +10,16 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::diffusion::{self, Diffusion};
-use super::normal::{Moments, invert};
+use super::normal::{Moments, invert, spread};
 use super::{InferenceError, Posterior, Prior, Structure, Sums};
 
 /// Change of D, relative to itself, below which it has settled.
 const SETTLED: f64 = 1e-11;
 /// Passes at most. An error of D falls by the share of unknowns among the steps in each.
 const PASSES: usize = 1000;
-/// Growth of a variance beyond all of the movement, from which it runs away: its share of the coefficients, ½ D V Φ⁻¹, then
-/// adds more to the residuals than it explains.
+/// Growth of a variance beyond all of the movement, from which it runs away. Its share of the coefficients, ½ D V Φ⁻¹, then adds
+/// more to the residuals than it explains: the Jacobian is of first order in h div f, and coefficients are so uncertain that this
+/// is not small. More steps, fewer terms, a prior or the left point help.
 const RUNAWAY: f64 = 10.0;
 
 /// How an inference is made.
@@ -80,8 +81,15 @@ impl Fit {
                 return self.finish(sums, structure, pass, drift, noise, passes);
             }
             self.enough(sums, &moments, &pass.active)?;
-            let spread = moments.spread(&pass.active, &pass.covariance);
-            let next = self.diffusion.estimate(sums, structure, &drift, &spread, self.lag_corrected)?;
+            let spread = |phi: &DMatrix<f64>| spread(structure, &pass.active, &pass.covariance, phi);
+            let mut products = sums.residuals(&drift) + spread(&sums.phi());
+            if self.lag_corrected && sums.n_pair() > 0 {
+                let lagged = sums.lagged_residuals(&drift) + spread(&sums.lagged_phi());
+                let share = sums.n_step() as f64 / sums.n_pair() as f64;
+                products += (&lagged + lagged.transpose()) * share;
+            }
+            diffusion::noisy(sums, structure, &drift)?;
+            let next = self.diffusion.estimate(sums, structure, &products)?;
             let settled = change(&noise, &next) < SETTLED;
             if (0..next.nrows()).any(|l| next[(l, l)] > RUNAWAY * first[(l, l)]) {
                 return Err(InferenceError::NotSettled { passes });

@@ -18,7 +18,7 @@ const TAKES_PART: f64 = 0.1;
 /// Sums as a structure sees them: what its known terms leave.
 pub(crate) struct Moments<'a> {
     pub(crate) structure: &'a Structure,
-    pub(crate) phi: DMatrix<f64>,
+    phi: DMatrix<f64>,
     /// Σ (ẋ − C₀ φ) φᵀ, L x B.
     free: DMatrix<f64>,
     v: &'a DMatrix<f64>,
@@ -81,29 +81,34 @@ impl<'a> Moments<'a> {
         Normal { precision, vector: DVector::from_iterator(n, active.iter().map(of)) }
     }
 
-    /// Σ F cov Fᵀ, L x L: what the uncertainty of the coefficients adds to the squares of the residuals.
-    pub(crate) fn spread(&self, active: &[usize], covariance: &DMatrix<f64>) -> DMatrix<f64> {
-        let n = self.structure.equations().len();
-        let mut spread = DMatrix::zeros(n, n);
-        for (i, p) in active.iter().enumerate() {
-            for (j, q) in active.iter().enumerate() {
-                for a in self.places(*p) {
-                    for b in self.places(*q) {
-                        spread[(a.equation, b.equation)] +=
-                            covariance[(i, j)] * a.factor * b.factor * self.phi[(a.function, b.function)];
-                    }
-                }
-            }
-        }
-        (&spread + spread.transpose()) * 0.5
-    }
-
     /// Number of these coefficients that enter each equation, length L.
     pub(crate) fn unknowns(&self, active: &[usize]) -> Vec<usize> {
         let enters = |p: usize, l: usize| self.places(p).iter().any(|place| place.equation == l);
         let count = |l| active.iter().filter(|p| enters(**p, l)).count();
         (0..self.structure.equations().len()).map(count).collect()
     }
+}
+
+/// Σ F_n cov F_mᵀ, L x L, for Σ φ_n φ_mᵀ of B x B: what the uncertainty of the coefficients adds to residuals.
+pub(crate) fn spread(
+    structure: &Structure,
+    active: &[usize],
+    covariance: &DMatrix<f64>,
+    phi: &DMatrix<f64>,
+) -> DMatrix<f64> {
+    let n = structure.equations().len();
+    let mut spread = DMatrix::zeros(n, n);
+    for (i, p) in active.iter().enumerate() {
+        for (j, q) in active.iter().enumerate() {
+            for a in &structure.coefficients()[*p].places {
+                for b in &structure.coefficients()[*q].places {
+                    spread[(a.equation, b.equation)] +=
+                        covariance[(i, j)] * a.factor * b.factor * phi[(a.function, b.function)];
+                }
+            }
+        }
+    }
+    spread
 }
 
 /// The inverse of a precision; `name` gives the names of its rows.

@@ -126,6 +126,11 @@ impl Sums {
         first - (part(b, 0, l, b) - c * part(0, 0, b, b)) * c.transpose()
     }
 
+    /// Σ φ_n φ_{n+1}ᵀ, B x B.
+    pub(crate) fn lagged_phi(&self) -> DMatrix<f64> {
+        self.lagged.view((0, 0), (self.n_function, self.n_function)).into_owned()
+    }
+
     /// Σ rrᵀ of the residuals, L x L.
     pub(crate) fn residuals(&self, c: &DMatrix<f64>) -> DMatrix<f64> {
         let cross = c * self.z().transpose();

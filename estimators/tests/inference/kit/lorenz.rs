@@ -40,8 +40,12 @@ pub fn weak(seed: u64, n: usize, h: f64, d: &DMatrix<f64>) -> Vec<[f64; 3]> {
 
 /// The nine monomials of Table 1.2.
 pub fn basis() -> Arc<Basis> {
+    basis_at(Rule::MidPoint)
+}
+
+pub fn basis_at(rule: Rule) -> Arc<Basis> {
     let quadratic = Polynomial::new(&NAMES, 3, &[0, 1, 2], 2, false);
-    Arc::new(Basis::new(3, 0).with(Rule::MidPoint, quadratic).unwrap())
+    Arc::new(Basis::new(3, 0).with(rule, quadratic).unwrap())
 }
 
 /// The seven coefficients of Table 1.1, equation by equation.

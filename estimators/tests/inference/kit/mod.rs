@@ -2,7 +2,9 @@
 #![allow(dead_code)]
 
 pub mod dense;
+pub mod fhn;
 pub mod lorenz;
+pub mod motor;
 pub mod sde;
 pub mod tanks;
 

@@ -1,0 +1,78 @@
+//! Intervals hold the truth as often as they say, over 200 seeds of three systems.
+
+use starlings_estimators::inference::{Diffusion, Fit, Posterior};
+
+use crate::kit::{lorenz, motor, sums, tanks};
+
+const SEEDS: u64 = 200;
+
+/// Share of 90 % intervals that hold the truth, by coefficient.
+fn coverage(truth: &[f64], infer: impl Fn(u64) -> Posterior) -> Vec<f64> {
+    let mut held = vec![0.0; truth.len()];
+    for seed in 0..SEEDS {
+        let posterior = infer(2000 + seed);
+        for (k, truth) in truth.iter().enumerate() {
+            let [lo, hi] = posterior.interval(k, 0.9).unwrap();
+            held[k] += f64::from(u8::from(lo <= *truth && *truth <= hi));
+        }
+    }
+    held.iter().map(|n| n / SEEDS as f64).collect()
+}
+
+fn assert_calibrated(of: &str, coverage: &[f64]) {
+    let all = coverage.iter().sum::<f64>() / coverage.len() as f64;
+    println!("{of}: {all:.3} {coverage:.3?}");
+    assert!((0.85..=0.95).contains(&all), "{of} {all}");
+    // One coefficient over 200 seeds has an sd of 2.1 %.
+    assert!(coverage.iter().all(|c| (0.82..=0.98).contains(c)), "{of} {coverage:?}");
+}
+
+#[test]
+fn intervals_of_the_lorenz_system_are_calibrated() {
+    let (basis, h) = (lorenz::basis(), 0.002);
+    let structure = lorenz::seven(&basis);
+    let infer = |seed| {
+        let sums = sums(&basis, &lorenz::strong(seed, 4000, h, 40.0), h);
+        Fit::new(Diffusion::Isotropic, 7).posterior(&sums, &structure).unwrap()
+    };
+    assert_calibrated("Lorenz", &coverage(&lorenz::SEVEN, infer));
+}
+
+#[test]
+fn intervals_of_the_tanks_are_calibrated() {
+    let basis = tanks::basis();
+    let structure = tanks::joint(&basis);
+    let infer = |seed| {
+        let sums = sums(&basis, &tanks::recording(seed), 0.002);
+        Fit::new(Diffusion::Diagonal, 9).posterior(&sums, &structure).unwrap()
+    };
+    assert_calibrated("tanks", &coverage(&tanks::TRUTH, infer));
+}
+
+#[test]
+fn intervals_of_the_motor_are_calibrated() {
+    let basis = motor::basis();
+    let structure = motor::throat(&basis);
+    let infer = |seed| {
+        let rows = motor::recording(seed, 500, 1.0, |_| 1.0);
+        Fit::new(Diffusion::Full, 1).posterior(&sums(&basis, &rows, 0.001), &structure).unwrap()
+    };
+    assert_calibrated("motor", &coverage(&[motor::THROAT], infer));
+}
+
+#[test]
+fn intervals_of_the_noise_are_calibrated() {
+    let basis = motor::basis();
+    let structure = motor::throat(&basis);
+    let held = |seed: u64| {
+        let rows = motor::recording(5000 + seed, 60, 1.0, |_| 1.0);
+        let posterior =
+            Fit::new(Diffusion::Full, 1).posterior(&sums(&basis, &rows, 0.001), &structure).unwrap();
+        let [lo, hi] = posterior.diffusion_interval(0, 0.9).unwrap();
+        f64::from(u8::from(lo <= motor::NOISE && motor::NOISE <= hi))
+    };
+    let share = (0..400_u64).map(held).sum::<f64>() / 400.0;
+    println!("D of the motor: {share:.3}");
+    // Four sd of a share of 400 draws.
+    assert!((0.84..=0.96).contains(&share), "{share}");
+}
