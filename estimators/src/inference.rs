@@ -7,6 +7,7 @@
 //! Deliberately no simulation here, and no nonlinear parameter inside a function.
 
 mod basis;
+mod decimation;
 mod diffusion;
 mod error;
 mod evidence;
@@ -27,6 +28,7 @@ mod structure;
 mod sums;
 
 pub use basis::{Basis, Rule};
+pub use decimation::{Decimation, Extrapolated, Strength, extrapolate};
 pub use diffusion::Diffusion;
 pub use error::InferenceError;
 pub use fit::Fit;

@@ -33,9 +33,15 @@ pub fn strong(seed: u64, n: usize, h: f64, tau: f64) -> Vec<[f64; 3]> {
 
 /// A recording of Table 1.2, four substeps of fourth order.
 pub fn weak(seed: u64, n: usize, h: f64, d: &DMatrix<f64>) -> Vec<[f64; 3]> {
+    fine(seed, n, (h, 4), d)
+}
+
+/// The same with any number of substeps.
+pub fn fine(seed: u64, n: usize, (h, substeps): (f64, usize), d: &DMatrix<f64>) -> Vec<[f64; 3]> {
     let (root, mut rng) = (root(d), rng(seed));
-    let warm = record(20_000, (h, 1), [1.0, 1.0, 25.0], |t, h, x| rk4(&mut rng, (t, h), x, &root, &drift));
-    record(n, (h, 4), *warm.last().unwrap(), |t, h, x| rk4(&mut rng, (t, h), x, &root, &drift))
+    let warm =
+        record(20_000, (0.005, 4), [1.0, 1.0, 25.0], |t, h, x| rk4(&mut rng, (t, h), x, &root, &drift));
+    record(n, (h, substeps), *warm.last().unwrap(), |t, h, x| rk4(&mut rng, (t, h), x, &root, &drift))
 }
 
 /// The nine monomials of Table 1.2.
