@@ -7,10 +7,14 @@
 //! Deliberately no simulation here, and no nonlinear parameter inside a function.
 
 mod basis;
+mod change;
 mod decimation;
+mod detector;
 mod diffusion;
+mod em;
 mod error;
 mod evidence;
+mod expected;
 mod fit;
 mod function;
 mod functions;
@@ -23,13 +27,18 @@ mod prior;
 mod quantiles;
 mod reduced;
 mod regression;
+mod smoother;
 mod stream;
 mod structure;
 mod sums;
+mod window;
 
 pub use basis::{Basis, Rule};
+pub use change::{Change, compare};
 pub use decimation::{Decimation, Extrapolated, Strength, extrapolate};
+pub use detector::{Detector, Following, Report};
 pub use diffusion::Diffusion;
+pub use em::{Iteration, Measured, Noisy, NoisyPosterior};
 pub use error::InferenceError;
 pub use fit::Fit;
 pub use function::Function;
@@ -43,3 +52,4 @@ pub use regression::Regression;
 pub use stream::Stream;
 pub use structure::{Coefficient, Place, Structure};
 pub use sums::Sums;
+pub use window::{Memory, Window};

@@ -2,7 +2,7 @@
 //!
 //! Read next: `posterior.rs`.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, Normal, StudentsT};
 
 /// Degrees of freedom from which expansions about the normal distribution are exact to a millionth.
 const MANY: f64 = 200.0;
@@ -40,6 +40,14 @@ pub(crate) fn chi_squared(p: f64, degrees: f64) -> f64 {
 /// Probability that χ² is larger.
 pub(crate) fn chi_squared_tail(value: f64, degrees: f64) -> f64 {
     ChiSquared::new(degrees).map_or(1.0, |chi| chi.sf(value.max(0.0)))
+}
+
+/// Probability that F is larger.
+pub(crate) fn fisher_tail(value: f64, degrees: f64, left: f64) -> f64 {
+    if left > 1e5 {
+        return chi_squared_tail(value * degrees, degrees);
+    }
+    FisherSnedecor::new(degrees, left).map_or(1.0, |f| f.sf(value.max(0.0)))
 }
 
 #[cfg(test)]

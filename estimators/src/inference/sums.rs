@@ -205,7 +205,8 @@ impl Sums {
         Ok(())
     }
 
-    fn fits(&self, other: &Self) -> Result<(), InferenceError> {
+    /// Whether another block can be merged.
+    pub(crate) fn fits(&self, other: &Self) -> Result<(), InferenceError> {
         let same =
             |equal: bool, what| if equal { Ok(()) } else { Err(InferenceError::Incompatible { what }) };
         same(self.basis == other.basis, "their functions")?;
@@ -223,6 +224,13 @@ impl Sums {
             return Ok(());
         }
         Err(InferenceError::Damaged { what: "a part of another shape" })
+    }
+
+    /// Without pairs of neighbouring steps and without ends.
+    pub(crate) fn without_pairs(mut self) -> Self {
+        self.n_pair = 0;
+        self.lagged.fill(0.0);
+        self.detach()
     }
 
     /// Adds a block of steps.

@@ -1,7 +1,9 @@
 //! Recordings with measurement noise: it is noticed, and the noise of the process is found in spite of it.
 
+use nalgebra::DMatrix;
 use starlings_estimators::inference::{
-    Diffusion, Fit, NoiseCheck, Posterior, Rule, Structure, Sums, Verdict, noise_checks,
+    Diffusion, Fit, InferenceError, Iteration, Measured, NoiseCheck, Noisy, NoisyPosterior, Posterior, Rule,
+    Structure, Sums, Verdict, noise_checks,
 };
 
 use crate::kit::sde::{gauss, rng};
@@ -70,4 +72,58 @@ fn lagged_residuals_give_the_noise_of_the_process_and_unbiased_coefficients() {
     );
     // Errors in the functions, of order M, remain.
     assert!((c(&corrected, 1, 1) + 1.0).abs() < 0.2 && (c(&corrected, 0, 0) + 10.0).abs() < 0.4);
+}
+
+fn smoothed(sd: f64, n: usize, known: &Measured, most: usize) -> NoisyPosterior {
+    let (basis, rows) = (lorenz::basis(), measured(2, n, sd));
+    let structure = Structure::same(&basis, &lorenz::NAMES).unwrap();
+    let times = crate::kit::times(rows.len(), H);
+    let noisy = Noisy { basis: &basis, step: H, times: &times, rows: rows.as_flattened() };
+    let iteration = Iteration { most, tolerance: 0.5 };
+    let found = noisy.infer(&Fit::new(Diffusion::Full, 27), &structure, known, iteration).unwrap();
+    let c = found.posterior.drift();
+    let a = [c[(0, 0)], c[(1, 1)], found.posterior.diffusion[(0, 0)], found.measured[(0, 0)]];
+    println!("noise {sd}: a11, a22, D11, M {a:.4?}, {} rounds", found.log_likelihood.len());
+    // Rounding of sums of ten thousand terms.
+    assert!(found.log_likelihood.windows(2).all(|pair| pair[1] > pair[0] - 1e-3), "no round is worse");
+    found
+}
+
+fn known(sd: f64) -> Measured {
+    Measured::Known(DMatrix::identity(3, 3) * (sd * sd))
+}
+
+#[test]
+fn smoothing_finds_drift_and_noise_under_measurement_noise() {
+    let found = smoothed(0.3, 10_000, &known(0.3), 12);
+    let (c, d) = (found.posterior.drift(), found.posterior.diffusion[(0, 0)]);
+    // Lagged residuals give -9.2, -0.5 and 0.38 at this noise, where 2 M/h is 36. Errors here are of chance, four posterior sd.
+    assert!((c[(0, 0)] + 10.0).abs() < 0.3 && (c[(1, 1)] + 1.0).abs() < 0.2, "{c}");
+    assert!((d / 0.2867 - 1.0).abs() < 0.35, "D after twelve rounds from 0.4, {d}");
+}
+
+#[test]
+fn smoothing_finds_the_measurement_noise_too() {
+    let found = smoothed(0.1, 10_000, &Measured::Unknown, 12);
+    let (c, d) = (found.posterior.drift(), found.posterior.diffusion[(0, 0)]);
+    assert!((c[(0, 0)] + 10.0).abs() < 0.3 && (c[(1, 1)] + 1.0).abs() < 0.2, "{c}");
+    assert!((d / 0.2867 - 1.0).abs() < 0.25, "{d}");
+    assert!(found.measured.diagonal().iter().all(|m| (m / 0.01 - 1.0).abs() < 0.1), "{}", found.measured);
+}
+
+#[test]
+fn measurement_noise_that_is_not_there_or_not_a_covariance_is_refused() {
+    let (basis, rows) = (lorenz::basis(), measured(5, 5000, 0.0));
+    let structure = Structure::same(&basis, &lorenz::NAMES).unwrap();
+    let times = crate::kit::times(rows.len(), H);
+    let noisy = Noisy { basis: &basis, step: H, times: &times, rows: rows.as_flattened() };
+    let fit = Fit::new(Diffusion::Full, 27);
+    let infer = |m| noisy.infer(&fit, &structure, &m, Iteration { most: 2, tolerance: 1.0 });
+    let refused = infer(Measured::Known(DMatrix::zeros(3, 3))).unwrap_err();
+    assert_eq!(refused, InferenceError::NotDefinite { what: "the measurement noise" });
+    let outcome = infer(Measured::Unknown);
+    assert!(
+        matches!(outcome, Err(InferenceError::NotPositive { .. })),
+        "no noise is seen in one of the states"
+    );
 }
