@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs, unreachable_pub)]
 
 mod calibration;
+mod changes;
 mod decimated;
 mod errors;
 mod kit;
