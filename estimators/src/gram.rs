@@ -60,7 +60,7 @@ impl WithSimd for Gram<'_> {
 
 /// Sums over rows of the products of three columns with three others.
 #[inline(always)]
-pub(crate) fn products<S: Simd>(
+fn products<S: Simd>(
     simd: S,
     left: [&[S::f64s]; TILE],
     right: [&[S::f64s]; TILE],

@@ -137,7 +137,11 @@ impl Detector {
         let Some(sums) = self.reference.sums().filter(|s| s.n_step() >= self.following.least) else {
             return Ok(());
         };
-        match self.fit.posterior(&sums, &self.structure) {
+        let found = match &self.posterior {
+            Some(earlier) => self.fit.update(&sums, &self.structure, earlier),
+            None => self.fit.posterior(&sums, &self.structure),
+        };
+        match found {
             Ok(posterior) => self.posterior = Some(posterior),
             Err(InferenceError::TooFew { .. } | InferenceError::NothingObserved) => {}
             Err(other) => return Err(other),

@@ -8,13 +8,15 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use pulp::Arch;
 
 use super::functions::Samples;
+use super::products::{LANES, Products};
 use super::smoother::Smoothed;
 use super::sums::BlockSums;
 use super::{Basis, InferenceError, Sums};
-use crate::gram::{Gram, TILE};
 
 /// Rows of a block.
 const ROWS: usize = 512;
+/// Length of a column, with room for zeros.
+const HEIGHT: usize = ROWS + LANES;
 
 /// Steps of sigma points that were not added up yet.
 struct Steps<'a> {
@@ -43,11 +45,11 @@ pub(crate) fn expected_sums(
         basis,
         step,
         n: 0,
-        mid_times: vec![0.0; ROWS],
-        left_times: vec![0.0; ROWS],
-        mid: vec![0.0; ROWS * width],
-        left: vec![0.0; ROWS * width],
-        columns: DMatrix::zeros(ROWS, (b + l).next_multiple_of(TILE)),
+        mid_times: vec![0.0; HEIGHT],
+        left_times: vec![0.0; HEIGHT],
+        mid: vec![0.0; HEIGHT * width],
+        left: vec![0.0; HEIGHT * width],
+        columns: DMatrix::zeros(HEIGHT, b + l),
         products: DMatrix::zeros(b + l, b + l),
         slopes: vec![0.0; b * l],
     };
@@ -104,13 +106,13 @@ impl Steps<'_> {
         let (row, n, b) = (self.n, before.len(), self.basis.n_function());
         (self.left_times[row], self.mid_times[row]) = (time, time + 0.5 * self.step);
         for (l, (before, after)) in before.iter().zip(after).enumerate() {
-            self.left[l * ROWS + row] = *before;
-            self.mid[l * ROWS + row] = 0.5 * (before + after);
+            self.left[l * HEIGHT + row] = *before;
+            self.mid[l * HEIGHT + row] = 0.5 * (before + after);
             self.columns[(row, b + l)] = (after - before) / self.step;
         }
         for (k, (from, to)) in inputs[0].iter().zip(inputs[1]).enumerate() {
-            self.left[(n + k) * ROWS + row] = *from;
-            self.mid[(n + k) * ROWS + row] = 0.5 * (from + to);
+            self.left[(n + k) * HEIGHT + row] = *from;
+            self.mid[(n + k) * HEIGHT + row] = 0.5 * (from + to);
         }
         self.n += 1;
     }
@@ -120,11 +122,14 @@ impl Steps<'_> {
         if n == 0 {
             return Ok(());
         }
-        let samples = |times, channels| Samples { n, times, channels, height: ROWS, n_state: l };
+        let samples = |times, channels| Samples { n, times, channels, height: HEIGHT, n_state: l };
         let (mid, left) = (samples(&self.mid_times, &self.mid), samples(&self.left_times, &self.left));
-        let columns = &mut self.columns.as_mut_slice()[..self.basis.n_function() * ROWS];
-        self.basis.evaluate(&mid, &left, columns, ROWS, &mut self.slopes);
-        Arch::new().dispatch(Gram { columns: &mut self.columns, rows: n, products: &mut self.products });
+        let columns = self.columns.as_mut_slice();
+        let functions = &mut columns[..self.basis.n_function() * HEIGHT];
+        self.basis.evaluate(&mid, &left, functions, HEIGHT, &mut self.slopes);
+        columns.chunks_exact_mut(HEIGHT).for_each(|column| column[n..].fill(0.0));
+        let products = Products { columns, height: HEIGHT, rows: n, lag: 0, sums: &mut self.products };
+        Arch::new().dispatch(products);
         if self.products.iter().chain(&self.slopes).all(|v| v.is_finite()) {
             return Ok(());
         }

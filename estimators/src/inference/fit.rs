@@ -65,6 +65,30 @@ impl Fit {
     /// # Errors
     /// `Shape`, `TooFew` steps, `NothingObserved`, `Collinear` terms, `DiffusionNotDefinite`, `NotSettled`, `Overflow`.
     pub fn posterior(&self, sums: &Sums, structure: &Structure) -> Result<Posterior, InferenceError> {
+        self.posterior_from(sums, structure, None)
+    }
+
+    /// The posterior, started from the noise of an earlier one: the same but for rounding, in fewer passes.
+    ///
+    /// # Errors
+    /// As for [`Fit::posterior`].
+    pub fn update(
+        &self,
+        sums: &Sums,
+        structure: &Structure,
+        earlier: &Posterior,
+    ) -> Result<Posterior, InferenceError> {
+        let n = sums.n_state();
+        let fits = earlier.diffusion.shape() == (n, n) && !matches!(self.diffusion, Diffusion::Known(_));
+        self.posterior_from(sums, structure, fits.then_some(&earlier.diffusion))
+    }
+
+    fn posterior_from(
+        &self,
+        sums: &Sums,
+        structure: &Structure,
+        start: Option<&DMatrix<f64>>,
+    ) -> Result<Posterior, InferenceError> {
         structure.fits(sums.n_state(), sums.n_function())?;
         let (expected, got) = (structure.n_coefficient(), self.prior.n_coefficient());
         if expected != got {
@@ -72,7 +96,7 @@ impl Fit {
         }
         let moments = Moments::new(sums, structure);
         let first = self.diffusion.first(sums, structure)?;
-        let mut noise = first.clone();
+        let mut noise = start.unwrap_or(&first).clone();
         for passes in 1..=PASSES {
             let inverse = diffusion::inverse(&noise, structure)?;
             let pass = self.pass(&moments, &inverse)?;

@@ -3,7 +3,7 @@
 //! Rows are gathered in blocks of 256; a block's functions become columns, and its products are made in vector registers. Each
 //! block keeps the last row for the next one, so the steps do not depend on where blocks are cut. Nothing is allocated per row.
 //! The recording must be sampled uniformly: every step within 1 % of the stated one, a block's length within a tenth of that.
-//! Read next: `../gram.rs` and `lagged.rs`, the products, and `sums.rs`, what they are added to.
+//! Read next: `products.rs`, how they are summed, and `sums.rs`, what they are added to.
 
 use std::sync::Arc;
 
@@ -11,10 +11,9 @@ use nalgebra::DMatrix;
 use pulp::Arch;
 
 use super::functions::Samples;
-use super::lagged::{LANES, Lagged};
+use super::products::{LANES, Products};
 use super::sums::BlockSums;
 use super::{Basis, InferenceError, Sums};
-use crate::gram::{Gram, TILE};
 
 /// Steps of a block.
 const ROWS: usize = 256;
@@ -66,7 +65,7 @@ impl Stream {
             mid: channels.clone(),
             channels,
             mid_times: vec![0.0; HEIGHT],
-            columns: DMatrix::zeros(HEIGHT, width.next_multiple_of(TILE)),
+            columns: DMatrix::zeros(HEIGHT, width),
             products: DMatrix::zeros(width, width),
             lagged: DMatrix::zeros(width, width),
             slopes: vec![0.0; b * l],
@@ -218,8 +217,10 @@ impl Stream {
     fn add(&mut self, n: usize) -> Result<(), InferenceError> {
         self.products.fill(0.0);
         self.lagged.fill(0.0);
-        self.arch.dispatch(Gram { columns: &mut self.columns, rows: n, products: &mut self.products });
-        self.arch.dispatch(Lagged { columns: &self.columns, rows: n, products: &mut self.lagged });
+        for (lag, sums) in [&mut self.products, &mut self.lagged].into_iter().enumerate() {
+            let columns = self.columns.as_slice();
+            self.arch.dispatch(Products { columns, height: HEIGHT, rows: n, lag, sums });
+        }
         if !self.products.iter().chain(&self.slopes).all(|v| v.is_finite()) {
             return Err(self.culprit(n));
         }

@@ -32,7 +32,14 @@ fn a_sliding_window_is_one_pass_over_its_rows_and_a_growing_one_over_all() {
             assert!(close(&sliding.sums().unwrap(), &sums(&basis, &rows[from..=n], h)), "{n}");
         }
     }
-    assert!(close(&growing.sums().unwrap(), &sums(&basis, &rows, h)));
+    let whole = sums(&basis, &rows, h);
+    assert!(close(&growing.sums().unwrap(), &whole));
+    let (fit, structure) = (Fit::new(Diffusion::Full, 7), lorenz::seven(&basis));
+    let earlier = fit.posterior(&sliding.sums().unwrap(), &structure).unwrap();
+    let (fresh, updated) = (fit.posterior(&whole, &structure), fit.update(&whole, &structure, &earlier));
+    let (fresh, updated) = (fresh.unwrap(), updated.unwrap());
+    // D settles to 1e-11 of itself.
+    assert!((fresh.mean() - updated.mean()).amax() < 1e-7 && updated.passes <= fresh.passes);
     assert_eq!((growing.n_block(), sliding.n_block(), sliding.is_full()), (1, 4, true));
 }
 
