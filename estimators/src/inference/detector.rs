@@ -1,7 +1,7 @@
 //! Follows a recording row by row: estimates, and an alarm when the last steps no longer fit them.
 //!
 //! Rows are gathered in blocks; the last blocks are the recent window, and blocks that leave it join the reference, so that a change
-//! is compared with what was before it. Read next: `change.rs`, the test.
+//! is compared with what was before it. The reference is estimated anew when it has grown by a hundredth. Read next: `change.rs`, the test.
 
 use std::sync::Arc;
 
@@ -50,7 +50,12 @@ pub struct Detector {
     reference: Window,
     posterior: Option<Posterior>,
     in_block: u64,
+    /// Steps that joined the reference since it was estimated.
+    unused: u64,
 }
+
+/// Share of its steps by which the reference grows before it is estimated anew.
+const GROWTH: f64 = 0.01;
 
 impl Detector {
     /// A detector before the first row.
@@ -79,6 +84,7 @@ impl Detector {
             following,
             posterior: None,
             in_block: 0,
+            unused: 0,
         })
     }
 
@@ -98,8 +104,12 @@ impl Detector {
         self.in_block = 0;
         let block = self.stream.take()?;
         if let Some(older) = self.recent.push(block)? {
+            self.unused += older.n_step();
             self.reference.push(older)?;
-            self.estimate()?;
+            let used = self.posterior.as_ref().map_or(0, |p| p.n_step);
+            if self.unused as f64 >= GROWTH * used as f64 {
+                self.estimate()?;
+            }
         }
         let Some((posterior, recent)) = self.posterior.as_ref().zip(self.recent.sums()) else {
             return Ok(None);
@@ -142,7 +152,10 @@ impl Detector {
             None => self.fit.posterior(&sums, &self.structure),
         };
         match found {
-            Ok(posterior) => self.posterior = Some(posterior),
+            Ok(posterior) => {
+                self.posterior = Some(posterior);
+                self.unused = 0;
+            }
             Err(InferenceError::TooFew { .. } | InferenceError::NothingObserved) => {}
             Err(other) => return Err(other),
         }

@@ -10,7 +10,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::diffusion::{self, Diffusion};
-use super::normal::{Moments, invert, spread};
+use super::normal::{Moments, invert, invert_shared, spread};
 use super::{InferenceError, Posterior, Prior, Structure, Sums};
 
 /// Change of D, relative to itself, below which it has settled.
@@ -141,7 +141,12 @@ impl Fit {
         let precision = normal.precision + &prior_precision;
         let vector = normal.vector + prior_precision * prior_mean;
         let name = |i: usize| moments.structure.coefficients()[active[i]].name.clone();
-        let covariance = invert(&precision, name)?;
+        let flat = active.iter().all(|p| !known(p));
+        let covariance = if flat && moments.structure.is_shared(&active) {
+            invert_shared(&precision, inverse, name)?
+        } else {
+            invert(&precision, name)?
+        };
         let mean = &covariance * vector;
         if !mean.iter().all(|v| v.is_finite()) {
             return Err(InferenceError::Overflow { what: "a coefficient" });

@@ -111,6 +111,20 @@ pub(crate) fn spread(
     spread
 }
 
+/// (D⁻¹ ⊗ A)⁻¹ = D ⊗ A⁻¹ for a precision of that form, of the functions that all of n equations share: one inverse of B x B instead
+/// of one of LB x LB.
+pub(crate) fn invert_shared(
+    precision: &DMatrix<f64>,
+    inverse: &DMatrix<f64>,
+    name: impl Fn(usize) -> String,
+) -> Result<DMatrix<f64>, InferenceError> {
+    let b = precision.nrows() / inverse.nrows();
+    let of_functions = precision.view((0, 0), (b, b)) / inverse[(0, 0)];
+    let overflow = InferenceError::Overflow { what: "the inverse of the noise" };
+    let noise = inverse.clone().cholesky().ok_or(overflow)?.inverse();
+    Ok(noise.kronecker(&invert(&of_functions, name)?))
+}
+
 /// The inverse of a precision; `name` gives the names of its rows.
 ///
 /// # Errors

@@ -167,6 +167,20 @@ impl Structure {
         c
     }
 
+    /// Whether these coefficients are the same functions in every equation, equation after equation, with a factor of one.
+    pub(crate) fn is_shared(&self, active: &[usize]) -> bool {
+        let per_equation = active.len() / self.equations.len().max(1);
+        if per_equation == 0 || per_equation * self.equations.len() != active.len() {
+            return false;
+        }
+        let place = |i: usize| match self.coefficients[active[i]].places.as_slice() {
+            [place] if place.factor.to_bits() == 1.0_f64.to_bits() => Some((place.equation, place.function)),
+            _ => None,
+        };
+        let expected = |i: usize| place(i % per_equation).map(|(_, function)| (i / per_equation, function));
+        (0..active.len()).all(|i| place(i).is_some() && place(i) == expected(i))
+    }
+
     /// Whether sums are of as many functions and equations.
     pub(crate) fn fits(&self, n_state: usize, n_function: usize) -> Result<(), InferenceError> {
         let shape = |what, expected, got| {

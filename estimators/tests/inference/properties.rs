@@ -28,6 +28,78 @@ fn drift(posterior: &Posterior, x: &Vector3<f64>) -> DVector<f64> {
     posterior.drift() * DVector::from_vec(phi)
 }
 
+/// Slopes against differences of values at some points, and blocks against single samples.
+fn assert_consistent(basis: &Arc<Basis>, samples: &[Vec<f64>]) {
+    let (b, l) = (basis.n_function(), basis.n_state());
+    let (mut slopes, mut above, mut below) = (vec![0.0; b * l], vec![0.0; b], vec![0.0; b]);
+    for (n, x) in samples.iter().enumerate() {
+        let time = 0.1 * n as f64;
+        basis.slopes(time, x, &mut slopes);
+        for state in 0..l {
+            let step = 1e-5 * x[state].abs().max(0.1);
+            let moved = |by: f64| {
+                let mut x = x.clone();
+                x[state] += by;
+                x
+            };
+            basis.values(time, &moved(step), &mut above);
+            basis.values(time, &moved(-step), &mut below);
+            for f in 0..b {
+                let difference = (above[f] - below[f]) / (2.0 * step);
+                let slope = slopes[f * l + state];
+                // The third derivative times the square of the step, and rounding over the step.
+                assert!(
+                    (slope - difference).abs() < 1e-7 * (1.0 + slope.abs() + above[f].abs()),
+                    "{f} {state}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn slopes_are_those_of_the_values() {
+    let point = |n: usize, k: usize| 1.0 + 0.31 * (n as f64 * 1.7 + k as f64).sin();
+    let samples: Vec<Vec<f64>> = (0..20).map(|n| (0..4).map(|k| point(n, k)).collect()).collect();
+    let names = ["x", "y", "u", "w"];
+    let cubic = |constant| Polynomial::new(&names, 2, &[0, 1, 3], 3, constant);
+    let with = |constant| Basis::new(2, 2).with(Rule::MidPoint, cubic(constant)).unwrap();
+    let (all, fewer) = (Arc::new(with(true)), Arc::new(with(false)));
+    assert_eq!((all.n_function(), fewer.n_function()), (20, 19));
+    assert_eq!(all.names()[..6], ["1", "x", "y", "w", "x^2", "x*y"]);
+    assert_eq!(all.index("x*y*w"), Some(14));
+    assert_consistent(&all, &samples);
+    assert_consistent(&fewer, &samples);
+    let three = |n: &Vec<f64>| n[..3].to_vec();
+    let samples: Vec<Vec<f64>> = samples.iter().map(three).collect();
+    assert_consistent(&crate::kit::motor::basis(), &samples);
+    assert_consistent(&lorenz::basis(), &samples);
+    // Leaks are taken at the left point and have no slopes; levels here are above all openings.
+    let flows: Vec<Vec<f64>> = samples.iter().map(|x| x.iter().map(|v| v + 1.0).collect()).collect();
+    let basis = crate::kit::tanks::flows();
+    assert_consistent(&basis, &flows);
+}
+
+/// Blocks go another way than single samples in a polynomial.
+#[test]
+fn sums_of_blocks_are_those_of_single_samples() {
+    let rows: Vec<[f64; 3]> = lorenz::strong(1, 300, H, 5.0);
+    let basis = quadratic();
+    let sums = sums(&basis, &rows, H);
+    let (mut phi, mut v) = (nalgebra::DMatrix::zeros(10, 10), nalgebra::DMatrix::zeros(3, 10));
+    for pair in rows.windows(2) {
+        let mid: [f64; 3] = std::array::from_fn(|i| 0.5 * (pair[0][i] + pair[1][i]));
+        let (mut values, mut slopes) = (vec![0.0; 10], vec![0.0; 30]);
+        basis.values(0.0, &mid, &mut values);
+        basis.slopes(0.0, &mid, &mut slopes);
+        let values = DVector::from_vec(values);
+        phi += &values * values.transpose();
+        v += nalgebra::DMatrix::from_vec(3, 10, slopes);
+    }
+    // Rounding of 300 terms.
+    assert!((sums.phi() - &phi).amax() < 1e-12 * phi.amax() && (sums.v() - &v).amax() < 1e-11 * v.amax());
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 

@@ -70,6 +70,20 @@ fn a_term_without_information_is_not_observed_and_returns_when_it_has_some() {
     assert!(observed(&late).iter().all(|o| *o));
 }
 
+/// The least information is an inverse variance: what is known worse than to 0.2 counts as not observed.
+#[test]
+fn a_term_below_the_least_information_is_not_observed() {
+    let basis = tanks::basis();
+    let (structure, rows) = (tanks::joint(&basis), tanks::recording(2));
+    let opens = rows.iter().position(|x| x[0] > tanks::H12).unwrap();
+    let seen = |until: usize, least_information: f64| {
+        let sums = sums(&basis, &rows[..opens + until], H);
+        let fit = Fit { least_information, ..Fit::new(Diffusion::Diagonal, 9) };
+        fit.posterior(&sums, &structure).unwrap().estimates[3].observed
+    };
+    assert!(seen(5, 0.0) && !seen(5, 25.0) && seen(200, 25.0));
+}
+
 #[test]
 fn nothing_observed_is_an_error_that_says_so() {
     let basis = tanks::basis();

@@ -73,6 +73,14 @@ fn leak(name: &str, tank: usize, level: f64) -> Function {
     Function::of_inputs(name, move |_, x| root(x[tank] - level))
 }
 
+/// The flows between tanks alone.
+pub fn flows() -> Arc<Basis> {
+    let basis = Basis::new(3, 0)
+        .with(Rule::MidPoint, flow("flow12", 0, 1, H12))
+        .and_then(|b| b.with(Rule::MidPoint, flow("flow32", 2, 1, H23)));
+    Arc::new(basis.unwrap())
+}
+
 pub fn basis() -> Arc<Basis> {
     let basis = Basis::new(3, 0)
         .with(Rule::MidPoint, Function::of_inputs("sine", |t, _| sine(t)))
