@@ -2,9 +2,11 @@
 
 use std::sync::Arc;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
+use proptest::prelude::*;
 use starlings_estimators::inference::{
-    Basis, Diffusion, Fit, Function, InferenceError, Polynomial, Prior, Rule, Stream, Structure, Sums,
+    Basis, Detector, Diffusion, Fit, Following, Function, InferenceError, Memory, Polynomial, Prior,
+    Regression, Rule, Stream, Structure, Sums, Window, compare, noise_checks, reduce,
 };
 
 use crate::kit::sde::{gauss, rng};
@@ -157,4 +159,75 @@ fn names_shapes_priors_and_noise_that_do_not_fit_are_refused() {
     );
     let refused = Fit::new(Diffusion::Full, 3).posterior(&walked, &same(&basis)).unwrap_err();
     assert_eq!(refused, InferenceError::Shape { what: "coefficients of the prior", expected: 12, got: 3 });
+}
+
+#[test]
+fn windows_detectors_regressions_and_reduced_models_that_do_not_fit_are_refused() {
+    let basis = plane(quadratic());
+    let mut window = Window::new(Memory::Sliding(3));
+    window.push(sums(&basis, &walk(20), 0.1)).unwrap();
+    let coarse = sums(&basis, &walk(20), 0.2);
+    assert_eq!(window.push(coarse), Err(InferenceError::Incompatible { what: "their step" }));
+    assert_eq!(window.n_block(), 1, "what was refused was not taken");
+    let following =
+        Following { block: 1, recent: 1, reference: Memory::Growing, least: 10, rate: 0.0, watched: vec![] };
+    let fit = Fit::new(Diffusion::Full, 12);
+    let refused = Detector::new(Arc::clone(&basis), 0.1, same(&basis), fit.clone(), following);
+    assert_eq!(said(refused), "the rate of false alarms is 0: it must be positive and finite");
+    let mut regression = Regression::new(Arc::clone(&basis));
+    assert_eq!(said(regression.push(0.0, &[1.0], &[])), "outputs and states of a sample: expected 2, got 1");
+    let posterior = fit.posterior(&sums(&basis, &walk(500), 0.1), &same(&basis)).unwrap();
+    let start = DVector::from_element(13, 1.0);
+    let refused = reduce(&posterior, &start, |_| DVector::zeros(12));
+    assert!(matches!(refused, Err(InferenceError::TooFew { n_step: 12, n_unknown: 13, .. })));
+    let start = DVector::from_element(2, 1.0);
+    assert!(matches!(reduce(&posterior, &start, |_| DVector::zeros(3)), Err(InferenceError::Shape { .. })));
+    let lost = reduce(&posterior, &start, |_| DVector::from_element(12, f64::NAN));
+    assert_eq!(said(lost), "the reduced model at its start is not finite");
+    let idle = reduce(&posterior, &start, |theta| DVector::from_element(12, theta[0]));
+    assert!(
+        matches!(idle, Err(InferenceError::Collinear { .. } | InferenceError::Overflow { .. })),
+        "{idle:?}"
+    );
+}
+
+/// Rows of zeros, constants, huge, tiny and equal values.
+fn nasty() -> impl Strategy<Value = Vec<[f64; 2]>> {
+    let value = prop_oneof![
+        4 => -1.0_f64..1.0,
+        1 => Just(0.0),
+        1 => Just(1.0),
+        1 => Just(1e-200),
+        1 => Just(1e150),
+        1 => Just(-3e80),
+    ];
+    proptest::collection::vec([value.clone(), value], 2..40)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(256))]
+
+    #[test]
+    fn every_figure_is_finite_or_refused(rows in nasty(), degree in 0_u32..3, form in 0_usize..3) {
+        let basis = plane(Polynomial::new(&["x", "y"], 2, &[0, 1], degree, true));
+        let mut stream = Stream::new(Arc::clone(&basis), 0.1).unwrap();
+        let times = crate::kit::times(rows.len(), 0.1);
+        prop_assume!(stream.extend(&times, rows.as_flattened()).is_ok());
+        let Ok(sums) = stream.take() else { return Ok(()) };
+        let structure = same(&basis);
+        let form = [Diffusion::Full, Diffusion::Diagonal, Diffusion::Isotropic][form].clone();
+        for lag_corrected in [false, true] {
+            let fit = Fit { lag_corrected, ..Fit::new(form.clone(), structure.n_coefficient()) };
+            let Ok(posterior) = fit.posterior(&sums, &structure) else { continue };
+            let values = posterior.estimates.iter().filter_map(|e| e.value).flat_map(|v| [v.mean, v.sd]);
+            prop_assert!(values.chain(posterior.diffusion.iter().copied()).all(f64::is_finite));
+            prop_assert!(posterior.diffusion_sd().iter().all(|sd| *sd > 0.0 || sd.is_finite()));
+            for check in noise_checks(&sums, &structure, &posterior).into_iter().flatten() {
+                prop_assert!(check.ratio.is_finite() && check.sd.is_finite());
+            }
+            if let Ok(change) = compare(&posterior, &sums, &structure, &[]) {
+                prop_assert!(change.statistic.is_finite() && (0.0..=1.0).contains(&change.probability));
+            }
+        }
+    }
 }
