@@ -2,7 +2,7 @@
 //!
 //! ẋ = f(x, t) + D^{1/2} ξ with f linear in unknown coefficients: their posterior is a formula over sums that add up over blocks of
 //! the recording and over machines (Smelyanskiy, Luchinsky et al., "Physics-based methods of failure analysis and diagnostics in
-//! human space flight", section 1.2). The order of the files is that of the work: `basis.rs` (functions), `stream.rs` and
+//! human space flight", eqs. 1.1 to 1.26). The order of the files is that of the work: `basis.rs` (functions), `stream.rs` and
 //! `sums.rs` (one pass over the data), `structure.rs` (which function in which equation), `fit.rs` and `posterior.rs`.
 //! Deliberately no simulation here, and no nonlinear parameter inside a function.
 

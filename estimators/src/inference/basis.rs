@@ -1,7 +1,7 @@
 //! The functions of an inference: families one after the other, each with the point of a step at which it is taken.
 //!
 //! The mid-point x* = (x_n + x_{n+1})/2 needs the slopes (Smelyanskiy, Luchinsky et al., "Physics-based methods of failure
-//! analysis and diagnostics in human space flight", eqs. 1.11 to 1.13, with F at x* as v is); the left point x_n needs none
+//! analysis and diagnostics in human space flight", eq. 1.11, with F at x* as v is); the left point x_n needs none
 //! (Itô) and serves functions whose slope has no bound, as the square root of a level at the opening. One regression may mix
 //! both: each column then has a noise-free normal equation of its own, to first order in the step.
 //! Read next: `stream.rs`, which takes sums of products of them.

@@ -2,7 +2,7 @@
 //! until both settle.
 //!
 //! For functions that all equations share this is C = (Z − ½ D V) Φ⁻¹ with covariance D ⊗ (hΦ)⁻¹ (Smelyanskiy, Luchinsky et al.,
-//! eqs. 1.12 to 1.14 and 1.25); the term V is what the Jacobian of the map from noise to the next state leaves at the mid-point.
+//! eqs. 1.11 and 1.25); the term V is what the Jacobian of the map from noise to the next state leaves at the mid-point.
 //! The noise is D = (h/N) (Σ rrᵀ + Σ F cov Fᵀ): the second sum takes away the bias of the mode, and is h/(N − B) Σ rrᵀ where all
 //! equations share their functions (restricted likelihood, Patterson & Thompson, Biometrika 1971, by expectation and
 //! maximisation). Read next: `normal.rs`, the equations of a pass, and `diffusion.rs`, the forms of the noise.

@@ -1,6 +1,6 @@
 //! The equations for the coefficients at a given noise: what one pass of a fit solves.
 //!
-//! Ξ = h Σ Fᵀ D⁻¹ F and w = h Σ (Fᵀ D⁻¹ ẋ − v/2) with v_p = Σ_l ∂F_lp/∂x_l (Smelyanskiy, Luchinsky et al., eqs. 1.12 and 1.13, with
+//! Ξ = h Σ Fᵀ D⁻¹ F and w = h Σ (Fᵀ D⁻¹ ẋ − v/2) with v_p = Σ_l ∂F_lp/∂x_l (Smelyanskiy, Luchinsky et al., eq. 1.11, with
 //! F at the mid-point of the step as v is), from sums alone: Ξ_pq = h Σ s s' (D⁻¹)_ll' Φ_bb' over the places of p and q.
 //! Read next: `fit.rs`.
 

@@ -110,7 +110,7 @@ impl Posterior {
         Some([at(0.5 * (1.0 + level)), at(0.5 * (1.0 - level))])
     }
 
-    /// This posterior as the prior of later data (eqs. 1.22 to 1.24, with Ξ c instead of Ξ⁻¹ c).
+    /// This posterior as the prior of later data (eq. 1.23, with Ξ c instead of Ξ⁻¹ c).
     pub fn as_prior(&self) -> Prior {
         let n = self.estimates.len();
         let mut prior = Prior::flat(n);

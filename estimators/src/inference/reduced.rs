@@ -2,7 +2,7 @@
 //!
 //! θ minimises (ĉ − g(θ))ᵀ Ξ (ĉ − g(θ)), by Gauss and Newton with the damping of Marquardt (1963); under a flat prior the minimum is χ²
 //! of as many degrees of freedom as there are coefficients more than unknowns, which tests whether the reduced model can be right.
-//! The map g is a formula that costs nothing, so its slopes are central differences. (Smelyanskiy, Luchinsky et al., eqs. 1.76 to
+//! The map g is a formula that costs nothing, so its slopes are central differences. (Smelyanskiy, Luchinsky et al., eqs. 1.73 to
 //! 1.82: oscillators behind an unknown mixing matrix.) Read next: `posterior.rs`.
 
 use nalgebra::{DMatrix, DVector};

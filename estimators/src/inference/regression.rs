@@ -1,6 +1,6 @@
 //! The measurement model y = G(x) b + M^{1/2} η: its coefficients b and noise M are those of a regression without time.
 //!
-//! Θ = Σ Gᵀ M⁻¹ G, b = Θ⁻¹ Σ Gᵀ M⁻¹ y, M = (1/N) Σ rrᵀ less the bias of the fit (Smelyanskiy, Luchinsky et al., eqs. 1.15 and 1.16, with
+//! Θ = Σ Gᵀ M⁻¹ G, b = Θ⁻¹ Σ Gᵀ M⁻¹ y, M = (1/N) Σ rrᵀ less the bias of the fit (Smelyanskiy, Luchinsky et al., eq. 1.16, with
 //! Θ as the precision that it is). The equations are those of the drift with h = 1 and without a Jacobian, so the same sums,
 //! structures and fit serve: D of the posterior is M. Read next: `fit.rs`.
 

@@ -3,7 +3,7 @@
 //! With a_n = (φ_n, ẋ_n), ẋ_n = (x_{n+1} − x_n)/h, they are Σ a aᵀ (which holds Φ = Σ φφᵀ, Z = Σ ẋφᵀ and Q = Σ ẋẋᵀ), the slopes
 //! V_lb = Σ ∂φ_b/∂x_l, and Σ a_n a_{n+1}ᵀ, from which residuals at lag one follow. They do not depend on which functions enter
 //! which equation: that is asked of them later (`structure.rs`), of one pass through the data. (Smelyanskiy, Luchinsky et al.,
-//! eqs. 1.12 to 1.14 and 1.25.) Deliberately no basis inside: a fingerprint stands for it.
+//! eqs. 1.11 and 1.25.) Deliberately no basis inside: a fingerprint stands for it.
 //! Read next: `stream.rs`, which makes them, and `fit.rs`, which reads them.
 
 use nalgebra::DMatrix;

@@ -165,7 +165,7 @@ proptest! {
         }
     }
 
-    /// With a given D the posterior of one block is the prior of the next (eqs. 1.22 to 1.26).
+    /// With a given D the posterior of one block is the prior of the next (eqs. 1.23 to 1.26).
     #[test]
     fn blocks_one_after_the_other_give_the_posterior_of_all(cut in 50_usize..550, seed in 0_u64..1000) {
         let basis = lorenz::basis();

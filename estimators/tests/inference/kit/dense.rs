@@ -1,5 +1,5 @@
 //! The estimator written out over all rows, sharing no code with the crate: F of L x P at every step, one dense solve per pass
-//! (Smelyanskiy, Luchinsky et al., eqs. 1.12 to 1.14).
+//! (Smelyanskiy, Luchinsky et al., eq. 1.11).
 
 use nalgebra::{DMatrix, DVector};
 

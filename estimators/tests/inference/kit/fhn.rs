@@ -1,4 +1,4 @@
-//! Two FitzHugh-Nagumo oscillators seen through an unknown mixing matrix (Smelyanskiy, Luchinsky et al., eqs. 1.76 to 1.82 and Table
+//! Two FitzHugh-Nagumo oscillators seen through an unknown mixing matrix (Smelyanskiy, Luchinsky et al., eqs. 1.73 to 1.82 and Table
 //! 1.5): v̇ = α v + b v² − v³ − q + η + √D ξ, q̇ = −β q + γ v, y = X v. Eliminating q leaves a memory of y and a decay as functions.
 
 use std::sync::Arc;

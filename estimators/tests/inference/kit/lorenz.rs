@@ -1,4 +1,4 @@
-//! The Lorenz system with noise (Smelyanskiy, Luchinsky et al., section 1.2, Tables 1.1 and 1.2).
+//! The Lorenz system with noise (Smelyanskiy, Luchinsky et al., Tables 1.1 and 1.2).
 
 use std::sync::Arc;
 
