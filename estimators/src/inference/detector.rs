@@ -6,7 +6,8 @@
 use std::sync::Arc;
 
 use super::{
-    Basis, Change, Fit, InferenceError, Memory, Posterior, Stream, Structure, Sums, Window, compare,
+    Basis, Change, Fit, InferenceError, Memory, Posterior, Stream, StreamState, Structure, Sums, Window,
+    compare,
 };
 
 /// How a recording is followed.
@@ -51,6 +52,17 @@ pub struct Detector {
     posterior: Option<Posterior>,
     in_block: u64,
     /// Steps that joined the reference since it was estimated.
+    unused: u64,
+}
+
+/// A detector between two rows.
+#[derive(serde::Serialize, serde::Deserialize, Debug, Clone, PartialEq)]
+pub struct DetectorState {
+    stream: StreamState,
+    recent: Window,
+    reference: Window,
+    posterior: Option<Posterior>,
+    in_block: u64,
     unused: u64,
 }
 
@@ -141,6 +153,43 @@ impl Detector {
         }
         self.posterior = None;
         self.estimate()
+    }
+
+    /// What it goes on from, in this program or another.
+    ///
+    /// # Errors
+    /// As for [`Stream::state`].
+    pub fn state(&mut self) -> Result<DetectorState, InferenceError> {
+        Ok(DetectorState {
+            stream: self.stream.state()?,
+            recent: self.recent.clone(),
+            reference: self.reference.clone(),
+            posterior: self.posterior.clone(),
+            in_block: self.in_block,
+            unused: self.unused,
+        })
+    }
+
+    /// Puts a new detector where another one was; basis, structure, fit and following are the same.
+    ///
+    /// # Errors
+    /// As for [`Stream::resume`] and [`Sums::check`]; `Incompatible` for a posterior of another structure.
+    pub fn resume(mut self, state: DetectorState) -> Result<Self, InferenceError> {
+        let basis = Arc::clone(self.stream.basis());
+        for window in [&state.recent, &state.reference] {
+            window.sums().map_or(Ok(()), |sums| sums.check(&basis))?;
+        }
+        let fits = |p: &Posterior| {
+            let names = p.estimates.iter().map(|e| &e.name);
+            names.eq(self.structure.coefficients().iter().map(|c| &c.name))
+        };
+        if !state.posterior.as_ref().is_none_or(fits) {
+            return Err(InferenceError::Incompatible { what: "their coefficients" });
+        }
+        self.stream = Stream::resume(basis, state.stream)?;
+        (self.recent, self.reference) = (state.recent, state.reference);
+        (self.posterior, self.in_block, self.unused) = (state.posterior, state.in_block, state.unused);
+        Ok(self)
     }
 
     fn estimate(&mut self) -> Result<(), InferenceError> {

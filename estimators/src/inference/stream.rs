@@ -45,6 +45,16 @@ pub struct Stream {
     sums: Sums,
 }
 
+/// A recording between two rows.
+#[derive(serde::Serialize, serde::Deserialize, Debug, Clone, PartialEq)]
+pub struct StreamState {
+    row: u64,
+    /// Time and values of the last row, with which the next step starts.
+    last: Option<(f64, Vec<f64>)>,
+    follows: bool,
+    sums: Sums,
+}
+
 impl Stream {
     /// An empty recording with steps of length `step`.
     ///
@@ -131,6 +141,35 @@ impl Stream {
         self.flush()?;
         let empty = Sums::new(&self.basis, self.sums.step());
         Ok(std::mem::replace(&mut self.sums, empty))
+    }
+
+    /// What the recording goes on from, in this program or another.
+    ///
+    /// # Errors
+    /// As for [`Stream::sums`].
+    pub fn state(&mut self) -> Result<StreamState, InferenceError> {
+        self.flush()?;
+        let row = || self.channels.chunks_exact(HEIGHT).map(|column| column[0]).collect();
+        let last = (self.n > 0).then(|| (self.times[0], row()));
+        Ok(StreamState { row: self.row, last, follows: self.follows, sums: self.sums.clone() })
+    }
+
+    /// Goes on from a state.
+    ///
+    /// # Errors
+    /// As for [`Sums::check`] and [`Stream::new`]; `Damaged` for a last row that does not fit.
+    pub fn resume(basis: Arc<Basis>, state: StreamState) -> Result<Self, InferenceError> {
+        state.sums.check(&basis)?;
+        let mut stream = Self::new(basis, state.sums.step())?;
+        if let Some((time, values)) = &state.last {
+            let fits = stream.admit(*time, values).is_ok();
+            if !fits {
+                return Err(InferenceError::Damaged { what: "the last row of a recording" });
+            }
+            stream.push(*time, values)?;
+        }
+        (stream.row, stream.follows, stream.sums) = (state.row, state.follows, state.sums);
+        Ok(stream)
     }
 
     /// Rows taken.

@@ -171,3 +171,42 @@ fn an_accepted_change_is_the_new_reference() {
         "{value:?}: one old step is in it"
     );
 }
+
+/// A program that stops after a report and starts again from what it wrote says the same, to the last bit.
+#[test]
+fn a_detector_goes_on_from_its_state() {
+    let rows = motor::recording(5, 500, 1.0, |t| if t < 0.4 { 1.0 } else { 0.9 });
+    let detector = || throat(1e-6);
+    let (_, whole) = follow(detector(), 0.001, &rows);
+    let mut reports = vec![];
+    let mut running = detector();
+    for (n, row) in rows.iter().enumerate() {
+        reports.extend(running.push(n as f64 * 0.001, row).unwrap());
+        if n % 97 == 0 {
+            let text = serde_json::to_string(&running.state().unwrap()).unwrap();
+            running = detector().resume(serde_json::from_str(&text).unwrap()).unwrap();
+        }
+    }
+    assert_eq!(reports, whole);
+    let mut elsewhere = running.state().unwrap();
+    elsewhere =
+        serde_json::from_str(&serde_json::to_string(&elsewhere).unwrap().replace("\"a\"", "\"b\"")).unwrap();
+    assert!(detector().resume(elsewhere).is_err(), "another structure");
+}
+
+/// Between two blocks of 256 rows as well, to rounding.
+#[test]
+fn a_stream_goes_on_from_its_state() {
+    let (basis, h) = (lorenz::basis(), 0.005);
+    let rows = lorenz::strong(6, 700, h, 10.0);
+    let mut stream = Stream::new(Arc::clone(&basis), h).unwrap();
+    for (n, row) in rows.iter().enumerate() {
+        stream.push(n as f64 * h, row).unwrap();
+        if n % 111 == 0 {
+            let state = stream.state().unwrap();
+            stream = Stream::resume(Arc::clone(&basis), state).unwrap();
+        }
+    }
+    assert_eq!(stream.n_row(), 701);
+    assert!(close(stream.sums().unwrap(), &sums(&basis, &rows, h)));
+}
