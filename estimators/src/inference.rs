@@ -20,6 +20,7 @@ mod function;
 mod functions;
 mod noise_check;
 mod normal;
+mod path;
 mod polynomial;
 mod posterior;
 mod prior;

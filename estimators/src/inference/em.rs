@@ -2,8 +2,8 @@
 //! Stoffer 1982): smooth the states under the present values, fit as if they were known with that uncertainty, repeat.
 //!
 //! The noise settles slowly where the measurement's is larger, so its steps are lengthened while the likelihood grows (Salakhutdinov &
-//! Roweis 2003). For measurement noise that lagged residuals alone do not mend (`noise_check.rs`). The intervals are those of a known path: they lack
-//! what the path's uncertainty adds. Read next: `smoother.rs`, `expected.rs`.
+//! Roweis 2003). For measurement noise that lagged residuals alone do not mend (`noise_check.rs`). The intervals are those of a known path; `path.rs`
+//! adds what the path's uncertainty makes of them. Read next: `smoother.rs`, `expected.rs`.
 
 use std::sync::Arc;
 
@@ -132,7 +132,8 @@ impl Noisy<'_> {
         Ok(NoisyPosterior { posterior: safe.0, measured: safe.1, log_likelihood, converged })
     }
 
-    fn smooth(
+    /// Smoothed states under a posterior and M, with the log-likelihood of the recording.
+    pub(crate) fn smooth(
         &self,
         posterior: &Posterior,
         noise: &DMatrix<f64>,

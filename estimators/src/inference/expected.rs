@@ -138,7 +138,7 @@ impl Steps<'_> {
 }
 
 /// A factor of a covariance that may be singular to rounding.
-fn root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
+pub(crate) fn root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
     let n = covariance.nrows();
     let lift = 1e-13 * covariance.diagonal().amax() + f64::MIN_POSITIVE;
     let lifted = covariance + DMatrix::identity(n, n) * lift;
