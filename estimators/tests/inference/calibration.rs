@@ -108,7 +108,7 @@ fn the_uncertainty_of_a_path_widens_intervals_and_moves_no_estimate() {
 }
 
 #[test]
-#[ignore = "half a minute in release: just inference"]
+#[ignore = "a minute in release: just inference"]
 fn intervals_under_measurement_noise_are_nearly_calibrated() {
     let (mut narrow, mut wide) = (0.0, 0.0);
     let seeds = 100;
