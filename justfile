@@ -23,6 +23,10 @@ intervals:
     cargo test --release -p starlings-coordinator --test intervals -- --ignored --nocapture --test-threads 1
     cargo test --release -p starlings-estimators --lib alternatives -- --ignored --nocapture
 
+# The reconstruction of the Lorenz system from twelve million points.
+inference:
+    cargo test --release -p starlings-estimators --test inference -- --ignored --nocapture
+
 # Every system, effect and noise level of docs/battery.md: about an hour. BATTERY_SYSTEMS, BATTERY_KINDS, BATTERY_NOISE, BATTERY_SEEDS, BATTERY_THREADS choose.
 explain-battery:
     cargo test --release -p starlings-coordinator --test explain_battery -- --ignored --nocapture the_whole
@@ -68,6 +72,7 @@ doc $RUSTDOCFLAGS="-D warnings":
 # Micro-benchmarks and the fleet benchmark.
 bench:
     cargo bench --bench analysis
+    cargo bench -p starlings-estimators --bench inference
     cargo bench --bench tube
     cargo bench --bench solver
     cargo bench --bench memory

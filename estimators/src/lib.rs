@@ -6,7 +6,7 @@
 //! and every reduction runs in a fixed order, so the same input gives the same bits.
 //!
 //! Read next: `kind.rs` (which estimators there are), then `sigma_set.rs` (where the particles are) and `roukf.rs` (what an
-//! analysis does with them).
+//! analysis does with them). `inference.rs` stands apart: it sees a recording and a formula, no particles.
 
 mod analysis;
 mod batch;
@@ -21,6 +21,7 @@ mod filter;
 mod gaussian;
 mod gram;
 mod identifiability;
+pub mod inference;
 mod information;
 mod kind;
 mod least_squares;

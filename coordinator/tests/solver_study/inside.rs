@@ -99,6 +99,7 @@ impl Solve for Inside {
             effects: if with_terms { vec![terms] } else { Vec::new() },
             max_steps: None,
             timeout: None,
+            noise: None,
         };
         let theta =
             run.parameters.iter().copied().chain(run.initial.iter().map(|(_, value)| *value)).collect();

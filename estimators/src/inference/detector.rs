@@ -1,0 +1,213 @@
+//! Follows a recording row by row: estimates, and an alarm when the last steps no longer fit them.
+//!
+//! Rows are gathered in blocks; the last blocks are the recent window, and blocks that leave it join the reference, so that a change
+//! is compared with what was before it. The reference is estimated anew when it has grown by a hundredth. Read next: `change.rs`, the test.
+
+use std::sync::Arc;
+
+use super::{
+    Basis, Change, Fit, InferenceError, Memory, Posterior, Stream, StreamState, Structure, Sums, Window,
+    compare,
+};
+
+/// How a recording is followed.
+#[derive(serde::Serialize, serde::Deserialize, Debug, Clone, PartialEq)]
+pub struct Following {
+    /// Steps of a block: the detector answers once a block.
+    pub block: u64,
+    /// Blocks of the recent window.
+    pub recent: usize,
+    /// Memory of the reference.
+    pub reference: Memory,
+    /// Steps of the reference before the first test.
+    pub least: u64,
+    /// Probability of a false alarm of one test.
+    pub rate: f64,
+    /// Coefficients that are watched, all where it is empty.
+    pub watched: Vec<usize>,
+}
+
+/// What the detector says after a block.
+#[derive(serde::Serialize, serde::Deserialize, Debug, Clone, PartialEq)]
+pub struct Report {
+    /// Time of the last row.
+    pub time: f64,
+    /// When the recent window starts.
+    pub since: f64,
+    /// The test.
+    pub change: Change,
+    /// Whether it is an alarm.
+    pub alarm: bool,
+}
+
+/// A recording that is followed.
+#[derive(Debug)]
+pub struct Detector {
+    stream: Stream,
+    structure: Structure,
+    fit: Fit,
+    following: Following,
+    recent: Window,
+    reference: Window,
+    posterior: Option<Posterior>,
+    in_block: u64,
+    /// Steps that joined the reference since it was estimated.
+    unused: u64,
+}
+
+/// A detector between two rows.
+#[derive(serde::Serialize, serde::Deserialize, Debug, Clone, PartialEq)]
+pub struct DetectorState {
+    stream: StreamState,
+    recent: Window,
+    reference: Window,
+    posterior: Option<Posterior>,
+    in_block: u64,
+    unused: u64,
+}
+
+/// Share of its steps by which the reference grows before it is estimated anew.
+const GROWTH: f64 = 0.01;
+
+impl Detector {
+    /// A detector before the first row.
+    ///
+    /// # Errors
+    /// `NotPositive` for the step or the rate.
+    pub fn new(
+        basis: Arc<Basis>,
+        step: f64,
+        structure: Structure,
+        fit: Fit,
+        following: Following,
+    ) -> Result<Self, InferenceError> {
+        if !(following.rate > 0.0 && following.rate < 1.0) {
+            return Err(InferenceError::NotPositive {
+                what: "the rate of false alarms",
+                value: following.rate,
+            });
+        }
+        Ok(Self {
+            stream: Stream::new(basis, step)?,
+            structure,
+            fit,
+            recent: Window::new(Memory::Sliding(following.recent)),
+            reference: Window::new(following.reference),
+            following,
+            posterior: None,
+            in_block: 0,
+            unused: 0,
+        })
+    }
+
+    /// Takes the next row; a report when it ends a block and there is a reference to compare with.
+    ///
+    /// # Errors
+    /// As for [`Stream::push`] and [`Fit::posterior`], less those that say that the reference is still too short.
+    pub fn push(&mut self, time: f64, values: &[f64]) -> Result<Option<Report>, InferenceError> {
+        let first = self.stream.n_row() == 0;
+        self.stream.push(time, values)?;
+        if !first {
+            self.in_block += 1;
+        }
+        if self.in_block < self.following.block {
+            return Ok(None);
+        }
+        self.in_block = 0;
+        let block = self.stream.take()?;
+        if let Some(older) = self.recent.push(block)? {
+            self.unused += older.n_step();
+            self.reference.push(older)?;
+            let used = self.posterior.as_ref().map_or(0, |p| p.n_step);
+            if self.unused as f64 >= GROWTH * used as f64 {
+                self.estimate()?;
+            }
+        }
+        let Some((posterior, recent)) = self.posterior.as_ref().zip(self.recent.sums()) else {
+            return Ok(None);
+        };
+        let change = compare(posterior, &recent, &self.structure, &self.following.watched)?;
+        let alarm = change.is_alarm(self.following.rate);
+        let since = recent.span().map_or(time, |[from, _]| from);
+        Ok(Some(Report { time, since, change, alarm }))
+    }
+
+    /// The estimate of the reference, `None` while it is too short.
+    pub fn posterior(&self) -> Option<&Posterior> {
+        self.posterior.as_ref()
+    }
+
+    /// The sums of the recent window.
+    pub fn recent(&self) -> Option<Sums> {
+        self.recent.sums()
+    }
+
+    /// Takes the recent window as the new reference, after a change.
+    ///
+    /// # Errors
+    /// As for [`Window::push`].
+    pub fn accept(&mut self) -> Result<(), InferenceError> {
+        self.reference = Window::new(self.following.reference);
+        for block in self.recent.drain() {
+            self.reference.push(block)?;
+        }
+        self.posterior = None;
+        self.estimate()
+    }
+
+    /// What it goes on from, in this program or another.
+    ///
+    /// # Errors
+    /// As for [`Stream::state`].
+    pub fn state(&mut self) -> Result<DetectorState, InferenceError> {
+        Ok(DetectorState {
+            stream: self.stream.state()?,
+            recent: self.recent.clone(),
+            reference: self.reference.clone(),
+            posterior: self.posterior.clone(),
+            in_block: self.in_block,
+            unused: self.unused,
+        })
+    }
+
+    /// Puts a new detector where another one was; basis, structure, fit and following are the same.
+    ///
+    /// # Errors
+    /// As for [`Stream::resume`] and [`Sums::check`]; `Incompatible` for a posterior of another structure.
+    pub fn resume(mut self, state: DetectorState) -> Result<Self, InferenceError> {
+        let basis = Arc::clone(self.stream.basis());
+        for window in [&state.recent, &state.reference] {
+            window.sums().map_or(Ok(()), |sums| sums.check(&basis))?;
+        }
+        let fits = |p: &Posterior| {
+            let names = p.estimates.iter().map(|e| &e.name);
+            names.eq(self.structure.coefficients().iter().map(|c| &c.name))
+        };
+        if !state.posterior.as_ref().is_none_or(fits) {
+            return Err(InferenceError::Incompatible { what: "their coefficients" });
+        }
+        self.stream = Stream::resume(basis, state.stream)?;
+        (self.recent, self.reference) = (state.recent, state.reference);
+        (self.posterior, self.in_block, self.unused) = (state.posterior, state.in_block, state.unused);
+        Ok(self)
+    }
+
+    fn estimate(&mut self) -> Result<(), InferenceError> {
+        let Some(sums) = self.reference.sums().filter(|s| s.n_step() >= self.following.least) else {
+            return Ok(());
+        };
+        let found = match &self.posterior {
+            Some(earlier) => self.fit.update(&sums, &self.structure, earlier),
+            None => self.fit.posterior(&sums, &self.structure),
+        };
+        match found {
+            Ok(posterior) => {
+                self.posterior = Some(posterior);
+                self.unused = 0;
+            }
+            Err(InferenceError::TooFew { .. } | InferenceError::NothingObserved) => {}
+            Err(other) => return Err(other),
+        }
+        Ok(())
+    }
+}

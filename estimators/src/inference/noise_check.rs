@@ -1,0 +1,78 @@
+//! Whether measurement noise matters: white residuals are uncorrelated, differences of measurement noise are not.
+//!
+//! A step between rows that were measured with errors η has the residual (η_{n+1} − η_n)/h more, so neighbouring residuals share an
+//! error: −E r_n r_{n+1} / E r² is 0 for process noise alone and ½ for measurement noise alone. The fit itself makes residuals of
+//! few steps anticorrelated, by Σ F_n cov F_{n+1}ᵀ, which is taken away first. Read next: `diffusion.rs`, the noise that holds in
+//! spite of it, and `smoother.rs` for when it is large.
+
+use nalgebra::DMatrix;
+
+use super::normal::spread;
+use super::quantiles::normal;
+use super::{InferenceError, Posterior, Structure, Sums};
+
+/// Ratio from which measurement noise moves coefficients by more than their sd in the examples of Smelyanskiy, Luchinsky et al.
+pub const MATTERS: f64 = 0.05;
+/// Probability with which a verdict is right.
+const SURE: f64 = 0.95;
+
+/// Residuals of one equation at lag one.
+#[derive(serde::Serialize, serde::Deserialize, Debug, Clone, PartialEq)]
+pub struct NoiseCheck {
+    /// The equation.
+    pub equation: String,
+    /// −E r_n r_{n+1} / E r².
+    pub ratio: f64,
+    /// Its sampling error (Bartlett 1946).
+    pub sd: f64,
+    /// Variance of the measurement noise that it means, in the state's unit squared; negative by chance where there is none.
+    pub measured: f64,
+    /// What follows.
+    pub verdict: Verdict,
+}
+
+/// What residuals at lag one say, with 95 % probability.
+#[derive(serde::Serialize, serde::Deserialize, Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// Measurement noise matters: take D from lagged residuals, or smooth.
+    Matters,
+    /// It does not.
+    Absent,
+    /// There are too few steps to say.
+    Unclear,
+}
+
+/// Looks at every equation's residuals at lag one.
+///
+/// # Errors
+/// `Shape`; `TooFew` without a pair of neighbouring steps.
+pub fn noise_checks(
+    sums: &Sums,
+    structure: &Structure,
+    posterior: &Posterior,
+) -> Result<Vec<NoiseCheck>, InferenceError> {
+    structure.fits(sums.n_state(), sums.n_function())?;
+    if sums.n_pair() == 0 {
+        let equation = structure.equations().first().cloned().unwrap_or_default();
+        return Err(InferenceError::TooFew { n_step: sums.n_step(), n_unknown: 0, equation });
+    }
+    let part = |phi: &DMatrix<f64>| spread(structure, &posterior.active, &posterior.covariance, phi);
+    let squares = sums.residuals(&posterior.drift) + part(&sums.phi());
+    let lagged = sums.lagged_residuals(&posterior.drift) + part(&sums.lagged_phi());
+    let (n, pairs) = (sums.n_step() as f64, sums.n_pair() as f64);
+    let check = |(l, equation): (usize, &String)| {
+        let shared = -lagged[(l, l)] / pairs;
+        let ratio = shared / (squares[(l, l)] / n);
+        let squared = ratio * ratio;
+        let sd = ((1.0 - 3.0 * squared + 4.0 * squared * squared) / pairs).max(0.0).sqrt();
+        let margin = normal(SURE) * sd;
+        let verdict = match ratio - MATTERS {
+            above if above > margin => Verdict::Matters,
+            above if above < -margin => Verdict::Absent,
+            _ => Verdict::Unclear,
+        };
+        let measured = shared * sums.step() * sums.step();
+        NoiseCheck { equation: equation.clone(), ratio, sd, measured, verdict }
+    };
+    Ok(structure.equations().iter().enumerate().map(check).collect())
+}

@@ -1,0 +1,16 @@
+//! Dynamical inference on simulated recordings of known drift and noise.
+#![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs, unreachable_pub)]
+
+mod calibration;
+mod changes;
+mod decimated;
+mod errors;
+mod kit;
+mod lorenz;
+mod measured;
+mod measurement;
+mod merging;
+mod mixing;
+mod motor;
+mod properties;
+mod tanks;
