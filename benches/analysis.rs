@@ -212,8 +212,15 @@ fn equations_against_rust(figures: &mut Map<String, Value>) -> Result<(), Failur
     let rust = Duffing { spec: equations.spec().clone() };
     let order: BTreeMap<&str, f64> = [("k", 1.0), ("c", 0.1), ("b", 0.5)].into();
     let theta: Vec<f64> = equations.spec().parameters.iter().map(|q| order[q.name.as_str()]).collect();
-    let segment =
-        Segment { t0: 0.0, t1: 50.0, u0: &[], slope: &[], history: &NoHistory, limits: &Limits::none(), noise: None };
+    let segment = Segment {
+        t0: 0.0,
+        t1: 50.0,
+        u0: &[],
+        slope: &[],
+        history: &NoHistory,
+        limits: &Limits::none(),
+        noise: None,
+    };
     let mut x = [0.1, 0.0];
     advance_by(&rust, Solver::Dopri5(Tolerance::default()), segment, &[1.0, 0.1, 0.5], &mut x)?;
     let native = best(20, || {

@@ -114,8 +114,15 @@ fn start(model: &dyn Model) -> Result<(Vec<f64>, Vec<f64>), Failure> {
 
 fn advance(model: &dyn Model, theta: &[f64], [from, to]: [f64; 2], x: &mut [f64]) -> Result<(), Failure> {
     let (u0, slope) = ([inflow(from)], [(inflow(to) - inflow(from)) / (to - from)]);
-    let segment =
-        Segment { t0: from, t1: to, u0: &u0, slope: &slope, history: &NoHistory, limits: &Limits::none(), noise: None };
+    let segment = Segment {
+        t0: from,
+        t1: to,
+        u0: &u0,
+        slope: &slope,
+        history: &NoHistory,
+        limits: &Limits::none(),
+        noise: None,
+    };
     Ok(model.advance(segment, theta, x)?)
 }
 

@@ -142,8 +142,8 @@ fn a_twin_of_a_model_with_fields_is_a_recording_of_the_next_study() {
 
 /// A study of a walk that is drawn back, with so much noise and a solver.
 fn noisy_study(folder: &std::path::Path, noise: &str, solver: &str) -> std::path::PathBuf {
-    let rows: String = (0..200).map(|i| format!("{},0\n", f64::from(i) * 0.1)).collect();
-    std::fs::write(folder.join("data.csv"), format!("time,x\n{rows}")).unwrap();
+    let rows: Vec<String> = (0..200).map(|i| format!("{},0", f64::from(i) * 0.1)).collect();
+    std::fs::write(folder.join("data.csv"), format!("time,x\n{}\n", rows.join("\n"))).unwrap();
     let text = format!(
         "[study]\nname = \"walk\"\n[model]\nkind = \"equations\"\noutputs = [ {{ name = \"x\", value = \"x\" }} ]\n{solver}\n\
          [[model.states]]\nname = \"x\"\ninitial = 1\nrate = \"-k*x\"\nnoise = {noise}\n\

@@ -141,9 +141,7 @@ fn check(path: &Path, text: &str, solver_host: &SolverHost) -> Result<Study, Stu
     scales::check(&source, &file, &mut model, (&parameters, &records), solver_host, &mut warnings);
     source.verdict()?;
     check_setup(&source, &file, &model.setup, &records)?;
-    if model.setup.is_noisy() {
-        warnings.push(NOISE_LEFT_OUT.to_owned());
-    }
+    warnings.extend(model.setup.is_noisy().then(|| NOISE_LEFT_OUT.to_owned()));
     warnings.extend(units::warnings(&file, &model, &records));
     let theta = expand::theta(&parameters, &records);
     Ok(Study {

@@ -23,6 +23,7 @@ mod expression_error;
 mod inline;
 mod model;
 mod node;
+mod noise;
 mod parse;
 mod parsed;
 mod program;

@@ -12,6 +12,7 @@ use super::def::EquationsDef;
 use super::expression::Expression;
 use super::inline::Names;
 use super::node::Node;
+use super::noise::Noise;
 use super::parsed::{Parsed, Placed, fault};
 use super::program::Program;
 use crate::bounds::unbounded;
@@ -28,9 +29,7 @@ pub(super) struct Built {
     /// For each rate, the states that it depends on.
     pub(super) depends: Vec<Vec<usize>>,
     pub(super) outputs: Vec<Program>,
-    /// Sources of white noise by name, and the amplitudes that are not zero: (state, source, amplitude).
-    pub(super) sources_of_noise: Vec<String>,
-    pub(super) noise: Vec<(usize, usize, Program)>,
+    pub(super) noise: Noise,
     pub(super) switches: Vec<Program>,
     pub(super) memories: Vec<Memory>,
     /// For each memory, the state or output that it remembers.
@@ -86,30 +85,17 @@ pub(super) fn build(def: &EquationsDef, constants: &BTreeMap<String, f64>) -> Re
         })
         .map(|placed| compile(&placed))
         .collect::<Result<_, _>>()?;
-    let mut sources_of_noise = Vec::<String>::new();
-    let mut noise = Vec::new();
-    for (state, (source, placed)) in
-        parsed.noise.iter().enumerate().flat_map(|(i, all)| all.iter().map(move |one| (i, one)))
-    {
-        let known = sources_of_noise.iter().position(|name| name == source);
-        let at = known.unwrap_or_else(|| {
-            sources_of_noise.push(source.clone());
-            sources_of_noise.len() - 1
-        });
-        noise.push((state, at, compile(placed)?.1));
-    }
     let initial = parsed.initial(&names, &resolve, &known)?;
-    let depends = rates.iter().map(|(e, _)| dependencies(e.node(), &names)).collect();
+    let noise = Noise::new(&parsed, compile)?;
     let switches = switches(&rates, &names, &resolve)?;
     let spec = spec(def, &names, &parameters, &values);
     let memories = memories.take();
     Ok(Built {
         spec,
         initial,
+        depends: rates.iter().map(|(e, _)| dependencies(e.node(), &names)).collect(),
         rates: rates.into_iter().map(|(_, p)| p).collect(),
-        depends,
         outputs: values.into_iter().map(|(_, p)| p).collect(),
-        sources_of_noise,
         noise,
         switches,
         sources: memories.iter().map(|memory| source(&memory.of, def, &names)).collect(),

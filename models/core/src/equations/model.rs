@@ -86,14 +86,14 @@ impl Model for EquationsModel {
     }
 
     fn n_noise(&self) -> usize {
-        self.built.sources_of_noise.len()
+        self.built.noise.sources.len()
     }
 
     fn noise(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, b: &mut [f64]) {
         let n = self.unit.len();
         b.fill(0.0);
-        for (state, source, amplitude) in &self.built.noise {
-            b[source * n + state] = amplitude.eval(&At { t, x, theta, u, y: &[] });
+        for amplitude in &self.built.noise.amplitudes {
+            b[amplitude.source * n + amplitude.state] = amplitude.value.eval(&At { t, x, theta, u, y: &[] });
         }
     }
 

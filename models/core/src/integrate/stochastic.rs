@@ -37,7 +37,9 @@ pub(super) fn advance<S: System>(
         let t = start + i as f64 * h;
         system.limits().take(1, t)?;
         system.draw(dw);
-        dw.iter_mut().for_each(|dw| *dw *= h.sqrt());
+        for dw in dw.iter_mut() {
+            *dw *= h.sqrt();
+        }
         change(system, t, x, (h, dw), b, first);
         if sense == Sense::Stratonovich {
             for ((moved, x), first) in moved.iter_mut().zip(x.iter()).zip(first.iter()) {
@@ -68,7 +70,9 @@ fn change<S: System>(
     change: &mut [f64],
 ) {
     system.rhs(t, x, change);
-    change.iter_mut().for_each(|change| *change *= h);
+    for change in change.iter_mut() {
+        *change *= h;
+    }
     if dw.is_empty() {
         return;
     }

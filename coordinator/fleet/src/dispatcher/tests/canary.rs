@@ -40,8 +40,8 @@ fn played(
 }
 
 /// Answers all leases after so many seconds each; the leases beyond the jobs.
-fn played_at(stage: &mut Stage, first: Vec<Command>, n: usize, seconds: f64) -> usize {
-    let mut open = std::collections::VecDeque::from(sent(&first));
+fn played_at(stage: &mut Stage, first: &[Command], n: usize, seconds: f64) -> usize {
+    let mut open = std::collections::VecDeque::from(sent(first));
     let mut n_lease = 0;
     while let Some((lease, index)) = open.pop_front() {
         n_lease += 1;
@@ -55,7 +55,7 @@ fn played_at(stage: &mut Stage, first: Vec<Command>, n: usize, seconds: f64) -> 
 fn many_short_runs_do_not_pay_for_the_repeats_of_long_ones() {
     let mut stage = comparing(&[1, 1], false);
     let short = stage.step(submit(20_000));
-    assert!(played_at(&mut stage, short, 20_000, 1e-6) > 100, "short runs are repeated");
+    assert!(played_at(&mut stage, &short, 20_000, 1e-6) > 100, "short runs are repeated");
     // Each setup is new, and the first run of a new one is repeated where that can be paid.
     for i in 0..200 {
         stage.step(Event::SetupDone { worker: WorkerId(1), setup: setup(i) });
@@ -63,7 +63,7 @@ fn many_short_runs_do_not_pay_for_the_repeats_of_long_ones() {
     }
     let setups: Vec<u8> = (0..200).collect();
     let long = stage.step(submit_mixed(&setups));
-    assert!(played_at(&mut stage, long, 200, 0.01) < 5);
+    assert!(played_at(&mut stage, &long, 200, 0.01) < 5);
 }
 
 pub(super) fn put_out(commands: &[Command]) -> Vec<u64> {
