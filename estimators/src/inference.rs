@@ -32,6 +32,7 @@ mod smoother;
 mod stream;
 mod structure;
 mod sums;
+mod text;
 mod window;
 
 pub use basis::{Basis, Rule};

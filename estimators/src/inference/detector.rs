@@ -5,6 +5,7 @@
 
 use std::sync::Arc;
 
+use super::sums::MOST;
 use super::{
     Basis, Change, Fit, InferenceError, Memory, Posterior, Stream, StreamState, Structure, Sums, Window,
     compare,
@@ -173,19 +174,15 @@ impl Detector {
     /// Puts a new detector where another one was; basis, structure, fit and following are the same.
     ///
     /// # Errors
-    /// As for [`Stream::resume`] and [`Sums::check`]; `Incompatible` for a posterior of another structure.
+    /// As for [`Stream::resume`], [`Window::check`] and [`Posterior::check`].
     pub fn resume(mut self, state: DetectorState) -> Result<Self, InferenceError> {
         let basis = Arc::clone(self.stream.basis());
-        for window in [&state.recent, &state.reference] {
-            window.sums().map_or(Ok(()), |sums| sums.check(&basis))?;
+        if state.in_block.max(state.unused) > MOST {
+            return Err(InferenceError::Damaged { what: "the number of steps in a block" });
         }
-        let fits = |p: &Posterior| {
-            let names = p.estimates.iter().map(|e| &e.name);
-            names.eq(self.structure.coefficients().iter().map(|c| &c.name))
-        };
-        if !state.posterior.as_ref().is_none_or(fits) {
-            return Err(InferenceError::Incompatible { what: "their coefficients" });
-        }
+        state.recent.check(&basis)?;
+        state.reference.check(&basis)?;
+        state.posterior.as_ref().map_or(Ok(()), |p| p.check(&self.structure))?;
         self.stream = Stream::resume(basis, state.stream)?;
         (self.recent, self.reference) = (state.recent, state.reference);
         (self.posterior, self.in_block, self.unused) = (state.posterior, state.in_block, state.unused);

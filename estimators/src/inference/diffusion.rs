@@ -22,7 +22,7 @@ pub enum Diffusion {
     /// Independent noise of one size.
     Isotropic,
     /// Given, L x L.
-    Known(DMatrix<f64>),
+    Known(#[serde(with = "super::text::matrix")] DMatrix<f64>),
 }
 
 impl Diffusion {

@@ -21,7 +21,7 @@ const STRETCH: f64 = 1.5;
 #[derive(serde::Serialize, serde::Deserialize, Debug, Clone, PartialEq)]
 pub enum Measured {
     /// Its covariance M, L x L.
-    Known(DMatrix<f64>),
+    Known(#[serde(with = "super::text::matrix")] DMatrix<f64>),
     /// Nothing: independent noise of every state is estimated.
     Unknown,
 }
@@ -41,6 +41,7 @@ pub struct NoisyPosterior {
     /// Coefficients and D, given the smoothed path.
     pub posterior: Posterior,
     /// M, L x L.
+    #[serde(with = "super::text::matrix")]
     pub measured: DMatrix<f64>,
     /// Log-likelihood of the recording at the start of every round.
     pub log_likelihood: Vec<f64>,

@@ -6,7 +6,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::quantiles::{chi_squared, student};
-use super::{Prior, Structure};
+use super::{InferenceError, Prior, Structure};
 
 /// Value and uncertainty of one coefficient.
 #[derive(serde::Serialize, serde::Deserialize, Debug, Clone, Copy, PartialEq)]
@@ -34,6 +34,7 @@ pub struct Posterior {
     /// The P coefficients.
     pub estimates: Vec<Estimate>,
     /// D, L x L, per time unit.
+    #[serde(with = "super::text::matrix")]
     pub diffusion: DMatrix<f64>,
     /// Degrees of freedom left for each variance in D; `None` where D was given.
     pub degrees: Option<f64>,
@@ -43,9 +44,13 @@ pub struct Posterior {
     pub passes: usize,
     /// Indices of the coefficients that have a value.
     pub(crate) active: Vec<usize>,
+    #[serde(with = "super::text::vector")]
     pub(crate) mean: DVector<f64>,
+    #[serde(with = "super::text::matrix")]
     pub(crate) covariance: DMatrix<f64>,
+    #[serde(with = "super::text::matrix")]
     pub(crate) precision: DMatrix<f64>,
+    #[serde(with = "super::text::matrix")]
     pub(crate) drift: DMatrix<f64>,
 }
 
@@ -121,6 +126,33 @@ impl Posterior {
             }
         }
         prior
+    }
+
+    /// Whether this posterior, which came from elsewhere, is whole and of this structure.
+    ///
+    /// # Errors
+    /// `Incompatible` with the structure, `Damaged` otherwise.
+    pub fn check(&self, structure: &Structure) -> Result<(), InferenceError> {
+        let names = self.estimates.iter().map(|e| &e.name);
+        if !names.eq(structure.coefficients().iter().map(|c| &c.name)) {
+            return Err(InferenceError::Incompatible { what: "their coefficients" });
+        }
+        let (a, l, b) = (self.active.len(), structure.equations().len(), structure.n_function());
+        let increasing = self.active.windows(2).all(|pair| pair[0] < pair[1]);
+        let shapes = self.mean.len() == a
+            && self.covariance.shape() == (a, a)
+            && self.precision.shape() == (a, a)
+            && self.diffusion.shape() == (l, l)
+            && self.drift.shape() == (l, b);
+        if !increasing || self.active.last().is_some_and(|p| *p >= self.estimates.len()) || !shapes {
+            return Err(InferenceError::Damaged { what: "a part of the posterior of another shape" });
+        }
+        let parts = [&self.covariance, &self.precision, &self.diffusion, &self.drift];
+        let mut numbers = parts.into_iter().flatten().chain(&self.mean).chain(&self.degrees);
+        if !numbers.all(|v| v.is_finite()) {
+            return Err(InferenceError::Damaged { what: "a number of the posterior that is not finite" });
+        }
+        Ok(())
     }
 
     /// Estimates from the parts of a fit.

@@ -10,8 +10,10 @@ use super::InferenceError;
 #[derive(serde::Serialize, serde::Deserialize, Debug, Clone, PartialEq)]
 pub struct Prior {
     /// Mean, length P.
+    #[serde(with = "super::text::vector")]
     pub(crate) mean: DVector<f64>,
     /// Precision, P x P.
+    #[serde(with = "super::text::matrix")]
     pub(crate) precision: DMatrix<f64>,
 }
 

@@ -22,8 +22,10 @@ const STALLED: f64 = 1e12;
 #[derive(serde::Serialize, serde::Deserialize, Debug, Clone, PartialEq)]
 pub struct Reduced {
     /// θ.
+    #[serde(with = "super::text::vector")]
     pub mean: DVector<f64>,
     /// Covariance of θ.
+    #[serde(with = "super::text::matrix")]
     pub covariance: DMatrix<f64>,
     /// χ² of the coefficients that the reduced model leaves.
     pub chi_squared: f64,

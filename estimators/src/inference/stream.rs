@@ -12,7 +12,7 @@ use pulp::Arch;
 
 use super::functions::Samples;
 use super::products::{LANES, Products};
-use super::sums::BlockSums;
+use super::sums::{BlockSums, MOST};
 use super::{Basis, InferenceError, Sums};
 
 /// Steps of a block.
@@ -160,6 +160,9 @@ impl Stream {
     /// As for [`Sums::check`] and [`Stream::new`]; `Damaged` for a last row that does not fit.
     pub fn resume(basis: Arc<Basis>, state: StreamState) -> Result<Self, InferenceError> {
         state.sums.check(&basis)?;
+        if state.row > MOST {
+            return Err(InferenceError::Damaged { what: "the number of a row" });
+        }
         let mut stream = Self::new(basis, state.sums.step())?;
         if let Some((time, values)) = &state.last {
             let fits = stream.admit(*time, values).is_ok();

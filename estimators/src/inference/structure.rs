@@ -35,6 +35,7 @@ pub struct Structure {
     equations: Vec<String>,
     functions: Vec<String>,
     coefficients: Vec<Coefficient>,
+    #[serde(with = "super::text::matrix")]
     known: DMatrix<f64>,
 }
 

@@ -13,6 +13,9 @@ use super::{Basis, InferenceError};
 /// By how much of a step two steps may miss each other in time and still be neighbours.
 const NEIGHBOUR: f64 = 0.02;
 
+/// Steps beyond which a count is no exact number.
+pub(crate) const MOST: u64 = 1 << 53;
+
 /// Sums over the steps of a recording, or of a block of it.
 #[derive(serde::Serialize, serde::Deserialize, Debug, Clone, PartialEq)]
 pub struct Sums {
@@ -23,10 +26,13 @@ pub struct Sums {
     n_step: u64,
     n_pair: u64,
     /// Upper triangle of Σ a aᵀ, (B+L) x (B+L).
+    #[serde(with = "super::text::matrix")]
     products: DMatrix<f64>,
     /// Σ a_n a_{n+1}ᵀ, (B+L) x (B+L).
+    #[serde(with = "super::text::matrix")]
     lagged: DMatrix<f64>,
     /// V, L x B.
+    #[serde(with = "super::text::matrix")]
     slopes: DMatrix<f64>,
     first: Option<End>,
     last: Option<End>,
@@ -149,10 +155,10 @@ impl Sums {
             && (last.time + self.step - first.time).abs() <= NEIGHBOUR * self.step
         {
             rank_one(&mut self.lagged, &last.row, &first.row);
-            self.n_pair += 1;
+            self.n_pair = self.n_pair.saturating_add(1);
         }
-        self.n_step += later.n_step;
-        self.n_pair += later.n_pair;
+        self.n_step = self.n_step.saturating_add(later.n_step);
+        self.n_pair = self.n_pair.saturating_add(later.n_pair);
         self.products += &later.products;
         self.lagged += &later.lagged;
         self.slopes += &later.slopes;
@@ -192,7 +198,10 @@ impl Sums {
         if parts.iter().any(|part| part.iter().any(|v| !v.is_finite())) {
             return damaged("a sum that is not finite");
         }
-        if self.n_pair > self.n_step || self.products.diagonal().iter().any(|v| *v < 0.0) {
+        if self.n_step > MOST
+            || self.n_pair > self.n_step
+            || self.products.diagonal().iter().any(|v| *v < 0.0)
+        {
             return damaged("counts or squares that cannot be");
         }
         let width = self.n_function + self.n_state;

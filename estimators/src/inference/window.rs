@@ -4,7 +4,7 @@
 
 use std::collections::VecDeque;
 
-use super::{InferenceError, Sums};
+use super::{Basis, InferenceError, Sums};
 
 /// How far back the memory goes.
 #[derive(serde::Serialize, serde::Deserialize, Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,6 +60,15 @@ impl Window {
             whole.merge(block).ok()?;
         }
         Some(whole)
+    }
+
+    /// Whether the blocks, which came from elsewhere, are whole and of this basis.
+    ///
+    /// # Errors
+    /// As for [`Sums::check`] and [`Sums::merge`].
+    pub fn check(&self, basis: &Basis) -> Result<(), InferenceError> {
+        let Some(first) = self.blocks.front() else { return Ok(()) };
+        self.blocks.iter().try_for_each(|block| block.check(basis).and_then(|()| first.fits(block)))
     }
 
     /// Number of blocks that are held.

@@ -110,7 +110,13 @@ fn sums_and_rows_give_the_same_posterior() {
         (f, nalgebra::DVector::from_fn(27, |p, _| slope(p)))
     };
     let rows: Vec<Vec<f64>> = rows.iter().map(|x| x.to_vec()).collect();
-    let dense = crate::kit::dense::solve(&rows, h, &monomials, &posterior.diffusion);
+    let dense = crate::kit::dense::solve(
+        &rows,
+        h,
+        &monomials,
+        &|_| nalgebra::DVector::zeros(3),
+        &posterior.diffusion,
+    );
     let scale = dense.c.amax();
     // Products of numbers up to 2000 with a condition of 10^6.
     assert!((&dense.c - posterior.mean()).amax() < 1e-7 * scale, "{}", (&dense.c - posterior.mean()).amax());

@@ -3,6 +3,7 @@
 
 mod calibration;
 mod changes;
+mod damaged;
 mod decimated;
 mod errors;
 mod kit;

@@ -24,7 +24,8 @@ fn same(a: &Sums, b: &Sums, tolerance: f64) -> bool {
 /// The sums at lag one, which are private, by their text.
 fn lagged(sums: &Sums) -> DMatrix<f64> {
     let value = serde_json::to_value(sums).unwrap();
-    serde_json::from_value(value["lagged"].clone()).unwrap()
+    let (n, m, values): (usize, usize, Vec<f64>) = serde_json::from_value(value["lagged"].clone()).unwrap();
+    DMatrix::from_vec(n, m, values)
 }
 
 /// A recording in blocks that share one row with the next one.

@@ -1,9 +1,10 @@
 //! Table 1.3: three tanks whose terms come and go with the levels; couplings are shared by two equations.
 
+use nalgebra::{DMatrix, DVector};
 use starlings_estimators::inference::{Diffusion, Fit, InferenceError, Posterior, Prior, Stream};
 
 use crate::kit::tanks::{self, COEFFICIENTS, TRUTH};
-use crate::kit::{mean, sd, sums, times};
+use crate::kit::{dense, mean, sd, sums, times};
 
 const H: f64 = 0.002;
 
@@ -42,6 +43,46 @@ fn one_equation_alone_knows_a_coupling_far_worse_than_both() {
     let alone = Fit::new(Diffusion::Diagonal, 11).posterior(&sums, &alone).unwrap();
     let gain = alone.value("c12 of h1").unwrap().sd / both.value("c12").unwrap().sd;
     assert!((40.0..160.0).contains(&gain), "{gain}: about 80");
+}
+
+/// Shared coefficients, a known inflow and independent noise, against an implementation that sees every row.
+#[test]
+fn sums_and_rows_give_the_same_joint_posterior() {
+    let basis = tanks::basis();
+    let structure = tanks::joint(&basis).without(&["L12", "L13", "L23"]);
+    let rows = tanks::recording(3);
+    let fit = Fit::new(Diffusion::Diagonal, 6);
+    let posterior = fit.posterior(&sums(&basis, &rows, H), &structure).unwrap();
+    let terms = |t: f64, x: &[f64]| {
+        let up = |z: f64| z.max(0.0);
+        let open = |z: f64| f64::from(u8::from(z > 0.0));
+        let sine = (std::f64::consts::TAU * t).sin();
+        let q12 = up(x[0] - tanks::H12) - up(x[1] - tanks::H12);
+        let q13 = up(x[0] - tanks::H13) - up(x[2] - tanks::H13);
+        let q32 = up(x[2] - tanks::H23) - up(x[1] - tanks::H23);
+        let f = DMatrix::from_row_slice(
+            3,
+            6,
+            &[
+                sine, 0.0, 0.0, -q12, -q13, 0.0, 0.0, -sine, 0.0, q12, 0.0, q32, 0.0, 0.0, sine, 0.0, q13,
+                -q32,
+            ],
+        );
+        let flow = |a: usize, b: usize, level: f64| -open(x[a] - level) - open(x[b] - level);
+        let v = [0.0, 0.0, 0.0, flow(0, 1, tanks::H12), flow(0, 2, tanks::H13), flow(2, 1, tanks::H23)];
+        (f, DVector::from_row_slice(&v))
+    };
+    let inflow = |t: f64| DVector::from_row_slice(&[tanks::inflow(t), 0.0, 0.0]);
+    let rows: Vec<Vec<f64>> = rows.iter().map(|x| x.to_vec()).collect();
+    let dense = dense::solve(&rows, H, &terms, &inflow, &posterior.diffusion);
+    // Rounding of sums of six thousand products.
+    assert!((&dense.c - posterior.mean()).amax() < 1e-10, "{}", (&dense.c - posterior.mean()).amax());
+    assert!((&dense.precision - posterior.precision()).amax() < 1e-11 * dense.precision.amax());
+    for l in 0..3 {
+        let ratio = dense.d[(l, l)] / posterior.diffusion[(l, l)];
+        // Six coefficients of six thousand steps were taken off.
+        assert!((0.999..1.0).contains(&ratio), "{ratio}");
+    }
 }
 
 /// Before the level reaches an opening nothing is known of what flows through it.

@@ -6,6 +6,9 @@ use nalgebra::{DMatrix, DVector};
 /// F(x, t), L x P, and v(x, t), length P.
 pub type Drift<'a> = &'a dyn Fn(f64, &[f64]) -> (DMatrix<f64>, DVector<f64>);
 
+/// The known part of the drift, length L.
+pub type Offset<'a> = &'a dyn Fn(f64) -> DVector<f64>;
+
 pub struct Dense {
     pub c: DVector<f64>,
     pub precision: DMatrix<f64>,
@@ -13,7 +16,7 @@ pub struct Dense {
 }
 
 /// Coefficients for a given noise, and h/N times the squares of the residuals.
-pub fn solve(rows: &[Vec<f64>], h: f64, f: Drift<'_>, d: &DMatrix<f64>) -> Dense {
+pub fn solve(rows: &[Vec<f64>], h: f64, f: Drift<'_>, offset: Offset<'_>, d: &DMatrix<f64>) -> Dense {
     let n_state = d.nrows();
     let inverse = d.clone().try_inverse().unwrap();
     let steps: Vec<(DMatrix<f64>, DVector<f64>, DVector<f64>)> = rows
@@ -22,8 +25,9 @@ pub fn solve(rows: &[Vec<f64>], h: f64, f: Drift<'_>, d: &DMatrix<f64>) -> Dense
         .map(|(n, pair)| {
             let mid: Vec<f64> = pair[0].iter().zip(&pair[1]).map(|(a, b)| 0.5 * (a + b)).collect();
             let speed = DVector::from_fn(n_state, |l, _| (pair[1][l] - pair[0][l]) / h);
-            let (f, v) = f((n as f64 + 0.5) * h, &mid);
-            (f, v, speed)
+            let time = (n as f64 + 0.5) * h;
+            let (f, v) = f(time, &mid);
+            (f, v, speed - offset(time))
         })
         .collect();
     let p = steps[0].1.len();
