@@ -29,7 +29,7 @@ impl Fit {
     }
 
     /// S_dyn at the posterior mean.
-    fn action(&self, sums: &Sums, posterior: &Posterior, noise: &DMatrix<f64>) -> Option<f64> {
+    pub(crate) fn action(&self, sums: &Sums, posterior: &Posterior, noise: &DMatrix<f64>) -> Option<f64> {
         let (n, l, h) = (sums.n_step() as f64, sums.n_state() as f64, sums.step());
         let root = noise.clone().cholesky()?;
         let squares = root.solve(&sums.residuals(&posterior.drift)).trace();

@@ -79,6 +79,12 @@ impl Prior {
         &self.precision
     }
 
+    /// A prior of these coefficients alone.
+    pub(crate) fn only(&self, coefficients: &[usize]) -> Self {
+        let (mean, precision) = self.select(coefficients);
+        Self { mean, precision }
+    }
+
     /// The part of these coefficients.
     pub(crate) fn select(&self, active: &[usize]) -> (DVector<f64>, DMatrix<f64>) {
         (self.mean.select_rows(active), self.precision.select_rows(active).select_columns(active))

@@ -124,6 +124,12 @@ impl Structure {
         self
     }
 
+    /// With the coefficients at these indices alone.
+    pub(crate) fn only(&self, coefficients: &[usize]) -> Self {
+        let coefficients = coefficients.iter().map(|c| self.coefficients[*c].clone()).collect();
+        Self { coefficients, ..self.clone() }
+    }
+
     fn place(&self, equation: &str, function: &str, factor: f64) -> Result<Place, InferenceError> {
         let at = |what, names: &[String], name: &str| {
             let unknown = || InferenceError::Unknown { what, name: name.to_owned() };

@@ -11,6 +11,7 @@ mod lorenz;
 mod measured;
 mod measurement;
 mod merging;
+mod missing;
 mod mixing;
 mod motor;
 mod properties;
