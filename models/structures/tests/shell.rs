@@ -7,7 +7,7 @@ use shell_kit::collocation;
 use starlings_models_core::Model;
 use starlings_models_core::limits::Limits;
 use starlings_models_core::segment::{Drive, Segment};
-use starlings_structures::conical_shell::{Cone, ConicalShell, Layout, Ritz, Wall};
+use starlings_structures::conical_shell::{Cone, ConicalShell, Layout, Ritz, ShellMode, Wall};
 
 fn cone() -> Cone {
     Cone { half_angle: 20_f64.to_radians(), ends: [1.5, 3.0] }
@@ -31,7 +31,7 @@ const TABLE: [(usize, [f64; 4], [f64; 2]); 10] = [
 
 fn ritz(waves: usize, terms: usize, in_plane: bool, count: usize) -> Vec<f64> {
     let modes = Ritz::new(cone(), waves, terms).modes(&WALL, in_plane, count).unwrap();
-    modes.iter().map(|mode| mode.frequency()).collect()
+    modes.iter().map(ShellMode::frequency).collect()
 }
 
 #[test]

@@ -8,7 +8,8 @@ use starlings_structures::conical_shell::{Cone, Wall};
 /// Differentiation matrix and points cos(πj/N), from 1 to −1 (Trefethen 2000, ch. 6).
 fn chebyshev(n: usize) -> (DMatrix<f64>, DVector<f64>) {
     let x = DVector::from_fn(n + 1, |j, _| (std::f64::consts::PI * j as f64 / n as f64).cos());
-    let c = |j: usize| if j == 0 || j == n { 2.0 } else { 1.0 } * if j % 2 == 0 { 1.0 } else { -1.0 };
+    let sign = |j: usize| if j.is_multiple_of(2) { 1.0 } else { -1.0 };
+    let c = |j: usize| sign(j) * if j == 0 || j == n { 2.0 } else { 1.0 };
     let mut d = DMatrix::from_fn(n + 1, n + 1, |i, j| if i == j { 0.0 } else { c(i) / c(j) / (x[i] - x[j]) });
     for i in 0..=n {
         d[(i, i)] = -d.row(i).sum();
