@@ -124,6 +124,12 @@ pub enum EstimatorError {
         /// Value given.
         value: f64,
     },
+    /// An intensity of a random walk is not positive and finite, or none is given.
+    #[error("intensity {value} of the random walk: give at least one, all positive and finite")]
+    Intensity {
+        /// Value given; NaN where there is none.
+        value: f64,
+    },
     /// The model could not be run at the first centre of a batch fit, or nowhere close to it.
     #[error(
         "the model cannot be run at the prior mean (attempt {attempt}): move the prior or bound its parameters"

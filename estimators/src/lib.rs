@@ -6,7 +6,8 @@
 //! and every reduction runs in a fixed order, so the same input gives the same bits.
 //!
 //! Read next: `kind.rs` (which estimators there are), then `sigma_set.rs` (where the particles are) and `roukf.rs` (what an
-//! analysis does with them). `inference.rs` stands apart: it sees a recording and a formula, no particles.
+//! analysis does with them). `inference.rs` and `unknown_input.rs` stand apart: they see a recording and a
+//! formula, no particles.
 
 mod analysis;
 mod batch;
@@ -32,11 +33,13 @@ mod qr;
 mod recombine;
 mod roukf;
 mod sandwich;
+pub mod scenarios;
 mod score;
 mod sigma_set;
 mod spectral;
 mod stored;
 mod transform;
+pub mod unknown_input;
 mod whiten;
 mod whiteness;
 

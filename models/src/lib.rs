@@ -13,6 +13,7 @@ pub use starlings_models_core::*;
 
 pub use build::{BuildSetup, Factory};
 pub use starlings_haemodynamics::prestress;
+pub use starlings_structures as structures;
 
 /// The built-in models of all families, by the names of their types.
 pub mod native {

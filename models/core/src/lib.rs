@@ -11,6 +11,7 @@
 mod binding;
 pub mod blocks;
 mod bounds;
+pub mod cache;
 pub mod effect;
 pub mod equations;
 pub mod exponential;
@@ -27,6 +28,7 @@ mod native_models;
 mod nearest;
 mod noise;
 pub mod observer;
+pub mod oscillation;
 mod past;
 pub mod segment;
 mod setup;

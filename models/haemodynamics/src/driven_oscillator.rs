@@ -2,10 +2,11 @@
 //!
 //! Next file to read: [`super::fsi_tube`].
 
+use starlings_models_core::oscillation::driven_motion;
 use starlings_models_core::segment::Segment;
 use starlings_models_core::{Blocks, Drive, Model, ModelFailure, Quantity, Role, Spec};
 
-use super::oscillator::{INITIAL_POSITION, blocks, free_motion, measures, outputs, parameters, states};
+use super::oscillator::{INITIAL_POSITION, blocks, measures, outputs, parameters, states};
 
 /// m d²x/dt² + c dx/dt + k x = F(t), with position x and velocity v as states and outputs.
 pub(crate) struct DrivenOscillator {
@@ -53,15 +54,10 @@ impl Model for DrivenOscillator {
         Some(blocks(theta))
     }
 
-    /// Exact for a force linear in time: the free motion about the particular solution x = (F − c Ḟ/k)/k, v = Ḟ/k.
+    /// Exact for a force linear in time.
     fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ModelFailure> {
-        let (damping, stiffness) = (theta[1], theta[2]);
-        let h = segment.t1 - segment.t0;
-        let v = segment.slope[0] / stiffness;
-        let start = (segment.u0[0] - damping * v) / stiffness;
-        let [dx, dv] = free_motion(theta, h, [x[0] - start, x[1] - v]);
-        x[0] = start + v * h + dx;
-        x[1] = v + dv;
+        let load = [segment.u0[0], segment.slope[0]];
+        x.copy_from_slice(&driven_motion(theta, segment.t1 - segment.t0, [x[0], x[1]], load));
         Ok(())
     }
 }

@@ -4,6 +4,7 @@
 
 use nalgebra::DMatrix;
 use starlings_models_core::blocks::WallOutputs;
+use starlings_models_core::oscillation::free_motion;
 use starlings_models_core::segment::Segment;
 use starlings_models_core::{Blocks, Drive, Model, ModelFailure, Quantity, Role, Spec};
 
@@ -67,31 +68,6 @@ pub(super) fn blocks(theta: &[f64]) -> Blocks {
 
 /// Initial displacement when the study gives none: released from one unit.
 pub(super) const INITIAL_POSITION: f64 = 1.0;
-
-/// Exact free motion over a time `h` (Meirovitch 1986, §1.6 to 1.8): e^(−σh) (Cos I + Sin (A + σ I)) applied to (x, v).
-///
-/// σ = c/2m and w² = k/m − σ²; Cos and Sin are cos wh and sin wh/w, their hyperbolic forms when overdamped, 1 and h when
-/// critically damped.
-pub(super) fn free_motion(theta: &[f64], h: f64, state: [f64; 2]) -> [f64; 2] {
-    let (mass, damping, stiffness) = (theta[0], theta[1], theta[2]);
-    let (sigma, natural) = (0.5 * damping / mass, stiffness / mass);
-    let square = natural - sigma * sigma;
-    let (cos, sin) = if square > 0.0 {
-        let (decay, w) = ((-sigma * h).exp(), square.sqrt());
-        let (s, c) = (w * h).sin_cos();
-        (decay * c, decay * s / w)
-    } else if square < 0.0 {
-        // The slow root as natural/(σ + w): σ − w would cancel for heavy damping.
-        let w = (-square).sqrt();
-        let (slow, fast) = ((-natural * h / (sigma + w)).exp(), (-(sigma + w) * h).exp());
-        (0.5 * (slow + fast), -0.5 * slow * (-2.0 * w * h).exp_m1() / w)
-    } else {
-        let decay = (-sigma * h).exp();
-        (decay, decay * h)
-    };
-    let [x, v] = state;
-    [cos * x + sin * (v + sigma * x), cos * v - sin * (natural * x + sigma * v)]
-}
 
 impl Default for Oscillator {
     fn default() -> Self {

@@ -5,7 +5,6 @@
 //! its nodes. No input, no viscosity, no outlet: [`super::toy_fsi_stokes`] and [`super::toy_fsi_windkessel`] have those. Next
 //! file to read: [`vessel`], then [`vibration`].
 
-pub(crate) mod cache;
 pub(crate) mod elements;
 pub(super) mod layout;
 pub(crate) mod profiles;
@@ -17,10 +16,10 @@ mod vibration;
 use std::sync::Arc;
 
 use starlings_models_core::blocks::{Blocks, WallOutputs};
+use starlings_models_core::cache::Cache;
 use starlings_models_core::segment::Segment;
 use starlings_models_core::{Drive, Model, ModelDef, ModelFailure, SetupError, Spec};
 
-use cache::Cache;
 use elements::Matrices;
 use layout::{Discretisation, Layout};
 use spectral::Spectral;

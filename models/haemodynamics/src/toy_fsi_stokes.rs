@@ -14,7 +14,6 @@ use starlings_models_core::blocks::Blocks;
 use starlings_models_core::segment::Segment;
 use starlings_models_core::{Drive, Model, ModelDef, ModelFailure, Quantity, Role, SetupError, Spec};
 
-use super::toy_fsi::cache::Cache;
 use super::toy_fsi::elements::Matrices;
 use super::toy_fsi::layout::count;
 use super::toy_fsi::profiles::{Fluid, Profiles};
@@ -22,6 +21,7 @@ use super::toy_fsi::propagator::Propagator;
 use super::toy_fsi::spectral::Spectral;
 use super::toy_fsi::vessel::{self, Vessel, wall_fields};
 use super::toy_fsi::{WALL, bump, modal_matrices};
+use starlings_models_core::cache::Cache;
 
 /// A Stokes flow under a generalised string.
 pub(crate) struct ToyFsiStokes {

@@ -14,12 +14,12 @@ use starlings_models_core::blocks::{Blocks, WallOutputs, WindkesselBlock};
 use starlings_models_core::segment::Segment;
 use starlings_models_core::{Drive, Model, ModelDef, ModelFailure, Quantity, Role, SetupError, Spec};
 
-use super::toy_fsi::cache::Cache;
 use super::toy_fsi::layout::count;
 use super::toy_fsi::propagator::Propagator;
 use super::toy_fsi::spectral::Spectral;
 use super::toy_fsi::vessel::{Vessel, wall_fields};
 use super::toy_fsi::{WALL, modal_matrices};
+use starlings_models_core::cache::Cache;
 
 /// A channel under an elastic wall, from a known inflow to a Windkessel.
 pub(crate) struct ToyFsiWindkessel {

@@ -34,6 +34,11 @@ fn seconds(kind: &str) -> f64 {
     }
 }
 
+/// Factor on the inputs: a nozzle hardly turns under a few newtons.
+fn strength(kind: &str) -> f64 {
+    if kind == "thrust-vector-control" { 1e4 } else { 1.0 }
+}
+
 /// Every model.
 pub(crate) fn benches() -> Vec<Bench> {
     let native = common::kinds().into_iter().filter(|kind| kind != starlings_models::catalogue::EQUATIONS);
@@ -62,7 +67,8 @@ impl Bench {
         // From before the start, on other times than those observed.
         let sampled: Vec<f64> = (-9..=37).map(|i| clock(i, 36) - 0.004 * span).collect();
         let signal = |k: usize| {
-            let values = sampled.iter().map(|t| 20.0 + 15.0 * (9.0 * t / span + k as f64).sin()).collect();
+            let value = |t: &f64| strength(&name) * (20.0 + 15.0 * (9.0 * t / span + k as f64).sin());
+            let values = sampled.iter().map(value).collect();
             Signal { times: sampled.clone(), values }
         };
         let observed = vec![f64::NAN; times.len() * sizes.iter().sum::<usize>()];

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 use starlings_models_core::exponential::exponential;
 
-use super::cache::Cache;
+use starlings_models_core::cache::Cache;
 
 /// A linear system and the steps already computed.
 pub(crate) struct Propagator {

@@ -3,8 +3,7 @@
 //! Next file to read: [`super::elements`], then [`super::propagator`] for systems whose modes are coupled.
 
 use nalgebra::{DMatrix, DVector, DVectorView, SymmetricEigen};
-
-use crate::oscillator::free_motion;
+use starlings_models_core::oscillation::free_motion;
 
 /// Normal modes Φ with Φᵀ M Φ = 1 and Φᵀ K Φ = ω².
 #[derive(Clone, Debug)]

@@ -1,6 +1,6 @@
 //! What was computed for the last few sets of values, kept: the same values always give the same bits, computed or kept.
 //!
-//! Next file to read: [`super::propagator`].
+//! Next file to read: [`crate::exponential`].
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -11,7 +11,7 @@ const KEPT: usize = 8;
 type Entry<T> = (Vec<u64>, Arc<T>);
 
 /// The last few results of a costly computation, by the bits of what it was computed from.
-pub(crate) struct Cache<T> {
+pub struct Cache<T> {
     entries: Mutex<Vec<Entry<T>>>,
 }
 
@@ -23,7 +23,7 @@ impl<T> Default for Cache<T> {
 
 impl<T> Cache<T> {
     /// The result for these numbers, computed by `make` when it is not kept.
-    pub(crate) fn get(&self, from: &[f64], make: impl FnOnce() -> T) -> Arc<T> {
+    pub fn get(&self, from: &[f64], make: impl FnOnce() -> T) -> Arc<T> {
         let same = |entry: &Entry<T>| entry.0.iter().copied().eq(from.iter().map(|v| v.to_bits()));
         if let Some(found) = self.entries().iter().rev().find(|entry| same(entry)) {
             return Arc::clone(&found.1);
