@@ -18,6 +18,7 @@ mod fleet_session;
 mod fleet_values;
 mod guard;
 mod identify;
+mod infer;
 mod interrupt;
 mod load;
 mod models;
@@ -62,6 +63,8 @@ enum Command {
     Check(check::Args),
     /// Run the model forward with chosen values and noise: a twin experiment.
     Simulate(simulate::Args),
+    /// Infer drift and noise of stochastic equations from recordings of all states.
+    Infer(infer::Args),
     /// Say whether the estimation is reasonable, before it is made: what these data could determine.
     Identify(identify::Args),
     /// Show how the poles of the model's error move with the gain of each observer.
@@ -93,6 +96,7 @@ fn main() -> ExitCode {
     let outcome = match cli.command {
         Command::Run(args) => run::run(&args, started),
         Command::Explain(args) => explain::run(&args, started),
+        Command::Infer(args) => infer::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Identify(args) => identify::run(&args),
@@ -140,6 +144,7 @@ impl Command {
         match self {
             Self::Run(args) => args.json,
             Self::Explain(args) => args.json,
+            Self::Infer(args) => args.json,
             Self::Check(args) => args.json,
             Self::Identify(args) => args.json,
             Self::Spectrum(args) => args.json,

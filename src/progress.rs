@@ -108,6 +108,30 @@ impl Display {
         }
     }
 
+    /// An inference goes on.
+    pub(crate) fn blocks(&self, at: &starlings_coordinator::infer::Progress) {
+        let says = format!("{} blocks, {} steps", at.n_block, at.n_step);
+        match self {
+            Self::Silent => {}
+            Self::Lines(last) => {
+                let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
+                if at.n_block == 1 || last.at.elapsed() > LINE_EVERY {
+                    note(format_args!("sums: {says}, {} workers", at.workers));
+                    last.at = Instant::now();
+                }
+            }
+            Self::Bar(bar) => {
+                if bar.prefix() != "sums" {
+                    let spinner = ProgressStyle::with_template("{spinner} {prefix}: {wide_msg} {elapsed}");
+                    bar.set_style(spinner.unwrap_or_else(|_| ProgressStyle::default_spinner()));
+                    bar.set_prefix("sums");
+                    bar.enable_steady_tick(TICK);
+                }
+                bar.set_message(format!("{says}, {} workers", at.workers));
+            }
+        }
+    }
+
     /// A line from the fleet that people should see.
     pub(crate) fn say(&self, text: &str) {
         match self {

@@ -9,6 +9,7 @@ use starlings_coordinator::study::store::Purpose;
 
 use crate::console::{line, note};
 use crate::failure::Failure;
+use crate::infer;
 
 /// Write the result files of a run folder again from its run.db: report.html, and the numbers beside it.
 ///
@@ -27,6 +28,9 @@ pub(crate) struct Args {
 
 /// Writes the files; a run that is not finished gets a report of what there is.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    if args.dir.join(infer::RESULT).is_file() {
+        return infer::write_again(&args.dir, args.overview.is_some(), args.json);
+    }
     let folder = RunFolder::open(&args.dir).map_err(Failure::input)?;
     if folder.purpose().map_err(Failure::run)? == Purpose::Explanation {
         return explanation(args, &folder);

@@ -101,6 +101,7 @@ impl Twin {
                 history: &NoHistory,
                 limits: &Limits::none(),
                 noise: None,
+                sums: None,
             };
             model.advance(segment, &theta, &mut x).unwrap();
             if !rows.is_empty() && (sample + 1) % 10 == 0 {

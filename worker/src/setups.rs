@@ -121,7 +121,8 @@ impl Setups {
 
     fn build(&self, id: SetupId, setup: Result<Box<Setup>, ProtocolError>) -> Result<(), String> {
         let setup = setup.map_err(|error| error.to_string())?;
-        let forward = catch_unwind(AssertUnwindSafe(|| (self.factory)(&setup)))
+        let make = || starlings_sums::build(&setup).unwrap_or_else(|| (self.factory)(&setup));
+        let forward = catch_unwind(AssertUnwindSafe(make))
             .map_err(|panic| panic_text(panic.as_ref()))?
             .map_err(|error| error.to_string())?;
         self.keep(id, Arc::from(forward));

@@ -199,8 +199,11 @@ impl Fleet for GrpcFleet {
         // A state of another length would be noticed only where states are mixed: where the specification is known, so is its
         // length.
         if !self.hub.knows(std::iter::once(&id)) {
-            let n_state = setup.spec().ok().filter(|spec| spec.restart).map(|spec| spec.n_state());
-            let shape = SetupShape { parameters: setup.parameters.clone(), n_state };
+            // Sums over rows predict none of them, and their length is known where they are asked for.
+            let sums = setup.sums.is_some();
+            let spec = || setup.spec().ok().filter(|spec| spec.restart);
+            let n_state = if sums { None } else { spec().map(|spec| spec.n_state()) };
+            let shape = SetupShape { parameters: setup.parameters.clone(), n_state, sums };
             self.hub.install(id, json, shape, likeness(setup));
         }
         Ok(id)

@@ -24,6 +24,14 @@ pub enum FilesError {
     /// The page could not be made.
     #[error(transparent)]
     Page(#[from] ReportError),
+    /// A file of a result that no store holds could not be written.
+    #[error("cannot write {}: {source}", path.display())]
+    Result {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
     /// A file could not be written.
     #[error(
         "cannot write {path}: {source}; the result is safe in run.db, `starlings report` writes the files again"

@@ -12,6 +12,7 @@ mod files;
 mod hangs_on;
 mod headline;
 mod identify;
+mod infer;
 mod layout;
 pub mod locus;
 mod number;
@@ -28,6 +29,7 @@ pub use data::ReportData;
 pub use explained::{state_names, write_explanation};
 pub use files::{FilesError, write_files, write_page};
 pub use identify::identify_page;
+pub use infer::{coefficients_csv, infer_page, write_inference};
 pub use overview::overview_svg;
 
 /// Why a report could not be made.

@@ -7,6 +7,7 @@ mod blame;
 mod built;
 mod defs;
 mod explain;
+mod infer;
 mod initial;
 mod limits;
 mod model;
@@ -73,6 +74,15 @@ impl Study {
         let own = solver::own(&source, &file);
         source.verdict()?;
         own.ok_or_else(|| StudyError { problems: Vec::new() })
+    }
+
+    /// Reads and checks a study file for an inference: its recordings are described in [`Study::infer`] and not read, and parameters
+    /// need no prior.
+    ///
+    /// # Errors
+    /// Everything that is wrong, each with its place and remedy.
+    pub fn load_for_inference(path: &Path) -> Result<Self, StudyError> {
+        infer::study(path, &text_of(path)?)
     }
 
     /// Checks the text of a study file that stands, or stood, at `file`.
@@ -161,6 +171,7 @@ fn check(path: &Path, text: &str, solver_host: &SolverHost) -> Result<Study, Stu
         fleet,
         explain,
         spectrum,
+        infer: None,
         delays: model.delays,
         runs_here: solver.is_none_or(|known| known.is_here),
         whole_answers: false,

@@ -10,6 +10,7 @@ use starlings_estimators::{Drift, Kind, Options, Points, Root, Transform};
 use starlings_models::spectrum::Decay;
 use starlings_models::{EffectDef, Setup, Signal, Spec};
 
+use super::infer_choice::InferChoice;
 use super::solver_host::SolverHost;
 use super::surfaces::Node;
 
@@ -48,6 +49,8 @@ pub struct Study {
     pub explain: ExplainChoice,
     /// What `spectrum` compares.
     pub spectrum: SpectrumChoice,
+    /// What `infer` asks, where the file says so and the study was read for it.
+    pub infer: Option<Arc<InferChoice>>,
     /// An input is used at earlier times: windows then hold it from the record's start.
     pub delays: bool,
     /// Whether the model can be run in this process; a solver that a file describes may be on another machine.

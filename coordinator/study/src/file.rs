@@ -4,6 +4,7 @@
 //! Next file to read: [`crate::file::read`], which fills these.
 
 mod brackets;
+pub(super) mod infer;
 pub(super) mod layout;
 pub(super) mod locate;
 pub(crate) mod memory;
@@ -34,6 +35,8 @@ pub(super) struct StudyFile {
     pub(super) effects: Vec<EffectSection>,
     pub(super) explain: ExplainSection,
     pub(super) spectrum: spectrum::SpectrumSection,
+    /// Present where the file has the section.
+    pub(super) infer: Option<infer::InferSection>,
     pub(super) estimator: EstimatorSection,
     pub(super) fleet: FleetSection,
 }

@@ -17,6 +17,7 @@ mod fit;
 pub mod fuzzing;
 mod given_residuals;
 pub mod identify;
+pub mod infer_choice;
 mod observer_gain;
 mod plan;
 pub mod posterior;

@@ -100,6 +100,7 @@ impl Solve for Inside {
             max_steps: None,
             timeout: None,
             noise: None,
+            sums: None,
         };
         let theta =
             run.parameters.iter().copied().chain(run.initial.iter().map(|(_, value)| *value)).collect();

@@ -6,6 +6,8 @@
 //! eqs. 1.11 and 1.25.) Deliberately no basis inside: a fingerprint stands for it.
 //! Read next: `stream.rs`, which makes them, and `fit.rs`, which reads them.
 
+mod values;
+
 use nalgebra::DMatrix;
 
 use super::{Basis, InferenceError};

@@ -37,6 +37,7 @@ mod simulator;
 pub mod solver;
 mod spec;
 pub mod spectrum;
+mod sums_def;
 pub mod surface;
 pub mod units;
 
@@ -58,3 +59,4 @@ pub use setup_error::SetupError;
 pub use simulator::Simulator;
 pub use solver::{Description, FaultPlace, FilesDef, SOLVER, SolverDef, SolverFault};
 pub use spec::{Quantity, Role, Spec};
+pub use sums_def::{PolynomialDef, SumsDef};

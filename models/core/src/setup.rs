@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::effect::{EffectDef, library};
 use crate::equations::EquationsDef;
 use crate::solver::{Description, SolverDef};
+use crate::sums_def::SumsDef;
 use crate::{SetupError, Spec};
 
 /// The model by kind, with the values that are not estimated.
@@ -70,6 +71,9 @@ pub struct Setup {
     /// Seconds of computing that one run may take; [`crate::limits::TIMEOUT`] where nothing is said. A solver has its own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub timeout: Option<f64>,
+    /// What jobs of a dynamical inference sum over their rows, instead of running the model.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sums: Option<Box<SumsDef>>,
 }
 
 impl Setup {

@@ -74,6 +74,7 @@ impl Served {
             max_steps: None,
             timeout: None,
             noise: None,
+            sums: None,
         };
         let theta =
             request.parameters.into_iter().chain(request.initial.iter().map(|(_, value)| *value)).collect();

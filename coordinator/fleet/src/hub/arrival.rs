@@ -40,8 +40,9 @@ impl State {
     ) -> LeaseOutcome {
         let LeaseOutcome::Ran(Ok(prediction)) = &answer else { return answer };
         let Some((setup, job)) = asked else { return answer };
-        let n_state = self.shapes.get(setup).and_then(|shape| shape.n_state);
-        match fault(prediction, job, n_state, was_put) {
+        let shape = self.shapes.get(setup);
+        let n_output = if shape.is_some_and(|shape| shape.sums) { 0 } else { job.window.observed.len() };
+        match fault(prediction, n_output, shape.and_then(|shape| shape.n_state), was_put) {
             Some(fault) => LeaseOutcome::Ran(Err(ParticleError::Infrastructure(fault))),
             None => answer,
         }
@@ -57,9 +58,8 @@ impl State {
 }
 
 /// What is wrong with a prediction; nothing where it is sound.
-fn fault(prediction: &Prediction, job: &Job, n_state: Option<usize>, was_put: bool) -> Option<String> {
+fn fault(prediction: &Prediction, wanted: usize, n_state: Option<usize>, was_put: bool) -> Option<String> {
     let Prediction { outputs, state, .. } = prediction;
-    let wanted = job.window.observed.len();
     if outputs.len() != wanted {
         return Some(format!("it sent {} predicted values where {wanted} belong", outputs.len()));
     }
@@ -82,18 +82,14 @@ fn spoiled(values: &[f64]) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use starlings_models::Window;
-
     use super::*;
 
     #[test]
     fn a_prediction_of_another_length_or_with_a_value_that_is_not_finite_is_the_workers_fault() {
-        let window = Window { start: 0.0, times: vec![1.0, 2.0], observed: vec![0.0; 2], inputs: vec![] };
-        let job = Job { particle: 0, record: 0, window: window.into(), theta: vec![], state: None };
         let of = |outputs: &[f64], state: &[f64], n_state| {
             fault(
                 &Prediction { outputs: outputs.to_vec(), state: state.to_vec().into(), cost: 0.0 },
-                &job,
+                2,
                 n_state,
                 false,
             )
@@ -102,8 +98,8 @@ mod tests {
         assert_eq!(of(&[1.0, 2.0], &[3.0], None), None, "nobody knows the model's states");
         let says = |fault: Option<String>| fault.expect("it is wrong");
         let named = Prediction { outputs: vec![1.0, 2.0], state: Travelling::Named([7; 32]), cost: 0.0 };
-        assert_eq!(fault(&named, &job, Some(100_000), true), None);
-        assert_eq!(says(fault(&named, &job, None, false)), "it names a state that it did not send");
+        assert_eq!(fault(&named, 2, Some(100_000), true), None);
+        assert_eq!(says(fault(&named, 2, None, false)), "it names a state that it did not send");
         assert_eq!(says(of(&[1.0], &[], None)), "it sent 1 predicted values where 2 belong");
         assert_eq!(says(of(&[1.0, 2.0], &[3.0, 4.0], Some(1))), "it sent a state of 2 values where 1 belong");
         assert_eq!(

@@ -65,6 +65,8 @@ pub(crate) struct SetupShape {
     pub(crate) parameters: Vec<String>,
     /// Length of a state, where it is known.
     pub(crate) n_state: Option<usize>,
+    /// Whether it sums over rows and predicts none.
+    pub(crate) sums: bool,
 }
 
 /// The way to one worker.

@@ -44,7 +44,7 @@ fn hub(build: Option<[u8; 32]>) -> (Hub, Receiver<FleetEvent>) {
 
 fn batch(hub: &Hub) -> (Submission, Receiver<Reply>) {
     let (setup, json) = encode_setup(&Setup::default()).expect("it travels");
-    let shape = SetupShape { parameters: vec!["k".to_owned()], n_state: None };
+    let shape = SetupShape { parameters: vec!["k".to_owned()], n_state: None, sums: false };
     hub.install(setup, json, shape, Likeness::Exact);
     let window = Window { start: 0.0, times: vec![1.0], observed: vec![0.0], inputs: vec![] };
     let job = starlings_models::Job {

@@ -16,7 +16,7 @@ use super::{
 };
 use crate::problem::{Source, StudyError};
 
-const SECTIONS: [&str; 10] = [
+const SECTIONS: [&str; 11] = [
     "study",
     "model",
     "parameters",
@@ -25,6 +25,7 @@ const SECTIONS: [&str; 10] = [
     "effects",
     "explain",
     "spectrum",
+    "infer",
     "estimator",
     "fleet",
 ];
@@ -54,6 +55,7 @@ pub(crate) fn read(source: &Source, adapters: &[AdapterDef]) -> Result<StudyFile
         effects: effects(source, &root),
         explain: explain(&root),
         spectrum: super::spectrum::read(&root),
+        infer: super::infer::read(source, &root),
         estimator: estimator(&root),
         fleet: fleet(&root),
     };
@@ -145,7 +147,7 @@ fn records(source: &Source, root: &Table<'_>) -> Vec<RecordSection> {
             file: t.required_text("file", "a CSV file, relative to the study"),
             time: t.text("time").unwrap_or_else(|| Spanned::new(t.span.clone(), "time".to_owned())),
             inputs: named_texts(source, &t.free_entries("inputs")),
-            channels: channels(source, &t),
+            channels: channels(source, &t, root.get("infer").is_some()),
             train: t.interval("train"),
             held_out: held_out(source, &t),
             every: t.count("every").unwrap_or_else(|| Spanned::new(t.span.clone(), 1)),
@@ -167,10 +169,11 @@ fn held_out(source: &Source, record: &Table<'_>) -> bool {
     }
 }
 
-fn channels(source: &Source, record: &Table<'_>) -> Vec<ChannelSection> {
+/// The channels of a record; an inference finds their noise by itself.
+fn channels(source: &Source, record: &Table<'_>, infers: bool) -> Vec<ChannelSection> {
     let read = |t: Table<'_>| {
         let noise = t.get("noise").and_then(|node| noise(source, node));
-        if t.get("noise").is_none() {
+        if t.get("noise").is_none() && !infers {
             t.missing("noise", "the standard deviation in the channel's unit, or \"auto\"");
         }
         let surface = surface(source, &t);

@@ -138,6 +138,7 @@ mod tests {
             history: &record,
             limits: &Limits::none(),
             noise: None,
+            sums: None,
         };
         bends(&[source], segment, &[shift])
     }

@@ -1,0 +1,117 @@
+//! From sums to the tables: the fit, what the residuals say of the measurement, the extrapolation, the reduced model.
+//!
+//! Next file to read: `words.rs`.
+
+use nalgebra::DMatrix;
+use starlings_estimators::inference::{
+    Diffusion, Extrapolated, Fit, NoiseCheck, Posterior, Prior, Strength, Structure, Sums, Verdict,
+    extrapolate, noise_checks,
+};
+use starlings_study::infer_choice::{DiffusionChoice, InferChoice, MeasuredChoice};
+
+use crate::error::InferError;
+use crate::result::{CoefficientFound, DiffusionFound, LEVEL, RichardsonFound};
+
+/// The fit that a study asks for.
+pub(crate) fn fit(choice: &InferChoice, structure: &Structure) -> Result<Fit, InferError> {
+    let form = match choice.diffusion {
+        DiffusionChoice::Full => Diffusion::Full,
+        DiffusionChoice::Diagonal => Diffusion::Diagonal,
+        DiffusionChoice::Isotropic => Diffusion::Isotropic,
+    };
+    let names = || structure.coefficients().iter().map(|c| c.name.as_str());
+    let prior = |name: &str| choice.priors.iter().find(|(known, _, _)| known == name);
+    let mean: Vec<f64> = names().map(|name| prior(name).map_or(0.0, |(_, mean, _)| *mean)).collect();
+    let sd: Vec<f64> = names().map(|name| prior(name).map_or(f64::INFINITY, |(_, _, sd)| *sd)).collect();
+    let fit = Fit::new(form, structure.n_coefficient());
+    Ok(Fit { prefactor: choice.prefactor, prior: Prior::independent(&mean, &sd)?, ..fit })
+}
+
+/// What the sums of all blocks say.
+pub(crate) struct Answer {
+    pub(crate) posterior: Posterior,
+    pub(crate) checks: Vec<NoiseCheck>,
+    /// Whether errors of the measurement were taken out of the noise.
+    pub(crate) lag_corrected: bool,
+    pub(crate) extrapolated: Option<Extrapolated>,
+}
+
+impl Answer {
+    /// The posterior from sums by level.
+    pub(crate) fn of(
+        choice: &InferChoice,
+        fit: &Fit,
+        structure: &Structure,
+        levels: &[Sums],
+    ) -> Result<Self, InferError> {
+        let Some(sums) = levels.first() else {
+            return Err(InferError::Setting("no block of any recording was summed".to_owned()));
+        };
+        let mut posterior = fit.posterior(sums, structure)?;
+        let checks = if sums.n_pair() > 0 { noise_checks(sums, structure, &posterior)? } else { Vec::new() };
+        let matters = checks.iter().any(|check| check.verdict == Verdict::Matters);
+        let lag_corrected = matters && choice.measured == MeasuredChoice::Auto;
+        let fit = Fit { lag_corrected, ..fit.clone() };
+        if lag_corrected {
+            posterior = fit.posterior(sums, structure)?;
+        }
+        let extrapolated = if levels.len() > 1 {
+            let longer = levels[1..].iter().map(|sums| fit.posterior(sums, structure));
+            let all = std::iter::once(Ok(posterior.clone())).chain(longer).collect::<Result<Vec<_>, _>>()?;
+            Some(extrapolate(&all, None)?)
+        } else {
+            None
+        };
+        Ok(Self { posterior, checks, lag_corrected, extrapolated })
+    }
+
+    /// The table of the coefficients.
+    pub(crate) fn coefficients(&self, choice: &InferChoice) -> Vec<CoefficientFound> {
+        let all = self.posterior.estimates.iter().enumerate();
+        all.map(|(p, found)| {
+            let at_step = found.value.map(|value| value.mean);
+            let moved = self.extrapolated.as_ref().and_then(|e| e.estimates.get(p)?.value).map(|v| v.mean);
+            let shift = moved.zip(at_step).map_or(0.0, |(moved, at_step)| moved - at_step);
+            let interval = self.posterior.interval(p, LEVEL).map(|ends| ends.map(|end| end + shift));
+            let prior = choice.priors.iter().find(|(name, _, _)| *name == found.name);
+            CoefficientFound {
+                name: found.name.clone(),
+                observed: found.observed,
+                estimate: moved.or(at_step),
+                sd: found.value.map(|value| value.sd),
+                interval90: interval,
+                may_be_zero: interval.map(|[lo, hi]| lo <= 0.0 && hi >= 0.0),
+                at_step: moved.and(at_step),
+                prior: prior.map(|(_, mean, sd)| [*mean, *sd]),
+            }
+        })
+        .collect()
+    }
+
+    /// The table of the noise.
+    pub(crate) fn diffusion(&self, choice: &InferChoice) -> DiffusionFound {
+        let rows =
+            |matrix: &DMatrix<f64>| matrix.row_iter().map(|row| row.iter().copied().collect()).collect();
+        let n = self.posterior.diffusion.nrows();
+        let form = match choice.diffusion {
+            DiffusionChoice::Full => "full",
+            DiffusionChoice::Diagonal => "diagonal",
+            DiffusionChoice::Isotropic => "isotropic",
+        };
+        DiffusionFound {
+            form: form.to_owned(),
+            matrix: rows(&self.posterior.diffusion),
+            sd: rows(&self.posterior.diffusion_sd()),
+            interval90: (0..n).map(|l| self.posterior.diffusion_interval(l, LEVEL)).collect(),
+            lag_corrected: self.lag_corrected,
+            measured_sd: if let MeasuredChoice::Known(sd) = choice.measured { Some(sd) } else { None },
+        }
+    }
+
+    /// The order of the extrapolation.
+    pub(crate) fn richardson(&self) -> Option<RichardsonFound> {
+        let found = self.extrapolated.as_ref()?;
+        let order = if found.used == Strength::Weak { 2 } else { 1 };
+        Some(RichardsonFound { order, ratio: found.ratio })
+    }
+}

@@ -1,0 +1,240 @@
+//! Cuts a recording into blocks of steps, in the memory of one block.
+//!
+//! A block's last row is the next one's first. Where a row is missing, repeated or out of step the recording is refused with its line,
+//! or a new piece begins where the study allows that. Next file to read: `gather.rs`.
+
+use std::fs::File;
+use std::io::{BufReader, Read};
+
+use starlings_study::infer_choice::InferRecord;
+
+use crate::error::InferError;
+use crate::rows::{Row, Rows};
+
+/// By how much of a step a step may differ.
+const TOLERANCE: f64 = 0.01;
+/// Rows that the sampling step is taken from.
+const FIRST: usize = 1000;
+
+/// Steps of a recording that follow one another.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Block {
+    /// Index of the record.
+    pub(crate) record: usize,
+    /// Row of the record with which it begins, from 0.
+    pub(crate) first: u64,
+    /// Steps that start in it.
+    pub(crate) n_step: usize,
+    /// Times of its rows, some of which lie after its last step.
+    pub(crate) times: Vec<f64>,
+    /// Values row after row.
+    pub(crate) rows: Vec<f64>,
+}
+
+/// How recordings are cut.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Cut {
+    /// Sampling step.
+    pub(crate) step: f64,
+    /// Steps of a block.
+    pub(crate) block: usize,
+    /// Rows beyond its last step.
+    pub(crate) ahead: usize,
+    /// Whether a new piece begins where rows are missing.
+    pub(crate) breaks: bool,
+}
+
+/// What the start of a recording says of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Start {
+    /// Sampling step.
+    pub(crate) step: f64,
+    /// Number of rows, guessed from the length of the file.
+    pub(crate) n_row: f64,
+}
+
+/// Opens a recording.
+pub(crate) fn open(record: &InferRecord) -> Result<Rows<BufReader<File>>, InferError> {
+    let file = File::open(&record.file).map_err(|error| InferError::Recording {
+        file: record.file.clone(),
+        line: None,
+        message: format!("the recording of `{}` cannot be read: {error}", record.name),
+        help: "paths are relative to the study file".to_owned(),
+    })?;
+    Rows::new(&record.file, BufReader::with_capacity(1 << 18, file), &record.time, &record.columns)
+}
+
+/// The sampling step of a recording, from its first rows.
+pub(crate) fn start(record: &InferRecord) -> Result<Start, InferError> {
+    let mut rows = open(record)?;
+    let before = rows.n_byte();
+    let mut values = vec![0.0; record.columns.len()];
+    let mut times = Vec::new();
+    let mut n_read = 0_u64;
+    while times.len() < FIRST {
+        let Some(Row { time, .. }) = rows.next(&mut values)? else { break };
+        n_read += 1;
+        if time >= record.span[0] && time <= record.span[1] {
+            times.push(time);
+        }
+    }
+    let mut steps: Vec<f64> =
+        times.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
+    if steps.is_empty() {
+        let message = format!("record `{}` has {} row in its span", record.name, times.len());
+        return Err(rows.fault(None, message, "an inference needs many rows"));
+    }
+    steps.sort_by(f64::total_cmp);
+    let median = steps[steps.len() / 2];
+    let even = steps.iter().all(|step| (step - median).abs() <= TOLERANCE * median)
+        && steps.len() + 1 == times.len();
+    let step = if even { (times[times.len() - 1] - times[0]) / steps.len() as f64 } else { median };
+    let per_row = (rows.n_byte() - before) as f64 / n_read as f64;
+    let bytes = std::fs::metadata(&record.file).map_or(0, |file| file.len());
+    Ok(Start { step, n_row: bytes as f64 / per_row.max(1.0) })
+}
+
+/// The blocks of one recording.
+pub(crate) struct Blocks<'a, R> {
+    record: (usize, &'a InferRecord),
+    rows: Rows<R>,
+    cut: Cut,
+    /// Number of the next row.
+    row: u64,
+    first: u64,
+    times: Vec<f64>,
+    values: Vec<f64>,
+    next: Vec<f64>,
+    /// A row that begins a new piece.
+    held: Option<f64>,
+    is_over: bool,
+}
+
+impl<'a, R: Read> Blocks<'a, R> {
+    pub(crate) fn new(record: (usize, &'a InferRecord), rows: Rows<R>, cut: Cut) -> Self {
+        let next = vec![0.0; record.1.columns.len()];
+        Self {
+            record,
+            rows,
+            cut,
+            row: 0,
+            first: 0,
+            times: Vec::new(),
+            values: Vec::new(),
+            next,
+            held: None,
+            is_over: false,
+        }
+    }
+
+    /// The next block; `None` at the end of the recording.
+    pub(crate) fn next(&mut self) -> Result<Option<Block>, InferError> {
+        loop {
+            if self.times.len() <= 1
+                && let Some(time) = self.held.take()
+            {
+                self.begin(time);
+            }
+            let wanted = self.cut.block + 1 + self.cut.ahead;
+            while self.times.len() < wanted && !self.is_over && self.held.is_none() {
+                self.read()?;
+            }
+            if self.times.len() >= wanted {
+                return Ok(Some(self.full()));
+            }
+            if self.times.len() > 1 {
+                let rest = self.rest();
+                return Ok(Some(rest));
+            }
+            if self.is_over && self.held.is_none() {
+                return Ok(None);
+            }
+        }
+    }
+
+    /// A new piece begins with the row that was read last.
+    fn begin(&mut self, time: f64) {
+        self.times.clear();
+        self.values.clear();
+        self.first = self.row - 1;
+        self.times.push(time);
+        self.values.extend_from_slice(&self.next);
+    }
+
+    fn read(&mut self) -> Result<(), InferError> {
+        let [from, to] = self.record.1.span;
+        let Some(Row { line, time }) = self.rows.next(&mut self.next)? else {
+            self.is_over = true;
+            return Ok(());
+        };
+        self.row += 1;
+        if time < from || time > to {
+            return Ok(());
+        }
+        let Some(&before) = self.times.last() else {
+            self.begin(time);
+            return Ok(());
+        };
+        let (step, got) = (self.cut.step, time - before);
+        if (got - step).abs() <= TOLERANCE * step {
+            self.times.push(time);
+            self.values.extend_from_slice(&self.next);
+            return Ok(());
+        }
+        if got > 1.5 * step && self.cut.breaks {
+            self.held = Some(time);
+            return Ok(());
+        }
+        Err(self.uneven(line, before, time))
+    }
+
+    fn uneven(&self, line: u64, before: f64, time: f64) -> InferError {
+        let step = self.cut.step;
+        let (message, help) = if time <= before {
+            (
+                format!("time {time} is not later than {before} in the row before"),
+                "keep one row per time, in their order",
+            )
+        } else if time - before > 1.5 * step {
+            (
+                format!("time jumps from {before} to {time}, over more than one step of {step}"),
+                "use gaps = \"break\" in [infer] to go on behind it without a step across",
+            )
+        } else {
+            (
+                format!(
+                    "the step from {before} to {time} is {} where the recording's is {step}",
+                    time - before
+                ),
+                "an inference needs equal steps: resample the recording",
+            )
+        };
+        self.rows.fault(Some(line), message, help)
+    }
+
+    /// A whole block, whose last row is kept for the next.
+    fn full(&mut self) -> Block {
+        let (n, width) = (self.cut.block, self.next.len());
+        let block = Block {
+            record: self.record.0,
+            first: self.first,
+            n_step: n,
+            times: self.times.clone(),
+            rows: self.values.clone(),
+        };
+        self.times.drain(..n);
+        self.values.drain(..n * width);
+        self.first += n as u64;
+        block
+    }
+
+    /// What is left of a piece.
+    fn rest(&mut self) -> Block {
+        let n_step = (self.times.len() - 1).min(self.cut.block);
+        if n_step + 1 < self.times.len() {
+            return Block { n_step, ..self.full() };
+        }
+        let (times, rows) = (std::mem::take(&mut self.times), std::mem::take(&mut self.values));
+        Block { record: self.record.0, first: self.first, n_step, times, rows }
+    }
+}

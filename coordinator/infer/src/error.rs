@@ -1,0 +1,103 @@
+//! Why an inference ends without a result.
+//!
+//! Next file to read: [`super::run`].
+
+use std::path::PathBuf;
+
+use starlings_estimators::inference::InferenceError;
+use starlings_fleet::FleetError;
+use starlings_models::Failure;
+use starlings_sums::SumsError;
+
+/// Why there is no inference.
+#[derive(Debug, thiserror::Error)]
+pub enum InferError {
+    /// The fleet failed as a whole.
+    #[error(transparent)]
+    Fleet(#[from] FleetError),
+    /// What is asked for does not fit together.
+    #[error(transparent)]
+    Question(#[from] SumsError),
+    /// The estimate cannot be made of these recordings.
+    #[error("{error}{}", remedy(error))]
+    Estimate {
+        /// Why.
+        #[from]
+        error: InferenceError,
+    },
+    /// A recording is not what it should be.
+    #[error("{}{}: {message} ({help})", file.display(), line.map(|line| format!(":{line}")).unwrap_or_default())]
+    Recording {
+        /// Its file.
+        file: PathBuf,
+        /// Line, from 1.
+        line: Option<u64>,
+        /// What was found.
+        message: String,
+        /// What to do.
+        help: String,
+    },
+    /// A block of a recording has no sums.
+    #[error("record `{record}`: {failure}")]
+    Block {
+        /// The record.
+        record: String,
+        /// Why.
+        failure: Failure,
+    },
+    /// The reduced model and the coefficients do not fit together.
+    #[error("[infer.reduced]: {0}")]
+    Reduced(String),
+    /// A setting that these recordings do not allow.
+    #[error("{0}")]
+    Setting(String),
+    /// A state that was written for another study, or is damaged.
+    #[error("the state file {} cannot be continued: {message} (remove it to begin anew)", file.display())]
+    State {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong.
+        message: String,
+    },
+    /// Something cannot be written or read.
+    #[error("{what}: {error}")]
+    File {
+        /// What was done, with the file.
+        what: String,
+        /// Why it failed.
+        error: std::io::Error,
+    },
+}
+
+impl InferError {
+    /// Whether somebody cancelled the work, rather than that it failed.
+    pub fn is_cancelled(&self) -> bool {
+        matches!(self, Self::Fleet(FleetError::Cancelled))
+    }
+
+    /// Whether the input is wrong, rather than the run.
+    pub fn is_input(&self) -> bool {
+        !matches!(self, Self::Fleet(_) | Self::File { .. })
+    }
+}
+
+/// What to do about an estimate that cannot be made.
+fn remedy(error: &InferenceError) -> &'static str {
+    match error {
+        InferenceError::Collinear { .. } => {
+            " (leave one of them out, give one a prior, or record where they differ)"
+        }
+        InferenceError::TooFew { .. } => " (record longer, ask for fewer coefficients, or give them priors)",
+        InferenceError::NotSettled { .. } => {
+            " (give `[[parameters]]` priors, ask for fewer terms, or use rule = \"ito\")"
+        }
+        InferenceError::DiffusionNotDefinite { .. } => {
+            " (make the equation's state an input, use diffusion = \"diagonal\" where equations share their noise, or look for a column \
+             that stands twice)"
+        }
+        InferenceError::NothingObserved => {
+            " (no function of theirs was ever different from zero in these recordings)"
+        }
+        _ => "",
+    }
+}

@@ -1,0 +1,30 @@
+//! Dynamical inference: drift and noise of stochastic equations from recordings, with the sums made on the fleet.
+//!
+//! | file | what it does |
+//! |---|---|
+//! | [`error`] | why there is no inference |
+//! | `rows`, `blocks` | a recording row by row, and cut into blocks, in memory that does not grow with it |
+//! | `gather` | has the sums of every block made as jobs and merges them in block order |
+//! | `convergence` | the estimate after each power of two of blocks |
+//! | `smoothed` | the same from a smoothed path, where the measurement's noise is known |
+//! | [`reduced`] | a model with fewer unknowns than coefficients |
+//! | [`result`], `answer`, `words` | the tables with intervals, and what is said of them |
+//! | [`run`] | all of it on a page |
+//!
+//! The mathematics is in the estimators; nothing here computes a posterior. Next file to read: [`mod@run`].
+
+mod answer;
+mod blocks;
+mod convergence;
+pub mod error;
+mod gather;
+pub mod reduced;
+pub mod result;
+mod rows;
+pub mod run;
+mod smoothed;
+mod words;
+
+pub use error::InferError;
+pub use result::Inference;
+pub use run::{Progress, infer};

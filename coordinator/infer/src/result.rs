@@ -1,0 +1,150 @@
+//! The result of an inference: tables with intervals, as they are written and read by programs.
+//!
+//! Nothing in it depends on who computed it. Next file to read: `answer.rs`, which fills it.
+
+use serde::{Deserialize, Serialize};
+use starlings_estimators::inference::NoiseCheck;
+
+/// Probability with which an interval holds its coefficient.
+pub const LEVEL: f64 = 0.9;
+
+/// An inference.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Inference {
+    /// Name of the study.
+    pub study: String,
+    /// What was found, in one sentence.
+    pub verdict: String,
+    /// Unit label of every time.
+    pub time_unit: String,
+    /// The recordings.
+    pub records: Vec<RecordUsed>,
+    /// Sampling step.
+    pub step: f64,
+    /// Steps of all records.
+    pub n_step: u64,
+    /// Steps of a block.
+    pub block: usize,
+    /// The equations, by the names of their states.
+    pub equations: Vec<String>,
+    /// The coefficients of the drift.
+    pub coefficients: Vec<CoefficientFound>,
+    /// The noise.
+    pub diffusion: DiffusionFound,
+    /// What the residuals of neighbouring steps say of errors of the measurement.
+    pub noise_checks: Vec<NoiseCheck>,
+    /// The extrapolation to no step, where it was asked for.
+    pub richardson: Option<RichardsonFound>,
+    /// The reduced model, where there is one.
+    pub reduced: Option<ReducedFound>,
+    /// The estimate after each power of two of blocks, and after all.
+    pub convergence: Vec<Converging>,
+    /// What the intervals are conditional on.
+    pub conditional_on: String,
+    /// What is doubtful.
+    pub warnings: Vec<String>,
+}
+
+/// A recording as far as it was used.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RecordUsed {
+    /// Its name.
+    pub name: String,
+    /// Steps that were used.
+    pub n_step: u64,
+    /// Its first and last time.
+    pub span: [f64; 2],
+}
+
+/// A coefficient.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CoefficientFound {
+    /// Its name.
+    pub name: String,
+    /// Whether the data say anything of it.
+    pub observed: bool,
+    /// Posterior mean; `None` where neither data nor prior say anything.
+    pub estimate: Option<f64>,
+    /// Posterior standard deviation.
+    pub sd: Option<f64>,
+    /// Interval that holds it with a probability of 90 %.
+    pub interval90: Option<[f64; 2]>,
+    /// Whether that interval holds zero.
+    pub may_be_zero: Option<bool>,
+    /// The estimate at the sampling step, where it was extrapolated to none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub at_step: Option<f64>,
+    /// Mean and standard deviation before the data, where something was known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub prior: Option<[f64; 2]>,
+}
+
+/// The noise.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DiffusionFound {
+    /// `full`, `diagonal` or `isotropic`.
+    pub form: String,
+    /// Covariance per time unit, row by row.
+    pub matrix: Vec<Vec<f64>>,
+    /// Standard deviations of its entries.
+    pub sd: Vec<Vec<f64>>,
+    /// Intervals of the variances, one per equation.
+    pub interval90: Vec<Option<[f64; 2]>>,
+    /// Whether errors of the measurement were taken out of it.
+    pub lag_corrected: bool,
+    /// Standard deviation of the measurement, where it was given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub measured_sd: Option<f64>,
+}
+
+/// The extrapolation to no step.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RichardsonFound {
+    /// Order of the step's error that was used, 1 or 2.
+    pub order: u32,
+    /// Change from 4h to 2h over that from 2h to h.
+    pub ratio: Option<f64>,
+}
+
+/// The reduced model.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ReducedFound {
+    /// Its unknowns.
+    pub unknowns: Vec<UnknownFound>,
+    /// χ² of what it leaves of the coefficients.
+    pub chi_squared: f64,
+    /// Coefficients less unknowns.
+    pub degrees: usize,
+    /// Probability of a larger χ² where it is right.
+    pub probability: f64,
+    /// Whether that probability is above 1 %.
+    pub consistent: bool,
+}
+
+/// An unknown of the reduced model.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct UnknownFound {
+    /// Its name.
+    pub name: String,
+    /// Estimate.
+    pub estimate: f64,
+    /// Standard deviation.
+    pub sd: f64,
+    /// Interval that holds it with a probability of 90 %.
+    pub interval90: [f64; 2],
+}
+
+/// An estimate on the way.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Converging {
+    /// Blocks so far.
+    pub n_block: u64,
+    /// Steps so far.
+    pub n_step: u64,
+    /// Time that the steps cover.
+    pub time: f64,
+    /// Mean and standard deviation of every coefficient that has a value.
+    pub values: Vec<Option<[f64; 2]>>,
+    /// Variances of the noise.
+    pub diffusion: Vec<f64>,
+}

@@ -1,0 +1,42 @@
+//! The posterior from a smoothed path, where the standard deviation of the measurement is known.
+//!
+//! Smoothing goes through a recording back and forth, so that it is held in memory: the one way in which memory grows with a
+//! recording. It is computed here and not on the fleet. Next file to read: `answer.rs`.
+
+use nalgebra::DMatrix;
+use starlings_estimators::inference::{Fit, Iteration, Measured, Noisy, NoisyPosterior};
+use starlings_sums::Question;
+
+use crate::blocks::{Blocks, Cut, open};
+use crate::error::InferError;
+use starlings_study::infer_choice::InferRecord;
+
+/// Rounds of smoothing and fitting, and the growth of the likelihood at which they end.
+const ITERATION: Iteration = Iteration { most: 100, tolerance: 1e-3 };
+
+/// Smooths the one recording of a study under errors of standard deviation `sd` in every state, and fits.
+pub(crate) fn smoothed(
+    question: &Question,
+    fit: &Fit,
+    records: &[InferRecord],
+    cut: Cut,
+    sd: f64,
+) -> Result<NoisyPosterior, InferError> {
+    let [record] = records else {
+        let message = "a given `measurement_noise` smooths one recording: keep one record, or use \"auto\"";
+        return Err(InferError::Setting(message.to_owned()));
+    };
+    let mut blocks = Blocks::new((0, record), open(record)?, Cut { ahead: 0, breaks: false, ..cut });
+    let (mut times, mut rows) = (Vec::new(), Vec::new());
+    let width = question.basis.n_channel();
+    while let Some(block) = blocks.next()? {
+        // The first row of a block is the last one of that before it.
+        let skip = usize::from(!times.is_empty());
+        times.extend_from_slice(&block.times[skip..]);
+        rows.extend_from_slice(&block.rows[skip * width..]);
+    }
+    let n = question.basis.n_state();
+    let noise = Measured::Known(DMatrix::from_diagonal_element(n, n, sd * sd));
+    let noisy = Noisy { basis: &question.basis, step: cut.step, times: &times, rows: &rows };
+    Ok(noisy.infer(fit, &question.structure, &noise, ITERATION)?)
+}

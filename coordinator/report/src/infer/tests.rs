@@ -1,0 +1,88 @@
+//! The page and the table of an inference.
+
+use starlings_infer::result::{
+    CoefficientFound, Converging, DiffusionFound, Inference, RecordUsed, ReducedFound, UnknownFound,
+};
+
+use super::{coefficients_csv, infer_page};
+
+fn coefficient(name: &str, estimate: Option<f64>, zero: bool) -> CoefficientFound {
+    CoefficientFound {
+        name: name.to_owned(),
+        observed: estimate.is_some(),
+        estimate,
+        sd: estimate.map(|_| 0.25),
+        interval90: estimate.map(|v| [v - 0.41, v + 0.41]),
+        may_be_zero: estimate.map(|_| zero),
+        at_step: None,
+        prior: None,
+    }
+}
+
+fn sample() -> Inference {
+    let values = |scale: f64| vec![Some([10.0, scale]), Some([0.1, scale]), None];
+    let at = |n_block: u64| Converging {
+        n_block,
+        n_step: 100 * n_block,
+        time: n_block as f64,
+        values: values(1.0 / n_block as f64),
+        diffusion: vec![1.0],
+    };
+    Inference {
+        study: "lorenz".to_owned(),
+        verdict: "400 steps give 2 of 3 coefficients".to_owned(),
+        time_unit: "s".to_owned(),
+        records: vec![RecordUsed { name: "one".to_owned(), n_step: 400, span: [0.0, 4.0] }],
+        step: 0.01,
+        n_step: 400,
+        block: 100,
+        equations: vec!["x".to_owned()],
+        coefficients: vec![
+            coefficient("sigma", Some(10.0), false),
+            coefficient("x:a,b", Some(0.1), true),
+            coefficient("leak", None, false),
+        ],
+        diffusion: DiffusionFound {
+            form: "full".to_owned(),
+            matrix: vec![vec![1600.0]],
+            sd: vec![vec![36.0]],
+            interval90: vec![Some([1540.0, 1660.0])],
+            lag_corrected: false,
+            measured_sd: None,
+        },
+        noise_checks: Vec::new(),
+        richardson: None,
+        reduced: Some(ReducedFound {
+            unknowns: vec![UnknownFound { name: "k".to_owned(), estimate: 2.0, sd: 0.1, interval90: [1.8, 2.2] }],
+            chi_squared: 11.5,
+            degrees: 12,
+            probability: 0.49,
+            consistent: true,
+        }),
+        convergence: vec![at(1), at(2), at(4)],
+        conditional_on: "90 % intervals".to_owned(),
+        warnings: vec!["not observed: leak".to_owned()],
+    }
+}
+
+#[test]
+fn the_page_shows_the_verdict_the_table_and_the_convergence() {
+    let page = infer_page(&sample()).expect("a page");
+    for text in
+        ["400 steps give 2 of 3 coefficients", "sigma", "may be zero", "not observed", "χ² 11.5 for 12", "<svg", "1600"]
+    {
+        assert!(page.contains(text), "{text} is missing");
+    }
+    assert!(!page.contains("NaN"), "what has no value is no number");
+    assert_eq!(page.matches("<figcaption>").count(), 2, "the third coefficient has no estimate to draw");
+}
+
+#[test]
+fn the_table_has_a_line_per_coefficient_and_entry_of_the_noise() {
+    let csv = coefficients_csv(&sample());
+    let lines: Vec<&str> = csv.lines().collect();
+    assert_eq!(lines[1], "sigma,10.0,0.25,9.59,10.41,false,true");
+    assert_eq!(lines[2].split(',').next(), Some("\"x:a"), "a name with a comma is quoted");
+    assert_eq!(lines[3], "leak,,,,,,false");
+    assert_eq!(lines[4], "\"D[x,x]\",1600.0,36.0,1540.0,1660.0,,true");
+}

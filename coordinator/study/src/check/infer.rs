@@ -1,0 +1,138 @@
+//! A study as `infer` takes it: equations whose states are all measured, and what is unknown in them.
+//!
+//! Recordings are not read here: only which column is which state. Next file to read: [`self::records`].
+
+mod records;
+mod reduced;
+mod settings;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use starlings_models::equations::{Drift, EquationsDef};
+use starlings_models::{SetupError, SumsDef};
+
+use super::built::CheckedModel;
+use super::settings::{estimator, fleet};
+use super::{check_name, model};
+use crate::checked::{ExplainChoice, SpectrumChoice, Study};
+use crate::file::infer::InferSection;
+use crate::file::read::read;
+use crate::infer_choice::InferChoice;
+use crate::problem::{Source, StudyError};
+use crate::solver_host::SolverHost;
+
+/// Checks the text of a study for an inference.
+pub(super) fn study(path: &Path, text: &str) -> Result<Study, StudyError> {
+    let source = Source::new(path, text);
+    let host = SolverHost::default();
+    let file = read(&source, host.adapters())?;
+    source.verdict()?;
+    check_name(&source, &file);
+    let Some(section) = &file.infer else {
+        let end = source.text.len();
+        let help = "add `[infer]` with `parameters = [...]`, `basis = \"polynomial\"` or `functions = [...]`";
+        source.report_with(end..end, "the study does not say what to infer", help);
+        source.verdict()?;
+        return Err(StudyError { problems: Vec::new() });
+    };
+    let (fleet, estimator) = (fleet(&source, &file.fleet), estimator(&source, &file.estimator, None));
+    let built = model::model(&source, &file, None);
+    source.verdict()?;
+    let Some(CheckedModel { setup, spec, candidates, delays, .. }) = built else {
+        return Err(StudyError { problems: Vec::new() });
+    };
+    let Some(equations) = &setup.model.equations else {
+        let help = "an inference is made of states and rates that the study writes";
+        let message = format!("`infer` needs `kind = \"equations\"`, found `{}`", setup.model.kind);
+        source.report_with(file.model.kind.span(), message, help);
+        source.verdict()?;
+        return Err(StudyError { problems: Vec::new() });
+    };
+    let mut sums = settings::sums(&source, section);
+    sums.left = settings::left(&source, section, equations);
+    source.verdict()?;
+    check_functions(&source, section, equations, &setup.model.constants, &sums);
+    let records = records::records(&source, &file, equations);
+    let priors = settings::priors(&source, &file, &sums);
+    let reduced = section.reduced.as_ref().map(|reduced| reduced::reduced(&source, reduced));
+    let most_steps = settings::most_steps(equations);
+    let infer = InferChoice {
+        diffusion: settings::diffusion(&source, section),
+        prefactor: section.prefactor.as_ref().is_none_or(|p| *p.get_ref()),
+        measured: settings::measured(&source, section),
+        block: settings::block(&source, section, most_steps),
+        most_steps,
+        breaks: settings::breaks(&source, section),
+        follow: settings::follow(&source, section.follow.as_ref()),
+        sums,
+        priors,
+        reduced,
+        records,
+    };
+    source.verdict()?;
+    let text = Arc::clone(&source.text);
+    Ok(Study {
+        file: path.to_owned(),
+        text,
+        name: file.study.name.into_inner(),
+        says: file.study.says,
+        seed: file.study.seed,
+        time_unit: file.study.time_unit,
+        setup,
+        spec,
+        candidates: Arc::new(candidates),
+        parameters: Vec::new(),
+        theta: Vec::new(),
+        records: Arc::default(),
+        estimator,
+        fleet,
+        explain: ExplainChoice::default(),
+        spectrum: SpectrumChoice::default(),
+        infer: Some(Arc::new(infer)),
+        delays,
+        runs_here: true,
+        whole_answers: false,
+        solver_host: host,
+        warnings: Vec::new(),
+    })
+}
+
+/// Whether the rates are linear in the unknowns, and functions are known.
+fn check_functions(
+    source: &Source,
+    section: &InferSection,
+    equations: &EquationsDef,
+    constants: &std::collections::BTreeMap<String, f64>,
+    sums: &SumsDef,
+) {
+    let refused = if sums.unknown.is_empty() {
+        Drift::of_texts(equations, constants, &sums.functions, &sums.left).err()
+    } else {
+        Drift::of_rates(equations, constants, &sums.unknown, &sums.left).err()
+    };
+    if let Some(error) = refused {
+        let listed = section.parameters.iter().chain(&section.functions);
+        match error {
+            SetupError::Unknown { what, name, nearest } => {
+                let span =
+                    listed.clone().find(|p| *p.get_ref() == name).map_or(section.span.clone(), |p| p.span());
+                let message = format!("no {what} is named `{name}`");
+                match nearest {
+                    Some(near) => source.report_with(span, message, format!("did you mean `{near}`?")),
+                    None => source.report_with(span, message, "name a parameter that a state's rate uses"),
+                }
+            }
+            SetupError::Expression { place, expression, column, message } => {
+                let span = listed
+                    .clone()
+                    .find(|p| *p.get_ref() == expression)
+                    .map_or(section.span.clone(), |p| p.span());
+                let message = format!("in the {place} (`{expression}`, column {column}): {message}");
+                let help = "coefficients are inferred where the rates are linear in them; give other parameters as constants";
+                source.report_with(span, message, help);
+            }
+            other => source.report(section.span.clone(), other.to_string()),
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! `starlings infer`: drift and noise of stochastic equations from recordings of all their states.
+//!
+//! Next files to read: [`mod@print`] for the answer on a terminal, [`crate::fleet_session`] for the fleet.
+
+mod print;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use clap::Parser;
+use starlings_coordinator::fleet::RunIdentity;
+use starlings_coordinator::infer::{InferError, Inference, Progress, infer};
+use starlings_coordinator::report::write_inference;
+use starlings_coordinator::study::Study;
+
+use crate::console::line;
+use crate::failure::Failure;
+use crate::fleet_session::{Entrance, FleetArgs, FleetSession, Out};
+use crate::interrupt;
+use crate::progress::Display;
+
+/// Name of the result in its folder.
+pub(crate) const RESULT: &str = "infer.json";
+
+/// Infer drift and noise of stochastic equations, with intervals, from recordings of all their states.
+///
+/// The study has equations with states that are measured as they are, and a section `[infer]` that says which coefficients are
+/// unknown. Sums over blocks of the recordings are made by the workers; the posterior is a formula over them. The folder
+/// receives study.toml, infer.json, coefficients.csv and report.html.
+#[derive(Parser)]
+pub(crate) struct Args {
+    /// The study file.
+    study: PathBuf,
+    /// Folder of the result; runs/NAME-infer-TIME without it.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    fleet: FleetArgs,
+    /// Print the inference as JSON on standard output and nothing else.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Infers, and writes the folder.
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    interrupt::watch();
+    let study = Study::load_for_inference(&args.study)?;
+    let plan = args.fleet.plan(&study, Some(&Out(args.out.as_deref())))?;
+    let entrance = Entrance::take(&plan, args.out.as_deref())?;
+    let folder = folder(&study, args.out.as_deref())?;
+    let display = Arc::new(Display::new(args.json));
+    let mut session = FleetSession::listen(&study, &plan, entrance, RunIdentity::new(), &display)?;
+    session.start_workers(&study, &plan, Some(&folder))?;
+    let mut watch = |at: &Progress| display.blocks(at);
+    let result = infer(&study, &mut session.fleet, &mut watch);
+    display.finish();
+    session.close(result.is_ok());
+    let found = result.map_err(|error| failed(&error))?;
+    write_study(&study, &folder)?;
+    write_inference(&folder, &found).map_err(Failure::run)?;
+    tell(&found, &folder, args.json)
+}
+
+/// Writes the files of an inference again from its result.
+pub(crate) fn write_again(folder: &Path, overview: bool, json: bool) -> Result<(), Failure> {
+    if overview {
+        return Err(Failure::input("an inference has no overview picture: leave out --overview"));
+    }
+    let path = folder.join(RESULT);
+    let unreadable = |error: &dyn std::fmt::Display| Failure::input(format!("cannot read {}: {error}", path.display()));
+    let text = std::fs::read_to_string(&path).map_err(|error| unreadable(&error))?;
+    let found: Inference = serde_json::from_str(&text).map_err(|error| unreadable(&error))?;
+    write_inference(folder, &found).map_err(Failure::run)?;
+    tell(&found, folder, json)
+}
+
+fn tell(found: &Inference, folder: &Path, json: bool) -> Result<(), Failure> {
+    if json {
+        return line(serde_json::to_string_pretty(found).map_err(Failure::run)?);
+    }
+    print::print(found, folder)
+}
+
+/// The folder of the result, made where it is not there; another result in it is refused.
+fn folder(study: &Study, out: Option<&Path>) -> Result<PathBuf, Failure> {
+    let stamp = jiff::Timestamp::now().strftime("%Y%m%d-%H%M%S");
+    let default = || Path::new("runs").join(format!("{}-infer-{stamp}", study.name));
+    let path = out.map_or_else(default, Path::to_owned);
+    for name in [RESULT, "run.db"] {
+        if path.join(name).exists() {
+            let message = format!("{} holds a result already: give another --out, or remove it", path.display());
+            return Err(Failure::input(message));
+        }
+    }
+    std::fs::create_dir_all(&path)
+        .map_err(|error| Failure::input(format!("cannot make the folder {}: {error}", path.display())))?;
+    Ok(path)
+}
+
+fn write_study(study: &Study, folder: &Path) -> Result<(), Failure> {
+    let path = folder.join("study.toml");
+    std::fs::write(&path, &*study.text)
+        .map_err(|error| Failure::run(format!("cannot write {}: {error}", path.display())))
+}
+
+fn failed(error: &InferError) -> Failure {
+    if error.is_cancelled() {
+        return interrupt::failure("nothing is kept of it: start again");
+    }
+    if error.is_input() { Failure::input(error) } else { Failure::run(error) }
+}
