@@ -9,6 +9,7 @@ mod check;
 mod conformance;
 mod console;
 mod csv_file;
+mod deploy;
 mod disk;
 mod effects;
 mod explain;
@@ -71,6 +72,8 @@ enum Command {
     Spectrum(spectrum::Args),
     /// Be a worker: dial a coordinator and run its jobs.
     Worker(worker::Args),
+    /// Start the workers of a study under an engine that starts and supervises processes.
+    Deploy(deploy::Args),
     /// Try an external solver out: does it do what a study relies on?
     Conformance(conformance::Args),
     /// Serve the model of a study as an external solver.
@@ -102,6 +105,7 @@ fn main() -> ExitCode {
         Command::Identify(args) => identify::run(&args),
         Command::Spectrum(args) => spectrum::run(&args),
         Command::Worker(args) => worker::run(&args),
+        Command::Deploy(args) => deploy::run(&args),
         Command::Conformance(args) => conformance::run(&args),
         Command::Serve(args) => serve::run(&args),
         Command::Guard => {
@@ -143,6 +147,7 @@ impl Command {
     fn prints_json(&self) -> bool {
         match self {
             Self::Run(args) => args.json,
+            Self::Deploy(args) => args.prints_json(),
             Self::Explain(args) => args.json,
             Self::Infer(args) => args.json,
             Self::Check(args) => args.json,

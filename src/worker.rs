@@ -17,6 +17,7 @@ use crate::console::{cancel_on_signal, line, note};
 use crate::failure::Failure;
 use crate::solvers::{adapter_names, solvers};
 use contact::ContactArgs;
+pub(crate) use contact::duration;
 use permit::{PermitArgs, here};
 
 /// Be a worker: dial the coordinator, run its jobs, hold nothing it needs.

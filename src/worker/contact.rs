@@ -69,7 +69,7 @@ impl ContactArgs {
 }
 
 /// A time as people write it.
-fn duration(text: &str) -> Result<Duration, String> {
+pub(crate) fn duration(text: &str) -> Result<Duration, String> {
     let wrong = |_| "expected a time such as 90s, 10m or 1h30m".to_owned();
     let parsed: SignedDuration = text.parse().map_err(wrong)?;
     Duration::try_from(parsed).map_err(|_| "expected a time of zero or more".to_owned())

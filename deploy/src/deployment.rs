@@ -1,0 +1,105 @@
+//! A deployment: its folder with the scripts, the logs and `deployment.json`, from which it is asked and removed later.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::engine::{Engine, engine};
+use crate::error::DeployError;
+use crate::logs;
+use crate::order::Order;
+use crate::task::{Role, Task};
+
+/// Name of the file that says what a folder deploys.
+pub const FILE: &str = "deployment.json";
+
+/// Number of its format.
+const FORMAT: u64 = 1;
+
+/// What `deployment.json` says.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Record {
+    starlings_deployment: u64,
+    engine: String,
+    #[serde(flatten)]
+    order: Order,
+}
+
+/// A folder of a deployment.
+pub struct Deployment {
+    /// The folder, absolute.
+    pub folder: PathBuf,
+    /// What was asked for.
+    pub order: Order,
+    engine: &'static dyn Engine,
+}
+
+impl Deployment {
+    /// Writes the folder of a deployment; nothing is submitted.
+    ///
+    /// # Errors
+    /// When something stands there already, the order is none for this engine, or it cannot be written.
+    pub fn write(engine: &'static dyn Engine, order: Order, folder: &Path) -> Result<Self, DeployError> {
+        let files = engine.files(&order, folder)?;
+        if fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some()) {
+            return Err(DeployError::Occupied(folder.to_owned()));
+        }
+        let logs = folder.join(logs::FOLDER);
+        fs::create_dir_all(&logs).map_err(|source| DeployError::Unwritable { path: logs, source })?;
+        let record = Record { starlings_deployment: FORMAT, engine: engine.name().to_owned(), order };
+        let text = serde_json::to_string_pretty(&record).map_err(io::Error::from);
+        let put = |name: &str, text: io::Result<String>| {
+            let path = folder.join(name);
+            text.and_then(|text| fs::write(&path, text))
+                .map_err(|source| DeployError::Unwritable { path, source })
+        };
+        files.into_iter().try_for_each(|(name, text)| put(&name, Ok(text)))?;
+        // Last: what has it is whole.
+        put(FILE, text.map(|text| text + "\n"))?;
+        Ok(Self { folder: folder.to_owned(), order: record.order, engine })
+    }
+
+    /// Reads the deployment of a folder.
+    ///
+    /// # Errors
+    /// When there is none.
+    pub fn read(folder: &Path) -> Result<Self, DeployError> {
+        let none = |reason: String| DeployError::NoDeployment { path: folder.to_owned(), reason };
+        let text = fs::read_to_string(folder.join(FILE)).map_err(|error| none(format!("{FILE}: {error}")))?;
+        let record: Record = serde_json::from_str(&text).map_err(|error| none(format!("{FILE}: {error}")))?;
+        if record.starlings_deployment != FORMAT {
+            let found = record.starlings_deployment;
+            return Err(none(format!("{FILE} is of format {found}, this program reads {FORMAT}")));
+        }
+        let engine = engine(&record.engine)
+            .ok_or_else(|| none(format!("{FILE}: no engine named `{}`", record.engine)))?;
+        let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
+        Ok(Self { folder, order: record.order, engine })
+    }
+
+    /// The engine that runs it.
+    pub fn engine(&self) -> &'static dyn Engine {
+        self.engine
+    }
+
+    /// Every process of the deployment, the coordinator first.
+    ///
+    /// # Errors
+    /// When the engine gives no answer.
+    pub fn tasks(&self) -> Result<Vec<Task>, DeployError> {
+        self.engine.tasks(self)
+    }
+
+    /// What should be there: the coordinator where it is a job, and the workers.
+    pub fn roles(&self) -> Vec<Role> {
+        let coordinator = self.order.run_folder.as_ref().map(|_| Role::Coordinator);
+        coordinator.into_iter().chain((0..self.order.workers).map(Role::Worker)).collect()
+    }
+
+    /// The last lines of the log of a process; empty where it has none.
+    pub fn last_lines(&self, role: Role, n: usize) -> Vec<String> {
+        logs::last_lines(&self.folder.join(logs::FOLDER).join(role.log()), n)
+    }
+}

@@ -1,0 +1,103 @@
+//! Why nothing was deployed, or nothing is known of what was.
+
+use std::io;
+use std::path::PathBuf;
+
+/// Why a deployment could not be made, asked or cancelled.
+#[derive(Debug, thiserror::Error)]
+pub enum DeployError {
+    /// A program of the engine is not on this machine.
+    #[error("there is no program `{program}` on this machine, which {engine} has: {remedy}")]
+    Missing {
+        /// The program.
+        program: String,
+        /// Whose it is.
+        engine: &'static str,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// The engine did not take what was submitted.
+    #[error(
+        "{program} refused the submission: {said}\n  nothing is left in the queue; it was asked with: {command}"
+    )]
+    Refused {
+        /// The program.
+        program: String,
+        /// Its words.
+        said: String,
+        /// The whole command.
+        command: String,
+    },
+    /// A program of the engine failed.
+    #[error("{program} failed: {said}\n  it was called with: {command}")]
+    Failed {
+        /// The program.
+        program: String,
+        /// Its words.
+        said: String,
+        /// The whole command.
+        command: String,
+    },
+    /// A program of the engine did not end.
+    #[error("{program} gave no answer within {seconds} s: is the engine up? It was called with: {command}")]
+    NoAnswer {
+        /// The program.
+        program: String,
+        /// How long it was waited for.
+        seconds: u64,
+        /// The whole command.
+        command: String,
+    },
+    /// The folder holds no deployment.
+    #[error("{} is no folder of a deployment ({reason}): name one that `starlings deploy` wrote", path.display())]
+    NoDeployment {
+        /// The folder.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+    /// The folder for a deployment has something in it.
+    #[error("{} is not empty: give a folder that is free with --out", .0.display())]
+    Occupied(PathBuf),
+    /// An option for the engine that a deployment sets itself.
+    #[error("{option} cannot be given to {engine}: {reason}")]
+    Option {
+        /// The option.
+        option: String,
+        /// The engine.
+        engine: &'static str,
+        /// Who sets it.
+        reason: &'static str,
+    },
+    /// A file cannot be written.
+    #[error("cannot write {}: {source}", path.display())]
+    Unwritable {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// A script could not be made.
+    #[error("the script {name} could not be made: {source}")]
+    Script {
+        /// Its name.
+        name: &'static str,
+        /// What the templates say.
+        source: minijinja::Error,
+    },
+}
+
+impl DeployError {
+    /// Whether what the user gave is at fault, and not the machine.
+    pub fn is_input(&self) -> bool {
+        match self {
+            Self::Missing { .. }
+            | Self::Refused { .. }
+            | Self::NoDeployment { .. }
+            | Self::Occupied(_)
+            | Self::Option { .. } => true,
+            Self::Unwritable { source, .. } => source.kind() != io::ErrorKind::StorageFull,
+            Self::Failed { .. } | Self::NoAnswer { .. } | Self::Script { .. } => false,
+        }
+    }
+}

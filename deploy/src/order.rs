@@ -1,0 +1,68 @@
+//! What is to be deployed.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+/// Workers of a study, how they find their coordinator, and what the engine is told besides. Paths are absolute, as the nodes see them.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Order {
+    /// Name of the deployment in the engine, of letters, digits, `.`, `_` and `-`; no other deployment has it.
+    pub name: String,
+    /// The study file.
+    pub study: PathBuf,
+    /// Whether the model of the study is a program of its own, which the workers must be allowed to start.
+    pub is_solver: bool,
+    /// This program.
+    pub program: PathBuf,
+    /// Number of workers, at least one.
+    pub workers: usize,
+    /// Runs of one worker at a time; the number of cores that it is given where nothing is said.
+    pub slots: Option<usize>,
+    /// The access file, which the coordinator writes and may not stand yet.
+    pub access: PathBuf,
+    /// How long a worker waits for work, such as `10m`.
+    pub idle: String,
+    /// Folder on the nodes for files of runs; the system's where nothing is said.
+    pub scratch: Option<PathBuf>,
+    /// Run folder of a coordinator that is a job too; none where the coordinator is started by hand.
+    pub run_folder: Option<PathBuf>,
+    /// Options for the program that submits.
+    #[serde(default)]
+    pub options: Vec<String>,
+}
+
+/// The longest part of a name that is taken from a study.
+const LONGEST: usize = 40;
+
+impl Order {
+    /// A name for a deployment of a study: `stamp` tells it from others.
+    pub fn name_of(study: &str, stamp: &str) -> String {
+        let is_plain = |c: char| c.is_ascii_alphanumeric() || ".-_".contains(c);
+        let plain: String = study.chars().map(|c| if is_plain(c) { c } else { '-' }).take(LONGEST).collect();
+        format!("starlings-{plain}-{stamp}")
+    }
+
+    /// Name of the coordinator's job in the engine.
+    pub fn coordinator_name(&self) -> String {
+        format!("{}-coordinator", self.name)
+    }
+
+    /// The command that starts a coordinator for these workers by hand, for a shell.
+    pub fn coordinator_command(&self) -> String {
+        let path = |path: &Path| shell_words::quote(&path.to_string_lossy()).into_owned();
+        format!("starlings run {} --listen 0.0.0.0:0 --access {}", path(&self.study), path(&self.access))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_has_only_what_every_engine_takes() {
+        let name = Order::name_of("a b,c/%d\u{e9}", "7");
+        assert_eq!(name, "starlings-a-b-c--d--7");
+        assert_eq!(Order::name_of(&"x".repeat(99), "7").len(), "starlings-".len() + LONGEST + "-7".len());
+    }
+}

@@ -1,0 +1,38 @@
+//! The scripts that engines are given, made from the templates in `deploy/templates`.
+
+use std::path::Path;
+
+use minijinja::syntax::SyntaxConfig;
+use minijinja::value::Serde;
+use minijinja::{Environment, UndefinedBehavior};
+use serde::Serialize;
+
+use crate::error::DeployError;
+
+/// Every template, by its name.
+const TEMPLATES: &[(&str, &str)] = &[
+    ("worker.sh", include_str!("../templates/worker.sh")),
+    ("worker.sbatch", include_str!("../templates/worker.sbatch")),
+    ("coordinator.sbatch", include_str!("../templates/coordinator.sbatch")),
+];
+
+/// The script of a template with these values. A value that is missing is an error; the filter `sh` makes one word for a shell.
+pub(crate) fn script(name: &'static str, values: impl Serialize) -> Result<String, DeployError> {
+    let made = || {
+        let mut environment = Environment::new();
+        environment.set_undefined_behavior(UndefinedBehavior::Strict);
+        environment
+            .set_syntax(SyntaxConfig::builder().keep_trailing_newline(true).trim_blocks(true).build()?);
+        environment.add_filter("sh", |text: String| shell_words::quote(&text).into_owned());
+        for (name, text) in TEMPLATES {
+            environment.add_template(name, text)?;
+        }
+        environment.get_template(name)?.render(Serde(values))
+    };
+    made().map_err(|source| DeployError::Script { name, source })
+}
+
+/// A path as a value of a template.
+pub(crate) fn text(path: &Path) -> String {
+    path.to_string_lossy().into_owned()
+}

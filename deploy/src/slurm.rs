@@ -1,0 +1,158 @@
+//! Slurm: an array of workers, and the coordinator as a job of its own where that is asked for.
+//!
+//! Jobs are known by the name of the deployment, which stands in its folder before anything is submitted: what was submitted is found
+//! whenever this program ended. Next files to read: [`queue`], [`reasons`].
+
+mod queue;
+mod reasons;
+
+use std::path::Path;
+
+use serde_json::json;
+
+use crate::deployment::Deployment;
+use crate::engine::Engine;
+use crate::error::DeployError;
+use crate::logs;
+use crate::order::Order;
+use crate::program::Programs;
+use crate::script::{script, text};
+use crate::task::{Role, State, Task};
+
+/// Slurm 20.11 or later.
+pub struct Slurm;
+
+const PROGRAMS: Programs = Programs {
+    engine: "Slurm",
+    remedy: "deploy from a login node of the cluster, or use `starlings deploy hosts` for machines without an engine",
+    // Times as seconds since 1970.
+    environment: &[("SLURM_TIME_FORMAT", "%s")],
+};
+
+/// Options of sbatch that a deployment sets itself: long name, letter, reason.
+const OWN: &[(&str, char, &str)] = &[
+    ("--array", 'a', "the number of tasks is that of --workers"),
+    ("--job-name", 'J', "the jobs of a deployment are found by their name"),
+    ("--output", 'o', "the logs stand in the folder of the deployment"),
+    ("--error", 'e', "the logs stand in the folder of the deployment"),
+    ("--wrap", '\0', "the script of the deployment is submitted"),
+    ("--wait", 'W', "`starlings deploy watch` waits"),
+    ("--test-only", '\0', "use --dry-run"),
+];
+
+const WORKER: &str = "worker.sbatch";
+const COORDINATOR: &str = "coordinator.sbatch";
+
+impl Engine for Slurm {
+    fn name(&self) -> &'static str {
+        "slurm"
+    }
+
+    fn files(&self, order: &Order, folder: &Path) -> Result<Vec<(String, String)>, DeployError> {
+        for option in &order.options {
+            refuse_own(option)?;
+        }
+        let values = json!({
+            "name": order.name,
+            "last": order.workers.saturating_sub(1),
+            "cores": order.slots.unwrap_or(1),
+            "log": log(folder, "worker-%a.log"),
+            "program": text(&order.program),
+            "access": text(&order.access),
+            "scratch": order.scratch.as_deref().map(text),
+            "idle": order.idle,
+            "slots": slots(order),
+            "is_solver": order.is_solver,
+            "study": text(&order.study),
+        });
+        let mut files = vec![(WORKER.to_owned(), script(WORKER, values)?)];
+        if let Some(run_folder) = &order.run_folder {
+            let values = json!({
+                "name": order.coordinator_name(),
+                "workers": order.name,
+                "log": log(folder, &Role::Coordinator.log()),
+                "program": text(&order.program),
+                "access": text(&order.access),
+                "study": text(&order.study),
+                "run_folder": text(run_folder),
+            });
+            files.push((COORDINATOR.to_owned(), script(COORDINATOR, values)?));
+        }
+        Ok(files)
+    }
+
+    fn commands(&self, deployment: &Deployment) -> Vec<Vec<String>> {
+        let order = &deployment.order;
+        // The workers wait for what the coordinator writes, so it is the first in the queue.
+        let coordinator = order.run_folder.as_ref().map(|_| COORDINATOR);
+        let submission = |script: &str| {
+            let head = ["sbatch", "--parsable"].map(str::to_owned);
+            let script = text(&deployment.folder.join(script));
+            head.into_iter().chain(order.options.iter().cloned()).chain([script]).collect()
+        };
+        coordinator.into_iter().chain([WORKER]).map(submission).collect()
+    }
+
+    fn submit(&self, deployment: &Deployment) -> Result<(), DeployError> {
+        for command in self.commands(deployment) {
+            let said = PROGRAMS.run(&command, "")?;
+            if !said.is_well {
+                // What was taken before it is of no use alone.
+                let _ = self.cancel(deployment);
+                return Err(said.refused());
+            }
+        }
+        Ok(())
+    }
+
+    fn tasks(&self, deployment: &Deployment) -> Result<Vec<Task>, DeployError> {
+        let (order, roles) = (&deployment.order, deployment.roles());
+        let answer = PROGRAMS.run(&queue::command(order), "")?.answer()?;
+        Ok(queue::tasks(&answer, order, &roles))
+    }
+
+    fn cancel(&self, deployment: &Deployment) -> Result<(), DeployError> {
+        // The coordinator first: the workers of one that goes on are missed.
+        for name in [deployment.order.coordinator_name(), deployment.order.name.clone()] {
+            PROGRAMS.run(&["scancel".to_owned(), format!("--name={name}")], "")?.answer()?;
+        }
+        Ok(())
+    }
+
+    fn release(&self, task: &Task) -> Result<bool, DeployError> {
+        let is_held_back =
+            task.state == State::Waiting && task.restarts > 0 && task.reason.as_deref() == Some("BeginTime");
+        if is_held_back {
+            let update = ["scontrol", "update", &format!("JobId={}", task.id), "StartTime=now"];
+            PROGRAMS.run(&update.map(str::to_owned), "")?.answer()?;
+        }
+        Ok(is_held_back)
+    }
+}
+
+/// The pattern of a log for Slurm, in which only that of `name` is one, inside double quotes.
+fn log(folder: &Path, name: &str) -> String {
+    let folder =
+        text(&folder.join(logs::FOLDER)).replace('%', "%%").replace('\\', "\\\\").replace('"', "\\\"");
+    format!("{folder}/{name}")
+}
+
+/// Slots of a worker inside double quotes of a shell: as ordered, else one for every core that the task was given.
+fn slots(order: &Order) -> String {
+    let given = "${SLURM_CPUS_PER_TASK:-${SLURM_CPUS_ON_NODE:-1}}".to_owned();
+    order.slots.map_or(given, |slots| slots.to_string())
+}
+
+fn refuse_own(option: &str) -> Result<(), DeployError> {
+    let is_own = |(long, letter, _): &&(&str, char, &str)| {
+        let rest = option.strip_prefix(long);
+        rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('='))
+            || (*letter != '\0' && option.strip_prefix('-').is_some_and(|rest| rest.starts_with(*letter)))
+    };
+    match OWN.iter().find(is_own) {
+        Some((_, _, reason)) => {
+            Err(DeployError::Option { option: option.to_owned(), engine: "sbatch", reason })
+        }
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,44 @@
+set -u
+
+program={{ program|sh }}
+access={{ access|sh }}
+{% if scratch is none %}
+base="${TMPDIR:-/tmp}"
+{% else %}
+base={{ scratch|sh }}
+{% endif %}
+
+say() { printf 'starlings: %s: %s\n' "$(uname -n)" "$*" >&2; }
+
+if [ ! -x "$program" ]; then
+  say "there is no program $program on this node: put it where the nodes see it, or name it with --program"
+  exit 2
+fi
+if ! scratch="$(mktemp -d "$base/{{ name }}-XXXXXX" 2> /dev/null)"; then
+  say "no scratch folder can be made in $base: is it there, and may you write in it? Name another with --scratch"
+  exit 2
+fi
+trap 'rm -rf -- "$scratch"' EXIT
+export TMPDIR="$scratch"
+
+# The engine may have told the worker itself: a second word at once would end it without order.
+worker=
+stopped=
+stop() {
+  stopped=yes
+  sleep 1
+  [ -z "$worker" ] || kill -TERM "$worker" 2> /dev/null
+}
+trap stop TERM INT
+
+"$program" worker --access "$access" --stay --idle {{ idle|sh }} --slots "{{ slots }}"{% if is_solver %} --solver-from {{ study|sh }}{% endif %} &
+worker=$!
+[ -z "$stopped" ] || kill -TERM "$worker" 2> /dev/null
+
+# A signal interrupts `wait` before the worker has ended.
+while :; do
+  wait "$worker"
+  code=$?
+  kill -0 "$worker" 2> /dev/null || break
+done
+exit "$code"
