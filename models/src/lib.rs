@@ -17,4 +17,5 @@ pub use starlings_haemodynamics::prestress;
 /// The built-in models of all families, by the names of their types.
 pub mod native {
     pub use starlings_haemodynamics::*;
+    pub use starlings_propulsion::RocketMotor;
 }
