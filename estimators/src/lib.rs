@@ -6,7 +6,8 @@
 //! and every reduction runs in a fixed order, so the same input gives the same bits.
 //!
 //! Read next: `kind.rs` (which estimators there are), then `sigma_set.rs` (where the particles are) and `roukf.rs` (what an
-//! analysis does with them). `inference.rs` stands apart: it sees a recording and a formula, no particles.
+//! analysis does with them). `inference.rs` stands apart: it sees a recording and a formula, no particles; `forecast.rs`
+//! sees the courses of an ensemble.
 
 mod analysis;
 mod batch;
@@ -18,6 +19,7 @@ mod drift;
 mod error;
 mod exchange;
 mod filter;
+pub mod forecast;
 mod gaussian;
 mod gram;
 mod identifiability;
