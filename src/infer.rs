@@ -67,7 +67,8 @@ pub(crate) fn write_again(folder: &Path, overview: bool, json: bool) -> Result<(
         return Err(Failure::input("an inference has no overview picture: leave out --overview"));
     }
     let path = folder.join(RESULT);
-    let unreadable = |error: &dyn std::fmt::Display| Failure::input(format!("cannot read {}: {error}", path.display()));
+    let unreadable =
+        |error: &dyn std::fmt::Display| Failure::input(format!("cannot read {}: {error}", path.display()));
     let text = std::fs::read_to_string(&path).map_err(|error| unreadable(&error))?;
     let found: Inference = serde_json::from_str(&text).map_err(|error| unreadable(&error))?;
     write_inference(folder, &found).map_err(Failure::run)?;
@@ -88,7 +89,8 @@ fn folder(study: &Study, out: Option<&Path>) -> Result<PathBuf, Failure> {
     let path = out.map_or_else(default, Path::to_owned);
     for name in [RESULT, "run.db"] {
         if path.join(name).exists() {
-            let message = format!("{} holds a result already: give another --out, or remove it", path.display());
+            let message =
+                format!("{} holds a result already: give another --out, or remove it", path.display());
             return Err(Failure::input(message));
         }
     }

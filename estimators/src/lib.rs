@@ -7,7 +7,7 @@
 //!
 //! Read next: `kind.rs` (which estimators there are), then `sigma_set.rs` (where the particles are) and `roukf.rs` (what an
 //! analysis does with them). `inference.rs` and `unknown_input.rs` stand apart: they see a recording and a
-//! formula, no particles.
+//! formula, no particles; `forecast.rs` sees the courses of an ensemble.
 
 mod analysis;
 mod batch;
@@ -19,6 +19,7 @@ mod drift;
 mod error;
 mod exchange;
 mod filter;
+pub mod forecast;
 mod gaussian;
 mod gram;
 mod identifiability;

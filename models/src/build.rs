@@ -34,6 +34,11 @@ pub trait BuildSetup {
     /// # Errors
     /// When the model or an effect does not build.
     fn model(&self) -> Result<Box<dyn Model>, SetupError>;
+
+    /// Whether the model's states have noise; no for a model that does not build.
+    fn is_noisy(&self) -> bool {
+        self.model().is_ok_and(|model| model.n_noise() > 0)
+    }
 }
 
 impl BuildSetup for Setup {

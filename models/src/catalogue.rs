@@ -14,8 +14,11 @@ use starlings_models_core::{
 pub use starlings_models_core::equations::KIND as EQUATIONS;
 
 /// The built-in models, one entry per family.
-pub const NATIVE: NativeModels =
-    NativeModels::of(&[starlings_haemodynamics::MODELS, starlings_structures::MODELS]);
+pub const NATIVE: NativeModels = NativeModels::of(&[
+    starlings_haemodynamics::MODELS,
+    starlings_propulsion::MODELS,
+    starlings_structures::MODELS,
+]);
 
 /// What every kind of model says of itself, in the order of the list of built-in ones, `equations` last; the lists of
 /// `equations` are empty, since the study fills them.

@@ -18,4 +18,5 @@ pub use starlings_structures as structures;
 /// The built-in models of all families, by the names of their types.
 pub mod native {
     pub use starlings_haemodynamics::*;
+    pub use starlings_propulsion::RocketMotor;
 }

@@ -142,7 +142,8 @@ fn diffusion(found: &Inference) -> Vec<Vec<String>> {
     let noise = &found.diffusion;
     let row = |i: usize| {
         let values = noise.matrix[i].iter().zip(&noise.sd[i]);
-        let cells = values.map(|(value, sd)| format!("{} ± {}", number::with_sd(*value, *sd), number::significant(*sd, 2)));
+        let cells = values
+            .map(|(value, sd)| format!("{} ± {}", number::with_sd(*value, *sd), number::significant(*sd, 2)));
         std::iter::once(found.equations[i].clone()).chain(cells).collect()
     };
     (0..noise.matrix.len()).map(row).collect()
@@ -153,7 +154,11 @@ fn unknowns(reduced: &ReducedFound) -> Vec<Row> {
         name: u.name.clone(),
         estimate: number::with_sd(u.estimate, u.sd),
         sd: number::significant(u.sd, 2),
-        interval: format!("{} to {}", number::with_sd(u.interval90[0], u.sd), number::with_sd(u.interval90[1], u.sd)),
+        interval: format!(
+            "{} to {}",
+            number::with_sd(u.interval90[0], u.sd),
+            number::with_sd(u.interval90[1], u.sd)
+        ),
         says: String::new(),
     };
     reduced.unknowns.iter().map(row).collect()
@@ -166,7 +171,8 @@ fn checks(found: &Inference) -> Vec<[String; 4]> {
             starlings_estimators::inference::Verdict::Absent => "none that matter",
             starlings_estimators::inference::Verdict::Unclear => "too few steps to say",
         };
-        let ratio = format!("{} ± {}", number::with_sd(check.ratio, check.sd), number::significant(check.sd, 2));
+        let ratio =
+            format!("{} ± {}", number::with_sd(check.ratio, check.sd), number::significant(check.sd, 2));
         let measured = number::significant(check.measured.max(0.0).sqrt(), 2);
         [check.equation.clone(), ratio, measured, verdict.to_owned()]
     };

@@ -25,7 +25,7 @@ mod units;
 use std::path::Path;
 use std::sync::Arc;
 
-use starlings_models::{Setup, SolverDef};
+use starlings_models::{BuildSetup, Setup, SolverDef};
 
 use self::built::CheckedModel;
 use self::parameters::initial_medians;

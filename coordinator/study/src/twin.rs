@@ -13,7 +13,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use starlings_models::effect::library::library_in;
-use starlings_models::{ObserverDef, ParticleError, Setup, SetupError, Window, nearest};
+use starlings_models::{BuildSetup, ObserverDef, ParticleError, Setup, SetupError, Window, nearest};
 
 use super::check::relative::relative;
 use super::check::scales::{CourseError, Ruler, Trial};

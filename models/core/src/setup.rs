@@ -77,15 +77,6 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// Whether the model's states have noise.
-    pub fn is_noisy(&self) -> bool {
-        self.model
-            .equations
-            .iter()
-            .flat_map(|equations| &equations.states)
-            .any(|state| !state.noise.is_empty())
-    }
-
     /// The effects with the built-in ones written out for a model of this specification; their unit labels, which no run
     /// reads, are those of a time in seconds.
     ///

@@ -5,6 +5,7 @@ pub mod dense;
 pub mod fhn;
 pub mod lorenz;
 pub mod motor;
+pub mod neutral;
 pub mod sde;
 pub mod tanks;
 
