@@ -9,6 +9,7 @@ mod data;
 mod explain;
 mod explained;
 mod files;
+mod forecast;
 mod hangs_on;
 mod headline;
 mod identify;
@@ -27,6 +28,7 @@ mod tests;
 pub use data::ReportData;
 pub use explained::{state_names, write_explanation};
 pub use files::{FilesError, write_files, write_page};
+pub use forecast::forecast_page;
 pub use identify::identify_page;
 pub use overview::overview_svg;
 
