@@ -24,21 +24,30 @@ pub(crate) fn load(path: &Path) -> Result<Study, Failure> {
 
 /// The same; where the runs are made elsewhere, no solver is started on this machine.
 pub(crate) fn load_where(path: &Path, here: bool) -> Result<Study, Failure> {
-    if !here {
-        let describe = |_: &_| {
-            Err(Undescribed {
-                reason: "with --listen no solver is started on this machine".to_owned(),
-                last_words: None,
-                is_absent: true,
-            })
-        };
-        let host = SolverHost::asking(describe, Arc::new(Setup::build)).inspecting(faults).by(adapters());
-        return Ok(Study::load_with(path, &host)?);
-    }
-    load_here(path)
+    Ok(Study::load_with(path, &host(here))?)
 }
 
-fn load_here(path: &Path) -> Result<Study, Failure> {
+/// The same for the text of a study that stood at `path` when it was run.
+pub(crate) fn load_frozen(path: &Path, text: &str, here: bool) -> Result<Study, Failure> {
+    Ok(Study::from_text_with(path, text, &host(here))?)
+}
+
+fn host(here: bool) -> SolverHost {
+    if here { host_here() } else { host_elsewhere() }
+}
+
+fn host_elsewhere() -> SolverHost {
+    let describe = |_: &_| {
+        Err(Undescribed {
+            reason: "with --listen no solver is started on this machine".to_owned(),
+            last_words: None,
+            is_absent: true,
+        })
+    };
+    SolverHost::asking(describe, Arc::new(Setup::build)).inspecting(faults).by(adapters())
+}
+
+fn host_here() -> SolverHost {
     let describe = |def: &_| {
         here()?.describe(def).map_err(|error| Undescribed {
             reason: error.to_string(),
@@ -47,8 +56,7 @@ fn load_here(path: &Path) -> Result<Study, Failure> {
         })
     };
     let factory = Arc::new(|setup: &_| here().map_err(SetupError::Invalid)?.build(setup));
-    let host = SolverHost::asking(describe, factory).inspecting(faults).by(adapters());
-    Ok(Study::load_with(path, &host)?)
+    SolverHost::asking(describe, factory).inspecting(faults).by(adapters())
 }
 
 /// Whether the model of a study is a program of its own.

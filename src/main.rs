@@ -17,6 +17,7 @@ mod export;
 mod failure;
 mod fleet_session;
 mod fleet_values;
+mod forecast;
 mod guard;
 mod identify;
 mod infer;
@@ -68,6 +69,8 @@ enum Command {
     Infer(infer::Args),
     /// Say whether the estimation is reasonable, before it is made: what these data could determine.
     Identify(identify::Args),
+    /// Forecast from a finished run: quantiles against time, and when a quantity crosses a level.
+    Forecast(forecast::Args),
     /// Show how the poles of the model's error move with the gain of each observer.
     Spectrum(spectrum::Args),
     /// Be a worker: dial a coordinator and run its jobs.
@@ -103,6 +106,7 @@ fn main() -> ExitCode {
         Command::Check(args) => check::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Identify(args) => identify::run(&args),
+        Command::Forecast(args) => forecast::run(&args),
         Command::Spectrum(args) => spectrum::run(&args),
         Command::Worker(args) => worker::run(&args),
         Command::Deploy(args) => deploy::run(&args),
@@ -152,6 +156,7 @@ impl Command {
             Self::Infer(args) => args.json,
             Self::Check(args) => args.json,
             Self::Identify(args) => args.json,
+            Self::Forecast(args) => args.json,
             Self::Spectrum(args) => args.json,
             Self::Conformance(args) => args.json,
             Self::Models(args) => args.json,

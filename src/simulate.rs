@@ -80,7 +80,7 @@ fn noise(text: &str) -> Result<Noise, String> {
 }
 
 /// `NAME=VALUE` with a finite value.
-fn assignment(text: &str) -> Result<(String, f64), String> {
+pub(crate) fn assignment(text: &str) -> Result<(String, f64), String> {
     let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE")?;
     let value: f64 = value.trim().parse().map_err(|_| format!("`{value}` is not a number"))?;
     if value.is_finite() {

@@ -13,6 +13,7 @@ mod failures;
 pub mod field;
 mod file;
 mod fit;
+pub mod forecast;
 #[cfg(fuzzing)]
 pub mod fuzzing;
 mod given_residuals;

@@ -35,6 +35,9 @@ pub struct StudyInfo {
     /// Names of the model's states.
     #[serde(default)]
     pub states: Vec<String>,
+    /// Where the study file stood.
+    #[serde(default)]
+    pub file: String,
     /// Record names and training spans; `None` for a record that is held out as a whole.
     pub records: Vec<(String, Option<[f64; 2]>)>,
     /// The command line of the run.
@@ -78,6 +81,7 @@ pub(super) fn info(study: &Study, command: &str, started: &str) -> StudyInfo {
             .collect(),
         stiffness: stiffness(study),
         states: study.spec.states.iter().map(|q| q.name.clone()).collect(),
+        file: std::path::absolute(&study.file).unwrap_or_else(|_| study.file.clone()).display().to_string(),
         records: study.records.iter().map(|r| (r.name.clone(), r.train_span())).collect(),
         command: command.to_owned(),
         started: started.to_owned(),

@@ -1,0 +1,168 @@
+//! What is asked of a forecast, and what it makes of a study: a setup, times, the outputs that are recorded.
+
+use starlings_estimators::forecast::Level;
+use starlings_models::{BuildSetup, ObserverDef, Setup, nearest};
+
+use super::StudyForecastError;
+use crate::Study;
+use crate::field::components;
+
+/// Numbers of an ensemble at most: members times outputs times rows.
+const MOST_NUMBERS: f64 = 2e8;
+
+/// A level of a quantity.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Threshold {
+    /// The output or scalar state.
+    pub output: String,
+    /// The level and its side.
+    pub level: Level,
+}
+
+/// What is asked.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Ask {
+    /// The record whose start, inputs and times are used.
+    pub record: usize,
+    /// Values by name that all members have: parameters, constants or `initial:<state>`.
+    pub values: Vec<(String, f64)>,
+    /// Last time; the record's end without it.
+    pub until: Option<f64>,
+    /// Spacing of the times after the record's end; its mean spacing without it.
+    pub step: Option<f64>,
+    /// Levels whose crossing is wanted.
+    pub thresholds: Vec<Threshold>,
+    /// Time by which the probability of a crossing is wanted.
+    pub horizon: Option<f64>,
+    /// Members of the ensemble.
+    pub members: usize,
+    /// Seed of draws and noise.
+    pub seed: u64,
+}
+
+/// What members are run with.
+#[derive(Clone, Debug)]
+pub(super) struct Plan {
+    pub(super) record: usize,
+    pub(super) setup: Setup,
+    pub(super) times: Vec<f64>,
+    /// Values that all members have, by their place in the setup's parameters.
+    pub(super) fixed: Vec<(usize, f64)>,
+    pub(super) members: usize,
+    pub(super) seed: u64,
+}
+
+impl Plan {
+    /// The row of an output that is in the plan.
+    pub(super) fn row(&self, output: &str) -> usize {
+        self.setup.outputs.iter().position(|name| name == output).unwrap_or_default()
+    }
+}
+
+impl Ask {
+    /// Makes of it what members are run with.
+    ///
+    /// # Errors
+    /// When a name is unknown, with the nearest valid one, or a time or count makes no forecast.
+    pub(super) fn plan(&self, study: &Study) -> Result<Plan, StudyForecastError> {
+        let mut setup = study.setup.clone();
+        setup.observer = ObserverDef::default();
+        setup.noise = study.setup.is_noisy().then_some(self.seed);
+        setup.outputs = self.outputs(study)?;
+        let mut fixed = Vec::new();
+        for (name, value) in &self.values {
+            match setup.parameters.iter().position(|p| p == name) {
+                Some(place) => fixed.push((place, *value)),
+                None => {
+                    known(study, name)?;
+                    setup.model.constants.insert(name.clone(), *value);
+                }
+            }
+        }
+        let times = self.times(study)?;
+        let numbers = self.members as f64 * setup.outputs.len() as f64 * times.len() as f64;
+        if self.members == 0 || numbers > MOST_NUMBERS {
+            return Err(StudyForecastError::Request(format!(
+                "{} members of {} outputs at {} times: give at least one member, and no more than {MOST_NUMBERS:e} numbers in all",
+                self.members,
+                setup.outputs.len(),
+                times.len()
+            )));
+        }
+        Ok(Plan { record: self.record, setup, times, fixed, members: self.members, seed: self.seed })
+    }
+
+    /// What the record measures, component by component, and what has a level.
+    fn outputs(&self, study: &Study) -> Result<Vec<String>, StudyForecastError> {
+        let all = components(&study.spec.outputs);
+        let states = study.spec.states.iter().filter(|q| q.size == 1).map(|q| q.name.clone());
+        let possible: Vec<String> = all.iter().cloned().chain(states).collect();
+        let measured = study.records[self.record].channels.iter().filter(|c| c.node.is_none());
+        let mut outputs: Vec<String> = Vec::new();
+        let asked = self.thresholds.iter().map(|t| &t.output);
+        for name in measured.map(|c| &c.output).chain(asked) {
+            if !possible.contains(name) {
+                let hint =
+                    nearest(name, &possible).map(|n| format!("; did you mean `{n}`?")).unwrap_or_default();
+                let message = format!("no output or scalar state named `{name}`{hint}");
+                return Err(StudyForecastError::Request(message));
+            }
+            if !outputs.contains(name) {
+                outputs.push(name.clone());
+            }
+        }
+        if outputs.is_empty() {
+            let message =
+                "the record measures no output: name one with --level, as in --level \"pressure>5\"";
+            return Err(StudyForecastError::Request(message.to_owned()));
+        }
+        Ok(outputs)
+    }
+
+    /// The record's times, and regular ones after its end.
+    fn times(&self, study: &Study) -> Result<Vec<f64>, StudyForecastError> {
+        let request = |message: String| Err(StudyForecastError::Request(message));
+        let recorded = &study.records[self.record].times;
+        let (start, end) = match (recorded.first(), recorded.last()) {
+            (Some(start), Some(end)) => (*start, *end),
+            _ => return request("the record has no times".to_owned()),
+        };
+        let until = self.until.unwrap_or(end);
+        if !(until > start && until.is_finite()) {
+            return request(format!("--until {until}: give a time after the record's start at {start}"));
+        }
+        if let Some(horizon) = self.horizon.filter(|horizon| !(*horizon > start && *horizon <= until)) {
+            return request(format!(
+                "--horizon {horizon}: give a time after the record's start at {start} and up to the end at {until}"
+            ));
+        }
+        let step = self.step.unwrap_or((end - start) / (recorded.len() - 1).max(1) as f64);
+        if !(step > 0.0 && step.is_finite()) {
+            return request(format!("--step {step}: give a number above zero"));
+        }
+        let mut times: Vec<f64> = recorded.iter().copied().filter(|t| *t <= until).collect();
+        let n = ((until - end) / step + 1e-9).floor().max(0.0);
+        if n > MOST_NUMBERS {
+            return request(format!(
+                "--until {until} with steps of {step} makes {n:.1e} rows: give a larger --step"
+            ));
+        }
+        times.extend((1..=n as usize).map(|k| step.mul_add(k as f64, end)));
+        Ok(times)
+    }
+}
+
+/// Refuses a value for a name that the model does not have.
+fn known(study: &Study, name: &str) -> Result<(), StudyForecastError> {
+    let mut names: Vec<String> = study.setup.parameters.clone();
+    names.extend(study.spec.parameters.iter().map(|q| q.name.clone()));
+    names.extend(study.setup.model.constants.keys().cloned());
+    names.extend(components(&study.spec.states).iter().map(|state| format!("initial:{state}")));
+    if names.iter().any(|known| known == name) {
+        return Ok(());
+    }
+    let hint = nearest(name, &names).map(|n| format!("; did you mean `{n}`?")).unwrap_or_default();
+    Err(StudyForecastError::Request(format!(
+        "--set {name}: the study has no parameter, constant or initial value of that name{hint}"
+    )))
+}

@@ -1,0 +1,183 @@
+//! The result of a forecast: what is written as `forecast.json`, and the courses that its tables and figures show.
+
+use serde::Serialize;
+use starlings_estimators::forecast::{Crossings, Direction, Fan};
+
+use super::Threshold;
+use crate::field::quantity_of;
+use crate::{Study, checked::Channel, checked::Record};
+
+/// A forecast.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Forecast {
+    /// Name of the study.
+    pub study: String,
+    /// Kind of the model.
+    pub model: String,
+    /// The record whose start and inputs were used.
+    pub record: String,
+    /// Unit label of every time.
+    pub time_unit: String,
+    /// First time.
+    pub from: f64,
+    /// Last time of the record.
+    pub measured_until: f64,
+    /// Last time of the forecast.
+    pub until: f64,
+    /// Members that were drawn.
+    pub members: usize,
+    /// Members without a prediction; the figures are of the others.
+    pub failed: usize,
+    /// Seed of draws and noise.
+    pub seed: u64,
+    /// Whether members have noise of the model's states.
+    pub model_noise: bool,
+    /// Values that all members have.
+    pub set: Vec<(String, f64)>,
+    /// What is doubtful.
+    pub warnings: Vec<String>,
+    /// Courses by output.
+    pub outputs: Vec<OutputForecast>,
+    /// Levels, in the order in which they were asked for.
+    pub levels: Vec<LevelForecast>,
+}
+
+/// The course of one output.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OutputForecast {
+    /// Its name.
+    pub output: String,
+    /// Its unit label.
+    pub unit: String,
+    /// Median and central 90 % interval at the last time.
+    pub at_end: [f64; 3],
+    /// Shares of measured values within the 90 % band of what would be measured.
+    pub coverage90: Option<Coverage>,
+    /// Quantiles of the quantity.
+    #[serde(skip)]
+    pub fan: Fan,
+    /// Quantiles of what would be measured, with the noise of its channel.
+    #[serde(skip)]
+    pub measured: Option<Fan>,
+    /// Measured values: time, value.
+    #[serde(skip)]
+    pub observed: Vec<(f64, f64)>,
+}
+
+/// Shares of measured values within the 90 % band.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Coverage {
+    /// Of those that were fitted.
+    pub train: Option<f64>,
+    /// Of those that were not.
+    pub held_out: Option<f64>,
+}
+
+/// When a level is crossed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LevelForecast {
+    /// The output.
+    pub output: String,
+    /// Its unit label.
+    pub unit: String,
+    /// From which side.
+    pub direction: Direction,
+    /// The level.
+    pub value: f64,
+    /// Members that cross it.
+    pub crossed: usize,
+    /// Members that do not, up to the last time.
+    pub never: usize,
+    /// Probability of a crossing up to the last time.
+    pub probability: f64,
+    /// The horizon that was asked for.
+    pub horizon: Option<f64>,
+    /// Probability of a crossing up to the horizon.
+    pub probability_by_horizon: Option<f64>,
+    /// Median time over all members; none where half of them do not cross.
+    pub median: Option<f64>,
+    /// Central 90 % interval over all members; none where 5 % of them do not cross.
+    pub interval90: Option<[f64; 2]>,
+    /// The answer in a sentence.
+    pub says: String,
+    /// First crossings, sorted.
+    #[serde(skip)]
+    pub times: Vec<f64>,
+}
+
+impl OutputForecast {
+    pub(super) fn new(
+        study: &Study,
+        name: &str,
+        fan: Fan,
+        measured: Option<Fan>,
+        channel: Option<(&Record, &Channel)>,
+    ) -> Self {
+        let last = fan.times.len() - 1;
+        let at = |fan: &Fan, p: f64, k: usize| {
+            let row = fan.probabilities.iter().position(|q| (q - p).abs() < 1e-9);
+            row.map_or(f64::NAN, |row| fan.quantiles[row][k])
+        };
+        let mut shares = [[0_u32; 2]; 2];
+        let mut observed = Vec::new();
+        if let Some((record, channel)) = channel {
+            for (k, time) in record.times.iter().enumerate().take(fan.times.len()) {
+                let Some(value) = record.observed(channel, *time) else { continue };
+                observed.push((*time, value));
+                let Some(band) = &measured else { continue };
+                let held_out = channel.held_out || !record.trains_at(*time);
+                let within = at(band, 0.05, k) <= value && value <= at(band, 0.95, k);
+                shares[usize::from(held_out)][0] += u32::from(within);
+                shares[usize::from(held_out)][1] += 1;
+            }
+        }
+        let share = |[within, all]: [u32; 2]| (all > 0).then(|| f64::from(within) / f64::from(all));
+        let [train, held_out] = shares.map(share);
+        let coverage90 = measured.is_some().then_some(Coverage { train, held_out });
+        let at_end = [0.5, 0.05, 0.95].map(|p| at(&fan, p, last));
+        Self { output: name.to_owned(), unit: unit(study, name), at_end, coverage90, fan, measured, observed }
+    }
+}
+
+impl LevelForecast {
+    pub(super) fn new(study: &Study, threshold: &Threshold, horizon: Option<f64>, found: Crossings) -> Self {
+        let Threshold { output, level } = threshold;
+        let (never, until) = (found.n_never(), found.until);
+        let side = match level.direction {
+            Direction::Above => '>',
+            Direction::Below => '<',
+        };
+        let what = format!("{output} {side} {}", level.value);
+        let probability = found.probability_by(until);
+        let says = if found.times.is_empty() {
+            format!("{what}: not crossed by any of {} members up to {until}", found.n_member)
+        } else {
+            let median = found.median().map_or_else(
+                || "most members do not cross it".to_owned(),
+                |median| format!("median {median:.4} {}", study.time_unit),
+            );
+            format!("{what}: crossed with probability {probability:.3} up to {until}; {median}")
+        };
+        Self {
+            output: output.clone(),
+            unit: unit(study, output),
+            direction: level.direction,
+            value: level.value,
+            crossed: found.times.len(),
+            never,
+            probability,
+            horizon,
+            probability_by_horizon: horizon.map(|horizon| found.probability_by(horizon)),
+            median: found.median(),
+            interval90: found.interval(0.9),
+            says,
+            times: found.times,
+        }
+    }
+}
+
+/// Unit label of an output or a state.
+fn unit(study: &Study, name: &str) -> String {
+    let found = quantity_of(&study.spec.outputs, name).or_else(|| quantity_of(&study.spec.states, name));
+    found.map(|q| q.unit.clone()).unwrap_or_default()
+}

@@ -1,0 +1,201 @@
+//! `starlings forecast`: what a finished run says of the future.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use clap::Parser;
+use starlings_coordinator::fleet::RunIdentity;
+use starlings_coordinator::report::forecast_page;
+use starlings_coordinator::study::forecast::{Ask, Forecast, StudyForecastError, Threshold, forecast};
+use starlings_coordinator::study::store::folder::StudyInfo;
+use starlings_coordinator::study::{RunFolder, Study};
+use starlings_estimators::forecast::{Direction, Level};
+
+use crate::console::{line, note, table, text};
+use crate::csv_file;
+use crate::failure::Failure;
+use crate::fleet_session::{Entrance, FleetArgs, FleetSession};
+use crate::interrupt;
+use crate::load::load_frozen;
+use crate::progress::Display;
+
+/// Forecast from a finished run: an ensemble with parameters from its posterior, quantiles against time, and the time at which a
+/// quantity crosses a level.
+///
+/// Every member starts where the record does, with parameters drawn from the posterior and, where the model has it, with noise of its
+/// own. Writes forecast.json, fan.csv, crossing-times.csv and report.html.
+#[derive(Parser)]
+pub(crate) struct Args {
+    /// The folder of a finished run.
+    dir: PathBuf,
+    /// A value that all members have, of a parameter, constant or initial:STATE; may be repeated.
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = crate::simulate::assignment)]
+    set: Vec<(String, f64)>,
+    /// Last time of the forecast; the record's end without it. Inputs stay at their last value beyond theirs.
+    #[arg(long, value_name = "T", allow_negative_numbers = true)]
+    until: Option<f64>,
+    /// Spacing of times after the record's end; its mean spacing without it.
+    #[arg(long, value_name = "STEP", allow_negative_numbers = true)]
+    step: Option<f64>,
+    /// A level, as "pressure>5" or "level<0.2": when is it crossed? May be repeated.
+    #[arg(long = "level", value_name = "OUTPUT>VALUE", value_parser = threshold)]
+    level: Vec<Threshold>,
+    /// Time by which the probability of a crossing is wanted.
+    #[arg(long, value_name = "T", allow_negative_numbers = true)]
+    horizon: Option<f64>,
+    /// Members of the ensemble.
+    #[arg(long, value_name = "N", default_value_t = 200)]
+    members: usize,
+    /// Seed of draws and noise; the study's own without it.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Record whose start, inputs and times are used; the first without it.
+    #[arg(long)]
+    record: Option<String>,
+    /// The study file, where it does not stand any more where it was run; its recordings are looked for beside it.
+    #[arg(long, value_name = "FILE")]
+    study: Option<PathBuf>,
+    /// Folder for the files; `forecast` in the run folder without it.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    fleet: FleetArgs,
+    /// Print the result as JSON on standard output and nothing else.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `output>value` or `output<value`.
+fn threshold(text: &str) -> Result<Threshold, String> {
+    let (at, direction) = match (text.find('>'), text.find('<')) {
+        (Some(at), None) => (at, Direction::Above),
+        (None, Some(at)) => (at, Direction::Below),
+        _ => return Err("expected OUTPUT>VALUE or OUTPUT<VALUE, such as \"pressure>5\"".to_owned()),
+    };
+    let (output, value) = (text[..at].trim(), text[at + 1..].trim());
+    let value: f64 = value.parse().map_err(|_| format!("`{value}` is not a number"))?;
+    if output.is_empty() || !value.is_finite() {
+        return Err("expected the name of an output and a finite level".to_owned());
+    }
+    Ok(Threshold { output: output.to_owned(), level: Level { value, direction } })
+}
+
+/// Runs the ensemble and writes what it says.
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    let folder = RunFolder::open(&args.dir).map_err(Failure::input)?;
+    let study = study_of(args, &folder)?;
+    let ask = ask(args, &study)?;
+    let plan = args.fleet.plan(&study, None)?;
+    let display = Arc::new(Display::new(args.json));
+    let mut session =
+        FleetSession::listen(&study, &plan, Entrance::take(&plan, None)?, RunIdentity::new(), &display)?;
+    session.start_workers(&study, &plan, None)?;
+    let result = forecast(&study, &folder, &mut session.fleet, &ask);
+    display.finish();
+    session.close(result.is_ok());
+    let found = result.map_err(|error| match error {
+        StudyForecastError::Run(cause) if cause.is_cancelled() => {
+            interrupt::failure("nothing is kept of it: start again")
+        }
+        error if error.is_input() => Failure::input(error),
+        error => Failure::run(error),
+    })?;
+    let out = args.out.clone().unwrap_or_else(|| args.dir.join("forecast"));
+    let json = serde_json::to_string_pretty(&found).map_err(Failure::run)?;
+    write(&out, &found, &json)?;
+    if args.json {
+        return line(json);
+    }
+    print(&found)?;
+    note(format_args!("written: {}", out.join("report.html").display()));
+    Ok(())
+}
+
+/// The study as it was run.
+fn study_of(args: &Args, folder: &RunFolder) -> Result<Study, Failure> {
+    let frozen = folder.store.meta("study").map_err(Failure::run)?.unwrap_or_default();
+    let info = folder.store.meta("info").map_err(Failure::run)?.unwrap_or_default();
+    let stood = serde_json::from_str::<StudyInfo>(&info).map(|info| info.file).unwrap_or_default();
+    let place = match &args.study {
+        Some(file) => file.clone(),
+        None if stood.is_empty() => args.dir.join("study.toml"),
+        None => PathBuf::from(stood),
+    };
+    if !place.exists() {
+        return Err(Failure::input(format!(
+            "the study of this run stood at {}, and is not there: say where it and its recordings are with --study FILE",
+            place.display()
+        )));
+    }
+    load_frozen(&place, &frozen, args.fleet.is_here())
+}
+
+fn ask(args: &Args, study: &Study) -> Result<Ask, Failure> {
+    let record = match &args.record {
+        None => 0,
+        Some(name) => study.records.iter().position(|r| r.name == *name).ok_or_else(|| {
+            let names: Vec<&str> = study.records.iter().map(|r| r.name.as_str()).collect();
+            Failure::input(format!("no record named `{name}` (the study has: {})", names.join(", ")))
+        })?,
+    };
+    Ok(Ask {
+        record,
+        values: args.set.clone(),
+        until: args.until,
+        step: args.step,
+        thresholds: args.level.clone(),
+        horizon: args.horizon,
+        members: args.members,
+        seed: args.seed.unwrap_or(study.seed),
+    })
+}
+
+fn write(out: &Path, found: &Forecast, json: &str) -> Result<(), Failure> {
+    let cannot =
+        |path: &Path, e: std::io::Error| Failure::input(format!("cannot write {}: {e}", path.display()));
+    std::fs::create_dir_all(out).map_err(|e| cannot(out, e))?;
+    let page = forecast_page(found).map_err(Failure::run)?;
+    for (name, text) in [("forecast.json", json), ("report.html", page.as_str())] {
+        let path = out.join(name);
+        starlings_coordinator::study::store::folder::write(&path, text).map_err(|e| cannot(&path, e))?;
+    }
+    csv_file::write(Some(&out.join("fan.csv")), found.fan_table())?;
+    csv_file::write(Some(&out.join("crossing-times.csv")), found.crossing_table())
+}
+
+fn print(found: &Forecast) -> Result<(), Failure> {
+    line(format_args!(
+        "{}: {} members of model {} up to {} {}",
+        found.study, found.members, found.model, found.until, found.time_unit
+    ))?;
+    for warning in &found.warnings {
+        line(format_args!("warning: {warning}"))?;
+    }
+    for level in &found.levels {
+        line(&level.says)?;
+        if let Some([lo, hi]) = level.interval90 {
+            line(format_args!("  90 % of the members between {lo:.4} and {hi:.4}"))?;
+        }
+        if let (Some(horizon), Some(p)) = (level.horizon, level.probability_by_horizon) {
+            line(format_args!("  by {horizon}: probability {p:.3}"))?;
+        }
+    }
+    let heading =
+        ["output", "unit", "median at the end", "5 %", "95 %", "fitted in 90 %", "held out in 90 %"];
+    let mut rows = vec![heading.map(str::to_owned).to_vec()];
+    let share = |of: Option<f64>| of.map_or_else(String::new, |v| format!("{:.1} %", 100.0 * v));
+    for output in &found.outputs {
+        let [median, lo, hi] = output.at_end.map(|v| format!("{v:.5}"));
+        let coverage = output.coverage90;
+        rows.push(vec![
+            output.output.clone(),
+            output.unit.clone(),
+            median,
+            lo,
+            hi,
+            share(coverage.and_then(|c| c.train)),
+            share(coverage.and_then(|c| c.held_out)),
+        ]);
+    }
+    text(table(&rows, false))
+}
