@@ -146,12 +146,12 @@ impl Transfers {
         {
             // Its name is made of what stands there, by the coordinator alone.
             let taken = self.arrived(|pieces| pieces::send_in_memory(&pieces, head, number));
-            let (state, ()) = taken.map_err(not_taken)?;
+            let (state, ()) = taken.map_err(|reason| not_taken(&reason))?;
             self.lock_lent().push((number, values.len(), memory));
             return Ok(state);
         }
         let sent = self.send(|pieces| pieces::send(&pieces, head, values));
-        sent.map_err(not_taken)
+        sent.map_err(|reason| not_taken(&reason))
     }
 
     /// Memory for a state with its number: some that was lent before, or where the coordinator lends more.
@@ -326,7 +326,7 @@ async fn next(inbound: &mut Streaming<generated::Chunk>) -> Result<generated::Ch
     inbound.message().await.map_err(|status| lost(&status))?.ok_or_else(|| wrong(&"it ended early"))
 }
 
-fn not_taken(reason: String) -> ParticleError {
+fn not_taken(reason: &str) -> ParticleError {
     ParticleError::Infrastructure(format!("its end state was not taken: {reason}"))
 }
 
