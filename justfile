@@ -57,6 +57,16 @@ deaths:
     cargo test --release --test coordinator_death -- --ignored --nocapture
     cargo test --release -p starlings-fleet --test noticing -- --ignored --nocapture --test-threads 1
 
+# The example with a state of 8 MB, in every way in which its states can travel: the same bytes.
+large-states:
+    cargo test --release --test large_states -- --ignored --nocapture
+
+# What large states cost: 22 states of 8 MB both ways on every way, four of 256 MB in 256 MB of memory, and through a shared folder. A minute;
+# needs 5 GB in the folder for temporary files.
+states:
+    cargo bench -p starlings-fleet --bench states -- --large
+    cargo bench -p starlings-fleet --bench states -- --shared --large
+
 # The examples of docs/extending.md: applied to a copy, built and tested.
 extending:
     .ci/extending

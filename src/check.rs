@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Parser;
 use serde_json::json;
+use starlings_coordinator::fleet::{PlaceName, RunIdentity, StateStore};
 use starlings_coordinator::study::MAX_PASSES;
 use starlings_coordinator::study::field::{field_of, observed_fields};
 use starlings_coordinator::study::trial::{Depth, TrialChannel, dry_run};
@@ -11,6 +12,7 @@ use starlings_coordinator::study::{Study, posterior};
 use starlings_estimators::{Form, SigmaSet};
 
 use crate::console::{line, number, table, text};
+use crate::disk;
 use crate::failure::Failure;
 use crate::load::load;
 
@@ -22,6 +24,9 @@ pub(crate) struct Args {
     /// Print what was found as JSON.
     #[arg(long)]
     pub(crate) json: bool,
+    /// Folder for large states that `run --states` would share with workers: whether it takes them.
+    #[arg(long, value_name = "FOLDER")]
+    states: Option<PlaceName>,
 }
 
 /// Checks the study.
@@ -30,11 +35,34 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let kind = study.estimator.kind;
     let channels = dry_run(&mut study, kind, Depth::All).map_err(Failure::input)?;
     let ensemble = ensemble(&study)?;
+    if let Some(place) = &args.states {
+        check_place(&study, place)?;
+    }
     if args.json {
         line(format_args!("{:#}", as_json(&study, &channels, ensemble)))
     } else {
         print(&study, &channels, ensemble)
     }
+}
+
+/// Whether a folder takes the states of a study: that it can be written, and has the room. What is tried leaves nothing.
+fn check_place(study: &Study, place: &PlaceName) -> Result<(), Failure> {
+    let folder = place.of_run(&RunIdentity::new().id).passing();
+    StateStore::shared(folder).keep(&[1.0]).map_err(Failure::input)?;
+    disk::check_states(study, Some(&place.to_string()), false)
+}
+
+/// What becomes of states that are too large for messages; `None` where they are small.
+fn states_text(study: &Study) -> Option<String> {
+    let all = study.bytes_of_states();
+    study.has_large_states().then(|| {
+        format!(
+            "a state has {}: states travel beside the messages, and a step holds {} of them, in --state-memory and then on the \
+             disk, or in the folder of --states",
+            disk::size(8 * study.spec.n_state() as u64),
+            disk::size(3 * all)
+        )
+    })
 }
 
 /// Particles of one ensemble, and whether a filter draws them again at every analysis.
@@ -77,6 +105,7 @@ fn as_json(study: &Study, channels: &[TrialChannel], ensemble: (usize, bool)) ->
         })).collect::<Vec<_>>(),
         "particles": ensemble.0,
         "runs_per_pass": runs_per_pass(study, ensemble),
+        "state_bytes": 8 * study.spec.n_state(),
         "passes": passes(study).map(|(least, most)| json!({ "at_least": least, "at_most": most })),
         "trial": channels.iter().map(|c| json!({
             "record": c.record, "output": c.output, "observations": c.n_obs, "rmse": c.rmse, "noise": c.noise,
@@ -135,6 +164,9 @@ fn print(study: &Study, channels: &[TrialChannel], ensemble: (usize, bool)) -> R
         }
     };
     line(format_args!("\n{} particles, {runs} runs of the model per {per}", ensemble.0))?;
+    if let Some(states) = states_text(study) {
+        line(states)?;
+    }
     for warning in &study.warnings {
         line(format_args!("warning: {warning}"))?;
     }

@@ -102,7 +102,7 @@ fn judge(free: u64, all: u64, needed: u64, margin: u64, remedy: &str) -> Room {
 }
 
 /// Bytes for people.
-fn size(bytes: u64) -> String {
+pub(crate) fn size(bytes: u64) -> String {
     let units = ["KiB", "MiB", "GiB", "TiB"];
     let mut value = bytes as f64 / 1024.0;
     let mut unit = 0;

@@ -8,7 +8,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use common::studies::long_tube;
-use common::{analyses, bytes, kill, output, starlings, wait_until};
+use common::{analyses, bytes, kill, output, repository, starlings, wait_until};
+use starlings_coordinator::fleet::InProcess;
+use starlings_coordinator::study::store::Purpose;
+use starlings_coordinator::study::{RunContext, RunFolder, Study, run as study_run};
 
 fn run(study: &Path, out: &Path, more: &[&str]) -> Command {
     let mut command = starlings();
@@ -104,6 +107,64 @@ fn a_resume_without_the_shared_folder_of_its_states_says_what_is_missing() {
     let (code, _, stderr) = output(&mut run(&study, &out, &["--resume", "--states", file.to_str().unwrap()]));
     assert_eq!(code, 1, "{stderr}");
     assert!(stderr.contains("for the states of particles"), "{stderr}");
+}
+
+#[test]
+fn check_says_how_large_states_are_and_whether_a_folder_takes_them() {
+    let dir = tempfile::tempdir().unwrap();
+    let study = long_tube(dir.path(), 80);
+    let place = dir.path().join("shared");
+    let check = |place: &Path| output(starlings().arg("check").arg(&study).arg("--states").arg(place));
+    let (code, stdout, stderr) = check(&place);
+    assert_eq!(code, 0, "{stderr}");
+    // 40 001 numbers; three for each of three particles.
+    assert!(stdout.contains("a state has 312.508 KiB") && stdout.contains("holds 2.747 MiB of them"), "{stdout}");
+    assert_eq!(std::fs::read_dir(&place).unwrap().count(), 0, "what was tried leaves nothing");
+    let file = dir.path().join("file");
+    std::fs::write(&file, "no folder").unwrap();
+    let (code, _, stderr) = check(&file);
+    assert_eq!(code, 2, "{stderr}");
+    assert!(stderr.contains("for the states of particles") && stderr.contains("file"), "{stderr}");
+}
+
+/// The posterior of a study whose runs are made on threads of this process, where no state travels.
+fn in_this_process(study: &Path, out: &Path) -> Vec<u8> {
+    let study = Study::load(study).unwrap();
+    let mut folder = RunFolder::create(Purpose::Run, out, &study, "test", "today").unwrap();
+    let mut context =
+        RunContext { clock: &|| 0.0, watch: &mut |_| {}, events: None, earlier_s: 0.0, threads: 2 };
+    study_run::run(&study, &mut InProcess::new(2), &mut folder, &mut context).unwrap();
+    folder.store.meta("posterior").unwrap().unwrap().into_bytes()
+}
+
+/// Runs a study in every way in which its states can go, and compares with the run in which they go nowhere.
+fn every_way_gives_the_same_bytes(study: &Path) {
+    let dir = tempfile::tempdir().unwrap();
+    let small = in_this_process(study, &dir.path().join("small"));
+    let place = dir.path().join("shared");
+    for (name, more) in [
+        ("descriptors", &[][..]),
+        ("one-descriptor", &["--state-memory", "9 MB"]),
+        ("pieces", &["--state-memory", "0 MB"]),
+        ("shared", &["--states", place.to_str().unwrap()]),
+    ] {
+        let out = dir.path().join(name);
+        let (code, _, stderr) = output(&mut run(study, &out, more));
+        assert_eq!(code, 0, "{name}: {stderr}");
+        assert!(bytes(&out, "posterior.csv") == small, "{name}");
+    }
+}
+
+#[test]
+fn states_by_descriptors_in_pieces_and_in_a_folder_give_the_bytes_of_a_run_in_one_process() {
+    let dir = tempfile::tempdir().unwrap();
+    every_way_gives_the_same_bytes(&long_tube(dir.path(), 20));
+}
+
+#[test]
+#[ignore = "half a million rings, five times: `just large-states`"]
+fn the_fine_tube_gives_the_same_bytes_whichever_way_its_states_of_8_mb_go() {
+    every_way_gives_the_same_bytes(&repository("examples/fine-tube/study.toml"));
 }
 
 #[test]

@@ -3,6 +3,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use prost::Message;
+use starlings_proto::convert::lent::{Lend, decode_in_memory, encode_in_memory};
 use starlings_proto::convert::piece_names::{decode_names, encode_names};
 use starlings_proto::convert::state::{
     Get, PutHead, chunk_values, decode_chunk, decode_head, decode_put_result, encode_put_result, n_chunks,
@@ -25,12 +26,21 @@ fuzz_target!(|bytes: &[u8]| {
     {
         assert_eq!(PutHead::decode(&head.encode()), Ok(head));
     }
+    if let Ok(message) = generated::LendRequest::decode(bytes)
+        && let Ok(lend) = Lend::decode(&message)
+    {
+        assert_eq!(Lend::decode(&lend.encode()), Ok(lend));
+    }
     // A whole stream: messages one after the other, each after its length.
     let mut rest = bytes;
     let mut next = || generated::Chunk::decode_length_delimited(&mut rest).ok();
     let Some(Ok(n_state)) = next().map(|head| decode_head(&head)) else { return };
     let mut index = 0;
     while let Some(message) = next() {
+        if let Ok(Some(number)) = decode_in_memory(&message) {
+            assert_eq!(message, encode_in_memory(number));
+            break;
+        }
         let missing = n_chunks(n_state).saturating_sub(index);
         match decode_names(&message, missing) {
             Ok(Some(names)) => {

@@ -1,15 +1,18 @@
-//! Where pieces of large states stand: files by the hash of their bytes, in a folder of one process or in one that machines share.
+//! Where large states stand: pieces in files by the hash of their bytes, in a folder of one process or in one that machines share; or
+//! whole in memory that processes of one machine share.
 //!
 //! Coordinator and workers see this crate; nothing here knows states, jobs or messages. Next file to read: [`folder`], then
-//! [`place`] for what machines share.
+//! [`place`] for what machines share and [`memory`] for what processes do.
 
 mod access;
 pub mod error;
 pub mod folder;
+pub mod memory;
 pub mod place;
 
 pub use error::PieceError;
 pub use folder::{Folder, Staged};
+pub use memory::SharedMemory;
 pub use place::PlaceName;
 
 /// Name of a piece: BLAKE3 of its bytes.

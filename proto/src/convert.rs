@@ -10,6 +10,7 @@ pub mod from_worker;
 pub mod held;
 pub mod job;
 pub mod key;
+pub mod lent;
 pub mod piece_names;
 pub mod solver;
 pub mod state;

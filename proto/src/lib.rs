@@ -3,12 +3,13 @@
 //! `proto/fleet.proto` says what travels between coordinator and worker, `proto/solver.proto` between a worker and a solver
 //! outside, in which unit and shape. [`generated`] and [`generated_solver`] are generated from them; [`convert`] alone looks inside
 //! and checks and translates them. [`access`] is the file by which both sides know each other, [`socket`] the connection of workers
-//! that one process started. No scheduling here. Next file to read: [`convert`].
+//! that one process started, [`descriptors`] what is passed beside it. No scheduling here. Next file to read: [`convert`].
 
 pub mod access;
 pub mod adapters;
 mod codec;
 pub mod convert;
+pub mod descriptors;
 pub mod host;
 pub mod private_file;
 pub mod socket;
@@ -25,7 +26,7 @@ pub use convert::{
 };
 
 /// Number of the protocol; coordinator and worker must have the same.
-pub const PROTOCOL: u32 = 4;
+pub const PROTOCOL: u32 = 5;
 
 /// Largest state that travels inside a job or a prediction, bytes; a larger one travels by itself, under a name.
 pub const MAX_INLINE_STATE: usize = 256 * 1024;

@@ -13,6 +13,8 @@ use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::unix::pipe::{Receiver, Sender};
 use tonic::transport::server::Connected;
 
+use crate::descriptors::DescriptorSender;
+
 /// One end of a pair of sockets. What the runtime calls the ends of a pipe are descriptors watched for one direction.
 #[derive(Debug)]
 pub struct SocketEnd {
@@ -20,6 +22,8 @@ pub struct SocketEnd {
     incoming: Receiver,
     /// There while a write waits for room.
     room: Option<Sender>,
+    /// The way of descriptors beside it.
+    descriptors: Option<DescriptorSender>,
 }
 
 impl SocketEnd {
@@ -30,7 +34,13 @@ impl SocketEnd {
     pub fn new(socket: UnixStream) -> io::Result<Self> {
         socket.set_nonblocking(true)?;
         let incoming = Receiver::from_owned_fd_unchecked(socket.try_clone()?.into())?;
-        Ok(Self { socket, incoming, room: None })
+        Ok(Self { socket, incoming, room: None, descriptors: None })
+    }
+
+    /// The same with a way of descriptors beside it, which those who serve on it are told of.
+    #[must_use]
+    pub fn with_descriptors(self, descriptors: Option<DescriptorSender>) -> Self {
+        Self { descriptors, ..self }
     }
 
     /// Writes at once, or when there is room.
@@ -94,9 +104,11 @@ impl AsyncWrite for SocketEnd {
 }
 
 impl Connected for SocketEnd {
-    type ConnectInfo = ();
+    type ConnectInfo = Option<DescriptorSender>;
 
-    fn connect_info(&self) {}
+    fn connect_info(&self) -> Self::ConnectInfo {
+        self.descriptors.clone()
+    }
 }
 
 #[cfg(test)]

@@ -152,7 +152,7 @@ async fn attach(way: &Way, hello: Hello, states: Option<&PlaceName>) -> Result<C
             if folder.is_some() {
                 outbox.send(FromWorker::SharesStates);
             }
-            let transfers = Transfers::new(client, welcome.epoch, nonce, folder);
+            let transfers = Transfers::new(client, (welcome.epoch, nonce), folder, way.descriptors());
             Ok(Connection { address, welcome, outbox, inbound, windows, transfers, sharing })
         }
         Some(Ok(ToWorker::Refuse(reason))) => Err(Attempt::Refused(reason)),

@@ -1,17 +1,20 @@
 //! The way of large states between a worker and its coordinator: one stream each, beside the messages.
 //!
-//! Where both see one folder, the pieces stand there and only their names travel. What arrives is checked by its name, piece by piece.
+//! Where both see one folder, the pieces stand there and only their names travel. Where both are processes of one machine, the state
+//! stands in memory that both see, whose descriptor comes beside the messages. What arrives is checked by its name, piece by piece.
 //! Next file to read: `inbox`, for when states are asked for.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use starlings_models::ParticleError;
-use starlings_pieces::Folder;
+use starlings_pieces::{Folder, SharedMemory};
+use starlings_proto::convert::lent::{Lend, decode_in_memory};
 use starlings_proto::convert::piece_names::decode_names;
 use starlings_proto::convert::state::{
     ChunkId, Get, PutHead, chunk_values, decode_chunk, decode_head, decode_put_result, n_chunks,
 };
+use starlings_proto::descriptors::{Asked, DescriptorReceiver};
 use starlings_proto::generated::{self, fleet_client::FleetClient};
 use starlings_proto::words::status_text;
 use starlings_proto::{Lease, StateId, StateNaming, digest};
@@ -31,6 +34,9 @@ const LANES: usize = 2;
 /// Pieces made ahead of what the network has taken.
 const AHEAD: usize = 4;
 
+/// Its number, the values of its states, and the memory.
+type LentMemory = (u64, usize, SharedMemory);
+
 /// The way of states over one session.
 #[derive(Clone)]
 pub(crate) struct Transfers {
@@ -42,17 +48,20 @@ pub(crate) struct Transfers {
     epoch: u64,
     nonce: u64,
     shared: Option<Arc<Folder>>,
+    descriptors: Option<Arc<DescriptorReceiver>>,
+    /// Memory that the coordinator lent and nobody writes now.
+    lent: Arc<Mutex<Vec<LentMemory>>>,
     /// Whether it was told that the folder refuses.
     is_told: Arc<AtomicBool>,
 }
 
 impl Transfers {
-    /// The way over a connection whose worker is taken; called where the network lives.
+    /// The way over a connection whose worker is taken, of this session (epoch and nonce); called where the network lives.
     pub(crate) fn new(
         client: FleetClient<Proven>,
-        epoch: u64,
-        nonce: u64,
+        (epoch, nonce): (u64, u64),
         shared: Option<Arc<Folder>>,
+        descriptors: Option<Arc<DescriptorReceiver>>,
     ) -> Self {
         Self {
             client,
@@ -63,6 +72,8 @@ impl Transfers {
             epoch,
             nonce,
             shared,
+            descriptors,
+            lent: Arc::default(),
             is_told: Arc::default(),
         }
     }
@@ -90,13 +101,15 @@ impl Transfers {
     #[cfg(test)]
     pub(crate) fn nowhere(runtime: &Handle) -> Self {
         let _inside = runtime.enter();
-        Self::new(FleetClient::new(crate::way::nowhere()), 1, 1, None)
+        Self::new(FleetClient::new(crate::way::nowhere()), (1, 1), None, None)
     }
 
     /// Asks for a state; its values come when they are read.
     pub(crate) async fn ask(&self, state: StateId) -> Result<Incoming, String> {
-        let (n_state, inbound) = self.open(state, self.shared.is_some()).await?;
-        Ok(Incoming { state, n_state, inbound, way: self.clone() })
+        let asked = self.descriptors.as_ref().map(DescriptorReceiver::ask);
+        let number = asked.as_ref().map_or(0, Asked::number);
+        let (n_state, inbound) = self.open(state, self.shared.is_some(), number).await?;
+        Ok(Incoming { state, n_state, inbound, asked, way: self.clone() })
     }
 
     /// The number of values of a state, and the way on which they come, or the names of its pieces.
@@ -104,8 +117,9 @@ impl Transfers {
         &self,
         state: StateId,
         names: bool,
+        descriptor: u64,
     ) -> Result<(usize, Streaming<generated::Chunk>), String> {
-        let request = Get { epoch: self.epoch, nonce: self.nonce, state, names }.encode();
+        let request = Get { epoch: self.epoch, nonce: self.nonce, state, names, descriptor }.encode();
         let mut inbound = self.client.clone().get(request).await.map_err(|s| lost(&s))?.into_inner();
         let head = next(&mut inbound).await?;
         Ok((decode_head(&head).map_err(|error| wrong(&error))?, inbound))
@@ -127,8 +141,42 @@ impl Transfers {
                 Err(reason) => self.refused(&reason),
             }
         }
+        if let Some((number, memory)) = self.lent(head)
+            && pieces::fill(&memory, values).is_ok()
+        {
+            // Its name is made of what stands there, by the coordinator alone.
+            let taken = self.arrived(|pieces| pieces::send_in_memory(&pieces, head, number));
+            let (state, ()) = taken.map_err(|reason| not_taken(&reason))?;
+            self.lock_lent().push((number, values.len(), memory));
+            return Ok(state);
+        }
         let sent = self.send(|pieces| pieces::send(&pieces, head, values));
-        sent.map_err(|reason| ParticleError::Infrastructure(format!("its end state was not taken: {reason}")))
+        sent.map_err(|reason| not_taken(&reason))
+    }
+
+    /// Memory for a state with its number: some that was lent before, or where the coordinator lends more.
+    fn lent(&self, head: PutHead) -> Option<(u64, SharedMemory)> {
+        {
+            let mut lent = self.lock_lent();
+            // What is of another length is taken back.
+            lent.retain(|(_, n_state, _)| *n_state == head.n_state);
+            if let Some((number, _, memory)) = lent.pop() {
+                return Some((number, memory));
+            }
+        }
+        let asked = self.descriptors.as_ref()?.ask();
+        let number = asked.number();
+        let request = Lend { head, descriptor: number }.encode();
+        let (mut client, ended) = (self.client.clone(), self.ended.clone());
+        let (answer, answered) = oneshot::channel();
+        self.runtime.spawn(async move { answer.send(ended.run_until_cancelled(client.lend(request)).await) });
+        let loan = answered.blocking_recv().ok()??.ok()?.into_inner();
+        let descriptor = asked.take().filter(|_| loan.lent)?;
+        Some((number, SharedMemory::received(descriptor, head.n_state * 8, false).ok()?))
+    }
+
+    fn lock_lent(&self) -> MutexGuard<'_, Vec<LentMemory>> {
+        self.lent.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Puts what `send` says, which returns the name that the coordinator must answer with.
@@ -136,6 +184,15 @@ impl Transfers {
         &self,
         send: impl FnOnce(mpsc::Sender<generated::Chunk>) -> Option<StateId>,
     ) -> Result<StateId, String> {
+        let (taken, name) = self.arrived(send)?;
+        if Some(taken) == name { Ok(taken) } else { Err("another one arrived than was sent".to_owned()) }
+    }
+
+    /// Puts what `send` says: the name of what arrived, and what `send` returned.
+    fn arrived<T>(
+        &self,
+        send: impl FnOnce(mpsc::Sender<generated::Chunk>) -> T,
+    ) -> Result<(StateId, T), String> {
         let (pieces, outgoing) = mpsc::channel(AHEAD);
         let (answer, answered) = oneshot::channel();
         let (mut client, lanes, ended) = (self.client.clone(), Arc::clone(&self.lanes), self.ended.clone());
@@ -149,11 +206,11 @@ impl Transfers {
                 let _ = answer.send(result);
             }
         });
-        let name = send(pieces);
+        let sent = send(pieces);
         let result = answered.blocking_recv().map_err(|_| "the connection is gone".to_owned())?;
         let result = result.map_err(|status| status_text(&status))?;
         let taken = decode_put_result(result.get_ref()).map_err(|error| error.to_string())?;
-        if Some(taken) == name { Ok(taken) } else { Err("another one arrived than was sent".to_owned()) }
+        Ok((taken, sent))
     }
 }
 
@@ -163,17 +220,21 @@ pub(crate) struct Incoming {
     /// Number of its values.
     pub(crate) n_state: usize,
     inbound: Streaming<generated::Chunk>,
+    /// The descriptor of its memory, if it comes.
+    asked: Option<Asked>,
     way: Transfers,
 }
 
 impl Incoming {
     /// Its values.
     pub(crate) async fn read(mut self) -> Result<Vec<f64>, String> {
-        let Some(folder) = self.way.shared.clone() else { return self.whole(None).await };
         let first = next(&mut self.inbound).await?;
-        if first.names.is_empty() {
-            return self.whole(Some(first)).await;
+        if decode_in_memory(&first).map_err(|error| wrong(&error))?.is_some() {
+            return self.in_memory().await;
         }
+        let Some(folder) = self.way.shared.clone().filter(|_| !first.names.is_empty()) else {
+            return self.whole(Some(first)).await;
+        };
         let names = self.names(&first).await?;
         let values = self.room()?;
         let n_state = self.n_state;
@@ -183,9 +244,25 @@ impl Incoming {
             // The coordinator finds out whether it can read what this worker cannot, or says which file is missing.
             Err(reason) => {
                 self.way.refused(&reason);
-                (self.n_state, self.inbound) = self.way.open(self.state, false).await?;
+                (self.n_state, self.inbound) = self.way.open(self.state, false, 0).await?;
                 self.whole(None).await
             }
+        }
+    }
+
+    /// Its values, which stand in memory that the coordinator sees too.
+    async fn in_memory(mut self) -> Result<Vec<f64>, String> {
+        let (n_state, values) = (self.n_state, self.room()?);
+        let descriptor = self.asked.take().and_then(Asked::take);
+        let descriptor = descriptor.ok_or_else(|| wrong(&"the descriptor of its memory did not come"))?;
+        let read = tokio::task::spawn_blocking(move || {
+            let memory = SharedMemory::received(descriptor, n_state * 8, true)?;
+            pieces::copy(&memory, n_state, values)
+        });
+        let read = read.await.map_err(|_| wrong(&"its thread ended"))?;
+        match read.map_err(|error| wrong(&error))? {
+            (name, values) if name == self.state => Ok(values),
+            _ => Err(wrong(&"its values are not those of its name")),
         }
     }
 
@@ -247,6 +324,10 @@ impl Incoming {
 
 async fn next(inbound: &mut Streaming<generated::Chunk>) -> Result<generated::Chunk, String> {
     inbound.message().await.map_err(|status| lost(&status))?.ok_or_else(|| wrong(&"it ended early"))
+}
+
+fn not_taken(reason: &str) -> ParticleError {
+    ParticleError::Infrastructure(format!("its end state was not taken: {reason}"))
 }
 
 fn lost(status: &Status) -> String {

@@ -8,11 +8,13 @@ use std::error::Error;
 use std::os::fd::AsFd;
 use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use hyper_util::rt::TokioIo;
 use starlings_proto::access::{AccessError, AccessFile, SERVER_NAME, TOKEN_KEY, Token};
+use starlings_proto::descriptors::{self, DescriptorReceiver};
 use starlings_proto::socket::SocketEnd;
 use starlings_proto::words::causes;
 use starlings_proto::{FRAME_SIZE, INHERITED};
@@ -85,8 +87,8 @@ pub(crate) enum Way {
         once: bool,
         attempts: AtomicUsize,
     },
-    /// The standard input, which is there already, and once.
-    Inherited(Endpoint, UnixStream),
+    /// The standard input, which is there already, and once; with the descriptors that come beside it.
+    Inherited(Endpoint, UnixStream, Option<Arc<DescriptorReceiver>>),
 }
 
 impl Way {
@@ -119,8 +121,14 @@ impl Way {
         let own = std::io::stdin().as_fd().try_clone_to_owned().map_err(WorkerError::NoSocket)?;
         let socket = UnixStream::from(own);
         socket.peer_addr().map_err(WorkerError::NoSocket)?;
+        let descriptors = descriptors::offered(&socket).map_err(WorkerError::NoSocket)?;
         // The address is never resolved.
-        Ok(Self::Inherited(with_windows(Endpoint::from_static("http://coordinator")), socket))
+        Ok(Self::Inherited(with_windows(Endpoint::from_static("http://coordinator")), socket, descriptors))
+    }
+
+    /// The descriptors that come beside the connection.
+    pub(crate) fn descriptors(&self) -> Option<Arc<DescriptorReceiver>> {
+        if let Self::Inherited(_, _, descriptors) = self { descriptors.clone() } else { None }
     }
 
     pub(crate) fn is_inherited(&self) -> bool {
@@ -158,7 +166,7 @@ impl Way {
                 let attempt = attempts.fetch_add(1, Ordering::Relaxed);
                 return with_access(file, address.as_deref(), *once, attempt).await;
             }
-            Self::Inherited(endpoint, socket) => {
+            Self::Inherited(endpoint, socket, _) => {
                 let socket = socket.try_clone().and_then(SocketEnd::new);
                 let mut socket = Some(socket);
                 let connect = move |_: Uri| {

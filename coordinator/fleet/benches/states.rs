@@ -1,10 +1,12 @@
 //! What a large state costs: the states of all particles to two real worker processes and back, beside the raw socket.
 //!
-//! `cargo bench -p starlings-fleet --bench states -- [--quick] [--large] [--shared]`. The program starts itself as worker and as the echo that is
+//! `cargo bench -p starlings-fleet --bench states -- [--quick] [--local] [--large] [--shared]`. The program starts itself as worker and as the echo that is
 //! the limit of the same run. The model hands its state on, so that all of a cycle is transport: from the store through the
 //! network to the model and back into the store.
 #![allow(clippy::print_stdout, missing_docs)]
 
+#[path = "states/dialled.rs"]
+mod dialled;
 #[path = "states/shared.rs"]
 mod shared;
 
@@ -48,8 +50,10 @@ fn main() -> Result<(), Failure> {
     if has("--echo") {
         return echo();
     }
-    if has("--connect") {
-        let mut config = WorkerConfig::new(starlings_proto::INHERITED);
+    let named = |flag: &str| args.iter().skip_while(|arg| *arg != flag).nth(1);
+    if has("--connect") || has("--access") {
+        let mut config = WorkerConfig::new(named("--connect").cloned().unwrap_or_default());
+        config.access = named("--access").map(Into::into);
         config.once = true;
         config.factory = Arc::new(build);
         config.states = shared::place(&args)?;
@@ -60,28 +64,69 @@ fn main() -> Result<(), Failure> {
     if has("--shared") {
         return shared::bench(cycles, has("--large"));
     }
+    if has("--large") {
+        // First: the memory that is told is the most of all times.
+        large()?;
+    }
+    pieces();
+    travelling(cycles, !has("--local"))
+}
+
+/// Four states of 256 MB with memory for one: run, mixed here, run again.
+fn large() -> Result<(), Failure> {
+    let store = StateStore::new(LARGE_MEMORY);
+    let (mut fleet, workers) = fleet(&store, None)?;
+    let setup = fleet.install(&Setup::default())?;
+    let first = (0..4).map(|k| start(&store, LARGE, k)).collect::<Result<Vec<_>, Failure>>()?;
+    let t = nalgebra::DMatrix::from_fn(4, 4, |i, j| if i == j { 0.5 } else { 0.125 });
+    let gb = 2.0 * 8.0 * 4.0 * LARGE as f64 / 1e9;
+    let started = Instant::now();
+    let ended = run(&mut fleet, setup, &first)?;
+    let ran = gb / started.elapsed().as_secs_f64();
+    drop(first);
+    let started = Instant::now();
+    let mixed = shared::by_itself(&store, &ended, &t)?;
+    let mixing = gb / started.elapsed().as_secs_f64();
+    drop(ended);
+    let again = run(&mut fleet, setup, &mixed)?;
+    if !again.iter().map(StoredState::id).eq(mixed.iter().map(StoredState::id)) {
+        return Err("a state is not the one that was sent".into());
+    }
+    println!("4 states of 256 MB, --state-memory 256 MB: run {ran:.2} GB/s, mixed {mixing:.2} GB/s");
+    let most = store.in_memory().1 / 1_000_000;
+    println!("  most that the coordinator held: {} MB of its own, {most} MB of states", peak_mb());
+    drop(workers);
+    fleet.close();
+    Ok(())
+}
+
+/// On which way states travel.
+#[derive(Clone, Copy, PartialEq)]
+enum Way {
+    /// To processes of this one.
+    Local,
+    /// To workers that dial, inside TLS or not.
+    Dialled { tls: bool },
+}
+
+/// All ways, beside the raw sockets.
+fn travelling(cycles: usize, dialled: bool) -> Result<(), Failure> {
     let bytes = (2 * 8 * VALUES * PARTICLES) as f64;
     let rate = |wall: Duration| bytes / wall.as_secs_f64() / 1e9;
-    pieces();
     let raw = raw(cycles)?;
     println!("{PARTICLES} states of 8 MB there and back, {WORKERS} workers, GB/s both ways");
-    println!("  raw socket pairs   p50 {:.2}  best {:.2}", rate(median(&raw)), rate(raw[0]));
-    for (name, memory) in [("memory", usize::MAX), ("a folder", 0)] {
-        let walls = states(VALUES, PARTICLES, memory, cycles)?;
+    println!("  raw socket pairs        p50 {:.2}  best {:.2}", rate(median(&raw)), rate(raw[0]));
+    let ways = [
+        ("local, in memory", usize::MAX, Way::Local),
+        ("local, in a folder", 0, Way::Local),
+        ("dialled, in memory", usize::MAX, Way::Dialled { tls: false }),
+        ("TLS, in memory", usize::MAX, Way::Dialled { tls: true }),
+    ];
+    for (name, memory, way) in ways.into_iter().filter(|(.., way)| dialled || *way == Way::Local) {
+        let walls = states(VALUES, PARTICLES, memory, cycles, way)?;
         let (p50, best) = (rate(median(&walls)), rate(walls[0]));
-        println!(
-            "  states in {name:<9} p50 {p50:.2}  best {best:.2}  of the socket {:.2}",
-            p50 / rate(median(&raw))
-        );
-    }
-    if has("--large") {
-        let walls = states(LARGE, 4, LARGE_MEMORY, 1)?;
-        let gb = 2.0 * 8.0 * 4.0 * LARGE as f64 / 1e9;
-        println!(
-            "4 states of 256 MB, --state-memory 256 MB: {:.2} GB/s, peak of the coordinator {} MB",
-            gb / walls[0].as_secs_f64(),
-            peak_mb()
-        );
+        let of_raw = p50 / rate(median(&raw));
+        println!("  {name:<22}  p50 {p50:.2}  best {best:.2}  of the socket {of_raw:.2}");
     }
     Ok(())
 }
@@ -117,9 +162,21 @@ fn pieces() {
 }
 
 /// Wall times of cycles, fastest first.
-fn states(values: usize, particles: usize, memory: usize, cycles: usize) -> Result<Vec<Duration>, Failure> {
+fn states(
+    values: usize,
+    particles: usize,
+    memory: usize,
+    cycles: usize,
+    way: Way,
+) -> Result<Vec<Duration>, Failure> {
     let store = StateStore::new(memory);
-    let (mut fleet, workers) = fleet(&store, None)?;
+    let (mut fleet, workers): (_, Box<dyn std::any::Any>) = match way {
+        Way::Local => fleet(&store, None).map(|(fleet, workers)| (fleet, Box::new(workers) as _))?,
+        Way::Dialled { tls } => {
+            let (config, events) = config(&store);
+            dialled::fleet(config, &events, tls).map(|(fleet, workers)| (fleet, Box::new(workers) as _))?
+        }
+    };
     let setup = fleet.install(&Setup::default())?;
     let mut now = (0..particles).map(|k| start(&store, values, k)).collect::<Result<Vec<_>, Failure>>()?;
     let first: Vec<_> = now.iter().map(StoredState::id).collect();
@@ -141,12 +198,17 @@ fn states(values: usize, particles: usize, memory: usize, cycles: usize) -> Resu
     Ok(walls)
 }
 
-/// A fleet with this store, and its workers; with those that share the place.
-fn fleet(store: &StateStore, place: Option<&str>) -> Result<(GrpcFleet, LocalWorkers), Failure> {
+fn config(store: &StateStore) -> (FleetConfig, mpsc::Receiver<FleetEvent>) {
     let (sender, events) = mpsc::channel();
     let mut config = FleetConfig::new(None, "bench", CancellationToken::new(), sender);
     config.states = store.clone();
     config.identity.id = shared::RUN;
+    (config, events)
+}
+
+/// A fleet with this store, and its workers; with those that share the place.
+fn fleet(store: &StateStore, place: Option<&str>) -> Result<(GrpcFleet, LocalWorkers), Failure> {
+    let (config, events) = config(store);
     let fleet = GrpcFleet::listen(config)?;
     let program = std::env::current_exe()?;
     let args = place.map(|place| vec!["--states".to_owned(), place.to_owned()]).unwrap_or_default();
@@ -164,7 +226,7 @@ fn fleet(store: &StateStore, place: Option<&str>) -> Result<(GrpcFleet, LocalWor
 
 /// A state piece by piece, so that no more than a piece of it is in memory beside the store.
 fn start(store: &StateStore, values: usize, particle: usize) -> Result<StoredState, Failure> {
-    let mut writer = store.writer(values);
+    let mut writer = store.writer_for_workers(values);
     let mut first = 0;
     while writer.wanted() > 0 {
         let piece: Vec<f64> = (first..first + writer.wanted()).map(|i| (i + particle) as f64).collect();

@@ -5,7 +5,6 @@
 
 use std::net::SocketAddr;
 use std::ops::ControlFlow;
-use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::thread::JoinHandle;
@@ -21,7 +20,7 @@ use super::config::FleetConfig;
 use super::dispatcher::{BatchError, Comparing, Event, Likeness, Rules};
 use super::door::{Door, Refusals, Refused};
 use super::explained::{Listening, explained};
-use super::handle::FleetHandle;
+use super::handle::{Adopted, FleetHandle};
 use super::hub::{Hub, Reply, SetupShape, Submission};
 use super::network::{self, Ways};
 use super::probe::probe;
@@ -39,7 +38,7 @@ const GRACE: Duration = Duration::from_millis(2500);
 /// Workers that dial in.
 pub struct GrpcFleet {
     pub(super) hub: Arc<Hub>,
-    adopted: UnboundedSender<UnixStream>,
+    adopted: UnboundedSender<Adopted>,
     batches: UnboundedSender<Submission>,
     stop: CancellationToken,
     network: Option<JoinHandle<Result<(), String>>>,

@@ -5,21 +5,29 @@
 use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 
+use starlings_proto::descriptors::DescriptorSender;
 use tokio::sync::mpsc::UnboundedSender;
 
 use super::FleetEvent;
 use super::dispatcher::Event;
 use super::hub::Hub;
 
+/// The ways to a worker that this process started, of which it holds the other ends.
+pub(super) struct Adopted {
+    pub(super) connection: UnixStream,
+    /// That of descriptors, where the system gave one.
+    pub(super) descriptors: Option<DescriptorSender>,
+}
+
 /// Lets the supervisor of local workers end a fleet's wait.
 #[derive(Clone)]
 pub struct FleetHandle {
     hub: Arc<Hub>,
-    adopted: UnboundedSender<UnixStream>,
+    adopted: UnboundedSender<Adopted>,
 }
 
 impl FleetHandle {
-    pub(super) fn new(hub: Arc<Hub>, adopted: UnboundedSender<UnixStream>) -> Self {
+    pub(super) fn new(hub: Arc<Hub>, adopted: UnboundedSender<Adopted>) -> Self {
         Self { hub, adopted }
     }
 
@@ -30,6 +38,7 @@ impl FleetHandle {
 
     /// Says that all workers are processes of this machine: a setup that they cannot build ends a batch at once.
     pub fn local_only(&self) {
+        self.hub.states().lends();
         self.hub.handle(Event::LocalOnly);
     }
 
@@ -48,10 +57,10 @@ impl FleetHandle {
         self.hub.dismiss(pids);
     }
 
-    /// Takes this end of a pair of sockets, of which a process that this one started holds the other, as the way to a worker.
-    pub(crate) fn adopt(&self, end: UnixStream) {
+    /// Takes these ends of pairs of sockets, of which a process that this one started holds the others, as the ways to a worker.
+    pub(crate) fn adopt(&self, connection: UnixStream, descriptors: Option<DescriptorSender>) {
         // A network that ended has told why.
-        let _ = self.adopted.send(end);
+        let _ = self.adopted.send(Adopted { connection, descriptors });
     }
 
     /// Passes an event on.

@@ -1,6 +1,7 @@
 //! Worker processes on this machine: starts them, starts a dead one again, ends them all.
 //!
-//! The standard input of each is its connection: one of a pair of sockets, which nobody else can reach. A worker ends by itself
+//! The standard input of each is its connection: one of a pair of sockets, which nobody else can reach; descriptors of memory for large
+//! states come on a second pair. A worker ends by itself
 //! when it closes, so none outlives this process, however it ends. Nothing is decided about jobs here: a dead worker's jobs are the dispatcher's business. Next file to read: `process`.
 
 mod process;

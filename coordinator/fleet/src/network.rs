@@ -1,6 +1,5 @@
 //! The network thread: one runtime that serves the workers' streams, keeps time, and starts the caller's batches.
 
-use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -18,6 +17,7 @@ use tonic::transport::Server;
 
 use super::dispatcher::{BatchError, Event};
 use super::door::Door;
+use super::handle::Adopted;
 use super::hub::{Hub, Submission};
 use super::service::Service;
 
@@ -42,7 +42,7 @@ pub(super) struct Ways {
     /// From anywhere that reaches the address, once it has proved itself.
     pub(super) door: Option<Door>,
     /// Ends of the pairs of sockets that processes of this one hold the other ends of. Nothing else can come on them.
-    pub(super) adopted: UnboundedReceiver<UnixStream>,
+    pub(super) adopted: UnboundedReceiver<Adopted>,
 }
 
 /// Serves until stopped; then asks the workers to leave and waits shortly for them.
@@ -77,7 +77,9 @@ pub(super) fn run(
                 .max_frame_size(FRAME_SIZE)
                 .max_concurrent_streams(Some(STREAMS))
         };
-        let inherited = UnboundedReceiverStream::new(adopted).map(SocketEnd::new);
+        let inherited = UnboundedReceiverStream::new(adopted).map(|adopted| {
+            SocketEnd::new(adopted.connection).map(|end| end.with_descriptors(adopted.descriptors))
+        });
         let listening = async {
             match opened {
                 Some((check, incoming)) => {

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use starlings_proto::descriptors::DescriptorSender;
 use starlings_proto::generated::{self, fleet_server};
 use starlings_proto::words::status_text;
 use starlings_proto::{FromWorker, ToWorker};
@@ -38,7 +39,14 @@ impl fleet_server::Fleet for Service {
         &self,
         request: Request<generated::GetRequest>,
     ) -> Result<Response<Self::GetStream>, Status> {
-        transfer::get(&self.hub, request.get_ref()).map(Response::new)
+        transfer::get(&self.hub, request.get_ref(), way(&request)).map(Response::new)
+    }
+
+    async fn lend(
+        &self,
+        request: Request<generated::LendRequest>,
+    ) -> Result<Response<generated::Loan>, Status> {
+        transfer::lend(&self.hub, request.get_ref(), way(&request)).map(Response::new)
     }
 
     async fn work(
@@ -69,6 +77,11 @@ impl fleet_server::Fleet for Service {
         }
         Ok(Response::new(outgoing))
     }
+}
+
+/// The way of descriptors beside the connection on which a request came.
+fn way<T>(request: &Request<T>) -> Option<&DescriptorSender> {
+    request.extensions().get::<Option<DescriptorSender>>()?.as_ref()
 }
 
 /// Tells the hub that a worker left, however its reader ended.

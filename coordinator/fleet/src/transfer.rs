@@ -1,17 +1,21 @@
 //! Large states on their way between workers and the store: one stream each, beside the workers' own.
 //!
 //! Everything that arrives is checked before it is kept: that the worker has a session and the run a lease, lengths, values, and by
-//! the name that all of it came as it went. Next file to read: `hub/states.rs`.
+//! the name that all of it came as it went. A worker of this machine that takes descriptors reads states where they are, and writes them
+//! into memory that it is lent. Next file to read: `hub/states.rs`.
 
+use std::os::fd::AsFd;
 use std::sync::Arc;
 use std::time::Duration;
 
+use starlings_proto::convert::lent::{Lend, decode_in_memory, encode_in_memory};
 use starlings_proto::convert::piece_names::{NAMES, decode_names, encode_names};
 use starlings_proto::convert::state::{
     CHUNK_BYTES, ChunkId, Get, PutHead, decode_chunk, encode_chunk, encode_head, encode_put_result,
 };
+use starlings_proto::descriptors::DescriptorSender;
 use starlings_proto::generated;
-use starlings_states::{StateError, StateWriter, StoredState};
+use starlings_states::{Lent, StateError, StateWriter, StoredState, not_finite};
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Status, Streaming};
@@ -35,14 +39,16 @@ pub(super) async fn put(
     let _counted = hub.begin_put(&head)?;
     let mut writer = hub.states().writer(head.n_state);
     while let Some(message) = next(&mut inbound).await? {
+        if let Some(number) = decode_in_memory(&message).map_err(|error| invalid(&error))? {
+            return written(hub, &head, number).await;
+        }
         if let Some(names) = decode_names(&message, writer.missing()).map_err(|error| invalid(&error))? {
             writer = find(hub, writer, names).await?;
             continue;
         }
         let bytes = decode_chunk(message, writer.wanted()).map_err(|error| invalid(&error))?;
-        let (words, _) = bytes.as_chunks::<8>();
-        if let Some(spoiled) = words.iter().map(|w| f64::from_le_bytes(*w)).find(|value| !value.is_finite()) {
-            return Err(Status::invalid_argument(format!("{spoiled} is a value of the state")));
+        if let Some(value) = not_finite(&bytes) {
+            return Err(invalid(&StateError::NotFinite { value }));
         }
         writer = keep(hub, writer, bytes).await?;
     }
@@ -50,6 +56,32 @@ pub(super) async fn put(
     let result = encode_put_result(&state.id());
     hub.end_put(&head, state)?;
     Ok(result)
+}
+
+/// Takes a state that its worker wrote into memory that it was lent under a number.
+async fn written(hub: &Arc<Hub>, head: &PutHead, number: u64) -> Result<generated::PutResult, Status> {
+    let lent = hub.lent(head, number).filter(|lent| lent.n_state() == head.n_state);
+    let lent = lent.ok_or_else(|| Status::failed_precondition("no memory is lent for this state"))?;
+    let writer = hub.states().writer(head.n_state);
+    let state = on_disk(move || lent.copy(writer)).await?.map_err(|error| match error {
+        StateError::NotFinite { .. } => Status::invalid_argument(error.to_string()),
+        _ => lost(hub, &error),
+    })?;
+    let result = encode_put_result(&state.id());
+    hub.end_put(head, state)?;
+    Ok(result)
+}
+
+/// Lends memory for end states to a worker that takes descriptors, where there is room.
+pub(super) fn lend(
+    hub: &Arc<Hub>,
+    request: &generated::LendRequest,
+    way: Option<&DescriptorSender>,
+) -> Result<generated::Loan, Status> {
+    let lend = Lend::decode(request).map_err(|error| Status::invalid_argument(error.to_string()))?;
+    let give = |lent: &Lent| way.is_some_and(|way| way.send(lend.descriptor, lent.as_fd()).is_ok());
+    let lent = hub.lend(&lend, give)?;
+    Ok(generated::Loan { lent })
 }
 
 async fn next(inbound: &mut Streaming<generated::Chunk>) -> Result<Option<generated::Chunk>, Status> {
@@ -81,19 +113,26 @@ async fn find(hub: &Arc<Hub>, mut writer: StateWriter, names: Vec<ChunkId>) -> R
     found.await?.map_err(|error| Status::failed_precondition(error.to_string()))
 }
 
-/// Gives a state to a worker, or, where it shares the folder, the names of its pieces.
+/// Gives a state to a worker: its memory where the worker takes descriptors, the names of its pieces where it shares the folder.
 pub(super) fn get(
     hub: &Arc<Hub>,
     request: &generated::GetRequest,
+    way: Option<&DescriptorSender>,
 ) -> Result<ReceiverStream<Result<generated::Chunk, Status>>, Status> {
     let get = Get::decode(request).map_err(|error| Status::invalid_argument(error.to_string()))?;
     let (state, counted) = hub.begin_get(&get)?;
     let (sender, pieces) = mpsc::channel(AHEAD);
     let by_names = get.names && hub.states().is_shared();
+    let in_memory = get.descriptor != 0
+        && state.descriptor().zip(way).is_some_and(|(memory, way)| way.send(get.descriptor, memory).is_ok());
     let hub = Arc::clone(hub);
     tokio::spawn(async move {
         let _counted = counted;
         let mut given = sender.send(Ok(encode_head(state.n_state()))).await.is_ok();
+        if in_memory {
+            let _ = sender.send(Ok(encode_in_memory(get.descriptor))).await;
+            return;
+        }
         if by_names {
             for names in state.pieces().chunks(NAMES) {
                 if sender.send(Ok(encode_names(names))).await.is_err() {

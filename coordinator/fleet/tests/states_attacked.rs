@@ -48,7 +48,7 @@ async fn put(hand: &mut Hand, messages: Vec<generated::Chunk>) -> Result<StateId
 }
 
 async fn get(hand: &mut Hand, epoch: u64, nonce: u64, state: StateId) -> Result<usize, Status> {
-    let request = Get { epoch, nonce, state, names: false }.encode();
+    let request = Get { epoch, nonce, state, names: false, descriptor: 0 }.encode();
     let mut pieces = hand.client.get(request).await?.into_inner();
     let mut bytes = 0;
     while let Some(piece) = pieces.message().await? {

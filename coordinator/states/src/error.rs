@@ -1,5 +1,7 @@
 //! Why a state cannot be kept or read.
 
+use std::sync::Arc;
+
 use starlings_pieces::PieceError;
 
 /// What is wrong with a state or with the folder that holds its pieces.
@@ -17,6 +19,20 @@ pub enum StateError {
         index: usize,
         /// Its length; 0 where it is missing.
         bytes: usize,
+    },
+    /// A state with a value that is none.
+    #[error("{value} is a value of the state")]
+    NotFinite {
+        /// The value.
+        value: f64,
+    },
+    /// Memory of a whole state.
+    #[error("cannot {what} the memory of a particle's state: {source}")]
+    Memory {
+        /// What was tried.
+        what: &'static str,
+        /// What the system said.
+        source: Arc<std::io::Error>,
     },
 }
 

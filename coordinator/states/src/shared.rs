@@ -4,14 +4,16 @@
 //! puts a file into its place and what removes one exclude each other by a lock of their own. In a folder that workers write into as well no piece is
 //! removed while a run is on its way that may end in it: see [`Shared::tidy`]. Next file to read: `table`.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 use bytes::Bytes;
 use starlings_pieces::Folder;
-use starlings_proto::StateId;
 use starlings_proto::convert::state::ChunkId;
+use starlings_proto::{MAX_INLINE_STATE, StateId};
 
 use crate::StateError;
+use crate::memory::{InMemory, Memory};
 use crate::table::Table;
 
 /// Files that are removed before others may come into their places.
@@ -27,6 +29,8 @@ pub(crate) struct Shared {
     pub(crate) files: Mutex<()>,
     /// Whether workers write into the folder and read from it.
     pub(crate) for_workers: bool,
+    /// Whether workers of this machine take descriptors of memory.
+    pub(crate) lends: AtomicBool,
 }
 
 /// The pieces of one state.
@@ -36,6 +40,8 @@ pub(crate) struct Pieces {
     pub(crate) id: StateId,
     pub(crate) n_state: usize,
     pub(crate) names: Vec<ChunkId>,
+    /// Where all of it is one after the other.
+    pub(crate) memory: Option<Arc<Memory>>,
 }
 
 impl Shared {
@@ -60,6 +66,21 @@ impl Shared {
                 return Ok(());
             }
         }
+        self.put_on_disk(name, bytes)
+    }
+
+    /// The same of bytes that stay the caller's: they are copied where no state has them.
+    pub(crate) fn put_copy(&self, name: ChunkId, bytes: &[u8]) -> Result<(), StateError> {
+        if self.lock().again(&name) {
+            return Ok(());
+        }
+        if self.lock().in_memory().saturating_add(bytes.len()) > self.memory {
+            return self.put_on_disk(name, bytes);
+        }
+        self.put(name, &Bytes::copy_from_slice(bytes))
+    }
+
+    fn put_on_disk(&self, name: ChunkId, bytes: &[u8]) -> Result<(), StateError> {
         let folder = self.folder()?;
         let written = folder.stage(bytes)?;
         let _files = lock(&self.files);
@@ -69,6 +90,22 @@ impl Shared {
         folder.place(written, &name)?;
         self.lock().on_disk(name);
         Ok(())
+    }
+
+    /// Memory for a whole state of so many values, to be lent or not, where there is room and somebody who takes descriptors.
+    pub(crate) fn whole(&self, n_state: usize, is_lent: bool) -> Option<Memory> {
+        let bytes = n_state.checked_mul(8).filter(|bytes| *bytes > MAX_INLINE_STATE)?;
+        if !self.lends.load(Ordering::Relaxed) {
+            return None;
+        }
+        let room = self.lock().room(bytes, self.memory, is_lent)?;
+        Memory::new(room)
+    }
+
+    /// Counts one use of each of these pieces, which are in the memory of a whole state.
+    pub(crate) fn put_within(&self, pieces: impl Iterator<Item = (ChunkId, InMemory)>) {
+        let mut table = self.lock();
+        pieces.for_each(|(name, held)| table.within(name, held));
     }
 
     /// Takes note of a piece that the folder has already.
@@ -82,24 +119,24 @@ impl Shared {
     }
 
     pub(crate) fn read(&self, name: &ChunkId) -> Result<Bytes, StateError> {
-        let held = self.lock().chunks.get(name).and_then(|entry| entry.bytes.clone());
-        held.map_or_else(|| Ok(self.folder()?.read(name)?), Ok)
+        let held = self.lock().chunks.get(name).and_then(|entry| entry.held.clone());
+        held.map_or_else(|| Ok(self.folder()?.read(name)?), |held| held.read())
     }
 
     /// Whether reading a piece takes no file.
     pub(crate) fn is_in_memory(&self, name: &ChunkId) -> bool {
-        self.lock().chunks.get(name).is_some_and(|entry| entry.bytes.is_some())
+        self.lock().chunks.get(name).is_some_and(|entry| entry.held.is_some())
     }
 
     /// Makes sure that the folder has a piece that is held.
     pub(crate) fn persist(&self, name: &ChunkId) -> Result<(), StateError> {
-        let bytes = match self.lock().chunks.get(name) {
-            Some(entry) if !entry.on_disk => entry.bytes.clone(),
+        let held = match self.lock().chunks.get(name) {
+            Some(entry) if !entry.on_disk => entry.held.clone(),
             _ => None,
         };
-        let Some(bytes) = bytes else { return Ok(()) };
+        let Some(held) = held else { return Ok(()) };
         let folder = self.folder()?;
-        let written = folder.stage(&bytes)?;
+        let written = folder.stage(&held.read()?)?;
         let _files = lock(&self.files);
         folder.place(written, name)?;
         self.lock().placed(name);

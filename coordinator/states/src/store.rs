@@ -5,6 +5,7 @@
 
 use std::collections::HashSet;
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
 use starlings_pieces::{Folder, hex};
@@ -13,7 +14,7 @@ use starlings_proto::convert::floats;
 use starlings_proto::convert::state::{CHUNK_VALUES, ChunkId};
 
 use crate::shared::{Shared, lock};
-use crate::{StateError, StateWriter, StoredState};
+use crate::{Lent, StateError, StateWriter, StoredState};
 
 /// A store of states; clones are the same one.
 #[derive(Clone, Debug)]
@@ -37,13 +38,25 @@ impl StateStore {
 
     fn with(memory: usize, folder: Option<Arc<Folder>>, for_workers: bool) -> Self {
         let (table, files) = (Mutex::default(), Mutex::default());
-        let shared = Shared { memory, folder: Mutex::new(folder), table, files, for_workers };
+        let lends = AtomicBool::new(false);
+        let shared = Shared { memory, folder: Mutex::new(folder), table, files, for_workers, lends };
         Self { shared: Arc::new(shared) }
     }
 
     /// Whether workers may read pieces from the folder and write them there.
     pub fn is_shared(&self) -> bool {
         self.shared.for_workers
+    }
+
+    /// Keeps states that go to workers in memory from now on whose descriptors workers of this machine take, as far as there is room. A
+    /// store in a folder that workers share stays as it is.
+    pub fn lends(&self) {
+        self.shared.lends.store(!self.is_shared(), Ordering::Relaxed);
+    }
+
+    /// Memory into which a worker writes states of so many values; `None` where there is no room for it, or nobody takes descriptors.
+    pub fn lend(&self, n_state: usize) -> Option<Lent> {
+        Lent::new(&self.shared, n_state)
     }
 
     /// Removes what nobody needs any more from a folder that workers share; before a batch of runs is given away.
@@ -77,7 +90,12 @@ impl StateStore {
 
     /// Begins a state of so many values.
     pub fn writer(&self, n_state: usize) -> StateWriter {
-        StateWriter::new(&self.shared, n_state)
+        StateWriter::new(&self.shared, n_state, false)
+    }
+
+    /// Begins a state of so many values that goes to workers: where these take descriptors, in memory that they see.
+    pub fn writer_for_workers(&self, n_state: usize) -> StateWriter {
+        StateWriter::new(&self.shared, n_state, true)
     }
 
     /// Keeps a state that is in memory.
@@ -85,7 +103,7 @@ impl StateStore {
     /// # Errors
     /// When memory is full and the folder refuses.
     pub fn keep(&self, values: &[f64]) -> Result<StoredState, StateError> {
-        let mut writer = self.writer(values.len());
+        let mut writer = self.writer_for_workers(values.len());
         for piece in values.chunks(CHUNK_VALUES) {
             writer.push(floats::encode(piece))?;
         }
@@ -136,13 +154,13 @@ impl StateStore {
 
     /// Whether a piece of so many bytes goes into memory.
     pub fn has_room(&self, bytes: usize) -> bool {
-        self.shared.lock().in_memory + bytes <= self.shared.memory
+        self.shared.lock().in_memory() + bytes <= self.shared.memory
     }
 
     /// Bytes of the pieces in memory now, and most of them at one time.
     pub fn in_memory(&self) -> (usize, usize) {
         let table = self.shared.lock();
-        (table.in_memory, table.most)
+        (table.in_memory(), table.most)
     }
 
     /// Number of different pieces.

@@ -1,6 +1,7 @@
 //! A state that the store holds: its pieces stay for as long as somebody has it.
 
-use std::sync::Arc;
+use std::os::fd::{AsFd, BorrowedFd};
+use std::sync::{Arc, Weak};
 
 use bytes::Bytes;
 use starlings_proto::StateId;
@@ -22,6 +23,27 @@ impl PartialEq for StoredState {
 impl StoredState {
     pub(crate) fn of(pieces: Arc<Pieces>) -> Self {
         Self(pieces)
+    }
+
+    /// The state of these pieces, of which each is used once for it, or the one that somebody holds under its name.
+    pub(crate) fn named(pieces: Pieces) -> Self {
+        let store = Arc::clone(&pieces.store);
+        let mut table = store.lock();
+        let held = table.named.get(&pieces.id).and_then(Weak::upgrade);
+        if held.is_none() {
+            let pieces = Arc::new(pieces);
+            table.named.insert(pieces.id, Arc::downgrade(&pieces));
+            return Self(pieces);
+        }
+        drop(table);
+        // Its uses are given back.
+        drop(pieces);
+        held.map_or_else(|| unreachable!("it was found"), Self)
+    }
+
+    /// The descriptor of the memory that it is in as a whole.
+    pub fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        self.0.memory.as_deref().map(AsFd::as_fd)
     }
 
     /// Its name.
@@ -63,8 +85,11 @@ impl StoredState {
         self.0.store.is_in_memory(&self.0.names[index])
     }
 
-    /// Whether pieces of it stand in the folder: to drop its last clone takes time then.
-    pub fn is_on_disk(&self) -> bool {
+    /// Whether to drop its last clone takes time: pieces of it stand in the folder, or the system takes memory back.
+    pub fn goes_slowly(&self) -> bool {
+        if self.0.memory.is_some() {
+            return true;
+        }
         let table = self.0.store.lock();
         self.0.names.iter().any(|name| table.chunks.get(name).is_some_and(|entry| entry.on_disk))
     }

@@ -1,11 +1,13 @@
 //! Which pieces there are, where each of them is and how many states need it.
 
 use std::collections::{HashMap, HashSet};
-use std::sync::Weak;
+use std::sync::{Arc, Weak};
 
 use bytes::Bytes;
 use starlings_proto::StateId;
 use starlings_proto::convert::state::ChunkId;
+
+use crate::memory::{InMemory, Room, Taken};
 
 /// Guarded by the store's lock. A state is a `P`.
 #[derive(Debug)]
@@ -13,9 +15,11 @@ pub(crate) struct Table<P> {
     pub(crate) chunks: HashMap<ChunkId, Entry>,
     /// States that somebody holds.
     pub(crate) named: HashMap<StateId, Weak<P>>,
-    /// Bytes of the pieces in memory.
-    pub(crate) in_memory: usize,
-    /// Most of them at one time.
+    /// Bytes of the pieces that are in memory by themselves.
+    alone: usize,
+    /// What whole states take in memory.
+    whole: Arc<Taken>,
+    /// Most bytes in memory at one time.
     pub(crate) most: usize,
     /// Pieces that stand in the folder and were given up by their last state.
     given_up: HashSet<ChunkId>,
@@ -27,7 +31,7 @@ pub(crate) struct Entry {
     /// How many states, or places in one state, need it.
     refs: usize,
     /// Where it is in memory.
-    pub(crate) bytes: Option<Bytes>,
+    pub(crate) held: Option<InMemory>,
     /// Whether the folder has it, and it goes with the last use.
     pub(crate) on_disk: bool,
 }
@@ -37,7 +41,8 @@ impl<P> Default for Table<P> {
         Self {
             chunks: HashMap::new(),
             named: HashMap::new(),
-            in_memory: 0,
+            alone: 0,
+            whole: Arc::default(),
             most: 0,
             given_up: HashSet::new(),
         }
@@ -52,20 +57,43 @@ impl<P> Table<P> {
         true
     }
 
+    /// Bytes in memory.
+    pub(crate) fn in_memory(&self) -> usize {
+        self.alone + self.whole.bytes()
+    }
+
     /// Takes a piece that is not there into memory where the limit allows it.
     pub(crate) fn remember(&mut self, name: ChunkId, bytes: &Bytes, limit: usize) -> bool {
-        if self.in_memory + bytes.len() > limit {
+        if self.in_memory() + bytes.len() > limit {
             return false;
         }
-        self.in_memory += bytes.len();
-        self.most = self.most.max(self.in_memory);
-        self.chunks.insert(name, Entry { refs: 1, bytes: Some(bytes.clone()), on_disk: false });
+        self.alone += bytes.len();
+        self.most = self.most.max(self.in_memory());
+        let held = Some(InMemory::Alone(bytes.clone()));
+        self.chunks.insert(name, Entry { refs: 1, held, on_disk: false });
         true
+    }
+
+    /// Room for a whole state of so many bytes where the limit allows it, to be lent or not.
+    pub(crate) fn room(&mut self, bytes: usize, limit: usize, is_lent: bool) -> Option<Room> {
+        if self.in_memory().saturating_add(bytes) > limit {
+            return None;
+        }
+        let room = self.whole.take(bytes, limit, is_lent)?;
+        self.most = self.most.max(self.in_memory());
+        Some(room)
+    }
+
+    /// Counts one use of a piece that is in the memory of a whole state.
+    pub(crate) fn within(&mut self, name: ChunkId, held: InMemory) {
+        let entry = self.chunks.entry(name).or_insert(Entry { refs: 0, held: None, on_disk: false });
+        entry.refs += 1;
+        entry.held.get_or_insert(held);
     }
 
     /// Counts one use of a piece that stands in the folder; it may have come into memory meanwhile.
     pub(crate) fn on_disk(&mut self, name: ChunkId) {
-        let entry = self.chunks.entry(name).or_insert(Entry { refs: 0, bytes: None, on_disk: true });
+        let entry = self.chunks.entry(name).or_insert(Entry { refs: 0, held: None, on_disk: true });
         (entry.refs, entry.on_disk) = (entry.refs + 1, true);
         self.given_up.remove(&name);
     }
@@ -106,7 +134,7 @@ impl<P> Table<P> {
         if entry.refs > 0 {
             return;
         }
-        self.in_memory -= entry.bytes.as_ref().map_or(0, Bytes::len);
+        self.alone -= entry.held.as_ref().map_or(0, InMemory::own_bytes);
         if entry.on_disk {
             self.given_up.insert(*name);
         }

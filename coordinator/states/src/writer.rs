@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use bytes::Bytes;
-use starlings_proto::convert::state::{ChunkId, chunk_values, n_chunks};
+use starlings_proto::convert::state::{CHUNK_BYTES, ChunkId, chunk_values, n_chunks};
 use starlings_proto::{StateNaming, digest};
 
+use crate::memory::{InMemory, Memory};
 use crate::shared::{Pieces, Shared};
 use crate::{StateError, StoredState};
 
@@ -16,12 +17,17 @@ pub struct StateWriter {
     n_state: usize,
     names: Vec<ChunkId>,
     naming: StateNaming,
+    /// Whether it goes to workers.
+    for_workers: bool,
+    /// The memory of all of it, where there is room for that.
+    whole: Option<Arc<Memory>>,
 }
 
 impl StateWriter {
-    pub(crate) fn new(store: &Arc<Shared>, n_state: usize) -> Self {
+    pub(crate) fn new(store: &Arc<Shared>, n_state: usize, for_workers: bool) -> Self {
         let store = Arc::clone(store);
-        Self { store, n_state, names: Vec::new(), naming: StateNaming::of(n_state) }
+        let naming = StateNaming::of(n_state);
+        Self { store, n_state, names: Vec::new(), naming, for_workers, whole: None }
     }
 
     /// Values that the next piece must have; zero when all are there.
@@ -53,7 +59,35 @@ impl StateWriter {
         if wanted == 0 || bytes.len() != wanted {
             return Err(self.misfit(bytes.len()));
         }
-        self.store.put(name, &bytes)?;
+        if self.names.is_empty() && self.for_workers {
+            self.whole = self.store.whole(self.n_state, false).map(Arc::new);
+        }
+        match &self.whole {
+            Some(memory) => {
+                let at = self.names.len() * CHUNK_BYTES;
+                memory.write(&bytes, at)?;
+                let piece = InMemory::Within(Arc::clone(memory), at, bytes.len());
+                self.store.put_within(std::iter::once((name, piece)));
+            }
+            None => self.store.put(name, &bytes)?,
+        }
+        self.take(name);
+        Ok(())
+    }
+
+    /// Takes the next piece, of which a copy is kept where no other state has it.
+    ///
+    /// # Errors
+    /// As [`StateWriter::push`].
+    pub fn push_copy(&mut self, bytes: &[u8]) -> Result<(), StateError> {
+        let wanted = self.wanted() * 8;
+        if wanted == 0 || bytes.len() != wanted {
+            return Err(self.misfit(bytes.len()));
+        }
+        let name = digest(bytes);
+        self.store.put_copy(name, bytes)?;
+        // Not in the memory of the whole.
+        self.whole = None;
         self.take(name);
         Ok(())
     }
@@ -68,6 +102,8 @@ impl StateWriter {
             return Err(self.misfit(0));
         }
         self.store.found(name, wanted)?;
+        // It is no longer all there.
+        self.whole = None;
         self.take(name);
         Ok(())
     }
@@ -89,18 +125,13 @@ impl StateWriter {
         if self.names.len() != n_chunks(self.n_state) {
             return Err(self.misfit(0));
         }
-        let id = self.naming.finish();
-        let mut table = self.store.lock();
-        if let Some(held) = table.named.get(&id).and_then(std::sync::Weak::upgrade) {
-            // The drop of this writer gives its uses back.
-            drop(table);
-            return Ok(StoredState::of(held));
+        let (store, n_state, id) = (Arc::clone(&self.store), self.n_state, self.naming.finish());
+        let memory = self.whole.take();
+        if let Some(memory) = &memory {
+            memory.seal()?;
         }
         let names = std::mem::take(&mut self.names);
-        let pieces = Arc::new(Pieces { store: Arc::clone(&self.store), id, n_state: self.n_state, names });
-        table.named.insert(id, Arc::downgrade(&pieces));
-        drop(table);
-        Ok(StoredState::of(pieces))
+        Ok(StoredState::named(Pieces { store, id, n_state, names, memory }))
     }
 }
 

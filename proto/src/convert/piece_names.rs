@@ -13,7 +13,7 @@ pub const NAMES: usize = 8192;
 
 /// A message with names of the next pieces of a state, at most [`NAMES`].
 pub fn encode_names(names: &[ChunkId]) -> generated::Chunk {
-    generated::Chunk { head: None, data: Bytes::new(), names: join(names) }
+    generated::Chunk { names: join(names), ..generated::Chunk::default() }
 }
 
 /// The names of the next pieces of a state that has so many more; `None` for a message with a piece itself.
@@ -28,7 +28,11 @@ pub fn decode_names(
         return Ok(None);
     }
     let names = split(&message.names, "names")?;
-    if message.head.is_some() || !message.data.is_empty() || names.len() > wanted.min(NAMES) {
+    if message.head.is_some()
+        || !message.data.is_empty()
+        || message.in_memory != 0
+        || names.len() > wanted.min(NAMES)
+    {
         let message = format!("{} names of pieces where {wanted} are missing", names.len());
         return Err(ProtocolError::Shape { field: "names", message });
     }

@@ -1,7 +1,7 @@
 //! States on the wire: inside a message while they are small, under a name and in pieces of their own above that.
 //!
 //! A name says what the state holds, value by value, so the side that receives the pieces knows that all of them arrived. Next
-//! file to read: `proto/fleet.proto`, for Put and Get.
+//! files to read: `proto/fleet.proto`, for Put and Get; [`super::lent`].
 
 use bytes::Bytes;
 
@@ -123,6 +123,8 @@ pub struct Get {
     pub state: StateId,
     /// The names of its pieces are enough.
     pub names: bool,
+    /// The number under which a descriptor of its memory is taken; 0 where none is.
+    pub descriptor: u64,
 }
 
 impl PutHead {
@@ -130,7 +132,7 @@ impl PutHead {
     pub fn encode(self) -> generated::Chunk {
         let Self { n_state, lease, nonce } = self;
         let head = generated::StateHead { n_state: n_state as u64, lease: Some(lease.into()), nonce };
-        generated::Chunk { head: Some(head), data: Bytes::new(), names: Bytes::new() }
+        generated::Chunk { head: Some(head), ..generated::Chunk::default() }
     }
 
     /// Checks the first message of a put, which has no values.
@@ -147,8 +149,8 @@ impl PutHead {
 impl Get {
     /// The request.
     pub fn encode(self) -> generated::GetRequest {
-        let Self { epoch, nonce, state, names } = self;
-        generated::GetRequest { epoch, nonce, state_id: Bytes::copy_from_slice(&state), names }
+        let Self { epoch, nonce, state, names, descriptor } = self;
+        generated::GetRequest { epoch, nonce, state_id: Bytes::copy_from_slice(&state), names, descriptor }
     }
 
     /// Checks a request.
@@ -157,14 +159,15 @@ impl Get {
     /// When the name is none.
     pub fn decode(message: &generated::GetRequest) -> Result<Self, ProtocolError> {
         let state = hash(&message.state_id, "state id")?;
-        Ok(Self { epoch: message.epoch, nonce: message.nonce, state, names: message.names })
+        let generated::GetRequest { epoch, nonce, names, descriptor, .. } = *message;
+        Ok(Self { epoch, nonce, state, names, descriptor })
     }
 }
 
 /// The first message of an answer to a get, without values.
 pub fn encode_head(n_state: usize) -> generated::Chunk {
     let head = generated::StateHead { n_state: n_state as u64, lease: None, nonce: 0 };
-    generated::Chunk { head: Some(head), data: Bytes::new(), names: Bytes::new() }
+    generated::Chunk { head: Some(head), ..generated::Chunk::default() }
 }
 
 /// The number of values of the state of which this is the first message.
@@ -174,7 +177,7 @@ pub fn encode_head(n_state: usize) -> generated::Chunk {
 pub fn decode_head(message: &generated::Chunk) -> Result<usize, ProtocolError> {
     let n_state = required(message.head.as_ref(), "head")?.n_state as usize;
     check_state(n_state)?;
-    if !message.data.is_empty() || !message.names.is_empty() {
+    if !message.data.is_empty() || !message.names.is_empty() || message.in_memory != 0 {
         let message = "the first message of a state has values".to_owned();
         return Err(ProtocolError::Shape { field: "data", message });
     }
@@ -183,7 +186,7 @@ pub fn decode_head(message: &generated::Chunk) -> Result<usize, ProtocolError> {
 
 /// A message with a piece of a state.
 pub fn encode_chunk(data: Bytes) -> generated::Chunk {
-    generated::Chunk { head: None, data, names: Bytes::new() }
+    generated::Chunk { data, ..generated::Chunk::default() }
 }
 
 /// The bytes of a piece that must have so many values.
@@ -191,8 +194,8 @@ pub fn encode_chunk(data: Bytes) -> generated::Chunk {
 /// # Errors
 /// When it has another length, or a head.
 pub fn decode_chunk(message: generated::Chunk, values: usize) -> Result<Bytes, ProtocolError> {
-    if message.head.is_some() || !message.names.is_empty() {
-        let message = "a second head or names among the pieces of a state".to_owned();
+    if message.head.is_some() || !message.names.is_empty() || message.in_memory != 0 {
+        let message = "a second head, names or memory among the pieces of a state".to_owned();
         return Err(ProtocolError::Shape { field: "head", message });
     }
     let wanted = values * 8;

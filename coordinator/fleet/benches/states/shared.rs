@@ -93,13 +93,13 @@ fn by_workers(
     mixed.ok_or_else(|| "no worker shares the folder".into())
 }
 
-fn by_itself(
+pub(super) fn by_itself(
     store: &StateStore,
     columns: &[StoredState],
     t: &DMatrix<f64>,
 ) -> Result<Vec<StoredState>, Failure> {
     let n_state = columns[0].n_state();
-    let mut writers: Vec<StateWriter> = columns.iter().map(|_| store.writer(n_state)).collect();
+    let mut writers: Vec<StateWriter> = columns.iter().map(|_| store.writer_for_workers(n_state)).collect();
     for index in 0..n_chunks(n_state) {
         for (writer, (name, bytes)) in writers.iter_mut().zip(block(columns, t, index)?) {
             writer.push_named(name, bytes)?;

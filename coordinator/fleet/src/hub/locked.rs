@@ -1,6 +1,6 @@
-//! The hub's lock: what is decided under it lets go of states whose files are removed after it.
+//! The hub's lock: what is decided under it lets go of states, whose files and memory go after it.
 //!
-//! Files may take long to go, as on a shared file system, and a thread of the network that waits for them hears no heartbeat. Next file
+//! Files may take long to go, as on a shared file system, and memory of many pages does; a thread of the network that waits for them hears no heartbeat. Next file
 //! to read: [`super::state`].
 
 use std::ops::{Deref, DerefMut};
@@ -37,12 +37,14 @@ impl DerefMut for Locked<'_> {
 impl Drop for Locked<'_> {
     fn drop(&mut self) {
         let Some(mut state) = self.0.take() else { return };
-        let gone = state.states.gone();
+        let (gone, lent) = state.states.gone();
         drop(state);
-        let on_disk: Vec<StoredState> = gone.into_iter().filter(StoredState::is_on_disk).collect();
+        let slow: Vec<StoredState> = gone.into_iter().filter(StoredState::goes_slowly).collect();
         match Handle::try_current() {
-            Ok(runtime) if !on_disk.is_empty() => drop(runtime.spawn_blocking(|| drop(on_disk))),
-            _ => drop(on_disk),
+            Ok(runtime) if !slow.is_empty() || !lent.is_empty() => {
+                drop(runtime.spawn_blocking(|| drop((slow, lent))));
+            }
+            _ => drop((slow, lent)),
         }
     }
 }

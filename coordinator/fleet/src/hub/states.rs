@@ -6,9 +6,10 @@
 //! answer, until the caller has it: what came of a repeated run, or of the loser of a race, goes with its answer. Those of jobs are held by their batch, or by the copy of a job that is kept for control runs. Next file to read: `transfers`.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use starlings_proto::{Lease, State as Travelling, StateId};
-use starlings_states::{Held, StateStore, StoredState};
+use starlings_states::{Held, Lent, StateStore, StoredState};
 use tonic::Status;
 
 use crate::dispatcher::{ControlId, WorkerId};
@@ -27,8 +28,11 @@ pub(super) struct States {
     answered: BTreeMap<StateId, StoredState>,
     /// Of jobs that are kept for control runs.
     kept: BTreeMap<ControlId, StoredState>,
+    /// Memory that workers write end states into, by its number.
+    lent: BTreeMap<(WorkerId, u64), Arc<Lent>>,
     /// Held no longer.
     gone: Vec<StoredState>,
+    lent_gone: Vec<Arc<Lent>>,
 }
 
 /// A worker that may transfer states.
@@ -46,7 +50,9 @@ impl States {
             put: BTreeMap::new(),
             answered: BTreeMap::new(),
             kept: BTreeMap::new(),
+            lent: BTreeMap::new(),
             gone: Vec::new(),
+            lent_gone: Vec::new(),
         }
     }
 
@@ -67,6 +73,15 @@ impl States {
         let (its, others): (BTreeMap<_, _>, _) = put.partition(|(lease, _)| lease.epoch == worker.0);
         self.put = others;
         self.gone.extend(its.into_values());
+        self.take_back(|of, _| of == worker);
+    }
+
+    /// Takes back memory that was lent.
+    fn take_back(&mut self, is_it: impl Fn(WorkerId, &Lent) -> bool) {
+        let lent = std::mem::take(&mut self.lent).into_iter();
+        let (its, others): (BTreeMap<_, _>, _) = lent.partition(|((of, _), lent)| is_it(*of, lent));
+        self.lent = others;
+        self.lent_gone.extend(its.into_values());
     }
 
     /// A batch is over, or another one begins: nothing of the earlier one is named any more.
@@ -76,8 +91,26 @@ impl States {
     }
 
     /// What is held no longer, to be dropped after the lock.
-    pub(super) fn gone(&mut self) -> Vec<StoredState> {
-        std::mem::take(&mut self.gone)
+    pub(super) fn gone(&mut self) -> (Vec<StoredState>, Vec<Arc<Lent>>) {
+        (std::mem::take(&mut self.gone), std::mem::take(&mut self.lent_gone))
+    }
+
+    /// Whether a worker may be lent memory for states of so many values: one for each of its slots. What it has for states of
+    /// another length is taken back.
+    pub(super) fn may_borrow(&mut self, worker: WorkerId, n_state: usize) -> bool {
+        self.take_back(|of, lent| of == worker && lent.n_state() != n_state);
+        let has = self.lent.range((worker, 0)..=(worker, u64::MAX)).count();
+        self.slots(worker).is_some_and(|slots| has < slots)
+    }
+
+    /// Holds memory that a worker is lent under a number.
+    pub(super) fn lend(&mut self, worker: WorkerId, number: u64, lent: Lent) {
+        self.lent_gone.extend(self.lent.insert((worker, number), Arc::new(lent)));
+    }
+
+    /// The memory that a worker was lent under a number.
+    pub(super) fn lent(&self, worker: WorkerId, number: u64) -> Option<Arc<Lent>> {
+        self.lent.get(&(worker, number)).cloned()
     }
 
     /// Drops states after the lock.

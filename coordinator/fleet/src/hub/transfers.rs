@@ -5,8 +5,9 @@
 use std::sync::Arc;
 
 use starlings_proto::MAX_INLINE_STATE;
+use starlings_proto::convert::lent::Lend;
 use starlings_proto::convert::state::{Get, PutHead};
-use starlings_states::{StateStore, StoredState};
+use starlings_states::{Lent, StateStore, StoredState};
 use tonic::Status;
 
 use super::Hub;
@@ -62,6 +63,32 @@ impl Hub {
         state.may_put(head)?;
         state.states.count(worker, head.nonce)?;
         Ok(Counted { hub: Arc::clone(self), worker })
+    }
+
+    /// Lends memory for end states to a worker, which `give` sends the descriptor; whether it did.
+    pub(crate) fn lend(&self, lend: &Lend, give: impl FnOnce(&Lent) -> bool) -> Result<bool, Status> {
+        let Lend { head, descriptor } = lend;
+        let worker = WorkerId(head.lease.epoch);
+        self.may_put(head)?;
+        if !self.lock().states.may_borrow(worker, head.n_state) {
+            return Ok(false);
+        }
+        let Some(lent) = self.store.lend(head.n_state).filter(give) else { return Ok(false) };
+        let mut state = self.lock();
+        state.states.session(worker, head.nonce)?;
+        state.states.lend(worker, *descriptor, lent);
+        Ok(true)
+    }
+
+    /// The memory that was lent to the worker of a run under a number.
+    pub(crate) fn lent(&self, head: &PutHead, number: u64) -> Option<Arc<Lent>> {
+        self.lock().states.lent(WorkerId(head.lease.epoch), number)
+    }
+
+    fn may_put(&self, head: &PutHead) -> Result<(), Status> {
+        let mut state = self.lock();
+        state.states.session(WorkerId(head.lease.epoch), head.nonce)?;
+        state.may_put(head)
     }
 
     /// Holds a state that arrived until the answer that names it.

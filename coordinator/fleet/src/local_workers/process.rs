@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use starlings_proto::INHERITED;
+use starlings_proto::{INHERITED, descriptors};
 
 use super::LocalConfig;
 use crate::FleetError;
@@ -45,6 +45,7 @@ impl Process {
         let mut command = Command::new(standing(&config.program));
         let spawn = |source| FleetError::Spawn { program: config.program.clone(), source };
         let (own, its) = UnixStream::pair().map_err(spawn)?;
+        let descriptors = descriptors::offer(&own).map_err(spawn)?;
         command.args(&config.args).args(["--connect", INHERITED, "--place", &place.to_string()]);
         command.stdin(OwnedFd::from(its)).stdout(Stdio::null()).stderr(Stdio::piped());
         // A group of its own: an interrupt on the terminal reaches the coordinator only, which ends the workers in order.
@@ -53,7 +54,7 @@ impl Process {
         let mut child = command.spawn().map_err(spawn)?;
         // The command holds the child's end: as long as it does, the end of the child would not be noticed.
         drop(command);
-        config.fleet.adopt(own);
+        config.fleet.adopt(own, descriptors);
         let pipe = child.stderr.take();
         let tail = Arc::new(Mutex::new(VecDeque::new()));
         // From here on the guard ends the child, whatever fails.

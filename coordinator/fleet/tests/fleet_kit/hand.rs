@@ -24,7 +24,11 @@ pub struct Hand {
 
 impl Hand {
     pub async fn dial(address: SocketAddr, hello: Hello) -> Self {
-        let mut client = FleetClient::connect(format!("http://{address}")).await.unwrap();
+        Self::over(FleetClient::connect(format!("http://{address}")).await.unwrap(), hello).await
+    }
+
+    /// One over a connection that is there.
+    pub async fn over(mut client: FleetClient<Channel>, hello: Hello) -> Self {
         let (outbox, outgoing) = unbounded_channel();
         outbox.send(FromWorker::Hello(hello).encode().unwrap()).unwrap();
         let inbound = client.work(UnboundedReceiverStream::new(outgoing)).await.unwrap().into_inner();

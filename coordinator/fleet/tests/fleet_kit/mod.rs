@@ -3,6 +3,7 @@
 
 pub mod access;
 pub mod hand;
+pub mod inherited;
 pub mod shared;
 
 use std::io::{Read, Write};
@@ -101,6 +102,13 @@ pub fn listen_with(
 /// The same for processes of this one alone.
 pub fn private() -> (GrpcFleet, Receiver<FleetEvent>, CancellationToken) {
     start(None, |_| {})
+}
+
+/// The same with a configuration of its own.
+pub fn private_with(
+    change: impl FnOnce(&mut FleetConfig),
+) -> (GrpcFleet, Receiver<FleetEvent>, CancellationToken) {
+    start(None, change)
 }
 
 /// A fleet of this start of a run.

@@ -97,7 +97,8 @@ impl StoredStates {
     fn mapped(&self, threads: usize, work: &(dyn Fn(&mut DMatrix<f64>) + Sync)) -> Result<Self, StateError> {
         let Some(first) = self.columns.first() else { return Ok(self.clone()) };
         let store = StateStore::of(first);
-        let mut writers: Vec<StateWriter> = self.columns.iter().map(|_| store.writer(self.n_state)).collect();
+        let mut writers: Vec<StateWriter> =
+            self.columns.iter().map(|_| store.writer_for_workers(self.n_state)).collect();
         for first in (0..self.n_blocks()).step_by(threads) {
             let last = (first + threads).min(self.n_blocks());
             for pieces in self.made(first..last, work) {

@@ -1,0 +1,178 @@
+//! Memory that is lent to a worker of this machine, which writes states into it, one after the other.
+//!
+//! The coordinator makes it, of the length of a state, and counts it from then on. The worker can write there at any time, so
+//! what is in it is copied first, then looked at; what is kept is the copy. Pages are given by the system once, not for every state, which
+//! costs more than all else of a state's way. Next file to read: `memory`.
+
+use std::os::fd::{AsFd, BorrowedFd};
+use std::sync::Arc;
+
+use starlings_proto::convert::state::CHUNK_BYTES;
+
+use crate::memory::Memory;
+use crate::shared::Shared;
+use crate::{StateError, StateWriter, StoredState};
+
+/// Memory for states of one length, which is counted until it is dropped.
+#[derive(Debug)]
+pub struct Lent {
+    memory: Memory,
+    n_state: usize,
+}
+
+impl Lent {
+    pub(crate) fn new(store: &Arc<Shared>, n_state: usize) -> Option<Self> {
+        Some(Self { memory: store.whole(n_state, true)?, n_state })
+    }
+
+    /// Values of the states that it is for.
+    pub fn n_state(&self) -> usize {
+        self.n_state
+    }
+
+    /// Takes the state that was written into it into the store; this takes time.
+    ///
+    /// # Errors
+    /// [`StateError::NotFinite`] when a value is not finite; others when the store cannot keep it.
+    pub fn copy(&self, mut writer: StateWriter) -> Result<StoredState, StateError> {
+        let (mut buffer, mut at) = (vec![0; CHUNK_BYTES], 0);
+        while writer.wanted() > 0 {
+            let bytes = &mut buffer[..8 * writer.wanted()];
+            self.memory.read(bytes, at)?;
+            if let Some(value) = not_finite(bytes) {
+                return Err(StateError::NotFinite { value });
+            }
+            writer.push_copy(bytes)?;
+            at += bytes.len();
+        }
+        writer.finish()
+    }
+}
+
+impl AsFd for Lent {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.memory.as_fd()
+    }
+}
+
+/// The first value among these bytes that is not finite.
+pub fn not_finite(bytes: &[u8]) -> Option<f64> {
+    /// Bits of the exponent, all set where a value is not finite (IEEE 754).
+    const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
+    let words = bytes.as_chunks::<8>().0;
+    let is_spoiled = |word: &[u8; 8]| u64::from_le_bytes(*word) & EXPONENT == EXPONENT;
+    // Without a way out of the loop several values are looked at together.
+    if !words.iter().fold(false, |any, word| any | is_spoiled(word)) {
+        return None;
+    }
+    words.iter().find(|word| is_spoiled(word)).map(|word| f64::from_le_bytes(*word))
+}
+
+#[cfg(test)]
+mod tests {
+    use starlings_pieces::SharedMemory;
+    use starlings_proto::convert::floats;
+    use starlings_proto::convert::state::{CHUNK_VALUES, name};
+
+    use super::*;
+    use crate::StateStore;
+
+    const N: usize = 2 * CHUNK_VALUES + 5;
+    const BYTES: usize = 8 * N;
+
+    fn values(seed: usize) -> Vec<f64> {
+        (0..N).map(|i| ((i * 31 + seed * 7919) % 100_003) as f64 / 7.0).collect()
+    }
+
+    fn lending(memory: usize) -> StateStore {
+        let store = StateStore::new(memory);
+        store.lends();
+        store
+    }
+
+    /// The lent memory as its worker has it.
+    fn of_worker(lent: &Lent) -> SharedMemory {
+        let descriptor = lent.as_fd().try_clone_to_owned().expect("a descriptor");
+        SharedMemory::received(descriptor, BYTES, false).expect("its length stays")
+    }
+
+    #[test]
+    fn what_a_worker_wrote_is_the_state_of_its_values_and_what_it_writes_later_is_not() {
+        let store = lending(64 * BYTES);
+        let (x, y) = (values(1), values(2));
+        let lent = store.lend(N).expect("room");
+        assert_eq!((store.in_memory().0, store.n_pieces()), (BYTES, 0));
+        let memory = of_worker(&lent);
+        memory.write(&floats::encode(&x), 0).expect("it is the worker's");
+        let first = lent.copy(store.writer(N)).expect("it is whole");
+        memory.write(&floats::encode(&y), 0).expect("it is the worker's");
+        assert!(first.id() == name(&x) && first.values().expect("it is there") == x);
+        let second = lent.copy(store.writer(N)).expect("it is whole");
+        assert!(second.id() == name(&y) && second.values().expect("it is there") == y);
+        assert!(lent.copy(store.writer(N)).expect("it is whole") == second, "equal states are one");
+        drop((first, second, lent));
+        assert_eq!((store.in_memory().0, store.n_pieces()), (0, 0));
+    }
+
+    #[test]
+    fn a_value_that_is_none_is_refused_and_leaves_nothing() {
+        let store = lending(64 * BYTES);
+        for (place, value) in [(0, f64::NAN), (CHUNK_VALUES, f64::INFINITY), (N - 1, f64::NEG_INFINITY)] {
+            let lent = store.lend(N).expect("room");
+            of_worker(&lent).write(&value.to_le_bytes(), 8 * place).expect("it is the worker's");
+            let error = lent.copy(store.writer(N)).expect_err("no value");
+            assert!(error.to_string().contains(&format!("{value} is a value of the state")), "{error}");
+            drop(lent);
+            assert_eq!((store.in_memory().0, store.n_pieces()), (0, 0));
+        }
+    }
+
+    #[test]
+    fn memory_is_lent_up_to_a_quarter_of_the_limit_and_states_beyond_the_limit_stand_in_pieces() {
+        assert!(StateStore::new(usize::MAX).lend(N).is_none(), "nobody takes descriptors");
+        let store = lending(8 * BYTES + 100);
+        assert!(store.lend(CHUNK_VALUES).is_none(), "a small state travels in its message");
+        let lent = (store.lend(N).expect("room"), store.lend(N).expect("room"));
+        assert!(store.lend(N).is_none() && store.lend(usize::MAX).is_none());
+        let states: Vec<_> = (0..7).map(|k| store.keep(&values(k)).expect("the folder has room")).collect();
+        for (k, state) in states.iter().enumerate() {
+            assert_eq!(state.descriptor().is_some(), k < 6, "number {k}");
+            assert!(state.values().expect("it is there") == values(k));
+        }
+        assert_eq!(store.in_memory(), (8 * BYTES, 8 * BYTES));
+        drop((lent, states));
+        assert_eq!((store.in_memory().0, store.n_pieces()), (0, 0));
+        assert!(store.lend(N).is_some(), "what was given back is lent again");
+    }
+
+    #[test]
+    fn a_state_in_memory_is_persisted_and_reopened_as_any_other() {
+        let scratch = tempfile::tempdir().expect("a folder");
+        let path = scratch.path().join("states");
+        let pieces = {
+            let store = lending(usize::MAX);
+            store.settle(&path);
+            let state = store.keep(&values(5)).expect("room");
+            state.persist().expect("the folder has room");
+            state.leave();
+            state.pieces().to_vec()
+        };
+        let store = lending(usize::MAX);
+        store.settle(&path);
+        let state = store.reopen(N, &pieces).expect("it is there");
+        assert!(state.descriptor().is_none() && state.values().expect("it is there") == values(5));
+        // The same values in memory are read there from then on.
+        let again = store.keep(&values(5)).expect("room");
+        assert!(again == state && again.values().expect("it is there") == values(5));
+    }
+
+    #[test]
+    fn values_that_are_not_finite_are_found_wherever_they_are() {
+        let mut x = values(6);
+        assert_eq!(not_finite(&floats::encode(&x)), None);
+        (x[7], x[8]) = (f64::MAX, -f64::MIN_POSITIVE / 4.0);
+        assert_eq!(not_finite(&floats::encode(&x)), None);
+        x[N - 2] = f64::NEG_INFINITY;
+        assert_eq!(not_finite(&floats::encode(&x)), Some(f64::NEG_INFINITY));
+    }
+}
