@@ -118,7 +118,10 @@ fn check_says_how_large_states_are_and_whether_a_folder_takes_them() {
     let (code, stdout, stderr) = check(&place);
     assert_eq!(code, 0, "{stderr}");
     // 40 001 numbers; three for each of three particles.
-    assert!(stdout.contains("a state has 312.508 KiB") && stdout.contains("holds 2.747 MiB of them"), "{stdout}");
+    assert!(
+        stdout.contains("a state has 312.508 KiB") && stdout.contains("holds 2.747 MiB of them"),
+        "{stdout}"
+    );
     assert_eq!(std::fs::read_dir(&place).unwrap().count(), 0, "what was tried leaves nothing");
     let file = dir.path().join("file");
     std::fs::write(&file, "no folder").unwrap();
