@@ -2,6 +2,7 @@
 //!
 //! Next files to read: [`mod@print`] for the answer on a terminal, [`crate::fleet_session`] for the fleet.
 
+mod followed;
 mod print;
 
 use std::path::{Path, PathBuf};
@@ -34,6 +35,14 @@ pub(crate) struct Args {
     /// Folder of the result; runs/NAME-infer-TIME without it.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Follow a recording that is still written: rows of this CSV file, or of standard input (`-`), with the columns of the study's
+    /// first record. Standard output receives a line of JSON per block: coefficients, noise, the test for a change. No folder is
+    /// written and no worker is started.
+    #[arg(long, value_name = "FILE|-", conflicts_with_all = ["out", "workers", "listen", "json"])]
+    follow: Option<PathBuf>,
+    /// With --follow: write what a restart goes on from into this file after every block, and go on from it where it is there.
+    #[arg(long, value_name = "FILE", requires = "follow")]
+    state: Option<PathBuf>,
     #[command(flatten)]
     fleet: FleetArgs,
     /// Print the inference as JSON on standard output and nothing else.
@@ -45,6 +54,9 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     interrupt::watch();
     let study = Study::load_for_inference(&args.study)?;
+    if let Some(source) = &args.follow {
+        return followed::run(&study, source, args.state.clone());
+    }
     let plan = args.fleet.plan(&study, Some(&Out(args.out.as_deref())))?;
     let entrance = Entrance::take(&plan, args.out.as_deref())?;
     let folder = folder(&study, args.out.as_deref())?;
@@ -67,7 +79,8 @@ pub(crate) fn write_again(folder: &Path, overview: bool, json: bool) -> Result<(
         return Err(Failure::input("an inference has no overview picture: leave out --overview"));
     }
     let path = folder.join(RESULT);
-    let unreadable = |error: &dyn std::fmt::Display| Failure::input(format!("cannot read {}: {error}", path.display()));
+    let unreadable =
+        |error: &dyn std::fmt::Display| Failure::input(format!("cannot read {}: {error}", path.display()));
     let text = std::fs::read_to_string(&path).map_err(|error| unreadable(&error))?;
     let found: Inference = serde_json::from_str(&text).map_err(|error| unreadable(&error))?;
     write_inference(folder, &found).map_err(Failure::run)?;
@@ -88,7 +101,8 @@ fn folder(study: &Study, out: Option<&Path>) -> Result<PathBuf, Failure> {
     let path = out.map_or_else(default, Path::to_owned);
     for name in [RESULT, "run.db"] {
         if path.join(name).exists() {
-            let message = format!("{} holds a result already: give another --out, or remove it", path.display());
+            let message =
+                format!("{} holds a result already: give another --out, or remove it", path.display());
             return Err(Failure::input(message));
         }
     }

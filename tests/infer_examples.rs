@@ -68,7 +68,11 @@ fn rounded(value: f64, sd: f64) -> String {
 fn compare(found: &Value, promises: &[Promise]) -> String {
     let mut table = String::new();
     let columns = promises.iter().any(|p| p.chapter.is_some());
-    table.push_str(if columns { "| | true | chapter | found | 90 % interval |\n|---|---|---|---|---|\n" } else { "| | true | found | 90 % interval |\n|---|---|---|---|\n" });
+    table.push_str(if columns {
+        "| | true | chapter | found | 90 % interval |\n|---|---|---|---|---|\n"
+    } else {
+        "| | true | found | 90 % interval |\n|---|---|---|---|\n"
+    });
     for p in promises {
         let entry = found.as_array().unwrap().iter().find(|c| c["name"] == p.name.as_str());
         let entry = entry.unwrap_or_else(|| panic!("no `{}` in {found}", p.name));
@@ -76,7 +80,8 @@ fn compare(found: &Value, promises: &[Promise]) -> String {
         let off = (estimate - p.truth).abs();
         assert!(off <= p.within_sd * sd + p.within, "{}: {estimate} ± {sd} for {}", p.name, p.truth);
         let ends = [0, 1].map(|k| rounded(number(&entry["interval90"][k]), sd));
-        let chapter = if columns { format!(" {} |", p.chapter.as_deref().unwrap_or("")) } else { String::new() };
+        let chapter =
+            if columns { format!(" {} |", p.chapter.as_deref().unwrap_or("")) } else { String::new() };
         let zero = if entry["may_be_zero"] == true { ", may be zero" } else { "" };
         writeln!(
             table,
@@ -95,10 +100,16 @@ fn compare(found: &Value, promises: &[Promise]) -> String {
 
 fn compare_noise(found: &Value, promises: &[Noise]) {
     for p in promises {
-        let at = found["equations"].as_array().unwrap().iter().position(|e| *e == p.equation.as_str()).unwrap();
+        let at =
+            found["equations"].as_array().unwrap().iter().position(|e| *e == p.equation.as_str()).unwrap();
         let entry = |key: &str| number(&found["diffusion"][key][at][at]);
         let (value, sd) = (entry("matrix"), entry("sd"));
-        assert!((value - p.truth).abs() <= p.within_sd * sd, "D of {}: {value} ± {sd} for {}", p.equation, p.truth);
+        assert!(
+            (value - p.truth).abs() <= p.within_sd * sd,
+            "D of {}: {value} ± {sd} for {}",
+            p.equation,
+            p.truth
+        );
     }
 }
 
@@ -111,18 +122,25 @@ fn table_is_fresh(readme: &Path, table: &str) {
     if std::env::var_os("STARLINGS_WRITE_PAGES").is_some() {
         std::fs::write(readme, format!("{}{table}{}", &text[..from], &text[to..])).unwrap();
     } else {
-        assert_eq!(&text[from..to], table, "{}: write it again as the head of this test says", readme.display());
+        assert_eq!(
+            &text[from..to],
+            table,
+            "{}: write it again as the head of this test says",
+            readme.display()
+        );
     }
 }
 
 fn example(name: &str) {
     let source = repository("examples").join(name);
-    let expected: Expected = toml::from_str(&std::fs::read_to_string(source.join("expected.toml")).unwrap()).unwrap();
+    let expected: Expected =
+        toml::from_str(&std::fs::read_to_string(source.join("expected.toml")).unwrap()).unwrap();
     let dir = tempfile::tempdir().unwrap();
     for file in ["study.toml", "truth.toml", "start.csv"] {
         std::fs::copy(source.join(file), dir.path().join(file)).unwrap();
     }
-    let (code, _, stderr) = output(starlings().current_dir(dir.path()).arg("simulate").args(&expected.simulate));
+    let (code, _, stderr) =
+        output(starlings().current_dir(dir.path()).arg("simulate").args(&expected.simulate));
     assert_eq!(code, 0, "{stderr}");
     let infer = ["infer", "study.toml", "--out", "out", "--workers", "2", "--json"];
     let (code, stdout, stderr) = output(starlings().current_dir(dir.path()).args(infer));

@@ -33,10 +33,9 @@ pub(super) fn print(found: &Inference, folder: &Path) -> Result<(), Failure> {
 
 fn coefficient(c: &CoefficientFound) -> Vec<String> {
     let shown = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| number(v, c.sd));
-    let interval = c.interval90.map_or_else(
-        || "-".to_owned(),
-        |[lo, hi]| format!("{} to {}", number(lo, c.sd), number(hi, c.sd)),
-    );
+    let interval = c
+        .interval90
+        .map_or_else(|| "-".to_owned(), |[lo, hi]| format!("{} to {}", number(lo, c.sd), number(hi, c.sd)));
     let says = match (c.observed, c.may_be_zero) {
         (false, _) => "not observed",
         (true, Some(true)) => "may be zero",
@@ -48,7 +47,13 @@ fn coefficient(c: &CoefficientFound) -> Vec<String> {
 fn unknown(u: &UnknownFound) -> Vec<String> {
     let shown = |value: f64| number(value, Some(u.sd));
     let [lo, hi] = u.interval90;
-    vec![u.name.clone(), shown(u.estimate), shown(u.sd), format!("{} to {}", shown(lo), shown(hi)), String::new()]
+    vec![
+        u.name.clone(),
+        shown(u.estimate),
+        shown(u.sd),
+        format!("{} to {}", shown(lo), shown(hi)),
+        String::new(),
+    ]
 }
 
 fn noise(found: &Inference) -> Vec<Vec<String>> {

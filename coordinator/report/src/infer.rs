@@ -69,18 +69,24 @@ pub fn coefficients_csv(found: &Inference) -> String {
         let [lo, hi] = c.interval90.map_or([None; 2], |ends| ends.map(Some));
         let zero = c.may_be_zero.map_or_else(String::new, |zero| zero.to_string());
         let cells = [cell(c.estimate), cell(c.sd), cell(lo), cell(hi), zero, c.observed.to_string()];
-        text.push_str(&format!("{},{}\n", quoted(&c.name), cells.join(",")));
+        text.push_str(&line(&c.name, &cells));
     }
     let (names, noise) = (&found.equations, &found.diffusion);
     for (i, row) in noise.matrix.iter().enumerate() {
         for (j, value) in row.iter().enumerate().skip(i) {
-            let name = quoted(&format!("D[{},{}]", names[i], names[j]));
+            let name = format!("D[{},{}]", names[i], names[j]);
             let [lo, hi] = noise.interval90[i].filter(|_| i == j).map_or([None; 2], |ends| ends.map(Some));
-            let cells = [cell(Some(*value)), cell(Some(noise.sd[i][j])), cell(lo), cell(hi)];
-            text.push_str(&format!("{name},{},,true\n", cells.join(",")));
+            let known = [String::new(), "true".to_owned()];
+            let [value, sd] = [*value, noise.sd[i][j]].map(|v| cell(Some(v)));
+            let cells = [value, sd, cell(lo), cell(hi)].into_iter().chain(known).collect::<Vec<_>>();
+            text.push_str(&line(&name, &cells));
         }
     }
     text
+}
+
+fn line(name: &str, cells: &[String]) -> String {
+    format!("{},{}\n", quoted(name), cells.join(","))
 }
 
 /// A name that may hold commas as a cell of a CSV file.
@@ -142,7 +148,8 @@ fn diffusion(found: &Inference) -> Vec<Vec<String>> {
     let noise = &found.diffusion;
     let row = |i: usize| {
         let values = noise.matrix[i].iter().zip(&noise.sd[i]);
-        let cells = values.map(|(value, sd)| format!("{} ± {}", number::with_sd(*value, *sd), number::significant(*sd, 2)));
+        let cells = values
+            .map(|(value, sd)| format!("{} ± {}", number::with_sd(*value, *sd), number::significant(*sd, 2)));
         std::iter::once(found.equations[i].clone()).chain(cells).collect()
     };
     (0..noise.matrix.len()).map(row).collect()
@@ -153,7 +160,11 @@ fn unknowns(reduced: &ReducedFound) -> Vec<Row> {
         name: u.name.clone(),
         estimate: number::with_sd(u.estimate, u.sd),
         sd: number::significant(u.sd, 2),
-        interval: format!("{} to {}", number::with_sd(u.interval90[0], u.sd), number::with_sd(u.interval90[1], u.sd)),
+        interval: format!(
+            "{} to {}",
+            number::with_sd(u.interval90[0], u.sd),
+            number::with_sd(u.interval90[1], u.sd)
+        ),
         says: String::new(),
     };
     reduced.unknowns.iter().map(row).collect()
@@ -166,7 +177,8 @@ fn checks(found: &Inference) -> Vec<[String; 4]> {
             starlings_estimators::inference::Verdict::Absent => "none that matter",
             starlings_estimators::inference::Verdict::Unclear => "too few steps to say",
         };
-        let ratio = format!("{} ± {}", number::with_sd(check.ratio, check.sd), number::significant(check.sd, 2));
+        let ratio =
+            format!("{} ± {}", number::with_sd(check.ratio, check.sd), number::significant(check.sd, 2));
         let measured = number::significant(check.measured.max(0.0).sqrt(), 2);
         [check.equation.clone(), ratio, measured, verdict.to_owned()]
     };

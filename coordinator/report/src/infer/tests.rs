@@ -53,7 +53,12 @@ fn sample() -> Inference {
         noise_checks: Vec::new(),
         richardson: None,
         reduced: Some(ReducedFound {
-            unknowns: vec![UnknownFound { name: "k".to_owned(), estimate: 2.0, sd: 0.1, interval90: [1.8, 2.2] }],
+            unknowns: vec![UnknownFound {
+                name: "k".to_owned(),
+                estimate: 2.0,
+                sd: 0.1,
+                interval90: [1.8, 2.2],
+            }],
             chi_squared: 11.5,
             degrees: 12,
             probability: 0.49,
@@ -68,9 +73,15 @@ fn sample() -> Inference {
 #[test]
 fn the_page_shows_the_verdict_the_table_and_the_convergence() {
     let page = infer_page(&sample()).expect("a page");
-    for text in
-        ["400 steps give 2 of 3 coefficients", "sigma", "may be zero", "not observed", "χ² 11.5 for 12", "<svg", "1600"]
-    {
+    for text in [
+        "400 steps give 2 of 3 coefficients",
+        "sigma",
+        "may be zero",
+        "not observed",
+        "χ² 11.5 for 12",
+        "<svg",
+        "1600",
+    ] {
         assert!(page.contains(text), "{text} is missing");
     }
     assert!(!page.contains("NaN"), "what has no value is no number");

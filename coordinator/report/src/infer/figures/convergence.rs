@@ -46,8 +46,16 @@ fn figure(found: &Inference, p: usize, c: &CoefficientFound) -> Option<Result<Fi
             opacity: 0.2,
         },
         Mark::dashed_level((x.lo, x.hi), last, MUTED),
-        Mark::Line { points: points.iter().map(|(t, [mean, _])| (*t, *mean)).collect(), colour: BLUE, width: 1.75 },
-        Mark::Dots { points: points.iter().map(|(t, [mean, _])| (*t, *mean)).collect(), colour: BLUE, radius: 2.5 },
+        Mark::Line {
+            points: points.iter().map(|(t, [mean, _])| (*t, *mean)).collect(),
+            colour: BLUE,
+            width: 1.75,
+        },
+        Mark::Dots {
+            points: points.iter().map(|(t, [mean, _])| (*t, *mean)).collect(),
+            colour: BLUE,
+            radius: 2.5,
+        },
     ];
     let caption = format!("{} ± {} at the end.", number::with_sd(last, sd), number::significant(sd, 2));
     let scene = Scene { title: c.name.clone(), description: caption.clone(), x, y, marks };
