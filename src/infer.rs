@@ -2,6 +2,7 @@
 //!
 //! Next files to read: [`mod@print`] for the answer on a terminal, [`crate::fleet_session`] for the fleet.
 
+mod followed;
 mod print;
 
 use std::path::{Path, PathBuf};
@@ -34,6 +35,14 @@ pub(crate) struct Args {
     /// Folder of the result; runs/NAME-infer-TIME without it.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Follow a recording that is still written: rows of this CSV file, or of standard input (`-`), with the columns of the study's
+    /// first record. Standard output receives a line of JSON per block: coefficients, noise, the test for a change. No folder is
+    /// written and no worker is started.
+    #[arg(long, value_name = "FILE|-", conflicts_with_all = ["out", "workers", "listen", "json"])]
+    follow: Option<PathBuf>,
+    /// With --follow: write what a restart goes on from into this file after every block, and go on from it where it is there.
+    #[arg(long, value_name = "FILE", requires = "follow")]
+    state: Option<PathBuf>,
     #[command(flatten)]
     fleet: FleetArgs,
     /// Print the inference as JSON on standard output and nothing else.
@@ -45,6 +54,9 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     interrupt::watch();
     let study = Study::load_for_inference(&args.study)?;
+    if let Some(source) = &args.follow {
+        return followed::run(&study, source, args.state.clone());
+    }
     let plan = args.fleet.plan(&study, Some(&Out(args.out.as_deref())))?;
     let entrance = Entrance::take(&plan, args.out.as_deref())?;
     let folder = folder(&study, args.out.as_deref())?;

@@ -1,6 +1,7 @@
 //! Runs the studies of an example as a user would, and compares each with what it promises.
 
 #![allow(clippy::unwrap_used)] // a failed unwrap is a failed test
+#![allow(dead_code)] // every test file uses its own part
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -126,11 +127,21 @@ fn compare_study(study: &Path, expected: &Path) {
 
 /// Names of the examples whose model runs in a program of its own.
 pub(crate) fn of_solvers() -> BTreeSet<String> {
-    let is_solver = |name: &String| {
+    with("kind = \"solver\"")
+}
+
+/// Names of the examples that are inferred.
+pub(crate) fn of_inference() -> BTreeSet<String> {
+    with("\n[infer]\n")
+}
+
+/// Names of the examples whose study has this text.
+fn with(text: &str) -> BTreeSet<String> {
+    let has = |name: &String| {
         let study = repository("examples").join(name).join("study.toml");
-        std::fs::read_to_string(study).is_ok_and(|text| text.contains("kind = \"solver\""))
+        std::fs::read_to_string(study).is_ok_and(|study| study.contains(text))
     };
-    all().into_iter().filter(is_solver).collect()
+    all().into_iter().filter(has).collect()
 }
 
 /// Names of all examples.

@@ -101,7 +101,13 @@ impl Answer {
         DiffusionFound {
             form: form.to_owned(),
             matrix: rows(&self.posterior.diffusion),
-            sd: rows(&self.posterior.diffusion_sd()),
+            // What the form holds at zero is known to be.
+            sd: rows(
+                &self
+                    .posterior
+                    .diffusion_sd()
+                    .zip_map(&self.posterior.diffusion, |sd, d| if d.abs() > 0.0 { sd } else { 0.0 }),
+            ),
             interval90: (0..n).map(|l| self.posterior.diffusion_interval(l, LEVEL)).collect(),
             lag_corrected: self.lag_corrected,
             measured_sd: if let MeasuredChoice::Known(sd) = choice.measured { Some(sd) } else { None },

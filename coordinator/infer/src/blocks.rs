@@ -78,20 +78,24 @@ pub(crate) fn start(record: &InferRecord) -> Result<Start, InferError> {
             times.push(time);
         }
     }
-    let mut steps: Vec<f64> =
-        times.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
-    if steps.is_empty() {
-        let message = format!("record `{}` has {} row in its span", record.name, times.len());
+    let Some(step) = even_step(&times) else {
+        let message = format!("record `{}` has too few rows in its span: {}", record.name, times.len());
         return Err(rows.fault(None, message, "an inference needs many rows"));
-    }
-    steps.sort_by(f64::total_cmp);
-    let median = steps[steps.len() / 2];
-    let even = steps.iter().all(|step| (step - median).abs() <= TOLERANCE * median)
-        && steps.len() + 1 == times.len();
-    let step = if even { (times[times.len() - 1] - times[0]) / steps.len() as f64 } else { median };
+    };
     let per_row = (rows.n_byte() - before) as f64 / n_read as f64;
     let bytes = std::fs::metadata(&record.file).map_or(0, |file| file.len());
     Ok(Start { step, n_row: bytes as f64 / per_row.max(1.0) })
+}
+
+/// The step of times that are in equal steps, or else the most usual one; `None` where no time is later than the one before.
+pub(crate) fn even_step(times: &[f64]) -> Option<f64> {
+    let mut steps: Vec<f64> =
+        times.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
+    steps.sort_by(f64::total_cmp);
+    let median = *steps.get(steps.len() / 2)?;
+    let even = steps.iter().all(|step| (step - median).abs() <= TOLERANCE * median);
+    let whole = even && steps.len() + 1 == times.len();
+    Some(if whole { (times[times.len() - 1] - times[0]) / steps.len() as f64 } else { median })
 }
 
 /// The blocks of one recording.

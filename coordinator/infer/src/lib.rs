@@ -9,6 +9,7 @@
 //! | `smoothed` | the same from a smoothed path, where the measurement's noise is known |
 //! | [`reduced`] | a model with fewer unknowns than coefficients |
 //! | [`result`], `answer`, `words` | the tables with intervals, and what is said of them |
+//! | [`follow`](mod@follow) | a recording that is still written: estimates and alarms as it arrives |
 //! | [`run`] | all of it on a page |
 //!
 //! The mathematics is in the estimators; nothing here computes a posterior. Next file to read: [`mod@run`].
@@ -17,6 +18,7 @@ mod answer;
 mod blocks;
 mod convergence;
 pub mod error;
+pub mod follow;
 mod gather;
 pub mod reduced;
 pub mod result;

@@ -35,7 +35,7 @@ pub fn fit_reduced(
     let reduced = Reduced::new(choice, structure)?;
     let start = DVector::from_iterator(choice.start.len(), choice.start.iter().map(|(_, value)| *value));
     let map = |theta: &DVector<f64>| reduced.at(theta, posterior.active());
-    let found = reduce(posterior, &start, map).map_err(|error| named(error, choice))?;
+    let found = reduce(posterior, &start, map).map_err(|error| named(&error, choice))?;
     let unknown = |(k, (name, _)): (usize, &(String, f64))| {
         let (estimate, sd) = (found.mean[k], found.covariance[(k, k)].max(0.0).sqrt());
         UnknownFound {
@@ -55,8 +55,8 @@ pub fn fit_reduced(
 }
 
 /// An error with the unknowns by their names instead of numbers.
-fn named(error: InferenceError, choice: &ReducedChoice) -> InferError {
-    let InferenceError::Collinear { columns } = &error else {
+fn named(error: &InferenceError, choice: &ReducedChoice) -> InferError {
+    let InferenceError::Collinear { columns } = error else {
         return InferError::Reduced(error.to_string());
     };
     let name = |column: &String| {

@@ -17,30 +17,25 @@ pub(crate) fn verdict(
     let count = |which: &dyn Fn(&CoefficientFound) -> bool| coefficients.iter().filter(|c| which(c)).count();
     let unknown = count(&|c| !c.observed);
     let zero = count(&|c| c.observed && c.may_be_zero == Some(true));
-    let mut text = format!(
-        "{n_step} steps give {} of {}",
-        coefficients.len() - unknown,
-        plural(coefficients.len(), "coefficient")
-    );
-    text.push_str(&match zero {
+    let given = coefficients.len() - unknown;
+    let differ = match zero {
         0 => ", all of which differ from zero".to_owned(),
         1 => ", one of which may be zero".to_owned(),
         n => format!(", {n} of which may be zero"),
-    });
-    if unknown > 0 {
-        text.push_str(&format!("; {unknown} not observed"));
-    }
-    if let Some(reduced) = reduced {
+    };
+    let unseen = if unknown > 0 { format!("; {unknown} not observed") } else { String::new() };
+    let reduced = reduced.map_or_else(String::new, |reduced| {
         let agrees = if reduced.consistent { "agrees with them" } else { "is refuted by them" };
-        text.push_str(&format!(
+        format!(
             "; the reduced model of {} {agrees} (χ² {:.1} for {} degrees of freedom, probability {})",
             plural(reduced.unknowns.len(), "unknown"),
             reduced.chi_squared,
             reduced.degrees,
             probability(reduced.probability)
-        ));
-    }
-    text
+        )
+    });
+    let of = plural(coefficients.len(), "coefficient");
+    format!("{n_step} steps give {given} of {of}{differ}{unseen}{reduced}")
 }
 
 fn plural(n: usize, what: &str) -> String {
@@ -58,21 +53,20 @@ pub(crate) fn conditional_on(choice: &InferChoice, answer: &Answer) -> String {
     } else {
         "the rates are those of the study"
     };
-    let mut text = format!("90 % intervals, given that {drift} and that the noise is white");
-    match choice.measured {
-        MeasuredChoice::Known(sd) => text.push_str(&format!(
-            ", at the smoothed path under errors of the measurement of {sd}, whose own uncertainty they do not hold"
-        )),
+    let measured = match choice.measured {
+        MeasuredChoice::Known(sd) => format!(
+            "at the smoothed path under errors of the measurement of {sd}, whose own uncertainty they do not hold"
+        ),
         _ if answer.lag_corrected => {
-            text.push_str(", with the noise freed of errors of the measurement, whose effect on the functions they do not hold");
+            "with the noise freed of errors of the measurement, whose effect on the functions they do not hold".to_owned()
         }
-        _ => text.push_str(", without errors of the measurement"),
-    }
-    match &answer.extrapolated {
-        Some(_) => text.push_str("; extrapolated to no sampling step"),
-        None => text.push_str("; the error of the sampling step is not in them"),
-    }
-    text
+        _ => "without errors of the measurement".to_owned(),
+    };
+    let step = match &answer.extrapolated {
+        Some(_) => "extrapolated to no sampling step",
+        None => "the error of the sampling step is not in them",
+    };
+    format!("90 % intervals, given that {drift} and that the noise is white, {measured}; {step}")
 }
 
 /// What is doubtful.

@@ -69,18 +69,24 @@ pub fn coefficients_csv(found: &Inference) -> String {
         let [lo, hi] = c.interval90.map_or([None; 2], |ends| ends.map(Some));
         let zero = c.may_be_zero.map_or_else(String::new, |zero| zero.to_string());
         let cells = [cell(c.estimate), cell(c.sd), cell(lo), cell(hi), zero, c.observed.to_string()];
-        text.push_str(&format!("{},{}\n", quoted(&c.name), cells.join(",")));
+        text.push_str(&line(&c.name, &cells));
     }
     let (names, noise) = (&found.equations, &found.diffusion);
     for (i, row) in noise.matrix.iter().enumerate() {
         for (j, value) in row.iter().enumerate().skip(i) {
-            let name = quoted(&format!("D[{},{}]", names[i], names[j]));
+            let name = format!("D[{},{}]", names[i], names[j]);
             let [lo, hi] = noise.interval90[i].filter(|_| i == j).map_or([None; 2], |ends| ends.map(Some));
-            let cells = [cell(Some(*value)), cell(Some(noise.sd[i][j])), cell(lo), cell(hi)];
-            text.push_str(&format!("{name},{},,true\n", cells.join(",")));
+            let known = [String::new(), "true".to_owned()];
+            let [value, sd] = [*value, noise.sd[i][j]].map(|v| cell(Some(v)));
+            let cells = [value, sd, cell(lo), cell(hi)].into_iter().chain(known).collect::<Vec<_>>();
+            text.push_str(&line(&name, &cells));
         }
     }
     text
+}
+
+fn line(name: &str, cells: &[String]) -> String {
+    format!("{},{}\n", quoted(name), cells.join(","))
 }
 
 /// A name that may hold commas as a cell of a CSV file.

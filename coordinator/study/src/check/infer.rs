@@ -10,12 +10,14 @@ use std::path::Path;
 use std::sync::Arc;
 
 use starlings_models::equations::{Drift, EquationsDef};
-use starlings_models::{SetupError, SumsDef};
+use starlings_models::{Setup, SetupError, SumsDef};
+use toml::Spanned;
 
 use super::built::CheckedModel;
 use super::settings::{estimator, fleet};
 use super::{check_name, model};
 use crate::checked::{ExplainChoice, SpectrumChoice, Study};
+use crate::file::StudyFile;
 use crate::file::infer::InferSection;
 use crate::file::read::read;
 use crate::infer_choice::InferChoice;
@@ -29,52 +31,16 @@ pub(super) fn study(path: &Path, text: &str) -> Result<Study, StudyError> {
     let file = read(&source, host.adapters())?;
     source.verdict()?;
     check_name(&source, &file);
-    let Some(section) = &file.infer else {
-        let end = source.text.len();
-        let help = "add `[infer]` with `parameters = [...]`, `basis = \"polynomial\"` or `functions = [...]`";
-        source.report_with(end..end, "the study does not say what to infer", help);
-        source.verdict()?;
-        return Err(StudyError { problems: Vec::new() });
-    };
     let (fleet, estimator) = (fleet(&source, &file.fleet), estimator(&source, &file.estimator, None));
     let built = model::model(&source, &file, None);
+    let infer = built.as_ref().and_then(|built| infer(&source, &file, &built.setup));
     source.verdict()?;
-    let Some(CheckedModel { setup, spec, candidates, delays, .. }) = built else {
+    let (Some(CheckedModel { setup, spec, candidates, delays, .. }), Some(infer)) = (built, infer) else {
         return Err(StudyError { problems: Vec::new() });
     };
-    let Some(equations) = &setup.model.equations else {
-        let help = "an inference is made of states and rates that the study writes";
-        let message = format!("`infer` needs `kind = \"equations\"`, found `{}`", setup.model.kind);
-        source.report_with(file.model.kind.span(), message, help);
-        source.verdict()?;
-        return Err(StudyError { problems: Vec::new() });
-    };
-    let mut sums = settings::sums(&source, section);
-    sums.left = settings::left(&source, section, equations);
-    source.verdict()?;
-    check_functions(&source, section, equations, &setup.model.constants, &sums);
-    let records = records::records(&source, &file, equations);
-    let priors = settings::priors(&source, &file, &sums);
-    let reduced = section.reduced.as_ref().map(|reduced| reduced::reduced(&source, reduced));
-    let most_steps = settings::most_steps(equations);
-    let infer = InferChoice {
-        diffusion: settings::diffusion(&source, section),
-        prefactor: section.prefactor.as_ref().is_none_or(|p| *p.get_ref()),
-        measured: settings::measured(&source, section),
-        block: settings::block(&source, section, most_steps),
-        most_steps,
-        breaks: settings::breaks(&source, section),
-        follow: settings::follow(&source, section.follow.as_ref()),
-        sums,
-        priors,
-        reduced,
-        records,
-    };
-    source.verdict()?;
-    let text = Arc::clone(&source.text);
     Ok(Study {
         file: path.to_owned(),
-        text,
+        text: Arc::clone(&source.text),
         name: file.study.name.into_inner(),
         says: file.study.says,
         seed: file.study.seed,
@@ -98,6 +64,43 @@ pub(super) fn study(path: &Path, text: &str) -> Result<Study, StudyError> {
     })
 }
 
+/// What the file asks of its model; `None` where a problem was reported.
+fn infer(source: &Source, file: &StudyFile, setup: &Setup) -> Option<InferChoice> {
+    let Some(section) = &file.infer else {
+        let end = source.text.len();
+        let help = "add `[infer]` with `parameters = [...]`, `basis = \"polynomial\"` or `functions = [...]`";
+        source.report_with(end..end, "the study does not say what to infer", help);
+        return None;
+    };
+    let Some(equations) = &setup.model.equations else {
+        let help = "an inference is made of states and rates that the study writes";
+        let message = format!("`infer` needs `kind = \"equations\"`, found `{}`", setup.model.kind);
+        source.report_with(file.model.kind.span(), message, help);
+        return None;
+    };
+    let before = source.count();
+    let mut sums = settings::sums(source, section);
+    sums.left = settings::left(source, section, equations);
+    if source.count() > before {
+        return None;
+    }
+    check_functions(source, section, equations, &setup.model.constants, &sums);
+    let most_steps = settings::most_steps(equations);
+    Some(InferChoice {
+        priors: settings::priors(source, file, &sums),
+        sums,
+        diffusion: settings::diffusion(source, section),
+        prefactor: section.prefactor.as_ref().is_none_or(|p| *p.get_ref()),
+        measured: settings::measured(source, section),
+        block: settings::block(source, section, most_steps),
+        most_steps,
+        breaks: settings::breaks(source, section),
+        reduced: section.reduced.as_ref().map(|reduced| reduced::reduced(source, reduced)),
+        follow: settings::follow(source, section.follow.as_ref()),
+        records: records::records(source, file, equations),
+    })
+}
+
 /// Whether the rates are linear in the unknowns, and functions are known.
 fn check_functions(
     source: &Source,
@@ -116,7 +119,7 @@ fn check_functions(
         match error {
             SetupError::Unknown { what, name, nearest } => {
                 let span =
-                    listed.clone().find(|p| *p.get_ref() == name).map_or(section.span.clone(), |p| p.span());
+                    listed.clone().find(|p| *p.get_ref() == name).map_or(section.span.clone(), Spanned::span);
                 let message = format!("no {what} is named `{name}`");
                 match nearest {
                     Some(near) => source.report_with(span, message, format!("did you mean `{near}`?")),
@@ -127,7 +130,7 @@ fn check_functions(
                 let span = listed
                     .clone()
                     .find(|p| *p.get_ref() == expression)
-                    .map_or(section.span.clone(), |p| p.span());
+                    .map_or(section.span.clone(), Spanned::span);
                 let message = format!("in the {place} (`{expression}`, column {column}): {message}");
                 let help = "coefficients are inferred where the rates are linear in them; give other parameters as constants";
                 source.report_with(span, message, help);

@@ -109,7 +109,7 @@ pub(crate) fn read(source: &Source, root: &Table<'_>) -> Option<InferSection> {
 }
 
 fn rules(source: &Source, t: &Table<'_>) -> Rules {
-    match t.get("rule").map(|node| node.get_ref()) {
+    match t.get("rule").map(Spanned::get_ref) {
         Some(DeValue::Table(_)) => Rules::ByName(named_texts(source, &t.free_entries("rule"))),
         _ => Rules::All(t.text("rule")),
     }

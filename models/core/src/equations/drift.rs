@@ -87,31 +87,19 @@ impl Drift {
     ) -> Result<Self, SetupError> {
         let parsed = Parsed::new(def)?;
         let names = parsed.names(def);
-        let known = parsed.parameters(&names);
+        let told = |equation: usize, error: ExpressionError| {
+            let state = &def.states[equation];
+            let terms: Vec<&str> = state.rate.iter().map(|(_, text)| text.as_str()).collect();
+            fault(format!("rate of `{}`", state.name), &terms.join(" + "), error)
+        };
+        let rates = names.states.iter().enumerate();
+        let rates = rates.map(|(l, (_, rate))| names.inline(rate).map_err(|error| told(l, error)));
+        let rates = rates.collect::<Result<Vec<_>, _>>()?;
+        used(unknown, &rates, &names)?;
         let mut collected = Collected { names: &names, constants, drift: Self::default(), nodes: Vec::new() };
         collected.drift.places = vec![Vec::new(); unknown.len()];
-        for (equation, (state, rate)) in names.states.iter().enumerate() {
-            let place = || format!("rate of `{state}`");
-            let text = || def.states[equation].rate.iter().map(|(_, text)| text.as_str()).collect::<Vec<_>>();
-            let told = |error: ExpressionError| fault(place(), &text().join(" + "), error);
-            let node = names.inline(rate).map_err(told)?;
-            let parts = split(&node, unknown).map_err(told)?;
-            if let Some(rest) = &parts.rest {
-                let (name, left) = (format!("known part of {state}"), left.iter().any(|l| l == state));
-                let place = collected.take(equation, rest, name, left).map_err(told)?;
-                collected.drift.known.extend(place);
-            }
-            for (p, factor) in parts.factors.iter().enumerate() {
-                let Some(factor) = factor else { continue };
-                let left = left.iter().any(|l| l == state || *l == unknown[p]);
-                let place = collected.take(equation, factor, format!("{} in {state}", unknown[p]), left);
-                collected.drift.places[p].extend(place.map_err(told)?);
-            }
-        }
-        for (name, _) in unknown.iter().zip(&collected.drift.places).filter(|(_, places)| places.is_empty()) {
-            let nearest =
-                nearest(name, known.iter().map(String::as_str).filter(|k| !unknown.iter().any(|u| u == k)));
-            return Err(SetupError::Unknown { what: "parameter of a rate", name: name.clone(), nearest });
+        for (l, rate) in rates.iter().enumerate() {
+            collected.add(l, rate, unknown, left).map_err(|error| told(l, error))?;
         }
         Ok(collected.drift)
     }
@@ -139,6 +127,20 @@ impl Drift {
     }
 }
 
+/// Whether every unknown stands in a rate.
+fn used(unknown: &[String], rates: &[Node], names: &Names<'_>) -> Result<(), SetupError> {
+    let mut parameters: Vec<&str> = Vec::new();
+    for rate in rates {
+        rate.walk(&mut |part| {
+            parameters
+                .extend(part.name().map(|name| name.text.as_str()).filter(|name| !names.is_taken(name)));
+        });
+    }
+    let Some(name) = unknown.iter().find(|name| !parameters.contains(&name.as_str())) else { return Ok(()) };
+    let nearest = nearest(name, parameters.iter().filter(|known| !unknown.iter().any(|u| u == *known)));
+    Err(SetupError::Unknown { what: "parameter of a rate", name: name.clone(), nearest })
+}
+
 /// Functions found so far.
 struct Collected<'a> {
     names: &'a Names<'a>,
@@ -148,6 +150,30 @@ struct Collected<'a> {
 }
 
 impl Collected<'_> {
+    /// Takes the rate of an equation apart.
+    fn add(
+        &mut self,
+        equation: usize,
+        rate: &Node,
+        unknown: &[String],
+        left: &[String],
+    ) -> Result<(), ExpressionError> {
+        let state = self.names.states[equation].0;
+        let of_state = left.iter().any(|l| l == state);
+        let parts = split(rate, unknown)?;
+        if let Some(rest) = &parts.rest {
+            let place = self.take(equation, rest, format!("known part of {state}"), of_state)?;
+            self.drift.known.extend(place);
+        }
+        for (p, factor) in parts.factors.iter().enumerate() {
+            let Some(factor) = factor else { continue };
+            let left = of_state || left.contains(&unknown[p]);
+            let place = self.take(equation, factor, format!("{} in {state}", unknown[p]), left)?;
+            self.drift.places[p].extend(place);
+        }
+        Ok(())
+    }
+
     /// Where a part of a rate enters, its function added where it is new; nothing for a part that is zero.
     fn take(
         &mut self,

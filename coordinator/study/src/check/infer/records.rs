@@ -43,21 +43,11 @@ fn record(source: &Source, section: &RecordSection, equations: &EquationsDef) ->
     }
     for state in &equations.states {
         let shows = |name: &String| state_of(equations, name) == Some(state.name.as_str());
-        match section.channels.iter().find(|channel| shows(channel.output.get_ref())) {
-            Some(channel) => columns.push(channel.column.get_ref().clone()),
-            None => {
-                let message = format!(
-                    "no channel of record `{}` measures state `{}`",
-                    section.name.get_ref(),
-                    state.name
-                );
-                let help = format!(
-                    "an inference needs every state: add a channel of an output with `value = \"{0}\"`, or take what is known of `{0}` as an input",
-                    state.name
-                );
-                source.report_with(section.name.span(), message, help);
-            }
-        }
+        let Some(channel) = section.channels.iter().find(|channel| shows(channel.output.get_ref())) else {
+            unmeasured(source, section, &state.name);
+            continue;
+        };
+        columns.push(channel.column.get_ref().clone());
     }
     for input in &equations.inputs {
         match section.inputs.iter().find(|(name, _)| *name.get_ref() == input.name) {
@@ -84,6 +74,15 @@ fn record(source: &Source, section: &RecordSection, equations: &EquationsDef) ->
         columns,
         span: section.train.as_ref().map_or([f64::NEG_INFINITY, f64::INFINITY], |span| *span.get_ref()),
     })
+}
+
+/// Reports a state that no channel measures.
+fn unmeasured(source: &Source, section: &RecordSection, state: &str) {
+    let message = format!("no channel of record `{}` measures state `{state}`", section.name.get_ref());
+    let help = format!(
+        "an inference needs every state: add a channel of an output with `value = \"{state}\"`, or take what is known of it as an input"
+    );
+    source.report_with(section.name.span(), message, help);
 }
 
 /// The state that an output is, without anything added.

@@ -1,0 +1,51 @@
+//! What a restart goes on from: written after every block, all or nothing.
+//!
+//! Next file to read: [`super`].
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use starlings_estimators::inference::{DetectorState, Posterior, StreamState, Window};
+
+use crate::error::InferError;
+
+/// A recording that is followed, after a block.
+#[derive(Debug, Serialize, Deserialize)]
+pub(crate) struct Saved {
+    /// Tells functions apart.
+    pub(crate) basis: u64,
+    /// The settings that it was followed with.
+    pub(crate) follow: String,
+    pub(crate) step: f64,
+    /// Time of the last row.
+    pub(crate) time: f64,
+    pub(crate) n_step: u64,
+    pub(crate) detector: DetectorState,
+    pub(crate) stream: StreamState,
+    pub(crate) window: Window,
+    pub(crate) posterior: Option<Posterior>,
+}
+
+/// Reads a state; `None` where there is no file.
+pub(crate) fn read(file: &Path) -> Result<Option<Saved>, InferError> {
+    let text = match std::fs::read_to_string(file) {
+        Ok(text) => text,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        Err(error) => {
+            return Err(InferError::File { what: format!("cannot read {}", file.display()), error });
+        }
+    };
+    let damaged = |message: String| InferError::State { file: file.to_owned(), message };
+    let saved: Saved = serde_json::from_str(&text).map_err(|error| damaged(error.to_string()))?;
+    if !(saved.step > 0.0 && saved.step.is_finite() && saved.time.is_finite()) {
+        return Err(damaged("its step or its time is no number".to_owned()));
+    }
+    Ok(Some(saved))
+}
+
+/// Writes a state in the place of the one before.
+pub(crate) fn write(file: &Path, saved: &Saved) -> Result<(), InferError> {
+    let lost = |error| InferError::File { what: format!("cannot write {}", file.display()), error };
+    let text = serde_json::to_string(saved).map_err(|error| lost(std::io::Error::other(error)))?;
+    starlings_study::store::folder::write(file, &text).map_err(lost)
+}
