@@ -220,7 +220,6 @@ fn equations_against_rust(figures: &mut Map<String, Value>) -> Result<(), Failur
         history: &NoHistory,
         limits: &Limits::none(),
         noise: None,
-        sums: None,
     };
     let mut x = [0.1, 0.0];
     advance_by(&rust, Solver::Dopri5(Tolerance::default()), segment, &[1.0, 0.1, 0.5], &mut x)?;

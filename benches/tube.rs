@@ -122,7 +122,6 @@ fn advance(model: &dyn Model, theta: &[f64], [from, to]: [f64; 2], x: &mut [f64]
         history: &NoHistory,
         limits: &Limits::none(),
         noise: None,
-        sums: None,
     };
     Ok(model.advance(segment, theta, x)?)
 }

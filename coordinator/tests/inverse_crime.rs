@@ -101,7 +101,6 @@ impl Twin {
                 history: &NoHistory,
                 limits: &Limits::none(),
                 noise: None,
-                sums: None,
             };
             model.advance(segment, &theta, &mut x).unwrap();
             if !rows.is_empty() && (sample + 1) % 10 == 0 {

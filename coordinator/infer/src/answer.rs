@@ -4,8 +4,8 @@
 
 use nalgebra::DMatrix;
 use starlings_estimators::inference::{
-    Diffusion, Extrapolated, Fit, NoiseCheck, Posterior, Prior, Strength, Structure, Sums, Verdict,
-    extrapolate, noise_checks,
+    Coefficient, Diffusion, Extrapolated, Fit, InferenceError, NoiseCheck, Posterior, Prior, Strength,
+    Structure, Sums, Verdict, extrapolate, noise_checks,
 };
 use starlings_study::infer_choice::{DiffusionChoice, InferChoice, MeasuredChoice};
 
@@ -47,6 +47,9 @@ impl Answer {
         let Some(sums) = levels.first() else {
             return Err(InferError::Setting("no block of any recording was summed".to_owned()));
         };
+        if choice.priors.is_empty() {
+            enough(sums, structure)?;
+        }
         let mut posterior = fit.posterior(sums, structure)?;
         let checks = if sums.n_pair() > 0 { noise_checks(sums, structure, &posterior)? } else { Vec::new() };
         let matters = checks.iter().any(|check| check.verdict == Verdict::Matters);
@@ -120,4 +123,17 @@ impl Answer {
         let order = if found.used == Strength::Weak { 2 } else { 1 };
         Some(RichardsonFound { order, ratio: found.ratio })
     }
+}
+
+/// Whether there are more steps than unknowns in every equation; fewer look like terms that cannot be told apart.
+fn enough(sums: &Sums, structure: &Structure) -> Result<(), InferenceError> {
+    for (l, equation) in structure.equations().iter().enumerate() {
+        let enters = |c: &&Coefficient| c.places.iter().any(|place| place.equation == l);
+        let n_unknown = structure.coefficients().iter().filter(enters).count();
+        if sums.n_step() <= n_unknown as u64 {
+            let equation = equation.clone();
+            return Err(InferenceError::TooFew { n_step: sums.n_step(), n_unknown, equation });
+        }
+    }
+    Ok(())
 }

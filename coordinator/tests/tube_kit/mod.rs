@@ -253,7 +253,6 @@ fn step(model: &FsiTube, theta: &[f64], q: [f64; 2], x: &mut [f64]) {
         history: &NoHistory,
         limits: &Limits::none(),
         noise: None,
-        sums: None,
     };
     model.advance(segment, theta, x).unwrap();
 }

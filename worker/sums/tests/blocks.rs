@@ -64,7 +64,10 @@ fn blocks_in_order_are_the_whole_recording_at_every_step() {
         }
     }
     for (k, (whole, parts)) in whole.iter().zip(&parts.unwrap()).enumerate() {
-        assert_eq!((whole.n_step(), whole.n_pair()), (parts.n_step(), parts.n_pair()), "level {k}");
+        assert_eq!(whole.n_step(), parts.n_step(), "level {k}");
+        if k == 0 {
+            assert_eq!(whole.n_pair(), parts.n_pair(), "pairs at the seams count at the sampling step");
+        }
         // A step of 2^k rows starts at every row but the last 2^k.
         assert_eq!(whole.n_step(), end as u64 + 1 - (1 << k));
         let close = (whole.phi() - parts.phi()).amax() / whole.phi().amax();

@@ -138,7 +138,6 @@ mod tests {
             history: &record,
             limits: &Limits::none(),
             noise: None,
-            sums: None,
         };
         bends(&[source], segment, &[shift])
     }

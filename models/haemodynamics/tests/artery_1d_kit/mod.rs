@@ -91,7 +91,6 @@ pub(crate) fn run(
         history: &NoHistory,
         limits: &Limits::none(),
         noise: None,
-        sums: None,
     };
     let volumes = model.advance_counting(segment, theta, x).unwrap();
     [volumes.inflow, volumes.outflow]

@@ -58,7 +58,6 @@ pub(crate) fn advance(model: &FsiTube, theta: &[f64], q: [f64; 2], dt: f64, x: &
         history: &NoHistory,
         limits: &Limits::none(),
         noise: None,
-        sums: None,
     };
     model.advance(segment, theta, x).unwrap();
 }
