@@ -36,4 +36,7 @@ examples! {
     toy_fsi => "toy-fsi",
     toy_fsi_windkessel => "toy-fsi-windkessel",
     toy_fsi_stokes => "toy-fsi-stokes",
+    plate => "plate",
+    conical_shell => "conical-shell",
+    thrust_vector_control => "thrust-vector-control",
 }

@@ -47,11 +47,10 @@ mod tests {
 
     #[test]
     fn the_rule_integrates_the_highest_power_that_it_must() {
-        for n in [1, 5, 90] {
-            let power = 2 * n - 2;
-            let found: f64 = gauss(n).iter().map(|[x, w]| w * x.powi(power as i32)).sum();
+        for (n, power) in [(1, 0), (5, 8), (90, 178)] {
+            let found: f64 = gauss(n).iter().map(|[x, w]| w * x.powi(power)).sum();
             // Rounding of up to ninety weights.
-            assert!((found - 2.0 / (power as f64 + 1.0)).abs() < 1e-13, "{n}: {found}");
+            assert!((found - 2.0 / (f64::from(power) + 1.0)).abs() < 1e-13, "{n}: {found}");
         }
     }
 
