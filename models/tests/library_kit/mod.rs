@@ -29,7 +29,8 @@ const TIMES: u32 = 12;
 /// Part of a second that is simulated: waves and many small steps make some models slow.
 fn seconds(kind: &str) -> f64 {
     match kind {
-        "fsi-tube" | "artery-1d" | "toy-fsi" | "toy-fsi-windkessel" | "toy-fsi-stokes" => 0.02,
+        "fsi-tube" | "artery-1d" | "toy-fsi" | "toy-fsi-windkessel" | "toy-fsi-stokes"
+        | "rocket-motor-1d" => 0.02,
         _ => 1.0,
     }
 }
