@@ -85,6 +85,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let folder = RunFolder::open(&args.dir).map_err(Failure::input)?;
     let study = study_of(args, &folder)?;
     let ask = ask(args, &study)?;
+    ask.check(&study).map_err(Failure::input)?;
     let plan = args.fleet.plan(&study, None)?;
     let display = Arc::new(Display::new(args.json));
     let mut session =

@@ -28,6 +28,7 @@ examples! {
     rcr => "rcr",
     oscillator => "oscillator",
     knsb_motor => "knsb-motor",
+    rocket_motor => "rocket-motor",
     rcr_network => "rcr-network",
     coarctation => "coarctation",
     fsi_tube => "fsi-tube",

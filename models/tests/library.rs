@@ -155,6 +155,8 @@ fn absence(kind: &str) -> f64 {
     match kind {
         // A scheme of an order of its own, which is integrated or cut at other times as soon as an effect needs it.
         "fsi-tube" | "artery-1d" => 5e-2,
+        // Likewise, in shorter steps and of second order.
+        "rocket-motor-1d" => 1e-4,
         // Waves that take tens of thousands of steps.
         "toy-fsi" | "toy-fsi-windkessel" | "toy-fsi-stokes" => 5e-5,
         // A model's exact step becomes an integration to a relative tolerance of 1e-8, over many steps.

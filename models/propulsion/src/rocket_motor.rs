@@ -74,8 +74,12 @@ impl Model for RocketMotor {
 
     fn output(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, y: &mut [f64]) {
         let (chamber, factor) = (self.chamber(theta), self.factor(t, theta, u));
-        let (area, flow) = (chamber.area * factor, chamber.flow(factor, x[0], x[1]));
-        y.copy_from_slice(&[x[0], x[1], x[2], area, flow, chamber.thrust * factor * x[0]]);
+        let flow = chamber.flow(factor, x[0], x[1]);
+        y[..5].copy_from_slice(&[x[0], x[1], x[2], flow, chamber.thrust * factor * x[0]]);
+        // Only a throat with a course shows its area.
+        if let Some(area) = y.get_mut(5) {
+            *area = chamber.area * factor;
+        }
     }
 
     fn solver(&self) -> Solver {

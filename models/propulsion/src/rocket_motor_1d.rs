@@ -166,8 +166,12 @@ impl Model for RocketMotor1d {
         y[2 * n..3 * n].copy_from_slice(&x[3 * n..]);
         let nozzle = exit::stagnation(work.exit, motor.gamma);
         let thrust = motor.c_f * motor.throat * now.factor * nozzle;
-        let scalars = [work.cells[0].p, nozzle, work.flows.nozzle[0], work.flows.breach[0], thrust];
-        y[3 * n..].copy_from_slice(&scalars);
+        let scalars = [work.cells[0].p, nozzle, work.flows.nozzle[0], thrust];
+        y[3 * n..3 * n + 4].copy_from_slice(&scalars);
+        // Only a bore that may have a hole shows what leaves through it.
+        if let Some(flow) = y.get_mut(3 * n + 4) {
+            *flow = work.flows.breach[0];
+        }
     }
 
     fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ModelFailure> {

@@ -276,7 +276,10 @@ fn fault(n: usize, name: &str, parameters: &[(&'static str, f64)]) -> [Vec<f64>;
     let mut constants = FROZEN.to_vec();
     constants.extend(parameters);
     constants.push(("A_t", 3e-3));
-    let outputs = ["pressure", "breach_flow", "mass_flow"];
+    let mut outputs = vec!["pressure", "mass_flow"];
+    if name == "breach" {
+        outputs.push("breach_flow");
+    }
     let mut rows = motor(json!({ "cells": n, "faults": [name] }), &constants, &outputs).run(&[0.015, 0.15]);
     [rows.remove(0), rows.remove(0)]
 }
@@ -286,9 +289,9 @@ fn a_breach_takes_the_choked_flow_of_its_place_and_the_pressure_falls() {
     let [before, after] =
         fault(40, "breach", &[("t_breach", 0.02), ("x_breach", 0.3), ("breach_area", 2e-4)]);
     let choked = Steady { gamma: 1.2, throat: 0.0, length: 1.0 }.choked();
-    assert!(before[40].abs() < f64::MIN_POSITIVE);
+    assert!(before[41].abs() < f64::MIN_POSITIVE);
     // Of the stagnation temperature of a flow of Mach 0.1 and the pressure at the place.
-    near(after[40], choked * 1.2 * after[11] * 2e-4 / C_0, 3e-3);
+    near(after[41], choked * 1.2 * after[11] * 2e-4 / C_0, 3e-3);
     // A lumped chamber with a throat wider by the hole: (3.0/3.2)^{1/(1−n)}.
     near(after[0] / before[0], (3.0_f64 / 3.2).powf(1.0 / 0.6), 0.01);
 }

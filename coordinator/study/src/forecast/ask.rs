@@ -60,6 +60,14 @@ impl Plan {
 }
 
 impl Ask {
+    /// Refuses what makes no forecast of this study, before anything runs.
+    ///
+    /// # Errors
+    /// When a name is unknown, with the nearest valid one, or a time or count makes no forecast.
+    pub fn check(&self, study: &Study) -> Result<(), StudyForecastError> {
+        self.plan(study).map(|_| ())
+    }
+
     /// Makes of it what members are run with.
     ///
     /// # Errors

@@ -5,6 +5,7 @@
 use starlings_models_core::{Quantity, Role, Spec};
 
 use super::layout::{Layout, Units};
+use crate::throat::Throat;
 
 /// The specification of a motor.
 pub(super) fn spec(layout: &Layout) -> Spec {
@@ -15,7 +16,7 @@ pub(super) fn spec(layout: &Layout) -> Spec {
             .to_owned(),
         states: states(layout.units),
         parameters: parameters(layout),
-        outputs: outputs(layout.units),
+        outputs: outputs(layout),
         inputs: layout.throat.inputs(),
         measures: vec![same("pressure", "p"), same("density", "rho")],
         restart: true,
@@ -41,18 +42,22 @@ fn states(units: Units) -> Vec<Quantity> {
     ]
 }
 
-fn outputs(units: Units) -> Vec<Quantity> {
+fn outputs(layout: &Layout) -> Vec<Quantity> {
+    let units = layout.units;
     let [pressure, density, length, area, force] = labels(units);
     let flow = if units == Units::Si { "kg/s" } else { "1/s" };
-    vec![
+    let mut all = vec![
         Quantity::new("pressure", pressure).role(Role::Pressure).says("Pressure in the chamber."),
         Quantity::new("density", density).says("Density of the gas in the chamber."),
         Quantity::new("radius", length).says("Radius of the bore."),
-        Quantity::new("throat_area", area)
-            .says("Area of the throat, over the one at the start in scaled units."),
         Quantity::new("mass_flow", flow).says("Mass flow through the throat."),
         Quantity::new("thrust", force).role(Role::Thrust).says("Thrust in a vacuum."),
-    ]
+    ];
+    if layout.throat != Throat::Steady {
+        let says = "Area of the throat, over the one at the start in scaled units.";
+        all.push(Quantity::new("throat_area", area).says(says));
+    }
+    all
 }
 
 fn parameters(layout: &Layout) -> Vec<Quantity> {

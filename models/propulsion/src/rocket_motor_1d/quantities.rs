@@ -4,6 +4,7 @@
 
 use starlings_models_core::{Quantity, Role, Spec};
 
+use super::faults::Fault;
 use super::layout::Layout;
 
 /// Number of parameters that every motor has; those of the throat follow, then those of the faults.
@@ -20,7 +21,7 @@ pub(super) fn spec(layout: &Layout) -> Spec {
             .to_owned(),
         states: states(layout.cells),
         parameters,
-        outputs: outputs(layout.cells),
+        outputs: outputs(layout),
         inputs: layout.throat.inputs(),
         measures: vec![("mass_flux".to_owned(), "rho_u".to_owned())],
         restart: true,
@@ -38,18 +39,22 @@ fn states(n: usize) -> Vec<Quantity> {
     ]
 }
 
-fn outputs(n: usize) -> Vec<Quantity> {
+fn outputs(layout: &Layout) -> Vec<Quantity> {
+    let n = layout.cells;
     let pressure = |name: &str, says: &str| Quantity::new(name, "Pa").role(Role::Pressure).says(says);
-    vec![
+    let mut all = vec![
         pressure("pressure", "Pressure in each cell.").size(n),
         Quantity::new("mass_flux", "kg/(m^2 s)").size(n).says("Mass flux in each cell."),
         Quantity::new("radius", "m").size(n).says("Radius of the bore in each cell."),
         pressure("head_pressure", "Pressure in the cell at the head end."),
         pressure("nozzle_pressure", "Stagnation pressure at the nozzle."),
         Quantity::new("mass_flow", "kg/s").says("Mass flow through the nozzle."),
-        Quantity::new("breach_flow", "kg/s").says("Mass flow through a hole in the case."),
         Quantity::new("thrust", "N").role(Role::Thrust).says("Thrust in a vacuum."),
-    ]
+    ];
+    if layout.faults.contains(&Fault::Breach) {
+        all.push(Quantity::new("breach_flow", "kg/s").says("Mass flow through a hole in the case."));
+    }
+    all
 }
 
 fn shared() -> Vec<Quantity> {

@@ -1,0 +1,165 @@
+//! `starlings forecast`: bands that are known in closed form, the same bytes whoever computes, levels, and what is refused.
+
+#![allow(clippy::unwrap_used)] // a failed unwrap is a failed test
+
+mod common;
+
+use std::fmt::Write;
+use std::path::Path;
+
+use common::{bytes, output, run, starlings};
+use nalgebra::{Matrix2, Vector2};
+use serde_json::Value;
+
+/// A free oscillator of mass 1, damping 0.4 and stiffness 9 whose start alone is unknown.
+const STUDY: &str = r#"
+[study]
+name = "free"
+seed = 5
+
+[model]
+kind = "oscillator"
+constants = { m = 1.0, c = 0.4, k = 9.0 }
+
+[[parameters]]
+name = "initial:x"
+unit = "m"
+prior = { transform = "linear", median = 0.5, sd = 1.0 }
+
+[[parameters]]
+name = "initial:v"
+unit = "m/s"
+prior = { transform = "linear", median = 0.0, sd = 3.0 }
+
+[[records]]
+name = "swing"
+file = "swing.csv"
+time = "time"
+channels = [ { column = "position", output = "position", noise = 0.2 } ]
+train = [0.0, 2.0]
+
+[estimator]
+kind = "batch"
+"#;
+
+const NOISE: f64 = 0.2;
+
+/// Position after a time from unit displacement and unit velocity (Meirovitch 1986, section 1.6).
+fn motion(t: f64) -> Vector2<f64> {
+    let (sigma, w) = (0.2, (9.0_f64 - 0.04).sqrt());
+    let (sin, cos) = (w * t).sin_cos();
+    Vector2::new(cos + sigma / w * sin, sin / w) * (-sigma * t).exp()
+}
+
+/// Times and values of the recording: a swing with errors that look like noise.
+fn recording() -> Vec<(f64, f64)> {
+    let error = |i: u32| NOISE * (f64::from(i * i) * 0.7).sin() * 1.4;
+    (0..=30).map(|i| (0.1 * f64::from(i), motion(0.1 * f64::from(i)).x + error(i))).collect()
+}
+
+/// Mean and covariance of the start after the rows up to 2 s.
+fn posterior() -> (Vector2<f64>, Matrix2<f64>) {
+    let prior = Matrix2::new(1.0, 0.0, 0.0, 1.0 / 9.0);
+    let (mut precision, mut weighted) = (prior, prior * Vector2::new(0.5, 0.0));
+    for (t, y) in recording().into_iter().filter(|(t, _)| *t < 2.0 + 1e-9) {
+        let phi = motion(t);
+        precision += phi * phi.transpose() / (NOISE * NOISE);
+        weighted += phi * (y / (NOISE * NOISE));
+    }
+    let covariance = precision.try_inverse().unwrap();
+    (covariance * weighted, covariance)
+}
+
+/// A folder with the study, its recording and a finished run.
+fn finished(folder: &Path) {
+    std::fs::write(folder.join("free.toml"), STUDY).unwrap();
+    let mut csv = "time,position\n".to_owned();
+    for (t, y) in recording() {
+        writeln!(csv, "{t},{y}").unwrap();
+    }
+    std::fs::write(folder.join("swing.csv"), csv).unwrap();
+    run(&folder.join("free.toml"), &folder.join("run"), 2);
+}
+
+fn forecast(folder: &Path, extra: &[&str]) -> (i32, String, String) {
+    output(starlings().arg("forecast").arg(folder.join("run")).args(extra))
+}
+
+#[test]
+fn the_fan_of_a_linear_oscillator_is_its_posterior_predictive_band() {
+    let folder = tempfile::tempdir().unwrap();
+    finished(folder.path());
+    let asked = ["--members", "2000", "--until", "5", "--level", "position>0.3", "--json"];
+    let (code, stdout, stderr) = forecast(folder.path(), &[&asked[..], &["--workers", "2"]].concat());
+    assert_eq!(code, 0, "{stderr}");
+    let found: Value = serde_json::from_str(&stdout).unwrap();
+    assert!(
+        found["outputs"][0]["coverage90"]["held_out"].as_f64().is_some_and(|share| share > 0.5),
+        "{found}"
+    );
+    let (mean, covariance) = posterior();
+    let text = String::from_utf8(bytes(&folder.path().join("run/forecast"), "fan.csv")).unwrap();
+    let mut rows = csv::Reader::from_reader(text.as_bytes());
+    let mut seen = 0;
+    for row in rows.records() {
+        let row = row.unwrap();
+        let value = |i: usize| row[i].parse::<f64>().unwrap();
+        let phi = motion(value(2));
+        let own = (phi.transpose() * covariance * phi)[(0, 0)];
+        let variance = if &row[1] == "measured" { own + NOISE * NOISE } else { own };
+        // 2.5, 5, 25, 50, 75, 95 and 97.5 % of a Gaussian; the sample quantile of 5 % of 2000 has an sd of 0.047 of its sd.
+        let normal = [-1.960, -1.645, -1.2816, -0.6745, 0.0, 0.6745, 1.2816, 1.645, 1.960];
+        for (k, z) in normal.iter().enumerate() {
+            let off = (value(3 + k) - phi.dot(&mean)) / variance.sqrt() - z;
+            assert!(off.abs() < 0.3, "{row:?}: {off}");
+        }
+        seen += 1;
+    }
+    // Both kinds at the record's 31 times and the 20 after them.
+    assert_eq!(seen, 2 * 51);
+    assert!((found["outputs"][0]["at_end"][0].as_f64().unwrap() - motion(5.0).dot(&mean)).abs() < 0.05);
+    let first = ["forecast.json", "fan.csv", "crossing-times.csv", "report.html"]
+        .map(|name| bytes(&folder.path().join("run/forecast"), name));
+    let (code, _, stderr) = forecast(folder.path(), &[&asked[..], &["--workers", "1"]].concat());
+    assert_eq!(code, 0, "{stderr}");
+    let again = ["forecast.json", "fan.csv", "crossing-times.csv", "report.html"]
+        .map(|name| bytes(&folder.path().join("run/forecast"), name));
+    assert!(first == again, "one worker and two give the same bytes");
+}
+
+#[test]
+fn levels_and_mistakes_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    finished(folder.path());
+    let with = |members: &str, extra: &[&str]| {
+        forecast(folder.path(), &[&["--members", members, "--workers", "1"][..], extra].concat())
+    };
+    let few = |extra: &[&str]| with("8", extra);
+    let (code, stdout, stderr) = few(&["--level", "position>1000", "--until", "4"]);
+    assert_eq!(code, 0, "{stderr}");
+    assert!(stdout.contains("position > 1000: not crossed by any of 8 members up to 4"), "{stdout}");
+    let told = [
+        (&["--level", "positon>1"][..], "did you mean `position`?"),
+        (&["--level", "position"], "expected OUTPUT>VALUE"),
+        (&["--level", "position>high"], "`high` is not a number"),
+        (&["--until", "-1"], "after the record's start"),
+        (&["--horizon", "9"], "--horizon 9"),
+        (&["--set", "kk=2"], "no parameter, constant or initial value"),
+        (&["--record", "fall"], "the study has: swing"),
+    ];
+    for (extra, message) in told {
+        let (code, _, stderr) = few(extra);
+        assert_eq!(code, 2, "{extra:?}: {stderr}");
+        assert!(stderr.contains(message), "{extra:?}: {stderr}");
+    }
+    let (code, _, stderr) = with("0", &[]);
+    assert!(code == 2 && stderr.contains("give at least one member"), "{stderr}");
+    let (code, _, stderr) = output(starlings().arg("forecast").arg(folder.path()));
+    assert_eq!(code, 2, "{stderr}");
+    std::fs::rename(folder.path().join("free.toml"), folder.path().join("moved.toml")).unwrap();
+    let (code, _, stderr) = few(&[]);
+    assert!(code == 2 && stderr.contains("--study FILE"), "{stderr}");
+    let moved = folder.path().join("moved.toml");
+    let (code, _, stderr) = few(&["--study", moved.to_str().unwrap()]);
+    assert_eq!(code, 0, "{stderr}");
+}
