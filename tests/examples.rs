@@ -32,6 +32,7 @@ examples! {
     rcr_network => "rcr-network",
     coarctation => "coarctation",
     fsi_tube => "fsi-tube",
+    fine_tube => "fine-tube",
     artery_1d => "artery-1d",
     wall_images => "wall-images",
     toy_fsi => "toy-fsi",
