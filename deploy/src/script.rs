@@ -14,6 +14,18 @@ const TEMPLATES: &[(&str, &str)] = &[
     ("worker.sh", include_str!("../templates/worker.sh")),
     ("worker.sbatch", include_str!("../templates/worker.sbatch")),
     ("coordinator.sbatch", include_str!("../templates/coordinator.sbatch")),
+    ("hosts-start.sh", include_str!("../templates/hosts-start.sh")),
+    ("hosts-ask.sh", include_str!("../templates/hosts-ask.sh")),
+    ("kubernetes/container.yaml", include_str!("../templates/kubernetes/container.yaml")),
+    ("kubernetes/coordinator.yaml", include_str!("../templates/kubernetes/coordinator.yaml")),
+    ("kubernetes/disruption.yaml", include_str!("../templates/kubernetes/disruption.yaml")),
+    ("kubernetes/kustomization.yaml", include_str!("../templates/kubernetes/kustomization.yaml")),
+    ("kubernetes/network.yaml", include_str!("../templates/kubernetes/network.yaml")),
+    ("kubernetes/run-folder.yaml", include_str!("../templates/kubernetes/run-folder.yaml")),
+    ("kubernetes/scale.yaml", include_str!("../templates/kubernetes/scale.yaml")),
+    ("kubernetes/security.yaml", include_str!("../templates/kubernetes/security.yaml")),
+    ("kubernetes/study-volume.yaml", include_str!("../templates/kubernetes/study-volume.yaml")),
+    ("kubernetes/workers.yaml", include_str!("../templates/kubernetes/workers.yaml")),
 ];
 
 /// The script of a template with these values. A value that is missing is an error; the filter `sh` makes one word for a shell.
