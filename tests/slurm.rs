@@ -64,6 +64,13 @@ fn worker_process(access: &Path, task: &str) -> Option<String> {
     })
 }
 
+/// The process that started a process.
+fn parent(pid: &str) -> String {
+    let status = std::fs::read_to_string(format!("/proc/{pid}/status")).unwrap();
+    let line = status.lines().find_map(|line| line.strip_prefix("PPid:")).unwrap();
+    line.trim().to_owned()
+}
+
 fn kill(pid: &str) {
     assert!(Command::new("kill").args(["-9", pid]).status().unwrap().success());
 }
@@ -102,9 +109,13 @@ fn a_node_that_dies_in_the_middle_changes_no_byte_and_its_worker_is_back_at_once
     let first = task(&out, "worker 0");
     let node = first["node"].as_str().unwrap().to_owned();
     let daemon = std::fs::read_to_string(lab().join(format!("run/slurmd-{node}.pid"))).unwrap();
-    kill(daemon.trim());
+    let worker = worker_process(&access, "0").unwrap();
+    let script = parent(&worker);
+    // Whoever would tell Slurm of the end of the others dies before them, as all of a machine does at once.
+    for process in [daemon.trim(), &parent(&script), &script, &worker] {
+        kill(process);
+    }
     let _revived = Revived(node.clone());
-    kill(&worker_process(&access, "0").unwrap());
     let killed = Instant::now();
 
     assert_eq!(coordinator.end(), Some(0), "{}", coordinator.said());

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use minijinja::syntax::SyntaxConfig;
 use minijinja::value::Serde;
-use minijinja::{Environment, UndefinedBehavior};
+use minijinja::{AutoEscape, Environment, UndefinedBehavior};
 use serde::Serialize;
 
 use crate::error::DeployError;
@@ -33,6 +33,8 @@ pub(crate) fn script(name: &'static str, values: impl Serialize) -> Result<Strin
     let made = || {
         let mut environment = Environment::new();
         environment.set_undefined_behavior(UndefinedBehavior::Strict);
+        // The templates say where a value is quoted, and how.
+        environment.set_auto_escape_callback(|_| AutoEscape::None);
         environment
             .set_syntax(SyntaxConfig::builder().keep_trailing_newline(true).trim_blocks(true).build()?);
         environment.add_filter("sh", |text: String| shell_words::quote(&text).into_owned());
