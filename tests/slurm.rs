@@ -111,6 +111,7 @@ fn a_node_that_dies_in_the_middle_changes_no_byte_and_its_worker_is_back_at_once
     let daemon = std::fs::read_to_string(lab().join(format!("run/slurmd-{node}.pid"))).unwrap();
     let worker = worker_process(&access, "0").unwrap();
     let script = parent(&worker);
+    assert!(coordinator.child.try_wait().unwrap().is_none(), "the study is in the middle");
     // Whoever would tell Slurm of the end of the others dies before them, as all of a machine does at once.
     for process in [daemon.trim(), &parent(&script), &script, &worker] {
         kill(process);
