@@ -45,6 +45,15 @@ faults:
 chaos:
     STARLINGS_WRITE_PAGES=1 cargo test --test chaos -- --ignored --nocapture
 
+# Workers under a real Slurm of four nodes on this machine: a node killed, a coordinator requeued. Minutes; needs root, installs slurm-wlm and
+# munge where they are missing.
+slurm:
+    .ci/slurm test
+
+# The manifests for Kubernetes, strictly against its published schemas; installs the validator and kubectl into target/kubernetes.
+kubernetes:
+    .ci/kubernetes
+
 # Every fuzz target for FUZZ_SECONDS each, 600 by default (cargo install cargo-fuzz; a stable compiler is told to take the fuzzer's flags).
 fuzz:
     cargo run --manifest-path fuzz/Cargo.toml --example seeds

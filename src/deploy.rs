@@ -2,6 +2,8 @@
 //!
 //! Next files to read: [`order`] for what is asked for, [`submit`], then the crate `deploy`, which has a file per engine.
 
+mod access;
+mod kubernetes;
 mod order;
 mod remove;
 mod status;
@@ -13,7 +15,7 @@ use starlings_deploy::DeployError;
 
 use crate::failure::Failure;
 
-/// Start the workers of a study under Slurm, and ask, keep and remove them.
+/// Start the workers of a study under Slurm, on a list of machines or in Kubernetes, and ask, keep and remove them.
 ///
 /// The scripts that are submitted stand in a folder, by which a deployment is named afterwards. Workers find their coordinator through
 /// the access file, which may be written after them.
@@ -27,6 +29,12 @@ pub(crate) struct Args {
 enum What {
     /// Submit an array of workers to Slurm.
     Slurm(submit::SlurmArgs),
+    /// Start workers on a list of machines over ssh.
+    Hosts(submit::HostsArgs),
+    /// Write the manifests of a coordinator and its workers for Kubernetes.
+    Kubernetes(kubernetes::Args),
+    /// Make an access file beforehand, for places that are given it as a secret.
+    Access(access::Args),
     /// Say of every process of a deployment where it stands, since when, and why.
     Status(status::Args),
     /// Keep the pool of a deployment: have what the engine starts again started at once, and say what waits and why.
@@ -39,6 +47,9 @@ enum What {
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     match &args.what {
         What::Slurm(args) => submit::slurm(args),
+        What::Hosts(args) => submit::hosts(args),
+        What::Kubernetes(args) => kubernetes::run(args),
+        What::Access(args) => access::run(args),
         What::Status(args) => status::run(args),
         What::Watch(args) => watch::run(args),
         What::Remove(args) => remove::run(args),

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::deployment::Deployment;
 use crate::error::DeployError;
+use crate::hosts::Hosts;
 use crate::order::Order;
 use crate::slurm::Slurm;
 use crate::task::Task;
@@ -50,7 +51,7 @@ pub trait Engine: Sync {
 }
 
 /// All engines.
-pub const ENGINES: &[&dyn Engine] = &[&Slurm];
+pub const ENGINES: &[&dyn Engine] = &[&Slurm, &Hosts];
 
 /// The engine of a name.
 pub fn engine(name: &str) -> Option<&'static dyn Engine> {

@@ -69,6 +69,25 @@ pub enum DeployError {
         /// Who sets it.
         reason: &'static str,
     },
+    /// The study does not fit into a ConfigMap.
+    #[error(
+        "the study and its files have {bytes} bytes, and a ConfigMap holds {most}: put its folder on a volume and name its claim with \
+         --study-claim"
+    )]
+    TooLarge {
+        /// Bytes of all files.
+        bytes: usize,
+        /// Bytes that fit.
+        most: usize,
+    },
+    /// A file cannot be read.
+    #[error("cannot read {}: {source}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
     /// A file cannot be written.
     #[error("cannot write {}: {source}", path.display())]
     Unwritable {
@@ -95,6 +114,8 @@ impl DeployError {
             | Self::Refused { .. }
             | Self::NoDeployment { .. }
             | Self::Occupied(_)
+            | Self::Unreadable { .. }
+            | Self::TooLarge { .. }
             | Self::Option { .. } => true,
             Self::Unwritable { source, .. } => source.kind() != io::ErrorKind::StorageFull,
             Self::Failed { .. } | Self::NoAnswer { .. } | Self::Script { .. } => false,

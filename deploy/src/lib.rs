@@ -7,6 +7,8 @@
 mod deployment;
 mod engine;
 mod error;
+mod hosts;
+mod kubernetes;
 mod logs;
 mod order;
 mod program;
@@ -17,6 +19,8 @@ mod task;
 pub use deployment::{Deployment, FILE};
 pub use engine::{ENGINES, Engine, engine};
 pub use error::DeployError;
+pub use hosts::Hosts;
+pub use kubernetes::{KubernetesOrder, PORT};
 pub use order::Order;
 pub use slurm::Slurm;
 pub use task::{Role, State, Task};

@@ -30,6 +30,18 @@ pub struct Order {
     /// Options for the program that submits.
     #[serde(default)]
     pub options: Vec<String>,
+    /// Machines, where no engine chooses them.
+    #[serde(default)]
+    pub hosts: Vec<String>,
+    /// The command by which a machine is reached, in parts.
+    #[serde(default)]
+    pub ssh: Vec<String>,
+    /// Whether the access file stands already and is copied to the machines.
+    #[serde(default)]
+    pub copies_access: bool,
+    /// Port on which the coordinator is dialled, where that is settled beforehand.
+    #[serde(default)]
+    pub port: Option<u16>,
 }
 
 /// The longest part of a name that is taken from a study.
@@ -51,7 +63,8 @@ impl Order {
     /// The command that starts a coordinator for these workers by hand, for a shell.
     pub fn coordinator_command(&self) -> String {
         let path = |path: &Path| shell_words::quote(&path.to_string_lossy()).into_owned();
-        format!("starlings run {} --listen 0.0.0.0:0 --access {}", path(&self.study), path(&self.access))
+        let (study, access, port) = (path(&self.study), path(&self.access), self.port.unwrap_or(0));
+        format!("starlings run {study} --listen 0.0.0.0:{port} --access {access}")
     }
 }
 

@@ -2,13 +2,17 @@
 
 use std::io::{self, Read, Write};
 use std::process::{Child, Command, Stdio};
-use std::thread::{self, JoinHandle};
+use std::sync::{Arc, Mutex, PoisonError, mpsc};
+use std::thread;
 use std::time::{Duration, Instant};
 
 use crate::error::DeployError;
 
 /// How long a program of an engine may take. Those of Slurm give up a controller that is down after less.
 const LIMIT: Duration = Duration::from_secs(120);
+
+/// How long after its end what a program wrote is waited for.
+const LAST_WORDS: Duration = Duration::from_secs(2);
 
 /// How often it is looked whether a program has ended.
 const TICK: Duration = Duration::from_millis(10);
@@ -86,20 +90,41 @@ impl Programs {
                 command: shown,
             });
         };
-        let [stdout, stderr] = [stdout, stderr].map(|reader| reader.join().unwrap_or_default());
+        let [stdout, stderr] = [stdout, stderr].map(Heard::text);
         Ok(Said { is_well, stdout, stderr, command: shown, program: program.to_owned() })
     }
 }
 
-/// Reads to the end in a thread, so that a program that says much is not held up.
-fn listen(source: Option<impl Read + Send + 'static>) -> JoinHandle<String> {
+/// What a program writes, read in a thread, so that one that says much is not held up.
+struct Heard {
+    bytes: Arc<Mutex<Vec<u8>>>,
+    /// Closed at the end of what is read.
+    open: mpsc::Receiver<()>,
+}
+
+fn listen(source: Option<impl Read + Send + 'static>) -> Heard {
+    let bytes = Arc::<Mutex<Vec<u8>>>::default();
+    let (end, open) = mpsc::channel();
+    let kept = Arc::clone(&bytes);
     thread::spawn(move || {
-        let mut bytes = Vec::new();
-        if let Some(mut source) = source {
-            let _ = source.read_to_end(&mut bytes);
+        let _end: mpsc::Sender<()> = end;
+        let (Some(mut source), mut part) = (source, [0; 8192]) else { return };
+        while let Ok(n) = source.read(&mut part) {
+            if n == 0 {
+                break;
+            }
+            kept.lock().unwrap_or_else(PoisonError::into_inner).extend_from_slice(&part[..n]);
         }
-        String::from_utf8_lossy(&bytes).into_owned()
-    })
+    });
+    Heard { bytes, open }
+}
+
+impl Heard {
+    /// All of it, once the program has ended; what it started may hold the other end for longer, as a master of ssh does.
+    fn text(self) -> String {
+        let _ = self.open.recv_timeout(LAST_WORDS);
+        String::from_utf8_lossy(&self.bytes.lock().unwrap_or_else(PoisonError::into_inner)).into_owned()
+    }
 }
 
 /// Whether a program ended well; nothing where it did not end in time and was killed.
@@ -115,5 +140,36 @@ fn end(child: &mut Child) -> Option<bool> {
                 return None;
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SHELL: Programs =
+        Programs { engine: "a shell", remedy: "install one", environment: &[("GIVEN", "too")] };
+
+    fn run(words: &[&str], input: &str) -> Result<Said, DeployError> {
+        SHELL.run(&words.iter().map(|word| (*word).to_owned()).collect::<Vec<_>>(), input)
+    }
+
+    #[test]
+    fn a_program_is_heard_to_its_end_and_a_process_that_it_leaves_holds_nobody_up() {
+        let said = run(&["sh", "-c", "cat; echo $GIVEN; sleep 60 & exit 0"], "read, ").unwrap();
+        assert!(said.is_well);
+        assert_eq!(said.stdout, "read, too\n");
+    }
+
+    #[test]
+    fn what_goes_wrong_is_told_in_the_words_of_the_program() {
+        let failed = run(&["sh", "-c", "echo one >&2; echo two >&2; exit 3"], "").unwrap().answer();
+        let text = failed.unwrap_err().to_string();
+        assert!(text.starts_with("sh failed: one; two") && text.contains("exit 3"), "{text}");
+        let missing = run(&["no-such-program"], "").err().unwrap();
+        assert!(
+            missing.is_input() && missing.to_string().contains("no program `no-such-program`"),
+            "{missing}"
+        );
     }
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use minijinja::syntax::SyntaxConfig;
 use minijinja::value::Serde;
-use minijinja::{Environment, UndefinedBehavior};
+use minijinja::{AutoEscape, Environment, UndefinedBehavior};
 use serde::Serialize;
 
 use crate::error::DeployError;
@@ -14,6 +14,18 @@ const TEMPLATES: &[(&str, &str)] = &[
     ("worker.sh", include_str!("../templates/worker.sh")),
     ("worker.sbatch", include_str!("../templates/worker.sbatch")),
     ("coordinator.sbatch", include_str!("../templates/coordinator.sbatch")),
+    ("hosts-start.sh", include_str!("../templates/hosts-start.sh")),
+    ("hosts-ask.sh", include_str!("../templates/hosts-ask.sh")),
+    ("kubernetes/container.yaml", include_str!("../templates/kubernetes/container.yaml")),
+    ("kubernetes/coordinator.yaml", include_str!("../templates/kubernetes/coordinator.yaml")),
+    ("kubernetes/disruption.yaml", include_str!("../templates/kubernetes/disruption.yaml")),
+    ("kubernetes/kustomization.yaml", include_str!("../templates/kubernetes/kustomization.yaml")),
+    ("kubernetes/network.yaml", include_str!("../templates/kubernetes/network.yaml")),
+    ("kubernetes/run-folder.yaml", include_str!("../templates/kubernetes/run-folder.yaml")),
+    ("kubernetes/scale.yaml", include_str!("../templates/kubernetes/scale.yaml")),
+    ("kubernetes/security.yaml", include_str!("../templates/kubernetes/security.yaml")),
+    ("kubernetes/study-volume.yaml", include_str!("../templates/kubernetes/study-volume.yaml")),
+    ("kubernetes/workers.yaml", include_str!("../templates/kubernetes/workers.yaml")),
 ];
 
 /// The script of a template with these values. A value that is missing is an error; the filter `sh` makes one word for a shell.
@@ -21,6 +33,8 @@ pub(crate) fn script(name: &'static str, values: impl Serialize) -> Result<Strin
     let made = || {
         let mut environment = Environment::new();
         environment.set_undefined_behavior(UndefinedBehavior::Strict);
+        // The templates say where a value is quoted, and how.
+        environment.set_auto_escape_callback(|_| AutoEscape::None);
         environment
             .set_syntax(SyntaxConfig::builder().keep_trailing_newline(true).trim_blocks(true).build()?);
         environment.add_filter("sh", |text: String| shell_words::quote(&text).into_owned());

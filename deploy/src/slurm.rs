@@ -64,6 +64,8 @@ impl Engine for Slurm {
             "slots": slots(order),
             "is_solver": order.is_solver,
             "study": text(&order.study),
+            "is_copied": false,
+            "keeps_code": false,
         });
         let mut files = vec![(WORKER.to_owned(), script(WORKER, values)?)];
         if let Some(run_folder) = &order.run_folder {

@@ -1,7 +1,11 @@
 set -u
 
 program={{ program|sh }}
+{% if is_copied %}
+access="$HOME/.starlings/{{ name }}/access.json"
+{% else %}
 access={{ access|sh }}
+{% endif %}
 {% if scratch is none %}
 base="${TMPDIR:-/tmp}"
 {% else %}
@@ -10,6 +14,11 @@ base={{ scratch|sh }}
 
 say() { printf 'starlings: %s: %s\n' "$(uname -n)" "$*" >&2; }
 
+{% if keeps_code %}
+# How this ends is all that is known of it afterwards.
+scratch=
+trap 'code=$?; [ -z "$scratch" ] || rm -rf -- "$scratch"; echo "$code" > "$HOME/.starlings/{{ name }}/worker-$1.code"' EXIT
+{% endif %}
 if [ ! -x "$program" ]; then
   say "there is no program $program on this node: put it where the nodes see it, or name it with --program"
   exit 2
@@ -18,7 +27,9 @@ if ! scratch="$(mktemp -d "$base/{{ name }}-XXXXXX" 2> /dev/null)"; then
   say "no scratch folder can be made in $base: is it there, and may you write in it? Name another with --scratch"
   exit 2
 fi
+{% if not keeps_code %}
 trap 'rm -rf -- "$scratch"' EXIT
+{% endif %}
 export TMPDIR="$scratch"
 
 # The engine may have told the worker itself: a second word at once would end it without order.

@@ -15,9 +15,9 @@ use crate::worker::duration;
 pub(crate) struct OrderArgs {
     /// The study file.
     pub(super) study: PathBuf,
-    /// Number of workers.
+    /// Number of workers; on a list of hosts one on each without it.
     #[arg(long, value_name = "N")]
-    workers: usize,
+    workers: Option<usize>,
     /// Access file by which workers and coordinator find each other; access.json in the folder of the deployment without it. It
     /// need not exist yet.
     #[arg(long, value_name = "FILE")]
@@ -49,8 +49,16 @@ fn idle(text: &str) -> Result<String, String> {
 
 impl OrderArgs {
     /// The order and the folder for it. The study is read and checked; no solver is started.
-    pub(super) fn order(&self, is_job: bool, options: &[String]) -> Result<(Order, PathBuf), Failure> {
-        if self.workers == 0 {
+    pub(super) fn order(
+        &self,
+        is_job: bool,
+        options: &[String],
+        hosts: &[String],
+    ) -> Result<(Order, PathBuf), Failure> {
+        let workers = self.workers.or(Some(hosts.len()).filter(|n| *n > 0));
+        let workers =
+            workers.ok_or_else(|| Failure::input("say with --workers N how many workers there are to be"))?;
+        if workers == 0 {
             return Err(Failure::input("--workers must be at least 1"));
         }
         if self.slots == Some(0) {
@@ -71,13 +79,17 @@ impl OrderArgs {
             study: absolute(&self.study)?,
             is_solver: is_outside(&study),
             program,
-            workers: self.workers,
+            workers,
             slots: self.slots,
             access: absolute(&self.access.clone().unwrap_or_else(|| folder.join("access.json")))?,
             idle: self.idle.clone(),
             scratch,
             run_folder: is_job.then(|| folder.join("run")),
             options: options.to_vec(),
+            hosts: hosts.to_vec(),
+            ssh: Vec::new(),
+            copies_access: false,
+            port: None,
         };
         Ok((order, folder))
     }

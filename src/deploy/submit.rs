@@ -1,15 +1,16 @@
 //! Submitting a deployment, and looking whether it dies at once.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
-use starlings_deploy::{Deployment, Engine, Order, Slurm, State};
+use starlings_deploy::{Deployment, Engine, Hosts, Order, Slurm, State};
+use starlings_worker::check_address;
 
-use super::failed;
 use super::order::OrderArgs;
 use super::status::last_words;
+use super::{access, failed};
 use crate::console::line;
 use crate::failure::Failure;
 
@@ -43,12 +44,69 @@ pub(crate) struct SlurmArgs {
 
 /// Deploys under Slurm.
 pub(crate) fn slurm(args: &SlurmArgs) -> Result<(), Failure> {
-    let made = args.order.order(args.coordinator == Coordinator::Job, &args.options)?;
-    submit(&Slurm, made, args.order.dry_run)
+    let made = args.order.order(args.coordinator == Coordinator::Job, &args.options, &[])?;
+    submit(&Slurm, made, args.order.dry_run, None)
+}
+
+/// Start workers on a list of machines over ssh.
+#[derive(Args)]
+pub(crate) struct HostsArgs {
+    #[command(flatten)]
+    order: OrderArgs,
+    /// The machines, as ssh names them; workers go to one after the other.
+    #[arg(long, value_name = "A,B,C", value_delimiter = ',', required_unless_present = "hosts_file")]
+    hosts: Vec<String>,
+    /// File with a machine on each line; what follows a # is not read.
+    #[arg(long, value_name = "FILE", conflicts_with = "hosts")]
+    hosts_file: Option<PathBuf>,
+    /// Address by which the machines reach the coordinator, HOST:PORT: an access file is made now and copied to them. Without it they
+    /// must see the file of --access.
+    #[arg(long, value_name = "ADDR")]
+    address: Option<String>,
+    /// The command that reaches a machine, with its options.
+    #[arg(long, value_name = "CMD", default_value = "ssh -o BatchMode=yes -o ConnectTimeout=10")]
+    ssh: String,
+}
+
+/// Deploys on a list of machines.
+pub(crate) fn hosts(args: &HostsArgs) -> Result<(), Failure> {
+    let hosts = match &args.hosts_file {
+        Some(file) => listed(file)?,
+        None => args.hosts.clone(),
+    };
+    let is_plain =
+        |host: &String| !host.is_empty() && !host.starts_with('-') && !host.contains(char::is_whitespace);
+    if let Some(wrong) = hosts.iter().find(|host| !is_plain(host)) {
+        return Err(Failure::input(format!("`{wrong}` is no name of a host")));
+    }
+    if hosts.is_empty() {
+        return Err(Failure::input("the list of hosts is empty"));
+    }
+    let (mut order, folder) = args.order.order(false, &[], &hosts)?;
+    order.ssh = shell_words::split(&args.ssh).map_err(|error| Failure::input(format!("--ssh: {error}")))?;
+    if let Some(address) = &args.address {
+        check_address(address).map_err(|error| Failure::input(format!("--address: {error}")))?;
+        order.port = address.rsplit_once(':').and_then(|(_, port)| port.parse().ok());
+        order.copies_access = true;
+    }
+    submit(&Hosts, (order, folder), args.order.dry_run, args.address.as_deref())
+}
+
+/// The hosts of a file.
+fn listed(file: &Path) -> Result<Vec<String>, Failure> {
+    let text = std::fs::read_to_string(file)
+        .map_err(|error| Failure::input(format!("--hosts-file: cannot read {}: {error}", file.display())))?;
+    let names = text.lines().map(|line| line.split('#').next().unwrap_or_default().trim());
+    Ok(names.filter(|name| !name.is_empty()).map(str::to_owned).collect())
 }
 
 /// Writes a deployment, submits it and says what comes next.
-fn submit(engine: &'static dyn Engine, made: (Order, PathBuf), dry_run: bool) -> Result<(), Failure> {
+fn submit(
+    engine: &'static dyn Engine,
+    made: (Order, PathBuf),
+    dry_run: bool,
+    address: Option<&str>,
+) -> Result<(), Failure> {
     let (order, folder) = made;
     let deployment = Deployment::write(engine, order, &folder).map_err(failed)?;
     let shown = folder.display();
@@ -58,6 +116,11 @@ fn submit(engine: &'static dyn Engine, made: (Order, PathBuf), dry_run: bool) ->
             .commands(&deployment)
             .iter()
             .try_for_each(|command| line(format_args!("  {}", in_shell(command))));
+    }
+    if let Some(address) = address
+        && !deployment.order.access.exists()
+    {
+        access::prepare(&deployment.order.access, &deployment.order.name, vec![address.to_owned()])?;
     }
     engine.submit(&deployment).map_err(failed)?;
     look(&deployment)?;

@@ -57,6 +57,9 @@ pub enum AccessFault {
     /// Another coordinator has it.
     #[error("{} is in use by another command: wait for its end, or give another --access FILE", .0.display())]
     InUse(PathBuf),
+    /// It stands already where a new one is to be made.
+    #[error("{} is an access file already: use it, or remove it and its private part for new secrets", .0.display())]
+    Stands(PathBuf),
     /// It cannot be written.
     #[error("cannot write {}: {source}", path.display())]
     Unwritable {
@@ -163,6 +166,24 @@ impl Access {
         })?;
         self.made = None;
         self.published = Some((path.to_owned(), file));
+        Ok(())
+    }
+
+    /// Makes an access file and its private part for a coordinator that will be dialled at these addresses, `host:port`, and does not
+    /// listen yet. It takes the secrets of both when it starts with the same `path`.
+    ///
+    /// # Errors
+    /// When something stands there already, or it cannot be written.
+    pub fn prepare(path: &Path, run: &str, addresses: Vec<String>) -> Result<(), AccessFault> {
+        let mut access = Self::at(Some(path))?;
+        if access.lock.is_some() {
+            return Err(AccessFault::Stands(path.to_owned()));
+        }
+        access.reserve(path)?;
+        let file = AccessFile::new(run, addresses, &access.secrets.authority, access.secrets.token.clone());
+        file.write_new(path).map_err(|source| AccessFault::Unwritable { path: path.to_owned(), source })?;
+        // From here on the private part belongs to the file.
+        access.made = None;
         Ok(())
     }
 

@@ -114,3 +114,16 @@ fn a_private_part_that_others_can_read_or_that_is_damaged_is_refused() {
     private_file::write(&private, "{}").unwrap();
     assert!(matches!(Access::at(Some(&path)), Err(AccessFault::Damaged { .. })));
 }
+
+#[test]
+fn an_access_file_made_beforehand_lasts_and_its_coordinator_has_the_same_secrets() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("access.json");
+    let addresses = vec!["coordinator:7000".to_owned()];
+    Access::prepare(&path, "run", addresses.clone()).unwrap();
+    let made = AccessFile::read(&path).unwrap();
+    assert_eq!((made.ended, &made.addresses), (false, &addresses));
+    assert!(matches!(Access::prepare(&path, "run", addresses), Err(AccessFault::Stands(_))));
+    let _access = published(&path);
+    assert!(AccessFile::read(&path).unwrap().token.is(made.token.digits().as_bytes()));
+}

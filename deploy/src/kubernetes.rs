@@ -1,0 +1,172 @@
+//! Kubernetes: a kustomize base of a coordinator, its workers, and what they need. It is written and not applied: what runs in a cluster is
+//! asked and removed with the cluster's own tools.
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use crate::error::DeployError;
+use crate::script::script;
+
+/// The port on which the coordinator listens.
+pub const PORT: u16 = 7000;
+
+/// The largest content of a ConfigMap, bytes (the limit of the Kubernetes API).
+const LARGEST: usize = 1024 * 1024;
+
+/// What is to run in a cluster.
+#[derive(Clone, Debug)]
+pub struct KubernetesOrder {
+    /// Name of everything, of lower-case letters, digits and `-`.
+    pub name: String,
+    /// The image with this program.
+    pub image: String,
+    /// Number of workers, at least one; where they are scaled, the least.
+    pub workers: usize,
+    /// The most workers, where they are scaled.
+    pub max_workers: Option<usize>,
+    /// External metric by which they are scaled instead of their use of processors.
+    pub queue_metric: Option<String>,
+    /// Runs of one worker at a time, and cores that it asks for.
+    pub slots: usize,
+    /// Memory of one worker, such as `2Gi`.
+    pub memory: String,
+    /// Room for the run folder, such as `10Gi`.
+    pub storage: String,
+    /// Claim of a volume with the folder of the study; where there is none, `files` go into a ConfigMap.
+    pub claim: Option<String>,
+    /// Name of the study file in that folder.
+    pub study: String,
+    /// Files of the study, by their paths in its folder.
+    pub files: Vec<(PathBuf, Vec<u8>)>,
+    /// Whether the model of the study is a program of its own, which must be in the image.
+    pub is_solver: bool,
+}
+
+#[derive(Serialize)]
+struct File {
+    key: String,
+    path: String,
+}
+
+#[derive(Serialize)]
+struct Values<'a> {
+    name: &'a str,
+    image: &'a str,
+    workers: usize,
+    max_workers: Option<usize>,
+    queue_metric: Option<&'a str>,
+    slots: usize,
+    memory: &'a str,
+    storage: &'a str,
+    claim: Option<&'a str>,
+    study_path: String,
+    is_solver: bool,
+    port: u16,
+    files: Vec<File>,
+}
+
+/// The manifests, in the order of the templates.
+const MANIFESTS: [(&str, &str); 7] = [
+    ("kustomization.yaml", "kubernetes/kustomization.yaml"),
+    ("coordinator.yaml", "kubernetes/coordinator.yaml"),
+    ("workers.yaml", "kubernetes/workers.yaml"),
+    ("run-folder.yaml", "kubernetes/run-folder.yaml"),
+    ("disruption.yaml", "kubernetes/disruption.yaml"),
+    ("network.yaml", "kubernetes/network.yaml"),
+    ("scale.yaml", "kubernetes/scale.yaml"),
+];
+
+impl KubernetesOrder {
+    /// A name of a study that Kubernetes takes.
+    pub fn name_of(study: &str) -> String {
+        let lower = study.to_lowercase();
+        let plain: String =
+            lower.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).take(30).collect();
+        let plain = plain.trim_matches('-');
+        if plain.is_empty() { "starlings".to_owned() } else { format!("starlings-{plain}") }
+    }
+
+    /// Where workers dial the coordinator.
+    pub fn address(&self) -> String {
+        format!("{}-coordinator:{PORT}", self.name)
+    }
+
+    /// The manifests, name and text of each.
+    ///
+    /// # Errors
+    /// When the files of the study are too large for a ConfigMap and no claim is given.
+    pub fn manifests(&self) -> Result<Vec<(String, String)>, DeployError> {
+        let bytes = self.files.iter().map(|(path, bytes)| path.as_os_str().len() + bytes.len()).sum();
+        if self.claim.is_none() && bytes > LARGEST {
+            return Err(DeployError::TooLarge { bytes, most: LARGEST });
+        }
+        let is_wanted = |name: &&(&str, &str)| name.0 != "scale.yaml" || self.max_workers.is_some();
+        let made = |(name, template): &(&'static str, &'static str)| {
+            Ok(((*name).to_owned(), script(template, self.values())?))
+        };
+        MANIFESTS.iter().filter(is_wanted).map(made).collect()
+    }
+
+    fn values(&self) -> Values<'_> {
+        let key = |(i, (path, _)): (usize, &(PathBuf, Vec<u8>))| File {
+            key: format!("file-{i}"),
+            path: path.to_string_lossy().into_owned(),
+        };
+        Values {
+            name: &self.name,
+            image: &self.image,
+            workers: self.workers,
+            max_workers: self.max_workers,
+            queue_metric: self.queue_metric.as_deref(),
+            slots: self.slots,
+            memory: &self.memory,
+            storage: &self.storage,
+            claim: self.claim.as_deref(),
+            study_path: format!("/study/{}", self.study),
+            is_solver: self.is_solver,
+            port: PORT,
+            files: self.files.iter().enumerate().map(key).collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn order(bytes: usize) -> KubernetesOrder {
+        KubernetesOrder {
+            name: "starlings-a".to_owned(),
+            image: "a:1".to_owned(),
+            workers: 2,
+            max_workers: None,
+            queue_metric: None,
+            slots: 1,
+            memory: "1Gi".to_owned(),
+            storage: "1Gi".to_owned(),
+            claim: None,
+            study: "study.toml".to_owned(),
+            files: vec![("study.toml".into(), vec![0; bytes])],
+            is_solver: false,
+        }
+    }
+
+    #[test]
+    fn a_name_is_one_that_kubernetes_takes() {
+        let names = ["Pig Aorta_2", "\u{e9}", "a".repeat(99).as_str()].map(KubernetesOrder::name_of);
+        assert_eq!(names[..2], ["starlings-pig-aorta-2", "starlings"]);
+        assert_eq!(names[2].len(), "starlings-".len() + 30);
+    }
+
+    #[test]
+    fn a_study_that_is_larger_than_a_config_map_needs_a_claim() {
+        let refused = order(LARGEST).manifests();
+        assert!(matches!(refused, Err(DeployError::TooLarge { .. })));
+        assert_eq!(order(LARGEST - 99).manifests().unwrap().len(), 6);
+        let claimed = KubernetesOrder { claim: Some("data".to_owned()), ..order(LARGEST) };
+        let manifests = claimed.manifests().unwrap();
+        assert!(manifests.iter().any(|(_, text)| text.contains("claimName: \"data\"")));
+        assert!(manifests.iter().all(|(_, text)| !text.contains("configMap")));
+    }
+}
