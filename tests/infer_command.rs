@@ -147,23 +147,18 @@ fn what_cannot_be_estimated_is_refused_with_names() {
     let of_functions = |functions: &str| STUDY.replace(r#"parameters = ["k", "c", "d"]"#, functions);
     let collinear = of_functions(r#"functions = ["x", "z", "2*x - z"]"#);
     refused(&collinear, &data, &["cannot tell these terms apart", "x:2*x - z", "x:x"]);
-    let few: String = data.lines().take(4).map(|line| format!("{line}\n")).collect();
+    let few = data.lines().take(4).collect::<Vec<_>>().join("\n");
     refused(
         &of_functions("basis = \"polynomial\""),
         &few,
         &["2 steps do not determine the 5 unknowns", "record longer"],
     );
-    let same: String = data
-        .lines()
-        .map(|line| line.rsplit_once(',').unwrap().0)
-        .map(|line| {
-            if line.starts_with('t') {
-                format!("{line},z\n")
-            } else {
-                format!("{line},{}\n", line.split(',').nth(1).unwrap())
-            }
-        })
-        .collect();
+    let twice = |line: &str| {
+        let cells: Vec<&str> = line.split(',').collect();
+        let last = if cells[0] == "time" { "z" } else { cells[1] };
+        [cells[0], cells[1], last].join(",")
+    };
+    let same = data.lines().map(twice).collect::<Vec<_>>().join("\n");
     refused(&of_functions(r#"functions = ["x"]"#), &same, &["no positive definite covariance"]);
     refused(&of_functions(r#"functions = ["log(x)"]"#), &data, &["log(x) is", "at row"]);
 }

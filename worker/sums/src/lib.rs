@@ -1,7 +1,7 @@
 //! Sums over blocks of a recording, as jobs of the fleet: what a dynamical inference sends to workers instead of runs of the model.
 //!
 //! [`Question`] makes of a setup the functions of its equations and where each enters; both sides make the same one. [`BlockSums`] is
-//! the [`Forward`](starlings_models::Forward) that a worker builds of such a setup. Nothing is estimated here, and no file is read:
+//! the [`Forward`] that a worker builds of such a setup. Nothing is estimated here, and no file is read:
 //! `coordinator/infer` does both. Next file to read: [`question`].
 
 mod block_sums;
