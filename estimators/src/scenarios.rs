@@ -170,7 +170,7 @@ mod tests {
     #[test]
     fn scenarios_alike_share_the_probability_and_missing_samples_say_nothing() {
         let one = vec![1.0, 2.0, -1.0, 0.5];
-        let courses = [one.clone(), one.iter().map(|v| -v).collect(), one.clone()];
+        let courses = [one.clone(), vec![1.0, 0.0, 1.0, 0.0], one.clone()];
         let observed = [1.1, f64::NAN, -0.9, 0.4];
         let found = identify(&observed, 0.1, &courses, PRIOR).expect("three scenarios");
         let without = identify(&[1.1, -0.9, 0.4], 0.1, &[vec![1.0, -1.0, 0.5]], PRIOR).expect("one scenario");
