@@ -79,12 +79,11 @@ impl Ask {
         setup.outputs = self.outputs(study)?;
         let mut fixed = Vec::new();
         for (name, value) in &self.values {
-            match setup.parameters.iter().position(|p| p == name) {
-                Some(place) => fixed.push((place, *value)),
-                None => {
-                    known(study, name)?;
-                    setup.model.constants.insert(name.clone(), *value);
-                }
+            if let Some(place) = setup.parameters.iter().position(|p| p == name) {
+                fixed.push((place, *value));
+            } else {
+                known(study, name)?;
+                setup.model.constants.insert(name.clone(), *value);
             }
         }
         let times = self.times(study)?;
