@@ -100,19 +100,19 @@ pub(super) fn last_words(deployment: &Deployment, tasks: &[Task]) -> String {
             None => told.push((lines, vec![task.role])),
         }
     }
-    let mut text = String::new();
+    let mut shown: Vec<String> = Vec::new();
     for (lines, roles) in told.iter().take(LOGS) {
         let more = if roles.len() > 1 { format!(" and {} more", roles.len() - 1) } else { String::new() };
-        text += &format!("  {}{more}:\n", roles[0]);
+        shown.push(format!("  {}{more}:", roles[0]));
         if lines.is_empty() {
-            text += "    it left no log\n";
+            shown.push("    it left no log".to_owned());
         }
-        lines.iter().for_each(|line| text += &format!("    {line}\n"));
+        shown.extend(lines.iter().map(|line| format!("    {line}")));
     }
     if told.len() > LOGS {
-        text += &format!("  others: {}\n", deployment.folder.join("logs").display());
+        shown.push(format!("  others: {}", deployment.folder.join("logs").display()));
     }
-    text
+    shown.into_iter().map(|line| line + "\n").collect()
 }
 
 #[cfg(test)]
