@@ -128,6 +128,21 @@ fn the_fan_of_a_linear_oscillator_is_its_posterior_predictive_band() {
 }
 
 #[test]
+fn members_reach_the_end_and_the_horizon_that_were_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    finished(folder.path());
+    // Neither is a whole number of steps after the record's end at 3.
+    let asked = ["--until", "3.37", "--horizon", "3.24", "--members", "20", "--level", "position>100"];
+    let (code, _, stderr) = forecast(folder.path(), &asked);
+    assert_eq!(code, 0, "{stderr}");
+    let text = String::from_utf8(bytes(&folder.path().join("run/forecast"), "fan.csv")).unwrap();
+    let mut rows = csv::Reader::from_reader(text.as_bytes());
+    let times: Vec<f64> = rows.records().map(|row| row.unwrap()[2].parse().unwrap()).collect();
+    assert!(times.contains(&3.37) && times.contains(&3.24), "{times:?}");
+    assert!(times.iter().all(|t| *t <= 3.37), "{times:?}");
+}
+
+#[test]
 fn levels_and_mistakes_are_told() {
     let folder = tempfile::tempdir().unwrap();
     finished(folder.path());

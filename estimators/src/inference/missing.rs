@@ -222,14 +222,19 @@ impl Hunt<'_> {
         all.max_by(|a, b| a.2.total_cmp(&b.2)).map(|(old, new, _)| (old, new))
     }
 
-    /// Takes away what the other named terms have made superfluous.
+    /// Takes away what the other named terms have made superfluous, the least sure first.
     fn prune(&self, model: &[usize], named: &mut Vec<usize>) {
-        while let Some(weakest) = named.iter().copied().find(|c| {
-            let others = joined(model, &without(named, *c));
-            let score = self.score(&others, &[*c]);
-            let n = self.candidates.len() as f64;
-            score.is_none_or(|s| !s.allowed || s.by_chance * n >= self.search.false_alarm)
-        }) {
+        let by_chance = |named: &[usize], c: usize| {
+            let score = self.score(&joined(model, &without(named, c)), &[c]);
+            score.filter(|s| s.allowed).map_or(1.0, |s| s.by_chance)
+        };
+        let n = self.candidates.len() as f64;
+        while let Some((weakest, chance)) =
+            named.iter().map(|c| (*c, by_chance(named, *c))).max_by(|a, b| a.1.total_cmp(&b.1))
+        {
+            if chance * n < self.search.false_alarm {
+                return;
+            }
             named.retain(|c| *c != weakest);
         }
     }

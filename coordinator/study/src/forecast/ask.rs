@@ -126,7 +126,7 @@ impl Ask {
         Ok(outputs)
     }
 
-    /// The record's times, and regular ones after its end.
+    /// The record's times, regular ones after its end, the end that was asked for and the horizon.
     fn times(&self, study: &Study) -> Result<Vec<f64>, StudyForecastError> {
         let request = |message: String| Err(StudyForecastError::Request(message));
         let recorded = &study.records[self.record].times;
@@ -155,6 +155,13 @@ impl Ask {
             ));
         }
         times.extend((1..=n as usize).map(|k| step.mul_add(k as f64, end)));
+        // Nothing may be told of a time that no member reaches.
+        for asked in [Some(until), self.horizon].into_iter().flatten() {
+            let place = times.partition_point(|t| *t < asked - 1e-9 * step);
+            if times.get(place).is_none_or(|t| *t > asked + 1e-9 * step) {
+                times.insert(place, asked);
+            }
+        }
         Ok(times)
     }
 }
