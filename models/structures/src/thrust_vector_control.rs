@@ -69,22 +69,31 @@ impl ThrustVectorControl {
         let force = |name: &str| {
             Quantity::new(name, "N").role(Role::Force).says("Force of the actuator on the nozzle.")
         };
-        let mut states = vec![
-            Quantity::new("angle", "rad").role(Role::Displacement).default(0.0).says("Angle of the nozzle."),
-            Quantity::new("rate", "rad/s").role(Role::Velocity).default(0.0).says("Rate of the angle."),
-        ];
+        let angle = |name: &str| {
+            Quantity::new(name, "rad").role(Role::Displacement).default(0.0).says("Angle of the nozzle.")
+        };
+        let rate = |name: &str| {
+            Quantity::new(name, "rad/s").role(Role::Velocity).default(0.0).says("Rate of the angle.")
+        };
+        // An effect on a name that a state has would enter its rate.
+        let mut states = vec![angle("phi"), rate("phi_dot")];
+        let mut outputs = vec![angle("angle"), rate("rate")];
         let torque =
             Quantity::new("torque", "N m").role(Role::Force).says("Torque on the nozzle about its pivot.");
         let mut inputs = vec![torque];
         match actuator {
             Actuator::Measured => inputs.insert(0, force("actuator_force")),
-            Actuator::Law => states.push(force("actuator_force").default(0.0)),
+            Actuator::Law => {
+                states.push(force("F").default(0.0));
+                outputs.push(force("actuator_force"));
+            }
         }
+        let measures = outputs.iter().zip(&states).map(|(o, s)| (o.name.clone(), s.name.clone())).collect();
         let spec = Spec {
             kind: "thrust-vector-control".to_owned(),
             says: "A gimballed nozzle held by its actuator, pushed by an unknown torque.".to_owned(),
-            outputs: states.clone(),
-            measures: states.iter().map(|state| (state.name.clone(), state.name.clone())).collect(),
+            measures,
+            outputs,
             states,
             parameters: parameters(actuator),
             inputs,
