@@ -2,7 +2,7 @@
 
 mod leases;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use starlings_proto::{Lease, SetupId};
@@ -55,6 +55,8 @@ pub(super) struct Worker {
     pub(super) nonce: u64,
     pub(super) last_heard: Duration,
     pub(super) setups: BTreeMap<SetupId, SetupState>,
+    /// Setups that count as failed because it took too long to answer: the answer is no surprise.
+    pub(super) unanswered: BTreeSet<SetupId>,
     /// Why it gets no jobs at the moment.
     pub(super) aside: Option<Aside>,
     held: BTreeMap<u64, Held>,
@@ -104,6 +106,7 @@ impl Worker {
             nonce: joining.nonce,
             last_heard: now,
             setups: BTreeMap::new(),
+            unanswered: BTreeSet::new(),
             aside: None,
             held: BTreeMap::new(),
             sent: 0,
@@ -233,7 +236,9 @@ impl Worker {
     /// Whether an answer about a setup is of no use: of a setup that it failed to build before, or of far more than it was sent.
     pub(super) fn answers_unasked(&self, setup: &SetupId, state: &SetupState) -> bool {
         match self.setups.get(setup) {
-            Some(SetupState::Failed(_)) => matches!(state, SetupState::Failed(_)),
+            Some(SetupState::Failed(_)) => {
+                matches!(state, SetupState::Failed(_)) && !self.unanswered.contains(setup)
+            }
             Some(_) => false,
             None => self.setups.len() >= UNASKED,
         }
@@ -241,7 +246,10 @@ impl Worker {
 
     /// Takes an answer about a setup: those that wait behind it are being built from now on.
     pub(super) fn setup_answered(&mut self, setup: SetupId, state: SetupState, now: Duration) {
-        self.setups.insert(setup, state);
+        // One that was sent anew meanwhile is answered twice.
+        if !matches!(self.setups.insert(setup, state), Some(SetupState::Pending { .. })) {
+            self.unanswered.remove(&setup);
+        }
         for state in self.setups.values_mut() {
             if let SetupState::Pending { since } = state {
                 *since = now;

@@ -11,16 +11,11 @@ use super::message::{BatchError, Command, WorkerId};
 use super::roster::{self, SetupState, Worker};
 
 impl Dispatcher {
-    /// Everything that may follow from any event: settle, make control runs, assign, recall, end.
+    /// Everything that may follow from any event: settle, make control runs, compare, assign, recall, end.
     pub(super) fn proceed(&mut self) {
-        if self.local_only {
-            self.fail_without_setup();
-        }
-        self.settle_failures();
-        // Before jobs are assigned: a place on trial makes one run at a time, and this one tells more.
-        self.control();
-        if self.now >= self.opens && !self.is_matching {
-            self.canaries();
+        // What was settled before a worker was put out may have waited for that worker, and no other event need come.
+        while self.settle() {}
+        if self.is_open() {
             self.assign();
         }
         self.recall();
@@ -32,6 +27,26 @@ impl Dispatcher {
             self.overdue = None;
             self.out.push(Command::BatchDone(batch.into_outcomes()));
         }
+    }
+
+    /// Settles what can be settled and starts control runs and repeats; says whether a worker was found wrong by it.
+    fn settle(&mut self) -> bool {
+        let n_wrong = self.repeats.wrong.len();
+        if self.local_only {
+            self.fail_without_setup();
+        }
+        self.settle_failures();
+        // Before jobs are assigned: a place on trial makes one run at a time, and this one tells more.
+        self.control();
+        if self.is_open() {
+            self.canaries();
+        }
+        self.repeats.wrong.len() > n_wrong
+    }
+
+    /// Whether jobs are given away now.
+    fn is_open(&self) -> bool {
+        self.now >= self.opens && !self.is_matching
     }
 
     /// Ends the batch when none of the workers can build a setup that it still needs, and no others will come.

@@ -74,6 +74,7 @@ impl Dispatcher {
                 if matches!(state, SetupState::Pending { since } if now.saturating_sub(*since) >= patience) {
                     let reason = format!("it was not built within {:.0} s", patience.as_secs_f64());
                     *state = SetupState::Failed(reason.clone());
+                    worker.unanswered.insert(*setup);
                     let notice = FleetEvent::SetupFailed { worker: worker.name.clone(), reason };
                     self.out.push(Command::Notice(notice));
                 }

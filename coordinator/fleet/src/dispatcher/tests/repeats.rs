@@ -20,6 +20,39 @@ fn large_states_are_compared_by_name_and_that_of_a_repeat_is_needed_by_nobody() 
 }
 
 #[test]
+fn a_dispute_asks_on_when_the_worker_that_it_asked_is_put_out_in_another_dispute() {
+    let mut stage = comparing(&[1, 1, 1], false);
+    let mut open = stage.jobs(submit(3));
+    let mut answers = |worker: u64, index: usize, said| {
+        let at = open.iter().position(|(lease, job)| (lease.epoch, *job) == (worker, index));
+        let commands = stage.step(ran(open.remove(at.expect("it has the job")).0, said));
+        open.extend(sent(&commands));
+        commands
+    };
+    answers(3, 2, Err(solver("no")));
+    answers(2, 1, Ok(scaled(1, 1.0)));
+    answers(1, 0, Ok(scaled(0, 0.995)));
+    // Job 2 has a prediction where the third worker failed: the second is asked.
+    answers(1, 2, Ok(scaled(2, 1.0)));
+    // The first two differ in job 0: the third is asked.
+    let asked = sent(&answers(2, 0, Ok(scaled(0, 1.0))));
+    assert!(asked.iter().any(|(lease, index)| (lease.epoch, *index) == (3, 0)), "{asked:?}");
+    // Of job 2 the third was wrong, so nobody says any more who is right in job 0: both are asked again, without a tick.
+    let mut all = answers(2, 2, Ok(scaled(2, 1.0)));
+    assert_eq!(put_out(&all), [3]);
+    let mut next = sent(&all);
+    assert!(next.iter().any(|(_, index)| *index == 0), "{next:?}");
+    while let Some((lease, index)) = next.pop() {
+        let commands = stage.step(ran(lease, Ok(scaled(index, 1.0))));
+        next.extend(sent(&commands));
+        all.extend(commands);
+    }
+    // The first contradicts itself.
+    assert_eq!(put_out(&all), [3, 1]);
+    assert_right(&all);
+}
+
+#[test]
 fn a_repeat_that_never_comes_back_does_not_hold_the_batch() {
     let mut stage = comparing(&[1, 1], false);
     let first = stage.step(submit(2));

@@ -157,3 +157,26 @@ fn a_batch_whose_runs_are_all_made_waits_for_a_slow_setup_as_long_as_patience_la
     let patience = RULES.patience.as_secs();
     assert_eq!(until_done(&mut stage, 2 * patience, &[1, 2]), patience);
 }
+
+#[test]
+fn a_worker_that_refuses_a_setup_after_patience_ended_is_not_blamed_the_first_time() {
+    let mut stage = Stage::with(&[]);
+    stage.step(submit(1));
+    stage.step(Event::Joined(joining(1, 1)));
+    stage.seconds(59, &[1]);
+    // Another one makes the runs, so that the batch goes on.
+    stage.step(Event::Joined(joining(2, 1)));
+    stage.step(Event::SetupDone { worker: WorkerId(2), setup: SETUP });
+    stage.seconds(2, &[1, 2]);
+    assert!(!stage.dispatcher.workers[&WorkerId(1)].may_run(&SETUP), "it counts as failed");
+    let refused =
+        || Event::SetupFailed { worker: WorkerId(1), setup: SETUP, reason: "no compiler".to_owned() };
+    let strays = |stage: &Stage| stage.dispatcher.workers[&WorkerId(1)].strays;
+    let told = stage.step(refused());
+    assert!(told.iter().any(
+        |c| matches!(c, Command::Notice(FleetEvent::SetupFailed { reason, .. }) if reason == "no compiler")
+    ));
+    assert_eq!(strays(&stage), 0);
+    stage.step(refused());
+    assert_eq!(strays(&stage), 1);
+}
