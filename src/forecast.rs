@@ -6,6 +6,7 @@ use std::sync::Arc;
 use clap::Parser;
 use starlings_coordinator::fleet::RunIdentity;
 use starlings_coordinator::report::forecast_page;
+use starlings_coordinator::study::forecast::result::OutputForecast;
 use starlings_coordinator::study::forecast::{Ask, Forecast, StudyForecastError, Threshold, forecast};
 use starlings_coordinator::study::store::folder::StudyInfo;
 use starlings_coordinator::study::{RunFolder, Study};
@@ -181,22 +182,35 @@ fn print(found: &Forecast) -> Result<(), Failure> {
             line(format_args!("  by {horizon}: probability {p:.3}"))?;
         }
     }
-    let heading =
-        ["output", "unit", "median at the end", "5 %", "95 %", "fitted in 90 %", "held out in 90 %"];
+    let heading = [
+        "output",
+        "unit",
+        "median at the end",
+        "quantity 5 to 95 %",
+        "measured 5 to 95 %",
+        "errors",
+        "fitted in 90 %",
+        "held out in 90 %",
+    ];
     let mut rows = vec![heading.map(str::to_owned).to_vec()];
+    rows.extend(found.outputs.iter().map(row));
+    text(table(&rows, false))?;
+    line(&found.conditional_on)
+}
+
+/// The row of an output: both bands at the end, the errors of what would be measured, and what its band holds.
+fn row(output: &OutputForecast) -> Vec<String> {
     let share = |of: Option<f64>| of.map_or_else(String::new, |v| format!("{:.1} %", 100.0 * v));
-    for output in &found.outputs {
-        let [median, lo, hi] = output.at_end.map(|v| format!("{v:.5}"));
-        let coverage = output.coverage90;
-        rows.push(vec![
-            output.output.clone(),
-            output.unit.clone(),
-            median,
-            lo,
-            hi,
-            share(coverage.and_then(|c| c.train)),
-            share(coverage.and_then(|c| c.held_out)),
-        ]);
-    }
-    text(table(&rows, false))
+    let [median, lo, hi] = output.at_end.map(|v| format!("{v:.5}"));
+    let coverage = output.coverage90;
+    vec![
+        output.output.clone(),
+        output.unit.clone(),
+        median,
+        format!("{lo} to {hi}"),
+        output.measured_at_end.map_or_else(String::new, |[lo, hi]| format!("{lo:.5} to {hi:.5}")),
+        output.errors.map_or_else(String::new, |errors| format!("{:.4}", errors.sd)),
+        share(coverage.and_then(|c| c.train)),
+        share(coverage.and_then(|c| c.held_out)),
+    ]
 }

@@ -9,6 +9,9 @@ use std::path::Path;
 
 use common::{bytes, output, run, starlings};
 use nalgebra::{Matrix2, Vector2};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
 use serde_json::Value;
 
 /// A free oscillator of mass 1, damping 0.4 and stiffness 9 whose start alone is unknown.
@@ -98,6 +101,14 @@ fn the_fan_of_a_linear_oscillator_is_its_posterior_predictive_band() {
         "{found}"
     );
     let (mean, covariance) = posterior();
+    // The residuals are as large as the noise, so that the members' spread is that of the posterior within the tolerance below.
+    let wider = found["wider_given_residuals"].as_f64().unwrap();
+    assert!((1.0..1.2).contains(&wider), "{wider}");
+    let fitted = recording().into_iter().filter(|(t, _)| *t < 2.0 + 1e-9);
+    let squares: Vec<f64> = fitted.map(|(t, y)| (y - motion(t).dot(&mean)).powi(2)).collect();
+    let residual = (squares.iter().sum::<f64>() / (squares.len() as f64 - 2.0)).sqrt();
+    let sd = found["outputs"][0]["errors"]["sd"].as_f64().unwrap();
+    assert!((sd - residual.max(NOISE)).abs() < 1e-3, "{sd}, {residual}");
     let text = String::from_utf8(bytes(&folder.path().join("run/forecast"), "fan.csv")).unwrap();
     let mut rows = csv::Reader::from_reader(text.as_bytes());
     let mut seen = 0;
@@ -106,7 +117,7 @@ fn the_fan_of_a_linear_oscillator_is_its_posterior_predictive_band() {
         let value = |i: usize| row[i].parse::<f64>().unwrap();
         let phi = motion(value(2));
         let own = (phi.transpose() * covariance * phi)[(0, 0)];
-        let variance = if &row[1] == "measured" { own + NOISE * NOISE } else { own };
+        let variance = if &row[1] == "measured" { own + sd * sd } else { own };
         // 2.5, 5, 25, 50, 75, 95 and 97.5 % of a Gaussian; the sample quantile of 5 % of 2000 has an sd of 0.047 of its sd.
         let normal = [-1.960, -1.645, -1.2816, -0.6745, 0.0, 0.6745, 1.2816, 1.645, 1.960];
         for (k, z) in normal.iter().enumerate() {
@@ -177,4 +188,61 @@ fn levels_and_mistakes_are_told() {
     let moved = folder.path().join("moved.toml");
     let (code, _, stderr) = few(&["--study", moved.to_str().unwrap()]);
     assert_eq!(code, 0, "{stderr}");
+}
+
+/// Errors of a recording: white, or an autoregression of the same sd, from a seed.
+fn errors(seed: u64, correlation: f64, n: usize) -> Vec<f64> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut last: f64 = StandardNormal.sample(&mut rng);
+    let mut next = || {
+        let now = last;
+        let z: f64 = StandardNormal.sample(&mut rng);
+        last = correlation.mul_add(last, (1.0 - correlation * correlation).sqrt() * z);
+        now
+    };
+    (0..n).map(|_| next()).collect()
+}
+
+/// Shares of values in the 90 % band of what would be measured, fitted and held out, over so many twins with errors of `sd`.
+fn coverage(n_twin: u64, sd: f64, correlation: f64) -> [f64; 2] {
+    let mut shares = [0.0; 2];
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(
+        folder.path().join("free.toml"),
+        STUDY.replace("train = [0.0, 2.0]", "train = [0.0, 4.0]"),
+    )
+    .unwrap();
+    for seed in 0..n_twin {
+        let mut csv = "time,position\n".to_owned();
+        for (i, error) in errors(seed, correlation, 121).into_iter().enumerate() {
+            let t = 0.05 * i as f64;
+            writeln!(csv, "{t},{}", motion(t).x + sd * error).unwrap();
+        }
+        std::fs::write(folder.path().join("swing.csv"), csv).unwrap();
+        let out = folder.path().join(format!("run-{seed}"));
+        run(&folder.path().join("free.toml"), &out, 1);
+        let asked = ["--members", "400", "--workers", "1", "--json"];
+        let (code, stdout, stderr) = output(starlings().arg("forecast").arg(&out).args(asked));
+        assert_eq!(code, 0, "{stderr}");
+        let found: Value = serde_json::from_str(&stdout).unwrap();
+        for (sum, part) in shares.iter_mut().zip(["train", "held_out"]) {
+            *sum += found["outputs"][0]["coverage90"][part].as_f64().unwrap() / n_twin as f64;
+        }
+    }
+    shares
+}
+
+#[test]
+fn the_band_of_what_would_be_measured_holds_nine_values_in_ten_of_twins_with_white_noise() {
+    // 24 twins of 40 held-out values: a share's standard error is 0.01.
+    let shares = coverage(24, NOISE, 0.0);
+    assert!(shares.iter().all(|share| (0.85..=0.95).contains(share)), "{shares:?}");
+}
+
+#[test]
+fn the_band_of_what_would_be_measured_holds_where_errors_are_larger_than_stated_and_correlated() {
+    // Two and a half times the stated noise, correlated by 0.8 from one value to the next: the band of the stated noise would
+    // hold half of them. 24 twins of 40 values that count for about 5: a standard error of 0.03.
+    let shares = coverage(24, 2.5 * NOISE, 0.8);
+    assert!(shares.iter().all(|share| (0.8..=0.97).contains(share)), "{shares:?}");
 }

@@ -7,6 +7,7 @@ mod figures;
 
 use serde::Serialize;
 use starlings_study::forecast::Forecast;
+use starlings_study::forecast::measurement::{Errors, From};
 use starlings_study::forecast::result::{LevelForecast, OutputForecast};
 
 use super::plot::figure::Slots;
@@ -19,7 +20,7 @@ struct Page<'a> {
     headline: String,
     facts: Vec<(&'static str, String)>,
     levels: Vec<[String; 5]>,
-    outputs: Vec<[String; 5]>,
+    outputs: Vec<[String; 7]>,
     figures: Slots,
 }
 
@@ -72,12 +73,31 @@ fn level_row(level: &LevelForecast, time_unit: &str) -> [String; 5] {
     ]
 }
 
-fn output_row(output: &OutputForecast) -> [String; 5] {
+fn output_row(output: &OutputForecast) -> [String; 7] {
     let [median, lo, hi] = output.at_end.map(|v| number::significant(v, 4));
     let share = |of: Option<f64>| of.map_or_else(String::new, number::percent);
     let coverage = output.coverage90.map(|c| [share(c.train), share(c.held_out)]).unwrap_or_default();
     let [train, held_out] = coverage;
-    [output.output.clone(), format!("{median} {}", output.unit), format!("{lo} to {hi}"), train, held_out]
+    let measured = output.measured_at_end.map(|band| band.map(|v| number::significant(v, 4)));
+    [
+        output.output.clone(),
+        format!("{median} {}", output.unit),
+        format!("{lo} to {hi}"),
+        measured.map_or_else(String::new, |[lo, hi]| format!("{lo} to {hi}")),
+        output.errors.map_or_else(String::new, |errors| errors_of(&errors, &output.unit)),
+        train,
+        held_out,
+    ]
+}
+
+/// The size of the errors of measured values, and where it comes from.
+fn errors_of(errors: &Errors, unit: &str) -> String {
+    let from = match errors.from {
+        From::Noise => "stated noise",
+        From::Residuals => "its training residuals",
+        From::OtherResiduals => "as residuals of fitted outputs exceed their noise",
+    };
+    format!("{} ({from})", number::quantity(errors.sd, unit))
 }
 
 #[cfg(test)]

@@ -1,11 +1,13 @@
 //! What a run says of the future: an ensemble of runs with parameters drawn from its posterior, and with the model's noise.
 //!
 //! Every member starts where the record does and runs freely. Members are drawn from a seed and run on the fleet; which worker
-//! runs which changes no number. The arithmetic of fans and crossings is `forecast` in `starlings-estimators`. Next files to read:
+//! runs which changes no number. There are two bands: that of the quantity, which the members make, and that of what would be
+//! measured, which [`measurement`] adds errors to. The arithmetic of fans and crossings is `forecast` in `starlings-estimators`. Next files to read:
 //! [`ask`], then [`members`], then [`result`].
 
 pub mod ask;
 mod error;
+pub mod measurement;
 mod members;
 mod posterior;
 pub mod result;
@@ -21,7 +23,9 @@ pub use ask::{Ask, Threshold};
 pub use error::StudyForecastError;
 pub use result::Forecast;
 
+use measurement::TrainingResiduals;
 use members::Members;
+use posterior::Drawn;
 use result::{LevelForecast, OutputForecast};
 
 /// Forecasts from a finished run.
@@ -34,12 +38,13 @@ pub fn forecast(
     fleet: &mut dyn Fleet,
     ask: &Ask,
 ) -> Result<Forecast, StudyForecastError> {
-    let posterior = posterior::read(study, folder)?;
+    let drawn = Drawn::read(study, folder)?;
+    let residuals = TrainingResiduals::read(study, folder)?;
     let plan = ask.plan(study)?;
-    let members = Members::run(study, fleet, &plan, &posterior)?;
+    let members = Members::run(study, fleet, &plan, &drawn.gaussian)?;
     let mut outputs = Vec::with_capacity(plan.setup.outputs.len());
     for row in 0..plan.setup.outputs.len() {
-        outputs.push(output(study, &plan, &members, row)?);
+        outputs.push(output(study, &plan, &members, &residuals, row)?);
     }
     let levels = ask.thresholds.iter().map(|threshold| {
         let row = plan.row(&threshold.output);
@@ -59,6 +64,8 @@ pub fn forecast(
         failed: members.n_failed(),
         seed: ask.seed,
         model_noise: plan.setup.noise.is_some(),
+        wider_given_residuals: drawn.wider,
+        conditional_on: conditional_on(drawn.wider),
         set: ask.values.clone(),
         warnings: warnings(study, ask, &members),
         outputs,
@@ -70,6 +77,7 @@ fn output(
     study: &Study,
     plan: &ask::Plan,
     members: &Members,
+    residuals: &TrainingResiduals,
     row: usize,
 ) -> Result<OutputForecast, StudyForecastError> {
     let courses = members.courses(row);
@@ -77,10 +85,31 @@ fn output(
     let name = &plan.setup.outputs[row];
     let record = &study.records[plan.record];
     let channel = record.channels.iter().find(|c| c.output == *name && c.node.is_none());
-    let measured = channel
-        .map(|c| Fan::of(&plan.times, &members.with_noise(row, c.noise, plan.seed), &Fan::USUAL))
+    let errors = channel.map(|c| residuals.errors(name, c.noise));
+    let measured = errors
+        .map(|errors| Fan::of(&plan.times, &members.with_noise(row, errors.sd, plan.seed), &Fan::USUAL))
         .transpose()?;
-    Ok(OutputForecast::new(study, name, fan, measured, channel.map(|c| (record, c))))
+    Ok(OutputForecast::new(study, name, fan, measured.zip(errors), channel.map(|c| (record, c))))
+}
+
+fn conditional_on(wider: Option<f64>) -> String {
+    let spread = wider.map_or_else(
+        || {
+            "on the posterior at the stated noise, since the run has none given its residuals: bands are too narrow where the \
+             noise is not white or larger than stated"
+                .to_owned()
+        },
+        |wider| {
+            format!(
+                "on the posterior given the residuals of the run, in which a parameter's sd is up to {wider:.2} times that at the \
+                 stated noise"
+            )
+        },
+    );
+    format!(
+        "Bands are conditional on the model and {spread}. The band of what would be measured holds errors as large as the training \
+         residuals, and at least the stated noise; what the model lacks only later is in neither band."
+    )
 }
 
 fn warnings(study: &Study, ask: &Ask, members: &Members) -> Vec<String> {

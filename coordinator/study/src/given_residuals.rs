@@ -5,7 +5,7 @@
 //! in residuals and slopes alike. The arithmetic is in the `sandwich` module of `starlings-estimators`. None of this enters the
 //! posterior. Next file to read: [`crate::summary`].
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use starlings_estimators::{DataPoint, Gaussian, Residuals};
 
 use super::fit::runner::{self, EnsembleRunner, StepWindows};
@@ -18,8 +18,13 @@ const DISTANCE: f64 = 0.1;
 /// The result for the intervals.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum GivenResiduals {
-    /// Factor on the sd of each entry of the estimated vector, at least one.
-    Wider(Vec<f64>),
+    /// The posterior is wider.
+    Wider {
+        /// Factor on the sd of each entry of the estimated vector, at least one.
+        factors: Vec<f64>,
+        /// Covariance of the estimated vector, transformed units.
+        covariance: DMatrix<f64>,
+    },
     /// No factor is known; a clause that says why.
     Unknown(String),
 }
@@ -46,7 +51,7 @@ pub(crate) fn compare(
         });
         if let Some(outputs) = run(runner, &theta, &windows)? {
             let slopes = Slopes { study, windows: &windows, outputs: &outputs, theta: &theta };
-            return slopes.compare();
+            return slopes.compare(posterior);
         }
     }
     Ok(GivenResiduals::Unknown("the model fails beside the estimate".to_owned()))
@@ -74,7 +79,7 @@ struct Slopes<'a> {
 }
 
 impl Slopes<'_> {
-    fn compare(&self) -> Result<GivenResiduals, RunError> {
+    fn compare(&self, posterior: &Gaussian) -> Result<GivenResiduals, RunError> {
         let rows = self.rows();
         if rows.iter().any(|row| self.outputs.row(row.at).iter().any(|v| !v.is_finite())) {
             let why = "the model predicts what is no finite number beside the estimate";
@@ -83,16 +88,18 @@ impl Slopes<'_> {
         let jacobian = DMatrix::from_fn(rows.len(), self.study.theta.len(), |k, j| self.slope(&rows[k], j));
         let values = DVector::from_iterator(rows.len(), rows.iter().map(|row| row.residual(self.outputs)));
         let places: Vec<DataPoint> = rows.iter().map(|row| row.place).collect();
-        let inflation = Residuals { jacobian: &jacobian, values: &values, places: &places }.inflation()?;
-        Ok(inflation.map_or_else(
-            || {
-                let (n, p) = (rows.len(), self.study.theta.len());
-                GivenResiduals::Unknown(format!(
-                    "{n} residuals of {p} parameters say too little of themselves"
-                ))
-            },
-            GivenResiduals::Wider,
-        ))
+        let factors =
+            |jacobian: &DMatrix<f64>| Residuals { jacobian, values: &values, places: &places }.inflation();
+        let prior_sd =
+            DVector::from_iterator(self.study.theta.len(), self.study.theta.iter().map(|t| t.prior_sd));
+        let axes = Axes::of(posterior, prior_sd);
+        let (Some(of_entries), Some(of_axes)) = (factors(&jacobian)?, factors(&(&jacobian * &axes.vectors))?)
+        else {
+            let (n, p) = (rows.len(), self.study.theta.len());
+            let why = format!("{n} residuals of {p} parameters say too little of themselves");
+            return Ok(GivenResiduals::Unknown(why));
+        };
+        Ok(GivenResiduals::Wider { factors: of_entries, covariance: axes.stretched(&of_axes) })
     }
 
     /// The observed values of the training spans, in the order of the predictions.
@@ -132,6 +139,36 @@ impl Slopes<'_> {
     }
 }
 
+/// The principal axes of the posterior in units of the prior sd: directions that the data know independently of one another,
+/// from what they determine best to what the prior alone says.
+struct Axes {
+    prior_sd: DVector<f64>,
+    /// Unit vectors in columns, p x p.
+    vectors: DMatrix<f64>,
+    variances: DVector<f64>,
+}
+
+impl Axes {
+    fn of(posterior: &Gaussian, prior_sd: DVector<f64>) -> Self {
+        let n = prior_sd.len();
+        let covariance = &posterior.covariance;
+        let even = DMatrix::from_fn(n, n, |i, j| {
+            0.5 * (covariance[(i, j)] + covariance[(j, i)]) / (prior_sd[i] * prior_sd[j])
+        });
+        let SymmetricEigen { eigenvectors, eigenvalues } = even.symmetric_eigen();
+        Self { prior_sd, vectors: eigenvectors, variances: eigenvalues.map(|v| v.max(0.0)) }
+    }
+
+    /// The covariance in transformed units with the sd along each axis so many times larger. A factor per parameter would
+    /// spread the combinations that the data determine far better than any parameter by itself.
+    fn stretched(&self, factors: &[f64]) -> DMatrix<f64> {
+        let scaled = DVector::from_fn(factors.len(), |k, _| factors[k].powi(2) * self.variances[k]);
+        let to_units = DMatrix::from_diagonal(&self.prior_sd) * &self.vectors;
+        let covariance = &to_units * DMatrix::from_diagonal(&scaled) * to_units.transpose();
+        (&covariance + covariance.transpose()) * 0.5
+    }
+}
+
 /// One observed value.
 struct Row {
     /// Row of the predictions.
@@ -144,5 +181,27 @@ struct Row {
 impl Row {
     fn residual(&self, outputs: &DMatrix<f64>) -> f64 {
         (self.observed - outputs[(self.at, 0)]) / self.noise
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_axes_stretch_what_residuals_stretch_and_leave_the_rest() {
+        // Two parameters whose sum is known to 0.02 and whose difference is known to 2.
+        let (narrow, wide) = (0.02_f64.powi(2), 2.0_f64.powi(2));
+        let covariance = |narrow: f64, wide: f64| {
+            let (same, other) = (0.25 * (narrow + wide), 0.25 * (narrow - wide));
+            DMatrix::from_row_slice(2, 2, &[same, other, other, same])
+        };
+        let posterior = Gaussian { mean: DVector::zeros(2), covariance: covariance(narrow, wide) };
+        let axes = Axes::of(&posterior, DVector::from_element(2, 3.0));
+        assert!((axes.stretched(&[1.0, 1.0]) - &posterior.covariance).amax() < 1e-12);
+        // The sum's factor is 5 and the difference's 1, in whichever order the axes come.
+        let factors = axes.variances.map(|v| if v < 0.01 { 5.0 } else { 1.0 });
+        let wider = axes.stretched(factors.as_slice());
+        assert!((wider - covariance(25.0 * narrow, wide)).amax() < 1e-12);
     }
 }

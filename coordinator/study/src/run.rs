@@ -18,7 +18,7 @@ use super::summary::Summary;
 use super::{RunError, Study, observer_gain, summary, warnings};
 use crate::fit::runner::EnsembleRunner;
 use crate::observer_gain::Compared;
-use crate::store::folder::{OBSERVER, RunFolder};
+use crate::store::folder::{GIVEN_RESIDUALS, OBSERVER, RunFolder};
 use crate::store::json::json;
 use crate::store::snapshot::{Counts, Snapshot};
 
@@ -184,6 +184,10 @@ fn from_start_to_end(
     context.keep_events(&folder.store)?;
     let mut result = summary::make(study, &fit, &predictions, runner.n_answered(), context.elapsed());
     result.add_residuals(study, &fit, &given_residuals);
+    if let GivenResiduals::Wider { covariance, .. } = &given_residuals {
+        let rows: Vec<Vec<f64>> = covariance.row_iter().map(|row| row.iter().copied().collect()).collect();
+        folder.store.set_meta(GIVEN_RESIDUALS, &json(&rows))?;
+    }
     let mut unknown = None;
     match observer {
         Compared::NoObserver => {}

@@ -114,7 +114,7 @@ impl Summary {
     /// Adds the intervals given the residuals, or why there are none.
     pub(super) fn add_residuals(&mut self, study: &Study, fit: &Fit, given: &GivenResiduals) {
         match given {
-            GivenResiduals::Wider(factors) => {
+            GivenResiduals::Wider { factors, .. } => {
                 posterior::widen(study, &fit.posterior, &mut self.parameters, factors);
                 self.conditional_on.push_str(RESIDUALS);
             }

@@ -90,7 +90,7 @@ impl Members {
         self.predicted.iter().map(of).collect()
     }
 
-    /// The same as it would be measured, with noise of this standard deviation.
+    /// The same as it would be measured, with errors of this standard deviation.
     pub(super) fn with_noise(&self, row: usize, sd: f64, seed: u64) -> Vec<Vec<f64>> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(MEASURED + row as u64);

@@ -1,9 +1,10 @@
-//! The posterior that a finished run left in its store.
+//! The posterior that a finished run left in its store, and how wide the residuals make it.
 
 use nalgebra::{DMatrix, DVector};
 use starlings_estimators::Gaussian;
 
 use super::StudyForecastError;
+use crate::store::folder::GIVEN_RESIDUALS;
 use crate::{RunFolder, Study};
 
 /// Columns before the covariances, as [`crate::posterior::to_csv`] writes them.
@@ -13,7 +14,7 @@ const FIXED: usize = 8;
 ///
 /// # Errors
 /// When the run is not finished, or its posterior is not that of this study.
-pub(super) fn read(study: &Study, folder: &RunFolder) -> Result<Gaussian, StudyForecastError> {
+fn read(study: &Study, folder: &RunFolder) -> Result<Gaussian, StudyForecastError> {
     let shown = folder.path.display();
     let Some(text) = folder.store.meta("posterior")? else {
         let message =
@@ -47,4 +48,35 @@ pub(super) fn read(study: &Study, folder: &RunFolder) -> Result<Gaussian, StudyF
         return Err(other(&format!("has {} parameters where the study has {n}", mean.len())));
     }
     Ok(Gaussian { mean: DVector::from_vec(mean), covariance: DMatrix::from_row_slice(n, n, &covariance) })
+}
+
+/// What the parameters of the members are drawn from.
+pub(super) struct Drawn {
+    pub(super) gaussian: Gaussian,
+    /// By how many times the sd of a parameter exceeds that at the stated noise, at the most; `None` where the run has no
+    /// covariance given the residuals.
+    pub(super) wider: Option<f64>,
+}
+
+impl Drawn {
+    /// The posterior with its covariance given the residuals, where the run has one.
+    ///
+    /// # Errors
+    /// When the run is not finished, or its posterior is not that of this study.
+    pub(super) fn read(study: &Study, folder: &RunFolder) -> Result<Self, StudyForecastError> {
+        let stated = read(study, folder)?;
+        let Some(text) = folder.store.meta(GIVEN_RESIDUALS)? else {
+            return Ok(Self { gaussian: stated, wider: None });
+        };
+        let damaged = |why: &str| folder.store.damaged("covariance given the residuals", why);
+        let rows: Vec<Vec<f64>> = serde_json::from_str(&text).map_err(|e| damaged(&e.to_string()))?;
+        let n = stated.mean.len();
+        if rows.len() != n || rows.iter().any(|row| row.len() != n || row.iter().any(|v| !v.is_finite())) {
+            return Err(damaged("it is no table of the study's parameters").into());
+        }
+        let covariance = DMatrix::from_fn(n, n, |i, j| rows[i][j]);
+        let ratio = |j: usize| (covariance[(j, j)] / stated.covariance[(j, j)]).sqrt();
+        let wider = (0..n).map(ratio).filter(|ratio| ratio.is_finite()).fold(1.0, f64::max);
+        Ok(Self { gaussian: Gaussian { mean: stated.mean, covariance }, wider: Some(wider) })
+    }
 }

@@ -4,6 +4,7 @@ use serde::Serialize;
 use starlings_estimators::forecast::{Crossings, Direction, Fan};
 
 use super::Threshold;
+use super::measurement::Errors;
 use crate::field::quantity_of;
 use crate::{Study, checked::Channel, checked::Record};
 
@@ -32,6 +33,11 @@ pub struct Forecast {
     pub seed: u64,
     /// Whether members have noise of the model's states.
     pub model_noise: bool,
+    /// By how many times the sd of a parameter that the members are drawn with exceeds that at the stated noise, at the most;
+    /// `None` where the run has no intervals given the residuals and they are drawn at the stated noise.
+    pub wider_given_residuals: Option<f64>,
+    /// What the bands are conditional on.
+    pub conditional_on: String,
     /// Values that all members have.
     pub set: Vec<(String, f64)>,
     /// What is doubtful.
@@ -49,14 +55,18 @@ pub struct OutputForecast {
     pub output: String,
     /// Its unit label.
     pub unit: String,
-    /// Median and central 90 % interval at the last time.
+    /// Median and central 90 % interval of the quantity at the last time.
     pub at_end: [f64; 3],
+    /// Central 90 % interval of what would be measured at the last time; none of an output that is not measured.
+    pub measured_at_end: Option<[f64; 2]>,
+    /// The errors in what would be measured.
+    pub errors: Option<Errors>,
     /// Shares of measured values within the 90 % band of what would be measured.
     pub coverage90: Option<Coverage>,
     /// Quantiles of the quantity.
     #[serde(skip)]
     pub fan: Fan,
-    /// Quantiles of what would be measured, with the noise of its channel.
+    /// Quantiles of what would be measured, with its errors.
     #[serde(skip)]
     pub measured: Option<Fan>,
     /// Measured values: time, value.
@@ -110,7 +120,7 @@ impl OutputForecast {
         study: &Study,
         name: &str,
         fan: Fan,
-        measured: Option<Fan>,
+        measured: Option<(Fan, Errors)>,
         channel: Option<(&Record, &Channel)>,
     ) -> Self {
         let last = fan.times.len() - 1;
@@ -118,6 +128,8 @@ impl OutputForecast {
             let row = fan.probabilities.iter().position(|q| (q - p).abs() < 1e-9);
             row.map_or(f64::NAN, |row| fan.quantiles[row][k])
         };
+        let (measured, errors) = measured.unzip();
+        let measured_at_end = measured.as_ref().map(|band| [0.05, 0.95].map(|p| at(band, p, last)));
         let mut shares = [[0_u32; 2]; 2];
         let mut observed = Vec::new();
         if let Some((record, channel)) = channel {
@@ -135,7 +147,17 @@ impl OutputForecast {
         let [train, held_out] = shares.map(share);
         let coverage90 = measured.is_some().then_some(Coverage { train, held_out });
         let at_end = [0.5, 0.05, 0.95].map(|p| at(&fan, p, last));
-        Self { output: name.to_owned(), unit: unit(study, name), at_end, coverage90, fan, measured, observed }
+        Self {
+            output: name.to_owned(),
+            unit: unit(study, name),
+            at_end,
+            measured_at_end,
+            errors,
+            coverage90,
+            fan,
+            measured,
+            observed,
+        }
     }
 }
 

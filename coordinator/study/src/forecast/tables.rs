@@ -5,7 +5,7 @@ use starlings_estimators::forecast::Fan;
 use super::Forecast;
 
 impl Forecast {
-    /// One row per output, kind (`quantity`, or `measured`: with the noise of its channel) and time, one column per quantile.
+    /// One row per output, kind (`quantity`, or `measured`: with the errors of what would be measured) and time, one column per quantile.
     pub fn fan_table(&self) -> Vec<Vec<String>> {
         let probabilities = self.outputs.first().map_or(&[][..], |output| &output.fan.probabilities);
         let fixed = ["output", "kind", "time"].map(str::to_owned);

@@ -35,6 +35,9 @@ pub struct RunFolder {
 /// Name under which the store keeps the course of the innovations with and without the observer.
 pub const OBSERVER: &str = "observer";
 
+/// Name under which the store keeps the covariance given the residuals: rows, in transformed units.
+pub(crate) const GIVEN_RESIDUALS: &str = "covariance_given_residuals";
+
 /// The database of a run, and the study as it was run.
 pub(super) const DATABASE: &str = "run.db";
 const FROZEN: &str = "study.toml";

@@ -44,7 +44,7 @@ fn figure(found: &Forecast, output: &OutputForecast) -> Result<Figure, ReportErr
         "Half of the members run within the darker band, nine in ten within the lighter one.".to_owned();
     let mut keys = vec![("line blue", "median"), ("area blue", "50 and 90\u{a0}% of the members")];
     if output.measured.is_some() {
-        keys.push(("area grey", "90\u{a0}% with the noise of the channel"));
+        keys.push(("area grey", "90\u{a0}% of what would be measured"));
     }
     if !time.is_empty() {
         keys.push((measured_key(&time), "measured"));
