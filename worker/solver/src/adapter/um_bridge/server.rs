@@ -25,7 +25,7 @@ const LOOK: Duration = Duration::from_millis(10);
 /// Least time for a question but the first: a busy machine may take some of it.
 const QUESTION: Duration = Duration::from_millis(100);
 /// How long a server that broke its connection may take to end, so that its ending can be told.
-const LAST_WORDS: Duration = Duration::from_millis(500);
+const LAST_WORDS: Duration = Duration::from_secs(5);
 
 /// A server that answers, with one of its models.
 pub(super) struct Server {
