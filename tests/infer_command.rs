@@ -260,11 +260,30 @@ fn a_restart_goes_on_with_the_same_lines() {
     assert_eq!(code, 0, "{stderr}");
     parts.extend(rest);
     assert_eq!(parts, whole);
-    let (code, _, stderr) = {
-        fs::write(dir.path().join("study.toml"), STUDY.replace("recent = 1", "recent = 2")).unwrap();
-        followed(dir.path(), &data, &["--state", "state.json"])
-    };
-    assert!(code == 2 && stderr.contains("another [infer] section"), "{stderr}");
+}
+
+#[test]
+fn the_state_of_another_study_is_refused() {
+    let dir = folder(STUDY, "");
+    let data = recording(1_500, usize::MAX);
+    let (code, _, stderr) = followed(dir.path(), &data, &["--state", "state.json"]);
+    assert_eq!(code, 0, "{stderr}");
+    let changes = [
+        ("recent = 1", "recent = 2"),
+        ("level = 0.0", "level = 1.0"),
+        ("block = 300", "diffusion = \"diagonal\""),
+        ("block = 300", "prefactor = false"),
+        ("block = 300", "measurement_noise = \"none\""),
+        ("rate = \"-c*x - d*z\"", "rate = \"-c*x - 2*d*z\""),
+        ("column = \"z\"", "column = \"x\""),
+    ];
+    for (from, to) in changes {
+        assert!(STUDY.contains(from));
+        fs::write(dir.path().join("study.toml"), STUDY.replace(from, to)).unwrap();
+        let (code, lines, stderr) = followed(dir.path(), &data, &["--state", "state.json"]);
+        assert!(code == 2 && stderr.contains("state of another study"), "{to}: {stderr}");
+        assert!(lines.is_empty(), "{to}: {lines:?}");
+    }
 }
 
 #[test]

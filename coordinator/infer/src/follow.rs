@@ -239,8 +239,7 @@ impl<'a> Follower<'a> {
 
     fn saved(&mut self) -> Result<Saved, InferError> {
         Ok(Saved {
-            basis: self.asked.question.basis.fingerprint(),
-            follow: format!("{:?}", self.asked.choice.follow),
+            asked: state::fingerprint(self.asked)?,
             step: self.step,
             time: self.time,
             n_step: self.n_step,
@@ -253,8 +252,9 @@ impl<'a> Follower<'a> {
 
     fn resume(&mut self, saved: Saved) -> Result<(), InferError> {
         let basis = &self.asked.question.basis;
-        if saved.basis != basis.fingerprint() || saved.follow != format!("{:?}", self.asked.choice.follow) {
-            return Err(InferError::Setting("it was written for another [infer] section".to_owned()));
+        if saved.asked != state::fingerprint(self.asked)? {
+            let message = "it is the state of another study, whose model, step, columns or [infer] differ";
+            return Err(InferError::Setting(message.to_owned()));
         }
         saved.window.check(basis)?;
         saved
