@@ -304,3 +304,64 @@ fn a_stream_that_stops_repeats_jumps_or_holds_text_is_told_with_its_line() {
         assert!(code == 2 && stderr.contains(says), "no `{says}` in: {stderr}");
     }
 }
+
+#[test]
+fn a_stream_whose_terms_cannot_be_told_apart_says_so_in_every_line_and_once_beside_them() {
+    let collinear = STUDY.replace(r#"parameters = ["k", "c", "d"]"#, r#"functions = ["x", "z", "2*x - z"]"#);
+    let dir = folder(&collinear, "");
+    let (code, lines, stderr) = followed(dir.path(), &recording(1_000, usize::MAX), &[]);
+    assert_eq!(code, 0, "{stderr}");
+    assert_eq!(lines.len(), 5);
+    for line in lines {
+        let line: Value = serde_json::from_str(&line).unwrap();
+        assert!(line["error"].as_str().unwrap().contains("cannot tell these terms apart"), "{line}");
+        assert!(line["diffusion"].is_null(), "{line}");
+    }
+    assert_eq!(stderr.matches("cannot tell these terms apart").count(), 1, "{stderr}");
+}
+
+#[test]
+fn a_stream_with_errors_of_the_measurement_has_the_noise_of_the_whole_inference() {
+    let mut state = 1_u64;
+    let mut error = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        0.2 * ((state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5)
+    };
+    let mut data = "time,x,z\n".to_owned();
+    for line in recording(1_000, usize::MAX).lines().skip(1) {
+        let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
+        writeln!(data, "{:?},{:?},{:?}", cells[0], cells[1] + error(), cells[2] + error()).unwrap();
+    }
+    let study = STUDY.replace("block = 200", "block = 1000").replace("[infer]", "[infer]\nMEASURED");
+    for (word, corrected) in [("auto", true), ("none", false)] {
+        let study = study.replace("MEASURED", &format!("measurement_noise = \"{word}\""));
+        let dir = folder(&study, &data);
+        let whole = infer(dir.path(), "out", "1");
+        assert_eq!(whole["diffusion"]["lag_corrected"], corrected);
+        let (code, lines, stderr) = followed(dir.path(), &data, &[]);
+        assert_eq!(code, 0, "{stderr}");
+        let line: Value = serde_json::from_str(&lines[0]).unwrap();
+        assert_eq!(line["lag_corrected"], corrected, "{line}");
+        for l in 0..2 {
+            let [one, other] =
+                [&line["diffusion"][l], &whole["diffusion"]["matrix"][l][l]].map(|v| v.as_f64().unwrap());
+            // The same sums, added in another order.
+            assert!((one / other - 1.0).abs() < 1e-6, "{word}: {one} and {other}");
+        }
+    }
+}
+
+#[test]
+fn what_needs_a_whole_recording_is_refused_for_a_stream() {
+    let reduced = "\n[infer.reduced]\nstart = { a = 1.0 }\ncoefficients = { k = \"a\" }\n";
+    let cases = [
+        (STUDY.replace("block = 300", "measurement_noise = 0.1"), "a given `measurement_noise`"),
+        (STUDY.replace("block = 300", "richardson = true"), "`richardson` is not part of --follow"),
+        (format!("{STUDY}{reduced}"), "[infer.reduced] is not part of --follow"),
+    ];
+    for (study, says) in cases {
+        let dir = folder(&study, "");
+        let (code, lines, stderr) = followed(dir.path(), &recording(500, usize::MAX), &[]);
+        assert!(code == 2 && lines.is_empty() && stderr.contains(says), "no `{says}` in: {stderr}");
+    }
+}
