@@ -292,7 +292,7 @@ fn a_stream_that_stops_repeats_jumps_or_holds_text_is_told_with_its_line() {
     let good = recording(1_000, usize::MAX);
     let lines: Vec<&str> = good.lines().collect();
     let cases = [
-        (lines[..100].join("\n"), "ended after 98 steps"),
+        (lines[..100].join("\n") + "\n", "ended after 98 steps"),
         ([&lines[..700], &lines[699..]].concat().join("\n"), "standard input:701: time 6.98 of row"),
         ([&lines[..700], &lines[701..]].concat().join("\n"), "standard input:701: time jumps"),
         (good.replace("\n7.0,", "\n7.0,off"), "standard input:702: `off"),
@@ -364,4 +364,17 @@ fn what_needs_a_whole_recording_is_refused_for_a_stream() {
         let (code, lines, stderr) = followed(dir.path(), &recording(500, usize::MAX), &[]);
         assert!(code == 2 && lines.is_empty() && stderr.contains(says), "no `{says}` in: {stderr}");
     }
+}
+
+#[test]
+fn half_a_row_at_the_end_of_a_stream_is_not_taken() {
+    let dir = folder(STUDY, "");
+    let data = recording(400, usize::MAX);
+    // The last row closes the second block, and half of its last number is a number.
+    let half = &data[..data.len() - 4];
+    let (code, lines, stderr) = followed(dir.path(), half, &[]);
+    assert!(code == 0 && lines.len() == 1, "{lines:?} {stderr}");
+    assert!(stderr.contains("ended after 399 steps") && stderr.contains("was not taken"), "{stderr}");
+    let (_, lines, stderr) = followed(dir.path(), &data, &[]);
+    assert!(lines.len() == 2 && !stderr.contains("was not taken"), "{stderr}");
 }

@@ -41,8 +41,13 @@ fn rows(study: &Study, name: &Path, text: impl Read, state: Option<PathBuf>) -> 
     let followed = follow(study, Source { name, text, state }, &mut told);
     match (followed, unread) {
         (_, Some(failure)) => Err(failure),
-        (Ok(n_step), None) => {
-            note(format_args!("{} ended after {n_step} steps", name.display()));
+        (Ok(followed), None) => {
+            let left_off = if followed.left_off {
+                "; no line break ended its last line, which was not taken"
+            } else {
+                ""
+            };
+            note(format_args!("{} ended after {} steps{left_off}", name.display(), followed.n_step));
             Ok(())
         }
         (Err(error), None) => Err(failed(&error)),

@@ -6,6 +6,7 @@
 mod follower;
 pub mod line;
 mod state;
+mod whole_lines;
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -20,6 +21,7 @@ use crate::rows::{Row, Rows};
 use crate::run::{asked, choice};
 use follower::Follower;
 use line::Line;
+use whole_lines::WholeLines;
 
 /// Rows from which the sampling step is taken where the study does not say it.
 const FIRST: usize = 100;
@@ -34,6 +36,15 @@ pub struct Source<'a, R> {
     pub state: Option<PathBuf>,
 }
 
+/// How far a recording was followed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Followed {
+    /// Steps.
+    pub n_step: u64,
+    /// Whether its last line was not taken, since no line break ended it.
+    pub left_off: bool,
+}
+
 /// Follows a recording to its end, with the columns of the study's first record. `told` hears a line per block.
 ///
 /// # Errors
@@ -43,7 +54,7 @@ pub fn follow<R: Read>(
     study: &Study,
     source: Source<'_, R>,
     told: &mut dyn FnMut(&Line) -> Result<(), InferError>,
-) -> Result<u64, InferError> {
+) -> Result<Followed, InferError> {
     let settings = choice(study)?;
     row_by_row(settings)?;
     let Some(record) = settings.records.first() else {
@@ -51,7 +62,8 @@ pub fn follow<R: Read>(
             "the study has no record whose columns could be followed".to_owned(),
         ));
     };
-    let mut rows = Rows::new(source.name, source.text, &record.time, &record.columns)?;
+    let text = WholeLines::new(source.text);
+    let mut rows = Rows::new(source.name, text, &record.time, &record.columns)?;
     let saved = source.state.as_deref().map_or(Ok(None), state::read)?;
     let mut first = First::default();
     let step = match &saved {
@@ -88,7 +100,7 @@ pub fn follow<R: Read>(
         );
         return Err(rows.fault(None, message, "a smaller [infer.follow] block answers sooner"));
     }
-    Ok(follower.n_step)
+    Ok(Followed { n_step: follower.n_step, left_off: rows.text().left_off })
 }
 
 /// Refuses what is made of a whole recording.
