@@ -378,3 +378,13 @@ fn half_a_row_at_the_end_of_a_stream_is_not_taken() {
     let (_, lines, stderr) = followed(dir.path(), &data, &[]);
     assert!(lines.len() == 2 && !stderr.contains("was not taken"), "{stderr}");
 }
+
+#[test]
+fn a_name_over_two_lines_is_one_line_of_the_table() {
+    let study = STUDY.replace(r#"parameters = ["k", "c", "d"]"#, r#"functions = ["x", "x *\n  z"]"#);
+    let dir = folder(&study, &recording(1_000, usize::MAX));
+    infer(dir.path(), "out", "1");
+    let table = fs::read_to_string(dir.path().join("out/coefficients.csv")).unwrap();
+    assert!(table.lines().all(|line| line.split(',').count() >= 7), "{table}");
+    assert!(table.contains("\nx:x * z,"), "{table}");
+}
