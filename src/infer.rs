@@ -36,8 +36,9 @@ pub(crate) struct Args {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Follow a recording that is still written: rows of this CSV file, or of standard input (`-`), with the columns of the study's
-    /// first record. Standard output receives a line of JSON per block: coefficients, noise, the test for a change. No folder is
-    /// written and no worker is started.
+    /// first record. Standard output receives a line of JSON per block: coefficients, noise, the test for a change. It ends where the
+    /// file ends; `tail -n +1 -f FILE | starlings infer STUDY --follow -` goes on while the file grows. A last line that no line break
+    /// ends is not taken. No folder is written and no worker is started.
     #[arg(long, value_name = "FILE|-", conflicts_with_all = ["out", "workers", "listen", "json"])]
     follow: Option<PathBuf>,
     /// With --follow: write what a restart goes on from into this file after every block, and go on from it where it is there.

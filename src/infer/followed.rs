@@ -26,7 +26,12 @@ pub(super) fn run(study: &Study, source: &Path, state: Option<PathBuf>) -> Resul
 fn rows(study: &Study, name: &Path, text: impl Read, state: Option<PathBuf>) -> Result<(), Failure> {
     // A reader of standard output that leaves ends the command, with its own words.
     let mut unread = None;
+    let mut failing = false;
     let mut told = |answer: &Line| {
+        if let Some(error) = answer.error.as_ref().filter(|_| !failing) {
+            note(format_args!("{} at time {}: {error}", name.display(), answer.time));
+        }
+        failing = answer.error.is_some();
         let json = serde_json::to_string(answer).map_err(|error| InferError::Setting(error.to_string()))?;
         line(json).map_err(|failure| {
             unread = Some(failure);
@@ -36,8 +41,13 @@ fn rows(study: &Study, name: &Path, text: impl Read, state: Option<PathBuf>) -> 
     let followed = follow(study, Source { name, text, state }, &mut told);
     match (followed, unread) {
         (_, Some(failure)) => Err(failure),
-        (Ok(n_step), None) => {
-            note(format_args!("{} ended after {n_step} steps", name.display()));
+        (Ok(followed), None) => {
+            let left_off = if followed.left_off {
+                "; no line break ended its last line, which was not taken"
+            } else {
+                ""
+            };
+            note(format_args!("{} ended after {} steps{left_off}", name.display(), followed.n_step));
             Ok(())
         }
         (Err(error), None) => Err(failed(&error)),

@@ -27,6 +27,40 @@ pub(crate) fn fit(choice: &InferChoice, structure: &Structure) -> Result<Fit, In
     Ok(Fit { prefactor: choice.prefactor, prior: Prior::independent(&mean, &sd)?, ..fit })
 }
 
+/// The posterior of sums, freed of errors of the measurement where the residuals show them and the study leaves it to them.
+pub(crate) struct Fitted {
+    pub(crate) posterior: Posterior,
+    pub(crate) checks: Vec<NoiseCheck>,
+    /// Whether errors of the measurement were taken out of the noise.
+    pub(crate) lag_corrected: bool,
+}
+
+impl Fitted {
+    /// Fits; the noise settles from that of an `earlier` posterior where there is one.
+    pub(crate) fn of(
+        choice: &InferChoice,
+        fit: &Fit,
+        structure: &Structure,
+        sums: &Sums,
+        earlier: Option<&Posterior>,
+    ) -> Result<Self, InferenceError> {
+        if choice.priors.is_empty() {
+            enough(sums, structure)?;
+        }
+        let mut posterior = match earlier {
+            Some(earlier) => fit.update(sums, structure, earlier)?,
+            None => fit.posterior(sums, structure)?,
+        };
+        let checks = if sums.n_pair() > 0 { noise_checks(sums, structure, &posterior)? } else { Vec::new() };
+        let matters = checks.iter().any(|check| check.verdict == Verdict::Matters);
+        let lag_corrected = matters && choice.measured == MeasuredChoice::Auto;
+        if lag_corrected {
+            posterior = Fit { lag_corrected, ..fit.clone() }.posterior(sums, structure)?;
+        }
+        Ok(Self { posterior, checks, lag_corrected })
+    }
+}
+
 /// What the sums of all blocks say.
 pub(crate) struct Answer {
     pub(crate) posterior: Posterior,
@@ -47,17 +81,8 @@ impl Answer {
         let Some(sums) = levels.first() else {
             return Err(InferError::Setting("no block of any recording was summed".to_owned()));
         };
-        if choice.priors.is_empty() {
-            enough(sums, structure)?;
-        }
-        let mut posterior = fit.posterior(sums, structure)?;
-        let checks = if sums.n_pair() > 0 { noise_checks(sums, structure, &posterior)? } else { Vec::new() };
-        let matters = checks.iter().any(|check| check.verdict == Verdict::Matters);
-        let lag_corrected = matters && choice.measured == MeasuredChoice::Auto;
+        let Fitted { posterior, checks, lag_corrected } = Fitted::of(choice, fit, structure, sums, None)?;
         let fit = Fit { lag_corrected, ..fit.clone() };
-        if lag_corrected {
-            posterior = fit.posterior(sums, structure)?;
-        }
         let extrapolated = if levels.len() > 1 {
             let longer = levels[1..].iter().map(|sums| fit.posterior(sums, structure));
             let all = std::iter::once(Ok(posterior.clone())).chain(longer).collect::<Result<Vec<_>, _>>()?;

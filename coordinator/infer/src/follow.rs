@@ -3,24 +3,25 @@
 //! Everything is computed here, row by row, in constant memory. After an alarm the last blocks are the new reference and the new start of
 //! the estimate. Next files to read: [`line`](mod@line), what is told, and `state.rs`, what a restart goes on from.
 
+mod follower;
 pub mod line;
 mod state;
+mod whole_lines;
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
-use starlings_estimators::inference::{
-    Detector, Following, InferenceError, Memory, Posterior, Report, Stream, Window,
-};
+use starlings_estimators::inference::InferenceError;
 use starlings_study::Study;
+use starlings_study::infer_choice::{InferChoice, MeasuredChoice};
 
 use crate::blocks::even_step;
 use crate::error::InferError;
 use crate::rows::{Row, Rows};
-use crate::run::{Asked, asked, choice};
+use crate::run::{asked, choice};
+use follower::Follower;
 use line::Line;
-use state::Saved;
+use whole_lines::WholeLines;
 
 /// Rows from which the sampling step is taken where the study does not say it.
 const FIRST: usize = 100;
@@ -35,22 +36,34 @@ pub struct Source<'a, R> {
     pub state: Option<PathBuf>,
 }
 
+/// How far a recording was followed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Followed {
+    /// Steps.
+    pub n_step: u64,
+    /// Whether its last line was not taken, since no line break ended it.
+    pub left_off: bool,
+}
+
 /// Follows a recording to its end, with the columns of the study's first record. `told` hears a line per block.
 ///
 /// # Errors
-/// For a row that is not what it should be, with its line; for a state of another study; where the recording ends before its first block.
+/// For a choice that needs the whole recording; for a row that is not what it should be, with its line; for a state of another study;
+/// where the recording ends before its first block.
 pub fn follow<R: Read>(
     study: &Study,
     source: Source<'_, R>,
     told: &mut dyn FnMut(&Line) -> Result<(), InferError>,
-) -> Result<u64, InferError> {
+) -> Result<Followed, InferError> {
     let settings = choice(study)?;
+    row_by_row(settings)?;
     let Some(record) = settings.records.first() else {
         return Err(InferError::Setting(
             "the study has no record whose columns could be followed".to_owned(),
         ));
     };
-    let mut rows = Rows::new(source.name, source.text, &record.time, &record.columns)?;
+    let text = WholeLines::new(source.text);
+    let mut rows = Rows::new(source.name, text, &record.time, &record.columns)?;
     let saved = source.state.as_deref().map_or(Ok(None), state::read)?;
     let mut first = First::default();
     let step = match &saved {
@@ -87,7 +100,27 @@ pub fn follow<R: Read>(
         );
         return Err(rows.fault(None, message, "a smaller [infer.follow] block answers sooner"));
     }
-    Ok(follower.n_step)
+    Ok(Followed { n_step: follower.n_step, left_off: rows.text().left_off })
+}
+
+/// Refuses what is made of a whole recording.
+fn row_by_row(choice: &InferChoice) -> Result<(), InferError> {
+    let refuse = |what: &str, help: &str| {
+        Err(InferError::Setting(format!("{what} is not part of --follow, which goes on row by row: {help}")))
+    };
+    if matches!(choice.measured, MeasuredChoice::Known(_)) {
+        return refuse(
+            "a given `measurement_noise`, which smooths a whole recording,",
+            "use \"auto\" or \"none\"",
+        );
+    }
+    if choice.sums.levels > 1 {
+        return refuse("`richardson`", "leave it out, or infer from the recording when it has ended");
+    }
+    if choice.reduced.is_some() {
+        return refuse("[infer.reduced]", "leave it out, or infer from the recording when it has ended");
+    }
+    Ok(())
 }
 
 /// An error of a row with its line.
@@ -141,144 +174,4 @@ impl First {
         }
         Ok(rows.next(values)?.map(|row| (row.line, row.time)))
     }
-}
-
-/// The estimate and the detector between two rows.
-struct Follower<'a> {
-    asked: &'a Asked<'a>,
-    step: f64,
-    detector: Detector,
-    stream: Stream,
-    window: Window,
-    posterior: Option<Posterior>,
-    n_step: u64,
-    time: f64,
-}
-
-impl<'a> Follower<'a> {
-    fn new(asked: &'a Asked<'a>, step: f64) -> Result<Self, InferError> {
-        let settings = &asked.choice.follow;
-        let memory = settings.window.map_or(Memory::Growing, Memory::Sliding);
-        let following = Following {
-            block: settings.block as u64,
-            recent: settings.recent,
-            reference: memory,
-            least: settings.least as u64,
-            rate: settings.rate,
-            watched: Vec::new(),
-        };
-        let (basis, structure) = (&asked.question.basis, asked.question.structure.clone());
-        Ok(Self {
-            asked,
-            step,
-            detector: Detector::new(Arc::clone(basis), step, structure, asked.fit.clone(), following)?,
-            stream: Stream::new(Arc::clone(basis), step)?,
-            window: Window::new(memory),
-            posterior: None,
-            n_step: 0,
-            time: f64::NAN,
-        })
-    }
-
-    /// Takes a row; a line where it ends a block.
-    fn push(&mut self, time: f64, values: &[f64]) -> Result<Option<Line>, InferenceError> {
-        let first = self.stream.n_row() == 0;
-        self.stream.push(time, values)?;
-        let report = match self.detector.push(time, values) {
-            Ok(report) => report,
-            Err(error) if speaks_of_a_row(&error) => return Err(error),
-            // There is no reference yet that could be estimated.
-            Err(_) => None,
-        };
-        self.time = time;
-        if first {
-            return Ok(None);
-        }
-        self.n_step += 1;
-        if !self.n_step.is_multiple_of(self.asked.choice.follow.block as u64) {
-            return Ok(None);
-        }
-        let block = self.stream.take()?;
-        self.window.push(block)?;
-        if report.as_ref().is_some_and(|report| report.alarm) {
-            self.restart()?;
-        }
-        self.estimate();
-        Ok(Some(self.line(report.as_ref())))
-    }
-
-    /// After a change the last blocks are all that counts.
-    fn restart(&mut self) -> Result<(), InferenceError> {
-        let recent = self.detector.recent();
-        match self.detector.accept() {
-            Err(error) if speaks_of_a_row(&error) => return Err(error),
-            _ => {}
-        }
-        self.window = Window::new(self.asked.choice.follow.window.map_or(Memory::Growing, Memory::Sliding));
-        if let Some(recent) = recent {
-            self.window.push(recent)?;
-        }
-        self.posterior = None;
-        Ok(())
-    }
-
-    fn estimate(&mut self) {
-        let (fit, structure) = (&self.asked.fit, &self.asked.question.structure);
-        let Some(sums) = self.window.sums() else { return };
-        let found = match &self.posterior {
-            Some(earlier) => fit.update(&sums, structure, earlier),
-            None => fit.posterior(&sums, structure),
-        };
-        // Too little is known: the line has no values.
-        self.posterior = found.ok();
-    }
-
-    fn line(&self, report: Option<&Report>) -> Line {
-        line::line(self.time, self.n_step, self.posterior.as_ref(), report, &self.asked.question.structure)
-    }
-
-    fn saved(&mut self) -> Result<Saved, InferError> {
-        Ok(Saved {
-            basis: self.asked.question.basis.fingerprint(),
-            follow: format!("{:?}", self.asked.choice.follow),
-            step: self.step,
-            time: self.time,
-            n_step: self.n_step,
-            detector: self.detector.state()?,
-            stream: self.stream.state()?,
-            window: self.window.clone(),
-            posterior: self.posterior.clone(),
-        })
-    }
-
-    fn resume(&mut self, saved: Saved) -> Result<(), InferError> {
-        let basis = &self.asked.question.basis;
-        if saved.basis != basis.fingerprint() || saved.follow != format!("{:?}", self.asked.choice.follow) {
-            return Err(InferError::Setting("it was written for another [infer] section".to_owned()));
-        }
-        saved.window.check(basis)?;
-        saved
-            .posterior
-            .as_ref()
-            .map_or(Ok(()), |posterior| posterior.check(&self.asked.question.structure))?;
-        let fresh = Self::new(self.asked, self.step)?;
-        self.detector = fresh.detector.resume(saved.detector)?;
-        self.stream = Stream::resume(Arc::clone(basis), saved.stream)?;
-        (self.window, self.posterior) = (saved.window, saved.posterior);
-        (self.n_step, self.time) = (saved.n_step, saved.time);
-        Ok(())
-    }
-}
-
-/// Whether a row is at fault, rather than that too little is known.
-fn speaks_of_a_row(error: &InferenceError) -> bool {
-    matches!(
-        error,
-        InferenceError::Shape { .. }
-            | InferenceError::NonFinite { .. }
-            | InferenceError::NotIncreasing { .. }
-            | InferenceError::TimeJump { .. }
-            | InferenceError::NonUniform { .. }
-            | InferenceError::Damaged { .. }
-    )
 }

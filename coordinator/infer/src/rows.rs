@@ -104,6 +104,11 @@ impl<R: Read> Rows<R> {
         self.reader.position().byte()
     }
 
+    /// The text.
+    pub(crate) fn text(&self) -> &R {
+        self.reader.get_ref()
+    }
+
     /// A fault of this recording.
     pub(crate) fn fault(&self, line: Option<u64>, message: String, help: &str) -> InferError {
         InferError::Recording { file: self.file.clone(), line, message, help: help.to_owned() }

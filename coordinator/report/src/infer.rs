@@ -89,9 +89,10 @@ fn line(name: &str, cells: &[String]) -> String {
     format!("{},{}\n", quoted(name), cells.join(","))
 }
 
-/// A name that may hold commas as a cell of a CSV file.
+/// A name that may hold commas as a cell of a CSV file. Its white space, line breaks included, becomes single spaces.
 fn quoted(name: &str) -> String {
-    if name.contains([',', '"']) { format!("\"{}\"", name.replace('"', "\"\"")) } else { name.to_owned() }
+    let name = name.split_whitespace().collect::<Vec<_>>().join(" ");
+    if name.contains([',', '"']) { format!("\"{}\"", name.replace('"', "\"\"")) } else { name }
 }
 
 impl<'a> Page<'a> {

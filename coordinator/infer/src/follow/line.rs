@@ -18,6 +18,10 @@ pub struct Line {
     pub coefficients: BTreeMap<String, Option<[f64; 2]>>,
     /// Variances of the noise per time unit; null while they cannot be estimated.
     pub diffusion: Option<Vec<f64>>,
+    /// Whether errors of the measurement were taken out of the noise.
+    pub lag_corrected: bool,
+    /// Why there is no estimate or no test, where more rows alone do not mend it.
+    pub error: Option<String>,
     /// Whether the last blocks no longer fit those before.
     pub alarm: bool,
     /// The test; null while there is no reference.
@@ -68,6 +72,8 @@ pub(crate) fn line(
         n_step,
         coefficients: (0..structure.n_coefficient()).map(|p| (name(p), value(p))).collect(),
         diffusion: posterior.map(|found| found.diffusion.diagonal().iter().copied().collect()),
+        lag_corrected: false,
+        error: None,
         alarm: report.is_some_and(|report| report.alarm),
         test: report.map(test),
     }

@@ -8,14 +8,13 @@ use serde::{Deserialize, Serialize};
 use starlings_estimators::inference::{DetectorState, Posterior, StreamState, Window};
 
 use crate::error::InferError;
+use crate::run::Asked;
 
 /// A recording that is followed, after a block.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Saved {
-    /// Tells functions apart.
-    pub(crate) basis: u64,
-    /// The settings that it was followed with.
-    pub(crate) follow: String,
+    /// Fingerprint of what was asked of which columns ([`fingerprint`]).
+    pub(crate) asked: String,
     pub(crate) step: f64,
     /// Time of the last row.
     pub(crate) time: f64,
@@ -24,6 +23,18 @@ pub(crate) struct Saved {
     pub(crate) stream: StreamState,
     pub(crate) window: Window,
     pub(crate) posterior: Option<Posterior>,
+}
+
+/// Tells what is asked of which columns from anything else: the model with its constants and functions, the sampling step, the columns,
+/// and the choices of the fit and of the following.
+pub(crate) fn fingerprint(asked: &Asked<'_>) -> Result<String, InferError> {
+    let choice = asked.choice;
+    let unwritten = |error: serde_json::Error| InferError::Setting(error.to_string());
+    let setup = serde_json::to_string(&asked.setup).map_err(unwritten)?;
+    let columns = choice.records.first().map(|record| (&record.time, &record.columns));
+    let fit = (choice.diffusion, choice.prefactor, choice.measured, &choice.priors);
+    let text = format!("{setup}\n{columns:?}\n{fit:?}\n{:?}", choice.follow);
+    Ok(blake3::hash(text.as_bytes()).to_hex().to_string())
 }
 
 /// Reads a state; `None` where there is no file.
