@@ -163,7 +163,7 @@ fn look(deployment: &Deployment) -> Result<(), Failure> {
         sleep(TICK);
         let tasks = deployment.tasks().map_err(failed)?;
         let n_failed = tasks.iter().filter(|task| task.state == State::Failed).count();
-        if n_failed == 0 || tasks.iter().any(|task| task.state.is_live()) {
+        if n_failed == 0 || tasks.iter().any(|task| task.state.is_live() || task.state == State::Unreached) {
             continue;
         }
         let words = last_words(deployment, &tasks);
