@@ -205,6 +205,22 @@ fn remove_cancels_by_name_and_says_what_is_left() {
 }
 
 #[test]
+fn a_deployment_that_others_can_write_or_whose_name_is_no_plain_word_is_refused() {
+    let site = slurm("RUNNING", "None", 0, 0);
+    assert_eq!(site.slurm(&["--workers", "2"]).0, 0);
+    let file = site.path("pool/deployment.json");
+    std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o664)).unwrap();
+    let (code, said) = site.said(&["remove", "pool"]);
+    assert!(code == 2 && said.contains("others can write it"), "{said}");
+    std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o644)).unwrap();
+    let text = std::fs::read_to_string(&file).unwrap();
+    std::fs::write(&file, text.replace("starlings-rcr-", "$(touch here) ")).unwrap();
+    let (code, said) = site.said(&["remove", "pool"]);
+    assert!(code == 2 && said.contains("is no name of a deployment"), "{said}");
+    assert!(!site.path("cancelled").exists());
+}
+
+#[test]
 fn remove_cancels_before_it_looks() {
     let site = slurm("RUNNING", "None", 0, 0);
     assert_eq!(site.slurm(&["--workers", "2"]).0, 0);
