@@ -221,6 +221,27 @@ fn a_deployment_that_others_can_write_or_whose_name_is_no_plain_word_is_refused(
 }
 
 #[test]
+fn what_a_failed_submission_leaves_is_said_and_a_failed_look_is_no_failed_submission() {
+    let site = slurm("PENDING", "None", 0, 0).program("sbatch", "echo no >&2; exit 1");
+    let (code, said) = site.slurm(&["--workers", "2"]);
+    assert!(code == 2 && said.contains("is cancelled, nothing is left"), "{said}");
+    let site = site.program("scancel", "echo busy >&2; exit 1");
+    std::fs::remove_dir_all(site.path("pool")).unwrap();
+    let (code, said) = site.slurm(&["--workers", "2"]);
+    assert!(
+        code == 2 && said.contains("starlings deploy remove") && !said.contains("nothing is left"),
+        "{said}"
+    );
+
+    let site = slurm("PENDING", "None", 0, 0).program("squeue", "echo busy >&2; exit 1");
+    let (code, said) = site.slurm(&["--workers", "2"]);
+    assert!(
+        code == 0 && said.contains("busy") && said.contains("remove:  starlings deploy remove"),
+        "{said}"
+    );
+}
+
+#[test]
 fn remove_cancels_before_it_looks() {
     let site = slurm("RUNNING", "None", 0, 0);
     assert_eq!(site.slurm(&["--workers", "2"]).0, 0);

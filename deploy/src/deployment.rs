@@ -96,6 +96,22 @@ impl Deployment {
         self.engine.tasks(self)
     }
 
+    /// Cancels what was submitted before an error, and says with it what is left.
+    pub(crate) fn given_up(&self, cause: DeployError) -> DeployError {
+        DeployError::Submission { cause: Box::new(cause), left: self.cancel_rest() }
+    }
+
+    /// Cancels everything, and says whether that was done.
+    pub fn cancel_rest(&self) -> String {
+        let folder = shell_words::join([self.folder.to_string_lossy()]);
+        match self.engine.cancel(self) {
+            Ok(()) => "what was submitted is cancelled, nothing is left".to_owned(),
+            Err(error) => format!(
+                "what was submitted may be left, it could not be cancelled ({error}): try starlings deploy remove {folder}"
+            ),
+        }
+    }
+
     /// What should be there: the coordinator where it is a job, and the workers.
     pub fn roles(&self) -> Vec<Role> {
         let coordinator = self.order.run_folder.as_ref().map(|_| Role::Coordinator);

@@ -97,8 +97,7 @@ impl Engine for Hosts {
                 Ok(said) => said.refused(),
                 Err(error) => error,
             };
-            let _ = self.cancel(deployment);
-            return Err(refused);
+            return Err(deployment.given_up(refused));
         }
         Ok(())
     }
