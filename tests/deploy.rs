@@ -195,13 +195,79 @@ fn remove_cancels_by_name_and_says_what_is_left() {
     let site = slurm("RUNNING", "None", 0, 0);
     assert_eq!(site.slurm(&["--workers", "2"]).0, 0);
     let (code, said) = site.said(&["remove", "pool"]);
-    assert!(code == 0 && said.contains("2 cancelled, nothing is left"), "{said}");
+    assert!(code == 0 && said.contains("is cancelled, nothing is left"), "{said}");
     let cancelled = std::fs::read_to_string(site.path("cancelled")).unwrap();
     assert!(cancelled.contains("--name=starlings-rcr-"), "{cancelled}");
     std::fs::remove_file(site.path("cancelled")).unwrap();
     let site = site.program("scancel", "");
     let (code, said) = site.said(&["remove", "pool", "--within", "0"]);
-    assert!(code == 1 && said.contains("there is left: worker 0 (7_0, running on n1), worker 1"), "{said}");
+    assert!(code == 1 && said.contains("worker 0 (7_0, running on n1), worker 1"), "{said}");
+}
+
+#[test]
+fn a_deployment_that_others_can_write_or_whose_name_is_no_plain_word_is_refused() {
+    let site = slurm("RUNNING", "None", 0, 0);
+    assert_eq!(site.slurm(&["--workers", "2"]).0, 0);
+    let file = site.path("pool/deployment.json");
+    std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o664)).unwrap();
+    let (code, said) = site.said(&["remove", "pool"]);
+    assert!(code == 2 && said.contains("others can write it"), "{said}");
+    std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o644)).unwrap();
+    let text = std::fs::read_to_string(&file).unwrap();
+    std::fs::write(&file, text.replace("starlings-rcr-", "$(touch here) ")).unwrap();
+    let (code, said) = site.said(&["remove", "pool"]);
+    assert!(code == 2 && said.contains("is no name of a deployment"), "{said}");
+    assert!(!site.path("cancelled").exists());
+}
+
+#[test]
+fn what_a_failed_submission_leaves_is_said_and_a_failed_look_is_no_failed_submission() {
+    let site = slurm("PENDING", "None", 0, 0).program("sbatch", "echo no >&2; exit 1");
+    let (code, said) = site.slurm(&["--workers", "2"]);
+    assert!(code == 2 && said.contains("is cancelled, nothing is left"), "{said}");
+    let site = site.program("scancel", "echo busy >&2; exit 1");
+    std::fs::remove_dir_all(site.path("pool")).unwrap();
+    let (code, said) = site.slurm(&["--workers", "2"]);
+    assert!(
+        code == 2 && said.contains("starlings deploy remove") && !said.contains("nothing is left"),
+        "{said}"
+    );
+
+    let site = slurm("PENDING", "None", 0, 0).program("squeue", "echo busy >&2; exit 1");
+    let (code, said) = site.slurm(&["--workers", "2"]);
+    assert!(
+        code == 0 && said.contains("busy") && said.contains("remove:  starlings deploy remove"),
+        "{said}"
+    );
+}
+
+#[test]
+fn remove_cancels_before_it_looks() {
+    let site = slurm("RUNNING", "None", 0, 0);
+    assert_eq!(site.slurm(&["--workers", "2"]).0, 0);
+    let site = site.program("squeue", "echo 'slurm_load_jobs error' >&2; exit 1");
+    let (code, said) = site.said(&["remove", "pool"]);
+    assert!(code == 1 && said.contains("slurm_load_jobs error"), "{said}");
+    assert!(site.path("cancelled").exists(), "{said}");
+}
+
+#[test]
+fn workers_on_a_host_that_is_lost_are_neither_live_nor_ended() {
+    // A host that takes workers and is not reached afterwards.
+    let ssh = "[ -e $SITE/lost ] && { echo 'No route to host' >&2; exit 255; }
+for i in 0 1; do echo \"starlings $i running 100 0\"; done";
+    let site = Site::new().program("ssh", ssh);
+    let study = repository("examples/rcr/study.toml");
+    let head = ["hosts", study.to_str().unwrap(), "--ssh", "ssh", "--out", "pool", "--hosts", "a"];
+    let (code, said) = site.said(&[&head[..], &["--workers", "2"]].concat());
+    assert!(code == 0 && said.contains("2 of 2 run"), "{said}");
+    std::fs::write(site.path("lost"), "").unwrap();
+    let (code, said) = site.said(&["status", "pool"]);
+    assert!(code == 0 && said.contains("unreached") && said.contains("No route to host"), "{said}");
+    let (code, said) = site.said(&["watch", "pool", "--every", "0.01"]);
+    assert!(code == 1 && said.contains("2 of 2 processes are not reached"), "{said}");
+    let (code, said) = site.said(&["remove", "pool"]);
+    assert!(code == 1 && said.contains("worker 1 (") && said.contains("unreached on a"), "{said}");
 }
 
 #[test]
@@ -260,7 +326,7 @@ fn workers_on_a_list_of_hosts_serve_a_run_are_seen_and_are_removed() {
     assert_eq!((code, nodes), (0, vec!["a", "b", "a"]));
     assert!(runs(name));
     let (code, said) = site.said(&["remove", "pool"]);
-    assert!(code == 0 && said.contains("3 cancelled, nothing is left"), "{said}");
+    assert!(code == 0 && said.contains("is cancelled, nothing is left"), "{said}");
     assert!(!runs(name), "no process of it is left");
 
     let (code, said) = deploy("broken", &["--scratch", "/not/there"]);

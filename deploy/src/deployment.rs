@@ -1,7 +1,8 @@
 //! A deployment: its folder with the scripts, the logs and `deployment.json`, from which it is asked and removed later.
 
-use std::fs;
-use std::io;
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Read, Write};
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -52,7 +53,7 @@ impl Deployment {
         let text = serde_json::to_string_pretty(&record).map_err(io::Error::from);
         let put = |name: &str, text: io::Result<String>| {
             let path = folder.join(name);
-            text.and_then(|text| fs::write(&path, text))
+            text.and_then(|text| write(&path, &text))
                 .map_err(|source| DeployError::Unwritable { path, source })
         };
         files.into_iter().try_for_each(|(name, text)| put(&name, Ok(text)))?;
@@ -64,14 +65,17 @@ impl Deployment {
     /// Reads the deployment of a folder.
     ///
     /// # Errors
-    /// When there is none.
+    /// When there is none, or somebody else could have written it: it names programs that are started.
     pub fn read(folder: &Path) -> Result<Self, DeployError> {
         let none = |reason: String| DeployError::NoDeployment { path: folder.to_owned(), reason };
-        let text = fs::read_to_string(folder.join(FILE)).map_err(|error| none(format!("{FILE}: {error}")))?;
+        let text = read(&folder.join(FILE)).map_err(|error| none(format!("{FILE}: {error}")))?;
         let record: Record = serde_json::from_str(&text).map_err(|error| none(format!("{FILE}: {error}")))?;
         if record.starlings_deployment != FORMAT {
             let found = record.starlings_deployment;
             return Err(none(format!("{FILE} is of format {found}, this program reads {FORMAT}")));
+        }
+        if !Order::is_name(&record.order.name) {
+            return Err(none(format!("{FILE}: `{}` is no name of a deployment", record.order.name)));
         }
         let engine = engine(&record.engine)
             .ok_or_else(|| none(format!("{FILE}: no engine named `{}`", record.engine)))?;
@@ -92,6 +96,22 @@ impl Deployment {
         self.engine.tasks(self)
     }
 
+    /// Cancels what was submitted before an error, and says with it what is left.
+    pub(crate) fn given_up(&self, cause: DeployError) -> DeployError {
+        DeployError::Submission { cause: Box::new(cause), left: self.cancel_rest() }
+    }
+
+    /// Cancels everything, and says whether that was done.
+    pub fn cancel_rest(&self) -> String {
+        let folder = shell_words::join([self.folder.to_string_lossy()]);
+        match self.engine.cancel(self) {
+            Ok(()) => "what was submitted is cancelled, nothing is left".to_owned(),
+            Err(error) => format!(
+                "what was submitted may be left, it could not be cancelled ({error}): try starlings deploy remove {folder}"
+            ),
+        }
+    }
+
     /// What should be there: the coordinator where it is a job, and the workers.
     pub fn roles(&self) -> Vec<Role> {
         let coordinator = self.order.run_folder.as_ref().map(|_| Role::Coordinator);
@@ -102,4 +122,28 @@ impl Deployment {
     pub fn last_lines(&self, role: Role, n: usize) -> Vec<String> {
         logs::last_lines(&self.folder.join(logs::FOLDER).join(role.log()), n)
     }
+}
+
+/// Writes a new file that its owner alone can write, whatever the umask.
+fn write(path: &Path, text: &str) -> io::Result<()> {
+    let mut file = OpenOptions::new().write(true).create(true).truncate(true).mode(0o644).open(path)?;
+    file.write_all(text.as_bytes())
+}
+
+/// Reads a file that this user or root alone can have written.
+fn read(path: &Path) -> io::Result<String> {
+    let mut file = File::open(path)?;
+    let found = file.metadata()?;
+    let own = rustix::process::geteuid().as_raw();
+    if found.uid() != own && found.uid() != 0 {
+        return Err(io::Error::other(format!("it belongs to user {}, and not to this one", found.uid())));
+    }
+    if found.mode() & 0o022 != 0 {
+        return Err(io::Error::other(
+            "others can write it: look through it, then take that from them with chmod go-w",
+        ));
+    }
+    let mut text = String::new();
+    file.read_to_string(&mut text)?;
+    Ok(text)
 }

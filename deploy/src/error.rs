@@ -17,9 +17,7 @@ pub enum DeployError {
         remedy: &'static str,
     },
     /// The engine did not take what was submitted.
-    #[error(
-        "{program} refused the submission: {said}\n  nothing is left in the queue; it was asked with: {command}"
-    )]
+    #[error("{program} refused the submission: {said}\n  it was asked with: {command}")]
     Refused {
         /// The program.
         program: String,
@@ -27,6 +25,14 @@ pub enum DeployError {
         said: String,
         /// The whole command.
         command: String,
+    },
+    /// A submission did not come to its end.
+    #[error("{cause}\n  {left}")]
+    Submission {
+        /// Why.
+        cause: Box<DeployError>,
+        /// What is left of it.
+        left: String,
     },
     /// A program of the engine failed.
     #[error("{program} failed: {said}\n  it was called with: {command}")]
@@ -117,6 +123,7 @@ impl DeployError {
             | Self::Unreadable { .. }
             | Self::TooLarge { .. }
             | Self::Option { .. } => true,
+            Self::Submission { cause, .. } => cause.is_input(),
             Self::Unwritable { source, .. } => source.kind() != io::ErrorKind::StorageFull,
             Self::Failed { .. } | Self::NoAnswer { .. } | Self::Script { .. } => false,
         }

@@ -97,8 +97,7 @@ impl Engine for Hosts {
                 Ok(said) => said.refused(),
                 Err(error) => error,
             };
-            let _ = self.cancel(deployment);
-            return Err(refused);
+            return Err(deployment.given_up(refused));
         }
         Ok(())
     }
@@ -107,11 +106,7 @@ impl Engine for Hosts {
         let order = &deployment.order;
         let mut tasks = Vec::new();
         for (host, indices, said) in on_all(order, |indices| ask(order, indices, false)) {
-            match said {
-                Ok(said) if said.is_well => tasks.extend(told(deployment, host, &indices, &said.stdout)),
-                Ok(said) => tasks.extend(indices.iter().map(|i| unreached(host, *i, &said.words()))),
-                Err(error) => return Err(error),
-            }
+            tasks.extend(of_host(deployment, host, &indices, said)?);
         }
         tasks.sort_by_key(|task| task.role);
         Ok(tasks)
@@ -119,10 +114,9 @@ impl Engine for Hosts {
 
     fn cancel(&self, deployment: &Deployment) -> Result<(), DeployError> {
         let order = &deployment.order;
-        for (_, _, said) in on_all(order, |indices| ask(order, indices, true)) {
-            said?.answer()?;
-        }
-        Ok(())
+        // All have been asked before the first that failed is told.
+        let asked = on_all(order, |indices| ask(order, indices, true));
+        asked.into_iter().try_for_each(|(_, _, said)| said?.answer().map(drop))
     }
 }
 
@@ -148,10 +142,26 @@ fn ask(order: &Order, indices: &[usize], cancels: bool) -> Result<String, Deploy
     script("hosts-ask.sh", json!({ "name": order.name, "indices": indices, "cancels": cancels }))
 }
 
+/// The workers of a host by what came of asking it; a host that does not answer is no error for the others.
+fn of_host(
+    deployment: &Deployment,
+    host: &str,
+    indices: &[usize],
+    said: Result<Said, DeployError>,
+) -> Result<Vec<Task>, DeployError> {
+    let words = match said {
+        Ok(said) if said.is_well => return Ok(told(deployment, host, indices, &said.stdout)),
+        Ok(said) => said.words(),
+        Err(error @ DeployError::NoAnswer { .. }) => error.to_string(),
+        Err(error) => return Err(error),
+    };
+    Ok(indices.iter().map(|i| unreached(host, *i, &words)).collect())
+}
+
 /// A worker on a host that does not answer: it may well run.
 fn unreached(host: &str, i: usize, words: &str) -> Task {
     let says = Some(format!("{host} is not reached: {words}"));
-    Task { node: Some(host.to_owned()), says, ..Task::unknown(Role::Worker(i)) }
+    Task { state: State::Unreached, node: Some(host.to_owned()), says, ..Task::unknown(Role::Worker(i)) }
 }
 
 /// What the script says of the workers of a host; the ends of their logs are kept in the folder of the deployment.
@@ -190,4 +200,25 @@ fn task(host: &str, line: &str) -> Option<Task> {
     };
     let id = format!("{host}:{i}");
     Some(Task { role, id, state, since: since.parse().ok(), node, reason: None, says, restarts: 0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_host_that_hangs_leaves_its_own_workers_unreached_and_is_no_error() {
+        let order: Order = serde_json::from_value(json!({
+            "name": "starlings-a-1", "study": "/s.toml", "is_solver": false, "program": "/p", "workers": 2,
+            "access": "/a.json", "idle": "10m", "hosts": ["a", "b"],
+        }))
+        .unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let deployment = Deployment::write(&Hosts, order, folder.path()).unwrap();
+        let hangs =
+            DeployError::NoAnswer { program: "ssh".to_owned(), seconds: 120, command: "ssh b".to_owned() };
+        let tasks = of_host(&deployment, "b", &[1], Err(hangs)).unwrap();
+        assert_eq!((tasks.len(), tasks[0].role, tasks[0].state), (1, Role::Worker(1), State::Unreached));
+        assert!(tasks[0].says.as_deref().unwrap().contains("b is not reached"), "{tasks:?}");
+    }
 }

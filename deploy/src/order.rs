@@ -55,6 +55,12 @@ impl Order {
         format!("starlings-{plain}-{stamp}")
     }
 
+    /// Whether a name is one that every engine and every script takes as one plain word.
+    pub(crate) fn is_name(name: &str) -> bool {
+        name.starts_with(|c: char| c.is_ascii_alphanumeric())
+            && name.chars().all(|c| c.is_ascii_alphanumeric() || ".-_".contains(c))
+    }
+
     /// Name of the coordinator's job in the engine.
     pub fn coordinator_name(&self) -> String {
         format!("{}-coordinator", self.name)

@@ -63,6 +63,10 @@ pub(crate) struct Programs {
 impl Programs {
     /// Runs a command to its end; `input` is what it reads.
     pub(crate) fn run(&self, command: &[String], input: &str) -> Result<Said, DeployError> {
+        self.run_within(command, input, LIMIT)
+    }
+
+    fn run_within(&self, command: &[String], input: &str, limit: Duration) -> Result<Said, DeployError> {
         let shown = shell_words::join(command);
         let (program, arguments) = command.split_first().map_or(("", command), |(p, a)| (p.as_str(), a));
         let missing = |_: io::Error| DeployError::Missing {
@@ -80,13 +84,14 @@ impl Programs {
             .map_err(missing)?;
         let (stdout, stderr) = (listen(child.stdout.take()), listen(child.stderr.take()));
         if let Some(mut stdin) = child.stdin.take() {
-            // A program that reads nothing may have ended.
-            let _ = stdin.write_all(input.as_bytes());
+            let input = input.as_bytes().to_vec();
+            // A program that reads nothing may have ended, or hang: the limit holds for it too.
+            thread::spawn(move || stdin.write_all(&input));
         }
-        let Some(is_well) = end(&mut child) else {
+        let Some(is_well) = end(&mut child, limit) else {
             return Err(DeployError::NoAnswer {
                 program: program.to_owned(),
-                seconds: LIMIT.as_secs(),
+                seconds: limit.as_secs(),
                 command: shown,
             });
         };
@@ -128,12 +133,12 @@ impl Heard {
 }
 
 /// Whether a program ended well; nothing where it did not end in time and was killed.
-fn end(child: &mut Child) -> Option<bool> {
+fn end(child: &mut Child, limit: Duration) -> Option<bool> {
     let started = Instant::now();
     loop {
         match child.try_wait() {
             Ok(Some(status)) => return Some(status.success()),
-            Ok(None) if started.elapsed() < LIMIT => thread::sleep(TICK),
+            Ok(None) if started.elapsed() < limit => thread::sleep(TICK),
             Ok(None) | Err(_) => {
                 let _ = child.kill();
                 let _ = child.wait();
@@ -159,6 +164,14 @@ mod tests {
         let said = run(&["sh", "-c", "cat; echo $GIVEN; sleep 60 & exit 0"], "read, ").unwrap();
         assert!(said.is_well);
         assert_eq!(said.stdout, "read, too\n");
+    }
+
+    #[test]
+    fn a_program_that_reads_nothing_of_a_long_input_is_ended_at_the_limit() {
+        let command = ["sh", "-c", "exec sleep 60"].map(str::to_owned);
+        let longer_than_a_pipe = "x".repeat(1 << 20);
+        let said = SHELL.run_within(&command, &longer_than_a_pipe, Duration::from_millis(200));
+        assert!(matches!(said, Err(DeployError::NoAnswer { .. })));
     }
 
     #[test]

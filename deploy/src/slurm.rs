@@ -97,12 +97,15 @@ impl Engine for Slurm {
 
     fn submit(&self, deployment: &Deployment) -> Result<(), DeployError> {
         for command in self.commands(deployment) {
-            let said = PROGRAMS.run(&command, "")?;
-            if !said.is_well {
-                // What was taken before it is of no use alone.
-                let _ = self.cancel(deployment);
-                return Err(said.refused());
-            }
+            let refused = match PROGRAMS.run(&command, "") {
+                Ok(said) if said.is_well => continue,
+                Ok(said) => said.refused(),
+                // Without the program nothing was submitted.
+                Err(error @ DeployError::Missing { .. }) => return Err(error),
+                Err(error) => error,
+            };
+            // What was taken before it is of no use alone, and one that gave no answer may have been taken.
+            return Err(deployment.given_up(refused));
         }
         Ok(())
     }
@@ -115,10 +118,11 @@ impl Engine for Slurm {
 
     fn cancel(&self, deployment: &Deployment) -> Result<(), DeployError> {
         // The coordinator first: the workers of one that goes on are missed.
-        for name in [deployment.order.coordinator_name(), deployment.order.name.clone()] {
-            PROGRAMS.run(&["scancel".to_owned(), format!("--name={name}")], "")?.answer()?;
-        }
-        Ok(())
+        let names = [deployment.order.coordinator_name(), deployment.order.name.clone()];
+        let cancelled = names.map(|name| {
+            PROGRAMS.run(&["scancel".to_owned(), format!("--name={name}")], "")?.answer().map(drop)
+        });
+        cancelled.into_iter().collect()
     }
 
     fn release(&self, task: &Task) -> Result<bool, DeployError> {

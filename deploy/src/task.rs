@@ -51,6 +51,8 @@ pub enum State {
     Cancelled,
     /// The engine knows nothing of it.
     Unknown,
+    /// Its machine does not answer: it may run or not.
+    Unreached,
 }
 
 impl State {
@@ -69,6 +71,7 @@ impl State {
             Self::Failed => "failed",
             Self::Cancelled => "cancelled",
             Self::Unknown => "gone",
+            Self::Unreached => "unreached",
         }
     }
 }

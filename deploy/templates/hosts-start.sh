@@ -3,9 +3,10 @@ umask 077
 folder="$HOME/.starlings/"{{ name }}
 mkdir -p "$folder" || exit 2
 {% if access_text is not none %}
-cat > "$folder/access.json" << 'END_OF_ACCESS'
+cat > "$folder/access.json.new" << 'END_OF_ACCESS'
 {{ access_text }}
 END_OF_ACCESS
+mv -f "$folder/access.json.new" "$folder/access.json" || exit 2
 {% endif %}
 {% for i in indices %}
 cat > "$folder/worker-{{ i }}.sh" << 'END_OF_WORKER'

@@ -5,10 +5,10 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use clap::Parser;
-use starlings_deploy::{Deployment, Task};
+use starlings_deploy::{Deployment, State, Task};
 
 use super::failed;
-use crate::console::line;
+use crate::console::{line, note};
 use crate::failure::Failure;
 
 /// How often it is looked whether something is left.
@@ -33,30 +33,36 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 /// Cancels and waits.
 pub(super) fn remove(deployment: &Deployment, within: Duration) -> Result<(), Failure> {
     let started = Instant::now();
-    let n = live(deployment)?.len();
-    // Also where nothing is seen: a task may be on its way.
-    deployment.engine().cancel(deployment).map_err(failed)?;
-    let mut left = live(deployment)?;
-    while !left.is_empty() && started.elapsed() < within {
+    // Before any look, which may hang: a task may be on its way too.
+    let cancelled = deployment.engine().cancel(deployment);
+    let mut left = left(deployment)?;
+    if let Err(error) = cancelled {
+        if !left.iter().any(|task| task.state == State::Unreached) {
+            return Err(failed(error));
+        }
+        note(format_args!("warning: {error}"));
+    }
+    while left.iter().any(|task| task.state.is_live()) && started.elapsed() < within {
         sleep(TICK);
-        left = live(deployment)?;
+        left = self::left(deployment)?;
     }
     if left.is_empty() {
-        return line(format_args!("{}: {n} cancelled, nothing is left", deployment.order.name));
+        return line(format_args!("{} is cancelled, nothing is left", deployment.order.name));
     }
     let names: Vec<String> = left.iter().map(told).collect();
     Err(Failure::run(format!(
-        "{} is cancelled, but after {} s there is left: {}; try again, or ask the administrator of {}",
+        "{} is cancelled, but there is left after {} s: {}; try again, or ask the administrator of {}",
         deployment.order.name,
-        within.as_secs(),
+        started.elapsed().as_secs(),
         names.join(", "),
         deployment.engine().name()
     )))
 }
 
-fn live(deployment: &Deployment) -> Result<Vec<Task>, Failure> {
+/// What is live, and what may be.
+fn left(deployment: &Deployment) -> Result<Vec<Task>, Failure> {
     let tasks = deployment.tasks().map_err(failed)?;
-    Ok(tasks.into_iter().filter(|task| task.state.is_live()).collect())
+    Ok(tasks.into_iter().filter(|task| task.state.is_live() || task.state == State::Unreached).collect())
 }
 
 fn told(task: &Task) -> String {

@@ -11,7 +11,7 @@ use starlings_worker::check_address;
 use super::order::OrderArgs;
 use super::status::last_words;
 use super::{access, failed};
-use crate::console::line;
+use crate::console::{line, note};
 use crate::failure::Failure;
 
 /// How long it is looked whether what was submitted dies at once.
@@ -134,9 +134,18 @@ fn in_shell(command: &[String]) -> String {
 /// What comes next.
 fn told(deployment: &Deployment) -> Result<(), Failure> {
     let order = &deployment.order;
-    let tasks = deployment.tasks().map_err(failed)?;
+    let tasks = deployment.tasks().unwrap_or_default();
     let running = tasks.iter().filter(|task| task.state == State::Running).count();
-    line(format_args!("submitted {} as {}: {running} of {} run", plural(order), order.name, tasks.len()))?;
+    if tasks.is_empty() {
+        line(format_args!("submitted {} as {}", plural(order), order.name))?;
+    } else {
+        line(format_args!(
+            "submitted {} as {}: {running} of {} run",
+            plural(order),
+            order.name,
+            tasks.len()
+        ))?;
+    }
     let waits = tasks.iter().find(|task| task.state == State::Waiting);
     if let Some(says) = waits.and_then(|task| task.says.as_deref()) {
         line(format_args!("the others wait: {says}"))?;
@@ -161,17 +170,24 @@ fn look(deployment: &Deployment) -> Result<(), Failure> {
     let started = Instant::now();
     while started.elapsed() < LOOKED_AT {
         sleep(TICK);
-        let tasks = deployment.tasks().map_err(failed)?;
+        let tasks = match deployment.tasks() {
+            Ok(tasks) => tasks,
+            // The submission stands.
+            Err(error) => {
+                note(format_args!("warning: it is not known whether what was submitted runs: {error}"));
+                return Ok(());
+            }
+        };
         let n_failed = tasks.iter().filter(|task| task.state == State::Failed).count();
-        if n_failed == 0 || tasks.iter().any(|task| task.state.is_live()) {
+        if n_failed == 0 || tasks.iter().any(|task| task.state.is_live() || task.state == State::Unreached) {
             continue;
         }
         let words = last_words(deployment, &tasks);
         // What is left of it would be started for nothing.
-        let _ = deployment.engine().cancel(deployment);
+        let left = deployment.cancel_rest();
         let says = tasks.iter().find_map(|task| task.says.clone()).unwrap_or_default();
         return Err(Failure::input(format!(
-            "all {} tasks died at once ({says}); nothing is left in the queue. Their last lines:\n{words}",
+            "all {} tasks died at once ({says}); {left}. Their last lines:\n{words}",
             tasks.len()
         )));
     }

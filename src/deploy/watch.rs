@@ -53,9 +53,13 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     loop {
         match deployment.tasks() {
             Ok(tasks) => {
-                failures = 0;
+                let unreached = tasks.iter().filter(|task| task.state == State::Unreached).count();
                 seen.look(&deployment, tasks);
-                if !seen.tasks.iter().any(|task| task.state.is_live()) {
+                failures = if unreached == 0 { 0 } else { failures + 1 };
+                if failures > ATTEMPTS {
+                    return Err(given_up(&deployment, unreached));
+                }
+                if unreached == 0 && !seen.tasks.iter().any(|task| task.state.is_live()) {
                     note(format_args!("{}: no process is left", deployment.order.name));
                     return Ok(());
                 }
@@ -71,6 +75,15 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
             return interrupted(&deployment, args.remove_on_exit);
         }
     }
+}
+
+/// What is said of processes on machines that did not answer for many looks in a row.
+fn given_up(deployment: &Deployment, unreached: usize) -> Failure {
+    let folder = deployment.folder.display();
+    Failure::run(format!(
+        "{unreached} of {} processes are not reached and may still run: see starlings deploy status {folder}, and watch again",
+        deployment.roles().len()
+    ))
 }
 
 /// Whether a signal came in this time.
