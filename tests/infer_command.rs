@@ -388,3 +388,28 @@ fn a_name_over_two_lines_is_one_line_of_the_table() {
     assert!(table.lines().all(|line| line.split(',').count() >= 7), "{table}");
     assert!(table.contains("\nx:x * z,"), "{table}");
 }
+
+#[test]
+fn a_reduced_model_is_fitted_to_extrapolated_coefficients() {
+    let reduced = "\n[infer.reduced]\nstart = { a = 1.0, b = 1.0, e = 1.0 }\ncoefficients = { k = \"a\", c = \"b\", d = \"e\" }\n";
+    let study = STUDY.replace("block = 300", "richardson = true") + reduced;
+    let dir = folder(&study, &recording(2_000, usize::MAX));
+    let found = infer(dir.path(), "out", "1");
+    for k in 0..3 {
+        let (of, unknown) = (&found["coefficients"][k], &found["reduced"]["unknowns"][k]);
+        let [moved, before, same] =
+            [&of["estimate"], &of["at_step"], &unknown["estimate"]].map(|v| v.as_f64().unwrap());
+        // As many unknowns as coefficients: the reduced model is the coefficients, as far as its search converges.
+        assert!((moved - same).abs() < 1e-6 && (before - same).abs() > 1e-4, "{of} {unknown}");
+    }
+}
+
+#[test]
+fn a_step_that_cannot_be_fitted_leaves_the_estimate_where_it_is() {
+    let study = STUDY.replace("block = 300", "richardson = true");
+    let dir = folder(&study, &recording(12, usize::MAX));
+    let found = infer(dir.path(), "out", "1");
+    let warning = found["warnings"][0].as_str().unwrap();
+    assert!(warning.contains("`richardson`") && warning.contains("at steps of 2h"), "{warning}");
+    assert!(found["richardson"].is_null() && found["coefficients"][0]["estimate"].is_f64(), "{found}");
+}

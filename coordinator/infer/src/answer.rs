@@ -2,7 +2,7 @@
 //!
 //! Next file to read: `words.rs`.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use starlings_estimators::inference::{
     Coefficient, Diffusion, Extrapolated, Fit, InferenceError, NoiseCheck, Posterior, Prior, Strength,
     Structure, Sums, Verdict, extrapolate, noise_checks,
@@ -68,6 +68,8 @@ pub(crate) struct Answer {
     /// Whether errors of the measurement were taken out of the noise.
     pub(crate) lag_corrected: bool,
     pub(crate) extrapolated: Option<Extrapolated>,
+    /// What went less well than was asked for.
+    pub(crate) doubts: Vec<String>,
 }
 
 impl Answer {
@@ -83,14 +85,21 @@ impl Answer {
         };
         let Fitted { posterior, checks, lag_corrected } = Fitted::of(choice, fit, structure, sums, None)?;
         let fit = Fit { lag_corrected, ..fit.clone() };
-        let extrapolated = if levels.len() > 1 {
-            let longer = levels[1..].iter().map(|sums| fit.posterior(sums, structure));
-            let all = std::iter::once(Ok(posterior.clone())).chain(longer).collect::<Result<Vec<_>, _>>()?;
-            Some(extrapolate(&all, None)?)
-        } else {
-            None
+        let (extrapolated, doubts) = match to_no_step(&fit, structure, &posterior, &levels[1..]) {
+            Ok(extrapolated) => (extrapolated, Vec::new()),
+            Err(doubt) => (None, vec![doubt]),
         };
-        Ok(Self { posterior, checks, lag_corrected, extrapolated })
+        Ok(Self { posterior, checks, lag_corrected, extrapolated, doubts })
+    }
+
+    /// Means of the coefficients that have a value, at no step where they were extrapolated.
+    pub(crate) fn means(&self) -> DVector<f64> {
+        let mean = |(k, p): (usize, &usize)| {
+            let moved = self.extrapolated.as_ref().and_then(|e| e.estimates.get(*p)?.value);
+            moved.map_or(self.posterior.mean()[k], |value| value.mean)
+        };
+        let active = self.posterior.active();
+        DVector::from_iterator(active.len(), active.iter().enumerate().map(mean))
     }
 
     /// The table of the coefficients.
@@ -148,6 +157,27 @@ impl Answer {
         let order = if found.used == Strength::Weak { 2 } else { 1 };
         Some(RichardsonFound { order, ratio: found.ratio })
     }
+}
+
+/// The extrapolation from sums at 2h and 4h, `None` without them; why there is none where they cannot be fitted.
+fn to_no_step(
+    fit: &Fit,
+    structure: &Structure,
+    posterior: &Posterior,
+    longer: &[Sums],
+) -> Result<Option<Extrapolated>, String> {
+    if longer.is_empty() {
+        return Ok(None);
+    }
+    let missing = |of: &str, error: &InferenceError| {
+        format!("the error of the sampling step is not taken out, as `richardson` asks: {of}{error}")
+    };
+    let mut all = vec![posterior.clone()];
+    for (k, sums) in longer.iter().enumerate() {
+        let found = fit.posterior(sums, structure);
+        all.push(found.map_err(|error| missing(&format!("at steps of {}h ", 2 << k), &error))?);
+    }
+    extrapolate(&all, None).map(Some).map_err(|error| missing("between steps of h, 2h and 4h ", &error))
 }
 
 /// Whether there are more steps than unknowns in every equation; fewer look like terms that cannot be told apart.

@@ -23,7 +23,7 @@ struct Reduced {
     coefficients: Vec<Option<Program>>,
 }
 
-/// Fits the reduced model.
+/// Fits the reduced model to the `means` of the coefficients that have a value, under the precision of their posterior.
 ///
 /// # Errors
 /// For a coefficient that is not there, and where the fit fails.
@@ -31,10 +31,13 @@ pub fn fit_reduced(
     choice: &ReducedChoice,
     structure: &Structure,
     posterior: &Posterior,
+    means: &DVector<f64>,
 ) -> Result<ReducedFound, InferError> {
     let reduced = Reduced::new(choice, structure)?;
     let start = DVector::from_iterator(choice.start.len(), choice.start.iter().map(|(_, value)| *value));
-    let map = |theta: &DVector<f64>| reduced.at(theta, posterior.active());
+    // The posterior has its own means: c + shift − g(θ) = c − (g(θ) − shift).
+    let shift = means - posterior.mean();
+    let map = |theta: &DVector<f64>| reduced.at(theta, posterior.active()) - &shift;
     let found = reduce(posterior, &start, map).map_err(|error| named(&error, choice))?;
     let unknown = |(k, (name, _)): (usize, &(String, f64))| {
         let (estimate, sd) = (found.mean[k], found.covariance[(k, k)].max(0.0).sqrt());

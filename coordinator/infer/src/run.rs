@@ -16,7 +16,7 @@ use crate::error::InferError;
 use crate::gather::{Gathered, Work};
 use crate::reduced::fit_reduced;
 use crate::result::{Converging, Inference, RecordUsed};
-use crate::smoothed::smoothed;
+use crate::smoothed::{not_converged, smoothed};
 use crate::words;
 
 /// Blocks that a recording is cut into where the study does not say, as far as their sizes allow.
@@ -72,8 +72,9 @@ pub fn infer(
     let gathered = work.gather(fleet, &mut told)?;
     let mut answer = Answer::of(choice, &asked.fit, &asked.question.structure, &gathered.levels)?;
     if let MeasuredChoice::Known(sd) = choice.measured {
-        answer.posterior = smoothed(&asked.question, &asked.fit, &choice.records, cut, sd)?.posterior;
-        answer.extrapolated = None;
+        let found = smoothed(&asked.question, &asked.fit, &choice.records, cut, sd)?;
+        answer.doubts = not_converged(found.converged, found.log_likelihood.len()).into_iter().collect();
+        (answer.posterior, answer.extrapolated) = (found.posterior, None);
     }
     let convergence = match gathered.levels.first() {
         Some(sums) => convergence.finish(gathered.n_block, sums, &answer.posterior),
@@ -122,7 +123,9 @@ fn told_of(
 ) -> Result<Inference, InferError> {
     let choice = asked.choice;
     let structure = &asked.question.structure;
-    let reduced = choice.reduced.as_ref().map(|reduced| fit_reduced(reduced, structure, &answer.posterior));
+    let means = answer.means();
+    let reduced =
+        choice.reduced.as_ref().map(|reduced| fit_reduced(reduced, structure, &answer.posterior, &means));
     let reduced = reduced.transpose()?;
     let coefficients = answer.coefficients(choice);
     let n_step = gathered.levels.first().map_or(0, Sums::n_step);

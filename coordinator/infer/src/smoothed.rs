@@ -14,6 +14,15 @@ use starlings_study::infer_choice::InferRecord;
 /// Rounds of smoothing and fitting, and the growth of the likelihood at which they end.
 const ITERATION: Iteration = Iteration { most: 100, tolerance: 1e-3 };
 
+/// What is said of a smoothing that ended before it converged.
+pub(crate) fn not_converged(converged: bool, rounds: usize) -> Option<String> {
+    (!converged).then(|| {
+        format!(
+            "smoothing has not converged after {rounds} rounds: coefficients and noise may still move, which their intervals do not hold"
+        )
+    })
+}
+
 /// Smooths the one recording of a study under errors of standard deviation `sd` in every state, and fits.
 pub(crate) fn smoothed(
     question: &Question,
@@ -39,4 +48,16 @@ pub(crate) fn smoothed(
     let noise = Measured::Known(DMatrix::from_diagonal_element(n, n, sd * sd));
     let noisy = Noisy { basis: &question.basis, step: cut.step, times: &times, rows: &rows };
     Ok(noisy.infer(fit, &question.structure, &noise, ITERATION)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::not_converged;
+
+    #[test]
+    fn smoothing_that_has_not_converged_is_said_with_its_rounds() {
+        let said = not_converged(false, 100);
+        assert!(said.is_some_and(|said| said.contains("not converged after 100 rounds")));
+        assert_eq!(not_converged(true, 100), None);
+    }
 }

@@ -71,7 +71,7 @@ pub(crate) fn conditional_on(choice: &InferChoice, answer: &Answer) -> String {
 
 /// What is doubtful.
 pub(crate) fn warnings(choice: &InferChoice, answer: &Answer, reduced: Option<&ReducedFound>) -> Vec<String> {
-    let mut warnings = Vec::new();
+    let mut warnings = answer.doubts.clone();
     let noisy: Vec<&NoiseCheck> =
         answer.checks.iter().filter(|check| check.verdict == Verdict::Matters).collect();
     if !noisy.is_empty() && !matches!(choice.measured, MeasuredChoice::Known(_)) {
