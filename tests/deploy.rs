@@ -242,6 +242,24 @@ fn what_a_failed_submission_leaves_is_said_and_a_failed_look_is_no_failed_submis
 }
 
 #[test]
+fn what_a_deployment_sets_itself_holds_over_the_environment_and_the_options() {
+    let site = slurm("PENDING", "None", 0, 0)
+        .program("sbatch", "echo \"$SBATCH_JOB_NAME:$*\" >> $SITE/submitted; echo 7");
+    let study = repository("examples/rcr/study.toml");
+    let mut command = site.starlings(&["slurm", study.to_str().unwrap(), "--out", "pool", "--workers", "2"]);
+    let (code, _, said) = output(command.args(["--", "-p", "short"]).env("SBATCH_JOB_NAME", "mine"));
+    assert_eq!(code, 0, "{said}");
+    let submitted = std::fs::read_to_string(site.path("submitted")).unwrap();
+    assert!(submitted.starts_with(":--parsable -p short --job-name=starlings-rcr-"), "{submitted}");
+    assert!(submitted.contains(" --array=0-1 --output=/"), "{submitted}");
+    assert_eq!(site.said(&["remove", "pool"]).0, 0);
+    let cancelled = std::fs::read_to_string(site.path("cancelled")).unwrap();
+    assert!(cancelled.contains("--user="), "{cancelled}");
+    let (code, said) = site.said(&["slurm", study.to_str().unwrap(), "--out", "a\\b", "--workers", "2"]);
+    assert!(code == 2 && said.contains("backslash"), "{said}");
+}
+
+#[test]
 fn remove_cancels_before_it_looks() {
     let site = slurm("RUNNING", "None", 0, 0);
     assert_eq!(site.slurm(&["--workers", "2"]).0, 0);

@@ -75,6 +75,9 @@ pub enum DeployError {
         /// Who sets it.
         reason: &'static str,
     },
+    /// A path that no script can name safely.
+    #[error("{:?} has a backslash or a control character in it: choose another folder or name", .0)]
+    Path(PathBuf),
     /// The study does not fit into a ConfigMap.
     #[error(
         "the study and its files have {bytes} bytes, and a ConfigMap holds {most}: put its folder on a volume and name its claim with \
@@ -120,6 +123,7 @@ impl DeployError {
             | Self::Refused { .. }
             | Self::NoDeployment { .. }
             | Self::Occupied(_)
+            | Self::Path(_)
             | Self::Unreadable { .. }
             | Self::TooLarge { .. }
             | Self::Option { .. } => true,

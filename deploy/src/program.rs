@@ -1,5 +1,6 @@
 //! Running a program of an engine: to its end, within a bounded time.
 
+use std::ffi::OsStr;
 use std::io::{self, Read, Write};
 use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
@@ -74,7 +75,11 @@ impl Programs {
             engine: self.engine,
             remedy: self.remedy,
         };
-        let mut child = Command::new(program)
+        let mut command = Command::new(program);
+        for (name, _) in std::env::vars_os().filter(|(name, _)| is_option(name)) {
+            command.env_remove(name);
+        }
+        let mut child = command
             .args(arguments)
             .envs(self.environment.iter().copied())
             .stdin(Stdio::piped())
@@ -98,6 +103,12 @@ impl Programs {
         let [stdout, stderr] = [stdout, stderr].map(Heard::text);
         Ok(Said { is_well, stdout, stderr, command: shown, program: program.to_owned() })
     }
+}
+
+/// Whether a variable of the environment is an option of a program of Slurm: a deployment gives all that it needs itself.
+fn is_option(name: &OsStr) -> bool {
+    let name = name.to_string_lossy();
+    ["SBATCH_", "SQUEUE_", "SCANCEL_"].iter().any(|head| name.starts_with(head))
 }
 
 /// What a program writes, read in a thread, so that one that says much is not held up.

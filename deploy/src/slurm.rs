@@ -52,6 +52,8 @@ impl Engine for Slurm {
         for option in &order.options {
             refuse_own(option)?;
         }
+        let paths = [folder, &order.program, &order.access, &order.study];
+        paths.into_iter().chain(order.scratch.as_deref()).try_for_each(refuse_path)?;
         let values = json!({
             "name": order.name,
             "last": order.workers.saturating_sub(1),
@@ -89,8 +91,10 @@ impl Engine for Slurm {
         let coordinator = order.run_folder.as_ref().map(|_| COORDINATOR);
         let submission = |script: &str| {
             let head = ["sbatch", "--parsable"].map(str::to_owned);
+            // After the options of the user: of an option that is given twice the last holds.
+            let own = own(deployment, script);
             let script = text(&deployment.folder.join(script));
-            head.into_iter().chain(order.options.iter().cloned()).chain([script]).collect()
+            head.into_iter().chain(order.options.iter().cloned()).chain(own).chain([script]).collect()
         };
         coordinator.into_iter().chain([WORKER]).map(submission).collect()
     }
@@ -120,7 +124,7 @@ impl Engine for Slurm {
         // The coordinator first: the workers of one that goes on are missed.
         let names = [deployment.order.coordinator_name(), deployment.order.name.clone()];
         let cancelled = names.map(|name| {
-            PROGRAMS.run(&["scancel".to_owned(), format!("--name={name}")], "")?.answer().map(drop)
+            PROGRAMS.run(&["scancel".to_owned(), user(), format!("--name={name}")], "")?.answer().map(drop)
         });
         cancelled.into_iter().collect()
     }
@@ -136,17 +140,47 @@ impl Engine for Slurm {
     }
 }
 
+/// Nobody else's jobs, whatever their name, also where this user may end them.
+fn user() -> String {
+    format!("--user={}", rustix::process::geteuid().as_raw())
+}
+
 /// The pattern of a log for Slurm, in which only that of `name` is one, inside double quotes.
 fn log(folder: &Path, name: &str) -> String {
-    let folder =
-        text(&folder.join(logs::FOLDER)).replace('%', "%%").replace('\\', "\\\\").replace('"', "\\\"");
-    format!("{folder}/{name}")
+    pattern(folder, name).replace('"', "\\\"")
+}
+
+/// The same as a word of its own.
+fn pattern(folder: &Path, name: &str) -> String {
+    format!("{}/{name}", text(&folder.join(logs::FOLDER)).replace('%', "%%"))
+}
+
+/// Scripts of sbatch have no way to write such a path.
+fn refuse_path(path: &Path) -> Result<(), DeployError> {
+    if text(path).contains(|c: char| c.is_control() || c == '\\') {
+        return Err(DeployError::Path(path.to_owned()));
+    }
+    Ok(())
 }
 
 /// Slots of a worker inside double quotes of a shell: as ordered, else one for every core that the task was given.
 fn slots(order: &Order) -> String {
     let given = "${SLURM_CPUS_PER_TASK:-${SLURM_CPUS_ON_NODE:-1}}".to_owned();
     order.slots.map_or(given, |slots| slots.to_string())
+}
+
+/// What a deployment sets itself for a script.
+fn own(deployment: &Deployment, script: &str) -> Vec<String> {
+    let (order, folder) = (&deployment.order, &deployment.folder);
+    if script == COORDINATOR {
+        let name = format!("--job-name={}", order.coordinator_name());
+        return vec![name, format!("--output={}", pattern(folder, &Role::Coordinator.log()))];
+    }
+    vec![
+        format!("--job-name={}", order.name),
+        format!("--array=0-{}", order.workers.saturating_sub(1)),
+        format!("--output={}", pattern(folder, "worker-%a.log")),
+    ]
 }
 
 fn refuse_own(option: &str) -> Result<(), DeployError> {

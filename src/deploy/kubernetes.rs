@@ -6,7 +6,7 @@ use clap::Parser;
 use starlings_coordinator::study::Study;
 use starlings_deploy::{DeployError, KubernetesOrder};
 
-use super::{access, failed};
+use super::{access, failed, now};
 use crate::console::line;
 use crate::failure::Failure;
 use crate::load::{is_outside, load_where};
@@ -87,7 +87,8 @@ fn order(args: &Args, study: &Study) -> Result<KubernetesOrder, Failure> {
     let name = args.study.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let files = if args.study_claim.is_some() { Vec::new() } else { files(study, &args.study)? };
     Ok(KubernetesOrder {
-        name: KubernetesOrder::name_of(&study.name),
+        // The time tells two deployments of one study apart; with the longest ending it has no more than the 63 letters of a name.
+        name: format!("{}-{:x}", KubernetesOrder::name_of(&study.name), now()),
         image: args.image.clone(),
         workers: args.workers,
         max_workers: args.max_workers,

@@ -27,7 +27,7 @@ pub(super) fn command(order: &Order) -> Vec<String> {
     let fields: Vec<String> = FIELDS.iter().map(|(name, width)| format!("{name}:{width}{END}")).collect();
     let names = format!("--name={},{}", order.name, order.coordinator_name());
     let format = format!("--Format={}", fields.join(","));
-    ["squeue", "--noheader", "--array", "--states=all", &names, &format].map(str::to_owned).into()
+    ["squeue", "--me", "--noheader", "--array", "--states=all", &names, &format].map(str::to_owned).into()
 }
 
 /// The tasks of an answer in the order of `roles`; one that it lacks is unknown.
