@@ -184,10 +184,7 @@ fn from_start_to_end(
     context.keep_events(&folder.store)?;
     let mut result = summary::make(study, &fit, &predictions, runner.n_answered(), context.elapsed());
     result.add_residuals(study, &fit, &given_residuals);
-    if let GivenResiduals::Wider { covariance, .. } = &given_residuals {
-        let rows: Vec<Vec<f64>> = covariance.row_iter().map(|row| row.iter().copied().collect()).collect();
-        folder.store.set_meta(GIVEN_RESIDUALS, &json(&rows))?;
-    }
+    keep_covariance(&folder.store, &given_residuals)?;
     let mut unknown = None;
     match observer {
         Compared::NoObserver => {}
@@ -214,6 +211,13 @@ fn from_start_to_end(
     folder.finish(study, &fit, &result)?;
     states.clear();
     Ok(result)
+}
+
+/// Stores the covariance given the residuals, for forecasts.
+fn keep_covariance(store: &Store, given: &GivenResiduals) -> Result<(), StoreError> {
+    let GivenResiduals::Wider { covariance, .. } = given else { return Ok(()) };
+    let rows: Vec<Vec<f64>> = covariance.row_iter().map(|row| row.iter().copied().collect()).collect();
+    store.set_meta(GIVEN_RESIDUALS, &json(&rows))
 }
 
 /// How far the estimates follow the constants, or why that is not known. Empty for parameters that drift: they follow any
