@@ -85,10 +85,10 @@ pub fn crossing(rows: &[[f64; 3]], from: f64, h: f64, level: f64) -> Option<f64>
 }
 
 /// Outflow of either equation times powers of the time since the recording's first row, and what is known.
-pub fn basis(powers: usize) -> Arc<Basis> {
+pub fn basis(powers: i32) -> Arc<Basis> {
     let mut basis = Basis::new(2, 1);
     for (k, of) in ["p", "rho"].into_iter().enumerate() {
-        for power in 0..powers as i32 {
+        for power in 0..powers {
             let value = move |t: f64, x: &[f64]| t.powi(power) * outflow(x[0], x[1], x[2])[k];
             let own = if k == 0 { 1.5 } else { 0.5 };
             let slopes = move |t: f64, x: &[f64], slopes: &mut [f64]| {
