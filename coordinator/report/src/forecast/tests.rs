@@ -32,7 +32,7 @@ fn forecast(times: Vec<f64>) -> Forecast {
         output: "p".to_owned(),
         unit: "bar".to_owned(),
         at_end: [4.0, 0.0, 8.0],
-        measured_at_end: Some([-1.0, 9.0]),
+        measured_at_end: Some([-1.125, 9.125]),
         errors: Some(Errors { noise: 0.5, sd: 1.25, from: From::Residuals }),
         coverage90: Some(Coverage { train: Some(0.9), held_out: None }),
         fan: fan.clone(),
@@ -64,7 +64,8 @@ fn forecast(times: Vec<f64>) -> Forecast {
 fn a_forecast_shows_its_levels_its_fan_and_its_warnings() {
     let page = forecast_page(&forecast(vec![1.0, 1.9])).unwrap();
     assert_eq!(page.matches("<svg").count(), 2, "the fan and the crossings");
-    let bands = ["-1 to 9", "1.25 bar (its training residuals)", "Bands are conditional on the model"];
+    let bands =
+        ["−1.125 to 9.125", "1.25 bar (its training residuals)", "Bands are conditional on the model"];
     for text in ["motor &lt;1&gt;", "p &gt; 3: crossed", "inputs stay", "0.2 by 1.5", "90\u{a0}%"]
         .into_iter()
         .chain(bands)
