@@ -66,7 +66,7 @@ fn a_forecast_shows_its_levels_its_fan_and_its_warnings() {
     assert_eq!(page.matches("<svg").count(), 2, "the fan and the crossings");
     let bands =
         ["−1.125 to 9.125", "1.25 bar (its training residuals)", "Bands are conditional on the model"];
-    for text in ["motor &lt;1&gt;", "p &gt; 3: crossed", "inputs stay", "0.2 by 1.5", "90\u{a0}%"]
+    for text in ["motor &lt;1&gt;", "p &gt; 3: crossed", "inputs stay", "0.200 by 1.5", "90\u{a0}%"]
         .into_iter()
         .chain(bands)
     {
