@@ -83,7 +83,7 @@ fn test_names(text: &str) -> Vec<&str> {
 
 #[test]
 fn every_test_that_holds_an_invariant_stands_in_the_file_named_after_it() {
-    let text = std::fs::read_to_string(repository("ARCHITECTURE.md")).unwrap();
+    let text = std::fs::read_to_string(repository("docs/invariants.md")).unwrap();
     let invariants = text.split("## Invariants").nth(1).unwrap().split("\n## ").next().unwrap();
     let mut found = 0;
     // `name`, `name` (file), `name` (file): the names before each parenthesis belong to the file in it.
