@@ -3,6 +3,7 @@
 //! Shared by every command that runs the model on the fleet. Next file to read: [`crate::run`].
 
 mod entrance;
+mod load_file;
 mod plan;
 mod relay;
 
@@ -31,6 +32,7 @@ use crate::progress::Display;
 use crate::solvers::own_program;
 pub(crate) use entrance::Entrance;
 use entrance::failed;
+use load_file::LoadFile;
 use plan::{ACCESS, AccessPlan, Plan};
 use relay::relay;
 
@@ -112,6 +114,8 @@ pub(crate) struct FleetSession {
     pub(crate) fleet: GrpcFleet,
     local: Option<LocalWorkers>,
     access: Option<Access>,
+    /// How much work there is, where that is asked for.
+    load: Option<LoadFile>,
     /// How to start workers, once they may come from elsewhere.
     invitation: Arc<OnceLock<String>>,
     /// What happened, for the store.
@@ -155,7 +159,7 @@ impl FleetSession {
             let missing = || [refused.summary(), told.get().cloned()];
             relay(heard, &kept, &display, listens, missing);
         });
-        Ok(Self { fleet, local: None, access, invitation, events, watcher })
+        Ok(Self { fleet, local: None, access, load: None, invitation, events, watcher })
     }
 
     /// Starts the local workers, or says how to start others; `folder` is the run folder, where there is one.
@@ -210,6 +214,7 @@ impl FleetSession {
             access.publish(&file, run, address, plan.host.as_deref()).map_err(|fault| failed(&fault))?;
         }
         let absolute = std::path::absolute(&file).unwrap_or(file);
+        self.load = LoadFile::beside(&absolute, self.fleet.handle());
         let name = shell_words::quote(&absolute.to_string_lossy()).into_owned();
         self.say_how(address, &format!("starlings worker --access {name}{}", plan.states_option()));
         Ok(())
@@ -243,7 +248,9 @@ impl FleetSession {
         if !is_done {
             self.fleet.handle().break_off();
         }
-        let Self { fleet, local, watcher, mut access, .. } = self;
+        let Self { fleet, local, watcher, mut access, load, .. } = self;
+        // It has a hold on the fleet, which ends with the last one.
+        drop(load);
         // Before the workers leave: one that stays looks there for what comes next.
         if let Some(access) = &mut access {
             access.end();

@@ -134,6 +134,7 @@ fn start(order: &Order, indices: &[usize], access: Option<&str>) -> Result<Strin
         "is_solver": order.is_solver,
         "study": text(&order.study),
         "keeps_code": true,
+        "processes": null,
     });
     script("hosts-start.sh", values)
 }

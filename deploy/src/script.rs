@@ -13,6 +13,7 @@ use crate::error::DeployError;
 const TEMPLATES: &[(&str, &str)] = &[
     ("worker.sh", include_str!("../templates/worker.sh")),
     ("worker.sbatch", include_str!("../templates/worker.sbatch")),
+    ("worker.pbs", include_str!("../templates/worker.pbs")),
     ("coordinator.sbatch", include_str!("../templates/coordinator.sbatch")),
     ("hosts-start.sh", include_str!("../templates/hosts-start.sh")),
     ("hosts-ask.sh", include_str!("../templates/hosts-ask.sh")),

@@ -44,9 +44,9 @@ use std::time::Duration;
 
 use starlings_proto::{SetupId, StateId};
 
-use super::FleetEvent;
 use super::job_name::JobName;
 use super::wire::Outcome;
+use super::{FleetEvent, Load, WorkerLoad};
 use batch::{Batch, Lost};
 pub(crate) use doubt::Asked;
 pub(crate) use held::Taken;
@@ -134,6 +134,15 @@ impl Dispatcher {
     /// Number of workers.
     pub(crate) fn n_workers(&self) -> usize {
         self.workers.len()
+    }
+
+    /// How much work there is, and who makes it.
+    pub(crate) fn load(&self) -> Load {
+        let worker = |w: &Worker| WorkerLoad { name: w.name.clone(), slots: w.slots, jobs: w.load() };
+        Load {
+            unfinished: self.batch.as_ref().map_or(0, Batch::n_unfinished),
+            workers: self.workers.values().map(worker).collect(),
+        }
     }
 
     /// Number of slots of all workers.

@@ -35,7 +35,7 @@ use super::event_text::{BROKEN_OFF, OVER};
 use super::identity::RunIdentity;
 use super::job_name::JobName;
 use super::outbox::Outbox;
-use super::{FleetEvent, Held, Outcome, StateStore, StoredState};
+use super::{FleetEvent, Held, Load, Outcome, StateStore, StoredState};
 pub(super) use blocks::{Made, Work};
 use locked::Locked;
 pub(super) use state::{Closed, SetupShape, Submission};
@@ -131,6 +131,10 @@ impl Hub {
     pub(super) fn counts(&self) -> (usize, usize) {
         let state = self.lock();
         (state.dispatcher.n_workers(), state.dispatcher.slots())
+    }
+
+    pub(super) fn load(&self) -> Load {
+        self.lock().dispatcher.load()
     }
 
     /// Takes a setup as it travels, with the names of its parameters, and the length of a state where it is known.

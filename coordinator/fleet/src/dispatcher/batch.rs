@@ -158,6 +158,11 @@ impl Batch {
         (index < self.jobs.len()).then_some(index)
     }
 
+    /// Jobs without an outcome.
+    pub(super) fn n_unfinished(&self) -> usize {
+        self.jobs.len() - self.ended.len()
+    }
+
     pub(super) fn is_done(&self) -> bool {
         self.ended.len() == self.jobs.len()
     }
