@@ -45,7 +45,7 @@ faults:
 chaos:
     STARLINGS_WRITE_PAGES=1 cargo test --test chaos -- --ignored --nocapture
 
-# Workers under a real Slurm of four nodes on this machine: a node killed, a coordinator requeued. Minutes; needs root, installs slurm-wlm and
+# Workers under a real Slurm of four nodes on this machine: a node killed, a coordinator requeued, a pool that follows the work. Minutes; needs root, installs slurm-wlm and
 # munge where they are missing.
 slurm:
     .ci/slurm test
@@ -53,6 +53,12 @@ slurm:
 # The manifests for Kubernetes, strictly against its published schemas; installs the validator and kubectl into target/kubernetes.
 kubernetes:
     .ci/kubernetes
+
+# The image without a registry: its root file system around the debug build, the pig's aorta run in it by chroot as its user, and the image
+# where buildah is there. Needs root.
+container:
+    cargo build --workspace
+    .ci/container
 
 # Every fuzz target for FUZZ_SECONDS each, 600 by default (cargo install cargo-fuzz; a stable compiler is told to take the fuzzer's flags).
 fuzz:

@@ -221,7 +221,10 @@ fn a_node_with_another_build_is_named_with_both_builds() {
     assert_eq!(worker.end(), Some(0), "{}", worker.said());
     let said = coordinator.said();
     let line = said.lines().find(|line| line.contains("another build")).unwrap_or_else(|| panic!("{said}"));
-    assert!(line.starts_with("worker 1@") && line.contains(" runs another build of this version ("), "{line}");
+    assert!(
+        line.starts_with("worker 1@") && line.contains(" runs another build of this version ("),
+        "{line}"
+    );
     assert!(line.contains(" instead of ") && line.contains("may differ in the last digits"), "{line}");
 }
 

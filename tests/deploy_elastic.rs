@@ -7,7 +7,9 @@ mod access_kit;
 mod common;
 mod deploy_kit;
 
-use access_kit::Started;
+use access_kit::{Started, worker};
+use common::studies::slow;
+use common::{starlings, wait_until};
 use deploy_kit::Site;
 use serde_json::{Value, json};
 
@@ -102,4 +104,49 @@ fn a_pool_that_may_be_empty_waits_for_its_coordinator_and_ends_after_it() {
     watch.await_words("2 workers released, 2 → 0");
     assert_eq!(watch.end(), Some(0), "{}", watch.said());
     assert!(watch.said().contains("no process is left"), "{}", watch.said());
+}
+
+#[test]
+fn a_pool_that_is_removed_is_not_filled_again_by_whoever_watches_it() {
+    let site = queue();
+    assert_eq!(site.slurm(&["--elastic", "1..4"]).0, 0);
+    let mut watch = Started::of(&mut site.starlings(&["watch", "pool", "--every", "0.1"]));
+    work(&site, 1, false, 3);
+    watch.await_words("2 workers added, 1 → 3");
+    // The coordinator still has work.
+    let (code, said) = site.said(&["remove", "pool"]);
+    assert!(code == 0 && said.contains("nothing is left"), "{said}");
+    assert_eq!(watch.end(), Some(0), "{}", watch.said());
+    assert_eq!(std::fs::read_to_string(site.path("submitted")).unwrap(), "0\n1-2\n");
+}
+
+#[test]
+fn a_coordinator_tells_its_work_where_a_deployment_asks_for_that_and_in_the_end_that_it_has_ended() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = slow(folder.path(), 2);
+    let path = |name: &str| folder.path().join(name);
+    std::fs::write(path("access.load"), "").unwrap();
+    let told = || -> Value {
+        let text = std::fs::read_to_string(path("access.load")).unwrap();
+        serde_json::from_str(&text).unwrap_or_default()
+    };
+    let mut call = starlings();
+    call.arg("run").arg(&study).args(["--listen", "127.0.0.1:0", "--access"]).arg(path("access.json"));
+    let mut coordinator = Started::of(call.arg("--out").arg(path("run")));
+    coordinator.await_words("listening on ");
+    let mut worker = worker(&path("access.json"), &[]);
+    let own = format!("/{}", worker.child.id());
+    wait_until("a worker with runs", || {
+        let told = told();
+        let named = told["workers"][0]["name"]
+            .as_str()
+            .is_some_and(|name| name.starts_with("1@") && name.ends_with(&own));
+        named
+            && told["unfinished"].as_u64() > Some(0)
+            && told["workers"][0]["slots"] == 1
+            && told["ended"] == false
+    });
+    assert_eq!(coordinator.end(), Some(0), "{}", coordinator.said());
+    assert_eq!((&told()["ended"], &told()["unfinished"]), (&true.into(), &0.into()));
+    assert_eq!(worker.end(), Some(0), "{}", worker.said());
 }

@@ -16,6 +16,9 @@ use crate::task::{Role, State, Task};
 /// Name of the file that says what a folder deploys.
 pub const FILE: &str = "deployment.json";
 
+/// Name of the file that says that it was removed.
+const REMOVED: &str = "removed";
+
 /// Number of its format.
 const FORMAT: u64 = 1;
 
@@ -111,6 +114,33 @@ impl Deployment {
             task.says = self.unreached(task.role);
         }
         Ok(tasks)
+    }
+
+    /// Does something that submits more, unless the deployment is removed; what removes it waits for that.
+    pub fn unless_removed<T>(&self, act: impl FnOnce() -> T) -> Option<T> {
+        let _lock = self.lock();
+        (!self.is_removed()).then(act)
+    }
+
+    /// Whether it is removed.
+    pub fn is_removed(&self) -> bool {
+        self.folder.join(REMOVED).exists()
+    }
+
+    /// Notes that the deployment is removed: whoever watches it submits nothing more.
+    ///
+    /// # Errors
+    /// When that cannot be written.
+    pub fn note_removed(&self) -> Result<(), DeployError> {
+        let _lock = self.lock();
+        let path = self.folder.join(REMOVED);
+        fs::write(&path, "").map_err(|source| DeployError::Unwritable { path, source })
+    }
+
+    /// Held by one process at a time; nothing on file systems without locks.
+    fn lock(&self) -> Option<File> {
+        let file = File::open(self.folder.join(FILE)).ok()?;
+        file.lock().ok().map(|()| file)
     }
 
     /// Cancels what was submitted before an error, and says with it what is left.

@@ -56,6 +56,9 @@ impl Scale {
     /// Looks at the work and at the tasks, and has the engine add or end workers. Whether a coordinator is there
     /// or may still come.
     pub(super) fn look(&mut self, deployment: &Deployment, tasks: &[Task]) -> bool {
+        if deployment.is_removed() {
+            return false;
+        }
         let work = self.work();
         let workers: Vec<&Task> = tasks.iter().filter(|task| is_there(task)).collect();
         let unfinished = work.as_ref().map_or(0, |work| work.unfinished);
@@ -98,9 +101,10 @@ fn add(deployment: &Deployment, tasks: &[Task], there: usize, n: usize, unfinish
     if numbers.is_empty() {
         return;
     }
-    match deployment.engine().add(deployment, &numbers) {
-        Ok(()) => tell(deployment, "workers-added", there, there + numbers.len(), unfinished),
-        Err(error) => note(format_args!("warning: no workers are added: {error}")),
+    match deployment.unless_removed(|| deployment.engine().add(deployment, &numbers)) {
+        None => {}
+        Some(Ok(())) => tell(deployment, "workers-added", there, there + numbers.len(), unfinished),
+        Some(Err(error)) => note(format_args!("warning: no workers are added: {error}")),
     }
 }
 
