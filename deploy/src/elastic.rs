@@ -88,7 +88,7 @@ impl Policy {
     /// on their way.
     pub fn look(&mut self, at: Duration, wanted: usize, there: usize) -> Change {
         self.looks.push_back((at, wanted.clamp(self.limits.least, self.limits.most)));
-        while self.looks.get(1).is_some_and(|(then, _)| at - *then >= self.patience.release) {
+        while self.looks.get(1).is_some_and(|(then, _)| at.saturating_sub(*then) >= self.patience.release) {
             self.looks.pop_front();
         }
         let least = self.over(self.patience.add).and_then(Iterator::min);
@@ -104,7 +104,7 @@ impl Policy {
     fn over(&self, time: Duration) -> Option<impl Iterator<Item = usize>> {
         let now = self.looks.back()?.0;
         // What was wanted at a look held until the next one.
-        let begin = self.looks.iter().rposition(|(then, _)| now - *then >= time)?;
+        let begin = self.looks.iter().rposition(|(then, _)| now.saturating_sub(*then) >= time)?;
         Some(self.looks.range(begin..).map(|(_, wanted)| *wanted))
     }
 }

@@ -59,32 +59,46 @@ impl Scale {
         if deployment.is_removed() {
             return false;
         }
-        let work = self.work();
+        let told = self.told();
+        let work = if let Told::Work(work) = &told { Some(work) } else { None };
         let workers: Vec<&Task> = tasks.iter().filter(|task| is_there(task)).collect();
-        let unfinished = work.as_ref().map_or(0, |work| work.unfinished);
+        let unfinished = work.map_or(0, |work| work.unfinished);
         self.slots = work.iter().flat_map(|work| &work.workers).map(|w| w.slots).max().unwrap_or(self.slots);
         let wanted = self.limits.wanted(unfinished, self.slots);
         match self.policy.look(self.started.elapsed(), wanted, workers.len()) {
             // Without a coordinator a pool ends by its idle time.
             Change::Add(n) if work.is_some() => add(deployment, tasks, workers.len(), n, unfinished),
-            Change::Release(n) => release(deployment, work.as_ref(), &workers, n, unfinished),
+            Change::Release(n) => release(deployment, &told, &workers, n, unfinished),
             Change::Add(_) | Change::None => {}
         }
         self.has_come |= work.is_some();
         work.is_some() || !self.has_come
     }
 
-    /// What the coordinator says, where one is there.
-    fn work(&mut self) -> Option<Work> {
-        let work = Work::read(&self.file)?;
+    /// What the coordinator says.
+    fn told(&mut self) -> Told {
+        let Some(work) = Work::read(&self.file) else { return Told::Nothing };
+        if work.ended {
+            return Told::Ended;
+        }
         let (count, since) = *self.seen.get_or_insert_with(|| (work.count, Instant::now()));
         if count != work.count {
             self.seen = Some((work.count, Instant::now()));
         } else if since.elapsed() > BELIEVED {
-            return None;
+            return Told::Nothing;
         }
-        (!work.ended).then_some(work)
+        Told::Work(work)
     }
+}
+
+/// What a coordinator says of its work.
+enum Told {
+    /// Nothing: none has come, or it is gone without a word.
+    Nothing,
+    /// It has ended.
+    Ended,
+    /// This.
+    Work(Work),
 }
 
 /// Whether a task is a worker that is there or on its way.
@@ -109,10 +123,14 @@ fn add(deployment: &Deployment, tasks: &[Task], there: usize, n: usize, unfinish
 }
 
 /// Ends workers that have not begun, then those that are idle, of each the last first.
-fn release(deployment: &Deployment, work: Option<&Work>, workers: &[&Task], n: usize, unfinished: usize) {
+fn release(deployment: &Deployment, told: &Told, workers: &[&Task], n: usize, unfinished: usize) {
     let is_idle = |task: &Task| {
-        // Nobody gives work where there is no coordinator.
-        let Some(work) = work else { return true };
+        let work = match told {
+            Told::Work(work) => work,
+            Told::Ended => return true,
+            // Workers may hold results that the coordinator needs when it is back.
+            Told::Nothing => return false,
+        };
         let process = deployment.process(task.role).unwrap_or_default();
         let own = work.workers.iter().find(|worker| worker.is(&process));
         own.is_some_and(|worker| worker.runs == 0 && worker.idle_s >= IDLE_S)

@@ -78,7 +78,10 @@ impl Looks {
                 name: worker.name.clone(),
                 slots: worker.slots,
                 runs: worker.jobs,
-                idle_s: self.worked.get(&worker.name).map_or(0, |worked| (now - *worked).as_secs()),
+                idle_s: self
+                    .worked
+                    .get(&worker.name)
+                    .map_or(0, |worked| now.saturating_duration_since(*worked).as_secs()),
             };
             let workers = load.workers.iter().map(of_worker).collect();
             self.write(&Work { count: self.n, ended: false, unfinished: self.most, workers });

@@ -21,8 +21,8 @@ struct Answer {
 /// Attributes of pbs_job_attributes(7B).
 #[derive(Deserialize)]
 struct Job {
-    #[serde(default)]
-    job_state: String,
+    #[serde(default, rename = "job_state")]
+    state: String,
     #[serde(default)]
     exec_host: Option<String>,
     #[serde(default)]
@@ -97,7 +97,7 @@ impl Job {
 
     /// States of qstat(1B).
     fn state(&self) -> State {
-        match (self.job_state.as_str(), self.exit_status) {
+        match (self.state.as_str(), self.exit_status) {
             ("Q" | "H" | "W" | "T" | "M", _) => State::Waiting,
             ("R" | "S" | "U" | "B", _) => State::Running,
             ("E", _) => State::Ending,
