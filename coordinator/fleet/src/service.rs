@@ -49,6 +49,13 @@ impl fleet_server::Fleet for Service {
         transfer::lend(&self.hub, request.get_ref(), way(&request)).map(Response::new)
     }
 
+    async fn give_back(
+        &self,
+        request: Request<generated::GiveBackRequest>,
+    ) -> Result<Response<generated::GivenBack>, Status> {
+        transfer::give_back(&self.hub, request.get_ref()).map(Response::new)
+    }
+
     async fn work(
         &self,
         request: Request<Streaming<generated::FromWorker>>,
