@@ -5,8 +5,8 @@
 mod fleet_kit;
 
 use fleet_kit::inherited::{part, workers, workers_after};
-use fleet_kit::large::{BYTES, assert_moved, await_bytes, job, moved};
-use fleet_kit::lent::{await_nothing, fleet, run};
+use fleet_kit::large::{BYTES, assert_moved, await_bytes, await_nothing, job, moved};
+use fleet_kit::lent::{fleet, run};
 use fleet_kit::{await_event, factory};
 use rustix::process::{Resource, Rlimit, setrlimit};
 use starlings_fleet::{Fleet, FleetEvent};

@@ -6,7 +6,7 @@ mod fleet_kit;
 use std::net::SocketAddr;
 
 use fleet_kit::hand::{Hand, block_on, hello};
-use fleet_kit::large::{answer, given};
+use fleet_kit::large::{answer, await_nothing, given};
 use fleet_kit::{any_port, listen_with};
 use starlings_fleet::{Fleet, Folder, Held, StateStore};
 use starlings_models::{Job, Setup, Window};
@@ -99,7 +99,7 @@ fn a_stranger_neither_gets_nor_puts_a_state() {
         stranger.stay_until_drained().await;
     });
     assert!(values == vec![2.0; N]);
-    assert_eq!(store.n_pieces(), 0);
+    await_nothing(&store);
 }
 
 #[test]
@@ -147,7 +147,7 @@ fn what_is_put_wrongly_is_refused_and_leaves_nothing() {
         hand.stay_until_drained().await;
     });
     assert!(values == vec![5.0; N]);
-    assert_eq!(store.n_pieces(), 0);
+    await_nothing(&store);
 }
 
 #[test]
@@ -168,7 +168,7 @@ fn a_liar_about_its_state_is_set_aside_and_the_job_runs_elsewhere() {
         thief.stay_until_drained().await;
     });
     assert!(values == vec![7.0; N]);
-    assert_eq!(store.n_pieces(), 0);
+    await_nothing(&store);
 }
 
 #[test]
@@ -206,7 +206,7 @@ fn a_hoarder_has_no_more_transfers_than_its_slots_can_need() {
         hand.stay_until_drained().await;
     });
     assert!(values == vec![8.0; N]);
-    assert_eq!(store.n_pieces(), 0);
+    await_nothing(&store);
 }
 
 #[test]
@@ -239,6 +239,6 @@ fn names_of_pieces_count_where_these_stand_in_the_shared_folder() {
         hand.stay_until_drained().await;
     });
     assert!(values == vec![9.0; N]);
+    await_nothing(&store);
     store.tidy();
-    assert_eq!(store.n_pieces(), 0);
 }

@@ -1,6 +1,7 @@
 //! Runs with states that travel by themselves: a model whose every value tells what went in, and workers by hand that are given them.
 
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use starlings_fleet::{Outcome, StateStore};
 use starlings_models::{Job, Prediction, Window};
@@ -63,11 +64,20 @@ pub fn answer(hand: &Hand, lease: Lease, state: StateId) {
     hand.say(FromWorker::Result { lease, answer: LeaseOutcome::Ran(Ok(prediction)), cost: 0.1 });
 }
 
-/// Waits until the store has so many bytes in memory: memory goes on a thread of its own.
+/// Waits until the store has so many bytes in memory: what is let go of goes on a thread of its own.
 pub fn await_bytes(store: &StateStore, bytes: usize) {
-    let begun = std::time::Instant::now();
-    while store.in_memory().0 != bytes {
+    await_store(store, || store.in_memory().0 == bytes);
+}
+
+/// Waits until the store is empty.
+pub fn await_nothing(store: &StateStore) {
+    await_store(store, || (store.n_pieces(), store.in_memory().0) == (0, 0));
+}
+
+fn await_store(store: &StateStore, is_so: impl Fn() -> bool) {
+    let begun = Instant::now();
+    while !is_so() {
         assert!(begun.elapsed().as_secs() < 60, "{} pieces, {:?}", store.n_pieces(), store.in_memory());
-        std::thread::sleep(std::time::Duration::from_millis(1));
+        std::thread::sleep(Duration::from_millis(1));
     }
 }

@@ -6,7 +6,7 @@ use starlings_fleet::{Fleet, FleetEvent, GrpcFleet, Held, StateStore};
 use starlings_models::Setup;
 
 use super::inherited::workers;
-use super::large::{await_bytes, job};
+use super::large::{await_nothing, job};
 use super::private_with;
 
 pub fn fleet(memory: usize) -> (GrpcFleet, StateStore, Receiver<FleetEvent>) {
@@ -33,10 +33,4 @@ pub fn under(part: &str, memory: usize) -> Vec<f64> {
     drop(fleet);
     await_nothing(&store);
     values
-}
-
-/// Waits until the store is empty.
-pub fn await_nothing(store: &StateStore) {
-    await_bytes(store, 0);
-    assert_eq!(store.n_pieces(), 0);
 }
