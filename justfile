@@ -76,6 +76,15 @@ deaths:
 large-states:
     cargo test --release --test large_states -- --ignored --nocapture
 
+# Pieces of states in a bucket, with the feature s3, against a server of its own; installs that into target/s3.
+s3:
+    .ci/s3
+
+# A solver in Python with a state of 256 MB: the posterior of a small one, and what coordinator, workers and solvers hold. Needs .ci/solvers and
+# six gigabytes of memory.
+largest-states:
+    cargo test --release --test largest_states -- --ignored --nocapture
+
 # What large states cost: 22 states of 8 MB both ways on every way, four of 256 MB in 256 MB of memory, and through a shared folder. A minute;
 # needs 5 GB in the folder for temporary files.
 states:

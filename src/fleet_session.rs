@@ -59,7 +59,7 @@ pub(crate) struct FleetArgs {
     #[arg(long, value_name = "SIZE", default_value = "1 GiB", value_parser = memory)]
     state_memory: usize,
     /// Folder on a file system that all machines see: states of particles that are larger than 256 KiB stand there, and workers
-    /// that name it too read, write and mix them there.
+    /// that name it too read, write and mix them there. With the feature s3 also s3://BUCKET/PREFIX.
     #[arg(long, value_name = "FOLDER", conflicts_with = "state_memory")]
     states: Option<PlaceName>,
 }

@@ -46,7 +46,7 @@ pub(crate) struct Args {
     #[arg(long)]
     once: bool,
     /// Folder for states of particles as this machine sees it, where the coordinator names the same one with its --states: states
-    /// that are larger than 256 KiB are read, written and mixed there.
+    /// that are larger than 256 KiB are read, written and mixed there. With the feature s3 also s3://BUCKET/PREFIX.
     #[arg(long, value_name = "FOLDER")]
     states: Option<PlaceName>,
     /// Place among the workers that one coordinator started on this machine, by which their solvers find their cores.

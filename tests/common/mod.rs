@@ -2,6 +2,7 @@
 
 #![allow(dead_code)] // every test file uses its own part
 
+pub(crate) mod python;
 pub(crate) mod studies;
 
 use std::path::{Path, PathBuf};

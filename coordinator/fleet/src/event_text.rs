@@ -107,21 +107,7 @@ impl fmt::Display for FleetEvent {
                 write!(f, "worker {worker} is set aside for {seconds} s, its runs go to others: {reason}")
             }
             Self::WorkerBack { worker } => write!(f, "worker {worker} makes runs again"),
-            Self::ControlRun { particle, record, worker, fault } => {
-                let found = controlled(fault.as_deref());
-                write!(f, "particle {particle}, record {record}: failed again on worker {worker}, {found}")
-            }
-            Self::JobRetried { particle, record, worker, reason } => {
-                write!(f, "particle {particle}, record {record}: tried again after worker {worker}: {reason}")
-            }
-            Self::JobFailed { particle, record, parameters, attempts, reason } => {
-                let s = if *attempts == 1 { "" } else { "s" };
-                let with = with(parameters);
-                write!(
-                    f,
-                    "particle {particle}, record {record}{with}: given up after {attempts} attempt{s}: {reason}"
-                )
-            }
+            Self::ControlRun { .. } | Self::JobRetried { .. } | Self::JobFailed { .. } => runs(self, f),
             Self::RunsBrought { worker, finished, computing } => {
                 write!(
                     f,
@@ -139,6 +125,28 @@ impl fmt::Display for FleetEvent {
             Self::Waiting { .. } | Self::Progress { .. } => going(self, f),
             Self::LocalWorkerRestarted { .. } | Self::LocalWorkerGivenUp { .. } => local(self, f),
         }
+    }
+}
+
+/// How a run went that gave no result.
+fn runs(event: &FleetEvent, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    match event {
+        FleetEvent::ControlRun { particle, record, worker, fault } => {
+            let found = controlled(fault.as_deref());
+            write!(f, "particle {particle}, record {record}: failed again on worker {worker}, {found}")
+        }
+        FleetEvent::JobRetried { particle, record, worker, reason } => {
+            write!(f, "particle {particle}, record {record}: tried again after worker {worker}: {reason}")
+        }
+        FleetEvent::JobFailed { particle, record, parameters, attempts, reason } => {
+            let s = if *attempts == 1 { "" } else { "s" };
+            let with = with(parameters);
+            write!(
+                f,
+                "particle {particle}, record {record}{with}: given up after {attempts} attempt{s}: {reason}"
+            )
+        }
+        _ => Ok(()),
     }
 }
 

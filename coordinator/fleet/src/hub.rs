@@ -9,6 +9,7 @@ mod blocks;
 mod doorway;
 mod excluded;
 mod held;
+mod link;
 mod locked;
 mod mixing;
 mod replies;
@@ -37,9 +38,10 @@ use super::job_name::JobName;
 use super::outbox::Outbox;
 use super::{FleetEvent, Held, Load, Outcome, StateStore, StoredState};
 pub(super) use blocks::{Made, Work};
+use link::Link;
 use locked::Locked;
+use state::State;
 pub(super) use state::{Closed, SetupShape, Submission};
-use state::{Link, State};
 
 /// Answer to the caller of a batch.
 pub(super) type Reply = Result<Vec<Outcome<Held>>, BatchError>;
