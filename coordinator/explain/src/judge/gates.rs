@@ -10,7 +10,7 @@ use super::adequacy::Adequacy;
 use super::form::Leftover;
 use super::held_out::{HeldOut, held_out};
 use super::misfit::Misfit;
-use super::uncertainty::{Uncertainty, allowances};
+use super::uncertainty::allowances;
 use crate::fit::fitted_variant::FittedVariant;
 use crate::fit::model_variant::AddedEffect;
 use crate::number::{spaced, three, times};
@@ -230,23 +230,18 @@ fn held_out_span(before: Misfit, judged: &JudgedFit<'_>) -> Option<Refusal> {
     })
 }
 
-/// The refusal for a held-out channel that gets worse, by more than the uncertainty of the estimate explains.
+/// The refusal for a held-out channel that gets worse.
 fn held_out_channel(
     cache: &RunCache<'_>,
     base: &FittedVariant<'_>,
     fit: &FittedVariant<'_>,
 ) -> Option<Refusal> {
     let rows = &cache.rows;
-    let uncertainty = Uncertainty::of(cache, fit);
-    let (was, is) = (rows.whitened(&base.predicted), rows.whitened(&fit.predicted));
     for (output, name) in cache.study.setup.outputs.iter().enumerate() {
         let of = |row: &Row| row.output == output && row.usage == Usage::HeldOutChannel;
         let Some(row) = rows.rows.iter().find(|row| of(row)) else { continue };
         let (before, after) = (rows.rmse(&base.predicted, of), rows.rmse(&fit.predicted, of));
-        let at: Vec<usize> = (0..rows.rows.len()).filter(|i| of(&rows.rows[*i])).collect();
-        let squares = |e: &[f64]| at.iter().map(|i| e[*i].powi(2)).sum::<f64>();
-        let explained = uncertainty.as_ref().map_or(0.0, |of| of.allowance(&at));
-        if after > before * WORSE && squares(&is) - explained > squares(&was) * WORSE * WORSE {
+        if after > before * WORSE {
             return Some(Refusal {
                 gate: "held-out channel",
                 reason: format!(
