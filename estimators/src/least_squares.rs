@@ -46,7 +46,7 @@ pub struct LeastSquares {
 
 impl LeastSquares {
     /// A fit from a point that was not run yet. It ends when no step promises a fall of the cost (chi-square plus prior) above
-    /// `tolerance`, or after `trials` steps.
+    /// `tolerance`, counted in the mean square of the residuals where that is above one, or after `trials` steps.
     pub fn new(start: DVector<f64>, prior: Scaled, tolerance: f64, trials: usize) -> Self {
         let need = Need::Residual(start.clone());
         Self {
@@ -127,6 +127,13 @@ impl LeastSquares {
     /// The fall of the cost that the linear model predicted for the last step that was considered.
     pub fn last_promise(&self) -> f64 {
         self.predicted
+    }
+
+    /// Mean square of the residuals at the best point, at least one: the unit in which a fall of the cost counts. Residuals far above
+    /// the stated noise have an optimum that no absolute fall of the cost can name, since its digits are lost in their sum.
+    pub fn mean_square(&self) -> f64 {
+        let n = self.residual.len().max(1) as f64;
+        (self.residual.norm_squared() / n).max(1.0)
     }
 
     /// Steps that it may still try.
@@ -248,7 +255,7 @@ impl LeastSquares {
             self.need = Need::Nothing(End::Stalled);
             return;
         };
-        if self.predicted <= self.tolerance {
+        if self.predicted <= self.tolerance * self.mean_square() {
             self.need = if self.fresh {
                 Need::Nothing(End::Converged)
             } else if self.thorough {

@@ -31,6 +31,19 @@ pub(crate) fn output(command: &mut Command) -> (i32, String, String) {
     (out.status.code().unwrap_or(-1), text(out.stdout), text(out.stderr))
 }
 
+/// Expects a command to be refused with exit code 2, nothing on standard output and every one of `words`.
+pub(crate) fn refused(command: &mut Command, words: &[&str]) {
+    let (code, stdout, stderr) = output(command);
+    // Line breaks of the display may fall anywhere.
+    let flat =
+        stderr.split_whitespace().filter(|w| !matches!(*w, "│" | "×" | "╰─▶")).collect::<Vec<_>>().join(" ");
+    assert_eq!(code, 2, "{stderr}");
+    assert_eq!(stdout, "");
+    for word in words {
+        assert!(flat.contains(word), "no `{word}` in: {flat}");
+    }
+}
+
 /// Runs a study into `out` with local workers and returns its summary.
 pub(crate) fn run(study: &Path, out: &Path, workers: usize) -> serde_json::Value {
     let mut command = starlings();

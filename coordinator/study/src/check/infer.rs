@@ -16,7 +16,7 @@ use toml::Spanned;
 use super::built::CheckedModel;
 use super::settings::{estimator, fleet};
 use super::{check_name, model};
-use crate::checked::{ExplainChoice, SpectrumChoice, Study};
+use crate::checked::Study;
 use crate::file::StudyFile;
 use crate::file::infer::InferSection;
 use crate::file::read::read;
@@ -38,30 +38,9 @@ pub(super) fn study(path: &Path, text: &str) -> Result<Study, StudyError> {
     let (Some(CheckedModel { setup, spec, candidates, delays, .. }), Some(infer)) = (built, infer) else {
         return Err(StudyError { problems: Vec::new() });
     };
-    Ok(Study {
-        file: path.to_owned(),
-        text: Arc::clone(&source.text),
-        name: file.study.name.into_inner(),
-        says: file.study.says,
-        seed: file.study.seed,
-        time_unit: file.study.time_unit,
-        setup,
-        spec,
-        candidates: Arc::new(candidates),
-        parameters: Vec::new(),
-        theta: Vec::new(),
-        records: Arc::default(),
-        estimator,
-        fleet,
-        explain: ExplainChoice::default(),
-        spectrum: SpectrumChoice::default(),
-        infer: Some(Arc::new(infer)),
-        delays,
-        runs_here: true,
-        whole_answers: false,
-        solver_host: host,
-        warnings: Vec::new(),
-    })
+    let mut study = super::study_of(path, &source, file, (setup, spec), (fleet, estimator), &host);
+    (study.candidates, study.delays, study.infer) = (Arc::new(candidates), delays, Some(Arc::new(infer)));
+    Ok(study)
 }
 
 /// What the file asks of its model; `None` where a problem was reported.
