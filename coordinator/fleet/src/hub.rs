@@ -11,6 +11,7 @@ mod excluded;
 mod held;
 mod locked;
 mod mixing;
+mod reading;
 mod replies;
 mod state;
 mod states;
@@ -94,6 +95,7 @@ impl Hub {
         if let FleetEvent::Listening { address } = event {
             state.doorway.address = Some(address);
         }
+        state.counting.happened(&event);
         state.events.tell(now, event);
     }
 
@@ -184,6 +186,7 @@ impl Hub {
             probe: self.probe.as_ref().map(|probe| probe.pieces()[0]),
         };
         link.send(ToWorker::welcome(welcome));
+        state.counting.joined(hello.nonce);
         state.states.joined(id, hello.nonce, hello.slots);
         let name = format!("{}@{}/{}", state.joined, hello.host, hello.pid);
         state.links.insert(id, Link::new(name.clone(), link, hello.pid, hello.nonce));
@@ -196,6 +199,7 @@ impl Hub {
         });
         state.handle(now, Event::Joined(Joining { id, name, host, pid, slots, cores, nonce, build }));
         if let Some(event) = other {
+            state.counting.happened(&event);
             state.events.tell(now, event);
         }
         Ok(id)
