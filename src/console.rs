@@ -1,4 +1,4 @@
-//! What people read on a terminal: log lines, text on standard output, aligned tables, numbers of the digits they deserve.
+//! What people read on a terminal: text on standard output, aligned tables, numbers of the digits they deserve.
 //!
 //! Every command writes to standard output through `line`, `text` or `lost`: a reader that stops early, as `head`
 //! does, ends the command quietly. What is for people only goes to standard error through [`note`].
@@ -6,27 +6,9 @@
 use std::fmt::Display;
 use std::io::{self, ErrorKind, IsTerminal, Write};
 
-use tracing_subscriber::filter::LevelFilter;
-
 use crate::failure::Failure;
 pub(crate) use crate::note::note;
 use crate::plain::Plain;
-
-/// Sends log lines to standard error: warnings, or more with each `-v`.
-pub(crate) fn log_to_stderr(verbose: u8) {
-    let level = match verbose {
-        0 => LevelFilter::WARN,
-        1 => LevelFilter::INFO,
-        2 => LevelFilter::DEBUG,
-        _ => LevelFilter::TRACE,
-    };
-    tracing_subscriber::fmt()
-        .with_writer(std::io::stderr)
-        .with_max_level(level)
-        .with_ansi(std::io::stderr().is_terminal())
-        .with_target(false)
-        .init();
-}
 
 /// Writes a line to standard output.
 pub(crate) fn line(content: impl Display) -> Result<(), Failure> {

@@ -7,7 +7,8 @@ use miette::{Diagnostic, LabeledSpan, NamedSource, Report, Severity, SourceCode}
 use serde_json::{Value, json};
 use starlings_coordinator::study::{Problem, StudyError};
 
-use crate::note::{drawn, note};
+use crate::log;
+use crate::note::{drawn, note, note_error};
 use crate::plain::{Plain, of_same_length};
 
 /// Why a command ended without doing what was asked.
@@ -89,7 +90,14 @@ impl Failure {
             | Self::Run(message)
             | Self::Answered(message)
             | Self::Interrupted { message, .. } => {
-                note(format_args!("error: {message}"));
+                note_error(message);
+            }
+            Self::Study(error) if log::is_json() => {
+                for problem in &error.problems {
+                    let (line, column) = problem.line_column().unzip();
+                    let (file, help) = (problem.file.display(), problem.help.as_deref());
+                    tracing::error!(%file, line, column, help, "{}", problem.message);
+                }
             }
             Self::Study(error) => {
                 for problem in &error.problems {

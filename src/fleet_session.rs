@@ -17,6 +17,7 @@ use starlings_coordinator::fleet::access::Access;
 use starlings_coordinator::fleet::{
     FleetConfig, FleetError, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers, PlaceName, RunIdentity,
 };
+use starlings_coordinator::metrics::{Server, Source};
 use starlings_coordinator::study::Study;
 use starlings_coordinator::study::store::Store;
 use starlings_coordinator::study::trial::{FleetTrialError, trial_on_fleet};
@@ -25,16 +26,16 @@ use tokio_util::sync::CancellationToken;
 
 use crate::console::note;
 use crate::failure::Failure;
-use crate::fleet_values::{address, alone, host_of, memory};
+use crate::fleet_values::{address, alone, host_of, memory, metrics_address};
 use crate::interrupt;
 use crate::load::end_solvers;
 use crate::progress::Display;
 use crate::solvers::own_program;
 pub(crate) use entrance::Entrance;
-use entrance::failed;
+use entrance::{failed, serve_metrics};
 use load_file::LoadFile;
 use plan::{ACCESS, AccessPlan, Plan};
-use relay::relay;
+use relay::{Shown, relay};
 
 /// Which workers run the model.
 #[derive(Args)]
@@ -62,6 +63,10 @@ pub(crate) struct FleetArgs {
     /// that name it too read, write and mix them there. With the feature s3 also s3://BUCKET/PREFIX.
     #[arg(long, value_name = "FOLDER", conflicts_with = "state_memory")]
     states: Option<PlaceName>,
+    /// Serve what the fleet does in numbers, for Prometheus, at http://ADDR/metrics, and whether it is well at /healthz and /readyz:
+    /// PORT or :PORT for this machine alone, HOST:PORT for others too (port 0 picks a free one).
+    #[arg(long, value_name = "ADDR")]
+    metrics: Option<String>,
 }
 
 impl FleetArgs {
@@ -79,7 +84,8 @@ impl FleetArgs {
                 "--workers must be at least 1 (or use --listen ADDR and start workers elsewhere)",
             ));
         }
-        let address = self.listen.as_deref().map(address).transpose()?;
+        let address = self.listen.as_deref().map(|text| address("--listen", text)).transpose()?;
+        let metrics = self.metrics.as_deref().map(metrics_address).transpose()?;
         let host = self.listen.as_deref().and_then(host_of).map(str::to_owned);
         if let (Some(host), Some(address)) = (&host, address)
             && let Some(warning) = alone(host, address)
@@ -91,7 +97,17 @@ impl FleetArgs {
             _ => None,
         };
         let (mixed, state_memory, states) = (self.mixed, self.state_memory, self.states.clone());
-        Ok(Plan { address, host, access, n_worker, mixed, state_memory, states, keeps_states: false })
+        Ok(Plan {
+            address,
+            host,
+            access,
+            metrics,
+            n_worker,
+            mixed,
+            state_memory,
+            states,
+            keeps_states: false,
+        })
     }
 
     fn access_plan(&self, out: Option<&Out<'_>>) -> Result<AccessPlan, Failure> {
@@ -121,6 +137,9 @@ pub(crate) struct FleetSession {
     /// What happened, for the store.
     pub(crate) events: mpsc::Receiver<FleetEvent>,
     watcher: std::thread::JoinHandle<()>,
+    /// What is served of it in numbers.
+    source: Source,
+    metrics: Option<Server>,
 }
 
 impl FleetSession {
@@ -144,22 +163,24 @@ impl FleetSession {
         if let Some(attempts) = study.fleet.max_attempts {
             config.max_attempts = attempts;
         }
-        let Entrance { bound, access } = entrance;
+        let Entrance { bound, access, metrics } = entrance;
         config.secrets = access.as_ref().map(|access| access.secrets().clone());
         (config.seed, config.mixed) = (study.seed, plan.mixed);
         config.timeout_factor = study.fleet.timeout_factor;
         config.states = plan.store(&config.identity);
         let fleet = GrpcFleet::listen_on(bound, config).map_err(Failure::run)?;
-        let display = Arc::clone(display);
+        let source = Source::new(fleet.readings(), env!("CARGO_PKG_VERSION"));
+        let metrics = metrics.map(|at| serve_metrics(at, source.clone())).transpose()?;
         let refused = fleet.refused();
         let listens = fleet.address().is_some();
+        let shown = Shown { display: Arc::clone(display), run: study.name.clone(), listens };
         let invitation = Arc::<OnceLock<String>>::default();
         let told = Arc::clone(&invitation);
         let watcher = std::thread::spawn(move || {
             let missing = || [refused.summary(), told.get().cloned()];
-            relay(heard, &kept, &display, listens, missing);
+            relay(heard, &kept, &shown, missing);
         });
-        Ok(Self { fleet, local: None, access, load: None, invitation, events, watcher })
+        Ok(Self { fleet, local: None, access, load: None, invitation, events, watcher, source, metrics })
     }
 
     /// Starts the local workers, or says how to start others; `folder` is the run folder, where there is one.
@@ -243,12 +264,17 @@ impl FleetSession {
         })
     }
 
+    /// What is told of it in numbers, for what the fleet does not count itself.
+    pub(crate) fn source(&self) -> Source {
+        self.source.clone()
+    }
+
     /// Ends the fleet and its workers, and says to those whether the command is done.
     pub(crate) fn close(self, is_done: bool) {
         if !is_done {
             self.fleet.handle().break_off();
         }
-        let Self { fleet, local, watcher, mut access, load, .. } = self;
+        let Self { fleet, local, watcher, mut access, load, metrics, .. } = self;
         // It has a hold on the fleet, which ends with the last one.
         drop(load);
         // Before the workers leave: one that stays looks there for what comes next.
@@ -256,6 +282,7 @@ impl FleetSession {
             access.end();
         }
         fleet.close();
+        drop(metrics);
         drop(local);
         // The relay ends with the last sender of events; a panic in it has been printed already.
         let _ = watcher.join();

@@ -6,15 +6,24 @@ use starlings_coordinator::study::bytes_of;
 
 use crate::failure::Failure;
 
-/// Where to listen, as it was asked for.
-pub(crate) fn address(text: &str) -> Result<SocketAddr, Failure> {
+/// Where to serve metrics: this machine alone, unless a host is named.
+pub(crate) fn metrics_address(text: &str) -> Result<SocketAddr, Failure> {
+    let port = text.strip_prefix(':').unwrap_or(text);
+    if port.parse::<u16>().is_ok() {
+        return address("--metrics", &format!("127.0.0.1:{port}"));
+    }
+    address("--metrics", text)
+}
+
+/// Where to listen, as it was asked for by an option.
+pub(crate) fn address(option: &str, text: &str) -> Result<SocketAddr, Failure> {
     let all: Vec<_> = text.to_socket_addrs().map(Iterator::collect).unwrap_or_default();
     // A name may lead to this machine alone and to its network.
     let others = all.iter().find(|address| !address.ip().is_loopback());
     others
         .or(all.first())
         .copied()
-        .ok_or_else(|| Failure::input(format!("--listen {text}: expected HOST:PORT, such as 127.0.0.1:7000")))
+        .ok_or_else(|| Failure::input(format!("{option} {text}: expected HOST:PORT, such as 127.0.0.1:7000")))
 }
 
 /// The host of where to listen, where it is named and not numbered.
@@ -46,6 +55,15 @@ pub(crate) fn memory(text: &str) -> Result<usize, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn metrics_are_for_this_machine_unless_a_host_is_named() {
+        let at = |text| metrics_address(text).map(|address| address.to_string()).map_err(|_| ());
+        assert_eq!(at("9464"), Ok("127.0.0.1:9464".to_owned()));
+        assert_eq!(at(":0"), Ok("127.0.0.1:0".to_owned()));
+        assert_eq!(at("0.0.0.0:9464"), Ok("0.0.0.0:9464".to_owned()));
+        assert_eq!([at("nowhere"), at("70000")], [Err(()), Err(())]);
+    }
 
     #[test]
     fn a_name_that_leads_to_this_machine_alone_is_told_and_one_that_means_it_is_not() {

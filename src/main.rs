@@ -23,6 +23,7 @@ mod identify;
 mod infer;
 mod interrupt;
 mod load;
+mod log;
 mod models;
 mod note;
 mod plain;
@@ -51,6 +52,9 @@ struct Cli {
     /// More detail on standard error: -v for what the fleet does, -vv for every job.
     #[arg(short, long, action = clap::ArgAction::Count, global = true)]
     verbose: u8,
+    /// Form of what goes to standard error: text for people, or a JSON object a line for programs (docs/watching.md).
+    #[arg(long = "log", value_name = "FORMAT", global = true, value_enum, default_value_t = log::LogFormat::Text)]
+    log: log::LogFormat,
     #[command(subcommand)]
     command: Command,
 }
@@ -98,7 +102,7 @@ fn main() -> ExitCode {
     let started = Instant::now();
     let cli = Cli::try_parse().unwrap_or_else(|error| refuse(&error));
     let json = cli.command.prints_json();
-    console::log_to_stderr(cli.verbose);
+    log::to_stderr(cli.log, cli.verbose);
     let outcome = match cli.command {
         Command::Run(args) => run::run(&args, started),
         Command::Explain(args) => explain::run(&args, started),

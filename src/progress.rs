@@ -9,6 +9,7 @@ use starlings_coordinator::explain::Stage;
 use starlings_coordinator::study::Progress;
 
 use crate::console::note;
+use crate::log;
 
 /// Spacing of plain lines.
 const LINE_EVERY: Duration = Duration::from_secs(10);
@@ -39,7 +40,7 @@ impl Display {
         if silent {
             return Self::Silent;
         }
-        if !std::io::stderr().is_terminal() {
+        if log::is_json() || !std::io::stderr().is_terminal() {
             return Self::Lines(Mutex::new(Last { at: Instant::now(), stage: None }));
         }
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr_with_hz(10));

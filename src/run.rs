@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use clap::Parser;
 use starlings_coordinator::fleet::Fleet;
+use starlings_coordinator::metrics::Source;
 use starlings_coordinator::report;
 use starlings_coordinator::study::constants::HangsOn;
 use starlings_coordinator::study::store::Purpose;
@@ -80,7 +81,7 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
         run_folder::give_up(folder, args.resume);
         return Err(failure);
     }
-    let mut watch = |p: &Progress| display.step(p);
+    let mut watch = watching(session.source(), &display);
     let clock = move || started.elapsed().as_secs_f64();
     let mut context = RunContext {
         clock: &clock,
@@ -103,6 +104,14 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     })?;
     report::write_files(&folder).map_err(Failure::run)?;
     print(&summary, &folder.path, args.json)
+}
+
+/// Counts every analysis, and shows where the run stands.
+fn watching(source: Source, display: &Display) -> impl FnMut(&Progress) {
+    move |at| {
+        source.analysed();
+        display.step(at);
+    }
 }
 
 /// The estimates with their intervals: both, that given the residuals first, where they differ much, else that at the stated noise.

@@ -15,6 +15,7 @@ use tokio_util::sync::CancellationToken;
 
 use crate::console::{cancel_on_signal, line, note};
 use crate::failure::Failure;
+use crate::log;
 use crate::solvers::{adapter_names, solvers};
 use contact::ContactArgs;
 pub(crate) use contact::duration;
@@ -78,7 +79,13 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     cancel_on_signal(&cancel);
     let slots = args.slots.unwrap_or(cores);
     let solvers = solvers()?.with_cores_after(args.place.saturating_mul(slots)).permitting(permit);
-    let tell: Tell = if args.contact.is_inherited() { Arc::new(|_| {}) } else { tell() };
+    let tell: Tell = if args.contact.is_inherited() {
+        Arc::new(|_| {})
+    } else if log::is_json() {
+        log::worker(format!("{}/{}", contact.host, std::process::id()))
+    } else {
+        tell()
+    };
     let config = WorkerConfig {
         slots,
         once: args.once,

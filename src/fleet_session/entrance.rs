@@ -2,22 +2,26 @@
 
 use starlings_coordinator::fleet::Bound;
 use starlings_coordinator::fleet::access::{Access, AccessFault};
+use starlings_coordinator::metrics::{Address, Server, Source};
 
 use super::plan::{AccessPlan, Plan};
+use crate::console::note;
 use crate::failure::Failure;
 
 /// What was taken. What is in use by another command leaves nothing behind, and neither does one that ends before it listens.
 pub(crate) struct Entrance {
     pub(super) bound: Option<Bound>,
     pub(super) access: Option<Access>,
+    pub(super) metrics: Option<Address>,
 }
 
 impl Entrance {
     /// Takes the address and the secrets of the access file. `out` is the run folder, where it was named.
     pub(crate) fn take(plan: &Plan, out: Option<&std::path::Path>) -> Result<Self, Failure> {
         let bound = plan.address.map(Bound::new).transpose().map_err(Failure::run)?;
+        let metrics = plan.metrics.map(Address::take).transpose().map_err(Failure::run)?;
         let file = match &plan.access {
-            None => return Ok(Self { bound, access: None }),
+            None => return Ok(Self { bound, access: None, metrics }),
             Some(AccessPlan::Named(file)) => Some(file.as_path()),
             Some(AccessPlan::RunFolder(file)) => file.as_deref(),
         };
@@ -28,8 +32,21 @@ impl Entrance {
         {
             access.reserve(file).map_err(|fault| failed(&fault))?;
         }
-        Ok(Self { bound, access: Some(access) })
+        Ok(Self { bound, access: Some(access), metrics })
     }
+}
+
+/// Serves metrics where an address was taken for them, and says where that is.
+pub(super) fn serve_metrics(at: Address, source: Source) -> Result<Server, Failure> {
+    let address = at.address;
+    let server = Server::start(at, source).map_err(Failure::run)?;
+    note(format_args!("metrics at http://{address}/metrics"));
+    if !address.ip().is_loopback() {
+        note(format_args!(
+            "warning: --metrics: whoever reaches {address} can read how many runs are made, by how many workers, and how they end"
+        ));
+    }
+    Ok(server)
 }
 
 pub(super) fn failed(fault: &AccessFault) -> Failure {

@@ -15,6 +15,8 @@ pub(crate) struct Plan {
     pub(super) host: Option<String>,
     /// Where the access file goes; `None` without one.
     pub(super) access: Option<AccessPlan>,
+    /// Where metrics are served.
+    pub(super) metrics: Option<SocketAddr>,
     /// Workers to start where it does not listen.
     pub(super) n_worker: usize,
     /// Whether results of workers may differ.

@@ -235,9 +235,9 @@ fn unserved(dialled: &Dialled, sessions: u64, idle: Option<&Idle>) -> String {
 
 /// Tells a coordinator what is held for its run, or forgets it where it is for another one.
 fn begin(config: &WorkerConfig, slots: &Slots, held: Option<&Arc<Held>>, connection: &Connection) {
-    let Welcome { run, run_id, incarnation, .. } = &connection.welcome;
+    let Welcome { run, run_id, incarnation, epoch, .. } = &connection.welcome;
     let (run, address) = (run.clone(), connection.address.clone());
-    (config.tell)(&News::Connected { run, address, slots: config.slots.max(1) });
+    (config.tell)(&News::Connected { run, address, slots: config.slots.max(1), epoch: *epoch });
     if let Some(news) = &connection.sharing {
         (config.tell)(news);
     }

@@ -17,6 +17,8 @@ pub enum News {
         address: String,
         /// Runs at the same time.
         slots: usize,
+        /// Number of the connection.
+        epoch: u64,
     },
     /// It came back to a run that it knew.
     Delivered {
@@ -80,10 +82,29 @@ pub enum News {
     Told(String),
 }
 
+impl News {
+    /// A short name of the kind of news.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Connected { .. } => "connected",
+            Self::Delivered { .. } => "delivered",
+            Self::Waiting { .. } => "waiting",
+            Self::Stays { .. } => "stays",
+            Self::Ended { .. } => "ended",
+            Self::Working => "working",
+            Self::Idle { .. } => "idle",
+            Self::Lost { .. } => "lost",
+            Self::Shares { .. } => "shares-states",
+            Self::DoesNotShare { .. } => "does-not-share-states",
+            Self::Told(_) => "told",
+        }
+    }
+}
+
 impl fmt::Display for News {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Connected { run, address, slots } => {
+            Self::Connected { run, address, slots, .. } => {
                 let s = if *slots == 1 { "" } else { "s" };
                 write!(f, "connected to {address} for the run `{run}`, {slots} slot{s}")
             }

@@ -198,6 +198,7 @@ impl Shared {
             let result = catch_unwind(AssertUnwindSafe(|| task.forward.run_within(&task.job, &until)))
                 .unwrap_or_else(|panic| Err(ModelFailure::Solver(panic_text(panic.as_ref())).into()));
             let cost = started.elapsed().as_secs_f64();
+            task.log(result.as_ref().err(), cost);
             self.running.fetch_sub(1, Ordering::Relaxed);
             // A result that came all the same is as good as any; what a stopped run says of itself is not.
             if result.is_err() && task.stop.is_set() {

@@ -21,6 +21,7 @@ mod aside;
 pub(crate) mod batch;
 mod belief;
 mod canary;
+mod census;
 mod dispute;
 mod doubt;
 mod duplicate;

@@ -41,6 +41,37 @@ impl FleetEvent {
         }
     }
 
+    /// The worker that it is about, by its name.
+    pub fn worker(&self) -> Option<&str> {
+        match self {
+            Self::WorkerJoined { worker, .. }
+            | Self::OtherBuild { worker, .. }
+            | Self::SharesStates { worker }
+            | Self::WorkerLeft { worker, .. }
+            | Self::SetupFailed { worker, .. }
+            | Self::WorkerSetAside { worker, .. }
+            | Self::WorkerBack { worker }
+            | Self::ControlRun { worker, .. }
+            | Self::JobRetried { worker, .. }
+            | Self::RunsBrought { worker, .. }
+            | Self::WorkerExcluded { worker, .. }
+            | Self::JobDuplicated { worker, .. }
+            | Self::LateAnswer { worker, .. } => Some(worker),
+            _ => None,
+        }
+    }
+
+    /// The run of the model that it is about: index of the sigma point, and of the record.
+    pub fn job(&self) -> Option<(u32, u32)> {
+        match *self {
+            Self::ControlRun { particle, record, .. }
+            | Self::JobRetried { particle, record, .. }
+            | Self::JobFailed { particle, record, .. }
+            | Self::JobDuplicated { particle, record, .. } => Some((particle, record)),
+            _ => None,
+        }
+    }
+
     /// Whether somebody who watches the run should see it at once.
     pub fn is_notable(&self) -> bool {
         matches!(

@@ -25,6 +25,7 @@ use super::hub::{Hub, Reply, SetupShape, Submission};
 use super::network::{self, Ways};
 use super::probe::probe;
 use super::recombination::{Compared, Recombine};
+use super::tally::Readings;
 use super::travel::submission;
 use super::{Arrived, Fleet, FleetError, FleetEvent, Held, Outcome, StateStore, StoredState, TELL_EVERY};
 
@@ -128,6 +129,11 @@ impl GrpcFleet {
     /// How many callers were refused, and the last of them with the reason; `None` where none was.
     pub fn refused(&self) -> Refused {
         Refused::new(Arc::clone(&self.refusals))
+    }
+
+    /// For whoever watches it in numbers.
+    pub fn readings(&self) -> Readings {
+        Readings::new(Arc::downgrade(&self.hub))
     }
 
     /// For the supervisor of local workers.

@@ -12,6 +12,7 @@ mod held;
 mod link;
 mod locked;
 mod mixing;
+mod reading;
 mod replies;
 mod state;
 mod states;
@@ -96,6 +97,7 @@ impl Hub {
         if let FleetEvent::Listening { address } = event {
             state.doorway.address = Some(address);
         }
+        state.counting.happened(&event);
         state.events.tell(now, event);
     }
 
@@ -190,6 +192,7 @@ impl Hub {
             probe: self.probe.as_ref().map(|probe| probe.pieces()[0]),
         };
         link.send(ToWorker::welcome(welcome));
+        state.counting.joined(hello.nonce);
         state.states.joined(id, hello.nonce, hello.slots);
         let name = format!("{}@{}/{}", state.joined, hello.host, hello.pid);
         state.links.insert(id, Link::new(name.clone(), link, hello.pid, hello.nonce));
@@ -202,6 +205,7 @@ impl Hub {
         });
         state.handle(now, Event::Joined(Joining { id, name, host, pid, slots, cores, nonce, build }));
         if let Some(event) = other {
+            state.counting.happened(&event);
             state.events.tell(now, event);
         }
         Ok(id)

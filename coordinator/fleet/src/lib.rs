@@ -28,6 +28,7 @@ mod outbox;
 mod probe;
 mod recombination;
 mod service;
+mod tally;
 mod transfer;
 mod travel;
 mod wire;
@@ -49,6 +50,7 @@ pub use starlings_proto::{ProtocolError, SetupId, job_key};
 pub use starlings_states::{
     CHUNK_VALUES, Folder, Held, PlaceName, StateError, StateStore, StateWriter, StoredState, hex, n_chunks,
 };
+pub use tally::{Census, FAILURE_TYPES, RUN_TIME_BOUNDS, Reading, Readings, Tally};
 pub use travel::travels;
 
 use std::ops::ControlFlow;

@@ -36,10 +36,11 @@ pub(super) async fn put(
     let invalid = |error: &dyn std::fmt::Display| Status::invalid_argument(error.to_string());
     let first = next(&mut inbound).await?.ok_or_else(|| Status::invalid_argument("a put without a head"))?;
     let head = PutHead::decode(&first).map_err(|error| invalid(&error))?;
-    let _counted = hub.begin_put(&head)?;
+    let mut counted = hub.begin_put(&head)?;
     let mut writer = hub.states().writer(head.n_state);
     while let Some(message) = next(&mut inbound).await? {
         if let Some(number) = decode_in_memory(&message).map_err(|error| invalid(&error))? {
+            counted.came(8 * head.n_state);
             return written(hub, &head, number).await;
         }
         if let Some(names) = decode_names(&message, writer.missing()).map_err(|error| invalid(&error))? {
@@ -50,6 +51,7 @@ pub(super) async fn put(
         if let Some(value) = not_finite(&bytes) {
             return Err(invalid(&StateError::NotFinite { value }));
         }
+        counted.came(bytes.len());
         writer = keep(hub, writer, bytes).await?;
     }
     let state = writer.finish().map_err(|error| invalid(&error))?;
@@ -130,16 +132,16 @@ pub(super) fn get(
     way: Option<&DescriptorSender>,
 ) -> Result<ReceiverStream<Result<generated::Chunk, Status>>, Status> {
     let get = Get::decode(request).map_err(|error| Status::invalid_argument(error.to_string()))?;
-    let (state, counted) = hub.begin_get(&get)?;
+    let (state, mut counted) = hub.begin_get(&get)?;
     let (sender, pieces) = mpsc::channel(AHEAD);
     let by_names = get.names && hub.states().is_shared();
     let in_memory = get.descriptor != 0
         && state.descriptor().zip(way).is_some_and(|(memory, way)| way.send(get.descriptor, memory).is_ok());
     let hub = Arc::clone(hub);
     tokio::spawn(async move {
-        let _counted = counted;
         let mut given = sender.send(Ok(encode_head(state.n_state()))).await.is_ok();
         if in_memory {
+            counted.went(8 * state.n_state());
             let _ = sender.send(Ok(encode_in_memory(get.descriptor))).await;
             return;
         }
@@ -156,7 +158,9 @@ pub(super) fn get(
             if !given {
                 return;
             }
-            let message = piece(&hub, &state, index).await.map(encode_chunk);
+            let piece = piece(&hub, &state, index).await;
+            counted.went(piece.as_ref().map_or(0, bytes::Bytes::len));
+            let message = piece.map(encode_chunk);
             let ended = message.is_err();
             given = sender.send(message).await.is_ok() && !ended;
         }

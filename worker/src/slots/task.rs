@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use starlings_models::{Forward, Job, Stop};
+use starlings_models::{Forward, Job, ParticleError, Stop};
 use starlings_proto::{JobKey, Lease, SetupId};
 use tokio::sync::OwnedSemaphorePermit;
 
@@ -70,6 +70,17 @@ impl Task {
 
     pub(super) fn asked(&self) -> MutexGuard<'_, Option<Asked>> {
         self.asked.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Says in the log how it ended, after so many seconds.
+    pub(super) fn log(&self, failure: Option<&ParticleError>, seconds: f64) {
+        // Who asks for it is looked up for nobody otherwise.
+        if tracing::enabled!(tracing::Level::DEBUG) {
+            let Job { particle, record, .. } = *self.job;
+            let epoch = self.asked().as_ref().map(|asked| asked.lease.epoch);
+            let failure = failure.map(tracing::field::display);
+            tracing::debug!(event = "ran", particle, record, epoch, seconds, failure, "a run has ended");
+        }
     }
 
     pub(super) fn has_lease(&self, leases: &[Lease]) -> bool {

@@ -116,7 +116,7 @@ impl Dispatcher {
     /// Whether a lease is open: its worker may still answer for its job.
     pub(crate) fn holds(&self, lease: &Lease) -> bool {
         let worker = self.workers.get(&WorkerId(lease.epoch));
-        worker.is_some_and(|worker| worker.leases().any(|held| held == *lease))
+        worker.is_some_and(|worker| worker.lease_of(lease.job) == Some(*lease))
     }
 
     /// What a lease of the running batch asks for.

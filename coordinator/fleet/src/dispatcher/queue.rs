@@ -74,6 +74,12 @@ impl Queue {
         true
     }
 
+    /// Jobs that wait.
+    pub(super) fn len(&self) -> usize {
+        let fresh: usize = self.fresh.iter().map(VecDeque::len).sum();
+        fresh + self.retries.values().map(VecDeque::len).sum::<usize>()
+    }
+
     /// Puts a job back.
     pub(super) fn put_back(&mut self, index: usize, key: RetryKey) {
         self.retries.entry(key).or_default().push_back(index);

@@ -18,6 +18,7 @@ use super::teller::Teller;
 use super::waiting::Waiting;
 use crate::dispatcher::{BatchError, Command, ControlId, Dispatcher, Event, WorkerId};
 use crate::event_text::OVER;
+use crate::tally::Counting;
 use crate::wire::{Job, named};
 use crate::{FleetEvent, StateStore, StoredState};
 
@@ -41,6 +42,7 @@ pub(super) struct State {
     /// Blocks of rows that workers mix.
     pub(super) blocks: Blocks,
     pub(super) events: Teller,
+    pub(super) counting: Counting,
     /// The time of the last event.
     now: Duration,
     pub(super) first_epoch: u64,
@@ -103,6 +105,7 @@ impl State {
             states: States::new(store),
             blocks: Blocks::default(),
             events: Teller::new(events),
+            counting: Counting::default(),
             now: Duration::ZERO,
             first_epoch,
             joined: 0,
@@ -145,6 +148,9 @@ impl State {
             Event::Answered { worker, lease, answer, cost } => {
                 let own = lease.epoch == worker.0;
                 let answer = if own { self.checked(&lease, answer) } else { answer };
+                if own && self.dispatcher.holds(&lease) {
+                    self.counting.ended(&answer, cost);
+                }
                 ended_in = named(&answer).copied();
                 Event::Answered { worker, lease, answer, cost }
             }
@@ -192,6 +198,7 @@ impl State {
             Command::SendJob { worker, lease, index } => {
                 let Some(Submission { jobs, encoder, .. }) = &mut self.running else { return };
                 let (Some(job), Some(link)) = (jobs.get(index), self.links.get_mut(&worker)) else { return };
+                self.counting.given(&job.1);
                 link.give(encoder, lease, job);
             }
             Command::SendControl { worker, lease, control } => {
@@ -254,6 +261,7 @@ impl State {
 
     pub(super) fn tell(&mut self, event: FleetEvent) {
         tracing::debug!(?event, "fleet");
+        self.counting.happened(&event);
         self.events.tell(self.now, event);
     }
 

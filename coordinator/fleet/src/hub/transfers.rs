@@ -21,11 +21,33 @@ const UNKNOWN: usize = (1 << 30) / 8;
 pub(crate) struct Counted {
     hub: Arc<Hub>,
     worker: WorkerId,
+    /// Bytes that came and went.
+    came: u64,
+    went: u64,
+}
+
+impl Counted {
+    fn new(hub: &Arc<Hub>, worker: WorkerId) -> Self {
+        Self { hub: Arc::clone(hub), worker, came: 0, went: 0 }
+    }
+
+    /// So many bytes came from the worker.
+    pub(crate) fn came(&mut self, bytes: usize) {
+        self.came += bytes as u64;
+    }
+
+    /// So many bytes went to the worker.
+    pub(crate) fn went(&mut self, bytes: usize) {
+        self.went += bytes as u64;
+    }
 }
 
 impl Drop for Counted {
     fn drop(&mut self) {
-        self.hub.lock().states.ended(self.worker);
+        let mut state = self.hub.lock();
+        state.states.ended(self.worker);
+        state.counting.tally.state_bytes_in += self.came;
+        state.counting.tally.state_bytes_out += self.went;
     }
 }
 
@@ -62,7 +84,7 @@ impl Hub {
         state.states.session(worker, head.nonce)?;
         state.may_put(head)?;
         state.states.count(worker, head.nonce)?;
-        Ok(Counted { hub: Arc::clone(self), worker })
+        Ok(Counted::new(self, worker))
     }
 
     /// Lends memory for end states to a worker, which `give` sends the descriptor; whether it did.
@@ -117,7 +139,7 @@ impl Hub {
         let found = found.ok_or_else(|| Status::not_found("nobody holds a state of this name"))?;
         state.states.count(worker, get.nonce)?;
         drop(state);
-        Ok((found, Counted { hub: Arc::clone(self), worker }))
+        Ok((found, Counted::new(self, worker)))
     }
 
     /// A state cannot be kept or read here: the batch ends.
