@@ -6,13 +6,12 @@
 use std::fs::File;
 use std::io::{BufReader, Read};
 
+use starlings_estimators::inference::STEP_TOLERANCE;
 use starlings_study::infer_choice::InferRecord;
 
 use crate::error::InferError;
 use crate::rows::{Row, Rows};
 
-/// By how much of a step a step may differ.
-const TOLERANCE: f64 = 0.01;
 /// Rows that the sampling step is taken from.
 const FIRST: usize = 1000;
 
@@ -93,7 +92,7 @@ pub(crate) fn even_step(times: &[f64]) -> Option<f64> {
         times.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
     steps.sort_by(f64::total_cmp);
     let median = *steps.get(steps.len() / 2)?;
-    let even = steps.iter().all(|step| (step - median).abs() <= TOLERANCE * median);
+    let even = steps.iter().all(|step| (step - median).abs() <= STEP_TOLERANCE * median);
     let whole = even && steps.len() + 1 == times.len();
     Some(if whole { (times[times.len() - 1] - times[0]) / steps.len() as f64 } else { median })
 }
@@ -180,7 +179,7 @@ impl<'a, R: Read> Blocks<'a, R> {
             return Ok(());
         };
         let (step, got) = (self.cut.step, time - before);
-        if (got - step).abs() <= TOLERANCE * step {
+        if (got - step).abs() <= STEP_TOLERANCE * step {
             self.times.push(time);
             self.values.extend_from_slice(&self.next);
             return Ok(());

@@ -117,6 +117,9 @@ fn row_by_row(choice: &InferChoice) -> Result<(), InferError> {
     if choice.sums.levels > 1 {
         return refuse("`richardson`", "leave it out, or infer from the recording when it has ended");
     }
+    if choice.missing.is_some() {
+        return refuse("[infer.candidates]", "leave it out, or infer from the recording when it has ended");
+    }
     if choice.reduced.is_some() {
         return refuse("[infer.reduced]", "leave it out, or infer from the recording when it has ended");
     }

@@ -127,3 +127,34 @@ fn measurement_noise_that_is_not_there_or_not_a_covariance_is_refused() {
         "no noise is seen in one of the states"
     );
 }
+
+#[test]
+fn smoothing_begins_where_the_recording_itself_has_no_fit() {
+    for sd in [0.5, 1.0, 2.0, 4.0] {
+        let (basis, rows) = (lorenz::basis(), measured(2, 10_000, sd));
+        let structure = Structure::same(&basis, &lorenz::NAMES).unwrap();
+        let sums = sums(&basis, &rows, H);
+        let fit = Fit::new(Diffusion::Full, 27);
+        let plain = fit.posterior(&sums, &structure).map(|p| p.diffusion[(0, 0)]);
+        let lagged =
+            Fit { lag_corrected: true, ..fit }.posterior(&sums, &structure).map(|p| p.diffusion[(0, 0)]);
+        println!("{sd}: {plain:?} {lagged:?}");
+        let times = crate::kit::times(rows.len(), H);
+        let noisy = Noisy { basis: &basis, step: H, times: &times, rows: rows.as_flattened() };
+        let found = noisy.infer(
+            &Fit::new(Diffusion::Full, 27),
+            &structure,
+            &known(sd),
+            Iteration { most: 40, tolerance: 0.5 },
+        );
+        match found {
+            Ok(found) => println!(
+                "   {:?} {} {}",
+                found.posterior.diffusion.diagonal(),
+                found.posterior.drift()[(0, 0)],
+                found.log_likelihood.len()
+            ),
+            Err(e) => println!("   {e}"),
+        }
+    }
+}

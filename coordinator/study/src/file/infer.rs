@@ -29,6 +29,7 @@ pub(crate) struct InferSection {
     pub(crate) step: Option<Spanned<f64>>,
     pub(crate) gaps: Option<Spanned<String>>,
     pub(crate) reduced: Option<ReducedSection>,
+    pub(crate) candidates: Option<CandidatesSection>,
     pub(crate) follow: Option<FollowSection>,
 }
 
@@ -57,6 +58,16 @@ pub(crate) struct ReducedSection {
     pub(crate) coefficients: Named<String>,
 }
 
+/// `[infer.candidates]`.
+#[derive(Debug)]
+pub(crate) struct CandidatesSection {
+    pub(crate) span: Range<usize>,
+    pub(crate) degree: Option<Spanned<u64>>,
+    pub(crate) functions: Vec<Spanned<String>>,
+    pub(crate) false_alarm: Option<Spanned<f64>>,
+    pub(crate) most: Option<Spanned<u64>>,
+}
+
 /// `[infer.follow]`.
 #[derive(Debug)]
 pub(crate) struct FollowSection {
@@ -67,7 +78,7 @@ pub(crate) struct FollowSection {
     pub(crate) rate: Option<Spanned<f64>>,
 }
 
-const KEYS: [&str; 15] = [
+const KEYS: [&str; 16] = [
     "parameters",
     "basis",
     "degree",
@@ -82,6 +93,7 @@ const KEYS: [&str; 15] = [
     "step",
     "gaps",
     "reduced",
+    "candidates",
     "follow",
 ];
 
@@ -104,6 +116,7 @@ pub(crate) fn read(source: &Source, root: &Table<'_>) -> Option<InferSection> {
         step: t.number("step"),
         gaps: t.text("gaps"),
         reduced: reduced(source, &t),
+        candidates: candidates(&t),
         follow: follow(&t),
     })
 }
@@ -150,6 +163,18 @@ fn reduced(source: &Source, t: &Table<'_>) -> Option<ReducedSection> {
         start: start.iter().filter_map(value).collect(),
         define: named_texts(source, &t.free_entries("define")),
         coefficients: named_texts(source, &t.free_entries("coefficients")),
+    })
+}
+
+fn candidates(t: &Table<'_>) -> Option<CandidatesSection> {
+    let keys = ["degree", "functions", "false_alarm", "most"];
+    let t = t.table("candidates", "[infer.candidates]", &keys)?;
+    Some(CandidatesSection {
+        span: t.span.clone(),
+        degree: t.count("degree"),
+        functions: t.texts("functions"),
+        false_alarm: t.number("false_alarm"),
+        most: t.count("most"),
     })
 }
 

@@ -64,6 +64,8 @@ pub(super) fn sums(source: &Source, section: &InferSection) -> SumsDef {
         left: Vec::new(),
         step: step(source, section),
         levels: if section.richardson.as_ref().is_some_and(|r| *r.get_ref()) { RICHARDSON_LEVELS } else { 1 },
+        files: Vec::new(),
+        candidates: Vec::new(),
     }
 }
 
@@ -76,14 +78,20 @@ fn step(source: &Source, section: &InferSection) -> f64 {
 }
 
 /// What is taken at the start of a step: all states, or what is named.
-pub(super) fn left(source: &Source, section: &InferSection, equations: &EquationsDef) -> Vec<String> {
+pub(super) fn left(
+    source: &Source,
+    section: &InferSection,
+    equations: &EquationsDef,
+    candidates: &[String],
+) -> Vec<String> {
     let rules = [("midpoint", false), ("ito", true)];
     let states: Vec<String> = equations.states.iter().map(|state| state.name.clone()).collect();
     match &section.rule {
         Rules::All(word) => {
             let ito = choose(source, word.as_ref(), "rule", &rules).unwrap_or(false);
             let functions = section.functions.iter().map(|f| f.get_ref().clone());
-            if ito { states.into_iter().chain(functions).collect() } else { Vec::new() }
+            let all = states.into_iter().chain(functions).chain(candidates.iter().cloned());
+            if ito { all.collect() } else { Vec::new() }
         }
         Rules::ByName(named) => {
             let listed = section.parameters.iter().chain(&section.functions).map(|p| p.get_ref().clone());
