@@ -93,6 +93,11 @@ fmt:
 doc $RUSTDOCFLAGS="-D warnings":
     cargo doc --workspace --no-deps
 
+# Seconds and memory of `infer` for a long recording, with one worker and with two.
+infer-bench:
+    cargo build --release
+    benches/infer.sh
+
 # Micro-benchmarks and the fleet benchmark.
 bench:
     cargo bench --bench analysis

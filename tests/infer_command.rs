@@ -160,7 +160,11 @@ fn what_cannot_be_estimated_is_refused_with_names() {
     };
     let same = data.lines().map(twice).collect::<Vec<_>>().join("\n");
     refused(&of_functions(r#"functions = ["x"]"#), &same, &["no positive definite covariance"]);
-    refused(&of_functions(r#"functions = ["log(x)"]"#), &data, &["log(x) is", "at row"]);
+    refused(
+        &of_functions(r#"functions = ["log(x)"]"#),
+        &data,
+        &["data.csv:", "log(x) is NaN in the step that begins in this row", "leave out the function"],
+    );
 }
 
 #[test]
@@ -412,4 +416,141 @@ fn a_step_that_cannot_be_fitted_leaves_the_estimate_where_it_is() {
     let warning = found["warnings"][0].as_str().unwrap();
     assert!(warning.contains("`richardson`") && warning.contains("at steps of 2h"), "{warning}");
     assert!(found["richardson"].is_null() && found["coefficients"][0]["estimate"].is_f64(), "{found}");
+}
+
+/// What `starlings check` says, and whether it takes the study.
+fn checked(study: &str, data: &str) -> (i32, String) {
+    let dir = folder(study, data);
+    let (code, stdout, stderr) = output(starlings().current_dir(dir.path()).args(["check", "study.toml"]));
+    (code, stdout + &stderr)
+}
+
+#[test]
+fn keys_that_do_not_fit_together_are_refused_before_anything_is_read() {
+    let data = recording(500, usize::MAX);
+    let (code, says) = checked(STUDY, &data);
+    assert!(
+        code == 0 && says.contains("coefficients  3: k, c, d") && says.contains("steps of 0.01"),
+        "{says}"
+    );
+    let with = |lines: &str| STUDY.replace("block = 300", lines);
+    let reduced = "\n[infer.reduced]\nstart = { a = 1.0 }\ncoefficients = { kk = \"a\" }\n";
+    let nothing = "\n[infer.candidates]\nfunctions = [\"x\"]\n";
+    let functions = STUDY.replace(r#"parameters = ["k", "c", "d"]"#, r#"functions = ["x"]"#);
+    let cases = [
+        (format!("{STUDY}{reduced}"), "there is no coefficient `kk`"),
+        (with("measurement_noise = 0.1\nrichardson = true"), "remove `richardson`"),
+        (with("measurement_noise = 0.1\ngaps = \"break\""), "remove gaps"),
+        (format!("{functions}{nothing}"), "names no term that the model has not already"),
+    ];
+    for (study, says) in cases {
+        let (code, found) = checked(&study, &data);
+        assert!(code == 2 && found.contains(says), "no `{says}` in: {found}");
+        // Without a recording: the question is asked first.
+        refused(&study.replace("data.csv", "none.csv"), &data, &[&says[..10]]);
+    }
+    let (code, found) = checked(&format!("{STUDY}\n[infer.candidates]\nmost = 2\n"), &data);
+    assert!(code == 2 && found.contains("names no candidate"), "{found}");
+}
+
+/// The study with another rate of `x` and monomials up to the second degree as candidates.
+fn lacking(rate: &str, parameters: &str) -> String {
+    let candidates = "\n[infer.candidates]\ndegree = 2\n";
+    let later = "\n[[records]]\nname = \"later\"\nfile = \"later.csv\"\nuse = \"held-out\"\n\
+                 channels = [ { column = \"x\", output = \"x\" }, { column = \"z\", output = \"z\" } ]\n";
+    let study = STUDY.replace("-k*(x - level) + c*z", rate);
+    let study = study.replace(r#"parameters = ["k", "c", "d"]"#, parameters);
+    format!("{study}{candidates}{later}")
+}
+
+#[test]
+fn a_term_that_the_rates_lack_is_named_alone_and_nothing_where_none_is() {
+    let data = recording(6_000, usize::MAX);
+    let lines: Vec<&str> = data.lines().collect();
+    let (train, later) = (lines[..4_001].join("\n"), [&lines[..1], &lines[4_001..]].concat().join("\n"));
+    let made = |study: &str| {
+        let dir = folder(study, &train);
+        fs::write(dir.path().join("later.csv"), &later).unwrap();
+        let found = infer(dir.path(), "one", "1");
+        assert_eq!(found, infer(dir.path(), "two", "2"), "the same whoever makes the sums");
+        let page = fs::read_to_string(dir.path().join("one/report.html")).unwrap();
+        assert!(page.contains("Terms that the drift may lack"));
+        found
+    };
+    // Without the coupling c z in the first rate; the second has it.
+    let found = made(&lacking("-k*x", r#"parameters = ["k", "c", "d"]"#));
+    let missing = &found["missing"];
+    let names: Vec<&str> =
+        missing["named"].as_array().unwrap().iter().map(|named| named["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["x:z"], "{missing}");
+    let verdict = found["verdict"].as_str().unwrap();
+    assert!(verdict.contains("the drift lacks x:z"), "{verdict}");
+    let [lo, hi] = [0, 1].map(|end| missing["named"][0]["interval90"][end].as_f64().unwrap());
+    // Euler's path: rates are wrong by one in a hundred or so at the mid-point.
+    assert!(lo - 0.5 < 3.0 && 3.0 < hi + 0.5, "{lo} to {hi}");
+    // Half of h (3 z)² / D per step, where z has a variance of a tenth of a unit, is some nats in a hundred steps.
+    assert!(missing["held_out"]["gain"].as_f64().unwrap() > 5.0, "{missing}");
+    assert_eq!(missing["held_out"]["n_step"], 2000);
+    // With it the others are those of the whole model.
+    let k = missing["coefficients"].as_array().unwrap().iter().find(|c| c["name"] == "k").unwrap();
+    assert!((k["estimate"].as_f64().unwrap() - 2.0).abs() < 4.0 * k["sd"].as_f64().unwrap() + 0.1, "{k}");
+    let found = made(&lacking("-k*x + c*z", r#"parameters = ["k", "c", "d"]"#));
+    assert_eq!(found["missing"]["named"].as_array().unwrap().len(), 0, "{}", found["missing"]);
+    assert!(found["verdict"].as_str().unwrap().contains("no term is missing"), "{}", found["verdict"]);
+}
+
+#[test]
+fn a_known_error_of_the_measurement_is_smoothed_where_the_recording_itself_has_no_fit() {
+    let mut state = 1_u64;
+    let mut error = || {
+        let uniform = |state: &mut u64| {
+            *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (*state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        0.5 * ((0..12).map(|_| uniform(&mut state)).sum::<f64>() - 6.0)
+    };
+    let mut data = "time,x,z\n".to_owned();
+    for line in recording(1_500, usize::MAX).lines().skip(1) {
+        let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
+        writeln!(data, "{:?},{:?},{:?}", cells[0], cells[1] + error(), cells[2] + error()).unwrap();
+    }
+    refused(&STUDY.replace("block = 300", "measurement_noise = \"none\""), &data, &["have not settled"]);
+    let dir = folder(&STUDY.replace("block = 300", "measurement_noise = 0.5"), &data);
+    let found = infer(dir.path(), "out", "2");
+    let of = found["convergence_of"].as_str().unwrap();
+    assert!(of.contains("before smoothing"), "{of}");
+    let noise = found["diffusion"]["matrix"][0][0].as_f64().unwrap();
+    // 2 M/h of the raw residuals is 50, and D is a quarter.
+    assert!(noise < 5.0, "{noise}");
+}
+
+#[test]
+fn rows_at_unequal_times_are_interpolated_by_request_with_the_noise_that_they_had() {
+    // Every row of the path but those whose number is drawn: of twenty thousand steps of 10 ms about a third is left out.
+    let data = recording(20_000, usize::MAX);
+    let mut state = 7_u64;
+    let mut dropped = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40).is_multiple_of(3)
+    };
+    let kept: Vec<&str> =
+        data.lines().enumerate().filter(|(k, _)| *k < 2 || !dropped()).map(|(_, l)| l).collect();
+    let kept = kept.join("\n");
+    refused(STUDY, &kept, &["data.csv:"]);
+    let study = STUDY.replace("block = 300", "resample = 0.04\ngaps = \"break\"");
+    let found = infer(folder(&study, &kept).path(), "out", "2");
+    let warning = found["warnings"][0].as_str().unwrap();
+    assert!(warning.contains("interpolated to equal steps"), "{warning}");
+    for l in 0..2 {
+        let noise = found["diffusion"]["matrix"][l][l].as_f64().unwrap();
+        // D is a quarter. Rows are 15 ms apart on average, longer ones weigh more: single steps of 40 ms alone would have lost a sixth.
+        assert!((noise / 0.25 - 1.0).abs() < 0.1, "{noise}");
+    }
+    let c = found["coefficients"].as_array().unwrap().iter().find(|c| c["name"] == "c").unwrap();
+    let (estimate, sd) = (c["estimate"].as_f64().unwrap(), c["sd"].as_f64().unwrap());
+    // Steps of 40 ms move the rates by (c h)² / 12 and interpolation by as much.
+    assert!((estimate - 3.0).abs() < 4.0 * sd + 0.1, "{estimate} ± {sd}");
+    let dir = folder(&study.replace("resample", "richardson = true\nresample"), &kept);
+    let (code, _, stderr) = output(starlings().current_dir(dir.path()).args(["check", "study.toml"]));
+    assert!(code == 2 && stderr.contains("remove it, or `resample`"), "{stderr}");
 }

@@ -56,7 +56,8 @@ impl Fitted {
         };
         let checks = if sums.n_pair() > 0 { noise_checks(sums, structure, &posterior)? } else { Vec::new() };
         let matters = checks.iter().any(|check| check.verdict == Verdict::Matters);
-        let lag_corrected = matters && choice.measured == MeasuredChoice::Auto;
+        // What interpolation takes out of single steps, neighbouring ones have together.
+        let lag_corrected = (matters && choice.measured == MeasuredChoice::Auto) || choice.resample;
         if lag_corrected {
             posterior = Fit { lag_corrected, ..fit.clone() }.posterior(sums, structure)?;
         }

@@ -152,7 +152,7 @@ mod tests {
         let record = record();
         for n_row in [2, 3, 9, 10, 11, 12, 13, 14, 19, 20, 21, 22, 23, 24, 31, 2000] {
             for (block, ahead) in [(1, 0), (1, 3), (2, 3), (10, 0), (10, 1), (10, 3), (500, 3)] {
-                let cut = Cut { step: 1.0, block, ahead, breaks: false };
+                let cut = Cut { step: 1.0, block, ahead, breaks: false, resample: false };
                 let mut text = "t,x\n".to_owned();
                 (0..n_row).for_each(|k| writeln!(text, "{k},{}", k * k).unwrap_or_default());
                 for text in [text.as_str(), text.trim_end()] {

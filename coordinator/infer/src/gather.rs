@@ -230,7 +230,7 @@ impl Work<'_> {
                 (*row, "leave out the function, or record where it has a value and a slope")
             }
             InferenceError::NonUniform { row, .. } => {
-                (*row, "an inference needs equal steps: resample the recording")
+                (*row, "an inference needs equal steps: `resample = STEP` in [infer] interpolates to them")
             }
             InferenceError::NotIncreasing { row, .. } => (*row, "keep one row per time, in their order"),
             InferenceError::TimeJump { row, .. } => {
@@ -240,8 +240,8 @@ impl Work<'_> {
         };
         let record = &self.records[record];
         let line = || {
-            let mut rows = open(record).ok()?;
             let mut values = vec![0.0; record.columns.len()];
+            let mut rows = self.cut.feed(open(record).ok()?, values.len());
             (0..row).try_for_each(|_| rows.next(&mut values).ok()?.map(drop))?;
             rows.next(&mut values).ok()?.map(|row| row.line)
         };

@@ -3,7 +3,7 @@
 //! | file | what it does |
 //! |---|---|
 //! | [`error`] | why there is no inference |
-//! | `rows`, `blocks` | a recording row by row, and cut into blocks, in memory that does not grow with it |
+//! | `rows`, `resampled`, `blocks` | a recording row by row, at equal steps, and cut into blocks, in memory that does not grow with it |
 //! | `file_blocks` | the same blocks as bytes of its file, which workers read |
 //! | `gather` | has the sums of every block made as jobs and merges them in block order |
 //! | `convergence` | the estimate after each power of two of blocks |
@@ -25,6 +25,7 @@ pub mod follow;
 mod gather;
 mod missing;
 pub mod reduced;
+mod resampled;
 pub mod result;
 mod rows;
 pub mod run;

@@ -125,7 +125,15 @@ pub fn check(study: &Study) -> Result<(), InferError> {
         let message = "[infer.candidates] names no term that the model has not already: give others, or a larger `degree`";
         return Err(InferError::Setting(message.to_owned()));
     }
+    if choice.resample && choice.sums.levels > 1 {
+        let message = "`richardson` compares steps of a recording as it is: remove it, or `resample`";
+        return Err(InferError::Setting(message.to_owned()));
+    }
     let MeasuredChoice::Known(_) = choice.measured else { return Ok(()) };
+    if choice.resample {
+        let message = "a given `measurement_noise` is that of the rows, which `resample` mixes: remove one";
+        return Err(InferError::Setting(message.to_owned()));
+    }
     let refused =
         |what: &str| Err(InferError::Setting(format!("a given `measurement_noise` {what}, or use \"auto\"")));
     if choice.records.len() > 1 {
@@ -192,8 +200,8 @@ fn gathered(
     let Asked { choice, setup, question, .. } = asked;
     let work = Work { setup, question, records, cut, levels: choice.sums.levels };
     let files = match reader {
-        Reader::Workers => files(records),
-        Reader::Coordinator => None,
+        Reader::Workers if !cut.resample => files(records),
+        _ => None,
     };
     let sources = files.as_deref().map(Source::Files).into_iter().chain([Source::Rows]);
     for source in sources {
@@ -236,6 +244,7 @@ fn cut(choice: &InferChoice, asked: &Asked<'_>, at: Start) -> Cut {
         block: choice.block.unwrap_or(usual).min(choice.most_steps),
         ahead: choice.sums.n_ahead(),
         breaks: choice.breaks,
+        resample: choice.resample,
     }
 }
 

@@ -74,6 +74,9 @@ pub(crate) fn conditional_on(choice: &InferChoice, answer: &Answer) -> String {
         MeasuredChoice::Known(sd) => format!(
             "at the smoothed path under errors of the measurement of {sd}, whose own uncertainty they do not hold"
         ),
+        _ if choice.resample => {
+            "at rows that were interpolated to equal steps, whose effect on the functions they do not hold".to_owned()
+        }
         _ if answer.lag_corrected => {
             "with the noise freed of errors of the measurement, whose effect on the functions they do not hold".to_owned()
         }
@@ -130,6 +133,13 @@ pub(crate) fn warnings(
     missing: Option<&MissingFound>,
 ) -> Vec<String> {
     let mut warnings = answer.doubts.clone();
+    if choice.resample {
+        warnings.push(
+            "rows were interpolated to equal steps, which takes noise out of each: the noise was taken from neighbouring residuals, which \
+             have it together"
+                .to_owned(),
+        );
+    }
     let noisy: Vec<&NoiseCheck> =
         answer.checks.iter().filter(|check| check.verdict == Verdict::Matters).collect();
     if !noisy.is_empty() && !matches!(choice.measured, MeasuredChoice::Known(_)) {

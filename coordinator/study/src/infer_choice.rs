@@ -23,6 +23,8 @@ pub struct InferChoice {
     pub most_steps: usize,
     /// Whether a recording goes on in a new piece where rows are missing.
     pub breaks: bool,
+    /// Whether rows are interpolated to equal steps, those of the sums.
+    pub resample: bool,
     /// Mean and standard deviation of every coefficient with a prior, by name.
     pub priors: Vec<(String, f64, f64)>,
     /// A model with fewer unknowns behind the coefficients.

@@ -2,8 +2,7 @@
 //!
 //! Rows are gathered in blocks of 256; a block's functions become columns, and its products are made in vector registers. Each
 //! block keeps the last row for the next one, so the steps do not depend on where blocks are cut. Nothing is allocated per row.
-//! The recording must be sampled uniformly: [`STEP_TOLERANCE`] says how much.
-//! Read next: `products.rs`, how they are summed, and `sums.rs`, what they are added to.
+//! Steps must be equal within [`STEP_TOLERANCE`]. Read next: `products.rs`, how they are summed, and `sums.rs`, what they are added to.
 
 use std::sync::Arc;
 

@@ -76,7 +76,7 @@ impl Case {
 
     fn gather(&self, from_files: bool, block: usize, breaks: bool) -> Result<Option<Gathered>, InferError> {
         let sums = self.setup.sums.as_ref().unwrap();
-        let cut = Cut { step: STEP, block, ahead: sums.n_ahead(), breaks };
+        let cut = Cut { step: STEP, block, ahead: sums.n_ahead(), breaks, resample: false };
         let (setup, question, records) = (&self.setup, &self.question, &self.records[..]);
         let work = Work { setup, question, records, cut, levels: sums.levels };
         let mut fleet =

@@ -42,6 +42,9 @@ impl MissingTerms {
 }
 
 fn chance(p: f64) -> String {
+    if p <= 0.0 {
+        return "below 1e-300".to_owned();
+    }
     if p < 1e-3 { format!("{p:.0e}") } else { format!("{p:.3}") }
 }
 

@@ -97,6 +97,7 @@ fn infer(source: &Source, file: &StudyFile, setup: &Setup) -> Option<InferChoice
         block: settings::block(source, section, most_steps),
         most_steps,
         breaks: settings::breaks(source, section),
+        resample: section.resample.is_some(),
         reduced: section.reduced.as_ref().map(|reduced| reduced::reduced(source, reduced)),
         missing: candidates::missing(source, section.candidates.as_ref()),
         follow: settings::follow(source, section.follow.as_ref()),

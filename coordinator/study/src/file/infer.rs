@@ -27,6 +27,7 @@ pub(crate) struct InferSection {
     pub(crate) richardson: Option<Spanned<bool>>,
     pub(crate) block: Option<Spanned<u64>>,
     pub(crate) step: Option<Spanned<f64>>,
+    pub(crate) resample: Option<Spanned<f64>>,
     pub(crate) gaps: Option<Spanned<String>>,
     pub(crate) reduced: Option<ReducedSection>,
     pub(crate) candidates: Option<CandidatesSection>,
@@ -78,7 +79,7 @@ pub(crate) struct FollowSection {
     pub(crate) rate: Option<Spanned<f64>>,
 }
 
-const KEYS: [&str; 16] = [
+const KEYS: [&str; 17] = [
     "parameters",
     "basis",
     "degree",
@@ -91,6 +92,7 @@ const KEYS: [&str; 16] = [
     "richardson",
     "block",
     "step",
+    "resample",
     "gaps",
     "reduced",
     "candidates",
@@ -114,6 +116,7 @@ pub(crate) fn read(source: &Source, root: &Table<'_>) -> Option<InferSection> {
         richardson: t.flag("richardson"),
         block: t.count("block"),
         step: t.number("step"),
+        resample: t.number("resample"),
         gaps: t.text("gaps"),
         reduced: reduced(source, &t),
         candidates: candidates(&t),

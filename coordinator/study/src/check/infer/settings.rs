@@ -70,9 +70,17 @@ pub(super) fn sums(source: &Source, section: &InferSection) -> SumsDef {
 }
 
 fn step(source: &Source, section: &InferSection) -> f64 {
-    let Some(step) = &section.step else { return 0.0 };
+    if let (Some(_), Some(resample)) = (&section.step, &section.resample) {
+        let message = "`step` is that of the rows as they are, and `resample` makes another";
+        source.report_with(resample.span(), message, "remove one of the two");
+    }
+    let (name, given) = match &section.resample {
+        Some(step) => ("resample", Some(step)),
+        None => ("step", section.step.as_ref()),
+    };
+    let Some(step) = given else { return 0.0 };
     if *step.get_ref() <= 0.0 {
-        source.report(step.span(), format!("`step` must be above zero, found {}", step.get_ref()));
+        source.report(step.span(), format!("`{name}` must be above zero, found {}", step.get_ref()));
     }
     *step.get_ref()
 }
