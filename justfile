@@ -95,6 +95,7 @@ doc $RUSTDOCFLAGS="-D warnings":
 
 # Seconds and memory of `infer` for a long recording, with one worker and with two.
 infer-bench:
+    cargo bench -p starlings-sums --bench file_blocks
     cargo build --release
     benches/infer.sh
 

@@ -53,22 +53,63 @@ fn parse(text: &[u8], def: &SumsFile, n_row: usize) -> Option<(Vec<f64>, Vec<f64
         return None;
     }
     let (time, channels) = def.cells.split_first()?;
+    let wanted: Vec<bool> = (0..def.n_cell).map(|k| def.cells.contains(&k)).collect();
+    let mut values = vec![0.0; def.n_cell];
     let mut times = Vec::with_capacity(n_row);
     let mut rows = Vec::with_capacity(n_row.checked_mul(channels.len())?);
-    let mut cells = vec![(0, 0); def.n_cell];
-    let text = text.strip_suffix(b"\n").unwrap_or(text);
-    let mut start = 0;
-    for end in memchr::memchr_iter(b'\n', text).chain([text.len()]) {
-        let line = &text[start..end];
-        start = end + 1;
-        let line = line.strip_suffix(b"\r").unwrap_or(line);
-        take_apart(line, &mut cells)?;
-        times.push(number(line, *cells.get(*time)?)?);
+    let mut rest = text;
+    while !rest.is_empty() {
+        let used = quick_row(rest, &wanted, &mut values).or_else(|| row(rest, &wanted, &mut values))?;
+        rest = &rest[used..];
+        times.push(*values.get(*time)?);
         for at in channels {
-            rows.push(number(line, *cells.get(*at)?)?);
+            rows.push(*values.get(*at)?);
         }
     }
     (times.len() == n_row).then_some((times, rows))
+}
+
+/// Reads a row without looking for its end first, and says how many bytes it has with its line end; `None` where a cell that is wanted is more
+/// than a number.
+fn quick_row(text: &[u8], wanted: &[bool], values: &mut [f64]) -> Option<usize> {
+    let mut at = 0;
+    let n = values.len();
+    for (k, (value, wanted)) in values.iter_mut().zip(wanted).enumerate() {
+        let rest = &text[at..];
+        if *wanted {
+            let (found, used) = fast_float2::parse_partial::<f64, _>(rest).ok()?;
+            *value = found;
+            at += used;
+            if !found.is_finite() {
+                return None;
+            }
+        } else {
+            at += memchr::memchr3(b',', b'\n', b'\r', rest).unwrap_or(rest.len());
+        }
+        match (text.get(at), k + 1 == n) {
+            (Some(b','), false) | (Some(b'\n'), true) => at += 1,
+            (None, true) if at > 0 => {}
+            (Some(b'\r'), true) if text.get(at + 1) == Some(&b'\n') => at += 2,
+            _ => return None,
+        }
+    }
+    // An empty line is no row, as which one cell that nobody wants would be taken.
+    (n > 1 || at > 1).then_some(at)
+}
+
+/// Reads a row with blanks around its numbers, and says how many bytes it has with its line end.
+fn row(text: &[u8], wanted: &[bool], values: &mut [f64]) -> Option<usize> {
+    let end = memchr::memchr(b'\n', text);
+    let line = &text[..end.unwrap_or(text.len())];
+    let line = line.strip_suffix(b"\r").unwrap_or(line);
+    let mut cells = vec![(0, 0); values.len()];
+    take_apart(line, &mut cells)?;
+    for ((value, wanted), cell) in values.iter_mut().zip(wanted).zip(cells) {
+        if *wanted {
+            *value = number(line, cell)?;
+        }
+    }
+    Some(end.map_or(text.len(), |end| end + 1))
 }
 
 /// Where the cells of a line are; `None` where there are more or fewer.
@@ -126,12 +167,38 @@ mod tests {
             "0,1\n1,\"2\"\n",
             "0,1\r1,2\n2,3", // a line that ends otherwise
             "0,1\n1,\u{e4}2\n",
+            "0,1\n1,2e\n",
+            "0,1\n1,1_0\n",
+            "0,1\n1,0x1\n",
+            "0,1\n1,1e999\n",
+            "0,1\n\r\n",
         ];
         for text in wrong {
             assert_eq!(parse(text.as_bytes(), &def(2, &[0, 1]), 2), None, "{text:?}");
         }
         assert!(parse(b"0,1\n1,2\n", &def(2, &[0, 1]), 2).is_some());
         assert_eq!(parse(b"0,1\n1,2\n", &def(2, &[0, 2]), 2), None, "a position that no row has");
+        assert_eq!(parse(b"\n\n", &def(1, &[]), 2), None, "no time");
+        assert_eq!(parse(b"1\n\n", &def(1, &[0]), 2), None);
+    }
+
+    #[test]
+    fn numbers_have_the_bits_of_the_standard_library() {
+        let mut state = 1_u64;
+        for k in 0..20_000 {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            let bits = f64::from_bits(state);
+            let value = if k % 2 == 0 { (state >> 11) as f64 * 1e-12 - 4.0 } else { bits };
+            if value.is_finite() {
+                for text in [format!("{value:?},{value}"), format!("{value:e},{value:.3e}")] {
+                    let expected: Vec<f64> = text.split(',').filter_map(|cell| cell.parse().ok()).collect();
+                    let found = parse(text.as_bytes(), &def(2, &[0, 1]), 1);
+                    let found = found.map(|(times, rows)| [times, rows].concat()).unwrap_or_default();
+                    let bits = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+                    assert_eq!(bits(&found), bits(&expected), "{text}");
+                }
+            }
+        }
     }
 
     #[test]

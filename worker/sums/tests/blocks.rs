@@ -48,7 +48,8 @@ fn summed(setup: &Setup, from: usize, n_step: usize, ahead: usize, end: usize) -
     let prediction = sums.run(&job).unwrap();
     let levels = setup.sums.as_ref().unwrap().levels;
     let answer = answer_of(&Question::of(setup).unwrap(), STEP, levels, &prediction.state).unwrap().unwrap();
-    assert_eq!(answer.span, [from as f64 * STEP, (from + n_step) as f64 * STEP]);
+    let [begin, end] = answer.span;
+    assert_eq!((begin, end), (from as f64 * STEP, (from + n_step) as f64 * STEP));
     answer.levels
 }
 
