@@ -4,7 +4,7 @@
 //! whoever parses it. Next file to read: `gather.rs`.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, Seek, SeekFrom};
+use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 
 use starlings_models::SumsFile;
 use starlings_study::infer_choice::InferRecord;
@@ -36,7 +36,11 @@ pub(crate) struct FileBlock {
 }
 
 /// The recordings as workers find them; `None` where one has to be read here, or cannot be.
-pub(crate) fn files(records: &[InferRecord]) -> Option<Vec<FileRecord>> {
+pub(crate) fn files(records: &[InferRecord], cut: Cut) -> Option<Vec<FileRecord>> {
+    // Rows that are none of the file's, and blocks that reach over the next one's start.
+    if cut.resample || cut.block <= cut.ahead {
+        return None;
+    }
     records.iter().map(file).collect()
 }
 
@@ -47,9 +51,19 @@ fn file(record: &InferRecord) -> Option<FileRecord> {
     }
     let rows = open(record).ok()?;
     let path = std::path::absolute(&record.file).ok()?.to_str()?.to_owned();
-    let (length, modified) = stamp(&File::open(&record.file).ok()?)?;
-    let (first, n_cell, cells) = (rows.n_byte(), rows.n_cell(), rows.cells().to_vec());
+    let mut text = File::open(&record.file).ok()?;
+    let (length, modified) = stamp(&text)?;
+    let (first, n_cell, cells) =
+        (after_line_end(&mut text, rows.n_byte())?, rows.n_cell(), rows.cells().to_vec());
     Some(FileRecord { file: SumsFile { path, length, modified, n_cell, cells }, first })
+}
+
+/// Where the line after the header begins: its reader may stand between the two bytes of a line end.
+fn after_line_end(text: &mut File, at: u64) -> Option<u64> {
+    text.seek(SeekFrom::Start(at.checked_sub(1)?)).ok()?;
+    let mut bytes = Vec::new();
+    text.take(2).read_to_end(&mut bytes).ok()?;
+    Some(if bytes == *b"\r\n" { at + 1 } else { at })
 }
 
 /// The blocks of one file, in the memory of one portion.
@@ -151,7 +165,7 @@ mod tests {
     fn the_blocks_of_a_file_are_those_of_its_rows() {
         let record = record();
         for n_row in [2, 3, 9, 10, 11, 12, 13, 14, 19, 20, 21, 22, 23, 24, 31, 2000] {
-            for (block, ahead) in [(1, 0), (1, 3), (2, 3), (10, 0), (10, 1), (10, 3), (500, 3)] {
+            for (block, ahead) in [(1, 0), (2, 1), (4, 3), (10, 0), (10, 1), (10, 3), (500, 3)] {
                 let cut = Cut { step: 1.0, block, ahead, breaks: false, resample: false };
                 let mut text = "t,x\n".to_owned();
                 (0..n_row).for_each(|k| writeln!(text, "{k},{}", k * k).unwrap_or_default());
@@ -182,14 +196,18 @@ mod tests {
     #[test]
     fn a_recording_with_a_span_or_without_a_file_is_read_here() {
         let record = InferRecord { file: "no such file".into(), ..record() };
-        assert_eq!(files(std::slice::from_ref(&record)), None);
+        let cut = Cut { step: 1.0, block: 10, ahead: 3, breaks: false, resample: false };
+        assert_eq!(files(std::slice::from_ref(&record), cut), None);
         let dir = tempfile::tempdir().unwrap_or_else(|error| panic!("{error}"));
         let file = dir.path().join("data.csv");
         std::fs::write(&file, "\u{feff}x,\"t\"\r\n1,0\r\n").unwrap_or_else(|error| panic!("{error}"));
         let record = InferRecord { file, ..record };
-        let found = files(std::slice::from_ref(&record)).unwrap_or_default();
+        let found = files(std::slice::from_ref(&record), cut).unwrap_or_default();
         assert_eq!((found[0].first, found[0].file.n_cell), (10, 2));
         assert_eq!(found[0].file.cells, [1, 0]);
-        assert_eq!(files(&[InferRecord { span: [0.0, f64::INFINITY], ..record }]), None);
+        for cut in [Cut { resample: true, ..cut }, Cut { block: 3, ..cut }] {
+            assert_eq!(files(std::slice::from_ref(&record), cut), None, "{cut:?}");
+        }
+        assert_eq!(files(&[InferRecord { span: [0.0, f64::INFINITY], ..record }], cut), None);
     }
 }

@@ -200,8 +200,8 @@ fn gathered(
     let Asked { choice, setup, question, .. } = asked;
     let work = Work { setup, question, records, cut, levels: choice.sums.levels };
     let files = match reader {
-        Reader::Workers if !cut.resample => files(records),
-        _ => None,
+        Reader::Workers => files(records, cut),
+        Reader::Coordinator => None,
     };
     let sources = files.as_deref().map(Source::Files).into_iter().chain([Source::Rows]);
     for source in sources {

@@ -81,7 +81,7 @@ impl Case {
         let work = Work { setup, question, records, cut, levels: sums.levels };
         let mut fleet =
             InProcess::new(2).with_factory(factory(Arc::new(|setup| setup.build()), Reading::Allowed));
-        let found = files(records).unwrap();
+        let found = files(records, cut).unwrap();
         let source = if from_files { Source::Files(&found) } else { Source::Rows };
         work.gather(source, &mut fleet, &mut |_, _| {})
     }
@@ -89,7 +89,7 @@ impl Case {
 
 #[test]
 fn workers_that_read_files_give_the_bits_of_rows_that_travel() {
-    let texts = [text(0..1000), text(3..500).trim_end().to_owned()];
+    let texts = [text(0..1000).replace('\n', "\r\n"), text(3..500).trim_end().to_owned()];
     for levels in [1, 3] {
         let case = Case::new(levels, &[], &texts);
         for block in [7, 100, 256, 5000] {
