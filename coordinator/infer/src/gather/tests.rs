@@ -79,8 +79,7 @@ impl Case {
         let cut = Cut { step: STEP, block, ahead: sums.n_ahead(), breaks, resample: false };
         let (setup, question, records) = (&self.setup, &self.question, &self.records[..]);
         let work = Work { setup, question, records, cut, levels: sums.levels };
-        let mut fleet =
-            InProcess::new(2).with_factory(factory(Arc::new(|setup| setup.build()), Reading::Allowed));
+        let mut fleet = InProcess::new(2).with_factory(factory(Arc::new(Setup::build), Reading::Allowed));
         let found = files(records, cut).unwrap();
         let source = if from_files { Source::Files(&found) } else { Source::Rows };
         work.gather(source, &mut fleet, &mut |_, _| {})

@@ -50,25 +50,25 @@ fn chance(p: f64) -> String {
 
 /// At which rate terms are named, what is left, what held-out records say.
 fn note(found: &MissingFound) -> String {
-    let mut note = format!(
+    let mut note = vec![format!(
         "A term is named by chance in {} of a hundred searches of recordings that lack none.",
         number::significant(100.0 * found.false_alarm, 2)
-    );
+    )];
     if let Some(left) = &found.left {
-        note += &format!(
-            " The {} candidates that are not named have χ² {:.1} together, by chance {}.",
+        note.push(format!(
+            "The {} candidates that are not named have χ² {:.1} together, by chance {}.",
             left.terms,
             left.chi_squared,
             chance(left.by_chance)
-        );
+        ));
     }
     if let Some(held_out) = found.held_out.as_ref().filter(|_| !found.named.is_empty()) {
-        note += &format!(
-            " Over {} steps of held-out records ({}) the log-likelihood is {:.1} nats larger with the named terms.",
+        note.push(format!(
+            "Over {} steps of held-out records ({}) the log-likelihood is {:.1} nats larger with the named terms.",
             held_out.n_step,
             held_out.records.join(", "),
             held_out.gain
-        );
+        ));
     }
-    note
+    note.join(" ")
 }

@@ -20,6 +20,26 @@ fn coefficient(name: &str, estimate: Option<f64>, zero: bool) -> CoefficientFoun
     }
 }
 
+fn missing() -> MissingFound {
+    MissingFound {
+        candidates: 21,
+        false_alarm: 0.01,
+        named: vec![NamedTerm {
+            name: "x:z".to_owned(),
+            estimate: -1.0,
+            sd: 0.02,
+            interval90: [-1.03, -0.97],
+            chi_squared: 2500.0,
+            by_chance: 0.0,
+            ties: vec!["x:w".to_owned()],
+        }],
+        strongest: vec![ScoredTerm { name: "x:u".to_owned(), chi_squared: 17.5, by_chance: 3e-5 }],
+        left: Some(JointScore { terms: 20, chi_squared: 18.0, by_chance: 0.587 }),
+        held_out: Some(HeldOut { records: vec!["later".to_owned()], n_step: 100, gain: 1234.5 }),
+        coefficients: vec![coefficient("sigma", Some(10.5), false), coefficient("x:z", Some(-1.0), false)],
+    }
+}
+
 fn sample() -> Inference {
     let values = |scale: f64| vec![Some([10.0, scale]), Some([0.1, scale]), None];
     let at = |n_block: u64| Converging {
@@ -65,26 +85,7 @@ fn sample() -> Inference {
             probability: 0.49,
             consistent: true,
         }),
-        missing: Some(MissingFound {
-            candidates: 21,
-            false_alarm: 0.01,
-            named: vec![NamedTerm {
-                name: "x:z".to_owned(),
-                estimate: -1.0,
-                sd: 0.02,
-                interval90: [-1.03, -0.97],
-                chi_squared: 2500.0,
-                by_chance: 0.0,
-                ties: vec!["x:w".to_owned()],
-            }],
-            strongest: vec![ScoredTerm { name: "x:u".to_owned(), chi_squared: 17.5, by_chance: 3e-5 }],
-            left: Some(JointScore { terms: 20, chi_squared: 18.0, by_chance: 0.587 }),
-            held_out: Some(HeldOut { records: vec!["later".to_owned()], n_step: 100, gain: 1234.5 }),
-            coefficients: vec![
-                coefficient("sigma", Some(10.5), false),
-                coefficient("x:z", Some(-1.0), false),
-            ],
-        }),
+        missing: Some(missing()),
         convergence: vec![at(1), at(2), at(4)],
         convergence_of: Some("estimates before smoothing".to_owned()),
         conditional_on: "90 % intervals".to_owned(),
