@@ -18,7 +18,7 @@ use crate::load::load;
 
 /// Validate a study, its recordings and its model, and make one trial run at the prior median.
 ///
-/// A study with a section [infer] is checked as `starlings infer` takes it: what is asked of which equations, and the first rows of its
+/// A study with a section `[infer]` is checked as `starlings infer` takes it: what is asked of which equations, and the first rows of its
 /// recordings.
 #[derive(Parser)]
 pub(crate) struct Args {
