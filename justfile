@@ -108,6 +108,12 @@ fmt:
 doc $RUSTDOCFLAGS="-D warnings":
     cargo doc --workspace --no-deps
 
+# Seconds and memory of `infer` for a long recording, with one worker and with two.
+infer-bench:
+    cargo bench -p starlings-sums --bench file_blocks
+    cargo build --release
+    benches/infer.sh
+
 # Micro-benchmarks and the fleet benchmark.
 bench:
     cargo bench --bench analysis

@@ -94,6 +94,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         factory: solvers.factory(),
         tell,
         states: args.states.clone(),
+        reading: args.permit.reading(),
         ..contact
     };
     let report = starlings_worker::run(config).map_err(|error| match error {

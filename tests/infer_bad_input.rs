@@ -5,16 +5,8 @@
 mod common;
 mod infer_kit;
 
-use common::starlings;
-use infer_kit::{STUDY, folder, infer, recording};
-
-/// Expects a study to be refused with every one of `words` and exit code 2.
-fn refused(study: &str, data: &str, words: &[&str]) {
-    let dir = folder(study, data);
-    let arguments = ["infer", "study.toml", "--out", "out", "--workers", "1"];
-    common::refused(starlings().current_dir(dir.path()).args(arguments), words);
-    assert!(!dir.path().join("out/infer.json").exists(), "no result of what was refused");
-}
+use common::{output, starlings};
+use infer_kit::{STUDY, folder, infer, recording, refused};
 
 #[test]
 fn a_recording_out_of_step_is_refused_with_its_line() {
@@ -58,7 +50,11 @@ fn what_cannot_be_estimated_is_refused_with_names() {
     };
     let same = data.lines().map(twice).collect::<Vec<_>>().join("\n");
     refused(&of_functions(r#"functions = ["x"]"#), &same, &["no positive definite covariance"]);
-    refused(&of_functions(r#"functions = ["log(x)"]"#), &data, &["log(x) is", "at row"]);
+    refused(
+        &of_functions(r#"functions = ["log(x)"]"#),
+        &data,
+        &["data.csv:", "log(x) is NaN in the step that begins in this row", "leave out the function"],
+    );
 }
 
 #[test]
@@ -99,4 +95,39 @@ fn a_section_that_does_not_fit_is_refused_with_place_and_remedy() {
     let prior =
         "\n[[parameters]]\nname = \"k\"\nprior = { transform = \"log\", median = 2.0, factor = 2.0 }\n";
     refused(&format!("{STUDY}{prior}"), &data, &["Gaussian under log", "transform = \"linear\""]);
+}
+
+/// What `starlings check` says, and whether it takes the study.
+fn checked(study: &str, data: &str) -> (i32, String) {
+    let dir = folder(study, data);
+    let (code, stdout, stderr) = output(starlings().current_dir(dir.path()).args(["check", "study.toml"]));
+    (code, stdout + &stderr)
+}
+
+#[test]
+fn keys_that_do_not_fit_together_are_refused_before_anything_is_read() {
+    let data = recording(500, usize::MAX);
+    let (code, says) = checked(STUDY, &data);
+    assert!(
+        code == 0 && says.contains("coefficients  3: k, c, d") && says.contains("steps of 0.01"),
+        "{says}"
+    );
+    let with = |lines: &str| STUDY.replace("block = 300", lines);
+    let reduced = "\n[infer.reduced]\nstart = { a = 1.0 }\ncoefficients = { kk = \"a\" }\n";
+    let nothing = "\n[infer.candidates]\nfunctions = [\"x\"]\n";
+    let functions = STUDY.replace(r#"parameters = ["k", "c", "d"]"#, r#"functions = ["x"]"#);
+    let cases = [
+        (format!("{STUDY}{reduced}"), "there is no coefficient `kk`"),
+        (with("measurement_noise = 0.1\nrichardson = true"), "remove `richardson`"),
+        (with("measurement_noise = 0.1\ngaps = \"break\""), "remove gaps"),
+        (format!("{functions}{nothing}"), "names no term that the model has not already"),
+    ];
+    for (study, says) in cases {
+        let (code, found) = checked(&study, &data);
+        assert!(code == 2 && found.contains(says), "no `{says}` in: {found}");
+        // Without a recording: the question is asked first.
+        refused(&study.replace("data.csv", "none.csv"), &data, &[&says[..10]]);
+    }
+    let (code, found) = checked(&format!("{STUDY}\n[infer.candidates]\nmost = 2\n"), &data);
+    assert!(code == 2 && found.contains("names no candidate"), "{found}");
 }

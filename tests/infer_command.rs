@@ -5,10 +5,11 @@
 mod common;
 mod infer_kit;
 
+use std::fmt::Write as _;
 use std::fs;
 
 use common::{output, starlings};
-use infer_kit::{STUDY, folder, infer, recording};
+use infer_kit::{STUDY, folder, infer, recording, refused};
 
 #[test]
 fn one_two_and_three_workers_give_the_same_bytes() {
@@ -76,4 +77,60 @@ fn a_step_that_cannot_be_fitted_leaves_the_estimate_where_it_is() {
     let warning = found["warnings"][0].as_str().unwrap();
     assert!(warning.contains("`richardson`") && warning.contains("at steps of 2h"), "{warning}");
     assert!(found["richardson"].is_null() && found["coefficients"][0]["estimate"].is_f64(), "{found}");
+}
+
+#[test]
+fn a_known_error_of_the_measurement_is_smoothed_where_the_recording_itself_has_no_fit() {
+    let mut state = 1_u64;
+    let mut error = || {
+        let uniform = |state: &mut u64| {
+            *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (*state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        0.5 * ((0..12).map(|_| uniform(&mut state)).sum::<f64>() - 6.0)
+    };
+    let mut data = "time,x,z\n".to_owned();
+    for line in recording(1_500, usize::MAX).lines().skip(1) {
+        let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
+        writeln!(data, "{:?},{:?},{:?}", cells[0], cells[1] + error(), cells[2] + error()).unwrap();
+    }
+    refused(&STUDY.replace("block = 300", "measurement_noise = \"none\""), &data, &["have not settled"]);
+    let dir = folder(&STUDY.replace("block = 300", "measurement_noise = 0.5"), &data);
+    let found = infer(dir.path(), "out", "2");
+    let of = found["convergence_of"].as_str().unwrap();
+    assert!(of.contains("before smoothing"), "{of}");
+    let noise = found["diffusion"]["matrix"][0][0].as_f64().unwrap();
+    // 2 M/h of the raw residuals is 50, and D is a quarter.
+    assert!(noise < 5.0, "{noise}");
+}
+
+#[test]
+fn rows_at_unequal_times_are_interpolated_by_request_with_the_noise_that_they_had() {
+    // Every row of the path but those whose number is drawn: of twenty thousand steps of 10 ms about a third is left out.
+    let data = recording(20_000, usize::MAX);
+    let mut state = 7_u64;
+    let mut dropped = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40).is_multiple_of(3)
+    };
+    let kept: Vec<&str> =
+        data.lines().enumerate().filter(|(k, _)| *k < 2 || !dropped()).map(|(_, l)| l).collect();
+    let kept = kept.join("\n");
+    refused(STUDY, &kept, &["data.csv:"]);
+    let study = STUDY.replace("block = 300", "resample = 0.04\ngaps = \"break\"");
+    let found = infer(folder(&study, &kept).path(), "out", "2");
+    let warning = found["warnings"][0].as_str().unwrap();
+    assert!(warning.contains("interpolated to equal steps"), "{warning}");
+    for l in 0..2 {
+        let noise = found["diffusion"]["matrix"][l][l].as_f64().unwrap();
+        // D is a quarter. Rows are 15 ms apart on average, longer ones weigh more: single steps of 40 ms alone would have lost a sixth.
+        assert!((noise / 0.25 - 1.0).abs() < 0.1, "{noise}");
+    }
+    let c = found["coefficients"].as_array().unwrap().iter().find(|c| c["name"] == "c").unwrap();
+    let (estimate, sd) = (c["estimate"].as_f64().unwrap(), c["sd"].as_f64().unwrap());
+    // Steps of 40 ms move the rates by (c h)² / 12 and interpolation by as much.
+    assert!((estimate - 3.0).abs() < 4.0 * sd + 0.1, "{estimate} ± {sd}");
+    let dir = folder(&study.replace("resample", "richardson = true\nresample"), &kept);
+    let (code, _, stderr) = output(starlings().current_dir(dir.path()).args(["check", "study.toml"]));
+    assert!(code == 2 && stderr.contains("remove it, or `resample`"), "{stderr}");
 }

@@ -80,6 +80,14 @@ pub(crate) fn infer(dir: &Path, out: &str, workers: &str) -> Value {
     serde_json::from_str(&stdout).expect("--json prints JSON and nothing else")
 }
 
+/// Expects a study to be refused with every one of `words` and exit code 2.
+pub(crate) fn refused(study: &str, data: &str, words: &[&str]) {
+    let dir = folder(study, data);
+    let arguments = ["infer", "study.toml", "--out", "out", "--workers", "1"];
+    crate::common::refused(starlings().current_dir(dir.path()).args(arguments), words);
+    assert!(!dir.path().join("out/infer.json").exists(), "no result of what was refused");
+}
+
 /// Lines of a followed recording.
 pub(crate) fn followed(dir: &Path, data: &str, arguments: &[&str]) -> (i32, Vec<String>, String) {
     let mut command = starlings();

@@ -9,8 +9,11 @@ use starlings_estimators::inference::{
 };
 use starlings_study::infer_choice::{DiffusionChoice, InferChoice, MeasuredChoice};
 
+use crate::blocks::Cut;
 use crate::error::InferError;
 use crate::result::{CoefficientFound, DiffusionFound, LEVEL, RichardsonFound};
+use crate::run::Asked;
+use crate::smoothed::{not_converged, smoothed};
 
 /// The fit that a study asks for.
 pub(crate) fn fit(choice: &InferChoice, structure: &Structure) -> Result<Fit, InferError> {
@@ -53,7 +56,8 @@ impl Fitted {
         };
         let checks = if sums.n_pair() > 0 { noise_checks(sums, structure, &posterior)? } else { Vec::new() };
         let matters = checks.iter().any(|check| check.verdict == Verdict::Matters);
-        let lag_corrected = matters && choice.measured == MeasuredChoice::Auto;
+        // What interpolation takes out of single steps, neighbouring ones have together.
+        let lag_corrected = (matters && choice.measured == MeasuredChoice::Auto) || choice.resample;
         if lag_corrected {
             posterior = Fit { lag_corrected, ..fit.clone() }.posterior(sums, structure)?;
         }
@@ -90,6 +94,29 @@ impl Answer {
             Err(doubt) => (None, vec![doubt]),
         };
         Ok(Self { posterior, checks, lag_corrected, extrapolated, doubts })
+    }
+
+    /// The posterior from a smoothed path, where the standard deviation of the measurement is known. The recording as it was measured
+    /// need not have a fit by itself.
+    pub(crate) fn smoothed(
+        asked: &Asked<'_>,
+        cut: Cut,
+        sd: f64,
+        levels: &[Sums],
+    ) -> Result<Self, InferError> {
+        let Asked { choice, question, fit, .. } = asked;
+        let checks = match levels.first().map(|sums| Fitted::of(choice, fit, &question.structure, sums, None))
+        {
+            Some(Ok(raw)) => raw.checks,
+            None
+            | Some(Err(InferenceError::DiffusionNotDefinite { .. } | InferenceError::NotSettled { .. })) => {
+                Vec::new()
+            }
+            Some(Err(error)) => return Err(error.into()),
+        };
+        let found = smoothed(question, fit, &choice.records, cut, sd)?;
+        let doubts = not_converged(found.converged, found.log_likelihood.len()).into_iter().collect();
+        Ok(Self { posterior: found.posterior, checks, lag_corrected: false, extrapolated: None, doubts })
     }
 
     /// Means of the coefficients that have a value, at no step where they were extrapolated.

@@ -84,6 +84,12 @@ impl Study {
         infer::study(path, &text_of(path)?)
     }
 
+    /// Whether a study file has a section `[infer]`; a file that cannot be read has none.
+    pub fn asks_to_infer(path: &Path) -> bool {
+        let file = text_of(path).ok().and_then(|text| text.parse::<toml::Table>().ok());
+        file.is_some_and(|file| file.contains_key("infer"))
+    }
+
     /// Checks the text of a study file that stands, or stood, at `file`.
     ///
     /// # Errors

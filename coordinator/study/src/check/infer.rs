@@ -2,6 +2,7 @@
 //!
 //! Recordings are not read here: only which column is which state. Next file to read: [`self::records`].
 
+mod candidates;
 mod records;
 mod reduced;
 mod settings;
@@ -59,7 +60,8 @@ fn infer(source: &Source, file: &StudyFile, setup: &Setup) -> Option<InferChoice
     };
     let before = source.count();
     let mut sums = settings::sums(source, section);
-    sums.left = settings::left(source, section, equations);
+    sums.candidates = candidates::functions(source, section.candidates.as_ref(), equations);
+    sums.left = settings::left(source, section, equations, &sums.candidates);
     if source.count() > before {
         return None;
     }
@@ -74,9 +76,16 @@ fn infer(source: &Source, file: &StudyFile, setup: &Setup) -> Option<InferChoice
         block: settings::block(source, section, most_steps),
         most_steps,
         breaks: settings::breaks(source, section),
+        resample: section.resample.is_some(),
         reduced: section.reduced.as_ref().map(|reduced| reduced::reduced(source, reduced)),
+        missing: candidates::missing(source, section.candidates.as_ref()),
         follow: settings::follow(source, section.follow.as_ref()),
         records: records::records(source, file, equations),
+        held_out: section
+            .candidates
+            .iter()
+            .flat_map(|_| records::held_out(source, file, equations))
+            .collect(),
     })
 }
 
@@ -93,8 +102,10 @@ fn check_functions(
     } else {
         Drift::of_rates(equations, constants, &sums.unknown, &sums.left).err()
     };
-    if let Some(error) = refused {
-        let listed = section.parameters.iter().chain(&section.functions);
+    let candidates = || Drift::of_texts(equations, constants, &sums.candidates, &sums.left).err();
+    if let Some(error) = refused.or_else(candidates) {
+        let of_candidates = candidates::listed(section.candidates.as_ref());
+        let listed = section.parameters.iter().chain(&section.functions).chain(of_candidates);
         match error {
             SetupError::Unknown { what, name, nearest } => {
                 let span =
