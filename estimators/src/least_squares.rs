@@ -20,6 +20,8 @@ use crate::block_angular::BlockAngular;
 const REJECTED_DAMPING: f64 = 1e-2;
 /// Rejected steps in a row after which the fit has stalled.
 const MOST_REJECTED: usize = 8;
+/// Share of the cost that derivatives from differences of runs resolve.
+const RESOLUTION: f64 = 1e-8;
 /// Longest step of one component, in units of z.
 const LONGEST: f64 = 3.0;
 
@@ -46,7 +48,7 @@ pub struct LeastSquares {
 
 impl LeastSquares {
     /// A fit from a point that was not run yet. It ends when no step promises a fall of the cost (chi-square plus prior) above
-    /// `tolerance`, counted in the mean square of the residuals where that is above one, or after `trials` steps.
+    /// `tolerance` and what the digits of the cost resolve, or after `trials` steps.
     pub fn new(start: DVector<f64>, prior: Scaled, tolerance: f64, trials: usize) -> Self {
         let need = Need::Residual(start.clone());
         Self {
@@ -129,11 +131,9 @@ impl LeastSquares {
         self.predicted
     }
 
-    /// Mean square of the residuals at the best point, at least one: the unit in which a fall of the cost counts. Residuals far above
-    /// the stated noise have an optimum that no absolute fall of the cost can name, since its digits are lost in their sum.
-    pub fn mean_square(&self) -> f64 {
-        let n = self.residual.len().max(1) as f64;
-        (self.residual.norm_squared() / n).max(1.0)
+    /// The smallest fall of the cost that derivatives from differences of runs can promise beside a cost of this size.
+    pub fn resolution(&self) -> f64 {
+        RESOLUTION * self.cost
     }
 
     /// Steps that it may still try.
@@ -255,7 +255,7 @@ impl LeastSquares {
             self.need = Need::Nothing(End::Stalled);
             return;
         };
-        if self.predicted <= self.tolerance * self.mean_square() {
+        if self.predicted <= self.tolerance.max(self.resolution()) {
             self.need = if self.fresh {
                 Need::Nothing(End::Converged)
             } else if self.thorough {

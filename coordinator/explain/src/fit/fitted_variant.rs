@@ -14,7 +14,7 @@ use super::model_variant::ModelVariant;
 use crate::rows::Rows;
 use crate::run_cache::Point;
 
-/// Fall of χ² below which a fit has converged, in the mean square of the residuals where that is above one.
+/// Fall of χ² below which a fit has converged, where the size of χ² resolves it.
 const TOLERANCE: f64 = 0.02;
 /// The same for a tentative fit.
 const ROUGH: f64 = 0.3;
@@ -119,7 +119,7 @@ impl<'c> FittedVariant<'c> {
     pub(crate) fn has_converged(&self) -> bool {
         match self.end() {
             Some(End::Converged | End::Tentative) => true,
-            Some(End::Stalled) => self.solver.last_promise() < self.solver.mean_square(),
+            Some(End::Stalled) => self.solver.last_promise() < self.solver.resolution().max(1.0),
             _ => false,
         }
     }
