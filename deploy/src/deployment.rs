@@ -11,6 +11,7 @@ use crate::engine::{Engine, engine};
 use crate::error::DeployError;
 use crate::logs;
 use crate::order::Order;
+use crate::program::Programs;
 use crate::task::{Role, State, Task};
 
 /// Name of the file that says what a folder deploys.
@@ -141,6 +142,22 @@ impl Deployment {
     fn lock(&self) -> Option<File> {
         let file = File::open(self.folder.join(FILE)).ok()?;
         file.lock().ok().map(|()| file)
+    }
+
+    /// Runs the commands that submit it, one after the other. What was taken before one that is refused is of no use alone, and one that
+    /// gave no answer may have been taken: then everything is cancelled.
+    pub(crate) fn submit(&self, programs: &Programs, commands: &[Vec<String>]) -> Result<(), DeployError> {
+        for command in commands {
+            let refused = match programs.run(command, "") {
+                Ok(said) if said.is_well => continue,
+                Ok(said) => said.refused(),
+                // Without the program nothing was submitted.
+                Err(error @ DeployError::Missing { .. }) => return Err(error),
+                Err(error) => error,
+            };
+            return Err(self.given_up(refused));
+        }
+        Ok(())
     }
 
     /// Cancels what was submitted before an error, and says with it what is left.

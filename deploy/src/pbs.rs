@@ -15,7 +15,7 @@ use crate::logs;
 use crate::options::{Own, Syntax};
 use crate::order::Order;
 use crate::program::Programs;
-use crate::script::{script, text};
+use crate::script::{text, worker_script};
 use crate::task::Task;
 
 /// OpenPBS or PBS Professional, 19 or later.
@@ -61,23 +61,12 @@ impl Engine for Pbs {
 
     fn files(&self, order: &Order, folder: &Path) -> Result<Vec<(String, String)>, DeployError> {
         SYNTAX.check(&order.options)?;
-        let values = json!({
-            "name": order.name,
-            "workers": order.workers,
-            "cores": order.slots.unwrap_or(1),
-            "logs": text(&folder.join(logs::FOLDER)),
-            "program": text(&order.program),
-            "access": text(&order.access),
-            "scratch": order.scratch.as_deref().map(text),
-            "idle": order.idle,
-            "slots": order.slots.map_or_else(|| "${NCPUS:-1}".to_owned(), |slots| slots.to_string()),
-            "is_solver": order.is_solver,
-            "study": text(&order.study),
-            "is_copied": false,
-            "keeps_code": false,
-            "processes": null,
-        });
-        Ok(vec![(WORKER.to_owned(), script(WORKER, values)?)])
+        let own = [
+            ("workers", json!(order.workers)),
+            ("cores", json!(order.slots.unwrap_or(1))),
+            ("logs", json!(text(&folder.join(logs::FOLDER)))),
+        ];
+        Ok(vec![(WORKER.to_owned(), worker_script(WORKER, order, "${NCPUS:-1}", own)?)])
     }
 
     fn commands(&self, deployment: &Deployment) -> Vec<Vec<String>> {
@@ -91,17 +80,7 @@ impl Engine for Pbs {
     }
 
     fn submit(&self, deployment: &Deployment) -> Result<(), DeployError> {
-        for command in self.commands(deployment) {
-            let refused = match PROGRAMS.run(&command, "") {
-                Ok(said) if said.is_well => continue,
-                Ok(said) => said.refused(),
-                // Without the program nothing was submitted.
-                Err(error @ DeployError::Missing { .. }) => return Err(error),
-                Err(error) => error,
-            };
-            return Err(deployment.given_up(refused));
-        }
-        Ok(())
+        deployment.submit(&PROGRAMS, &self.commands(deployment))
     }
 
     fn tasks(&self, deployment: &Deployment) -> Result<Vec<Task>, DeployError> {

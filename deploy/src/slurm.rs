@@ -17,7 +17,7 @@ use crate::logs;
 use crate::options::{Own, Syntax};
 use crate::order::Order;
 use crate::program::Programs;
-use crate::script::{script, text};
+use crate::script::{script, text, worker_script};
 use crate::task::{Role, State, Task};
 
 /// Slurm 20.11 or later.
@@ -77,6 +77,9 @@ const fn own_option(long: &'static str, letter: Option<char>, reason: &'static s
 }
 
 const WORKER: &str = "worker.sbatch";
+/// The cores that a task was given, for a shell.
+const CORES: &str = "${SLURM_CPUS_PER_TASK:-${SLURM_CPUS_ON_NODE:-1}}";
+
 const COORDINATOR: &str = "coordinator.sbatch";
 
 impl Engine for Slurm {
@@ -86,23 +89,13 @@ impl Engine for Slurm {
 
     fn files(&self, order: &Order, folder: &Path) -> Result<Vec<(String, String)>, DeployError> {
         SYNTAX.check(&order.options)?;
-        let values = json!({
-            "name": order.name,
-            "array": indices(&order.first()),
-            "cores": order.slots.unwrap_or(1),
-            "log": log(folder, "worker-%a.log"),
-            "program": text(&order.program),
-            "access": text(&order.access),
-            "scratch": order.scratch.as_deref().map(text),
-            "idle": order.idle,
-            "slots": slots(order),
-            "is_solver": order.is_solver,
-            "study": text(&order.study),
-            "is_copied": false,
-            "keeps_code": false,
-            "processes": text(&folder.join(logs::FOLDER)),
-        });
-        let mut files = vec![(WORKER.to_owned(), script(WORKER, values)?)];
+        let own = [
+            ("array", json!(indices(&order.first()))),
+            ("cores", json!(order.slots.unwrap_or(1))),
+            ("log", json!(log(folder, "worker-%a.log"))),
+            ("processes", json!(text(&folder.join(logs::FOLDER)))),
+        ];
+        let mut files = vec![(WORKER.to_owned(), worker_script(WORKER, order, CORES, own)?)];
         if let Some(run_folder) = &order.run_folder {
             let values = json!({
                 "name": order.coordinator_name(),
@@ -128,18 +121,7 @@ impl Engine for Slurm {
     }
 
     fn submit(&self, deployment: &Deployment) -> Result<(), DeployError> {
-        for command in self.commands(deployment) {
-            let refused = match PROGRAMS.run(&command, "") {
-                Ok(said) if said.is_well => continue,
-                Ok(said) => said.refused(),
-                // Without the program nothing was submitted.
-                Err(error @ DeployError::Missing { .. }) => return Err(error),
-                Err(error) => error,
-            };
-            // What was taken before it is of no use alone, and one that gave no answer may have been taken.
-            return Err(deployment.given_up(refused));
-        }
-        Ok(())
+        deployment.submit(&PROGRAMS, &self.commands(deployment))
     }
 
     fn tasks(&self, deployment: &Deployment) -> Result<Vec<Task>, DeployError> {
@@ -192,12 +174,6 @@ fn log(folder: &Path, name: &str) -> String {
 /// The same as a word of its own.
 fn pattern(folder: &Path, name: &str) -> String {
     format!("{}/{name}", text(&folder.join(logs::FOLDER)).replace('%', "%%"))
-}
-
-/// Slots of a worker inside double quotes of a shell: as ordered, else one for every core that the task was given.
-fn slots(order: &Order) -> String {
-    let given = "${SLURM_CPUS_PER_TASK:-${SLURM_CPUS_ON_NODE:-1}}".to_owned();
-    order.slots.map_or(given, |slots| slots.to_string())
 }
 
 /// The command that submits a script, for workers with these numbers.

@@ -13,6 +13,7 @@ mod dispatcher;
 mod door;
 mod error;
 mod event;
+mod event_kind;
 mod event_text;
 mod explained;
 mod grpc;

@@ -65,6 +65,30 @@ impl Fitted {
     }
 }
 
+/// A row of the table of coefficients; `moved` is the estimate at no step, where it was extrapolated to that.
+pub(crate) fn coefficient(
+    choice: &InferChoice,
+    posterior: &Posterior,
+    p: usize,
+    moved: Option<f64>,
+) -> CoefficientFound {
+    let found = &posterior.estimates[p];
+    let at_step = found.value.map(|value| value.mean);
+    let shift = moved.zip(at_step).map_or(0.0, |(moved, at_step)| moved - at_step);
+    let interval = posterior.interval(p, LEVEL).map(|ends| ends.map(|end| end + shift));
+    let prior = choice.priors.iter().find(|(name, _, _)| *name == found.name);
+    CoefficientFound {
+        name: found.name.clone(),
+        observed: found.observed,
+        estimate: moved.or(at_step),
+        sd: found.value.map(|value| value.sd),
+        interval90: interval,
+        may_be_zero: interval.map(|[lo, hi]| lo <= 0.0 && hi >= 0.0),
+        at_step: moved.and(at_step),
+        prior: prior.map(|(_, mean, sd)| [*mean, *sd]),
+    }
+}
+
 /// What the sums of all blocks say.
 pub(crate) struct Answer {
     pub(crate) posterior: Posterior,
@@ -131,23 +155,10 @@ impl Answer {
 
     /// The table of the coefficients.
     pub(crate) fn coefficients(&self, choice: &InferChoice) -> Vec<CoefficientFound> {
-        let all = self.posterior.estimates.iter().enumerate();
-        all.map(|(p, found)| {
-            let at_step = found.value.map(|value| value.mean);
+        let all = 0..self.posterior.estimates.len();
+        all.map(|p| {
             let moved = self.extrapolated.as_ref().and_then(|e| e.estimates.get(p)?.value).map(|v| v.mean);
-            let shift = moved.zip(at_step).map_or(0.0, |(moved, at_step)| moved - at_step);
-            let interval = self.posterior.interval(p, LEVEL).map(|ends| ends.map(|end| end + shift));
-            let prior = choice.priors.iter().find(|(name, _, _)| *name == found.name);
-            CoefficientFound {
-                name: found.name.clone(),
-                observed: found.observed,
-                estimate: moved.or(at_step),
-                sd: found.value.map(|value| value.sd),
-                interval90: interval,
-                may_be_zero: interval.map(|[lo, hi]| lo <= 0.0 && hi >= 0.0),
-                at_step: moved.and(at_step),
-                prior: prior.map(|(_, mean, sd)| [*mean, *sd]),
-            }
+            coefficient(choice, &self.posterior, p, moved)
         })
         .collect()
     }

@@ -8,6 +8,7 @@ use starlings_estimators::inference::{
 };
 use starlings_study::infer_choice::{InferChoice, MissingChoice};
 
+use crate::answer::coefficient;
 use crate::error::InferError;
 use crate::result::{CoefficientFound, HeldOut, JointScore, LEVEL, MissingFound, NamedTerm, ScoredTerm};
 
@@ -106,23 +107,7 @@ impl<'a> Wider<'a> {
     /// The model's coefficients with the named terms.
     fn coefficients(&self, choice: &InferChoice, found: &Missing) -> Vec<CoefficientFound> {
         let is_named = |p: usize| found.named.iter().any(|named| named.coefficient == p);
-        let estimates = found.posterior.estimates.iter().enumerate();
-        let shown = estimates.filter(|(p, _)| *p < self.n_own || is_named(*p));
-        shown
-            .map(|(p, estimate)| {
-                let interval = found.posterior.interval(p, LEVEL);
-                let prior = choice.priors.iter().find(|(name, _, _)| *name == estimate.name);
-                CoefficientFound {
-                    name: estimate.name.clone(),
-                    observed: estimate.observed,
-                    estimate: estimate.value.map(|value| value.mean),
-                    sd: estimate.value.map(|value| value.sd),
-                    interval90: interval,
-                    may_be_zero: interval.map(|[lo, hi]| lo <= 0.0 && hi >= 0.0),
-                    at_step: None,
-                    prior: prior.map(|(_, mean, sd)| [*mean, *sd]),
-                }
-            })
-            .collect()
+        let shown = (0..found.posterior.estimates.len()).filter(|p| *p < self.n_own || is_named(*p));
+        shown.map(|p| coefficient(choice, &found.posterior, p, None)).collect()
     }
 }

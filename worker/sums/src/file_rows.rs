@@ -59,7 +59,7 @@ fn parse(text: &[u8], def: &SumsFile, n_row: usize) -> Option<(Vec<f64>, Vec<f64
     let mut rows = Vec::with_capacity(n_row.checked_mul(channels.len())?);
     let mut rest = text;
     while !rest.is_empty() {
-        let used = quick_row(rest, &wanted, &mut values).or_else(|| row(rest, &wanted, &mut values))?;
+        let used = row(rest, &wanted, &mut values)?;
         rest = &rest[used..];
         times.push(*values.get(*time)?);
         for at in channels {
@@ -69,20 +69,21 @@ fn parse(text: &[u8], def: &SumsFile, n_row: usize) -> Option<(Vec<f64>, Vec<f64
     (times.len() == n_row).then_some((times, rows))
 }
 
-/// Reads a row without looking for its end first, and says how many bytes it has with its line end; `None` where a cell that is wanted is more
-/// than a number.
-fn quick_row(text: &[u8], wanted: &[bool], values: &mut [f64]) -> Option<usize> {
+/// Reads a row and says how many bytes it has with its line end; blanks may stand around a number. `None` where a cell that is wanted is no
+/// finite number, or the row has another number of cells.
+fn row(text: &[u8], wanted: &[bool], values: &mut [f64]) -> Option<usize> {
     let mut at = 0;
     let n = values.len();
     for (k, (value, wanted)) in values.iter_mut().zip(wanted).enumerate() {
         let rest = &text[at..];
         if *wanted {
-            let (found, used) = fast_float2::parse_partial::<f64, _>(rest).ok()?;
-            *value = found;
-            at += used;
+            let before = n_blank(rest);
+            let (found, used) = fast_float2::parse_partial::<f64, _>(&rest[before..]).ok()?;
             if !found.is_finite() {
                 return None;
             }
+            *value = found;
+            at += before + used + n_blank(&rest[before + used..]);
         } else {
             at += memchr::memchr3(b',', b'\n', b'\r', rest).unwrap_or(rest.len());
         }
@@ -97,43 +98,9 @@ fn quick_row(text: &[u8], wanted: &[bool], values: &mut [f64]) -> Option<usize> 
     (n > 1 || at > 1).then_some(at)
 }
 
-/// Reads a row with blanks around its numbers, and says how many bytes it has with its line end.
-fn row(text: &[u8], wanted: &[bool], values: &mut [f64]) -> Option<usize> {
-    let end = memchr::memchr(b'\n', text);
-    let line = &text[..end.unwrap_or(text.len())];
-    let line = line.strip_suffix(b"\r").unwrap_or(line);
-    let mut cells = vec![(0, 0); values.len()];
-    take_apart(line, &mut cells)?;
-    for ((value, wanted), cell) in values.iter_mut().zip(wanted).zip(cells) {
-        if *wanted {
-            *value = number(line, cell)?;
-        }
-    }
-    Some(end.map_or(text.len(), |end| end + 1))
-}
-
-/// Where the cells of a line are; `None` where there are more or fewer.
-fn take_apart(line: &[u8], cells: &mut [(usize, usize)]) -> Option<()> {
-    let (last, before) = cells.split_last_mut()?;
-    let mut start = 0;
-    let mut commas = line.iter().enumerate().filter(|(_, byte)| matches!(byte, b',' | b'\r'));
-    for cell in before {
-        let (end, byte) = commas.next()?;
-        if *byte != b',' {
-            return None;
-        }
-        *cell = (start, end);
-        start = end + 1;
-    }
-    *last = (start, line.len());
-    (commas.next().is_none() && !line.is_empty()).then_some(())
-}
-
-/// A finite number, with blanks around it.
-fn number(line: &[u8], (start, end): (usize, usize)) -> Option<f64> {
-    let cell = std::str::from_utf8(line.get(start..end)?).ok()?;
-    let value = cell.parse::<f64>().or_else(|_| cell.trim_matches([' ', '\t']).parse::<f64>()).ok()?;
-    value.is_finite().then_some(value)
+/// Blanks at the start of a text.
+fn n_blank(text: &[u8]) -> usize {
+    text.iter().take_while(|byte| matches!(byte, b' ' | b'\t')).count()
 }
 
 #[cfg(test)]

@@ -232,11 +232,6 @@ impl Batch {
         self.names[index]
     }
 
-    /// Jobs without an outcome.
-    pub(super) fn n_open(&self) -> usize {
-        self.jobs.len() - self.ended.len()
-    }
-
     /// Takes back a job whose worker is gone; `counted` when the worker may have died of it.
     pub(super) fn lost(&mut self, index: usize, counted: bool, limit: u32) -> Lost {
         let job = &mut self.jobs[index];

@@ -17,7 +17,7 @@ use super::states::States;
 use super::teller::Teller;
 use super::waiting::Waiting;
 use crate::dispatcher::{BatchError, Command, ControlId, Dispatcher, Event, WorkerId};
-use crate::event_text::OVER;
+use crate::event_kind::OVER;
 use crate::tally::Counting;
 use crate::wire::{Job, named};
 use crate::{FleetEvent, StateStore, StoredState};
