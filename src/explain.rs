@@ -88,7 +88,7 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     let plan = args.fleet.plan(&study, Some(&Out(args.out.as_deref())))?;
     let options = args.options(&study);
     check(&study, &options).map_err(Failure::input)?;
-    let is_away = is_outside(&study) && !args.fleet.is_here();
+    let is_away = args.fleet.workers_try(&study);
     // What a solver answers for is found out by the trial, and may be needed again.
     let is_known = !is_outside(&study) && args.resume.was_tried(args.out.as_deref());
     if !is_away && !is_known {

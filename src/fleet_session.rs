@@ -28,7 +28,7 @@ use crate::console::note;
 use crate::failure::Failure;
 use crate::fleet_values::{address, alone, host_of, memory, metrics_address};
 use crate::interrupt;
-use crate::load::end_solvers;
+use crate::load::{end_solvers, is_outside};
 use crate::progress::Display;
 use crate::solvers::own_program;
 pub(crate) use entrance::Entrance;
@@ -73,6 +73,11 @@ impl FleetArgs {
     /// Whether runs are made on this machine, by workers that this process starts.
     pub(crate) fn is_here(&self) -> bool {
         self.listen.is_none()
+    }
+
+    /// Whether workers make the trial: nothing of a solver is started where this process listens, and it never holds a large state.
+    pub(crate) fn workers_try(&self, study: &Study) -> bool {
+        (is_outside(study) && !self.is_here()) || study.has_large_states()
     }
 
     /// Checks the arguments; nothing is started yet. `out` is the run folder where it is named, `None` for a command that makes
@@ -248,7 +253,7 @@ impl FleetSession {
         let _ = self.invitation.set(invitation);
     }
 
-    /// Tries a study on workers elsewhere, where it is not tried here.
+    /// Tries a study on the workers, where it is not tried here.
     pub(crate) fn trial(
         &mut self,
         study: &mut Study,

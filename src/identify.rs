@@ -17,7 +17,7 @@ use crate::disk;
 use crate::failure::Failure;
 use crate::fleet_session::{Entrance, FleetArgs, FleetSession};
 use crate::interrupt;
-use crate::load::{is_outside, load_where};
+use crate::load::load_where;
 use crate::progress::Display;
 use crate::run::hangs_on;
 
@@ -56,7 +56,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     csv_file::check_outputs(&outputs, &study.text, &StudyLocation::Known(&study.file))?;
     let at = At::from_argument(&args.at);
     at.centre(&study).map_err(Failure::input)?;
-    let is_away = is_outside(&study) && !args.fleet.is_here();
+    let is_away = args.fleet.workers_try(&study);
     if !is_away {
         dry_run(&mut study, &BATCH, Depth::First).map_err(Failure::input)?;
     }

@@ -48,7 +48,7 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     let mut study = load_where(&args.study, args.fleet.is_here())?;
     let plan = args.fleet.plan(&study, Some(&Out(args.out.as_deref())))?.keeping_states();
     let kind = study.estimator.kind;
-    let is_away = is_outside(&study) && !args.fleet.is_here();
+    let is_away = args.fleet.workers_try(&study);
     // What a solver answers for is found out by the trial, and may be needed again.
     let is_known = !is_outside(&study) && args.resume.was_tried(args.out.as_deref());
     if !is_away && !is_known {
@@ -72,6 +72,9 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     let identity = folder.store.begin().map_err(Failure::run)?;
     let mut session = FleetSession::listen(&study, &plan, entrance, identity, &display)?;
     session.start_workers(&study, &plan, Some(&folder.path))?;
+    if is_away {
+        folder.settle_states_of_trial(session.fleet.states()).map_err(Failure::run)?;
+    }
     if is_away && let Err(failure) = session.trial(&mut study, Some(kind), Some(&folder.store)) {
         let states = session.fleet.states().cloned().filter(|_| args.resume.is_first());
         session.close(false);

@@ -52,7 +52,7 @@ pub use starlings_states::{
     CHUNK_VALUES, Folder, Held, PlaceName, StateError, StateStore, StateWriter, StoredState, hex, n_chunks,
 };
 pub use tally::{Census, FAILURE_TYPES, RUN_TIME_BOUNDS, Reading, Readings, Tally};
-pub use travel::travels;
+pub use travel::{returns, travels};
 
 use std::ops::ControlFlow;
 use std::time::Duration;

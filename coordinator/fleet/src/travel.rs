@@ -12,13 +12,21 @@ use starlings_proto::{JobEncoder, ProtocolError, SetupId, State};
 use crate::hub::{Reply, Submission};
 use crate::{FleetError, Held, StateError, StateStore};
 
-/// Whether a job and its prediction can travel.
+/// Whether a job can travel.
 ///
 /// # Errors
 /// What is too large, as the fleet would say it.
-pub fn travels(job: &Job, prediction: &Prediction) -> Result<(), ProtocolError> {
+pub fn travels(job: &Job<Held>) -> Result<(), ProtocolError> {
     check_size(job)?;
-    check_state(prediction.state.len())
+    check_state(job.state.as_ref().map_or(0, Held::n_state))
+}
+
+/// Whether a prediction can travel back.
+///
+/// # Errors
+/// As [`travels`].
+pub fn returns(prediction: &Prediction<Held>) -> Result<(), ProtocolError> {
+    check_state(prediction.state.n_state())
 }
 
 /// A batch as it travels; large states are in the store and stay there until it is over.
@@ -28,8 +36,7 @@ pub(crate) fn submission(
     reply: Sender<Reply>,
 ) -> Result<Submission, FleetError> {
     for (_, job) in &jobs {
-        check_size(job).map_err(FleetError::TooLarge)?;
-        check_state(job.state.as_ref().map_or(0, Held::n_state)).map_err(FleetError::TooLarge)?;
+        travels(job).map_err(FleetError::TooLarge)?;
     }
     let mut states = Vec::new();
     let mut travelling = |held: Held| {
@@ -59,12 +66,17 @@ mod tests {
     #[test]
     fn a_state_of_any_size_travels() {
         let window = Window { start: 0.0, times: vec![1.0], observed: vec![1.0], inputs: Vec::new() };
-        let job = Job { particle: 0, record: 0, window: Arc::new(window), theta: Vec::new(), state: None };
-        let ended = |n: usize| Prediction { outputs: vec![1.0], state: vec![0.0; n], cost: 0.0 };
-        assert_eq!(travels(&job, &ended(32_768)), Ok(()));
-        assert_eq!(travels(&job, &ended(32_769)), Ok(()));
-        let never = Window { times: Vec::new(), ..(*job.window).clone() };
-        let error = travels(&Job { window: Arc::new(never), ..job }, &ended(1));
+        let window = Arc::new(window);
+        for n in [32_768, 32_769] {
+            let state = Held::Values(vec![0.0; n]);
+            let ended = Prediction { outputs: vec![1.0], state: state.clone(), cost: 0.0 };
+            assert_eq!(returns(&ended), Ok(()));
+            let window = Arc::clone(&window);
+            let job = Job { particle: 0, record: 0, window, theta: Vec::new(), state: Some(state) };
+            assert_eq!(travels(&job), Ok(()));
+        }
+        let never = Arc::new(Window { times: Vec::new(), ..(*window).clone() });
+        let error = travels(&Job { particle: 0, record: 0, window: never, theta: Vec::new(), state: None });
         assert!(matches!(error, Err(ProtocolError::Shape { .. })), "a window without times");
     }
 }

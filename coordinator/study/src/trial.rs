@@ -1,13 +1,14 @@
-//! One trial run of every record at the prior median, in this process: whether the model runs where the study starts.
+//! One trial run of every record at the prior median: whether the model runs where the study starts.
 //!
-//! Next file to read: [`mod@dry_run`], which makes the runs of a fit.
+//! It is made in this process, or by the workers where nothing of the model may run here or its states are large. Next files to read:
+//! [`mod@dry_run`], which makes the runs of a fit, and [`on_fleet`].
 
 pub mod dry_run;
 pub mod on_fleet;
 
 use std::sync::Arc;
 
-use starlings_fleet::{ProtocolError, travels};
+use starlings_fleet::{Held, ProtocolError, returns, travels};
 use starlings_models::external::table::foreign_bytes;
 use starlings_models::{
     Forward, Job, ModelFailure, ParticleError, Prediction, SOLVER, SetupError, Stop, Until, Window,
@@ -106,11 +107,32 @@ pub fn trial(study: &Study) -> Result<Vec<TrialChannel>, TrialError> {
     if !study.runs_here {
         return Ok(Vec::new());
     }
-    trial_by(study, &*study.solver_host.build(&study.setup)?)
+    trial_by(study, &Here(&*study.solver_host.build(&study.setup)?))
 }
 
-/// The trial by a model that is built.
-fn trial_by(study: &Study, model: &dyn Forward) -> Result<Vec<TrialChannel>, TrialError> {
+/// Who makes the runs of a trial. A large state stays where it is held.
+trait Runner {
+    /// Makes one run.
+    ///
+    /// # Errors
+    /// When it gives no prediction.
+    fn run(&self, job: Job<Held>) -> Result<Prediction<Held>, ParticleError>;
+}
+
+/// A model in this process.
+struct Here<'a>(&'a dyn Forward);
+
+impl Runner for Here<'_> {
+    fn run(&self, job: Job<Held>) -> Result<Prediction<Held>, ParticleError> {
+        let lost = |error: starlings_fleet::StateError| ParticleError::Infrastructure(error.to_string());
+        let job = job.try_map(Held::into_values).map_err(lost)?;
+        let until = Until { spent: &spent(), stop: &Stop::default() };
+        self.0.run_within(&job, &until)?.try_map(|state| Ok(Held::Values(state)))
+    }
+}
+
+/// The trial by whoever makes the runs.
+fn trial_by(study: &Study, model: &dyn Runner) -> Result<Vec<TrialChannel>, TrialError> {
     let prior = posterior::prior(study);
     let mut channels = Vec::new();
     for (index, record) in study.records.iter().enumerate() {
@@ -159,24 +181,24 @@ enum Fault {
     Travel(ProtocolError),
 }
 
-/// One run, in this process; its job and prediction must also fit the protocol to workers.
+/// One run; wherever it is made, its job and prediction must fit the protocol to workers.
 fn run(
-    model: &dyn Forward,
+    model: &dyn Runner,
     record: usize,
     window: &Arc<Window>,
     theta: &[f64],
-    state: Option<Vec<f64>>,
-) -> Result<Prediction, Fault> {
+    state: Option<Held>,
+) -> Result<Prediction<Held>, Fault> {
     let job =
         Job { particle: 0, record: record as u32, window: Arc::clone(window), theta: theta.to_vec(), state };
-    let until = Until { spent: &spent(), stop: &Stop::default() };
-    let prediction = model.run_within(&job, &until).map_err(Fault::Run)?;
-    travels(&job, &prediction).map_err(Fault::Travel)?;
+    travels(&job).map_err(Fault::Travel)?;
+    let prediction = model.run(job).map_err(Fault::Run)?;
+    returns(&prediction).map_err(Fault::Travel)?;
     Ok(prediction)
 }
 
 /// Refuses what a program of its own sent in other bytes than those of 64-bit floats.
-fn check_bytes(study: &Study, record: &str, prediction: &Prediction) -> Result<(), TrialError> {
+fn check_bytes(study: &Study, record: &str, prediction: &Prediction<Held>) -> Result<(), TrialError> {
     if study.setup.model.kind != SOLVER {
         return Ok(());
     }

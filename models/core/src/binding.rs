@@ -105,14 +105,18 @@ impl Binding {
 
     /// Overrides the model's initial state by the constants and by a job's values.
     pub(crate) fn initial(&self, values: &[f64], x: &mut [f64]) {
-        for &(i, value) in &self.initial {
+        for (i, value) in self.initial_values(values) {
             x[i] = value;
         }
-        for (target, &value) in self.targets.iter().zip(values) {
-            if let Target::Initial(i) = *target {
-                x[i] = value;
-            }
-        }
+    }
+
+    /// The initial values that the constants and a job's values give, each with the place of its state; a later one counts.
+    pub(crate) fn initial_values<'a>(&'a self, values: &'a [f64]) -> impl Iterator<Item = (usize, f64)> + 'a {
+        let of_job = self.targets.iter().zip(values).filter_map(|(target, &value)| match *target {
+            Target::Initial(i) => Some((i, value)),
+            Target::Parameter(_) => None,
+        });
+        self.initial.iter().copied().chain(of_job)
     }
 }
 

@@ -13,6 +13,8 @@ mod run;
 mod split;
 pub mod table;
 
+use std::collections::BTreeMap;
+
 use crate::SetupError;
 use crate::binding::Binding;
 use crate::effect::Addition;
@@ -159,8 +161,11 @@ impl<S: Solve> External<S> {
         Ok(shown.outputs)
     }
 
-    /// The state of a job as that of the program and what effects remember.
-    fn split_state(&self, state: Option<&[f64]>) -> Result<(Option<Vec<f64>>, EffectStates), ParticleError> {
+    /// The state of a job as that of the program, which may be large and stays where it is, and what effects remember.
+    fn split_state<'a>(
+        &self,
+        state: Option<&'a [f64]>,
+    ) -> Result<(Option<&'a [f64]>, EffectStates), ParticleError> {
         let Some(state) = state else { return Ok((None, EffectStates::default())) };
         if !self.spec.restart {
             let name = &self.description.name;
@@ -179,7 +184,7 @@ impl<S: Solve> External<S> {
             last: some(last, self.on_outputs.is_some()),
             outputs: some(of_outputs, self.on_outputs.is_some()),
         };
-        Ok((Some(own.to_vec()), of_effects))
+        Ok((Some(own), of_effects))
     }
 
     /// Refuses an answer of another shape, of which nobody knows whose doing it is, and one that is not finite.
@@ -226,6 +231,18 @@ struct EffectStates {
     outputs: Option<Vec<f64>>,
 }
 
+impl EffectStates {
+    /// What they remember behind the program's own state, in whose memory it is where there is nothing to remember.
+    fn after(self, mut own: Vec<f64>) -> Vec<f64> {
+        let parts = [self.inputs, self.last, self.outputs];
+        own.reserve_exact(parts.iter().flatten().map(Vec::len).sum());
+        for part in parts.into_iter().flatten() {
+            own.extend(part);
+        }
+        own
+    }
+}
+
 impl<S: Solve> Forward for External<S> {
     fn spec(&self) -> &Spec {
         &self.spec
@@ -241,11 +258,9 @@ impl<S: Solve> Forward for External<S> {
         let theta = self.binding.theta(&job.theta, job.window.start)?;
         let (state, mut of_effects) = self.split_state(job.state.as_deref())?;
         let window = self.window(job, &theta, &mut of_effects)?;
-        let mut start = vec![f64::NAN; own.n_state()];
-        self.binding.initial(&job.theta, &mut start);
-        let given = (0..own.n_state()).filter(|i| !start[*i].is_nan());
+        let given: BTreeMap<usize, f64> = self.binding.initial_values(&job.theta).collect();
         let initial: Vec<(String, f64)> =
-            given.map(|i| (Spec::component(&own.states, i), start[i])).collect();
+            given.into_iter().map(|(i, value)| (Spec::component(&own.states, i), value)).collect();
         let of_terms = self.of_terms.iter().map(|(name, place)| (name.clone(), theta[*place]));
         let constants: Vec<(String, f64)> = of_terms.chain(self.constants.iter().cloned()).collect();
         let run = Run {
@@ -256,7 +271,7 @@ impl<S: Solve> Forward for External<S> {
             outputs: self.rows.asked(),
             window: &window,
             observer: &self.observer,
-            state: state.as_deref(),
+            state,
             terms: &self.terms,
             constants: &constants,
             stop: Some(until.stop),
@@ -265,12 +280,7 @@ impl<S: Solve> Forward for External<S> {
         self.check(&solved, &window)?;
         let shown = self.add_to_outputs(job, &theta, solved.outputs, &mut of_effects)?;
         let outputs = self.rows.picked(&shown);
-        let state = if self.spec.restart {
-            let parts = [Some(solved.state), of_effects.inputs, of_effects.last, of_effects.outputs];
-            parts.into_iter().flatten().flatten().collect()
-        } else {
-            Vec::new()
-        };
+        let state = if self.spec.restart { of_effects.after(solved.state) } else { Vec::new() };
         Ok(Prediction { outputs, state, cost: 0.0 })
     }
 }

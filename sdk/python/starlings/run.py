@@ -40,12 +40,14 @@ def execute(
     stopped: Callable[[], bool] = lambda: False,
     progress: Callable[[float], None] = lambda time: None,
 ) -> Answer:
-    """Runs a job. Raises Failed, or Cancelled when nobody waits any more."""
+    """Runs a job, of which the state is taken. Raises Failed, or Cancelled when nobody waits any more."""
     try:
         window = prepare(served, job, stopped, progress)
         served.solver.window = window
         if job.state is None:
             window.state = initial_state(served, window, job.initial)
+        # The window has its own, which the solver may change.
+        job.state = None
         if served.form == "run":
             return _whole(served, window)
         return _March(served, window).run()
@@ -65,6 +67,9 @@ def execute(
     except Exception as error:  # whatever a solver raises is data about this run
         show(error, served.solver)
         raise Failed(SOLVER, told(error, served.solver)) from error
+    finally:
+        # A large state of the past would stay beside the next one.
+        vars(served.solver).pop("window", None)
 
 
 class _March:
@@ -72,17 +77,20 @@ class _March:
 
     def __init__(self, served: Served, window: Window) -> None:
         self.served, self.window, self.solver = served, window, served.solver
-        self.advance = self._step if served.form == "step" else self._runge_kutta
         # Begin of a span between samples, the inputs there, and their slopes on it.
         self._line: Tuple[float, Array, Array] = (math.nan, np.zeros(0), np.zeros(0))
 
     def run(self) -> Answer:
         served, window = self.served, self.window
+        # No attribute: a method of this object that it holds itself would keep it, and its states, until the collector comes by.
+        advance = self._step if served.form == "step" else self._runge_kutta
         x = window.state
         recorded = np.empty((window.times.size, len(window._rows)))
         previous = window.start
         for index, time in enumerate(window.times.tolist()):
-            x = self._to(previous, time, x)
+            # Here and not in a method of its own, whose caller would keep the state before.
+            for t, h in window.steps(previous, time, self.solver.dt, self.solver.cut_at_samples):
+                x = advance(t, h, x)
             y = self._outputs(time, x)
             check_finite(served.states, "state", x, time)
             check_finite(served.outputs, "output", y, time)
@@ -92,12 +100,6 @@ class _March:
             previous = time
         check_finite(served.states, "state", x, previous)
         return Answer(recorded, x)
-
-    def _to(self, previous: float, time: float, x: Array) -> Array:
-        """The state at `time`."""
-        for t, h in self.window.steps(previous, time, self.solver.dt, self.solver.cut_at_samples):
-            x = self.advance(t, h, x)
-        return x
 
     def _step(self, t: float, h: float, x: Array) -> Array:
         u = StepInputs(self.served.inputs, self.window.inputs, t, t + h)

@@ -40,13 +40,26 @@ OPTIONS = [
 
 
 class _Call:
-    """One call of Run: its request, its replies, and whether anybody still waits."""
+    """One call of Run: its request, its replies, and whether anybody still waits.
 
-    def __init__(self, request: Any) -> None:
-        self.request = request
-        self.replies: queue.SimpleQueue[Any] = queue.SimpleQueue()
+    gRPC holds what it deserialized and what it serializes for as long as the call lasts. It is therefore given this in the place of
+    a request, which goes when it was read, and replies as bytes, so that a large state is in memory once and not in three forms.
+    """
+
+    def __init__(self, data: bytes) -> None:
+        self._request: Any = pb.RunRequest.FromString(data)
+        self.replies: queue.SimpleQueue[Optional[bytes]] = queue.SimpleQueue()
         self.over = False
         self._told = time.monotonic()
+
+    def job(self) -> Job:
+        """The job that is asked for; once. Raises BadRequest."""
+        request, self._request = self._request, None
+        return wire.job(request)
+
+    def reply(self, message: Any) -> None:
+        """Sends a message."""
+        self.replies.put(message.SerializeToString())
 
     def end(self) -> None:
         """The call was answered, or given up."""
@@ -60,7 +73,7 @@ class _Call:
         now = time.monotonic()
         if now - self._told >= _PROGRESS_EVERY:
             self._told = now
-            self.replies.put(wire.progress(reached))
+            self.reply(wire.progress(reached))
 
 
 class Server:
@@ -81,8 +94,8 @@ class Server:
             ),
             "Run": grpc.unary_stream_rpc_method_handler(
                 self._run,
-                request_deserializer=pb.RunRequest.FromString,
-                response_serializer=pb.RunReply.SerializeToString,
+                request_deserializer=_Call,
+                response_serializer=None,
             ),
         }
         service = grpc.method_handlers_generic_handler("starlings.solver.v1.Solver", handlers)
@@ -119,8 +132,7 @@ class Server:
         self._calls.put(None)
         self._server.stop(None)
 
-    def _run(self, request: Any, context: Any) -> Iterator[Any]:
-        call = _Call(request)
+    def _run(self, call: _Call, context: Any) -> Iterator[bytes]:
         if not context.add_callback(call.end):
             return
         self._calls.put(call)
@@ -132,13 +144,11 @@ class Server:
 
     def _answer(self, call: _Call) -> None:
         try:
-            job = wire.job(call.request)
-            # The message holds the bytes a second time.
-            call.request = None
-            call.replies.put(wire.finished(self._runner(job, call.stopped, call.progress)))
+            # Nothing of it has a name here: what a run needs no more is gone before the answer is made.
+            call.reply(wire.finished(self._runner(call.job(), call.stopped, call.progress)))
         except Cancelled:
             return
         except BadRequest as error:
-            call.replies.put(wire.failure(Failed(BAD_REQUEST, str(error))))
+            call.reply(wire.failure(Failed(BAD_REQUEST, str(error))))
         except Failed as error:
-            call.replies.put(wire.failure(error))
+            call.reply(wire.failure(error))

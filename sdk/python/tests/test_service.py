@@ -1,6 +1,7 @@
 """A real server process over a real socket: what it answers."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -170,3 +171,46 @@ def test_a_failure_is_told_and_the_next_run_goes_on(serve, how, kind, text, time
     code, rest = process.close()
     assert (code, rest) == (0, "")
     assert "noise on standard output" in process.stderr()
+
+
+FIELD = """
+import numpy as np
+import starlings
+
+class Field(starlings.Solver):
+    parameters = {"rate": "1/s"}
+    states = [starlings.Quantity("x", size=8_000_000)]
+    outputs = {"height": "m"}
+    dt = 0.1
+
+    def initial(self, p):
+        return np.ones(8_000_000)
+
+    def step(self, t, dt, x, p, u):
+        return x * (1.0 - p.rate * dt)
+
+    def output(self, t, x, p, u):
+        return [x[0]]
+
+starlings.serve(Field)
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="memory is read from /proc")
+def test_a_large_state_is_in_memory_a_few_times_and_not_after_the_run(serve):
+    process = serve(FIELD)
+
+    def megabytes(name):
+        status = Path(f"/proc/{process.child.pid}/status").read_text()
+        return int(re.search(rf"{name}:\s+(\d+) kB", status).group(1)) / 1000
+
+    process.describe()
+    before, size = megabytes("VmRSS"), 64
+    ask = request(times=floats(0.2), observed=floats(np.nan), inputs=[])
+    for _ in range(4):
+        ended = process.run(ask).finished
+        assert len(ended.state) == size * 1_000_000
+        ask.state = ended.state
+    # The states that the run has, first, last and next; what gRPC received and sent of the messages is free, but in the allocator.
+    assert megabytes("VmHWM") < before + 5.5 * size
+    assert megabytes("VmRSS") < before + 2.5 * size

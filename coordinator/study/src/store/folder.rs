@@ -104,6 +104,17 @@ impl RunFolder {
         Ok(states)
     }
 
+    /// Lets the pieces of a trial stand where those of the run will. Where there is a snapshot, which an earlier version may have made
+    /// without such a trial, they do not: with a piece of the trial one of the snapshot that is equal would go.
+    ///
+    /// # Errors
+    /// When the store fails.
+    pub fn settle_states_of_trial(&self, states: Option<&StateStore>) -> Result<(), StoreError> {
+        let count = "SELECT count(*) FROM snapshot";
+        let n: i64 = self.store.guard(self.store.connection().query_row(count, [], |row| row.get(0)))?;
+        if n == 0 { self.settle_states(states).map(drop) } else { Ok(()) }
+    }
+
     /// Removes a run that came to nothing, and its folder where that is empty then.
     pub fn discard(self) {
         let Self { path, store, _lock: lock } = self;

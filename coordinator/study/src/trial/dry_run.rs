@@ -1,4 +1,4 @@
-//! The runs of a fit, made once at the prior median before there is a fleet: the same windows, spans and adapters.
+//! The runs of a fit, made once at the prior median before it begins: the same windows, spans and adapters.
 //!
 //! The filter's windows run one after the other from the state in which the one before ended; the batch fit runs the training
 //! span. A program that is started anew for every run and answers for the times of a whole record only, whatever it was asked,
@@ -7,10 +7,11 @@
 use std::sync::Arc;
 
 use starlings_estimators::{Form, Kind};
+use starlings_fleet::Held;
 use starlings_models::external::table::is_transposed;
-use starlings_models::{Forward, Prediction, Window};
+use starlings_models::{Prediction, Window};
 
-use super::{Fault, TrialChannel, TrialError, named, run, trial_by};
+use super::{Fault, Here, Runner, TrialChannel, TrialError, named, run, trial_by};
 use crate::{Study, posterior};
 
 /// Windows of a record that are run where not all are.
@@ -35,15 +36,15 @@ pub fn dry_run(study: &mut Study, kind: &Kind, depth: Depth) -> Result<Vec<Trial
         return Ok(Vec::new());
     }
     let model = study.solver_host.build(&study.setup)?;
-    dry_run_by(study, kind, depth, &*model)
+    dry_run_by(study, kind, depth, &Here(&*model))
 }
 
-/// The same by a model that is built.
+/// The same by whoever makes the runs.
 pub(super) fn dry_run_by(
     study: &mut Study,
     kind: &Kind,
     depth: Depth,
-    model: &dyn Forward,
+    model: &dyn Runner,
 ) -> Result<Vec<TrialChannel>, TrialError> {
     let channels = trial_by(study, model)?;
     for record in 0..study.records.len() {
@@ -71,13 +72,13 @@ pub(super) fn dry_run_by(
 /// The runs of one record.
 struct DryRun<'a> {
     study: &'a Study,
-    model: &'a dyn Forward,
+    model: &'a dyn Runner,
     record: usize,
     theta: Vec<f64>,
 }
 
 impl<'a> DryRun<'a> {
-    fn new(study: &'a Study, model: &'a dyn Forward, record: usize) -> Self {
+    fn new(study: &'a Study, model: &'a dyn Runner, record: usize) -> Self {
         let prior = posterior::prior(study);
         Self { study, model, record, theta: study.theta_for(record, prior.mean.as_slice()) }
     }
@@ -86,7 +87,7 @@ impl<'a> DryRun<'a> {
         self.study.records[self.record].name.clone()
     }
 
-    fn run(&self, window: &Arc<Window>, state: Option<Vec<f64>>) -> Result<Prediction, Fault> {
+    fn run(&self, window: &Arc<Window>, state: Option<Held>) -> Result<Prediction<Held>, Fault> {
         let sent = self.study.sendable(self.record, window);
         run(self.model, self.record, &sent, &self.theta, state)
     }
@@ -141,7 +142,7 @@ impl<'a> DryRun<'a> {
     }
 
     /// A table that is transposed shows in a run over the first time alone.
-    fn check_layout(&self, window: &Arc<Window>, prediction: &Prediction) -> Result<(), TrialError> {
+    fn check_layout(&self, window: &Arc<Window>, prediction: &Prediction<Held>) -> Result<(), TrialError> {
         let (n, n_times) = (self.study.setup.outputs.len(), window.times.len());
         if n < 2 || n_times < 2 {
             return Ok(());

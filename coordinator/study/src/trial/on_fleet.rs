@@ -1,5 +1,5 @@
-//! The trial of a study whose model runs on workers elsewhere: the same runs, made by the fleet, since nothing of a solver is started
-//! where the coordinator listens.
+//! The trial of a study by its workers: the same runs, made by the fleet, since nothing of a solver is started where the coordinator
+//! listens, and since large states are in bounded memory there and here.
 //!
 //! What the trial finds is stored, so that a resumed run does not make it again. Next file to read: [`mod@super::dry_run`].
 
@@ -7,11 +7,11 @@ use std::sync::{Mutex, PoisonError};
 
 use serde::{Deserialize, Serialize};
 use starlings_estimators::Kind;
-use starlings_fleet::{Fleet, FleetError, SetupId};
-use starlings_models::{BuildSetup, Failure, Forward, Job, ParticleError, Prediction, Spec};
+use starlings_fleet::{Fleet, FleetError, Held, SetupId};
+use starlings_models::{Failure, Job, ParticleError, Prediction};
 
 use super::dry_run::{Depth, dry_run_by};
-use super::{TrialError, trial_by};
+use super::{Runner, TrialError, trial_by};
 use crate::store::json::json;
 use crate::store::{Store, StoreError};
 use crate::{Study, check};
@@ -75,12 +75,11 @@ fn read(store: &Store) -> Result<Option<Found>, StoreError> {
 fn on<T>(
     study: &mut Study,
     fleet: &mut (dyn Fleet + Send),
-    act: impl FnOnce(&mut Study, &dyn Forward) -> T,
+    act: impl FnOnce(&mut Study, &dyn Runner) -> T,
 ) -> Result<T, FleetError> {
     let setup = fleet.install(&study.setup)?;
-    let spec = study.setup.spec().unwrap_or_else(|_| study.spec.clone());
     let away = Mutex::new(Away { fleet, failed: None });
-    let model = OnFleet { away: &away, setup, spec };
+    let model = OnFleet { away: &away, setup };
     let done = act(study, &model);
     match away.into_inner().unwrap_or_else(PoisonError::into_inner).failed {
         Some(error) => Err(error),
@@ -94,21 +93,16 @@ struct Away<'a> {
     failed: Option<FleetError>,
 }
 
-/// A model whose runs are batches of one.
+/// Runs that are batches of one.
 struct OnFleet<'a, 'f> {
     away: &'a Mutex<Away<'f>>,
     setup: SetupId,
-    spec: Spec,
 }
 
-impl Forward for OnFleet<'_, '_> {
-    fn spec(&self) -> &Spec {
-        &self.spec
-    }
-
-    fn run(&self, job: &Job) -> Result<Prediction, ParticleError> {
+impl Runner for OnFleet<'_, '_> {
+    fn run(&self, job: Job<Held>) -> Result<Prediction<Held>, ParticleError> {
         let mut away = self.away.lock().unwrap_or_else(PoisonError::into_inner);
-        match away.fleet.run(self.setup, vec![job.clone()]) {
+        match away.fleet.run_held(vec![(self.setup, job)]) {
             Ok(outcomes) => match outcomes.into_iter().next().map(|outcome| outcome.result) {
                 Some(Ok(prediction)) => Ok(prediction),
                 Some(Err(Failure::Model(failed))) => Err(failed.into()),
