@@ -11,7 +11,7 @@ use starlings_coordinator::report;
 use starlings_coordinator::study::constants::HangsOn;
 use starlings_coordinator::study::store::Purpose;
 use starlings_coordinator::study::trial::{Depth, dry_run};
-use starlings_coordinator::study::{Progress, RunContext, Summary, run as study_run};
+use starlings_coordinator::study::{Progress, RunContext, RunFolder, Study, Summary, run as study_run};
 
 use crate::console::{line, note, number, table};
 use crate::disk;
@@ -72,10 +72,7 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     let identity = folder.store.begin().map_err(Failure::run)?;
     let mut session = FleetSession::listen(&study, &plan, entrance, identity, &display)?;
     session.start_workers(&study, &plan, Some(&folder.path))?;
-    if is_away {
-        folder.settle_states_of_trial(session.fleet.states()).map_err(Failure::run)?;
-    }
-    if is_away && let Err(failure) = session.trial(&mut study, Some(kind), Some(&folder.store)) {
+    if is_away && let Err(failure) = tried_by_workers(&mut session, &mut study, &folder) {
         let states = session.fleet.states().cloned().filter(|_| args.resume.is_first());
         session.close(false);
         if let Some(states) = states {
@@ -107,6 +104,17 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     })?;
     report::write_files(&folder).map_err(Failure::run)?;
     print(&summary, &folder.path, args.json)
+}
+
+/// The trial by the workers; its states stand where those of the run will.
+fn tried_by_workers(
+    session: &mut FleetSession,
+    study: &mut Study,
+    folder: &RunFolder,
+) -> Result<(), Failure> {
+    folder.settle_states_of_trial(session.fleet.states()).map_err(Failure::run)?;
+    let kind = study.estimator.kind;
+    session.trial(study, Some(kind), Some(&folder.store))
 }
 
 /// Counts every analysis, and shows where the run stands.
