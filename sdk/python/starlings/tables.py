@@ -9,10 +9,15 @@ from typing import Any, Dict, List, Optional
 import numpy as np
 
 
+#: Truth values in CSV files.
+_TRUTH = {"true": True, "false": False}
+
+
 def column(values: List[str]) -> Any:
-    """The cells of a CSV file: truth values or numbers where all of them are, an empty cell as NaN, else text."""
-    if values and set(values) <= {"true", "false"}:
-        return np.array([value == "true" for value in values])
+    """The cells of a CSV file: numbers where all of them are, an empty cell as NaN; truth values, an empty cell as None; or text."""
+    if set(values) & set(_TRUTH) and set(values) <= {*_TRUTH, ""}:
+        truths = [_TRUTH.get(value) for value in values]
+        return np.array(truths, dtype=object if None in truths else bool)
     try:
         return np.array([float(value) if value else np.nan for value in values])
     except ValueError:

@@ -193,7 +193,8 @@ def _started(folder):
     )
     assert child.stdout.readline() == "begins\n"
     deadline = time.monotonic() + 60.0
-    while len(_below(folder)) < 3:
+    # The script, the program, two workers and their solvers.
+    while not (folder / "out" / "run.db").is_file() or len(_below(folder)) < 5:
         assert time.monotonic() < deadline, "no worker came"
         time.sleep(0.05)
     return child
