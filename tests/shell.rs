@@ -40,8 +40,11 @@ fn every_command_has_its_page() {
     assert!(page("starlings.1").contains("starlings\\-run(1)"), "{}", page("starlings.1"));
     assert!(page("starlings-run.1").contains("\\-\\-state\\-memory"), "{}", page("starlings-run.1"));
     let (_, help, _) = output(starlings().arg("--help"));
-    let commands = help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
-    for name in commands.filter(|line| !line.starts_with("   ")).filter_map(|line| line.split_whitespace().next()) {
+    let commands =
+        help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
+    for name in
+        commands.filter(|line| !line.starts_with("   ")).filter_map(|line| line.split_whitespace().next())
+    {
         if name != "help" {
             assert!(page(&format!("starlings-{name}.1")).starts_with(".ie"), "{name}");
         }
