@@ -54,6 +54,10 @@ slurm:
 kubernetes:
     .ci/kubernetes
 
+# One wheel of program and package in target/wheels, and what a user does with it in an empty environment.
+wheel:
+    .ci/wheel
+
 # The image without a registry: its root file system around the debug build, the pig's aorta run in it by chroot as its user, and the image
 # where buildah is there. Needs root.
 container:

@@ -36,6 +36,16 @@ pub(crate) fn watch() {
     });
 }
 
+/// From here on the end of standard input ends this command in order too: whoever started it is gone.
+pub(crate) fn at_end_of_stdin() {
+    watch();
+    std::thread::spawn(|| {
+        // What arrives there is nobody's: a command that reads standard input is not started so.
+        let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
+        first(HANGUP);
+    });
+}
+
 /// The first signal cancels this from now on.
 pub(crate) fn cancels(token: &CancellationToken) {
     watch();
@@ -66,11 +76,12 @@ fn first(signal: u8) {
     std::process::exit((ENDED_BY + signal).into());
 }
 
+const HANGUP: u8 = 1;
 const INTERRUPT: u8 = 2;
 
 fn name(signal: u8) -> &'static str {
     match signal {
-        1 => "SIGHUP",
+        HANGUP => "SIGHUP",
         15 => "SIGTERM",
         _ => "Ctrl-C",
     }
@@ -87,7 +98,7 @@ async fn wait(ready: &mpsc::Sender<()>) {
         tokio::select! {
             _ = interrupt.recv() => INTERRUPT,
             _ = terminate.recv() => 15,
-            _ = hangup.recv() => 1,
+            _ = hangup.recv() => HANGUP,
         }
     };
     first(next().await);

@@ -6,9 +6,14 @@ use std::io::IsTerminal;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use clap::ValueEnum;
+use starlings_coordinator::explain::Stage;
 use starlings_coordinator::fleet::FleetEvent;
+use starlings_coordinator::{infer, study};
 use starlings_worker::{News, Tell};
 use tracing_subscriber::filter::LevelFilter;
+
+/// Name of the event of every record that says where the work stands.
+const PROGRESS: &str = "progress";
 
 /// The form, once it is chosen.
 static FORMAT: OnceLock<LogFormat> = OnceLock::new();
@@ -52,6 +57,25 @@ pub(crate) fn fleet(run: &str, event: &FleetEvent, said: &str) {
     } else {
         tracing::info!(event = kind, run, worker, particle, record, "{said}");
     }
+}
+
+/// One analysis more, with what is `said` of it.
+pub(crate) fn step(at: &study::Progress, said: &str) {
+    let (stage, pass, passes) = (at.stage, at.pass, at.passes);
+    let (step, steps, runs, workers) = (at.step, at.steps, at.runs, at.workers);
+    tracing::info!(event = PROGRESS, stage, pass, passes, step, steps, runs, workers, "{said}");
+}
+
+/// An explanation goes on.
+pub(crate) fn stage(at: &Stage, said: &str) {
+    let (stage, runs, workers) = (at.name, at.runs, at.workers);
+    tracing::info!(event = PROGRESS, stage, runs, workers, "{said}");
+}
+
+/// An inference goes on.
+pub(crate) fn blocks(at: &infer::Progress, said: &str) {
+    let (stage, blocks, workers) = ("sums", at.n_block, at.workers);
+    tracing::info!(event = PROGRESS, stage, blocks, workers, "{said}");
 }
 
 /// Records the news of a worker, with the run and the connection that it had last; `name` is the end of its name at its coordinators.

@@ -32,6 +32,7 @@ mod report;
 mod run;
 mod run_folder;
 mod serve;
+mod shell;
 mod simulate;
 mod solvers;
 mod spectrum;
@@ -55,6 +56,9 @@ struct Cli {
     /// Form of what goes to standard error: text for people, or a JSON object a line for programs (docs/watching.md).
     #[arg(long = "log", value_name = "FORMAT", global = true, value_enum, default_value_t = log::LogFormat::Text)]
     log: log::LogFormat,
+    /// End in order, as at Ctrl-C, when standard input ends: for programs that start this one.
+    #[arg(long, global = true)]
+    end_with_stdin: bool,
     #[command(subcommand)]
     command: Command,
 }
@@ -96,6 +100,10 @@ enum Command {
     Report(report::Args),
     /// Write a table of a run folder as CSV.
     Export(export::Args),
+    /// Print what a shell needs to complete commands and options.
+    Completions(shell::CompletionsArgs),
+    /// Write a page of the manual for every command.
+    Manual(shell::ManualArgs),
 }
 
 fn main() -> ExitCode {
@@ -103,6 +111,9 @@ fn main() -> ExitCode {
     let cli = Cli::try_parse().unwrap_or_else(|error| refuse(&error));
     let json = cli.command.prints_json();
     log::to_stderr(cli.log, cli.verbose);
+    if cli.end_with_stdin {
+        interrupt::at_end_of_stdin();
+    }
     let outcome = match cli.command {
         Command::Run(args) => run::run(&args, started),
         Command::Explain(args) => explain::run(&args, started),
@@ -124,6 +135,8 @@ fn main() -> ExitCode {
         Command::Effects(args) => effects::run(&args),
         Command::Report(args) => report::run(&args),
         Command::Export(args) => export::run(&args),
+        Command::Completions(args) => shell::completions(&args),
+        Command::Manual(args) => shell::manual(&args),
     };
     // Nothing else drops them: their folders would stay.
     load::end_solvers();
@@ -167,6 +180,7 @@ impl Command {
             Self::Effects(args) => args.json,
             Self::Report(args) => args.json,
             Self::Simulate(_) | Self::Worker(_) | Self::Serve(_) | Self::Guard | Self::Export(_) => false,
+            Self::Completions(_) | Self::Manual(_) => false,
         }
     }
 }

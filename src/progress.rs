@@ -1,4 +1,4 @@
-//! Progress: a bar on a terminal, plain lines elsewhere, nothing with `--json`.
+//! Progress: a bar on a terminal, plain lines elsewhere, records with `--log json`, nothing with `--json` alone.
 
 use std::io::IsTerminal;
 use std::sync::{Mutex, PoisonError};
@@ -13,6 +13,9 @@ use crate::log;
 
 /// Spacing of plain lines.
 const LINE_EVERY: Duration = Duration::from_secs(10);
+
+/// Spacing of records for programs.
+const RECORD_EVERY: Duration = Duration::from_millis(250);
 
 /// Spacing of the pictures of a spinner.
 const TICK: Duration = Duration::from_millis(100);
@@ -30,17 +33,22 @@ pub(crate) enum Display {
     Silent,
     /// A line now and then, the first and the last of a pass always.
     Lines(Mutex<Last>),
+    /// Records for programs, a few a second; the time of the last one.
+    Records(Mutex<Option<Instant>>),
     /// A bar.
     Bar(ProgressBar),
 }
 
 impl Display {
-    /// A bar if standard error is a terminal, lines otherwise, nothing when `silent`.
+    /// Records with `--log json`; nothing when `silent`; a bar if standard error is a terminal, lines otherwise.
     pub(crate) fn new(silent: bool) -> Self {
+        if log::is_json() {
+            return Self::Records(Mutex::new(None));
+        }
         if silent {
             return Self::Silent;
         }
-        if log::is_json() || !std::io::stderr().is_terminal() {
+        if !std::io::stderr().is_terminal() {
             return Self::Lines(Mutex::new(Last { at: Instant::now(), stage: None }));
         }
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr_with_hz(10));
@@ -67,6 +75,10 @@ impl Display {
                     last.at = Instant::now();
                 }
             }
+            Self::Records(last) if p.step == 1 || p.step == p.steps || is_due(last) => {
+                log::step(p, &format!("{head}: {} of {} analyses, {tail}", p.step, p.steps));
+            }
+            Self::Records(_) => {}
             Self::Bar(bar) => {
                 if bar.length() != Some(p.steps as u64) || p.step <= 1 {
                     bar.reset();
@@ -97,6 +109,8 @@ impl Display {
                     last.stage = Some((stage.name, stage.says.clone()));
                 }
             }
+            Self::Records(last) if is_due(last) => log::stage(stage, &format!("{}: {tail}", stage.name)),
+            Self::Records(_) => {}
             Self::Bar(bar) => {
                 if bar.prefix() != stage.name {
                     let spinner = ProgressStyle::with_template("{spinner} {prefix}: {wide_msg} {elapsed}");
@@ -121,6 +135,10 @@ impl Display {
                     last.at = Instant::now();
                 }
             }
+            Self::Records(last) if at.n_block == 1 || is_due(last) => {
+                log::blocks(at, &format!("sums: {says}, {} workers", at.workers));
+            }
+            Self::Records(_) => {}
             Self::Bar(bar) => {
                 if bar.prefix() != "sums" {
                     let spinner = ProgressStyle::with_template("{spinner} {prefix}: {wide_msg} {elapsed}");
@@ -137,7 +155,7 @@ impl Display {
     pub(crate) fn say(&self, text: &str) {
         match self {
             Self::Silent => {}
-            Self::Lines(_) => note(format_args!("{text}")),
+            Self::Lines(_) | Self::Records(_) => note(format_args!("{text}")),
             Self::Bar(bar) => bar.suspend(|| note(format_args!("{text}"))),
         }
     }
@@ -148,4 +166,14 @@ impl Display {
             bar.finish_and_clear();
         }
     }
+}
+
+/// Whether the last record was told long enough ago; then another one is told now.
+fn is_due(last: &Mutex<Option<Instant>>) -> bool {
+    let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
+    let is_due = last.is_none_or(|at| at.elapsed() > RECORD_EVERY);
+    if is_due {
+        *last = Some(Instant::now());
+    }
+    is_due
 }

@@ -35,6 +35,9 @@ fn a_run_tells_its_events_as_objects_and_its_result_stays_on_standard_output() {
     assert_eq!(joined["run"], "small");
     assert!(joined["worker"].as_str().is_some_and(|name| name.starts_with("1@")), "{joined}");
     assert!(joined.get("particle").is_none(), "{joined}");
+    let at = event(&told, "progress");
+    assert_eq!((&at["stage"], &at["pass"], &at["step"]), (&"filter".into(), &1.into(), &1.into()), "{at}");
+    assert!(at["steps"].as_u64() > Some(1) && at["workers"].is_u64() && at["runs"].is_u64(), "{at}");
     for record in &told {
         assert!(record["timestamp"].is_string() && record["level"].is_string(), "{record}");
         assert!(record["fields"]["message"].is_string(), "{record}");
@@ -50,6 +53,23 @@ fn a_study_that_is_wrong_is_told_with_its_place() {
     let wrong = told.iter().find(|record| record["level"] == "ERROR").expect("an error");
     assert_eq!(wrong["fields"]["line"], 5, "{wrong}");
     assert!(wrong["fields"]["message"].as_str().is_some_and(|says| says.contains("windkessel-9")), "{wrong}");
+}
+
+#[test]
+fn a_command_ends_in_order_with_the_program_that_started_it() {
+    let (folder, file) = study(same, same);
+    let mut run = starlings();
+    // Nobody dials: without the end of standard input it would wait.
+    run.args(["--end-with-stdin", "run"]).arg(&file).args(["--listen", "127.0.0.1:0", "--out"]);
+    run.arg(folder.path().join("out")).stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
+    let mut run = run.spawn().expect("a coordinator");
+    let access = folder.path().join("out").join("access.json");
+    wait_until("the access file", || std::fs::metadata(&access).is_ok_and(|file| file.len() > 0));
+    drop(run.stdin.take());
+    let ended = run.wait_with_output().expect("its end");
+    let said = String::from_utf8_lossy(&ended.stderr);
+    assert_eq!(ended.status.code(), Some(129), "{said}");
+    assert!(said.contains("--resume"), "{said}");
 }
 
 /// Kills the coordinator with the test.

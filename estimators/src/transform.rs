@@ -4,6 +4,7 @@
 //! mean +- k sd, which is exact because every transform is monotonic. Read next: `gaussian.rs`.
 
 use std::f64::consts::LN_2;
+use std::fmt;
 
 /// Map between a physical value v and its transformed value theta.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,6 +22,16 @@ pub enum Transform {
         /// Upper bound, not reached.
         hi: f64,
     },
+}
+
+/// As a study has it: the name, of a logit with its bounds.
+impl fmt::Display for Transform {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Logit { lo, hi } => write!(f, "{}({lo:?}, {hi:?})", self.name()),
+            _ => f.write_str(self.name()),
+        }
+    }
 }
 
 impl Transform {

@@ -134,7 +134,7 @@ pub(crate) fn to_csv(study: &Study, posterior: &Gaussian) -> Result<String, csv:
     for (j, e) in estimates(study, posterior).into_iter().enumerate() {
         let numbers = [e.estimate, e.sd, e.interval95[0], e.interval95[1], posterior.mean[j]];
         let row = posterior.covariance.row(j);
-        let text = [e.name, e.unit, study.theta[j].transform.name().to_owned()];
+        let text = [e.name, e.unit, study.theta[j].transform.to_string()];
         csv.write_record(text.into_iter().chain(numbers.iter().chain(row.iter()).map(|v| format!("{v:?}"))))?;
     }
     let bytes = csv.into_inner().map_err(csv::IntoInnerError::into_error)?;

@@ -1,6 +1,15 @@
-"""Write a solver for Starlings in Python.
+"""Estimate what a simulation does not know, and say what it is missing, from Python.
 
     import starlings
+
+    def cooling(t, start, rate):
+        return start * np.exp(-rate * t)
+
+    study = starlings.study(cooling, frame, {"start": starlings.Prior(80, factor=2), "rate": starlings.Prior(0.1, factor=3)})
+    starlings.run(study)
+
+`run`, `check`, `explain`, `identify`, `infer` and `twin` take a study: a `Study`, the path of a study file, or its sections as
+tables. A solver with a state of its own, or one that a study file names, is written so:
 
     @starlings.solver(parameters={"k": "N/m"}, states={"x": "m", "v": "m/s"}, outputs={"position": "m"},
                       measures={"position": "x"}, dt=0.01)
@@ -11,45 +20,69 @@
     starlings.serve(Spring)
 
 A solver says what it has and does one thing: `rate`, `step` or `run` (`Solver`). `serve` is the last line of its file,
-`simulate` tries it without a study, `Observer` gives it a correction towards data, `read_run` reads results.
+`simulate` tries it without a study, `Observer` gives it a correction towards data. `read_run` reads results.
 """
 
+from .answers import Checked, Explanation, Forecast, Identification, Inference
+from .build import study
+from .commands import check, explain, identify, infer, run, twin
 from .expression import Expression, ExpressionError
 from .failures import DeclarationError, Failed, NotFinite, OutsideDomain, Unavailable
 from .matrices import extension
 from .observers import Correction, Observer
+from .prior import Prior
+from .program import RunError, StudyError
 from .quantity import Quantity
+from .recording import RecordingError
 from .run_folder import Run, read_run
 from .serve import serve
 from .simulate import Simulated, simulate
 from .solver import Solver, solver
+from .study_file import Study
 from .values import Inputs, Signal, StepInputs, Values
 from .window import Window
 
 __all__ = [
+    "Checked",
     "Correction",
     "DeclarationError",
+    "Explanation",
     "Expression",
     "ExpressionError",
     "Failed",
+    "Forecast",
+    "Identification",
+    "Inference",
     "Inputs",
     "NotFinite",
     "Observer",
     "OutsideDomain",
+    "Prior",
     "Quantity",
+    "RecordingError",
     "Run",
+    "RunError",
     "Signal",
     "Simulated",
     "Solver",
     "StepInputs",
+    "Study",
+    "StudyError",
     "Unavailable",
     "Values",
     "Window",
+    "check",
+    "explain",
     "extension",
+    "identify",
+    "infer",
     "read_run",
+    "run",
     "serve",
     "simulate",
     "solver",
+    "study",
+    "twin",
 ]
 
 __version__ = "0.1.0"

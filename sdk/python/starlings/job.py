@@ -1,6 +1,6 @@
 """A request of one run as arrays, and whether it fits the solver.
 
-Next file to read: run.py.
+Next file to read: one_run.py.
 """
 
 from __future__ import annotations

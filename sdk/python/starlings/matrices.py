@@ -82,4 +82,4 @@ def factor(matrix: Matrix) -> Callable[[Array], Array]:
 
         solve: Callable[[Array], Array] = splu(matrix.tocsc()).solve
         return solve
-    return lambda right: np.linalg.solve(matrix, right)
+    return lambda right: np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)

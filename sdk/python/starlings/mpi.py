@@ -19,7 +19,7 @@ from typing import Any, Callable, List, Optional, Type, Union
 from .failures import Cancelled, DeclarationError, Failed
 from .job import Answer, Job
 from .places import caller
-from .run import execute
+from .one_run import execute
 from .serve import address_of, run
 from .serve import serve as serve_alone
 from .solver import Served, Solver

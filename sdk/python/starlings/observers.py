@@ -3,7 +3,7 @@
 A run predicts, records, and only then corrects: an observer never sees a datum before the prediction of the same time stands.
 On noise-free data of the true model it changes nothing, and with gain 0 it is not even called. Each correction is the step of
 d/dt error = -gain * feedback over the time since the previous observation, in an exponential or implicit form that no gain
-makes unstable. Next file to read: run.py.
+makes unstable. Next file to read: one_run.py.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Where in the solver's own file an exception comes from: people look there, not into this package.
 
-Next file to read: run.py.
+Next file to read: one_run.py.
 """
 
 from __future__ import annotations

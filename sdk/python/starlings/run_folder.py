@@ -1,15 +1,23 @@
-"""Reads what `starlings run` leaves in its folder. It plots nothing."""
+"""What `starlings run` leaves in its folder.
+
+Next file to read: posterior.py, for draws.
+"""
 
 from __future__ import annotations
 
 import csv
 import json
+import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Dict, List, Union
+from typing import Any, Dict, List, Optional, Sequence, Union
 
 import numpy as np
 
+from . import page, posterior
+from .answers import Forecast
+from .program import call, output
+from .tables import column, read_columns, table
 from .values import Array
 
 
@@ -19,8 +27,8 @@ class Run:
 
     `parameters` has one row per parameter: `unit`, `transform`, `estimate`, `sd`, `lo95`, `hi95`, `mean_transformed`; a
     pandas.DataFrame indexed by name where pandas is installed, else a table of arrays with the names in "parameter".
-    `covariance` is that of the transformed parameters, [n_param][n_param]; see `covariance_table`. `summary` is all of
-    summary.json.
+    `covariance` is that of the transformed parameters, [n_param][n_param], and `mean` their mean; see `covariance_table`.
+    `summary` is all of summary.json. In a notebook it shows its report.
     """
 
     folder: Path
@@ -28,6 +36,10 @@ class Run:
     names: List[str]
     parameters: Any
     covariance: Array
+    mean: Array
+    transforms: List[str]
+    #: The study file, where it is not the one that the folder remembers.
+    study: Optional[Path] = None
 
     def __getitem__(self, name: str) -> Dict[str, Any]:
         """Entry of one parameter in the summary: estimate, sd, interval95, prior_median, ..."""
@@ -46,6 +58,58 @@ class Run:
     def warnings(self) -> List[str]:
         """What has to be said with the numbers."""
         return list(self.summary.get("warnings", []))
+
+    @property
+    def report(self) -> Path:
+        """The page with all figures."""
+        return self.folder / "report.html"
+
+    def draws(self, n: int = 1000, seed: int = 0) -> Any:
+        """Draws of the parameters from the posterior at the stated noise, in their units: a pandas.DataFrame with a column per
+        parameter where pandas is installed, else a table of arrays, [n] each. The same seed gives the same draws."""
+        drawn = posterior.draw(self.mean, self.covariance, self.transforms, n, seed)
+        return table({name: drawn[:, k] for k, name in enumerate(self.names)})
+
+    def table(self, name: str) -> Any:
+        """A table of the run folder: "estimates" (every parameter after every analysis), "innovations", "predictions" (the run
+        with the estimate beside what was observed), "analyses", "jobs", "events"."""
+        return table(self.columns(name))
+
+    def columns(self, name: str) -> Dict[str, Array]:
+        """The same as arrays by name."""
+        return read_columns(output(["export", str(self.folder), "--table", name]))
+
+    def forecast(
+        self,
+        *,
+        members: int = 200,
+        until: Optional[float] = None,
+        levels: Sequence[str] = (),
+        horizon: Optional[float] = None,
+        record: Optional[str] = None,
+        seed: Optional[int] = None,
+        set: Optional[Dict[str, float]] = None,  # noqa: A002  (the name that the command has)
+        workers: Optional[int] = None,
+        out: Optional[Union[str, "os.PathLike[str]"]] = None,
+        progress: Optional[bool] = None,
+    ) -> Forecast:
+        """Quantiles against time, and when a quantity crosses a level ("pressure>5"), of an ensemble from the posterior."""
+        folder = Path(out) if out is not None else self.folder / "forecast"
+        words = ["forecast", str(self.folder), "--members", str(members), "--out", str(folder)]
+        options = {"until": until, "horizon": horizon, "record": record, "seed": seed, "workers": workers, "study": self.study}
+        words += [word for key, value in options.items() if value is not None for word in (f"--{key}", str(value))]
+        words += [word for level in levels for word in ("--level", level)]
+        words += [word for key, value in (set or {}).items() for word in ("--set", f"{key}={value!r}")]
+        return Forecast(call(words, progress), folder)
+
+    def to_arviz(self, draws: int = 1000, chains: int = 4, seed: int = 0) -> Any:
+        """The run as ArviZ takes it: posterior, observed data, and the run with the estimate. Needs arviz."""
+        from .inference_data import of_run
+
+        return of_run(self, draws, chains, seed)
+
+    def _repr_html_(self) -> str:
+        return page.frame(self.report)
 
     def covariance_table(self) -> Any:
         """The covariance as an xarray.DataArray with the names as coordinates. Needs xarray."""
@@ -71,20 +135,7 @@ def read_run(folder: Union[str, "Path"]) -> Run:
         raise ValueError(f"{path / 'posterior.csv'} has no rows of parameters")
     names = [row["parameter"] for row in rows]
     covariance = np.array([[float(row[f"cov:{name}"]) for name in names] for row in rows])
-    columns = {key: _column([row[key] for row in rows]) for key in rows[0] if not key.startswith("cov:")}
-    return Run(path, summary, names, _table(columns), covariance)
-
-
-def _column(values: List[str]) -> Any:
-    try:
-        return np.array([float(value) for value in values])
-    except ValueError:
-        return np.array(values, dtype=object)
-
-
-def _table(columns: Dict[str, Any]) -> Any:
-    try:
-        import pandas
-    except ImportError:
-        return columns
-    return pandas.DataFrame(columns).set_index("parameter")
+    columns = {key: column([row[key] for row in rows]) for key in rows[0] if not key.startswith("cov:")}
+    transforms = [row.get("transform", "linear") for row in rows]
+    means = np.array([float(row["mean_transformed"]) for row in rows])
+    return Run(path, summary, names, table(columns, "parameter"), covariance, means, transforms)

@@ -21,7 +21,7 @@ from . import _solver_pb2 as pb  # noqa: E402
 from . import wire  # noqa: E402
 from .failures import BAD_REQUEST, BadRequest, Cancelled, Failed  # noqa: E402
 from .job import Answer, Job  # noqa: E402
-from .run import execute  # noqa: E402
+from .one_run import execute  # noqa: E402
 from .solver import Served  # noqa: E402
 
 #: What computes a job: the answer, or Failed, or Cancelled.

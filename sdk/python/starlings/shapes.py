@@ -1,7 +1,7 @@
 """What a solver returns, taken by its shape: nothing is reshaped, so nothing can end in the wrong place.
 
 A table of outputs is [n_times][n_outputs], or [n_times] of a single output; a state is [n_state]. An array of whole numbers is
-refused: numpy cuts off the decimals of whatever is put into one. Next file to read: run.py.
+refused: numpy cuts off the decimals of whatever is put into one. Next file to read: one_run.py.
 """
 
 from __future__ import annotations

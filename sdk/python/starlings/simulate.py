@@ -1,4 +1,4 @@
-"""Runs a solver in this process, without a fleet: for trying it out, for tests, for making data."""
+"""Runs a solver in this process, without a fleet: for trying it out, for tests, for making data. See `twin` for studies."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from .failures import BadRequest
 from .job import Job
-from .run import execute
+from .one_run import execute
 from .solver import Served, Solver
 from .values import Array, Signal
 

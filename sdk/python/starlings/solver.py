@@ -1,6 +1,6 @@
 """A solver: what it is, and the one thing it does, as `rate`, `step` or `run`.
 
-Derive from `Solver`, or put `@solver(...)` on a class or a function. Next file to read: run.py.
+Derive from `Solver`, or put `@solver(...)` on a class or a function. Next file to read: one_run.py.
 """
 
 from __future__ import annotations

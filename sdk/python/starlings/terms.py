@@ -1,6 +1,6 @@
 """Terms of effects that a request adds to the rates of hosted states.
 
-Next file to read: run.py.
+Next file to read: one_run.py.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """What a solver sees of one run.
 
-Next file to read: run.py.
+Next file to read: one_run.py.
 """
 
 from __future__ import annotations
