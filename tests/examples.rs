@@ -41,4 +41,6 @@ examples! {
     plate => "plate",
     conical_shell => "conical-shell",
     thrust_vector_control => "thrust-vector-control",
+    windkessel_human => "windkessel-human",
+    pendulum => "pendulum",
 }

@@ -224,6 +224,16 @@ fn a_budget_ends_the_search_and_says_what_was_left_untried() {
 }
 
 #[test]
+fn a_candidate_that_changes_nothing_has_no_influence_and_has_not_failed() {
+    let idle = "\n[[effects]]\nname = \"idle\"\nsays = \"It never acts.\"\nadds = [ { to = \"v\", term = \"b_idle*max(0, -1 - t)\" } ]\nparameters = [ { name = \"b_idle\", range = [0, 1] } ]\n";
+    let (text, data) = cubic();
+    let found = explained(&(text + idle), data).explanation;
+    let refused = found.rejected.iter().find(|r| r.name == "idle").unwrap();
+    assert_eq!(refused.gate, "no influence", "{refused:?}");
+    assert_eq!(found.effects[0].name, "cubic-stiffness", "the others go on: {}", found.headline);
+}
+
+#[test]
 fn a_candidate_whose_runs_all_fail_is_refused_with_the_reason() {
     let broken = "\n[[effects]]\nname = \"broken\"\nsays = \"No number comes of it.\"\nadds = [ { to = \"v\", term = \"b_broken/max(0, -1 - t)\" } ]\nparameters = [ { name = \"b_broken\", range = [0, 1] } ]\n";
     let (text, data) = cubic();

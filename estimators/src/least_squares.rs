@@ -215,13 +215,15 @@ impl LeastSquares {
 
     fn reject(&mut self, was_fresh: bool) {
         self.rejected += 1;
+        let damping = self.damping;
         self.damping = self.damping.max(REJECTED_DAMPING) * 5.0;
         if self.trials_left == 0 {
             self.need = Need::Nothing(End::Limit);
         } else if self.rejected > MOST_REJECTED {
             self.give_up(was_fresh);
         } else if self.thorough && self.measured.is_none() {
-            self.damping = 0.0;
+            // It was the secant that failed, so the damping stays as it was.
+            self.damping = damping;
             self.need = Need::Jacobian(self.z.clone());
         } else if self.rejected > 1 && self.restore() {
             // The secant did not help either. Along the measured slope, steps that are short enough lower the cost.

@@ -143,3 +143,20 @@ fn residuals_far_above_the_stated_noise_do_not_keep_a_fit_from_converging() {
     // The alternation is nearly orthogonal to decays: it moves them by a few hundredths.
     assert!((fit.best().0[0] - 2.0).abs() < 0.1 && (fit.best().0[1] - 0.7).abs() < 0.1, "{:?}", fit.best().0);
 }
+
+#[test]
+fn a_step_that_the_secant_misjudged_leaves_the_damping_as_it_was() {
+    let mut fit = LeastSquares::new(DVector::from_vec(vec![1.0, 0.2]), flat(2), 1e-6, 50);
+    loop {
+        match fit.need().clone() {
+            Need::Residual(_) if fit.cost.is_finite() && fit.measured.is_none() => break,
+            Need::Residual(z) => fit.give_residual(Some(residual(&z))),
+            Need::Jacobian(z) => fit.give_jacobian(Some(jacobian(&z).into())),
+            Need::Nothing(end) => panic!("{end:?} before a step by the secant"),
+        }
+    }
+    fit.damping = 0.3;
+    fit.give_residual(None);
+    assert!(matches!(fit.need(), Need::Jacobian(_)), "{:?}", fit.need());
+    assert_eq!(fit.damping.to_bits(), 0.3_f64.to_bits());
+}

@@ -72,6 +72,9 @@ pub(crate) fn search<'c>(
     if adequacy.is_gap() || largest_gain > found.null_distribution.threshold {
         searcher.refit_singles(&mut found)?;
         searcher.replace_terms(&mut found)?;
+        if options.max_effects > 1 && found.passing().is_empty() {
+            searcher.refit_pairs(&mut found)?;
+        }
         searcher.second_pass(&mut found, options)?;
     }
     found.cut_short = searcher.cut_short || searcher.cache.was_cut_short();

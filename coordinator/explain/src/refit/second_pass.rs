@@ -142,7 +142,7 @@ impl<'c> Searcher<'_, '_, 'c> {
     }
 
     /// The best point of the grid of every candidate, by the first screening.
-    fn best_points(&self, screening: &[ScreeningResult]) -> Vec<(usize, usize)> {
+    pub(super) fn best_points(&self, screening: &[ScreeningResult]) -> Vec<(usize, usize)> {
         let best = self.best_of_each(screening);
         let point = |result: &ScreeningResult| {
             let points = &self.candidates[result.candidate].points;

@@ -32,7 +32,8 @@ pub(crate) fn rejected(
         if let Some(reason) =
             of().find_map(|h| h.failure.clone()).filter(|_| of().all(|h| h.failure.is_some()))
         {
-            list.push(Rejected { name, gate: "failed".to_owned(), reason });
+            let gate = if reason.starts_with("no influence") { "no influence" } else { "failed" };
+            list.push(Rejected { name, gate: gate.to_owned(), reason });
         } else if of().count() > 0 && of().all(ScreeningResult::is_absorbed) {
             let reason =
                 "the model's parameters imitate it: it cannot be told from them, which does not mean absent";

@@ -5,7 +5,7 @@
 use super::at::Slot;
 use super::expression_error::ExpressionError;
 use super::node::{Node, Operation};
-use super::{calculus, compile, node, parse};
+use super::{calculus, compile, linear, node, parse};
 
 use super::program::Program;
 
@@ -52,6 +52,11 @@ impl Expression {
         let mut found = false;
         self.node.walk(&mut |part| found |= matches!(part, Node::Time));
         found
+    }
+
+    /// Whether it is a sum of terms in each of which the name stands as a factor once or not at all.
+    pub fn is_linear_in(&self, name: &str) -> bool {
+        linear::split(&self.node, &[name.to_owned()]).is_ok()
     }
 
     /// Makes flat code out of the expression.
