@@ -179,8 +179,13 @@ impl Command {
             Self::Models(args) => args.json,
             Self::Effects(args) => args.json,
             Self::Report(args) => args.json,
-            Self::Simulate(_) | Self::Worker(_) | Self::Serve(_) | Self::Guard | Self::Export(_) => false,
-            Self::Completions(_) | Self::Manual(_) => false,
+            Self::Simulate(_)
+            | Self::Worker(_)
+            | Self::Serve(_)
+            | Self::Guard
+            | Self::Export(_)
+            | Self::Completions(_)
+            | Self::Manual(_) => false,
         }
     }
 }

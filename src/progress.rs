@@ -66,7 +66,6 @@ impl Display {
         };
         let tail = format!("{} runs, {} workers", p.runs, p.workers);
         match self {
-            Self::Silent => {}
             Self::Lines(last) => {
                 let edge = p.step == 1 || p.step == p.steps;
                 let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
@@ -78,7 +77,7 @@ impl Display {
             Self::Records(last) if p.step == 1 || p.step == p.steps || is_due(last) => {
                 log::step(p, &format!("{head}: {} of {} analyses, {tail}", p.step, p.steps));
             }
-            Self::Records(_) => {}
+            Self::Silent | Self::Records(_) => {}
             Self::Bar(bar) => {
                 if bar.length() != Some(p.steps as u64) || p.step <= 1 {
                     bar.reset();
@@ -96,7 +95,6 @@ impl Display {
         let says = if stage.says.is_empty() { String::new() } else { format!("{}, ", stage.says) };
         let tail = format!("{says}{} runs, {} workers", stage.runs, stage.workers);
         match self {
-            Self::Silent => {}
             Self::Lines(last) => {
                 let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
                 let told = |(name, says): &(&str, String)| {
@@ -110,7 +108,7 @@ impl Display {
                 }
             }
             Self::Records(last) if is_due(last) => log::stage(stage, &format!("{}: {tail}", stage.name)),
-            Self::Records(_) => {}
+            Self::Silent | Self::Records(_) => {}
             Self::Bar(bar) => {
                 if bar.prefix() != stage.name {
                     let spinner = ProgressStyle::with_template("{spinner} {prefix}: {wide_msg} {elapsed}");
@@ -127,7 +125,6 @@ impl Display {
     pub(crate) fn blocks(&self, at: &starlings_coordinator::infer::Progress) {
         let says = format!("{} blocks, {} steps", at.n_block, at.n_step);
         match self {
-            Self::Silent => {}
             Self::Lines(last) => {
                 let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
                 if at.n_block == 1 || last.at.elapsed() > LINE_EVERY {
@@ -138,7 +135,7 @@ impl Display {
             Self::Records(last) if at.n_block == 1 || is_due(last) => {
                 log::blocks(at, &format!("sums: {says}, {} workers", at.workers));
             }
-            Self::Records(_) => {}
+            Self::Silent | Self::Records(_) => {}
             Self::Bar(bar) => {
                 if bar.prefix() != "sums" {
                     let spinner = ProgressStyle::with_template("{spinner} {prefix}: {wide_msg} {elapsed}");
