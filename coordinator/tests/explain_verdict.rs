@@ -284,3 +284,11 @@ fn a_series_without_a_value_is_refused_by_its_name() {
     let text = Study::load(&folder.path().join("study.toml")).unwrap_err().to_string();
     assert!(text.contains("column `y` of record `a` has no value"), "{text}");
 }
+
+#[test]
+fn a_baseline_that_cannot_run_is_told() {
+    let (times, values) = decaying(60, 0.02);
+    let text = decay("0.02", TRAIN, "").replace("\"-k*x\"", "\"-k*x/max(0, -1 - t)\"");
+    let error = explained(&Case::new(&text, &[("a.csv", csv("time,y", &[&times, &values]))])).unwrap_err();
+    assert!(matches!(error, ExplainError::Baseline(_)) && error.is_input(), "{error}");
+}

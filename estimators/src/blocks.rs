@@ -67,7 +67,7 @@ fn offsets(blocks: &[Block], factor: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 
 /// (R^T R)^{-1/2}, symmetric, from the singular values of R.
 fn inverse_root(root: &DMatrix<f64>) -> Result<DMatrix<f64>, EstimatorError> {
-    let (_, values, vectors) = spectral::svd(root.clone(), "posterior")?;
+    let (_, values, vectors) = spectral::svd(root, "posterior")?;
     let sd = DMatrix::from_diagonal(&values.map(|v| 1.0 / v));
     Ok(vectors.tr_mul(&(sd * &vectors)))
 }

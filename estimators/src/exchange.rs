@@ -60,7 +60,7 @@ pub fn exchange_prior(
     let singular = EstimatorError::NotPositiveDefinite { what: "posterior" };
     // Information of the data in coordinates y, theta = m2 + L V y: diagonal, (L2^-1 L)^T (L2^-1 L) - 1.
     let ratio = l2.solve_lower_triangular(&l).ok_or_else(|| singular.clone())?;
-    let (_, singular_values, v_t) = spectral::svd(ratio, "ratio of used prior to posterior")?;
+    let (_, singular_values, v_t) = spectral::svd(&ratio, "ratio of used prior to posterior")?;
     let v = v_t.transpose();
     // Singular values have the rounding of the largest.
     let none = NO_INFORMATION.max(100.0 * f64::EPSILON * singular_values.max());

@@ -72,6 +72,7 @@ pub use roukf::{ROUKF, Root, Roukf};
 pub use sandwich::{DataPoint, Residuals};
 pub use score::{Optimum, Score, null_maxima, score_correlation};
 pub use sigma_set::{Points, SigmaSet};
+pub use spectral::{Svd, svd};
 pub use transform::Transform;
 pub use whiteness::ljung_box;
 

@@ -30,7 +30,7 @@ impl Information {
         let qr = s.qr();
         qr.q_tr_mul(&mut d);
         // The singular vectors of the transpose are the right ones of S.
-        let (vectors, singular, left) = spectral::svd(qr.unpack_r().transpose(), SENSITIVITY)?;
+        let (vectors, singular, left) = spectral::svd(&qr.unpack_r().transpose(), SENSITIVITY)?;
         let values = singular.map(|s| 1.0 + s * s);
         let along = left * d.rows(0, p);
         let scaled = along.component_mul(&singular).component_div(&values);
@@ -47,7 +47,7 @@ const SENSITIVITY: &str = "whitened sensitivity";
 
 /// Whitens S and d by the extra noise 1 + Y Y^T, returns its log determinant.
 fn absorb(y: &DMatrix<f64>, s: &mut DMatrix<f64>, d: &mut DVector<f64>) -> Result<f64, EstimatorError> {
-    let (left, singular, _) = spectral::svd(y.clone(), SENSITIVITY)?;
+    let (left, singular, _) = spectral::svd(y, SENSITIVITY)?;
     let shrink = DMatrix::from_diagonal(&singular.map(|v| 1.0 - 1.0 / v.hypot(1.0)));
     *s -= &left * (&shrink * left.tr_mul(s));
     *d -= &left * (&shrink * left.tr_mul(d));

@@ -35,7 +35,7 @@ impl Fisher {
         let p = scaled.ncols();
         // R of the QR factorisation has the singular values of S_u in p rows.
         let tall = scaled.clone().resize_vertically(scaled.nrows().max(p), 0.0);
-        let (_, values, v_t) = spectral::svd(tall.qr().r(), "sensitivity")?;
+        let (_, values, v_t) = spectral::svd(&tall.qr().r(), "sensitivity")?;
         let vectors = v_t.transpose();
         let lengths: Vec<f64> = scaled.column_iter().map(|c| c.norm()).collect();
         let singular = DVector::from_fn(p, |k, _| {

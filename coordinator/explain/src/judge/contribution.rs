@@ -7,7 +7,7 @@ use super::misfit::Misfit;
 use super::search_result::SearchResult;
 
 /// Share of the fall of χ² that a further effect must contribute.
-const SECOND_SHARE: f64 = 0.1;
+pub(crate) const SECOND_SHARE: f64 = 0.1;
 /// Share below which what a further effect adds is something small that remains, and says nothing against its partner.
 const SMALL_SHARE: f64 = 0.01;
 /// Effective variance of the residuals above which they count as a discrepancy of another kind, not as a wrong form of the

@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 /// A rival is tied within this difference in χ², in units of the effective noise.
 const MARGIN: f64 = 6.0;
 /// Correlation of two influences above which no refit can tell their candidates apart.
-const ALIKE: f64 = 0.995;
+pub(crate) const ALIKE: f64 = 0.995;
 /// A rival is tied where the difference in χ² is less than so many of its standard deviations.
 const VUONG: f64 = 1.64;
 /// Fall of χ² by a fully modulated form that the data must allow before a form counts as tested. A form modulated by half makes a

@@ -4,6 +4,8 @@
 //! effect is therefore held at amplitudes spread over its range; the parameters are fitted there, and the other candidates scored
 //! beside it. What promises most is refitted with the amplitude free. Next file to read: [`super::pairs`].
 
+use std::collections::HashSet;
+
 use starlings_models::EffectDef;
 use starlings_models::equations::Expression;
 
@@ -53,23 +55,8 @@ impl<'c> Searcher<'_, '_, 'c> {
             let mut fits = held(&found.base, candidate, index);
             self.cut_short |= !drive_rounds(self.cache, &mut fits, ROUNDS)?;
             fits.retain(|fit| !fit.residual().is_empty() && !fit.jacobian.of_train.is_empty());
-            let mut beside: Vec<Beside> = Vec::new();
-            for (fit, at) in fits.iter().zip(0..) {
-                for partner in self.screen(fit, &of)? {
-                    let gain = partner.allowed_gain(self.candidates[partner.candidate].sign());
-                    let cost = fit.cost() - gain;
-                    if gain <= 0.0 || partner.failure.is_some() || partner.is_imitated() {
-                        continue;
-                    }
-                    match beside.iter_mut().find(|b| b.partner.candidate == partner.candidate) {
-                        Some(known) if cost < known.cost => *known = Beside { fit: at, partner, cost },
-                        Some(_) => {}
-                        None => beside.push(Beside { fit: at, partner, cost }),
-                    }
-                }
-            }
+            let mut beside = self.beside(&fits, &of)?;
             beside.retain(|b| b.cost < wanted);
-            beside.sort_by(|a, b| a.cost.total_cmp(&b.cost));
             for Beside { fit, partner, .. } in beside.iter().take(PARTNERS) {
                 begun.extend(self.with_candidate(&fits[*fit], partner).ok());
             }
@@ -77,6 +64,27 @@ impl<'c> Searcher<'_, '_, 'c> {
             begun.extend(alone.filter(|fit| fit.cost() < wanted).and_then(free));
         }
         Ok(begun)
+    }
+
+    /// Every partner beside the one of these fits with which it promises most, those that promise most first.
+    fn beside(
+        &mut self,
+        fits: &[FittedVariant<'c>],
+        of: &[(usize, usize)],
+    ) -> Result<Vec<Beside>, ExplainError> {
+        let mut all = Vec::new();
+        for (at, fit) in fits.iter().enumerate() {
+            for partner in self.screen(fit, of)? {
+                let gain = partner.allowed_gain(self.candidates[partner.candidate].sign());
+                if gain > 0.0 && partner.failure.is_none() && !partner.is_imitated() {
+                    all.push(Beside { fit: at, partner, cost: fit.cost() - gain });
+                }
+            }
+        }
+        all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        let mut seen = HashSet::new();
+        all.retain(|b| seen.insert(b.partner.candidate));
+        Ok(all)
     }
 }
 

@@ -6,13 +6,15 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::search::Searcher;
+use super::search::{Searcher, largest_of_each};
 use crate::error::ExplainError;
 use crate::fit::drive::drive_rounds;
 use crate::fit::fitted_variant::FittedVariant;
 use crate::fit::model_variant::{AddedEffect, ModelVariant};
+use crate::judge::contribution::SECOND_SHARE;
 use crate::judge::effective_noise::inflation;
 use crate::judge::search_result::SearchResult;
+use crate::judge::verdict::ALIKE;
 use crate::screen::screening_result::ScreeningResult;
 
 /// Pairs that begin a refit.
@@ -21,12 +23,8 @@ const PAIRS: usize = 6;
 const ROUNDS: usize = 12;
 /// ... so many of them.
 const FINAL: usize = 3;
-/// Share of a pair's gain that each of the two must add to the other, as in the verdict.
-const SHARE: f64 = 0.1;
 /// Part of the way to the amplitudes that the scores promise at which a refit begins: as far as the influences surely hold.
 const FIRST_WAY: f64 = 0.1;
-/// Correlation of two influences above which they are one.
-const ALIKE: f64 = 0.995;
 
 /// One effect as a member of a pair.
 struct Member {
@@ -113,15 +111,8 @@ impl<'c> Searcher<'_, '_, 'c> {
     /// most first.
     fn members(&mut self, found: &SearchResult<'c>) -> Result<Vec<Member>, ExplainError> {
         let optimum = found.base.optimum()?;
-        let mut best: Vec<ScreeningResult> = Vec::new();
-        for result in found.screening.iter().filter(|h| h.failure.is_none() && !h.is_imitated()) {
-            match best.iter_mut().find(|b| b.candidate == result.candidate) {
-                Some(known) if result.score.gain > known.score.gain => known.clone_from(result),
-                Some(_) => {}
-                None => best.push(result.clone()),
-            }
-        }
-        best.sort_by(|a, b| b.score.gain.total_cmp(&a.score.gain));
+        let usable = found.screening.iter().filter(|h| h.failure.is_none() && !h.is_imitated());
+        let mut best = largest_of_each(usable, |h| h.score.gain);
         best.truncate(self.cache.series_held().max(2));
         let member = |result: ScreeningResult| {
             let own = optimum.unimitated(&result.influence.of_train(self.cache)?);
@@ -201,7 +192,7 @@ impl Normal {
         };
         let gain = self.gain(amplitudes);
         let allowed = (0..2).all(|k| amplitudes[k] * signs[k] >= 0.0);
-        (allowed && gain.is_finite() && gain - alone(0).max(alone(1)) > SHARE * gain)
+        (allowed && gain.is_finite() && gain - alone(0).max(alone(1)) > SECOND_SHARE * gain)
             .then_some((amplitudes, gain))
     }
 }

@@ -148,16 +148,8 @@ impl<'c> Searcher<'_, '_, 'c> {
     /// The best point of the grid of every candidate that could be named, largest gain first.
     pub(super) fn best_of_each(&self, screening: &[ScreeningResult]) -> Vec<ScreeningResult> {
         let gain = |h: &ScreeningResult| h.allowed_gain(self.candidates[h.candidate].sign());
-        let mut best: Vec<ScreeningResult> = Vec::new();
-        for result in screening.iter().filter(|h| h.failure.is_none() && !h.is_absorbed() && gain(h) > 0.0) {
-            match best.iter_mut().find(|b| b.candidate == result.candidate) {
-                Some(known) if gain(result) > gain(known) => known.clone_from(result),
-                Some(_) => {}
-                None => best.push(result.clone()),
-            }
-        }
-        best.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
-        best
+        let usable = screening.iter().filter(|h| h.failure.is_none() && !h.is_absorbed() && gain(h) > 0.0);
+        largest_of_each(usable, gain)
     }
 
     /// Refits until all have converged.
@@ -233,4 +225,21 @@ impl<'c> Searcher<'_, '_, 'c> {
 fn order(a: &JudgedFit<'_>, b: &JudgedFit<'_>) -> Ordering {
     let refused = |j: &JudgedFit<'_>| j.refusal.is_some();
     refused(a).cmp(&refused(b)).then(b.rank().total_cmp(&a.rank()))
+}
+
+/// The result with the largest gain of every candidate, the largest first.
+pub(super) fn largest_of_each<'r>(
+    results: impl Iterator<Item = &'r ScreeningResult>,
+    gain: impl Fn(&ScreeningResult) -> f64,
+) -> Vec<ScreeningResult> {
+    let mut best: Vec<ScreeningResult> = Vec::new();
+    for result in results {
+        match best.iter_mut().find(|b| b.candidate == result.candidate) {
+            Some(known) if gain(result) > gain(known) => known.clone_from(result),
+            Some(_) => {}
+            None => best.push(result.clone()),
+        }
+    }
+    best.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
+    best
 }

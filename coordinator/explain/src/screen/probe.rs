@@ -5,6 +5,7 @@
 use starlings_estimators::Score;
 
 use super::influence::Influence;
+use super::screening_result::Unmeasured;
 use crate::fit::model_variant::ModelVariant;
 
 /// A candidate at one point of its grid, and its measurement as far as it has come.
@@ -13,7 +14,7 @@ pub(super) struct Probe<'c> {
     pub(super) variant: ModelVariant<'c>,
     pub(super) point: Vec<f64>,
     pub(super) amplitude: f64,
-    pub(super) answer: Option<Result<MeasuredInfluence, String>>,
+    pub(super) answer: Option<Result<MeasuredInfluence, Unmeasured>>,
 }
 
 /// A measured influence with its score.

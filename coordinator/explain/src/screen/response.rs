@@ -9,6 +9,7 @@ use starlings_study::store::RunKey;
 
 use super::influence::{Influence, difference};
 use super::probe::{MeasuredInfluence, Probe};
+use super::screening_result::{UNSEEN, Unmeasured};
 use crate::run_cache::{RowPredictions, RunCache};
 
 /// Size of a response at which a derivative is taken: root mean square over the spread of the channel.
@@ -37,7 +38,7 @@ pub(super) enum ProbeOutcome {
     /// Measure it again, with this amplitude.
     Amplitude(f64),
     /// It is measured, or has failed.
-    Done(Result<MeasuredInfluence, String>),
+    Done(Result<MeasuredInfluence, Unmeasured>),
 }
 
 impl ProbeResponse<'_> {
@@ -46,7 +47,7 @@ impl ProbeResponse<'_> {
         let amplitude = self.probe.amplitude;
         let predicted = match &self.answer {
             Ok(predicted) => predicted,
-            Err(reason) if last => return ProbeOutcome::Done(Err(reason.clone())),
+            Err(reason) if last => return ProbeOutcome::Done(Err(Unmeasured::Failed(reason.clone()))),
             Err(_) => return ProbeOutcome::Amplitude(amplitude * 1e-2),
         };
         let n = cache.rows.rows.len().max(1) as f64;
@@ -57,7 +58,7 @@ impl ProbeResponse<'_> {
         if fits || (last && response > 0.0) {
             ProbeOutcome::Done(Ok(self.measured(cache, scale, predicted)))
         } else if last {
-            ProbeOutcome::Done(Err(String::new()))
+            ProbeOutcome::Done(Err(UNSEEN))
         } else if response > 0.0 {
             ProbeOutcome::Amplitude(amplitude * (WANTED / response).clamp(1e-6, 1e6))
         } else {

@@ -12,7 +12,7 @@ use starlings_study::Record;
 
 use super::probe::{MeasuredInfluence, Probe};
 use super::response::{ProbeOutcome, ProbeResponse, ResponseScale};
-use super::screening_result::ScreeningResult;
+use super::screening_result::{ScreeningResult, UNSEEN, Unmeasured};
 
 use super::influence::Influence;
 use super::natural_amplitude::{ReferenceRun, natural_amplitude};
@@ -70,7 +70,7 @@ pub(crate) fn screen<'c>(
         if !cache.affords(open.len()) {
             cache.cut_short();
             for i in open {
-                probes[i].answer = Some(Err(UNAFFORDED.to_owned()));
+                probes[i].answer = Some(Err(Unmeasured::Failed(UNAFFORDED.to_owned())));
             }
             break;
         }
@@ -178,21 +178,18 @@ fn incompatible(candidate: usize, point: &[f64], error: &SetupError) -> Screenin
         point: point.to_vec(),
         influence: Influence::none(),
         score: NO_SCORE,
-        failure: Some(error.to_string()),
+        failure: Some(Unmeasured::Failed(error.to_string())),
         is_significant: false,
     }
 }
 
 fn finished(probe: Probe<'_>) -> ScreeningResult {
     let Probe { candidate, point, answer, .. } = probe;
-    let reason = match answer.unwrap_or_else(|| Err(String::new())) {
+    let (influence, score, failure) = match answer.unwrap_or(Err(UNSEEN)) {
         Ok(MeasuredInfluence { influence, score, is_unfelt }) => {
-            let failure = is_unfelt.then(|| "no influence on what is fitted".to_owned());
-            return ScreeningResult { candidate, point, influence, score, failure, is_significant: false };
+            (influence, score, is_unfelt.then_some(Unmeasured::NoInfluence("what is fitted")))
         }
-        Err(reason) if reason.is_empty() => "no influence on what was measured".to_owned(),
-        Err(reason) => reason,
+        Err(failure) => (Influence::none(), NO_SCORE, Some(failure)),
     };
-    let (influence, failure) = (Influence::none(), Some(reason));
-    ScreeningResult { candidate, point, influence, score: NO_SCORE, failure, is_significant: false }
+    ScreeningResult { candidate, point, influence, score, failure, is_significant: false }
 }

@@ -25,9 +25,39 @@ pub(crate) struct ScreeningResult {
     /// Its score.
     pub score: Score,
     /// Why its influence was not measured.
-    pub failure: Option<String>,
+    pub failure: Option<Unmeasured>,
     /// Whether it gains more than chance in units of the effective noise, or was asked for by name.
     pub is_significant: bool,
+}
+
+/// The candidate changes nothing that is measured.
+pub(super) const UNSEEN: Unmeasured = Unmeasured::NoInfluence("what was measured");
+
+/// Why nothing is known of the influence of a candidate.
+#[derive(Clone, Debug)]
+pub(crate) enum Unmeasured {
+    /// It has none, on what is named.
+    NoInfluence(&'static str),
+    /// It fits in no model with the effects of the fit, or its runs failed, as the text says.
+    Failed(String),
+}
+
+impl Unmeasured {
+    /// Name of the gate at which it is refused.
+    pub(crate) fn gate(&self) -> &'static str {
+        match self {
+            Self::NoInfluence(_) => "no influence",
+            Self::Failed(_) => "failed",
+        }
+    }
+
+    /// The reason, for people.
+    pub(crate) fn reason(&self) -> String {
+        match self {
+            Self::NoInfluence(on) => format!("no influence on {on}"),
+            Self::Failed(reason) => reason.clone(),
+        }
+    }
 }
 
 impl ScreeningResult {

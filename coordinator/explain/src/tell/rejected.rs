@@ -29,11 +29,10 @@ pub(crate) fn rejected(
     for (index, candidate) in candidates.iter().enumerate() {
         let of = || found.screening.iter().filter(|h| h.candidate == index);
         let name = candidate.name().to_owned();
-        if let Some(reason) =
-            of().find_map(|h| h.failure.clone()).filter(|_| of().all(|h| h.failure.is_some()))
+        if let Some(failure) =
+            of().find_map(|h| h.failure.as_ref()).filter(|_| of().all(|h| h.failure.is_some()))
         {
-            let gate = if reason.starts_with("no influence") { "no influence" } else { "failed" };
-            list.push(Rejected { name, gate: gate.to_owned(), reason });
+            list.push(Rejected { name, gate: failure.gate().to_owned(), reason: failure.reason() });
         } else if of().count() > 0 && of().all(ScreeningResult::is_absorbed) {
             let reason =
                 "the model's parameters imitate it: it cannot be told from them, which does not mean absent";

@@ -113,12 +113,8 @@ fn fate(
         "named"
     } else if decision.tied.iter().any(|set| is(set)) {
         "tied"
-    } else if let Some(reason) = &best.failure {
-        return if reason.starts_with("no influence") {
-            "no influence".to_owned()
-        } else {
-            "failed".to_owned()
-        };
+    } else if let Some(failure) = &best.failure {
+        failure.gate()
     } else if best.is_absorbed() {
         "absorbed by the parameters"
     } else if found.judged.iter().any(|j| j.fit.variant.effects.iter().any(|m| m.index == index)) {

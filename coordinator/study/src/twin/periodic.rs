@@ -7,6 +7,7 @@
 use std::collections::VecDeque;
 
 use nalgebra::{DMatrix, DVector};
+use starlings_estimators::svd;
 use starlings_models::ParticleError;
 
 /// Change over one period, in units of each state quantity's size, at which the state counts as periodic.
@@ -17,8 +18,6 @@ const LIMIT: usize = 60;
 const DEPTH: usize = 10;
 /// Singular values of the combined changes below this share of the largest are rounding errors.
 const RANK: f64 = 1e-13;
-/// Iterations of the decomposition at most; a few per column are usual.
-const ITERATIONS: usize = 3000;
 
 /// Runs one period from a state to the one at its end.
 pub(super) type Period<'a> = dyn FnMut(&[f64]) -> Result<Vec<f64>, ParticleError> + 'a;
@@ -98,9 +97,10 @@ impl Mixing {
         if !self.residuals.is_empty() {
             let differences: Vec<DVector<f64>> = self.residuals.iter().cloned().collect();
             // Differences that cannot be decomposed are a plain step.
-            let svd = DMatrix::from_columns(&differences).try_svd(true, true, f64::EPSILON, ITERATIONS);
-            let least = RANK * svd.as_ref().map_or(0.0, |svd| svd.singular_values.max());
-            if let Some(Ok(gamma)) = svd.map(|svd| svd.solve(&residual, least)) {
+            if let Ok((u, values, v_t)) = svd(&DMatrix::from_columns(&differences), "changes per period") {
+                let least = RANK * values.max();
+                let inverse = values.map(|s| if s > least { 1.0 / s } else { 0.0 });
+                let gamma = v_t.tr_mul(&u.tr_mul(&residual).component_mul(&inverse));
                 for (difference, share) in self.images.iter().zip(gamma.iter()) {
                     next.axpy(-share, difference, 1.0);
                 }
