@@ -1,4 +1,8 @@
-//! `starlings forecast`: what a finished run says of the future.
+//! `starlings forecast`: what a run or an inference says of the future.
+//!
+//! Next file to read: `forecast/source.rs`, which opens either.
+
+mod source;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -7,32 +11,31 @@ use clap::Parser;
 use starlings_coordinator::fleet::RunIdentity;
 use starlings_coordinator::report::forecast_page;
 use starlings_coordinator::study::forecast::result::OutputForecast;
-use starlings_coordinator::study::forecast::{Ask, Forecast, StudyForecastError, Threshold, forecast};
-use starlings_coordinator::study::store::folder::StudyInfo;
-use starlings_coordinator::study::{RunFolder, Study};
+use starlings_coordinator::study::forecast::{Ask, Forecast, Threshold};
 use starlings_estimators::forecast::{Direction, Level};
 
 use crate::console::{line, note, table, text};
 use crate::csv_file;
 use crate::failure::Failure;
 use crate::fleet_session::{Entrance, FleetArgs, FleetSession};
-use crate::interrupt;
-use crate::load::{self, load_frozen};
 use crate::progress::Display;
+use source::Source;
 
-/// Forecast from a finished run: an ensemble with parameters from its posterior, quantiles against time, and the time at which a
+/// Forecast from a run or an inference: an ensemble with parameters from its posterior, quantiles against time, and the time at which a
 /// quantity crosses a level.
 ///
-/// Every member starts where the record does, with parameters drawn from the posterior and, where the model has it, with noise of its
-/// own. Writes forecast.json, fan.csv, crossing-times.csv and report.html.
+/// Every member of a run starts where the record does, with parameters drawn from the posterior and, where the model has it, with noise of
+/// its own. From an inference members start at the last row, with coefficients and noise drawn from its posterior. Writes forecast.json,
+/// fan.csv, crossing-times.csv and report.html.
 #[derive(Parser)]
 pub(crate) struct Args {
-    /// The folder of a finished run.
-    dir: PathBuf,
+    /// The folder of a finished run or inference, or the state file of `starlings infer --follow`.
+    #[arg(value_name = "DIR|STATE")]
+    from: PathBuf,
     /// A value that all members have, of a parameter, constant or initial:STATE; may be repeated.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = crate::simulate::assignment)]
     set: Vec<(String, f64)>,
-    /// Last time of the forecast; the record's end without it. Inputs stay at their last value beyond theirs.
+    /// Last time of the forecast; the record's end without it, which is none where an inference used all of it. Inputs stay at their last value beyond theirs.
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     until: Option<f64>,
     /// Spacing of times after the record's end; its mean spacing without it.
@@ -53,10 +56,11 @@ pub(crate) struct Args {
     /// Record whose start, inputs and times are used; the first without it.
     #[arg(long)]
     record: Option<String>,
-    /// The study file, where it does not stand any more where it was run; its recordings are looked for beside it.
+    /// The study file: of a state file always, else where it does not stand any more where it was run. Its recordings are looked for
+    /// beside it.
     #[arg(long, value_name = "FILE")]
     study: Option<PathBuf>,
-    /// Folder for the files; `forecast` in the run folder without it.
+    /// Folder for the files; without it `forecast` in the folder, and beside STATE its name with `-forecast`.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -83,26 +87,20 @@ fn threshold(text: &str) -> Result<Threshold, String> {
 
 /// Runs the ensemble and writes what it says.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    let folder = RunFolder::open(&args.dir).map_err(Failure::input)?;
-    let study = study_of(args, &folder)?;
-    let ask = ask(args, &study)?;
-    ask.check(&study).map_err(Failure::input)?;
-    let plan = args.fleet.plan(&study, None)?;
+    let source = Source::open(args)?;
+    let study = &source.study;
+    let ask = ask(args, &source)?;
+    source.check(&ask)?;
+    let plan = args.fleet.plan(study, None)?;
     let display = Arc::new(Display::new(args.json));
     let mut session =
-        FleetSession::listen(&study, &plan, Entrance::take(&plan, None)?, RunIdentity::new(), &display)?;
-    session.start_workers(&study, &plan, None)?;
-    let result = forecast(&study, &folder, &mut session.fleet, &ask);
+        FleetSession::listen(study, &plan, Entrance::take(&plan, None)?, RunIdentity::new(), &display)?;
+    session.start_workers(study, &plan, None)?;
+    let result = source.forecast(&mut session.fleet, &ask);
     display.finish();
     session.close(result.is_ok());
-    let found = result.map_err(|error| match error {
-        StudyForecastError::Run(cause) if cause.is_cancelled() => {
-            interrupt::failure("nothing is kept of it: start again")
-        }
-        error if error.is_input() => Failure::input(error),
-        error => Failure::run(error),
-    })?;
-    let out = args.out.clone().unwrap_or_else(|| args.dir.join("forecast"));
+    let found = result?;
+    let out = args.out.clone().unwrap_or_else(|| usual_out(&args.from));
     let json = serde_json::to_string_pretty(&found).map_err(Failure::run)?;
     write(&out, &found, &json)?;
     if args.json {
@@ -113,36 +111,25 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The study as it was run.
-fn study_of(args: &Args, folder: &RunFolder) -> Result<Study, Failure> {
-    let frozen = folder.store.meta("study").map_err(Failure::run)?.unwrap_or_default();
-    let info = folder.store.meta("info").map_err(Failure::run)?.unwrap_or_default();
-    let stood = serde_json::from_str::<StudyInfo>(&info).map(|info| info.file).unwrap_or_default();
-    let place = match &args.study {
-        Some(file) => file.clone(),
-        None if stood.is_empty() => args.dir.join("study.toml"),
-        None => PathBuf::from(stood),
-    };
-    if !place.exists() {
-        return Err(Failure::input(format!(
-            "the study of this run stood at {}, and is not there: say where it and its recordings are with --study FILE",
-            place.display()
-        )));
+/// `forecast` in a folder; beside a state file, its name with `-forecast`.
+fn usual_out(from: &Path) -> PathBuf {
+    if from.is_dir() {
+        return from.join("forecast");
     }
-    load_frozen(&place, &frozen, args.fleet.is_here())
+    let stem = from.file_stem().unwrap_or_default().to_string_lossy();
+    from.with_file_name(format!("{stem}-forecast"))
 }
 
-fn ask(args: &Args, study: &Study) -> Result<Ask, Failure> {
-    let record = load::record(study, args.record.as_deref())?;
+fn ask(args: &Args, source: &Source) -> Result<Ask, Failure> {
     Ok(Ask {
-        record,
+        record: source.record(args.record.as_deref())?,
         values: args.set.clone(),
         until: args.until,
         step: args.step,
         thresholds: args.level.clone(),
         horizon: args.horizon,
         members: args.members,
-        seed: args.seed.unwrap_or(study.seed),
+        seed: args.seed.unwrap_or(source.study.seed),
     })
 }
 

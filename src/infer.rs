@@ -114,13 +114,18 @@ pub(crate) fn write_again(folder: &Path, overview: bool, json: bool) -> Result<(
     if overview {
         return Err(Failure::input("an inference has no overview picture: leave out --overview"));
     }
+    let found = read_result(folder)?;
+    write_inference(folder, &found).map_err(Failure::run)?;
+    tell(&found, folder, json)
+}
+
+/// The result in its folder.
+pub(crate) fn read_result(folder: &Path) -> Result<Inference, Failure> {
     let path = folder.join(RESULT);
     let unreadable =
         |error: &dyn std::fmt::Display| Failure::input(format!("cannot read {}: {error}", path.display()));
     let text = std::fs::read_to_string(&path).map_err(|error| unreadable(&error))?;
-    let found: Inference = serde_json::from_str(&text).map_err(|error| unreadable(&error))?;
-    write_inference(folder, &found).map_err(Failure::run)?;
-    tell(&found, folder, json)
+    serde_json::from_str(&text).map_err(|error| unreadable(&error))
 }
 
 fn tell(found: &Inference, folder: &Path, json: bool) -> Result<(), Failure> {

@@ -35,10 +35,14 @@ pub(crate) fn load_frozen(path: &Path, text: &str, here: bool) -> Result<Study, 
 /// Which record of a study a command is about: the first where none is named.
 pub(crate) fn record(study: &Study, name: Option<&str>) -> Result<usize, Failure> {
     let Some(name) = name else { return Ok(0) };
-    study.records.iter().position(|r| r.name == name).ok_or_else(|| {
-        let names: Vec<&str> = study.records.iter().map(|r| r.name.as_str()).collect();
-        Failure::input(format!("no record named `{name}` (the study has: {})", names.join(", ")))
-    })
+    let names = || study.records.iter().map(|record| record.name.as_str());
+    names().position(|known| known == name).ok_or_else(|| unknown_record(name, names()))
+}
+
+/// What is told of a record that is not there.
+pub(crate) fn unknown_record<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> Failure {
+    let names: Vec<&str> = names.collect();
+    Failure::input(format!("no record named `{name}` (the study has: {})", names.join(", ")))
 }
 
 fn host(here: bool) -> SolverHost {

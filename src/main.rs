@@ -77,7 +77,7 @@ enum Command {
     Infer(infer::Args),
     /// Say whether the estimation is reasonable, before it is made: what these data could determine.
     Identify(identify::Args),
-    /// Forecast from a finished run: quantiles against time, and when a quantity crosses a level.
+    /// Forecast from a run or an inference: quantiles against time, and when a quantity crosses a level.
     Forecast(forecast::Args),
     /// Show how the poles of the model's error move with the gain of each observer.
     Spectrum(spectrum::Args),

@@ -199,3 +199,53 @@ fn a_folder_serves_one_command() {
     assert_eq!(fs::read_to_string(taken.join("explained.toml")).unwrap(), "mine");
     assert_eq!(fs::read_dir(&taken).unwrap().count(), 1, "nothing was added");
 }
+
+/// A decay whose state has noise.
+const NOISY: &str = r#"[study]
+name = "noisy"
+
+[model]
+kind = "equations"
+outputs = [ { name = "x", value = "x" } ]
+solver = { method = "heun", step = 0.02 }
+
+[[model.states]]
+name = "x"
+initial = 3.0
+rate = "-k*x"
+noise = "0.05"
+
+[[parameters]]
+name = "k"
+prior = { transform = "log", median = 1.0, factor = 2.0 }
+
+[[records]]
+name = "fall"
+file = "fall.csv"
+channels = [ { column = "x", output = "x", noise = 0.02 } ]
+train = [0.0, 1.6]
+
+[estimator]
+kind = "batch"
+"#;
+
+#[test]
+fn of_a_model_with_noise_in_its_states_it_says_where_the_drift_is_asked_for() {
+    let dir = tempfile::tempdir().unwrap();
+    let study = dir.path().join("study.toml");
+    fs::write(&study, NOISY).unwrap();
+    let row = |i: usize| format!("{:.2},{:.4}\n", 0.04 * i as f64, 3.0 * (-0.048 * i as f64).exp());
+    fs::write(dir.path().join("fall.csv"), format!("time,x\n{}", (0..51).map(row).collect::<String>()))
+        .unwrap();
+    let out = dir.path().join("out");
+    let (code, stdout, stderr) = output(explain(&study, &out).args(["--workers", "1", "--json"]));
+    assert_eq!(code, 0, "{stderr}");
+    let warnings = json(stdout.as_bytes())["warnings"].to_string();
+    assert!(warnings.contains("[infer.candidates] by `starlings infer`"), "{warnings}");
+    // The same without noise says nothing of it.
+    fs::write(&study, NOISY.replace("noise = \"0.05\"\n", "")).unwrap();
+    let out = dir.path().join("still");
+    let (code, stdout, stderr) = output(explain(&study, &out).args(["--workers", "1", "--json"]));
+    assert_eq!(code, 0, "{stderr}");
+    assert!(!json(stdout.as_bytes())["warnings"].to_string().contains("infer.candidates"), "{stdout}");
+}

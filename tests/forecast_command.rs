@@ -139,6 +139,31 @@ fn the_fan_of_a_linear_oscillator_is_its_posterior_predictive_band() {
 }
 
 #[test]
+fn the_report_of_the_run_has_the_same_band_to_first_order_which_is_exact_here() {
+    let folder = tempfile::tempdir().unwrap();
+    finished(folder.path());
+    let db = rusqlite::Connection::open(folder.path().join("run/run.db")).unwrap();
+    let meta = |key: &str| -> Value {
+        let text: String =
+            db.query_row("SELECT value FROM meta WHERE key = ?1", [key], |row| row.get(0)).unwrap();
+        serde_json::from_str(&text).unwrap()
+    };
+    let given = meta("covariance_given_residuals");
+    let given = Matrix2::from_fn(|i, j| given[i][j].as_f64().unwrap());
+    let sd = meta("prediction_sd");
+    let rows = recording();
+    assert_eq!(sd.as_array().unwrap().len(), rows.len(), "held-out values have one too");
+    for ((t, _), sd) in rows.iter().zip(sd.as_array().unwrap()) {
+        let phi = motion(*t);
+        let expected = (phi.transpose() * given * phi)[(0, 0)].sqrt();
+        // The integrator's tolerance over a tenth of a posterior sd, and seven digits.
+        assert!((sd.as_f64().unwrap() - expected).abs() < 1e-4 * expected, "{t}: {sd} for {expected}");
+    }
+    let page = String::from_utf8(bytes(&folder.path().join("run"), "report.html")).unwrap();
+    assert!(page.contains("of parameters and noise"), "the report shows it");
+}
+
+#[test]
 fn members_reach_the_end_and_the_horizon_that_were_asked_for() {
     let folder = tempfile::tempdir().unwrap();
     finished(folder.path());
@@ -168,7 +193,7 @@ fn levels_and_mistakes_are_told() {
         (&["--level", "positon>1"][..], "did you mean `position`?"),
         (&["--level", "position"], "expected OUTPUT>VALUE"),
         (&["--level", "position>high"], "`high` is not a number"),
-        (&["--until", "-1"], "after the record's start"),
+        (&["--until", "-1"], "after the start at"),
         (&["--horizon", "9"], "--horizon 9"),
         (&["--set", "kk=2"], "no parameter, constant or initial value"),
         (&["--record", "fall"], "the study has: swing"),

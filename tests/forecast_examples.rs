@@ -84,3 +84,29 @@ fn the_simulated_motor_bursts_when_its_page_says_and_the_false_alarm_never() {
     );
     says("crossed by none of 200 members up to 22 s");
 }
+
+#[test]
+fn what_comes_next_of_the_lorenz_system_is_what_its_page_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let example = repository("examples/lorenz");
+    for file in ["study.toml", "truth.toml", "start.csv"] {
+        std::fs::copy(example.join(file), folder.path().join(file)).unwrap();
+    }
+    let made = |arguments: &[&str]| {
+        let (code, stdout, stderr) = output(starlings().current_dir(folder.path()).args(arguments));
+        assert_eq!(code, 0, "{stderr}");
+        stdout
+    };
+    made(&["simulate", "truth.toml", "--until", "8", "--step", "0.002", "-o", "data.csv"]);
+    made(&["infer", "study.toml", "--out", "lorenz-result"]);
+    let asked =
+        ["forecast", "lorenz-result", "--until", "8.5", "--level", "x1<-20", "--horizon", "8.2", "--json"];
+    let found: Value = serde_json::from_str(&made(&asked)).unwrap();
+    let level = &found["levels"][0];
+    let readme = std::fs::read_to_string(example.join("README.md")).unwrap();
+    let readme = readme.split_whitespace().collect::<Vec<_>>().join(" ");
+    let [early, late] =
+        [&level["probability_by_horizon"], &level["probability"]].map(|p| p.as_f64().unwrap());
+    let says = format!("{early:.3} by 8.2 s and {late:.3} by 8.5 s");
+    assert!(readme.contains(&says), "the page does not say: {says}");
+}

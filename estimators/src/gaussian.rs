@@ -37,7 +37,7 @@ impl Gaussian {
     ///
     /// # Panics
     /// When the covariance has no eigenvalues, because an entry is no finite number.
-    pub(crate) fn factor(&self) -> DMatrix<f64> {
+    pub fn factor(&self) -> DMatrix<f64> {
         if let Some(cholesky) = self.covariance.clone().cholesky() {
             return cholesky.l();
         }

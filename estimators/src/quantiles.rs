@@ -4,6 +4,9 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, Normal, StudentsT};
 
+/// Half-width of a central 95 % interval of a Gaussian, in standard deviations: [`normal`] of 0.975.
+pub const Z95: f64 = 1.959_963_984_540_054;
+
 /// Degrees of freedom from which expansions about the normal distribution are exact to a millionth.
 const MANY: f64 = 200.0;
 

@@ -65,6 +65,11 @@ impl Fitted {
     }
 }
 
+/// A matrix row by row.
+fn rows(matrix: &DMatrix<f64>) -> Vec<Vec<f64>> {
+    matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
+}
+
 /// A row of the table of coefficients; `moved` is the estimate at no step, where it was extrapolated to that.
 pub(crate) fn coefficient(
     choice: &InferChoice,
@@ -163,10 +168,13 @@ impl Answer {
         .collect()
     }
 
+    /// Covariance of the coefficients that have a value.
+    pub(crate) fn covariance(&self) -> Vec<Vec<f64>> {
+        rows(self.posterior.covariance())
+    }
+
     /// The table of the noise.
     pub(crate) fn diffusion(&self, choice: &InferChoice) -> DiffusionFound {
-        let rows =
-            |matrix: &DMatrix<f64>| matrix.row_iter().map(|row| row.iter().copied().collect()).collect();
         let n = self.posterior.diffusion.nrows();
         let form = match choice.diffusion {
             DiffusionChoice::Full => "full",
@@ -184,6 +192,7 @@ impl Answer {
                     .zip_map(&self.posterior.diffusion, |sd, d| if d.abs() > 0.0 { sd } else { 0.0 }),
             ),
             interval90: (0..n).map(|l| self.posterior.diffusion_interval(l, LEVEL)).collect(),
+            degrees: self.posterior.degrees,
             lag_corrected: self.lag_corrected,
             measured_sd: if let MeasuredChoice::Known(sd) = choice.measured { Some(sd) } else { None },
         }

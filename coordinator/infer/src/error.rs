@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use starlings_estimators::inference::InferenceError;
 use starlings_fleet::FleetError;
 use starlings_models::Failure;
+use starlings_study::forecast::StudyForecastError;
 use starlings_sums::SumsError;
 
 /// Why there is no inference.
@@ -70,6 +71,9 @@ pub enum InferError {
         /// What is wrong.
         message: String,
     },
+    /// There is no forecast.
+    #[error(transparent)]
+    Forecast(#[from] StudyForecastError),
     /// Something cannot be written or read.
     #[error("{what}: {error}")]
     File {
@@ -83,12 +87,20 @@ pub enum InferError {
 impl InferError {
     /// Whether somebody cancelled the work, rather than that it failed.
     pub fn is_cancelled(&self) -> bool {
-        matches!(self, Self::Fleet(FleetError::Cancelled))
+        match self {
+            Self::Fleet(error) => matches!(error, FleetError::Cancelled),
+            Self::Forecast(StudyForecastError::Run(error)) => error.is_cancelled(),
+            _ => false,
+        }
     }
 
     /// Whether the input is wrong, rather than the run.
     pub fn is_input(&self) -> bool {
-        !matches!(self, Self::Fleet(_) | Self::File { .. })
+        match self {
+            Self::Fleet(_) | Self::File { .. } => false,
+            Self::Forecast(error) => error.is_input(),
+            _ => true,
+        }
     }
 }
 

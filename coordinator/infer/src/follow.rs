@@ -5,7 +5,7 @@
 
 mod follower;
 pub mod line;
-mod state;
+pub(crate) mod state;
 mod whole_lines;
 
 use std::io::Read;

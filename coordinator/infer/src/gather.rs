@@ -18,8 +18,11 @@ use crate::file_blocks::{FileBlock, FileBlocks, FileRecord};
 
 /// Numbers of one batch at most.
 const BATCH_NUMBERS: usize = 1 << 22;
-/// Blocks of one batch at most.
+/// Blocks of the first batch; each later one has twice as many, so that workers begin at once and seldom wait for one another.
+const FIRST_BLOCKS: usize = 4;
+/// Blocks of one batch at most, where rows travel and where places in a file do.
 const BATCH_BLOCKS: usize = 64;
+const BATCH_PLACES: usize = 1024;
 
 /// Blocks that are to be summed.
 pub(crate) struct Work<'a> {
@@ -126,6 +129,7 @@ impl Work<'_> {
         let width = 1 + self.question.basis.n_channel();
         let most = (BATCH_NUMBERS / (width * (self.cut.block + 1))).clamp(1, BATCH_BLOCKS);
         let mut batch = Vec::new();
+        let mut wanted = FIRST_BLOCKS.min(most);
         for (k, record) in self.records.iter().enumerate() {
             let opened = open(record);
             let mut blocks = match opened {
@@ -140,8 +144,11 @@ impl Work<'_> {
                     Ok(None) => break,
                     Err(error) => return drop(sender.send(Err(error))),
                 }
-                if batch.len() >= most && sender.send(Ok(std::mem::take(&mut batch))).is_err() {
-                    return;
+                if batch.len() >= wanted {
+                    wanted = (2 * wanted).min(most);
+                    if sender.send(Ok(std::mem::take(&mut batch))).is_err() {
+                        return;
+                    }
                 }
             }
         }
@@ -151,6 +158,7 @@ impl Work<'_> {
     /// Finds the blocks of all files, in batches.
     fn find(&self, files: &[FileRecord], sender: &SyncSender<Result<Vec<Asked>, InferError>>) {
         let mut batch = Vec::new();
+        let mut wanted = FIRST_BLOCKS;
         for (k, record) in files.iter().enumerate() {
             let Ok(mut blocks) = FileBlocks::open(record, self.cut) else {
                 return drop(sender.send(Err(InferError::Unread)));
@@ -163,8 +171,11 @@ impl Work<'_> {
                     Ok(None) => break,
                     Err(_) => return drop(sender.send(Err(InferError::Unread))),
                 }
-                if batch.len() >= BATCH_BLOCKS && sender.send(Ok(std::mem::take(&mut batch))).is_err() {
-                    return;
+                if batch.len() >= wanted {
+                    wanted = (2 * wanted).min(BATCH_PLACES);
+                    if sender.send(Ok(std::mem::take(&mut batch))).is_err() {
+                        return;
+                    }
                 }
             }
         }

@@ -12,6 +12,7 @@
 //! | [`reduced`] | a model with fewer unknowns than coefficients |
 //! | [`result`], `answer`, `words` | the tables with intervals, and what is said of them |
 //! | [`follow`](mod@follow) | a recording that is still written: estimates and alarms as it arrives |
+//! | [`forecast`](mod@forecast) | an ensemble of what comes next, drawn from the posterior |
 //! | [`run`] | all of it on a page |
 //!
 //! The mathematics is in the estimators; nothing here computes a posterior. Next file to read: [`mod@run`].
@@ -22,6 +23,7 @@ mod convergence;
 pub mod error;
 mod file_blocks;
 pub mod follow;
+pub mod forecast;
 mod gather;
 mod missing;
 pub mod reduced;

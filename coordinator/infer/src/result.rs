@@ -15,6 +15,9 @@ pub struct Inference {
     pub study: String,
     /// What was found, in one sentence.
     pub verdict: String,
+    /// Where the study file stood.
+    #[serde(default)]
+    pub file: String,
     /// Unit label of every time.
     pub time_unit: String,
     /// The recordings.
@@ -29,6 +32,9 @@ pub struct Inference {
     pub equations: Vec<String>,
     /// The coefficients of the drift.
     pub coefficients: Vec<CoefficientFound>,
+    /// Covariance of those coefficients that have an estimate, row by row in their order.
+    #[serde(default)]
+    pub covariance: Vec<Vec<f64>>,
     /// The noise.
     pub diffusion: DiffusionFound,
     /// What the residuals of neighbouring steps say of errors of the measurement.
@@ -96,6 +102,9 @@ pub struct DiffusionFound {
     pub sd: Vec<Vec<f64>>,
     /// Intervals of the variances, one per equation.
     pub interval90: Vec<Option<[f64; 2]>>,
+    /// Degrees of freedom of every variance.
+    #[serde(default)]
+    pub degrees: Option<f64>,
     /// Whether errors of the measurement were taken out of it.
     pub lag_corrected: bool,
     /// Standard deviation of the measurement, where it was given.

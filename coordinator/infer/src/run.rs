@@ -270,6 +270,7 @@ fn told_of(
     Ok(Inference {
         study: study.name.clone(),
         verdict: words::verdict(n_step, &coefficients, reduced.as_ref(), missing.as_ref()),
+        file: std::path::absolute(&study.file).unwrap_or_else(|_| study.file.clone()).display().to_string(),
         time_unit: study.time_unit.clone(),
         records: records
             .map(|(k, r)| RecordUsed {
@@ -283,6 +284,7 @@ fn told_of(
         block: cut.block,
         equations: structure.equations().to_vec(),
         coefficients,
+        covariance: answer.covariance(),
         diffusion: answer.diffusion(choice),
         noise_checks: answer.checks.clone(),
         richardson: answer.richardson(),

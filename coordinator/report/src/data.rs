@@ -143,7 +143,7 @@ pub(crate) struct PassTrack {
     pub(crate) hi: Vec<f64>,
 }
 
-/// One observed output of one record, free run with the final estimate; the three vectors have equal length.
+/// One observed output of one record, free run with the final estimate; the four vectors have equal length.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub(crate) struct ChannelPlot {
@@ -159,6 +159,8 @@ pub(crate) struct ChannelPlot {
     pub(crate) observed: Vec<Option<f64>>,
     /// Prediction with the final estimate.
     pub(crate) predicted: Vec<f64>,
+    /// Standard deviations of the prediction that the uncertainty of the parameters makes; `None` where it is not known.
+    pub(crate) spread: Vec<Option<f64>>,
     /// Standard deviation of the measurement noise, in the channel's unit.
     pub(crate) noise: f64,
     /// First and last time of the training span; `None` when no time of this record was fitted.

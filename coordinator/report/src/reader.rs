@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use starlings_estimators::{autocorrelation, nis_band};
 use starlings_study::ObserverCourse;
 use starlings_study::posterior::Estimate;
-use starlings_study::store::folder::{OBSERVER, StudyInfo};
+use starlings_study::store::folder::{OBSERVER, PREDICTION_SD, StudyInfo};
 use starlings_study::store::{Store, StoreError};
 use starlings_study::summary::Summary;
 
@@ -182,8 +182,9 @@ fn channels(store: &Store, info: &StudyInfo) -> Result<Vec<ChannelPlot>, StoreEr
         "SELECT record, output, time, observed, predicted, use, noise FROM predictions ORDER BY rowid",
         |r| Ok((r.get(0)?, r.get(1)?, r.get(2)?, r.get(3)?, r.get(4)?, r.get(5)?, r.get(6)?)),
     )?;
+    let spread = spread(store, rows.len())?;
     let mut channels: Vec<(ChannelPlot, Misfit)> = Vec::new();
-    for (record, output, time, observed, predicted, usage, noise) in rows {
+    for ((record, output, time, observed, predicted, usage, noise), spread) in rows.into_iter().zip(spread) {
         if channels.last().is_none_or(|(c, _)| c.record != record || c.channel != output) {
             let unit = info.outputs.iter().find(|(name, _)| *name == output).map(|(_, u)| u.clone());
             let train = info.records.iter().find(|(name, _)| *name == record).and_then(|(_, span)| *span);
@@ -202,10 +203,22 @@ fn channels(store: &Store, info: &StudyInfo) -> Result<Vec<ChannelPlot>, StoreEr
             plot.time.push(time);
             plot.observed.push(observed);
             plot.predicted.push(predicted);
+            plot.spread.push(spread);
             misfit.add(usage == "train", observed.map(|o| o - predicted));
         }
     }
     Ok(channels.into_iter().map(|(plot, misfit)| misfit.fill(plot)).collect())
+}
+
+/// The standard deviation of each of so many predictions, where it is known.
+fn spread(store: &Store, n: usize) -> Result<Vec<Option<f64>>, StoreError> {
+    let Some(text) = store.meta(PREDICTION_SD)? else { return Ok(vec![None; n]) };
+    let spread: Vec<Option<f64>> =
+        serde_json::from_str(&text).map_err(|e| store.damaged("spread of the predictions", e))?;
+    if spread.len() != n {
+        return Err(store.damaged("spread of the predictions", "it is of another number of them"));
+    }
+    Ok(spread)
 }
 
 /// Sums of squares over the training and held-out parts of one channel.

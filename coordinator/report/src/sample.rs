@@ -89,6 +89,7 @@ fn channel(n: usize) -> ChannelPlot {
         unit: "mmHg".into(),
         observed: time.iter().map(|&t| (!missing(t)).then(|| pressure(t) + misfit(t))).collect(),
         predicted: time.iter().map(|&t| pressure(t)).collect(),
+        spread: time.iter().map(|&t| Some(0.5 + t)).collect(),
         time,
         noise: 2.0,
         train: Some([0.0, 2.31]),

@@ -81,6 +81,20 @@ fn a_report_of_nothing_says_what_is_missing() {
 }
 
 #[test]
+fn the_bands_of_a_prediction_say_what_they_hold() {
+    let known = render(&sample::run(300)).unwrap();
+    assert!(known.contains("prediction ± 2 sd of parameters (dark), and of parameters and noise"), "{known}");
+    let mut data = sample::run(300);
+    data.channels[0].spread.clear();
+    let unknown = render(&data).unwrap();
+    assert!(unknown.contains("prediction ± 2 noise sd") && unknown.contains("which is not known here"));
+    // One band more on each side of the end of the training span.
+    let bands =
+        |page: &str| page.matches("fill-opacity=\"0.28\"").count() + page.matches("opacity=\"0.28\"").count();
+    assert!(bands(&known) > 0 && bands(&unknown) == 0, "{} {}", bands(&known), bands(&unknown));
+}
+
+#[test]
 fn a_record_that_was_never_fitted_is_marked_as_held_out() {
     let mut data = sample::run(60);
     let held_out =

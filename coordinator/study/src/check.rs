@@ -84,6 +84,14 @@ impl Study {
         infer::study(path, &text_of(path)?)
     }
 
+    /// The same for the text of a study file that stands, or stood, at `file`.
+    ///
+    /// # Errors
+    /// As [`Study::load_for_inference`].
+    pub fn from_text_for_inference(file: &Path, text: &str) -> Result<Self, StudyError> {
+        infer::study(file, text)
+    }
+
     /// Whether a study file has a section `[infer]`; a file that cannot be read has none.
     pub fn asks_to_infer(path: &Path) -> bool {
         let file = text_of(path).ok().and_then(|text| text.parse::<toml::Table>().ok());

@@ -3,9 +3,10 @@
 //! Every member starts where the record does and runs freely. Members are drawn from a seed and run on the fleet; which worker
 //! runs which changes no number. There are two bands: that of the quantity, which the members make, and that of what would be
 //! measured, which [`measurement`] adds errors to. The arithmetic of fans and crossings is `forecast` in `starlings-estimators`. Next files to read:
-//! [`ask`], then [`members`], then [`result`].
+//! [`ask`], then [`ensemble`], then [`result`].
 
 pub mod ask;
+pub mod ensemble;
 mod error;
 pub mod measurement;
 mod members;
@@ -13,20 +14,22 @@ mod posterior;
 pub mod result;
 mod tables;
 
-use starlings_estimators::forecast::{Crossings, Fan};
+use nalgebra::DVector;
+use rand_distr::{Distribution, StandardNormal};
+use starlings_estimators::Gaussian;
 use starlings_fleet::Fleet;
 use starlings_models::BuildSetup;
 
+use crate::checked::{Channel, Record};
 use crate::{RunFolder, Study};
 
 pub use ask::{Ask, Threshold};
 pub use error::StudyForecastError;
 pub use result::Forecast;
 
+use ensemble::{Ensemble, MeasuredOutput, MeasuredValue, draws};
 use measurement::TrainingResiduals;
-use members::Members;
 use posterior::Drawn;
-use result::{LevelForecast, OutputForecast};
 
 /// Forecasts from a finished run.
 ///
@@ -41,55 +44,56 @@ pub fn forecast(
     let drawn = Drawn::read(study, folder)?;
     let residuals = TrainingResiduals::read(study, folder)?;
     let plan = ask.plan(study)?;
-    let members = Members::run(study, fleet, &plan, &drawn.gaussian)?;
-    let mut outputs = Vec::with_capacity(plan.setup.outputs.len());
-    for row in 0..plan.setup.outputs.len() {
-        outputs.push(output(study, &plan, &members, &residuals, row)?);
-    }
-    let levels = ask.thresholds.iter().map(|threshold| {
-        let row = plan.row(&threshold.output);
-        let crossings = Crossings::of(&plan.times, &members.courses(row), threshold.level)?;
-        Ok(LevelForecast::new(study, threshold, ask.horizon, crossings))
+    let record = &study.records[plan.record];
+    let measured = plan.setup.outputs.iter().map(|name| {
+        let channel = record.channels.iter().find(|c| c.output == *name && c.node.is_none())?;
+        let values = measured_values(record, channel, &plan.times);
+        Some(MeasuredOutput { errors: residuals.errors(name, channel.noise), values })
     });
-    let levels = levels.collect::<Result<Vec<_>, StudyForecastError>>()?;
-    Ok(Forecast {
-        study: study.name.clone(),
-        model: study.setup.model.kind.clone(),
-        record: study.records[ask.record].name.clone(),
-        time_unit: study.time_unit.clone(),
-        from: plan.times[0],
-        measured_until: study.records[ask.record].times.last().copied().unwrap_or_default(),
-        until: plan.times[plan.times.len() - 1],
-        members: ask.members,
-        failed: members.n_failed(),
-        seed: ask.seed,
-        model_noise: plan.setup.noise.is_some(),
-        wider_given_residuals: drawn.wider,
+    let ensemble = Ensemble {
+        record: (plan.record as u32, record.name.clone()),
+        inputs: record.inputs.clone(),
+        members: members(study, &plan, &drawn.gaussian),
+        measured: measured.collect(),
+        measured_until: record.times.last().copied().unwrap_or_default(),
+        wider: drawn.wider,
         conditional_on: conditional_on(drawn.wider),
-        set: ask.values.clone(),
-        warnings: warnings(study, ask, &members),
-        outputs,
-        levels,
-    })
+        warnings: warnings(study, ask),
+        setup: plan.setup,
+        times: plan.times,
+    };
+    ensemble.forecast(study, fleet, ask)
 }
 
-fn output(
-    study: &Study,
-    plan: &ask::Plan,
-    members: &Members,
-    residuals: &TrainingResiduals,
-    row: usize,
-) -> Result<OutputForecast, StudyForecastError> {
-    let courses = members.courses(row);
-    let fan = Fan::of(&plan.times, &courses, &Fan::USUAL)?;
-    let name = &plan.setup.outputs[row];
-    let record = &study.records[plan.record];
-    let channel = record.channels.iter().find(|c| c.output == *name && c.node.is_none());
-    let errors = channel.map(|c| residuals.errors(name, c.noise));
-    let measured = errors
-        .map(|errors| Fan::of(&plan.times, &members.with_noise(row, errors.sd, plan.seed), &Fan::USUAL))
-        .transpose()?;
-    Ok(OutputForecast::new(study, name, fan, measured.zip(errors), channel.map(|c| (record, c))))
+/// The parameters of every member, drawn from the posterior.
+fn members(study: &Study, plan: &ask::Plan, posterior: &Gaussian) -> Vec<Vec<f64>> {
+    let mut rng = draws(plan.seed);
+    let root = posterior.factor();
+    let member = |_| {
+        let z = DVector::from_fn(root.ncols(), |_, _| StandardNormal.sample(&mut rng));
+        let drawn: DVector<f64> = &posterior.mean + &root * z;
+        let mut theta = study.theta_for(plan.record, drawn.as_slice());
+        for (place, value) in &plan.fixed {
+            theta[*place] = *value;
+        }
+        theta
+    };
+    (0..plan.members).map(member).collect()
+}
+
+/// What a channel measured at times of the forecast.
+fn measured_values(record: &Record, channel: &Channel, times: &[f64]) -> Vec<MeasuredValue> {
+    let value = |time: &f64| {
+        let value = record.observed(channel, *time)?;
+        let held_out = channel.held_out || !record.trains_at(*time);
+        Some(MeasuredValue { time: *time, value, held_out })
+    };
+    record
+        .times
+        .iter()
+        .take_while(|time| times.last().is_some_and(|last| *time <= last))
+        .filter_map(value)
+        .collect()
 }
 
 fn conditional_on(wider: Option<f64>) -> String {
@@ -112,15 +116,8 @@ fn conditional_on(wider: Option<f64>) -> String {
     )
 }
 
-fn warnings(study: &Study, ask: &Ask, members: &Members) -> Vec<String> {
+fn warnings(study: &Study, ask: &Ask) -> Vec<String> {
     let mut warnings = Vec::new();
-    if let Some(reason) = &members.failure {
-        warnings.push(format!(
-            "{} of {} members have no prediction and are left out of every figure: {reason}",
-            members.n_failed(),
-            ask.members
-        ));
-    }
     let end = study.records[ask.record].times.last().copied().unwrap_or_default();
     let late = ask.until.is_some_and(|until| until > end);
     if late && !study.spec.inputs.is_empty() {

@@ -3,17 +3,22 @@
 //! One run per parameter beside the estimate gives the slope of every observed value; a parameter with one value per record is
 //! moved in all records at once. The runs get the same observed values as the fit's runs: with an observer its corrections are
 //! in residuals and slopes alike. The arithmetic is in the `sandwich` module of `starlings-estimators`. None of this enters the
-//! posterior. Next file to read: [`crate::summary`].
+//! posterior. Next files to read: [`crate::predictive`], which takes the same slopes to the predictions, and [`crate::summary`].
+
+use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use starlings_estimators::{DataPoint, Gaussian, Residuals};
 
 use super::fit::runner::{self, EnsembleRunner, StepWindows};
 use super::fit::stack::stack_outputs;
-use super::{RunError, Study, posterior};
+use super::{RunError, Study, posterior, predictive};
 
 /// Distance of the points from the estimate, in posterior sd: close enough for a model that is nearly linear within one.
 const DISTANCE: f64 = 0.1;
+
+/// Why nothing is known where runs beside the estimate fail.
+const FAILS: &str = "the model fails beside the estimate";
 
 /// The result for the intervals.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,32 +34,97 @@ pub(crate) enum GivenResiduals {
     Unknown(String),
 }
 
-/// Runs the trained records once more, at the estimate and beside it, and compares.
+impl GivenResiduals {
+    /// The posterior with its covariance given the residuals, or as it is where that is not known.
+    fn widened(&self, posterior: &Gaussian) -> Gaussian {
+        match self {
+            Self::Wider { covariance, .. } => {
+                Gaussian { mean: posterior.mean.clone(), covariance: covariance.clone() }
+            }
+            Self::Unknown(_) => posterior.clone(),
+        }
+    }
+}
+
+/// What an ensemble beside the estimate says.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Beside {
+    /// The intervals given the residuals.
+    pub given: GivenResiduals,
+    /// Standard deviations of the predictions, in their order; `None` where they are not known.
+    pub spread: Option<Vec<Option<f32>>>,
+}
+
+impl Beside {
+    /// Nothing is known, for a reason.
+    pub(crate) fn unknown(why: &str) -> Self {
+        Self { given: GivenResiduals::Unknown(why.to_owned()), spread: None }
+    }
+}
+
+/// Runs the records once more, at the estimate and beside it, and compares.
 ///
 /// # Errors
 /// When the fleet fails. A model that fails beside the estimate is no error: see [`GivenResiduals::Unknown`].
-pub(crate) fn compare(
-    runner: &mut EnsembleRunner<'_>,
-    posterior: &Gaussian,
-) -> Result<GivenResiduals, RunError> {
+pub(crate) fn compare(runner: &mut EnsembleRunner<'_>, posterior: &Gaussian) -> Result<Beside, RunError> {
     let study = runner.study();
     if study.drifts() && study.estimator.kind.is_filter() {
-        let why = "a parameter drifts, and its value at the end is no parameter of the whole record";
-        return Ok(GivenResiduals::Unknown(why.to_owned()));
+        return Ok(Beside::unknown(
+            "a parameter drifts, and its value at the end is no parameter of the whole record",
+        ));
     }
+    let (whole, trained) = (predictive::whole_windows(study), study.trained_windows());
+    let n_time = |windows: &StepWindows| windows.iter().map(|(_, window)| window.times.len()).sum::<usize>();
+    let is_free = study.observer_is_off();
+    // A run to a record's end serves the predictions too. One that fails there may still reach the end of the training span.
+    if is_free && let Some(points) = beside(runner, posterior, &whole)? {
+        let given = Slopes::of(study, &whole, &points).compare(posterior)?;
+        let spread = predictive::spread(study, &whole, &points, &given.widened(posterior));
+        return Ok(Beside { given, spread: Some(spread) });
+    }
+    if is_free && n_time(&whole) == n_time(&trained) {
+        return Ok(Beside::unknown(FAILS));
+    }
+    let Some(points) = beside(runner, posterior, &trained)? else {
+        return Ok(Beside::unknown(FAILS));
+    };
+    let given = Slopes::of(study, &trained, &points).compare(posterior)?;
+    if is_free {
+        return Ok(Beside { given, spread: None });
+    }
+    let free: StepWindows =
+        (0..study.records.len()).map(|record| (record, Arc::new(study.whole(record, false)))).collect();
+    let spread = beside(runner, posterior, &free)?
+        .map(|points| predictive::spread(study, &free, &points, &given.widened(posterior)));
+    Ok(Beside { given, spread })
+}
+
+/// Points around the estimate and their predictions: column 0 is the estimate, then one parameter of the study moved in each.
+pub(crate) struct Points {
+    /// Estimated vectors, p x (q + 1).
+    pub(crate) theta: DMatrix<f64>,
+    /// Predictions, m x (q + 1).
+    pub(crate) outputs: DMatrix<f64>,
+}
+
+/// An ensemble on the one side of the estimate, or on the other where a run fails: its points and predictions.
+fn beside(
+    runner: &mut EnsembleRunner<'_>,
+    posterior: &Gaussian,
+    windows: &StepWindows,
+) -> Result<Option<Points>, RunError> {
+    let study = runner.study();
     let sd = posterior::standard_deviations(posterior);
-    let windows = study.trained_windows();
     for side in [1.0, -1.0] {
         let theta = DMatrix::from_fn(sd.len(), study.parameters.len() + 1, |j, particle| {
             let moved = particle == study.theta[j].parameter + 1;
             posterior.mean[j] + if moved { side * DISTANCE * sd[j] } else { 0.0 }
         });
-        if let Some(outputs) = run(runner, &theta, &windows)? {
-            let slopes = Slopes { study, windows: &windows, outputs: &outputs, theta: &theta };
-            return slopes.compare(posterior);
+        if let Some(outputs) = run(runner, &theta, windows)? {
+            return Ok(Some(Points { theta, outputs }));
         }
     }
-    Ok(GivenResiduals::Unknown("the model fails beside the estimate".to_owned()))
+    Ok(None)
 }
 
 /// The predictions, m x (q + 1); `None` when a run failed or predicted what is no finite number.
@@ -70,7 +140,7 @@ fn run(
     Ok(Some(stack_outputs(&results, windows)))
 }
 
-/// One ensemble around the estimate: column 0 is the estimate, then one parameter of the study moved in each.
+/// The slopes of what was observed.
 struct Slopes<'a> {
     study: &'a Study,
     windows: &'a StepWindows,
@@ -78,7 +148,11 @@ struct Slopes<'a> {
     theta: &'a DMatrix<f64>,
 }
 
-impl Slopes<'_> {
+impl<'a> Slopes<'a> {
+    fn of(study: &'a Study, windows: &'a StepWindows, Points { theta, outputs }: &'a Points) -> Self {
+        Self { study, windows, outputs, theta }
+    }
+
     fn compare(&self, posterior: &Gaussian) -> Result<GivenResiduals, RunError> {
         let rows = self.rows();
         if rows.iter().any(|row| self.outputs.row(row.at).iter().any(|v| !v.is_finite())) {

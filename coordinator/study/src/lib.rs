@@ -22,6 +22,7 @@ pub mod infer_choice;
 mod observer_gain;
 mod plan;
 pub mod posterior;
+mod predictive;
 mod problem;
 mod record;
 mod room;

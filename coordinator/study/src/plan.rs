@@ -60,12 +60,17 @@ impl Study {
         if !self.whole_answers {
             return Arc::clone(window);
         }
+        Arc::new(self.with_values(record, window))
+    }
+
+    /// All times of a record, with the observed values of a window of it and no others.
+    pub(crate) fn with_values(&self, record: usize, window: &Window) -> Window {
         let n_obs = self.setup.outputs.len();
         let mut whole = self.whole(record, false);
         for (j, values) in rows_of(&whole.times, window).zip(window.observed.chunks(n_obs.max(1))) {
             whole.observed[j * n_obs..(j + 1) * n_obs].copy_from_slice(values);
         }
-        Arc::new(whole)
+        whole
     }
 
     /// The outputs at the times of a window out of those at the times that were asked for.

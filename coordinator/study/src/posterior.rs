@@ -4,13 +4,11 @@
 //! first-order one, |dv/dθ|·sd.
 
 use serde::{Deserialize, Serialize};
+use starlings_estimators::quantiles::Z95;
 use starlings_estimators::{Gaussian, Transform};
 
 use super::store::EstimateRow;
 use super::{Study, ThetaEntry};
-
-/// Half-width of a central 95 % interval of a Gaussian, in standard deviations.
-pub const Z95: f64 = 1.959_963_984_540_054;
 
 /// One estimated parameter in physical units.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

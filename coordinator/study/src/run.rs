@@ -11,14 +11,14 @@ use starlings_fleet::{Fleet, FleetEvent};
 use super::constants::{self, HangsOn};
 use super::failures::FailureCluster;
 use super::fit::{batch, filter, free_run};
-use super::given_residuals::{self, GivenResiduals};
+use super::given_residuals::{self, Beside, GivenResiduals};
 use super::identify::IdentifyError;
 use super::store::{Store, StoreError};
 use super::summary::Summary;
 use super::{RunError, Study, observer_gain, summary, warnings};
 use crate::fit::runner::EnsembleRunner;
 use crate::observer_gain::Compared;
-use crate::store::folder::{GIVEN_RESIDUALS, OBSERVER, RunFolder};
+use crate::store::folder::{GIVEN_RESIDUALS, OBSERVER, PREDICTION_SD, RunFolder};
 use crate::store::json::json;
 use crate::store::snapshot::{Counts, Snapshot};
 
@@ -169,11 +169,10 @@ fn from_start_to_end(
     };
     let predictions = free_run::run(&mut runner, &fit.posterior)?;
     let observer = observer_gain::compare(&mut runner, &fit.posterior, &predictions)?;
-    let (hangs_on, given_residuals) = match &observer {
+    let (hangs_on, beside) = match &observer {
         // What fails at the estimate itself need not be tried beside it.
         Compared::Failed(_) => {
-            let why = "the model fails under its observer".to_owned();
-            (Ok(HangsOn::default()), GivenResiduals::Unknown(why))
+            (Ok(HangsOn::default()), Beside::unknown("the model fails under its observer"))
         }
         Compared::NoObserver | Compared::Both(_) => {
             (hangs_on(&mut runner, &fit)?, given_residuals::compare(&mut runner, &fit.posterior)?)
@@ -183,8 +182,11 @@ fn from_start_to_end(
     folder.store.predictions(&predictions, &jobs)?;
     context.keep_events(&folder.store)?;
     let mut result = summary::make(study, &fit, &predictions, runner.n_answered(), context.elapsed());
-    result.add_residuals(study, &fit, &given_residuals);
-    keep_covariance(&folder.store, &given_residuals)?;
+    result.add_residuals(study, &fit, &beside.given);
+    keep_covariance(&folder.store, &beside.given)?;
+    if let Some(spread) = &beside.spread {
+        folder.store.set_meta(PREDICTION_SD, &json(spread))?;
+    }
     let mut unknown = None;
     match observer {
         Compared::NoObserver => {}

@@ -49,8 +49,8 @@ pub struct Stream {
 #[derive(serde::Serialize, serde::Deserialize, Debug, Clone, PartialEq)]
 pub struct StreamState {
     row: u64,
-    /// Time and values of the last row, with which the next step starts.
-    last: Option<(f64, Vec<f64>)>,
+    /// Time and values of the last row, states and then inputs, with which the next step starts.
+    pub last: Option<(f64, Vec<f64>)>,
     follows: bool,
     sums: Sums,
 }

@@ -10,12 +10,12 @@ use std::f64::consts::PI;
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
+use crate::quantiles::Z95;
+
 /// Largest autocorrelation that the choice of B takes into account (Andrews 1991, note to table II).
 const MOST_CORRELATED: f64 = 0.97;
 /// Cosines at most: beyond, Student's t is a Gaussian.
 const MOST: usize = 400;
-/// Quantile of a Gaussian at which the t quantile is compared.
-const Z95: f64 = 1.959_963_984_540_054;
 
 /// Variance of the sum of the scores of all records, each a series in time, times the square of the t quantile over the Gaussian
 /// one. Their degrees of freedom are joined after Satterthwaite (1946).

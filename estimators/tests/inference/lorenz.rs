@@ -28,6 +28,70 @@ fn parameters_of_the_lorenz_system_are_found_under_strong_noise() {
     assert!(bias.abs() < 1.0 && without > 4.0);
 }
 
+/// The seven coefficients by ordinary regression of every equation, row by row: Smelyanskiy, Luchinsky et al., eqs. 1.11 to 1.14 for
+/// noise of one size, without any of the sums.
+fn by_rows(rows: &[[f64; 3]], h: f64) -> Vec<f64> {
+    let functions = |l: usize, [a, b, c]: [f64; 3]| match l {
+        0 => vec![a, b],
+        1 => vec![a, b, a * c],
+        _ => vec![a * b, c],
+    };
+    // Sums of the functions' slopes by the equation's own state.
+    let slopes = [vec![1.0, 0.0], vec![0.0, 1.0, 0.0], vec![0.0, 1.0]];
+    let steps: Vec<([f64; 3], [f64; 3])> = rows
+        .windows(2)
+        .map(|w| {
+            let middle = std::array::from_fn(|l| 0.5 * (w[0][l] + w[1][l]));
+            (middle, std::array::from_fn(|l| (w[1][l] - w[0][l]) / h))
+        })
+        .collect();
+    let n = steps.len() as f64;
+    let mut noise = h * steps.iter().flat_map(|(_, rate)| rate).map(|v| v * v).sum::<f64>() / (3.0 * n);
+    let mut found = Vec::new();
+    for _ in 0..8 {
+        found.clear();
+        let mut left = 0.0;
+        for (l, slopes) in slopes.iter().enumerate() {
+            let matrix = DMatrix::from_fn(steps.len(), slopes.len(), |k, p| functions(l, steps[k].0)[p]);
+            let rate = nalgebra::DVector::from_fn(steps.len(), |k, _| steps[k].1[l]);
+            let jacobian = nalgebra::DVector::from_fn(slopes.len(), |p, _| 0.5 * noise * n * slopes[p]);
+            let c = matrix.tr_mul(&matrix).lu().solve(&(matrix.tr_mul(&rate) - jacobian)).unwrap();
+            left += (&rate - &matrix * &c).norm_squared();
+            found.extend(c.iter().copied());
+        }
+        noise = h * left / (3.0 * n - 7.0);
+    }
+    found
+}
+
+/// Fifty recordings are few: their medians differ by as much as from one fifty to the next, of this implementation and of any other.
+#[test]
+fn medians_of_fifty_recordings_are_those_of_a_regression_by_rows() {
+    let basis = lorenz::basis();
+    let (mut ours, mut other) = (Vec::new(), Vec::new());
+    for seed in 0..200 {
+        let rows = lorenz::strong(seed, 4000, 0.002, 40.0);
+        let found = Fit::new(Diffusion::Isotropic, 7)
+            .posterior(&sums(&basis, &rows, 0.002), &lorenz::seven(&basis))
+            .unwrap();
+        ours.push((found.mean()[6] - SEVEN[6]).abs());
+        let by_rows = by_rows(&rows, 0.002);
+        other.push((by_rows[6] - SEVEN[6]).abs());
+        for (k, other) in by_rows.iter().enumerate() {
+            // Normal equations with a condition of 10^6, and passes that end at 10^-9 of the noise.
+            assert!((found.mean()[k] - other).abs() < 1e-5, "{seed}: {k}: {} for {other}", found.mean()[k]);
+        }
+    }
+    let medians =
+        |errors: &[f64]| -> Vec<f64> { errors.chunks(50).map(|part| median(part.iter().copied())).collect() };
+    let (ours, other, all) = (medians(&ours), medians(&other), median(ours.iter().copied()));
+    assert!(all < 0.35, "{all}");
+    // The figures of docs/inference.md.
+    for (k, told) in [0.37, 0.30, 0.23, 0.22].into_iter().enumerate() {
+        assert!((ours[k] - told).abs() < 0.005 && (other[k] - told).abs() < 0.005, "{ours:?} {other:?}");
+    }
+}
+
 fn reconstruct(sums: &Sums, prefactor: bool) -> Posterior {
     let basis = lorenz::basis();
     let structure = Structure::same(&basis, &lorenz::NAMES).unwrap();

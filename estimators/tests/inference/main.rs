@@ -5,6 +5,7 @@ mod calibration;
 mod changes;
 mod damaged;
 mod decimated;
+mod draws;
 mod errors;
 mod false_alarm;
 mod kit;

@@ -2,7 +2,7 @@
 //!
 //! Rates are differences of simulated signals and inputs, never of measured values. Next file to read: [`super::signal`].
 
-use starlings_study::posterior::Z95;
+use starlings_estimators::quantiles::Z95;
 use starlings_study::{Record, Study};
 
 use super::residuals::{Residuals, primary};

@@ -3,8 +3,9 @@
 //! Nothing is decided here. Next file to read: [`crate::run`].
 
 use nalgebra::DMatrix;
+use starlings_estimators::quantiles::Z95;
 use starlings_estimators::{Gaussian, Optimum};
-use starlings_study::posterior::{self, Estimate, Z95};
+use starlings_study::posterior::{self, Estimate};
 
 use super::figures::Curve;
 use super::patch::PatchEffect;

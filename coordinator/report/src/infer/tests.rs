@@ -53,6 +53,7 @@ fn sample() -> Inference {
         study: "lorenz".to_owned(),
         verdict: "400 steps give 2 of 3 coefficients".to_owned(),
         time_unit: "s".to_owned(),
+        file: String::new(),
         records: vec![RecordUsed { name: "one".to_owned(), n_step: 400, span: [0.0, 4.0] }],
         step: 0.01,
         n_step: 400,
@@ -63,7 +64,9 @@ fn sample() -> Inference {
             coefficient("x:a,b", Some(0.1), true),
             coefficient("leak", None, false),
         ],
+        covariance: Vec::new(),
         diffusion: DiffusionFound {
+            degrees: None,
             form: "full".to_owned(),
             matrix: vec![vec![1600.0]],
             sd: vec![vec![36.0]],

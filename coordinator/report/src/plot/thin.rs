@@ -64,9 +64,9 @@ pub(crate) fn curve(part: &[Sample]) -> Vec<(f64, f64)> {
     points
 }
 
-/// A part as a band, widened by `margin` on both sides.
-pub(crate) fn band(part: &[Sample], margin: f64) -> Vec<(f64, f64, f64)> {
-    part.iter().map(|s| (s.t, s.lo - margin, s.hi + margin)).collect()
+/// A part as a band.
+pub(crate) fn band(part: &[Sample]) -> Vec<(f64, f64, f64)> {
+    part.iter().map(|s| (s.t, s.lo, s.hi)).collect()
 }
 
 #[cfg(test)]

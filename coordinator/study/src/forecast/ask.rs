@@ -52,13 +52,6 @@ pub(super) struct Plan {
     pub(super) seed: u64,
 }
 
-impl Plan {
-    /// The row of an output that is in the plan.
-    pub(super) fn row(&self, output: &str) -> usize {
-        self.setup.outputs.iter().position(|name| name == output).unwrap_or_default()
-    }
-}
-
 impl Ask {
     /// Refuses what makes no forecast of this study, before anything runs.
     ///
@@ -76,7 +69,22 @@ impl Ask {
         let mut setup = study.setup.clone();
         setup.observer = ObserverDef::default();
         setup.noise = study.setup.is_noisy().then_some(self.seed);
-        setup.outputs = self.outputs(study)?;
+        let record = &study.records[self.record];
+        let measured = record.channels.iter().filter(|c| c.node.is_none()).map(|c| &c.output);
+        setup.outputs = self.outputs(study, measured)?;
+        let fixed = self.set(study, &mut setup)?;
+        let recorded = &record.times;
+        let span = recorded.last().zip(recorded.first()).map_or(0.0, |(end, start)| end - start);
+        let times = self.times(recorded, span / (recorded.len().max(2) - 1) as f64)?;
+        self.room(setup.outputs.len(), times.len())?;
+        Ok(Plan { record: self.record, setup, times, fixed, members: self.members, seed: self.seed })
+    }
+
+    /// Sets the values that all members have: constants in the setup, and of its parameters places with values.
+    ///
+    /// # Errors
+    /// For a name that the model does not have, with the nearest valid one.
+    pub fn set(&self, study: &Study, setup: &mut Setup) -> Result<Vec<(usize, f64)>, StudyForecastError> {
         let mut fixed = Vec::new();
         for (name, value) in &self.values {
             if let Some(place) = setup.parameters.iter().position(|p| p == name) {
@@ -86,36 +94,46 @@ impl Ask {
                 setup.model.constants.insert(name.clone(), *value);
             }
         }
-        let times = self.times(study)?;
-        let numbers = self.members as f64 * setup.outputs.len() as f64 * times.len() as f64;
-        if self.members == 0 || numbers > MOST_NUMBERS {
-            return Err(StudyForecastError::Request(format!(
-                "{} members of {} outputs at {} times: give at least one member, and no more than {MOST_NUMBERS:e} numbers in all",
-                self.members,
-                setup.outputs.len(),
-                times.len()
-            )));
-        }
-        Ok(Plan { record: self.record, setup, times, fixed, members: self.members, seed: self.seed })
+        Ok(fixed)
     }
 
-    /// What the record measures, component by component, and what has a level.
-    fn outputs(&self, study: &Study) -> Result<Vec<String>, StudyForecastError> {
+    /// Refuses an ensemble without members, or of more numbers than there is room for.
+    ///
+    /// # Errors
+    /// When it is either.
+    pub fn room(&self, n_output: usize, n_time: usize) -> Result<(), StudyForecastError> {
+        if self.members > 0 && self.members as f64 * n_output as f64 * n_time as f64 <= MOST_NUMBERS {
+            return Ok(());
+        }
+        Err(StudyForecastError::Request(format!(
+            "{} members of {n_output} outputs at {n_time} times: give at least one member, and no more than {MOST_NUMBERS:e} numbers in all",
+            self.members
+        )))
+    }
+
+    /// What is measured, component by component, and what has a level.
+    ///
+    /// # Errors
+    /// When a name is unknown, with the nearest valid one, or there is none.
+    pub fn outputs<'a>(
+        &self,
+        study: &Study,
+        measured: impl Iterator<Item = &'a String>,
+    ) -> Result<Vec<String>, StudyForecastError> {
         let all = components(&study.spec.outputs);
         let states = study.spec.states.iter().filter(|q| q.size == 1).map(|q| q.name.clone());
         let possible: Vec<String> = all.iter().cloned().chain(states).collect();
-        let measured = study.records[self.record].channels.iter().filter(|c| c.node.is_none());
         let mut outputs: Vec<String> = Vec::new();
-        let asked = self.thresholds.iter().map(|t| &t.output);
-        for name in measured.map(|c| &c.output).chain(asked) {
-            if !possible.contains(name) {
+        let asked = self.thresholds.iter().map(|t| t.output.clone());
+        for name in measured.cloned().chain(asked) {
+            if !possible.contains(&name) {
                 let hint =
-                    nearest(name, &possible).map(|n| format!("; did you mean `{n}`?")).unwrap_or_default();
+                    nearest(&name, &possible).map(|n| format!("; did you mean `{n}`?")).unwrap_or_default();
                 let message = format!("no output or scalar state named `{name}`{hint}");
                 return Err(StudyForecastError::Request(message));
             }
-            if !outputs.contains(name) {
-                outputs.push(name.clone());
+            if !outputs.contains(&name) {
+                outputs.push(name);
             }
         }
         if outputs.is_empty() {
@@ -126,24 +144,27 @@ impl Ask {
         Ok(outputs)
     }
 
-    /// The record's times, regular ones after its end, the end that was asked for and the horizon.
-    fn times(&self, study: &Study) -> Result<Vec<f64>, StudyForecastError> {
+    /// Times of the record, regular ones after its end, the end that was asked for and the horizon. `usual` is the spacing where none
+    /// is asked for.
+    ///
+    /// # Errors
+    /// When the end, the horizon or the spacing make no forecast.
+    pub fn times(&self, recorded: &[f64], usual: f64) -> Result<Vec<f64>, StudyForecastError> {
         let request = |message: String| Err(StudyForecastError::Request(message));
-        let recorded = &study.records[self.record].times;
         let (start, end) = match (recorded.first(), recorded.last()) {
             (Some(start), Some(end)) => (*start, *end),
             _ => return request("the record has no times".to_owned()),
         };
         let until = self.until.unwrap_or(end);
         if !(until > start && until.is_finite()) {
-            return request(format!("--until {until}: give a time after the record's start at {start}"));
+            return request(format!("--until {until}: give a time after the start at {start}"));
         }
         if let Some(horizon) = self.horizon.filter(|horizon| !(*horizon > start && *horizon <= until)) {
             return request(format!(
-                "--horizon {horizon}: give a time after the record's start at {start} and up to the end at {until}"
+                "--horizon {horizon}: give a time after the start at {start} and up to the end at {until}"
             ));
         }
-        let step = self.step.unwrap_or((end - start) / (recorded.len() - 1).max(1) as f64);
+        let step = self.step.unwrap_or(usual);
         if !(step > 0.0 && step.is_finite()) {
             return request(format!("--step {step}: give a number above zero"));
         }

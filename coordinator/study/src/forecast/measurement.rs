@@ -21,6 +21,8 @@ pub enum From {
     Residuals,
     /// The residuals of the outputs that were fitted, which exceed their noise; this one was not fitted.
     OtherResiduals,
+    /// The errors of the measurement that an inference was given, or that residuals of neighbouring steps share.
+    Inferred,
 }
 
 /// The errors of measured values of one output.

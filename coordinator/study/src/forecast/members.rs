@@ -1,21 +1,18 @@
-//! The members of a forecast: drawn from the posterior, run on the fleet, gathered in their order.
+//! The members of a forecast: run on the fleet, gathered in their order.
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use starlings_estimators::Gaussian;
 use starlings_fleet::Fleet;
 use starlings_models::{Job, Window};
 
 use super::StudyForecastError;
-use super::ask::Plan;
-use crate::{RunError, Study};
+use super::ensemble::Ensemble;
+use crate::RunError;
 
-/// Streams of the seed: draws of the posterior, and the noise of each output after them.
-const DRAWS: u64 = 0;
+/// Stream of the seed for the errors of the first output; draws of the posterior have the one before.
 const MEASURED: u64 = 1;
 
 /// What the members predict.
@@ -29,43 +26,34 @@ pub(super) struct Members {
 }
 
 impl Members {
-    /// Draws and runs them.
+    /// Runs an ensemble.
     ///
     /// # Errors
     /// When the fleet fails, or no member has a prediction.
-    pub(super) fn run(
-        study: &Study,
-        fleet: &mut dyn Fleet,
-        plan: &Plan,
-        posterior: &Gaussian,
-    ) -> Result<Self, StudyForecastError> {
-        let n_obs = plan.setup.outputs.len();
-        let record = &study.records[plan.record];
+    pub(super) fn run(fleet: &mut dyn Fleet, ensemble: &Ensemble) -> Result<Self, StudyForecastError> {
+        let n_obs = ensemble.setup.outputs.len();
+        let times = &ensemble.times;
         let window = Arc::new(Window {
-            start: plan.times[0],
-            times: plan.times.clone(),
-            observed: vec![f64::NAN; n_obs * plan.times.len()],
-            inputs: record.inputs.clone(),
+            start: times[0],
+            times: times.clone(),
+            observed: vec![f64::NAN; n_obs * times.len()],
+            inputs: ensemble.inputs.clone(),
         });
-        let mut rng = ChaCha8Rng::seed_from_u64(plan.seed);
-        rng.set_stream(DRAWS);
-        let root = root(&posterior.covariance);
-        let job = |particle: u32| {
-            let z = DVector::from_fn(root.ncols(), |_, _| StandardNormal.sample(&mut rng));
-            let drawn: DVector<f64> = &posterior.mean + &root * z;
-            let mut theta = study.theta_for(plan.record, drawn.as_slice());
-            for (place, value) in &plan.fixed {
-                theta[*place] = *value;
-            }
-            Job { particle, record: plan.record as u32, window: Arc::clone(&window), theta, state: None }
+        let job = |(particle, theta): (usize, &Vec<f64>)| Job {
+            particle: particle as u32,
+            record: ensemble.record.0,
+            window: Arc::clone(&window),
+            theta: theta.clone(),
+            state: None,
         };
-        let jobs: Vec<Job> = (0..plan.members as u32).map(job).collect();
-        let setup = fleet.install(&plan.setup).map_err(RunError::from)?;
+        let jobs: Vec<Job> = ensemble.members.iter().enumerate().map(job).collect();
+        let asked = jobs.len();
+        let setup = fleet.install(&ensemble.setup).map_err(RunError::from)?;
         let outcomes = fleet.run(setup, jobs).map_err(RunError::from)?;
-        let (mut predicted, mut failure) = (Vec::with_capacity(plan.members), None);
+        let (mut predicted, mut failure) = (Vec::with_capacity(asked), None);
         for outcome in outcomes {
             match outcome.result {
-                Ok(prediction) if prediction.outputs.len() == n_obs * plan.times.len() => {
+                Ok(prediction) if prediction.outputs.len() == n_obs * times.len() => {
                     predicted.push(prediction.outputs);
                 }
                 Ok(_) => failure = failure.or_else(|| Some("an answer of another length".to_owned())),
@@ -74,9 +62,9 @@ impl Members {
         }
         if predicted.is_empty() {
             let reason = failure.unwrap_or_default();
-            return Err(StudyForecastError::NoMember { members: plan.members, reason });
+            return Err(StudyForecastError::NoMember { members: asked, reason });
         }
-        Ok(Self { n_obs, predicted, asked: plan.members, failure })
+        Ok(Self { n_obs, predicted, asked, failure })
     }
 
     /// Members without a prediction.
@@ -101,14 +89,4 @@ impl Members {
         }
         courses
     }
-}
-
-/// A square root of a covariance, which may lack directions.
-fn root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
-    if let Some(root) = covariance.clone().cholesky() {
-        return root.l();
-    }
-    let even = (covariance + covariance.transpose()) * 0.5;
-    let SymmetricEigen { eigenvectors, eigenvalues } = even.symmetric_eigen();
-    eigenvectors * DMatrix::from_diagonal(&eigenvalues.map(|v| v.max(0.0).sqrt()))
 }

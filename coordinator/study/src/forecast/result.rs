@@ -4,9 +4,10 @@ use serde::Serialize;
 use starlings_estimators::forecast::{Crossings, Direction, Fan};
 
 use super::Threshold;
+use super::ensemble::MeasuredValue;
 use super::measurement::Errors;
+use crate::Study;
 use crate::field::quantity_of;
-use crate::{Study, checked::Channel, checked::Record};
 
 /// A forecast.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -121,31 +122,28 @@ impl OutputForecast {
         name: &str,
         fan: Fan,
         measured: Option<(Fan, Errors)>,
-        channel: Option<(&Record, &Channel)>,
+        values: &[MeasuredValue],
     ) -> Self {
         let last = fan.times.len() - 1;
         let at = |fan: &Fan, p: f64, k: usize| {
             let row = fan.probabilities.iter().position(|q| (q - p).abs() < 1e-9);
             row.map_or(f64::NAN, |row| fan.quantiles[row][k])
         };
-        let (measured, errors) = measured.unzip();
-        let measured_at_end = measured.as_ref().map(|band| [0.05, 0.95].map(|p| at(band, p, last)));
+        let (band, errors) = measured.unzip();
+        let measured_at_end = band.as_ref().map(|band| [0.05, 0.95].map(|p| at(band, p, last)));
         let mut shares = [[0_u32; 2]; 2];
-        let mut observed = Vec::new();
-        if let Some((record, channel)) = channel {
-            for (k, time) in record.times.iter().enumerate().take(fan.times.len()) {
-                let Some(value) = record.observed(channel, *time) else { continue };
-                observed.push((*time, value));
-                let Some(band) = &measured else { continue };
-                let held_out = channel.held_out || !record.trains_at(*time);
-                let within = at(band, 0.05, k) <= value && value <= at(band, 0.95, k);
-                shares[usize::from(held_out)][0] += u32::from(within);
-                shares[usize::from(held_out)][1] += 1;
-            }
+        let observed = values.iter().map(|measured| (measured.time, measured.value)).collect();
+        for measured in values {
+            let Some(band) = &band else { continue };
+            let k = fan.times.partition_point(|time| *time < measured.time).min(last);
+            let within = at(band, 0.05, k) <= measured.value && measured.value <= at(band, 0.95, k);
+            let held_out = usize::from(measured.held_out);
+            shares[held_out][0] += u32::from(within);
+            shares[held_out][1] += 1;
         }
         let share = |[within, all]: [u32; 2]| (all > 0).then(|| f64::from(within) / f64::from(all));
         let [train, held_out] = shares.map(share);
-        let coverage90 = measured.is_some().then_some(Coverage { train, held_out });
+        let coverage90 = band.is_some().then_some(Coverage { train, held_out });
         let at_end = [0.5, 0.05, 0.95].map(|p| at(&fan, p, last));
         Self {
             output: name.to_owned(),
@@ -155,7 +153,7 @@ impl OutputForecast {
             errors,
             coverage90,
             fan,
-            measured,
+            measured: band,
             observed,
         }
     }

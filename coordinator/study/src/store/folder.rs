@@ -38,6 +38,10 @@ pub const OBSERVER: &str = "observer";
 /// Name under which the store keeps the covariance given the residuals: rows, in transformed units.
 pub(crate) const GIVEN_RESIDUALS: &str = "covariance_given_residuals";
 
+/// Name under which the store keeps the standard deviations of the predictions that the parameters' uncertainty makes: a list in the order
+/// of the predictions, null where one is not known.
+pub const PREDICTION_SD: &str = "prediction_sd";
+
 /// The database of a run, and the study as it was run.
 pub(super) const DATABASE: &str = "run.db";
 const FROZEN: &str = "study.toml";

@@ -48,7 +48,7 @@ fn over_time(input: &UnknownInput, time_unit: &str) -> Result<Figure, ReportErro
     let parts = thin::parts(&input.time, &lo, &hi);
     let mut marks: Vec<Mark> = parts
         .iter()
-        .map(|part| Mark::Band { points: thin::band(part, 0.0), colour: BLUE, opacity: 0.2 })
+        .map(|part| Mark::Band { points: thin::band(part), colour: BLUE, opacity: 0.2 })
         .collect();
     marks.push(Mark::level((x.lo, x.hi), 0.0, MUTED));
     marks.extend(Mark::curve(&input.time, &input.value, BLUE, 1.75));

@@ -66,5 +66,5 @@ fn row(fan: &Fan, p: f64) -> Option<&Vec<f64>> {
 fn band(fan: &Fan, lo: f64, hi: f64, colour: plotters::style::RGBColor, opacity: f64) -> Vec<Mark> {
     let (Some(lo), Some(hi)) = (row(fan, lo), row(fan, hi)) else { return Vec::new() };
     let parts = thin::parts(&fan.times, lo, hi);
-    parts.iter().map(|part| Mark::Band { points: thin::band(part, 0.0), colour, opacity }).collect()
+    parts.iter().map(|part| Mark::Band { points: thin::band(part), colour, opacity }).collect()
 }

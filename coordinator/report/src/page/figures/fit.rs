@@ -33,22 +33,29 @@ fn figure(channel: &ChannelPlot, time_unit: &str) -> Result<Figure, ReportError>
         keys.push(("line vermilion", "predicted, held out"));
     }
     let band = if trained(channel).is_some() { "area blue" } else { "area vermilion" };
-    keys.push((band, "prediction ± 2 noise sd"));
+    if has_spread(channel) {
+        keys.push((band, "prediction ± 2 sd of parameters (dark), and of parameters and noise"));
+    } else {
+        keys.push((band, "prediction ± 2 noise sd"));
+    }
     Figure::new(&scene(channel, time_unit), &keys, caption(channel))
 }
 
 /// The scene of one channel of one record.
 pub(crate) fn scene(channel: &ChannelPlot, time_unit: &str) -> Scene {
     let observed: Vec<f64> = channel.observed.iter().map(|v| v.unwrap_or(f64::NAN)).collect();
-    let margin = 2.0 * finite_or_zero(channel.noise);
-    let reach = channel.predicted.iter().flat_map(|p| [p - margin, p + margin]);
+    let [inner, outer] = margins(channel);
+    let reach = channel.predicted.iter().zip(&outer).flat_map(|(p, margin)| [p - margin, p + margin]);
     let y = Axis::around(&with_unit(&channel.channel, &channel.unit), reach.chain(observed.iter().copied()))
         .with_headroom();
     let x = Axis::tight(&with_unit("time", time_unit), channel.time.iter().copied());
     let mut marks = spans(trained(channel), &x);
-    marks.extend(prediction(channel, margin, 0.16));
+    marks.extend(prediction(channel, &outer, 0.16));
+    if has_spread(channel) {
+        marks.extend(prediction(channel, &inner, 0.28));
+    }
     marks.extend(measured(&channel.time, &observed, INK));
-    marks.extend(prediction(channel, margin, 0.0));
+    marks.extend(prediction(channel, &vec![0.0; channel.predicted.len()], 0.0));
     Scene {
         title: format!("{}, record {}: predicted against measured", channel.channel, channel.record),
         description: caption(channel),
@@ -63,10 +70,25 @@ pub(crate) fn trained(channel: &ChannelPlot) -> Option<[f64; 2]> {
     channel.train.filter(|_| !channel.held_out_channel)
 }
 
+/// Whether anything is known of what the uncertainty of the parameters makes of the prediction.
+fn has_spread(channel: &ChannelPlot) -> bool {
+    channel.spread.iter().any(Option::is_some)
+}
+
+/// Half widths of the bands: of the parameters' uncertainty, and of noise with it, two standard deviations each.
+fn margins(channel: &ChannelPlot) -> [Vec<f64>; 2] {
+    let noise = finite_or_zero(channel.noise);
+    let spread = |k: usize| channel.spread.get(k).copied().flatten().map_or(0.0, finite_or_zero);
+    let of = |noise: f64| (0..channel.predicted.len()).map(|k| 2.0 * noise.hypot(spread(k))).collect();
+    [of(0.0), of(noise)]
+}
+
 /// The prediction's band (`opacity` > 0) or its curve, in the colour of each span.
-fn prediction(channel: &ChannelPlot, margin: f64, opacity: f64) -> Vec<Mark> {
+fn prediction(channel: &ChannelPlot, margin: &[f64], opacity: f64) -> Vec<Mark> {
     let (time, value) = (&channel.time, &channel.predicted);
     let n = time.len().min(value.len());
+    let edge = |side: f64| value.iter().zip(margin).map(|(v, m)| m.mul_add(side, *v)).collect::<Vec<f64>>();
+    let (lo, hi) = (edge(-1.0), edge(1.0));
     let span = trained(channel);
     let first = span.map_or(0, |[from, _]| time[..n].partition_point(|t| *t < from));
     let last = span.map_or(0, |[_, to]| time[..n].partition_point(|t| *t <= to));
@@ -79,9 +101,9 @@ fn prediction(channel: &ChannelPlot, margin: f64, opacity: f64) -> Vec<Mark> {
         if from >= to || (k == 0 && skip_head) || (k == 2 && last == n) {
             continue;
         }
-        for part in thin::parts(&time[from..to], &value[from..to], &value[from..to]) {
+        for part in thin::parts(&time[from..to], &lo[from..to], &hi[from..to]) {
             marks.push(if opacity > 0.0 {
-                Mark::Band { points: thin::band(&part, margin), colour, opacity }
+                Mark::Band { points: thin::band(&part), colour, opacity }
             } else {
                 Mark::Line { points: thin::curve(&part), colour, width: 2.0 }
             });
@@ -97,8 +119,19 @@ fn caption(channel: &ChannelPlot) -> String {
     numbers.extend(channel.held_out_rmse.map(|v| format!("held-out RMSE {}", with_unit(v))));
     numbers.push(format!("noise sd {}", with_unit(channel.noise)));
     let never = if channel.held_out_channel { " This channel was never fitted." } else { "" };
+    let (it, holds) = if has_spread(channel) {
+        (
+            "the wide one",
+            "The wide band holds the noise as stated and, to first order, the uncertainty of the parameters; the dark one that uncertainty alone.",
+        )
+    } else {
+        (
+            "it",
+            "The band holds the noise as stated, not the uncertainty of the parameters, which is not known here.",
+        )
+    };
     format!(
-        "{}.{never} A prediction that explains the data leaves about 5\u{a0}% of the measured values outside the band.",
+        "{}.{never} {holds} A prediction that explains the data leaves about 5\u{a0}% of the measured values outside {it}.",
         sentence(&numbers.join(", "))
     )
 }

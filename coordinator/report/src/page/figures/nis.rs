@@ -54,7 +54,7 @@ fn band(series: &NisSeries, ends: (f64, f64)) -> Vec<Mark> {
     let (time, (lo, hi)): (Vec<f64>, (Vec<f64>, Vec<f64>)) =
         steps.into_iter().map(|(t, lo, hi)| (t, (lo, hi))).unzip();
     let parts = thin::parts(&time, &lo, &hi).into_iter();
-    parts.map(|part| Mark::Band { points: thin::band(&part, 0.0), colour: GREEN, opacity: 0.16 }).collect()
+    parts.map(|part| Mark::Band { points: thin::band(&part), colour: GREEN, opacity: 0.16 }).collect()
 }
 
 /// The band as (time, lower, upper): that of an analysis reaches half-way to its neighbours; equal neighbours are one step.

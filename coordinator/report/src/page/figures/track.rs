@@ -49,7 +49,7 @@ fn figure(track: &Track, x_label: &str) -> Result<Figure, ReportError> {
 fn pass_marks(pass: &PassTrack, last: bool) -> Vec<Mark> {
     let (colour, opacity, width) = if last { (BLUE, 0.18, 2.0) } else { (GREY, 0.18, 1.5) };
     let bands = thin::parts(&pass.time, &pass.lo, &pass.hi).into_iter();
-    let bands = bands.map(|part| Mark::Band { points: thin::band(&part, 0.0), colour, opacity });
+    let bands = bands.map(|part| Mark::Band { points: thin::band(&part), colour, opacity });
     let curves = thin::parts(&pass.time, &pass.estimate, &pass.estimate).into_iter();
     let curves = curves.map(|part| Mark::Line { points: thin::curve(&part), colour, width });
     bands.chain(curves).collect()
