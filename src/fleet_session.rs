@@ -15,12 +15,14 @@ use clap::Args;
 use starlings_coordinator::fleet::access::Access;
 use starlings_coordinator::fleet::{
     FleetConfig, FleetError, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers, PlaceName, RunIdentity,
+    RunTraces,
 };
 use starlings_coordinator::metrics::{Server, Source};
 use starlings_coordinator::study::Study;
 use starlings_coordinator::study::store::Store;
 use starlings_coordinator::study::trial::{FleetTrialError, trial_on_fleet};
 use starlings_estimators::Kind;
+use starlings_traces::{Span, Target, Traces};
 use tokio_util::sync::CancellationToken;
 
 use crate::console::note;
@@ -65,6 +67,10 @@ pub(crate) struct FleetArgs {
     /// PORT or :PORT for this machine alone, HOST:PORT for others too (port 0 picks a free one).
     #[arg(long, value_name = "ADDR")]
     metrics: Option<String>,
+    /// Write a span of this command, of every run and of its computation in a local worker, as OTLP: into a FILE, a line of JSON each,
+    /// or to a collector at http://HOST:PORT. Workers elsewhere write theirs where their own --traces says.
+    #[arg(long, value_name = "FILE|URL")]
+    traces: Option<Target>,
 }
 
 impl FleetArgs {
@@ -95,11 +101,13 @@ impl FleetArgs {
             _ => None,
         };
         let (mixed, state_memory, states) = (self.mixed, self.state_memory, self.states.clone());
+        let traces = self.traces.clone();
         Ok(Plan {
             address,
             host,
             access,
             metrics,
+            traces,
             n_worker,
             mixed,
             state_memory,
@@ -136,6 +144,8 @@ pub(crate) struct FleetSession {
     /// What is served of it in numbers.
     source: Source,
     metrics: Option<Server>,
+    /// The span of the command, and where spans go.
+    traced: Option<(Traces, Span)>,
 }
 
 impl FleetSession {
@@ -159,11 +169,18 @@ impl FleetSession {
         if let Some(attempts) = study.fleet.max_attempts {
             config.max_attempts = attempts;
         }
-        let Entrance { bound, access, metrics } = entrance;
+        let Entrance { bound, access, metrics, traces } = entrance;
         config.secrets = access.as_ref().map(|access| access.secrets().clone());
         (config.seed, config.mixed) = (study.seed, plan.mixed);
         config.timeout_factor = study.fleet.timeout_factor;
         config.states = plan.store(&config.identity);
+        let traced = traces.map(|traces| {
+            let about = [("starlings.study", study.name.clone().into())];
+            let span = traces.begin("study", None, about);
+            (traces, span)
+        });
+        config.traces =
+            traced.as_ref().map(|(traces, span)| RunTraces { traces: traces.clone(), above: span.parent() });
         let fleet = GrpcFleet::listen_on(bound, config).map_err(Failure::run)?;
         let source = Source::new(fleet.readings(), env!("CARGO_PKG_VERSION"));
         let metrics = metrics.map(|at| serve_metrics(at, source.clone())).transpose()?;
@@ -176,7 +193,7 @@ impl FleetSession {
             let missing = || [refused.summary(), told.get().cloned()];
             relay(heard, &kept, &shown, missing);
         });
-        Ok(Self { fleet, local: None, access, invitation, events, watcher, source, metrics })
+        Ok(Self { fleet, local: None, access, invitation, events, watcher, source, metrics, traced })
     }
 
     /// Starts the local workers, or says how to start others; `folder` is the run folder, where there is one.
@@ -195,6 +212,7 @@ impl FleetSession {
         let mut args =
             ["worker", "--allow-commands-from-study", "--slots", &slots].map(str::to_owned).to_vec();
         args.extend(plan.states.iter().flat_map(|place| ["--states".to_owned(), place.to_string()]));
+        args.extend(plan.traces.iter().flat_map(|target| ["--traces".to_owned(), target.to_string()]));
         let config = LocalConfig {
             program: own_program().map_err(Failure::run)?,
             args,
@@ -269,7 +287,7 @@ impl FleetSession {
         if !is_done {
             self.fleet.handle().break_off();
         }
-        let Self { fleet, local, watcher, mut access, metrics, .. } = self;
+        let Self { fleet, local, watcher, mut access, metrics, traced, .. } = self;
         // Before the workers leave: one that stays looks there for what comes next.
         if let Some(access) = &mut access {
             access.end();
@@ -279,5 +297,9 @@ impl FleetSession {
         drop(local);
         // The relay ends with the last sender of events; a panic in it has been printed already.
         let _ = watcher.join();
+        if let Some((traces, span)) = traced {
+            span.end();
+            traces.close();
+        }
     }
 }

@@ -35,6 +35,7 @@ mod serve;
 mod simulate;
 mod solvers;
 mod spectrum;
+mod traces;
 mod worker;
 
 use std::process::ExitCode;

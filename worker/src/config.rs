@@ -9,6 +9,7 @@ use starlings_models::{BuildSetup, Factory, Setup};
 use starlings_pieces::PlaceName;
 use starlings_proto::host::host_name;
 use starlings_proto::{Hello, PROTOCOL, VERSION, own_build};
+use starlings_traces::Traces;
 use tokio_util::sync::CancellationToken;
 
 use crate::held::HoldLimits;
@@ -45,6 +46,8 @@ pub struct WorkerConfig {
     pub scratch: PathBuf,
     /// The folder for states that machines share, as this machine sees it; used where the coordinator's is the same.
     pub states: Option<PlaceName>,
+    /// Where spans of runs go, of those that belong in a trace.
+    pub traces: Option<Traces>,
     /// Takes news for whoever watches.
     pub tell: Tell,
 }
@@ -66,6 +69,7 @@ impl WorkerConfig {
             hold: HoldLimits::default(),
             scratch: std::env::temp_dir(),
             states: None,
+            traces: None,
             tell: Arc::new(|_| {}),
         }
     }

@@ -169,7 +169,7 @@ fn run(
 ) -> Result<Prediction, Fault> {
     let job =
         Job { particle: 0, record: record as u32, window: Arc::clone(window), theta: theta.to_vec(), state };
-    let until = Until { spent: &spent(), stop: &Stop::default() };
+    let until = Until { spent: &spent(), stop: &Stop::default(), traceparent: None };
     let prediction = model.run_within(&job, &until).map_err(Fault::Run)?;
     travels(&job, &prediction).map_err(Fault::Travel)?;
     Ok(prediction)

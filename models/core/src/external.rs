@@ -232,7 +232,7 @@ impl<S: Solve> Forward for External<S> {
     }
 
     fn run(&self, job: &Job) -> Result<Prediction, ParticleError> {
-        self.run_within(job, &Until { spent: &|| 0.0, stop: &Stop::default() })
+        self.run_within(job, &Until { spent: &|| 0.0, stop: &Stop::default(), traceparent: None })
     }
 
     fn run_within(&self, job: &Job, until: &Until<'_>) -> Result<Prediction, ParticleError> {
@@ -260,6 +260,7 @@ impl<S: Solve> Forward for External<S> {
             terms: &self.terms,
             constants: &constants,
             stop: Some(until.stop),
+            traceparent: until.traceparent,
         };
         let solved = self.solve.solve(&run)?;
         self.check(&solved, &window)?;

@@ -6,6 +6,7 @@
 //! end of a batch, or when the last one at an end is long ago. The loser of a race for a slow job is compared too. A repeat never is an outcome.
 //! Next file to read: [`super::dispute`], for results that differ.
 
+use std::collections::BTreeSet;
 use std::time::Duration;
 
 use starlings_models::ParticleError;
@@ -69,13 +70,23 @@ impl Dispatcher {
             return;
         }
         self.settle_disputes();
-        let unchecked = self.repeats.contributors.iter().map(|(&id, c)| (id, c.index));
-        for (id, index) in unchecked.collect::<Vec<_>>() {
-            if !self.repeats.repeats(index) && !self.repeats.disputes.contains_key(&index) {
-                self.repeat(index, id);
-            }
+        if !self.repeats.contributors.is_empty() {
+            self.repeat_firsts();
         }
         self.repeat_sampled();
+    }
+
+    /// Has the first result of every worker repeated that nobody repeats yet. In a large fleet many are open at once: they are gone
+    /// through once, and not for every worker.
+    fn repeat_firsts(&mut self) {
+        let mut repeated: BTreeSet<usize> = self.repeats.open.iter().map(|(_, index)| *index).collect();
+        let unchecked = self.repeats.contributors.iter().map(|(&id, c)| (id, c.index));
+        for (id, index) in unchecked.collect::<Vec<_>>() {
+            let is_due = !repeated.contains(&index) && !self.repeats.disputes.contains_key(&index);
+            if is_due && self.repeat(index, id) {
+                repeated.insert(index);
+            }
+        }
     }
 
     /// Compares runs of a setup no more.

@@ -89,6 +89,9 @@ impl Dispatcher {
 
     fn assign(&mut self) {
         let Some(batch) = &mut self.batch else { return };
+        if batch.queue.is_empty() {
+            return;
+        }
         for key in batch.queue.retries() {
             let setup = *batch.setup(key.setup);
             while let Some(index) = batch.queue.first_retry(key) {
@@ -114,7 +117,9 @@ impl Dispatcher {
         let Some(batch) = &mut self.batch else { return };
         let idle =
             self.workers.values().filter(|w| w.aside.is_none() && w.load() < w.slots).collect::<Vec<_>>();
-        if idle.is_empty() {
+        // Both looks are cheap; what follows goes through every lease, and follows every answer of a large fleet.
+        let mut victims = self.workers.values().filter(|w| w.surplus() > 0).map(|w| w.id).collect::<Vec<_>>();
+        if idle.is_empty() || victims.is_empty() {
             return;
         }
         let runnable = batch.open_setups().filter(|setup| idle.iter().any(|w| w.is_ready(setup)));
@@ -125,10 +130,6 @@ impl Dispatcher {
             0 => 0,
             free => free.saturating_sub(self.workers.values().map(Worker::n_returning).sum()),
         };
-        let mut victims = Vec::<WorkerId>::new();
-        if open > 0 {
-            victims.extend(self.workers.values().filter(|w| w.surplus() > 0).map(|w| w.id));
-        }
         // The fullest first; one whose waiting jobs have all been called back before is passed over.
         while open > 0 {
             let fullest =

@@ -20,6 +20,7 @@ use super::waiting::Waiting;
 use crate::dispatcher::{BatchError, Command, ControlId, Dispatcher, Event, WorkerId};
 use crate::event_text::OVER;
 use crate::outbox::Outbox;
+use crate::run_traces::Spans;
 use crate::tally::Counting;
 use crate::wire::{Job, named};
 use crate::{FleetEvent, StateStore, StoredState};
@@ -45,6 +46,7 @@ pub(super) struct State {
     pub(super) blocks: Blocks,
     pub(super) events: Teller,
     pub(super) counting: Counting,
+    pub(super) spans: Spans,
     /// The time of the last event.
     now: Duration,
     pub(super) first_epoch: u64,
@@ -86,9 +88,19 @@ impl Link {
         Self { name, outbox, pid, nonce, windows: SentWindows::default() }
     }
 
-    fn give(&mut self, encoder: &mut JobEncoder, lease: Lease, (setup, job): &(SetupId, Job)) {
-        let (window, job) = encoder.encode(lease, setup, job, &mut self.windows);
-        for message in window.into_iter().chain([job]) {
+    fn give(
+        &mut self,
+        encoder: &mut JobEncoder,
+        spans: &mut Spans,
+        lease: Lease,
+        (setup, job): &(SetupId, Job),
+    ) {
+        let parent = spans.begin(lease, job, &self.name);
+        let (window, mut message) = encoder.encode(lease, setup, job, &mut self.windows);
+        if let Some(parent) = parent {
+            message = ToWorker::traced(message, parent);
+        }
+        for message in window.into_iter().chain([message]) {
             self.outbox.send(message);
         }
     }
@@ -131,6 +143,7 @@ impl State {
             blocks: Blocks::default(),
             events: Teller::new(events),
             counting: Counting::default(),
+            spans: Spans::default(),
             now: Duration::ZERO,
             first_epoch,
             joined: 0,
@@ -173,6 +186,7 @@ impl State {
             Event::Answered { worker, lease, answer, cost } => {
                 let own = lease.epoch == worker.0;
                 let answer = if own { self.checked(&lease, answer) } else { answer };
+                self.spans.end(&lease, &answer);
                 if own && self.dispatcher.holds(&lease) {
                     self.counting.ended(&answer, cost);
                 }
@@ -224,14 +238,14 @@ impl State {
                 let Some(Submission { jobs, encoder, .. }) = &mut self.running else { return };
                 let (Some(job), Some(link)) = (jobs.get(index), self.links.get_mut(&worker)) else { return };
                 self.counting.given(&job.1);
-                link.give(encoder, lease, job);
+                link.give(encoder, &mut self.spans, lease, job);
             }
             Command::SendControl { worker, lease, control } => {
                 let Some(Submission { encoder, .. }) = &mut self.running else { return };
                 let (Some(job), Some(link)) = (self.kept.get(&control), self.links.get_mut(&worker)) else {
                     return;
                 };
-                link.give(encoder, lease, job);
+                link.give(encoder, &mut self.spans, lease, job);
             }
             Command::Keep { control, index } => {
                 let job = self.running.as_ref().and_then(|running| running.jobs.get(index));
