@@ -53,7 +53,7 @@ peers:
 scale:
     cargo bench --bench scale
 
-# Workers under a real Slurm of four nodes on this machine: a node killed, a coordinator requeued. Minutes; needs root, installs slurm-wlm and
+# Workers under a real Slurm of four nodes on this machine: a node killed, a coordinator requeued, a pool that follows the work. Minutes; needs root, installs slurm-wlm and
 # munge where they are missing.
 slurm:
     .ci/slurm test
@@ -61,6 +61,12 @@ slurm:
 # The manifests for Kubernetes, strictly against its published schemas; installs the validator and kubectl into target/kubernetes.
 kubernetes:
     .ci/kubernetes
+
+# The image without a registry: its root file system around the debug build, the pig's aorta run in it by chroot as its user, and the image
+# where buildah is there. Needs root.
+container:
+    cargo build --workspace
+    .ci/container
 
 # Every fuzz target for FUZZ_SECONDS each, 600 by default (cargo install cargo-fuzz; a stable compiler is told to take the fuzzer's flags).
 fuzz:
@@ -77,6 +83,15 @@ deaths:
 # The example with a state of 8 MB, in every way in which its states can travel: the same bytes.
 large-states:
     cargo test --release --test large_states -- --ignored --nocapture
+
+# Pieces of states in a bucket, with the feature s3, against a server of its own; installs that into target/s3.
+s3:
+    .ci/s3
+
+# A solver in Python with a state of 256 MB: the posterior of a small one, and what coordinator, workers and solvers hold. Needs .ci/solvers and
+# six gigabytes of memory.
+largest-states:
+    cargo test --release --test largest_states -- --ignored --nocapture
 
 # What large states cost: 22 states of 8 MB both ways on every way, four of 256 MB in 256 MB of memory, and through a shared folder. A minute;
 # needs 5 GB in the folder for temporary files.
@@ -100,6 +115,12 @@ fmt:
 # API documentation, warnings are errors.
 doc $RUSTDOCFLAGS="-D warnings":
     cargo doc --workspace --no-deps
+
+# Seconds and memory of `infer` for a long recording, with one worker and with two.
+infer-bench:
+    cargo bench -p starlings-sums --bench file_blocks
+    cargo build --release
+    benches/infer.sh
 
 # Micro-benchmarks and the fleet benchmark.
 bench:

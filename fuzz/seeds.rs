@@ -12,7 +12,7 @@ use starlings_proto::access::{AccessFile, Token};
 use starlings_proto::convert::solver::description::encode_description;
 use starlings_proto::convert::solver::{Reply, encode_reply, encode_run};
 use starlings_proto::convert::piece_names::encode_names;
-use starlings_proto::convert::lent::{Lend, encode_in_memory};
+use starlings_proto::convert::lent::{GiveBack, Lend, encode_in_memory};
 use starlings_proto::convert::state::{CHUNK_VALUES, Get, PutHead, encode_chunk, encode_head, encode_put_result};
 use starlings_proto::convert::{HeldRun, ended};
 use starlings_proto::{
@@ -104,6 +104,8 @@ fn messages() -> Result<(), Box<dyn std::error::Error>> {
     write("state_transfer", "head", &PutHead { n_state: 3, lease: LEASE, nonce: 42 }.encode().encode_to_vec())?;
     let lend = Lend { head: PutHead { n_state: 3, lease: LEASE, nonce: 42 }, descriptor: 5 };
     write("state_transfer", "lend", &lend.encode().encode_to_vec())?;
+    let back = GiveBack { epoch: 1, nonce: 42, descriptor: 5 };
+    write("state_transfer", "give-back", &back.encode().encode_to_vec())?;
     let mut lent = encode_head(CHUNK_VALUES + 1).encode_length_delimited_to_vec();
     lent.extend(encode_in_memory(5).encode_length_delimited_to_vec());
     write("state_transfer", "in-memory", &lent)?;

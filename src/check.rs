@@ -17,6 +17,9 @@ use crate::failure::Failure;
 use crate::load::load;
 
 /// Validate a study, its recordings and its model, and make one trial run at the prior median.
+///
+/// A study with a section `[infer]` is checked as `starlings infer` takes it: what is asked of which equations, and the first rows of its
+/// recordings.
 #[derive(Parser)]
 pub(crate) struct Args {
     /// The study file.
@@ -31,6 +34,9 @@ pub(crate) struct Args {
 
 /// Checks the study.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    if Study::asks_to_infer(&args.study) {
+        return crate::infer::check_only(&args.study, args.json);
+    }
     let mut study = load(&args.study)?;
     let kind = study.estimator.kind;
     let channels = dry_run(&mut study, kind, Depth::All).map_err(Failure::input)?;

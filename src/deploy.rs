@@ -6,6 +6,7 @@ mod access;
 mod kubernetes;
 mod order;
 mod remove;
+mod scale;
 mod status;
 mod submit;
 mod watch;
@@ -15,7 +16,7 @@ use starlings_deploy::DeployError;
 
 use crate::failure::Failure;
 
-/// Start the workers of a study under Slurm, on a list of machines or in Kubernetes, and ask, keep and remove them.
+/// Start the workers of a study under Slurm or PBS, on a list of machines or in Kubernetes, and ask, keep and remove them.
 ///
 /// The scripts that are submitted stand in a folder, by which a deployment is named afterwards. Workers find their coordinator through
 /// the access file, which may be written after them.
@@ -29,6 +30,8 @@ pub(crate) struct Args {
 enum What {
     /// Submit an array of workers to Slurm.
     Slurm(submit::SlurmArgs),
+    /// Submit an array of workers to PBS.
+    Pbs(submit::PbsArgs),
     /// Start workers on a list of machines over ssh.
     Hosts(submit::HostsArgs),
     /// Write the manifests of a coordinator and its workers for Kubernetes.
@@ -47,6 +50,7 @@ enum What {
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     match &args.what {
         What::Slurm(args) => submit::slurm(args),
+        What::Pbs(args) => submit::pbs(args),
         What::Hosts(args) => submit::hosts(args),
         What::Kubernetes(args) => kubernetes::run(args),
         What::Access(args) => access::run(args),

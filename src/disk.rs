@@ -37,7 +37,8 @@ pub(crate) fn check(study: &Study, folder: &Path, shares: bool, goes_on: bool) -
 
 /// The same of the folder for states that machines share, of which a step needs three per particle.
 pub(crate) fn check_states(study: &Study, place: Option<&str>, goes_on: bool) -> Result<(), Failure> {
-    // What is there of a run that goes on is known to nobody yet.
+    // What is there of a run that goes on is known to nobody yet, and a bucket is never full.
+    let place = place.filter(|place| !place.contains("://"));
     let Some(folder) = place.filter(|_| !goes_on).map(Path::new) else { return Ok(()) };
     // Smaller ones never stand there.
     if !study.has_large_states() {

@@ -3,6 +3,7 @@
 //! Shared by every command that runs the model on the fleet. Next file to read: [`crate::run`].
 
 mod entrance;
+mod load_file;
 mod plan;
 mod relay;
 
@@ -34,6 +35,7 @@ use crate::progress::Display;
 use crate::solvers::own_program;
 pub(crate) use entrance::Entrance;
 use entrance::{failed, serve_metrics};
+use load_file::LoadFile;
 use plan::{ACCESS, AccessPlan, Plan};
 use relay::{Shown, relay};
 
@@ -60,7 +62,7 @@ pub(crate) struct FleetArgs {
     #[arg(long, value_name = "SIZE", default_value = "1 GiB", value_parser = memory)]
     state_memory: usize,
     /// Folder on a file system that all machines see: states of particles that are larger than 256 KiB stand there, and workers
-    /// that name it too read, write and mix them there.
+    /// that name it too read, write and mix them there. With the feature s3 also s3://BUCKET/PREFIX.
     #[arg(long, value_name = "FOLDER", conflicts_with = "state_memory")]
     states: Option<PlaceName>,
     /// Serve what the fleet does in numbers, for Prometheus, at http://ADDR/metrics, and whether it is well at /healthz and /readyz:
@@ -136,6 +138,8 @@ pub(crate) struct FleetSession {
     pub(crate) fleet: GrpcFleet,
     local: Option<LocalWorkers>,
     access: Option<Access>,
+    /// How much work there is, where that is asked for.
+    load: Option<LoadFile>,
     /// How to start workers, once they may come from elsewhere.
     invitation: Arc<OnceLock<String>>,
     /// What happened, for the store.
@@ -193,7 +197,7 @@ impl FleetSession {
             let missing = || [refused.summary(), told.get().cloned()];
             relay(heard, &kept, &shown, missing);
         });
-        Ok(Self { fleet, local: None, access, invitation, events, watcher, source, metrics, traced })
+        Ok(Self { fleet, local: None, access, load: None, invitation, events, watcher, source, metrics, traced })
     }
 
     /// Starts the local workers, or says how to start others; `folder` is the run folder, where there is one.
@@ -249,6 +253,7 @@ impl FleetSession {
             access.publish(&file, run, address, plan.host.as_deref()).map_err(|fault| failed(&fault))?;
         }
         let absolute = std::path::absolute(&file).unwrap_or(file);
+        self.load = LoadFile::beside(&absolute, self.fleet.handle());
         let name = shell_words::quote(&absolute.to_string_lossy()).into_owned();
         self.say_how(address, &format!("starlings worker --access {name}{}", plan.states_option()));
         Ok(())
@@ -287,7 +292,9 @@ impl FleetSession {
         if !is_done {
             self.fleet.handle().break_off();
         }
-        let Self { fleet, local, watcher, mut access, metrics, traced, .. } = self;
+        let Self { fleet, local, watcher, mut access, load, metrics, traced, .. } = self;
+        // It has a hold on the fleet, which ends with the last one.
+        drop(load);
         // Before the workers leave: one that stays looks there for what comes next.
         if let Some(access) = &mut access {
             access.end();

@@ -17,7 +17,7 @@ use crate::csv_file;
 use crate::failure::Failure;
 use crate::fleet_session::{Entrance, FleetArgs, FleetSession};
 use crate::interrupt;
-use crate::load::load_frozen;
+use crate::load::{self, load_frozen};
 use crate::progress::Display;
 
 /// Forecast from a finished run: an ensemble with parameters from its posterior, quantiles against time, and the time at which a
@@ -133,13 +133,7 @@ fn study_of(args: &Args, folder: &RunFolder) -> Result<Study, Failure> {
 }
 
 fn ask(args: &Args, study: &Study) -> Result<Ask, Failure> {
-    let record = match &args.record {
-        None => 0,
-        Some(name) => study.records.iter().position(|r| r.name == *name).ok_or_else(|| {
-            let names: Vec<&str> = study.records.iter().map(|r| r.name.as_str()).collect();
-            Failure::input(format!("no record named `{name}` (the study has: {})", names.join(", ")))
-        })?,
-    };
+    let record = load::record(study, args.record.as_deref())?;
     Ok(Ask {
         record,
         values: args.set.clone(),

@@ -9,8 +9,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::Parser;
+use serde_json::json;
 use starlings_coordinator::fleet::RunIdentity;
-use starlings_coordinator::infer::{InferError, Inference, Progress, infer};
+use starlings_coordinator::infer::{InferError, Inference, Progress, Reader, check, infer, outlook};
 use starlings_coordinator::report::write_inference;
 use starlings_coordinator::study::Study;
 
@@ -58,6 +59,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if let Some(source) = &args.follow {
         return followed::run(&study, source, args.state.clone());
     }
+    check(&study).map_err(|error| failed(&error))?;
     let plan = args.fleet.plan(&study, Some(&Out(args.out.as_deref())))?;
     let entrance = Entrance::take(&plan, args.out.as_deref())?;
     let folder = folder(&study, args.out.as_deref())?;
@@ -65,13 +67,46 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let mut session = FleetSession::listen(&study, &plan, entrance, RunIdentity::new(), &display)?;
     session.start_workers(&study, &plan, Some(&folder))?;
     let mut watch = |at: &Progress| display.blocks(at);
-    let result = infer(&study, &mut session.fleet, &mut watch);
+    let reader = if args.fleet.is_here() { Reader::Workers } else { Reader::Coordinator };
+    let result = infer(&study, &mut session.fleet, reader, &mut watch);
     display.finish();
     session.close(result.is_ok());
     let found = result.map_err(|error| failed(&error))?;
     write_study(&study, &folder)?;
     write_inference(&folder, &found).map_err(Failure::run)?;
     tell(&found, &folder, args.json)
+}
+
+/// Says what an inference would do, for `starlings check`.
+pub(crate) fn check_only(path: &Path, json: bool) -> Result<(), Failure> {
+    let study = Study::load_for_inference(path)?;
+    let found = outlook(&study).map_err(|error| failed(&error))?;
+    let records = found.records.iter();
+    if json {
+        let records =
+            records.map(|(name, step, rows)| json!({ "name": name, "step": step, "rows": rows.round() }));
+        return line(format_args!(
+            "{:#}",
+            json!({
+                "study": study.name,
+                "equations": found.equations,
+                "functions": found.n_function,
+                "coefficients": found.coefficients,
+                "records": records.collect::<Vec<_>>(),
+            })
+        ));
+    }
+    line(format_args!("{}: `starlings infer` takes this study; nothing was computed", study.name))?;
+    line(format_args!("equations     {}", found.equations.join(", ")))?;
+    line(format_args!("functions     {}", found.n_function))?;
+    line(format_args!("coefficients  {}: {}", found.coefficients.len(), found.coefficients.join(", ")))?;
+    for (name, step, rows) in records {
+        line(format_args!(
+            "record        {name}: steps of {step} {}, about {rows:.0} rows",
+            study.time_unit
+        ))?;
+    }
+    Ok(())
 }
 
 /// Writes the files of an inference again from its result.

@@ -32,6 +32,15 @@ pub(crate) fn load_frozen(path: &Path, text: &str, here: bool) -> Result<Study, 
     Ok(Study::from_text_with(path, text, &host(here))?)
 }
 
+/// Which record of a study a command is about: the first where none is named.
+pub(crate) fn record(study: &Study, name: Option<&str>) -> Result<usize, Failure> {
+    let Some(name) = name else { return Ok(0) };
+    study.records.iter().position(|r| r.name == name).ok_or_else(|| {
+        let names: Vec<&str> = study.records.iter().map(|r| r.name.as_str()).collect();
+        Failure::input(format!("no record named `{name}` (the study has: {})", names.join(", ")))
+    })
+}
+
 fn host(here: bool) -> SolverHost {
     if here { host_here() } else { host_elsewhere() }
 }

@@ -14,7 +14,7 @@ use starlings_models::{Spec, catalogue, nearest};
 use crate::console::note;
 use crate::csv_file::{self, StudyLocation};
 use crate::failure::Failure;
-use crate::load::load;
+use crate::load::{self, load};
 
 /// Run the study's model forward with chosen values and noise, and write the outputs as CSV. Noise of the model's states is drawn from
 /// the same seed.
@@ -99,13 +99,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let outputs = [("-o", &args.output), ("--state-out", &args.state_out)];
     csv_file::check_outputs(&outputs, &study.text, &StudyLocation::Known(&study.file))?;
     check_names(args, &study)?;
-    let record = match &args.record {
-        None => 0,
-        Some(name) => study.records.iter().position(|r| r.name == *name).ok_or_else(|| {
-            let names: Vec<&str> = study.records.iter().map(|r| r.name.as_str()).collect();
-            Failure::input(format!("no record named `{name}` (the study has: {})", names.join(", ")))
-        })?,
-    };
+    let record = load::record(&study, args.record.as_deref())?;
     let twin = Twin {
         record,
         values: args.set.clone(),

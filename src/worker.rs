@@ -49,7 +49,7 @@ pub(crate) struct Args {
     #[arg(long)]
     once: bool,
     /// Folder for states of particles as this machine sees it, where the coordinator names the same one with its --states: states
-    /// that are larger than 256 KiB are read, written and mixed there.
+    /// that are larger than 256 KiB are read, written and mixed there. With the feature s3 also s3://BUCKET/PREFIX.
     #[arg(long, value_name = "FOLDER")]
     states: Option<PlaceName>,
     /// Write a span of every run that its coordinator traces, as OTLP: into a FILE, a line of JSON each, or to a collector at
@@ -102,6 +102,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         tell,
         states: args.states.clone(),
         traces: traces.clone(),
+        reading: args.permit.reading(),
         ..contact
     };
     let ended = starlings_worker::run(config);

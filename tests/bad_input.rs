@@ -14,15 +14,7 @@ use small_kit::{same, study, swap};
 /// Runs the study and expects it to be refused with every one of `words`, and no run folder.
 fn refused(file: &Path, words: &[&str]) {
     let out = file.with_file_name("out");
-    let (code, stdout, stderr) = output(starlings().arg("run").arg(file).arg("--out").arg(&out));
-    // Line breaks of the display may fall anywhere.
-    let flat =
-        stderr.split_whitespace().filter(|w| !matches!(*w, "│" | "×" | "╰─▶")).collect::<Vec<_>>().join(" ");
-    assert_eq!(code, 2, "{stderr}");
-    assert_eq!(stdout, "");
-    for word in words {
-        assert!(flat.contains(word), "no `{word}` in: {flat}");
-    }
+    common::refused(starlings().arg("run").arg(file).arg("--out").arg(&out), words);
     assert!(!out.exists(), "a refused study leaves no folder behind");
 }
 

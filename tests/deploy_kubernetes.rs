@@ -52,11 +52,14 @@ fn the_base_holds_the_study_with_its_data_and_no_secret_outside_its_folder() {
         assert!(!read(&out, name).contains(&secret[..16]), "{name}");
     }
     assert_eq!(read(&out, ".gitignore"), "access/\n");
-    let address = value(&out.join("access/access.json"), "addresses")[0].clone();
-    let stamp = address.as_str().unwrap().strip_prefix("starlings-pig-aorta-").unwrap();
-    let stamp = stamp.strip_suffix("-coordinator:7000").unwrap();
-    // Two deployments of one study are two.
-    assert!(stamp.len() == 8 && u32::from_str_radix(stamp, 16).is_ok(), "{address}");
+    let address =
+        |out: &Path| value(&out.join("access/access.json"), "addresses")[0].as_str().unwrap().to_owned();
+    let first = address(&out);
+    assert!(first.starts_with("starlings-pig-aorta-") && first.ends_with("-coordinator:7000"), "{first}");
+    // Two deployments of one study are two, also in the same second.
+    let again = dir.path().join("again");
+    assert_eq!(write(&repository(STUDY), &again, &["--workers", "3"]).0, 0);
+    assert_ne!(first, address(&again));
 }
 
 #[test]

@@ -165,6 +165,53 @@ fn example(name: &str) {
     table_is_fresh(&source.join("README.md"), &table);
 }
 
+/// The study of the example `lorenz` with a term left out of its rates, or as it is, and every quadratic monomial as a candidate.
+fn lacking(term: &str, coefficient: &str) -> String {
+    let study = std::fs::read_to_string(repository("examples/lorenz/study.toml")).unwrap();
+    let listed = format!("\"{coefficient}\", ");
+    assert!(study.contains(term) && (coefficient.is_empty() || study.contains(&listed)), "{term}");
+    let study = if term.is_empty() { study } else { study.replace(term, "").replace(&listed, "") };
+    let study = study.replace("\"isotropic\"", "\"full\"");
+    study.replace("[[records]]", "[infer.candidates]\ndegree = 2\n\n[[records]]")
+}
+
+/// The path of `lorenz-27`, whose noise is that of the chapter's reconstruction.
+#[test]
+fn a_hidden_term_of_the_lorenz_system_is_named_alone_and_none_of_the_whole_system() {
+    let dir = tempfile::tempdir().unwrap();
+    for file in ["truth.toml", "start.csv"] {
+        std::fs::copy(repository("examples/lorenz-27").join(file), dir.path().join(file)).unwrap();
+    }
+    let simulate = ["simulate", "truth.toml", "--until", "100", "--step", "0.005", "-o", "data.csv"];
+    let (code, _, stderr) = output(starlings().current_dir(dir.path()).args(simulate));
+    assert_eq!(code, 0, "{stderr}");
+    let cases = [
+        (" + b213*x1*x3", "b213", "x2:x1*x3", -1.0),
+        (" + a22*x2", "a22", "x2:x2", -1.0),
+        ("b312*x1*x2 + ", "b312", "x3:x1*x2", 1.0),
+        ("", "", "", 0.0),
+    ];
+    for (term, coefficient, expected, truth) in cases {
+        std::fs::write(dir.path().join("study.toml"), lacking(term, coefficient)).unwrap();
+        let out = format!("out-{coefficient}");
+        let infer = ["infer", "study.toml", "--out", &out, "--workers", "2", "--json"];
+        let (code, stdout, stderr) = output(starlings().current_dir(dir.path()).args(infer));
+        assert_eq!(code, 0, "{stderr}");
+        let found: Value = serde_json::from_str(&stdout).expect("--json prints JSON and nothing else");
+        let named = found["missing"]["named"].as_array().unwrap();
+        let names: Vec<&str> = named.iter().map(|named| named["name"].as_str().unwrap()).collect();
+        if expected.is_empty() {
+            assert!(names.is_empty(), "{names:?}");
+            continue;
+        }
+        assert_eq!(names, [expected], "without {coefficient}");
+        let (estimate, sd) = (number(&named[0]["estimate"]), number(&named[0]["sd"]));
+        // Four posterior sd, and the step's error as the example states it.
+        assert!((estimate - truth).abs() < 4.0 * sd + 0.03, "{expected}: {estimate} ± {sd}");
+        assert_eq!(named[0]["ties"], serde_json::json!([]), "{expected}");
+    }
+}
+
 macro_rules! examples {
     ($($test:ident => $name:literal),+ $(,)?) => {
         $(#[test] fn $test() { example($name); })+

@@ -11,13 +11,20 @@ use crate::engine::{Engine, engine};
 use crate::error::DeployError;
 use crate::logs;
 use crate::order::Order;
-use crate::task::{Role, Task};
+use crate::program::Programs;
+use crate::task::{Role, State, Task};
 
 /// Name of the file that says what a folder deploys.
 pub const FILE: &str = "deployment.json";
 
+/// Name of the file that says that it was removed.
+const REMOVED: &str = "removed";
+
 /// Number of its format.
 const FORMAT: u64 = 1;
+
+/// What a worker writes into its log while nobody answers it.
+const UNREACHED: &str = " worker: no coordinator at ";
 
 /// What `deployment.json` says.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -43,6 +50,7 @@ impl Deployment {
     /// # Errors
     /// When something stands there already, the order is none for this engine, or it cannot be written.
     pub fn write(engine: &'static dyn Engine, order: Order, folder: &Path) -> Result<Self, DeployError> {
+        order.check_paths(folder)?;
         let files = engine.files(&order, folder)?;
         if fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some()) {
             return Err(DeployError::Occupied(folder.to_owned()));
@@ -88,12 +96,68 @@ impl Deployment {
         self.engine
     }
 
+    /// The process of a worker on its node, `HOST/PROCESS`, where its script has said it.
+    pub fn process(&self, role: Role) -> Option<String> {
+        let said = fs::read_to_string(self.folder.join(logs::FOLDER).join(role.process())).ok()?;
+        Some(said.trim().to_owned())
+    }
+
     /// Every process of the deployment, the coordinator first.
     ///
     /// # Errors
     /// When the engine gives no answer.
     pub fn tasks(&self) -> Result<Vec<Task>, DeployError> {
-        self.engine.tasks(self)
+        let mut tasks = self.engine.tasks(self)?;
+        // Of those that may come and go nothing is said as long as they are not there.
+        let comes_and_goes = |task: &Task| self.order.elastic.is_some() && task.role != Role::Coordinator;
+        tasks.retain(|task| task.state != State::Unknown || !comes_and_goes(task));
+        for task in tasks.iter_mut().filter(|task| task.state == State::Running && task.says.is_none()) {
+            task.says = self.unreached(task.role);
+        }
+        Ok(tasks)
+    }
+
+    /// Does something that submits more, unless the deployment is removed; what removes it waits for that.
+    pub fn unless_removed<T>(&self, act: impl FnOnce() -> T) -> Option<T> {
+        let _lock = self.lock();
+        (!self.is_removed()).then(act)
+    }
+
+    /// Whether it is removed.
+    pub fn is_removed(&self) -> bool {
+        self.folder.join(REMOVED).exists()
+    }
+
+    /// Notes that the deployment is removed: whoever watches it submits nothing more.
+    ///
+    /// # Errors
+    /// When that cannot be written.
+    pub fn note_removed(&self) -> Result<(), DeployError> {
+        let _lock = self.lock();
+        let path = self.folder.join(REMOVED);
+        fs::write(&path, "").map_err(|source| DeployError::Unwritable { path, source })
+    }
+
+    /// Held by one process at a time; nothing on file systems without locks.
+    fn lock(&self) -> Option<File> {
+        let file = File::open(self.folder.join(FILE)).ok()?;
+        file.lock().ok().map(|()| file)
+    }
+
+    /// Runs the commands that submit it, one after the other. What was taken before one that is refused is of no use alone, and one that
+    /// gave no answer may have been taken: then everything is cancelled.
+    pub(crate) fn submit(&self, programs: &Programs, commands: &[Vec<String>]) -> Result<(), DeployError> {
+        for command in commands {
+            let refused = match programs.run(command, "") {
+                Ok(said) if said.is_well => continue,
+                Ok(said) => said.refused(),
+                // Without the program nothing was submitted.
+                Err(error @ DeployError::Missing { .. }) => return Err(error),
+                Err(error) => error,
+            };
+            return Err(self.given_up(refused));
+        }
+        Ok(())
     }
 
     /// Cancels what was submitted before an error, and says with it what is left.
@@ -110,6 +174,13 @@ impl Deployment {
                 "what was submitted may be left, it could not be cancelled ({error}): try starlings deploy remove {folder}"
             ),
         }
+    }
+
+    /// What a worker that runs says of a coordinator that it does not reach: what it tried, and what came of it.
+    fn unreached(&self, role: Role) -> Option<String> {
+        let line = self.last_lines(role, 1).pop()?;
+        let (_, words) = line.split_once(UNREACHED)?;
+        Some(format!("it reaches no coordinator at {words}"))
     }
 
     /// What should be there: the coordinator where it is a job, and the workers.

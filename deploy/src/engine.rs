@@ -6,6 +6,7 @@ use crate::deployment::Deployment;
 use crate::error::DeployError;
 use crate::hosts::Hosts;
 use crate::order::Order;
+use crate::pbs::Pbs;
 use crate::slurm::Slurm;
 use crate::task::Task;
 
@@ -41,6 +42,22 @@ pub trait Engine: Sync {
     /// When the engine gives no answer.
     fn cancel(&self, deployment: &Deployment) -> Result<(), DeployError>;
 
+    /// Submits the workers with these numbers, of which none is live.
+    ///
+    /// # Errors
+    /// When the engine cannot do that, refuses or gives no answer.
+    fn add(&self, _deployment: &Deployment, _workers: &[usize]) -> Result<(), DeployError> {
+        Err(DeployError::NotElastic(self.name()))
+    }
+
+    /// Has the engine end these processes, and does not wait for that.
+    ///
+    /// # Errors
+    /// When the engine cannot do that, refuses or gives no answer.
+    fn end(&self, _tasks: &[&Task]) -> Result<(), DeployError> {
+        Err(DeployError::NotElastic(self.name()))
+    }
+
     /// Has the engine start a process at once that it holds back only because it was started before; whether it was such a one.
     ///
     /// # Errors
@@ -51,7 +68,7 @@ pub trait Engine: Sync {
 }
 
 /// All engines.
-pub const ENGINES: &[&dyn Engine] = &[&Slurm, &Hosts];
+pub const ENGINES: &[&dyn Engine] = &[&Slurm, &Pbs, &Hosts];
 
 /// The engine of a name.
 pub fn engine(name: &str) -> Option<&'static dyn Engine> {

@@ -16,6 +16,14 @@ pub enum DeployError {
         /// What to do.
         remedy: &'static str,
     },
+    /// This machine gives no means to start a program.
+    #[error("cannot start {program}: {source}")]
+    Unstarted {
+        /// The program.
+        program: String,
+        /// What the system said.
+        source: io::Error,
+    },
     /// The engine did not take what was submitted.
     #[error("{program} refused the submission: {said}\n  it was asked with: {command}")]
     Refused {
@@ -75,8 +83,13 @@ pub enum DeployError {
         /// Who sets it.
         reason: &'static str,
     },
+    /// An engine whose workers are as many as were asked for.
+    #[error(
+        "the number of workers under the engine `{0}` does not follow the work: use Slurm, or submit another deployment"
+    )]
+    NotElastic(&'static str),
     /// A path that no script can name safely.
-    #[error("{:?} has a backslash or a control character in it: choose another folder or name", .0)]
+    #[error("{:?} has a backslash, a control character or a letter that is no UTF-8 in it: choose another folder or name", .0)]
     Path(PathBuf),
     /// The study does not fit into a ConfigMap.
     #[error(
@@ -124,12 +137,15 @@ impl DeployError {
             | Self::NoDeployment { .. }
             | Self::Occupied(_)
             | Self::Path(_)
+            | Self::NotElastic(_)
             | Self::Unreadable { .. }
             | Self::TooLarge { .. }
             | Self::Option { .. } => true,
             Self::Submission { cause, .. } => cause.is_input(),
             Self::Unwritable { source, .. } => source.kind() != io::ErrorKind::StorageFull,
-            Self::Failed { .. } | Self::NoAnswer { .. } | Self::Script { .. } => false,
+            Self::Unstarted { .. } | Self::Failed { .. } | Self::NoAnswer { .. } | Self::Script { .. } => {
+                false
+            }
         }
     }
 }

@@ -16,7 +16,7 @@ use crate::error::DeployError;
 use crate::logs;
 use crate::order::Order;
 use crate::program::{Programs, Said};
-use crate::script::{script, text};
+use crate::script::{script, worker_script};
 use crate::task::{Role, State, Task};
 
 /// Machines that ssh reaches.
@@ -121,21 +121,14 @@ impl Engine for Hosts {
 }
 
 fn start(order: &Order, indices: &[usize], access: Option<&str>) -> Result<String, DeployError> {
-    let values = json!({
-        "name": order.name,
-        "indices": indices,
-        "access_text": access.map(str::trim_end),
-        "program": text(&order.program),
-        "access": if order.copies_access { "access.json".to_owned() } else { text(&order.access) },
-        "is_copied": order.copies_access,
-        "scratch": order.scratch.as_deref().map(text),
-        "idle": order.idle,
-        "slots": order.slots.map_or_else(|| "$(nproc)".to_owned(), |slots| slots.to_string()),
-        "is_solver": order.is_solver,
-        "study": text(&order.study),
-        "keeps_code": true,
-    });
-    script("hosts-start.sh", values)
+    // A copy of the access file is found without its path.
+    let own = [
+        ("indices", json!(indices)),
+        ("access_text", json!(access.map(str::trim_end))),
+        ("is_copied", json!(order.copies_access)),
+        ("keeps_code", json!(true)),
+    ];
+    worker_script("hosts-start.sh", order, "$(nproc)", own)
 }
 
 fn ask(order: &Order, indices: &[usize], cancels: bool) -> Result<String, DeployError> {

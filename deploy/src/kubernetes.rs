@@ -1,11 +1,12 @@
 //! Kubernetes: a kustomize base of a coordinator, its workers, and what they need. It is written and not applied: what runs in a cluster is
 //! asked and removed with the cluster's own tools.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
 use crate::error::DeployError;
+use crate::order::check_path;
 use crate::script::script;
 
 /// The port on which the coordinator listens.
@@ -13,6 +14,9 @@ pub const PORT: u16 = 7000;
 
 /// The largest content of a ConfigMap, bytes (the limit of the Kubernetes API).
 const LARGEST: usize = 1024 * 1024;
+
+/// The longest part of a name that is taken from a study.
+const LONGEST: usize = 24;
 
 /// What is to run in a cluster.
 #[derive(Clone, Debug)]
@@ -78,13 +82,15 @@ const MANIFESTS: [(&str, &str); 7] = [
 ];
 
 impl KubernetesOrder {
-    /// A name of a study that Kubernetes takes.
-    pub fn name_of(study: &str) -> String {
+    /// A name for a deployment of a study that Kubernetes takes: `stamp` tells it from others. With the longest ending it has no more
+    /// than the 63 letters of a label.
+    pub fn name_of(study: &str, stamp: u64) -> String {
+        let stamp = base_36(stamp);
         let lower = study.to_lowercase();
         let plain: String =
-            lower.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).take(30).collect();
+            lower.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).take(LONGEST).collect();
         let plain = plain.trim_matches('-');
-        if plain.is_empty() { "starlings".to_owned() } else { format!("starlings-{plain}") }
+        if plain.is_empty() { format!("starlings-{stamp}") } else { format!("starlings-{plain}-{stamp}") }
     }
 
     /// Where workers dial the coordinator.
@@ -95,8 +101,10 @@ impl KubernetesOrder {
     /// The manifests, name and text of each.
     ///
     /// # Errors
-    /// When the files of the study are too large for a ConfigMap and no claim is given.
+    /// When a manifest cannot name a file of the study, or all are too large for a ConfigMap and no claim is given.
     pub fn manifests(&self) -> Result<Vec<(String, String)>, DeployError> {
+        check_path(Path::new(&self.study))?;
+        self.files.iter().try_for_each(|(path, _)| check_path(path))?;
         let bytes = self.files.iter().map(|(path, bytes)| path.as_os_str().len() + bytes.len()).sum();
         if self.claim.is_none() && bytes > LARGEST {
             return Err(DeployError::TooLarge { bytes, most: LARGEST });
@@ -131,6 +139,18 @@ impl KubernetesOrder {
     }
 }
 
+/// Digits and lower-case letters.
+fn base_36(mut number: u64) -> String {
+    let mut digits = Vec::new();
+    loop {
+        digits.extend(char::from_digit((number % 36) as u32, 36));
+        number /= 36;
+        if number == 0 {
+            return digits.into_iter().rev().collect();
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -154,9 +174,13 @@ mod tests {
 
     #[test]
     fn a_name_is_one_that_kubernetes_takes() {
-        let names = ["Pig Aorta_2", "\u{e9}", "a".repeat(99).as_str()].map(KubernetesOrder::name_of);
-        assert_eq!(names[..2], ["starlings-pig-aorta-2", "starlings"]);
-        assert_eq!(names[2].len(), "starlings-".len() + 30);
+        let name = KubernetesOrder::name_of;
+        assert_eq!(
+            (name("Pig Aorta_2", 35), name("\u{e9}", 36)),
+            ("starlings-pig-aorta-2-z".into(), "starlings-10".into())
+        );
+        let longest = format!("{}-coordinator", name(&"a".repeat(99), u64::MAX));
+        assert!(longest.len() < 64, "{longest}");
     }
 
     #[test]

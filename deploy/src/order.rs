@@ -4,6 +4,9 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use crate::elastic::Limits;
+use crate::error::DeployError;
+
 /// Workers of a study, how they find their coordinator, and what the engine is told besides. Paths are absolute, as the nodes see them.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Order {
@@ -15,8 +18,11 @@ pub struct Order {
     pub is_solver: bool,
     /// This program.
     pub program: PathBuf,
-    /// Number of workers, at least one.
+    /// Number of workers, at least one; where it follows the work, the most.
     pub workers: usize,
+    /// The least and the most workers, where their number follows the work.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub elastic: Option<Limits>,
     /// Runs of one worker at a time; the number of cores that it is given where nothing is said.
     pub slots: Option<usize>,
     /// The access file, which the coordinator writes and may not stand yet.
@@ -61,6 +67,17 @@ impl Order {
             && name.chars().all(|c| c.is_ascii_alphanumeric() || ".-_".contains(c))
     }
 
+    /// Refuses paths that not every script and manifest can name.
+    pub(crate) fn check_paths(&self, folder: &Path) -> Result<(), DeployError> {
+        let paths = [folder, &self.program, &self.access, &self.study];
+        paths.into_iter().chain(self.scratch.as_deref()).try_for_each(check_path)
+    }
+
+    /// Numbers of the workers that are submitted at first.
+    pub fn first(&self) -> Vec<usize> {
+        (0..self.elastic.map_or(self.workers, |limits| limits.least)).collect()
+    }
+
     /// Name of the coordinator's job in the engine.
     pub fn coordinator_name(&self) -> String {
         format!("{}-coordinator", self.name)
@@ -74,9 +91,23 @@ impl Order {
     }
 }
 
+/// Refuses a path with letters that a directive of a script, or a line of a list, has no way to write.
+pub(crate) fn check_path(path: &Path) -> Result<(), DeployError> {
+    let is_plain = |text: &str| !text.contains(|c: char| c.is_control() || c == '\\');
+    if path.to_str().is_some_and(is_plain) { Ok(()) } else { Err(DeployError::Path(path.to_owned())) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_path_that_no_script_can_name_is_refused() {
+        assert!(check_path(Path::new("/a pool, 100% \"new\"/\u{e9}.toml")).is_ok());
+        for wrong in ["/a\\b", "/a\nb", "/a\tb"] {
+            assert!(matches!(check_path(Path::new(wrong)), Err(DeployError::Path(_))), "{wrong:?}");
+        }
+    }
 
     #[test]
     fn a_name_has_only_what_every_engine_takes() {

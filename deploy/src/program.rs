@@ -1,22 +1,20 @@
 //! Running a program of an engine: to its end, within a bounded time.
 
 use std::ffi::OsStr;
-use std::io::{self, Read, Write};
-use std::process::{Child, Command, Stdio};
-use std::sync::{Arc, Mutex, PoisonError, mpsc};
-use std::thread;
-use std::time::{Duration, Instant};
+use std::process::Stdio;
+use std::time::Duration;
+
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::process::{Child, Command};
+use tokio::time::timeout;
 
 use crate::error::DeployError;
 
 /// How long a program of an engine may take. Those of Slurm give up a controller that is down after less.
 const LIMIT: Duration = Duration::from_secs(120);
 
-/// How long after its end what a program wrote is waited for.
+/// How long after its end what a program wrote is waited for: what it started may hold the other end for longer, as a master of ssh does.
 const LAST_WORDS: Duration = Duration::from_secs(2);
-
-/// How often it is looked whether a program has ended.
-const TICK: Duration = Duration::from_millis(10);
 
 /// What a program said, and whether it says that all went well.
 pub(crate) struct Said {
@@ -70,38 +68,36 @@ impl Programs {
     fn run_within(&self, command: &[String], input: &str, limit: Duration) -> Result<Said, DeployError> {
         let shown = shell_words::join(command);
         let (program, arguments) = command.split_first().map_or(("", command), |(p, a)| (p.as_str(), a));
-        let missing = |_: io::Error| DeployError::Missing {
-            program: program.to_owned(),
-            engine: self.engine,
-            remedy: self.remedy,
-        };
-        let mut command = Command::new(program);
-        for (name, _) in std::env::vars_os().filter(|(name, _)| is_option(name)) {
-            command.env_remove(name);
-        }
-        let mut child = command
-            .args(arguments)
-            .envs(self.environment.iter().copied())
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .map_err(missing)?;
-        let (stdout, stderr) = (listen(child.stdout.take()), listen(child.stderr.take()));
-        if let Some(mut stdin) = child.stdin.take() {
-            let input = input.as_bytes().to_vec();
-            // A program that reads nothing may have ended, or hang: the limit holds for it too.
-            thread::spawn(move || stdin.write_all(&input));
-        }
-        let Some(is_well) = end(&mut child, limit) else {
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+        let runtime =
+            runtime.map_err(|source| DeployError::Unstarted { program: program.to_owned(), source })?;
+        let heard = runtime.block_on(async {
+            let mut child = self.start(program, arguments)?;
+            Ok(hear(&mut child, input, limit).await)
+        })?;
+        let Some((is_well, [stdout, stderr])) = heard else {
             return Err(DeployError::NoAnswer {
                 program: program.to_owned(),
                 seconds: limit.as_secs(),
                 command: shown,
             });
         };
-        let [stdout, stderr] = [stdout, stderr].map(Heard::text);
         Ok(Said { is_well, stdout, stderr, command: shown, program: program.to_owned() })
+    }
+
+    /// Starts a program, which is killed where nobody waits for it any more.
+    fn start(&self, program: &str, arguments: &[String]) -> Result<Child, DeployError> {
+        let mut command = Command::new(program);
+        for (name, _) in std::env::vars_os().filter(|(name, _)| is_option(name)) {
+            command.env_remove(name);
+        }
+        command.args(arguments).envs(self.environment.iter().copied());
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).kill_on_drop(true);
+        command.spawn().map_err(|_| DeployError::Missing {
+            program: program.to_owned(),
+            engine: self.engine,
+            remedy: self.remedy,
+        })
     }
 }
 
@@ -111,52 +107,49 @@ fn is_option(name: &OsStr) -> bool {
     ["SBATCH_", "SQUEUE_", "SCANCEL_"].iter().any(|head| name.starts_with(head))
 }
 
-/// What a program writes, read in a thread, so that one that says much is not held up.
-struct Heard {
-    bytes: Arc<Mutex<Vec<u8>>>,
-    /// Closed at the end of what is read.
-    open: mpsc::Receiver<()>,
-}
-
-fn listen(source: Option<impl Read + Send + 'static>) -> Heard {
-    let bytes = Arc::<Mutex<Vec<u8>>>::default();
-    let (end, open) = mpsc::channel();
-    let kept = Arc::clone(&bytes);
-    thread::spawn(move || {
-        let _end: mpsc::Sender<()> = end;
-        let (Some(mut source), mut part) = (source, [0; 8192]) else { return };
-        while let Ok(n) = source.read(&mut part) {
-            if n == 0 {
-                break;
-            }
-            kept.lock().unwrap_or_else(PoisonError::into_inner).extend_from_slice(&part[..n]);
+/// Whether a program ended well, and what it wrote; nothing where it did not end in time.
+async fn hear(child: &mut Child, input: &str, limit: Duration) -> Option<(bool, [String; 2])> {
+    let (stdin, stdout, stderr) = (child.stdin.take(), child.stdout.take(), child.stderr.take());
+    let (mut out, mut err) = (Vec::new(), Vec::new());
+    // A program that reads nothing may have ended, or hang: nobody waits for the end of this alone.
+    let mut told = Box::pin(async {
+        if let Some(mut stdin) = stdin {
+            let _ = stdin.write_all(input.as_bytes()).await;
         }
     });
-    Heard { bytes, open }
-}
-
-impl Heard {
-    /// All of it, once the program has ended; what it started may hold the other end for longer, as a master of ssh does.
-    fn text(self) -> String {
-        let _ = self.open.recv_timeout(LAST_WORDS);
-        String::from_utf8_lossy(&self.bytes.lock().unwrap_or_else(PoisonError::into_inner)).into_owned()
-    }
-}
-
-/// Whether a program ended well; nothing where it did not end in time and was killed.
-fn end(child: &mut Child, limit: Duration) -> Option<bool> {
-    let started = Instant::now();
-    loop {
-        match child.try_wait() {
-            Ok(Some(status)) => return Some(status.success()),
-            Ok(None) if started.elapsed() < limit => thread::sleep(TICK),
-            Ok(None) | Err(_) => {
-                let _ = child.kill();
-                let _ = child.wait();
-                return None;
+    let mut heard = Box::pin(async {
+        let out = async {
+            if let Some(mut stdout) = stdout {
+                let _ = stdout.read_to_end(&mut out).await;
+            }
+        };
+        let err = async {
+            if let Some(mut stderr) = stderr {
+                let _ = stderr.read_to_end(&mut err).await;
+            }
+        };
+        tokio::join!(out, err);
+    });
+    let (mut is_told, mut is_heard) = (false, false);
+    let ended = timeout(limit, async {
+        loop {
+            tokio::select! {
+                status = child.wait() => break status,
+                () = &mut told, if !is_told => is_told = true,
+                () = &mut heard, if !is_heard => is_heard = true,
             }
         }
+    });
+    let ended = ended.await;
+    if ended.is_ok() && !is_heard {
+        let _ = timeout(LAST_WORDS, &mut heard).await;
     }
+    drop(heard);
+    let Ok(Ok(status)) = ended else {
+        let _ = child.kill().await;
+        return None;
+    };
+    Some((status.success(), [out, err].map(|bytes| String::from_utf8_lossy(&bytes).into_owned())))
 }
 
 #[cfg(test)]

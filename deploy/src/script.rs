@@ -1,18 +1,22 @@
 //! The scripts that engines are given, made from the templates in `deploy/templates`.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use minijinja::syntax::SyntaxConfig;
 use minijinja::value::Serde;
 use minijinja::{AutoEscape, Environment, UndefinedBehavior};
 use serde::Serialize;
+use serde_json::{Value, json};
 
 use crate::error::DeployError;
+use crate::order::Order;
 
 /// Every template, by its name.
 const TEMPLATES: &[(&str, &str)] = &[
     ("worker.sh", include_str!("../templates/worker.sh")),
     ("worker.sbatch", include_str!("../templates/worker.sbatch")),
+    ("worker.pbs", include_str!("../templates/worker.pbs")),
     ("coordinator.sbatch", include_str!("../templates/coordinator.sbatch")),
     ("hosts-start.sh", include_str!("../templates/hosts-start.sh")),
     ("hosts-ask.sh", include_str!("../templates/hosts-ask.sh")),
@@ -44,6 +48,30 @@ pub(crate) fn script(name: &'static str, values: impl Serialize) -> Result<Strin
         environment.get_template(name)?.render(Serde(values))
     };
     made().map_err(|source| DeployError::Script { name, source })
+}
+
+/// The script of a worker under an engine: the values of `worker.sh`, which its template includes, and the engine's own, which take the
+/// place of those. `slots` are those of a worker where the order says none, as words of a shell.
+pub(crate) fn worker_script(
+    name: &'static str,
+    order: &Order,
+    slots: &str,
+    own: impl IntoIterator<Item = (&'static str, Value)>,
+) -> Result<String, DeployError> {
+    let common = [
+        ("name", json!(order.name)),
+        ("program", json!(text(&order.program))),
+        ("access", json!(text(&order.access))),
+        ("scratch", json!(order.scratch.as_deref().map(text))),
+        ("idle", json!(order.idle)),
+        ("slots", json!(order.slots.map_or_else(|| slots.to_owned(), |slots| slots.to_string()))),
+        ("is_solver", json!(order.is_solver)),
+        ("study", json!(text(&order.study))),
+        ("is_copied", json!(false)),
+        ("keeps_code", json!(false)),
+        ("processes", Value::Null),
+    ];
+    script(name, common.into_iter().chain(own).collect::<BTreeMap<_, _>>())
 }
 
 /// A path as a value of a template.

@@ -14,9 +14,10 @@ use crate::deployment::Deployment;
 use crate::engine::Engine;
 use crate::error::DeployError;
 use crate::logs;
+use crate::options::{Own, Syntax};
 use crate::order::Order;
 use crate::program::Programs;
-use crate::script::{script, text};
+use crate::script::{script, text, worker_script};
 use crate::task::{Role, State, Task};
 
 /// Slurm 20.11 or later.
@@ -29,18 +30,56 @@ const PROGRAMS: Programs = Programs {
     environment: &[("SLURM_TIME_FORMAT", "%s")],
 };
 
-/// Options of sbatch that a deployment sets itself: long name, letter, reason.
-const OWN: &[(&str, char, &str)] = &[
-    ("--array", 'a', "the number of tasks is that of --workers"),
-    ("--job-name", 'J', "the jobs of a deployment are found by their name"),
-    ("--output", 'o', "the logs stand in the folder of the deployment"),
-    ("--error", 'e', "the logs stand in the folder of the deployment"),
-    ("--wrap", '\0', "the script of the deployment is submitted"),
-    ("--wait", 'W', "`starlings deploy watch` waits"),
-    ("--test-only", '\0', "use --dry-run"),
-];
+/// Options of sbatch(1), Slurm 22.05 to 25.05.
+const SYNTAX: Syntax = Syntax {
+    program: "sbatch",
+    own: &[
+        own_option("array", Some('a'), "the number of tasks is that of --workers"),
+        own_option("job-name", Some('J'), "the jobs of a deployment are found by their name"),
+        own_option("output", Some('o'), "the logs stand in the folder of the deployment"),
+        own_option("error", Some('e'), "the logs stand in the folder of the deployment"),
+        own_option("wrap", None, "the script of the deployment is submitted"),
+        own_option("wait", Some('W'), "`starlings deploy watch` waits"),
+        own_option("test-only", None, "use --dry-run"),
+    ],
+    flags: "hHIkOQsuvV",
+    long_flags: &[
+        "contiguous",
+        "exclusive",
+        "get-user-env",
+        "help",
+        "hold",
+        "ignore-pbs",
+        "immediate",
+        "kill-on-invalid-dep",
+        "nice",
+        "no-kill",
+        "no-requeue",
+        "overcommit",
+        "oversubscribe",
+        "parsable",
+        "propagate",
+        "quiet",
+        "reboot",
+        "requeue",
+        "share",
+        "spread-job",
+        "test-only",
+        "usage",
+        "use-min-nodes",
+        "verbose",
+        "version",
+    ],
+};
+
+const fn own_option(long: &'static str, letter: Option<char>, reason: &'static str) -> Own {
+    Own { long, letter, reason }
+}
 
 const WORKER: &str = "worker.sbatch";
+/// The cores that a task was given, for a shell.
+const CORES: &str = "${SLURM_CPUS_PER_TASK:-${SLURM_CPUS_ON_NODE:-1}}";
+
 const COORDINATOR: &str = "coordinator.sbatch";
 
 impl Engine for Slurm {
@@ -49,27 +88,14 @@ impl Engine for Slurm {
     }
 
     fn files(&self, order: &Order, folder: &Path) -> Result<Vec<(String, String)>, DeployError> {
-        for option in &order.options {
-            refuse_own(option)?;
-        }
-        let paths = [folder, &order.program, &order.access, &order.study];
-        paths.into_iter().chain(order.scratch.as_deref()).try_for_each(refuse_path)?;
-        let values = json!({
-            "name": order.name,
-            "last": order.workers.saturating_sub(1),
-            "cores": order.slots.unwrap_or(1),
-            "log": log(folder, "worker-%a.log"),
-            "program": text(&order.program),
-            "access": text(&order.access),
-            "scratch": order.scratch.as_deref().map(text),
-            "idle": order.idle,
-            "slots": slots(order),
-            "is_solver": order.is_solver,
-            "study": text(&order.study),
-            "is_copied": false,
-            "keeps_code": false,
-        });
-        let mut files = vec![(WORKER.to_owned(), script(WORKER, values)?)];
+        SYNTAX.check(&order.options)?;
+        let own = [
+            ("array", json!(indices(&order.first()))),
+            ("cores", json!(order.slots.unwrap_or(1))),
+            ("log", json!(log(folder, "worker-%a.log"))),
+            ("processes", json!(text(&folder.join(logs::FOLDER)))),
+        ];
+        let mut files = vec![(WORKER.to_owned(), worker_script(WORKER, order, CORES, own)?)];
         if let Some(run_folder) = &order.run_folder {
             let values = json!({
                 "name": order.coordinator_name(),
@@ -89,29 +115,13 @@ impl Engine for Slurm {
         let order = &deployment.order;
         // The workers wait for what the coordinator writes, so it is the first in the queue.
         let coordinator = order.run_folder.as_ref().map(|_| COORDINATOR);
-        let submission = |script: &str| {
-            let head = ["sbatch", "--parsable"].map(str::to_owned);
-            // After the options of the user: of an option that is given twice the last holds.
-            let own = own(deployment, script);
-            let script = text(&deployment.folder.join(script));
-            head.into_iter().chain(order.options.iter().cloned()).chain(own).chain([script]).collect()
-        };
-        coordinator.into_iter().chain([WORKER]).map(submission).collect()
+        let first = order.first();
+        let workers = Some(WORKER).filter(|_| !first.is_empty());
+        coordinator.into_iter().chain(workers).map(|script| submission(deployment, script, &first)).collect()
     }
 
     fn submit(&self, deployment: &Deployment) -> Result<(), DeployError> {
-        for command in self.commands(deployment) {
-            let refused = match PROGRAMS.run(&command, "") {
-                Ok(said) if said.is_well => continue,
-                Ok(said) => said.refused(),
-                // Without the program nothing was submitted.
-                Err(error @ DeployError::Missing { .. }) => return Err(error),
-                Err(error) => error,
-            };
-            // What was taken before it is of no use alone, and one that gave no answer may have been taken.
-            return Err(deployment.given_up(refused));
-        }
-        Ok(())
+        deployment.submit(&PROGRAMS, &self.commands(deployment))
     }
 
     fn tasks(&self, deployment: &Deployment) -> Result<Vec<Task>, DeployError> {
@@ -127,6 +137,17 @@ impl Engine for Slurm {
             PROGRAMS.run(&["scancel".to_owned(), user(), format!("--name={name}")], "")?.answer().map(drop)
         });
         cancelled.into_iter().collect()
+    }
+
+    fn add(&self, deployment: &Deployment, workers: &[usize]) -> Result<(), DeployError> {
+        let said = PROGRAMS.run(&submission(deployment, WORKER, workers), "")?;
+        if said.is_well { Ok(()) } else { Err(said.refused()) }
+    }
+
+    fn end(&self, tasks: &[&Task]) -> Result<(), DeployError> {
+        let ids = tasks.iter().map(|task| task.id.clone());
+        let command: Vec<String> = ["scancel".to_owned(), user()].into_iter().chain(ids).collect();
+        PROGRAMS.run(&command, "")?.answer().map(drop)
     }
 
     fn release(&self, task: &Task) -> Result<bool, DeployError> {
@@ -155,22 +176,27 @@ fn pattern(folder: &Path, name: &str) -> String {
     format!("{}/{name}", text(&folder.join(logs::FOLDER)).replace('%', "%%"))
 }
 
-/// Scripts of sbatch have no way to write such a path.
-fn refuse_path(path: &Path) -> Result<(), DeployError> {
-    if text(path).contains(|c: char| c.is_control() || c == '\\') {
-        return Err(DeployError::Path(path.to_owned()));
-    }
-    Ok(())
+/// The command that submits a script, for workers with these numbers.
+fn submission(deployment: &Deployment, script: &str, workers: &[usize]) -> Vec<String> {
+    let head = ["sbatch", "--parsable"].map(str::to_owned);
+    // After the options of the user: of an option that is given twice the last holds.
+    let own = own(deployment, script, workers);
+    let options = deployment.order.options.iter().cloned();
+    head.into_iter().chain(options).chain(own).chain([text(&deployment.folder.join(script))]).collect()
 }
 
-/// Slots of a worker inside double quotes of a shell: as ordered, else one for every core that the task was given.
-fn slots(order: &Order) -> String {
-    let given = "${SLURM_CPUS_PER_TASK:-${SLURM_CPUS_ON_NODE:-1}}".to_owned();
-    order.slots.map_or(given, |slots| slots.to_string())
+/// Numbers in the form of `sbatch --array`, such as `0-3,7`.
+fn indices(workers: &[usize]) -> String {
+    let ranges = workers.chunk_by(|one, next| one + 1 == *next);
+    let range = |range: &[usize]| match range {
+        [first, .., last] => format!("{first}-{last}"),
+        _ => range.iter().map(ToString::to_string).collect(),
+    };
+    ranges.map(range).collect::<Vec<_>>().join(",")
 }
 
 /// What a deployment sets itself for a script.
-fn own(deployment: &Deployment, script: &str) -> Vec<String> {
+fn own(deployment: &Deployment, script: &str, workers: &[usize]) -> Vec<String> {
     let (order, folder) = (&deployment.order, &deployment.folder);
     if script == COORDINATOR {
         let name = format!("--job-name={}", order.coordinator_name());
@@ -178,21 +204,18 @@ fn own(deployment: &Deployment, script: &str) -> Vec<String> {
     }
     vec![
         format!("--job-name={}", order.name),
-        format!("--array=0-{}", order.workers.saturating_sub(1)),
+        format!("--array={}", indices(workers)),
         format!("--output={}", pattern(folder, "worker-%a.log")),
     ]
 }
 
-fn refuse_own(option: &str) -> Result<(), DeployError> {
-    let is_own = |(long, letter, _): &&(&str, char, &str)| {
-        let rest = option.strip_prefix(long);
-        rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('='))
-            || (*letter != '\0' && option.strip_prefix('-').is_some_and(|rest| rest.starts_with(*letter)))
-    };
-    match OWN.iter().find(is_own) {
-        Some((_, _, reason)) => {
-            Err(DeployError::Option { option: option.to_owned(), engine: "sbatch", reason })
-        }
-        None => Ok(()),
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_written_as_ranges() {
+        let written = [&[][..], &[0], &[0, 1, 2], &[0, 2, 3, 7]].map(indices);
+        assert_eq!(written, ["", "0", "0-2", "0,2-3,7"]);
     }
 }

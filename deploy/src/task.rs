@@ -31,6 +31,14 @@ impl Role {
             Self::Worker(i) => format!("worker-{i}.log"),
         }
     }
+
+    /// Name of the file beside it in which its script says which process it is.
+    pub(crate) fn process(self) -> String {
+        match self {
+            Self::Coordinator => "coordinator.process".to_owned(),
+            Self::Worker(i) => format!("worker-{i}.process"),
+        }
+    }
 }
 
 /// Where a process stands.

@@ -44,6 +44,10 @@ trap stop TERM INT
 
 "$program" worker --access "$access" --stay --idle {{ idle|sh }} --slots "{{ slots }}"{% if is_solver %} --solver-from {{ study|sh }}{% endif %} &
 worker=$!
+{% if processes is not none %}
+# By this the worker is found among those of the coordinator.
+echo "$(uname -n)/$worker" > {{ processes|sh }}"/worker-${SLURM_ARRAY_TASK_ID:-0}.process" || true
+{% endif %}
 [ -z "$stopped" ] || kill -TERM "$worker" 2> /dev/null
 
 # A signal interrupts `wait` before the worker has ended.

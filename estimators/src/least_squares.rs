@@ -20,6 +20,8 @@ use crate::block_angular::BlockAngular;
 const REJECTED_DAMPING: f64 = 1e-2;
 /// Rejected steps in a row after which the fit has stalled.
 const MOST_REJECTED: usize = 8;
+/// Share of the cost that derivatives from differences of runs resolve.
+const RESOLUTION: f64 = 1e-8;
 /// Longest step of one component, in units of z.
 const LONGEST: f64 = 3.0;
 
@@ -46,7 +48,7 @@ pub struct LeastSquares {
 
 impl LeastSquares {
     /// A fit from a point that was not run yet. It ends when no step promises a fall of the cost (chi-square plus prior) above
-    /// `tolerance`, or after `trials` steps.
+    /// `tolerance` and what the digits of the cost resolve, or after `trials` steps.
     pub fn new(start: DVector<f64>, prior: Scaled, tolerance: f64, trials: usize) -> Self {
         let need = Need::Residual(start.clone());
         Self {
@@ -127,6 +129,11 @@ impl LeastSquares {
     /// The fall of the cost that the linear model predicted for the last step that was considered.
     pub fn last_promise(&self) -> f64 {
         self.predicted
+    }
+
+    /// The smallest fall of the cost that derivatives from differences of runs can promise beside a cost of this size.
+    pub fn resolution(&self) -> f64 {
+        RESOLUTION * self.cost
     }
 
     /// Steps that it may still try.
@@ -248,7 +255,7 @@ impl LeastSquares {
             self.need = Need::Nothing(End::Stalled);
             return;
         };
-        if self.predicted <= self.tolerance {
+        if self.predicted <= self.tolerance.max(self.resolution()) {
             self.need = if self.fresh {
                 Need::Nothing(End::Converged)
             } else if self.thorough {

@@ -31,6 +31,7 @@ mod linearisation;
 mod particles;
 mod pooled;
 mod qr;
+pub mod quantiles;
 mod recombine;
 mod roukf;
 mod sandwich;

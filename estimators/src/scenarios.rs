@@ -6,6 +6,7 @@
 //! is what the outputs then show.
 
 use crate::EstimatorError;
+use crate::quantiles::normal;
 
 /// What is known of an amplitude beforehand: a Gaussian.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,8 +37,7 @@ pub struct Scenario {
 impl Scenario {
     /// The interval that holds the amplitude with 90 %, at the stated noise.
     pub fn interval90(&self) -> [f64; 2] {
-        // The 95 % quantile of the unit normal.
-        let half = 1.644_853_626_951_472_7 * self.sd;
+        let half = normal(0.95) * self.sd;
         [self.amplitude - half, self.amplitude + half]
     }
 }

@@ -9,15 +9,17 @@ Standard library and the project's own binary; the seed is fixed, so the script 
     python3 make_data.py ../../target/release/starlings
 """
 
-import csv
 import math
 import random
-import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
 HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE.parent))
+sys.dont_write_bytecode = True
+
+import twin  # noqa: E402  stands beside the examples
+
 TRUTH = {"E_aorta": 4e6, "E_left": 1.2e7, "R_d_left_leg": 3000.0, "R_d_right_leg": 4500.0, "p0": 103991.16}
 NOISE = {"inlet_pressure": 2.0 * 1333.22, "outflow_left_leg": 3.0, "outflow_right_leg": 3.0}
 SEED = 1
@@ -29,34 +31,21 @@ def flow_at(millisecond: int) -> float:
     return 300.0 * math.sin(math.pi * phase / 0.3) if phase < 0.3 else 0.0
 
 
-def write(path: Path, header: list[str], rows: list[list[float]]) -> None:
-    """Writes a CSV file."""
-    with open(path, "w", newline="") as file:
-        out = csv.writer(file, lineterminator="\n")
-        out.writerow(header)
-        out.writerows([f"{value:.6g}" for value in row] for row in rows)
-
-
-def simulate(binary: str) -> list[dict[str, str]]:
+def simulated(binary: str) -> list[dict[str, str]]:
     """Runs the fine network at the times of a recording that is still empty."""
-    write(HERE / "legs.csv", ["time", *NOISE], [[i / 100, *[0.0] * len(NOISE)] for i in range(241)])
-    with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder) / "truth.csv"
-        values = [f"--set={name}={value}" for name, value in TRUTH.items()]
-        subprocess.run([binary, "simulate", HERE / "truth.toml", *values, "-o", out], check=True)
-        with open(out, newline="") as file:
-            return list(csv.DictReader(file))
+    twin.write(HERE / "legs.csv", ["time", *NOISE], [[i / 100, *[0.0] * len(NOISE)] for i in range(241)])
+    return twin.simulate(binary, HERE / "truth.toml", TRUTH)
 
 
 def main(binary: str) -> None:
     """Simulates, observes, writes."""
-    write(HERE / "flow.csv", ["time", "flow"], [[i / 1000, flow_at(i)] for i in range(0, 2401, 5)])
+    twin.write(HERE / "flow.csv", ["time", "flow"], [[i / 1000, flow_at(i)] for i in range(0, 2401, 5)])
     noise = random.Random(SEED)
     rows = [
         [float(row["time"]), *(float(row[name]) + noise.gauss(0.0, sd) for name, sd in NOISE.items())]
-        for row in simulate(binary)
+        for row in simulated(binary)
     ]
-    write(HERE / "legs.csv", ["time", *NOISE], rows)
+    twin.write(HERE / "legs.csv", ["time", *NOISE], rows)
 
 
 if __name__ == "__main__":

@@ -8,15 +8,16 @@ Standard library and the project's own binary; the seed is fixed, so the script 
     python3 make_data.py ../../target/release/starlings
 """
 
-import csv
 import math
-import random
-import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
 HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE.parent))
+sys.dont_write_bytecode = True
+
+import twin  # noqa: E402  stands beside the examples
+
 TRUTH = {"eps": 0.12, "xd": 0.52, "yd": 0.71}
 OMEGA, WINDOW, SENSORS, SAMPLES, STEP = 2 * math.pi * 1e4, 3.5, 6, 751, 4e-6
 PEAK, NOISE, SEED = 100.0, 0.01, 1
@@ -30,37 +31,18 @@ def force(time: float) -> float:
     return PEAK * math.sin(OMEGA * time / WINDOW) * math.sin(OMEGA * time)
 
 
-def write(path: Path, header: list[str], rows: list[list[float]]) -> None:
-    """Writes a CSV file."""
-    with open(path, "w", newline="") as file:
-        out = csv.writer(file, lineterminator="\n")
-        out.writerow(header)
-        out.writerows([f"{value:.6g}" for value in row] for row in rows)
-
-
-def simulate(binary: str) -> list[dict[str, str]]:
+def simulated(binary: str) -> list[dict[str, str]]:
     """Runs the damaged plate."""
-    write(HERE / "waves.csv", ["time", *CHANNELS], [[i * STEP, *[0.0] * SENSORS] for i in range(SAMPLES)])
-    with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder) / "truth.csv"
-        values = [f"--set={name}={value}" for name, value in TRUTH.items()]
-        subprocess.run([binary, "simulate", HERE / "study.toml", *values, "-o", out], check=True)
-        with open(out, newline="") as file:
-            return list(csv.DictReader(file))
+    twin.write(HERE / "waves.csv", ["time", *CHANNELS], [[i * STEP, *[0.0] * SENSORS] for i in range(SAMPLES)])
+    return twin.simulate(binary, HERE / "study.toml", TRUTH)
 
 
 def main(binary: str) -> None:
     """Simulates, observes, writes."""
-    write(HERE / "burst.csv", ["time", "force"], [*([i * 2e-6, force(i * 2e-6)] for i in range(91)), [0.003, 0.0]])
-    clean = [[float(row["time"]), *(float(row[name]) for name in CHANNELS)] for row in simulate(binary)]
-    values = [value for row in clean for value in row[1:]]
-    noise = NOISE * math.sqrt(sum(value * value for value in values) / len(values))
-    generator = random.Random(SEED)
-    write(
-        HERE / "waves.csv",
-        ["time", *CHANNELS],
-        [[row[0], *(value + generator.gauss(0.0, noise) for value in row[1:])] for row in clean],
-    )
+    twin.write(HERE / "burst.csv", ["time", "force"], [*([i * 2e-6, force(i * 2e-6)] for i in range(91)), [0.003, 0.0]])
+    clean = [[float(row["time"]), *(float(row[name]) for name in CHANNELS)] for row in simulated(binary)]
+    rows, noise = twin.noisy(clean, NOISE, SEED)
+    twin.write(HERE / "waves.csv", ["time", *CHANNELS], rows)
     print(f"noise: {noise:.4g} m")
 
 

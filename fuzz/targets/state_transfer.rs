@@ -3,7 +3,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use prost::Message;
-use starlings_proto::convert::lent::{Lend, decode_in_memory, encode_in_memory};
+use starlings_proto::convert::lent::{GiveBack, Lend, decode_in_memory, encode_in_memory};
 use starlings_proto::convert::piece_names::{decode_names, encode_names};
 use starlings_proto::convert::state::{
     Get, PutHead, chunk_values, decode_chunk, decode_head, decode_put_result, encode_put_result, n_chunks,
@@ -30,6 +30,11 @@ fuzz_target!(|bytes: &[u8]| {
         && let Ok(lend) = Lend::decode(&message)
     {
         assert_eq!(Lend::decode(&lend.encode()), Ok(lend));
+    }
+    if let Ok(message) = generated::GiveBackRequest::decode(bytes)
+        && let Ok(back) = GiveBack::decode(&message)
+    {
+        assert_eq!(GiveBack::decode(&back.encode()), Ok(back));
     }
     // A whole stream: messages one after the other, each after its length.
     let mut rest = bytes;

@@ -32,6 +32,27 @@ fn every_name_of_a_state_parameter_output_or_input_is_given_once() {
     }
 }
 
+/// A term of an effect that adds to such a name enters the rate of the state: nobody may find another quantity under it. A term for
+/// the output says `output:NAME`.
+#[test]
+fn an_output_with_the_name_of_a_state_shows_that_state() {
+    for kind in kinds() {
+        let (setup, theta) = setup(&kind);
+        let spec = setup.spec().unwrap();
+        let (window, model) = (window(&setup, 8), setup.build().unwrap());
+        let prediction = run(&*model, &window, &theta);
+        let shown = &prediction.outputs[prediction.outputs.len() - spec.n_output()..];
+        for output in &spec.outputs {
+            let Some(state) = spec.states.iter().find(|state| state.name == output.name) else { continue };
+            assert_eq!(state.size, output.size, "{kind}: {}", output.name);
+            let place = |list| Spec::offset(list, &output.name).unwrap();
+            let (x, y) = (place(&spec.states), place(&spec.outputs));
+            let (x, y) = (&prediction.state[x..x + state.size], &shown[y..y + output.size]);
+            assert_eq!(x, y, "{kind}: {} is a state and an output", output.name);
+        }
+    }
+}
+
 #[test]
 fn every_model_starts_from_a_finite_state_and_predicts_every_output() {
     for kind in kinds() {

@@ -16,6 +16,20 @@ pub enum PieceError {
         /// What the system said.
         source: Arc<std::io::Error>,
     },
+    /// The bucket refuses or does not answer.
+    #[cfg(feature = "s3")]
+    #[error(
+        "cannot {what} {} for the states of particles: {says}; the bucket has to be there, and AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, AWS_REGION \
+         and, for a service that is not Amazon's, AWS_ENDPOINT say how to reach it", url.display()
+    )]
+    Bucket {
+        /// What was tried.
+        what: &'static str,
+        /// The bucket with the prefix.
+        url: PathBuf,
+        /// What was answered.
+        says: String,
+    },
     /// A piece that is not there.
     #[error("the piece {piece} of a particle's state is missing: expected the file {}", path.display())]
     Missing {

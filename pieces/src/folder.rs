@@ -1,62 +1,71 @@
-//! A folder of pieces: a file per piece, by its name. Whoever reads one checks it against its name.
+//! A folder of pieces: each under its name. Whoever reads one checks it against its name.
 //!
-//! A state is data of the study: folder and files are the user's own (0700 and 0600), unless the folder says that it is a group's.
+//! What it is made of is one of two: files, or objects of a bucket. Next files to read: [`crate::files`], `bucket`.
 
 use std::collections::HashSet;
-use std::io::{ErrorKind, Write as _};
+use std::fmt::Debug;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use bytes::Bytes;
-use tempfile::{Builder, TempDir, TempPath};
+use tempfile::TempPath;
 
-use crate::access::Access;
+use crate::files::Files;
 use crate::{PieceError, PieceName, hex};
 
-/// End of the name of a file that is being written.
-const PARTIAL: &str = ".partial";
+/// What pieces stand in.
+pub(crate) trait Storage: Debug + Send + Sync {
+    /// Where it is, for people.
+    fn path(&self) -> &Path;
+    /// Writes a piece where nobody sees it yet.
+    fn stage(&self, bytes: &[u8]) -> Result<Staged, PieceError>;
+    /// Puts a written piece into its place.
+    fn place(&self, written: Staged, name: &PieceName) -> Result<(), PieceError>;
+    /// What stands in the place of a piece.
+    fn fetch(&self, name: &PieceName) -> Result<Bytes, PieceError>;
+    /// Bytes of what stands there.
+    fn length(&self, name: &PieceName) -> Result<u64, PieceError>;
+    fn remove(&self, name: &PieceName);
+    /// Removes all but what has these names.
+    fn keep_only(&self, names: &HashSet<String>);
+    /// Removes all.
+    fn clear(&self);
+}
 
 /// A folder of pieces. It is made when the first piece is written. Several processes may write into one.
 #[derive(Debug)]
 pub struct Folder {
-    path: PathBuf,
-    access: Access,
+    storage: Box<dyn Storage>,
     /// Whether it goes with this value.
     passing: bool,
-    /// What removes a temporary one.
-    _temporary: Option<TempDir>,
 }
 
-/// A piece that is written beside its place; dropped, it is gone.
+/// A piece that is written and not yet in its place; dropped, it is gone.
 #[derive(Debug)]
 #[must_use]
-pub struct Staged(TempPath);
+pub enum Staged {
+    /// Beside its place.
+    File(TempPath),
+    /// To be sent as a whole.
+    #[cfg(feature = "s3")]
+    Object(Bytes),
+}
 
 impl Folder {
-    fn new(path: PathBuf, access: Access) -> Self {
-        Self { path, access, passing: false, _temporary: None }
+    pub(crate) fn of(storage: impl Storage + 'static) -> Self {
+        Self { storage: Box::new(storage), passing: false }
     }
 
-    /// A folder that stays, for nobody but the user.
+    /// A folder of files that stays, for nobody but the user.
     pub fn at(path: &Path) -> Self {
-        Self::new(path.to_owned(), Access::Own)
+        Self::of(Files::at(path))
     }
 
-    /// A folder that stays, inside one that machines share: for the group of that one where it is a group's.
-    pub(crate) fn inside(place: &Path, name: &str) -> Self {
-        Self::new(place.join(name), Access::of(place))
-    }
-
-    /// A folder among the system's temporary ones, which goes with this value.
+    /// A folder of files among the system's temporary ones, which goes with this value.
     ///
     /// # Errors
     /// When none can be made.
     pub fn temporary() -> Result<Self, PieceError> {
-        let mut builder = Builder::new();
-        builder.prefix("starlings-states-").permissions(Access::Own.of_folder());
-        let folder = builder.tempdir().map_err(Self::failed("make a folder in", &std::env::temp_dir()))?;
-        let path = folder.path().to_owned();
-        Ok(Self { path, access: Access::Own, passing: false, _temporary: Some(folder) })
+        Files::temporary().map(Self::of)
     }
 
     /// The same, which goes with this value.
@@ -68,44 +77,20 @@ impl Folder {
 
     /// Whether it is this one.
     pub fn is_at(&self, path: &Path) -> bool {
-        self.path == path
+        self.path() == path
     }
 
-    /// Where it is.
+    /// Where it is; of a bucket its URL.
     pub fn path(&self) -> &Path {
-        &self.path
+        self.storage.path()
     }
 
-    /// Where a piece stands.
-    fn file(&self, name: &PieceName) -> PathBuf {
-        self.path.join(hex(name))
-    }
-
-    fn failed(what: &'static str, path: &Path) -> impl Fn(std::io::Error) -> PieceError {
-        move |source| PieceError::Folder { what, path: path.to_owned(), source: Arc::new(source) }
-    }
-
-    /// Writes a piece beside its place; [`Folder::place`] puts it there.
+    /// Writes a piece where nobody sees it; [`Folder::place`] puts it into its place.
     ///
     /// # Errors
     /// When the folder refuses.
     pub fn stage(&self, bytes: &[u8]) -> Result<Staged, PieceError> {
-        let write = || {
-            let mut builder = Builder::new();
-            builder.suffix(PARTIAL).permissions(self.access.of_file());
-            let mut file = builder.tempfile_in(&self.path)?;
-            file.write_all(bytes)?;
-            self.access.open_up(file.path(), &self.access.of_file())?;
-            Ok(file.into_temp_path())
-        };
-        let written = write().or_else(|error: std::io::Error| {
-            if error.kind() != ErrorKind::NotFound {
-                return Err(error);
-            }
-            self.access.make(&self.path)?;
-            write()
-        });
-        written.map(Staged).map_err(Self::failed("write into", &self.path))
+        self.storage.stage(bytes)
     }
 
     /// Puts a written piece into its place.
@@ -113,8 +98,7 @@ impl Folder {
     /// # Errors
     /// When the folder refuses.
     pub fn place(&self, written: Staged, name: &PieceName) -> Result<(), PieceError> {
-        let path = self.file(name);
-        written.0.persist(&path).map_err(|refused| Self::failed("write", &path)(refused.error))
+        self.storage.place(written, name)
     }
 
     /// Writes a piece into its place, whether it is there or not: what stands there may be damaged.
@@ -130,17 +114,11 @@ impl Folder {
     /// # Errors
     /// When it is missing, damaged, or the folder refuses.
     pub fn read(&self, name: &PieceName) -> Result<Bytes, PieceError> {
-        let path = self.file(name);
-        let bytes = match std::fs::read(&path) {
-            Err(error) if error.kind() == ErrorKind::NotFound => {
-                return Err(PieceError::Missing { piece: hex(name), path });
-            }
-            other => other.map_err(Self::failed("read", &path))?,
-        };
+        let bytes = self.storage.fetch(name)?;
         if blake3::hash(&bytes) != *name {
-            return Err(PieceError::Damaged { piece: hex(name), path });
+            return Err(self.damaged(name));
         }
-        Ok(bytes.into())
+        Ok(bytes)
     }
 
     /// Whether a piece is there, with so many bytes.
@@ -148,33 +126,28 @@ impl Folder {
     /// # Errors
     /// When it is not.
     pub fn check(&self, name: &PieceName, bytes: usize) -> Result<(), PieceError> {
-        let path = self.file(name);
-        match std::fs::metadata(&path) {
-            Ok(found) if found.len() == bytes as u64 => Ok(()),
-            Ok(_) => Err(PieceError::Damaged { piece: hex(name), path }),
-            Err(_) => Err(PieceError::Missing { piece: hex(name), path }),
-        }
+        if self.storage.length(name)? == bytes as u64 { Ok(()) } else { Err(self.damaged(name)) }
+    }
+
+    fn damaged(&self, name: &PieceName) -> PieceError {
+        let piece = hex(name);
+        let path: PathBuf = self.path().join(&piece);
+        PieceError::Damaged { piece, path }
     }
 
     /// Removes a piece that nobody needs.
     pub fn remove(&self, name: &PieceName) {
-        // A file that stays costs space; the next resume removes it.
-        let _ = std::fs::remove_file(self.file(name));
+        self.storage.remove(name);
     }
 
-    /// Removes every file that is none of these pieces, as a killed process leaves them.
+    /// Removes everything that is none of these pieces, as a killed process leaves it.
     pub fn keep_only(&self, names: &HashSet<String>) {
-        let Ok(entries) = std::fs::read_dir(&self.path) else { return };
-        for entry in entries.flatten() {
-            if !entry.file_name().to_str().is_some_and(|name| names.contains(name)) {
-                let _ = std::fs::remove_file(entry.path());
-            }
-        }
+        self.storage.keep_only(names);
     }
 
     /// Removes the folder with all that is in it.
     pub fn clear(&self) {
-        let _ = std::fs::remove_dir_all(&self.path);
+        self.storage.clear();
     }
 }
 

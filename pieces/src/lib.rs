@@ -1,11 +1,14 @@
-//! Where large states stand: pieces in files by the hash of their bytes, in a folder of one process or in one that machines share; or
-//! whole in memory that processes of one machine share.
+//! Where large states stand: pieces in files by the hash of their bytes, in a folder of one process or in one that machines share; with
+//! the feature `s3` as objects of a bucket; or whole in memory that processes of one machine share.
 //!
 //! Coordinator and workers see this crate; nothing here knows states, jobs or messages. Next file to read: [`folder`], then
 //! [`place`] for what machines share and [`memory`] for what processes do.
 
 mod access;
+#[cfg(feature = "s3")]
+mod bucket;
 pub mod error;
+mod files;
 pub mod folder;
 pub mod memory;
 pub mod place;

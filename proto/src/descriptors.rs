@@ -2,7 +2,8 @@
 //!
 //! The coordinator makes a second pair of sockets and offers one end in the first byte of the connection, before its process starts;
 //! later it sends descriptors on the pair, each under a number that the worker has drawn and named in a request. A descriptor is in
-//! the pair before the answer that tells of it. None goes the other way: what a worker sends is bytes alone. What the
+//! the pair before the answer that tells of it. None goes the other way: what a worker sends is bytes alone. A descriptor may be lost on
+//! its way, as where a process has all that it may have: then there is none under its number, and whoever asked does without. What the
 //! descriptors are of is no matter here. Next file to read: [`crate::convert::lent`].
 
 use std::collections::BTreeMap;
@@ -36,15 +37,18 @@ impl DescriptorSender {
 }
 
 /// Makes the way of descriptors of a worker that is about to start and offers it on its connection, of which this is the own end:
-/// the first byte there. Where the system gives no such way, the byte says so.
+/// the first byte there. Where the system gives no such way, or none that it can pass on, the byte comes alone.
 ///
 /// # Errors
 /// When the connection takes no byte.
 pub fn offer(connection: &UnixStream) -> io::Result<Option<DescriptorSender>> {
     let pair = socketpair(AddressFamily::UNIX, SocketType::SEQPACKET, SocketFlags::CLOEXEC, None);
-    let Ok((own, its)) = pair else { return send(connection.as_fd(), &[OFFER], None).map(|()| None) };
-    send(connection.as_fd(), &[OFFER], Some(its.as_fd()))?;
-    Ok(Some(DescriptorSender(Arc::new(own))))
+    if let Ok((own, its)) = pair
+        && send(connection.as_fd(), &[OFFER], Some(its.as_fd())).is_ok()
+    {
+        return Ok(Some(DescriptorSender(Arc::new(own))));
+    }
+    send(connection.as_fd(), &[OFFER], None).map(|()| None)
 }
 
 fn send(socket: BorrowedFd<'_>, bytes: &[u8], descriptor: Option<BorrowedFd<'_>>) -> io::Result<()> {
@@ -59,7 +63,7 @@ fn send(socket: BorrowedFd<'_>, bytes: &[u8], descriptor: Option<BorrowedFd<'_>>
     Ok(())
 }
 
-/// What has come on a socket, with the descriptor that came with it; no bytes at its end.
+/// What has come on a socket, with the descriptor that came with it, unless the system had none left for it; no bytes at its end.
 fn receive<const N: usize>(socket: BorrowedFd<'_>) -> io::Result<(usize, [u8; N], Option<OwnedFd>)> {
     let mut bytes = [0; N];
     let mut space = [MaybeUninit::uninit(); rustix::cmsg_space!(ScmRights(1))];
@@ -108,12 +112,12 @@ impl DescriptorReceiver {
         Asked { number, receiver: Arc::clone(self) }
     }
 
-    /// Takes all that has come; what nobody asked for is closed.
+    /// Takes all that has come; what nobody asked for is closed. A number whose descriptor was lost has none.
     fn drain(&self) {
         let mut asked = self.lock();
-        while let Ok((8, number, Some(descriptor))) = receive::<8>(self.socket.as_fd()) {
+        while let Ok((8, number, descriptor)) = receive::<8>(self.socket.as_fd()) {
             if let Some(place) = asked.get_mut(&u64::from_le_bytes(number)) {
-                *place = Some(descriptor);
+                *place = descriptor;
             }
         }
     }
@@ -136,7 +140,7 @@ impl Asked {
         self.number
     }
 
-    /// The descriptor, once an answer told that it was sent.
+    /// The descriptor, once an answer told that it was sent; `None` where it was lost.
     pub fn take(self) -> Option<OwnedFd> {
         self.receiver.drain();
         self.receiver.lock().get_mut(&self.number)?.take()

@@ -5,6 +5,7 @@
 //! reading alone, and for writing only while a write waits for room.
 
 use std::io::{self, IoSlice, Write};
+use std::os::fd::OwnedFd;
 use std::os::unix::net::UnixStream;
 use std::pin::Pin;
 use std::task::{Context, Poll};
@@ -22,6 +23,8 @@ pub struct SocketEnd {
     incoming: Receiver,
     /// There while a write waits for room.
     room: Option<Sender>,
+    /// What `room` is made of: a process that has all descriptors that it may have can still wait.
+    spare: Option<OwnedFd>,
     /// The way of descriptors beside it.
     descriptors: Option<DescriptorSender>,
 }
@@ -34,7 +37,8 @@ impl SocketEnd {
     pub fn new(socket: UnixStream) -> io::Result<Self> {
         socket.set_nonblocking(true)?;
         let incoming = Receiver::from_owned_fd_unchecked(socket.try_clone()?.into())?;
-        Ok(Self { socket, incoming, room: None, descriptors: None })
+        let spare = Some(socket.try_clone()?.into());
+        Ok(Self { socket, incoming, room: None, spare, descriptors: None })
     }
 
     /// The same with a way of descriptors beside it, which those who serve on it are told of.
@@ -54,11 +58,12 @@ impl SocketEnd {
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
                 done => return Poll::Ready(done),
             }
-            self.room = Some(Sender::from_owned_fd_unchecked(self.socket.try_clone()?.into())?);
+            let spare = self.spare.take().map_or_else(|| self.socket.try_clone().map(OwnedFd::from), Ok)?;
+            self.room = Some(Sender::from_owned_fd_unchecked(spare)?);
         }
         let written = self.room.as_mut().map_or(Poll::Pending, |room| waiting(Pin::new(room)));
         if written.is_ready() {
-            self.room = None;
+            self.spare = self.room.take().and_then(|room| room.into_nonblocking_fd().ok());
         }
         written
     }

@@ -6,7 +6,7 @@ use clap::Parser;
 use starlings_coordinator::study::Study;
 use starlings_deploy::{DeployError, KubernetesOrder};
 
-use super::{access, failed, now};
+use super::{access, failed};
 use crate::console::line;
 use crate::failure::Failure;
 use crate::load::{is_outside, load_where};
@@ -87,8 +87,7 @@ fn order(args: &Args, study: &Study) -> Result<KubernetesOrder, Failure> {
     let name = args.study.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let files = if args.study_claim.is_some() { Vec::new() } else { files(study, &args.study)? };
     Ok(KubernetesOrder {
-        // The time tells two deployments of one study apart; with the longest ending it has no more than the 63 letters of a name.
-        name: format!("{}-{:x}", KubernetesOrder::name_of(&study.name), now()),
+        name: KubernetesOrder::name_of(&study.name, stamp()),
         image: args.image.clone(),
         workers: args.workers,
         max_workers: args.max_workers,
@@ -101,6 +100,12 @@ fn order(args: &Args, study: &Study) -> Result<KubernetesOrder, Failure> {
         files,
         is_solver: is_outside(study),
     })
+}
+
+/// Tells two deployments of one study apart: by the millisecond, and those of one by who makes them.
+fn stamp() -> u64 {
+    let milliseconds = jiff::Timestamp::now().as_millisecond().unsigned_abs();
+    (milliseconds << 16) | u64::from(std::process::id() & 0xffff)
 }
 
 /// The study file and the files that it names, by their paths in its folder.

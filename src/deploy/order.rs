@@ -17,7 +17,7 @@ pub(crate) struct OrderArgs {
     pub(super) study: PathBuf,
     /// Number of workers; on a list of hosts one on each without it.
     #[arg(long, value_name = "N")]
-    workers: Option<usize>,
+    pub(super) workers: Option<usize>,
     /// Access file by which workers and coordinator find each other; access.json in the folder of the deployment without it. It
     /// need not exist yet.
     #[arg(long, value_name = "FILE")]
@@ -48,14 +48,15 @@ fn idle(text: &str) -> Result<String, String> {
 }
 
 impl OrderArgs {
-    /// The order and the folder for it. The study is read and checked; no solver is started.
+    /// The order and the folder for it, with `default` workers where nothing is said. The study is read and checked; no solver is started.
     pub(super) fn order(
         &self,
         is_job: bool,
         options: &[String],
+        default: Option<usize>,
         hosts: &[String],
     ) -> Result<(Order, PathBuf), Failure> {
-        let workers = self.workers.or(Some(hosts.len()).filter(|n| *n > 0));
+        let workers = self.workers.or(default);
         let workers =
             workers.ok_or_else(|| Failure::input("say with --workers N how many workers there are to be"))?;
         if workers == 0 {
@@ -80,6 +81,7 @@ impl OrderArgs {
             is_solver: is_outside(&study),
             program,
             workers,
+            elastic: None,
             slots: self.slots,
             access: absolute(&self.access.clone().unwrap_or_else(|| folder.join("access.json")))?,
             idle: self.idle.clone(),

@@ -33,6 +33,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 /// Cancels and waits.
 pub(super) fn remove(deployment: &Deployment, within: Duration) -> Result<(), Failure> {
     let started = Instant::now();
+    deployment.note_removed().map_err(failed)?;
     // Before any look, which may hang: a task may be on its way too.
     let cancelled = deployment.engine().cancel(deployment);
     let mut left = left(deployment)?;

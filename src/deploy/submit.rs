@@ -5,13 +5,15 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
-use starlings_deploy::{Deployment, Engine, Hosts, Order, Slurm, State};
+use starlings_deploy::elastic::Limits;
+use starlings_deploy::{Deployment, Engine, Hosts, Order, Pbs, Slurm, State};
 use starlings_worker::check_address;
+use tokio_util::sync::CancellationToken;
 
 use super::order::OrderArgs;
 use super::status::last_words;
 use super::{access, failed};
-use crate::console::{line, note};
+use crate::console::{cancel_on_signal, line, note};
 use crate::failure::Failure;
 
 /// How long it is looked whether what was submitted dies at once.
@@ -37,6 +39,10 @@ pub(crate) struct SlurmArgs {
     /// Where the coordinator runs.
     #[arg(long, value_name = "WHERE", default_value = "here")]
     coordinator: Coordinator,
+    /// Let the number of workers follow the work: the least and the most. MIN are submitted; `starlings deploy watch` adds and ends
+    /// others while it runs.
+    #[arg(long, value_name = "MIN..MAX", conflicts_with = "workers")]
+    elastic: Option<Limits>,
     /// Options for sbatch, such as -p PARTITION --time=2:00:00 -c 4.
     #[arg(last = true, value_name = "SBATCH OPTIONS")]
     options: Vec<String>,
@@ -44,8 +50,27 @@ pub(crate) struct SlurmArgs {
 
 /// Deploys under Slurm.
 pub(crate) fn slurm(args: &SlurmArgs) -> Result<(), Failure> {
-    let made = args.order.order(args.coordinator == Coordinator::Job, &args.options, &[])?;
-    submit(&Slurm, made, args.order.dry_run, None)
+    let most = args.elastic.map(|limits| limits.most);
+    let is_job = args.coordinator == Coordinator::Job;
+    let (mut order, folder) = args.order.order(is_job, &args.options, most, &[])?;
+    order.elastic = args.elastic;
+    submit(&Slurm, (order, folder), args.order.dry_run, None)
+}
+
+/// Submit an array of workers to PBS.
+#[derive(Args)]
+pub(crate) struct PbsArgs {
+    #[command(flatten)]
+    order: OrderArgs,
+    /// Options for qsub, such as -q QUEUE -l walltime=2:00:00 -l select=1:ncpus=4.
+    #[arg(last = true, value_name = "QSUB OPTIONS")]
+    options: Vec<String>,
+}
+
+/// Deploys under PBS.
+pub(crate) fn pbs(args: &PbsArgs) -> Result<(), Failure> {
+    let made = args.order.order(false, &args.options, None, &[])?;
+    submit(&Pbs, made, args.order.dry_run, None)
 }
 
 /// Start workers on a list of machines over ssh.
@@ -82,7 +107,7 @@ pub(crate) fn hosts(args: &HostsArgs) -> Result<(), Failure> {
     if hosts.is_empty() {
         return Err(Failure::input("the list of hosts is empty"));
     }
-    let (mut order, folder) = args.order.order(false, &[], &hosts)?;
+    let (mut order, folder) = args.order.order(false, &[], Some(hosts.len()), &hosts)?;
     order.ssh = shell_words::split(&args.ssh).map_err(|error| Failure::input(format!("--ssh: {error}")))?;
     if let Some(address) = &args.address {
         check_address(address).map_err(|error| Failure::input(format!("--address: {error}")))?;
@@ -122,8 +147,17 @@ fn submit(
     {
         access::prepare(&deployment.order.access, &deployment.order.name, vec![address.to_owned()])?;
     }
+    if deployment.order.elastic.is_some() {
+        // A coordinator writes into it where it stands.
+        let work = starlings_deploy::work::path(&deployment.order.access);
+        let written =
+            work.parent().map_or(Ok(()), std::fs::create_dir_all).and_then(|()| std::fs::write(&work, ""));
+        written.map_err(|error| Failure::input(format!("cannot write {}: {error}", work.display())))?;
+    }
+    let ask = CancellationToken::new();
+    cancel_on_signal(&ask);
     engine.submit(&deployment).map_err(failed)?;
-    look(&deployment)?;
+    look(&deployment, &ask)?;
     told(&deployment)
 }
 
@@ -134,7 +168,13 @@ fn in_shell(command: &[String]) -> String {
 /// What comes next.
 fn told(deployment: &Deployment) -> Result<(), Failure> {
     let order = &deployment.order;
+    let folder = shell_words::quote(&deployment.folder.to_string_lossy()).into_owned();
     let tasks = deployment.tasks().unwrap_or_default();
+    if let Some(limits) = order.elastic {
+        line(format_args!(
+            "{limits} workers, as many as the work asks for, are kept by: starlings deploy watch {folder}"
+        ))?;
+    }
     let running = tasks.iter().filter(|task| task.state == State::Running).count();
     if tasks.is_empty() {
         line(format_args!("submitted {} as {}", plural(order), order.name))?;
@@ -150,7 +190,6 @@ fn told(deployment: &Deployment) -> Result<(), Failure> {
     if let Some(says) = waits.and_then(|task| task.says.as_deref()) {
         line(format_args!("the others wait: {says}"))?;
     }
-    let folder = shell_words::quote(&deployment.folder.to_string_lossy()).into_owned();
     match &order.run_folder {
         Some(run) => line(format_args!("result:  {}", run.display()))?,
         None => line(format_args!("next:    {}", order.coordinator_command()))?,
@@ -161,15 +200,20 @@ fn told(deployment: &Deployment) -> Result<(), Failure> {
 }
 
 fn plural(order: &Order) -> String {
-    let workers = format!("{} worker{}", order.workers, if order.workers == 1 { "" } else { "s" });
+    let n = order.first().len();
+    let workers = format!("{n} worker{}", if n == 1 { "" } else { "s" });
     if order.run_folder.is_some() { format!("a coordinator and {workers}") } else { workers }
 }
 
 /// Waits a moment and refuses what died in it: where a script or a node is wrong, all tasks do.
-fn look(deployment: &Deployment) -> Result<(), Failure> {
+fn look(deployment: &Deployment, ask: &CancellationToken) -> Result<(), Failure> {
     let started = Instant::now();
     while started.elapsed() < LOOKED_AT {
         sleep(TICK);
+        if ask.is_cancelled() {
+            let message = format!("interrupted; {}", deployment.cancel_rest());
+            return Err(Failure::Interrupted { message, code: 130 });
+        }
         let tasks = match deployment.tasks() {
             Ok(tasks) => tasks,
             // The submission stands.

@@ -5,13 +5,16 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use clap::Parser;
+use starlings_deploy::elastic::Patience;
 use starlings_deploy::{Deployment, State, Task};
 use tokio_util::sync::CancellationToken;
 
+use super::scale::Scale;
 use super::status::{last_words, span};
 use super::{failed, now, remove};
 use crate::console::{cancel_on_signal, note};
 use crate::failure::Failure;
+use crate::worker::duration;
 
 /// How often Ctrl-C is looked for.
 const TICK: Duration = Duration::from_millis(100);
@@ -25,8 +28,8 @@ const PATIENCE: i64 = 60;
 /// Failed questions to the engine in a row after which it is given up.
 const ATTEMPTS: u32 = 10;
 
-/// Keep the pool of a deployment: have what the engine starts again started at once, and say what waits and why. Ends when no
-/// process of it is left.
+/// Keep the pool of a deployment: have what the engine starts again started at once, say what waits and why, and with --elastic add
+/// and end workers as the work asks. Ends when no process of it is left.
 #[derive(Parser)]
 pub(crate) struct Args {
     /// Folder of the deployment.
@@ -34,6 +37,9 @@ pub(crate) struct Args {
     /// Seconds between two looks.
     #[arg(long, default_value_t = 5.0, value_name = "SECONDS")]
     every: f64,
+    /// With --elastic: end workers when the work has not asked for as many for so long, such as 90s or 10m.
+    #[arg(long, value_name = "TIME", default_value = "60s", value_parser = duration)]
+    release_after: Duration,
     /// Remove the deployment at Ctrl-C.
     #[arg(long)]
     remove_on_exit: bool,
@@ -48,6 +54,8 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let deployment = Deployment::read(&args.folder).map_err(failed)?;
     let ask = CancellationToken::new();
     cancel_on_signal(&ask);
+    let patience = Patience { add: every, release: args.release_after.max(every) };
+    let mut scale = Scale::of(&deployment, patience);
     let mut seen = Seen { tasks: Vec::new(), told_at: PATIENCE };
     let mut failures = 0;
     loop {
@@ -59,7 +67,8 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
                 if failures > ATTEMPTS {
                     return Err(given_up(&deployment, unreached));
                 }
-                if unreached == 0 && !seen.tasks.iter().any(|task| task.state.is_live()) {
+                let has_work = scale.as_mut().is_some_and(|scale| scale.look(&deployment, &seen.tasks));
+                if unreached == 0 && !has_work && !seen.tasks.iter().any(|task| task.state.is_live()) {
                     note(format_args!("{}: no process is left", deployment.order.name));
                     return Ok(());
                 }
@@ -125,7 +134,9 @@ impl Seen {
             }
             let before = self.tasks.iter().find(|before| before.role == task.role);
             let is_news = before.is_none_or(|before| {
+                let is_running = task.state == State::Running;
                 (before.state, before.restarts, &before.node) != (task.state, task.restarts, &task.node)
+                    || is_running && before.says != task.says && task.says.is_some()
             });
             if is_news {
                 tell(deployment, task);

@@ -33,9 +33,11 @@ pub(super) fn print(found: &Explanation, states: &[String], folder: &Path) -> Re
         line(format_args!("  in the place of the model's own {}", found.replaced.join(", ")))?;
     }
     ties(found)?;
-    if let Some(nearest) = found.closest.as_ref().filter(|_| found.verdict == Verdict::Unexplained) {
+    if found.verdict == Verdict::Unexplained && !found.closest.is_empty() {
         line("\nwhat came nearest, and was not added")?;
-        text(described(nearest, states))?;
+        for effect in &found.closest {
+            text(described(effect, states))?;
+        }
     }
     gap(found)?;
     held_out(found)?;

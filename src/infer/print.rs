@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use starlings_coordinator::infer::Inference;
-use starlings_coordinator::infer::result::{CoefficientFound, UnknownFound};
+use starlings_coordinator::infer::result::{CoefficientFound, MissingFound, UnknownFound};
 
 use crate::console::{line, note, number, table, text};
 use crate::failure::Failure;
@@ -24,11 +24,54 @@ pub(super) fn print(found: &Inference, folder: &Path) -> Result<(), Failure> {
         let rows = reduced.unknowns.iter().map(unknown);
         text(table(&std::iter::once(heading).chain(rows).collect::<Vec<_>>(), false))?;
     }
+    if let Some(missing) = &found.missing {
+        terms(missing)?;
+    }
     line(format_args!("\ncovariance of the noise per {}", found.time_unit))?;
     text(table(&noise(found), false))?;
     line(format_args!("\n{}", found.conditional_on))?;
     note(format_args!("written: {}", folder.display()));
     Ok(())
+}
+
+/// Terms that the drift lacks, or the strongest candidates where it lacks none.
+fn terms(missing: &MissingFound) -> Result<(), Failure> {
+    let of = missing.candidates;
+    if missing.named.is_empty() {
+        line(format_args!("\nno term is missing among {of} candidates; the strongest of them"))?;
+        let heading = ["name", "χ²", "by chance"].map(str::to_owned).to_vec();
+        let rows = missing.strongest.iter().take(3);
+        let rows = rows.map(|s| vec![s.name.clone(), format!("{:.1}", s.chi_squared), chance(s.by_chance)]);
+        text(table(&std::iter::once(heading).chain(rows).collect::<Vec<_>>(), false))?;
+    } else {
+        line(format_args!("\nterms that the drift lacks, of {of} candidates"))?;
+        let heading =
+            ["name", "estimate", "sd", "90 % interval", "χ²", "by chance", "as good"].map(str::to_owned);
+        let rows = missing.named.iter().map(|n| {
+            let shown = |value: f64| number(value, Some(n.sd));
+            let [lo, hi] = n.interval90;
+            let interval = format!("{} to {}", shown(lo), shown(hi));
+            let score = [format!("{:.1}", n.chi_squared), chance(n.by_chance), n.ties.join(", ")];
+            [vec![n.name.clone(), shown(n.estimate), shown(n.sd), interval], score.to_vec()].concat()
+        });
+        text(table(&std::iter::once(heading.to_vec()).chain(rows).collect::<Vec<_>>(), false))?;
+    }
+    if let Some(left) = &missing.left {
+        let (chi, terms, p) = (left.chi_squared, left.terms, chance(left.by_chance));
+        line(format_args!("what is left of them together: χ² {chi:.1} for {terms} terms, by chance {p}"))?;
+    }
+    if let Some(held_out) = missing.held_out.as_ref().filter(|_| !missing.named.is_empty()) {
+        let (gain, n) = (held_out.gain, held_out.n_step);
+        line(format_args!("held-out records: {gain:.1} nats better with the named terms over {n} steps"))?;
+    }
+    Ok(())
+}
+
+fn chance(p: f64) -> String {
+    if p <= 0.0 {
+        return "below 1e-300".to_owned();
+    }
+    if p < 1e-3 { format!("{p:.0e}") } else { format!("{p:.3}") }
 }
 
 fn coefficient(c: &CoefficientFound) -> Vec<String> {

@@ -1,4 +1,4 @@
-//! Which programs a worker may start for a coordinator: those that its own command line names.
+//! Which programs a worker may start and which files it may read for a coordinator: those that its own command line names.
 //!
 //! Next file to read: `worker/solver/src/permit.rs`, which compares a setup with them.
 
@@ -8,6 +8,7 @@ use clap::Args;
 use starlings_coordinator::study::{SolverHost, Study};
 use starlings_models::SolverDef;
 use starlings_solver::{Permit, adapters};
+use starlings_worker::Reading;
 
 use crate::console::note;
 use crate::failure::Failure;
@@ -21,7 +22,7 @@ pub(crate) struct PermitArgs {
     /// Run the solver of this study file of this machine, with its command, environment and files, and no other.
     #[arg(long, value_name = "STUDY", conflicts_with_all = ["solver", "describe"])]
     solver_from: Option<PathBuf>,
-    /// Run whatever command a study names: the coordinator can then do all that this user can.
+    /// Run whatever command a study names, and read the recordings of an inference: the coordinator can then do all that this user can.
     #[arg(long, conflicts_with_all = ["solver", "solver_from", "describe"])]
     allow_commands_from_study: bool,
 }
@@ -42,6 +43,11 @@ impl PermitArgs {
             return Ok(Permit::Pinned(Box::new(solver_of(study)?)));
         }
         Ok(if self.allow_commands_from_study { Permit::Study } else { Permit::Nothing })
+    }
+
+    /// Whether recordings that an inference names are read: whoever may run any command may have any file read too.
+    pub(crate) fn reading(&self) -> Reading {
+        if self.allow_commands_from_study { Reading::Allowed } else { Reading::Refused }
     }
 
     /// Says what `--allow-commands-from-study` gives up, where somebody reads it.

@@ -7,8 +7,10 @@ use std::path::PathBuf;
 use std::process::Command;
 use std::sync::{Mutex, OnceLock};
 
+pub(crate) use crate::common::python::has_python;
+use crate::common::python::path;
 use crate::common::studies::{long_tube, slow};
-use crate::common::{output, repository, starlings};
+use crate::common::{output, starlings};
 use crate::fault_kit::plan::{Reached, Verb};
 use crate::fault_kit::study_folder::StudyFolder;
 
@@ -116,19 +118,6 @@ fn repeated(text: &str, n: usize) -> String {
     let record = |i| text[from..to].replace("name = \"decay\"", &format!("name = \"decay{i}\""));
     let records: String = (0..n).map(record).collect();
     format!("{}{records}{}", &text[..from], &text[to..])
-}
-
-/// Where `python3` has the package, first.
-fn path() -> String {
-    let own = repository("target/solvers/bin");
-    let rest = std::env::var("PATH").unwrap_or_default();
-    if own.join("python3").exists() { format!("{}:{rest}", own.display()) } else { rest }
-}
-
-/// Whether the Python package is there.
-pub(crate) fn has_python() -> bool {
-    let asked = Command::new("python3").args(["-c", "import starlings, grpc"]).env("PATH", path()).output();
-    asked.is_ok_and(|asked| asked.status.success())
 }
 
 /// What the solver in Python says of itself.

@@ -2,6 +2,7 @@
 
 #![allow(dead_code)] // every test file uses its own part
 
+pub(crate) mod python;
 pub(crate) mod studies;
 
 use std::path::{Path, PathBuf};
@@ -28,6 +29,19 @@ pub(crate) fn output(command: &mut Command) -> (i32, String, String) {
     let out = command.stdin(Stdio::null()).output().expect("the binary starts");
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
     (out.status.code().unwrap_or(-1), text(out.stdout), text(out.stderr))
+}
+
+/// Expects a command to be refused with exit code 2, nothing on standard output and every one of `words`.
+pub(crate) fn refused(command: &mut Command, words: &[&str]) {
+    let (code, stdout, stderr) = output(command);
+    // Line breaks of the display may fall anywhere.
+    let flat =
+        stderr.split_whitespace().filter(|w| !matches!(*w, "│" | "×" | "╰─▶")).collect::<Vec<_>>().join(" ");
+    assert_eq!(code, 2, "{stderr}");
+    assert_eq!(stdout, "");
+    for word in words {
+        assert!(flat.contains(word), "no `{word}` in: {flat}");
+    }
 }
 
 /// Runs a study into `out` with local workers and returns its summary.

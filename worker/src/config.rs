@@ -10,6 +10,7 @@ use starlings_pieces::PlaceName;
 use starlings_proto::host::host_name;
 use starlings_proto::{Hello, PROTOCOL, VERSION, own_build};
 use starlings_traces::Traces;
+use starlings_sums::Reading;
 use tokio_util::sync::CancellationToken;
 
 use crate::held::HoldLimits;
@@ -48,6 +49,8 @@ pub struct WorkerConfig {
     pub states: Option<PlaceName>,
     /// Where spans of runs go, of those that belong in a trace.
     pub traces: Option<Traces>,
+    /// Whether recordings that a setup names are read here; only where the coordinator has this user's rights anyway.
+    pub reading: Reading,
     /// Takes news for whoever watches.
     pub tell: Tell,
 }
@@ -70,6 +73,7 @@ impl WorkerConfig {
             scratch: std::env::temp_dir(),
             states: None,
             traces: None,
+            reading: Reading::Refused,
             tell: Arc::new(|_| {}),
         }
     }

@@ -77,7 +77,7 @@ pub(crate) async fn dial(
 ) -> Result<Dialled, WorkerError> {
     let stays = config.stay.is_some();
     let started = Instant::now();
-    let mut wait = FIRST_WAIT;
+    let (mut wait, mut told) = (FIRST_WAIT, None::<String>);
     loop {
         let attempt = async {
             let attached = attach(way, hello.clone(), config.states.as_ref());
@@ -104,10 +104,13 @@ pub(crate) async fn dial(
             let (address, waited) = (way.name(), started.elapsed().as_secs_f64());
             return Err(WorkerError::NoCoordinator { address, waited, last, dropped: patience.dropped() });
         }
-        if std::mem::replace(&mut patience.is_told, true) {
+        // An access file that was missing, and now leads to where nobody answers, is news.
+        let address = way.name();
+        let leads_elsewhere = told.replace(address.clone()).is_some_and(|told| told != address);
+        if std::mem::replace(&mut patience.is_told, true) && !leads_elsewhere {
             tracing::debug!(last, "dialling again");
         } else {
-            (config.tell)(&News::Waiting { address: way.name(), last, left, option: patience.option() });
+            (config.tell)(&News::Waiting { address, last, left, option: patience.option() });
         }
         // Spread by the process's nonce, so that a thousand workers do not dial at the same moment.
         let spread = 0.5 + (hello.nonce % 1024) as f64 / 2048.0;

@@ -45,6 +45,7 @@ pub use starlings_pieces::PlaceName;
 pub use starlings_proto::access::AccessError;
 use starlings_proto::{FromWorker, HeldRun, JobKey, Welcome};
 pub use starlings_proto::{INHERITED, LIFELINE, MAX_SLOTS};
+pub use starlings_sums::Reading;
 use way::Way;
 pub use way::check_address;
 
@@ -164,7 +165,7 @@ async fn serve(
     held: Option<&Arc<Held>>,
 ) -> Result<WorkerReport, WorkerError> {
     let way = Way::of(config)?;
-    let setups = setups::Setups::new(Arc::clone(&config.factory));
+    let setups = setups::Setups::new(starlings_sums::factory(Arc::clone(&config.factory), config.reading));
     let hello = config.hello();
     let mut sessions = 0;
     let mut idle = config.stay.map(Idle::new);

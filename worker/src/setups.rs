@@ -121,8 +121,7 @@ impl Setups {
 
     fn build(&self, id: SetupId, setup: Result<Box<Setup>, ProtocolError>) -> Result<(), String> {
         let setup = setup.map_err(|error| error.to_string())?;
-        let make = || starlings_sums::build(&setup).unwrap_or_else(|| (self.factory)(&setup));
-        let forward = catch_unwind(AssertUnwindSafe(make))
+        let forward = catch_unwind(AssertUnwindSafe(|| (self.factory)(&setup)))
             .map_err(|panic| panic_text(panic.as_ref()))?
             .map_err(|error| error.to_string())?;
         self.keep(id, Arc::from(forward));

@@ -3,16 +3,16 @@
 //! Where both see one folder, the pieces stand there and only their names travel. Where both are processes of one machine, the state
 //! stands in memory that both see, whose descriptor comes beside the messages. What arrives is checked by its name, piece by piece.
 //! Next files to read: `incoming`, for what
-//! comes; `inbox`, for when states are asked for.
+//! comes; `lent`, for what goes by memory; `inbox`, for when states are asked for.
 
 mod incoming;
+mod lent;
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use starlings_models::ParticleError;
-use starlings_pieces::{Folder, SharedMemory};
-use starlings_proto::convert::lent::Lend;
+use starlings_pieces::Folder;
 use starlings_proto::convert::state::{Get, PutHead, decode_head, decode_put_result};
 use starlings_proto::descriptors::{Asked, DescriptorReceiver};
 use starlings_proto::generated::{self, fleet_client::FleetClient};
@@ -29,15 +29,13 @@ pub(crate) use incoming::Incoming;
 use crate::pieces;
 use crate::spare::Spare;
 use crate::way::Proven;
+use lent::LentMemory;
 
 /// States that are sent at the same time: what they leave of the connection's window is for the messages.
 const LANES: usize = 2;
 
 /// Pieces made ahead of what the network has taken.
 const AHEAD: usize = 4;
-
-/// Its number, the values of its states, and the memory.
-type LentMemory = (u64, usize, SharedMemory);
 
 /// The way of states over one session.
 #[derive(Clone)]
@@ -143,42 +141,12 @@ impl Transfers {
                 Err(reason) => self.refused(&reason),
             }
         }
-        if let Some((number, memory)) = self.lent(head)
-            && pieces::fill(&memory, values).is_ok()
-        {
-            // Its name is made of what stands there, by the coordinator alone.
-            let taken = self.arrived(|pieces| pieces::send_in_memory(&pieces, head, number));
-            let (state, ()) = taken.map_err(|reason| not_taken(&reason))?;
-            self.lock_lent().push((number, values.len(), memory));
-            return Ok(state);
+        let by_memory = self.put_in_memory(head, values);
+        if let Some(taken) = by_memory {
+            return taken.map_err(|status| not_taken(&status_text(&status)));
         }
         let sent = self.send(|pieces| pieces::send(&pieces, head, values));
         sent.map_err(|reason| not_taken(&reason))
-    }
-
-    /// Memory for a state with its number: some that was lent before, or where the coordinator lends more.
-    fn lent(&self, head: PutHead) -> Option<(u64, SharedMemory)> {
-        {
-            let mut lent = self.lock_lent();
-            // What is of another length is taken back.
-            lent.retain(|(_, n_state, _)| *n_state == head.n_state);
-            if let Some((number, _, memory)) = lent.pop() {
-                return Some((number, memory));
-            }
-        }
-        let asked = self.descriptors.as_ref()?.ask();
-        let number = asked.number();
-        let request = Lend { head, descriptor: number }.encode();
-        let (mut client, ended) = (self.client.clone(), self.ended.clone());
-        let (answer, answered) = oneshot::channel();
-        self.runtime.spawn(async move { answer.send(ended.run_until_cancelled(client.lend(request)).await) });
-        let loan = answered.blocking_recv().ok()??.ok()?.into_inner();
-        let descriptor = asked.take().filter(|_| loan.lent)?;
-        Some((number, SharedMemory::received(descriptor, head.n_state * 8, false).ok()?))
-    }
-
-    fn lock_lent(&self) -> MutexGuard<'_, Vec<LentMemory>> {
-        self.lent.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Puts what `send` says, which returns the name that the coordinator must answer with.
@@ -186,7 +154,7 @@ impl Transfers {
         &self,
         send: impl FnOnce(mpsc::Sender<generated::Chunk>) -> Option<StateId>,
     ) -> Result<StateId, String> {
-        let (taken, name) = self.arrived(send)?;
+        let (taken, name) = self.arrived(send).map_err(|status| status_text(&status))?;
         if Some(taken) == name { Ok(taken) } else { Err("another one arrived than was sent".to_owned()) }
     }
 
@@ -194,25 +162,35 @@ impl Transfers {
     fn arrived<T>(
         &self,
         send: impl FnOnce(mpsc::Sender<generated::Chunk>) -> T,
-    ) -> Result<(StateId, T), String> {
+    ) -> Result<(StateId, T), Status> {
         let (pieces, outgoing) = mpsc::channel(AHEAD);
+        let (mut client, lanes) = (self.client.clone(), Arc::clone(&self.lanes));
+        let answered = self.begin(async move {
+            // It is never closed.
+            let _lane = lanes.acquire().await;
+            client.put(ReceiverStream::new(outgoing)).await
+        });
+        let sent = send(pieces);
+        let result =
+            answered.blocking_recv().map_err(|_| Status::unavailable("the connection is gone"))??;
+        let taken =
+            decode_put_result(result.get_ref()).map_err(|error| Status::internal(error.to_string()))?;
+        Ok((taken, sent))
+    }
+
+    /// Begins a call; its answer does not come where the session ends before.
+    fn begin<T: Send + 'static>(
+        &self,
+        call: impl Future<Output = T> + Send + 'static,
+    ) -> oneshot::Receiver<T> {
         let (answer, answered) = oneshot::channel();
-        let (mut client, lanes, ended) = (self.client.clone(), Arc::clone(&self.lanes), self.ended.clone());
+        let ended = self.ended.clone();
         self.runtime.spawn(async move {
-            let sent = async {
-                // It is never closed.
-                let _lane = lanes.acquire().await;
-                client.put(ReceiverStream::new(outgoing)).await
-            };
-            if let Some(result) = ended.run_until_cancelled(sent).await {
+            if let Some(result) = ended.run_until_cancelled(call).await {
                 let _ = answer.send(result);
             }
         });
-        let sent = send(pieces);
-        let result = answered.blocking_recv().map_err(|_| "the connection is gone".to_owned())?;
-        let result = result.map_err(|status| status_text(&status))?;
-        let taken = decode_put_result(result.get_ref()).map_err(|error| error.to_string())?;
-        Ok((taken, sent))
+        answered
     }
 }
 

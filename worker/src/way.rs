@@ -12,18 +12,21 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
+use hyper_util::client::legacy::connect::HttpConnector;
 use hyper_util::rt::TokioIo;
 use starlings_proto::access::{AccessError, AccessFile, SERVER_NAME, TOKEN_KEY, Token};
 use starlings_proto::descriptors::{self, DescriptorReceiver};
 use starlings_proto::socket::SocketEnd;
 use starlings_proto::words::causes;
 use starlings_proto::{FRAME_SIZE, INHERITED};
+use tokio::io::BufReader;
+use tokio::net::TcpStream;
 use tonic::metadata::{Ascii, MetadataValue};
 use tonic::service::Interceptor;
 use tonic::service::interceptor::InterceptedService;
 use tonic::transport::{Certificate, Channel, ClientTlsConfig, Endpoint, Uri};
 use tonic::{Request, Status};
-use tower::service_fn;
+use tower::{ServiceExt as _, service_fn};
 
 use crate::{WorkerConfig, WorkerError};
 
@@ -39,6 +42,9 @@ const KEEP_ALIVE_PATIENCE: Duration = Duration::from_secs(30);
 
 /// HTTP/2 windows per stream and per connection, bytes.
 const WINDOWS: (u32, u32) = (4 * 1024 * 1024, 16 * 1024 * 1024);
+
+/// Bytes that are read ahead of TLS, which asks the system for a quarter of a record at a time.
+const AHEAD: usize = 64 * 1024;
 
 /// A connection whose every call carries the proof of this worker.
 pub(crate) type Proven = InterceptedService<Channel, Proof>;
@@ -203,7 +209,9 @@ async fn with_access(
         .timeout(ATTEMPT);
     let endpoint = dialled(Endpoint::from(uri), once).tls_config(tls);
     let endpoint = endpoint.map_err(|error| failed(format!("{}: {}", file.display(), causes(&error))))?;
-    let connected = endpoint.connect().await.map_err(|error| {
+    let ahead = |tcp: TokioIo<TcpStream>| TokioIo::new(BufReader::with_capacity(AHEAD, tcp.into_inner()));
+    let connector = tcp().map_response(ahead);
+    let connected = endpoint.connect_with_connector(connector).await.map_err(|error| {
         let words = causes(&error);
         failed(if is_other_server(&error) {
             format!("whoever answers at {address} is not the coordinator of {}: {words}", file.display())
@@ -249,6 +257,16 @@ fn with_windows(endpoint: Endpoint) -> Endpoint {
         .initial_stream_window_size(WINDOWS.0)
         .initial_connection_window_size(WINDOWS.1)
         .max_frame_size(FRAME_SIZE)
+}
+
+/// What dials, as [`dialled`] says it for connections that are not read ahead.
+fn tcp() -> HttpConnector {
+    let mut tcp = HttpConnector::new();
+    tcp.enforce_http(false);
+    tcp.set_nodelay(true);
+    tcp.set_keepalive(Some(KEEP_ALIVE));
+    tcp.set_connect_timeout(Some(ATTEMPT));
+    tcp
 }
 
 /// What holds for every connection over a network.

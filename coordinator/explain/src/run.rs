@@ -202,7 +202,8 @@ fn explanation(
         experiment: None,
         closest: nearest
             .filter(|_| decision.verdict == Verdict::Unexplained)
-            .and_then(|j| summary::effects(j).into_iter().next()),
+            .map(summary::effects)
+            .unwrap_or_default(),
         screened: summary::screened(found, candidates, decision, n_train),
         rejected: rejected::rejected(found, candidates, decision),
         gap: after.map(|y| summary::gap(cache, &found.base.predicted, y)).unwrap_or_default(),

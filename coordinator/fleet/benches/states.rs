@@ -7,13 +7,11 @@
 
 #[path = "states/dialled.rs"]
 mod dialled;
+#[path = "states/raw.rs"]
+mod raw;
 #[path = "states/shared.rs"]
 mod shared;
 
-use std::io::{Read, Write};
-use std::os::fd::OwnedFd;
-use std::os::unix::net::UnixStream;
-use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 
@@ -41,14 +39,14 @@ const LARGE_MEMORY: usize = 256_000_000;
 
 const WORKERS: usize = 2;
 
-/// Bytes written to a raw socket at a time.
+/// Bytes of a piece.
 const BLOCK: usize = 256 * 1024;
 
 fn main() -> Result<(), Failure> {
     let args = std::env::args().skip(1).collect::<Vec<_>>();
     let has = |flag: &str| args.iter().any(|a| a == flag);
-    if has("--echo") {
-        return echo();
+    if has(raw::ECHO) {
+        return raw::echo();
     }
     let named = |flag: &str| args.iter().skip_while(|arg| *arg != flag).nth(1);
     if has("--connect") || has("--access") {
@@ -113,7 +111,7 @@ enum Way {
 fn travelling(cycles: usize, dialled: bool) -> Result<(), Failure> {
     let bytes = (2 * 8 * VALUES * PARTICLES) as f64;
     let rate = |wall: Duration| bytes / wall.as_secs_f64() / 1e9;
-    let raw = raw(cycles)?;
+    let raw = raw::walls(cycles)?;
     println!("{PARTICLES} states of 8 MB there and back, {WORKERS} workers, GB/s both ways");
     println!("  raw socket pairs        p50 {:.2}  best {:.2}", rate(median(&raw)), rate(raw[0]));
     let ways = [
@@ -266,58 +264,6 @@ impl Forward for Still {
 #[expect(clippy::unnecessary_wraps, reason = "as a factory is called")]
 fn build(_: &Setup) -> Result<Box<dyn Forward>, SetupError> {
     Ok(Box::new(Still(Spec { restart: true, ..Spec::default() })))
-}
-
-/// Ends the echo process with the measurement.
-struct Echo(Child);
-
-impl Drop for Echo {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-/// Wall times of the same bytes there and back over pairs of sockets, fastest first.
-fn raw(cycles: usize) -> Result<Vec<Duration>, Failure> {
-    let mut ends = Vec::new();
-    for _ in 0..WORKERS {
-        let (own, its) = UnixStream::pair()?;
-        let mut command = Command::new(std::env::current_exe()?);
-        command.arg("--echo").stdin(Stdio::from(OwnedFd::from(its)));
-        ends.push((own, Echo(command.spawn()?)));
-    }
-    let blocks = 8 * VALUES * PARTICLES / WORKERS / BLOCK;
-    let mut walls = Vec::new();
-    for _ in 0..=cycles {
-        let started = Instant::now();
-        std::thread::scope(|scope| {
-            for (end, _) in &ends {
-                let (mut write, mut read) = (end, end);
-                scope.spawn(move || {
-                    let bytes = vec![1; BLOCK];
-                    (0..blocks).try_for_each(|_| write.write_all(&bytes))
-                });
-                scope.spawn(move || {
-                    let mut bytes = vec![0; BLOCK];
-                    (0..blocks).try_for_each(|_| read.read_exact(&mut bytes))
-                });
-            }
-        });
-        walls.push(started.elapsed());
-    }
-    walls.sort_unstable();
-    Ok(walls)
-}
-
-fn echo() -> Result<(), Failure> {
-    use std::os::fd::AsFd;
-    let mut end = UnixStream::from(std::io::stdin().as_fd().try_clone_to_owned()?);
-    let mut bytes = vec![0; BLOCK];
-    while end.read_exact(&mut bytes).is_ok() {
-        end.write_all(&bytes)?;
-    }
-    Ok(())
 }
 
 /// Most memory that this process held, MB.

@@ -34,6 +34,7 @@ mod repeats;
 pub(crate) mod roster;
 mod run_times;
 mod schedule;
+mod setups;
 mod strays;
 #[cfg(test)]
 mod tests;
@@ -45,9 +46,9 @@ use std::time::Duration;
 
 use starlings_proto::{SetupId, StateId};
 
-use super::FleetEvent;
 use super::job_name::JobName;
 use super::wire::Outcome;
+use super::{FleetEvent, Load, WorkerLoad};
 use batch::{Batch, Lost};
 pub(crate) use doubt::Asked;
 pub(crate) use held::Taken;
@@ -135,6 +136,15 @@ impl Dispatcher {
     /// Number of workers.
     pub(crate) fn n_workers(&self) -> usize {
         self.workers.len()
+    }
+
+    /// How much work there is, and who makes it.
+    pub(crate) fn load(&self) -> Load {
+        let worker = |w: &Worker| WorkerLoad { name: w.name.clone(), slots: w.slots, jobs: w.load() };
+        Load {
+            unfinished: self.batch.as_ref().map_or(0, Batch::n_unfinished),
+            workers: self.workers.values().map(worker).collect(),
+        }
     }
 
     /// Number of slots of all workers.
@@ -230,28 +240,6 @@ impl Dispatcher {
         if let Some((index, attempts, why)) = given_up {
             self.unanswered(index, attempts, &why);
         }
-    }
-
-    fn setup_answered(&mut self, now: Duration, id: WorkerId, setup: SetupId, state: SetupState) {
-        let Some(worker) = self.workers.get_mut(&id) else { return };
-        worker.last_heard = now;
-        let needed = self.batch.as_ref().is_some_and(|batch| batch.needs(&setup));
-        if worker.answers_unasked(&setup, &state) {
-            return self.stray(id, "it speaks of setups that it was not sent, again and again");
-        }
-        if let SetupState::Failed(reason) = &state {
-            if worker.is_ready(&setup) {
-                // It had built it: its cache was full.
-                worker.setups.remove(&setup);
-                if needed && worker.wants(setup, now) {
-                    self.out.push(Command::SendSetup { worker: id, setup });
-                }
-                return;
-            }
-            let notice = FleetEvent::SetupFailed { worker: worker.name.clone(), reason: reason.clone() };
-            self.out.push(Command::Notice(notice));
-        }
-        worker.setup_answered(setup, state, now);
     }
 
     fn submit(&mut self, now: Duration, jobs: Vec<(SetupId, JobName)>) {

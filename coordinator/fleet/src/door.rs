@@ -13,6 +13,7 @@ use std::net::TcpListener;
 use std::sync::Arc;
 use std::time::Duration;
 
+use tokio::io::BufReader;
 use tokio::net::TcpStream;
 use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
 use tokio_rustls::TlsAcceptor;
@@ -31,6 +32,9 @@ const PATIENCE: Duration = Duration::from_secs(10);
 
 /// How long the door stays shut when the system has no means for another connection.
 const PAUSE: Duration = Duration::from_millis(100);
+
+/// Bytes that are read ahead of TLS, which asks the system for a quarter of a record at a time.
+const AHEAD: usize = 64 * 1024;
 
 /// Connections whose TLS is done, where they need it.
 pub(super) type Incoming = UnboundedReceiverStream<std::io::Result<Connection>>;
@@ -105,7 +109,7 @@ async fn enter(
     let connection = match tls {
         None => Ok(Connection::new(Box::new(stream), caller, patience, refusals)),
         Some(tls) => tokio::select! {
-            done = tls.accept(stream) => match done {
+            done = tls.accept(BufReader::with_capacity(AHEAD, stream)) => match done {
                 Ok(stream) => Ok(Connection::new(Box::new(stream), caller, patience, refusals)),
                 Err(error) => Err((Why::of_handshake(&error), caller, refusals)),
             },

@@ -4,110 +4,6 @@ use std::fmt;
 
 use super::FleetEvent;
 
-/// Why workers leave at the end.
-pub(super) const OVER: &str = "the run is over";
-
-/// What a coordinator says to its workers that ends before its run is done.
-pub(super) const BROKEN_OFF: &str = "the command broke off before it was done, and may be started again, with --resume where that is possible";
-
-impl FleetEvent {
-    /// A short name of the kind of event.
-    pub fn kind(&self) -> &'static str {
-        match self {
-            Self::Listening { .. } => "listening",
-            Self::WorkerJoined { .. } => "worker-joined",
-            Self::OtherBuild { .. } => "other-build",
-            Self::SharesStates { .. } => "shares-states",
-            Self::WorkerRefused { .. } => "worker-refused",
-            Self::CallerRefused { .. } => "caller-refused",
-            Self::WorkerLeft { .. } => "worker-left",
-            Self::SetupFailed { .. } => "setup-failed",
-            Self::WorkerSetAside { .. } => "worker-set-aside",
-            Self::WorkerBack { .. } => "worker-back",
-            Self::ControlRun { .. } => "control-run",
-            Self::JobRetried { .. } => "job-retried",
-            Self::JobFailed { .. } => "job-failed",
-            Self::RunsBrought { .. } => "runs-brought",
-            Self::WorkerExcluded { .. } => "worker-excluded",
-            Self::WorkersDiffer { .. } => "workers-differ",
-            Self::NotReproducible { .. } => "not-reproducible",
-            Self::JobDuplicated { .. } => "job-duplicated",
-            Self::Untold { .. } => "untold",
-            Self::LateAnswer { .. } => "late-answer",
-            Self::Waiting { .. } => "waiting",
-            Self::Progress { .. } => "progress",
-            Self::LocalWorkerRestarted { .. } => "worker-restarted",
-            Self::LocalWorkerGivenUp { .. } => "worker-given-up",
-        }
-    }
-
-    /// The worker that it is about, by its name.
-    pub fn worker(&self) -> Option<&str> {
-        match self {
-            Self::WorkerJoined { worker, .. }
-            | Self::OtherBuild { worker, .. }
-            | Self::SharesStates { worker }
-            | Self::WorkerLeft { worker, .. }
-            | Self::SetupFailed { worker, .. }
-            | Self::WorkerSetAside { worker, .. }
-            | Self::WorkerBack { worker }
-            | Self::ControlRun { worker, .. }
-            | Self::JobRetried { worker, .. }
-            | Self::RunsBrought { worker, .. }
-            | Self::WorkerExcluded { worker, .. }
-            | Self::JobDuplicated { worker, .. }
-            | Self::LateAnswer { worker, .. } => Some(worker),
-            _ => None,
-        }
-    }
-
-    /// The run of the model that it is about: index of the sigma point, and of the record.
-    pub fn job(&self) -> Option<(u32, u32)> {
-        match *self {
-            Self::ControlRun { particle, record, .. }
-            | Self::JobRetried { particle, record, .. }
-            | Self::JobFailed { particle, record, .. }
-            | Self::JobDuplicated { particle, record, .. } => Some((particle, record)),
-            _ => None,
-        }
-    }
-
-    /// Whether somebody who watches the run should see it at once.
-    pub fn is_notable(&self) -> bool {
-        matches!(
-            self,
-            Self::WorkerRefused { .. }
-                | Self::CallerRefused { .. }
-                | Self::OtherBuild { .. }
-                | Self::SetupFailed { .. }
-                | Self::RunsBrought { .. }
-                | Self::WorkerSetAside { .. }
-                | Self::JobFailed { .. }
-                | Self::WorkerExcluded { .. }
-                | Self::WorkersDiffer { .. }
-                | Self::NotReproducible { .. }
-                | Self::Untold { .. }
-                | Self::Waiting { .. }
-                | Self::LocalWorkerRestarted { .. }
-                | Self::LocalWorkerGivenUp { .. }
-        )
-    }
-
-    /// Whether somebody who started workers elsewhere should see it: who came, who went, who is used again.
-    pub fn is_of_roster(&self) -> bool {
-        match self {
-            Self::WorkerJoined { .. } | Self::SharesStates { .. } | Self::WorkerBack { .. } => true,
-            Self::WorkerLeft { reason, .. } => reason != OVER && reason != BROKEN_OFF,
-            _ => false,
-        }
-    }
-
-    /// Whether the event belongs into the run's record; progress is only for the moment.
-    pub fn is_lasting(&self) -> bool {
-        !matches!(self, Self::Progress { .. })
-    }
-}
-
 impl fmt::Display for FleetEvent {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -138,21 +34,7 @@ impl fmt::Display for FleetEvent {
                 write!(f, "worker {worker} is set aside for {seconds} s, its runs go to others: {reason}")
             }
             Self::WorkerBack { worker } => write!(f, "worker {worker} makes runs again"),
-            Self::ControlRun { particle, record, worker, fault } => {
-                let found = controlled(fault.as_deref());
-                write!(f, "particle {particle}, record {record}: failed again on worker {worker}, {found}")
-            }
-            Self::JobRetried { particle, record, worker, reason } => {
-                write!(f, "particle {particle}, record {record}: tried again after worker {worker}: {reason}")
-            }
-            Self::JobFailed { particle, record, parameters, attempts, reason } => {
-                let s = if *attempts == 1 { "" } else { "s" };
-                let with = with(parameters);
-                write!(
-                    f,
-                    "particle {particle}, record {record}{with}: given up after {attempts} attempt{s}: {reason}"
-                )
-            }
+            Self::ControlRun { .. } | Self::JobRetried { .. } | Self::JobFailed { .. } => runs(self, f),
             Self::RunsBrought { worker, finished, computing } => {
                 write!(
                     f,
@@ -170,6 +52,28 @@ impl fmt::Display for FleetEvent {
             Self::Waiting { .. } | Self::Progress { .. } => going(self, f),
             Self::LocalWorkerRestarted { .. } | Self::LocalWorkerGivenUp { .. } => local(self, f),
         }
+    }
+}
+
+/// How a run went that gave no result.
+fn runs(event: &FleetEvent, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    match event {
+        FleetEvent::ControlRun { particle, record, worker, fault } => {
+            let found = controlled(fault.as_deref());
+            write!(f, "particle {particle}, record {record}: failed again on worker {worker}, {found}")
+        }
+        FleetEvent::JobRetried { particle, record, worker, reason } => {
+            write!(f, "particle {particle}, record {record}: tried again after worker {worker}: {reason}")
+        }
+        FleetEvent::JobFailed { particle, record, parameters, attempts, reason } => {
+            let s = if *attempts == 1 { "" } else { "s" };
+            let with = with(parameters);
+            write!(
+                f,
+                "particle {particle}, record {record}{with}: given up after {attempts} attempt{s}: {reason}"
+            )
+        }
+        _ => Ok(()),
     }
 }
 

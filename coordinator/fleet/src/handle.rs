@@ -8,9 +8,9 @@ use std::sync::Arc;
 use starlings_proto::descriptors::DescriptorSender;
 use tokio::sync::mpsc::UnboundedSender;
 
-use super::FleetEvent;
 use super::dispatcher::Event;
 use super::hub::Hub;
+use super::{FleetEvent, Load};
 
 /// The ways to a worker that this process started, of which it holds the other ends.
 pub(super) struct Adopted {
@@ -40,6 +40,11 @@ impl FleetHandle {
     pub fn local_only(&self) {
         self.hub.states().lends();
         self.hub.handle(Event::LocalOnly);
+    }
+
+    /// How much work there is, and who makes it.
+    pub fn load(&self) -> Load {
+        self.hub.load()
     }
 
     /// Tells workers, when they are asked to leave, that the run is not done.

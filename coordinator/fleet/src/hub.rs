@@ -9,8 +9,10 @@ mod blocks;
 mod doorway;
 mod excluded;
 mod held;
+mod link;
 mod locked;
 mod mixing;
+mod parting;
 mod reading;
 mod replies;
 mod state;
@@ -32,15 +34,15 @@ use starlings_states::hex;
 use tokio::sync::Notify;
 
 use super::dispatcher::{BatchError, Dispatcher, Event, Joining, Likeness, Rules, WorkerId};
-use super::event_text::{BROKEN_OFF, OVER};
 use super::identity::RunIdentity;
 use super::job_name::JobName;
 use super::outbox::Outbox;
-use super::{FleetEvent, Held, Outcome, StateStore, StoredState};
+use super::{FleetEvent, Held, Load, Outcome, StateStore, StoredState};
 pub(super) use blocks::{Made, Work};
+use link::Link;
 use locked::Locked;
+use state::State;
 pub(super) use state::{Closed, SetupShape, Submission};
-use state::{Link, State};
 
 /// Answer to the caller of a batch.
 pub(super) type Reply = Result<Vec<Outcome<Held>>, BatchError>;
@@ -90,7 +92,7 @@ impl Hub {
     }
 
     pub(super) fn tell(&self, event: FleetEvent) {
-        let now = self.started.elapsed();
+        let now = self.now();
         let mut state = self.lock();
         if let FleetEvent::Listening { address } = event {
             state.doorway.address = Some(address);
@@ -135,9 +137,13 @@ impl Hub {
         (state.dispatcher.n_workers(), state.dispatcher.slots())
     }
 
+    pub(super) fn load(&self) -> Load {
+        self.lock().dispatcher.load()
+    }
+
     /// Takes a setup as it travels, with the names of its parameters, and the length of a state where it is known.
     pub(super) fn install(&self, id: SetupId, json: Bytes, shape: SetupShape, likeness: Likeness) {
-        let now = self.started.elapsed();
+        let now = self.now();
         let mut state = self.decide();
         state.handle(now, Event::Likeness { setup: id, likeness });
         state.setups.insert(id, json);
@@ -151,7 +157,7 @@ impl Hub {
 
     /// Starts a batch.
     pub(super) fn submit(&self, batch: Submission) {
-        let now = self.started.elapsed();
+        let now = self.now();
         let mut state = self.decide();
         if let Some(reason) = state.given_up.clone().filter(|_| state.links.is_empty()) {
             let _ = batch.reply.send(Err(BatchError::LocalWorkers(reason)));
@@ -166,7 +172,7 @@ impl Hub {
 
     /// Takes a worker or says why not. The first message on its link is the welcome.
     pub(super) fn join(&self, hello: Hello, link: Outbox) -> Result<WorkerId, Closed> {
-        let now = self.started.elapsed();
+        let now = self.now();
         let mut state = self.decide();
         if let Err(closed) = state.admit(&hello) {
             if let Closed::Refused(reason) = closed.clone() {
@@ -207,7 +213,7 @@ impl Hub {
 
     /// Takes runs that a worker brings along from an earlier connection of the same run.
     pub(super) fn bring(&self, worker: WorkerId, runs: Vec<HeldRun>) {
-        let now = self.started.elapsed();
+        let now = self.now();
         let mut state = self.decide();
         // One that was put out speaks in vain.
         if state.links.contains_key(&worker) {
@@ -216,7 +222,7 @@ impl Hub {
     }
 
     pub(super) fn leave(&self, worker: WorkerId, reason: String, clean: bool) {
-        let now = self.started.elapsed();
+        let now = self.now();
         // After a panic under the lock there is nothing left to decide: the next tick ends the fleet.
         if self.state.is_poisoned() {
             return;
@@ -240,7 +246,7 @@ impl Hub {
 
     /// The local worker processes are given up: ends the batch unless other workers are there.
     pub(super) fn give_up(&self, reason: String) {
-        let now = self.started.elapsed();
+        let now = self.now();
         let mut state = self.lock();
         state.given_up = Some(reason);
         state.end_if_abandoned(now);
@@ -249,34 +255,6 @@ impl Hub {
     pub(super) fn beat(&self) {
         for link in self.lock().links.values() {
             link.outbox.send(ToWorker::heartbeat());
-        }
-    }
-
-    /// The run is not done, which workers are told in the end.
-    pub(super) fn break_off(&self) {
-        self.lock().last_word = BROKEN_OFF;
-    }
-
-    /// What workers are told in the end.
-    pub(super) fn last_word(&self) -> &'static str {
-        self.lock().last_word
-    }
-
-    /// Asks all workers to leave and takes no new ones.
-    pub(super) fn drain(&self, reason: &str) {
-        let now = self.started.elapsed();
-        let mut state = self.lock();
-        state.events.tell_rest(now);
-        state.draining = true;
-        for link in state.links.values() {
-            link.outbox.send(ToWorker::drain(reason));
-        }
-    }
-
-    /// Asks the workers with these process numbers to leave.
-    pub(super) fn dismiss(&self, pids: &[u32]) {
-        for link in self.lock().links.values().filter(|link| pids.contains(&link.pid)) {
-            link.outbox.send(ToWorker::drain(OVER));
         }
     }
 

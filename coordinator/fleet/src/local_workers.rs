@@ -131,9 +131,10 @@ impl Slot {
                     self.last_pid = process.pid();
                     self.process = Some(process);
                 }
+                // The system may have a place for it later.
                 Err(error) => {
                     self.last_words = error.to_string();
-                    self.tell_given_up(config);
+                    self.died(config, now);
                 }
             }
             return true;
@@ -143,8 +144,16 @@ impl Slot {
 
     fn bury(&mut self, config: &LocalConfig, status: ExitStatus, now: Instant) {
         let Some(process) = self.process.take() else { return };
-        self.deaths = if process.lived(now) >= HEALTHY { 1 } else { self.deaths + 1 };
+        if process.lived(now) >= HEALTHY {
+            self.deaths = 0;
+        }
         self.last_words = process.last_words(status);
+        self.died(config, now);
+    }
+
+    /// Counts one more death, or start in vain, and says when to start again, if at all.
+    fn died(&mut self, config: &LocalConfig, now: Instant) {
+        self.deaths += 1;
         if self.deaths < config.fleet.max_attempts().saturating_add(EXTRA_DEATHS) {
             let wait = FIRST_WAIT.saturating_mul(2_u32.saturating_pow(self.deaths - 1)).min(LONGEST_WAIT);
             self.restart_at = Some(now + wait);

@@ -1,12 +1,14 @@
 //! What waits to be sent to one worker. A worker that does not read has all of it let go, and its session ends.
 //!
 //! Leases bound the jobs that wait, but whatever a worker says may be answered, and one that only speaks would fill the memory of the
-//! coordinator. Next file to read: [`super::service`].
+//! coordinator; one that says it is there and reads nothing would keep the place of one that works. Next file to read:
+//! [`super::service`].
 
 use std::collections::VecDeque;
 use std::pin::Pin;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::task::{Context, Poll, Waker};
+use std::time::{Duration, Instant};
 
 use starlings_proto::{ToWorker, generated};
 use tokio_stream::Stream;
@@ -15,6 +17,13 @@ use tonic::Status;
 
 /// Bytes that may wait: above what the jobs have that a worker holds before it has answered any, with states inside.
 const MOST: usize = 160 << 20;
+
+/// How long messages may wait while none is taken: far above what the largest one needs on a slow network, and above the silence at
+/// which a worker that stands still is lost.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// What one look adds to that time at most: a coordinator that stood still itself learns nothing of its workers.
+const STEP: Duration = Duration::from_secs(10);
 
 /// What a link carries to its worker.
 type Outgoing = Result<generated::ToWorker, Status>;
@@ -31,7 +40,29 @@ struct Sender(Arc<Shared>);
 struct Shared {
     queue: Mutex<Queue>,
     most: usize,
-    given_up: CancellationToken,
+    patience: Duration,
+    given_up: GivenUp,
+}
+
+/// That a worker does not read; it has no part in the link.
+#[derive(Clone, Default)]
+pub(super) struct GivenUp {
+    token: CancellationToken,
+    why: Arc<OnceLock<String>>,
+}
+
+impl GivenUp {
+    /// Waits until it is so; what the worker does.
+    pub(super) async fn reason(&self) -> String {
+        self.token.cancelled().await;
+        self.why.get().cloned().unwrap_or_default()
+    }
+
+    fn say(&self, why: String) {
+        // The first one counts.
+        let _ = self.why.set(why);
+        self.token.cancel();
+    }
 }
 
 #[derive(Default)]
@@ -40,21 +71,24 @@ struct Queue {
     bytes: usize,
     is_closed: bool,
     reader: Option<Waker>,
+    /// For how long messages have waited while none was taken, and when that was looked at last.
+    waited: Duration,
+    looked: Option<Instant>,
 }
 
 /// Both ends of a link.
 pub(super) fn outbox() -> (Outbox, Unread) {
-    bounded(MOST)
+    bounded(MOST, PATIENCE)
 }
 
-fn bounded(most: usize) -> (Outbox, Unread) {
-    let shared = Shared { queue: Mutex::default(), most, given_up: CancellationToken::new() };
-    let shared = Arc::new(shared);
+fn bounded(most: usize, patience: Duration) -> (Outbox, Unread) {
+    let shared = Arc::new(Shared { queue: Mutex::default(), most, patience, given_up: GivenUp::default() });
     (Outbox(Arc::new(Sender(Arc::clone(&shared)))), Unread(shared))
 }
 
 impl Outbox {
-    /// Has a message wait; one that goes to nobody is dropped.
+    /// Has a message wait; one that goes to nobody is dropped. Whether the worker reads is seen at every one, and there is one at
+    /// every heartbeat.
     pub(super) fn send(&self, message: generated::ToWorker) {
         let shared = &self.0.0;
         let mut queue = shared.lock();
@@ -64,15 +98,15 @@ impl Outbox {
         let bytes = ToWorker::weight(&message);
         queue.bytes += bytes;
         queue.messages.push_back((bytes, message));
-        if queue.bytes > shared.most {
+        if let Some(why) = shared.is_unread(&mut queue) {
             queue.close();
-            shared.given_up.cancel();
+            shared.given_up.say(why);
         }
         queue.wake();
     }
 
-    /// Cancelled when too much waits and nothing more is sent.
-    pub(super) fn given_up(&self) -> CancellationToken {
+    /// What tells when the worker is given up, and nothing more is sent.
+    pub(super) fn given_up(&self) -> GivenUp {
         self.0.0.given_up.clone()
     }
 }
@@ -80,6 +114,22 @@ impl Outbox {
 impl Shared {
     fn lock(&self) -> MutexGuard<'_, Queue> {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Why the worker that the messages are for is one that does not read.
+    fn is_unread(&self, queue: &mut Queue) -> Option<String> {
+        if queue.bytes > self.most {
+            let mib = self.most >> 20;
+            return Some(format!("it does not read what it is sent: more than {mib} MiB wait for it"));
+        }
+        let now = Instant::now();
+        let since =
+            queue.looked.replace(now).map_or(Duration::ZERO, |looked| now.saturating_duration_since(looked));
+        queue.waited += since.min(STEP);
+        let s = self.patience.as_secs();
+        // Of a message that has just come nobody knows.
+        (queue.messages.len() > 1 && queue.waited >= self.patience)
+            .then(|| format!("it does not read what it is sent: nothing for {s} s"))
     }
 }
 
@@ -98,6 +148,7 @@ impl Queue {
     fn next(&mut self) -> Option<generated::ToWorker> {
         let (bytes, message) = self.messages.pop_front()?;
         self.bytes -= bytes;
+        (self.waited, self.looked) = (Duration::ZERO, None);
         Some(message)
     }
 }
@@ -160,7 +211,7 @@ mod tests {
                 tokio::task::yield_now().await;
             }
         }
-        assert!(!outbox.given_up().is_cancelled());
+        assert!(!outbox.given_up().token.is_cancelled());
         drop(outbox);
         assert_eq!(reader.await.expect("it ends"), (0..1000).map(notice).collect::<Vec<_>>());
     }
@@ -168,17 +219,36 @@ mod tests {
     #[test]
     fn what_is_not_read_is_let_go_when_it_is_too_much_and_what_is_read_counts_no_more() {
         let one = ToWorker::weight(&notice(0));
-        let (outbox, unread) = bounded(10 * one);
+        let (outbox, unread) = bounded(10 * one, PATIENCE);
         for n in 0..100 {
             outbox.send(notice(n % 10));
             assert!(unread.try_next().is_some());
         }
         (0..10).for_each(|n| outbox.send(notice(n)));
-        assert!(!outbox.given_up().is_cancelled());
+        assert!(!outbox.given_up().token.is_cancelled());
         outbox.send(notice(10));
-        assert!(outbox.given_up().is_cancelled());
+        assert!(outbox.given_up().token.is_cancelled());
         assert!(unread.try_next().is_none(), "nothing is held");
         outbox.send(notice(11));
         assert!(unread.try_next().is_none());
+    }
+
+    #[tokio::test]
+    async fn a_worker_that_takes_nothing_is_given_up_after_a_while_and_one_that_takes_something_is_not() {
+        // Without any patience whatever waits behind another message has waited too long.
+        let (outbox, unread) = bounded(MOST, Duration::ZERO);
+        for n in 0..100 {
+            outbox.send(notice(n));
+            assert!(unread.try_next().is_some());
+        }
+        assert!(!outbox.given_up().token.is_cancelled());
+        outbox.send(notice(0));
+        outbox.send(notice(1));
+        assert_eq!(outbox.given_up().reason().await, "it does not read what it is sent: nothing for 0 s");
+        assert!(unread.try_next().is_none(), "nothing is held");
+        // With some, what waits is no matter.
+        let (outbox, unread) = bounded(MOST, Duration::from_secs(3600));
+        (0..1000).for_each(|n| outbox.send(notice(n)));
+        assert!(!outbox.given_up().token.is_cancelled() && unread.try_next().is_some());
     }
 }

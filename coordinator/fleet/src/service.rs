@@ -8,12 +8,11 @@ use starlings_proto::generated::{self, fleet_server};
 use starlings_proto::words::status_text;
 use starlings_proto::{FromWorker, ToWorker};
 use tokio_stream::wrappers::ReceiverStream;
-use tokio_util::sync::CancellationToken;
 use tonic::{Request, Response, Status, Streaming};
 
 use super::dispatcher::{Event, WorkerId};
 use super::hub::{Closed, Hub};
-use super::outbox::{Unread, outbox};
+use super::outbox::{GivenUp, Unread, outbox};
 use super::transfer;
 
 /// How long a connection may stay open without a Hello.
@@ -47,6 +46,13 @@ impl fleet_server::Fleet for Service {
         request: Request<generated::LendRequest>,
     ) -> Result<Response<generated::Loan>, Status> {
         transfer::lend(&self.hub, request.get_ref(), way(&request)).map(Response::new)
+    }
+
+    async fn give_back(
+        &self,
+        request: Request<generated::GiveBackRequest>,
+    ) -> Result<Response<generated::GivenBack>, Status> {
+        transfer::give_back(&self.hub, request.get_ref()).map(Response::new)
     }
 
     async fn work(
@@ -103,15 +109,15 @@ async fn read(
     hub: Arc<Hub>,
     worker: WorkerId,
     mut inbound: Streaming<generated::FromWorker>,
-    given_up: CancellationToken,
+    given_up: GivenUp,
 ) {
-    let mut given_up = std::pin::pin!(given_up.cancelled());
+    let mut given_up = std::pin::pin!(given_up.reason());
     let reason = "its messages are no longer read".to_owned();
     let mut leaving = Leaving { hub: Arc::clone(&hub), worker, reason, clean: false };
     (leaving.reason, leaving.clean) = loop {
         let message = tokio::select! {
             biased;
-            () = &mut given_up => break ("it does not read what it is sent".to_owned(), false),
+            reason = &mut given_up => break (reason, false),
             message = inbound.message() => message,
         };
         match message {

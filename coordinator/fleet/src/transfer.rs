@@ -8,7 +8,7 @@ use std::os::fd::AsFd;
 use std::sync::Arc;
 use std::time::Duration;
 
-use starlings_proto::convert::lent::{Lend, decode_in_memory, encode_in_memory};
+use starlings_proto::convert::lent::{GiveBack, Lend, NOT_LENT, decode_in_memory, encode_in_memory};
 use starlings_proto::convert::piece_names::{NAMES, decode_names, encode_names};
 use starlings_proto::convert::state::{
     CHUNK_BYTES, ChunkId, Get, PutHead, decode_chunk, encode_chunk, encode_head, encode_put_result,
@@ -63,7 +63,7 @@ pub(super) async fn put(
 /// Takes a state that its worker wrote into memory that it was lent under a number.
 async fn written(hub: &Arc<Hub>, head: &PutHead, number: u64) -> Result<generated::PutResult, Status> {
     let lent = hub.lent(head, number).filter(|lent| lent.n_state() == head.n_state);
-    let lent = lent.ok_or_else(|| Status::failed_precondition("no memory is lent for this state"))?;
+    let lent = lent.ok_or_else(|| Status::new(NOT_LENT, "no memory is lent for this state"))?;
     let writer = hub.states().writer(head.n_state);
     let state = on_disk(move || lent.copy(writer)).await?.map_err(|error| match error {
         StateError::NotFinite { .. } => Status::invalid_argument(error.to_string()),
@@ -84,6 +84,16 @@ pub(super) fn lend(
     let give = |lent: &Lent| way.is_some_and(|way| way.send(lend.descriptor, lent.as_fd()).is_ok());
     let lent = hub.lend(&lend, give)?;
     Ok(generated::Loan { lent })
+}
+
+/// Takes memory back that its worker cannot use.
+pub(super) fn give_back(
+    hub: &Arc<Hub>,
+    request: &generated::GiveBackRequest,
+) -> Result<generated::GivenBack, Status> {
+    let back = GiveBack::decode(request).map_err(|error| Status::invalid_argument(error.to_string()))?;
+    hub.give_back(&back)?;
+    Ok(generated::GivenBack {})
 }
 
 async fn next(inbound: &mut Streaming<generated::Chunk>) -> Result<Option<generated::Chunk>, Status> {

@@ -3,11 +3,12 @@
 
 mod fleet_kit;
 
-use std::net::TcpListener;
+use std::net::SocketAddr;
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
 use fleet_kit::{ThreadWorker, any_port, await_workers, factory, jobs, listen, square};
+use rustix::net::{AddressFamily, SocketType};
 use starlings_fleet::{Fleet, FleetConfig, FleetError, GrpcFleet};
 use starlings_models::{Failure, ModelFailure, Setup, SetupError};
 use starlings_worker::{MAX_SLOTS, WorkerConfig, WorkerError};
@@ -65,7 +66,10 @@ fn a_fleet_without_workers_says_so_when_its_patience_ends() {
 
 #[test]
 fn a_worker_without_a_coordinator_gives_up_and_names_the_address() {
-    let address = TcpListener::bind(any_port()).unwrap().local_addr().unwrap();
+    // A port that is taken and on which nobody listens.
+    let socket = rustix::net::socket(AddressFamily::INET, SocketType::STREAM, None).unwrap();
+    rustix::net::bind(&socket, &any_port()).unwrap();
+    let address = SocketAddr::try_from(rustix::net::getsockname(&socket).unwrap()).unwrap();
     let lonely = |config: &mut WorkerConfig| config.patience = Duration::from_millis(50);
     let error = ThreadWorker::start_with(address, factory(|job| Ok(square(job))), lonely).end().unwrap_err();
     assert!(matches!(&error, WorkerError::NoCoordinator { .. }));

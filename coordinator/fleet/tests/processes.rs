@@ -115,6 +115,26 @@ fn workers_that_die_at_once_end_the_run_with_their_last_words() {
 }
 
 #[test]
+fn a_start_in_vain_counts_as_one_more_death_and_not_as_the_last() {
+    let (sender, events) = mpsc::channel();
+    let mut config = FleetConfig::new(None, "gone", CancellationToken::new(), sender);
+    config.max_attempts = 1;
+    let fleet = GrpcFleet::listen(config).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let program = folder.path().join("shell");
+    std::os::unix::fs::symlink("/bin/sh", &program).unwrap();
+    let program = program.display().to_string();
+    let script = format!("rm '{program}'; exit 3");
+    let _workers = LocalWorkers::spawn(local(&fleet, 1, &program, &["-c", &script, "worker"])).unwrap();
+    let told = await_event(&events, |e| {
+        assert!(!matches!(e, FleetEvent::LocalWorkerRestarted { .. }), "there is no program");
+        matches!(e, FleetEvent::LocalWorkerGivenUp { .. })
+    });
+    let FleetEvent::LocalWorkerGivenUp { deaths, reason, .. } = told else { unreachable!() };
+    assert!(deaths == 4 && reason.contains(&program), "{deaths} deaths: {reason}");
+}
+
+#[test]
 fn a_program_that_does_not_exist_is_named() {
     let (fleet, _events, _) = private();
     let error = LocalWorkers::spawn(local(&fleet, 1, "/no/such/program", &[])).err().expect("cannot start");

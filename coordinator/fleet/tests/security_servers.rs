@@ -245,7 +245,7 @@ fn a_worker_that_stays_serves_one_command_after_another_and_ends_when_it_is_idle
     let first = Guarded::new();
     let secrets = first.secrets.clone();
     let file = File::of(&secrets, first.address);
-    let worker = file.worker(|config| config.stay = Some(Duration::from_secs(5)));
+    let worker = file.worker(|config| config.stay = Some(Duration::from_secs(10)));
     let mut door = first;
     for last in [false, false, true] {
         await_workers(&door.events, 1);

@@ -6,50 +6,18 @@ mod fleet_kit;
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
+use fleet_kit::large::{BYTES, assert_moved, await_nothing, job, moved};
 use fleet_kit::{Proxy, ThreadWorker, any_port, await_event, factory, listen_with};
-use starlings_fleet::{Fleet, FleetError, FleetEvent, GrpcFleet, Held, Outcome, StateStore, hex};
-use starlings_models::{Job, Prediction, Setup, Window};
+use starlings_fleet::{Fleet, FleetError, FleetEvent, GrpcFleet, Held, StateStore, hex};
+use starlings_models::{Job, Setup};
 use starlings_worker::Factory;
-
-/// Values of a state that is no multiple of a piece.
-const N: usize = 100_003;
-
-/// Bytes of one state.
-const BYTES: usize = N * 8;
-
-/// Every value depends on the one before the run, its place and the particle.
-fn moved(job: &Job) -> Prediction {
-    let from = job.state.as_deref().expect("every job has a state");
-    let p = f64::from(job.particle);
-    let state = from.iter().enumerate().map(|(i, x)| x * 1.000_001 + p / (1.0 + i as f64)).collect();
-    Prediction { outputs: vec![from.iter().sum::<f64>() + p; 2], state, cost: 0.0 }
-}
 
 fn models() -> Factory {
     factory(|job| Ok(moved(job)))
 }
 
 fn jobs(n: u32) -> Vec<Job> {
-    let window = Window { start: 0.0, times: vec![1.0], observed: vec![f64::NAN; 2], inputs: vec![] };
-    let window = Arc::new(window);
-    let state = |k: u32| {
-        let mut x: Vec<f64> = (0..N).map(|i| ((i * 31 + k as usize) % 1009) as f64 / 7.0).collect();
-        (x[1], x[2]) = (-0.0, f64::MIN_POSITIVE / 4.0);
-        x
-    };
-    let job =
-        |k| Job { particle: k, record: 0, window: window.clone(), theta: vec![], state: Some(state(k)) };
-    (0..n).map(job).collect()
-}
-
-fn assert_moved(outcomes: &[Outcome], jobs: &[Job]) {
-    assert_eq!(outcomes.len(), jobs.len());
-    for (outcome, job) in outcomes.iter().zip(jobs) {
-        let (got, wanted) = (outcome.result.as_ref().unwrap(), moved(job));
-        let bits = |values: &[f64]| values.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
-        assert_eq!(bits(&got.outputs), bits(&wanted.outputs));
-        assert!(bits(&got.state) == bits(&wanted.state), "particle {}", job.particle);
-    }
+    (0..n).map(|k| job(k, 2)).collect()
 }
 
 fn fleet(memory: usize) -> (GrpcFleet, StateStore) {
@@ -71,7 +39,7 @@ fn large_states_travel_both_ways_to_the_last_bit_in_memory_and_beyond_it() {
         assert!(store.in_memory().1 <= memory);
         // The outcomes were values: nothing is needed any more, unless for a control run.
         drop(fleet);
-        assert_eq!((store.n_pieces(), store.in_memory().0), (0, 0));
+        await_nothing(&store);
     }
 }
 
@@ -124,7 +92,7 @@ fn a_connection_that_is_cut_while_states_travel_loses_none() {
     let (outcomes, fleet) = run.join().unwrap();
     assert_moved(&outcomes, &jobs);
     drop(fleet);
-    assert_eq!(store.n_pieces(), 0);
+    await_nothing(&store);
 }
 
 #[test]

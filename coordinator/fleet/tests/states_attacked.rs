@@ -6,6 +6,7 @@ mod fleet_kit;
 use std::net::SocketAddr;
 
 use fleet_kit::hand::{Hand, block_on, hello};
+use fleet_kit::large::{answer, await_nothing, given};
 use fleet_kit::{any_port, listen_with};
 use starlings_fleet::{Fleet, Folder, Held, StateStore};
 use starlings_models::{Job, Setup, Window};
@@ -14,7 +15,7 @@ use starlings_proto::convert::state::{
     CHUNK_BYTES, Get, PutHead, decode_put_result, encode_chunk, encode_head,
 };
 use starlings_proto::generated::{self, fleet_client::FleetClient};
-use starlings_proto::{FromWorker, Hello, Lease, LeaseOutcome, State, StateId, ToWorker};
+use starlings_proto::{Hello, Lease, StateId};
 use tokio::sync::mpsc::unbounded_channel;
 use tokio_stream::wrappers::UnboundedReceiverStream;
 use tonic::{Code, Status};
@@ -26,20 +27,6 @@ const N: usize = 40_000;
 
 async fn dial(address: SocketAddr, nonce: u64) -> Hand {
     Hand::dial(address, Hello { nonce, ..hello() }).await
-}
-
-/// Builds the setup and takes a job, with the name of its state.
-async fn job(hand: &mut Hand) -> (Lease, StateId) {
-    loop {
-        match hand.hear().await.expect("still connected") {
-            ToWorker::Setup { id, .. } => hand.say(FromWorker::Setup { id, result: Ok(()) }),
-            ToWorker::Job { lease, job, .. } => {
-                let Some(State::Named(id)) = job.state else { panic!("a large state has a name") };
-                return (lease, id);
-            }
-            _ => {}
-        }
-    }
 }
 
 async fn put(hand: &mut Hand, messages: Vec<generated::Chunk>) -> Result<StateId, Status> {
@@ -55,12 +42,6 @@ async fn get(hand: &mut Hand, epoch: u64, nonce: u64, state: StateId) -> Result<
         bytes += piece.data.len();
     }
     Ok(bytes)
-}
-
-fn answer(hand: &Hand, lease: Lease, state: StateId) {
-    let prediction =
-        starlings_models::Prediction { outputs: vec![1.0], state: State::Named(state), cost: 0.0 };
-    hand.say(FromWorker::Result { lease, answer: LeaseOutcome::Ran(Ok(prediction)), cost: 0.1 });
 }
 
 fn pieces(value: f64) -> Vec<generated::Chunk> {
@@ -101,7 +82,7 @@ fn under_with(store: StateStore, attack: impl AsyncFnOnce(SocketAddr)) -> (Vec<f
 fn a_stranger_neither_gets_nor_puts_a_state() {
     let (values, store) = under(async |address| {
         let mut hand = dial(address, NONCE).await;
-        let (lease, id) = job(&mut hand).await;
+        let (lease, id) = given(&mut hand).await;
         let mut stranger = hand;
         stranger.client = FleetClient::connect(format!("http://{address}")).await.unwrap();
         for (epoch, nonce) in [(lease.epoch, NONCE + 1), (lease.epoch + 1, NONCE), (0, 0)] {
@@ -118,14 +99,14 @@ fn a_stranger_neither_gets_nor_puts_a_state() {
         stranger.stay_until_drained().await;
     });
     assert!(values == vec![2.0; N]);
-    assert_eq!(store.n_pieces(), 0);
+    await_nothing(&store);
 }
 
 #[test]
 fn what_is_put_wrongly_is_refused_and_leaves_nothing() {
     let (values, store) = under(async |address| {
         let mut hand = dial(address, NONCE).await;
-        let (lease, _) = job(&mut hand).await;
+        let (lease, _) = given(&mut hand).await;
         let head = PutHead { n_state: N, lease, nonce: NONCE };
         let with = |change: &dyn Fn(&mut Vec<generated::Chunk>)| {
             let mut messages = state(head, 3.0);
@@ -166,18 +147,18 @@ fn what_is_put_wrongly_is_refused_and_leaves_nothing() {
         hand.stay_until_drained().await;
     });
     assert!(values == vec![5.0; N]);
-    assert_eq!(store.n_pieces(), 0);
+    await_nothing(&store);
 }
 
 #[test]
 fn a_liar_about_its_state_is_set_aside_and_the_job_runs_elsewhere() {
     let (values, store) = under(async |address| {
         let mut liar = dial(address, 1).await;
-        let (lease, given) = job(&mut liar).await;
+        let (lease, first) = given(&mut liar).await;
         // The state that it was given is not one that it sent.
-        answer(&liar, lease, given);
+        answer(&liar, lease, first);
         let mut thief = dial(address, 2).await;
-        let (theirs, _) = job(&mut thief).await;
+        let (theirs, _) = given(&mut thief).await;
         // Nor does a state under another one's lease count.
         let head = PutHead { n_state: N, lease: theirs, nonce: 1 };
         assert_eq!(put(&mut liar, state(head, 6.0)).await.unwrap_err().code(), Code::PermissionDenied);
@@ -187,14 +168,14 @@ fn a_liar_about_its_state_is_set_aside_and_the_job_runs_elsewhere() {
         thief.stay_until_drained().await;
     });
     assert!(values == vec![7.0; N]);
-    assert_eq!(store.n_pieces(), 0);
+    await_nothing(&store);
 }
 
 #[test]
 fn a_hoarder_has_no_more_transfers_than_its_slots_can_need() {
     let (values, store) = under(async |address| {
         let mut hand = dial(address, NONCE).await;
-        let (lease, _) = job(&mut hand).await;
+        let (lease, _) = given(&mut hand).await;
         let head = PutHead { n_state: N, lease, nonce: NONCE };
         let mut begun = Vec::new();
         let refused = loop {
@@ -225,7 +206,7 @@ fn a_hoarder_has_no_more_transfers_than_its_slots_can_need() {
         hand.stay_until_drained().await;
     });
     assert!(values == vec![8.0; N]);
-    assert_eq!(store.n_pieces(), 0);
+    await_nothing(&store);
 }
 
 #[test]
@@ -235,7 +216,7 @@ fn names_of_pieces_count_where_these_stand_in_the_shared_folder() {
     let store = StateStore::shared(Folder::at(&path));
     let (values, store) = under_with(store, async |address| {
         let mut hand = dial(address, NONCE).await;
-        let (lease, _) = job(&mut hand).await;
+        let (lease, _) = given(&mut hand).await;
         let head = PutHead { n_state: N, lease, nonce: NONCE };
         let bytes: Vec<Vec<u8>> = pieces(9.0).into_iter().map(|piece| piece.data.to_vec()).collect();
         let names: Vec<[u8; 32]> = bytes.iter().map(|piece| starlings_proto::digest(piece)).collect();
@@ -258,6 +239,6 @@ fn names_of_pieces_count_where_these_stand_in_the_shared_folder() {
         hand.stay_until_drained().await;
     });
     assert!(values == vec![9.0; N]);
+    await_nothing(&store);
     store.tidy();
-    assert_eq!(store.n_pieces(), 0);
 }

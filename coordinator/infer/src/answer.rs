@@ -9,8 +9,11 @@ use starlings_estimators::inference::{
 };
 use starlings_study::infer_choice::{DiffusionChoice, InferChoice, MeasuredChoice};
 
+use crate::blocks::Cut;
 use crate::error::InferError;
 use crate::result::{CoefficientFound, DiffusionFound, LEVEL, RichardsonFound};
+use crate::run::Asked;
+use crate::smoothed::{not_converged, smoothed};
 
 /// The fit that a study asks for.
 pub(crate) fn fit(choice: &InferChoice, structure: &Structure) -> Result<Fit, InferError> {
@@ -53,11 +56,36 @@ impl Fitted {
         };
         let checks = if sums.n_pair() > 0 { noise_checks(sums, structure, &posterior)? } else { Vec::new() };
         let matters = checks.iter().any(|check| check.verdict == Verdict::Matters);
-        let lag_corrected = matters && choice.measured == MeasuredChoice::Auto;
+        // What interpolation takes out of single steps, neighbouring ones have together.
+        let lag_corrected = (matters && choice.measured == MeasuredChoice::Auto) || choice.resample;
         if lag_corrected {
             posterior = Fit { lag_corrected, ..fit.clone() }.posterior(sums, structure)?;
         }
         Ok(Self { posterior, checks, lag_corrected })
+    }
+}
+
+/// A row of the table of coefficients; `moved` is the estimate at no step, where it was extrapolated to that.
+pub(crate) fn coefficient(
+    choice: &InferChoice,
+    posterior: &Posterior,
+    p: usize,
+    moved: Option<f64>,
+) -> CoefficientFound {
+    let found = &posterior.estimates[p];
+    let at_step = found.value.map(|value| value.mean);
+    let shift = moved.zip(at_step).map_or(0.0, |(moved, at_step)| moved - at_step);
+    let interval = posterior.interval(p, LEVEL).map(|ends| ends.map(|end| end + shift));
+    let prior = choice.priors.iter().find(|(name, _, _)| *name == found.name);
+    CoefficientFound {
+        name: found.name.clone(),
+        observed: found.observed,
+        estimate: moved.or(at_step),
+        sd: found.value.map(|value| value.sd),
+        interval90: interval,
+        may_be_zero: interval.map(|[lo, hi]| lo <= 0.0 && hi >= 0.0),
+        at_step: moved.and(at_step),
+        prior: prior.map(|(_, mean, sd)| [*mean, *sd]),
     }
 }
 
@@ -92,6 +120,29 @@ impl Answer {
         Ok(Self { posterior, checks, lag_corrected, extrapolated, doubts })
     }
 
+    /// The posterior from a smoothed path, where the standard deviation of the measurement is known. The recording as it was measured
+    /// need not have a fit by itself.
+    pub(crate) fn smoothed(
+        asked: &Asked<'_>,
+        cut: Cut,
+        sd: f64,
+        levels: &[Sums],
+    ) -> Result<Self, InferError> {
+        let Asked { choice, question, fit, .. } = asked;
+        let checks = match levels.first().map(|sums| Fitted::of(choice, fit, &question.structure, sums, None))
+        {
+            Some(Ok(raw)) => raw.checks,
+            None
+            | Some(Err(InferenceError::DiffusionNotDefinite { .. } | InferenceError::NotSettled { .. })) => {
+                Vec::new()
+            }
+            Some(Err(error)) => return Err(error.into()),
+        };
+        let found = smoothed(question, fit, &choice.records, cut, sd)?;
+        let doubts = not_converged(found.converged, found.log_likelihood.len()).into_iter().collect();
+        Ok(Self { posterior: found.posterior, checks, lag_corrected: false, extrapolated: None, doubts })
+    }
+
     /// Means of the coefficients that have a value, at no step where they were extrapolated.
     pub(crate) fn means(&self) -> DVector<f64> {
         let mean = |(k, p): (usize, &usize)| {
@@ -104,23 +155,10 @@ impl Answer {
 
     /// The table of the coefficients.
     pub(crate) fn coefficients(&self, choice: &InferChoice) -> Vec<CoefficientFound> {
-        let all = self.posterior.estimates.iter().enumerate();
-        all.map(|(p, found)| {
-            let at_step = found.value.map(|value| value.mean);
+        let all = 0..self.posterior.estimates.len();
+        all.map(|p| {
             let moved = self.extrapolated.as_ref().and_then(|e| e.estimates.get(p)?.value).map(|v| v.mean);
-            let shift = moved.zip(at_step).map_or(0.0, |(moved, at_step)| moved - at_step);
-            let interval = self.posterior.interval(p, LEVEL).map(|ends| ends.map(|end| end + shift));
-            let prior = choice.priors.iter().find(|(name, _, _)| *name == found.name);
-            CoefficientFound {
-                name: found.name.clone(),
-                observed: found.observed,
-                estimate: moved.or(at_step),
-                sd: found.value.map(|value| value.sd),
-                interval90: interval,
-                may_be_zero: interval.map(|[lo, hi]| lo <= 0.0 && hi >= 0.0),
-                at_step: moved.and(at_step),
-                prior: prior.map(|(_, mean, sd)| [*mean, *sd]),
-            }
+            coefficient(choice, &self.posterior, p, moved)
         })
         .collect()
     }

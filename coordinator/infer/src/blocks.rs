@@ -6,13 +6,13 @@
 use std::fs::File;
 use std::io::{BufReader, Read};
 
+use starlings_estimators::inference::STEP_TOLERANCE;
 use starlings_study::infer_choice::InferRecord;
 
 use crate::error::InferError;
+use crate::resampled::Feed;
 use crate::rows::{Row, Rows};
 
-/// By how much of a step a step may differ.
-const TOLERANCE: f64 = 0.01;
 /// Rows that the sampling step is taken from.
 const FIRST: usize = 1000;
 
@@ -42,6 +42,15 @@ pub(crate) struct Cut {
     pub(crate) ahead: usize,
     /// Whether a new piece begins where rows are missing.
     pub(crate) breaks: bool,
+    /// Whether rows are interpolated to equal steps.
+    pub(crate) resample: bool,
+}
+
+impl Cut {
+    /// The rows of a recording as they are cut, of so many values.
+    pub(crate) fn feed<R: Read>(&self, rows: Rows<R>, width: usize) -> Feed<R> {
+        Feed::new(rows, self.resample.then_some(self.step), width)
+    }
 }
 
 /// What the start of a recording says of it.
@@ -93,7 +102,7 @@ pub(crate) fn even_step(times: &[f64]) -> Option<f64> {
         times.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
     steps.sort_by(f64::total_cmp);
     let median = *steps.get(steps.len() / 2)?;
-    let even = steps.iter().all(|step| (step - median).abs() <= TOLERANCE * median);
+    let even = steps.iter().all(|step| (step - median).abs() <= STEP_TOLERANCE * median);
     let whole = even && steps.len() + 1 == times.len();
     Some(if whole { (times[times.len() - 1] - times[0]) / steps.len() as f64 } else { median })
 }
@@ -101,7 +110,7 @@ pub(crate) fn even_step(times: &[f64]) -> Option<f64> {
 /// The blocks of one recording.
 pub(crate) struct Blocks<'a, R> {
     record: (usize, &'a InferRecord),
-    rows: Rows<R>,
+    rows: Feed<R>,
     cut: Cut,
     /// Number of the next row.
     row: u64,
@@ -119,7 +128,7 @@ impl<'a, R: Read> Blocks<'a, R> {
         let next = vec![0.0; record.1.columns.len()];
         Self {
             record,
-            rows,
+            rows: cut.feed(rows, record.1.columns.len()),
             cut,
             row: 0,
             first: 0,
@@ -180,7 +189,7 @@ impl<'a, R: Read> Blocks<'a, R> {
             return Ok(());
         };
         let (step, got) = (self.cut.step, time - before);
-        if (got - step).abs() <= TOLERANCE * step {
+        if (got - step).abs() <= STEP_TOLERANCE * step {
             self.times.push(time);
             self.values.extend_from_slice(&self.next);
             return Ok(());
@@ -210,7 +219,7 @@ impl<'a, R: Read> Blocks<'a, R> {
                     "the step from {before} to {time} is {} where the recording's is {step}",
                     time - before
                 ),
-                "an inference needs equal steps: resample the recording",
+                "an inference needs equal steps: `resample = STEP` in [infer] interpolates to them",
             )
         };
         self.rows.fault(Some(line), message, help)

@@ -37,6 +37,17 @@ pub enum InferError {
         /// What to do.
         help: String,
     },
+    /// A row of a record, by their numbers, is not what it should be; it is told as [`InferError::Recording`].
+    #[error("{error}")]
+    Row {
+        /// Number of the record.
+        record: usize,
+        /// What is wrong with which row.
+        error: InferenceError,
+    },
+    /// Workers cannot read a recording by themselves; it is read here then.
+    #[error("a recording is no plain text of rows")]
+    Unread,
     /// A block of a recording has no sums.
     #[error("record `{record}`: {failure}")]
     Block {

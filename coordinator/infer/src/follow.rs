@@ -117,6 +117,15 @@ fn row_by_row(choice: &InferChoice) -> Result<(), InferError> {
     if choice.sums.levels > 1 {
         return refuse("`richardson`", "leave it out, or infer from the recording when it has ended");
     }
+    if choice.missing.is_some() {
+        return refuse("[infer.candidates]", "leave it out, or infer from the recording when it has ended");
+    }
+    if choice.resample {
+        return refuse(
+            "`resample`",
+            "give a stream with equal steps, or infer from the recording when it has ended",
+        );
+    }
     if choice.reduced.is_some() {
         return refuse("[infer.reduced]", "leave it out, or infer from the recording when it has ended");
     }
@@ -128,7 +137,7 @@ fn told_at<R: Read>(rows: &Rows<R>, line: u64, error: &InferenceError) -> InferE
     let help = match error {
         InferenceError::NotIncreasing { .. } => "a stream gives every row once, in the order of time",
         InferenceError::TimeJump { .. } => "rows are missing: follow the part behind it by itself",
-        InferenceError::NonUniform { .. } => "an inference needs equal steps",
+        InferenceError::NonUniform { .. } => "a stream has equal steps",
         _ => "see [infer] of the study",
     };
     rows.fault(Some(line), error.to_string(), help)

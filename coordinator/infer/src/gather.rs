@@ -1,18 +1,20 @@
 //! Has the sums of every block made as jobs of the fleet, and merges them in the order of the blocks.
 //!
-//! Recordings are read while the fleet works; so many blocks are held as a few batches have, whatever the length of a recording. What is
-//! merged does not depend on who made which block. Next file to read: `convergence.rs`.
+//! Recordings are read while the fleet works; so many blocks are held as a few batches have, whatever the length of a recording. Workers that
+//! may read files parse their own blocks ([`Source::Files`]); otherwise rows travel. What is merged does not depend on that, nor on who made
+//! which block. Next file to read: `convergence.rs`.
 
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
-use starlings_estimators::inference::Sums;
+use starlings_estimators::inference::{InferenceError, Sums};
 use starlings_fleet::{Fleet, Outcome, SetupId};
-use starlings_models::Setup;
+use starlings_models::{Job, Setup};
 use starlings_study::infer_choice::InferRecord;
-use starlings_sums::{Question, block, sums_of};
+use starlings_sums::{BlockAnswer, Fault, Question, answer_of, block, file_block};
 
 use crate::blocks::{Block, Blocks, Cut, open};
 use crate::error::InferError;
+use crate::file_blocks::{FileBlock, FileBlocks, FileRecord};
 
 /// Numbers of one batch at most.
 const BATCH_NUMBERS: usize = 1 << 22;
@@ -28,8 +30,17 @@ pub(crate) struct Work<'a> {
     pub(crate) levels: u32,
 }
 
+/// Who reads the recordings.
+#[derive(Clone, Copy)]
+pub(crate) enum Source<'a> {
+    /// This process: rows travel.
+    Rows,
+    /// The workers, every block for itself.
+    Files(&'a [FileRecord]),
+}
+
 /// What blocks add up to.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Gathered {
     /// Sums by level, the sampling step first.
     pub(crate) levels: Vec<Sums>,
@@ -42,27 +53,61 @@ pub(crate) struct Gathered {
     record: usize,
 }
 
+/// Hears of what there is after every block.
+type Told<'a> = dyn FnMut(&Gathered, &dyn Fleet) + 'a;
+
+/// A job with the steps that start in its block.
+type Asked = (Job, u64);
+
 impl Work<'_> {
-    /// Has all blocks summed; `told` hears of what there is after every block.
+    /// Has all blocks summed. `None` where a file has something else than plain rows, one step apart: then its rows are read here, which
+    /// tells what it is, or goes on behind a gap.
     pub(crate) fn gather(
         &self,
+        source: Source<'_>,
         fleet: &mut dyn Fleet,
-        told: &mut dyn FnMut(&Gathered, &dyn Fleet) -> Result<(), InferError>,
-    ) -> Result<Gathered, InferError> {
-        let id = fleet.install(self.setup)?;
+        told: &mut Told<'_>,
+    ) -> Result<Option<Gathered>, InferError> {
+        let id = match source {
+            Source::Rows => fleet.install(self.setup)?,
+            Source::Files(files) => fleet.install(&self.with_files(files))?,
+        };
         let mut gathered = self.empty();
-        std::thread::scope(|scope| {
+        let is_whole = std::thread::scope(|scope| {
             let (sender, batches) = sync_channel(1);
-            scope.spawn(move || self.read(&sender));
+            scope.spawn(move || match source {
+                Source::Rows => self.read(&sender),
+                Source::Files(files) => self.find(files, &sender),
+            });
             self.sum(fleet, id, &batches, &mut gathered, told)
-        })?;
+        });
+        match (is_whole, source) {
+            (Ok(()), _) => {}
+            (Err(InferError::Unread | InferError::Row { .. }), Source::Files(_)) => return Ok(None),
+            (Err(InferError::Row { record, error }), Source::Rows) => {
+                return Err(self.told_at(record, &error));
+            }
+            (Err(error), _) => return Err(error),
+        }
         if let Some(k) = gathered.steps.iter().position(|n| *n == 0) {
+            if let Source::Files(_) = source {
+                return Ok(None);
+            }
             let name = &self.records[k].name;
             return Err(InferError::Setting(format!(
                 "record `{name}` has no two rows one step apart in its span"
             )));
         }
-        Ok(gathered)
+        Ok(Some(gathered))
+    }
+
+    /// The setup of workers that read files.
+    fn with_files(&self, files: &[FileRecord]) -> Setup {
+        let mut setup = self.setup.clone();
+        if let Some(sums) = &mut setup.sums {
+            sums.files = files.iter().map(|record| record.file.clone()).collect();
+        }
+        setup
     }
 
     fn empty(&self) -> Gathered {
@@ -77,7 +122,7 @@ impl Work<'_> {
     }
 
     /// Reads all recordings in batches of blocks. A reader whose batches nobody takes ends.
-    fn read(&self, sender: &SyncSender<Result<Vec<Block>, InferError>>) {
+    fn read(&self, sender: &SyncSender<Result<Vec<Asked>, InferError>>) {
         let width = 1 + self.question.basis.n_channel();
         let most = (BATCH_NUMBERS / (width * (self.cut.block + 1))).clamp(1, BATCH_BLOCKS);
         let mut batch = Vec::new();
@@ -89,7 +134,9 @@ impl Work<'_> {
             };
             loop {
                 match blocks.next() {
-                    Ok(Some(block)) => batch.push(block),
+                    Ok(Some(Block { record, first, n_step, times, rows })) => {
+                        batch.push((block(record as u32, first, n_step, times, rows), n_step as u64));
+                    }
                     Ok(None) => break,
                     Err(error) => return drop(sender.send(Err(error))),
                 }
@@ -101,60 +148,112 @@ impl Work<'_> {
         let _ = sender.send(Ok(batch));
     }
 
+    /// Finds the blocks of all files, in batches.
+    fn find(&self, files: &[FileRecord], sender: &SyncSender<Result<Vec<Asked>, InferError>>) {
+        let mut batch = Vec::new();
+        for (k, record) in files.iter().enumerate() {
+            let Ok(mut blocks) = FileBlocks::open(record, self.cut) else {
+                return drop(sender.send(Err(InferError::Unread)));
+            };
+            loop {
+                match blocks.next() {
+                    Ok(Some(FileBlock { first, n_step, bytes })) => {
+                        batch.push((file_block(k as u32, first, n_step, bytes), n_step as u64));
+                    }
+                    Ok(None) => break,
+                    Err(_) => return drop(sender.send(Err(InferError::Unread))),
+                }
+                if batch.len() >= BATCH_BLOCKS && sender.send(Ok(std::mem::take(&mut batch))).is_err() {
+                    return;
+                }
+            }
+        }
+        let _ = sender.send(Ok(batch));
+    }
+
     fn sum(
         &self,
         fleet: &mut dyn Fleet,
         id: SetupId,
-        batches: &Receiver<Result<Vec<Block>, InferError>>,
+        batches: &Receiver<Result<Vec<Asked>, InferError>>,
         gathered: &mut Gathered,
-        told: &mut dyn FnMut(&Gathered, &dyn Fleet) -> Result<(), InferError>,
+        told: &mut Told<'_>,
     ) -> Result<(), InferError> {
         for batch in batches {
-            let batch = batch?;
-            let places: Vec<Place> = batch.iter().map(Place::of).collect();
-            let number = |k: usize| gathered.n_block as u32 + k as u32;
-            let jobs = batch.into_iter().enumerate();
-            let jobs = jobs.map(|(k, b)| block(number(k), b.first, b.n_step, b.times, b.rows)).collect();
+            let (mut jobs, steps): (Vec<Job>, Vec<u64>) = batch?.into_iter().unzip();
+            let records: Vec<usize> = jobs.iter().map(|job| job.record as usize).collect();
+            for (k, job) in jobs.iter_mut().enumerate() {
+                job.particle = gathered.n_block as u32 + k as u32;
+            }
             let outcomes = fleet.run(id, jobs)?;
-            for (place, outcome) in places.iter().zip(outcomes) {
-                self.add(gathered, place, outcome)?;
-                told(gathered, &*fleet)?;
+            for ((record, n_step), outcome) in records.into_iter().zip(steps).zip(outcomes) {
+                self.add(gathered, record, n_step, outcome)?;
+                told(gathered, &*fleet);
             }
         }
         Ok(())
     }
 
-    fn add(&self, gathered: &mut Gathered, place: &Place, outcome: Outcome) -> Result<(), InferError> {
-        let name = || self.records[place.record].name.clone();
+    fn add(
+        &self,
+        gathered: &mut Gathered,
+        record: usize,
+        n_step: u64,
+        outcome: Outcome,
+    ) -> Result<(), InferError> {
+        let name = || self.records[record].name.clone();
         let found = outcome.result.map_err(|failure| InferError::Block { record: name(), failure })?;
-        let sums = sums_of(self.question, self.cut.step, self.levels, &found.state)?;
-        for (whole, sums) in gathered.levels.iter_mut().zip(&sums) {
-            if place.record != gathered.record {
+        let answer = answer_of(self.question, self.cut.step, self.levels, &found.state)?;
+        let BlockAnswer { levels, span } = answer.map_err(|fault| match fault {
+            Fault::Unread => InferError::Unread,
+            Fault::Row(error) => InferError::Row { record, error },
+        })?;
+        for (whole, sums) in gathered.levels.iter_mut().zip(&levels) {
+            if record != gathered.record {
                 // Nothing of one recording is joined to another.
                 *whole = whole.clone().detach();
             }
             whole.merge(sums)?;
         }
-        gathered.record = place.record;
+        gathered.record = record;
         gathered.n_block += 1;
-        gathered.steps[place.record] += place.n_step as u64;
-        let span = &mut gathered.spans[place.record];
-        *span = [if span[0].is_nan() { place.span[0] } else { span[0] }, place.span[1]];
+        gathered.steps[record] += n_step;
+        let whole = &mut gathered.spans[record];
+        *whole = [if whole[0].is_nan() { span[0] } else { whole[0] }, span[1]];
         Ok(())
     }
-}
 
-/// Where a block stands.
-struct Place {
-    record: usize,
-    n_step: usize,
-    span: [f64; 2],
-}
-
-impl Place {
-    fn of(block: &Block) -> Self {
-        let last = block.times.get(block.n_step).copied().unwrap_or(f64::NAN);
-        let first = block.times.first().copied().unwrap_or(f64::NAN);
-        Self { record: block.record, n_step: block.n_step, span: [first, last] }
+    /// A fault of a row with its file and line, for which the recording is read once more up to there.
+    fn told_at(&self, record: usize, error: &InferenceError) -> InferError {
+        let (row, help) = match error {
+            InferenceError::NonFinite { row, .. } => {
+                (*row, "leave out the function, or record where it has a value and a slope")
+            }
+            InferenceError::NonUniform { row, .. } => {
+                (*row, "an inference needs equal steps: `resample = STEP` in [infer] interpolates to them")
+            }
+            InferenceError::NotIncreasing { row, .. } => (*row, "keep one row per time, in their order"),
+            InferenceError::TimeJump { row, .. } => {
+                (*row, "use gaps = \"break\" in [infer] to go on behind it without a step across")
+            }
+            _ => return error.clone().into(),
+        };
+        let record = &self.records[record];
+        let line = || {
+            let mut values = vec![0.0; record.columns.len()];
+            let mut rows = self.cut.feed(open(record).ok()?, values.len());
+            (0..row).try_for_each(|_| rows.next(&mut values).ok()?.map(drop))?;
+            rows.next(&mut values).ok()?.map(|row| row.line)
+        };
+        let message = match error {
+            InferenceError::NonFinite { what, value, .. } => {
+                format!("{what} is {value} in the step that begins in this row")
+            }
+            other => other.to_string(),
+        };
+        InferError::Recording { file: record.file.clone(), line: line(), message, help: help.to_owned() }
     }
 }
+
+#[cfg(test)]
+mod tests;

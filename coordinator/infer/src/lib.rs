@@ -3,10 +3,12 @@
 //! | file | what it does |
 //! |---|---|
 //! | [`error`] | why there is no inference |
-//! | `rows`, `blocks` | a recording row by row, and cut into blocks, in memory that does not grow with it |
+//! | `rows`, `resampled`, `blocks` | a recording row by row, at equal steps, and cut into blocks, in memory that does not grow with it |
+//! | `file_blocks` | the same blocks as bytes of its file, which workers read |
 //! | `gather` | has the sums of every block made as jobs and merges them in block order |
 //! | `convergence` | the estimate after each power of two of blocks |
 //! | `smoothed` | the same from a smoothed path, where the measurement's noise is known |
+//! | `missing` | which terms the drift lacks, among candidates |
 //! | [`reduced`] | a model with fewer unknowns than coefficients |
 //! | [`result`], `answer`, `words` | the tables with intervals, and what is said of them |
 //! | [`follow`](mod@follow) | a recording that is still written: estimates and alarms as it arrives |
@@ -18,9 +20,12 @@ mod answer;
 mod blocks;
 mod convergence;
 pub mod error;
+mod file_blocks;
 pub mod follow;
 mod gather;
+mod missing;
 pub mod reduced;
+mod resampled;
 pub mod result;
 mod rows;
 pub mod run;
@@ -29,4 +34,4 @@ mod words;
 
 pub use error::InferError;
 pub use result::Inference;
-pub use run::{Progress, infer};
+pub use run::{Outlook, Progress, Reader, check, infer, outlook};

@@ -4,17 +4,16 @@
 
 use nalgebra::DVector;
 use starlings_estimators::inference::{InferenceError, Posterior, Structure, reduce};
+use starlings_estimators::quantiles::normal;
 use starlings_models::equations::{At, Expression, Program, Slot};
 use starlings_models::{Drive, nearest};
 use starlings_study::infer_choice::ReducedChoice;
 
 use crate::error::InferError;
-use crate::result::{ReducedFound, UnknownFound};
+use crate::result::{LEVEL, ReducedFound, UnknownFound};
 
 /// Probability of χ² below which a reduced model counts as refuted.
 const REFUTED: f64 = 0.01;
-/// Half of an interval that holds a normal value with a probability of 90 %, in sd.
-const HALF: f64 = 1.644_853_626_951_472_2;
 
 /// The coefficients as functions of the unknowns.
 struct Reduced {
@@ -39,13 +38,14 @@ pub fn fit_reduced(
     let shift = means - posterior.mean();
     let map = |theta: &DVector<f64>| reduced.at(theta, posterior.active()) - &shift;
     let found = reduce(posterior, &start, map).map_err(|error| named(&error, choice))?;
+    let half = normal(0.5 + 0.5 * LEVEL);
     let unknown = |(k, (name, _)): (usize, &(String, f64))| {
         let (estimate, sd) = (found.mean[k], found.covariance[(k, k)].max(0.0).sqrt());
         UnknownFound {
             name: name.clone(),
             estimate,
             sd,
-            interval90: [estimate - HALF * sd, estimate + HALF * sd],
+            interval90: [estimate - half * sd, estimate + half * sd],
         }
     };
     Ok(ReducedFound {
@@ -55,6 +55,14 @@ pub fn fit_reduced(
         probability: found.probability,
         consistent: found.probability > REFUTED,
     })
+}
+
+/// Whether a reduced model names coefficients that are there, in expressions that compile.
+///
+/// # Errors
+/// When it does not.
+pub fn check_reduced(choice: &ReducedChoice, structure: &Structure) -> Result<(), InferError> {
+    Reduced::new(choice, structure).map(drop)
 }
 
 /// An error with the unknowns by their names instead of numbers.

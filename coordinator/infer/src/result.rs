@@ -37,8 +37,14 @@ pub struct Inference {
     pub richardson: Option<RichardsonFound>,
     /// The reduced model, where there is one.
     pub reduced: Option<ReducedFound>,
+    /// Terms that the drift lacks, where they were looked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub missing: Option<MissingFound>,
     /// The estimate after each power of two of blocks, and after all.
     pub convergence: Vec<Converging>,
+    /// In what these estimates differ from the table, where they do.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub convergence_of: Option<String>,
     /// What the intervals are conditional on.
     pub conditional_on: String,
     /// What is doubtful.
@@ -132,6 +138,77 @@ pub struct UnknownFound {
     pub sd: f64,
     /// Interval that holds it with a probability of 90 %.
     pub interval90: [f64; 2],
+}
+
+/// What was found of terms that the drift may lack.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MissingFound {
+    /// Candidates that were tried.
+    pub candidates: usize,
+    /// Probability of naming anything where nothing is missing.
+    pub false_alarm: f64,
+    /// The terms that are named, in the order of the equations.
+    pub named: Vec<NamedTerm>,
+    /// Candidates by themselves beside the model, the strongest first.
+    pub strongest: Vec<ScoredTerm>,
+    /// All candidates that are not named, together beside the model with the named terms; `None` where these span them all.
+    pub left: Option<JointScore>,
+    /// Recordings that nothing was inferred from, where there are any.
+    pub held_out: Option<HeldOut>,
+    /// The coefficients of the model and of the named terms, fitted together.
+    pub coefficients: Vec<CoefficientFound>,
+}
+
+/// A term that the drift lacks.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NamedTerm {
+    /// Equation and function.
+    pub name: String,
+    /// Posterior mean of its coefficient.
+    pub estimate: f64,
+    /// Posterior standard deviation.
+    pub sd: f64,
+    /// Interval that holds it with a probability of 90 %.
+    pub interval90: [f64; 2],
+    /// χ² of its coefficient against zero, beside everything else that is named.
+    pub chi_squared: f64,
+    /// Probability of as much by chance, for this candidate alone.
+    pub by_chance: f64,
+    /// Candidates that the data take as well in its place.
+    pub ties: Vec<String>,
+}
+
+/// A candidate by itself.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ScoredTerm {
+    /// Equation and function.
+    pub name: String,
+    /// χ² of its coefficient against zero.
+    pub chi_squared: f64,
+    /// Probability of as much by chance, for this candidate alone.
+    pub by_chance: f64,
+}
+
+/// Candidates together.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct JointScore {
+    /// How many, without those that the others span.
+    pub terms: usize,
+    /// χ² of their coefficients against zero.
+    pub chi_squared: f64,
+    /// Probability of as much by chance.
+    pub by_chance: f64,
+}
+
+/// What named terms do for recordings that nothing was inferred from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HeldOut {
+    /// Names of the records.
+    pub records: Vec<String>,
+    /// Their steps.
+    pub n_step: u64,
+    /// By how much the log-likelihood grows with the named terms, in nats, at what was inferred from the other records.
+    pub gain: f64,
 }
 
 /// An estimate on the way.

@@ -17,6 +17,7 @@ pub(crate) struct Rows<R> {
     /// Positions of the time and of every column.
     at: Vec<usize>,
     names: Vec<String>,
+    n_cell: usize,
 }
 
 /// A row that was read.
@@ -57,7 +58,8 @@ impl<R: Read> Rows<R> {
             })
         };
         let at = names.iter().map(find).collect::<Result<_, _>>()?;
-        Ok(Self { file: file.to_owned(), reader, record: csv::ByteRecord::new(), at, names })
+        let (file, record, n_cell) = (file.to_owned(), csv::ByteRecord::new(), headers.len());
+        Ok(Self { file, reader, record, at, names, n_cell })
     }
 
     /// Reads the next row into `values`, one per column; `None` at the end.
@@ -97,6 +99,16 @@ impl<R: Read> Rows<R> {
             format!("`{text}` in column `{name}` is not a finite number")
         };
         Err(self.fault(Some(line), message, "an inference needs every state at every time: remove what is before or after, or use gaps = \"break\" without this row"))
+    }
+
+    /// Cells of a row.
+    pub(crate) fn n_cell(&self) -> usize {
+        self.n_cell
+    }
+
+    /// Positions in a row of the time and of every column.
+    pub(crate) fn cells(&self) -> &[usize] {
+        &self.at
     }
 
     /// Bytes read so far.

@@ -6,17 +6,18 @@ use starlings_estimators::inference::{Fit, Sums};
 use starlings_fleet::Fleet;
 use starlings_models::Setup;
 use starlings_study::Study;
-use starlings_study::infer_choice::{InferChoice, MeasuredChoice};
+use starlings_study::infer_choice::{InferChoice, InferRecord, MeasuredChoice};
 use starlings_sums::Question;
 
 use crate::answer::{Answer, fit};
 use crate::blocks::{Cut, Start, start};
 use crate::convergence::Convergence;
 use crate::error::InferError;
-use crate::gather::{Gathered, Work};
-use crate::reduced::fit_reduced;
-use crate::result::{Converging, Inference, RecordUsed};
-use crate::smoothed::{not_converged, smoothed};
+use crate::file_blocks::files;
+use crate::gather::{Gathered, Source, Work};
+use crate::missing::Wider;
+use crate::reduced::{check_reduced, fit_reduced};
+use crate::result::{Converging, Inference, MissingFound, RecordUsed};
 use crate::words;
 
 /// Blocks that a recording is cut into where the study does not say, as far as their sizes allow.
@@ -44,6 +45,15 @@ pub(crate) struct Asked<'a> {
     pub(crate) fit: Fit,
 }
 
+/// Who reads the recordings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reader {
+    /// This process, for workers that do not see its files.
+    Coordinator,
+    /// The workers, every block for itself, where the files are plain rows.
+    Workers,
+}
+
 /// Infers drift and noise of a study that was read for it ([`Study::load_for_inference`]).
 ///
 /// # Errors
@@ -51,8 +61,10 @@ pub(crate) struct Asked<'a> {
 pub fn infer(
     study: &Study,
     fleet: &mut dyn Fleet,
+    reader: Reader,
     watch: &mut dyn FnMut(&Progress),
 ) -> Result<Inference, InferError> {
+    check(study)?;
     let choice = choice(study)?;
     let Some(first) = choice.records.first() else {
         return Err(InferError::Setting("the study has no record to infer from".to_owned()));
@@ -60,27 +72,150 @@ pub fn infer(
     let at = start(first)?;
     let asked = asked(study, choice, at.step)?;
     let cut = cut(choice, &asked, at);
-    let levels = choice.sums.levels;
-    let work = Work { setup: &asked.setup, question: &asked.question, records: &choice.records, cut, levels };
-    let mut convergence = Convergence::new(&asked.fit, &asked.question.structure);
-    let mut told = |gathered: &Gathered, fleet: &dyn Fleet| {
-        convergence.look(gathered);
-        let n_step = gathered.levels.first().map_or(0, Sums::n_step);
-        watch(&Progress { n_block: gathered.n_block, n_step, workers: fleet.n_workers() });
-        Ok(())
+    let (gathered, convergence) = gathered(&asked, &choice.records, cut, fleet, (reader, &mut *watch))?;
+    let structure = &asked.question.structure;
+    let answer = match choice.measured {
+        MeasuredChoice::Known(sd) => Answer::smoothed(&asked, cut, sd, &gathered.levels)?,
+        _ => Answer::of(choice, &asked.fit, structure, &gathered.levels)?,
     };
-    let gathered = work.gather(fleet, &mut told)?;
-    let mut answer = Answer::of(choice, &asked.fit, &asked.question.structure, &gathered.levels)?;
-    if let MeasuredChoice::Known(sd) = choice.measured {
-        let found = smoothed(&asked.question, &asked.fit, &choice.records, cut, sd)?;
-        answer.doubts = not_converged(found.converged, found.log_likelihood.len()).into_iter().collect();
-        (answer.posterior, answer.extrapolated) = (found.posterior, None);
+    let fit = Fit { lag_corrected: answer.lag_corrected, ..asked.fit.clone() };
+    let missing = missing(&asked, &fit, &gathered, cut, fleet, (reader, watch))?;
+    let convergence = convergence.finish(&fit, structure, &gathered);
+    told_of(study, &asked, &gathered, &answer, cut, (convergence, missing))
+}
+
+/// Terms that the drift lacks, where they are looked for: compared on the held-out records too, where there are any.
+fn missing(
+    asked: &Asked<'_>,
+    fit: &Fit,
+    of_all: &Gathered,
+    cut: Cut,
+    fleet: &mut dyn Fleet,
+    ways: Ways<'_>,
+) -> Result<Option<MissingFound>, InferError> {
+    let Asked { choice, question, .. } = asked;
+    let (Some(settings), Some(structure)) = (choice.missing, &question.wider) else { return Ok(None) };
+    let Some(sums) = of_all.levels.first() else { return Ok(None) };
+    let held_out = match choice.held_out.as_slice() {
+        [] => None,
+        records => Some(gathered(asked, records, cut, fleet, ways)?.0),
+    };
+    let names = || choice.held_out.iter().map(|record| record.name.clone()).collect();
+    let held_out = held_out.as_ref().and_then(|held_out| Some((held_out.levels.first()?, names())));
+    Wider::new(structure, fit)?.look(choice, settings, sums, held_out).map(Some)
+}
+
+/// Who reads the recordings, and who watches.
+type Ways<'a> = (Reader, &'a mut dyn FnMut(&Progress));
+
+/// Whether what a study asks fits together, before anything is read: functions, priors, the reduced model, what excludes one another.
+///
+/// # Errors
+/// When it does not.
+pub fn check(study: &Study) -> Result<(), InferError> {
+    let choice = choice(study)?;
+    // The step of the recording is not known yet, and nothing here depends on it.
+    let asked = asked(study, choice, 1.0)?;
+    if let Some(reduced) = &choice.reduced {
+        check_reduced(reduced, &asked.question.structure)?;
     }
-    let convergence = match gathered.levels.first() {
-        Some(sums) => convergence.finish(gathered.n_block, sums, &answer.posterior),
-        None => Vec::new(),
+    if let Some(structure) = &asked.question.wider
+        && structure.n_coefficient() == asked.question.structure.n_coefficient()
+    {
+        let message = "[infer.candidates] names no term that the model has not already: give others, or a larger `degree`";
+        return Err(InferError::Setting(message.to_owned()));
+    }
+    if choice.resample && choice.sums.levels > 1 {
+        let message = "`richardson` compares steps of a recording as it is: remove it, or `resample`";
+        return Err(InferError::Setting(message.to_owned()));
+    }
+    let MeasuredChoice::Known(_) = choice.measured else { return Ok(()) };
+    if choice.resample {
+        let message = "a given `measurement_noise` is that of the rows, which `resample` mixes: remove one";
+        return Err(InferError::Setting(message.to_owned()));
+    }
+    let refused =
+        |what: &str| Err(InferError::Setting(format!("a given `measurement_noise` {what}, or use \"auto\"")));
+    if choice.records.len() > 1 {
+        return refused("smooths one recording: keep one record");
+    }
+    if choice.missing.is_some() {
+        return refused(
+            "smooths a path, and [infer.candidates] are scored by the recording as it was measured: remove one",
+        );
+    }
+    if choice.breaks {
+        return refused("smooths a recording without gaps: remove gaps = \"break\"");
+    }
+    if choice.sums.levels > 1 {
+        return refused(
+            "smooths at the sampling step, which `richardson` does not extrapolate: remove `richardson`",
+        );
+    }
+    Ok(())
+}
+
+/// What an inference would do.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outlook {
+    /// The equations, by the names of their states.
+    pub equations: Vec<String>,
+    /// Functions of the basis.
+    pub n_function: usize,
+    /// Names of the coefficients.
+    pub coefficients: Vec<String>,
+    /// Name of every record, its sampling step and how many rows its length suggests.
+    pub records: Vec<(String, f64, f64)>,
+}
+
+/// Checks a study as [`check`] does, and looks at the first rows of its recordings.
+///
+/// # Errors
+/// As for [`check`]; for a recording that cannot be read, or lacks a column.
+pub fn outlook(study: &Study) -> Result<Outlook, InferError> {
+    check(study)?;
+    let choice = choice(study)?;
+    let asked = asked(study, choice, 1.0)?;
+    let structure = &asked.question.structure;
+    let record = |record: &InferRecord| {
+        let at = start(record)?;
+        Ok((record.name.clone(), at.step, at.n_row))
     };
-    told_of(study, &asked, &gathered, &answer, cut, convergence)
+    Ok(Outlook {
+        equations: structure.equations().to_vec(),
+        n_function: structure.n_function(),
+        coefficients: structure.coefficients().iter().map(|c| c.name.clone()).collect(),
+        records: choice.records.iter().map(record).collect::<Result<_, InferError>>()?,
+    })
+}
+
+/// The sums of all blocks, and those on the way.
+fn gathered(
+    asked: &Asked<'_>,
+    records: &[InferRecord],
+    cut: Cut,
+    fleet: &mut dyn Fleet,
+    (reader, watch): Ways<'_>,
+) -> Result<(Gathered, Convergence), InferError> {
+    let Asked { choice, setup, question, .. } = asked;
+    let work = Work { setup, question, records, cut, levels: choice.sums.levels };
+    let files = match reader {
+        Reader::Workers => files(records, cut),
+        Reader::Coordinator => None,
+    };
+    let sources = files.as_deref().map(Source::Files).into_iter().chain([Source::Rows]);
+    for source in sources {
+        let mut convergence = Convergence::default();
+        let mut told = |gathered: &Gathered, fleet: &dyn Fleet| {
+            convergence.look(gathered);
+            let n_step = gathered.levels.first().map_or(0, Sums::n_step);
+            watch(&Progress { n_block: gathered.n_block, n_step, workers: fleet.n_workers() });
+        };
+        if let Some(gathered) = work.gather(source, fleet, &mut told)? {
+            return Ok((gathered, convergence));
+        }
+    }
+    Err(InferError::Unread)
 }
 
 /// What the study asks.
@@ -109,6 +244,7 @@ fn cut(choice: &InferChoice, asked: &Asked<'_>, at: Start) -> Cut {
         block: choice.block.unwrap_or(usual).min(choice.most_steps),
         ahead: choice.sums.n_ahead(),
         breaks: choice.breaks,
+        resample: choice.resample,
     }
 }
 
@@ -119,7 +255,7 @@ fn told_of(
     gathered: &Gathered,
     answer: &Answer,
     cut: Cut,
-    convergence: Vec<Converging>,
+    (convergence, missing): (Vec<Converging>, Option<MissingFound>),
 ) -> Result<Inference, InferError> {
     let choice = asked.choice;
     let structure = &asked.question.structure;
@@ -130,10 +266,10 @@ fn told_of(
     let coefficients = answer.coefficients(choice);
     let n_step = gathered.levels.first().map_or(0, Sums::n_step);
     let records = choice.records.iter().enumerate();
-    let warnings = words::warnings(choice, answer, reduced.as_ref());
+    let warnings = words::warnings(choice, answer, reduced.as_ref(), missing.as_ref());
     Ok(Inference {
         study: study.name.clone(),
-        verdict: words::verdict(n_step, &coefficients, reduced.as_ref()),
+        verdict: words::verdict(n_step, &coefficients, reduced.as_ref(), missing.as_ref()),
         time_unit: study.time_unit.clone(),
         records: records
             .map(|(k, r)| RecordUsed {
@@ -151,7 +287,9 @@ fn told_of(
         noise_checks: answer.checks.clone(),
         richardson: answer.richardson(),
         reduced,
+        missing,
         convergence,
+        convergence_of: words::convergence_of(choice, answer),
         conditional_on: words::conditional_on(choice, answer),
         warnings: [study.warnings.clone(), warnings].concat(),
     })

@@ -32,8 +32,7 @@ pub(crate) fn smoothed(
     sd: f64,
 ) -> Result<NoisyPosterior, InferError> {
     let [record] = records else {
-        let message = "a given `measurement_noise` smooths one recording: keep one record, or use \"auto\"";
-        return Err(InferError::Setting(message.to_owned()));
+        return Err(InferError::Setting("smoothing takes one recording".to_owned()));
     };
     let mut blocks = Blocks::new((0, record), open(record)?, Cut { ahead: 0, breaks: false, ..cut });
     let (mut times, mut rows) = (Vec::new(), Vec::new());

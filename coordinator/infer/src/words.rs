@@ -6,13 +6,14 @@ use starlings_estimators::inference::{NoiseCheck, Verdict};
 use starlings_study::infer_choice::{InferChoice, MeasuredChoice};
 
 use crate::answer::Answer;
-use crate::result::{CoefficientFound, ReducedFound};
+use crate::result::{CoefficientFound, MissingFound, NamedTerm, ReducedFound};
 
 /// The result in one sentence.
 pub(crate) fn verdict(
     n_step: u64,
     coefficients: &[CoefficientFound],
     reduced: Option<&ReducedFound>,
+    missing: Option<&MissingFound>,
 ) -> String {
     let count = |which: &dyn Fn(&CoefficientFound) -> bool| coefficients.iter().filter(|c| which(c)).count();
     let unknown = count(&|c| !c.observed);
@@ -35,7 +36,23 @@ pub(crate) fn verdict(
         )
     });
     let of = plural(coefficients.len(), "coefficient");
-    format!("{n_step} steps give {given} of {of}{differ}{unseen}{reduced}")
+    let missing = missing.map_or_else(String::new, lacks);
+    format!("{n_step} steps give {given} of {of}{differ}{unseen}{reduced}{missing}")
+}
+
+/// What the drift lacks, as the end of the verdict.
+fn lacks(missing: &MissingFound) -> String {
+    let of = plural(missing.candidates, "candidate");
+    if missing.named.is_empty() {
+        return format!("; of {of} no term is missing");
+    }
+    let name = |named: &NamedTerm| {
+        let ties =
+            if named.ties.is_empty() { String::new() } else { format!(" (or {})", named.ties.join(", ")) };
+        format!("{}{ties}", named.name)
+    };
+    let names: Vec<String> = missing.named.iter().map(name).collect();
+    format!("; of {of} the drift lacks {}", names.join(", "))
 }
 
 fn plural(n: usize, what: &str) -> String {
@@ -57,6 +74,9 @@ pub(crate) fn conditional_on(choice: &InferChoice, answer: &Answer) -> String {
         MeasuredChoice::Known(sd) => format!(
             "at the smoothed path under errors of the measurement of {sd}, whose own uncertainty they do not hold"
         ),
+        _ if choice.resample => {
+            "at rows that were interpolated to equal steps, whose effect on the functions they do not hold".to_owned()
+        }
         _ if answer.lag_corrected => {
             "with the noise freed of errors of the measurement, whose effect on the functions they do not hold".to_owned()
         }
@@ -69,9 +89,57 @@ pub(crate) fn conditional_on(choice: &InferChoice, answer: &Answer) -> String {
     format!("90 % intervals, given that {drift} and that the noise is white, {measured}; {step}")
 }
 
+/// In what the estimates on the way differ from the table.
+pub(crate) fn convergence_of(choice: &InferChoice, answer: &Answer) -> Option<String> {
+    if let MeasuredChoice::Known(_) = choice.measured {
+        return Some("estimates from the recording as it was measured, before smoothing".to_owned());
+    }
+    let extrapolated = answer.extrapolated.as_ref();
+    extrapolated.map(|_| "estimates at the sampling step, before the extrapolation to none".to_owned())
+}
+
+/// What is doubtful about terms that were named or not.
+fn of_missing(missing: &MissingFound) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if !missing.named.is_empty() {
+        let text = "the drift lacks terms: its coefficients are those of the model as it is, and move when these are added";
+        warnings.push(text.to_owned());
+    }
+    if let Some(left) = missing.left.as_ref().filter(|left| left.by_chance < missing.false_alarm) {
+        let beside = if missing.named.is_empty() { "" } else { " and the named terms" };
+        warnings.push(format!(
+            "all candidates together explain more beside the model{beside} than chance does (χ² {:.1} for {}, probability {}), and none \
+             alone is sure: record longer, or give other candidates",
+            left.chi_squared,
+            plural(left.terms, "term"),
+            probability(left.by_chance)
+        ));
+    }
+    if let Some(held_out) = missing.held_out.as_ref().filter(|h| !missing.named.is_empty() && h.gain <= 0.0) {
+        warnings.push(format!(
+            "held-out records are predicted no better with the named terms ({:.1} nats over {} steps): what was named may hold in the \
+             other records only",
+            held_out.gain, held_out.n_step
+        ));
+    }
+    warnings
+}
+
 /// What is doubtful.
-pub(crate) fn warnings(choice: &InferChoice, answer: &Answer, reduced: Option<&ReducedFound>) -> Vec<String> {
+pub(crate) fn warnings(
+    choice: &InferChoice,
+    answer: &Answer,
+    reduced: Option<&ReducedFound>,
+    missing: Option<&MissingFound>,
+) -> Vec<String> {
     let mut warnings = answer.doubts.clone();
+    if choice.resample {
+        warnings.push(
+            "rows were interpolated to equal steps, which takes noise out of each: the noise was taken from neighbouring residuals, which \
+             have it together"
+                .to_owned(),
+        );
+    }
     let noisy: Vec<&NoiseCheck> =
         answer.checks.iter().filter(|check| check.verdict == Verdict::Matters).collect();
     if !noisy.is_empty() && !matches!(choice.measured, MeasuredChoice::Known(_)) {
@@ -106,6 +174,9 @@ pub(crate) fn warnings(choice: &InferChoice, answer: &Answer, reduced: Option<&R
             "prefactor = false leaves a bias of ½ D V Φ⁻¹ in the coefficients, which more data do not remove"
                 .to_owned(),
         );
+    }
+    if let Some(missing) = missing {
+        warnings.extend(of_missing(missing));
     }
     if let Some(reduced) = reduced.filter(|reduced| !reduced.consistent) {
         warnings.push(format!(

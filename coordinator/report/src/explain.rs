@@ -84,8 +84,8 @@ impl<'a> Page<'a> {
             Verdict::Unexplained => ("unexplained", "Unexplained"),
             Verdict::NoGap => ("no-gap", "No gap"),
         };
-        let nearest = found.effects.is_empty() && found.closest.is_some();
-        let shown = if nearest { found.closest.as_slice() } else { &found.effects };
+        let nearest = found.effects.is_empty() && !found.closest.is_empty();
+        let shown = if nearest { &found.closest } else { &found.effects };
         let experiment = found.experiment.as_ref();
         Ok(Self {
             found,

@@ -4,6 +4,7 @@
 //! `infer/infer.html`.
 
 mod figures;
+mod missing;
 
 use std::path::Path;
 
@@ -14,6 +15,7 @@ use starlings_study::store::folder::write;
 
 use super::plot::figure::Slots;
 use super::{FilesError, ReportError, layout, number};
+use missing::MissingTerms;
 
 /// The page, ready to be arranged.
 #[derive(Debug, Serialize)]
@@ -24,11 +26,12 @@ struct Page<'a> {
     diffusion: Vec<Vec<String>>,
     unknowns: Vec<Row>,
     checks: Vec<[String; 4]>,
+    missing: Option<MissingTerms>,
     figures: Slots,
 }
 
 /// A line of a table of coefficients.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Default, Serialize)]
 struct Row {
     name: String,
     estimate: String,
@@ -104,6 +107,7 @@ impl<'a> Page<'a> {
             diffusion: diffusion(found),
             unknowns: found.reduced.as_ref().map(unknowns).unwrap_or_default(),
             checks: checks(found),
+            missing: found.missing.as_ref().map(MissingTerms::new),
             figures: figures::draw(found)?,
         })
     }

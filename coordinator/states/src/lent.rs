@@ -147,6 +147,36 @@ mod tests {
     }
 
     #[test]
+    fn a_piece_that_another_state_needs_does_not_keep_the_memory_of_a_whole_one() {
+        let store = lending(64 * BYTES);
+        let (x, mut y) = (values(1), values(2));
+        y[..CHUNK_VALUES].copy_from_slice(&x[..CHUNK_VALUES]);
+        let whole = store.keep(&x).expect("room");
+        assert!(whole.descriptor().is_some());
+        let in_pieces = || {
+            let mut writer = store.writer(N);
+            for piece in y.chunks(CHUNK_VALUES) {
+                writer.push_copy(&floats::encode(piece)).expect("room");
+            }
+            writer
+        };
+        let other = in_pieces().finish().expect("it is whole");
+        assert_eq!(store.in_memory().0, 2 * BYTES - CHUNK_BYTES, "they share one piece");
+        drop(whole);
+        assert_eq!((store.in_memory().0, store.n_pieces()), (BYTES, 3));
+        assert!(other.values().expect("it is there") == y);
+        drop(other);
+        assert_eq!((store.in_memory().0, store.n_pieces()), (0, 0));
+        // The same where the whole one is not finished.
+        let mut begun = store.writer_for_workers(N);
+        begun.push(floats::encode(&x[..CHUNK_VALUES])).expect("room");
+        let other = in_pieces().finish().expect("it is whole");
+        drop(begun);
+        assert_eq!((store.in_memory().0, store.n_pieces()), (BYTES, 3));
+        assert!(other.values().expect("it is there") == y);
+    }
+
+    #[test]
     fn a_state_in_memory_is_persisted_and_reopened_as_any_other() {
         let scratch = tempfile::tempdir().expect("a folder");
         let path = scratch.path().join("states");

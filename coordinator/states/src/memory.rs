@@ -49,7 +49,7 @@ impl Taken {
         self.bytes.fetch_add(bytes, Ordering::Relaxed);
         self.lent.fetch_add(lent, Ordering::Relaxed);
         self.descriptors.fetch_add(1, Ordering::Relaxed);
-        Some(Room { taken: Arc::clone(self), bytes, lent })
+        Some(Room { taken: Arc::clone(self), bytes: AtomicUsize::new(bytes), lent })
     }
 }
 
@@ -57,13 +57,13 @@ impl Taken {
 #[derive(Debug)]
 pub(crate) struct Room {
     taken: Arc<Taken>,
-    bytes: usize,
+    bytes: AtomicUsize,
     lent: usize,
 }
 
 impl Drop for Room {
     fn drop(&mut self) {
-        self.taken.bytes.fetch_sub(self.bytes, Ordering::Relaxed);
+        self.taken.bytes.fetch_sub(*self.bytes.get_mut(), Ordering::Relaxed);
         self.taken.lent.fetch_sub(self.lent, Ordering::Relaxed);
         self.taken.descriptors.fetch_sub(1, Ordering::Relaxed);
     }
@@ -73,13 +73,19 @@ impl Drop for Room {
 #[derive(Debug)]
 pub(crate) struct Memory {
     shared: SharedMemory,
-    _room: Room,
+    room: Room,
 }
 
 impl Memory {
     /// Memory in this room; `None` where the system gives none.
     pub(crate) fn new(room: Room) -> Option<Self> {
-        Some(Self { shared: SharedMemory::of(room.bytes).ok()?, _room: room })
+        Some(Self { shared: SharedMemory::of(room.bytes.load(Ordering::Relaxed)).ok()?, room })
+    }
+
+    /// Counts so many bytes of it no longer: they are counted elsewhere.
+    pub(crate) fn uncount(&self, bytes: usize) {
+        self.room.bytes.fetch_sub(bytes, Ordering::Relaxed);
+        self.room.taken.bytes.fetch_sub(bytes, Ordering::Relaxed);
     }
 
     fn failed(what: &'static str) -> impl Fn(std::io::Error) -> StateError {
@@ -121,6 +127,11 @@ impl InMemory {
             Self::Alone(bytes) => bytes.len(),
             Self::Within(..) => 0,
         }
+    }
+
+    /// Whether it is in this memory of a whole state.
+    pub(crate) fn is_within(&self, memory: &Arc<Memory>) -> bool {
+        matches!(self, Self::Within(within, ..) if Arc::ptr_eq(within, memory))
     }
 
     pub(crate) fn read(&self) -> Result<Bytes, StateError> {

@@ -143,7 +143,19 @@ impl Shared {
         Ok(())
     }
 
-    pub(crate) fn release(&self, names: &[ChunkId]) {
+    /// Copies those of these pieces that others need out of the memory of a whole state, which would stay with any of them.
+    pub(crate) fn move_out(&self, names: &[ChunkId], memory: &Arc<Memory>) {
+        for name in names {
+            let left = self.lock().left_within(name, memory);
+            // One that cannot be read stays where it is.
+            if let Some(Ok(bytes)) = left.map(|held| held.read()) {
+                self.lock().moved_out(name, memory, bytes);
+            }
+        }
+    }
+
+    /// Gives up one use of each of these pieces, some of which may be in the memory of a whole state that goes with them.
+    pub(crate) fn release(&self, names: &[ChunkId], memory: Option<&Arc<Memory>>) {
         let is_left = {
             let mut table = self.lock();
             for name in names {
@@ -151,6 +163,9 @@ impl Shared {
             }
             table.has_unneeded()
         };
+        if let Some(memory) = memory {
+            self.move_out(names, memory);
+        }
         if is_left && !self.for_workers {
             self.tidy();
         }
@@ -186,6 +201,6 @@ impl Drop for Pieces {
                 table.named.remove(&self.id);
             }
         }
-        self.store.release(&self.names);
+        self.store.release(&self.names, self.memory.as_ref());
     }
 }

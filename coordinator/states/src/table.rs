@@ -7,7 +7,7 @@ use bytes::Bytes;
 use starlings_proto::StateId;
 use starlings_proto::convert::state::ChunkId;
 
-use crate::memory::{InMemory, Room, Taken};
+use crate::memory::{InMemory, Memory, Room, Taken};
 
 /// Guarded by the store's lock. A state is a `P`.
 #[derive(Debug)]
@@ -89,6 +89,21 @@ impl<P> Table<P> {
         let entry = self.chunks.entry(name).or_insert(Entry { refs: 0, held: None, on_disk: false });
         entry.refs += 1;
         entry.held.get_or_insert(held);
+    }
+
+    /// Where a piece is that others need and that is in the memory of a state which goes.
+    pub(crate) fn left_within(&self, name: &ChunkId, memory: &Arc<Memory>) -> Option<InMemory> {
+        self.chunks.get(name)?.held.clone().filter(|held| held.is_within(memory))
+    }
+
+    /// Has a piece be in memory by itself that was in that of a whole state: it counts as much as there.
+    pub(crate) fn moved_out(&mut self, name: &ChunkId, memory: &Arc<Memory>, bytes: Bytes) {
+        let held = self.chunks.get_mut(name).and_then(|entry| entry.held.as_mut());
+        if let Some(held) = held.filter(|held| held.is_within(memory)) {
+            memory.uncount(bytes.len());
+            self.alone += bytes.len();
+            *held = InMemory::Alone(bytes);
+        }
     }
 
     /// Counts one use of a piece that stands in the folder; it may have come into memory meanwhile.

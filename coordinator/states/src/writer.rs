@@ -86,8 +86,7 @@ impl StateWriter {
         }
         let name = digest(bytes);
         self.store.put_copy(name, bytes)?;
-        // Not in the memory of the whole.
-        self.whole = None;
+        self.is_whole_no_more();
         self.take(name);
         Ok(())
     }
@@ -102,10 +101,16 @@ impl StateWriter {
             return Err(self.misfit(0));
         }
         self.store.found(name, wanted)?;
-        // It is no longer all there.
-        self.whole = None;
+        self.is_whole_no_more();
         self.take(name);
         Ok(())
+    }
+
+    /// The next piece is not in the memory of the whole, which is of no use then.
+    fn is_whole_no_more(&mut self) {
+        if let Some(memory) = self.whole.take() {
+            self.store.move_out(&self.names, &memory);
+        }
     }
 
     fn take(&mut self, name: ChunkId) {
@@ -125,11 +130,11 @@ impl StateWriter {
         if self.names.len() != n_chunks(self.n_state) {
             return Err(self.misfit(0));
         }
-        let (store, n_state, id) = (Arc::clone(&self.store), self.n_state, self.naming.finish());
-        let memory = self.whole.take();
-        if let Some(memory) = &memory {
+        if let Some(memory) = &self.whole {
             memory.seal()?;
         }
+        let (store, n_state, id) = (Arc::clone(&self.store), self.n_state, self.naming.finish());
+        let memory = self.whole.take();
         let names = std::mem::take(&mut self.names);
         Ok(StoredState::named(Pieces { store, id, n_state, names, memory }))
     }
@@ -137,6 +142,6 @@ impl StateWriter {
 
 impl Drop for StateWriter {
     fn drop(&mut self) {
-        self.store.release(&self.names);
+        self.store.release(&self.names, self.whole.as_ref());
     }
 }

@@ -14,6 +14,7 @@ mod model;
 mod observer;
 mod parameters;
 mod prior;
+mod records;
 pub(crate) mod relative;
 pub(crate) mod scales;
 mod settings;
@@ -25,19 +26,17 @@ mod units;
 use std::path::Path;
 use std::sync::Arc;
 
-use starlings_models::{BuildSetup, Setup, SolverDef};
+use starlings_models::{BuildSetup, Setup, SolverDef, Spec};
 
-use self::built::CheckedModel;
 use self::parameters::initial_medians;
+use self::records::records;
 use self::settings::{estimator, fleet};
 use self::solver::DescribedSolver;
 pub(crate) use self::solver::UNTRIED;
-use super::checked::{Record, Study};
+use super::checked::{EstimatorChoice, ExplainChoice, FleetChoice, Record, SpectrumChoice, Study};
 use super::expand;
-use super::field::field_of;
-use super::file::{RecordSection, StudyFile};
+use super::file::StudyFile;
 use super::problem::{Problem, Source, StudyError};
-use super::record::{Context, Recordings};
 use super::solver_host::SolverHost;
 use crate::file::read::read;
 
@@ -83,6 +82,12 @@ impl Study {
     /// Everything that is wrong, each with its place and remedy.
     pub fn load_for_inference(path: &Path) -> Result<Self, StudyError> {
         infer::study(path, &text_of(path)?)
+    }
+
+    /// Whether a study file has a section `[infer]`; a file that cannot be read has none.
+    pub fn asks_to_infer(path: &Path) -> bool {
+        let file = text_of(path).ok().and_then(|text| text.parse::<toml::Table>().ok());
+        file.is_some_and(|file| file.contains_key("infer"))
     }
 
     /// Checks the text of a study file that stands, or stood, at `file`.
@@ -154,30 +159,54 @@ fn check(path: &Path, text: &str, solver_host: &SolverHost) -> Result<Study, Stu
     warnings.extend(model.setup.is_noisy().then(|| NOISE_LEFT_OUT.to_owned()));
     warnings.extend(units::warnings(&file, &model, &records));
     let theta = expand::theta(&parameters, &records);
+    let described = (model.setup, model.spec);
     Ok(Study {
+        candidates: Arc::new(model.candidates),
+        parameters,
+        theta,
+        records: Arc::new(records),
+        explain,
+        spectrum,
+        delays: model.delays,
+        runs_here: solver.is_none_or(|known| known.is_here),
+        warnings,
+        ..study_of(path, &source, file, described, (fleet, estimator), solver_host)
+    })
+}
+
+/// A study of a model, without parameters, records and what commands ask of it.
+fn study_of(
+    path: &Path,
+    source: &Source,
+    file: StudyFile,
+    (setup, spec): (Setup, Spec),
+    (fleet, estimator): (FleetChoice, EstimatorChoice),
+    solver_host: &SolverHost,
+) -> Study {
+    Study {
         file: path.to_owned(),
         text: Arc::clone(&source.text),
         name: file.study.name.into_inner(),
         says: file.study.says,
         seed: file.study.seed,
         time_unit: file.study.time_unit,
-        setup: model.setup,
-        spec: model.spec,
-        candidates: Arc::new(model.candidates),
-        parameters,
-        theta,
-        records: Arc::new(records),
+        setup,
+        spec,
+        candidates: Arc::default(),
+        parameters: Vec::new(),
+        theta: Vec::new(),
+        records: Arc::default(),
         estimator,
         fleet,
-        explain,
-        spectrum,
+        explain: ExplainChoice::default(),
+        spectrum: SpectrumChoice::default(),
         infer: None,
-        delays: model.delays,
-        runs_here: solver.is_none_or(|known| known.is_here),
+        delays: false,
+        runs_here: true,
         whole_answers: false,
         solver_host: solver_host.clone(),
-        warnings,
-    })
+        warnings: Vec::new(),
+    }
 }
 
 /// Checks that need the finished setup: whether it builds, what a run of it costs, whether its observer fits.
@@ -208,76 +237,4 @@ fn check_name(source: &Source, file: &StudyFile) {
             "use letters, digits, `-` and `_`",
         );
     }
-}
-
-/// Reads all records; their outputs become those of the setup.
-fn records(
-    source: &Source,
-    file: &StudyFile,
-    model: &mut CheckedModel,
-    hold_out: &[String],
-    warnings: &mut Vec<String>,
-) -> Vec<Record> {
-    check_record_list(source, file);
-    let mut files = Recordings::new(source);
-    let mut context = Context { outputs: &mut model.setup.outputs, hold_out, warnings };
-    let read = |section: &RecordSection| files.record(section, &model.spec, &mut context);
-    let records: Vec<Record> = file.records.iter().filter_map(read).collect();
-    check_held_out_components(source, file, &records);
-    records
-}
-
-fn check_record_list(source: &Source, file: &StudyFile) {
-    let end = source.text.len();
-    if file.records.is_empty() {
-        source.report_with(
-            end..end,
-            "the study has no record",
-            "add `[[records]]` with `name`, `file` and `channels`",
-        );
-    } else if file.records.iter().all(|r| r.held_out) {
-        let help = "remove `use = \"held-out\"` from at least one";
-        source.report_with(
-            file.records[0].span.clone(),
-            "every record is held out: nothing is left to fit",
-            help,
-        );
-    }
-    for (i, record) in file.records.iter().enumerate() {
-        if file.records[..i].iter().any(|r| r.name.get_ref() == record.name.get_ref()) {
-            let message = format!("two records are named `{}`", record.name.get_ref());
-            source.report_with(record.name.span(), message, "names of records are unique in a study");
-        }
-    }
-    // A held-out name that no channel measures is refused: with a typing error the channel that is meant would be fitted.
-    let measured: Vec<String> =
-        file.records.iter().flat_map(|r| &r.channels).map(|c| c.output.get_ref().clone()).collect();
-    let found = |name: &str| measured.iter().any(|m| field_of(m) == field_of(name));
-    report_unmeasured(source, file, &measured, &found);
-}
-
-/// Checks held-out components of fields: whether their channel has a column for them is known only after the files are read.
-fn check_held_out_components(source: &Source, file: &StudyFile, records: &[Record]) {
-    let measured: Vec<String> = records.iter().flat_map(|r| &r.channels).map(|c| c.output.clone()).collect();
-    let found = |name: &str| measured.iter().any(|m| m == name || field_of(m) == name);
-    if records.len() == file.records.len() {
-        report_unmeasured(source, file, &measured, &found);
-    }
-}
-
-fn report_unmeasured(source: &Source, file: &StudyFile, measured: &[String], found: &dyn Fn(&str) -> bool) {
-    for name in file.explain.hold_out_channels.iter().filter(|n| !found(n.get_ref())) {
-        let message = format!("no channel measures `{}`, so it cannot be held out", name.get_ref());
-        source.report_unknown(name.span(), message, &unique(measured));
-    }
-}
-
-fn unique(names: &[String]) -> Vec<String> {
-    let mut list: Vec<String> = Vec::new();
-    for name in names {
-        if !list.contains(name) {
-            list.push(name.clone());
-        }
-    }
-    list
 }

@@ -23,14 +23,29 @@ pub struct InferChoice {
     pub most_steps: usize,
     /// Whether a recording goes on in a new piece where rows are missing.
     pub breaks: bool,
+    /// Whether rows are interpolated to equal steps, those of the sums.
+    pub resample: bool,
     /// Mean and standard deviation of every coefficient with a prior, by name.
     pub priors: Vec<(String, f64, f64)>,
     /// A model with fewer unknowns behind the coefficients.
     pub reduced: Option<ReducedChoice>,
+    /// How terms that the drift lacks are looked for, among the candidates of the sums.
+    pub missing: Option<MissingChoice>,
     /// How a recording is followed.
     pub follow: FollowChoice,
     /// The recordings.
     pub records: Vec<InferRecord>,
+    /// Recordings that nothing is inferred from, on which missing terms are compared; none where none is looked for.
+    pub held_out: Vec<InferRecord>,
+}
+
+/// How terms that a drift lacks are looked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MissingChoice {
+    /// Probability of naming anything where nothing is missing.
+    pub false_alarm: f64,
+    /// Terms named at most.
+    pub most: usize,
 }
 
 /// The form of the diffusion.

@@ -40,10 +40,12 @@ pub(super) fn tasks(answer: &str, order: &Order, roles: &[Role]) -> Vec<Task> {
         };
         let is_named = |row: &&Row<'_>| row.name() == name;
         let is_it = |row: &&Row<'_>| index.as_deref().is_none_or(|index| row.index() == index);
-        // An array that was cancelled before any of it started is one row for all.
-        let is_whole = |row: &&Row<'_>| row.index() == "N/A";
+        // An array that was cancelled before any of it started is one row for all; of several arrays it tells nothing of the others.
+        let is_whole = |row: &&Row<'_>| row.index() == "N/A" && order.elastic.is_none();
         let named = || rows.iter().filter(is_named);
-        let found = named().rfind(is_it).or_else(|| named().rfind(is_whole));
+        // A number that was given again is that of the live task, else of the last one.
+        let found = named().filter(is_it).max_by_key(|row| row.age());
+        let found = found.or_else(|| named().rfind(is_whole));
         found.map_or_else(|| Task::unknown(*role), |row| row.task(*role))
     };
     roles.iter().map(of_role).collect()
@@ -64,6 +66,12 @@ impl<'a> Row<'a> {
 
     fn name(&self) -> &'a str {
         self.0[10]
+    }
+
+    /// Orders tasks of one number: whether it is live, when it was submitted, the number of its job.
+    fn age(&self) -> (bool, i64, u64) {
+        let job = self.0[0].split(['_', '+']).next().and_then(|job| job.parse().ok());
+        (state(self.0[2]).is_live(), self.0[4].parse().unwrap_or(0), job.unwrap_or(0))
     }
 
     fn task(&self, role: Role) -> Task {
@@ -166,6 +174,17 @@ mod tests {
         assert_eq!(found[3].says.as_deref(), Some("ended with exit code 2"));
         assert!(found[4].says.as_deref().unwrap().contains("time limit"));
         assert_eq!((found[1].says.as_deref(), found[2].id.as_str()), (None, "4_1"));
+    }
+
+    #[test]
+    fn a_number_that_was_given_again_is_that_of_the_live_task_or_the_last() {
+        let line = |job: u32, state: &str, submitted: u32| {
+            format!("{job}_1|1|{state}|n1|{submitted}|1|2|None|0|0|starlings-a-1|\n")
+        };
+        let id = |answer: String| tasks(&answer, &order(2), &[Role::Worker(1)])[0].id.clone();
+        assert_eq!(id(line(9, "RUNNING", 50) + &line(12, "CANCELLED", 70)), "9_1");
+        assert_eq!(id(line(12, "CANCELLED", 70) + &line(9, "COMPLETED", 50)), "12_1");
+        assert_eq!(id(line(12, "PENDING", 70) + &line(9, "COMPLETING", 50)), "12_1");
     }
 
     #[test]

@@ -8,8 +8,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::normal::Moments;
-use super::quantiles::{chi_squared_tail, fisher_tail};
 use super::{Diffusion, Fit, InferenceError, Posterior, Structure, Sums, diffusion};
+use crate::quantiles::{chi_squared_tail, fisher_tail};
 
 /// Pivot of a score's correlation below which a direction is not informed.
 const INFORMED: f64 = 1e-8;

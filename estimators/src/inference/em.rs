@@ -11,11 +11,14 @@ use nalgebra::DMatrix;
 
 use super::expected::expected_sums;
 use super::smoother::{Smoothed, System};
-use super::{Basis, Diffusion, Fit, InferenceError, Posterior, Stream, Structure, noise_checks};
+use super::{Basis, Diffusion, Fit, InferenceError, Posterior, Stream, Structure, Sums, noise_checks};
 use crate::spectral;
 
 /// By how much a step of the noise is lengthened from round to round while the likelihood grows.
 const STRETCH: f64 = 1.5;
+
+/// Share of a variance of the residuals that smoothing begins with as noise at least.
+const LEAST_LEFT: f64 = 0.01;
 
 /// What is known of the measurement noise.
 #[derive(serde::Serialize, serde::Deserialize, Debug, Clone, PartialEq)]
@@ -78,15 +81,7 @@ impl Noisy<'_> {
         let mut stream = Stream::new(Arc::clone(self.basis), self.step)?;
         stream.extend(self.times, self.rows)?;
         let raw = stream.take()?;
-        let plain = Fit { lag_corrected: false, ..fit.clone() };
-        let lagged = Fit { lag_corrected: true, ..fit.clone() }.posterior(&raw, structure);
-        let posterior = match lagged {
-            Ok(posterior) => posterior,
-            Err(InferenceError::DiffusionNotDefinite { .. } | InferenceError::NotSettled { .. }) => {
-                plain.posterior(&raw, structure)?
-            }
-            Err(other) => return Err(other),
-        };
+        let posterior = self.first(fit, &raw, structure, measured)?;
         let noise = match measured {
             Measured::Known(m) => self.given(m)?,
             Measured::Unknown => {
@@ -98,6 +93,7 @@ impl Noisy<'_> {
                 DMatrix::from_diagonal(&variance.into())
             }
         };
+        let plain = Fit { lag_corrected: false, ..fit.clone() };
         let mut log_likelihood: Vec<f64> = Vec::new();
         // What is tried now, and what a round of plain maximisation gave, which is never worse.
         let mut tried = (posterior, noise);
@@ -131,6 +127,40 @@ impl Noisy<'_> {
             stretch *= STRETCH;
         }
         Ok(NoisyPosterior { posterior: safe.0, measured: safe.1, log_likelihood, converged })
+    }
+
+    /// A fit of the recording as it was measured, from which smoothing begins: with D from lagged residuals, or from all of them. Where
+    /// errors of the measurement are so large that neither holds, D is what a known M leaves of it and of each variance a hundredth at
+    /// least; the rounds find the rest.
+    fn first(
+        &self,
+        fit: &Fit,
+        raw: &Sums,
+        structure: &Structure,
+        measured: &Measured,
+    ) -> Result<Posterior, InferenceError> {
+        let unheld = |error: &InferenceError| {
+            matches!(error, InferenceError::DiffusionNotDefinite { .. } | InferenceError::NotSettled { .. })
+        };
+        let plain = Fit { lag_corrected: false, ..fit.clone() };
+        let lagged = Fit { lag_corrected: true, ..fit.clone() }.posterior(raw, structure);
+        let refused = match lagged {
+            Err(error) if unheld(&error) => match plain.posterior(raw, structure) {
+                Err(error) if unheld(&error) => error,
+                found => return found,
+            },
+            found => return found,
+        };
+        let Measured::Known(m) = measured else { return Err(refused) };
+        // Without the Jacobian's term, which D multiplies, coefficients and noise settle whatever D is.
+        let rough = Fit { prefactor: false, ..plain.clone() }.posterior(raw, structure)?.diffusion;
+        let left = &rough - self.given(m)? * (2.0 / self.step);
+        let all = 0..rough.nrows();
+        let is_left = left.clone().cholesky().is_some()
+            && all.clone().all(|l| left[(l, l)] > LEAST_LEFT * rough[(l, l)]);
+        let variances = all.map(|l| left[(l, l)].max(LEAST_LEFT * rough[(l, l)])).collect::<Vec<_>>();
+        let noise = if is_left { left } else { DMatrix::from_diagonal(&variances.into()) };
+        Fit { diffusion: Diffusion::Known(noise), ..plain }.posterior(raw, structure)
     }
 
     /// Smoothed states under a posterior and M, with the log-likelihood of the recording.

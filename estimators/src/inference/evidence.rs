@@ -28,6 +28,24 @@ impl Fit {
         if log.is_finite() { Ok(Some(log)) } else { Err(overflow) }
     }
 
+    /// ln of the likelihood, in nats, of a recording that the posterior does not come from, at its means and its noise; `None` where
+    /// the recording has no steps or the number is not finite.
+    ///
+    /// # Errors
+    /// `Shape` where the sums are of other functions or equations.
+    pub fn log_likelihood(&self, sums: &Sums, posterior: &Posterior) -> Result<Option<f64>, InferenceError> {
+        let (expected, got) = (posterior.drift.shape(), (sums.n_state(), sums.n_function()));
+        if expected != got {
+            return Err(InferenceError::Shape {
+                what: "functions of the sums",
+                expected: expected.1,
+                got: got.1,
+            });
+        }
+        let action = self.action(sums, posterior, &posterior.diffusion).filter(|_| sums.n_step() > 0);
+        Ok(action.map(|action| -action).filter(|log| log.is_finite()))
+    }
+
     /// S_dyn at the posterior mean.
     pub(crate) fn action(&self, sums: &Sums, posterior: &Posterior, noise: &DMatrix<f64>) -> Option<f64> {
         let (n, l, h) = (sums.n_step() as f64, sums.n_state() as f64, sums.step());

@@ -72,6 +72,8 @@ pub struct Missing {
     pub alone: Vec<Score>,
     /// The fit with the named terms: coefficients that are not part of it are absent.
     pub posterior: Posterior,
+    /// The fit of the model without any candidate.
+    pub model: Posterior,
 }
 
 /// Looks for missing terms among the candidates; all other coefficients of the structure are the model's.
@@ -88,7 +90,7 @@ pub fn missing_terms(
     let hunt = Hunt { subset: Subset { fit, sums, structure }, candidates, search };
     hunt.check()?;
     let model = hunt.model();
-    hunt.subset.posterior(&model)?;
+    let without = hunt.subset.posterior(&model)?;
     let alone = hunt.scores(&model);
     let mut named = Vec::new();
     while named.len() < search.most {
@@ -100,7 +102,7 @@ pub fn missing_terms(
     hunt.prune(&model, &mut named);
     let posterior = hunt.subset.posterior(&joined(&model, &named))?;
     let named = named.iter().map(|c| hunt.named(&model, &named, *c)).collect::<Result<_, _>>()?;
-    Ok(Missing { named, alone, posterior })
+    Ok(Missing { named, alone, posterior, model: without })
 }
 
 /// χ² of a family of coefficients together beside all others of the structure, without those that the others span: whether anything

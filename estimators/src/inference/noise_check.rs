@@ -8,8 +8,8 @@
 use nalgebra::DMatrix;
 
 use super::normal::spread;
-use super::quantiles::normal;
 use super::{InferenceError, Posterior, Structure, Sums};
+use crate::quantiles::normal;
 
 /// Ratio from which measurement noise moves coefficients by more than their sd in the examples of Smelyanskiy, Luchinsky et al.
 pub const MATTERS: f64 = 0.05;

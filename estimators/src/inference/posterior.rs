@@ -5,8 +5,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::quantiles::{chi_squared, student};
 use super::{InferenceError, Prior, Structure};
+use crate::quantiles::{chi_squared, student};
 
 /// Value and uncertainty of one coefficient.
 #[derive(serde::Serialize, serde::Deserialize, Debug, Clone, Copy, PartialEq)]

@@ -8,8 +8,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::normal::invert;
-use super::quantiles::chi_squared_tail;
 use super::{InferenceError, Posterior};
+use crate::quantiles::chi_squared_tail;
 
 /// Fall of χ² below which the fit has converged.
 const CONVERGED: f64 = 1e-9;

@@ -2,8 +2,7 @@
 //!
 //! Rows are gathered in blocks of 256; a block's functions become columns, and its products are made in vector registers. Each
 //! block keeps the last row for the next one, so the steps do not depend on where blocks are cut. Nothing is allocated per row.
-//! The recording must be sampled uniformly: every step within 1 % of the stated one, a block's length within a tenth of that.
-//! Read next: `products.rs`, how they are summed, and `sums.rs`, what they are added to.
+//! Steps must be equal within [`STEP_TOLERANCE`]. Read next: `products.rs`, how they are summed, and `sums.rs`, what they are added to.
 
 use std::sync::Arc;
 
@@ -19,10 +18,11 @@ use super::{Basis, InferenceError, Sums};
 const ROWS: usize = 256;
 /// Length of a column, with room for zeros.
 const HEIGHT: usize = ROWS + LANES;
-/// By how much of a step a step may differ from the stated one.
-const TOLERANCE: f64 = 0.01;
-/// By how much of its length a block may.
-const DRIFT: f64 = 1e-3;
+/// By how much of the sampling step a step may differ from it. Over many rows times may differ from equal steps by a tenth of that share,
+/// beyond one step's own difference: the coefficients are too large by as much as the steps are too long.
+pub const STEP_TOLERANCE: f64 = 0.01;
+/// The share over many rows.
+const DRIFT: f64 = 0.1 * STEP_TOLERANCE;
 
 /// A recording on its way into [`Sums`].
 #[derive(Debug)]
@@ -208,7 +208,9 @@ impl Stream {
             return Err(InferenceError::TimeJump { row, before, time, step });
         }
         let drift = (time - self.times[0] - self.n as f64 * step).abs();
-        if (got - step).abs() > TOLERANCE * step || drift > (DRIFT * self.n as f64 + TOLERANCE) * step {
+        if (got - step).abs() > STEP_TOLERANCE * step
+            || drift > (DRIFT * self.n as f64 + STEP_TOLERANCE) * step
+        {
             return Err(InferenceError::NonUniform { row, got, step });
         }
         Ok(())

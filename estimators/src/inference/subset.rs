@@ -5,8 +5,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::missing::Score;
-use super::quantiles::fisher_tail;
 use super::{Fit, InferenceError, Posterior, Structure, Sums};
+use crate::quantiles::fisher_tail;
 
 /// What fits of parts of a structure have in common.
 pub(crate) struct Subset<'a> {

@@ -10,10 +10,10 @@ mod values;
 
 use nalgebra::DMatrix;
 
-use super::{Basis, InferenceError};
+use super::{Basis, InferenceError, STEP_TOLERANCE};
 
 /// By how much of a step two steps may miss each other in time and still be neighbours.
-const NEIGHBOUR: f64 = 0.02;
+const NEIGHBOUR: f64 = 2.0 * STEP_TOLERANCE;
 
 /// Steps beyond which a count is no exact number.
 pub(crate) const MOST: u64 = 1 << 53;

@@ -118,3 +118,28 @@ fn a_prior_pulls_as_its_precision_says() {
     }
     assert!((fit.best().0[0] - 0.5).abs() < 1e-9);
 }
+
+#[test]
+fn residuals_far_above_the_stated_noise_do_not_keep_a_fit_from_converging() {
+    // A misfit of ±0.1 that no parameter mends beside a noise stated as 1e-10, and derivatives right to five digits: where the fit ends,
+    // they promise a fall of 1e-10 of a cost of 2e19.
+    let misfit = |i: usize| if i.is_multiple_of(2) { 10.0 } else { -10.0 };
+    let mut fit = LeastSquares::new(DVector::from_vec(vec![1.0, 0.2]), flat(2), 0.02, 50);
+    let end = loop {
+        match fit.need().clone() {
+            Need::Residual(z) => {
+                let all = residual(&z).map_with_location(|i, _, v| 1e8 * (v + misfit(i)));
+                fit.give_residual(Some(all));
+            }
+            Need::Jacobian(z) => {
+                let off = |i: usize, j: usize| 1.0 + 1e-5 * ((i + 3 * j) as f64).sin();
+                let all = jacobian(&z).map_with_location(|i, j, v| 1e8 * v * off(i, j));
+                fit.give_jacobian(Some(all.into()));
+            }
+            Need::Nothing(end) => break end,
+        }
+    };
+    assert_eq!(end, End::Converged, "after {} trials at {:?}", 50 - fit.trials_left(), fit.best().0);
+    // The alternation is nearly orthogonal to decays: it moves them by a few hundredths.
+    assert!((fit.best().0[0] - 2.0).abs() < 0.1 && (fit.best().0[1] - 0.7).abs() < 0.1, "{:?}", fit.best().0);
+}

@@ -127,3 +127,19 @@ fn measurement_noise_that_is_not_there_or_not_a_covariance_is_refused() {
         "no noise is seen in one of the states"
     );
 }
+
+#[test]
+fn smoothing_begins_where_the_recording_itself_has_no_fit() {
+    let (basis, rows) = (lorenz::basis(), measured(2, 10_000, 2.0));
+    let structure = Structure::same(&basis, &lorenz::NAMES).unwrap();
+    let sums = sums(&basis, &rows, H);
+    for lag_corrected in [false, true] {
+        let refused = Fit { lag_corrected, ..Fit::new(Diffusion::Full, 27) }.posterior(&sums, &structure);
+        assert!(matches!(refused, Err(InferenceError::NotSettled { .. })), "{refused:?}");
+    }
+    let found = smoothed(2.0, 10_000, &known(2.0), 20);
+    let (c, d) = (found.posterior.drift(), found.posterior.diffusion[(0, 0)]);
+    // Of a quarter of the movement, errors leave a11 right within a tenth; the noise is one with them still, at 1 of 1600 = 2 M/h.
+    assert!((c[(0, 0)] + 10.0).abs() < 1.0, "{c}");
+    assert!(d < 5.0, "{d}");
+}

@@ -7,6 +7,7 @@
 
 mod def;
 mod extended;
+mod extended_spec;
 pub mod library;
 pub mod scale;
 mod scope;

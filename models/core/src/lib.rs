@@ -59,4 +59,4 @@ pub use setup_error::SetupError;
 pub use simulator::Simulator;
 pub use solver::{Description, FaultPlace, FilesDef, SOLVER, SolverDef, SolverFault};
 pub use spec::{Quantity, Role, Spec};
-pub use sums_def::{PolynomialDef, SumsDef};
+pub use sums_def::{PolynomialDef, SumsDef, SumsFile};

@@ -2,6 +2,7 @@
 //!
 //! Next file to read: [`crate::model`].
 
+use crate::ModelFailure;
 use crate::limits::Limits;
 use crate::noise::WhiteNoise;
 
@@ -54,4 +55,23 @@ pub struct Segment<'a> {
     pub limits: &'a Limits<'a>,
     /// Where the numbers of the model's noise come from; `None` leaves the noise out.
     pub noise: Option<&'a WhiteNoise>,
+}
+
+impl Segment<'_> {
+    /// Where a step from `t` ends that is at most `longest` long: one of equal steps up to the segment's end, as far as the state does
+    /// not change the longest one. The step is counted.
+    ///
+    /// # Errors
+    /// When the step does not move the time, or the run costs more than its limits allow.
+    pub fn next_time(&self, t: f64, longest: f64) -> Result<f64, ModelFailure> {
+        let left = self.t1 - t;
+        let dt = left / (left / longest).ceil().max(1.0);
+        let next = if dt < left { t + dt } else { self.t1 };
+        if next <= t {
+            return Err(ModelFailure::StepTooSmall { time: t, step: dt });
+        }
+        self.limits.foresee(longest, t)?;
+        self.limits.take(1, t)?;
+        Ok(next)
+    }
 }

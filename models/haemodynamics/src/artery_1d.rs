@@ -108,18 +108,11 @@ impl Artery1d {
                 let what = format!("state `{}`", Spec::component(&self.spec.states, i));
                 return Err(ModelFailure::NotFinite { what, time: t });
             }
-            let (left, longest) = (segment.t1 - t, vessels.longest_step(x));
+            let longest = vessels.longest_step(x);
             if longest.is_nan() {
                 return Err(ModelFailure::NotFinite { what: "the speed of waves".to_owned(), time: t });
             }
-            // Equal steps up to the segment's end, as far as the state does not change the longest one.
-            let dt = left / (left / longest).ceil().max(1.0);
-            let next = if dt < left { t + dt } else { segment.t1 };
-            if next <= t {
-                return Err(ModelFailure::StepTooSmall { time: t, step: dt });
-            }
-            segment.limits.foresee(longest, t)?;
-            segment.limits.take(1, t)?;
+            let next = segment.next_time(t, longest)?;
             let inflow = Inflow {
                 start: segment.u0[0] + segment.slope[0] * (t - segment.t0),
                 slope: segment.slope[0],

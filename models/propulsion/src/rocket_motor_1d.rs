@@ -94,15 +94,8 @@ impl RocketMotor1d {
         stepper.load(x);
         while t < segment.t1 {
             let empty = |cell| no_gas(cell, t);
-            let (left, longest) = (segment.t1 - t, stepper.longest(&motor).map_err(empty)?);
-            // Equal steps up to the segment's end, as far as the state does not change the longest one.
-            let dt = left / (left / longest).ceil().max(1.0);
-            let next = if dt < left { t + dt } else { segment.t1 };
-            if next <= t {
-                return Err(ModelFailure::StepTooSmall { time: t, step: dt });
-            }
-            segment.limits.foresee(longest, t)?;
-            segment.limits.take(1, t)?;
+            let longest = stepper.longest(&motor).map_err(empty)?;
+            let next = segment.next_time(t, longest)?;
             stepper.step(&motor, [t, next - t], now, &mut balance).map_err(empty)?;
             t = next;
         }

@@ -1,11 +1,13 @@
 //! Gas dynamics along the bore against exact solutions, balances and the lumped motor.
 #![allow(clippy::unwrap_used, missing_docs)]
 
+mod bore;
 mod kit;
 mod riemann;
 
 use std::f64::consts::PI;
 
+use bore::{C_0, FROZEN, Steady, motor, near};
 use kit::{Motor, model, times};
 use riemann::{Side, exact};
 use serde_json::{Value, json};
@@ -13,18 +15,6 @@ use starlings_models_core::limits::Limits;
 use starlings_models_core::segment::Segment;
 use starlings_models_core::{Drive, Model, ModelDef, ModelFailure, NativeModels};
 use starlings_propulsion::{MODELS, RocketMotor1d};
-
-const C_0: f64 = 1030.0;
-/// A grain that gives the gas of the default one and does not regress.
-const FROZEN: [(&str, f64); 2] = [("r_c", 5e-12), ("rho_p", 1.75e12)];
-
-fn motor(layout: Value, constants: &[(&'static str, f64)], outputs: &[&'static str]) -> Motor {
-    Motor { kind: "rocket-motor-1d", layout, constants: constants.to_vec(), outputs: outputs.to_vec() }
-}
-
-fn near(got: f64, want: f64, relative: f64) {
-    assert!((got / want - 1.0).abs() < relative, "{got} for {want}");
-}
 
 /// A state of gas in a bore of radius 1 that does not burn between two walls, and where it is after a time.
 fn closed_tube(n: usize, gamma: f64, end: f64, start: impl Fn(f64) -> Side) -> Vec<Side> {
@@ -99,52 +89,6 @@ fn steady_profile(c: &Steady) -> Vec<f64> {
         head = if excess > 0.0 { [middle, head[1]] } else { [head[0], middle] };
     }
     c.march(head[1]).0
-}
-
-/// A frozen bore of radius 0.05 m.
-struct Steady {
-    gamma: f64,
-    throat: f64,
-    length: f64,
-}
-
-impl Steady {
-    fn burning(p: f64) -> f64 {
-        1750.0 * 0.005 * (p / 1.44e6).powf(0.4)
-    }
-
-    fn choked(&self) -> f64 {
-        (0.5 * (self.gamma + 1.0)).powf(-0.5 * (self.gamma + 1.0) / (self.gamma - 1.0))
-    }
-
-    fn lumped(&self) -> f64 {
-        let out = self.choked() * self.throat * self.gamma / C_0;
-        (2.0 * PI * 0.05 * self.length * Self::burning(1.0) / out).powf(1.0 / 0.6)
-    }
-
-    /// Pressures at 2000 places, and what burns less what the throat passes.
-    fn march(&self, head: f64) -> (Vec<f64>, f64) {
-        let (n, g) = (2000, self.gamma);
-        let heat = C_0 * C_0 / (g - 1.0);
-        let (mut flux, mut p, mut u, mut rho) = (0.0, head, 0.0, g * head / (C_0 * C_0));
-        let mut course = vec![];
-        for _ in 0..n {
-            // Of the momentum, p + g u = p_h, and the enthalpy: a quadratic for u at the middle and at the end of a step.
-            let middle = 1.5 * p - 0.5 * course.len().checked_sub(2).map_or(p, |k| course[k]);
-            let step = self.length / f64::from(n) * 2.0 / 0.05 * Self::burning(middle);
-            flux += step;
-            for _ in 0..50 {
-                u = flux / rho;
-                p = head - flux * u;
-                rho = g / (g - 1.0) * p / (heat - 0.5 * u * u);
-            }
-            course.push(p);
-        }
-        let mach = u / (g * p / rho).sqrt();
-        let rest = 1.0 + 0.5 * (g - 1.0) * mach * mach;
-        let (p, rho) = (p * rest.powf(g / (g - 1.0)), rho * rest.powf(1.0 / (g - 1.0)));
-        (course, flux * PI * 0.0025 - self.choked() * self.throat * (g * p * rho).sqrt())
-    }
 }
 
 /// Mean relative distance of the pressure from the steady profile after the scheme has settled.
@@ -269,56 +213,6 @@ fn a_short_wide_bore_is_the_lumped_motor() {
         near(along[15], lumped[1], 1e-4);
     }
     assert!(lumped[20][0] > 1.3 * lumped[4][0], "the fault raises the pressure");
-}
-
-/// Pressure at the head and along the bore before and after a fault at 20 ms.
-fn fault(n: usize, name: &str, parameters: &[(&'static str, f64)]) -> [Vec<f64>; 2] {
-    let mut constants = FROZEN.to_vec();
-    constants.extend(parameters);
-    constants.push(("A_t", 3e-3));
-    let mut outputs = vec!["pressure", "mass_flow"];
-    if name == "breach" {
-        outputs.push("breach_flow");
-    }
-    let mut rows = motor(json!({ "cells": n, "faults": [name] }), &constants, &outputs).run(&[0.015, 0.15]);
-    [rows.remove(0), rows.remove(0)]
-}
-
-#[test]
-fn a_breach_takes_the_choked_flow_of_its_place_and_the_pressure_falls() {
-    let [before, after] =
-        fault(40, "breach", &[("t_breach", 0.02), ("x_breach", 0.3), ("breach_area", 2e-4)]);
-    let choked = Steady { gamma: 1.2, throat: 0.0, length: 1.0 }.choked();
-    assert!(before[41].abs() < f64::MIN_POSITIVE);
-    // Of the stagnation temperature of a flow of Mach 0.1 and the pressure at the place.
-    near(after[41], choked * 1.2 * after[11] * 2e-4 / C_0, 3e-3);
-    // A lumped chamber with a throat wider by the hole: (3.0/3.2)^{1/(1−n)}.
-    near(after[0] / before[0], (3.0_f64 / 3.2).powf(1.0 / 0.6), 0.01);
-}
-
-#[test]
-fn a_crack_raises_the_pressure_by_its_burning_surface() {
-    let [before, after] = fault(40, "cracking", &[("t_crack", 0.02), ("crack_area", 0.031_415_926)]);
-    // A lumped chamber burns a tenth more: 1.1^{1/(1−n)}.
-    near(after[0] / before[0], 1.1_f64.powf(1.0 / 0.6), 0.01);
-}
-
-/// What burns before the narrow place has to pass it, as through a throat of its area.
-#[test]
-fn a_bore_that_chokes_is_a_throat_for_what_burns_before_it() {
-    let narrow = |choke: f64| {
-        let place = [("x_choke", 0.7), ("w_choke", 0.1), ("tau_choke", 0.005)];
-        fault(80, "choking", &[&[("t_choke", 0.02), ("choke", choke)][..], &place].concat())
-    };
-    let [before, after] = narrow(0.85);
-    let upstream = Steady { gamma: 1.2, throat: 0.15 * PI * 0.0025, length: 0.7 };
-    // What burns in the narrow place, which is 0.2 m long, takes part on either side; 160 cells give 1 % more.
-    near(after[0], upstream.lumped(), 0.05);
-    assert!(after[0] > 2.0 * before[0] && after[79] < 0.55 * after[0], "{} {}", after[0], after[79]);
-    // A flow that stays below the speed of sound passes with little loss: the pressure is low there and comes back.
-    let [before, after] = narrow(0.4);
-    assert!(after[55] / after[35] < 0.98 * before[55] / before[35], "{} {}", after[55], after[35]);
-    near(after[76] / after[35], before[76] / before[35], 0.015);
 }
 
 #[test]

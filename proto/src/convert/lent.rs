@@ -2,9 +2,14 @@
 //!
 //! The descriptors of that memory do not travel in messages: [`crate::descriptors`]. Next file to read: [`super::state`].
 
+use tonic::Code;
+
 use super::state::PutHead;
 use super::{ProtocolError, required};
 use crate::generated;
+
+/// What a put of a state in memory that is not lent for it ends with: the state has to come in pieces.
+pub const NOT_LENT: Code = Code::NotFound;
 
 /// A worker's request for memory for end states.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,6 +38,38 @@ impl Lend {
             return Err(ProtocolError::Shape { field: "descriptor", message });
         }
         Ok(Self { head, descriptor: message.descriptor })
+    }
+}
+
+/// What a worker says of memory that it cannot use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GiveBack {
+    /// Number of its stream.
+    pub epoch: u64,
+    /// The nonce of its Hello.
+    pub nonce: u64,
+    /// The number under which the memory was lent.
+    pub descriptor: u64,
+}
+
+impl GiveBack {
+    /// The request.
+    pub fn encode(self) -> generated::GiveBackRequest {
+        let Self { epoch, nonce, descriptor } = self;
+        generated::GiveBackRequest { epoch, nonce, descriptor }
+    }
+
+    /// Checks a request.
+    ///
+    /// # Errors
+    /// When there is no number.
+    pub fn decode(message: &generated::GiveBackRequest) -> Result<Self, ProtocolError> {
+        let generated::GiveBackRequest { epoch, nonce, descriptor } = *message;
+        if descriptor == 0 {
+            let message = "memory is given back without its number".to_owned();
+            return Err(ProtocolError::Shape { field: "descriptor", message });
+        }
+        Ok(Self { epoch, nonce, descriptor })
     }
 }
 
@@ -70,6 +107,9 @@ mod tests {
         assert_eq!(Lend::decode(&lend.encode()), Ok(lend));
         assert!(Lend::decode(&Lend { descriptor: 0, ..lend }.encode()).is_err());
         assert!(Lend::decode(&generated::LendRequest { head: None, descriptor: 5 }).is_err());
+        let back = GiveBack { epoch: 1, nonce: 2, descriptor: 3 };
+        assert_eq!(GiveBack::decode(&back.encode()), Ok(back));
+        assert!(GiveBack::decode(&GiveBack { descriptor: 0, ..back }.encode()).is_err());
     }
 
     #[test]

@@ -43,17 +43,27 @@ impl Incoming {
             // The coordinator finds out whether it can read what this worker cannot, or says which file is missing.
             Err(reason) => {
                 self.way.refused(&reason);
-                (self.n_state, self.inbound) = self.way.open(self.state, false, 0).await?;
-                self.whole(None).await
+                self.in_pieces().await
             }
         }
     }
 
+    /// Asks for it again, to come piece by piece over the connection.
+    async fn in_pieces(mut self) -> Result<Vec<f64>, String> {
+        (self.n_state, self.inbound) = self.way.open(self.state, false, 0).await?;
+        self.whole(None).await
+    }
+
     /// Its values, which stand in memory that the coordinator sees too.
     async fn in_memory(mut self) -> Result<Vec<f64>, String> {
+        let Some(asked) = self.asked.take() else {
+            return Err(wrong(&"it is in memory whose descriptor was not asked for"));
+        };
+        let Some(descriptor) = asked.take() else {
+            // It was lost on its way, as where this process has all descriptors that it may have.
+            return self.in_pieces().await;
+        };
         let (n_state, values) = (self.n_state, self.room()?);
-        let descriptor = self.asked.take().and_then(Asked::take);
-        let descriptor = descriptor.ok_or_else(|| wrong(&"the descriptor of its memory did not come"))?;
         let read = tokio::task::spawn_blocking(move || {
             let memory = SharedMemory::received(descriptor, n_state * 8, true)?;
             pieces::copy(&memory, n_state, values)

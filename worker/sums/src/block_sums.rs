@@ -8,10 +8,12 @@ use std::sync::Arc;
 
 use starlings_estimators::inference::{InferenceError, Stream, Sums};
 use starlings_models::{
-    BuildSetup, Forward, Job, ModelFailure, ParticleError, Prediction, Setup, Spec, Window,
+    BuildSetup, Forward, Job, ModelFailure, ParticleError, Prediction, Setup, Spec, SumsFile, Window,
 };
 
+use crate::answer::{Fault, fault_values, sums_values};
 use crate::error::SumsError;
+use crate::file_rows::{self, Bytes};
 use crate::question::Question;
 
 /// Makes the sums of blocks.
@@ -20,47 +22,44 @@ pub struct BlockSums {
     spec: Spec,
     step: f64,
     levels: u32,
+    files: Vec<SumsFile>,
 }
 
-/// The job of a block: its number, the number of its first row in the record, the number of steps that start in it, times, and rows of
-/// states and inputs one after the other.
-pub fn block(number: u32, first: u64, n_step: usize, times: Vec<f64>, rows: Vec<f64>) -> Job {
+/// Whether files that a setup names are read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reading {
+    /// They are not, and such a setup is refused.
+    Refused,
+    /// They are: the setup comes from the user whose process this is.
+    Allowed,
+}
+
+/// The job of a block: the number of its record, the number of its first row there, the number of steps that start in it, times, and
+/// rows of states and inputs one after the other.
+pub fn block(record: u32, first: u64, n_step: usize, times: Vec<f64>, rows: Vec<f64>) -> Job {
     let start = times.first().copied().unwrap_or(0.0);
     let window = Window { start, times, observed: rows, inputs: Vec::new() };
-    Job {
-        particle: number,
-        record: 0,
-        window: Arc::new(window),
-        theta: vec![n_step as f64, first as f64],
-        state: None,
-    }
+    job(record, window, vec![n_step as f64, first as f64])
 }
 
-/// The sums that a job's prediction holds, by level.
-///
-/// # Errors
-/// As for [`Sums::from_values`].
-pub fn sums_of(
-    question: &Question,
-    step: f64,
-    levels: u32,
-    values: &[f64],
-) -> Result<Vec<Sums>, InferenceError> {
-    let n = Sums::n_value(&question.basis);
-    let (expected, got) = (n * levels as usize, values.len());
-    if expected != got {
-        return Err(InferenceError::Shape { what: "numbers of block sums", expected, got });
-    }
-    let level = |(k, values)| Sums::from_values(&question.basis, step * f64::from(1_u32 << k), values);
-    values.chunks_exact(n).enumerate().map(level).collect()
+/// The job of a block whose rows are bytes of the record's file.
+pub fn file_block(record: u32, first: u64, n_step: usize, bytes: Bytes) -> Job {
+    let Bytes { start, length, n_row } = bytes;
+    // A window has a time; these rows have their own.
+    let window = Window { start: 0.0, times: vec![0.0], observed: Vec::new(), inputs: Vec::new() };
+    job(record, window, vec![n_step as f64, first as f64, start as f64, length as f64, n_row as f64])
+}
+
+fn job(record: u32, window: Window, theta: Vec<f64>) -> Job {
+    Job { particle: 0, record, window: Arc::new(window), theta, state: None }
 }
 
 impl BlockSums {
     /// What makes the sums of a setup.
     ///
     /// # Errors
-    /// As for [`Question::of`].
-    pub fn new(setup: &Setup) -> Result<Self, SumsError> {
+    /// As for [`Question::of`]; `Unasked` for files that are not to be read.
+    pub fn new(setup: &Setup, reading: Reading) -> Result<Self, SumsError> {
         let question = Question::of(setup)?;
         let def = setup.sums.as_deref().ok_or(SumsError::Unasked("the setup asks for no sums"))?;
         if !(def.step > 0.0 && def.step.is_finite()) {
@@ -69,12 +68,50 @@ impl BlockSums {
         if def.levels == 0 || def.levels > 8 {
             return Err(SumsError::Unasked("sums are made at 1 to 8 steps"));
         }
-        Ok(Self { question, spec: setup.spec()?, step: def.step, levels: def.levels })
+        if reading == Reading::Refused && !def.files.is_empty() {
+            return Err(SumsError::Unasked(
+                "this worker reads no recordings: those that --allow-commands-from-study trusts with its user's rights do",
+            ));
+        }
+        let (step, levels, files) = (def.step, def.levels, def.files.clone());
+        Ok(Self { question, spec: setup.spec()?, step, levels, files })
+    }
+
+    /// The answer for rows, the first of which has the number `first` in its record.
+    fn answer(
+        &self,
+        times: &[f64],
+        rows: &[f64],
+        n_step: usize,
+        first: u64,
+    ) -> Result<Vec<f64>, InferenceError> {
+        let found = self.sums(times, rows, n_step).map_err(|error| moved(error, |row| row + first));
+        match found {
+            Ok(levels) => Ok(sums_values(&levels, [times[0], times[n_step]])),
+            Err(error) => fault_values(&self.question, &Fault::Row(error.clone())).ok_or(error),
+        }
+    }
+
+    /// The answer for bytes of a file.
+    fn answer_of_file(
+        &self,
+        record: u32,
+        n_step: usize,
+        first: u64,
+        bytes: Bytes,
+    ) -> Result<Vec<f64>, InferenceError> {
+        let file = self.files.get(record as usize);
+        let rows = file.and_then(|file| file_rows::read(file, bytes));
+        let width = self.question.basis.n_channel();
+        match rows.filter(|(times, rows)| n_step < times.len() && rows.len() == times.len() * width) {
+            Some((times, rows)) => self.answer(&times, &rows, n_step, first),
+            None => Ok(fault_values(&self.question, &Fault::Unread).unwrap_or_default()),
+        }
     }
 
     /// Sums at the sampling step of the first `n_step` steps, then at every longer one of the steps that start there.
-    fn sums(&self, times: &[f64], rows: &[f64], n_step: usize) -> Result<Vec<f64>, InferenceError> {
-        let mut values = Vec::new();
+    fn sums(&self, times: &[f64], rows: &[f64], n_step: usize) -> Result<Vec<Sums>, InferenceError> {
+        let mut levels = Vec::new();
         for level in 0..self.levels {
             let stride = 1_usize << level;
             let mut whole: Option<Sums> = None;
@@ -86,9 +123,9 @@ impl BlockSums {
                     None => whole = Some(sums),
                 }
             }
-            values.extend(whole.map(|sums| sums.to_values()).unwrap_or_default());
+            levels.extend(whole);
         }
-        Ok(values)
+        Ok(levels)
     }
 
     fn phase(
@@ -141,18 +178,27 @@ impl Forward for BlockSums {
     fn run(&self, job: &Job) -> Result<Prediction, ParticleError> {
         let Window { times, observed, .. } = &*job.window;
         let bad = |what: String| Err(ParticleError::BadJob(what));
-        let [n_step, first] = job.theta[..] else {
-            return bad(format!("block sums need 2 numbers, got {}", job.theta.len()));
-        };
-        let (n_step, first) = (n_step as usize, first as u64);
-        if observed.len() != times.len() * self.question.basis.n_channel() || n_step >= times.len() {
-            return bad(format!("{} values and {n_step} steps for {} rows", observed.len(), times.len()));
-        }
-        match self.sums(times, observed, n_step) {
-            Ok(state) => Ok(Prediction { outputs: Vec::new(), state, cost: 0.0 }),
-            Err(error) => {
-                Err(ModelFailure::OutsideDomain(moved(error, |row| row + first).to_string()).into())
+        let answer = match job.theta[..] {
+            [n_step, first] => {
+                let n_step = n_step as usize;
+                if observed.len() != times.len() * self.question.basis.n_channel() || n_step >= times.len() {
+                    return bad(format!(
+                        "{} values and {n_step} steps for {} rows",
+                        observed.len(),
+                        times.len()
+                    ));
+                }
+                self.answer(times, observed, n_step, first as u64)
             }
+            [n_step, first, start, length, n_row] => {
+                let bytes = Bytes { start: start as u64, length: length as u64, n_row: n_row as usize };
+                self.answer_of_file(job.record, n_step as usize, first as u64, bytes)
+            }
+            _ => return bad(format!("block sums need 2 or 5 numbers, got {}", job.theta.len())),
+        };
+        match answer {
+            Ok(state) => Ok(Prediction { outputs: Vec::new(), state, cost: 0.0 }),
+            Err(error) => Err(ModelFailure::OutsideDomain(error.to_string()).into()),
         }
     }
 }

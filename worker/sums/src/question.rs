@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use starlings_estimators::inference::{Basis, Polynomial, Rule, Structure};
+use starlings_estimators::inference::{Basis, Coefficient, Place, Polynomial, Rule, Structure};
 use starlings_models::equations::{Drift, DriftFunction, DriftPlace, EquationsDef};
 use starlings_models::{Setup, SumsDef};
 
@@ -19,6 +19,8 @@ pub struct Question {
     pub basis: Arc<Basis>,
     /// Which coefficient enters where.
     pub structure: Structure,
+    /// The same with a coefficient for every term that may be missing, behind the others; `None` where none is looked for.
+    pub wider: Option<Structure>,
 }
 
 impl Question {
@@ -43,6 +45,7 @@ impl Question {
         let drift = Drift::of_rates(equations, &setup.model.constants, &def.unknown, &def.left)?;
         let names: Vec<String> = drift.functions.iter().map(|function| function.name.clone()).collect();
         let basis = with_expressions(empty(equations), drift.functions, equations.states.len())?;
+        let basis = with_candidates(basis, setup, def, equations)?;
         let states = states(equations);
         let mut structure = Structure::new(&basis, &states)?;
         let at = |place: &DriftPlace| (states[place.equation], names[place.function].as_str(), place.factor);
@@ -54,7 +57,7 @@ impl Question {
             let places: Vec<_> = places.iter().map(at).collect();
             structure = structure.with(name, &places)?;
         }
-        Ok(Self { basis: Arc::new(basis), structure })
+        Self::new(basis, structure, def)
     }
 
     /// The same functions in every equation.
@@ -69,9 +72,42 @@ impl Question {
         }
         let functions = Drift::of_texts(equations, &setup.model.constants, &def.functions, &def.left)?;
         let basis = with_expressions(basis, functions, states.len())?;
-        let structure = Structure::same(&basis, &states)?;
-        Ok(Self { basis: Arc::new(basis), structure })
+        let own = basis.names().to_vec();
+        let own: Vec<&str> = own.iter().map(String::as_str).collect();
+        let basis = with_candidates(basis, setup, def, equations)?;
+        let structure = Structure::by_equation(&basis, &states, &vec![own.as_slice(); states.len()])?;
+        Self::new(basis, structure, def)
     }
+
+    /// With a coefficient for every candidate in every equation that has not this function with a coefficient of its own.
+    fn new(basis: Basis, structure: Structure, def: &SumsDef) -> Result<Self, SumsError> {
+        let mut wider = structure.clone();
+        for (l, equation) in structure.equations().iter().enumerate() {
+            for function in &def.candidates {
+                let at = |place: &Place| place.equation == l && basis.index(function) == Some(place.function);
+                let has = |c: &Coefficient| matches!(c.places.as_slice(), [place] if at(place));
+                if !structure.coefficients().iter().any(has) {
+                    let name = format!("{equation}:{function}");
+                    wider = wider.with(&name, &[(equation, function, 1.0)])?;
+                }
+            }
+        }
+        let wider = (!def.candidates.is_empty()).then_some(wider);
+        Ok(Self { basis: Arc::new(basis), structure, wider })
+    }
+}
+
+/// With the functions of candidates that it has not by the same name.
+fn with_candidates(
+    basis: Basis,
+    setup: &Setup,
+    def: &SumsDef,
+    equations: &EquationsDef,
+) -> Result<Basis, SumsError> {
+    let new = def.candidates.iter().filter(|text| basis.index(text).is_none());
+    let new: Vec<String> = new.cloned().collect();
+    let functions = Drift::of_texts(equations, &setup.model.constants, &new, &def.left)?;
+    with_expressions(basis, functions, equations.states.len())
 }
 
 fn states(equations: &EquationsDef) -> Vec<&str> {

@@ -4,8 +4,8 @@
 
 use starlings_estimators::inference::{InferenceError, Stream, Sums};
 use starlings_models::equations::{EquationsDef, OutputDef, StateDef};
-use starlings_models::{Forward, ModelDef, PolynomialDef, Setup, SumsDef};
-use starlings_sums::{BlockSums, Question, block, sums_of};
+use starlings_models::{Forward, ModelDef, PolynomialDef, Setup, SumsDef, SumsFile};
+use starlings_sums::{BlockSums, Bytes, Fault, Question, Reading, answer_of, block, file_block, stamp};
 
 const STEP: f64 = 0.1;
 
@@ -44,10 +44,13 @@ fn summed(setup: &Setup, from: usize, n_step: usize, ahead: usize, end: usize) -
     let rows = from..=(from + n_step + ahead).min(end);
     let times = rows.clone().map(|k| k as f64 * STEP).collect();
     let job = block(0, from as u64, n_step, times, rows.flat_map(row).collect());
-    let sums = BlockSums::new(setup).unwrap();
+    let sums = BlockSums::new(setup, Reading::Refused).unwrap();
     let prediction = sums.run(&job).unwrap();
     let levels = setup.sums.as_ref().unwrap().levels;
-    sums_of(&Question::of(setup).unwrap(), STEP, levels, &prediction.state).unwrap()
+    let answer = answer_of(&Question::of(setup).unwrap(), STEP, levels, &prediction.state).unwrap().unwrap();
+    let [begin, end] = answer.span;
+    assert_eq!((begin, end), (from as f64 * STEP, (from + n_step) as f64 * STEP));
+    answer.levels
 }
 
 #[test]
@@ -89,10 +92,23 @@ fn sums_of_a_block_are_those_of_a_stream_bit_by_bit() {
 fn numbers_that_are_no_sums_are_refused() {
     let setup = setup(1);
     let question = Question::of(&setup).unwrap();
-    let values = summed(&setup, 0, 300, 0, 300)[0].to_values();
-    let refused = |values: &[f64]| sums_of(&question, STEP, 1, values).unwrap_err();
+    let values = [summed(&setup, 0, 300, 0, 300)[0].to_values(), vec![0.0, 30.0]].concat();
+    let refused = |values: &[f64]| answer_of(&question, STEP, 1, values).unwrap_err();
     assert!(matches!(refused(&values[1..]), InferenceError::Shape { .. }));
-    for (at, value) in [(0, 0.5), (0, -1.0), (0, f64::INFINITY), (1, 1e9), (3, -1.0), (20, f64::NAN)] {
+    let ends = values.len() - 1;
+    for fault in [[-1.0, 9.0, 0.0, 0.0, 0.0], [-1.0, 1.0, -3.0, 0.0, 0.0], [-1.0, 1.0, 3.0, 0.5, 0.0]] {
+        assert!(matches!(refused(&fault), InferenceError::Damaged { .. }), "{fault:?}");
+    }
+    for (at, value) in [
+        (0, 0.5),
+        (0, -2.0),
+        (ends, f64::NAN),
+        (ends, -1.0),
+        (0, f64::INFINITY),
+        (1, 1e9),
+        (3, -1.0),
+        (20, f64::NAN),
+    ] {
         let mut damaged = values.clone();
         damaged[at] = value;
         assert!(matches!(refused(&damaged), InferenceError::Damaged { .. }), "{value} at {at}");
@@ -105,7 +121,62 @@ fn a_function_without_a_value_is_told_with_the_row_of_the_recording() {
     setup.sums.as_mut().unwrap().functions.push("log(x)".to_owned());
     let times: Vec<f64> = (500..=600).map(|k| k as f64 * STEP).collect();
     let rows = (500..=600).flat_map(|k| if k == 520 { [-10.0, 0.0] } else { [9.0, 0.0] }).collect();
-    let error = BlockSums::new(&setup).unwrap().run(&block(0, 500, 100, times, rows)).unwrap_err();
+    let sums = BlockSums::new(&setup, Reading::Refused).unwrap();
+    let answer = sums.run(&block(0, 500, 100, times.clone(), rows)).unwrap();
+    let told =
+        |values: &[f64]| answer_of(&Question::of(&setup).unwrap(), STEP, 1, values).unwrap().unwrap_err();
     // The mid-point of rows 519 and 520 is the first below zero.
-    assert_eq!(error.to_string(), "outside the model's domain: log(x) is NaN at row 519");
+    assert_eq!(told(&answer.state).to_string(), "log(x) is NaN at row 519");
+    let (rows, mut late) = ([1.0, 0.0].repeat(101), times.clone());
+    late[20] += 0.05 * STEP;
+    let Fault::Row(InferenceError::NonUniform { row, .. }) =
+        told(&sums.run(&block(0, 500, 100, late, rows.clone())).unwrap().state)
+    else {
+        panic!("a row out of step is told as one")
+    };
+    assert_eq!(row, 520);
+    let Fault::Row(InferenceError::TimeJump { row, before, time, .. }) = told(
+        &sums.run(&block(0, 500, 99, [&times[..7], &times[8..]].concat(), rows[2..].to_vec())).unwrap().state,
+    ) else {
+        panic!("a missing row is told as one")
+    };
+    assert_eq!((row, before, time), (507, times[6], times[8]));
+}
+
+#[test]
+fn rows_of_a_file_give_the_bits_of_rows_that_travel_and_only_where_that_is_allowed() {
+    use std::fmt::Write as _;
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("rows.csv");
+    let mut text = "z,t,note,x\n".to_owned();
+    let mut starts = vec![text.len() as u64];
+    for k in 0..=600 {
+        let [x, z] = row(k);
+        writeln!(text, "{z:?},{:?},-,{x:?}", k as f64 * STEP).unwrap();
+        starts.push(text.len() as u64);
+    }
+    std::fs::write(&path, &text).unwrap();
+    let mut setup = setup(3);
+    let (length, modified) = stamp(&std::fs::File::open(&path).unwrap()).unwrap();
+    let path = path.display().to_string();
+    let cells = vec![1, 3, 0];
+    setup.sums.as_mut().unwrap().files = vec![SumsFile { path, length, modified, n_cell: 4, cells }];
+    assert!(BlockSums::new(&setup, Reading::Refused).is_err(), "a worker that may read nothing");
+    let sums = BlockSums::new(&setup, Reading::Allowed).unwrap();
+    let ahead = setup.sums.as_ref().unwrap().n_ahead();
+    let (from, n_step) = (200, 150);
+    let n_row = n_step + 1 + ahead;
+    let bytes = Bytes { start: starts[from], length: starts[from + n_row] - starts[from], n_row };
+    let rows = (from..from + n_row).flat_map(row).collect();
+    let times = (from..from + n_row).map(|k| k as f64 * STEP).collect();
+    let read = sums.run(&file_block(0, from as u64, n_step, bytes)).unwrap();
+    assert_eq!(read, sums.run(&block(0, from as u64, n_step, times, rows)).unwrap());
+    let question = Question::of(&setup).unwrap();
+    let unread = |bytes: Bytes, record| {
+        let answer = sums.run(&file_block(record, 0, n_step, bytes)).unwrap();
+        assert_eq!(answer_of(&question, STEP, 3, &answer.state).unwrap(), Err(Fault::Unread));
+    };
+    unread(Bytes { start: bytes.start + 3, ..bytes }, 0);
+    unread(Bytes { n_row: n_row + 1, ..bytes }, 0);
+    unread(bytes, 1);
 }

@@ -14,12 +14,12 @@ use super::model_variant::ModelVariant;
 use crate::rows::Rows;
 use crate::run_cache::Point;
 
-/// Fall of χ² below which a fit has converged.
+/// Fall of χ² below which a fit has converged, where the size of χ² resolves it.
 const TOLERANCE: f64 = 0.02;
-/// Fall of χ² below which a tentative fit stops.
+/// The same for a tentative fit.
 const ROUGH: f64 = 0.3;
 /// Steps of a fit at most.
-const TRIALS: usize = 60;
+const TRIALS: usize = 120;
 
 /// A variant and its fit.
 #[derive(Clone, Debug)]
@@ -119,7 +119,7 @@ impl<'c> FittedVariant<'c> {
     pub(crate) fn has_converged(&self) -> bool {
         match self.end() {
             Some(End::Converged | End::Tentative) => true,
-            Some(End::Stalled) => self.solver.last_promise() < 1.0,
+            Some(End::Stalled) => self.solver.last_promise() < self.solver.resolution().max(1.0),
             _ => false,
         }
     }

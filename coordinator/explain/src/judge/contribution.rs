@@ -8,6 +8,8 @@ use super::search_result::SearchResult;
 
 /// Share of the fall of χ² that a further effect must contribute.
 const SECOND_SHARE: f64 = 0.1;
+/// Share below which what a further effect adds is something small that remains, and says nothing against its partner.
+const SMALL_SHARE: f64 = 0.01;
 /// Effective variance of the residuals above which they count as a discrepancy of another kind, not as a wrong form of the
 /// effect.
 pub(crate) const DISCREPANT: f64 = 20.0;
@@ -48,7 +50,8 @@ pub(crate) fn check_contributions(found: &SearchResult<'_>, passing: &[usize]) -
         return all;
     }
     // A contribution that does not recur in the held-out span does not come from the form of the effect.
-    if held_out.is_some_and(|h| h < 0.3 * train) || found.judged[alone].inflation > DISCREPANT {
+    let is_small = train.max(held_out.unwrap_or(0.0)) < SMALL_SHARE;
+    if is_small || held_out.is_some_and(|h| h < 0.3 * train) || found.judged[alone].inflation > DISCREPANT {
         return ContributionCheck { best: alone, ..all };
     }
     let because = format!(

@@ -10,7 +10,7 @@ use super::adequacy::Adequacy;
 use super::form::Leftover;
 use super::held_out::{HeldOut, held_out};
 use super::misfit::Misfit;
-use super::uncertainty::Uncertainty;
+use super::uncertainty::allowances;
 use crate::fit::fitted_variant::FittedVariant;
 use crate::fit::model_variant::AddedEffect;
 use crate::number::{spaced, three, times};
@@ -49,9 +49,9 @@ pub(crate) struct JudgedFit<'c> {
     pub gain: f64,
     /// Fall of χ² on the held-out span.
     pub gain_held_out: f64,
-    /// Part of the χ² of the held-out span that a fit of all data would take away, to first order: what the uncertainty of the
-    /// estimate explains.
-    pub allowance: f64,
+    /// Part of the χ² of the held-out span and the channels that are never fitted that a fit of all data would take away, to first
+    /// order: what the uncertainty of the estimate explains.
+    pub allowance_unseen: f64,
     /// Fall of χ² on the channels that are never fitted.
     pub gain_channels: f64,
     /// Share of the excess χ² that it takes away, training rows.
@@ -78,10 +78,10 @@ impl JudgedFit<'_> {
         self.gain / self.inflation
     }
 
-    /// Fall of χ² on the training rows, the held-out span and the held-out channels, for ranking. The part of the held-out χ²
-    /// that the uncertainty of the estimate explains does not count against it.
+    /// Fall of χ² on the training rows, the held-out span and the held-out channels, for ranking. The part of the χ² of both that the
+    /// uncertainty of the estimate explains does not count against it.
     pub(crate) fn rank(&self) -> f64 {
-        self.gain + self.gain_held_out + self.allowance + self.gain_channels
+        self.gain + self.gain_held_out + self.gain_channels + self.allowance_unseen
     }
 }
 
@@ -109,10 +109,7 @@ pub(crate) fn judge<'c>(
     let has_excess = before.held_out > n_held + 3.0 * (2.0 * n_held).sqrt();
     let share_held_out =
         (misfit.n_held_out > 0 && has_excess).then(|| ratio(gain_held_out, before.held_out - n_held));
-    let rows = &cache.rows.rows;
-    let held: Vec<usize> = (0..rows.len()).filter(|i| rows[*i].usage == Usage::HeldOut).collect();
-    let uncertainty = if held.is_empty() { None } else { Uncertainty::of(cache, &fit) };
-    let allowance = uncertainty.map_or(0.0, |of| of.allowance(&held));
+    let [allowance, allowance_unseen] = allowances(cache, &fit);
     let held_out = held_out(cache, base, &fit);
     let beyond = misfit.held_out - allowance - n_held - 2.0 * (2.0 * n_held).sqrt();
     let unaccounted = if has_excess { ratio(beyond.max(0.0), before.held_out - n_held) } else { 0.0 };
@@ -124,7 +121,7 @@ pub(crate) fn judge<'c>(
         held_out,
         gain,
         gain_held_out,
-        allowance,
+        allowance_unseen,
         gain_channels: before.channels - misfit.channels,
         share,
         share_held_out,

@@ -23,8 +23,11 @@ const FIRST_ORDER: f64 = 0.05;
 /// Where the training residuals are no noise either, a variant must take away this share of the excess χ² of every held-out
 /// channel of every record that fails ...
 const SHARE_OF_EACH: f64 = 0.25;
-/// ... and leave no more than this root mean square over the noise beyond the uncertainty of the estimate.
+/// ... and leave no more than this root mean square over the noise beyond the uncertainty of the estimate ...
 const FAR: f64 = 2.5;
+/// ... unless it takes away this share of a span of a fitted channel: what it leaves there is the smaller part by far, however well the
+/// noise lets it be seen. A channel that is never fitted excuses nothing.
+const MOST: f64 = 0.75;
 /// Channels that a sentence names at most.
 const NAMED: usize = 3;
 
@@ -119,11 +122,13 @@ fn groups(rows: &[Row]) -> Vec<Vec<usize>> {
 }
 
 /// The held-out data that forbid to name a variant. Where its training residuals are noise, these are all that fail, since no
-/// remaining discrepancy of the training data could be their cause; otherwise those with a large error and those that the
-/// variant improves too little.
+/// remaining discrepancy of the training data could be their cause; otherwise those that the variant improves too little, which is more
+/// where their error stays large.
 pub(crate) fn forbidding<'h>(adequacy: &Adequacy, of: &'h [HeldOut]) -> Vec<&'h HeldOut> {
     let strict = adequacy.could_be_white();
-    of.iter().filter(|h| h.fails && (strict || h.mended < SHARE_OF_EACH || h.beyond > FAR)).collect()
+    let is_span = |h: &HeldOut| h.usage == Usage::HeldOut.word();
+    let far = |h: &HeldOut| h.beyond > FAR && !(is_span(h) && h.mended >= MOST);
+    of.iter().filter(|h| h.fails && (strict || h.mended < SHARE_OF_EACH || far(h))).collect()
 }
 
 /// Those that fail, the worst first, in words; empty without any.
@@ -176,7 +181,14 @@ mod tests {
         let correlated = residuals(0.8, 1e-9);
         assert!(forbidding(&correlated, &[channel(1.9, 1.7, 0.42)]).is_empty());
         assert_eq!(forbidding(&correlated, &[channel(1.9, 1.7, 0.1)]).len(), 1, "nothing improved it");
-        assert_eq!(forbidding(&correlated, &[channel(4.6, 4.2, 0.9)]).len(), 1, "far from its noise");
+        assert_eq!(forbidding(&correlated, &[channel(4.6, 4.2, 0.6)]).len(), 1, "far from its noise");
+        assert_eq!(
+            forbidding(&correlated, &[channel(4.6, 4.2, 0.9)]).len(),
+            1,
+            "a channel that no fit has seen"
+        );
+        let span = HeldOut { usage: "held-out".to_owned(), ..channel(17.0, 15.0, 0.9) };
+        assert!(forbidding(&correlated, &[span]).is_empty(), "something smaller remains");
     }
 
     #[test]

@@ -21,7 +21,7 @@ const SIMULATIONS: usize = 4000;
 /// Rate of false alarms for which the threshold of the search is set.
 pub(crate) const ALARM_RATE: f64 = 0.005;
 /// Lowest threshold, even if the simulations give a lower one.
-const LEAST: f64 = 10.0;
+pub(crate) const LEAST: f64 = 10.0;
 /// A decoy whose influence correlates with that of its candidate by more than this is not used.
 const RESEMBLANCE: f64 = 0.9;
 /// Shifts of a decoy, as shares of each stretch.
@@ -54,7 +54,7 @@ impl NullDistribution {
         sensitivity: &dyn Fn(&ScreeningResult) -> Result<DVector<f64>, ExplainError>,
     ) -> Result<Self, ExplainError> {
         let usable: Vec<&ScreeningResult> =
-            screening.iter().filter(|h| h.failure.is_none() && !h.is_absorbed()).collect();
+            screening.iter().filter(|h| h.failure.is_none() && !h.is_imitated()).collect();
         if usable.is_empty() {
             return Ok(Self { threshold: LEAST, ..Self::default() });
         }
@@ -153,7 +153,14 @@ mod tests {
             let sensitivity = white(m, 100 + candidate as u64);
             let score = optimum.score(&sensitivity);
             let influence = Influence::Held(Arc::new(sensitivity));
-            ScreeningResult { candidate, point: Vec::new(), influence, score, failure: None }
+            ScreeningResult {
+                candidate,
+                point: Vec::new(),
+                influence,
+                score,
+                failure: None,
+                is_significant: false,
+            }
         };
         let screening: Vec<ScreeningResult> = (0..n_candidate).map(result).collect();
         let held = |result: &ScreeningResult| match &result.influence {

@@ -8,7 +8,20 @@ use nalgebra::{DMatrix, DVector};
 use starlings_estimators::BlockAngular;
 
 use crate::fit::fitted_variant::FittedVariant;
+use crate::rows::Usage;
 use crate::run_cache::RunCache;
+
+/// The part of the χ² that the uncertainty of a fit explains: of the held-out span, and of the span and the channels that are never
+/// fitted together.
+pub(super) fn allowances(cache: &RunCache<'_>, fit: &FittedVariant<'_>) -> [f64; 2] {
+    let Some(uncertainty) = Uncertainty::of(cache, fit) else { return [0.0; 2] };
+    let rows = &cache.rows.rows;
+    let of = |wanted: &[Usage]| {
+        let at: Vec<usize> = (0..rows.len()).filter(|i| wanted.contains(&rows[*i].usage)).collect();
+        if at.is_empty() { 0.0 } else { uncertainty.allowance(&at) }
+    };
+    [of(&[Usage::HeldOut]), of(&[Usage::HeldOut, Usage::HeldOutChannel])]
+}
 
 /// The covariance of a fit and its influence on all rows.
 pub(super) struct Uncertainty<'f> {

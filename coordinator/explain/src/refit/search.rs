@@ -10,14 +10,15 @@ use std::cmp::Ordering;
 
 use crate::error::ExplainError;
 use crate::fit::candidate::Candidate;
-use crate::fit::drive::{drive, drive_rounds};
+use crate::fit::drive::drive;
 use crate::fit::fitted_variant::FittedVariant;
 use crate::fit::model_variant::{AddedEffect, ModelVariant};
 use crate::judge::adequacy::Adequacy;
+use crate::judge::effective_noise::inflation;
 use crate::judge::gates::{JudgedFit, judge};
 use crate::judge::held_out::held_out;
 use crate::judge::misfit::Misfit;
-use crate::judge::null_distribution::NullDistribution;
+use crate::judge::null_distribution::{LEAST, NullDistribution};
 use crate::judge::search_result::SearchResult;
 use crate::locate::Track;
 use crate::options::Options;
@@ -25,25 +26,14 @@ use crate::run_cache::RunCache;
 use crate::screen::screening::screen;
 use crate::screen::screening_result::ScreeningResult;
 
-/// Candidates that run the race.
-const RACE: usize = 8;
-/// Rounds of the race.
-const ROUNDS: usize = 2;
-/// Candidates that are refitted after it.
-const FINAL: usize = 3;
-/// Candidates with the best scores that are refitted whatever the race says.
-const SCORED: usize = 2;
-/// Of at most so many candidates all are refitted, since a linear score can be wrong where the misfit is large.
-const SMALL: usize = 6;
-/// Further candidates are refitted when the race promises a cost within this many units of the effective noise of the best.
-const CLOSE: f64 = 12.0;
-
 /// What the stages of a search share.
 pub(super) struct Searcher<'s, 'l, 'c> {
     pub(super) cache: &'s mut RunCache<'l>,
     pub(super) candidates: &'c [Candidate],
     pub(super) tracks: &'s [Track],
     pub(super) cut_short: bool,
+    /// Candidates were asked for by name, so that each is refitted whatever its score says.
+    pub(super) asked: bool,
 }
 
 /// Searches from a fitted model.
@@ -57,7 +47,8 @@ pub(crate) fn search<'c>(
     tracks: &[Track],
     options: &Options,
 ) -> Result<SearchResult<'c>, ExplainError> {
-    let mut searcher = Searcher { cache, candidates, tracks, cut_short: false };
+    let mut searcher =
+        Searcher { cache, candidates, tracks, cut_short: false, asked: !options.only.is_empty() };
     let before = Misfit::of(searcher.cache, &base);
     let adequacy = Adequacy::of(searcher.cache, &base);
     let held_out = held_out(searcher.cache, &base, &base);
@@ -120,14 +111,35 @@ impl<'c> Searcher<'_, '_, 'c> {
             self.cut_short = true;
             return Ok(Vec::new());
         }
-        screen(self.cache, fit, self.candidates, of, self.tracks)
+        let mut results = screen(self.cache, fit, self.candidates, of, self.tracks)?;
+        let noise = inflation(&self.cache.rows, fit.residual());
+        for result in &mut results {
+            result.is_significant = self.asked || result.score.gain > LEAST * noise;
+        }
+        Ok(results)
     }
 
-    /// Refits the best candidates, one effect each.
+    /// Refits the best candidates, one effect each, and goes on down the list while none of them passes the gates and the next still
+    /// gains more than chance.
     fn refit_singles(&mut self, found: &mut SearchResult<'c>) -> Result<(), ExplainError> {
         let best = self.best_of_each(&found.screening);
-        let fits = self.race_and_refit(&found.base, &best)?;
-        self.judge_all(found, fits)
+        let chance = found.adequacy.inflation * found.null_distribution.threshold;
+        let mut next = best.clone();
+        while !next.is_empty() {
+            let fits = self.race_and_refit(&found.base, &next)?;
+            if fits.is_empty() || self.cut_short {
+                return self.judge_all(found, fits);
+            }
+            self.judge_all(found, fits)?;
+            let is_refitted = |h: &ScreeningResult| {
+                found.judged.iter().any(|j| j.fit.variant.effects[0].index == h.candidate)
+            };
+            next.clear();
+            if found.passing().is_empty() {
+                next.extend(best.iter().filter(|h| h.score.gain > chance && !is_refitted(h)).cloned());
+            }
+        }
+        Ok(())
     }
 
     /// The best point of the grid of every candidate that could be named, largest gain first.
@@ -143,73 +155,6 @@ impl<'c> Searcher<'_, '_, 'c> {
         }
         best.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
         best
-    }
-
-    /// Adds single candidates to a fit: a race among the best, then refits of the first few. Where recordings are long, the
-    /// race is made with a few at a time, and repeated for those that are refitted; the cache has its runs.
-    fn race_and_refit(
-        &mut self,
-        parent: &FittedVariant<'c>,
-        best: &[ScreeningResult],
-    ) -> Result<Vec<FittedVariant<'c>>, ExplainError> {
-        self.cache.stage("refit", "a race among the best candidates");
-        let racing = &best[..best.len().min(RACE)];
-        let at_a_time = self.fits_held(parent);
-        let (mut raced, mut promised) = (Vec::new(), Vec::new());
-        for some in racing.chunks(at_a_time) {
-            raced.clear();
-            raced.extend(self.race(parent, some)?.into_iter().map(Some));
-            promised.extend(raced.iter().flatten().map(FittedVariant::promised));
-        }
-        let finalists = self.finalists(best, &promised);
-        self.cache.stage("refit", &format!("{} candidates with every parameter free", finalists.len()));
-        if racing.len() <= at_a_time {
-            return self.refit(finalists.into_iter().filter_map(|i| raced[i].take()).collect());
-        }
-        drop(raced);
-        let mut fits = Vec::with_capacity(finalists.len());
-        for some in finalists.chunks(at_a_time) {
-            let screening: Vec<ScreeningResult> = some.iter().map(|i| racing[*i].clone()).collect();
-            let again = self.race(parent, &screening)?;
-            fits.extend(self.refit(again)?);
-        }
-        Ok(fits)
-    }
-
-    /// The first steps of the fits that add each of these to a fit.
-    fn race(
-        &mut self,
-        parent: &FittedVariant<'c>,
-        screening: &[ScreeningResult],
-    ) -> Result<Vec<FittedVariant<'c>>, ExplainError> {
-        let mut fits = screening
-            .iter()
-            .map(|result| self.with_candidate(parent, result))
-            .collect::<Result<Vec<_>, _>>()?;
-        self.cut_short |= !drive_rounds(self.cache, &mut fits, ROUNDS)?;
-        Ok(fits)
-    }
-
-    /// How many fits with one effect more than `parent` are held at a time; at least one per slot of the fleet, so that no slot
-    /// waits.
-    fn fits_held(&mut self, parent: &FittedVariant<'c>) -> usize {
-        let slots = self.cache.fleet().slots();
-        // Two Jacobians, the predictions and the residuals.
-        let series = 2 * (parent.jacobian.n_series(&self.cache.rows) + 2);
-        (self.cache.series_held() / series).max(slots).max(1)
-    }
-
-    /// Positions of the candidates that are refitted after the race, the one with the lowest promised cost first.
-    fn finalists(&self, best: &[ScreeningResult], promised: &[f64]) -> Vec<usize> {
-        let mut order: Vec<usize> = (0..promised.len()).collect();
-        order.sort_by(|a, b| promised[*a].total_cmp(&promised[*b]));
-        let first = order.first().map_or(0.0, |i| promised[*i]);
-        let scale = (first / self.cache.rows.train.len().max(1) as f64).max(1.0);
-        let close = promised.iter().filter(|p| **p <= first + CLOSE * scale).count();
-        let keep = if best.len() <= SMALL { SMALL } else { close.clamp(FINAL, FINAL + 2) };
-        // The best two scores are refitted even if the race failed by a step too long for its secant approximation.
-        let goes_on = |(place, i): &(usize, usize)| *place < keep || *i < SCORED;
-        order.into_iter().enumerate().filter(goes_on).map(|(_, i)| i).collect()
     }
 
     /// Refits until all have converged.

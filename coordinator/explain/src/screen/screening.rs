@@ -179,6 +179,7 @@ fn incompatible(candidate: usize, point: &[f64], error: &SetupError) -> Screenin
         influence: Influence::none(),
         score: NO_SCORE,
         failure: Some(error.to_string()),
+        is_significant: false,
     }
 }
 
@@ -187,10 +188,11 @@ fn finished(probe: Probe<'_>) -> ScreeningResult {
     let reason = match answer.unwrap_or_else(|| Err(String::new())) {
         Ok(MeasuredInfluence { influence, score, is_unfelt }) => {
             let failure = is_unfelt.then(|| "no influence on what is fitted".to_owned());
-            return ScreeningResult { candidate, point, influence, score, failure };
+            return ScreeningResult { candidate, point, influence, score, failure, is_significant: false };
         }
         Err(reason) if reason.is_empty() => "no influence on what was measured".to_owned(),
         Err(reason) => reason,
     };
-    ScreeningResult { candidate, point, influence: Influence::none(), score: NO_SCORE, failure: Some(reason) }
+    let (influence, failure) = (Influence::none(), Some(reason));
+    ScreeningResult { candidate, point, influence, score: NO_SCORE, failure, is_significant: false }
 }

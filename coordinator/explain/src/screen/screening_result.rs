@@ -6,8 +6,12 @@ use starlings_estimators::Score;
 
 use super::influence::Influence;
 
-/// A candidate is absorbed by the parameters when they cannot imitate less than this part of its influence.
-pub(crate) const ABSORBED: f64 = 0.05;
+/// A candidate that gains no more than chance is absorbed by the parameters when they cannot imitate less than this part of its
+/// influence ...
+const ABSORBED: f64 = 0.05;
+/// ... and any candidate when it is less than this: an influence is a difference over a response of that share of the signal, and what
+/// is left of it below is the curvature of the response.
+const IMITATED: f64 = 3e-3;
 
 /// The screening of a candidate at one point of its grid.
 #[derive(Clone, Debug)]
@@ -22,6 +26,8 @@ pub(crate) struct ScreeningResult {
     pub score: Score,
     /// Why its influence was not measured.
     pub failure: Option<String>,
+    /// Whether it gains more than chance in units of the effective noise, or was asked for by name.
+    pub is_significant: bool,
 }
 
 impl ScreeningResult {
@@ -32,6 +38,33 @@ impl ScreeningResult {
 
     /// Whether the parameters absorb it.
     pub(crate) fn is_absorbed(&self) -> bool {
-        self.failure.is_none() && self.score.identifiable < ABSORBED
+        self.is_imitated()
+            || (self.failure.is_none() && self.score.identifiable < ABSORBED && !self.is_significant)
+    }
+
+    /// Whether nothing of its influence is known to be its own.
+    pub(crate) fn is_imitated(&self) -> bool {
+        self.failure.is_none() && self.score.identifiable < IMITATED
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_gains_no_more_than_chance_or_has_nothing_of_its_own_is_absorbed() {
+        let result = |identifiable: f64, is_significant: bool| ScreeningResult {
+            candidate: 0,
+            point: Vec::new(),
+            influence: Influence::none(),
+            score: Score { gain: 4e4, amplitude: 1.0, sd: 0.01, identifiable },
+            failure: None,
+            is_significant,
+        };
+        assert!(!result(0.03, true).is_absorbed(), "two hundred standard deviations are no imitation");
+        assert!(result(0.03, false).is_absorbed());
+        assert!(result(0.001, true).is_absorbed(), "the curvature of the response");
+        assert!(!result(0.06, false).is_absorbed());
     }
 }

@@ -33,8 +33,8 @@ pub struct Explanation {
     pub tied_with: Vec<Vec<String>>,
     /// The experiment that would best separate the tied sets.
     pub experiment: Option<Experiment>,
-    /// Where nothing explains the gap, what came nearest.
-    pub closest: Option<NamedEffect>,
+    /// Where nothing explains the gap, the effects of what came nearest.
+    pub closest: Vec<NamedEffect>,
     /// Every candidate that was screened, best first.
     pub screened: Vec<Screened>,
     /// Candidates that were refitted and refused, with the reason in words.

@@ -2,7 +2,7 @@
 //!
 //! Next file to read: [`super::words`].
 
-use starlings_models::SOLVER;
+use starlings_models::{BuildSetup, SOLVER};
 
 use crate::fit::fitted_variant::FittedVariant;
 use crate::judge::adequacy::Nature;
@@ -93,6 +93,11 @@ pub(crate) fn warnings(cache: &RunCache<'_>, found: &SearchResult<'_>, decision:
     }
     if decision.verdict != Verdict::NoGap && cache.study.setup.model.kind == SOLVER {
         let why = "the unknown input of every equation was not looked for: the rates of a solver are not open to one";
+        list.push(why.to_owned());
+    }
+    if cache.study.setup.is_noisy() {
+        let why = "effects are scored on the rates alone, without the states' `noise`: which terms the drift of the stochastic equations \
+                   lacks is asked with [infer.candidates] by `starlings infer`, which counts that noise";
         list.push(why.to_owned());
     }
     if matches!(found.adequacy.nature(), Nature::Smaller | Nature::Larger) || found.adequacy.is_numerical() {

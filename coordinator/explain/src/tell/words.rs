@@ -20,6 +20,9 @@ use crate::rows::Usage;
 use crate::run_cache::RunCache;
 use crate::screen::not_tried;
 
+/// Share of the gap below which what is left is not spoken of: with one digit it would read as nothing.
+const LITTLE: f64 = 5e-4;
+
 /// Where a fit stands that has not converged.
 pub(crate) fn stand(fit: &FittedVariant<'_>) -> String {
     let n = fit.residual().len().max(1) as f64;
@@ -46,15 +49,16 @@ pub(crate) fn headline(
     let best = decision.best.map(|i| &found.judged[i]);
     match (decision.verdict, best) {
         (Verdict::Named, Some(judged)) => {
-            format!("{} {}", subject(judged), capital(&shrinking(cache, found, judged)))
+            format!("{} {}{}", subject(judged), capital(&shrinking(cache, found, judged)), remains(judged))
         }
         (Verdict::Tie, Some(judged)) => {
             let rivals: Vec<String> = decision.tied.iter().map(|set| set.join(" + ")).collect();
             format!(
-                "{} or {}: the data cannot tell them apart. {}",
+                "{} or {}: the data cannot tell them apart. {}{}",
                 judged.fit.variant.name(),
                 rivals.join(" or "),
-                capital(&shrinking(cache, found, judged))
+                capital(&shrinking(cache, found, judged)),
+                remains(judged)
             )
         }
         (Verdict::Unexplained, _) => unexplained(cache, found, candidates, decision),
@@ -115,6 +119,22 @@ fn subject(judged: &JudgedFit<'_>) -> String {
     let variant = &judged.fit.variant;
     let says: Vec<&str> = variant.effects.iter().map(|m| m.candidate.def.says.as_str()).collect();
     format!("Missing: {}. {}", variant.name(), says.join(" "))
+}
+
+/// What is left beside the name, where that is no noise: how much, and where it shows in what was held out. Empty where nothing is.
+fn remains(judged: &JudgedFit<'_>) -> String {
+    let failing: Vec<&HeldOut> = judged.held_out.iter().filter(|h| h.fails).collect();
+    let left = (1.0 - judged.share).max(0.0);
+    if failing.is_empty() && !(judged.adequacy.is_gap() && left > LITTLE) {
+        return String::new();
+    }
+    let left = percent(left);
+    let unseen = if failing.is_empty() {
+        String::new()
+    } else {
+        format!("; of what was held out, {}", listed(&failing))
+    };
+    format!(" Something smaller remains: {left} of the gap on the training data{unseen}.")
 }
 
 /// How the error changes, for each use of the data.

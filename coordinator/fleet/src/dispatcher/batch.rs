@@ -158,6 +158,11 @@ impl Batch {
         (index < self.jobs.len()).then_some(index)
     }
 
+    /// Jobs without an outcome.
+    pub(super) fn n_unfinished(&self) -> usize {
+        self.jobs.len() - self.ended.len()
+    }
+
     pub(super) fn is_done(&self) -> bool {
         self.ended.len() == self.jobs.len()
     }
@@ -225,11 +230,6 @@ impl Batch {
 
     pub(super) fn name(&self, index: usize) -> JobName {
         self.names[index]
-    }
-
-    /// Jobs without an outcome.
-    pub(super) fn n_open(&self) -> usize {
-        self.jobs.len() - self.ended.len()
     }
 
     /// Takes back a job whose worker is gone; `counted` when the worker may have died of it.

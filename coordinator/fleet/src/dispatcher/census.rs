@@ -16,7 +16,7 @@ impl Dispatcher {
             census.aside += usize::from(worker.aside.is_some());
         }
         if let Some(batch) = &self.batch {
-            census.open = batch.n_open();
+            census.open = batch.n_unfinished();
             census.queued = batch.queue.len() + batch.parked().len();
         }
         census

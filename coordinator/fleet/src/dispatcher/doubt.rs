@@ -73,7 +73,7 @@ impl Dispatcher {
             worker.hold(lease, self.now);
             self.out.push(Command::SendControl { worker: worker.id, lease, control });
         }
-        let stuck = batch.parked().len() == batch.n_open();
+        let stuck = batch.parked().len() == batch.n_unfinished();
         if let Some(&index) = batch.parked().keys().next().filter(|_| stuck) {
             let (name, reason, parameters) = (batch.name(index), batch.last_words(index), String::new());
             let (particle, record) = (name.particle, name.record);

@@ -6,20 +6,18 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::mpsc::Sender;
 use std::time::Duration;
 
-use starlings_proto::{
-    Bytes, Hello, JobEncoder, Lease, PROTOCOL, SentWindows, SetupId, ToWorker, VERSION, generated,
-};
+use starlings_proto::{Bytes, Hello, JobEncoder, PROTOCOL, SetupId, ToWorker, VERSION, generated};
 
 use super::Reply;
 use super::blocks::Blocks;
 use super::doorway::Doorway;
 use super::excluded::Excluded;
+use super::link::Link;
 use super::states::States;
 use super::teller::Teller;
 use super::waiting::Waiting;
 use crate::dispatcher::{BatchError, Command, ControlId, Dispatcher, Event, WorkerId};
-use crate::event_text::OVER;
-use crate::outbox::Outbox;
+use crate::event_kind::OVER;
 use crate::run_traces::Spans;
 use crate::tally::Counting;
 use crate::wire::{Job, named};
@@ -71,39 +69,6 @@ pub(crate) struct SetupShape {
     pub(crate) n_state: Option<usize>,
     /// Whether it sums over rows and predicts none.
     pub(crate) sums: bool,
-}
-
-/// The way to one worker.
-pub(super) struct Link {
-    pub(super) name: String,
-    pub(super) outbox: Outbox,
-    pub(super) pid: u32,
-    pub(super) nonce: u64,
-    /// Windows that were sent on it.
-    pub(super) windows: SentWindows,
-}
-
-impl Link {
-    pub(super) fn new(name: String, outbox: Outbox, pid: u32, nonce: u64) -> Self {
-        Self { name, outbox, pid, nonce, windows: SentWindows::default() }
-    }
-
-    fn give(
-        &mut self,
-        encoder: &mut JobEncoder,
-        spans: &mut Spans,
-        lease: Lease,
-        (setup, job): &(SetupId, Job),
-    ) {
-        let parent = spans.begin(lease, job, &self.name);
-        let (window, mut message) = encoder.encode(lease, setup, job, &mut self.windows);
-        if let Some(parent) = parent {
-            message = ToWorker::traced(message, parent);
-        }
-        for message in window.into_iter().chain([message]) {
-            self.outbox.send(message);
-        }
-    }
 }
 
 /// Why a worker is not taken.

@@ -108,6 +108,11 @@ impl States {
         self.lent_gone.extend(self.lent.insert((worker, number), Arc::new(lent)));
     }
 
+    /// Takes back the memory that a worker was lent under a number.
+    pub(super) fn give_back(&mut self, worker: WorkerId, number: u64) {
+        self.lent_gone.extend(self.lent.remove(&(worker, number)));
+    }
+
     /// The memory that a worker was lent under a number.
     pub(super) fn lent(&self, worker: WorkerId, number: u64) -> Option<Arc<Lent>> {
         self.lent.get(&(worker, number)).cloned()

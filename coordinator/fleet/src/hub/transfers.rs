@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use starlings_proto::MAX_INLINE_STATE;
-use starlings_proto::convert::lent::Lend;
+use starlings_proto::convert::lent::{GiveBack, Lend};
 use starlings_proto::convert::state::{Get, PutHead};
 use starlings_states::{Lent, StateStore, StoredState};
 use tonic::Status;
@@ -100,6 +100,14 @@ impl Hub {
         state.states.session(worker, head.nonce)?;
         state.states.lend(worker, *descriptor, lent);
         Ok(true)
+    }
+
+    /// Takes back memory that was lent to a worker, if it was.
+    pub(crate) fn give_back(&self, back: &GiveBack) -> Result<(), Status> {
+        let (worker, mut state) = (WorkerId(back.epoch), self.lock());
+        state.states.session(worker, back.nonce)?;
+        state.states.give_back(worker, back.descriptor);
+        Ok(())
     }
 
     /// The memory that was lent to the worker of a run under a number.

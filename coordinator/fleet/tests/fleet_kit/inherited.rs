@@ -24,9 +24,14 @@ pub fn part() -> Option<String> {
 
 /// Processes of this test program as workers, each of which plays this part in the test named.
 pub fn workers(fleet: &GrpcFleet, n: usize, test: &str, part: &str) -> LocalWorkers {
+    workers_after("", fleet, n, test, part)
+}
+
+/// The same after these words of the shell.
+pub fn workers_after(words: &str, fleet: &GrpcFleet, n: usize, test: &str, part: &str) -> LocalWorkers {
     let this = std::env::current_exe().unwrap();
     let script = format!(
-        "{PART}={part} exec '{}' --exact {test} --ignored --nocapture --test-threads 1",
+        "{words} export {PART}={part}; exec '{}' --exact {test} --ignored --nocapture --test-threads 1",
         this.display()
     );
     let args = ["-c", &script, "worker"].map(str::to_owned).to_vec();

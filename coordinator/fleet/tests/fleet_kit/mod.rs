@@ -4,6 +4,9 @@
 pub mod access;
 pub mod hand;
 pub mod inherited;
+pub mod large;
+#[cfg(target_os = "linux")]
+pub mod lent;
 pub mod shared;
 
 use std::io::{Read, Write};

@@ -33,7 +33,7 @@ pub(super) fn found(verdict: Verdict, records: usize, n: usize) -> (Explanation,
         }
         Verdict::Unexplained => {
             explanation.headline = "Nothing in the library explains the gap.".into();
-            explanation.closest = Some(effect());
+            explanation.closest = vec![effect()];
         }
         Verdict::NoGap => {
             explanation.headline = "No gap: the model explains the training data at their noise.".into();
@@ -112,7 +112,7 @@ fn explanation(verdict: Verdict, records: usize) -> Explanation {
         replaced: Vec::new(),
         tied_with: Vec::new(),
         experiment: None,
-        closest: None,
+        closest: Vec::new(),
         screened: screened(),
         rejected: vec![Rejected {
             name: "inertance".into(),

@@ -143,7 +143,7 @@ fn an_explanation_of_nothing_says_what_is_missing() {
     let mut empty = found(Verdict::Unexplained, 0, 0);
     empty.1 = Figures::default();
     let e = &mut empty.0;
-    (e.closest, e.screened, e.rejected) = (None, Vec::new(), Vec::new());
+    (e.closest, e.screened, e.rejected) = (Vec::new(), Vec::new(), Vec::new());
     (e.places, e.warnings, e.untried) = (Vec::new(), Vec::new(), Vec::new());
     let page = explain_page(&empty.0, &empty.1, &StudyAbout::default()).unwrap();
     assert_well_formed(&page);

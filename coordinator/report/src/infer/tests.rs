@@ -1,7 +1,8 @@
 //! The page and the table of an inference.
 
 use starlings_infer::result::{
-    CoefficientFound, Converging, DiffusionFound, Inference, RecordUsed, ReducedFound, UnknownFound,
+    CoefficientFound, Converging, DiffusionFound, HeldOut, Inference, JointScore, MissingFound, NamedTerm,
+    RecordUsed, ReducedFound, ScoredTerm, UnknownFound,
 };
 
 use super::{coefficients_csv, infer_page};
@@ -16,6 +17,26 @@ fn coefficient(name: &str, estimate: Option<f64>, zero: bool) -> CoefficientFoun
         may_be_zero: estimate.map(|_| zero),
         at_step: None,
         prior: None,
+    }
+}
+
+fn missing() -> MissingFound {
+    MissingFound {
+        candidates: 21,
+        false_alarm: 0.01,
+        named: vec![NamedTerm {
+            name: "x:z".to_owned(),
+            estimate: -1.0,
+            sd: 0.02,
+            interval90: [-1.03, -0.97],
+            chi_squared: 2500.0,
+            by_chance: 0.0,
+            ties: vec!["x:w".to_owned()],
+        }],
+        strongest: vec![ScoredTerm { name: "x:u".to_owned(), chi_squared: 17.5, by_chance: 3e-5 }],
+        left: Some(JointScore { terms: 20, chi_squared: 18.0, by_chance: 0.587 }),
+        held_out: Some(HeldOut { records: vec!["later".to_owned()], n_step: 100, gain: 1234.5 }),
+        coefficients: vec![coefficient("sigma", Some(10.5), false), coefficient("x:z", Some(-1.0), false)],
     }
 }
 
@@ -64,7 +85,9 @@ fn sample() -> Inference {
             probability: 0.49,
             consistent: true,
         }),
+        missing: Some(missing()),
         convergence: vec![at(1), at(2), at(4)],
+        convergence_of: Some("estimates before smoothing".to_owned()),
         conditional_on: "90 % intervals".to_owned(),
         warnings: vec!["not observed: leak".to_owned()],
     }
@@ -81,6 +104,13 @@ fn the_page_shows_the_verdict_the_table_and_the_convergence() {
         "χ² 11.5 for 12",
         "<svg",
         "1600",
+        "These are estimates before smoothing.",
+        "Terms that the drift may lack",
+        "x:w",
+        "10.50",
+        "3e-5",
+        "χ² 18.0 together, by chance 0.587",
+        "later) the log-likelihood is 1234.5 nats larger",
     ] {
         assert!(page.contains(text), "{text} is missing");
     }

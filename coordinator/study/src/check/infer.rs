@@ -2,6 +2,7 @@
 //!
 //! Recordings are not read here: only which column is which state. Next file to read: [`self::records`].
 
+mod candidates;
 mod records;
 mod reduced;
 mod settings;
@@ -16,7 +17,7 @@ use toml::Spanned;
 use super::built::CheckedModel;
 use super::settings::{estimator, fleet};
 use super::{check_name, model};
-use crate::checked::{ExplainChoice, SpectrumChoice, Study};
+use crate::checked::Study;
 use crate::file::StudyFile;
 use crate::file::infer::InferSection;
 use crate::file::read::read;
@@ -38,30 +39,9 @@ pub(super) fn study(path: &Path, text: &str) -> Result<Study, StudyError> {
     let (Some(CheckedModel { setup, spec, candidates, delays, .. }), Some(infer)) = (built, infer) else {
         return Err(StudyError { problems: Vec::new() });
     };
-    Ok(Study {
-        file: path.to_owned(),
-        text: Arc::clone(&source.text),
-        name: file.study.name.into_inner(),
-        says: file.study.says,
-        seed: file.study.seed,
-        time_unit: file.study.time_unit,
-        setup,
-        spec,
-        candidates: Arc::new(candidates),
-        parameters: Vec::new(),
-        theta: Vec::new(),
-        records: Arc::default(),
-        estimator,
-        fleet,
-        explain: ExplainChoice::default(),
-        spectrum: SpectrumChoice::default(),
-        infer: Some(Arc::new(infer)),
-        delays,
-        runs_here: true,
-        whole_answers: false,
-        solver_host: host,
-        warnings: Vec::new(),
-    })
+    let mut study = super::study_of(path, &source, file, (setup, spec), (fleet, estimator), &host);
+    (study.candidates, study.delays, study.infer) = (Arc::new(candidates), delays, Some(Arc::new(infer)));
+    Ok(study)
 }
 
 /// What the file asks of its model; `None` where a problem was reported.
@@ -80,7 +60,8 @@ fn infer(source: &Source, file: &StudyFile, setup: &Setup) -> Option<InferChoice
     };
     let before = source.count();
     let mut sums = settings::sums(source, section);
-    sums.left = settings::left(source, section, equations);
+    sums.candidates = candidates::functions(source, section.candidates.as_ref(), equations);
+    sums.left = settings::left(source, section, equations, &sums.candidates);
     if source.count() > before {
         return None;
     }
@@ -95,9 +76,16 @@ fn infer(source: &Source, file: &StudyFile, setup: &Setup) -> Option<InferChoice
         block: settings::block(source, section, most_steps),
         most_steps,
         breaks: settings::breaks(source, section),
+        resample: section.resample.is_some(),
         reduced: section.reduced.as_ref().map(|reduced| reduced::reduced(source, reduced)),
+        missing: candidates::missing(source, section.candidates.as_ref()),
         follow: settings::follow(source, section.follow.as_ref()),
         records: records::records(source, file, equations),
+        held_out: section
+            .candidates
+            .iter()
+            .flat_map(|_| records::held_out(source, file, equations))
+            .collect(),
     })
 }
 
@@ -114,8 +102,10 @@ fn check_functions(
     } else {
         Drift::of_rates(equations, constants, &sums.unknown, &sums.left).err()
     };
-    if let Some(error) = refused {
-        let listed = section.parameters.iter().chain(&section.functions);
+    let candidates = || Drift::of_texts(equations, constants, &sums.candidates, &sums.left).err();
+    if let Some(error) = refused.or_else(candidates) {
+        let of_candidates = candidates::listed(section.candidates.as_ref());
+        let listed = section.parameters.iter().chain(&section.functions).chain(of_candidates);
         match error {
             SetupError::Unknown { what, name, nearest } => {
                 let span =

@@ -27,8 +27,10 @@ pub(crate) struct InferSection {
     pub(crate) richardson: Option<Spanned<bool>>,
     pub(crate) block: Option<Spanned<u64>>,
     pub(crate) step: Option<Spanned<f64>>,
+    pub(crate) resample: Option<Spanned<f64>>,
     pub(crate) gaps: Option<Spanned<String>>,
     pub(crate) reduced: Option<ReducedSection>,
+    pub(crate) candidates: Option<CandidatesSection>,
     pub(crate) follow: Option<FollowSection>,
 }
 
@@ -57,6 +59,16 @@ pub(crate) struct ReducedSection {
     pub(crate) coefficients: Named<String>,
 }
 
+/// `[infer.candidates]`.
+#[derive(Debug)]
+pub(crate) struct CandidatesSection {
+    pub(crate) span: Range<usize>,
+    pub(crate) degree: Option<Spanned<u64>>,
+    pub(crate) functions: Vec<Spanned<String>>,
+    pub(crate) false_alarm: Option<Spanned<f64>>,
+    pub(crate) most: Option<Spanned<u64>>,
+}
+
 /// `[infer.follow]`.
 #[derive(Debug)]
 pub(crate) struct FollowSection {
@@ -67,7 +79,7 @@ pub(crate) struct FollowSection {
     pub(crate) rate: Option<Spanned<f64>>,
 }
 
-const KEYS: [&str; 15] = [
+const KEYS: [&str; 17] = [
     "parameters",
     "basis",
     "degree",
@@ -80,8 +92,10 @@ const KEYS: [&str; 15] = [
     "richardson",
     "block",
     "step",
+    "resample",
     "gaps",
     "reduced",
+    "candidates",
     "follow",
 ];
 
@@ -102,8 +116,10 @@ pub(crate) fn read(source: &Source, root: &Table<'_>) -> Option<InferSection> {
         richardson: t.flag("richardson"),
         block: t.count("block"),
         step: t.number("step"),
+        resample: t.number("resample"),
         gaps: t.text("gaps"),
         reduced: reduced(source, &t),
+        candidates: candidates(&t),
         follow: follow(&t),
     })
 }
@@ -150,6 +166,18 @@ fn reduced(source: &Source, t: &Table<'_>) -> Option<ReducedSection> {
         start: start.iter().filter_map(value).collect(),
         define: named_texts(source, &t.free_entries("define")),
         coefficients: named_texts(source, &t.free_entries("coefficients")),
+    })
+}
+
+fn candidates(t: &Table<'_>) -> Option<CandidatesSection> {
+    let keys = ["degree", "functions", "false_alarm", "most"];
+    let t = t.table("candidates", "[infer.candidates]", &keys)?;
+    Some(CandidatesSection {
+        span: t.span.clone(),
+        degree: t.count("degree"),
+        functions: t.texts("functions"),
+        false_alarm: t.number("false_alarm"),
+        most: t.count("most"),
     })
 }
 

@@ -12,15 +12,15 @@
 
 use std::collections::BTreeMap;
 
+use super::extended_spec::extended_spec;
 use super::scope::{Reach, Scope, note_memories};
 use super::scratch::Scratch;
-use super::{Effect, EffectDef, EffectParameter, Moment, Scale, TermEffect, Touches};
+use super::{Effect, EffectDef, Moment, TermEffect, Touches};
 use crate::SetupError;
-use crate::bounds::unbounded;
-use crate::equations::{Slot, check};
+use crate::equations::Slot;
 use crate::integrate::Solver;
 use crate::segment::{Drive, Segment};
-use crate::{Blocks, Memory, Model, ModelFailure, Quantity, Spec, advance_by};
+use crate::{Blocks, Memory, Model, ModelFailure, Spec, advance_by};
 
 /// A model and the effects added to it.
 pub struct Extended {
@@ -249,56 +249,4 @@ impl Model for Extended {
         }
         self.with_fixed_parameters(theta, |theta| self.inner.advance(segment, theta, x))
     }
-}
-
-/// The inner model's specification with the effects' states and parameters.
-fn extended_spec(inner: &Spec, defs: &[EffectDef]) -> Result<Spec, SetupError> {
-    let mut spec = inner.clone();
-    for (i, def) in defs.iter().enumerate() {
-        if def.name.is_empty() {
-            return Err(SetupError::Invalid("an effect needs a name".to_owned()));
-        }
-        if defs[..i].iter().any(|d| d.name == def.name) {
-            return Err(SetupError::Twice(def.name.clone()));
-        }
-        if def.adds.is_empty() || def.parameters.is_empty() {
-            return Err(SetupError::Invalid(format!(
-                "effect `{}` needs at least one term in `adds` and one parameter, its amplitude",
-                def.name
-            )));
-        }
-        for (j, parameter) in def.parameters.iter().enumerate() {
-            check::usable(&parameter.name, &format!("a parameter of the effect `{}`", def.name))?;
-            check::range(parameter.range, &format!("parameter `{}`", parameter.name))?;
-            check_new(&spec, &parameter.name)?;
-            let mut quantity = Quantity::new(&parameter.name, &parameter.unit);
-            (quantity.range, quantity.default) = range_and_default(parameter, j);
-            spec.parameters.push(quantity.says(&format!("Parameter of the effect `{}`.", def.name)));
-        }
-        for state in &def.states {
-            check::usable(&state.name, &format!("a state of the effect `{}`", def.name))?;
-            check_new(&spec, &state.name)?;
-            let quantity = Quantity::new(&state.name, &state.unit);
-            spec.states.push(quantity.says(&format!("State of the effect `{}`.", def.name)));
-        }
-    }
-    Ok(spec)
-}
-
-/// Range and default value of the `i`th parameter of an effect: zero of the amplitude, the middle entry of the grid of any
-/// other. Numbers that count in another scale say nothing in the model's units; but a memory needs some bound on a delay, the
-/// amplitude of its effect.
-fn range_and_default(parameter: &EffectParameter, i: usize) -> ([f64; 2], Option<f64>) {
-    let absolute = parameter.scale == Scale::Absolute;
-    let bounded = absolute || (i == 0 && parameter.scale == Scale::Sampling);
-    let range = if bounded { parameter.range } else { unbounded() };
-    let middle = parameter.grid.get(parameter.grid.len() / 2).copied().filter(|_| absolute);
-    (range, if i == 0 { Some(0.0) } else { middle })
-}
-
-/// Refuses a name that the model already has.
-fn check_new(spec: &Spec, name: &str) -> Result<(), SetupError> {
-    let lists = [&spec.states, &spec.parameters, &spec.inputs, &spec.outputs];
-    let taken = lists.into_iter().flatten().any(|q| q.name == name);
-    if taken { Err(SetupError::Twice(name.to_owned())) } else { Ok(()) }
 }

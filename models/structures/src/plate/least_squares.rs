@@ -1,6 +1,8 @@
 //! Damped least squares in three bounded unknowns, with derivatives that need not be exact.
 //!
-//! Levenberg (1944) and Marquardt (1963), scaled by the diagonal. Next file to read: [`super::search`], which alone uses it.
+//! Levenberg (1944) and Marquardt (1963), scaled by the diagonal. The search stands with the plate, whose modes and dictionary it needs at
+//! every step, and a crate of models sees no estimator: hence a small fit here, for three unknowns and without priors, beside the one that
+//! asks a fleet for its runs. Next file to read: [`super::search`], which alone uses it.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 

@@ -27,6 +27,23 @@ fn outcomes_come_in_job_order_whatever_the_order_of_answers() {
 }
 
 #[test]
+fn the_load_tells_jobs_without_an_outcome_and_what_every_worker_holds() {
+    let mut stage = Stage::with(&[1, 1]);
+    let told = |stage: &Stage| {
+        let load = stage.dispatcher.load();
+        (load.unfinished, load.workers.iter().map(|w| (w.name.clone(), w.slots, w.jobs)).collect::<Vec<_>>())
+    };
+    let idle = vec![("w1".to_owned(), 1, 0), ("w2".to_owned(), 1, 0)];
+    assert_eq!(told(&stage), (0, idle.clone()));
+    let jobs = stage.jobs(submit(2));
+    assert_eq!(told(&stage), (2, vec![("w1".to_owned(), 1, 1), ("w2".to_owned(), 1, 1)]));
+    for (lease, index) in jobs {
+        stage.step(answered(lease, LeaseOutcome::Ran(Ok(prediction(index))), 1.0));
+    }
+    assert_eq!(told(&stage), (0, idle));
+}
+
+#[test]
 fn long_jobs_are_held_two_per_slot_and_short_ones_sixty_four() {
     let mut stage = Stage::with(&[2]);
     let jobs = stage.jobs(submit(1000));

@@ -1,7 +1,8 @@
 //! How the estimate of each coefficient converges as the recording goes on.
 
+use starlings_estimators::quantiles::normal;
 use starlings_infer::Inference;
-use starlings_infer::result::CoefficientFound;
+use starlings_infer::result::{CoefficientFound, LEVEL};
 
 use crate::ReportError;
 use crate::number;
@@ -13,8 +14,6 @@ use crate::plot::scene::Scene;
 
 /// Figures at most: those of coefficients that differ from zero come first.
 const FIGURES: usize = 12;
-/// Half of a 90 % interval, in sd.
-const HALF: f64 = 1.645;
 
 /// One figure per coefficient: estimate and 90 % interval after each power of two of blocks.
 ///
@@ -36,12 +35,13 @@ fn figure(found: &Inference, p: usize, c: &CoefficientFound) -> Option<Result<Fi
         [_, .., (_, [mean, sd])] => (*mean, *sd),
         _ => return None,
     };
-    let ends = points.iter().flat_map(|(_, [mean, sd])| [mean - HALF * sd, mean + HALF * sd]);
+    let half = normal(0.5 + 0.5 * LEVEL);
+    let ends = points.iter().flat_map(|(_, [mean, sd])| [mean - half * sd, mean + half * sd]);
     let x = Axis::log_around(&with_unit("recorded time", &found.time_unit), points.iter().map(|p| p.0));
     let y = Axis::around(&c.name, ends);
     let marks = vec![
         Mark::Band {
-            points: points.iter().map(|(t, [mean, sd])| (*t, mean - HALF * sd, mean + HALF * sd)).collect(),
+            points: points.iter().map(|(t, [mean, sd])| (*t, mean - half * sd, mean + half * sd)).collect(),
             colour: BLUE,
             opacity: 0.2,
         },
@@ -57,7 +57,8 @@ fn figure(found: &Inference, p: usize, c: &CoefficientFound) -> Option<Result<Fi
             radius: 2.5,
         },
     ];
-    let caption = format!("{} ± {} at the end.", number::with_sd(last, sd), number::significant(sd, 2));
+    let of = found.convergence_of.as_ref().map_or_else(String::new, |of| format!(" These are {of}."));
+    let caption = format!("{} ± {} at the end.{of}", number::with_sd(last, sd), number::significant(sd, 2));
     let scene = Scene { title: c.name.clone(), description: caption.clone(), x, y, marks };
     let keys = [("line blue", "estimate"), ("area blue", "90 % interval"), ("dash muted", "at the end")];
     Some(Figure::new(&scene, &keys, caption))

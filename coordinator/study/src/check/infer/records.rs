@@ -27,6 +27,12 @@ pub(super) fn records(source: &Source, file: &StudyFile, equations: &EquationsDe
     used.filter_map(|section| record(source, section, equations)).collect()
 }
 
+/// The recordings that nothing is inferred from, in the order of the file.
+pub(super) fn held_out(source: &Source, file: &StudyFile, equations: &EquationsDef) -> Vec<InferRecord> {
+    let held_out = file.records.iter().filter(|record| record.held_out);
+    held_out.filter_map(|section| record(source, section, equations)).collect()
+}
+
 fn record(source: &Source, section: &RecordSection, equations: &EquationsDef) -> Option<InferRecord> {
     let before = source.count();
     let mut columns = Vec::new();

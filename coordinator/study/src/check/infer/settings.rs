@@ -64,26 +64,42 @@ pub(super) fn sums(source: &Source, section: &InferSection) -> SumsDef {
         left: Vec::new(),
         step: step(source, section),
         levels: if section.richardson.as_ref().is_some_and(|r| *r.get_ref()) { RICHARDSON_LEVELS } else { 1 },
+        files: Vec::new(),
+        candidates: Vec::new(),
     }
 }
 
 fn step(source: &Source, section: &InferSection) -> f64 {
-    let Some(step) = &section.step else { return 0.0 };
+    if let (Some(_), Some(resample)) = (&section.step, &section.resample) {
+        let message = "`step` is that of the rows as they are, and `resample` makes another";
+        source.report_with(resample.span(), message, "remove one of the two");
+    }
+    let (name, given) = match &section.resample {
+        Some(step) => ("resample", Some(step)),
+        None => ("step", section.step.as_ref()),
+    };
+    let Some(step) = given else { return 0.0 };
     if *step.get_ref() <= 0.0 {
-        source.report(step.span(), format!("`step` must be above zero, found {}", step.get_ref()));
+        source.report(step.span(), format!("`{name}` must be above zero, found {}", step.get_ref()));
     }
     *step.get_ref()
 }
 
 /// What is taken at the start of a step: all states, or what is named.
-pub(super) fn left(source: &Source, section: &InferSection, equations: &EquationsDef) -> Vec<String> {
+pub(super) fn left(
+    source: &Source,
+    section: &InferSection,
+    equations: &EquationsDef,
+    candidates: &[String],
+) -> Vec<String> {
     let rules = [("midpoint", false), ("ito", true)];
     let states: Vec<String> = equations.states.iter().map(|state| state.name.clone()).collect();
     match &section.rule {
         Rules::All(word) => {
             let ito = choose(source, word.as_ref(), "rule", &rules).unwrap_or(false);
             let functions = section.functions.iter().map(|f| f.get_ref().clone());
-            if ito { states.into_iter().chain(functions).collect() } else { Vec::new() }
+            let all = states.into_iter().chain(functions).chain(candidates.iter().cloned());
+            if ito { all.collect() } else { Vec::new() }
         }
         Rules::ByName(named) => {
             let listed = section.parameters.iter().chain(&section.functions).map(|p| p.get_ref().clone());

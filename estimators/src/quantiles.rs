@@ -1,14 +1,14 @@
-//! Quantiles of Student's t and of χ² for any number of degrees of freedom.
+//! Quantiles of the normal distribution, and of Student's t and χ² for any number of degrees of freedom.
 //!
-//! Read next: `posterior.rs`.
+//! Every interval of this crate and of those above it takes them from here. Read next: `inference/posterior.rs`.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, Normal, StudentsT};
 
 /// Degrees of freedom from which expansions about the normal distribution are exact to a millionth.
 const MANY: f64 = 200.0;
 
-/// Quantile of the standard normal distribution.
-pub(crate) fn normal(p: f64) -> f64 {
+/// Quantile of the standard normal distribution at a probability from 0 to 1: 1.645 at 0.95.
+pub fn normal(p: f64) -> f64 {
     Normal::standard().inverse_cdf(p)
 }
 
@@ -53,6 +53,14 @@ pub(crate) fn fisher_tail(value: f64, degrees: f64, left: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_normal_quantile_is_that_of_the_tables() {
+        // Abramowitz & Stegun, table 26.5, and its last digits by Wichura's AS 241.
+        for (p, z) in [(0.5, 0.0), (0.95, 1.644_853_626_951_472_7), (0.975, 1.959_963_984_540_054)] {
+            assert!((normal(p) - z).abs() < 1e-14, "{p}: {}", normal(p));
+        }
+    }
 
     #[test]
     fn expansions_and_distributions_meet() {

@@ -1,0 +1,50 @@
+//! The number of workers follows the work under a real Slurm of four nodes, which `.ci/slurm test` starts: `just slurm`.
+
+#![cfg(target_os = "linux")]
+#![allow(clippy::unwrap_used)] // a failed unwrap is a failed test
+
+mod access_kit;
+mod common;
+mod slurm_kit;
+
+use access_kit::Started;
+use common::{starlings, wait_until};
+use serde_json::Value;
+use slurm_kit::{Trial, deploy, queue, remove, status};
+
+/// Workers of a deployment that run, as squeue says.
+fn running(out: &std::path::Path) -> usize {
+    status(out)["tasks"].as_array().unwrap().iter().filter(|task| task["state"] == "running").count()
+}
+
+#[test]
+#[ignore = "needs a Slurm: .ci/slurm test"]
+fn a_pool_grows_with_the_queue_and_shrinks_when_the_run_is_over_and_no_byte_changes() {
+    let trial = Trial::new();
+    let (out, fit) = (trial.path("pool"), trial.path("fit"));
+    let (code, said) = deploy(&trial.study, &out, &["--elastic", "1..3", "--slots", "1"]);
+    assert!(code == 0 && said.contains("1 of 1 run"), "{said}");
+    assert_eq!(queue().lines().count(), 1, "{}", queue());
+    let watch_options = ["deploy", "watch", "--every", "0.5", "--release-after", "5s"];
+    let mut watch = Started::of(starlings().args(watch_options).arg(&out));
+    let mut call = starlings();
+    call.arg("run")
+        .arg(&trial.study)
+        .args(["--listen", "127.0.0.1:0", "--access"])
+        .arg(out.join("access.json"));
+    let mut coordinator = Started::of(call.arg("--out").arg(&fit));
+
+    watch.await_words("2 workers added, 1 → 3");
+    wait_until("three workers in the queue or running", || queue().lines().count() == 3);
+    assert_eq!(coordinator.end(), Some(0), "{}", coordinator.said());
+    assert!(trial.is_same(&fit));
+
+    watch.await_words("2 workers released, 3 → 1");
+    wait_until("one worker", || queue().lines().count() == 1 && running(&out) == 1);
+    let events = std::fs::read_to_string(out.join("events.jsonl")).unwrap();
+    let told: Vec<Value> = events.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!(told.first().unwrap()["event"], "workers-added");
+    assert_eq!(told.last().unwrap()["event"], "workers-released");
+    remove(&out);
+    assert_eq!(watch.end(), Some(0), "{}", watch.said());
+}
