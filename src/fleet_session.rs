@@ -197,7 +197,18 @@ impl FleetSession {
             let missing = || [refused.summary(), told.get().cloned()];
             relay(heard, &kept, &shown, missing);
         });
-        Ok(Self { fleet, local: None, access, load: None, invitation, events, watcher, source, metrics, traced })
+        Ok(Self {
+            fleet,
+            local: None,
+            access,
+            load: None,
+            invitation,
+            events,
+            watcher,
+            source,
+            metrics,
+            traced,
+        })
     }
 
     /// Starts the local workers, or says how to start others; `folder` is the run folder, where there is one.

@@ -111,7 +111,7 @@ fn a_run_is_one_trace_from_the_coordinator_to_the_solver_and_its_result_is_the_s
         match span.name.as_str() {
             "run" => assert_eq!(above(span), Some(("coordinator", "study")), "{span:?}"),
             "compute" => {
-                assert_eq!((span.role.as_str(), above(span)), ("worker", Some(("coordinator", "run"))))
+                assert_eq!((span.role.as_str(), above(span)), ("worker", Some(("coordinator", "run"))));
             }
             other => assert_eq!(other, "study"),
         }

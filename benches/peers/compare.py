@@ -1,9 +1,11 @@
 """The same cycles through Starlings and through what others use, one after the other, round after round, on this machine.
 
-    python3 benches/peers/compare.py [--rounds N] [--write]
+    python3 benches/peers/compare.py [--rounds N] [--more] [--write]
 
 Makes a virtual environment in target/peers with what pip gives, builds the release bench, measures, prints a table; with --write the
-table goes into docs/fleet.md. What cannot be installed or fails is named with its reason. Next file to read: peers.py.
+table goes into docs/fleet.md. With --more the rounds of earlier calls count too, so that a long measurement can be made in parts;
+--rounds 0 prepares and tells, and measures nothing. What cannot be installed or fails is named with its reason. Next file to read:
+peers.py.
 """
 
 import argparse
@@ -37,7 +39,9 @@ PACKAGES = {
 }
 OWN = "Starlings"
 #: Longest time for one peer in one round, seconds.
-LIMIT = 240
+LIMIT = 90
+#: What was measured, round after round.
+KEPT = VENV / "rounds.json"
 
 
 def sizes():
@@ -51,7 +55,7 @@ def sizes():
         # Tenfold: between 2 and 20 ms, even in the logarithm.
         "spread": [0.002 * 10 ** draw.random() for _ in range(200)],
         "states": 3,
-        "patience": 4.0,
+        "patience": 3.0,
     }
 
 
@@ -74,7 +78,7 @@ def install():
 
 def build():
     """The program of the bench."""
-    command = ["cargo", "bench", "--bench", "peers", "--no-run", "--message-format", "json"]
+    command = ["cargo", "bench", "--workspace", "--bench", "peers", "--no-run", "--message-format", "json"]
     built = subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True)
     for line in built.stdout.splitlines():
         message = json.loads(line)
@@ -146,6 +150,11 @@ def machine():
     return f"{os.cpu_count()} cores ({model}), {memory:.0f} GiB, Linux {platform.release()}, load {load:.1f} at the start"
 
 
+def kind_of(program):
+    """What rounds have in common that are counted together."""
+    return [machine().rsplit(",", 1)[0], program, Path(program).stat().st_mtime]
+
+
 def versions(python):
     code = (
         "import importlib.metadata as m\n"
@@ -203,6 +212,7 @@ def table(rounds, missing, about, given):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--more", action="store_true", help="count the rounds of earlier calls too")
     parser.add_argument("--write", action="store_true", help="write the table into docs/fleet.md")
     options = parser.parse_args()
     python, missing = install()
@@ -210,7 +220,13 @@ def main():
     about = f"{machine()}; {versions(python)}"
     peers = [OWN, *(peer for peer in PACKAGES if peer not in missing)]
     rounds = {peer: [] for peer in peers}
-    for number in range(options.rounds):
+    if options.more and KEPT.exists():
+        kept = json.loads(KEPT.read_text())
+        # Of another machine, program or size they say nothing here.
+        if kept["of"] == [kind_of(program), given]:
+            rounds |= kept["rounds"]
+    begun = max(len(found) for found in rounds.values())
+    for number in range(begun, begun + options.rounds):
         # Each round begins with another one.
         turn = number % len(peers)
         for peer in peers[turn:] + peers[:turn]:
@@ -221,6 +237,10 @@ def main():
                 continue
             rounds[peer].append(figures(found, given))
             print(f"round {number + 1}: {peer}: {rounds[peer][-1]}", file=sys.stderr)
+        KEPT.write_text(json.dumps({"of": [kind_of(program), given], "rounds": rounds}))
+    if not any(rounds.values()):
+        print("nothing is measured yet", file=sys.stderr)
+        return
     if not rounds[OWN]:
         raise SystemExit(f"Starlings itself was not measured: {missing.get(OWN)}")
     text = table(rounds, {p: r for p, r in missing.items() if not rounds.get(p)}, about, given)

@@ -9,8 +9,8 @@ use starlings_models::{BuildSetup, Factory, Setup};
 use starlings_pieces::PlaceName;
 use starlings_proto::host::host_name;
 use starlings_proto::{Hello, PROTOCOL, VERSION, own_build};
-use starlings_traces::Traces;
 use starlings_sums::Reading;
+use starlings_traces::Traces;
 use tokio_util::sync::CancellationToken;
 
 use crate::held::HoldLimits;

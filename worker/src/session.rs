@@ -225,8 +225,15 @@ mod tests {
         let inbox = Inbox::new(Transfers::nowhere(runtime.handle()), 1);
         let tell: Tell = Arc::new(|_| {});
         let blocks = Blocks::new(None, 1);
-        let place =
-            Place { slots: &slots, setups: &setups, held: None, inbox: &inbox, blocks: &blocks, tell: &tell };
+        let place = Place {
+            slots: &slots,
+            setups: &setups,
+            held: None,
+            inbox: &inbox,
+            blocks: &blocks,
+            tell: &tell,
+            traces: None,
+        };
         let mut take = |message| take(Ok(Some(message)), &outbox, &mut windows, &place).unwrap();
         let mut next = || FromWorker::decode(sent.blocking_recv().expect("an answer")).unwrap();
         let (id, json) = encode_setup(&oscillator()).unwrap();

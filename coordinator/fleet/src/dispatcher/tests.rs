@@ -10,6 +10,7 @@ mod held;
 mod leases;
 mod losses;
 mod mixed;
+pub(super) mod plain;
 mod recall;
 mod repeats;
 mod waiting;

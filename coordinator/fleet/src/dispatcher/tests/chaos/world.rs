@@ -38,6 +38,8 @@ pub(super) struct World {
     pub(super) strays: u32,
     /// Workers that were put out.
     pub(super) put_out: BTreeSet<u64>,
+    /// Names of workers that are set aside, each with the time since when.
+    pub(super) aside: BTreeMap<String, Duration>,
     pub(super) ended: Option<Result<Vec<Outcome>, BatchError>>,
 }
 
@@ -71,6 +73,7 @@ impl World {
             answered: BTreeSet::new(),
             strays: 0,
             put_out: BTreeSet::new(),
+            aside: BTreeMap::new(),
             ended: None,
         };
         if local {
@@ -96,6 +99,7 @@ impl World {
                 let needed = (worker.0, setup(self.setups[index]));
                 assert!(self.built.contains(&needed), "a job is sent only to a worker with its setup");
                 assert!(self.alive.contains(&worker.0), "a job is sent only to a live worker");
+                self.assert_sound(worker);
                 let twice = self.open.values().any(|(_, open)| *open == index);
                 let again = self.duplicated.contains(&index) || self.answered.contains(&index);
                 let stopped =
@@ -110,6 +114,7 @@ impl World {
             Command::SendControl { worker, lease, control } => {
                 assert!(self.kept.contains(&control), "a control run is one that is kept");
                 assert!(self.alive.contains(&worker.0), "a control run is made by a live worker");
+                self.assert_sound(worker);
                 let index = (lease.job - 1) as usize;
                 let stopped =
                     |(lease, open): &(Lease, usize)| *open != index || self.withdrawn.contains(lease);
@@ -137,11 +142,31 @@ impl World {
             Command::Notice(FleetEvent::JobDuplicated { particle, .. }) => {
                 self.duplicated.insert(particle as usize);
             }
+            Command::Notice(FleetEvent::WorkerSetAside { worker, .. }) => {
+                self.aside.insert(worker, self.now);
+            }
+            Command::Notice(FleetEvent::WorkerBack { worker }) => {
+                self.aside.remove(&worker);
+            }
             Command::Notice(_) | Command::GivenUp { .. } => {}
         }
     }
 
+    /// A worker that is set aside gets nothing for a while, then one run at a time to try it.
+    fn assert_sound(&self, worker: WorkerId) {
+        let Some(since) = self.aside.get(&format!("w{}", worker.0)) else { return };
+        assert!(
+            self.now >= *since + Duration::from_millis(500),
+            "one that is set aside gets no run at first"
+        );
+        assert!(
+            self.open.keys().all(|(of, _)| *of != worker.0),
+            "one that is set aside is tried with one run"
+        );
+    }
+
     pub(super) fn forget(&mut self, worker: u64) {
+        self.aside.remove(&format!("w{worker}"));
         self.alive.remove(&worker);
         self.to_build.retain(|(of, _)| *of != worker);
         self.built.retain(|(of, _)| *of != worker);
