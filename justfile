@@ -51,7 +51,7 @@ peers:
 
 # A thousand connected workers and 16 384 runs in one batch: what docs/scale.md speaks of.
 scale:
-    cargo bench --bench scale
+    cargo bench --workspace --bench scale
 
 # Workers under a real Slurm of four nodes on this machine: a node killed, a coordinator requeued, a pool that follows the work. Minutes; needs root, installs slurm-wlm and
 # munge where they are missing.

@@ -1,4 +1,4 @@
-"""What every peer runs: the same tasks, of the same sizes, as the fleet's own in starlings.rs."""
+"""What every peer runs: the same tasks, of the same sizes, as the fleet's own in coordinator/fleet/benches/peers.rs."""
 
 import time
 

@@ -40,6 +40,8 @@ pub(super) struct World {
     pub(super) put_out: BTreeSet<u64>,
     /// Names of workers that are set aside, each with the time since when.
     pub(super) aside: BTreeMap<String, Duration>,
+    /// The control run that is being answered: its worker and the job that it was made for.
+    pub(super) controlled: Option<(u64, usize)>,
     pub(super) ended: Option<Result<Vec<Outcome>, BatchError>>,
 }
 
@@ -74,6 +76,7 @@ impl World {
             strays: 0,
             put_out: BTreeSet::new(),
             aside: BTreeMap::new(),
+            controlled: None,
             ended: None,
         };
         if local {
@@ -99,7 +102,10 @@ impl World {
                 let needed = (worker.0, setup(self.setups[index]));
                 assert!(self.built.contains(&needed), "a job is sent only to a worker with its setup");
                 assert!(self.alive.contains(&worker.0), "a job is sent only to a live worker");
-                self.assert_sound(worker);
+                // A job that failed is made once more where a run that is known to work has just worked.
+                if self.controlled != Some((worker.0, index)) {
+                    self.assert_sound(worker);
+                }
                 let twice = self.open.values().any(|(_, open)| *open == index);
                 let again = self.duplicated.contains(&index) || self.answered.contains(&index);
                 let stopped =
@@ -152,19 +158,6 @@ impl World {
         }
     }
 
-    /// A worker that is set aside gets nothing for a while, then one run at a time to try it.
-    fn assert_sound(&self, worker: WorkerId) {
-        let Some(since) = self.aside.get(&format!("w{}", worker.0)) else { return };
-        assert!(
-            self.now >= *since + Duration::from_millis(500),
-            "one that is set aside gets no run at first"
-        );
-        assert!(
-            self.open.keys().all(|(of, _)| *of != worker.0),
-            "one that is set aside is tried with one run"
-        );
-    }
-
     pub(super) fn forget(&mut self, worker: u64) {
         self.aside.remove(&format!("w{worker}"));
         self.alive.remove(&worker);
@@ -185,11 +178,12 @@ impl World {
     pub(super) fn answer(&mut self, which: usize, answer: impl FnOnce(usize) -> LeaseOutcome, cost: f64) {
         let Some((&key, &(lease, index))) = pick(&self.open, which) else { return };
         self.open.remove(&key);
-        self.controls.remove(&key);
+        self.controlled = self.controls.remove(&key).then_some((key.0, index));
         self.withdrawn.retain(|other| *other != lease);
         self.past.push(lease);
         self.answered.insert(index);
         self.event(answered(lease, answer(index), cost));
+        self.controlled = None;
     }
 
     pub(super) fn act(&mut self, act: &Act) {
@@ -247,16 +241,6 @@ impl World {
             }
         }
         self.assert_fair();
-    }
-
-    /// No worker is charged for what it does not have, or blamed for what it was asked for.
-    fn assert_fair(&self) {
-        for &worker in &self.alive {
-            let open = self.open.keys().filter(|(of, _)| *of == worker).count();
-            assert_eq!(self.dispatcher.in_flight(WorkerId(worker)), open, "credit follows the open leases");
-        }
-        let strays: u32 = self.dispatcher.workers.values().map(|worker| worker.strays).sum();
-        assert!(strays <= self.strays, "a worker is blamed for answers that it was asked for");
     }
 
     fn repeat(&mut self, which: usize) {

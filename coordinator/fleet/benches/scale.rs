@@ -1,6 +1,6 @@
 //! What a coordinator bears: a thousand connected workers, 16 384 runs in one batch, and how little its workers idle.
 //!
-//! `cargo bench --bench scale -- [--workers N] [--points N]`. The workers are those of the program, all in one other process, each over
+//! `cargo bench --workspace --bench scale -- [--workers N] [--points N]`. The workers are those of the program, all in one other process, each over
 //! a socket of its own; so the memory and the computing time of this process are the coordinator's alone. Figures of docs/scale.md.
 #![allow(clippy::print_stdout, missing_docs)]
 
@@ -10,9 +10,7 @@ use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::time::{Duration, Instant};
 
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
-use starlings_coordinator::fleet::{
-    Fleet, FleetConfig, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers, SetupId,
-};
+use starlings_fleet::{Fleet, FleetConfig, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers, SetupId};
 use starlings_models::{Forward, Job, ModelDef, ParticleError, Prediction, Setup, SetupError, Spec, Window};
 use starlings_worker::WorkerConfig;
 use tokio_util::sync::CancellationToken;
@@ -21,6 +19,9 @@ type Failure = Box<dyn std::error::Error>;
 
 /// Values in a prediction and parameters in a job.
 const FLOATS: usize = 14;
+
+/// Large batches, one after the other.
+const BATCHES: usize = 5;
 
 /// How long idle workers are watched.
 const IDLE: Duration = Duration::from_secs(20);
@@ -76,7 +77,8 @@ fn many(n: usize, points: usize) -> Result<(), Failure> {
     println!("  idle: {:.2} % of a core, {:.2} us a worker and second", 100.0 * idle, 1e6 * idle / n as f64);
     let setup = install(&mut fleet, "noop")?;
     run(&mut fleet, setup, &vec![0.0; n])?;
-    for _ in 0..3 {
+    // What waits anywhere from batch to batch would be seen in the memory after it.
+    for _ in 0..BATCHES {
         let begun = Usage::now();
         let wall = run(&mut fleet, setup, &vec![0.0; points])?.0.as_secs_f64();
         let ended = Usage::now();
@@ -84,7 +86,8 @@ fn many(n: usize, points: usize) -> Result<(), Failure> {
         let (rate, of_core) = (points as f64 / wall, points as f64 / own);
         println!(
             "  {points} no-op runs: {wall:.3} s, {rate:.0} results/s; the coordinator computed {own:.3} s, {of_core:.0} results per second \
-             of its core; most memory {:.0} MiB",
+             of its core; memory {:.0} MiB, most {:.0} MiB",
+            ended.memory_kib as f64 / 1024.0,
             ended.peak_kib as f64 / 1024.0
         );
     }

@@ -1,14 +1,14 @@
-//! The cycles of `compare.py` on a fleet of two local workers; a line of JSON with what was measured.
+//! The cycles of `benches/peers/compare.py` on a fleet of two local workers; a line of JSON with what was measured.
 //!
 //! Started by `python3 benches/peers/compare.py`, which starts one peer after the other and gives each the same sizes. The program
 //! starts itself as worker; with `--spin SECONDS` it is the task of a peer that starts a program per task. Next file to read:
-//! `compare.py` beside it.
+//! `benches/peers/tasks.py`, for the same runs elsewhere.
 #![allow(clippy::print_stdout, missing_docs)]
 
 use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 
-use starlings_coordinator::fleet::{
+use starlings_fleet::{
     Fleet, FleetConfig, FleetEvent, GrpcFleet, Held, LocalConfig, LocalWorkers, SetupId, StateStore,
 };
 use starlings_models::{Forward, Job, ModelDef, ParticleError, Prediction, Setup, SetupError, Spec, Window};
