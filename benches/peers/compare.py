@@ -203,7 +203,8 @@ def table(rounds, missing, about, given):
         f"Medians of {n} rounds, in each of which every peer is started, measured and ended; in brackets how many times better "
         f"Starlings is. {about}. {given['workers']} workers of one slot; a cycle is {given['particles']} runs and the wait for the "
         f"last, a bag {given['bag']} runs; efficiency is computing time over wall time of {len(given['spins'])} runs on all slots; "
-        f"{given['particles']} states of 8 MB go out and come back. HyperQueue starts a program per run.\n\n"
+        f"{given['particles']} states of 8 MB go out and come back. HyperQueue starts a program per run, and its Python client "
+        f"looks once a second.\n\n"
     )
     failed = "".join(f"\nNot measured: {peer}, {reason}." for peer, reason in missing.items())
     return text + "\n".join(lines) + "\n" + failed

@@ -98,7 +98,10 @@ fn many(n: usize, points: usize) -> Result<(), Failure> {
 /// Two local workers of one slot: what they idle between runs.
 fn two() -> Result<(), Failure> {
     let (sender, events) = mpsc::channel();
-    let mut fleet = GrpcFleet::listen(FleetConfig::new(None, "scale", CancellationToken::new(), sender))?;
+    let mut config = FleetConfig::new(None, "scale", CancellationToken::new(), sender);
+    // How long a worker idled is another number whenever a run is repeated.
+    config.mixed = true;
+    let mut fleet = GrpcFleet::listen(config)?;
     let program = std::env::current_exe()?;
     let _workers = LocalWorkers::spawn(LocalConfig { program, args: vec![], n: 2, fleet: fleet.handle() })?;
     for _ in 0..2 {
@@ -175,7 +178,6 @@ impl Forward for Bench {
         }
         let mut outputs = job.theta.clone();
         outputs[0] = f64::from(job.particle);
-        // It is repeated elsewhere and compared: what differs from run to run is told of long runs of local workers alone.
         outputs[1] = match ended {
             Some(ended) if self.0.kind == "spin" => started.duration_since(ended).as_secs_f64(),
             _ => 0.0,
