@@ -208,14 +208,14 @@ impl Dispatcher {
     }
 
     fn heard(&mut self, now: Duration, worker: WorkerId) {
-        if let Some(mut worker) = self.workers.get_mut(&worker) {
+        if let Some(mut worker) = self.workers.get_mut(worker) {
             worker.last_heard = now;
         }
     }
 
     /// Takes a worker out and returns its leases to the queue. A clean leave counts no attempt.
     fn lose(&mut self, id: WorkerId, reason: &str, clean: bool) {
-        let Some(worker) = self.workers.remove(&id) else { return };
+        let Some(worker) = self.workers.remove(id) else { return };
         let (mut requeued, mut given_up) = (0, None);
         let leases = worker.leases_in_order();
         for (position, job) in leases.into_iter().enumerate() {

@@ -36,7 +36,7 @@ impl Dispatcher {
             return;
         }
         let (Some(batch), Some(comparing)) = (&self.batch, self.rules.comparing) else { return };
-        let Some(mut worker) = self.workers.get_mut(&id) else { return };
+        let Some(mut worker) = self.workers.get_mut(id) else { return };
         worker.taken += 1;
         let (repeats, setup) = (&mut self.repeats, *batch.setup_of(index));
         let seconds = self.run_times.last();
@@ -193,20 +193,20 @@ impl Dispatcher {
     fn opine(&mut self, index: usize, by: WorkerId, said: Said) {
         let left = || "a worker that left".to_owned();
         let gone = || self.repeats.firsts.get(by).map_or_else(left, |c| c.name.clone());
-        let name = self.workers.get(&by).map_or_else(gone, Worker::called);
+        let name = self.workers.get(by).map_or_else(gone, Worker::called);
         let Some(dispute) = self.repeats.disputes.get_mut(&index) else { return };
         dispute.opinions.push(Opinion { by, name, said });
     }
 
     /// The build of a worker, in hexadecimal, and how many of its results were taken so far.
     pub(crate) fn taken(&self, id: WorkerId) -> (String, u64) {
-        self.workers.get(&id).map_or_else(|| (String::new(), 0), |w| (w.build.clone(), w.taken))
+        self.workers.get(id).map_or_else(|| (String::new(), 0), |w| (w.build.clone(), w.taken))
     }
 
     /// Results of this worker are those of others.
     pub(super) fn trusted(&mut self, id: WorkerId) {
         self.repeats.firsts.remove(id);
-        if let Some(mut worker) = self.workers.get_mut(&id) {
+        if let Some(mut worker) = self.workers.get_mut(id) {
             worker.compared = true;
         }
     }

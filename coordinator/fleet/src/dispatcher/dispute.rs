@@ -59,7 +59,7 @@ impl Dispatcher {
                 {
                     return;
                 }
-                match last_verdict(&opinions, |id| self.workers.contains_key(&id)) {
+                match last_verdict(&opinions, |id| self.workers.contains_key(id)) {
                     Verdict::Wrong(wrong) => self.convict(index, &opinions, &wrong),
                     Verdict::Open => self.undecidable(index, &opinions),
                 }
@@ -77,7 +77,7 @@ impl Dispatcher {
         let fits = |w: &&Worker| w.takes(&setup) && !w.holds(job) && asked(w) < ASKED && of(w);
         let key = |w: &&Worker| (asked(w), w.load() * 1000 / w.slots);
         let next = self.workers.values().filter(fits).min_by_key(key).map(|w| w.id);
-        let Some(mut worker) = next.and_then(|id| self.workers.get_mut(&id)) else { return false };
+        let Some(mut worker) = next.and_then(|id| self.workers.get_mut(id)) else { return false };
         *dispute.asked.entry(worker.id).or_default() += 1;
         self.repeats.repeating(worker.id, index, self.run_times.last());
         self.out.push(lease(&mut worker, batch, index, self.now));
@@ -141,7 +141,7 @@ impl Dispatcher {
         self.repeats.firsts.remove(id);
         self.repeats.hear_no_more(id);
         self.send_reopened();
-        let (name, build, taken) = self.workers.get(&id).map_or_else(
+        let (name, build, taken) = self.workers.get(id).map_or_else(
             || (called.to_owned(), String::new(), 0),
             |worker| (worker.name.clone(), worker.build.clone(), worker.taken),
         );
@@ -154,7 +154,7 @@ impl Dispatcher {
             earlier,
         };
         self.out.push(Command::Notice(notice));
-        if self.workers.contains_key(&id) {
+        if self.workers.contains_key(id) {
             self.out.push(Command::PutOut { worker: id, reason: reason.to_owned() });
             self.lose(id, reason, true);
         }

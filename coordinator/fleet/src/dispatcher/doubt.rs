@@ -22,7 +22,7 @@ impl Dispatcher {
     /// An abnormal end: tried once more, and then decided by a control run in the same place.
     pub(super) fn doubted(&mut self, id: WorkerId, index: usize, text: String) {
         let Some(batch) = &mut self.batch else { return };
-        let name = self.workers.get(&id).map_or("", |w| w.name.as_str());
+        let name = self.workers.get(id).map_or("", |w| w.name.as_str());
         if batch.doubt(index) == Some(Doubt::Confirmed) {
             batch.set_doubt(index, None);
             batch.finish(index, Err(Failure::Model(ModelFailure::Solver(text))), (id, name));
@@ -55,7 +55,7 @@ impl Dispatcher {
         for (index, by) in batch.parked().clone() {
             let job = batch.job_number(index);
             let may = |w: &Changing<'_>| w.may_control(batch.setup_of(index)) && !w.holds(job);
-            let place = self.workers.get_mut(&by).filter(may);
+            let place = self.workers.get_mut(by).filter(may);
             let Some(mut worker) = place else {
                 // It fails once more in another place, and that one is asked.
                 if self.proven.knows(batch.name(index)) {
@@ -90,7 +90,7 @@ impl Dispatcher {
         result: Result<Prediction, ParticleError>,
     ) {
         let Some(batch) = &mut self.batch else { return };
-        let Some(mut worker) = self.workers.get_mut(&id) else { return };
+        let Some(mut worker) = self.workers.get_mut(id) else { return };
         let fault = result.err().map(|error| error.to_string());
         self.out.push(Command::Notice(batch.controlled(index, &worker.name, fault.clone())));
         match fault {
@@ -118,7 +118,7 @@ impl Dispatcher {
 
     /// Whether a lease is open: its worker may still answer for its job.
     pub(crate) fn holds(&self, lease: &Lease) -> bool {
-        let worker = self.workers.get(&WorkerId(lease.epoch));
+        let worker = self.workers.get(WorkerId(lease.epoch));
         worker.is_some_and(|worker| worker.lease_of(lease.job) == Some(*lease))
     }
 

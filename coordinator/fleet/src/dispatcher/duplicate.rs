@@ -63,7 +63,7 @@ impl Dispatcher {
                 w.takes(&setup) && has_room && !w.holds(job) && batch.may_duplicate(index, w.id)
             };
             let to = self.workers.values().find(idle).map(|w| w.id);
-            let Some(mut worker) = to.and_then(|id| self.workers.get_mut(&id)) else { continue };
+            let Some(mut worker) = to.and_then(|id| self.workers.get_mut(id)) else { continue };
             let (name, to) = (batch.name(index), worker.name.clone());
             let (particle, record) = (name.particle, name.record);
             self.out.push(Command::Notice(FleetEvent::JobDuplicated { particle, record, slow, worker: to }));
@@ -78,7 +78,7 @@ impl Dispatcher {
         let usual = self.run_times.median().unwrap_or(0.0);
         let mut late = Vec::new();
         for &(id, index) in self.repeats.open() {
-            let Some(mut worker) = self.workers.get_mut(&id) else { continue };
+            let Some(mut worker) = self.workers.get_mut(id) else { continue };
             let job = batch.job_number(index);
             let own = worker.ages(now).into_iter().find(|(held, _, _)| *held == job);
             if own.is_some_and(|(_, age, rounds)| age > limit(REPEAT_SHORTEST, REPEAT_FACTOR, usual, rounds))
@@ -103,7 +103,7 @@ impl Dispatcher {
         let mut mute = Vec::new();
         let others = self.workers.values().filter(|w| w.id != winner && w.holds(job));
         for id in others.map(|w| w.id).collect::<Vec<_>>() {
-            let Some(mut worker) = self.workers.get_mut(&id) else { continue };
+            let Some(mut worker) = self.workers.get_mut(id) else { continue };
             let Some(lease) = worker.call_back(job) else { continue };
             self.out.push(Command::Cancel { worker: worker.id, leases: vec![lease], stop: true });
             worker.overtaken += 1;

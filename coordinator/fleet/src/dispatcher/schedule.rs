@@ -130,7 +130,7 @@ impl Dispatcher {
         for _ in n_returning..free {
             let called = loop {
                 let Some(id) = self.workers.overfull().find(|id| !passed.contains(id)) else { return };
-                let victim = self.workers.get_mut(&id);
+                let victim = self.workers.get_mut(id);
                 if let Some(held) =
                     victim.and_then(|mut w| w.youngest(|job| batch.may_recall(job, &runnable)))
                 {

@@ -13,7 +13,7 @@ use crate::FleetEvent;
 
 impl Dispatcher {
     pub(super) fn setup_answered(&mut self, now: Duration, id: WorkerId, setup: SetupId, state: SetupState) {
-        let Some(mut worker) = self.workers.get_mut(&id) else { return };
+        let Some(mut worker) = self.workers.get_mut(id) else { return };
         worker.last_heard = now;
         let needed = self.batch.as_ref().is_some_and(|batch| batch.needs(&setup));
         if worker.answers_unasked(&setup, &state) {

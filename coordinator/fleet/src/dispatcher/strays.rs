@@ -9,7 +9,7 @@ const STRAYS: u32 = 100;
 impl Dispatcher {
     /// Counts one.
     pub(super) fn stray(&mut self, id: WorkerId, reason: &str) {
-        let Some(mut worker) = self.workers.get_mut(&id) else { return };
+        let Some(mut worker) = self.workers.get_mut(id) else { return };
         worker.strays += 1;
         let too_many = worker.strays > STRAYS;
         drop(worker);

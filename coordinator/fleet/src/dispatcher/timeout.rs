@@ -35,7 +35,7 @@ impl Dispatcher {
             }
         }
         for (id, index, lease) in late {
-            if let Some(mut worker) = self.workers.get_mut(&id) {
+            if let Some(mut worker) = self.workers.get_mut(id) {
                 worker.drop_lease(lease.job);
             }
             self.out.push(Command::Cancel { worker: id, leases: vec![lease], stop: true });

@@ -74,16 +74,16 @@ impl Workers {
         self.all.values().map(|entry| &entry.worker)
     }
 
-    pub(super) fn contains_key(&self, id: &WorkerId) -> bool {
-        self.all.contains_key(id)
+    pub(super) fn contains_key(&self, id: WorkerId) -> bool {
+        self.all.contains_key(&id)
     }
 
-    pub(super) fn get(&self, id: &WorkerId) -> Option<&Worker> {
-        self.all.get(id).map(|entry| &entry.worker)
+    pub(super) fn get(&self, id: WorkerId) -> Option<&Worker> {
+        self.all.get(&id).map(|entry| &entry.worker)
     }
 
-    pub(super) fn get_mut(&mut self, id: &WorkerId) -> Option<Changing<'_>> {
-        let entry = self.all.get_mut(id)?;
+    pub(super) fn get_mut(&mut self, id: WorkerId) -> Option<Changing<'_>> {
+        let entry = self.all.get_mut(&id)?;
         Some(Changing { entry, index: &mut self.index, wanted: &self.wanted })
     }
 
@@ -96,15 +96,15 @@ impl Workers {
 
     pub(super) fn insert(&mut self, worker: Worker) {
         let id = worker.id;
-        self.remove(&id);
+        self.remove(id);
         self.all.insert(id, Entry { worker, standing: Standing::default() });
         // Entered as a change.
-        drop(self.get_mut(&id));
+        drop(self.get_mut(id));
     }
 
-    pub(super) fn remove(&mut self, id: &WorkerId) -> Option<Worker> {
-        let Entry { worker, standing } = self.all.remove(id)?;
-        self.index.moves(*id, &standing, &Standing::default());
+    pub(super) fn remove(&mut self, id: WorkerId) -> Option<Worker> {
+        let Entry { worker, standing } = self.all.remove(&id)?;
+        self.index.moves(id, &standing, &Standing::default());
         Some(worker)
     }
 
@@ -130,7 +130,7 @@ impl Workers {
         let id = self.of(self.index.with_room()).find(fits).map(|w| w.id);
         #[cfg(test)]
         super::tests::plain::same_choice(self.values().filter(fits), id);
-        self.get_mut(&id?)
+        self.get_mut(id?)
     }
 
     /// The same among workers that are not set aside, with room or, where `crowded`, without.
@@ -148,7 +148,7 @@ impl Workers {
         };
         #[cfg(test)]
         super::tests::plain::same_choice(self.values().filter(fits), id);
-        self.get_mut(&id?)
+        self.get_mut(id?)
     }
 
     /// Whether a worker with room has built a setup.
@@ -172,7 +172,7 @@ impl Workers {
     }
 
     fn of(&self, ids: impl Iterator<Item = WorkerId>) -> impl Iterator<Item = &Worker> {
-        ids.filter_map(|id| self.get(&id))
+        ids.filter_map(|id| self.get(id))
     }
 
     /// The index as it is, and as it would be were it made anew.

@@ -161,7 +161,7 @@ fn a_batch_whose_runs_are_all_made_waits_for_a_slow_setup_as_long_as_patience_la
 #[test]
 fn a_worker_that_refuses_a_setup_after_patience_ended_is_not_blamed_the_first_time() {
     let worker = |stage: &Stage| {
-        let one = stage.dispatcher.workers.get(&WorkerId(1)).expect("it is there");
+        let one = stage.dispatcher.workers.get(WorkerId(1)).expect("it is there");
         (one.may_run(&SETUP), one.strays)
     };
     let mut stage = Stage::with(&[]);

@@ -102,10 +102,7 @@ impl World {
                 let needed = (worker.0, setup(self.setups[index]));
                 assert!(self.built.contains(&needed), "a job is sent only to a worker with its setup");
                 assert!(self.alive.contains(&worker.0), "a job is sent only to a live worker");
-                // A job that failed is made once more where a run that is known to work has just worked.
-                if self.controlled != Some((worker.0, index)) {
-                    self.assert_sound(worker);
-                }
+                self.assert_sound(worker, index);
                 let twice = self.open.values().any(|(_, open)| *open == index);
                 let again = self.duplicated.contains(&index) || self.answered.contains(&index);
                 let stopped =
@@ -120,8 +117,8 @@ impl World {
             Command::SendControl { worker, lease, control } => {
                 assert!(self.kept.contains(&control), "a control run is one that is kept");
                 assert!(self.alive.contains(&worker.0), "a control run is made by a live worker");
-                self.assert_sound(worker);
                 let index = (lease.job - 1) as usize;
+                self.assert_sound(worker, index);
                 let stopped =
                     |(lease, open): &(Lease, usize)| *open != index || self.withdrawn.contains(lease);
                 assert!(
