@@ -20,6 +20,7 @@ import statistics
 import subprocess
 import sys
 import tempfile
+import textwrap
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -40,6 +41,8 @@ PACKAGES = {
 OWN = "Starlings"
 #: Longest time for one peer in one round, seconds.
 LIMIT = 90
+#: Letters of a line.
+WIDTH = 140
 #: What was measured, round after round.
 KEPT = VENV / "rounds.json"
 
@@ -195,7 +198,8 @@ def table(rounds, missing, about, given):
             shown = f"{value:.3g}" if value < 1000 else f"{value:.0f}"
             if peer != OWN and own[key]:
                 ratio = value / own[key] if less_is_better else own[key] / value
-                shown += f" ({ratio:.3g}×)" if key in ("cycle", "bag", "states") else ""
+                times = f"{ratio:.3g}" if ratio < 1000 else f"{ratio:.0f}"
+                shown += f" ({times}×)" if key in ("cycle", "bag", "states") else ""
             cells.append(shown)
         lines.append(f"| {peer} | " + " | ".join(cells) + " |")
     n = max(len(found) for found in rounds.values())
@@ -203,9 +207,10 @@ def table(rounds, missing, about, given):
         f"Medians of {n} rounds, in each of which every peer is started, measured and ended; in brackets how many times better "
         f"Starlings is. {about}. {given['workers']} workers of one slot; a cycle is {given['particles']} runs and the wait for the "
         f"last, a bag {given['bag']} runs; efficiency is computing time over wall time of {len(given['spins'])} runs on all slots; "
-        f"{given['particles']} states of 8 MB go out and come back. HyperQueue starts a program per run, and its Python client "
-        f"looks once a second.\n\n"
+        f"{given['particles']} states of 8 MB go out and come back. Others run a function of Python, Starlings a model in Rust. HyperQueue starts a program per run, and its Python client "
+        f"looks once a second."
     )
+    text = textwrap.fill(text, WIDTH) + "\n\n"
     failed = "".join(f"\nNot measured: {peer}, {reason}." for peer, reason in missing.items())
     return text + "\n".join(lines) + "\n" + failed
 
@@ -226,6 +231,7 @@ def main():
         # Of another machine, program or size they say nothing here.
         if kept["of"] == [kind_of(program), given]:
             rounds |= kept["rounds"]
+            about = kept["about"]
     begun = max(len(found) for found in rounds.values())
     for number in range(begun, begun + options.rounds):
         # Each round begins with another one.
@@ -238,7 +244,7 @@ def main():
                 continue
             rounds[peer].append(figures(found, given))
             print(f"round {number + 1}: {peer}: {rounds[peer][-1]}", file=sys.stderr)
-        KEPT.write_text(json.dumps({"of": [kind_of(program), given], "rounds": rounds}))
+        KEPT.write_text(json.dumps({"of": [kind_of(program), given], "about": about, "rounds": rounds}))
     if not any(rounds.values()):
         print("nothing is measured yet", file=sys.stderr)
         return
