@@ -207,8 +207,8 @@ def table(rounds, missing, about, given):
         f"Medians of {n} rounds, in each of which every peer is started, measured and ended; in brackets how many times better "
         f"Starlings is. {about}. {given['workers']} workers of one slot; a cycle is {given['particles']} runs and the wait for the "
         f"last, a bag {given['bag']} runs; efficiency is computing time over wall time of {len(given['spins'])} runs on all slots; "
-        f"{given['particles']} states of 8 MB go out and come back. Others run a function of Python, Starlings a model in Rust. HyperQueue starts a program per run, and its Python client "
-        f"looks once a second."
+        f"{given['particles']} states of 8 MB go out and come back. Others run a function of Python, Starlings a "
+        f"model in Rust. HyperQueue starts a program per run, and its Python client looks once a second."
     )
     text = textwrap.fill(text, WIDTH) + "\n\n"
     failed = "".join(f"\nNot measured: {peer}, {reason}." for peer, reason in missing.items())
