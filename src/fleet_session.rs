@@ -16,14 +16,13 @@ use clap::Args;
 use starlings_coordinator::fleet::access::Access;
 use starlings_coordinator::fleet::{
     FleetConfig, FleetError, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers, PlaceName, RunIdentity,
-    RunTraces,
 };
 use starlings_coordinator::metrics::{Server, Source};
 use starlings_coordinator::study::Study;
 use starlings_coordinator::study::store::Store;
 use starlings_coordinator::study::trial::{FleetTrialError, trial_on_fleet};
 use starlings_estimators::Kind;
-use starlings_traces::{Span, Target, Traces};
+use starlings_traces::Target;
 use tokio_util::sync::CancellationToken;
 
 use crate::console::note;
@@ -33,6 +32,7 @@ use crate::interrupt;
 use crate::load::end_solvers;
 use crate::progress::Display;
 use crate::solvers::own_program;
+use crate::traces::Traced;
 pub(crate) use entrance::Entrance;
 use entrance::{failed, serve_metrics};
 use load_file::LoadFile;
@@ -148,8 +148,7 @@ pub(crate) struct FleetSession {
     /// What is served of it in numbers.
     source: Source,
     metrics: Option<Server>,
-    /// The span of the command, and where spans go.
-    traced: Option<(Traces, Span)>,
+    traced: Option<Traced>,
 }
 
 impl FleetSession {
@@ -178,13 +177,8 @@ impl FleetSession {
         (config.seed, config.mixed) = (study.seed, plan.mixed);
         config.timeout_factor = study.fleet.timeout_factor;
         config.states = plan.store(&config.identity);
-        let traced = traces.map(|traces| {
-            let about = [("starlings.study", study.name.clone().into())];
-            let span = traces.begin("study", None, about);
-            (traces, span)
-        });
-        config.traces =
-            traced.as_ref().map(|(traces, span)| RunTraces { traces: traces.clone(), above: span.parent() });
+        let traced = traces.map(|traces| Traced::begin(traces, &study.name));
+        config.traces = traced.as_ref().map(Traced::for_runs);
         let fleet = GrpcFleet::listen_on(bound, config).map_err(Failure::run)?;
         let source = Source::new(fleet.readings(), env!("CARGO_PKG_VERSION"));
         let metrics = metrics.map(|at| serve_metrics(at, source.clone())).transpose()?;
@@ -197,18 +191,8 @@ impl FleetSession {
             let missing = || [refused.summary(), told.get().cloned()];
             relay(heard, &kept, &shown, missing);
         });
-        Ok(Self {
-            fleet,
-            local: None,
-            access,
-            load: None,
-            invitation,
-            events,
-            watcher,
-            source,
-            metrics,
-            traced,
-        })
+        let (local, load) = (None, None);
+        Ok(Self { fleet, local, access, load, invitation, events, watcher, source, metrics, traced })
     }
 
     /// Starts the local workers, or says how to start others; `folder` is the run folder, where there is one.
@@ -315,9 +299,8 @@ impl FleetSession {
         drop(local);
         // The relay ends with the last sender of events; a panic in it has been printed already.
         let _ = watcher.join();
-        if let Some((traces, span)) = traced {
-            span.end();
-            traces.close();
+        if let Some(traced) = traced {
+            traced.end();
         }
     }
 }
