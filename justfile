@@ -45,6 +45,14 @@ faults:
 chaos:
     STARLINGS_WRITE_PAGES=1 cargo test --test chaos -- --ignored --nocapture
 
+# The same cycles through Starlings and through what others use, and the table of docs/fleet.md: a quarter of an hour on a quiet machine.
+peers:
+    python3 benches/peers/compare.py --write
+
+# A thousand connected workers and 16 384 runs in one batch: what docs/scale.md speaks of.
+scale:
+    cargo bench --workspace --bench scale
+
 # Workers under a real Slurm of four nodes on this machine: a node killed, a coordinator requeued, a pool that follows the work. Minutes; needs root, installs slurm-wlm and
 # munge where they are missing.
 slurm:

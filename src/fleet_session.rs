@@ -22,6 +22,7 @@ use starlings_coordinator::study::Study;
 use starlings_coordinator::study::store::Store;
 use starlings_coordinator::study::trial::{FleetTrialError, trial_on_fleet};
 use starlings_estimators::Kind;
+use starlings_traces::Target;
 use tokio_util::sync::CancellationToken;
 
 use crate::console::note;
@@ -31,6 +32,7 @@ use crate::interrupt;
 use crate::load::{end_solvers, is_outside};
 use crate::progress::Display;
 use crate::solvers::own_program;
+use crate::traces::Traced;
 pub(crate) use entrance::Entrance;
 use entrance::{failed, serve_metrics};
 use load_file::LoadFile;
@@ -67,6 +69,10 @@ pub(crate) struct FleetArgs {
     /// PORT or :PORT for this machine alone, HOST:PORT for others too (port 0 picks a free one).
     #[arg(long, value_name = "ADDR")]
     metrics: Option<String>,
+    /// Write a span of this command, of every run and of its computation in a local worker, as OTLP: into a FILE, a line of JSON each,
+    /// or to a collector at http://HOST:PORT. Workers elsewhere write theirs where their own --traces says.
+    #[arg(long, value_name = "FILE|URL")]
+    traces: Option<Target>,
 }
 
 impl FleetArgs {
@@ -102,11 +108,13 @@ impl FleetArgs {
             _ => None,
         };
         let (mixed, state_memory, states) = (self.mixed, self.state_memory, self.states.clone());
+        let traces = self.traces.clone();
         Ok(Plan {
             address,
             host,
             access,
             metrics,
+            traces,
             n_worker,
             mixed,
             state_memory,
@@ -145,6 +153,7 @@ pub(crate) struct FleetSession {
     /// What is served of it in numbers.
     source: Source,
     metrics: Option<Server>,
+    traced: Option<Traced>,
 }
 
 impl FleetSession {
@@ -168,11 +177,13 @@ impl FleetSession {
         if let Some(attempts) = study.fleet.max_attempts {
             config.max_attempts = attempts;
         }
-        let Entrance { bound, access, metrics } = entrance;
+        let Entrance { bound, access, metrics, traces } = entrance;
         config.secrets = access.as_ref().map(|access| access.secrets().clone());
         (config.seed, config.mixed) = (study.seed, plan.mixed);
         config.timeout_factor = study.fleet.timeout_factor;
         config.states = plan.store(&config.identity);
+        let traced = traces.map(|traces| Traced::begin(traces, &study.name));
+        config.traces = traced.as_ref().map(Traced::for_runs);
         let fleet = GrpcFleet::listen_on(bound, config).map_err(Failure::run)?;
         let source = Source::new(fleet.readings(), env!("CARGO_PKG_VERSION"));
         let metrics = metrics.map(|at| serve_metrics(at, source.clone())).transpose()?;
@@ -185,7 +196,8 @@ impl FleetSession {
             let missing = || [refused.summary(), told.get().cloned()];
             relay(heard, &kept, &shown, missing);
         });
-        Ok(Self { fleet, local: None, access, load: None, invitation, events, watcher, source, metrics })
+        let (local, load) = (None, None);
+        Ok(Self { fleet, local, access, load, invitation, events, watcher, source, metrics, traced })
     }
 
     /// Starts the local workers, or says how to start others; `folder` is the run folder, where there is one.
@@ -204,6 +216,7 @@ impl FleetSession {
         let mut args =
             ["worker", "--allow-commands-from-study", "--slots", &slots].map(str::to_owned).to_vec();
         args.extend(plan.states.iter().flat_map(|place| ["--states".to_owned(), place.to_string()]));
+        args.extend(plan.traces.iter().flat_map(|target| ["--traces".to_owned(), target.to_string()]));
         let config = LocalConfig {
             program: own_program().map_err(Failure::run)?,
             args,
@@ -279,7 +292,7 @@ impl FleetSession {
         if !is_done {
             self.fleet.handle().break_off();
         }
-        let Self { fleet, local, watcher, mut access, load, metrics, .. } = self;
+        let Self { fleet, local, watcher, mut access, load, metrics, traced, .. } = self;
         // It has a hold on the fleet, which ends with the last one.
         drop(load);
         // Before the workers leave: one that stays looks there for what comes next.
@@ -291,5 +304,8 @@ impl FleetSession {
         drop(local);
         // The relay ends with the last sender of events; a panic in it has been printed already.
         let _ = watcher.join();
+        if let Some(traced) = traced {
+            traced.end();
+        }
     }
 }

@@ -36,6 +36,7 @@ mod shell;
 mod simulate;
 mod solvers;
 mod spectrum;
+mod traces;
 mod worker;
 
 use std::process::ExitCode;

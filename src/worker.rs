@@ -10,6 +10,7 @@ use std::time::Duration;
 
 use clap::Parser;
 use starlings_models::SolverDef;
+use starlings_traces::Target;
 use starlings_worker::{MAX_SLOTS, PlaceName, Tell, WorkerConfig, WorkerError};
 use tokio_util::sync::CancellationToken;
 
@@ -17,6 +18,7 @@ use crate::console::{cancel_on_signal, line, note};
 use crate::failure::Failure;
 use crate::log;
 use crate::solvers::{adapter_names, solvers};
+use crate::traces::open_traces;
 use contact::ContactArgs;
 pub(crate) use contact::duration;
 use permit::{PermitArgs, here};
@@ -50,6 +52,10 @@ pub(crate) struct Args {
     /// that are larger than 256 KiB are read, written and mixed there. With the feature s3 also s3://BUCKET/PREFIX.
     #[arg(long, value_name = "FOLDER")]
     states: Option<PlaceName>,
+    /// Write a span of every run that its coordinator traces, as OTLP: into a FILE, a line of JSON each, or to a collector at
+    /// http://HOST:PORT.
+    #[arg(long, value_name = "FILE|URL")]
+    traces: Option<Target>,
     /// Place among the workers that one coordinator started on this machine, by which their solvers find their cores.
     #[arg(long, default_value_t = 0, value_name = "I", hide = true)]
     place: usize,
@@ -74,6 +80,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if let Err(error) = starlings_solver::adopt_orphans() {
         tracing::debug!(%error, "orphans are not adopted");
     }
+    let traces = args.traces.as_ref().map(|target| open_traces(target, "worker")).transpose()?;
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let cancel = CancellationToken::new();
     cancel_on_signal(&cancel);
@@ -94,10 +101,15 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         factory: solvers.factory(),
         tell,
         states: args.states.clone(),
+        traces: traces.clone(),
         reading: args.permit.reading(),
         ..contact
     };
-    let report = starlings_worker::run(config).map_err(|error| match error {
+    let ended = starlings_worker::run(config);
+    if let Some(traces) = traces {
+        traces.close();
+    }
+    let report = ended.map_err(|error| match error {
         WorkerError::BadAddress { .. } => Failure::input(format!("--connect: {error}")),
         WorkerError::Access(_) | WorkerError::Ended { .. } => Failure::input(format!("--access: {error}")),
         _ => Failure::run(error),

@@ -26,6 +26,7 @@ const PROGRAMS: Programs = Programs {
     engine: "the engine `hosts`",
     remedy: "install it, or name another with --ssh",
     environment: &[],
+    withheld: &[],
 };
 
 /// Worker after worker on the next host; all of a host by its name.

@@ -25,6 +25,7 @@ const PROGRAMS: Programs = Programs {
     engine: "PBS",
     remedy: "deploy from a login node of the cluster, or use `starlings deploy hosts` for machines without an engine",
     environment: &[],
+    withheld: &[],
 };
 
 /// Options of qsub(1B).

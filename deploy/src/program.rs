@@ -57,6 +57,8 @@ pub(crate) struct Programs {
     pub(crate) remedy: &'static str,
     /// Variables of the environment that they have besides those of this process.
     pub(crate) environment: &'static [(&'static str, &'static str)],
+    /// Heads of the names of variables that they do not have: options, where a deployment gives all that it needs itself.
+    pub(crate) withheld: &'static [&'static str],
 }
 
 impl Programs {
@@ -88,7 +90,11 @@ impl Programs {
     /// Starts a program, which is killed where nobody waits for it any more.
     fn start(&self, program: &str, arguments: &[String]) -> Result<Child, DeployError> {
         let mut command = Command::new(program);
-        for (name, _) in std::env::vars_os().filter(|(name, _)| is_option(name)) {
+        let is_withheld = |name: &OsStr| {
+            let name = name.to_string_lossy();
+            self.withheld.iter().any(|head| name.starts_with(head))
+        };
+        for (name, _) in std::env::vars_os().filter(|(name, _)| is_withheld(name)) {
             command.env_remove(name);
         }
         command.args(arguments).envs(self.environment.iter().copied());
@@ -99,12 +105,6 @@ impl Programs {
             remedy: self.remedy,
         })
     }
-}
-
-/// Whether a variable of the environment is an option of a program of Slurm: a deployment gives all that it needs itself.
-fn is_option(name: &OsStr) -> bool {
-    let name = name.to_string_lossy();
-    ["SBATCH_", "SQUEUE_", "SCANCEL_"].iter().any(|head| name.starts_with(head))
 }
 
 /// Whether a program ended well, and what it wrote; nothing where it did not end in time.
@@ -156,8 +156,12 @@ async fn hear(child: &mut Child, input: &str, limit: Duration) -> Option<(bool, 
 mod tests {
     use super::*;
 
-    const SHELL: Programs =
-        Programs { engine: "a shell", remedy: "install one", environment: &[("GIVEN", "too")] };
+    const SHELL: Programs = Programs {
+        engine: "a shell",
+        remedy: "install one",
+        environment: &[("GIVEN", "too")],
+        withheld: &[],
+    };
 
     fn run(words: &[&str], input: &str) -> Result<Said, DeployError> {
         SHELL.run(&words.iter().map(|word| (*word).to_owned()).collect::<Vec<_>>(), input)

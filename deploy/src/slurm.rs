@@ -28,6 +28,7 @@ const PROGRAMS: Programs = Programs {
     remedy: "deploy from a login node of the cluster, or use `starlings deploy hosts` for machines without an engine",
     // Times as seconds since 1970.
     environment: &[("SLURM_TIME_FORMAT", "%s")],
+    withheld: &["SBATCH_", "SQUEUE_", "SCANCEL_"],
 };
 
 /// Options of sbatch(1), Slurm 22.05 to 25.05.

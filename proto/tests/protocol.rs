@@ -182,13 +182,27 @@ proptest! {
         for _ in 0..2 {
             let (ahead, sent) = encoder.encode(lease, &setup, &job, &mut SentWindows::default());
             prop_assert_eq!(ahead, None, "a small window travels inside");
-            let ToWorker::Job { lease: got_lease, setup: got_setup, job: got } =
+            let ToWorker::Job { lease: got_lease, setup: got_setup, job: got, traceparent } =
                 decode(through_bytes(&sent)).unwrap() else { panic!("a job arrives as a job") };
+            prop_assert_eq!(traceparent, None);
             prop_assert_eq!((got_lease, got_setup), (lease, setup));
             prop_assert_eq!((got.particle, got.record), (job.particle, job.record));
             prop_assert_eq!(bits(&got.theta), bits(&job.theta));
             prop_assert_eq!(got.state.as_ref().map(state_bits), job.state.as_ref().map(state_bits));
             prop_assert!(same_window(&got.window, &job.window));
+        }
+    }
+
+    /// One that is not as long as the recommendation wants it is no part of a trace, whatever else it is.
+    #[test]
+    fn a_job_arrives_with_its_place_in_a_trace(lease in lease(), setup: [u8; 32], job in job(), text in "[ -~]{0,80}") {
+        let whole = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01".to_owned();
+        for (given, wanted) in [(whole.clone(), Some(whole)), (text.clone(), Some(text).filter(|text| text.len() == 55))] {
+            let (_, sent) = JobEncoder::default().encode(lease, &setup, &job, &mut SentWindows::default());
+            let sent = ToWorker::traced(sent, given);
+            let ToWorker::Job { traceparent, .. } =
+                decode(through_bytes(&sent)).unwrap() else { panic!("a job arrives as a job") };
+            prop_assert_eq!(traceparent, wanted);
         }
     }
 

@@ -3,16 +3,19 @@
 use starlings_coordinator::fleet::Bound;
 use starlings_coordinator::fleet::access::{Access, AccessFault};
 use starlings_coordinator::metrics::{Address, Server, Source};
+use starlings_traces::Traces;
 
 use super::plan::{AccessPlan, Plan};
 use crate::console::note;
 use crate::failure::Failure;
+use crate::traces::open_traces;
 
 /// What was taken. What is in use by another command leaves nothing behind, and neither does one that ends before it listens.
 pub(crate) struct Entrance {
     pub(super) bound: Option<Bound>,
     pub(super) access: Option<Access>,
     pub(super) metrics: Option<Address>,
+    pub(super) traces: Option<Traces>,
 }
 
 impl Entrance {
@@ -20,8 +23,9 @@ impl Entrance {
     pub(crate) fn take(plan: &Plan, out: Option<&std::path::Path>) -> Result<Self, Failure> {
         let bound = plan.address.map(Bound::new).transpose().map_err(Failure::run)?;
         let metrics = plan.metrics.map(Address::take).transpose().map_err(Failure::run)?;
+        let traces = plan.traces.as_ref().map(|target| open_traces(target, "coordinator")).transpose()?;
         let file = match &plan.access {
-            None => return Ok(Self { bound, access: None, metrics }),
+            None => return Ok(Self { bound, access: None, metrics, traces }),
             Some(AccessPlan::Named(file)) => Some(file.as_path()),
             Some(AccessPlan::RunFolder(file)) => file.as_deref(),
         };
@@ -32,7 +36,7 @@ impl Entrance {
         {
             access.reserve(file).map_err(|fault| failed(&fault))?;
         }
-        Ok(Self { bound, access: Some(access), metrics })
+        Ok(Self { bound, access: Some(access), metrics, traces })
     }
 }
 

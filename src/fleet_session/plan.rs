@@ -6,6 +6,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use starlings_coordinator::fleet::{PlaceName, RunIdentity, StateStore};
+use starlings_traces::Target;
 
 /// What was asked for, checked.
 pub(crate) struct Plan {
@@ -17,6 +18,8 @@ pub(crate) struct Plan {
     pub(super) access: Option<AccessPlan>,
     /// Where metrics are served.
     pub(super) metrics: Option<SocketAddr>,
+    /// Where spans go.
+    pub(super) traces: Option<Target>,
     /// Workers to start where it does not listen.
     pub(super) n_worker: usize,
     /// Whether results of workers may differ.

@@ -10,6 +10,7 @@ use starlings_pieces::PlaceName;
 use starlings_proto::host::host_name;
 use starlings_proto::{Hello, PROTOCOL, VERSION, own_build};
 use starlings_sums::Reading;
+use starlings_traces::Traces;
 use tokio_util::sync::CancellationToken;
 
 use crate::held::HoldLimits;
@@ -46,6 +47,8 @@ pub struct WorkerConfig {
     pub scratch: PathBuf,
     /// The folder for states that machines share, as this machine sees it; used where the coordinator's is the same.
     pub states: Option<PlaceName>,
+    /// Where spans of runs go, of those that belong in a trace.
+    pub traces: Option<Traces>,
     /// Whether recordings that a setup names are read here; only where the coordinator has this user's rights anyway.
     pub reading: Reading,
     /// Takes news for whoever watches.
@@ -69,6 +72,7 @@ impl WorkerConfig {
             hold: HoldLimits::default(),
             scratch: std::env::temp_dir(),
             states: None,
+            traces: None,
             reading: Reading::Refused,
             tell: Arc::new(|_| {}),
         }

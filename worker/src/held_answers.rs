@@ -43,7 +43,7 @@ pub(crate) fn answer(
 }
 
 fn one(held: &Held, ended: Ended, asked: Asked) {
-    let Asked { lease, outbox, transfers } = asked;
+    let Asked { lease, outbox, transfers, .. } = asked;
     let (answer, cost) = match ended {
         Ended::Large(large) => {
             let put = large.put(&transfers, lease);

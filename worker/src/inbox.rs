@@ -44,7 +44,7 @@ impl Inbox {
 
     /// Who wants the answer to a job of this session.
     pub(crate) fn asked(&self, lease: Lease, outbox: &Outbox) -> Asked {
-        Asked { lease, outbox: outbox.clone(), transfers: self.transfers.clone() }
+        Asked { lease, outbox: outbox.clone(), transfers: self.transfers.clone(), traced: None }
     }
 
     /// Brings a job to the slots, with its state.

@@ -6,6 +6,7 @@ use std::time::Duration;
 use starlings_models::ParticleError;
 use starlings_proto::words::status_text;
 use starlings_proto::{FromWorker, LeaseOutcome, ProtocolError, ReceivedWindows, ToWorker, generated};
+use starlings_traces::Traces;
 use tonic::Streaming;
 
 use crate::WorkerConfig;
@@ -18,7 +19,7 @@ use crate::inbox::Inbox;
 use crate::news::{News, Tell};
 use crate::outbox::Outbox;
 use crate::setups::Setups;
-use crate::slots::Slots;
+use crate::slots::{Asked, Slots, Traced};
 use crate::watch::Watch;
 
 /// How long a leaving worker waits for the coordinator to close the stream.
@@ -57,7 +58,8 @@ pub(crate) async fn serve(
             biased;
             message = connection.inbound.message() => {
                 silence.broken();
-                let place = Place { slots, setups, held, inbox: &inbox, blocks: &blocks, tell: &config.tell };
+                let (tell, traces) = (&config.tell, config.traces.as_ref());
+                let place = Place { slots, setups, held, inbox: &inbox, blocks: &blocks, tell, traces };
                 match take(message, &connection.outbox, &mut connection.windows, &place) {
                     Ok(()) => {}
                     Err(Ended::Drained(reason)) => {
@@ -126,6 +128,7 @@ struct Place<'a> {
     inbox: &'a Inbox,
     blocks: &'a Blocks,
     tell: &'a Tell,
+    traces: Option<&'a Traces>,
 }
 
 fn take(
@@ -134,7 +137,7 @@ fn take(
     windows: &mut ReceivedWindows,
     place: &Place<'_>,
 ) -> Result<(), Ended> {
-    let Place { slots, setups, held, inbox, blocks, tell } = *place;
+    let Place { slots, setups, held, inbox, blocks, tell, traces } = *place;
     let message = match message {
         Ok(Some(message)) => message,
         Ok(None) => return Err(Ended::Lost("the coordinator closed the connection".to_owned())),
@@ -144,9 +147,10 @@ fn take(
         Ok(ToWorker::Job { .. }) if slots.is_flooded(inbox.len()) => {
             return Err(Ended::Lost("the coordinator sent more jobs than can wait here".to_owned()));
         }
-        Ok(ToWorker::Job { lease, setup, job }) => {
+        Ok(ToWorker::Job { lease, setup, job, traceparent }) => {
             if let Some(forward) = setups.get(&setup) {
-                inbox.take(slots, inbox.asked(lease, outbox), setup, forward, job);
+                let asked = Asked { traced: Traced::new(traceparent, traces), ..inbox.asked(lease, outbox) };
+                inbox.take(slots, asked, setup, forward, job);
             } else {
                 // First the setup, so that the job that comes back finds it missing here; and once, however many of its jobs
                 // are on their way: a second time would stand for the setup that is sent again.
@@ -221,8 +225,15 @@ mod tests {
         let inbox = Inbox::new(Transfers::nowhere(runtime.handle()), 1);
         let tell: Tell = Arc::new(|_| {});
         let blocks = Blocks::new(None, 1);
-        let place =
-            Place { slots: &slots, setups: &setups, held: None, inbox: &inbox, blocks: &blocks, tell: &tell };
+        let place = Place {
+            slots: &slots,
+            setups: &setups,
+            held: None,
+            inbox: &inbox,
+            blocks: &blocks,
+            tell: &tell,
+            traces: None,
+        };
         let mut take = |message| take(Ok(Some(message)), &outbox, &mut windows, &place).unwrap();
         let mut next = || FromWorker::decode(sent.blocking_recv().expect("an answer")).unwrap();
         let (id, json) = encode_setup(&oscillator()).unwrap();

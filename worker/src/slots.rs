@@ -22,7 +22,7 @@ use starlings_proto::{Lease, LeaseOutcome};
 
 use crate::held::Held;
 use crate::outbox::Outbox;
-pub(crate) use task::{Asked, Task};
+pub(crate) use task::{Asked, Task, Traced};
 
 /// Jobs that may wait per slot, twice what a coordinator sends ahead, and of the whole worker at least.
 const WAITING: usize = 128;
@@ -194,11 +194,15 @@ impl Shared {
             self.running.fetch_add(1, Ordering::Relaxed);
             let started = Instant::now();
             let spent = spent();
-            let until = Until { spent: &spent, stop: &task.stop };
+            let (span, traceparent) = task.traced();
+            let until = Until { spent: &spent, stop: &task.stop, traceparent: traceparent.as_deref() };
             let result = catch_unwind(AssertUnwindSafe(|| task.forward.run_within(&task.job, &until)))
                 .unwrap_or_else(|panic| Err(ModelFailure::Solver(panic_text(panic.as_ref())).into()));
             let cost = started.elapsed().as_secs_f64();
             task.log(result.as_ref().err(), cost);
+            if let Some(span) = span {
+                span.end_with(result.as_ref().err());
+            }
             self.running.fetch_sub(1, Ordering::Relaxed);
             // A result that came all the same is as good as any; what a stopped run says of itself is not.
             if result.is_err() && task.stop.is_set() {

@@ -11,6 +11,7 @@ use tokio_util::sync::CancellationToken;
 
 use super::access::Secrets;
 use super::identity::RunIdentity;
+use super::run_traces::RunTraces;
 use super::{FleetEvent, StateStore};
 
 /// How a fleet listens and when it loses patience.
@@ -43,6 +44,8 @@ pub struct FleetConfig {
     pub cancel: CancellationToken,
     /// Where events go.
     pub events: Sender<FleetEvent>,
+    /// Where spans of runs go, below one of the caller's.
+    pub traces: Option<RunTraces>,
     /// Where states are kept that are too large to travel inside a message.
     pub states: StateStore,
 }
@@ -69,6 +72,7 @@ impl FleetConfig {
             build: own_build(),
             cancel,
             events,
+            traces: None,
             states: StateStore::new(StateStore::MEMORY),
         }
     }

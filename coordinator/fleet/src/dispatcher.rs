@@ -25,6 +25,7 @@ mod census;
 mod dispute;
 mod doubt;
 mod duplicate;
+mod firsts;
 mod held;
 pub(crate) mod message;
 mod opinion;
@@ -40,8 +41,9 @@ mod strays;
 mod tests;
 mod timeout;
 mod watch;
+mod workers;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::time::Duration;
 
 use starlings_proto::{SetupId, StateId};
@@ -59,6 +61,7 @@ pub(crate) use repeats::{Comparing, draws};
 use roster::{SetupState, Worker};
 use run_times::RunTimes;
 use watch::{Overdue, Starved};
+use workers::Workers;
 
 /// The numbers that the rules need.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,7 +82,7 @@ pub(crate) struct Rules {
 #[derive(Debug)]
 pub(crate) struct Dispatcher {
     rules: Rules,
-    workers: BTreeMap<WorkerId, Worker>,
+    workers: Workers,
     batch: Option<Batch>,
     next_job: u64,
     last_setups: Vec<SetupId>,
@@ -108,7 +111,7 @@ impl Dispatcher {
     pub(crate) fn new(rules: Rules) -> Self {
         Self {
             rules,
-            workers: BTreeMap::new(),
+            workers: Workers::default(),
             batch: None,
             next_job: 1,
             last_setups: Vec::new(),
@@ -149,7 +152,7 @@ impl Dispatcher {
 
     /// Number of slots of all workers.
     pub(crate) fn slots(&self) -> usize {
-        self.workers.values().map(|w| w.slots).sum()
+        self.workers.slots()
     }
 
     /// Whether all workers are processes of this machine that were started for the run.
@@ -183,6 +186,8 @@ impl Dispatcher {
             Event::Abort(error) => self.abort(error),
         }
         self.proceed();
+        #[cfg(test)]
+        tests::plain::exact(&self.workers);
         std::mem::take(&mut self.out)
     }
 
@@ -199,18 +204,18 @@ impl Dispatcher {
                 self.out.push(Command::SendSetup { worker: joining.id, setup });
             }
         }
-        self.workers.insert(worker.id, worker);
+        self.workers.insert(worker);
     }
 
     fn heard(&mut self, now: Duration, worker: WorkerId) {
-        if let Some(worker) = self.workers.get_mut(&worker) {
+        if let Some(mut worker) = self.workers.get_mut(worker) {
             worker.last_heard = now;
         }
     }
 
     /// Takes a worker out and returns its leases to the queue. A clean leave counts no attempt.
     fn lose(&mut self, id: WorkerId, reason: &str, clean: bool) {
-        let Some(worker) = self.workers.remove(&id) else { return };
+        let Some(worker) = self.workers.remove(id) else { return };
         let (mut requeued, mut given_up) = (0, None);
         let leases = worker.leases_in_order();
         for (position, job) in leases.into_iter().enumerate() {
@@ -218,7 +223,7 @@ impl Dispatcher {
             let Some(index) = batch.index_of(job) else { continue };
             // What it repeated, or others have too, does not depend on it.
             let shared = || self.workers.values().any(|w| w.holds(job) && !w.has_dropped(job));
-            let repeated = self.repeats.open.contains(&(id, index)) || worker.has_dropped(job);
+            let repeated = self.repeats.is_open(id, index) || worker.has_dropped(job);
             if repeated || batch.is_finished(index) || (self.duplicated.contains(&index) && shared()) {
                 continue;
             }
@@ -247,17 +252,18 @@ impl Dispatcher {
         let n = jobs.len() as u64;
         let batch = Batch::new(self.next_job, jobs);
         if !batch.shares(&self.last_setups) {
-            self.workers.values_mut().for_each(Worker::forget_cost);
+            self.workers.for_each(Worker::forget_cost);
             self.run_times = RunTimes::default();
         }
         self.last_setups = batch.setups().to_vec();
-        for worker in self.workers.values_mut() {
+        self.workers.for_each(|worker| {
             for &setup in batch.setups() {
                 if worker.wants(setup, now) {
                     self.out.push(Command::SendSetup { worker: worker.id, setup });
                 }
             }
-        }
+        });
+        self.workers.want(batch.setups());
         self.repeats.begin();
         self.duplicated.clear();
         self.proven.keep_only(batch.names(), &mut self.out);

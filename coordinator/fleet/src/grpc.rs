@@ -76,9 +76,10 @@ impl GrpcFleet {
         };
         let started_again = address.is_some() && config.identity.incarnation > 1;
         let opens = if started_again { GRACE } else { Duration::ZERO };
-        let FleetConfig { run_name, build, identity, events, states, .. } = config;
+        let FleetConfig { run_name, build, identity, events, states, traces, .. } = config;
         let probe = probe(&states)?;
         let hub = Arc::new(Hub::new(run_name, build, identity, rules, opens, events, (states, probe)));
+        hub.trace(traces);
         let stop = CancellationToken::new();
         let (batches, submitted) = unbounded_channel();
         let (adopted, ends) = unbounded_channel();

@@ -232,6 +232,7 @@ impl Hub {
         state.waiting.left(worker);
         state.states.left(worker);
         state.blocks.left(worker);
+        state.spans.left(worker, &reason);
         state.give_blocks();
         state.handle(now, Event::Left { worker, reason, clean });
         drop(state);

@@ -88,7 +88,7 @@ impl Fleet for InProcess {
 fn run_one(forward: &dyn Forward, job: &Job) -> Result<Prediction, ParticleError> {
     let started = Instant::now();
     let mut result = catch_unwind(AssertUnwindSafe(|| {
-        let until = Until { spent: &spent(), stop: &Stop::default() };
+        let until = Until { spent: &spent(), stop: &Stop::default(), traceparent: None };
         forward.run_within(job, &until)
     }))
     .unwrap_or_else(|panic| Err(ModelFailure::Solver(panic_text(panic.as_ref())).into()));

@@ -28,6 +28,7 @@ mod network;
 mod outbox;
 mod probe;
 mod recombination;
+mod run_traces;
 mod service;
 mod tally;
 mod transfer;
@@ -46,6 +47,7 @@ pub use in_process::InProcess;
 pub use load::{Load, WorkerLoad};
 pub use local_workers::{LocalConfig, LocalWorkers};
 pub use recombination::{Piece, Recombine};
+pub use run_traces::RunTraces;
 pub use starlings_models::Factory;
 pub use starlings_proto::{ProtocolError, SetupId, job_key};
 pub use starlings_states::{

@@ -249,7 +249,7 @@ impl<S: Solve> Forward for External<S> {
     }
 
     fn run(&self, job: &Job) -> Result<Prediction, ParticleError> {
-        self.run_within(job, &Until { spent: &|| 0.0, stop: &Stop::default() })
+        self.run_within(job, &Until { spent: &|| 0.0, stop: &Stop::default(), traceparent: None })
     }
 
     fn run_within(&self, job: &Job, until: &Until<'_>) -> Result<Prediction, ParticleError> {
@@ -275,6 +275,7 @@ impl<S: Solve> Forward for External<S> {
             terms: &self.terms,
             constants: &constants,
             stop: Some(until.stop),
+            traceparent: until.traceparent,
         };
         let solved = self.solve.solve(&run)?;
         self.check(&solved, &window)?;

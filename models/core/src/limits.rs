@@ -42,6 +42,8 @@ pub struct Until<'a> {
     pub spent: &'a dyn Fn() -> f64,
     /// Whether nobody wants the answer any more.
     pub stop: &'a Stop,
+    /// Where the run belongs in a trace, `traceparent` of the W3C recommendation "Trace Context"; handed to a program outside.
+    pub traceparent: Option<&'a str>,
 }
 
 /// The limits of one run, and how much of them is used.

@@ -125,7 +125,7 @@ impl Forward for Simulator {
     }
 
     fn run(&self, job: &Job) -> Result<Prediction, ParticleError> {
-        self.run_within(job, &Until { spent: &|| 0.0, stop: &Stop::default() })
+        self.run_within(job, &Until { spent: &|| 0.0, stop: &Stop::default(), traceparent: None })
     }
 
     fn run_within(&self, job: &Job, until: &Until<'_>) -> Result<Prediction, ParticleError> {

@@ -66,6 +66,7 @@ impl JobEncoder {
             theta: floats::encode(&job.theta),
             state: inside,
             state_id: named,
+            traceparent: String::new(),
         };
         (ahead, generated::ToWorker { kind: Some(generated::to_worker::Kind::Job(message)) })
     }

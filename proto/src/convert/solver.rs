@@ -74,6 +74,7 @@ pub fn encode_run(run: &Run<'_>, scratch: &str) -> generated::RunRequest {
         terms: run.terms.iter().map(term).collect(),
         constants: named(run.constants),
         scratch: scratch.to_owned(),
+        traceparent: run.traceparent.unwrap_or_default().to_owned(),
     }
 }
 

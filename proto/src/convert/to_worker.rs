@@ -56,6 +56,8 @@ pub enum ToWorker {
         setup: SetupId,
         /// The job.
         job: Job<State>,
+        /// Where it belongs in a trace.
+        traceparent: Option<String>,
     },
     /// Withdraw these jobs.
     Cancel {
@@ -86,6 +88,9 @@ pub enum ToWorker {
     },
 }
 
+/// Letters of a `traceparent`; one of another length is none.
+const TRACEPARENT: usize = 55;
+
 /// What a message takes at least, with what is shared at most a little.
 const LEAST: usize = 1024;
 
@@ -107,6 +112,14 @@ impl ToWorker {
     /// The message for [`ToWorker::Setup`], from the text made by [`super::encode_setup`].
     pub fn setup(id: &SetupId, json: Bytes) -> generated::ToWorker {
         message(Kind::Setup(generated::SetupMsg { id: Bytes::copy_from_slice(id), json }))
+    }
+
+    /// A message for [`ToWorker::Job`] that says where its run belongs in a trace.
+    pub fn traced(mut message: generated::ToWorker, traceparent: String) -> generated::ToWorker {
+        if let Some(Kind::Job(job)) = &mut message.kind {
+            job.traceparent = traceparent;
+        }
+        message
     }
 
     /// The message for [`ToWorker::Cancel`].
@@ -220,7 +233,10 @@ fn decode_job(wire_job: &generated::Job, received: &ReceivedWindows) -> Result<T
     let decoded =
         setup_id(&wire_job.setup).and_then(|setup| Ok((setup, job::decode_job(wire_job, received)?)));
     match decoded {
-        Ok((setup, job)) => Ok(ToWorker::Job { lease, setup, job }),
+        Ok((setup, job)) => {
+            let traceparent = Some(&wire_job.traceparent).filter(|text| text.len() == TRACEPARENT).cloned();
+            Ok(ToWorker::Job { lease, setup, job, traceparent })
+        }
         // The stream is broken, not the job.
         Err(ProtocolError::UnknownWindow) => Err(ProtocolError::UnknownWindow),
         Err(source) => Err(ProtocolError::Job { lease, source: Box::new(source) }),

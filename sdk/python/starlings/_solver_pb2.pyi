@@ -70,7 +70,7 @@ class Measure(_message.Message):
     def __init__(self, output: _Optional[str] = ..., state: _Optional[str] = ...) -> None: ...
 
 class RunRequest(_message.Message):
-    __slots__ = ("particle", "record", "parameters", "initial", "state", "start", "times", "outputs", "observed", "observer", "inputs", "terms", "constants", "scratch")
+    __slots__ = ("particle", "record", "parameters", "initial", "state", "start", "times", "outputs", "observed", "observer", "inputs", "terms", "constants", "scratch", "traceparent")
     PARTICLE_FIELD_NUMBER: _ClassVar[int]
     RECORD_FIELD_NUMBER: _ClassVar[int]
     PARAMETERS_FIELD_NUMBER: _ClassVar[int]
@@ -85,6 +85,7 @@ class RunRequest(_message.Message):
     TERMS_FIELD_NUMBER: _ClassVar[int]
     CONSTANTS_FIELD_NUMBER: _ClassVar[int]
     SCRATCH_FIELD_NUMBER: _ClassVar[int]
+    TRACEPARENT_FIELD_NUMBER: _ClassVar[int]
     particle: int
     record: int
     parameters: bytes
@@ -99,7 +100,8 @@ class RunRequest(_message.Message):
     terms: _containers.RepeatedCompositeFieldContainer[Term]
     constants: _containers.RepeatedCompositeFieldContainer[Named]
     scratch: str
-    def __init__(self, particle: _Optional[int] = ..., record: _Optional[int] = ..., parameters: _Optional[bytes] = ..., initial: _Optional[_Iterable[_Union[Named, _Mapping]]] = ..., state: _Optional[bytes] = ..., start: _Optional[float] = ..., times: _Optional[bytes] = ..., outputs: _Optional[_Iterable[str]] = ..., observed: _Optional[bytes] = ..., observer: _Optional[_Union[Observer, _Mapping]] = ..., inputs: _Optional[_Iterable[_Union[Signal, _Mapping]]] = ..., terms: _Optional[_Iterable[_Union[Term, _Mapping]]] = ..., constants: _Optional[_Iterable[_Union[Named, _Mapping]]] = ..., scratch: _Optional[str] = ...) -> None: ...
+    traceparent: str
+    def __init__(self, particle: _Optional[int] = ..., record: _Optional[int] = ..., parameters: _Optional[bytes] = ..., initial: _Optional[_Iterable[_Union[Named, _Mapping]]] = ..., state: _Optional[bytes] = ..., start: _Optional[float] = ..., times: _Optional[bytes] = ..., outputs: _Optional[_Iterable[str]] = ..., observed: _Optional[bytes] = ..., observer: _Optional[_Union[Observer, _Mapping]] = ..., inputs: _Optional[_Iterable[_Union[Signal, _Mapping]]] = ..., terms: _Optional[_Iterable[_Union[Term, _Mapping]]] = ..., constants: _Optional[_Iterable[_Union[Named, _Mapping]]] = ..., scratch: _Optional[str] = ..., traceparent: _Optional[str] = ...) -> None: ...
 
 class Named(_message.Message):
     __slots__ = ("name", "value")

@@ -38,6 +38,7 @@ class Job:
     scratch: str = ""
     particle: int = 0
     record: int = 0
+    traceparent: str = ""
 
 
 @dataclass
@@ -91,6 +92,7 @@ def prepare(served: Served, job: Job, stopped: Callable[[], bool], progress: Cal
         scratch=job.scratch,
         particle=job.particle,
         record=job.record,
+        traceparent=job.traceparent,
         _rows=rows,
         _layouts=(served.outputs, served.states),
         _terms=terms,

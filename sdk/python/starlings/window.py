@@ -56,6 +56,8 @@ class Window:
     #: Index of the sigma point and of the record, for names of files.
     particle: int
     record: int
+    #: Where the run belongs in a trace: `traceparent` of the W3C recommendation "Trace Context"; empty for none.
+    traceparent: str
     _rows: List[Row]
     _layouts: Tuple[Layout, Layout]
     _terms: Terms

@@ -87,6 +87,7 @@ def job(request: Any) -> Job:
         scratch=request.scratch,
         particle=request.particle,
         record=request.record,
+        traceparent=request.traceparent,
     )
 
 

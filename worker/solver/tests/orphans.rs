@@ -90,7 +90,7 @@ fn daemons_of_a_solver_end_with_its_run_and_a_stopped_run_ends_at_once() {
         word.set();
     });
     let started = Instant::now();
-    let result = endless.run_within(&job(), &Until { spent: &|| 0.0, stop: &stop });
+    let result = endless.run_within(&job(), &Until { spent: &|| 0.0, stop: &stop, traceparent: None });
     assert!(result.is_err() && started.elapsed() < Duration::from_secs(300), "{result:?}");
     caller.join().unwrap();
     let left = numbers(&pids);

@@ -99,7 +99,7 @@ impl Shared {
         if self.over(&task, Ended::Large(Arc::clone(&large)), is_put).is_err() {
             return;
         }
-        let Some(Asked { lease, outbox, transfers }) = task.asked().take() else {
+        let Some(Asked { lease, outbox, transfers, .. }) = task.asked().take() else {
             self.was_put(&large, false);
             return;
         };

@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use starlings_models::{Forward, Job, ParticleError, Stop};
 use starlings_proto::{JobKey, Lease, SetupId};
+use starlings_traces::{Span, TraceParent, Traces};
 use tokio::sync::OwnedSemaphorePermit;
 
 use crate::held::Of;
@@ -32,6 +33,23 @@ pub(crate) struct Asked {
     pub(crate) outbox: Outbox,
     /// The way of a large end state.
     pub(crate) transfers: Transfers,
+    /// Where its run belongs in a trace.
+    pub(crate) traced: Option<Traced>,
+}
+
+/// Where a run belongs in a trace, and where its own span goes.
+#[derive(Clone)]
+pub(crate) struct Traced {
+    above: TraceParent,
+    traces: Option<Traces>,
+}
+
+impl Traced {
+    /// Nothing where the coordinator says nothing that is understood.
+    pub(crate) fn new(traceparent: Option<String>, traces: Option<&Traces>) -> Option<Self> {
+        let above = traceparent?.parse().ok()?;
+        Some(Self { above, traces: traces.cloned() })
+    }
 }
 
 impl Task {
@@ -70,6 +88,25 @@ impl Task {
 
     pub(super) fn asked(&self) -> MutexGuard<'_, Option<Asked>> {
         self.asked.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Begins its span, where spans are written; with what a program that runs it has as its parent.
+    pub(super) fn traced(&self) -> (Option<Span>, Option<String>) {
+        let asked = self.asked();
+        let Some((lease, traced)) =
+            asked.as_ref().and_then(|asked| Some((asked.lease, asked.traced.as_ref()?)))
+        else {
+            return (None, None);
+        };
+        let Job { particle, record, .. } = *self.job;
+        let about = [
+            ("starlings.particle", i64::from(particle).into()),
+            ("starlings.record", i64::from(record).into()),
+            ("starlings.epoch", i64::try_from(lease.epoch).unwrap_or(i64::MAX).into()),
+        ];
+        let span = traced.traces.as_ref().map(|traces| traces.begin("compute", Some(&traced.above), about));
+        let parent = span.as_ref().map_or_else(|| traced.above.clone(), Span::parent);
+        (span, Some(parent.to_string()))
     }
 
     /// Says in the log how it ended, after so many seconds.

@@ -64,7 +64,7 @@ fn a_run_that_is_over_stops_what_computes_and_nothing_of_it_is_kept_or_told_to_t
     let forwards: [Arc<dyn Forward>; 3] = [Arc::new(Endless), Arc::new(Stubborn), Arc::new(Endless)];
     for (number, forward) in (1..).zip(forwards) {
         let lease = Lease { epoch: 1, job: number, attempt: 1 };
-        let asked = Asked { lease, outbox: outbox.clone(), transfers: transfers.clone() };
+        let asked = Asked { lease, outbox: outbox.clone(), transfers: transfers.clone(), traced: None };
         slots.push(Task::new(asked, [7; 32], forward, job()));
     }
     while slots.load() != (2, 1) {
@@ -92,7 +92,12 @@ fn a_computing_job_is_stopped_when_that_is_asked_for_and_answered_as_withdrawn()
     let transfers = crate::transfer::Transfers::nowhere(runtime.handle());
     let lease = |job| Lease { epoch: 1, job, attempt: 1 };
     for number in 1..=3 {
-        let asked = Asked { lease: lease(number), outbox: outbox.clone(), transfers: transfers.clone() };
+        let asked = Asked {
+            lease: lease(number),
+            outbox: outbox.clone(),
+            transfers: transfers.clone(),
+            traced: None,
+        };
         slots.push(Task::new(asked, [7; 32], Arc::new(Endless), job()));
     }
     while slots.load().0 == 0 {

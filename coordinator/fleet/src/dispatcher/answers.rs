@@ -25,7 +25,7 @@ impl Dispatcher {
         let Some((index, asked_back)) = self.released(now, id, lease, &answer) else { return };
         let is_shared = self.is_shared(index);
         let Some(batch) = &mut self.batch else { return };
-        if self.repeats.open.remove(&(id, index)) || batch.is_finished(index) {
+        if self.repeats.ended(id, index) || batch.is_finished(index) {
             if answer == LeaseOutcome::Withdrawn && !asked_back {
                 self.no_opinion(id, index);
             }
@@ -33,7 +33,7 @@ impl Dispatcher {
         }
         match answer {
             LeaseOutcome::Ran(Ok(prediction)) if !matches!(batch.doubt(index), Some(Doubt::Control(_))) => {
-                if let Some(worker) = self.workers.get_mut(&id) {
+                if let Some(mut worker) = self.workers.get_mut(id) {
                     worker.learn_cost(cost);
                 }
                 self.run_times.learn(cost);
@@ -67,7 +67,7 @@ impl Dispatcher {
         lease: Lease,
         answer: &LeaseOutcome,
     ) -> Option<(usize, bool)> {
-        let worker = self.workers.get_mut(&id)?;
+        let mut worker = self.workers.get_mut(id)?;
         worker.last_heard = now;
         let own = lease.epoch == id.0;
         let released = if own { worker.release(lease.job, lease.attempt) } else { None };
@@ -78,6 +78,7 @@ impl Dispatcher {
                 let notice = FleetEvent::LateAnswer { worker: worker.name.clone(), job: lease.job };
                 self.out.push(Command::Notice(notice));
             }
+            drop(worker);
             if is_stray {
                 self.stray(id, "it answers runs that it was not given, again and again");
             }
@@ -95,7 +96,7 @@ impl Dispatcher {
     fn predicted(&mut self, id: WorkerId, index: usize, prediction: Prediction) {
         self.succeeded_where_another_failed(id, index, &prediction);
         let Some(batch) = &mut self.batch else { return };
-        let name = self.workers.get(&id).map_or("", |w| w.name.as_str());
+        let name = self.workers.get(id).map_or("", |w| w.name.as_str());
         self.proven.learn(batch.name(index), batch.setup_of(index), index, &mut self.out);
         batch.set_doubt(index, None);
         batch.finish(index, Ok(prediction), (id, name));
@@ -129,7 +130,7 @@ impl Dispatcher {
     /// A failure of the model, or the limit of wall time: tried once more on another worker, if there is one.
     pub(super) fn decided(&mut self, id: WorkerId, index: usize, failure: Failure) {
         let Some(batch) = &mut self.batch else { return };
-        let name = self.workers.get(&id).map_or("", |w| w.name.as_str());
+        let name = self.workers.get(id).map_or("", |w| w.name.as_str());
         batch.set_doubt(index, None);
         let setup = batch.setup_of(index);
         let other = self.workers.values().any(|w| w.id != id && w.could_take(setup));

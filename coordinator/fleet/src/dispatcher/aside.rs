@@ -43,7 +43,7 @@ impl Aside {
 impl Dispatcher {
     /// The place of a worker cannot make runs: what waits there comes back.
     pub(super) fn set_aside(&mut self, now: Duration, id: WorkerId, reason: &str) {
-        let Some(worker) = self.workers.get_mut(&id) else { return };
+        let Some(mut worker) = self.workers.get_mut(id) else { return };
         let Some(aside) = Aside::after(worker.aside.as_ref(), now, reason) else { return };
         let (name, seconds) = (worker.name.clone(), aside.pause.as_secs_f64());
         worker.aside = Some(aside);
@@ -57,7 +57,7 @@ impl Dispatcher {
 
     /// A run was made by a worker: if it was set aside, it is no longer.
     pub(super) fn works(&mut self, id: WorkerId) {
-        let Some(worker) = self.workers.get_mut(&id) else { return };
+        let Some(mut worker) = self.workers.get_mut(id) else { return };
         if worker.aside.take_if(|aside| aside.is_due).is_some() {
             self.out.push(Command::Notice(FleetEvent::WorkerBack { worker: worker.name.clone() }));
         }

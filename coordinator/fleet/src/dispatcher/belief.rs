@@ -6,8 +6,8 @@
 use std::collections::BTreeSet;
 
 use super::Dispatcher;
+use super::firsts::Contributor;
 use super::message::{BatchError, WorkerId};
-use super::repeats::Contributor;
 use super::roster::Worker;
 use crate::wire::Outcome;
 
@@ -25,12 +25,11 @@ impl Dispatcher {
 
     /// Workers whose results of this batch may turn out to be wrong.
     fn in_doubt(&self) -> BTreeSet<WorkerId> {
-        let uncompared = self.repeats.contributors.iter();
-        let uncompared = uncompared.filter(|(id, contributor)| {
-            self.repeats.repeats(contributor.index) || self.may_be_compared(**id, contributor)
+        let uncompared = self.repeats.firsts.iter().filter(|(id, contributor)| {
+            self.repeats.repeats(contributor.index) || self.may_be_compared(*id, contributor)
         });
         let disputed = self.repeats.disputes.values().flat_map(|dispute| &dispute.opinions);
-        uncompared.map(|(id, _)| *id).chain(disputed.map(|opinion| opinion.by)).collect()
+        uncompared.map(|(id, _)| id).chain(disputed.map(|opinion| opinion.by)).collect()
     }
 
     /// Whether another worker can repeat the first result of one, now or once it has built the setup: the first worker that is ready

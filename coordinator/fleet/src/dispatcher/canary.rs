@@ -12,9 +12,11 @@ use starlings_models::ParticleError;
 use starlings_proto::{LeaseOutcome, SetupId};
 
 use super::Dispatcher;
+use super::batch::Batch;
+use super::firsts::Contributor;
 use super::message::{Likeness, WorkerId};
 use super::opinion::{Opinion, Said, alike};
-use super::repeats::{Contributor, Dispute, MOST, draws};
+use super::repeats::{Dispute, MOST, draws};
 use super::roster::Worker;
 use super::schedule::lease;
 use crate::wire::Prediction;
@@ -34,7 +36,7 @@ impl Dispatcher {
             return;
         }
         let (Some(batch), Some(comparing)) = (&self.batch, self.rules.comparing) else { return };
-        let Some(worker) = self.workers.get_mut(&id) else { return };
+        let Some(mut worker) = self.workers.get_mut(id) else { return };
         worker.taken += 1;
         let (repeats, setup) = (&mut self.repeats, *batch.setup_of(index));
         let seconds = self.run_times.last();
@@ -43,7 +45,7 @@ impl Dispatcher {
         repeats.since_last += 1;
         if !worker.compared && !self.local_only {
             let new = || Contributor { name: worker.called(), index, tried: [].into() };
-            repeats.contributors.entry(id).or_insert_with(new);
+            repeats.firsts.add(id, new);
         }
         let is_first = !repeats.compared.contains(&(id, setup)) && repeats.affords(seconds);
         if is_first || draws(comparing.seed, batch.job_number(index)) {
@@ -69,13 +71,24 @@ impl Dispatcher {
             return;
         }
         self.settle_disputes();
-        let unchecked = self.repeats.contributors.iter().map(|(&id, c)| (id, c.index));
-        for (id, index) in unchecked.collect::<Vec<_>>() {
-            if !self.repeats.repeats(index) && !self.repeats.disputes.contains_key(&index) {
-                self.repeat(index, id);
-            }
-        }
+        self.repeat_firsts();
         self.repeat_sampled();
+    }
+
+    /// Has the first result of every worker repeated that nobody repeats yet.
+    fn repeat_firsts(&mut self) {
+        let is_done = self.batch.as_ref().is_some_and(Batch::is_done);
+        let mut passed = None;
+        while let Some((id, index)) = self.repeats.next_first(passed) {
+            // When nothing else is left to do, one that repeats need not have room.
+            if !is_done && !self.workers.have_room() {
+                return;
+            }
+            if self.repeat(index, id) {
+                self.repeats.firsts.wait(id);
+            }
+            passed = Some(id);
+        }
     }
 
     /// Compares runs of a setup no more.
@@ -83,7 +96,7 @@ impl Dispatcher {
         self.repeats.likeness.insert(setup, Likeness::None);
         let Some(batch) = &self.batch else { return };
         let other = |index: usize| *batch.setup_of(index) != setup;
-        self.repeats.contributors.retain(|_, contributor| other(contributor.index));
+        self.repeats.firsts.retain(|contributor| other(contributor.index));
         self.repeats.disputes.retain(|index, _| other(*index));
         self.repeats.sampled.retain(|index| other(*index));
     }
@@ -91,18 +104,14 @@ impl Dispatcher {
     /// Has a result of a worker repeated by another one; false when nobody has room.
     fn repeat(&mut self, index: usize, by: WorkerId) -> bool {
         let Some(batch) = &mut self.batch else { return false };
-        let tried = self.repeats.contributors.get(&by).map(|contributor| contributor.tried.clone());
         let (is_done, job, setup) = (batch.is_done(), batch.job_number(index), *batch.setup_of(index));
-        let fits = |w: &&mut Worker| {
-            // When nothing else is left to do, it need not have room.
-            let has_room = w.has_room() || is_done;
-            let was_tried = tried.as_ref().is_some_and(|tried| tried.contains(&w.id));
-            w.id != by && has_room && w.takes(&setup) && !w.holds(job) && !was_tried
-        };
-        let key = |w: &&mut Worker| w.load() * 1000 / w.slots;
-        let Some(worker) = self.workers.values_mut().filter(fits).min_by_key(key) else { return false };
+        let tried = self.repeats.firsts.get(by).map(|contributor| &contributor.tried);
+        let may =
+            |w: &Worker| w.id != by && !w.holds(job) && tried.is_none_or(|tried| !tried.contains(&w.id));
+        // When nothing else is left to do, it need not have room.
+        let Some(mut worker) = self.workers.least_loaded_sound(&setup, is_done, may) else { return false };
         self.repeats.repeating(worker.id, index, self.run_times.last());
-        self.out.push(lease(worker, batch, index, self.now));
+        self.out.push(lease(&mut worker, batch, index, self.now));
         true
     }
 
@@ -151,8 +160,7 @@ impl Dispatcher {
 
     /// One who was asked to repeat a job gave no result.
     pub(super) fn no_opinion(&mut self, id: WorkerId, index: usize) {
-        let asked = self.repeats.contributors.values_mut().filter(|contributor| contributor.index == index);
-        asked.for_each(|contributor| _ = contributor.tried.insert(id));
+        self.repeats.firsts.no_opinion(id, index);
     }
 
     fn compare(&mut self, id: WorkerId, index: usize, said: Said) {
@@ -184,28 +192,28 @@ impl Dispatcher {
 
     fn opine(&mut self, index: usize, by: WorkerId, said: Said) {
         let left = || "a worker that left".to_owned();
-        let gone = || self.repeats.contributors.get(&by).map_or_else(left, |c| c.name.clone());
-        let name = self.workers.get(&by).map_or_else(gone, Worker::called);
+        let gone = || self.repeats.firsts.get(by).map_or_else(left, |c| c.name.clone());
+        let name = self.workers.get(by).map_or_else(gone, Worker::called);
         let Some(dispute) = self.repeats.disputes.get_mut(&index) else { return };
         dispute.opinions.push(Opinion { by, name, said });
     }
 
     /// The build of a worker, in hexadecimal, and how many of its results were taken so far.
     pub(crate) fn taken(&self, id: WorkerId) -> (String, u64) {
-        self.workers.get(&id).map_or_else(|| (String::new(), 0), |w| (w.build.clone(), w.taken))
+        self.workers.get(id).map_or_else(|| (String::new(), 0), |w| (w.build.clone(), w.taken))
     }
 
     /// Results of this worker are those of others.
     pub(super) fn trusted(&mut self, id: WorkerId) {
-        self.repeats.contributors.remove(&id);
-        if let Some(worker) = self.workers.get_mut(&id) {
+        self.repeats.firsts.remove(id);
+        if let Some(mut worker) = self.workers.get_mut(id) {
             worker.compared = true;
         }
     }
 
     /// Whether nothing is left to compare before the batch may end.
     pub(super) fn is_compared(&self) -> bool {
-        let is_settled = self.repeats.disputes.is_empty() && self.repeats.open.is_empty();
-        is_settled && self.repeats.contributors.iter().all(|(id, first)| !self.may_be_compared(*id, first))
+        let is_settled = self.repeats.disputes.is_empty() && self.repeats.open().is_empty();
+        is_settled && self.repeats.firsts.iter().all(|(id, first)| !self.may_be_compared(id, first))
     }
 }

@@ -59,7 +59,7 @@ impl Dispatcher {
                 {
                     return;
                 }
-                match last_verdict(&opinions, |id| self.workers.contains_key(&id)) {
+                match last_verdict(&opinions, |id| self.workers.contains_key(id)) {
                     Verdict::Wrong(wrong) => self.convict(index, &opinions, &wrong),
                     Verdict::Open => self.undecidable(index, &opinions),
                 }
@@ -74,12 +74,13 @@ impl Dispatcher {
         let (job, setup) = (batch.job_number(index), *batch.setup_of(index));
         let times = dispute.asked.clone();
         let asked = |w: &Worker| times.get(&w.id).copied().unwrap_or(0);
-        let fits = |w: &&mut Worker| w.takes(&setup) && !w.holds(job) && asked(w) < ASKED && of(w);
-        let key = |w: &&mut Worker| (asked(w), w.load() * 1000 / w.slots);
-        let Some(worker) = self.workers.values_mut().filter(fits).min_by_key(key) else { return false };
+        let fits = |w: &&Worker| w.takes(&setup) && !w.holds(job) && asked(w) < ASKED && of(w);
+        let key = |w: &&Worker| (asked(w), w.load() * 1000 / w.slots);
+        let next = self.workers.values().filter(fits).min_by_key(key).map(|w| w.id);
+        let Some(mut worker) = next.and_then(|id| self.workers.get_mut(id)) else { return false };
         *dispute.asked.entry(worker.id).or_default() += 1;
         self.repeats.repeating(worker.id, index, self.run_times.last());
-        self.out.push(lease(worker, batch, index, self.now));
+        self.out.push(lease(&mut worker, batch, index, self.now));
         true
     }
 
@@ -89,7 +90,7 @@ impl Dispatcher {
         if self.repeats.told.insert(*batch.setup_of(index)) {
             self.out.push(Command::Notice(event(difference(opinions))));
         }
-        self.repeats.disputes.remove(&index);
+        self.repeats.no_dispute(index);
         for opinion in opinions {
             self.trusted(opinion.by);
         }
@@ -97,7 +98,7 @@ impl Dispatcher {
 
     /// Puts workers out; what they answered in this batch is made again.
     fn convict(&mut self, index: usize, opinions: &[Opinion], wrong: &BTreeSet<WorkerId>) {
-        self.repeats.disputes.remove(&index);
+        self.repeats.no_dispute(index);
         let right = opinions.iter().filter(|o| !wrong.contains(&o.by)).collect::<Vec<_>>();
         for opinion in &right {
             self.trusted(opinion.by);
@@ -128,11 +129,8 @@ impl Dispatcher {
         for &index in &again {
             batch.reopen(index);
             // Whoever repeats it makes it now.
-            let repeats = self.repeats.open.iter().copied().filter(|(by, job)| *job == index && *by != id);
-            for open in repeats.collect::<Vec<_>>() {
-                self.repeats.open.remove(&open);
-            }
-            self.repeats.disputes.remove(&index);
+            self.repeats.ended_but(id, index);
+            self.repeats.no_dispute(index);
             // Whoever still has it, as the loser of a race, answers it or gives it back.
             let job = batch.job_number(index);
             let has = |w: &Worker| w.id != id && w.holds(job) && !w.has_dropped(job);
@@ -140,10 +138,10 @@ impl Dispatcher {
                 batch.requeue(index);
             }
         }
-        self.repeats.contributors.remove(&id);
+        self.repeats.firsts.remove(id);
         self.repeats.hear_no_more(id);
         self.send_reopened();
-        let (name, build, taken) = self.workers.get(&id).map_or_else(
+        let (name, build, taken) = self.workers.get(id).map_or_else(
             || (called.to_owned(), String::new(), 0),
             |worker| (worker.name.clone(), worker.build.clone(), worker.taken),
         );
@@ -156,7 +154,7 @@ impl Dispatcher {
             earlier,
         };
         self.out.push(Command::Notice(notice));
-        if self.workers.contains_key(&id) {
+        if self.workers.contains_key(id) {
             self.out.push(Command::PutOut { worker: id, reason: reason.to_owned() });
             self.lose(id, reason, true);
         }
@@ -165,13 +163,13 @@ impl Dispatcher {
     /// Sends the setups of jobs that are open again to the workers that came, or forgot them, when none was.
     fn send_reopened(&mut self) {
         let Some(batch) = &self.batch else { return };
-        for worker in self.workers.values_mut() {
+        self.workers.for_each(|worker| {
             for &setup in batch.open_setups() {
                 if !worker.setups.contains_key(&setup) && worker.wants(setup, self.now) {
                     self.out.push(Command::SendSetup { worker: worker.id, setup });
                 }
             }
-        }
+        });
     }
 
     fn undecidable(&mut self, index: usize, opinions: &[Opinion]) {

@@ -14,15 +14,15 @@ use starlings_proto::Lease;
 use super::Dispatcher;
 use super::batch::{Batch, Doubt, Ended};
 use super::message::{BatchError, Command, ControlId, WorkerId};
-use super::roster::Worker;
 use super::schedule::lease;
+use super::workers::Changing;
 use crate::wire::Prediction;
 
 impl Dispatcher {
     /// An abnormal end: tried once more, and then decided by a control run in the same place.
     pub(super) fn doubted(&mut self, id: WorkerId, index: usize, text: String) {
         let Some(batch) = &mut self.batch else { return };
-        let name = self.workers.get(&id).map_or("", |w| w.name.as_str());
+        let name = self.workers.get(id).map_or("", |w| w.name.as_str());
         if batch.doubt(index) == Some(Doubt::Confirmed) {
             batch.set_doubt(index, None);
             batch.finish(index, Err(Failure::Model(ModelFailure::Solver(text))), (id, name));
@@ -54,9 +54,9 @@ impl Dispatcher {
         }
         for (index, by) in batch.parked().clone() {
             let job = batch.job_number(index);
-            let may = |w: &&mut Worker| w.may_control(batch.setup_of(index)) && !w.holds(job);
-            let place = self.workers.get_mut(&by).filter(may);
-            let Some(worker) = place else {
+            let may = |w: &Changing<'_>| w.may_control(batch.setup_of(index)) && !w.holds(job);
+            let place = self.workers.get_mut(by).filter(may);
+            let Some(mut worker) = place else {
                 // It fails once more in another place, and that one is asked.
                 if self.proven.knows(batch.name(index)) {
                     batch.unpark(index);
@@ -90,22 +90,25 @@ impl Dispatcher {
         result: Result<Prediction, ParticleError>,
     ) {
         let Some(batch) = &mut self.batch else { return };
-        let Some(worker) = self.workers.get_mut(&id) else { return };
+        let Some(mut worker) = self.workers.get_mut(id) else { return };
         let fault = result.err().map(|error| error.to_string());
         self.out.push(Command::Notice(batch.controlled(index, &worker.name, fault.clone())));
         match fault {
             // The worker forgot the setup meanwhile: the job waits until somebody has built it.
             None if !worker.is_ready(batch.setup_of(index)) => {
+                drop(worker);
                 batch.set_doubt(index, None);
                 batch.requeue(index);
                 self.works(id);
             }
             None => {
                 batch.set_doubt(index, Some(Doubt::Confirmed));
-                self.out.push(lease(worker, batch, index, now));
+                self.out.push(lease(&mut worker, batch, index, now));
+                drop(worker);
                 self.works(id);
             }
             Some(fault) => {
+                drop(worker);
                 batch.set_doubt(index, None);
                 batch.requeue(index);
                 self.set_aside(now, id, &format!("a run that worked before fails there: {fault}"));
@@ -115,7 +118,7 @@ impl Dispatcher {
 
     /// Whether a lease is open: its worker may still answer for its job.
     pub(crate) fn holds(&self, lease: &Lease) -> bool {
-        let worker = self.workers.get(&WorkerId(lease.epoch));
+        let worker = self.workers.get(WorkerId(lease.epoch));
         worker.is_some_and(|worker| worker.lease_of(lease.job) == Some(*lease))
     }
 

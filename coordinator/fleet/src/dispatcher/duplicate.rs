@@ -58,15 +58,16 @@ impl Dispatcher {
             let (job, setup) = (batch.job_number(index), *batch.setup_of(index));
             let has = |w: &&Worker| w.holds(job);
             let Some(slow) = self.workers.values().find(has).map(|w| w.name.clone()) else { continue };
-            let idle = |w: &&mut Worker| {
+            let idle = |w: &&Worker| {
                 let has_room = if usual < SHORT { w.has_room() } else { w.load() < w.slots };
                 w.takes(&setup) && has_room && !w.holds(job) && batch.may_duplicate(index, w.id)
             };
-            let Some(worker) = self.workers.values_mut().find(idle) else { continue };
+            let to = self.workers.values().find(idle).map(|w| w.id);
+            let Some(mut worker) = to.and_then(|id| self.workers.get_mut(id)) else { continue };
             let (name, to) = (batch.name(index), worker.name.clone());
             let (particle, record) = (name.particle, name.record);
             self.out.push(Command::Notice(FleetEvent::JobDuplicated { particle, record, slow, worker: to }));
-            self.out.push(lease(worker, batch, index, now));
+            self.out.push(lease(&mut worker, batch, index, now));
             self.duplicated.insert(index);
         }
     }
@@ -76,8 +77,8 @@ impl Dispatcher {
         let Some(batch) = &self.batch else { return };
         let usual = self.run_times.median().unwrap_or(0.0);
         let mut late = Vec::new();
-        for &(id, index) in &self.repeats.open {
-            let Some(worker) = self.workers.get_mut(&id) else { continue };
+        for &(id, index) in self.repeats.open() {
+            let Some(mut worker) = self.workers.get_mut(id) else { continue };
             let job = batch.job_number(index);
             let own = worker.ages(now).into_iter().find(|(held, _, _)| *held == job);
             if own.is_some_and(|(_, age, rounds)| age > limit(REPEAT_SHORTEST, REPEAT_FACTOR, usual, rounds))
@@ -86,7 +87,7 @@ impl Dispatcher {
             }
         }
         for (worker, index, lease) in late {
-            self.repeats.open.remove(&(worker, index));
+            self.repeats.ended(worker, index);
             self.no_opinion(worker, index);
             self.out.push(Command::Cancel { worker, leases: lease.into_iter().collect(), stop: true });
         }
@@ -100,7 +101,9 @@ impl Dispatcher {
         let Some(batch) = &self.batch else { return };
         let job = batch.job_number(index);
         let mut mute = Vec::new();
-        for worker in self.workers.values_mut().filter(|w| w.id != winner) {
+        let others = self.workers.values().filter(|w| w.id != winner && w.holds(job));
+        for id in others.map(|w| w.id).collect::<Vec<_>>() {
+            let Some(mut worker) = self.workers.get_mut(id) else { continue };
             let Some(lease) = worker.call_back(job) else { continue };
             self.out.push(Command::Cancel { worker: worker.id, leases: vec![lease], stop: true });
             worker.overtaken += 1;

@@ -51,11 +51,13 @@ impl Dispatcher {
         }
         let job = batch.job_number(index);
         // What it was given since is answered by itself.
-        if self.workers.get(&id).is_none_or(|worker| worker.holds(job)) {
+        if self.workers.get(id).is_none_or(|worker| worker.holds(job)) {
             return Taken::No;
         }
         let mut is_held = false;
-        for other in self.workers.values_mut().filter(|w| !w.has_dropped(job)) {
+        let others = self.workers.values().filter(|w| w.holds(job) && !w.has_dropped(job));
+        for id in others.map(|w| w.id).collect::<Vec<_>>() {
+            let Some(mut other) = self.workers.get_mut(id) else { continue };
             let Some(lease) = other.lease_of(job) else { continue };
             other.drop_lease(job);
             is_held = true;
@@ -64,8 +66,9 @@ impl Dispatcher {
         if !is_held && !batch.unqueue(index) {
             return Taken::No;
         }
-        let Some(worker) = self.workers.get_mut(&id) else { return Taken::No };
-        let lease = schedule::hold(worker, batch, index, now);
+        let Some(mut worker) = self.workers.get_mut(id) else { return Taken::No };
+        let lease = schedule::hold(&mut worker, batch, index, now);
+        drop(worker);
         match answer {
             Some((answer, cost)) => {
                 self.answered(now, id, lease, answer, cost);

@@ -74,6 +74,11 @@ impl Queue {
         true
     }
 
+    /// Whether no job waits.
+    pub(super) fn is_empty(&self) -> bool {
+        self.heads.is_empty() && self.retries.values().all(VecDeque::is_empty)
+    }
+
     /// Jobs that wait.
     pub(super) fn len(&self) -> usize {
         let fresh: usize = self.fresh.iter().map(VecDeque::len).sum();

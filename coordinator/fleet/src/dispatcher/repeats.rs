@@ -6,6 +6,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use starlings_proto::SetupId;
 
+use super::firsts::Firsts;
 use super::message::{Likeness, WorkerId};
 use super::opinion::Opinion;
 
@@ -23,17 +24,6 @@ const SAMPLED: u64 = 64;
 
 /// Of so many runs, and of so many seconds of theirs, at most one is a repeat, beside the first ones of each worker.
 pub(super) const MOST: u64 = 50;
-
-/// A worker whose results of this batch nobody has compared yet.
-#[derive(Debug)]
-pub(super) struct Contributor {
-    /// Its name with its build.
-    pub(super) name: String,
-    /// Its first result.
-    pub(super) index: usize,
-    /// Who was asked to repeat it and gave no result.
-    pub(super) tried: BTreeSet<WorkerId>,
-}
 
 /// Workers that say different things of a job.
 #[derive(Debug)]
@@ -59,8 +49,11 @@ pub(super) struct Repeats {
     /// Runs since one was repeated at the end of a batch.
     pub(super) since_last: u64,
     /// Leases of this batch that repeat a job.
-    pub(super) open: BTreeSet<(WorkerId, usize)>,
-    pub(super) contributors: BTreeMap<WorkerId, Contributor>,
+    open: BTreeSet<(WorkerId, usize)>,
+    /// The same by their jobs.
+    of_job: BTreeSet<(usize, WorkerId)>,
+    /// Workers whose results of this batch nobody has compared yet.
+    pub(super) firsts: Firsts,
     /// Jobs of this batch to repeat.
     pub(super) sampled: VecDeque<usize>,
     pub(super) disputes: BTreeMap<usize, Dispute>,
@@ -74,7 +67,8 @@ impl Repeats {
     /// Forgets what belongs to a batch.
     pub(super) fn begin(&mut self) {
         self.open.clear();
-        self.contributors.clear();
+        self.of_job.clear();
+        self.firsts = Firsts::default();
         self.sampled.clear();
         self.disputes.clear();
         self.wrong.clear();
@@ -95,27 +89,86 @@ impl Repeats {
     /// Takes note of a repeat of a run of so many seconds.
     pub(super) fn repeating(&mut self, worker: WorkerId, index: usize, seconds: f64) {
         self.open.insert((worker, index));
+        self.of_job.insert((index, worker));
         self.n_repeat += 1;
         self.repeat_time += seconds;
     }
 
+    /// Leases of this batch that repeat a job.
+    pub(super) fn open(&self) -> &BTreeSet<(WorkerId, usize)> {
+        &self.open
+    }
+
+    /// Whether a worker repeats a job.
+    pub(super) fn is_open(&self, worker: WorkerId, index: usize) -> bool {
+        self.open.contains(&(worker, index))
+    }
+
+    /// A worker repeats a job no more; false where it did not.
+    pub(super) fn ended(&mut self, worker: WorkerId, index: usize) -> bool {
+        let was_open = self.open.remove(&(worker, index));
+        if was_open {
+            self.of_job.remove(&(index, worker));
+            self.firsts.look_again(index);
+        }
+        was_open
+    }
+
+    /// Nobody repeats a job any more but this worker, where it does.
+    pub(super) fn ended_but(&mut self, worker: WorkerId, index: usize) {
+        for other in self.repeating_it(index).filter(|by| *by != worker).collect::<Vec<_>>() {
+            self.ended(other, index);
+        }
+    }
+
     /// Whether a job of this batch is being repeated.
     pub(super) fn repeats(&self, index: usize) -> bool {
-        self.open.iter().any(|(_, job)| *job == index)
+        self.repeating_it(index).next().is_some()
+    }
+
+    fn repeating_it(&self, index: usize) -> impl Iterator<Item = WorkerId> {
+        let all = (index, WorkerId(0))..=(index, WorkerId(u64::MAX));
+        self.of_job.range(all).map(|(_, worker)| *worker)
+    }
+
+    /// A dispute is over.
+    pub(super) fn no_dispute(&mut self, index: usize) {
+        if self.disputes.remove(&index).is_some() {
+            self.firsts.look_again(index);
+        }
+    }
+
+    /// A worker after this one, and its first result, that nobody repeats and of which there is no dispute.
+    pub(super) fn next_first(&mut self, passed: Option<WorkerId>) -> Option<(WorkerId, usize)> {
+        let mut at = passed;
+        while let Some((id, index)) = self.firsts.next_due(at) {
+            if !self.repeats(index) && !self.disputes.contains_key(&index) {
+                return Some((id, index));
+            }
+            self.firsts.wait(id);
+            at = Some(id);
+        }
+        None
     }
 
     /// A worker was wrong: what it says elsewhere is no opinion, and where only one is left there is no dispute.
     pub(super) fn hear_no_more(&mut self, worker: WorkerId) {
         self.wrong.insert(worker);
-        self.disputes.retain(|_, dispute| {
+        for dispute in self.disputes.values_mut() {
             dispute.opinions.retain(|opinion| opinion.by != worker);
-            dispute.opinions.len() > 1
-        });
+        }
+        let over = self.disputes.iter().filter(|(_, dispute)| dispute.opinions.len() < 2);
+        for index in over.map(|(index, _)| *index).collect::<Vec<_>>() {
+            self.no_dispute(index);
+        }
     }
 
     /// A worker is gone: its repeats are.
     pub(super) fn forget(&mut self, worker: WorkerId) {
-        self.open.retain(|(by, _)| *by != worker);
+        let its = self.open.range((worker, 0)..=(worker, usize::MAX));
+        for (_, index) in its.copied().collect::<Vec<_>>() {
+            self.ended(worker, index);
+        }
         self.compared.retain(|(by, _)| *by != worker);
     }
 }

@@ -60,6 +60,8 @@ pub(super) struct Worker {
     /// Why it gets no jobs at the moment.
     pub(super) aside: Option<Aside>,
     held: BTreeMap<u64, Held>,
+    /// Of these, how many were called back.
+    n_recalled: usize,
     sent: u64,
     cost: Option<f64>,
     /// BLAKE3 of its executable in hexadecimal; empty when unknown.
@@ -109,6 +111,7 @@ impl Worker {
             unanswered: BTreeSet::new(),
             aside: None,
             held: BTreeMap::new(),
+            n_recalled: 0,
             sent: 0,
             cost: None,
             build: joining.build.map_or_else(String::new, |hash| hex(&hash)),
@@ -127,7 +130,7 @@ impl Worker {
 
     /// Leases called back that have not started: they are on their way back. One that had started meanwhile runs to its end.
     pub(super) fn n_returning(&self) -> usize {
-        if self.held.values().all(|held| !held.recalled) {
+        if self.n_recalled == 0 {
             return 0;
         }
         let waiting = self.leases_in_order().split_off(self.slots.min(self.load()));
@@ -205,10 +208,9 @@ impl Worker {
     pub(super) fn hold(&mut self, lease: Lease, since: Duration) {
         self.sent += 1;
         let (attempt, order) = (lease.attempt, self.sent);
-        self.held.insert(
-            lease.job,
-            Held { attempt, order, recalled: false, dropped: false, since, running_since: None },
-        );
+        let held = Held { attempt, order, recalled: false, dropped: false, since, running_since: None };
+        let before = self.held.insert(lease.job, held);
+        self.n_recalled -= usize::from(before.is_some_and(|held| held.recalled));
     }
 
     /// Its name, with its build where that is known.
@@ -260,16 +262,4 @@ impl Worker {
     pub(super) fn forget_cost(&mut self) {
         self.cost = None;
     }
-}
-
-/// The worker with the fewest leases per slot among those that `may`, are ready and have room; the earlier one of equals.
-pub(super) fn least_loaded<'a>(
-    workers: &'a mut BTreeMap<WorkerId, Worker>,
-    setup: &SetupId,
-    may: impl Fn(&Worker) -> bool,
-) -> Option<&'a mut Worker> {
-    workers
-        .values_mut()
-        .filter(|w| may(w) && w.has_room() && w.is_ready(setup))
-        .min_by(|a, b| (a.load() * b.slots).cmp(&(b.load() * a.slots)))
 }

@@ -1,6 +1,6 @@
 //! Scheduling, done after every event: failures settle, control runs are made, jobs are assigned and recalled, the batch ends.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::time::Duration;
 
 use starlings_proto::{Lease, SetupId};
@@ -8,7 +8,8 @@ use starlings_proto::{Lease, SetupId};
 use super::Dispatcher;
 use super::batch::Batch;
 use super::message::{BatchError, Command, WorkerId};
-use super::roster::{self, SetupState, Worker};
+use super::roster::{SetupState, Worker};
+use super::workers::Workers;
 
 impl Dispatcher {
     /// Everything that may follow from any event: settle, make control runs, compare, assign, recall, end.
@@ -89,75 +90,67 @@ impl Dispatcher {
 
     fn assign(&mut self) {
         let Some(batch) = &mut self.batch else { return };
+        if batch.queue.is_empty() || !self.workers.have_room() {
+            return;
+        }
         for key in batch.queue.retries() {
             let setup = *batch.setup(key.setup);
             while let Some(index) = batch.queue.first_retry(key) {
                 // One that was told to stop it and has not answered has it still.
                 let job = batch.job_number(index);
                 let may = |w: &Worker| Some(w.id) != key.avoided && !w.holds(job);
-                let Some(worker) = roster::least_loaded(&mut self.workers, &setup, may) else { break };
+                let Some(mut worker) = self.workers.least_loaded(&setup, may) else { break };
                 batch.queue.next_retry(key);
-                self.out.push(lease(worker, batch, index, self.now));
+                self.out.push(lease(&mut worker, batch, index, self.now));
             }
         }
         // The earliest fresh job whose setup is built on a worker with room; jobs of setups still being built let it pass.
         while let Some(setup) = next_setup(&self.workers, batch) {
             let id = *batch.setup(setup);
-            let Some(worker) = roster::least_loaded(&mut self.workers, &id, |_| true) else { break };
+            let Some(mut worker) = self.workers.least_loaded(&id, |_| true) else { break };
             let Some(index) = batch.queue.next_fresh(setup) else { break };
-            self.out.push(lease(worker, batch, index, self.now));
+            self.out.push(lease(&mut worker, batch, index, self.now));
         }
     }
 
     /// Calls back jobs that wait behind a busy slot while another slot is idle.
     fn recall(&mut self) {
         let Some(batch) = &mut self.batch else { return };
-        let idle =
-            self.workers.values().filter(|w| w.aside.is_none() && w.load() < w.slots).collect::<Vec<_>>();
-        if idle.is_empty() {
+        let (n_idle, n_returning) = self.workers.idle_and_returning();
+        if n_idle <= n_returning || self.workers.overfull().next().is_none() {
             return;
         }
+        let idle = self.workers.idle().collect::<Vec<_>>();
         let runnable = batch.open_setups().filter(|setup| idle.iter().any(|w| w.is_ready(setup)));
         let runnable = runnable.copied().collect::<BTreeSet<SetupId>>();
         let useful = idle.iter().filter(|w| runnable.iter().any(|setup| w.is_ready(setup)));
         let free: usize = useful.map(|w| w.slots - w.load()).sum();
-        let mut open = match free {
-            0 => 0,
-            free => free.saturating_sub(self.workers.values().map(Worker::n_returning).sum()),
-        };
-        let mut victims = Vec::<WorkerId>::new();
-        if open > 0 {
-            victims.extend(self.workers.values().filter(|w| w.surplus() > 0).map(|w| w.id));
-        }
+        let mut passed = BTreeSet::new();
         // The fullest first; one whose waiting jobs have all been called back before is passed over.
-        while open > 0 {
-            let fullest =
-                victims.iter().copied().max_by_key(|id| self.workers.get(id).map_or(0, Worker::surplus));
-            let Some(victim) = fullest.and_then(|id| self.workers.get_mut(&id)) else { break };
-            let held = if victim.surplus() > 0 {
-                victim.youngest(|job| batch.may_recall(job, &runnable))
-            } else {
-                None
+        for _ in n_returning..free {
+            let called = loop {
+                let Some(id) = self.workers.overfull().find(|id| !passed.contains(id)) else { return };
+                let victim = self.workers.get_mut(id);
+                if let Some(held) =
+                    victim.and_then(|mut w| w.youngest(|job| batch.may_recall(job, &runnable)))
+                {
+                    break held;
+                }
+                passed.insert(id);
             };
-            let Some(held) = held else {
-                let passed = victim.id;
-                victims.retain(|&id| id != passed);
-                continue;
-            };
-            batch.mark_recalled(held.job);
-            self.out.push(Command::Cancel { worker: victim.id, leases: vec![held], stop: false });
-            open -= 1;
+            batch.mark_recalled(called.job);
+            let worker = WorkerId(called.epoch);
+            self.out.push(Command::Cancel { worker, leases: vec![called], stop: false });
         }
     }
 }
 
 /// The setup of the earliest fresh job that a worker with room could run now.
-fn next_setup(workers: &BTreeMap<WorkerId, Worker>, batch: &Batch) -> Option<usize> {
-    let open = workers.values().filter(|w| w.has_room()).collect::<Vec<_>>();
-    if open.is_empty() {
+fn next_setup(workers: &Workers, batch: &Batch) -> Option<usize> {
+    if !workers.have_room() {
         return None;
     }
-    batch.queue.fresh_setups().find(|&setup| open.iter().any(|w| w.is_ready(batch.setup(setup))))
+    batch.queue.fresh_setups().find(|&setup| workers.have_room_for(batch.setup(setup)))
 }
 
 /// Assigns a job to a worker.

@@ -13,10 +13,11 @@ use crate::FleetEvent;
 
 impl Dispatcher {
     pub(super) fn setup_answered(&mut self, now: Duration, id: WorkerId, setup: SetupId, state: SetupState) {
-        let Some(worker) = self.workers.get_mut(&id) else { return };
+        let Some(mut worker) = self.workers.get_mut(id) else { return };
         worker.last_heard = now;
         let needed = self.batch.as_ref().is_some_and(|batch| batch.needs(&setup));
         if worker.answers_unasked(&setup, &state) {
+            drop(worker);
             return self.stray(id, "it speaks of setups that it was not sent, again and again");
         }
         if let SetupState::Failed(reason) = &state {

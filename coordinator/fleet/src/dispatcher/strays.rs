@@ -9,9 +9,11 @@ const STRAYS: u32 = 100;
 impl Dispatcher {
     /// Counts one.
     pub(super) fn stray(&mut self, id: WorkerId, reason: &str) {
-        let Some(worker) = self.workers.get_mut(&id) else { return };
+        let Some(mut worker) = self.workers.get_mut(id) else { return };
         worker.strays += 1;
-        if worker.strays > STRAYS {
+        let too_many = worker.strays > STRAYS;
+        drop(worker);
+        if too_many {
             self.out.push(Command::PutOut { worker: id, reason: reason.to_owned() });
             self.lose(id, reason, true);
         }

@@ -10,6 +10,7 @@ mod held;
 mod leases;
 mod losses;
 mod mixed;
+pub(super) mod plain;
 mod recall;
 mod repeats;
 mod waiting;
@@ -29,7 +30,7 @@ const SETUP: SetupId = [7; 32];
 impl Dispatcher {
     /// Number of leases that a worker holds.
     fn in_flight(&self, worker: WorkerId) -> usize {
-        self.workers.get(&worker).map_or(0, Worker::load)
+        self.workers.get(worker).map_or(0, Worker::load)
     }
 }
 

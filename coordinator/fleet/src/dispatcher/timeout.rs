@@ -29,13 +29,13 @@ impl Dispatcher {
                 let Some(index) = batch.index_of(job) else { continue };
                 let is_late = now.saturating_sub(since).as_secs_f64() > limit && !worker.has_dropped(job);
                 let is_plain = batch.doubt(index).is_none() && !batch.is_finished(index);
-                if is_late && is_plain && !self.repeats.open.contains(&(worker.id, index)) {
+                if is_late && is_plain && !self.repeats.is_open(worker.id, index) {
                     late.extend(worker.lease_of(job).map(|lease| (worker.id, index, lease)));
                 }
             }
         }
         for (id, index, lease) in late {
-            if let Some(worker) = self.workers.get_mut(&id) {
+            if let Some(mut worker) = self.workers.get_mut(id) {
                 worker.drop_lease(lease.job);
             }
             self.out.push(Command::Cancel { worker: id, leases: vec![lease], stop: true });

@@ -41,7 +41,7 @@ impl Dispatcher {
         self.last_tick = Some(now);
         if gap > self.rules.heartbeat {
             // This process stood still (suspended, or starved of processor time): what workers sent meanwhile is unread.
-            self.workers.values_mut().for_each(|w| w.stood_still(gap, now));
+            self.workers.for_each(|w| w.stood_still(gap, now));
         }
         let limit = self.rules.heartbeat.mul_f64(SILENT);
         let silent = self.workers.values().filter(|w| now.saturating_sub(w.last_heard) > limit);
@@ -50,10 +50,11 @@ impl Dispatcher {
             self.out.push(Command::Close { worker: id });
             self.lose(id, &reason, false);
         }
-        self.workers
-            .values_mut()
-            .filter_map(|worker| worker.aside.as_mut())
-            .for_each(|aside| aside.look_again(now));
+        self.workers.for_each(|worker| {
+            if let Some(aside) = &mut worker.aside {
+                aside.look_again(now);
+            }
+        });
         if let Some(progress) = self.batch.as_mut().and_then(Batch::progress) {
             self.out.push(Command::Notice(progress));
         }
@@ -68,7 +69,7 @@ impl Dispatcher {
     fn watch_setups(&mut self, now: Duration) {
         let Some(batch) = &self.batch else { return };
         let patience = self.rules.patience;
-        for worker in self.workers.values_mut() {
+        self.workers.for_each(|worker| {
             for setup in batch.setups() {
                 let Some(state) = worker.setups.get_mut(setup) else { continue };
                 if matches!(state, SetupState::Pending { since } if now.saturating_sub(*since) >= patience) {
@@ -79,7 +80,7 @@ impl Dispatcher {
                     self.out.push(Command::Notice(notice));
                 }
             }
-        }
+        });
     }
 
     /// Says what is missing while no worker can take any job of the batch, and ends the batch when patience does.
@@ -160,7 +161,7 @@ impl Dispatcher {
     /// Names the job that has been computing for longest when it takes much longer than the others did, and again after twice as
     /// long. It is not ended: how long a run may take is not known here.
     fn watch_overdue(&mut self, now: Duration) {
-        self.workers.values_mut().for_each(|worker| worker.mark_running(now));
+        self.workers.for_each(|worker| worker.mark_running(now));
         let Some(batch) = &self.batch else { return };
         let running =
             self.workers.values().flat_map(|w| w.running().map(move |(job, since)| (since, job, w)));

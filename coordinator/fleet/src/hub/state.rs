@@ -18,6 +18,7 @@ use super::teller::Teller;
 use super::waiting::Waiting;
 use crate::dispatcher::{BatchError, Command, ControlId, Dispatcher, Event, WorkerId};
 use crate::event_kind::OVER;
+use crate::run_traces::Spans;
 use crate::tally::Counting;
 use crate::wire::{Job, named};
 use crate::{FleetEvent, StateStore, StoredState};
@@ -43,6 +44,7 @@ pub(super) struct State {
     pub(super) blocks: Blocks,
     pub(super) events: Teller,
     pub(super) counting: Counting,
+    pub(super) spans: Spans,
     /// The time of the last event.
     now: Duration,
     pub(super) first_epoch: u64,
@@ -106,6 +108,7 @@ impl State {
             blocks: Blocks::default(),
             events: Teller::new(events),
             counting: Counting::default(),
+            spans: Spans::default(),
             now: Duration::ZERO,
             first_epoch,
             joined: 0,
@@ -148,6 +151,7 @@ impl State {
             Event::Answered { worker, lease, answer, cost } => {
                 let own = lease.epoch == worker.0;
                 let answer = if own { self.checked(&lease, answer) } else { answer };
+                self.spans.end(&lease, &answer);
                 if own && self.dispatcher.holds(&lease) {
                     self.counting.ended(&answer, cost);
                 }
@@ -199,14 +203,14 @@ impl State {
                 let Some(Submission { jobs, encoder, .. }) = &mut self.running else { return };
                 let (Some(job), Some(link)) = (jobs.get(index), self.links.get_mut(&worker)) else { return };
                 self.counting.given(&job.1);
-                link.give(encoder, lease, job);
+                link.give(encoder, &mut self.spans, lease, job);
             }
             Command::SendControl { worker, lease, control } => {
                 let Some(Submission { encoder, .. }) = &mut self.running else { return };
                 let (Some(job), Some(link)) = (self.kept.get(&control), self.links.get_mut(&worker)) else {
                     return;
                 };
-                link.give(encoder, lease, job);
+                link.give(encoder, &mut self.spans, lease, job);
             }
             Command::Keep { control, index } => {
                 let job = self.running.as_ref().and_then(|running| running.jobs.get(index));

@@ -148,7 +148,9 @@ fn courses(
         };
         let theta = trial.theta.iter().zip(&kept).filter(|(_, kept)| **kept).map(|(v, _)| *v).collect();
         let job = Job { particle: 0, record: index as u32, window: Arc::new(window), theta, state: None };
-        let outputs = model.run_within(&job, &Until { spent: &spent(), stop: &Stop::default() })?.outputs;
+        let outputs = model
+            .run_within(&job, &Until { spent: &spent(), stop: &Stop::default(), traceparent: None })?
+            .outputs;
         for row in outputs.chunks(n_obs.max(1)) {
             bare.outputs.iter().zip(row).for_each(|(name, value)| widen(name, *value));
         }

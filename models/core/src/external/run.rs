@@ -28,4 +28,6 @@ pub struct Run<'a> {
     pub constants: &'a [(String, f64)],
     /// Tells when nobody wants the answer any more; the program is then ended.
     pub stop: Option<&'a Stop>,
+    /// Where the run belongs in a trace, `traceparent` of the W3C recommendation "Trace Context".
+    pub traceparent: Option<&'a str>,
 }

@@ -147,13 +147,22 @@ impl PerRun {
         Ok(())
     }
 
-    fn launch(&self, command: &[String], folder: &Path, core_slot: usize) -> Result<Process, SolverError> {
+    fn launch(
+        &self,
+        command: &[String],
+        folder: &Path,
+        core_slot: usize,
+        traceparent: Option<&str>,
+    ) -> Result<Process, SolverError> {
         let threads = self.def.threads;
+        let mut environment = self.def.environment.clone();
+        // By its usual name, as tools that trace programs look for it.
+        environment.extend(traceparent.map(|text| ("TRACEPARENT".to_owned(), text.to_owned())));
         self.site.start(&Launch {
             command,
             base: &self.def.folder,
             folder: Some(folder),
-            environment: self.def.environment.clone(),
+            environment,
             threads,
             cores: self.def.pin.then(|| self.site.cores(core_slot, threads)),
             memory: self.def.memory,
@@ -174,7 +183,7 @@ impl PerRun {
         let told = request::document(spec, run).to_string();
         let core_slot = self.core_slots.take();
         let command = request::filled(&self.command, spec, run, scratch.path());
-        let started = self.launch(&command, scratch.path(), core_slot.number());
+        let started = self.launch(&command, scratch.path(), core_slot.number(), run.traceparent);
         let mut process = started.map_err(|error| {
             let what = error.to_string();
             if scratch.is_gone() && !last { Failed::Disturbed(what) } else { Failed::Host(what) }

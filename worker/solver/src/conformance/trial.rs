@@ -63,6 +63,7 @@ impl Trial {
             terms: &[],
             constants: &[],
             stop: None,
+            traceparent: None,
         }
     }
 }

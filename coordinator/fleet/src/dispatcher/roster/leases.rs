@@ -51,18 +51,22 @@ impl Worker {
         self.held.get(&job).filter(|held| held.attempt == attempt)?;
         self.answers += 1;
         self.overtaken = 0;
-        self.held.remove(&job).map(|held| Released { recalled: held.recalled, dropped: held.dropped })
+        let held = self.held.remove(&job)?;
+        self.n_recalled -= usize::from(held.recalled);
+        Some(Released { recalled: held.recalled, dropped: held.dropped })
     }
 
     /// Its lease of this job, which is called back from it: that it gives the job back is no surprise then.
     pub(in crate::dispatcher) fn call_back(&mut self, job: u64) -> Option<Lease> {
-        self.held.get_mut(&job)?.recalled = true;
+        let was = std::mem::replace(&mut self.held.get_mut(&job)?.recalled, true);
+        self.n_recalled += usize::from(!was);
         self.lease_of(job)
     }
 
     /// All its leases, which are called back.
     pub(in crate::dispatcher) fn call_back_all(&mut self) -> Vec<Lease> {
         self.held.values_mut().for_each(|held| held.recalled = true);
+        self.n_recalled = self.held.len();
         self.leases().collect()
     }
 
@@ -82,8 +86,6 @@ impl Worker {
         let waiting = self.leases_in_order().split_off(self.slots.min(self.load()));
         let open = |job: &u64| may(*job) && self.held.get(job).is_some_and(|held| !held.recalled);
         let job = waiting.into_iter().rfind(open)?;
-        let held = self.held.get_mut(&job)?;
-        held.recalled = true;
-        Some(Lease { epoch: self.id.0, job, attempt: held.attempt })
+        self.call_back(job)
     }
 }

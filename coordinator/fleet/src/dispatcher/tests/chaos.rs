@@ -2,6 +2,7 @@
 
 mod act;
 mod draw;
+mod fair;
 mod world;
 
 use act::{Act, act, late};

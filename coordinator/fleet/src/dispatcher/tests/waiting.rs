@@ -160,6 +160,10 @@ fn a_batch_whose_runs_are_all_made_waits_for_a_slow_setup_as_long_as_patience_la
 
 #[test]
 fn a_worker_that_refuses_a_setup_after_patience_ended_is_not_blamed_the_first_time() {
+    let worker = |stage: &Stage| {
+        let one = stage.dispatcher.workers.get(WorkerId(1)).expect("it is there");
+        (one.may_run(&SETUP), one.strays)
+    };
     let mut stage = Stage::with(&[]);
     stage.step(submit(1));
     stage.step(Event::Joined(joining(1, 1)));
@@ -168,15 +172,14 @@ fn a_worker_that_refuses_a_setup_after_patience_ended_is_not_blamed_the_first_ti
     stage.step(Event::Joined(joining(2, 1)));
     stage.step(Event::SetupDone { worker: WorkerId(2), setup: SETUP });
     stage.seconds(2, &[1, 2]);
-    assert!(!stage.dispatcher.workers[&WorkerId(1)].may_run(&SETUP), "it counts as failed");
+    assert_eq!(worker(&stage), (false, 0), "it counts as failed");
     let refused =
         || Event::SetupFailed { worker: WorkerId(1), setup: SETUP, reason: "no compiler".to_owned() };
-    let strays = |stage: &Stage| stage.dispatcher.workers[&WorkerId(1)].strays;
     let told = stage.step(refused());
     assert!(told.iter().any(
         |c| matches!(c, Command::Notice(FleetEvent::SetupFailed { reason, .. }) if reason == "no compiler")
     ));
-    assert_eq!(strays(&stage), 0);
+    assert_eq!(worker(&stage).1, 0);
     stage.step(refused());
-    assert_eq!(strays(&stage), 1);
+    assert_eq!(worker(&stage).1, 1);
 }

@@ -134,5 +134,6 @@ fn sample<'a>(window: &'a Window, parameters: &'a [f64]) -> Run<'a> {
         terms: &[],
         constants: &[],
         stop: None,
+        traceparent: None,
     }
 }

@@ -126,6 +126,7 @@ mod tests {
             terms: &[],
             constants: &[],
             stop: None,
+            traceparent: None,
         };
         let made =
             filled(&words("run --E={E} {load}/{end} {print} {folder}/a"), &spec(), &run, Path::new("/s"));

@@ -206,6 +206,7 @@ mod tests {
             terms: &[],
             constants: &[],
             stop: None,
+            traceparent: None,
         };
         let texts = BTreeMap::from([("beam.inp".to_owned(), text.to_owned())]);
         let templates = Templates::new(&texts).map_err(|error| error.to_string())?;

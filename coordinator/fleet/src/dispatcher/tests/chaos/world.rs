@@ -38,6 +38,10 @@ pub(super) struct World {
     pub(super) strays: u32,
     /// Workers that were put out.
     pub(super) put_out: BTreeSet<u64>,
+    /// Names of workers that are set aside, each with the time since when.
+    pub(super) aside: BTreeMap<String, Duration>,
+    /// The control run that is being answered: its worker and the job that it was made for.
+    pub(super) controlled: Option<(u64, usize)>,
     pub(super) ended: Option<Result<Vec<Outcome>, BatchError>>,
 }
 
@@ -71,6 +75,8 @@ impl World {
             answered: BTreeSet::new(),
             strays: 0,
             put_out: BTreeSet::new(),
+            aside: BTreeMap::new(),
+            controlled: None,
             ended: None,
         };
         if local {
@@ -96,6 +102,7 @@ impl World {
                 let needed = (worker.0, setup(self.setups[index]));
                 assert!(self.built.contains(&needed), "a job is sent only to a worker with its setup");
                 assert!(self.alive.contains(&worker.0), "a job is sent only to a live worker");
+                self.assert_sound(worker, index);
                 let twice = self.open.values().any(|(_, open)| *open == index);
                 let again = self.duplicated.contains(&index) || self.answered.contains(&index);
                 let stopped =
@@ -111,6 +118,7 @@ impl World {
                 assert!(self.kept.contains(&control), "a control run is one that is kept");
                 assert!(self.alive.contains(&worker.0), "a control run is made by a live worker");
                 let index = (lease.job - 1) as usize;
+                self.assert_sound(worker, index);
                 let stopped =
                     |(lease, open): &(Lease, usize)| *open != index || self.withdrawn.contains(lease);
                 assert!(
@@ -137,11 +145,18 @@ impl World {
             Command::Notice(FleetEvent::JobDuplicated { particle, .. }) => {
                 self.duplicated.insert(particle as usize);
             }
+            Command::Notice(FleetEvent::WorkerSetAside { worker, .. }) => {
+                self.aside.insert(worker, self.now);
+            }
+            Command::Notice(FleetEvent::WorkerBack { worker }) => {
+                self.aside.remove(&worker);
+            }
             Command::Notice(_) | Command::GivenUp { .. } => {}
         }
     }
 
     pub(super) fn forget(&mut self, worker: u64) {
+        self.aside.remove(&format!("w{worker}"));
         self.alive.remove(&worker);
         self.to_build.retain(|(of, _)| *of != worker);
         self.built.retain(|(of, _)| *of != worker);
@@ -160,11 +175,12 @@ impl World {
     pub(super) fn answer(&mut self, which: usize, answer: impl FnOnce(usize) -> LeaseOutcome, cost: f64) {
         let Some((&key, &(lease, index))) = pick(&self.open, which) else { return };
         self.open.remove(&key);
-        self.controls.remove(&key);
+        self.controlled = self.controls.remove(&key).then_some((key.0, index));
         self.withdrawn.retain(|other| *other != lease);
         self.past.push(lease);
         self.answered.insert(index);
         self.event(answered(lease, answer(index), cost));
+        self.controlled = None;
     }
 
     pub(super) fn act(&mut self, act: &Act) {
@@ -222,16 +238,6 @@ impl World {
             }
         }
         self.assert_fair();
-    }
-
-    /// No worker is charged for what it does not have, or blamed for what it was asked for.
-    fn assert_fair(&self) {
-        for &worker in &self.alive {
-            let open = self.open.keys().filter(|(of, _)| *of == worker).count();
-            assert_eq!(self.dispatcher.in_flight(WorkerId(worker)), open, "credit follows the open leases");
-        }
-        let strays: u32 = self.dispatcher.workers.values().map(|worker| worker.strays).sum();
-        assert!(strays <= self.strays, "a worker is blamed for answers that it was asked for");
     }
 
     fn repeat(&mut self, which: usize) {
