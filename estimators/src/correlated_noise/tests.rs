@@ -81,7 +81,7 @@ fn the_noise_that_made_the_values_is_found_over_several_stretches() {
 fn the_families_tell_noise_with_a_memory_from_white_noise_with_something_on_top() {
     let n = 400;
     let of_the_noise = CorrelatedNoise { white: 0.02, correlated: 0.98, length: 0.2 };
-    let on_top = CorrelatedNoise { white: 1.0, correlated: 0.5, length: 0.6 };
+    let on_top = CorrelatedNoise { white: 1.0, correlated: 1.5, length: 0.6 };
     for seed in 0..10 {
         let both = |noise: &CorrelatedNoise| {
             let series = [drawn(noise, n, seed)];
