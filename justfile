@@ -32,7 +32,7 @@ diagnostics:
     cargo test --release -p starlings-structures --test plate_search -- --ignored --nocapture
     cargo test --release -p starlings-estimators --test nozzle -- --ignored --nocapture
 
-# Every system, effect and noise level of docs/battery.md: about an hour. BATTERY_SYSTEMS, BATTERY_KINDS, BATTERY_NOISE, BATTERY_SEEDS, BATTERY_THREADS choose.
+# Every system, effect and noise level of docs/battery.md: about an hour. BATTERY_SYSTEMS, BATTERY_KINDS, BATTERY_NOISE, BATTERY_CORRELATION, BATTERY_SEEDS, BATTERY_THREADS choose.
 explain-battery:
     cargo test --release -p starlings-coordinator --test explain_battery -- --ignored --nocapture the_whole
 

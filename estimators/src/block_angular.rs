@@ -207,6 +207,15 @@ impl BlockAngular {
         }
     }
 
+    /// Changes the entries of every column of every block, which are those of its rows; `change` gets the first of these as well.
+    pub fn for_each_column(&mut self, mut change: impl FnMut(usize, &mut [f64])) {
+        for block in Arc::make_mut(&mut self.blocks) {
+            for mut column in block.values.column_iter_mut() {
+                change(block.rows.start, column.as_mut_slice());
+            }
+        }
+    }
+
     /// The secant update: changes A so that A x, for a step x (p), comes closer to the observed change; `surprise` (m) is the
     /// observed change minus A x.
     ///

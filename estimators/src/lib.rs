@@ -13,6 +13,7 @@ mod analysis;
 mod batch;
 mod block_angular;
 mod blocks;
+mod correlated_noise;
 mod data;
 mod diagnostics;
 mod drift;
@@ -49,6 +50,7 @@ pub use analysis::Analysis;
 pub use batch::{BATCH, Batch, BatchState, BatchStep};
 pub use block_angular::{BlockAngular, BlockRow};
 pub use blocks::Block;
+pub use correlated_noise::{CorrelatedNoise, FittedNoise, Part, Series, fit_noise};
 pub use data::{Data, Noise};
 pub use diagnostics::{
     autocorrelation, correlation, effective_nis_band, effective_sample_size, nis_band,

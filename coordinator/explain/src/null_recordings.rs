@@ -1,8 +1,8 @@
 //! The measured false-alarm rate of a study: the whole search on simulated recordings in which no effect is missing.
 //!
-//! Each recording is the fitted model as it is plus noise of the stated sd, with the gaps and spans of the measured one. Runs
-//! that the search has made already are not made again, since a run does not depend on the measured values. Next file to read:
-//! [`crate::diagnosis`].
+//! Each recording is the fitted model as it is plus noise of the stated sd, correlated where that of the measured one is, with its
+//! gaps and spans. Runs that the search has made already are not made again, since a run does not depend on the measured values.
+//! Next file to read: [`crate::diagnosis`].
 
 use std::sync::Arc;
 
@@ -22,13 +22,14 @@ use crate::run_cache::RunCache;
 use crate::tell::result::Nulls;
 use crate::tell::summary;
 
-/// Searches `options.nulls` simulated recordings. `predicted` is what the fitted model as it is predicts, by row.
+/// Searches `options.nulls` simulated recordings. `fitted` is what the fitted model as it is predicts, by row, and the rows with their
+/// noise.
 ///
 /// # Errors
 /// When the fleet or the store fails. A simulated recording whose fit does not converge counts as one without a name.
 pub(super) fn measure(
     study: &Study,
-    predicted: &[f64],
+    fitted: &(Arc<Vec<f64>>, Rows),
     fleet: &mut dyn Fleet,
     store: &Store,
     context: &mut Context<'_>,
@@ -37,7 +38,7 @@ pub(super) fn measure(
     let mut nulls = Nulls { of: options.nulls, ..Nulls::default() };
     let options = Options { force: true, ..options.clone() };
     for k in 0..nulls.of {
-        let simulated = simulated(study, predicted, &mut random(study.seed, k as u64));
+        let simulated = simulated(study, fitted, &mut random(study.seed, k as u64));
         let (runs, n_worker) = (nulls.runs, fleet.n_workers());
         let says = format!("{} of {} recordings without a gap", k + 1, nulls.of);
         (context.watch)(&Stage { name: "null", says, runs, workers: n_worker });
@@ -72,11 +73,12 @@ fn random(seed: u64, k: u64) -> ChaCha8Rng {
 }
 
 /// The study with its measured values replaced by predictions and noise.
-fn simulated(study: &Study, predicted: &[f64], random: &mut ChaCha8Rng) -> Study {
+fn simulated(study: &Study, (predicted, rows): &(Arc<Vec<f64>>, Rows), random: &mut ChaCha8Rng) -> Study {
     let mut simulated = study.clone();
     let records = Arc::make_mut(&mut simulated.records);
-    for (row, y) in Rows::new(study).rows.iter().zip(predicted) {
-        let noise: f64 = StandardNormal.sample(random);
+    let mut noise: Vec<f64> = rows.rows.iter().map(|_| StandardNormal.sample(random)).collect();
+    rows.colour(0, &mut noise);
+    for ((row, y), noise) in rows.rows.iter().zip(&**predicted).zip(noise) {
         records[row.record].channels[row.channel].values[row.step] = y + row.noise * noise;
     }
     simulated

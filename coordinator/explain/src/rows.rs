@@ -1,7 +1,12 @@
 //! Every measured value of a study as one row, in a fixed order that all steps share.
 //!
-//! Predictions and residuals are vectors aligned with these rows. Next file to read: [`crate::run_cache`].
+//! Predictions and residuals are vectors aligned with these rows. What is *whitened* is divided by the noise and, where the noise of
+//! an output is known to be correlated, mapped to the innovations of that noise, every stretch of it from its own start:
+//! residuals, Jacobians and influences by the same linear map, so that sums of squares mean the same whatever the noise is. Next
+//! file to read: [`crate::run_cache`].
 
+use nalgebra::DVector;
+use starlings_estimators::CorrelatedNoise;
 use starlings_study::Study;
 use starlings_study::field::quantity_of;
 
@@ -65,6 +70,8 @@ pub struct Rows {
     pub rows: Vec<Row>,
     /// Positions of the rows that train, increasing.
     pub train: Vec<usize>,
+    /// The correlated noise of each output, in units of its stated variance; white where there is none.
+    pub(crate) noise: Vec<Option<CorrelatedNoise>>,
 }
 
 impl Rows {
@@ -93,7 +100,7 @@ impl Rows {
         }
         let mut train: Vec<usize> = (0..rows.len()).filter(|i| rows[*i].usage == Usage::Train).collect();
         train.shrink_to_fit();
-        Self { rows, train }
+        Self { rows, train, noise: Vec::new() }
     }
 
     /// Positions of the rows that do not train, increasing.
@@ -109,22 +116,69 @@ impl Rows {
 
     /// Runs of consecutive rows of one record, channel and use: (first, one past the last).
     pub(crate) fn stretches(&self) -> Vec<std::ops::Range<usize>> {
+        self.stretches_of(0..self.rows.len())
+    }
+
+    fn stretches_of(&self, part: std::ops::Range<usize>) -> Vec<std::ops::Range<usize>> {
         let key = |row: &Row| (row.record, row.channel, row.usage);
         let mut stretches = Vec::new();
-        let mut first = 0;
-        for i in 1..=self.rows.len() {
-            if i == self.rows.len() || key(&self.rows[i]) != key(&self.rows[first]) {
+        let mut first = part.start;
+        for i in part.start + 1..=part.end {
+            if i == part.end || key(&self.rows[i]) != key(&self.rows[first]) {
                 stretches.push(first..i);
                 first = i;
             }
         }
-        stretches.retain(|s| !s.is_empty());
         stretches
     }
 
     /// (observed − predicted) / noise of every row.
-    pub(crate) fn whitened(&self, predicted: &[f64]) -> Vec<f64> {
+    pub(crate) fn scaled(&self, predicted: &[f64]) -> Vec<f64> {
         self.rows.iter().zip(predicted).map(|(row, y)| (row.observed - y) / row.noise).collect()
+    }
+
+    /// The same, whitened.
+    pub(crate) fn whitened(&self, predicted: &[f64]) -> Vec<f64> {
+        let mut whitened = self.scaled(predicted);
+        self.whiten(0, &mut whitened);
+        whitened
+    }
+
+    /// The whitened residuals of the training rows.
+    pub(crate) fn train_residual(&self, predicted: &[f64]) -> DVector<f64> {
+        let whitened = self.whitened(predicted);
+        DVector::from_iterator(self.train.len(), self.train.iter().map(|i| whitened[*i]))
+    }
+
+    /// Whitens values in units of the noise, those of whole stretches of rows from `first` on.
+    pub(crate) fn whiten(&self, first: usize, values: &mut [f64]) {
+        self.map(first, values, CorrelatedNoise::whiten);
+    }
+
+    /// The inverse of [`Rows::whiten`].
+    pub(crate) fn colour(&self, first: usize, values: &mut [f64]) {
+        self.map(first, values, CorrelatedNoise::colour);
+    }
+
+    fn map(&self, first: usize, values: &mut [f64], by: fn(&CorrelatedNoise, &[f64], &mut [f64])) {
+        if self.is_white() {
+            return;
+        }
+        for stretch in self.stretches_of(first..first + values.len()) {
+            if let Some(Some(noise)) = self.noise.get(self.rows[stretch.start].output) {
+                by(noise, &self.times(&stretch), &mut values[stretch.start - first..stretch.end - first]);
+            }
+        }
+    }
+
+    /// Whether the noise of every output counts as white.
+    pub(crate) fn is_white(&self) -> bool {
+        self.noise.iter().all(Option::is_none)
+    }
+
+    /// The times of a stretch.
+    pub(crate) fn times(&self, stretch: &std::ops::Range<usize>) -> Vec<f64> {
+        self.rows[stretch.clone()].iter().map(|row| row.time).collect()
     }
 
     /// Root mean square of observed − predicted over the rows that `of` takes; NaN for none.
@@ -149,7 +203,8 @@ impl Rows {
             Row { record: 0, channel: 0, output: 0, step, time, observed: 0.0, noise: 1.0, usage }
         };
         let rows: Vec<Row> = (0..n).map(row).collect();
-        Self { train: (0..n).filter(|i| rows[*i].usage == Usage::Train).collect(), rows }
+        let train = (0..n).filter(|i| rows[*i].usage == Usage::Train).collect();
+        Self { train, rows, noise: Vec::new() }
     }
 }
 
@@ -161,4 +216,30 @@ pub(crate) fn white(n: usize, seed: u64) -> nalgebra::DVector<f64> {
 
     let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
     nalgebra::DVector::from_fn(n, |_, _| StandardNormal.sample(&mut random))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_stretch_is_whitened_from_its_own_start_and_coloured_back() {
+        let mut rows = Rows::sample(30, |i| if i < 20 { Usage::Train } else { Usage::HeldOut });
+        let values = white(30, 2).as_slice().to_vec();
+        let mut same = values.clone();
+        rows.whiten(0, &mut same);
+        assert_eq!(same, values, "white noise keeps the bits");
+        let noise = CorrelatedNoise { white: 0.1, correlated: 0.9, length: 2.0 };
+        rows.noise = vec![Some(noise)];
+        let mut whole = values.clone();
+        rows.whiten(0, &mut whole);
+        let (mut train, mut held_out) = (values[..20].to_vec(), values[20..].to_vec());
+        rows.whiten(0, &mut train);
+        rows.whiten(20, &mut held_out);
+        assert_eq!(whole, [train, held_out].concat(), "no stretch knows of another");
+        assert!(whole.iter().zip(&values).skip(1).any(|(a, b)| (a - b).abs() > 0.1));
+        rows.colour(0, &mut whole);
+        // Two passes of thirty values.
+        assert!(whole.iter().zip(&values).all(|(a, b)| (a - b).abs() < 1e-12));
+    }
 }

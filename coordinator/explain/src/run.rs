@@ -25,6 +25,7 @@ use crate::null_recordings;
 use crate::options::{Context, Options};
 use crate::run_cache::{Point, RunCache};
 use crate::screen::not_tried;
+use crate::tell::correlated::correlated_noise;
 use crate::tell::experiment::propose;
 use crate::tell::figures::Figures;
 use crate::tell::findings::Findings;
@@ -50,13 +51,13 @@ pub fn explain(
     let budget = options.budget.or(study.explain.budget);
     let mut cache = RunCache::new(&free, &mut *fleet, store, context, budget);
     cache.hold_at_most(options.hold);
-    let (mut findings, predicted) = diagnose(&mut cache, &free, options, |cache, diagnosis| {
-        let predicted = Arc::clone(&diagnosis.found.base.predicted);
-        Ok((finish(cache, &diagnosis)?, predicted))
+    let (mut findings, fitted) = diagnose(&mut cache, &free, options, |cache, diagnosis| {
+        let fitted = (Arc::clone(&diagnosis.found.base.predicted), cache.rows.clone());
+        Ok((finish(cache, &diagnosis)?, fitted))
     })?;
     drop(cache);
     if options.nulls > 0 {
-        let nulls = null_recordings::measure(&free, &predicted, fleet, store, context, options)?;
+        let nulls = null_recordings::measure(&free, &fitted, fleet, store, context, options)?;
         findings.explanation.runs += nulls.runs;
         findings.explanation.runs_by_stage.push(("null".to_owned(), nulls.runs));
         findings.explanation.false_alarm.nulls = Some(nulls);
@@ -209,6 +210,7 @@ fn explanation(
         gap: after.map(|y| summary::gap(cache, &found.base.predicted, y)).unwrap_or_default(),
         held_out: nearest.map_or(&found.held_out, |j| &j.held_out).clone(),
         not_tried: not_tried::not_tried(study, candidates),
+        correlated_noise: correlated_noise(study, &cache.rows),
         remaining: summary::remaining(found, added, checked, words::shape(found, added, before)),
         false_alarm: summary::false_alarm(found, best_gain(found, judged)),
         parameter_shifts: added.map(|j| summary::shifts(&found.base, j)).unwrap_or_default(),

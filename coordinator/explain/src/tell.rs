@@ -1,9 +1,10 @@
 //! What an explanation tells: its result, sentences, figures, warnings, and the study with the effects in it.
 //!
-//! Files: [`result`] (`explain.json`), [`figures`] (what the report draws), [`summary`] (the numbers of both), [`words`],
-//! [`warnings`] and [`rejected`] (the sentences), [`experiment`] (what would separate tied effects), [`patch`] (the study with
+//! Files: [`result`] (`explain.json`), [`figures`] (what the report draws), [`summary`] (the numbers of both), [`correlated`]
+//! (the noise), [`words`], [`warnings`] and [`rejected`] (the sentences), [`experiment`] (what would separate tied effects), [`patch`] (the study with
 //! the effects in it), [`findings`] (all of it, and its place in the run's database).
 
+pub(crate) mod correlated;
 pub(crate) mod experiment;
 pub(crate) mod figures;
 pub(crate) mod findings;

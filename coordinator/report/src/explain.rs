@@ -135,7 +135,8 @@ fn facts(found: &Explanation, about: &StudyAbout) -> Vec<(&'static str, String)>
 
 fn remaining(found: &Explanation) -> Vec<(&'static str, String)> {
     let left = &found.remaining;
-    vec![
+    let noise = found.correlated_noise.iter().map(|noise| ("Noise that is correlated in time", noise.says()));
+    let mut facts = vec![
         ("Training RMSE over noise (1 expected)", number::significant(left.rmse_over_noise, 3)),
         (
             "Probability of such autocorrelation in white residuals",
@@ -145,7 +146,9 @@ fn remaining(found: &Explanation) -> Vec<(&'static str, String)> {
                 "too few values to tell".to_owned()
             },
         ),
-    ]
+    ];
+    facts.extend(noise);
+    facts
 }
 
 /// A probability; below a thousandth only its order matters.

@@ -46,6 +46,8 @@ pub struct Case {
     pub without: Vec<String>,
     /// Noise in standard deviations of the channels.
     pub level: f64,
+    /// Correlation of the noise of neighbouring samples; 0 where it is white.
+    pub rho: f64,
     /// Samples.
     pub n: usize,
     pub seed: u64,

@@ -170,10 +170,26 @@ fn amplitude(change: impl Fn(f64) -> Option<f64>, (sign, limit): (f64, f64)) -> 
 }
 
 /// The data of a draw: noise of `level` standard deviations of each channel; also returns its standard deviation.
-pub fn noisy(draw: &Draw, level: f64, rng: &mut ChaCha8Rng) -> (Vec<Vec<f64>>, Vec<f64>) {
-    let noise: Vec<f64> = draw.clean.iter().map(|values| level * sd(values)).collect();
-    let add = |(values, noise): (&Vec<f64>, &f64)| {
-        values.iter().map(|v| v + noise * Distribution::<f64>::sample(&StandardNormal, rng)).collect()
+pub fn noisy(draw: &Draw, level: f64, rho: f64, rng: &mut ChaCha8Rng) -> (Vec<Vec<f64>>, Noise) {
+    let sd: Vec<f64> = draw.clean.iter().map(|values| level * sd(values)).collect();
+    let mut add = |(values, sd): (&Vec<f64>, &f64)| -> Vec<f64> {
+        let mut noise = 0.0;
+        let with = |(i, v): (usize, &f64)| {
+            let shock: f64 = StandardNormal.sample(rng);
+            // The first value has the variance of all.
+            noise = if i == 0 { shock } else { rho * noise + (1.0 - rho * rho).sqrt() * shock };
+            v + sd * noise
+        };
+        values.iter().enumerate().map(with).collect()
     };
-    (draw.clean.iter().zip(&noise).map(add).collect(), noise)
+    let data = draw.clean.iter().zip(&sd).map(&mut add).collect();
+    (data, Noise { sd, rho })
+}
+
+/// The noise of a data set: an autoregression of order one.
+pub struct Noise {
+    /// Standard deviation of each channel.
+    pub sd: Vec<f64>,
+    /// Correlation of neighbouring samples; 0 for white noise.
+    pub rho: f64,
 }

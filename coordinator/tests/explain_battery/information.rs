@@ -9,7 +9,7 @@ use starlings_coordinator::study::checked::StudyParameter;
 use starlings_estimators::Transform;
 use starlings_models::{BuildSetup, EffectDef, Forward};
 
-use crate::draw::{Draw, with_effect};
+use crate::draw::{Draw, Noise, with_effect};
 use crate::world::World;
 
 /// Iterations at most.
@@ -39,7 +39,7 @@ struct Problem<'a> {
     forward: Box<dyn Forward>,
     free: Vec<Free>,
     clean: &'a [Vec<f64>],
-    noise: &'a [f64],
+    noise: &'a Noise,
 }
 
 impl Problem<'_> {
@@ -48,7 +48,7 @@ impl Problem<'_> {
         self.free.iter().zip(z.iter()).map(value).collect()
     }
 
-    /// (simulated − true)/noise of the training rows.
+    /// (simulated − true)/noise of the training rows, whitened.
     fn residual(&self, z: &DVector<f64>) -> Option<DVector<f64>> {
         let outputs = self.world.run(self.forward.as_ref(), &self.physical(z))?;
         Some(training(self.world, &outputs, self.clean, self.noise))
@@ -102,22 +102,30 @@ impl Problem<'_> {
     }
 }
 
-/// Rows of the training span, (simulated − true)/noise, channel by channel.
+/// Rows of the training span, (simulated − true)/noise, channel by channel; the innovations of that where the noise is correlated, so
+/// that their squares add up to χ² in any case.
 pub fn training(
     world: &World<'_>,
     simulated: &[Vec<f64>],
     clean: &[Vec<f64>],
-    noise: &[f64],
+    noise: &Noise,
 ) -> DVector<f64> {
     let n = world.n_train();
-    let rows = simulated.iter().zip(clean).zip(noise).flat_map(|((simulated, clean), noise)| {
-        simulated.iter().zip(clean).take(n).map(move |(s, c)| (s - c) / noise)
-    });
-    DVector::from_iterator(n * clean.len(), rows)
+    let mut rows = Vec::with_capacity(n * clean.len());
+    for ((simulated, clean), sd) in simulated.iter().zip(clean).zip(&noise.sd) {
+        let mut before: Option<f64> = None;
+        for (s, c) in simulated.iter().zip(clean).take(n) {
+            let now = (s - c) / sd;
+            let rho = noise.rho;
+            rows.push(before.map_or(now, |before| (now - rho * before) / (1.0 - rho * rho).sqrt()));
+            before = Some(now);
+        }
+    }
+    DVector::from_vec(rows)
 }
 
 /// Fits the model, which lacks the effect, to a draw without noise; starts at the true parameters.
-pub fn refit(world: &World<'_>, draw: &Draw, noise: &[f64]) -> Option<Refit> {
+pub fn refit(world: &World<'_>, draw: &Draw, noise: &Noise) -> Option<Refit> {
     refit_with(world, draw, noise, &[])
 }
 
@@ -125,7 +133,7 @@ pub fn refit(world: &World<'_>, draw: &Draw, noise: &[f64]) -> Option<Refit> {
 pub fn refit_with(
     world: &World<'_>,
     draw: &Draw,
-    noise: &[f64],
+    noise: &Noise,
     effects: &[(EffectDef, Vec<f64>)],
 ) -> Option<Refit> {
     let own = |p: &StudyParameter| Free { transform: p.transform, mean: p.prior_mean[0], sd: p.prior_sd };

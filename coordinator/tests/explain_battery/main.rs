@@ -71,7 +71,8 @@ fn every_effect_changes_the_outputs_by_the_wanted_share() {
 #[test]
 fn a_small_battery_is_explained() {
     let systems = systems::all();
-    let plan = Plan { systems: Vec::new(), kinds: Vec::new(), levels: vec![0.03], seeds: 0..2, threads: 2 };
+    let (white, levels) = (vec![0.0], vec![0.03]);
+    let plan = Plan { systems: Vec::new(), kinds: Vec::new(), levels, rhos: white, seeds: 0..2, threads: 2 };
     let small = [
         ("oscillator", "coulomb-friction"),
         ("oscillator", "cubic-stiffness"),
@@ -107,6 +108,41 @@ fn a_small_battery_is_explained() {
         assert_eq!(quiet.count(Outcome::Wrong) + quiet.count(Outcome::TieWithout), 0);
     }
     assert_eq!(of(Kind::Alien).count(Outcome::Wrong), 0);
+}
+
+/// Noise that is correlated in time is no gap, and hides no effect that it leaves audible.
+#[test]
+fn a_small_battery_with_correlated_noise_is_explained() {
+    let systems = systems::all();
+    let (levels, rhos) = (vec![0.03], vec![0.6]);
+    let plan = Plan { systems: Vec::new(), kinds: Vec::new(), levels, rhos, seeds: 0..2, threads: 2 };
+    let small = [
+        ("oscillator", "cubic-stiffness"),
+        ("pendulum", "quadratic-drag"),
+        ("motor", "sensor-lag:thrust"),
+        ("windkessel", "inertance"),
+        ("building", "heat-from-input:air:sun"),
+    ];
+    let mut cases = plan.cases(&systems);
+    cases.retain(|case| {
+        let named = (systems[case.system].name, case.effect.as_deref().unwrap_or_default());
+        match case.kind {
+            Kind::Library => small.contains(&named),
+            Kind::Null => !matches!(named.0, "tube" | "tanks"),
+            Kind::Alien => named.1 == "telegraph-force",
+            Kind::LeftOut | Kind::Absorbed => false,
+        }
+    });
+    let results = runner::run(&systems, &cases, plan.threads);
+    println!("{}", tally::report(&results, &systems));
+    println!("{}", tally::csv(&results, &systems));
+    let informed = Group::of("", &results, |r| r.case.kind == Kind::Library && r.lambda > tally::INFORMATION);
+    assert!(informed.results.len() >= 4, "{} cases carry the information", informed.results.len());
+    assert!(informed.share(&[Outcome::Right, Outcome::RightInTie]) >= 0.9);
+    let nulls = Group::of("", &results, |r| r.case.kind == Kind::Null);
+    assert_eq!(nulls.count(Outcome::NoGap), nulls.results.len());
+    let others = Group::of("", &results, |r| r.case.kind != Kind::Null);
+    assert_eq!(others.count(Outcome::Wrong), 0);
 }
 
 #[test]

@@ -10,6 +10,8 @@ use crate::systems::System;
 
 /// Levels of noise in standard deviations of the signal.
 const LEVELS: [f64; 3] = [0.01, 0.03, 0.1];
+/// White noise, and an autoregression of order one.
+const RHOS: [f64; 2] = [0.0, 0.6];
 /// Samples, and of those seeds that record longer.
 const SHORT: usize = 250;
 const LONG: usize = 1000;
@@ -19,18 +21,22 @@ pub struct Plan {
     pub systems: Vec<String>,
     pub kinds: Vec<String>,
     pub levels: Vec<f64>,
+    /// Correlations of the noise of neighbouring samples.
+    pub rhos: Vec<f64>,
     pub seeds: std::ops::Range<u64>,
     pub threads: usize,
 }
 
 impl Plan {
-    /// From `BATTERY_SYSTEMS`, `BATTERY_KINDS`, `BATTERY_NOISE`, `BATTERY_SEEDS` (`0..10`) and `BATTERY_THREADS`.
+    /// From `BATTERY_SYSTEMS`, `BATTERY_KINDS`, `BATTERY_NOISE`, `BATTERY_CORRELATION`, `BATTERY_SEEDS` (`0..10`) and `BATTERY_THREADS`.
     pub fn from_environment() -> Self {
         let list = |name: &str| -> Vec<String> {
             let text = std::env::var(name).unwrap_or_default();
             text.split(',').map(str::trim).filter(|word| !word.is_empty()).map(str::to_owned).collect()
         };
-        let levels: Vec<f64> = list("BATTERY_NOISE").iter().map(|word| word.parse().unwrap()).collect();
+        let numbers =
+            |name: &str| -> Vec<f64> { list(name).iter().map(|word| word.parse().unwrap()).collect() };
+        let (levels, rhos) = (numbers("BATTERY_NOISE"), numbers("BATTERY_CORRELATION"));
         let seeds = std::env::var("BATTERY_SEEDS").unwrap_or_else(|_| "0..10".to_owned());
         let (first, end) = seeds.split_once("..").expect("BATTERY_SEEDS is like 0..10");
         let threads = std::env::var("BATTERY_THREADS").ok().and_then(|word| word.parse().ok());
@@ -39,6 +45,7 @@ impl Plan {
             systems: list("BATTERY_SYSTEMS"),
             kinds: list("BATTERY_KINDS"),
             levels: if levels.is_empty() { LEVELS.to_vec() } else { levels },
+            rhos: if rhos.is_empty() { RHOS.to_vec() } else { rhos },
             seeds: first.parse().unwrap()..end.parse().unwrap(),
             threads: threads.unwrap_or(cores),
         }
@@ -52,15 +59,16 @@ impl Plan {
                 continue;
             }
             for seed in self.seeds.clone() {
-                for &level in &self.levels {
+                for (&level, &rho) in self.levels.iter().flat_map(|l| self.rhos.iter().map(move |r| (l, r))) {
                     let n = if system.long && seed % 5 == 4 { LONG } else { SHORT };
                     let first = cases.len();
                     of_system(index, system, &mut cases);
                     for case in &mut cases[first..] {
                         let what =
                             [case.kind.word(), case.effect.as_deref().unwrap_or(""), &level.to_string()];
-                        let auto = random(&what, seed).random_range(0..2) == 0;
-                        (case.seed, case.level, case.n, case.auto) = (seed, level, n, auto);
+                        // Correlated noise is always told: its size cannot be found from third differences.
+                        let auto = random(&what, seed).random_range(0..2) == 0 && rho <= 0.0;
+                        (case.seed, case.level, case.rho, case.n, case.auto) = (seed, level, rho, n, auto);
                     }
                 }
             }
@@ -74,7 +82,18 @@ impl Plan {
 fn of_system(index: usize, system: &System, cases: &mut Vec<Case>) {
     let case = |kind: Kind, effect: Option<&str>, accepted: Vec<String>, without: Vec<String>| {
         let effect = effect.map(str::to_owned);
-        Case { system: index, kind, effect, accepted, without, level: 0.0, n: 0, seed: 0, auto: false }
+        Case {
+            system: index,
+            kind,
+            effect,
+            accepted,
+            without,
+            level: 0.0,
+            rho: 0.0,
+            n: 0,
+            seed: 0,
+            auto: false,
+        }
     };
     let none = Vec::new;
     for truth in system.truths {

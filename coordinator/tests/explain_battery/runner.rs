@@ -13,7 +13,7 @@ use starlings_coordinator::study::store::Store;
 use starlings_models::EffectDef;
 
 use crate::case::{Case, Outcome, Result};
-use crate::draw::{Draw, draw, noisy, random};
+use crate::draw::{Draw, Noise, draw, noisy, random};
 use crate::information::{refit, refit_with};
 use crate::systems::System;
 use crate::world::{Told, World};
@@ -60,10 +60,10 @@ pub fn one(world: &World<'_>, case: &Case) -> Option<Result> {
     let level = format!("{} {}", case.level, case.n);
     let mut rng =
         random(&[world.system.name, case.effect.as_deref().unwrap_or("null"), "noise", &level], case.seed);
-    let (data, noise) = noisy(&draw, case.level, &mut rng);
+    let (data, noise) = noisy(&draw, case.level, case.rho, &mut rng);
     let lambda = refit(world, &draw, &noise).map_or(f64::NAN, |refit| refit.misfit);
     let started = Instant::now();
-    let found = explained(world, case, &data, &noise);
+    let found = explained(world, case, &data, &noise.sd);
     let wall_s = started.elapsed().as_secs_f64();
     let base = Result {
         case: case.clone(),
@@ -101,7 +101,7 @@ fn explained(
     found.map(|findings| findings.explanation).map_err(|error| error.to_string())
 }
 
-fn judged(base: Result, found: &Explanation, draw: &Draw, world: &World<'_>, noise: &[f64]) -> Result {
+fn judged(base: Result, found: &Explanation, draw: &Draw, world: &World<'_>, noise: &Noise) -> Result {
     let sets = std::iter::once(found.effects.iter().map(|e| e.name.clone()).collect::<Vec<_>>())
         .chain(found.tied_with.iter().cloned());
     let named: Vec<String> = sets.map(|set| set.join(" + ")).collect();
@@ -117,7 +117,7 @@ fn judged(base: Result, found: &Explanation, draw: &Draw, world: &World<'_>, noi
         result.rival = rival(found, draw, world, noise);
     }
     if result.outcome == Outcome::Right {
-        result.held_out = held_out(found, world, noise);
+        result.held_out = held_out(found, world, &noise.sd);
         let same = draw.effect.as_ref().is_some_and(|(def, _)| def.name == found.effects[0].name);
         let amplitude = &found.effects[0].parameters[0];
         result.estimate = same.then_some((amplitude.estimate, amplitude.interval95));
@@ -126,7 +126,7 @@ fn judged(base: Result, found: &Explanation, draw: &Draw, world: &World<'_>, noi
 }
 
 /// The noise-free misfit of what was named.
-fn rival(found: &Explanation, draw: &Draw, world: &World<'_>, noise: &[f64]) -> Option<f64> {
+fn rival(found: &Explanation, draw: &Draw, world: &World<'_>, noise: &Noise) -> Option<f64> {
     let effects: Vec<(EffectDef, Vec<f64>)> = found
         .effects
         .iter()

@@ -5,7 +5,7 @@
 use nalgebra::{DMatrix, DVector};
 use starlings_models::BuildSetup;
 
-use crate::draw::{draw, noisy, random, sd, with_effect};
+use crate::draw::{Noise, draw, noisy, random, sd, with_effect};
 use crate::information::{Refit, refit, training};
 use crate::world::World;
 
@@ -22,7 +22,7 @@ fn line(world: &World<'_>, effect: &str, seed: u64) -> String {
     let Some(draw) = draw(world, Some(effect), seed) else {
         return format!("{name} cannot reach the strength");
     };
-    let (_, noise) = noisy(&draw, LEVEL, &mut random(&["structure"], seed));
+    let (_, noise) = noisy(&draw, LEVEL, 0.0, &mut random(&["structure"], seed));
     let Some(fit) = refit(world, &draw, &noise) else { return format!("{name} cannot be refitted") };
     let values = draw.effect.as_ref().map_or(Vec::new(), |(_, values)| values.clone());
     let mut alike: Vec<(f64, f64, String)> = world
@@ -41,7 +41,7 @@ fn line(world: &World<'_>, effect: &str, seed: u64) -> String {
 
 /// The share of the misfit that the candidate explains to first order, with the best of its inner values, and the part of its
 /// influence that the parameters cannot imitate.
-fn likeness(world: &World<'_>, fit: &Refit, noise: &[f64], name: &str) -> Option<(f64, f64)> {
+fn likeness(world: &World<'_>, fit: &Refit, noise: &Noise, name: &str) -> Option<(f64, f64)> {
     let def = world.resolved(name, &fit.theta);
     let setup = with_effect(&world.model, &def);
     let forward = setup.build().ok()?;
@@ -76,13 +76,13 @@ fn likeness(world: &World<'_>, fit: &Refit, noise: &[f64], name: &str) -> Option
 fn sensitivity(
     world: &World<'_>,
     base: &[Vec<f64>],
-    noise: &[f64],
+    noise: &Noise,
     run: impl Fn(f64) -> Option<Vec<Vec<f64>>>,
 ) -> Option<DVector<f64>> {
     let mut amplitude = 1e-3;
     for _ in 0..12 {
         let s = training(world, &run(amplitude)?, base, noise);
-        let size = s.norm() / (s.len() as f64).sqrt() / (sd(&base[0]) / noise[0]);
+        let size = s.norm() / (s.len() as f64).sqrt() / (sd(&base[0]) / noise.sd[0]);
         if (1e-4..1e-2).contains(&size) {
             return Some(s);
         }

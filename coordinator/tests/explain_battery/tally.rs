@@ -98,23 +98,20 @@ pub fn table(groups: &[Group<'_>]) -> String {
 
 /// All tables: by kind, and for effects of the library by information, noise and system.
 pub fn report(results: &[Result], systems: &[System]) -> String {
-    let of = |kind: Kind| move |result: &Result| result.case.kind == kind;
     let informed = |result: &Result| result.lambda > INFORMATION;
     let mut text = String::new();
-    let kinds = [Kind::Library, Kind::LeftOut, Kind::Absorbed, Kind::Alien, Kind::Null];
-    let mut groups = Vec::new();
-    for kind in &kinds {
-        let is = of(kind.clone());
-        if *kind == Kind::Null || *kind == Kind::Absorbed {
-            groups.push(Group::of(kind.word(), results, is));
-        } else {
-            let is = |result: &Result| result.case.kind == *kind;
-            groups.push(Group::of(format!("{}, λ > 100", kind.word()), results, |r| is(r) && informed(r)));
-            groups.push(Group::of(format!("{}, λ < 100", kind.word()), results, |r| is(r) && !informed(r)));
+    for (is_white, title) in [(true, "By what is missing"), (false, "The same with correlated noise")] {
+        let groups = by_kind(results, |r| (r.case.rho <= 0.0) == is_white);
+        if groups.iter().any(|group| !group.results.is_empty()) {
+            write!(text, "### {title}\n\n{}\n", table(&groups)).unwrap();
+            text += &in_words(&groups[0], &groups[2]);
         }
     }
-    write!(text, "### By what is missing\n\n{}\n", table(&groups)).unwrap();
-    text += &in_words(&groups[0], &groups[2]);
+    let results: Vec<Result> = results.iter().filter(|r| r.case.rho <= 0.0).cloned().collect();
+    let results = results.as_slice();
+    if results.is_empty() {
+        return text;
+    }
     for kind in [Kind::Library, Kind::LeftOut] {
         let is = |result: &Result| result.case.kind == kind && informed(result);
         let mut groups = Vec::new();
@@ -147,6 +144,23 @@ pub fn report(results: &[Result], systems: &[System]) -> String {
     text
 }
 
+/// The rows of a table by what is missing, of those results that `takes` picks.
+fn by_kind(results: &[Result], takes: impl Fn(&Result) -> bool) -> Vec<Group<'_>> {
+    let informed = |result: &Result| result.lambda > INFORMATION;
+    let mut groups = Vec::new();
+    for kind in [Kind::Library, Kind::LeftOut, Kind::Absorbed, Kind::Alien, Kind::Null] {
+        let is = |result: &Result| result.case.kind == kind && takes(result);
+        let word = kind.word();
+        if kind == Kind::Null || kind == Kind::Absorbed {
+            groups.push(Group::of(word, results, is));
+        } else {
+            groups.push(Group::of(format!("{word}, λ > 100"), results, |r| is(r) && informed(r)));
+            groups.push(Group::of(format!("{word}, λ < 100"), results, |r| is(r) && !informed(r)));
+        }
+    }
+    groups
+}
+
 /// What the first table does not say of effects that the library holds, and of those left out.
 fn in_words(library: &Group<'_>, left_out: &Group<'_>) -> String {
     let ((rms, above), (wrong, near)) = (library.held_out(), left_out.undetectable());
@@ -161,18 +175,19 @@ fn in_words(library: &Group<'_>, left_out: &Group<'_>) -> String {
 /// One line per case.
 pub fn csv(results: &[Result], systems: &[System]) -> String {
     let mut text = String::from(
-        "system,kind,effect,noise,n,seed,auto,lambda,outcome,named,rival,replaced,amplitude,estimate,lo,hi,held_out,runs,false_alarm,wall_s\n",
+        "system,kind,effect,noise,rho,n,seed,auto,lambda,outcome,named,rival,replaced,amplitude,estimate,lo,hi,held_out,runs,false_alarm,wall_s\n",
     );
     for r in results {
         let (estimate, [lo, hi]) = r.estimate.unwrap_or((f64::NAN, [f64::NAN; 2]));
         let case = &r.case;
         writeln!(
             text,
-            "{},{},{},{},{},{},{},{:.4e},{},\"{}\",{:.3e},{},{:e},{estimate:e},{lo:e},{hi:e},{:.4},{},{:.4},{:.3}",
+            "{},{},{},{},{},{},{},{},{:.4e},{},\"{}\",{:.3e},{},{:e},{estimate:e},{lo:e},{hi:e},{:.4},{},{:.4},{:.3}",
             systems[case.system].name,
             case.kind.word(),
             case.effect.as_deref().unwrap_or(""),
             case.level,
+            case.rho,
             case.n,
             case.seed,
             case.auto,

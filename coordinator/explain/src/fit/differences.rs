@@ -68,6 +68,10 @@ impl FittedVariant<'_> {
             (found[entry.parameter][i] - self.predicted[i]) / (h * row.noise)
         };
         let blocks = record_blocks(study, rows);
-        Ok(Some(BlockAngular::from_fn(rows.rows.len(), self.variant.n_param(), blocks, influence)))
+        let mut whole = BlockAngular::from_fn(rows.rows.len(), self.variant.n_param(), blocks, influence);
+        if !rows.is_white() {
+            whole.for_each_column(|first, values| rows.whiten(first, values));
+        }
+        Ok(Some(whole))
     }
 }

@@ -72,7 +72,7 @@ impl FittedVariant<'_> {
         match self.solver.need().clone() {
             Need::Residual(z) => {
                 let answer = answers.into_iter().next().and_then(Result::ok);
-                let residual = answer.as_ref().map(|y| train_residual(cache, y));
+                let residual = answer.as_ref().map(|y| cache.rows.train_residual(y));
                 self.solver.give_residual(residual);
                 if let Some(predicted) = answer.filter(|_| *self.solver.best().0 == z) {
                     self.predicted = predicted;
@@ -91,10 +91,4 @@ impl FittedVariant<'_> {
         }
         Ok(true)
     }
-}
-
-/// (observed − predicted) / noise of the training rows.
-pub(crate) fn train_residual(cache: &RunCache<'_>, predicted: &[f64]) -> DVector<f64> {
-    let whitened = cache.rows.whitened(predicted);
-    DVector::from_iterator(cache.rows.train.len(), cache.rows.train.iter().map(|i| whitened[*i]))
 }

@@ -149,7 +149,7 @@ mod tests {
         };
         let rows: Vec<Row> = (0..15).map(row).collect();
         let train = (0..15).filter(|i| rows[*i].usage == Usage::Train).collect();
-        let rows = Rows { rows, train };
+        let rows = Rows { rows, train, noise: Vec::new() };
         let columns = [vec![0, 1], vec![0, 1, 2], vec![0, 2]];
         let places = columns.into_iter().enumerate().map(|(r, columns)| (rows.of_record(r), columns));
         let whole = BlockAngular::from_fn(15, 3, places, |i, j| (10 * i + j) as f64);

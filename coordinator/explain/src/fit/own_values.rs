@@ -104,6 +104,11 @@ fn of_initial(
     let answer = cache.run(&[Point { study: &moved, theta: fit.theta() }])?.swap_remove(0);
     let (rows, of_record) = (&cache.rows.rows, cache.rows.of_record(record));
     let change = |y: &[f64], i: usize| (y[i] - fit.predicted[i]) / (STEP * rows[i].noise);
-    let all = |y: Arc<Vec<f64>>| DVector::from_iterator(of_record.len(), of_record.map(|i| change(&y, i)));
+    let all = |y: Arc<Vec<f64>>| {
+        let first = of_record.start;
+        let mut all = DVector::from_iterator(of_record.len(), of_record.map(|i| change(&y, i)));
+        cache.rows.whiten(first, all.as_mut_slice());
+        all
+    };
     Ok(answer.ok().map(all))
 }

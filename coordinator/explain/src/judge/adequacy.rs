@@ -3,11 +3,13 @@
 //! Every sentence of an explanation about noise is made here or in [`super::held_out`], from the figures that it stands beside.
 //! Next file to read: [`crate::tell::words`].
 
+use nalgebra::DVector;
 use starlings_estimators::nis_band;
 
 use super::effective_noise::{inflation, whiteness};
 use crate::fit::fitted_variant::FittedVariant;
 use crate::number::{three, times};
+use crate::rows::Rows;
 use crate::run_cache::RunCache;
 
 /// Residuals are not white if the probability of as large an autocorrelation in white ones is below this.
@@ -54,7 +56,15 @@ pub(crate) enum Nature {
 impl Adequacy {
     /// The figures of a fit.
     pub(crate) fn of(cache: &RunCache<'_>, fit: &FittedVariant<'_>) -> Self {
-        let (rows, residual) = (&cache.rows, fit.residual());
+        Self::of_residual(&cache.rows, fit.residual())
+    }
+
+    /// The figures of what is predicted, with the noise of these rows.
+    pub(crate) fn of_rows(rows: &Rows, predicted: &[f64]) -> Self {
+        Self::of_residual(rows, &rows.train_residual(predicted))
+    }
+
+    fn of_residual(rows: &Rows, residual: &DVector<f64>) -> Self {
         let n = rows.train.len();
         let observed: Vec<(f64, f64)> = rows.stretches().into_iter().fold(Vec::new(), |mut all, stretch| {
             let of = &rows.rows[stretch];

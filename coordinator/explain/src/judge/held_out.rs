@@ -82,6 +82,7 @@ pub(crate) fn held_out(
     }
     let level = Adequacy::of(cache, fit).level();
     let (before, after) = (rows.whitened(&base.predicted), rows.whitened(&fit.predicted));
+    let (scaled_before, scaled_after) = (rows.scaled(&base.predicted), rows.scaled(&fit.predicted));
     let uncertainty = Uncertainty::of(cache, fit);
     let one = |at: Vec<usize>| {
         let row: &Row = &rows.rows[at[0]];
@@ -96,8 +97,8 @@ pub(crate) fn held_out(
             channel: record.channels[row.channel].output.clone(),
             usage: row.usage.word().to_owned(),
             n: at.len(),
-            before: (was / n).sqrt(),
-            after: (is / n).sqrt(),
+            before: (squares(&scaled_before) / n).sqrt(),
+            after: (squares(&scaled_after) / n).sqrt(),
             beyond: beyond.sqrt(),
             fails: beyond > (FAILS * FAILS).max(nis_band(at.len(), LEVEL).1)
                 && is - explained > FIRST_ORDER * explained,

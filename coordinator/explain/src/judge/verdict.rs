@@ -10,9 +10,11 @@ use starlings_models::equations::{Expression, Slot};
 use super::contribution::{ContributionCheck, DISCREPANT, check_contributions};
 use super::gates::JudgedFit;
 use super::objections::{nearest_refused, objection};
+use super::same_form::same_form;
 use super::search_result::SearchResult;
 use crate::error::ExplainError;
 use crate::fit::candidate::Candidate;
+use crate::fit::model_variant::AddedEffect;
 use crate::run_cache::RunCache;
 use crate::screen::screening_result::ScreeningResult;
 use serde::{Deserialize, Serialize};
@@ -56,6 +58,8 @@ pub(crate) struct Decision {
     pub tied: Vec<Vec<String>>,
     /// Positions of those of the tied that were refitted.
     pub rivals: Vec<usize>,
+    /// Other names of the same effects among the candidates.
+    pub synonyms: Vec<String>,
     /// Why it is not named, in words.
     pub because: String,
 }
@@ -75,6 +79,7 @@ pub(crate) fn decide(
         checked: best,
         tied: Vec::new(),
         rivals: Vec::new(),
+        synonyms: Vec::new(),
         because: because.to_owned(),
     };
     let passing = found.passing();
@@ -96,26 +101,61 @@ pub(crate) fn decide(
     // Beside a discrepancy of another kind the check of the form says nothing.
     let is_tested = judged.inflation > DISCREPANT || leftover.power >= POWER;
     let mut rivals = rivals(cache, found, &passing, best);
-    // Of forms that the data cannot tell apart the simplest is shown.
-    let mut best = best;
-    for rival in &mut rivals {
-        if complexity(&found.judged[*rival]) < complexity(&found.judged[best]) {
-            std::mem::swap(rival, &mut best);
-        }
-    }
+    let best = shown(found, best, &mut rivals);
     let judged = &found.judged[best];
-    let mut tied: Vec<Vec<String>> = rivals.iter().map(|i| found.judged[*i].names()).collect();
-    for twin in twins(cache, found, judged, candidates)? {
-        if !tied.contains(&twin) {
-            tied.push(twin);
-        }
-    }
+    let (mut tied, synonyms) = class(cache, found, candidates, judged, &mut rivals)?;
     if !is_tested {
         tied.push(vec![format!("another form of {}", judged.fit.variant.name())]);
     }
     tied.extend(limits(judged).into_iter().map(|limit| vec![limit]));
     let verdict = if tied.is_empty() { Verdict::Named } else { Verdict::Tie };
-    Ok(Decision { verdict, best: Some(best), checked: Some(checked), tied, rivals, because: String::new() })
+    let because = String::new();
+    Ok(Decision { verdict, best: Some(best), checked: Some(checked), tied, rivals, synonyms, because })
+}
+
+/// The simplest of a class; what was the best takes its place among the rivals.
+fn shown(found: &SearchResult<'_>, mut best: usize, rivals: &mut [usize]) -> usize {
+    for rival in rivals {
+        if complexity(&found.judged[*rival]) < complexity(&found.judged[best]) {
+            std::mem::swap(rival, &mut best);
+        }
+    }
+    best
+}
+
+/// The sets of effects that are tied with what is shown, and its other names, which are no rivals.
+fn class(
+    cache: &RunCache<'_>,
+    found: &SearchResult<'_>,
+    candidates: &[Candidate],
+    judged: &JudgedFit<'_>,
+    rivals: &mut Vec<usize>,
+) -> Result<(Vec<Vec<String>>, Vec<String>), ExplainError> {
+    let own = &judged.fit.variant;
+    let is_same = |names: &[String]| {
+        let of = |name: &String| candidates.iter().find(|c| c.name() == name).map(|c| &c.def);
+        let is_there =
+            |e: &AddedEffect<'_>| names.iter().filter_map(of).any(|def| same_form(&e.candidate.def, def));
+        names.len() == own.effects.len() && own.effects.iter().all(is_there)
+    };
+    let is_other_name = |other: &JudgedFit<'_>| {
+        let variant = &other.fit.variant;
+        variant.left_out == own.left_out && other.names() != judged.names() && is_same(&other.names())
+    };
+    rivals.retain(|i| !is_other_name(&found.judged[*i]));
+    let refitted = found.judged.iter().filter(|j| is_other_name(j));
+    let mut synonyms: Vec<String> = refitted.map(|j| j.names().join(" + ")).collect();
+    let mut tied: Vec<Vec<String>> = rivals.iter().map(|i| found.judged[*i].names()).collect();
+    for twin in twins(cache, found, judged, candidates)? {
+        if is_same(&twin) {
+            synonyms.extend(twin);
+        } else if !tied.contains(&twin) {
+            tied.push(twin);
+        }
+    }
+    synonyms.sort();
+    synonyms.dedup();
+    Ok((tied, synonyms))
 }
 
 /// The limiting forms that the data do not exclude: those of a parameter inside a term that they do not determine.

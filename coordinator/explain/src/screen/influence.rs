@@ -9,10 +9,10 @@ use nalgebra::DVector;
 use starlings_study::store::RunKey;
 
 use crate::error::ExplainError;
-use crate::rows::Row;
+use crate::rows::Rows;
 use crate::run_cache::RunCache;
 
-/// d prediction / d amplitude over the noise, all rows.
+/// d prediction / d amplitude, whitened, all rows.
 #[derive(Clone, Debug)]
 pub(crate) enum Influence {
     /// Held in memory.
@@ -43,7 +43,7 @@ impl Influence {
             Self::Held(sensitivity) => Ok(Arc::clone(sensitivity)),
             Self::Remembered { runs, amplitude, base } => {
                 let predicted = cache.recall(runs)?.unwrap_or_default();
-                Ok(Arc::new(difference(&cache.rows.rows, &predicted, base, *amplitude)))
+                Ok(Arc::new(difference(&cache.rows, &predicted, base, *amplitude)))
             }
         }
     }
@@ -57,9 +57,11 @@ impl Influence {
     }
 }
 
-/// The change from `base` to `predicted` per amplitude, over the noise.
-pub(crate) fn difference(rows: &[Row], predicted: &[f64], base: &[f64], amplitude: f64) -> DVector<f64> {
-    let change = predicted.iter().zip(base).zip(rows);
+/// The change from `base` to `predicted` per amplitude, whitened.
+pub(crate) fn difference(rows: &Rows, predicted: &[f64], base: &[f64], amplitude: f64) -> DVector<f64> {
+    let change = predicted.iter().zip(base).zip(&rows.rows);
     let change = change.map(|((y, b), row)| (y - b) / (row.noise * amplitude));
-    DVector::from_iterator(rows.len(), change)
+    let mut difference = DVector::from_iterator(rows.rows.len(), change);
+    rows.whiten(0, difference.as_mut_slice());
+    difference
 }

@@ -58,10 +58,10 @@ fn power(rows: &Rows, whitened: &[f64], stretch: &std::ops::Range<usize>, omega:
 /// The instants at which the residuals of the training rows change most, the largest change first: where the means of two
 /// windows, before and after, differ most.
 pub(crate) fn change_points(rows: &Rows, predicted: &[f64]) -> Vec<f64> {
-    let whitened = rows.whitened(predicted);
+    let scaled = rows.scaled(predicted);
     let mut found: Vec<(f64, f64, f64)> = Vec::new();
     for stretch in training(rows) {
-        let (times, values): (Vec<f64>, Vec<f64>) = stretch.map(|i| (rows.rows[i].time, whitened[i])).unzip();
+        let (times, values): (Vec<f64>, Vec<f64>) = stretch.map(|i| (rows.rows[i].time, scaled[i])).unzip();
         let width = (values.len() / 16).max(3);
         for i in width..values.len().saturating_sub(width) {
             let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;

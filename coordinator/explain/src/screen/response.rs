@@ -73,7 +73,7 @@ impl ProbeResponse<'_> {
         predicted: &[f64],
     ) -> MeasuredInfluence {
         let amplitude = self.probe.amplitude;
-        let sensitivity = difference(&cache.rows.rows, predicted, self.base, amplitude);
+        let sensitivity = difference(&cache.rows, predicted, self.base, amplitude);
         let train = sensitivity.select_rows(&cache.rows.train);
         let influence = if scale.is_held {
             Influence::Held(Arc::new(sensitivity))

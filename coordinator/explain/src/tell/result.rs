@@ -47,6 +47,9 @@ pub struct Explanation {
     /// Kinds of physics of which nothing was tried, and why.
     #[serde(default)]
     pub not_tried: Vec<NotTried>,
+    /// The channels whose noise is correlated in time; what is said of all residuals counts in units of that noise.
+    #[serde(default)]
+    pub correlated_noise: Vec<CorrelatedChannel>,
     /// What is left of the gap.
     pub remaining: Remaining,
     /// How often this search would name an effect where none is missing.
@@ -160,6 +163,19 @@ pub struct GapRow {
     pub after: f64,
     /// Noise sd.
     pub noise: f64,
+}
+
+/// Noise of the stated size that is correlated in time, as an Ornstein–Uhlenbeck process is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CorrelatedChannel {
+    /// Output name.
+    pub channel: String,
+    /// Share of the noise's variance that is correlated; the rest is white.
+    pub share: f64,
+    /// Time over which that correlation falls to 1/e.
+    pub length: f64,
+    /// Unit of the time.
+    pub unit: String,
 }
 
 /// What is left of the gap.

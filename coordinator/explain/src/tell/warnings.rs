@@ -42,9 +42,9 @@ fn same(
     decision: &Decision,
     judged: &JudgedFit<'_>,
 ) -> Option<String> {
-    let own = cache.rows.whitened(&judged.fit.predicted);
+    let own = cache.rows.scaled(&judged.fit.predicted);
     let alike = |i: &&usize| {
-        let other = cache.rows.whitened(&found.judged[**i].fit.predicted);
+        let other = cache.rows.scaled(&found.judged[**i].fit.predicted);
         own.iter().zip(&other).all(|(a, b)| (a - b).abs() < SAME)
     };
     let names: Vec<String> = decision

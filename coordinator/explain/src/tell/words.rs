@@ -7,6 +7,7 @@ use std::fmt::Write as _;
 
 use starlings_study::posterior;
 
+use super::correlated::{correlated_noise, listed as listed_noise};
 use crate::fit::candidate::Candidate;
 use crate::fit::fitted_variant::FittedVariant;
 use crate::judge::adequacy::Nature;
@@ -47,23 +48,27 @@ pub(crate) fn headline(
     decision: &Decision,
 ) -> String {
     let best = decision.best.map(|i| &found.judged[i]);
-    match (decision.verdict, best) {
+    let noise = listed_noise(&correlated_noise(cache.study, &cache.rows));
+    let verdict = match (decision.verdict, best) {
         (Verdict::Named, Some(judged)) => {
-            format!("{} {}{}", subject(judged), capital(&shrinking(cache, found, judged)), remains(judged))
+            let shrinking = capital(&shrinking(cache, found, judged));
+            format!("{}{} {shrinking}{}", subject(judged), same(decision), remains(judged))
         }
         (Verdict::Tie, Some(judged)) => {
             let rivals: Vec<String> = decision.tied.iter().map(|set| set.join(" + ")).collect();
             format!(
-                "{} or {}: the data cannot tell them apart. {}{}",
+                "{} or {}: the data cannot tell them apart.{} {}{}",
                 judged.fit.variant.name(),
                 rivals.join(" or "),
+                same(decision),
                 capital(&shrinking(cache, found, judged)),
                 remains(judged)
             )
         }
         (Verdict::Unexplained, _) => unexplained(cache, found, candidates, decision),
-        _ => no_gap(found),
-    }
+        _ => return no_gap(found, &noise),
+    };
+    if noise.is_empty() { verdict } else { format!("{verdict} The noise is correlated in time: {noise}.") }
 }
 
 /// That nothing explains the gap, why, what fails of what was held out, and what was not tried.
@@ -94,9 +99,12 @@ fn unexplained(
 }
 
 /// That the data show no gap, with what they could have shown.
-fn no_gap(found: &SearchResult<'_>) -> String {
+fn no_gap(found: &SearchResult<'_>, noise: &str) -> String {
     let says = found.adequacy.says();
     let training = match found.adequacy.nature() {
+        Nature::Noise | Nature::Smaller if !noise.is_empty() => {
+            format!("No gap, the noise is correlated in time: {noise}. In units of that noise {says}.")
+        }
         Nature::Nothing => return format!("No gap could be seen: {says}."),
         Nature::Noise if found.adequacy.whiteness.is_some() => {
             format!("No gap: the model explains the training data at their noise; {says}.")
@@ -121,6 +129,15 @@ fn subject(judged: &JudgedFit<'_>) -> String {
     format!("Missing: {}. {}", variant.name(), says.join(" "))
 }
 
+/// Other names of what is named; empty without any.
+fn same(decision: &Decision) -> String {
+    if decision.synonyms.is_empty() {
+        return String::new();
+    }
+    let names: Vec<String> = decision.synonyms.iter().map(|name| format!("`{name}`")).collect();
+    format!(" The same effect by another name: {}.", names.join(", "))
+}
+
 /// What is left beside the name, where that is no noise: how much, and where it shows in what was held out. Empty where nothing is.
 fn remains(judged: &JudgedFit<'_>) -> String {
     let failing: Vec<&HeldOut> = judged.held_out.iter().filter(|h| h.fails).collect();
@@ -140,8 +157,8 @@ fn remains(judged: &JudgedFit<'_>) -> String {
 /// How the error changes, for each use of the data.
 fn shrinking(cache: &RunCache<'_>, found: &SearchResult<'_>, judged: &JudgedFit<'_>) -> String {
     let noise = |y: &[f64], usage| {
-        let whitened = cache.rows.whitened(y);
-        let of = cache.rows.rows.iter().zip(&whitened).filter(|(row, _)| row.usage == usage);
+        let scaled = cache.rows.scaled(y);
+        let of = cache.rows.rows.iter().zip(&scaled).filter(|(row, _)| row.usage == usage);
         let (n, sum) = of.fold((0.0, 0.0), |(n, sum), (_, e)| (n + 1.0, sum + e * e));
         (n > 0.0).then(|| f64::sqrt(sum / n))
     };

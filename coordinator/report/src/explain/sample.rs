@@ -4,8 +4,8 @@ mod figures;
 
 use starlings_explain::locate::MisfitPlace;
 use starlings_explain::result::{
-    Coefficient, Experiment, Explanation, FalseAlarm, GapRow, NamedEffect, ParameterShift, Rejected,
-    Remaining, Screened,
+    Coefficient, CorrelatedChannel, Experiment, Explanation, FalseAlarm, GapRow, NamedEffect, ParameterShift,
+    Rejected, Remaining, Screened,
 };
 use starlings_explain::{Figures, HeldOut, NotTried, Verdict};
 
@@ -127,6 +127,7 @@ fn explanation(verdict: Verdict, records: usize) -> Explanation {
             kind: "thermal".into(),
             reason: "this model has no place for it; it needs: a state with the role temperature".into(),
         }],
+        correlated_noise: correlated_noise(),
         remaining: remaining(),
         false_alarm: false_alarm(),
         parameter_shifts: vec![shift("R", "mmHg s/mL", 3.21, 3.367), shift("C", "mL/mmHg", 1.91, 1.248)],
@@ -154,6 +155,11 @@ fn held_out() -> Vec<HeldOut> {
         mended: 0.7,
     };
     vec![of("pressure", "held-out", 2.46), of("inlet", "held-out-channel", 1.02)]
+}
+
+fn correlated_noise() -> Vec<CorrelatedChannel> {
+    let (channel, unit) = ("pressure".into(), "s".into());
+    vec![CorrelatedChannel { channel, share: 0.97, length: 0.021, unit }]
 }
 
 fn remaining() -> Remaining {

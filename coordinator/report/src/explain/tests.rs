@@ -56,6 +56,12 @@ fn show(name: &str, text: &str) {
 }
 
 #[test]
+fn the_correlation_of_the_noise_stands_beside_what_is_left() {
+    let page = page_of(&found(Verdict::Named, 1, 40));
+    assert!(page.contains("pressure over 0.021 s (97 % of its variance)"));
+}
+
+#[test]
 fn every_verdict_has_its_banner_and_its_headline() {
     for (verdict, class) in VERDICTS.into_iter().zip(["named", "tie", "unexplained", "no-gap"]) {
         let sample = found(verdict, 1, 420);

@@ -1,0 +1,130 @@
+//! Whether two effects are one effect under two names.
+//!
+//! Next file to read: [`super::verdict`].
+
+use starlings_models::equations::{At, Expression, Program, Slot};
+use starlings_models::{Drive, EffectDef};
+
+/// Points at which terms are compared: two different functions of a formula's length agree at so many by accident never.
+const POINTS: usize = 16;
+/// Relative difference of two values that rounding makes.
+const ROUNDING: f64 = 1e-9;
+
+/// Whether two effects add the same functions to the same quantities, whatever their parameters and states are called and up to a
+/// factor on the amplitude, which is the same for all of their terms.
+pub(crate) fn same_form(a: &EffectDef, b: &EffectDef) -> bool {
+    let mut known: Vec<String> = Vec::new();
+    let (Some(a), Some(b)) = (Terms::of(a, &mut known), Terms::of(b, &mut known)) else { return false };
+    let places = |terms: &Terms| terms.adds.iter().map(|(to, _)| to.clone()).collect::<Vec<_>>();
+    if places(&a) != places(&b) || a.n_own != b.n_own || a.states.len() != b.states.len() {
+        return false;
+    }
+    let n = a.n_own + known.len();
+    let points: Vec<Vec<f64>> = (0..POINTS).map(|k| point(k, n)).collect();
+    let of = |terms: &[&Program]| -> Vec<f64> {
+        points.iter().flat_map(|p| terms.iter().map(|term| value(term, p)).collect::<Vec<_>>()).collect()
+    };
+    let adds = |terms: &Terms| of(&terms.adds.iter().map(|(_, term)| term).collect::<Vec<_>>());
+    let states = |terms: &Terms| of(&terms.states.iter().collect::<Vec<_>>());
+    let (left, right) = (adds(&a), adds(&b));
+    let first = left.iter().zip(&right).find(|(l, r)| l.abs() > 0.0 && r.abs() > 0.0);
+    let Some(factor) = first.map(|(l, r)| r / l) else { return false };
+    equal(&left, &right, factor) && equal(&states(&a), &states(&b), 1.0)
+}
+
+/// Whether the second values are the first times a factor.
+fn equal(a: &[f64], b: &[f64], factor: f64) -> bool {
+    let size = b.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+    // A root of a negative number is one of both.
+    a.iter().zip(b).all(|(a, b)| (a * factor - b).abs() <= ROUNDING * size || (a.is_nan() && b.is_nan()))
+}
+
+/// Numbers of both signs between 0.3 and 1.9, without a pattern (the golden ratio's multiples).
+fn point(k: usize, n: usize) -> Vec<f64> {
+    let number = |j: usize| {
+        let turn = (0.618_033_988_75 * (1 + j + k * (n + 1)) as f64).fract();
+        let size = 0.3 + 1.6 * turn;
+        if (j + k) % 3 == 2 { -size } else { size }
+    };
+    // The amplitude is one.
+    (0..n).map(|j| if j == 0 { 1.0 } else { number(j) }).collect()
+}
+
+fn value(term: &Program, values: &[f64]) -> f64 {
+    let t = values.iter().sum::<f64>().abs();
+    term.eval(&At { t, x: &[], theta: values, u: Drive::NONE, y: &[] })
+}
+
+/// The terms of an effect, whose names are numbers: its own parameters and states first.
+struct Terms {
+    n_own: usize,
+    adds: Vec<(String, Program)>,
+    /// Rate and initial value of every state of its own.
+    states: Vec<Program>,
+}
+
+impl Terms {
+    /// `known` gives names outside of the effect their numbers.
+    fn of(def: &EffectDef, known: &mut Vec<String>) -> Option<Self> {
+        let parameters = def.parameters.iter().map(|p| p.name.as_str());
+        let own: Vec<&str> = parameters.chain(def.states.iter().map(|s| s.name.as_str())).collect();
+        let mut program = |term: &str| {
+            let expression = Expression::parse(term).ok()?;
+            for (name, _) in expression.names() {
+                if !own.contains(&name.as_str()) && !known.contains(&name) {
+                    known.push(name);
+                }
+            }
+            let number = |name: &str| {
+                let of_own = own.iter().position(|own| *own == name);
+                of_own.or_else(|| Some(own.len() + known.iter().position(|known| known == name)?))
+            };
+            expression.compile(&|name| number(name).map(Slot::Parameter), &|_| None).ok()
+        };
+        let adds = def.adds.iter().map(|add| Some((add.to.clone(), program(&add.term)?)));
+        let adds = adds.collect::<Option<Vec<_>>>()?;
+        let of_state = def.states.iter().flat_map(|state| [&state.rate, &state.initial]);
+        let states = of_state.map(|term| program(term)).collect::<Option<Vec<_>>>()?;
+        Some(Self { n_own: own.len(), adds, states })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use starlings_models::effect::{Addition, EffectParameter, EffectState};
+
+    fn effect(to: &str, term: &str, parameters: &[&str], states: &[(&str, &str)]) -> EffectDef {
+        let parameter =
+            |name: &&str| EffectParameter { name: (*name).to_owned(), ..EffectParameter::default() };
+        let state = |(name, rate): &(&str, &str)| EffectState {
+            name: (*name).to_owned(),
+            rate: (*rate).to_owned(),
+            initial: "0".to_owned(),
+            ..EffectState::default()
+        };
+        EffectDef {
+            adds: vec![Addition { to: to.to_owned(), term: term.to_owned() }],
+            parameters: parameters.iter().map(parameter).collect(),
+            states: states.iter().map(state).collect(),
+            ..EffectDef::default()
+        }
+    }
+
+    #[test]
+    fn names_of_parameters_and_states_do_not_make_another_effect() {
+        let drag = effect("v", "-c*v*abs(v)", &["c"], &[]);
+        assert!(same_form(&drag, &effect("v", "-drag * v*abs( v )", &["drag"], &[])));
+        assert!(same_form(&drag, &effect("v", "0.5*rho*v*abs(v)", &["rho"], &[])), "in another unit");
+        let leak = effect("h", "-a*sqrt(h)", &["a"], &[]);
+        assert!(same_form(&leak, &effect("h", "-1*b*h^0.5", &["b"], &[])), "where it has a value");
+        assert!(!same_form(&drag, &effect("v", "-c*v", &["c"], &[])), "another term");
+        assert!(!same_form(&drag, &effect("x", "-c*v*abs(v)", &["c"], &[])), "another place");
+        assert!(!same_form(&drag, &effect("v", "-c*x*abs(x)", &["c"], &[])), "another signal");
+        let late = effect("v", "k*s", &["k", "tau"], &[("s", "(x - s)/tau")]);
+        assert!(same_form(&late, &effect("v", "a*z", &["a", "T"], &[("z", "(x - z)/T")])));
+        assert!(!same_form(&late, &effect("v", "a*z", &["a", "T"], &[("z", "(v - z)/T")])));
+        let broken = effect("v", "c*(", &["c"], &[]);
+        assert!(!same_form(&broken, &broken), "what cannot be read is equal to nothing");
+    }
+}

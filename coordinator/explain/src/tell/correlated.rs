@@ -1,0 +1,50 @@
+//! The correlated noise of the recordings, in figures and in words.
+//!
+//! Next file to read: [`super::words`].
+
+use starlings_study::Study;
+
+use super::result::CorrelatedChannel;
+use crate::number::{percent, spaced, three};
+use crate::rows::Rows;
+
+/// The outputs whose noise counts as correlated.
+pub(crate) fn correlated_noise(study: &Study, rows: &Rows) -> Vec<CorrelatedChannel> {
+    let of = |(output, name): (usize, &String)| {
+        let noise = rows.noise.get(output)?.as_ref()?;
+        let (channel, unit) = (name.clone(), study.time_unit.clone());
+        Some(CorrelatedChannel { channel, share: noise.correlated, length: noise.length, unit })
+    };
+    study.setup.outputs.iter().enumerate().filter_map(of).collect()
+}
+
+impl CorrelatedChannel {
+    /// Channel, length and share in words: `position over 0.21 s (97 % of its variance)`.
+    pub fn says(&self) -> String {
+        let length = format!("{}{}", three(self.length), spaced(&self.unit));
+        format!("{} over {length} ({} of its variance)", self.channel, percent(self.share))
+    }
+}
+
+/// All of them in words; empty without any.
+pub(crate) fn listed(noise: &[CorrelatedChannel]) -> String {
+    noise.iter().map(CorrelatedChannel::says).collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_noise_of_a_channel_is_told_with_its_length_and_share() {
+        let of = |channel: &str, unit: &str| {
+            let (channel, unit) = (channel.to_owned(), unit.to_owned());
+            CorrelatedChannel { channel, share: 0.974, length: 0.2134, unit }
+        };
+        assert_eq!(
+            listed(&[of("position", "s"), of("angle", "")]),
+            "position over 0.213 s (97 % of its variance), angle over 0.213 (97 % of its variance)"
+        );
+        assert_eq!(listed(&[]), "");
+    }
+}
