@@ -8,6 +8,11 @@ check:
 test:
     cargo test --workspace
 
+# The properties on new random values, ten times as many. PROPTEST_RNG_SEED of what is printed makes a failure again.
+properties seed=`date +%s`:
+    @echo "PROPTEST_RNG_SEED={{seed}}"
+    PROPTEST_RNG_SEED={{seed}} PROPTEST_CASES=2560 cargo test --workspace --lib --test protocol --test units --test equations_language --test inference --test identifiability
+
 # Coverage and false alarms over many draws of the noise: minutes, not part of `just test`.
 battery:
     cargo test --release -p starlings-coordinator --test tube_twin -- --ignored --nocapture

@@ -103,7 +103,8 @@ fn the_summary_says_what_the_observer_does_for_a_state_that_starts_wrong() {
     let runs = last.iter().filter(|row| row[1] == "0" || row[1] == "1").count();
     assert_eq!(runs, 2, "the free run and the one with the observer");
     let beside = last.iter().filter(|row| row[1] == "3").count();
-    assert_eq!(beside, wrong.summary.parameters.len() + 1, "the estimate and one beside it each");
+    let points = wrong.summary.parameters.len() + 1;
+    assert_eq!(beside, 2 * points, "the estimate and one beside it each, with the observer and free");
     let page = report::render(&report::reader::report_data(&wrong.folder.store).unwrap()).unwrap();
     assert!(page.contains("id=\"observer\"") && page.contains("With the observer nudging"));
     assert!(page.contains("displacement, record beats: residuals by component"));

@@ -5,6 +5,8 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Where the server is in the repository, once it is installed.
 const PROGRAM: &str = "target/s3/bin/moto_server";
@@ -14,6 +16,8 @@ pub struct Server {
     process: Child,
     /// Host and port.
     pub address: String,
+    /// Objects that were put into the bucket so far.
+    put: Arc<AtomicUsize>,
 }
 
 impl Drop for Server {
@@ -39,9 +43,14 @@ impl Server {
         let mut said = BufReader::new(process.stderr.take().unwrap()).lines();
         let line = said.find(|line| line.as_ref().unwrap().contains("Running on http://")).unwrap().unwrap();
         let address = line.split("http://").nth(1).unwrap().trim_matches('/').trim().to_owned();
-        // What it says later would fill the pipe.
-        std::thread::spawn(move || said.for_each(drop));
-        let server = Self { process, address };
+        // It says every request, which would fill the pipe.
+        let put = Arc::<AtomicUsize>::default();
+        let counted = Arc::clone(&put);
+        std::thread::spawn(move || {
+            let puts = said.map_while(Result::ok).filter(|line| line.contains("\"PUT /states/"));
+            puts.for_each(|_| drop(counted.fetch_add(1, Ordering::Relaxed)));
+        });
+        let server = Self { process, address, put };
         let made = server.ask("PUT", "/states");
         assert!(made.starts_with("HTTP/1.1 200"), "{made}");
         Some(server)
@@ -64,6 +73,11 @@ impl Server {
     /// Objects in the bucket, a thousand at most.
     pub fn n_object(&self) -> usize {
         self.ask("GET", "/states?list-type=2").matches("<Key>").count()
+    }
+
+    /// Objects that were put into the bucket since its start.
+    pub fn n_put(&self) -> usize {
+        self.put.load(Ordering::Relaxed)
     }
 
     /// What a program has to find in its environment to reach it.
