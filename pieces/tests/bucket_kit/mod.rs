@@ -47,8 +47,9 @@ impl Server {
         let put = Arc::<AtomicUsize>::default();
         let counted = Arc::clone(&put);
         std::thread::spawn(move || {
-            let puts = said.map_while(Result::ok).filter(|line| line.contains("\"PUT /states/"));
-            puts.for_each(|_| drop(counted.fetch_add(1, Ordering::Relaxed)));
+            for _ in said.map_while(Result::ok).filter(|line| line.contains("\"PUT /states/")) {
+                counted.fetch_add(1, Ordering::Relaxed);
+            }
         });
         let server = Self { process, address, put };
         let made = server.ask("PUT", "/states");

@@ -55,7 +55,8 @@ impl<'c> Searcher<'_, '_, 'c> {
             let mut fits = held(&found.base, candidate, index);
             self.cut_short |= !drive_rounds(self.cache, &mut fits, ROUNDS)?;
             // Held far out, an effect may leave a parameter without any influence.
-            let is_whole = |fit: &FittedVariant<'c>| !fit.residual().is_empty() && !fit.jacobian.of_train.is_empty();
+            let is_whole =
+                |fit: &FittedVariant<'c>| !fit.residual().is_empty() && !fit.jacobian.of_train.is_empty();
             fits.retain(|fit| is_whole(fit) && fit.optimum().is_ok());
             let mut beside = self.beside(&fits, &of)?;
             beside.retain(|b| b.cost < wanted);
