@@ -6,7 +6,9 @@ mod reactor_kit;
 mod study_kit;
 
 use reactor_kit::{reactor, recorded};
-use starlings_coordinator::explain::{Context, ExplainError, Explanation, Options, Verdict, check, explain};
+use starlings_coordinator::explain::{
+    Context, ExplainError, Explanation, Options, Verdict, candidates, check, explain,
+};
 use starlings_coordinator::fleet::InProcess;
 use starlings_coordinator::study::Study;
 use starlings_coordinator::study::store::Store;
@@ -82,6 +84,26 @@ fn states_without_a_role_yield_a_term_by_its_form_and_no_error_of_a_sensor() {
         let rate = &found.effects[0].parameters[0];
         assert!((rate.estimate - 0.05).abs() < 4.0 * rate.sd, "{held_out}: {rate:?}");
     }
+}
+
+#[test]
+fn a_family_is_left_out_by_its_name() {
+    let case =
+        Case::new(&reactor(NOISE, 25.0, "biomass", true), &[("batch.csv", recorded(NOISE, 25.0, 0.05))]);
+    let of = |without: &[&str]| -> Vec<String> {
+        let options = Options {
+            without: without.iter().map(|name| (*name).to_owned()).collect(),
+            ..Options::default()
+        };
+        candidates(&case.study(), &options).unwrap().into_iter().map(|effect| effect.name).collect()
+    };
+    let all = of(&[]);
+    assert!(
+        all.iter().any(|n| n == "self-limit:X") && all.iter().any(|n| n == "sensor-gain:substrate"),
+        "{all:?}"
+    );
+    assert!(!all.iter().any(|n| n == "loss:X"), "it is tried under the name that the study gives: {all:?}");
+    assert_eq!(of(&["sensors", "generic"]), ["death"]);
 }
 
 #[test]

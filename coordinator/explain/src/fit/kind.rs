@@ -50,3 +50,27 @@ impl Kind {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn effects_of_the_library_have_the_kind_of_their_family_wherever_they_enter() {
+        assert_eq!(Kind::built_in("quadratic-drag:v2"), Kind::Library);
+        assert_eq!(Kind::built_in("loss:X"), Kind::Generic);
+        assert_eq!(
+            (Kind::built_in("sensor-gain"), Kind::built_in("input-delay:q")),
+            (Kind::Instrument, Kind::Instrument)
+        );
+    }
+
+    #[test]
+    fn every_kind_is_a_third_as_likely_as_the_one_before() {
+        let kinds = [Kind::Study, Kind::Library, Kind::Generic, Kind::Instrument];
+        for (k, kind) in kinds.into_iter().enumerate() {
+            assert!((kind.price() - 2.0 * 3.0_f64.powi(k as i32).ln()).abs() < 1e-12, "{kind:?}");
+        }
+        assert!(kinds.is_sorted());
+    }
+}

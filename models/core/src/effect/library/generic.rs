@@ -82,7 +82,7 @@ fn self_limit(host: Host<'_>) -> Vec<EffectDef> {
     every(host, |place, x| {
         let k = place.name("k_limit");
         let unit = over(&per_time("", host.time), &x.unit);
-        Draft::new(place, "self-limit", format!("{0} limits itself: a loss with the square of {0}.", x.name))
+        Draft::new(place, "self-limit", format!("A loss of {0} with the square of {0}.", x.name))
             .adds(&x.name, format!("-{k}*{0}*abs({0})", x.name))
             .coefficient(&k, unit, POSITIVE, "Rate of the loss per size.")
             .confounders(&["loss", "threshold"])
