@@ -74,7 +74,7 @@ pub(crate) fn search<'c>(
     };
     if adequacy.is_gap() || largest_gain > found.null_distribution.threshold {
         let best = searcher.best_of_each(&found.screening);
-        searcher.refit_singles(&mut found, best)?;
+        searcher.refit_singles(&mut found, &best)?;
         searcher.replace_terms(&mut found)?;
         if options.max_effects > 1 && found.passing().is_empty() {
             searcher.refit_pairs(&mut found)?;
@@ -107,7 +107,7 @@ pub(crate) fn search_generic<'c>(
     found.screening.extend(screening);
     found.null_distribution = null_distribution(searcher.cache, &found.base, &found.screening, candidates)?;
     found.largest_gain = largest_gain(&found.screening, candidates);
-    searcher.refit_singles(found, best)?;
+    searcher.refit_singles(found, &best)?;
     searcher.second_pass(found, &Options { max_effects: 1, ..options.clone() })?;
     found.cut_short |= searcher.cut_short || searcher.cache.was_cut_short();
     Ok(true)
@@ -165,10 +165,10 @@ impl<'c> Searcher<'_, '_, 'c> {
     fn refit_singles(
         &mut self,
         found: &mut SearchResult<'c>,
-        best: Vec<ScreeningResult>,
+        best: &[ScreeningResult],
     ) -> Result<(), ExplainError> {
         let chance = found.adequacy.inflation * found.null_distribution.threshold;
-        let mut next = best.clone();
+        let mut next = best.to_vec();
         while !next.is_empty() {
             let fits = self.race_and_refit(&found.base, &next)?;
             if fits.is_empty() || self.cut_short {
