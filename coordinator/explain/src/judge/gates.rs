@@ -166,6 +166,10 @@ fn refusal(
     if matches!(judged.fit.end(), Some(End::NoStart)) {
         return Some(Refusal { gate: "failed", reason: "the model fails with it".to_owned() });
     }
+    if judged.fit.optimum().is_err() {
+        let reason = "with it the data leave a direction of the parameters free".to_owned();
+        return Some(Refusal { gate: "failed", reason });
+    }
     held_out_channel(cache, base, &judged.fit)
         .or_else(|| held_out_span(before, judged))
         .or_else(|| at_edge(&judged.fit))
