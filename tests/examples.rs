@@ -43,4 +43,5 @@ examples! {
     thrust_vector_control => "thrust-vector-control",
     windkessel_human => "windkessel-human",
     pendulum => "pendulum",
+    falling_balls => "falling-balls",
 }

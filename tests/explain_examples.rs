@@ -4,14 +4,21 @@
 
 mod common;
 
+use std::path::Path;
+
 use common::{output, repository, starlings};
 use serde_json::Value;
 
-/// The explanation of an example's study, over two worker processes.
+/// The explanation of an example's study.
 fn explained(study: &str) -> Value {
+    explained_at(&repository(&format!("examples/{study}")))
+}
+
+/// The explanation of a study, over two worker processes.
+fn explained_at(study: &Path) -> Value {
     let folder = tempfile::tempdir().unwrap();
     let mut command = starlings();
-    command.arg("explain").arg(repository(&format!("examples/{study}")));
+    command.arg("explain").arg(study);
     command.args(["--json", "--workers", "2", "--out"]).arg(folder.path().join("out"));
     let (code, stdout, stderr) = output(&mut command);
     assert_eq!(code, 0, "{stderr}");
@@ -94,4 +101,48 @@ fn what_comes_nearest_in_a_human_aorta_is_a_delay_with_a_resistance_before_the_s
     let held_out = &found["held_out"][0];
     let ratio = held_out["after"].as_f64().unwrap() / held_out["before"].as_f64().unwrap();
     assert!(ratio <= 0.62, "{ratio}");
+}
+
+/// The explanation of a falling ball's study with this library and noise.
+fn falling(ball: &str, library: &str, noise: &str) -> Value {
+    let (from, folder) = (repository("examples/falling-balls"), tempfile::tempdir().unwrap());
+    let text = std::fs::read_to_string(from.join(ball)).unwrap();
+    let stated = text.lines().map(|line| match line.split_once(" = ") {
+        Some(("library", _)) => format!("library = \"{library}\""),
+        _ => line
+            .replace("noise = 0.15", &format!("noise = {noise}"))
+            .replace("file = \"", &format!("file = \"{}/", from.display())),
+    });
+    let study = folder.path().join("study.toml");
+    std::fs::write(&study, stated.collect::<Vec<_>>().join("\n")).unwrap();
+    explained_at(&study)
+}
+
+#[test]
+fn a_whiffle_ball_is_slowed_by_drag() {
+    // The noise of the second, short drop is found together with the first.
+    for (library, noise) in [("study", "0.15"), ("all", "0.15"), ("study", "\"auto\""), ("all", "\"auto\"")] {
+        let found = falling("study.toml", library, noise);
+        assert_eq!(names(&found["effects"]), ["linear-drag"], "{}", found["headline"]);
+        assert!(ratio(&found, "held-out") < 0.05, "{}", ratio(&found, "held-out"));
+        // Neither a spring nor a sensor is as likely as what the study describes.
+        for other in ["stiffness", "sensor"] {
+            assert!(!found["tied_with"].to_string().contains(other), "{}", found["headline"]);
+        }
+    }
+}
+
+#[test]
+fn heavy_balls_get_no_name_whatever_is_tried_and_stated() {
+    for library in ["study", "all"] {
+        for (ball, noise) in [
+            ("bowling-ball.toml", "0.15"),
+            ("bowling-ball.toml", "\"auto\""),
+            ("golf-ball.toml", "0.15"),
+            ("golf-ball.toml", "\"auto\""),
+        ] {
+            let found = falling(ball, library, noise);
+            assert!(names(&found["effects"]).is_empty(), "{ball}, {library}, {noise}: {}", found["headline"]);
+        }
+    }
 }

@@ -178,3 +178,70 @@ fn values_of_held_out_records_and_spans_are_in_no_window() {
     assert_eq!(seen.len(), 31 + 21);
     assert!(seen.iter().all(|v| *v < SECRET));
 }
+
+/// A level that rises evenly, with errors that a generator of congruences makes.
+fn rising(n: usize, seed: u64) -> String {
+    let mut state = seed;
+    let mut text = "time,level\n".to_owned();
+    for i in 0..n {
+        let mut sum = 0.0;
+        for _ in 0..12 {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            sum += (state >> 11) as f64 / (1_u64 << 53) as f64;
+        }
+        writeln!(text, "{i},{}", 0.1 * i as f64 + 0.05 * (sum - 6.0)).unwrap();
+    }
+    text
+}
+
+#[test]
+fn short_records_share_the_noise_that_is_found_and_long_ones_keep_their_own() {
+    let mut study = r#"
+[study]
+name = "levels"
+seed = 1
+[model]
+kind = "equations"
+outputs = [{ name = "level", unit = "m", value = "h" }]
+[[model.states]]
+name = "h"
+unit = "m"
+initial = 0.0
+rate = "q"
+[[parameters]]
+name = "q"
+prior = { transform = "log", median = 0.1, factor = 2.0 }
+"#
+    .to_owned();
+    let names = ["a", "b", "c", "long", "unseen"];
+    for name in names {
+        let unseen = if name == "unseen" { "use = \"held-out\"\n" } else { "" };
+        let channels = "channels = [{ column = \"level\", output = \"level\", noise = \"auto\" }]";
+        write!(study, "[[records]]\nname = \"{name}\"\nfile = \"{name}.csv\"\n{unseen}{channels}\n").unwrap();
+    }
+    let length = |name: &str| if name == "long" { 400 } else { 15 };
+    let files: Vec<(String, String)> = names
+        .iter()
+        .zip(1..)
+        .map(|(name, seed)| (format!("{name}.csv"), rising(length(name), seed)))
+        .collect();
+    let files: Vec<(&str, String)> = files.iter().map(|(name, text)| (name.as_str(), text.clone())).collect();
+    let study = load(&study, &files);
+    let noise: Vec<f64> = study.records.iter().map(|record| record.channels[0].noise).collect();
+    let how: Vec<&str> = study.records.iter().map(|record| record.channels[0].noise_how.as_str()).collect();
+    // Four hundred samples and more: their median scatters by 7 %; four of these.
+    assert!(noise.iter().all(|sd| (sd / 0.05 - 1.0).abs() < 0.28), "{noise:?}");
+    assert_eq!((noise[0], noise[1]), (noise[2], noise[0]), "one noise for the short ones");
+    assert_eq!(how[0], "from the third differences of the 445 samples of 4 records, pooled");
+    assert_eq!(how[3], "from the third differences of its 400 samples");
+    // What is held out tells nothing of the others, and takes their noise.
+    assert_eq!(how[4], "from the third differences of the 460 samples of 5 records, pooled");
+    let told = |name: &str, how: &str| {
+        study.warnings.iter().any(|w| w.contains(&format!("`{name}`")) && w.contains(how))
+    };
+    assert!(
+        told("a", how[0]) && told("long", how[3]) && !told("a", "its 15 samples"),
+        "{:?}",
+        study.warnings
+    );
+}

@@ -35,6 +35,9 @@ const EITHER: &[&str] = &[
     "input-gain",
     "input-offset",
     "input-drift",
+    "source",
+    "coupling",
+    "interaction",
 ];
 
 /// Every effect of the catalogue.

@@ -13,13 +13,14 @@ use crate::error::ExplainError;
 use crate::fit::candidate::Candidate;
 use crate::fit::drive::drive;
 use crate::fit::fitted_variant::FittedVariant;
+use crate::fit::kind::Kind;
 use crate::fit::model_variant::ModelVariant;
 use crate::judge::noise_model::{alike, best_supported};
 use crate::judge::search_result::SearchResult;
-use crate::judge::verdict::{Decision, decide};
+use crate::judge::verdict::{Decision, Verdict, decide};
 use crate::locate::Track;
 use crate::options::Options;
-use crate::refit::search::search;
+use crate::refit::search::{search, search_generic};
 use crate::run_cache::{Point, RunCache};
 use crate::screen::residual_timing::{change_points, periods};
 use crate::screen::resolve::resolved_candidates;
@@ -64,12 +65,26 @@ pub(super) fn diagnose<R>(
         let is_afforded = cache.affords_runs(cache.runs());
         if !(goes_on && is_afforded) {
             found.cut_short |= goes_on;
-            let decision = decide(cache, &found, &candidates)?;
+            let mut decision = decide(cache, &found, &candidates)?;
+            if is_open(&found, &decision) && search_generic(cache, &mut found, &candidates, &tracks, options)?
+            {
+                decision = decide(cache, &found, &candidates)?;
+            }
             return then(cache, Diagnosis { found, candidates: &candidates, decision, tracks: &tracks });
         }
         cache.rows.noise = noise;
     }
     unreachable!("the last round returns")
+}
+
+/// Whether generic terms are tried: nothing explains the gap, or an instrument's error is all that does.
+fn is_open(found: &SearchResult<'_>, decision: &Decision) -> bool {
+    let instrument = |i: usize| found.judged[i].kinds().contains(&Kind::Instrument);
+    match decision.verdict {
+        Verdict::Unexplained => true,
+        Verdict::Named | Verdict::Tie => decision.best.is_some_and(instrument),
+        Verdict::NoGap => false,
+    }
 }
 
 /// The fit of the model as it is, on the training rows, from where it stood with another noise.

@@ -36,6 +36,7 @@ mod tell;
 pub use error::ExplainError;
 pub use fit::drive::drive;
 pub use fit::fitted_variant::FittedVariant;
+pub use fit::kind::Kind;
 pub use judge::held_out::HeldOut;
 pub use judge::verdict::Verdict;
 pub use options::{Context, Options, Stage};

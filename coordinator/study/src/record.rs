@@ -11,6 +11,7 @@ mod input;
 mod noise;
 mod off;
 mod part;
+mod pooled_noise;
 mod reader;
 mod separator;
 mod shapes;
@@ -30,6 +31,7 @@ use super::file::RecordSection;
 use super::problem::{Source, suggestion};
 pub(super) use crate::record::csv::Csv;
 use crate::record::input::inputs;
+pub(super) use crate::record::pooled_noise::pool_short_records;
 use crate::record::reader::ChannelReader;
 
 /// Reads the CSV files of a study, each once.

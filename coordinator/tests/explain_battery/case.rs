@@ -9,7 +9,9 @@ use starlings_coordinator::explain::{Explanation, Verdict};
 pub enum Kind {
     /// An effect of the library or of the study, which the search may name.
     Library,
-    /// The same, but the search may name neither it nor its equals.
+    /// An effect that no name of a field describes in this system: the search reaches it by its form only.
+    Generic,
+    /// One of the library, but the search may name neither it nor its equals.
     LeftOut,
     /// An effect that the parameters imitate.
     Absorbed,
@@ -24,6 +26,7 @@ impl Kind {
     pub fn word(&self) -> &'static str {
         match self {
             Self::Library => "library",
+            Self::Generic => "generic",
             Self::LeftOut => "left out",
             Self::Absorbed => "absorbed",
             Self::Alien => "alien",

@@ -3,6 +3,7 @@
 //! Next file to read: [`crate::case`].
 
 use rand::RngExt;
+use starlings_models::effect::library::{GENERIC, family_of};
 
 use crate::case::{Case, Kind};
 use crate::draw::random;
@@ -98,6 +99,10 @@ fn of_system(index: usize, system: &System, cases: &mut Vec<Case>) {
     let none = Vec::new;
     for truth in system.truths {
         let name = Some(truth.name);
+        if family_of(truth.name) == Some(GENERIC) {
+            cases.push(case(Kind::Generic, name, truth.accepted(), none()));
+            continue;
+        }
         cases.push(case(Kind::Library, name, truth.accepted(), none()));
         cases.push(case(Kind::LeftOut, name, truth.accepted(), truth.relatives()));
     }

@@ -6,6 +6,7 @@ mod building;
 mod motor;
 mod oscillator;
 mod pendulum;
+mod reactor;
 mod tanks;
 mod tube;
 mod windkessel;
@@ -107,5 +108,6 @@ pub fn all() -> Vec<System> {
         windkessel::system(),
         building::system(),
         tube::system(),
+        reactor::system(),
     ]
 }

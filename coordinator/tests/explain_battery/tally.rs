@@ -104,7 +104,7 @@ pub fn report(results: &[Result], systems: &[System]) -> String {
         let groups = by_kind(results, |r| (r.case.rho <= 0.0) == is_white);
         if groups.iter().any(|group| !group.results.is_empty()) {
             write!(text, "### {title}\n\n{}\n", table(&groups)).unwrap();
-            text += &in_words(&groups[0], &groups[2]);
+            text += &in_words(&groups[0], &groups[4]);
         }
     }
     let results: Vec<Result> = results.iter().filter(|r| r.case.rho <= 0.0).cloned().collect();
@@ -112,7 +112,7 @@ pub fn report(results: &[Result], systems: &[System]) -> String {
     if results.is_empty() {
         return text;
     }
-    for kind in [Kind::Library, Kind::LeftOut] {
+    for kind in [Kind::Library, Kind::Generic, Kind::LeftOut] {
         let is = |result: &Result| result.case.kind == kind && informed(result);
         let mut groups = Vec::new();
         for system in systems {
@@ -148,7 +148,7 @@ pub fn report(results: &[Result], systems: &[System]) -> String {
 fn by_kind(results: &[Result], takes: impl Fn(&Result) -> bool) -> Vec<Group<'_>> {
     let informed = |result: &Result| result.lambda > INFORMATION;
     let mut groups = Vec::new();
-    for kind in [Kind::Library, Kind::LeftOut, Kind::Absorbed, Kind::Alien, Kind::Null] {
+    for kind in [Kind::Library, Kind::Generic, Kind::LeftOut, Kind::Absorbed, Kind::Alien, Kind::Null] {
         let is = |result: &Result| result.case.kind == kind && takes(result);
         let word = kind.word();
         if kind == Kind::Null || kind == Kind::Absorbed {

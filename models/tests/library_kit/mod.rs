@@ -144,7 +144,7 @@ pub(crate) fn amplitudes(effect: &EffectDef) -> Vec<f64> {
     let sizes: Vec<f64> = if hi.is_finite() {
         vec![0.9 * hi, 0.5 * hi, 0.1 * hi]
     } else {
-        vec![0.3, 10.0, 1e-2, 1e3, 1e-4, 1e5]
+        vec![0.3, 10.0, 1e-2, 1e3, 1e-4, 1e5, 1e9]
     };
     let signed = sizes.iter().flat_map(|a| [*a, -a]);
     signed.filter(|a| (lo..=hi).contains(a)).collect()

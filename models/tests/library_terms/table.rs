@@ -149,5 +149,14 @@ pub(crate) const TABLE: &[Case] = &[
     case("pipe", "nonlinear-compliance", &[0.02, 90.0], &[Instead("C", "(C*exp(1.8 - 0.02*p))")]),
     case("artery-1d", "tissue-support", &[1e4], &[Plus("k_s", 1e4)]),
     case("fsi-tube", "wall-viscosity", &[1e4], &[Plus("c_s", 1e4)]),
+    case("one tank", "growth", &[0.7], &[Rate("h", "0.7*h")]),
+    case("one tank", "loss", &[0.7], &[Rate("h", "-0.7*h")]),
+    case("one tank", "source", &[-0.3], &[Rate("h", "-0.3")]),
+    case("one tank", "self-limit", &[0.7], &[Rate("h", "-0.7*h^2")]),
+    case("two tanks", "coupling:h1:h2", &[0.6], &[Rate("h1", "0.6*h2")]),
+    case("two tanks", "interaction:h1:h2", &[-0.6], &[Rate("h1", "-0.6*h1*h2")]),
+    // The level stays above zero.
+    case("one tank", "saturation", &[0.7, 0.4], &[Rate("h", "-0.7/(1 + 0.4/h)")]),
+    case("one tank", "threshold", &[3.0, 0.9], &[Rate("h", "3*min(0.9 - h, 0)")]),
     case("rcr-network", "external-pressure:Pv_upper", &[1.0], &[Plus("Pv_upper", 1.0)]),
 ];

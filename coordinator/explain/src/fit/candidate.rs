@@ -9,6 +9,8 @@ use starlings_estimators::Transform;
 use starlings_models::effect::{EffectDef, EffectParameter};
 use starlings_study::variant::EffectPrior;
 
+use super::kind::Kind;
+
 /// Grid points of one candidate at most.
 const MOST_POINTS: usize = 9;
 /// Prior standard deviation of a parameter inside a term, in the logarithm of the odds over its range: nearly uniform.
@@ -23,6 +25,8 @@ pub(crate) struct Candidate {
     pub def: EffectDef,
     /// Values of the parameters after the amplitude at which it is screened, at least one point.
     pub points: Vec<Vec<f64>>,
+    /// Where it comes from.
+    pub kind: Kind,
 }
 
 impl Candidate {
@@ -36,7 +40,12 @@ impl Candidate {
                 .flat_map(|point| values.iter().map(move |v| [point.as_slice(), &[*v]].concat()))
                 .collect();
         }
-        Self { def, points: thinned(points) }
+        Self { def, points: thinned(points), kind: Kind::default() }
+    }
+
+    /// The same of a kind.
+    pub(crate) fn of_kind(self, kind: Kind) -> Self {
+        Self { kind, ..self }
     }
 
     /// Its name.

@@ -12,6 +12,7 @@ use super::held_out::{HeldOut, held_out};
 use super::misfit::Misfit;
 use super::uncertainty::allowances;
 use crate::fit::fitted_variant::FittedVariant;
+use crate::fit::kind::Kind;
 use crate::fit::model_variant::AddedEffect;
 use crate::number::{spaced, three, times};
 use crate::rows::{Row, Usage, unit};
@@ -76,6 +77,23 @@ impl JudgedFit<'_> {
     /// Fall of χ² in units of its own effective noise.
     pub(crate) fn evidence(&self) -> f64 {
         self.gain / self.inflation
+    }
+
+    /// The kinds of its effects, the least likely first.
+    pub(crate) fn kinds(&self) -> Vec<Kind> {
+        let mut kinds: Vec<Kind> = self.fit.variant.effects.iter().map(|m| m.candidate.kind).collect();
+        kinds.sort_by(|a, b| b.cmp(a));
+        kinds
+    }
+
+    /// What the prior takes from its support, in χ².
+    pub(crate) fn prior(&self) -> f64 {
+        self.inflation * self.fit.variant.effects.iter().map(|m| m.candidate.kind.price()).sum::<f64>()
+    }
+
+    /// Its rank less what the prior takes: the order of what passes the gates.
+    pub(crate) fn standing(&self) -> f64 {
+        self.rank() - self.prior()
     }
 
     /// Fall of χ² on the training rows, the held-out span and the held-out channels, for ranking. The part of the χ² of both that the
@@ -147,6 +165,10 @@ fn refusal(
 ) -> Option<Refusal> {
     if matches!(judged.fit.end(), Some(End::NoStart)) {
         return Some(Refusal { gate: "failed", reason: "the model fails with it".to_owned() });
+    }
+    if judged.fit.optimum().is_err() {
+        let reason = "with it the data leave a direction of the parameters free".to_owned();
+        return Some(Refusal { gate: "failed", reason });
     }
     held_out_channel(cache, base, &judged.fit)
         .or_else(|| held_out_span(before, judged))

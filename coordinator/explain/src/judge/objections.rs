@@ -6,6 +6,7 @@ use super::form::{Leftover, white_share};
 use super::gates::JudgedFit;
 use super::held_out::forbidding;
 use super::search_result::SearchResult;
+use crate::fit::kind::Kind;
 use crate::run_cache::RunCache;
 use crate::screen::screening_result::ScreeningResult;
 
@@ -90,6 +91,12 @@ pub(crate) fn objection(
     }
     if judged.adequacy.could_be_white() {
         return None;
+    }
+    if judged.kinds().contains(&Kind::Generic) {
+        return Some(format!(
+            "`{name}` comes nearest, but what is left is not noise, and a term without a field of its own is named only where it \
+             leaves nothing else"
+        ));
     }
     correlated(cache, found, judged)
 }

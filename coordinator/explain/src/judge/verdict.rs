@@ -10,11 +10,11 @@ use starlings_models::equations::{Expression, Slot};
 use super::contribution::{ContributionCheck, DISCREPANT, check_contributions};
 use super::gates::JudgedFit;
 use super::objections::{nearest_refused, objection};
-use super::same_form::same_form;
 use super::search_result::SearchResult;
 use crate::error::ExplainError;
 use crate::fit::candidate::Candidate;
 use crate::fit::model_variant::AddedEffect;
+use crate::fit::same_form::same_form;
 use crate::run_cache::RunCache;
 use crate::screen::screening_result::ScreeningResult;
 use serde::{Deserialize, Serialize};
@@ -113,10 +113,11 @@ pub(crate) fn decide(
     Ok(Decision { verdict, best: Some(best), checked: Some(checked), tied, rivals, synonyms, because })
 }
 
-/// The simplest of a class; what was the best takes its place among the rivals.
+/// What is told of a class: the likeliest before any data, then the simplest. What was the best takes its place among the rivals.
 fn shown(found: &SearchResult<'_>, mut best: usize, rivals: &mut [usize]) -> usize {
     for rival in rivals {
-        if complexity(&found.judged[*rival]) < complexity(&found.judged[best]) {
+        let key = |i: usize| (found.judged[i].kinds(), complexity(&found.judged[i]));
+        if key(*rival) < key(best) {
             std::mem::swap(rival, &mut best);
         }
     }
@@ -184,7 +185,8 @@ fn rivals(cache: &RunCache<'_>, found: &SearchResult<'_>, passing: &[usize], bes
     let size = of_best.fit.variant.effects.len();
     let near = |i: &usize| {
         let judged = &found.judged[*i];
-        let apart = of_best.rank() - judged.rank();
+        // Neither the prior nor its absence breaks a tie.
+        let apart = (of_best.rank() - judged.rank()).min(of_best.standing() - judged.standing());
         *i != best
             && judged.fit.variant.effects.len() == size
             && judged.names() != of_best.names()

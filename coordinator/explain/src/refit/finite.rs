@@ -54,10 +54,10 @@ impl<'c> Searcher<'_, '_, 'c> {
         for (index, candidate) in self.candidates.iter().enumerate().filter(|(_, c)| is_nonlinear(&c.def)) {
             let mut fits = held(&found.base, candidate, index);
             self.cut_short |= !drive_rounds(self.cache, &mut fits, ROUNDS)?;
-            // Held far out, an effect may leave a parameter without any influence.
-            let is_whole =
-                |fit: &FittedVariant<'c>| !fit.residual().is_empty() && !fit.jacobian.of_train.is_empty();
-            fits.retain(|fit| is_whole(fit) && fit.optimum().is_ok());
+            // Far from where the model was fitted the data may leave a direction free; nothing can be scored there.
+            let is_known =
+                |fit: &FittedVariant<'_>| !fit.residual().is_empty() && !fit.jacobian.of_train.is_empty();
+            fits.retain(|fit| is_known(fit) && fit.optimum().is_ok());
             let mut beside = self.beside(&fits, &of)?;
             beside.retain(|b| b.cost < wanted);
             for Beside { fit, partner, .. } in beside.iter().take(PARTNERS) {

@@ -12,6 +12,7 @@ use crate::error::ExplainError;
 use crate::fit::candidate::Candidate;
 use crate::fit::drive::drive;
 use crate::fit::fitted_variant::FittedVariant;
+use crate::fit::kind::Kind;
 use crate::fit::model_variant::{AddedEffect, ModelVariant};
 use crate::judge::adequacy::Adequacy;
 use crate::judge::effective_noise::inflation;
@@ -34,6 +35,8 @@ pub(super) struct Searcher<'s, 'l, 'c> {
     pub(super) cut_short: bool,
     /// Candidates were asked for by name, so that each is refitted whatever its score says.
     pub(super) asked: bool,
+    /// The kinds of effects that are tried.
+    tried: fn(Kind) -> bool,
 }
 
 /// Searches from a fitted model.
@@ -47,16 +50,16 @@ pub(crate) fn search<'c>(
     tracks: &[Track],
     options: &Options,
 ) -> Result<SearchResult<'c>, ExplainError> {
-    let mut searcher =
-        Searcher { cache, candidates, tracks, cut_short: false, asked: !options.only.is_empty() };
+    let asked = !options.only.is_empty();
+    let tried = if asked { |_| true } else { |kind| kind != Kind::Generic };
+    let mut searcher = Searcher { cache, candidates, tracks, cut_short: false, asked, tried };
     let before = Misfit::of(searcher.cache, &base);
     let adequacy = Adequacy::of(searcher.cache, &base);
     let held_out = held_out(searcher.cache, &base, &base);
     searcher.cache.stage("screen", &format!("{} candidates", candidates.len()));
     let screening = searcher.screen_all(&base)?;
     let null_distribution = null_distribution(searcher.cache, &base, &screening, candidates)?;
-    let largest_gain =
-        screening.iter().map(|h| h.allowed_gain(candidates[h.candidate].sign())).fold(0.0, f64::max);
+    let largest_gain = largest_gain(&screening, candidates);
     let (judged, cut_short) = (Vec::new(), false);
     let mut found = SearchResult {
         base,
@@ -70,7 +73,8 @@ pub(crate) fn search<'c>(
         cut_short,
     };
     if adequacy.is_gap() || largest_gain > found.null_distribution.threshold {
-        searcher.refit_singles(&mut found)?;
+        let best = searcher.best_of_each(&found.screening);
+        searcher.refit_singles(&mut found, &best)?;
         searcher.replace_terms(&mut found)?;
         if options.max_effects > 1 && found.passing().is_empty() {
             searcher.refit_pairs(&mut found)?;
@@ -79,6 +83,39 @@ pub(crate) fn search<'c>(
     }
     found.cut_short = searcher.cut_short || searcher.cache.was_cut_short();
     Ok(found)
+}
+
+/// Goes on with the generic terms, one at a time, where no effect with a name of its own explains the gap. Whether there is any.
+///
+/// # Errors
+/// As [`search`].
+pub(crate) fn search_generic<'c>(
+    cache: &mut RunCache<'_>,
+    found: &mut SearchResult<'c>,
+    candidates: &'c [Candidate],
+    tracks: &[Track],
+    options: &Options,
+) -> Result<bool, ExplainError> {
+    if !options.only.is_empty() || candidates.iter().all(|c| c.kind != Kind::Generic) {
+        return Ok(false);
+    }
+    let tried = |kind| kind == Kind::Generic;
+    let mut searcher = Searcher { cache, candidates, tracks, cut_short: false, asked: false, tried };
+    searcher.cache.stage("screen", "generic terms, since no other effect explains the gap");
+    let screening = searcher.screen_all(&found.base)?;
+    let best = searcher.best_of_each(&screening);
+    found.screening.extend(screening);
+    found.null_distribution = null_distribution(searcher.cache, &found.base, &found.screening, candidates)?;
+    found.largest_gain = largest_gain(&found.screening, candidates);
+    searcher.refit_singles(found, &best)?;
+    searcher.second_pass(found, &Options { max_effects: 1, ..options.clone() })?;
+    found.cut_short |= searcher.cut_short || searcher.cache.was_cut_short();
+    Ok(true)
+}
+
+/// Largest fall of χ² in a screening, to first order, with an amplitude of a sign that physics allows.
+fn largest_gain(screening: &[ScreeningResult], candidates: &[Candidate]) -> f64 {
+    screening.iter().map(|h| h.allowed_gain(candidates[h.candidate].sign())).fold(0.0, f64::max)
 }
 
 /// The scores that a search reaches by chance at a fit.
@@ -100,6 +137,7 @@ impl<'c> Searcher<'_, '_, 'c> {
             .candidates
             .iter()
             .enumerate()
+            .filter(|(_, candidate)| (self.tried)(candidate.kind))
             .flat_map(|(c, candidate)| (0..candidate.points.len()).map(move |p| (c, p)))
             .collect();
         self.screen(fit, &of)
@@ -122,12 +160,15 @@ impl<'c> Searcher<'_, '_, 'c> {
         Ok(results)
     }
 
-    /// Refits the best candidates, one effect each, and goes on down the list while none of them passes the gates and the next still
+    /// Refits the best of these candidates, one effect each, and goes on down the list while none of them passes the gates and the next still
     /// gains more than chance.
-    fn refit_singles(&mut self, found: &mut SearchResult<'c>) -> Result<(), ExplainError> {
-        let best = self.best_of_each(&found.screening);
+    fn refit_singles(
+        &mut self,
+        found: &mut SearchResult<'c>,
+        best: &[ScreeningResult],
+    ) -> Result<(), ExplainError> {
         let chance = found.adequacy.inflation * found.null_distribution.threshold;
-        let mut next = best.clone();
+        let mut next = best.to_vec();
         while !next.is_empty() {
             let fits = self.race_and_refit(&found.base, &next)?;
             if fits.is_empty() || self.cut_short {
@@ -221,10 +262,10 @@ impl<'c> Searcher<'_, '_, 'c> {
     }
 }
 
-/// Those that pass the gates first, then by rank.
+/// Those that pass the gates first, then by rank and prior.
 fn order(a: &JudgedFit<'_>, b: &JudgedFit<'_>) -> Ordering {
     let refused = |j: &JudgedFit<'_>| j.refusal.is_some();
-    refused(a).cmp(&refused(b)).then(b.rank().total_cmp(&a.rank()))
+    refused(a).cmp(&refused(b)).then(b.standing().total_cmp(&a.standing()))
 }
 
 /// The result with the largest gain of every candidate, the largest first.

@@ -2,11 +2,13 @@
 //!
 //! A wrong name or an empty list is an error before the first run. Next file to read: [`crate::options`].
 
-use starlings_models::effect::library::{library_in, shows_in};
+use starlings_models::effect::library::{FAMILIES, family_of, library_in, shows_in};
 use starlings_models::{BuildSetup, EffectDef, Setup, nearest};
 use starlings_study::{Study, checked::Library};
 
 use crate::error::ExplainError;
+use crate::fit::kind::Kind;
+use crate::fit::same_form::same_form;
 use crate::number::three;
 use crate::options::Options;
 
@@ -28,14 +30,22 @@ pub fn candidates(study: &Study, options: &Options) -> Result<Vec<EffectDef>, Ex
     for name in options.only.iter().chain(&options.without) {
         check_name(name, study, &all)?;
     }
+    let own = |effect: &EffectDef| study.candidates.iter().any(|c| c.name == effect.name);
+    let is_in = |list: &[String], effect: &EffectDef| {
+        let family = || family_of(&effect.name).filter(|_| !own(effect));
+        list.contains(&effect.name) || family().is_some_and(|f| list.iter().any(|name| name == f))
+    };
     let in_model = |effect: &EffectDef| {
         study.setup.effects.iter().any(|known| known.name == effect.name || known.adds == effect.adds)
     };
+    // A generic term that has a name already is tried under that name.
+    let named: Vec<&EffectDef> = all.iter().copied().filter(|e| !is_generic(study, e)).collect();
     let mut kept: Vec<EffectDef> = Vec::new();
     for effect in &all {
-        let wanted = options.only.is_empty() || options.only.contains(&effect.name);
-        let repeated = kept.iter().any(|known| known.name == effect.name || known.adds == effect.adds);
-        if wanted && !options.without.contains(&effect.name) && !in_model(effect) && !repeated {
+        let wanted = options.only.is_empty() || is_in(&options.only, effect);
+        let repeated = kept.iter().any(|known| known.name == effect.name || known.adds == effect.adds)
+            || (is_generic(study, effect) && named.iter().any(|known| same_form(known, effect)));
+        if wanted && !is_in(&options.without, effect) && !in_model(effect) && !repeated {
             kept.push((*effect).clone());
         }
     }
@@ -43,6 +53,19 @@ pub fn candidates(study: &Study, options: &Options) -> Result<Vec<EffectDef>, Ex
         return Err(ExplainError::NothingToTry(nothing_to_try(study, options, all.len())));
     }
     Ok(kept)
+}
+
+/// Where an effect comes from.
+pub(crate) fn kind_of(study: &Study, name: &str) -> Kind {
+    if study.candidates.iter().any(|candidate| candidate.name == name) {
+        Kind::Study
+    } else {
+        Kind::built_in(name)
+    }
+}
+
+fn is_generic(study: &Study, effect: &EffectDef) -> bool {
+    kind_of(study, &effect.name) == Kind::Generic
 }
 
 /// Outputs that a fitted channel measures.
@@ -99,9 +122,10 @@ pub fn check(study: &Study, options: &Options) -> Result<(), ExplainError> {
     }
 }
 
-/// Refuses an unknown name. An effect that the model has already may be named; this has no influence.
+/// Refuses an unknown name of an effect or a family. An effect that the model has already may be named; this has no influence.
 fn check_name(name: &str, study: &Study, all: &[&EffectDef]) -> Result<(), ExplainError> {
-    let names: Vec<&str> = all.iter().copied().chain(&study.setup.effects).map(|e| e.name.as_str()).collect();
+    let effects = all.iter().copied().chain(&study.setup.effects).map(|e| e.name.as_str());
+    let names: Vec<&str> = effects.chain(FAMILIES.iter().map(|family| family.name)).collect();
     if names.contains(&name) {
         return Ok(());
     }

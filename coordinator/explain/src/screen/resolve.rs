@@ -6,7 +6,7 @@
 use starlings_models::effect::{EffectDef, Scale, scale};
 use starlings_study::{Record, Study};
 
-use super::candidates::candidates;
+use super::candidates::{candidates, kind_of};
 use crate::error::ExplainError;
 use crate::fit::candidate::Candidate;
 use crate::locate::Track;
@@ -24,7 +24,13 @@ pub(crate) fn resolved_candidates(
     options: &Options,
 ) -> Result<Vec<Candidate>, ExplainError> {
     let defs = resolved(study, candidates(study, options)?, tracks, periods, change_points);
-    Ok(defs.into_iter().map(Candidate::new).collect())
+    Ok(defs
+        .into_iter()
+        .map(|def| {
+            let kind = kind_of(study, &def.name);
+            Candidate::new(def).of_kind(kind)
+        })
+        .collect())
 }
 
 /// The effects with their numbers in the model's units. An effect whose quantity is constant along the run is left out, since its

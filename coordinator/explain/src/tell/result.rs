@@ -4,6 +4,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::fit::kind::Kind;
 use crate::judge::held_out::HeldOut;
 use crate::judge::verdict::Verdict;
 use crate::locate::MisfitPlace;
@@ -89,6 +90,9 @@ pub struct NamedEffect {
     pub confounders: Vec<String>,
     /// Where the form of the term comes from.
     pub source: String,
+    /// Where the effect comes from.
+    #[serde(default)]
+    pub kind: Kind,
 }
 
 impl NamedEffect {

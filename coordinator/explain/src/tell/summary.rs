@@ -48,6 +48,7 @@ pub(crate) fn effects(judged: &JudgedFit<'_>) -> Vec<NamedEffect> {
             parameters: def.parameters.iter().enumerate().map(coefficient).collect(),
             confounders: def.confounders.clone(),
             source: def.source.clone(),
+            kind: effect.candidate.kind,
         }
     };
     variant.effects.iter().enumerate().map(of_effect).collect()

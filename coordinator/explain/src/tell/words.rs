@@ -10,6 +10,7 @@ use starlings_study::posterior;
 use super::correlated::{correlated_noise, listed as listed_noise};
 use crate::fit::candidate::Candidate;
 use crate::fit::fitted_variant::FittedVariant;
+use crate::fit::kind::Kind;
 use crate::judge::adequacy::Nature;
 use crate::judge::gates::JudgedFit;
 use crate::judge::held_out::{HeldOut, listed};
@@ -52,14 +53,21 @@ pub(crate) fn headline(
     let verdict = match (decision.verdict, best) {
         (Verdict::Named, Some(judged)) => {
             let shrinking = capital(&shrinking(cache, found, judged));
-            format!("{}{} {shrinking}{}", subject(judged), same(decision), remains(judged))
+            format!(
+                "{}{}{} {shrinking}{}",
+                subject(judged),
+                of_no_field(judged),
+                same(decision),
+                remains(judged)
+            )
         }
         (Verdict::Tie, Some(judged)) => {
             let rivals: Vec<String> = decision.tied.iter().map(|set| set.join(" + ")).collect();
             format!(
-                "{} or {}: the data cannot tell them apart.{} {}{}",
+                "{} or {}: the data cannot tell them apart.{}{} {}{}",
                 judged.fit.variant.name(),
                 rivals.join(" or "),
+                likelier(judged, decision, candidates),
                 same(decision),
                 capital(&shrinking(cache, found, judged)),
                 remains(judged)
@@ -127,6 +135,29 @@ fn subject(judged: &JudgedFit<'_>) -> String {
     let variant = &judged.fit.variant;
     let says: Vec<&str> = variant.effects.iter().map(|m| m.candidate.def.says.as_str()).collect();
     format!("Missing: {}. {}", variant.name(), says.join(" "))
+}
+
+/// That a generic term is no physics; empty for an effect of a field.
+fn of_no_field(judged: &JudgedFit<'_>) -> &'static str {
+    if judged.kinds().contains(&Kind::Generic) {
+        " That describes a dependence and not its cause."
+    } else {
+        ""
+    }
+}
+
+/// That what is told first of a tie is so by the prior; empty where all of the tied are of its kind.
+fn likelier(judged: &JudgedFit<'_>, decision: &Decision, candidates: &[Candidate]) -> String {
+    let told = judged.kinds().first().copied().unwrap_or_default();
+    let tied = decision.tied.iter().flatten();
+    let kinds = tied.filter_map(|name| candidates.iter().find(|c| c.name() == name)).map(|c| c.kind);
+    kinds.filter(|kind| *kind > told).max().map_or_else(String::new, |other| {
+        let (first, last) = (told.plural(), other.plural());
+        format!(
+            " `{}` is told first, since {first} are held likelier than {last}.",
+            judged.fit.variant.name()
+        )
+    })
 }
 
 /// Other names of what is named; empty without any.

@@ -7,7 +7,7 @@ use starlings_explain::result::{
     Coefficient, CorrelatedChannel, Experiment, Explanation, FalseAlarm, GapRow, NamedEffect, ParameterShift,
     Rejected, Remaining, Screened,
 };
-use starlings_explain::{Figures, HeldOut, NotTried, Verdict};
+use starlings_explain::{Figures, HeldOut, Kind, NotTried, Verdict};
 
 use super::StudyAbout;
 
@@ -69,6 +69,7 @@ fn effect() -> NamedEffect {
         parameters: vec![coefficient],
         confounders: vec!["inertance".into(), "a gain of the flow meter".into()],
         source: "Westerhof, Lankhaar & Westerhof (2009)".into(),
+        kind: Kind::Study,
     }
 }
 

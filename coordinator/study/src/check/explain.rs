@@ -3,7 +3,7 @@
 //! Whether any candidate is left to try is checked by the command `explain`: other commands run such a study. Next file to
 //! read: [`super::settings`].
 
-use starlings_models::effect::library;
+use starlings_models::effect::library::{FAMILIES, library};
 use starlings_models::{BuildSetup, ModelDef, Setup};
 use toml::Spanned;
 
@@ -30,7 +30,7 @@ pub(crate) fn explain(source: &Source, file: &StudyFile) -> ExplainChoice {
     }
 }
 
-/// Effects that are named must be described in the study or be built-in effects for its model.
+/// What is named must be an effect described in the study, a built-in effect for its model or a family of these.
 pub(crate) fn check_names(source: &Source, file: &StudyFile, model: &ModelDef) {
     let section = &file.explain;
     if section.without.is_empty() && section.only.is_empty() {
@@ -41,6 +41,7 @@ pub(crate) fn check_names(source: &Source, file: &StudyFile, model: &ModelDef) {
     let Ok(spec) = bare.spec() else { return };
     let mut known: Vec<String> = library(&spec).into_iter().map(|effect| effect.name).collect();
     known.extend(file.effects.iter().map(|effect| effect.name.get_ref().clone()));
+    known.extend(FAMILIES.iter().map(|family| family.name.to_owned()));
     known.sort();
     known.dedup();
     for name in section.without.iter().chain(&section.only).filter(|name| !known.contains(name.get_ref())) {

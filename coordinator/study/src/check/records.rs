@@ -7,7 +7,7 @@ use crate::checked::Record;
 use crate::field::field_of;
 use crate::file::{RecordSection, StudyFile};
 use crate::problem::Source;
-use crate::record::{Context, Recordings};
+use crate::record::{Context, Recordings, pool_short_records};
 
 /// Reads all records; their outputs become those of the setup.
 pub(super) fn records(
@@ -21,7 +21,8 @@ pub(super) fn records(
     let mut files = Recordings::new(source);
     let mut context = Context { outputs: &mut model.setup.outputs, hold_out, warnings };
     let read = |section: &RecordSection| files.record(section, &model.spec, &mut context);
-    let records: Vec<Record> = file.records.iter().filter_map(read).collect();
+    let mut records: Vec<Record> = file.records.iter().filter_map(read).collect();
+    pool_short_records(&mut records, context.warnings);
     check_held_out_components(source, file, &records);
     records
 }

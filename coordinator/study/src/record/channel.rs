@@ -174,7 +174,7 @@ impl ChannelReader<'_> {
     }
 }
 
-fn with_unit(value: f64, unit: &str) -> String {
+pub(super) fn with_unit(value: f64, unit: &str) -> String {
     let text = rounded(value, 4).to_string();
     if unit.is_empty() { text } else { format!("{text} {unit}") }
 }

@@ -5,6 +5,7 @@
 
 use starlings_estimators::noise_from_third_differences;
 
+use super::pooled_noise::FOUND;
 use super::reader::ChannelReader;
 use crate::file::ChannelSection;
 
@@ -53,7 +54,7 @@ impl ChannelReader<'_> {
         let n = parts.first().map_or(0, |values| self.used(values).len());
         let uneven = if self.is_even() { "" } else { " (which are not evenly spaced: it may be too large)" };
         match parts.len() {
-            1 => format!("from the third differences of its {n} samples{uneven}"),
+            1 => format!("{FOUND}{n} samples{uneven}"),
             of => {
                 format!(
                     "from the third differences of the {n} samples of its {of} components, pooled{uneven}"

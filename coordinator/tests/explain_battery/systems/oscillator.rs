@@ -81,6 +81,7 @@ const TRUTHS: &[Truth] = &[
     truth("periodic-forcing"),
     truth("input-gain").same(&[
         ("sensor-gain", "a linear system answers in proportion, and its start is free"),
+        ("coupling:v:force", "the force enters this equation alone"),
         ("added-mass", "the force over the mass, with stiffness and damping free"),
     ]),
     truth("input-delay")

@@ -75,7 +75,7 @@ const TRUTHS: &[Truth] = &[
     truth("quadratic-stiffness"),
     truth("bias-force").same(&[("input-offset", "the torque enters this equation alone")]),
     truth("periodic-forcing"),
-    truth("input-gain"),
+    truth("input-gain").same(&[("coupling:w:torque", "the torque enters this equation alone")]),
     truth("sensor-gain"),
 ];
 

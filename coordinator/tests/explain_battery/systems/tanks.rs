@@ -94,7 +94,7 @@ const TRUTHS: &[Truth] = &[
     truth("overflow:h1").inside(&["overflow-into:h1:h2", "overflow-into:h1:h3"]),
     truth("overflow:h2").inside(&["overflow-into:h2:h1", "overflow-into:h2:h3"]),
     truth("bias-flow:h1").same(&[("input-offset", "the pump feeds this tank alone")]),
-    truth("input-gain"),
+    truth("input-gain").same(&[("coupling:h1:pump", "the pump feeds this tank alone")]),
     truth("sensor-gain:first"),
     truth("sensor-offset:last"),
 ];

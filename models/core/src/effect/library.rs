@@ -6,6 +6,7 @@
 //! [`super::scale`].
 
 mod draft;
+mod generic;
 mod haemodynamics;
 mod hydraulics;
 mod inputs;
@@ -17,6 +18,8 @@ mod sensors;
 mod specimen;
 mod thermal;
 mod unit;
+
+use std::sync::OnceLock;
 
 use super::{EffectDef, Target};
 use crate::SetupError;
@@ -61,7 +64,26 @@ pub const FAMILIES: &[Family] = &[
     },
     Family { name: "sensors", needs: "Any output of one component.", growers: sensors::GROWERS },
     Family { name: "inputs", needs: "Any input of one component.", growers: inputs::GROWERS },
+    Family {
+        name: GENERIC,
+        needs: "States of one component, eight at most, that are no displacements. Tried where no other effect explains the gap.",
+        growers: generic::GROWERS,
+    },
 ];
+
+/// Name of the family of terms that have no particular physics.
+pub const GENERIC: &str = "generic";
+
+/// Names of the families whose effects are errors of instruments.
+pub const INSTRUMENTS: [&str; 2] = ["sensors", "inputs"];
+
+/// Name of the family of a built-in effect.
+pub fn family_of(effect: &str) -> Option<&'static str> {
+    static STEMS: OnceLock<Vec<(String, &'static str)>> = OnceLock::new();
+    let of = |family: &'static Family| family.catalogue().into_iter().map(|def| (def.name, family.name));
+    let stems = STEMS.get_or_init(|| FAMILIES.iter().flat_map(of).collect());
+    stems.iter().find(|(known, _)| known == stem(effect)).map(|(_, family)| *family)
+}
 
 impl Family {
     /// Name with a capital.

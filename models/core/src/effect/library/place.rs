@@ -74,6 +74,11 @@ impl<'a> Host<'a> {
         scalars(&self.spec.parameters, Some(role))
     }
 
+    /// Every scalar state.
+    pub(super) fn all_states(self) -> Vec<&'a Quantity> {
+        scalars(&self.spec.states, None)
+    }
+
     /// Every scalar output.
     pub(super) fn all_outputs(self) -> Vec<&'a Quantity> {
         scalars(&self.spec.outputs, None)

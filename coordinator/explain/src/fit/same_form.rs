@@ -1,6 +1,6 @@
 //! Whether two effects are one effect under two names.
 //!
-//! Next file to read: [`super::verdict`].
+//! Next file to read: [`super::candidate`].
 
 use starlings_models::equations::{At, Expression, Program, Slot};
 use starlings_models::{Drive, EffectDef};

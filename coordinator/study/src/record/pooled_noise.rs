@@ -1,0 +1,69 @@
+//! The noise of short records, found from all records of one output: one short record tells it badly.
+//!
+//! Next file to read: [`super::noise`].
+
+use starlings_estimators::noise_from_third_differences;
+
+use super::channel::with_unit;
+use crate::checked::{Channel, Record};
+
+/// Third differences from which a record tells its noise alone: their median scatters by a fifth then, and by more with fewer.
+const ENOUGH: usize = 50;
+/// How a noise begins that was found from the samples of one channel of one record.
+pub(super) const FOUND: &str = "from the third differences of its ";
+
+/// Gives the channels of short records, where the study leaves their noise to be found, the noise that all records of that output tell
+/// together; warnings that speak of it follow. A record that is held out tells nothing of another one's noise.
+pub(crate) fn pool_short_records(records: &mut [Record], warnings: &mut [String]) {
+    let is_found = |channel: &Channel| channel.noise_how.starts_with(FOUND);
+    let mut pooled: Vec<(usize, usize, f64, String)> = Vec::new();
+    for (r, record) in records.iter().enumerate() {
+        for (c, channel) in record.channels.iter().enumerate().filter(|(_, channel)| is_found(channel)) {
+            let own = used(record, channel);
+            let same = |other: &&Channel| {
+                is_found(other) && other.output == channel.output && other.unit == channel.unit
+            };
+            let others: Vec<Vec<f64>> = (records.iter().enumerate())
+                .filter(|(other, of)| *other != r && of.train.is_some())
+                .flat_map(|(_, of)| of.channels.iter().filter(same).map(|channel| used(of, channel)))
+                .collect();
+            if own.len() >= ENOUGH + 3 || others.is_empty() {
+                continue;
+            }
+            let n = own.len() + others.iter().map(Vec::len).sum::<usize>();
+            let how = format!(
+                "from the third differences of the {n} samples of {} records, pooled",
+                others.len() + 1
+            );
+            // No difference reaches over the missing value between two records.
+            let series = others.into_iter().fold(own, |all, other| [all, vec![f64::NAN], other].concat());
+            let sd = noise_from_third_differences(&series);
+            if sd > 0.0 && sd.is_finite() {
+                pooled.push((r, c, sd, how));
+            }
+        }
+    }
+    for (r, c, sd, how) in pooled {
+        let Record { name, channels, .. } = &mut records[r];
+        let channel = &mut channels[c];
+        let about = format!("the noise of `{}` in record `{name}` was not given", channel.output);
+        for warning in warnings.iter_mut().filter(|warning| warning.starts_with(&about)) {
+            let (before, after) = (with_unit(channel.noise, ""), with_unit(sd, ""));
+            let (Some(unit), Some((_, rest))) =
+                (warning.split_once(&before), warning.split_once(&channel.noise_how))
+            else {
+                continue;
+            };
+            let unit = unit.1.split_once(" was found").map_or("", |(unit, _)| unit);
+            *warning = format!("{about}: {after}{unit} was found {how}{rest}");
+        }
+        (channel.noise, channel.noise_how) = (sd, how);
+    }
+}
+
+/// The values of a channel that count: those of the training span, or all of a record that is held out.
+fn used(record: &Record, channel: &Channel) -> Vec<f64> {
+    let counts = |time: f64| record.train.is_none_or(|[from, to]| from <= time && time <= to);
+    let rows = channel.values.iter().zip(&record.times);
+    rows.filter(|(_, time)| counts(**time)).map(|(value, _)| *value).collect()
+}
