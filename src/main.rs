@@ -20,6 +20,7 @@ mod fleet_values;
 mod forecast;
 mod guard;
 mod identify;
+mod import;
 mod infer;
 mod interrupt;
 mod load;
@@ -74,6 +75,8 @@ enum Command {
     Check(check::Args),
     /// Run the model forward with chosen values and noise: a twin experiment.
     Simulate(simulate::Args),
+    /// Write a study from a file of another program.
+    Import(import::Args),
     /// Infer drift and noise of stochastic equations from recordings of all states.
     Infer(infer::Args),
     /// Say whether the estimation is reasonable, before it is made: what these data could determine.
@@ -120,6 +123,7 @@ fn main() -> ExitCode {
         Command::Explain(args) => explain::run(&args, started),
         Command::Infer(args) => infer::run(&args),
         Command::Check(args) => check::run(&args),
+        Command::Import(args) => import::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Identify(args) => identify::run(&args),
         Command::Forecast(args) => forecast::run(&args),
@@ -173,6 +177,7 @@ impl Command {
             Self::Explain(args) => args.json,
             Self::Infer(args) => args.json,
             Self::Check(args) => args.json,
+            Self::Import(args) => args.json,
             Self::Identify(args) => args.json,
             Self::Forecast(args) => args.json,
             Self::Spectrum(args) => args.json,
