@@ -11,9 +11,6 @@ use common::{output, refused, repository, starlings};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-/// Largest difference of a waveform, as a part of the largest value of the other program's.
-const MOST: f64 = 0.01;
-
 /// Columns by name.
 type Table = BTreeMap<String, Vec<f64>>;
 
@@ -76,8 +73,8 @@ fn results(name: &str, vessel: &str, column: &str) -> (Vec<f64>, Vec<f64>) {
     rows.map(|(row, _)| (value("time", row), value(column, row))).unzip()
 }
 
-/// Imports a file of svZeroDSolver and compares: vessel, column of the results, output of the study.
-fn compare(name: &str, waveforms: &[(&str, &str, &str)]) {
+/// Imports a file of svZeroDSolver and compares, relative to the largest value of a waveform: vessel, column of the results, output of the study.
+fn compare(name: &str, bound: f64, waveforms: &[(&str, &str, &str)]) {
     let folder = TempDir::new().unwrap();
     let out = folder.path().join(name);
     import(&file(&format!("svzerodsolver/{name}.json")), &out);
@@ -85,11 +82,12 @@ fn compare(name: &str, waveforms: &[(&str, &str, &str)]) {
     for (vessel, column, predicted) in waveforms {
         let (times, wanted) = results(name, vessel, column);
         let most = difference(&found, predicted, &times, &wanted);
-        println!("{name} {vessel} {column}: {most:.1e}");
-        assert!(most <= MOST, "{name}: {column} of {vessel} is off by {most}");
+        assert!(most <= bound, "{name}: {column} of {vessel} is off by {most}");
     }
 }
 
+/// svZeroDSolver stops its iterations at this, and prints ten decimals.
+const STEADY: f64 = 2e-10;
 const VESSEL: &str = "branch0_seg0";
 const PRESSURES: [(&str, &str, &str); 2] =
     [(VESSEL, "pressure_in", "p_branch0_seg0_in"), (VESSEL, "pressure_out", "p_branch0_seg0_out")];
@@ -102,13 +100,13 @@ fn all(flow_in: &'static str, flow_out: &'static str) -> Vec<(&'static str, &'st
 
 #[test]
 fn steady_vessels_are_those_of_svzerodsolver() {
-    compare("steadyFlow_R_R", &all("q_branch0_seg0", "q_OUT"));
-    compare("steadyFlow_RC_R", &all("q_branch0_seg0", "q_OUT"));
-    compare("steadyFlow_RL_R", &all("q_branch0_seg0", "q_branch0_seg0_blood"));
-    compare("steadyFlow_RLC_R", &all("q_branch0_seg0", "q_branch0_seg0_blood"));
-    compare("steadyFlow_R_RCR", &all("q_branch0_seg0", "q_OUT"));
-    compare("steadyFlow_R_coronary", &all("q_branch0_seg0", "q_OUT_Ra1"));
-    compare("steadyFlow_stenosis_R", &all("q_branch0_seg0", "q_OUT"));
+    compare("steadyFlow_R_R", STEADY, &all("q_branch0_seg0", "q_OUT"));
+    compare("steadyFlow_RC_R", STEADY, &all("q_branch0_seg0", "q_OUT"));
+    compare("steadyFlow_RL_R", STEADY, &all("q_branch0_seg0", "q_branch0_seg0_blood"));
+    compare("steadyFlow_RLC_R", STEADY, &all("q_branch0_seg0", "q_branch0_seg0_blood"));
+    compare("steadyFlow_R_RCR", STEADY, &all("q_branch0_seg0", "q_OUT"));
+    compare("steadyFlow_R_coronary", STEADY, &all("q_branch0_seg0", "q_OUT_Ra1"));
+    compare("steadyFlow_stenosis_R", STEADY, &all("q_branch0_seg0", "q_OUT"));
     let fork = [
         ("branch0_seg0", "pressure_in", "p_branch0_seg0_in"),
         ("branch0_seg0", "pressure_out", "p_J0"),
@@ -117,35 +115,45 @@ fn steady_vessels_are_those_of_svzerodsolver() {
         ("branch2_seg0", "pressure_out", "p_branch2_seg0_out"),
         ("branch2_seg0", "flow_out", "q_OUT2"),
     ];
-    compare("steadyFlow_bifurcationR_R1", &fork);
+    compare("steadyFlow_bifurcationR_R1", STEADY, &fork);
 }
 
 #[test]
 fn pulsatile_waveforms_are_those_of_svzerodsolver() {
-    compare("pulsatileFlow_R_RCR", &all("q_branch0_seg0", "q_OUT"));
-    compare("pulsatileFlow_R_coronary", &all("q_branch0_seg0", "q_OUT_Ra1"));
+    compare("pulsatileFlow_R_RCR", 2e-5, &all("q_branch0_seg0", "q_OUT"));
+    compare("pulsatileFlow_R_coronary", 7e-5, &all("q_branch0_seg0", "q_OUT_Ra1"));
     // The source behind the vessel counts its flow towards it.
-    compare("pulsatileFlow_CStenosis_steadyPressure", &PRESSURES);
-    compare("pulsatileFlow_CStenosis_steadyPressure", &[(VESSEL, "flow_in", "q_branch0_seg0")]);
+    compare("pulsatileFlow_CStenosis_steadyPressure", 5e-4, &PRESSURES);
+    compare("pulsatileFlow_CStenosis_steadyPressure", 5e-4, &[(VESSEL, "flow_in", "q_branch0_seg0")]);
 }
 
 #[test]
-fn a_network_of_a_patient_conserves_the_flow_and_says_what_it_left_out() {
+fn a_network_of_a_patient_starts_steady_and_says_what_it_left_out() {
     let folder = TempDir::new().unwrap();
-    let out = folder.path().join("vmr");
-    let written = import(&file("svzerodsolver/vmr-0104_0001.json"), &out);
-    let notes = written["notes"].to_string();
-    assert!(
-        notes.contains("stenosis coefficient of `branch0_seg0`") && notes.contains("below zero"),
-        "{notes}"
+    let text = std::fs::read_to_string(file("svzerodsolver/vmr-0104_0001.json")).unwrap();
+    // Its first period, from the steady state: nine of them would only take longer.
+    let first = text.replace("\"number_of_cardiac_cycles\": 9", "\"number_of_cardiac_cycles\": 1");
+    assert_ne!(first, text);
+    let path = folder.path().join("vmr.json");
+    let few = first.replace(
+        "\"number_of_time_pts_per_cardiac_cycle\": 968",
+        "\"number_of_time_pts_per_cardiac_cycle\": 45",
     );
-    let found = predicted(&out);
-    let n = found["time"].len() - 1;
-    assert_eq!(n, 967);
-    let mean = |name: &str| found[name][..n].iter().sum::<f64>() / n as f64;
-    let outflow: f64 = found.keys().filter(|k| k.starts_with("q_RCR_")).map(|name| mean(name)).sum();
-    // In the periodic state what enters leaves; rows are means by the rule of rectangles of a periodic course.
-    assert!((outflow / mean("q_INFLOW") - 1.0).abs() < 1e-4, "{outflow}");
+    assert_ne!(few, first);
+    std::fs::write(&path, few).unwrap();
+    let out = folder.path().join("vmr");
+    let notes = import(&path, &out)["notes"].to_string();
+    assert!(notes.contains("stenosis coefficient of `branch6_seg0`"), "{notes}");
+    assert!(notes.contains("below zero") && notes.contains("is left out: at most"), "{notes}");
+    let start = table(&std::fs::read_to_string(out.join("predicted.csv")).unwrap());
+    assert_eq!(start["time"].len(), 45);
+    let outflow: f64 = start.iter().filter(|(name, _)| name.starts_with("q_RCR_")).map(|(_, q)| q[0]).sum();
+    let whole: Value = serde_json::from_str(&text).unwrap();
+    let inflow: Vec<f64> =
+        serde_json::from_value(whole["boundary_conditions"][0]["bc_values"]["Q"].clone()).unwrap();
+    let mean = inflow.iter().sum::<f64>() / inflow.len() as f64;
+    // The steady state is found to 1e-10 of its size; what enters leaves.
+    assert!((outflow / mean - 1.0).abs() < 1e-6, "{outflow} of {mean}");
 }
 
 #[test]
@@ -217,10 +225,10 @@ fn along(found: &Table, field: &str, first: usize, n: usize, part: f64) -> Vec<f
     column(cell).iter().zip(column(cell + 1)).map(|(a, b)| (1.0 - rest).mul_add(*a, rest * b)).collect()
 }
 
-/// Compares pressure (Pa) and flow (m³/s) of a vessel with openBF's; times are taken within the period.
+/// Compares, as root mean square relative to the largest value, pressure (Pa) and flow (m³/s) of a vessel with openBF's; times are taken within the period.
 fn compare_vessel(found: &Table, name: &str, period: f64, (first, n): (usize, usize)) {
     let reference = table(&std::fs::read_to_string(file(&format!("openbf/{name}_reference.csv"))).unwrap());
-    for (field, letter, unit) in [("pressure", "P", 0.1), ("flow_rate", "Q", 1e-6)] {
+    for (field, letter, unit, bound) in [("pressure", "P", 0.1, 2e-3), ("flow_rate", "Q", 1e-6, 5e-3)] {
         for (place, part) in PLACES {
             let values: Vec<f64> = along(found, field, first, n, part).iter().map(|v| unit * v).collect();
             let own = Table::from([("time".to_owned(), found["time"].clone()), ("v".to_owned(), values)]);
@@ -229,8 +237,7 @@ fn compare_vessel(found: &Table, name: &str, period: f64, (first, n): (usize, us
             let square = reference["time"].iter().zip(wanted);
             let square = square.map(|(t, w)| (at(&own, "v", t.rem_euclid(period)) - w).powi(2)).sum::<f64>();
             let rms = (square / wanted.len() as f64).sqrt() / size;
-            println!("{name} {letter} {place}: {rms:.1e}");
-            assert!(rms <= MOST, "{name}: {letter} at {place} is off by {rms}");
+            assert!(rms <= bound, "{name}: {letter} at {place} is off by {rms}");
         }
     }
 }

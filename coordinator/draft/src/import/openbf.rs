@@ -18,28 +18,84 @@ pub(super) fn plan(path: &Path, text: &str) -> Result<Plan, String> {
     let file = file::read(text)?;
     let inflow = inflow(path, &file)?;
     let period = inflow.times[inflow.times.len() - 1];
-    let (mut notes, mut constants, mut unknowns) = (Vec::new(), shared(&file)?, Vec::new());
-    let mut channels = vec![("inlet_pressure".to_owned(), "dyn/cm^2")];
-    let (inlet, outlets) = ends(&file.network)?;
-    let (mut first, mut middles) = (0, Vec::new());
-    let (mut names, mut segments) = (Names::default(), String::new());
-    let mut nodes = format!("    {{ name = \"{}\", kind = \"inlet\" }},\n", node(inlet));
-    for vessel in &file.network {
+    let parts = Parts::new(&file)?;
+    let points = file.solver.jump.unwrap_or(100);
+    if points < 2 {
+        return Err("solver.jump: give at least 2".to_owned());
+    }
+    Ok(Plan {
+        name: Names::default().take(&file.project_name),
+        program: "openBF",
+        kind: "artery-1d",
+        layout: format!("segments = [\n{}]\nnodes = [\n{}]\n", parts.segments, parts.nodes),
+        constants: parts.constants,
+        unknowns: parts.unknowns,
+        channels: parts.channels,
+        inputs: Inputs::new(&[inflow], period),
+        points,
+        course: course(&file, &parts.middles)?,
+        omissions: Vec::new(),
+        notes: parts.notes,
+    })
+}
+
+/// What the vessels give, one after another.
+struct Parts {
+    /// Lines of the layout.
+    segments: String,
+    nodes: String,
+    constants: Vec<(String, f64)>,
+    unknowns: Vec<Unknown>,
+    channels: Vec<(String, &'static str)>,
+    /// Outputs with the pressure in the middle of each vessel.
+    middles: Vec<String>,
+    notes: Vec<String>,
+    n_cell: usize,
+    names: Names,
+}
+
+impl Parts {
+    fn new(file: &File) -> Result<Self, String> {
+        let (inlet, outlets) = ends(&file.network)?;
+        let mut parts = Self {
+            segments: String::new(),
+            nodes: format!("    {{ name = \"{}\", kind = \"inlet\" }},\n", node(inlet)),
+            constants: shared(file)?,
+            unknowns: Vec::new(),
+            channels: vec![("inlet_pressure".to_owned(), "dyn/cm^2")],
+            middles: Vec::new(),
+            notes: Vec::new(),
+            n_cell: 0,
+            names: Names::default(),
+        };
+        for vessel in &file.network {
+            parts.segment(vessel, file.network.len() == 1)?;
+            if outlets.contains(&vessel.tn) {
+                parts.outlet(vessel, outlets.len() == 1)?;
+            } else {
+                vessel.inner()?;
+            }
+        }
+        Ok(parts)
+    }
+
+    /// Adds a vessel.
+    fn segment(&mut self, vessel: &Vessel, alone: bool) -> Result<(), String> {
         let artery = vessel.artery()?;
-        let name = names.take(&vessel.label);
+        let name = self.names.take(&vessel.label);
         // openBF compares periods at cell round(M/2) of every vessel.
-        middles.push(format!("pressure[{}]", first + (artery.cells - 1) / 2));
-        first += artery.cells;
-        let young = if file.network.len() == 1 { "E1".to_owned() } else { format!("E_{name}") };
-        constants.push((young, artery.young));
+        self.middles.push(format!("pressure[{}]", self.n_cell + (artery.cells - 1) / 2));
+        self.n_cell += artery.cells;
+        let young = if alone { "E1".to_owned() } else { format!("E_{name}") };
+        self.constants.push((young, artery.young));
         if vessel.h0.is_none() && artery.thickness[0].to_bits() != artery.thickness[1].to_bits() {
-            notes.push(format!(
+            self.notes.push(format!(
                 "`{name}` tapers and has no thickness: that of openBF's fit stands at its ends, and is linear in between"
             ));
         }
         // Writing to a text cannot fail.
         let _ = writeln!(
-            segments,
+            self.segments,
             "    {{ name = \"{name}\", from = \"{}\", to = \"{}\", length = {:?}, radius = {:?}, radius_to = {:?}, \
              thickness = {:?}, thickness_to = {:?}, profile = {:?}, cells = {} }},",
             node(vessel.sn),
@@ -52,38 +108,21 @@ pub(super) fn plan(path: &Path, text: &str) -> Result<Plan, String> {
             artery.profile,
             artery.cells
         );
-        if !outlets.contains(&vessel.tn) {
-            vessel.inner()?;
-            continue;
-        }
+        Ok(())
+    }
+
+    /// Adds the Windkessel behind a vessel.
+    fn outlet(&mut self, vessel: &Vessel, alone: bool) -> Result<(), String> {
         let windkessel = vessel.windkessel()?;
-        let own = |stem: &str| {
-            if outlets.len() == 1 { stem.to_owned() } else { format!("{stem}_{}", node(vessel.tn)) }
-        };
-        let _ = writeln!(nodes, "    {{ name = \"{}\", kind = \"rcr\" }},", node(vessel.tn));
-        constants.push((own("R_p"), tidy(windkessel.proximal)));
-        constants.push((own("C"), tidy(windkessel.compliance)));
-        unknowns.push(Unknown { name: own("R_d"), unit: "dyn s/cm^5", value: tidy(windkessel.distal) });
-        channels.push((own("outflow"), "cm^3/s"));
+        let own = |stem: &str| if alone { stem.to_owned() } else { format!("{stem}_{}", node(vessel.tn)) };
+        let _ = writeln!(self.nodes, "    {{ name = \"{}\", kind = \"rcr\" }},", node(vessel.tn));
+        self.constants.push((own("R_p"), tidy(windkessel.proximal)));
+        self.constants.push((own("C"), tidy(windkessel.compliance)));
+        let value = tidy(windkessel.distal);
+        self.unknowns.push(Unknown { name: own("R_d"), unit: "dyn s/cm^5", value });
+        self.channels.push((own("outflow"), "cm^3/s"));
+        Ok(())
     }
-    let points = file.solver.jump.unwrap_or(100);
-    if points < 2 {
-        return Err("solver.jump: give at least 2".to_owned());
-    }
-    Ok(Plan {
-        name: Names::default().take(&file.project_name),
-        program: "openBF",
-        kind: "artery-1d",
-        layout: format!("segments = [\n{segments}]\nnodes = [\n{nodes}]\n"),
-        constants,
-        unknowns,
-        channels,
-        inputs: Inputs::new(&[inflow], period),
-        points,
-        course: course(&file, &middles)?,
-        omissions: Vec::new(),
-        notes,
-    })
 }
 
 /// From rest until the mean pressures of two periods are as near as the file asks, or for as many periods as it says.

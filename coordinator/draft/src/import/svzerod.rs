@@ -4,6 +4,7 @@
 
 mod blocks;
 mod file;
+mod junctions;
 mod layout;
 mod network;
 

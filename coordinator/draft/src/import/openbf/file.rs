@@ -2,6 +2,8 @@
 //!
 //! Next file to read: [`super::vessel`].
 
+#![allow(clippy::struct_field_names, non_snake_case)] // the file's own keys
+
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 
@@ -49,7 +51,6 @@ pub(super) struct Solver {
 /// A vessel.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[allow(non_snake_case)] // the file's own keys
 pub(super) struct Vessel {
     pub(super) label: String,
     /// Node at its start.

@@ -1,16 +1,13 @@
 //! Vessels, junctions and boundary conditions of a file as elements of a network.
 //!
 //! The equations are those of the documentation of svZeroDSolver: a `BloodVessel` is a resistance with
-//! stenosis, a capacitor behind it and an inertance; a `BloodVesselCRL` has the capacitor at its inlet. Next file to read:
-//! [`super::network`].
+//! stenosis, a capacitor behind it and an inertance; a `BloodVesselCRL` has the capacitor at its inlet. Next files to
+//! read: [`super::junctions`], then [`super::network`].
 
 use std::collections::BTreeMap;
 
 use super::super::plan::{Samples, Unknown};
-use super::file::{
-    Boundary, Coronary, File, Flow, Junction, JunctionValues, Pressure, Rcr, Resistance, Resistances, Vessel,
-    VesselValues, typed,
-};
+use super::file::{Boundary, Coronary, File, Flow, Pressure, Rcr, Resistance, Vessel, VesselValues, typed};
 use super::network::{GROUND, Kind, Network, Node, Series};
 
 const FLOW: &str = "cm^3/s";
@@ -25,7 +22,7 @@ pub(super) struct Blocks {
     pub(super) channels: Vec<(String, &'static str)>,
     pub(super) unknowns: Vec<Unknown>,
     /// Inlet and outlet of every vessel, by its name; nothing where nothing is joined yet.
-    ends: BTreeMap<String, [Option<Node>; 2]>,
+    pub(super) ends: BTreeMap<String, [Option<Node>; 2]>,
     /// Where boundary conditions are.
     places: BTreeMap<String, (Node, Side)>,
     largest_flow: Option<f64>,
@@ -33,7 +30,7 @@ pub(super) struct Blocks {
 
 /// On which side of the network a boundary condition is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Side {
+pub(super) enum Side {
     Inlet,
     Outlet,
 }
@@ -85,7 +82,7 @@ impl Blocks {
     }
 
     /// Joins an end of a vessel to a node.
-    fn join(&mut self, vessel: &str, side: Side, node: Node) -> Result<(), String> {
+    pub(super) fn join(&mut self, vessel: &str, side: Side, node: Node) -> Result<(), String> {
         let (at, what) = if side == Side::Inlet { (0, "inlet") } else { (1, "outlet") };
         let ends = self.ends.get_mut(vessel).ok_or_else(|| format!("no vessel is called `{vessel}`"))?;
         match ends[at].replace(node) {
@@ -94,7 +91,7 @@ impl Blocks {
         }
     }
 
-    fn place(&mut self, boundary: &str, node: Node, side: Side) -> Result<(), String> {
+    pub(super) fn place(&mut self, boundary: &str, node: Node, side: Side) -> Result<(), String> {
         match self.places.insert(boundary.to_owned(), (node, side)) {
             None => Ok(()),
             Some(_) => {
@@ -103,87 +100,8 @@ impl Blocks {
         }
     }
 
-    /// Joins what a junction names to its node, with what stands between.
-    fn junction(&mut self, file: &File, junction: &Junction, place: &str) -> Result<(), String> {
-        let id = |id: &i64| {
-            let vessel = file.vessels.iter().find(|vessel| vessel.vessel_id == *id);
-            vessel.map(|v| v.vessel_name.clone()).ok_or_else(|| format!("{place}: no vessel has the id {id}"))
-        };
-        let by_id = |ids: &[i64]| ids.iter().map(id).collect::<Result<Vec<_>, _>>();
-        let (mut inlets, mut outlets) = (by_id(&junction.inlet_vessels)?, by_id(&junction.outlet_vessels)?);
-        inlets.extend(junction.inlet_blocks.iter().cloned());
-        outlets.extend(junction.outlet_blocks.iter().cloned());
-        if inlets.is_empty() || outlets.is_empty() {
-            return Err(format!(
-                "{place}: a junction has inlets and outlets (`inlet_vessels`, `outlet_vessels`)"
-            ));
-        }
-        let name = &junction.junction_name;
-        let centre = self.network.node(name);
-        let none = || -> Result<(), String> {
-            match &junction.junction_values {
-                None => Ok(()),
-                Some(value) if value.as_object().is_some_and(serde_json::Map::is_empty) => Ok(()),
-                Some(_) => Err(format!("{place}.junction_values: a {} has none", junction.junction_type)),
-            }
-        };
-        let values = junction.junction_values.as_ref().unwrap_or(&serde_json::Value::Null);
-        let own = format!("{place}.junction_values");
-        let n = (inlets.len(), outlets.len());
-        let series: Vec<Option<Series>> = match junction.junction_type.as_str() {
-            "NORMAL_JUNCTION" | "internal_junction" => {
-                none()?;
-                vec![None; n.0 + n.1]
-            }
-            "resistive_junction" => {
-                let Resistances { R } = typed(&own, values)?;
-                count(&own, "R", R.len(), n.0 + n.1)?;
-                R.into_iter().map(|resistance| Some(self.of(resistance, 0.0, 0.0))).collect()
-            }
-            "BloodVesselJunction" => {
-                if n.0 != 1 {
-                    return Err(format!("{place}: a BloodVesselJunction has one inlet, not {}", n.0));
-                }
-                let JunctionValues { R_poiseuille, L, mut stenosis_coefficient } = typed(&own, values)?;
-                if stenosis_coefficient.is_empty() {
-                    stenosis_coefficient = vec![0.0; n.1];
-                }
-                count(&own, "R_poiseuille", R_poiseuille.len(), n.1)?;
-                count(&own, "L", L.len(), n.1)?;
-                count(&own, "stenosis_coefficient", stenosis_coefficient.len(), n.1)?;
-                let outlets = R_poiseuille.iter().zip(&L).zip(stenosis_coefficient);
-                let outlets = outlets.map(|((r, l), s)| Some(self.of(*r, s, *l)));
-                std::iter::once(None).chain(outlets).collect()
-            }
-            other => {
-                return Err(format!(
-                    "{place}: a junction of type `{other}` is not in `rcr-network` (known: NORMAL_JUNCTION, \
-                     internal_junction, resistive_junction, BloodVesselJunction)"
-                ));
-            }
-        };
-        for (i, block) in inlets.iter().chain(&outlets).enumerate() {
-            let inlet = i < n.0;
-            let node = match series[i] {
-                None => centre,
-                Some(values) => {
-                    let node = self.network.node(&format!("{name}_{block}"));
-                    let (from, to) = if inlet { (node, centre) } else { (centre, node) };
-                    self.network.series(&format!("{name}_to_{block}"), values, from, to)?;
-                    node
-                }
-            };
-            // What flows into a junction leaves a vessel, or is a boundary condition at an inlet.
-            if self.ends.contains_key(block) {
-                self.join(block, if inlet { Side::Outlet } else { Side::Inlet }, node)?;
-            } else {
-                self.place(block, node, if inlet { Side::Inlet } else { Side::Outlet })?;
-            }
-        }
-        Ok(())
-    }
-
-    fn of(&self, resistance: f64, stenosis: f64, inertance: f64) -> Series {
+    /// What stands between a junction and one of its vessels.
+    pub(super) fn of(&self, resistance: f64, stenosis: f64, inertance: f64) -> Series {
         Series { resistance, stenosis, capacity: 0.0, inertance, largest_flow: self.largest_flow }
     }
 
@@ -253,7 +171,7 @@ impl Blocks {
                 let end = self.network.constant(name, Pd);
                 self.resistance(&own, "R", name, R, node, end, true)?;
             }
-            "RCR" => self.rcr(&own, name, typed(&own, values)?, node)?,
+            "RCR" => self.rcr(&own, name, &typed(&own, values)?, node)?,
             _ => self.coronary(&own, name, typed(&own, values)?, node)?,
         }
         Ok(())
@@ -280,8 +198,8 @@ impl Blocks {
         Ok(())
     }
 
-    fn rcr(&mut self, place: &str, name: &str, values: Rcr, node: Node) -> Result<(), String> {
-        let Rcr { Rp, C, Rd, Pd } = values;
+    fn rcr(&mut self, place: &str, name: &str, values: &Rcr, node: Node) -> Result<(), String> {
+        let &Rcr { Rp, C, Rd, Pd } = values;
         positive(place, "Rd", Rd)?;
         if Rp == 0.0 || C == 0.0 {
             // The model's own element has all three.
@@ -320,13 +238,11 @@ impl Blocks {
 
     fn course(&mut self, place: &str, name: String, times: Vec<f64>, values: Vec<f64>) -> Result<(), String> {
         let course = Samples { name, times, values };
-        match course.fault() {
-            Some(fault) => Err(format!("{place}: {fault}")),
-            None => {
-                self.courses.push(course);
-                Ok(())
-            }
+        if let Some(fault) = course.fault() {
+            return Err(format!("{place}: {fault}"));
         }
+        self.courses.push(course);
+        Ok(())
     }
 }
 
@@ -336,10 +252,6 @@ fn positive(place: &str, key: &str, value: f64) -> Result<(), String> {
     } else {
         Err(format!("{place}.{key}: {value} is not above zero"))
     }
-}
-
-fn count(place: &str, key: &str, found: usize, wanted: usize) -> Result<(), String> {
-    if found == wanted { Ok(()) } else { Err(format!("{place}.{key}: {found} numbers for {wanted} places")) }
 }
 
 /// The largest flow that sources can bring together; nothing where a pressure drives the network.

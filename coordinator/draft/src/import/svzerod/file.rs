@@ -2,6 +2,8 @@
 //!
 //! Keys that begin with `_` are comments, as the program itself takes them. Next file to read: [`super::blocks`].
 
+#![allow(clippy::struct_field_names, non_snake_case)] // the file's own keys
+
 use std::collections::BTreeMap;
 
 use serde::Deserialize;
@@ -142,7 +144,6 @@ pub(super) struct Junction {
 /// Values of a vessel.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[allow(non_snake_case)] // the file's own keys
 pub(super) struct VesselValues {
     pub(super) R_poiseuille: f64,
     #[serde(default)]
@@ -156,7 +157,6 @@ pub(super) struct VesselValues {
 /// Values of a junction of vessels, one per outlet.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[allow(non_snake_case)]
 pub(super) struct JunctionValues {
     pub(super) R_poiseuille: Vec<f64>,
     pub(super) L: Vec<f64>,
@@ -167,7 +167,6 @@ pub(super) struct JunctionValues {
 /// Values of a junction of resistances, one per inlet, then one per outlet.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[allow(non_snake_case)]
 pub(super) struct Resistances {
     pub(super) R: Vec<f64>,
 }
@@ -175,7 +174,6 @@ pub(super) struct Resistances {
 /// A prescribed flow.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[allow(non_snake_case)]
 pub(super) struct Flow {
     pub(super) t: Vec<f64>,
     pub(super) Q: Vec<f64>,
@@ -184,7 +182,6 @@ pub(super) struct Flow {
 /// A prescribed pressure.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[allow(non_snake_case)]
 pub(super) struct Pressure {
     pub(super) t: Vec<f64>,
     pub(super) P: Vec<f64>,
@@ -193,7 +190,6 @@ pub(super) struct Pressure {
 /// A resistance to a pressure.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[allow(non_snake_case)]
 pub(super) struct Resistance {
     pub(super) R: f64,
     pub(super) Pd: f64,
@@ -202,7 +198,6 @@ pub(super) struct Resistance {
 /// A Windkessel of three elements.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[allow(non_snake_case)]
 pub(super) struct Rcr {
     pub(super) Rp: f64,
     pub(super) C: f64,
@@ -213,7 +208,6 @@ pub(super) struct Rcr {
 /// A coronary bed (Kim et al. 2010): Ra1, Ca, Ra2, Cc under the pressure Pim of the muscle, Rv1.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[allow(non_snake_case)]
 pub(super) struct Coronary {
     pub(super) Ra1: f64,
     pub(super) Ra2: f64,
