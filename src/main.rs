@@ -43,7 +43,8 @@ mod worker;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use clap::{Parser, Subcommand};
+use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser, Subcommand};
 
 /// Estimates what a simulation does not know, on as many machines as you give it.
 ///
@@ -116,6 +117,12 @@ fn main() -> ExitCode {
     let json = cli.command.prints_json();
     log::to_stderr(cli.log, cli.verbose);
     if cli.end_with_stdin {
+        if let Command::Infer(args) = &cli.command
+            && args.follows_standard_input()
+        {
+            let message = "--end-with-stdin cannot be used with `infer --follow -`: standard input is the recording; follow a file";
+            refuse(&Cli::command().error(ErrorKind::ArgumentConflict, message));
+        }
         interrupt::at_end_of_stdin();
     }
     let outcome = match cli.command {
