@@ -52,6 +52,13 @@ pub(crate) struct Args {
     pub(crate) json: bool,
 }
 
+impl Args {
+    /// Whether rows come from standard input.
+    pub(crate) fn follows_standard_input(&self) -> bool {
+        self.follow.as_ref().is_some_and(|source| source.as_os_str() == "-")
+    }
+}
+
 /// Infers, and writes the folder.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     interrupt::watch();

@@ -60,7 +60,8 @@ fn host_elsewhere() -> SolverHost {
     SolverHost::asking(describe, Arc::new(Setup::build)).inspecting(faults).by(adapters())
 }
 
-fn host_here() -> SolverHost {
+/// Starts solvers on this machine.
+pub(crate) fn host_here() -> SolverHost {
     let describe = |def: &_| {
         here()?.describe(def).map_err(|error| Undescribed {
             reason: error.to_string(),

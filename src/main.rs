@@ -20,6 +20,7 @@ mod fleet_values;
 mod forecast;
 mod guard;
 mod identify;
+mod import;
 mod infer;
 mod interrupt;
 mod load;
@@ -42,7 +43,8 @@ mod worker;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use clap::{Parser, Subcommand};
+use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser, Subcommand};
 
 /// Estimates what a simulation does not know, on as many machines as you give it.
 ///
@@ -74,6 +76,8 @@ enum Command {
     Check(check::Args),
     /// Run the model forward with chosen values and noise: a twin experiment.
     Simulate(simulate::Args),
+    /// Write a study from a file of another program.
+    Import(import::Args),
     /// Infer drift and noise of stochastic equations from recordings of all states.
     Infer(infer::Args),
     /// Say whether the estimation is reasonable, before it is made: what these data could determine.
@@ -113,6 +117,12 @@ fn main() -> ExitCode {
     let json = cli.command.prints_json();
     log::to_stderr(cli.log, cli.verbose);
     if cli.end_with_stdin {
+        if let Command::Infer(args) = &cli.command
+            && args.follows_standard_input()
+        {
+            let message = "--end-with-stdin cannot be used with `infer --follow -`: standard input is the recording; follow a file";
+            refuse(&Cli::command().error(ErrorKind::ArgumentConflict, message));
+        }
         interrupt::at_end_of_stdin();
     }
     let outcome = match cli.command {
@@ -120,6 +130,7 @@ fn main() -> ExitCode {
         Command::Explain(args) => explain::run(&args, started),
         Command::Infer(args) => infer::run(&args),
         Command::Check(args) => check::run(&args),
+        Command::Import(args) => import::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Identify(args) => identify::run(&args),
         Command::Forecast(args) => forecast::run(&args),
@@ -173,6 +184,7 @@ impl Command {
             Self::Explain(args) => args.json,
             Self::Infer(args) => args.json,
             Self::Check(args) => args.json,
+            Self::Import(args) => args.json,
             Self::Identify(args) => args.json,
             Self::Forecast(args) => args.json,
             Self::Spectrum(args) => args.json,

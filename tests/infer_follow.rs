@@ -32,6 +32,18 @@ fn a_change_is_an_alarm_where_it_happens_and_nowhere_else() {
 }
 
 #[test]
+fn a_recording_on_standard_input_is_not_taken_for_the_program_that_started_it() {
+    let dir = folder(STUDY, "");
+    let study = dir.path().join("study.toml");
+    let mut command = common::starlings();
+    command.args(["--end-with-stdin", "infer"]).arg(study).args(["--follow", "-"]);
+    common::refused(
+        &mut command,
+        &["--end-with-stdin cannot be used with `infer --follow -`", "follow a file"],
+    );
+}
+
+#[test]
 fn a_restart_goes_on_with_the_same_lines() {
     let dir = folder(STUDY, "");
     let data = recording(6_000, 4_000);

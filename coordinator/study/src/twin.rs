@@ -122,6 +122,56 @@ pub fn simulate(study: &Study, twin: &Twin) -> Result<Recording, TwinError> {
     Ok(recording)
 }
 
+/// Runs periods of one length one after another from the initial state, until `last` says of a period's number, from 1, and
+/// recording that it is the last one; returns that recording, whose `start` is the state at the period's start.
+///
+/// Times count from the start of every period, and the last is its end; all periods have the inputs of the first, and no noise.
+///
+/// # Errors
+/// When a name is unknown, the times do not end with the period, or the model fails or cannot restart from a state.
+pub fn beats(
+    study: &Study,
+    twin: &Twin,
+    last: &mut dyn FnMut(usize, &Recording) -> bool,
+) -> Result<Recording, TwinError> {
+    let record = study
+        .records
+        .get(twin.record)
+        .ok_or_else(|| TwinError::Request(format!("the study has {} records", study.records.len())))?;
+    let (setup, theta) = place(study, twin)?;
+    let model = study.solver_host.build(&setup)?;
+    let start = record.times.first().copied().unwrap_or_default();
+    let (Some(period), Some(end)) = (twin.period, twin.times.last()) else {
+        return Err(TwinError::Request("periods need a length and times".to_owned()));
+    };
+    if (end - start - period).abs() > 1e-9 * period || twin.times.windows(2).any(|w| w[1] <= w[0]) {
+        return Err(TwinError::Request(format!("times must increase and end with the period, at {period}")));
+    }
+    if !model.spec().restart {
+        return Err(TwinError::Request("a model that cannot restart from a state has no periods".to_owned()));
+    }
+    let run = Run { model: &*model, record: twin.record, theta, n_obs: setup.outputs.len(), n_period: None };
+    let window = Window {
+        start,
+        observed: vec![f64::NAN; twin.times.len() * run.n_obs],
+        times: twin.times.clone(),
+        inputs: record.inputs.clone(),
+    };
+    let window = Arc::new(window);
+    let mut state = run.initial(&window)?;
+    let names = components(&study.spec.states);
+    for number in 1.. {
+        let found = run.predict(&window, Some(state.clone()))?;
+        let mut recording = recording(study, &run, &setup, &window, &found.outputs, twin);
+        recording.start = names.iter().cloned().zip(state).collect();
+        if last(number, &recording) {
+            return Ok(recording);
+        }
+        state = found.state;
+    }
+    unreachable!("numbers do not end")
+}
+
 /// The setup and parameter vector of the twin: prior medians, overridden by name.
 fn place(study: &Study, twin: &Twin) -> Result<(Setup, Vec<f64>), TwinError> {
     let mut setup = study.setup.clone();

@@ -28,7 +28,7 @@ use vessels::Vessels;
 
 /// Area A and flow Q along vessels (Hughes & Lubliner 1973; Formaggia, Lamponi & Quarteroni 2003), with R = √(A/π):
 ///
-/// ∂A/∂t + ∂Q/∂x = 0,  ∂Q/∂t + ∂(α Q²/A)/∂x + (A/ρ) ∂p/∂x = −K_r Q/A,  K_r = 8πμ/ρ,
+/// ∂A/∂t + ∂Q/∂x = 0,  ∂Q/∂t + ∂(α Q²/A)/∂x + (A/ρ) ∂p/∂x = −K_r Q/A,  K_r = 2(ζ + 2)πμ/ρ,
 ///
 /// p = p_ext + (E h/((1 − ν²)R0²) + k_s)(R − R0) + (c_w + c_s) ∂R/∂t.
 ///

@@ -200,6 +200,8 @@ fn a_layout_that_makes_no_network_is_refused_with_its_place_and_a_remedy() {
         ("/segments/1/name", serde_json::json!("a"), "segments[1].name", "two segments"),
         ("/segments/0/name", serde_json::json!("a b"), "segments[0].name", "letters, digits"),
         ("/segments/0/radius", serde_json::json!(-1.0), "segments[0].radius", "above zero"),
+        ("/segments/0/thickness_to", serde_json::json!(0.0), "segments[0].thickness_to", "above zero"),
+        ("/segments/0/profile", serde_json::json!(1.0), "segments[0].profile", "2 for a parabola"),
         ("/segments/0/cells", serde_json::json!(1), "segments[0].cells", "at least two"),
         ("/segments/0/regions", serde_json::json!(4), "segments[0].cells", "whole number of cells"),
         ("/segments/0/cells", serde_json::json!(10_000), "segments[1].cells", "10006 cells up to here"),

@@ -39,11 +39,17 @@ pub(super) fn segments(segments: &[Segment]) -> Result<(), SetupError> {
             ("radius", segment.radius),
             ("radius_to", segment.radius_to.unwrap_or(segment.radius)),
             ("thickness", segment.thickness),
+            ("thickness_to", segment.thickness_to.unwrap_or(segment.thickness)),
         ];
         for (key, size) in sizes {
             if !(size > 0.0 && size.is_finite()) {
                 return Err(fault(&path(key), format!("{key} is {size}: give a number of cm above zero")));
             }
+        }
+        if !(segment.profile >= 2.0 && segment.profile.is_finite()) {
+            let message =
+                format!("profile is {}: give 2 for a parabola, more for a flatter profile", segment.profile);
+            return Err(fault(&path("profile"), message));
         }
         let (cells, regions) = (segment.cells, segment.regions);
         (n_cell, n_region) = (n_cell.saturating_add(cells), n_region.saturating_add(regions));

@@ -30,8 +30,14 @@ pub struct Segment {
     pub radius: f64,
     /// R0 at `to` in cm, for a vessel that tapers; by default as at `from`.
     pub radius_to: Option<f64>,
-    /// Wall thickness h in cm.
+    /// Wall thickness h in cm, at `from`.
     pub thickness: f64,
+    /// h at `to` in cm, linear in between; by default as at `from`.
+    pub thickness_to: Option<f64>,
+    /// ζ of the velocity profile u (ζ + 2)/ζ (1 − (r/R)^ζ), which the friction 2(ζ + 2)πμ Q/A follows from (Smith, Pullan &
+    /// Hunter 2002): 2 for a parabola, more for a flatter one.
+    #[serde(default = "parabola")]
+    pub profile: f64,
     /// Number of cells.
     #[serde(default = "twenty")]
     pub cells: usize,
@@ -68,6 +74,10 @@ fn twenty() -> usize {
     20
 }
 
+fn parabola() -> f64 {
+    2.0
+}
+
 fn one() -> usize {
     1
 }
@@ -82,6 +92,8 @@ impl Default for Layout {
             radius: 1.0,
             radius_to: None,
             thickness: 0.15,
+            thickness_to: None,
+            profile: parabola(),
             cells: 20,
             regions: 5,
         };

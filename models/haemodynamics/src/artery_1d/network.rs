@@ -21,8 +21,10 @@ pub(super) struct Tube {
     pub(super) dx: f64,
     /// R0 at the n + 1 faces of the cells in cm.
     pub(super) radius: Vec<f64>,
-    /// Wall thickness in cm.
-    pub(super) thickness: f64,
+    /// Wall thickness at the faces in cm.
+    pub(super) thickness: Vec<f64>,
+    /// Friction relative to that of a parabolic profile, (ζ + 2)/4.
+    pub(super) friction: f64,
     /// Nodes at the start and at the end.
     pub(super) nodes: [usize; 2],
 }
@@ -135,10 +137,12 @@ impl Network {
     fn add(&mut self, segment: &Segment, alone: bool) {
         let (regions, n) = (segment.regions, segment.cells / segment.regions);
         let dx = segment.length / segment.cells as f64;
-        let end = segment.radius_to.unwrap_or(segment.radius);
-        let radius = |face: usize| {
+        let ends = |from: f64, to: Option<f64>| (from, to.unwrap_or(from));
+        let (radius, thickness) =
+            (ends(segment.radius, segment.radius_to), ends(segment.thickness, segment.thickness_to));
+        let between = |(from, to): (f64, f64), face: usize| {
             let part = face as f64 / segment.cells as f64;
-            (1.0 - part).mul_add(segment.radius, part * end)
+            (1.0 - part).mul_add(from, part * to)
         };
         let mut from = self.node(&segment.from);
         for region in 0..regions {
@@ -155,8 +159,9 @@ impl Network {
                 first: self.n_cell,
                 n,
                 dx,
-                radius: (region * n..=(region + 1) * n).map(radius).collect(),
-                thickness: segment.thickness,
+                radius: (region * n..=(region + 1) * n).map(|face| between(radius, face)).collect(),
+                thickness: (region * n..=(region + 1) * n).map(|face| between(thickness, face)).collect(),
+                friction: (segment.profile + 2.0) / 4.0,
                 nodes: [from, to],
             });
             self.n_cell += n;

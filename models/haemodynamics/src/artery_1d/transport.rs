@@ -73,14 +73,14 @@ impl Vessels<'_> {
             self.end_faces(node, x, viscous, inflow, faces)?;
         }
         for (i, tube) in self.network.tubes.iter().enumerate() {
-            let first = Self::first_face(i, tube);
+            let (first, friction) = (Self::first_face(i, tube), tube.friction * self.friction);
             for j in 0..tube.n {
                 let (cell, left, right) = (tube.first + j, first + j, first + j + 1);
                 let (a, b) = (faces.after[left], faces.before[right]);
                 let force = 0.5 * (a.area + b.area) / self.rho * (b.pressure - a.pressure);
                 let push = faces.push[right][0] - faces.push[left][1];
                 rate[cell] = (faces.mass[left] - faces.mass[right]) / tube.dx;
-                rate[n + cell] = -(push + force) / tube.dx - self.friction * x[n + cell] / x[cell];
+                rate[n + cell] = -(push + force) / tube.dx - friction * x[n + cell] / x[cell];
             }
         }
         for (outlet, &node) in self.outlets.iter().zip(&self.network.outlets) {
@@ -224,7 +224,7 @@ impl Vessels<'_> {
                 if speed.is_nan() {
                     return f64::NAN;
                 }
-                rate = rate.max(speed / tube.dx).max(self.friction / x[i]);
+                rate = rate.max(speed / tube.dx).max(tube.friction * self.friction / x[i]);
             }
         }
         for (outlet, &node) in self.outlets.iter().zip(&self.network.outlets) {

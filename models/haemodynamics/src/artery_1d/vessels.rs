@@ -31,7 +31,7 @@ pub(super) struct Vessels<'a> {
     pub(super) rho: f64,
     /// Momentum coefficient α.
     pub(super) alpha: f64,
-    /// K_r = 8πμ/ρ in cm²/s: the friction of a parabolic profile per flow and area.
+    /// K_r = 8πμ/ρ in cm²/s: the friction of a parabolic profile per flow and area; a tube has a multiple of it.
     pub(super) friction: f64,
     /// Γ = c_w + c_s: pressure per radial velocity of wall and tissue.
     pub(super) damping: f64,
@@ -62,10 +62,15 @@ impl<'a> Vessels<'a> {
             outlets: outlets(network, &theta[n + N_SHARED..]),
         };
         for (tube, young) in network.tubes.iter().zip(theta) {
-            let plate = young * tube.thickness / (1.0 - nu * nu);
-            let ring = |radius: f64| Ring { stiffness: plate / (radius * radius) + k_s, radius };
-            vessels.faces.extend(tube.radius.iter().map(|&radius| ring(radius)));
-            vessels.cells.extend(tube.radius.windows(2).map(|pair| ring(0.5 * (pair[0] + pair[1]))));
+            let ring = |radius: f64, thickness: f64| {
+                let plate = young * thickness / (1.0 - nu * nu);
+                Ring { stiffness: plate / (radius * radius) + k_s, radius }
+            };
+            let (radius, thickness) = (&tube.radius, &tube.thickness);
+            vessels.faces.extend(radius.iter().zip(thickness).map(|(&radius, &h)| ring(radius, h)));
+            let middle = |pair: &[f64]| 0.5 * (pair[0] + pair[1]);
+            let cells = radius.windows(2).zip(thickness.windows(2));
+            vessels.cells.extend(cells.map(|(radius, h)| ring(middle(radius), middle(h))));
         }
         vessels
     }

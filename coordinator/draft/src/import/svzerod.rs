@@ -1,0 +1,168 @@
+//! Input files of svZeroDSolver as networks of `rcr-network`.
+//!
+//! Next files to read: [`file`] for what is read, [`blocks`] for what becomes of it.
+
+mod blocks;
+mod file;
+mod junctions;
+mod layout;
+mod network;
+
+use serde_json::Value;
+
+use super::plan::{Course, Inputs, Origin, Plan, Unknown};
+use blocks::Blocks;
+use file::{File, Simulation};
+use network::Kind;
+
+/// Reads a file.
+pub(super) fn plan(name: &str, text: &str) -> Result<Plan, String> {
+    let file = file::read(text)?;
+    refuse_blocks(&file)?;
+    let blocks = Blocks::new(&file)?;
+    let simulation = &file.simulation_parameters;
+    let period = period(&blocks, simulation)?;
+    let Blocks { mut network, mut courses, channels, mut unknowns, .. } = blocks;
+    network.mend(period);
+    for course in &mut courses {
+        if let [value] = course.values[..] {
+            (course.times, course.values) = (vec![0.0, period], vec![value; 2]);
+        }
+    }
+    if unknowns.is_empty() {
+        unknowns = first_vessel(&network.elements)?;
+    }
+    let points = simulation.number_of_time_pts_per_cardiac_cycle.unwrap_or(101);
+    if points < 2 {
+        return Err("simulation_parameters.number_of_time_pts_per_cardiac_cycle: give at least 2".to_owned());
+    }
+    let course = course(&file, &mut network.notes)?;
+    Ok(Plan {
+        name: super::names::Names::default().take(name),
+        program: "svZeroDSolver",
+        kind: "rcr-network",
+        layout: layout::lines(&network),
+        constants: Vec::new(),
+        unknowns,
+        channels: once_each(channels),
+        inputs: Inputs::new(&courses, period),
+        points,
+        course,
+        omissions: network.omissions,
+        notes: network.notes,
+    })
+}
+
+/// The resistance of the first vessel that has one.
+fn first_vessel(elements: &[network::Element]) -> Result<Vec<Unknown>, String> {
+    let unknown = elements.iter().find_map(|element| match element.kind {
+        Kind::Resistance(value) => {
+            Some(Unknown { name: format!("R_{}", element.name), unit: "dyn s/cm^5", value })
+        }
+        Kind::Loss { quadratic: value, .. } => {
+            Some(Unknown { name: format!("Kq_{}", element.name), unit: "g/cm^7", value })
+        }
+        _ => None,
+    });
+    Ok(vec![unknown.ok_or("no vessel and no outlet has a resistance: there is nothing to estimate")?])
+}
+
+fn once_each(channels: Vec<(String, &'static str)>) -> Vec<(String, &'static str)> {
+    let mut kept: Vec<(String, &'static str)> = Vec::with_capacity(channels.len());
+    for channel in channels {
+        if !kept.contains(&channel) {
+            kept.push(channel);
+        }
+    }
+    kept
+}
+
+/// Names the blocks of the file that no model here has.
+fn refuse_blocks(file: &File) -> Result<(), String> {
+    let lists = [
+        ("closed_loop_blocks", &file.closed_loop_blocks, "closed_loop_type"),
+        ("chambers", &file.chambers, "type"),
+        ("valves", &file.valves, "type"),
+        ("external_solver_coupling_blocks", &file.external_solver_coupling_blocks, "type"),
+    ];
+    let mut missing = Vec::new();
+    for (list, blocks, key) in lists {
+        for (i, block) in blocks.iter().enumerate() {
+            let kind = block.get(key).and_then(Value::as_str).unwrap_or("unknown type");
+            missing.push(format!("{list}[{i}] ({kind})"));
+        }
+    }
+    if missing.is_empty() {
+        return Ok(());
+    }
+    Err(format!(
+        "{} {} not in `rcr-network`: run svZeroDSolver itself as an external solver for a file with chambers, valves or a closed loop",
+        missing.join(", "),
+        if missing.len() == 1 { "is" } else { "are" }
+    ))
+}
+
+/// The period that all signals of the file have.
+fn period(blocks: &Blocks, simulation: &Simulation) -> Result<f64, String> {
+    let mut found: Option<(f64, &str)> = None;
+    for course in blocks.courses.iter().filter(|course| course.values.len() > 1) {
+        let own = course.times[course.times.len() - 1];
+        match found {
+            Some((period, other)) if (own - period).abs() > 1e-6 * period => {
+                return Err(format!(
+                    "`{other}` has a period of {period} and `{}` one of {own}: give all signals the same",
+                    course.name
+                ));
+            }
+            Some(_) => {}
+            None => found = Some((own, &course.name)),
+        }
+    }
+    let given = simulation.cardiac_period.filter(|period| *period != 0.0);
+    match (found, given) {
+        (Some((period, _)), Some(given)) if (given - period).abs() > 1e-6 * period => {
+            Err(format!("simulation_parameters.cardiac_period: {given}, but the signals have {period}"))
+        }
+        (Some((period, _)), _) => Ok(period),
+        (None, Some(given)) if given > 0.0 && given.is_finite() => Ok(given),
+        (None, Some(given)) => {
+            Err(format!("simulation_parameters.cardiac_period: {given} is not above zero"))
+        }
+        (None, None) => Ok(1.0),
+    }
+}
+
+/// Where the program starts and which of its periods it shows.
+fn course(file: &File, notes: &mut Vec<String>) -> Result<Course, String> {
+    let simulation = &file.simulation_parameters;
+    if simulation.coupled_simulation {
+        return Err(
+            "simulation_parameters.coupled_simulation: a network that another solver drives has no inputs of its own"
+                .to_owned(),
+        );
+    }
+    let cycles = simulation
+        .number_of_cardiac_cycles
+        .ok_or("simulation_parameters.number_of_cardiac_cycles: not given, and needed")?;
+    if cycles == 0 {
+        return Err("simulation_parameters.number_of_cardiac_cycles: give at least 1".to_owned());
+    }
+    let from = if simulation.steady_initial { Origin::Steady } else { Origin::Zero };
+    let all = simulation.output_all_cycles;
+    if !(file.initial_condition.is_empty() && file.initial_condition_d.is_empty()) {
+        if all || cycles < FORGET {
+            return Err(format!(
+                "initial_condition: not read, and after {} cycles it still counts; ask for the last of at least {FORGET} cycles",
+                if all { 0 } else { cycles }
+            ));
+        }
+        notes.push(
+            "`initial_condition` is not read: the last of many cycles is shown, which hardly knows it"
+                .to_owned(),
+        );
+    }
+    Ok(Course { from, cycles, all, settled: None })
+}
+
+/// Cycles after which a network hardly knows where it started.
+const FORGET: usize = 10;

@@ -1,0 +1,260 @@
+//! `starlings import`: networks of svZeroDSolver and openBF, against what those programs computed.
+
+#![allow(clippy::unwrap_used)] // a failed unwrap is a failed test
+
+mod common;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use common::{output, refused, repository, starlings};
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+/// Columns by name.
+type Table = BTreeMap<String, Vec<f64>>;
+
+fn file(path: &str) -> PathBuf {
+    repository("tests/import_files").join(path)
+}
+
+fn import(file: &Path, out: &Path) -> Value {
+    let (code, stdout, stderr) =
+        output(starlings().arg("import").arg(file).arg("--out").arg(out).arg("--json"));
+    assert_eq!(code, 0, "{}: {stderr}", file.display());
+    serde_json::from_str(&stdout).unwrap()
+}
+
+/// What the model of an imported study predicts; `check` accepts the study.
+fn predicted(folder: &Path) -> Table {
+    let study = folder.join("study.toml");
+    let (code, _, stderr) = output(starlings().arg("check").arg(&study));
+    assert_eq!(code, 0, "{stderr}");
+    let (code, stdout, stderr) = output(starlings().arg("simulate").arg(&study));
+    assert_eq!(code, 0, "{stderr}");
+    table(&stdout)
+}
+
+fn table(text: &str) -> Table {
+    let mut lines = text.lines();
+    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let mut columns: Vec<Vec<f64>> = vec![Vec::new(); names.len()];
+    for line in lines {
+        for (column, word) in columns.iter_mut().zip(line.split(',')) {
+            column.push(word.parse().unwrap());
+        }
+    }
+    names.into_iter().map(str::to_owned).zip(columns).collect()
+}
+
+/// A column between its rows.
+fn at(table: &Table, name: &str, t: f64) -> f64 {
+    let (times, values) =
+        (&table["time"], table.get(name).unwrap_or_else(|| panic!("no {name} in {:?}", table.keys())));
+    let after = times.partition_point(|time| *time <= t).clamp(1, times.len() - 1);
+    let part = ((t - times[after - 1]) / (times[after] - times[after - 1])).clamp(0.0, 1.0);
+    (1.0 - part).mul_add(values[after - 1], part * values[after])
+}
+
+/// Largest difference relative to the largest value.
+fn difference(found: &Table, name: &str, times: &[f64], wanted: &[f64]) -> f64 {
+    let size = wanted.iter().fold(0.0, |size: f64, v| size.max(v.abs()));
+    let most =
+        times.iter().zip(wanted).fold(0.0, |most: f64, (t, w)| most.max((at(found, name, *t) - w).abs()));
+    most / size
+}
+
+/// Results of svZeroDSolver for a vessel: times and a column.
+fn results(name: &str, vessel: &str, column: &str) -> (Vec<f64>, Vec<f64>) {
+    let text = std::fs::read_to_string(file(&format!("svzerodsolver/results/{name}.json"))).unwrap();
+    let all: Value = serde_json::from_str(&text).unwrap();
+    let rows = all["name"].as_object().unwrap().iter().filter(|(_, name)| *name == vessel);
+    let value = |column: &str, row: &str| all[column][row].as_f64().unwrap();
+    rows.map(|(row, _)| (value("time", row), value(column, row))).unzip()
+}
+
+/// Imports a file of svZeroDSolver and compares, relative to the largest value of a waveform: vessel, column of the results, output of the study.
+fn compare(name: &str, bound: f64, waveforms: &[(&str, &str, &str)]) {
+    let folder = TempDir::new().unwrap();
+    let out = folder.path().join(name);
+    import(&file(&format!("svzerodsolver/{name}.json")), &out);
+    let found = predicted(&out);
+    for (vessel, column, predicted) in waveforms {
+        let (times, wanted) = results(name, vessel, column);
+        let most = difference(&found, predicted, &times, &wanted);
+        assert!(most <= bound, "{name}: {column} of {vessel} is off by {most}");
+    }
+}
+
+/// svZeroDSolver stops its iterations at this, and prints ten decimals.
+const STEADY: f64 = 2e-10;
+const VESSEL: &str = "branch0_seg0";
+const PRESSURES: [(&str, &str, &str); 2] =
+    [(VESSEL, "pressure_in", "p_branch0_seg0_in"), (VESSEL, "pressure_out", "p_branch0_seg0_out")];
+
+/// Both pressures, and the flows through two elements.
+fn all(flow_in: &'static str, flow_out: &'static str) -> Vec<(&'static str, &'static str, &'static str)> {
+    let flows = [(VESSEL, "flow_in", flow_in), (VESSEL, "flow_out", flow_out)];
+    PRESSURES.into_iter().chain(flows).collect()
+}
+
+#[test]
+fn steady_vessels_are_those_of_svzerodsolver() {
+    compare("steadyFlow_R_R", STEADY, &all("q_branch0_seg0", "q_OUT"));
+    compare("steadyFlow_RC_R", STEADY, &all("q_branch0_seg0", "q_OUT"));
+    compare("steadyFlow_RL_R", STEADY, &all("q_branch0_seg0", "q_branch0_seg0_blood"));
+    compare("steadyFlow_RLC_R", STEADY, &all("q_branch0_seg0", "q_branch0_seg0_blood"));
+    compare("steadyFlow_R_RCR", STEADY, &all("q_branch0_seg0", "q_OUT"));
+    compare("steadyFlow_R_coronary", STEADY, &all("q_branch0_seg0", "q_OUT_Ra1"));
+    compare("steadyFlow_stenosis_R", STEADY, &all("q_branch0_seg0", "q_OUT"));
+    let fork = [
+        ("branch0_seg0", "pressure_in", "p_branch0_seg0_in"),
+        ("branch0_seg0", "pressure_out", "p_J0"),
+        ("branch1_seg0", "pressure_out", "p_branch1_seg0_out"),
+        ("branch1_seg0", "flow_in", "q_branch1_seg0"),
+        ("branch2_seg0", "pressure_out", "p_branch2_seg0_out"),
+        ("branch2_seg0", "flow_out", "q_OUT2"),
+    ];
+    compare("steadyFlow_bifurcationR_R1", STEADY, &fork);
+}
+
+#[test]
+fn pulsatile_waveforms_are_those_of_svzerodsolver() {
+    compare("pulsatileFlow_R_RCR", 2e-5, &all("q_branch0_seg0", "q_OUT"));
+    compare("pulsatileFlow_R_coronary", 7e-5, &all("q_branch0_seg0", "q_OUT_Ra1"));
+    // The source behind the vessel counts its flow towards it.
+    compare("pulsatileFlow_CStenosis_steadyPressure", 5e-4, &PRESSURES);
+    compare("pulsatileFlow_CStenosis_steadyPressure", 5e-4, &[(VESSEL, "flow_in", "q_branch0_seg0")]);
+}
+
+#[test]
+fn blocks_keys_and_values_that_are_not_understood_are_named() {
+    let folder = TempDir::new().unwrap();
+    let out = folder.path().join("out");
+    let refuse = |path: &Path, words: &[&str]| {
+        refused(starlings().arg("import").arg(path).arg("--out").arg(&out), words);
+        assert!(!out.exists(), "nothing is left of {}", path.display());
+    };
+    refuse(
+        &file("svzerodsolver/closedLoopHeart_singleVessel.json"),
+        &["closed_loop_blocks[0] (ClosedLoopHeartAndPulmonary)", "not in `rcr-network`"],
+    );
+    let good: Value = serde_json::from_str(
+        &std::fs::read_to_string(file("svzerodsolver/steadyFlow_bifurcationR_R1.json")).unwrap(),
+    )
+    .unwrap();
+    let cases = [
+        ("/boundary_conditions/1/bc_type", json!("Impedance"), "`OUT1` of type `Impedance`"),
+        ("/boundary_conditions/1/bc_values/R", json!([1.0, 2.0]), "boundary_conditions[1].bc_values.R"),
+        ("/boundary_conditions/1/bc_values/R", json!(-1.0), "-1 is not above zero"),
+        ("/boundary_conditions/1/bc_values/Q", json!(1.0), "unknown field `Q`"),
+        ("/boundary_conditions/1/bc_name", json!("OUT9"), "`OUT9` is joined to nothing"),
+        ("/boundary_conditions/0/bc_values/t", json!([0.0, 0.0]), "time 0 is not later"),
+        ("/boundary_conditions/0/bc_values/t", json!([0.0]), "1 times and 2 values"),
+        ("/vessels/0/zero_d_element_type", json!("Chamber"), "a vessel of type `Chamber`"),
+        ("/vessels/0/zero_d_element_values/K", json!(1.0), "vessels[0].zero_d_element_values"),
+        ("/vessels/1/vessel_name", json!("branch0_seg0"), "two vessels are called"),
+        ("/vessels/1/boundary_conditions/outlet", json!("OUT2"), "at two places"),
+        ("/junctions/0/junction_type", json!("pump"), "a junction of type `pump`"),
+        ("/junctions/0/outlet_vessels", json!([1]), "nothing is joined to the inlet of `branch2_seg0`"),
+        ("/junctions/0/outlet_vessels", json!([1, 7]), "no vessel has the id 7"),
+        ("/simulation_parameters/speed", json!(1), "simulation_parameters.speed: unknown field"),
+        ("/simulation_parameters/coupled_simulation", json!(true), "coupled_simulation"),
+        ("/calibration_parameters", json!({}), "unknown field `calibration_parameters`"),
+    ];
+    let path = folder.path().join("changed.json");
+    for (place, value, words) in cases {
+        let mut changed = good.clone();
+        let (parent, key) = place.rsplit_once('/').unwrap();
+        changed.pointer_mut(parent).unwrap()[key] = value;
+        std::fs::write(&path, changed.to_string()).unwrap();
+        refuse(&path, &[words]);
+    }
+    for (text, words) in [("{", "is no JSON"), ("[]", "which is a JSON object"), ("{}", "neither `vessels`")]
+    {
+        std::fs::write(&path, text).unwrap();
+        refuse(&path, &[words]);
+    }
+    refuse(&folder.path().join("none.json"), &["cannot be read"]);
+    let other = folder.path().join("network.xml");
+    std::fs::write(&other, "<network/>").unwrap();
+    refuse(&other, &["a JSON of svZeroDSolver", "a YAML of openBF"]);
+    std::fs::create_dir(&out).unwrap();
+    let path = file("svzerodsolver/steadyFlow_R_R.json");
+    refused(starlings().arg("import").arg(path).arg("--out").arg(&out), &["is there already", "--out"]);
+}
+
+/// Places of openBF's results along a vessel, as parts of its cells.
+const PLACES: [(&str, f64); 3] = [("quarter", 0.25), ("mid", 0.5), ("threequarter", 0.75)];
+
+/// A field at a part of the cells of a vessel that begin at `first`.
+fn along(found: &Table, field: &str, first: usize, n: usize, part: f64) -> Vec<f64> {
+    // openBF shows cell round(M part), whose centre is half of its cells of 1 mm before that part.
+    let place = part * n as f64 - 0.5;
+    let (cell, rest) = (place.floor() as usize, place - place.floor());
+    let column = |cell: usize| &found[&format!("{field}[{}]", first + cell)];
+    column(cell).iter().zip(column(cell + 1)).map(|(a, b)| (1.0 - rest).mul_add(*a, rest * b)).collect()
+}
+
+/// Compares, as root mean square relative to the largest value, pressure (Pa) and flow (m³/s) of a vessel with openBF's; times are taken within the period.
+fn compare_vessel(found: &Table, name: &str, period: f64, (first, n): (usize, usize)) {
+    let reference = table(&std::fs::read_to_string(file(&format!("openbf/{name}_reference.csv"))).unwrap());
+    for (field, letter, unit, bound) in [("pressure", "P", 0.1, 2e-3), ("flow_rate", "Q", 1e-6, 5e-3)] {
+        for (place, part) in PLACES {
+            let values: Vec<f64> = along(found, field, first, n, part).iter().map(|v| unit * v).collect();
+            let own = Table::from([("time".to_owned(), found["time"].clone()), ("v".to_owned(), values)]);
+            let wanted = &reference[&format!("{letter}_{place}")];
+            let size = wanted.iter().fold(0.0, |size: f64, v| size.max(v.abs()));
+            let square = reference["time"].iter().zip(wanted);
+            let square = square.map(|(t, w)| (at(&own, "v", t.rem_euclid(period)) - w).powi(2)).sum::<f64>();
+            let rms = (square / wanted.len() as f64).sqrt() / size;
+            assert!(rms <= bound, "{name}: {letter} at {place} is off by {rms}");
+        }
+    }
+}
+
+#[test]
+fn a_carotid_and_an_iliac_bifurcation_carry_the_waves_of_openbf() {
+    let folder = TempDir::new().unwrap();
+    let (cca, ibif) = (folder.path().join("cca"), folder.path().join("ibif"));
+    import(&file("openbf/cca.yaml"), &cca);
+    let found = predicted(&cca);
+    compare_vessel(&found, "cca", found["time"].last().copied().unwrap(), (0, 51));
+    import(&file("openbf/ibif.yaml"), &ibif);
+    let found = predicted(&ibif);
+    let period = found["time"].last().copied().unwrap();
+    for (name, cells) in [("ibif_parent", (0, 35)), ("ibif_d1", (35, 34)), ("ibif_d2", (69, 34))] {
+        compare_vessel(&found, name, period, cells);
+    }
+}
+
+#[test]
+fn an_aorta_of_openbf_runs_and_what_the_model_lacks_is_named() {
+    let folder = TempDir::new().unwrap();
+    let out = folder.path().join("uta");
+    import(&file("openbf/uta.yaml"), &out);
+    let found = predicted(&out);
+    assert_eq!(found["time"].len(), 100);
+    let text = std::fs::read_to_string(file("openbf/uta.yaml")).unwrap();
+    let path = folder.path().join("uta.yaml");
+    std::fs::copy(file("openbf/uta_inlet.dat"), folder.path().join("uta_inlet.dat")).unwrap();
+    let other = folder.path().join("other");
+    let cases = [
+        ("R1: 1.1752e7", "Rt: 0.5", "a reflection coefficient (`Rt`)"),
+        ("R2: 1.1167e8", "visco-elastic: true", "`visco-elastic`"),
+        ("R2: 1.1167e8", "M: 5", "a Windkessel of two elements"),
+        ("inlet_impedance_matching: false", "inlet_impedance_matching: true", "`inlet_impedance_matching`"),
+        ("gamma_profile: 9", "gamma profile: 9", "write `gamma_profile`"),
+        ("gamma_profile: 9", "colour: red", "unknown field `colour`"),
+        ("E: 400.0e3", "E: -1.0", "E is -1"),
+        ("E: 400.0e3", "E: stiff", "line 17"),
+        ("tn: 2", "tn: 1", "the flow enters at exactly one"),
+        ("uta_inlet.dat", "none.dat", "none.dat cannot be read"),
+    ];
+    for (from, to, words) in cases {
+        assert!(text.contains(from), "{from}");
+        std::fs::write(&path, text.replace(from, to)).unwrap();
+        refused(starlings().arg("import").arg(&path).arg("--out").arg(&other), &[words]);
+        assert!(!other.exists());
+    }
+}
