@@ -1,13 +1,14 @@
 //! The coordinator: sends particles to the fleet, runs the study, explains its misfit, stores and reports both.
 //!
-//! Six crates, which import downwards only: [`fleet`] dispatches jobs and knows no study; [`study`] runs the loop and writes the
+//! Seven crates, which import downwards only: [`fleet`] dispatches jobs and knows no study; [`study`] runs the loop and writes the
 //! store; [`explain`] says what a study's model lacks, by running variants of it; [`infer`] finds drift and noise of stochastic
-//! equations; [`report`] reads only what the store holds; [`metrics`] tells a Prometheus what the fleet does. Here
-//! are their names for programs that want all of them, and the tests that need more than one. Next file to read: [`study`].
+//! equations; [`report`] reads only what the store holds; [`metrics`] tells a Prometheus what the fleet does,
+//! [`live`] shows people a run while it runs. Here are their names for programs that want all of them, and the tests that need more than one. Next file to read: [`study`].
 
 pub use starlings_explain as explain;
 pub use starlings_fleet as fleet;
 pub use starlings_infer as infer;
+pub use starlings_live as live;
 pub use starlings_metrics as metrics;
 pub use starlings_report as report;
 pub use starlings_study as study;
