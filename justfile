@@ -67,6 +67,10 @@ slurm:
 kubernetes:
     .ci/kubernetes
 
+# The live page in a headless Chromium at two widths, its console without errors; pictures in target/pages.
+pages:
+    .ci/pages
+
 # One wheel of program and package in target/wheels, and what a user does with it in an empty environment.
 wheel:
     .ci/wheel

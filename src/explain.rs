@@ -20,7 +20,7 @@ use starlings_coordinator::study::{RunFolder, Study};
 use crate::console::{line, note};
 use crate::disk;
 use crate::failure::Failure;
-use crate::fleet_session::{Entrance, FleetArgs, FleetSession, Out};
+use crate::fleet_session::{Entrance, FleetArgs, FleetSession, Out, finish};
 use crate::interrupt;
 use crate::load::{is_outside, load_where};
 use crate::progress::Display;
@@ -111,6 +111,7 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     let display = Arc::new(Display::new(args.json));
     let identity = folder.store.begin().map_err(Failure::run)?;
     let mut session = FleetSession::listen(&study, &plan, entrance, identity, &display)?;
+    session.show(&study, "explain", Some(&folder.path), &display)?;
     session.start_workers(&study, &plan, Some(&folder.path))?;
     if is_away && let Err(failure) = session.trial(&mut study, None, Some(&folder.store)) {
         session.close(false);
@@ -123,10 +124,13 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     let mut context = Context { clock: &clock, watch: &mut watch, events: Some(&session.events), earlier_s };
     let result = explain(&study, &mut session.fleet, &folder.store, &mut context, &options);
     display.finish();
-    session.close(result.is_ok());
+    let page = session.close(result.is_ok());
     let found = result.map_err(|error| failed(&error, &folder.path))?;
     save_findings(&folder, &found).map_err(Failure::run)?;
-    write(&folder, args.json)
+    let written = write(&folder, args.json);
+    finish(page, Some(&folder.path.join("report.html")));
+    folder.rest();
+    written
 }
 
 /// What is left of an explanation that ended early, and how to go on from there.

@@ -3,6 +3,7 @@
 //! Shared by every command that runs the model on the fleet. Next file to read: [`crate::run`].
 
 mod entrance;
+mod live_page;
 mod load_file;
 mod plan;
 mod relay;
@@ -17,7 +18,8 @@ use starlings_coordinator::fleet::access::Access;
 use starlings_coordinator::fleet::{
     FleetConfig, FleetError, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers, PlaceName, RunIdentity,
 };
-use starlings_coordinator::metrics::{Server, Source};
+use starlings_coordinator::live::LivePage;
+use starlings_coordinator::metrics::{Address, Server, Source};
 use starlings_coordinator::study::Study;
 use starlings_coordinator::study::store::Store;
 use starlings_coordinator::study::trial::{FleetTrialError, trial_on_fleet};
@@ -27,7 +29,7 @@ use tokio_util::sync::CancellationToken;
 
 use crate::console::note;
 use crate::failure::Failure;
-use crate::fleet_values::{address, alone, host_of, memory, metrics_address};
+use crate::fleet_values::{address, alone, host_of, memory, served_address};
 use crate::interrupt;
 use crate::load::{end_solvers, is_outside};
 use crate::progress::Display;
@@ -35,6 +37,8 @@ use crate::solvers::own_program;
 use crate::traces::Traced;
 pub(crate) use entrance::Entrance;
 use entrance::{failed, serve_metrics};
+pub(crate) use live_page::finish;
+use live_page::serve_page;
 use load_file::LoadFile;
 use plan::{ACCESS, AccessPlan, Plan};
 use relay::{Shown, relay};
@@ -69,6 +73,10 @@ pub(crate) struct FleetArgs {
     /// PORT or :PORT for this machine alone, HOST:PORT for others too (port 0 picks a free one).
     #[arg(long, value_name = "ADDR")]
     metrics: Option<String>,
+    /// Serve a page that follows the command while it runs, with a token in its address: on a free port of this machine alone, or on
+    /// PORT, or with HOST:PORT for others too.
+    #[arg(long, value_name = "ADDR", num_args = 0..=1, require_equals = true, default_missing_value = "0")]
+    dashboard: Option<String>,
     /// Write a span of this command, of every run and of its computation in a local worker, as OTLP: into a FILE, a line of JSON each,
     /// or to a collector at http://HOST:PORT. Workers elsewhere write theirs where their own --traces says.
     #[arg(long, value_name = "FILE|URL")]
@@ -96,7 +104,11 @@ impl FleetArgs {
             ));
         }
         let address = self.listen.as_deref().map(|text| address("--listen", text)).transpose()?;
-        let metrics = self.metrics.as_deref().map(metrics_address).transpose()?;
+        let serving = |option, text: &Option<String>| {
+            text.as_deref().map(|text| served_address(option, text)).transpose()
+        };
+        let metrics = serving("--metrics", &self.metrics)?;
+        let dashboard = serving("--dashboard", &self.dashboard)?;
         let host = self.listen.as_deref().and_then(host_of).map(str::to_owned);
         if let (Some(host), Some(address)) = (&host, address)
             && let Some(warning) = alone(host, address)
@@ -114,6 +126,7 @@ impl FleetArgs {
             host,
             access,
             metrics,
+            dashboard,
             traces,
             n_worker,
             mixed,
@@ -153,6 +166,9 @@ pub(crate) struct FleetSession {
     /// What is served of it in numbers.
     source: Source,
     metrics: Option<Server>,
+    /// Where the live page will be, until it is.
+    dashboard: Option<Address>,
+    page: Option<LivePage>,
     traced: Option<Traced>,
 }
 
@@ -177,7 +193,7 @@ impl FleetSession {
         if let Some(attempts) = study.fleet.max_attempts {
             config.max_attempts = attempts;
         }
-        let Entrance { bound, access, metrics, traces } = entrance;
+        let Entrance { bound, access, metrics, dashboard, traces } = entrance;
         config.secrets = access.as_ref().map(|access| access.secrets().clone());
         (config.seed, config.mixed) = (study.seed, plan.mixed);
         config.timeout_factor = study.fleet.timeout_factor;
@@ -197,7 +213,34 @@ impl FleetSession {
             relay(heard, &kept, &shown, missing);
         });
         let (local, load) = (None, None);
-        Ok(Self { fleet, local, access, load, invitation, events, watcher, source, metrics, traced })
+        let page = None;
+        Ok(Self {
+            fleet,
+            local,
+            access,
+            load,
+            invitation,
+            events,
+            watcher,
+            source,
+            metrics,
+            dashboard,
+            page,
+            traced,
+        })
+    }
+
+    /// Serves the live page, where it is asked for; `folder` is that of the run, where it has a store.
+    pub(crate) fn show(
+        &mut self,
+        study: &Study,
+        command: &str,
+        folder: Option<&Path>,
+        display: &Display,
+    ) -> Result<(), Failure> {
+        let Some(at) = self.dashboard.take() else { return Ok(()) };
+        self.page = Some(serve_page(at, (study, command), (self.fleet.readings(), folder), display)?);
+        Ok(())
     }
 
     /// Starts the local workers, or says how to start others; `folder` is the run folder, where there is one.
@@ -287,12 +330,13 @@ impl FleetSession {
         self.source.clone()
     }
 
-    /// Ends the fleet and its workers, and says to those whether the command is done.
-    pub(crate) fn close(self, is_done: bool) {
+    /// Ends the fleet and its workers, and says to those whether the command is done. The live page goes on until it is dropped or
+    /// [`finish`]ed.
+    pub(crate) fn close(self, is_done: bool) -> Option<LivePage> {
         if !is_done {
             self.fleet.handle().break_off();
         }
-        let Self { fleet, local, watcher, mut access, load, metrics, traced, .. } = self;
+        let Self { fleet, local, watcher, mut access, load, metrics, page, traced, .. } = self;
         // It has a hold on the fleet, which ends with the last one.
         drop(load);
         // Before the workers leave: one that stays looks there for what comes next.
@@ -307,5 +351,6 @@ impl FleetSession {
         if let Some(traced) = traced {
             traced.end();
         }
+        page
     }
 }

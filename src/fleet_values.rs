@@ -6,13 +6,13 @@ use starlings_coordinator::study::bytes_of;
 
 use crate::failure::Failure;
 
-/// Where to serve metrics: this machine alone, unless a host is named.
-pub(crate) fn metrics_address(text: &str) -> Result<SocketAddr, Failure> {
+/// Where to serve something over HTTP: for this machine alone, unless a host is named.
+pub(crate) fn served_address(option: &str, text: &str) -> Result<SocketAddr, Failure> {
     let port = text.strip_prefix(':').unwrap_or(text);
     if port.parse::<u16>().is_ok() {
-        return address("--metrics", &format!("127.0.0.1:{port}"));
+        return address(option, &format!("127.0.0.1:{port}"));
     }
-    address("--metrics", text)
+    address(option, text)
 }
 
 /// Where to listen, as it was asked for by an option.
@@ -57,8 +57,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn metrics_are_for_this_machine_unless_a_host_is_named() {
-        let at = |text| metrics_address(text).map(|address| address.to_string()).map_err(|_| ());
+    fn what_is_served_is_for_this_machine_unless_a_host_is_named() {
+        let at = |text| served_address("--metrics", text).map(|address| address.to_string()).map_err(|_| ());
         assert_eq!(at("9464"), Ok("127.0.0.1:9464".to_owned()));
         assert_eq!(at(":0"), Ok("127.0.0.1:0".to_owned()));
         assert_eq!(at("0.0.0.0:9464"), Ok("0.0.0.0:9464".to_owned()));

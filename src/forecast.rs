@@ -17,7 +17,7 @@ use starlings_estimators::forecast::{Direction, Level};
 use crate::console::{line, note, table, text};
 use crate::csv_file;
 use crate::failure::Failure;
-use crate::fleet_session::{Entrance, FleetArgs, FleetSession};
+use crate::fleet_session::{Entrance, FleetArgs, FleetSession, finish};
 use crate::progress::Display;
 use source::Source;
 
@@ -95,14 +95,16 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let display = Arc::new(Display::new(args.json));
     let mut session =
         FleetSession::listen(study, &plan, Entrance::take(&plan, None)?, RunIdentity::new(), &display)?;
+    session.show(study, "forecast", None, &display)?;
     session.start_workers(study, &plan, None)?;
     let result = source.forecast(&mut session.fleet, &ask);
     display.finish();
-    session.close(result.is_ok());
+    let page = session.close(result.is_ok());
     let found = result?;
     let out = args.out.clone().unwrap_or_else(|| usual_out(&args.from));
     let json = serde_json::to_string_pretty(&found).map_err(Failure::run)?;
     write(&out, &found, &json)?;
+    finish(page, Some(&out.join("report.html")));
     if args.json {
         return line(json);
     }

@@ -15,7 +15,7 @@ use crate::console::{line, note, number, table, text};
 use crate::csv_file::{self, StudyLocation};
 use crate::disk;
 use crate::failure::Failure;
-use crate::fleet_session::{Entrance, FleetArgs, FleetSession};
+use crate::fleet_session::{Entrance, FleetArgs, FleetSession, finish};
 use crate::interrupt;
 use crate::load::load_where;
 use crate::progress::Display;
@@ -64,6 +64,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let display = Arc::new(Display::new(args.json));
     let mut session =
         FleetSession::listen(&study, &plan, Entrance::take(&plan, None)?, RunIdentity::new(), &display)?;
+    session.show(&study, "identify", None, &display)?;
     session.start_workers(&study, &plan, None)?;
     if is_away {
         session.trial(&mut study, Some(&BATCH), None)?;
@@ -78,7 +79,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     }
     let result = identify(&study, &mut session.fleet, &at);
     display.finish();
-    session.close(result.is_ok());
+    let page = session.close(result.is_ok());
     let found = result.map_err(|error| match error {
         IdentifyError::Run(cause) if cause.is_cancelled() => {
             interrupt::failure("nothing is kept of it: start again")
@@ -92,6 +93,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if let Some(path) = &args.html {
         write_page(path, &found)?;
     }
+    finish(page, args.html.as_deref());
     if args.json {
         return line(serde_json::to_string_pretty(&found).map_err(Failure::run)?);
     }

@@ -17,7 +17,7 @@ use starlings_coordinator::study::Study;
 
 use crate::console::line;
 use crate::failure::Failure;
-use crate::fleet_session::{Entrance, FleetArgs, FleetSession, Out};
+use crate::fleet_session::{Entrance, FleetArgs, FleetSession, Out, finish};
 use crate::interrupt;
 use crate::progress::Display;
 
@@ -72,16 +72,19 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let folder = folder(&study, args.out.as_deref())?;
     let display = Arc::new(Display::new(args.json));
     let mut session = FleetSession::listen(&study, &plan, entrance, RunIdentity::new(), &display)?;
+    session.show(&study, "infer", None, &display)?;
     session.start_workers(&study, &plan, Some(&folder))?;
     let mut watch = |at: &Progress| display.blocks(at);
     let reader = if args.fleet.is_here() { Reader::Workers } else { Reader::Coordinator };
     let result = infer(&study, &mut session.fleet, reader, &mut watch);
     display.finish();
-    session.close(result.is_ok());
+    let page = session.close(result.is_ok());
     let found = result.map_err(|error| failed(&error))?;
     write_study(&study, &folder)?;
     write_inference(&folder, &found).map_err(Failure::run)?;
-    tell(&found, &folder, args.json)
+    let told = tell(&found, &folder, args.json);
+    finish(page, Some(&folder.join("report.html")));
+    told
 }
 
 /// Says what an inference would do, for `starlings check`.

@@ -38,6 +38,7 @@ mod simulate;
 mod solvers;
 mod spectrum;
 mod traces;
+mod watch;
 mod worker;
 
 use std::process::ExitCode;
@@ -72,6 +73,8 @@ enum Command {
     Run(run::Args),
     /// Say where a model disagrees with its recordings, name the missing effect, add it and show the gap shrink.
     Explain(explain::Args),
+    /// Follow a run in the terminal: by its folder, running or not, or by the address of its live page.
+    Watch(watch::Args),
     /// Validate a study and make one trial run of its model.
     Check(check::Args),
     /// Run the model forward with chosen values and noise: a twin experiment.
@@ -129,6 +132,7 @@ fn main() -> ExitCode {
         Command::Run(args) => run::run(&args, started),
         Command::Explain(args) => explain::run(&args, started),
         Command::Infer(args) => infer::run(&args),
+        Command::Watch(args) => watch::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Import(args) => import::run(&args),
         Command::Simulate(args) => simulate::run(&args),
@@ -183,6 +187,7 @@ impl Command {
             Self::Deploy(args) => args.prints_json(),
             Self::Explain(args) => args.json,
             Self::Infer(args) => args.json,
+            Self::Watch(args) => args.json,
             Self::Check(args) => args.json,
             Self::Import(args) => args.json,
             Self::Identify(args) => args.json,

@@ -1,176 +1,158 @@
-//! Progress: a bar on a terminal, plain lines elsewhere, records with `--log json`, nothing with `--json` alone.
+//! Progress: a bar on a terminal, plain lines elsewhere, records with `--log json`, nothing with `--json` alone; the same words on the
+//! live page.
+//!
+//! Next file to read: [`form`], for how each of them looks.
 
-use std::io::IsTerminal;
-use std::sync::{Mutex, PoisonError};
-use std::time::{Duration, Instant};
+mod form;
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::time::Instant;
+
 use starlings_coordinator::explain::Stage;
-use starlings_coordinator::study::Progress;
+use starlings_coordinator::fleet::FleetEvent;
+use starlings_coordinator::live::{Live, Pace, Standing};
+use starlings_coordinator::study::{Progress, Work};
 
-use crate::console::note;
 use crate::log;
+use form::Form;
 
-/// Spacing of plain lines.
-const LINE_EVERY: Duration = Duration::from_secs(10);
-
-/// Spacing of records for programs.
-const RECORD_EVERY: Duration = Duration::from_millis(250);
-
-/// Spacing of the pictures of a spinner.
-const TICK: Duration = Duration::from_millis(100);
-
-/// The line that was shown last.
-pub(crate) struct Last {
-    at: Instant,
-    /// Name of the stage, and what it said.
-    stage: Option<(&'static str, String)>,
+/// How far the work was when it was last told of.
+#[derive(Default)]
+struct Known {
+    pace: Pace,
+    work: Work,
+    /// What was said then.
+    standing: Standing,
 }
 
-/// Shows where a run stands.
-pub(crate) enum Display {
-    /// Nothing is shown.
-    Silent,
-    /// A line now and then, the first and the last of a pass always.
-    Lines(Mutex<Last>),
-    /// Records for programs, a few a second; the time of the last one.
-    Records(Mutex<Option<Instant>>),
-    /// A bar.
-    Bar(ProgressBar),
+/// Shows where a command stands.
+pub(crate) struct Display {
+    began: Instant,
+    form: Form,
+    pace: Mutex<Known>,
+    /// The live page, where there is one.
+    live: OnceLock<Live>,
 }
 
 impl Display {
     /// Records with `--log json`; nothing when `silent`; a bar if standard error is a terminal, lines otherwise.
     pub(crate) fn new(silent: bool) -> Self {
-        if log::is_json() {
-            return Self::Records(Mutex::new(None));
+        Self { began: Instant::now(), form: Form::new(silent), pace: Mutex::default(), live: OnceLock::new() }
+    }
+
+    /// Seconds since it began.
+    pub(crate) fn clock(&self) -> Arc<dyn Fn() -> f64 + Send + Sync> {
+        let began = self.began;
+        Arc::new(move || began.elapsed().as_secs_f64())
+    }
+
+    /// Shows everything on a live page too.
+    pub(crate) fn show_on(&self, live: Live) {
+        // A command has one.
+        let _ = self.live.set(live);
+    }
+
+    /// The fleet tells something.
+    pub(crate) fn heard(&self, event: &FleetEvent) {
+        if let Some(live) = self.live.get() {
+            live.event(event);
         }
-        if silent {
-            return Self::Silent;
+        if let FleetEvent::Progress { done, total } = event {
+            self.batch(*done as f64 / (*total).max(1) as f64);
         }
-        if !std::io::stderr().is_terminal() {
-            return Self::Lines(Mutex::new(Last { at: Instant::now(), stage: None }));
+    }
+
+    /// So much of the batch is done of which the last step told.
+    fn batch(&self, share: f64) {
+        let mut known = lock(&self.pace);
+        if known.work.total > 0.0 && share < 1.0 {
+            let work = known.work;
+            let standing = known.at(self.began.elapsed().as_secs_f64(), work.done + share * work.next);
+            drop(known);
+            self.form.batch(&standing);
+            if let Some(live) = self.live.get() {
+                live.stands(standing);
+            }
         }
-        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr_with_hz(10));
-        let style = ProgressStyle::with_template("{prefix} {wide_bar} {pos}/{len}  {msg}  {eta} left");
-        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        Self::Bar(bar)
     }
 
     /// One analysis more.
     pub(crate) fn step(&self, p: &Progress) {
-        let head = match p.passes {
+        let stage = match p.passes {
             None => format!("pass {}", p.pass),
             Some(passes) if passes > 1 => format!("pass {}/{passes}", p.pass),
             Some(_) => p.stage.to_owned(),
         };
-        let tail = format!("{} runs, {} workers", p.runs, p.workers);
-        match self {
-            Self::Lines(last) => {
-                let edge = p.step == 1 || p.step == p.steps;
-                let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
-                if edge || last.at.elapsed() > LINE_EVERY {
-                    note(format_args!("{head}: {} of {} analyses, {tail}", p.step, p.steps));
-                    last.at = Instant::now();
-                }
-            }
-            Self::Records(last) if p.step == 1 || p.step == p.steps || is_due(last) => {
-                log::step(p, &format!("{head}: {} of {} analyses, {tail}", p.step, p.steps));
-            }
-            Self::Silent | Self::Records(_) => {}
-            Self::Bar(bar) => {
-                if bar.length() != Some(p.steps as u64) || p.step <= 1 {
-                    bar.reset();
-                    bar.set_length(p.steps as u64);
-                }
-                bar.set_prefix(head);
-                bar.set_message(tail);
-                bar.set_position(p.step as u64);
-            }
+        let (stage, says) = if p.is_analysis() {
+            (stage, format!("{} of {} analyses", p.step, p.steps))
+        } else {
+            (p.stage.to_owned(), format!("{} of {} ensembles after the fit", p.step, p.steps))
+        };
+        let (runs, workers) = (p.runs, p.workers);
+        let mut known = lock(&self.pace);
+        known.work = p.work;
+        known.standing = Standing { stage, says, share: None, left_s: None, runs, workers };
+        let standing = known.at(self.began.elapsed().as_secs_f64(), p.work.done);
+        drop(known);
+        self.form.step(&standing, p);
+        if let Some(live) = self.live.get() {
+            live.stands(standing);
         }
     }
 
     /// An explanation goes on: each stage is told once, and where it stands now and then.
     pub(crate) fn stage(&self, stage: &Stage) {
-        let says = if stage.says.is_empty() { String::new() } else { format!("{}, ", stage.says) };
-        let tail = format!("{says}{} runs, {} workers", stage.runs, stage.workers);
-        match self {
-            Self::Lines(last) => {
-                let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
-                let told = |(name, says): &(&str, String)| {
-                    *name == stage.name && (stage.says.is_empty() || *says == stage.says)
-                };
-                let new = !last.stage.as_ref().is_some_and(told);
-                if new || last.at.elapsed() > LINE_EVERY {
-                    note(format_args!("{}: {tail}", stage.name));
-                    last.at = Instant::now();
-                    last.stage = Some((stage.name, stage.says.clone()));
-                }
-            }
-            Self::Records(last) if is_due(last) => log::stage(stage, &format!("{}: {tail}", stage.name)),
-            Self::Silent | Self::Records(_) => {}
-            Self::Bar(bar) => {
-                if bar.prefix() != stage.name {
-                    let spinner = ProgressStyle::with_template("{spinner} {prefix}: {wide_msg} {elapsed}");
-                    bar.set_style(spinner.unwrap_or_else(|_| ProgressStyle::default_spinner()));
-                    bar.set_prefix(stage.name);
-                    bar.enable_steady_tick(TICK);
-                }
-                bar.set_message(tail);
-            }
+        let standing = Standing {
+            stage: stage.name.to_owned(),
+            says: stage.says.clone(),
+            share: None,
+            left_s: None,
+            runs: stage.runs,
+            workers: stage.workers,
+        };
+        self.form.stage(&standing, |said| log::stage(stage, said));
+        if let Some(live) = self.live.get() {
+            live.stage(standing);
         }
     }
 
     /// An inference goes on.
     pub(crate) fn blocks(&self, at: &starlings_coordinator::infer::Progress) {
-        let says = format!("{} blocks, {} steps", at.n_block, at.n_step);
-        match self {
-            Self::Lines(last) => {
-                let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
-                if at.n_block == 1 || last.at.elapsed() > LINE_EVERY {
-                    note(format_args!("sums: {says}, {} workers", at.workers));
-                    last.at = Instant::now();
-                }
-            }
-            Self::Records(last) if at.n_block == 1 || is_due(last) => {
-                log::blocks(at, &format!("sums: {says}, {} workers", at.workers));
-            }
-            Self::Silent | Self::Records(_) => {}
-            Self::Bar(bar) => {
-                if bar.prefix() != "sums" {
-                    let spinner = ProgressStyle::with_template("{spinner} {prefix}: {wide_msg} {elapsed}");
-                    bar.set_style(spinner.unwrap_or_else(|_| ProgressStyle::default_spinner()));
-                    bar.set_prefix("sums");
-                    bar.enable_steady_tick(TICK);
-                }
-                bar.set_message(format!("{says}, {} workers", at.workers));
-            }
+        let standing = Standing {
+            stage: "sums".to_owned(),
+            says: format!("{} blocks, {} steps", at.n_block, at.n_step),
+            share: None,
+            left_s: None,
+            runs: at.n_block,
+            workers: at.workers,
+        };
+        self.form.blocks(&standing, at);
+        if let Some(live) = self.live.get() {
+            live.stands(standing);
         }
     }
 
     /// A line from the fleet that people should see.
     pub(crate) fn say(&self, text: &str) {
-        match self {
-            Self::Silent => {}
-            Self::Lines(_) | Self::Records(_) => note(format_args!("{text}")),
-            Self::Bar(bar) => bar.suspend(|| note(format_args!("{text}"))),
-        }
+        self.form.say(text);
     }
 
     /// Clears the bar.
     pub(crate) fn finish(&self) {
-        if let Self::Bar(bar) = self {
-            bar.finish_and_clear();
-        }
+        self.form.finish();
     }
 }
 
-/// Whether the last record was told long enough ago; then another one is told now.
-fn is_due(last: &Mutex<Option<Instant>>) -> bool {
-    let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
-    let is_due = last.is_none_or(|at| at.elapsed() > RECORD_EVERY);
-    if is_due {
-        *last = Some(Instant::now());
+impl Known {
+    /// Where the work stands with so much of it done at this time, s.
+    fn at(&mut self, now_s: f64, done: f64) -> Standing {
+        let total = self.work.total;
+        let left_s = self.pace.left(now_s, done, total);
+        let share = (total > 0.0).then(|| (done / total).clamp(0.0, 1.0));
+        Standing { share, left_s, ..self.standing.clone() }
     }
-    is_due
+}
+
+fn lock(known: &Mutex<Known>) -> MutexGuard<'_, Known> {
+    known.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use clap::Parser;
 use starlings_coordinator::fleet::Fleet;
+use starlings_coordinator::live::LivePage;
 use starlings_coordinator::metrics::Source;
 use starlings_coordinator::report;
 use starlings_coordinator::study::constants::HangsOn;
@@ -16,7 +17,7 @@ use starlings_coordinator::study::{Progress, RunContext, RunFolder, Study, Summa
 use crate::console::{line, note, number, table};
 use crate::disk;
 use crate::failure::Failure;
-use crate::fleet_session::{Entrance, FleetArgs, FleetSession, Out};
+use crate::fleet_session::{Entrance, FleetArgs, FleetSession, Out, finish};
 use crate::interrupt;
 use crate::load::{is_outside, load_where};
 use crate::progress::Display;
@@ -71,6 +72,7 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     let moved = run_folder::moved(&folder, place.as_deref())?.unwrap_or_default();
     let identity = folder.store.begin().map_err(Failure::run)?;
     let mut session = FleetSession::listen(&study, &plan, entrance, identity, &display)?;
+    session.show(&study, "run", Some(&folder.path), &display)?;
     session.start_workers(&study, &plan, Some(&folder.path))?;
     if is_away && let Err(failure) = tried_by_workers(&mut session, &mut study, &folder) {
         let states = session.fleet.states().cloned().filter(|_| args.resume.is_first());
@@ -92,7 +94,7 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     };
     let result = study_run::run(&study, &mut session.fleet, &mut folder, &mut context);
     display.finish();
-    session.close(result.is_ok());
+    let page = session.close(result.is_ok());
     let path = folder.path.display();
     let summary = result.map_err(|error| {
         let remedy = format!("the run so far is in {path}: continue it with --out {path} --resume");
@@ -102,8 +104,16 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
         let moved = if error.misses_a_piece() { &*moved } else { "" };
         Failure::run(format!("{error}{moved}\n  {remedy}"))
     })?;
-    report::write_files(&folder).map_err(Failure::run)?;
-    print(&summary, &folder.path, args.json)
+    end(&summary, &folder, page, args.json)
+}
+
+/// Writes and prints the result, and leads the live page to its report.
+fn end(summary: &Summary, folder: &RunFolder, page: Option<LivePage>, json: bool) -> Result<(), Failure> {
+    report::write_files(folder).map_err(Failure::run)?;
+    let printed = print(summary, &folder.path, json);
+    finish(page, Some(&folder.path.join("report.html")));
+    folder.rest();
+    printed
 }
 
 /// The trial by the workers; its states stand where those of the run will.
@@ -120,7 +130,9 @@ fn tried_by_workers(
 /// Counts every analysis, and shows where the run stands.
 fn watching(source: Source, display: &Display) -> impl FnMut(&Progress) {
     move |at| {
-        source.analysed();
+        if at.is_analysis() {
+            source.analysed();
+        }
         display.step(at);
     }
 }

@@ -18,6 +18,8 @@ pub(crate) struct Plan {
     pub(super) access: Option<AccessPlan>,
     /// Where metrics are served.
     pub(super) metrics: Option<SocketAddr>,
+    /// Where the live page is served.
+    pub(super) dashboard: Option<SocketAddr>,
     /// Where spans go.
     pub(super) traces: Option<Target>,
     /// Workers to start where it does not listen.

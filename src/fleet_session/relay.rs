@@ -25,6 +25,7 @@ pub(super) fn relay(
     missing: impl Fn() -> [Option<String>; 2],
 ) {
     for event in heard {
+        display.heard(&event);
         if log::is_json() || event.is_notable() || *listens && event.is_of_roster() {
             let waits = matches!(event, FleetEvent::Waiting { .. });
             let more = missing().into_iter().flatten().filter(|_| waits);

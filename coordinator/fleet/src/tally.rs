@@ -9,9 +9,9 @@ use std::sync::Weak;
 use starlings_models::{ModelFailure, ParticleError};
 use starlings_proto::{LeaseOutcome, State};
 
-use super::FleetEvent;
 use super::hub::Hub;
 use super::wire::Job;
+use super::{FleetEvent, Load};
 
 /// Upper bounds of the classes of run times, seconds; the last class has none.
 pub const RUN_TIME_BOUNDS: [f64; 17] =
@@ -85,6 +85,11 @@ impl Readings {
     /// A look now; `None` once the fleet is gone.
     pub fn read(&self) -> Option<Reading> {
         self.0.upgrade().map(|hub| hub.read())
+    }
+
+    /// How much work there is, and who makes it; `None` once the fleet is gone.
+    pub fn load(&self) -> Option<Load> {
+        self.0.upgrade().map(|hub| hub.load())
     }
 }
 

@@ -4,7 +4,9 @@
 //! no lock but its address: loopback, unless another one is named. Next files to read: [`page`], [`server`].
 
 pub mod page;
+mod routes;
 mod server;
 
 pub use page::Source;
-pub use server::{Address, MetricsError, Server};
+pub use routes::routes;
+pub use server::{Address, ServeError, Server};

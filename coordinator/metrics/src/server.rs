@@ -1,43 +1,42 @@
-//! Serves the page, and whether the fleet is well, over HTTP, on a thread and a runtime of its own: a slow reader delays no worker.
+//! Serves over HTTP, on a thread and a runtime of its own: a slow reader delays no worker.
 //!
-//! Next file to read: [`super::page`].
+//! What is served is a router of the caller's. Next file to read: [`super::routes`], for the metrics.
 
 use std::net::{SocketAddr, TcpListener};
 use std::thread::JoinHandle;
+use std::time::Duration;
 
 use axum::Router;
-use axum::extract::State;
-use axum::http::StatusCode;
-use axum::http::header::CONTENT_TYPE;
-use axum::response::{IntoResponse, Response};
-use axum::routing::get;
 use tokio_util::sync::CancellationToken;
 
-use super::page::Source;
-
-/// What the page is, by the specification of OpenMetrics.
-const OPENMETRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
-
-/// Why metrics are not served.
+/// Why something is not served.
 #[derive(Debug, thiserror::Error)]
-pub enum MetricsError {
+pub enum ServeError {
     /// The address is taken or does not exist.
-    #[error("cannot serve metrics on {address}: {source}; give another address, or port 0 for a free one")]
+    #[error("cannot serve {what} on {address}: {source}; give another address, or port 0 for a free one")]
     Bind {
+        /// What was to be served.
+        what: &'static str,
         /// What was asked for.
         address: SocketAddr,
         /// The system's words.
         source: std::io::Error,
     },
     /// No thread or runtime can start.
-    #[error("cannot serve metrics: {0}")]
-    Start(std::io::Error),
+    #[error("cannot serve {what}: {source}")]
+    Start {
+        /// What was to be served.
+        what: &'static str,
+        /// The system's words.
+        source: std::io::Error,
+    },
 }
 
 /// An address that is taken, and serves once there is a fleet.
 #[derive(Debug)]
 pub struct Address {
     listener: TcpListener,
+    what: &'static str,
     /// Where it is, with the port that was picked.
     pub address: SocketAddr,
 }
@@ -49,48 +48,51 @@ pub struct Server {
 }
 
 impl Address {
-    /// Takes an address; port 0 picks a free one.
+    /// Takes an address for what messages call `what`; port 0 picks a free one.
     ///
     /// # Errors
-    /// [`MetricsError::Bind`].
-    pub fn take(address: SocketAddr) -> Result<Self, MetricsError> {
-        let bind = |source| MetricsError::Bind { address, source };
+    /// [`ServeError::Bind`].
+    pub fn take(address: SocketAddr, what: &'static str) -> Result<Self, ServeError> {
+        let bind = |source| ServeError::Bind { what, address, source };
         let listener = TcpListener::bind(address).map_err(bind)?;
         listener.set_nonblocking(true).map_err(bind)?;
         let address = listener.local_addr().map_err(bind)?;
-        Ok(Self { listener, address })
+        Ok(Self { listener, what, address })
     }
 }
 
 impl Server {
-    /// Serves `/metrics`, `/healthz` (200 while the fleet's network lives) and `/readyz` (200 while a slot can take runs).
+    /// Serves a router. When it is dropped, answers that are on their way have `grace` to arrive.
     ///
     /// # Errors
-    /// [`MetricsError::Start`].
-    pub fn start(at: Address, source: Source) -> Result<Self, MetricsError> {
-        let runtime = tokio::runtime::Builder::new_current_thread()
-            .enable_all()
-            .build()
-            .map_err(MetricsError::Start)?;
+    /// [`ServeError::Start`].
+    pub fn start(at: Address, router: Router, grace: Duration) -> Result<Self, ServeError> {
+        let Address { listener, what, .. } = at;
+        let failed = |source| ServeError::Start { what, source };
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
         let stop = CancellationToken::new();
-        let stopped = stop.clone();
+        let (begins, ends) = (stop.clone(), stop.clone());
         let serve = async move {
-            let listener = match tokio::net::TcpListener::from_std(at.listener) {
+            let listener = match tokio::net::TcpListener::from_std(listener) {
                 Ok(listener) => listener,
-                Err(error) => return tracing::warn!(%error, "metrics are not served"),
+                Err(error) => return tracing::warn!(%error, "{what} are not served"),
             };
-            let served = axum::serve(listener, router(source)).into_future();
+            let served = axum::serve(listener, router).with_graceful_shutdown(begins.cancelled_owned());
+            let over = async {
+                ends.cancelled().await;
+                tokio::time::sleep(grace).await;
+            };
             tokio::select! {
-                ended = served => if let Err(error) = ended {
-                    tracing::warn!(%error, "metrics are no longer served");
+                ended = served.into_future() => if let Err(error) = ended {
+                    tracing::warn!(%error, "{what} are no longer served");
                 },
-                () = stopped.cancelled() => {}
+                () = over => {}
             }
         };
         let thread = std::thread::Builder::new()
-            .name("metrics".to_owned())
+            .name("http".to_owned())
             .spawn(move || runtime.block_on(serve))
-            .map_err(MetricsError::Start)?;
+            .map_err(failed)?;
         Ok(Self { stop, thread: Some(thread) })
     }
 }
@@ -102,38 +104,5 @@ impl Drop for Server {
             // A panic in it has been printed already.
             let _ = thread.join();
         }
-    }
-}
-
-fn router(source: Source) -> Router {
-    Router::new()
-        .route("/metrics", get(metrics))
-        .route("/healthz", get(healthy))
-        .route("/readyz", get(ready))
-        .with_state(source)
-}
-
-async fn metrics(State(source): State<Source>) -> Response {
-    match source.page() {
-        Ok(Some(page)) => ([(CONTENT_TYPE, OPENMETRICS)], page).into_response(),
-        Ok(None) => (StatusCode::SERVICE_UNAVAILABLE, "the fleet is closed\n").into_response(),
-        Err(error) => (StatusCode::INTERNAL_SERVER_ERROR, format!("{error}\n")).into_response(),
-    }
-}
-
-async fn healthy(State(source): State<Source>) -> (StatusCode, &'static str) {
-    match source.read() {
-        Some(reading) if !reading.has_ended => (StatusCode::OK, "the fleet is open\n"),
-        _ => (StatusCode::SERVICE_UNAVAILABLE, "the fleet's network has ended\n"),
-    }
-}
-
-async fn ready(State(source): State<Source>) -> (StatusCode, &'static str) {
-    match source.read() {
-        Some(reading) if reading.census.workers > reading.census.aside => {
-            (StatusCode::OK, "workers take runs\n")
-        }
-        Some(_) => (StatusCode::SERVICE_UNAVAILABLE, "no worker takes runs\n"),
-        None => (StatusCode::SERVICE_UNAVAILABLE, "the fleet is closed\n"),
     }
 }

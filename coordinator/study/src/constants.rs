@@ -119,6 +119,12 @@ pub(crate) fn of_ensemble(
 }
 
 /// What is found without a run, where no constant can be moved.
+/// Runs of a study's constants at most, cheaply: one each, and one of none.
+pub(crate) fn n_run(study: &Study) -> usize {
+    let n = moved::count(study);
+    if n == 0 { 0 } else { n + 1 }
+}
+
 fn none_of(moved: &[Moved]) -> Option<HangsOn> {
     let not_tried = moved.iter().map(|m| m.name.clone()).collect();
     moved.iter().all(|m| m.setup.is_none()).then(|| HangsOn { not_tried, ..HangsOn::default() })

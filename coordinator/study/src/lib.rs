@@ -39,6 +39,7 @@ pub mod trial;
 pub mod twin;
 pub mod variant;
 mod warnings;
+mod work;
 
 pub use checked::{EstimatorChoice, FleetChoice, Record, Study, ThetaEntry};
 pub use failures::{FailedRange, FailureCluster};
@@ -52,3 +53,4 @@ pub use solver_host::{SolverHost, Undescribed};
 pub use states::recombine_by;
 pub use store::folder::{FolderError, RunFolder};
 pub use summary::Summary;
+pub use work::Work;

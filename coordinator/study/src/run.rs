@@ -5,6 +5,7 @@
 
 use std::sync::mpsc::Receiver;
 
+use serde::Serialize;
 use starlings_estimators::{Form, Gaussian};
 use starlings_fleet::{Fleet, FleetEvent};
 
@@ -13,7 +14,7 @@ use super::failures::FailureCluster;
 use super::fit::{batch, filter, free_run};
 use super::given_residuals::{self, Beside, GivenResiduals};
 use super::identify::IdentifyError;
-use super::store::{Store, StoreError};
+use super::store::{PredictionRow, Store, StoreError};
 use super::summary::Summary;
 use super::{RunError, Study, observer_gain, summary, warnings};
 use crate::fit::runner::EnsembleRunner;
@@ -21,6 +22,7 @@ use crate::observer_gain::Compared;
 use crate::store::folder::{GIVEN_RESIDUALS, OBSERVER, PREDICTION_SD, RunFolder};
 use crate::store::json::json;
 use crate::store::snapshot::{Counts, Snapshot};
+use crate::work::{Work, WorkPlan};
 
 /// What a fit leaves behind.
 #[derive(Clone, Debug)]
@@ -45,6 +47,8 @@ pub struct Fit {
     pub converged: bool,
     /// How far the last pass moved the estimate; `None` for one pass, which has no estimate before it.
     pub last_move: Option<Move>,
+    /// What was planned, and how much of it the fit was.
+    pub(crate) work: (WorkPlan, f64),
 }
 
 /// The entry of the estimated vector that a pass moved most.
@@ -74,9 +78,9 @@ impl Fit {
 }
 
 /// Where a run stands.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Progress {
-    /// `filter`, `batch` or `forward run`.
+    /// `filter`, `batch`, or one of [`LAST`].
     pub stage: &'static str,
     /// Pass, from 1.
     pub pass: usize,
@@ -90,6 +94,26 @@ pub struct Progress {
     pub runs: u64,
     /// Workers now.
     pub workers: usize,
+    /// How much of the work is done.
+    pub work: Work,
+}
+
+/// Name under which the store keeps the last [`Progress`], as JSON.
+pub const PROGRESS: &str = "progress";
+
+/// The runs after a fit, in their order: with the estimate, with the observer, with constants moved, beside the estimate.
+pub const LAST: [&str; 4] = ["final run", "observer", "constants", "residuals"];
+
+impl Progress {
+    /// Whether it tells of an analysis, and not of the runs after the last one.
+    pub fn is_analysis(&self) -> bool {
+        !LAST.contains(&self.stage)
+    }
+
+    /// Keeps it in the store, for those who look at the run from outside.
+    fn note(&self, store: &Store) -> Result<(), StoreError> {
+        store.set_meta(PROGRESS, &json(self))
+    }
 }
 
 /// What the run gets from its caller: a clock, a function for progress, and the fleet's events.
@@ -115,9 +139,27 @@ impl RunContext<'_> {
     /// Stores the fleet's events and reports progress.
     pub(super) fn after_step(&mut self, store: &Store, progress: &Progress) -> Result<(), StoreError> {
         self.keep_events(store)?;
-        store.commit_if_due(self.elapsed())?;
+        store.commit_if_due(self.elapsed(), |store| progress.note(store))?;
         (self.watch)(progress);
         Ok(())
+    }
+
+    /// The fit is over and the runs of a place of [`LAST`] begin.
+    fn goes_on(&mut self, store: &Store, fit: &Fit, place: usize, runner: &EnsembleRunner<'_>) {
+        let (plan, done) = &fit.work;
+        let progress = Progress {
+            stage: LAST[place],
+            pass: fit.passes,
+            passes: Some(fit.passes),
+            step: place,
+            steps: LAST.len(),
+            runs: runner.counts.total,
+            workers: runner.n_workers(),
+            work: plan.after(*done, place),
+        };
+        // What looks at the store may miss it; the run does not depend on it.
+        let _ = progress.note(store);
+        (self.watch)(&progress);
     }
 
     fn keep_events(&self, store: &Store) -> Result<(), StoreError> {
@@ -167,17 +209,8 @@ fn from_start_to_end(
         Form::Windows(make) => filter::fit(make, &mut runner, &folder.store, context, resumed)?,
         Form::WholeRecords => batch::fit(&mut runner, &folder.store, context, resumed)?,
     };
-    let predictions = free_run::run(&mut runner, &fit.posterior)?;
-    let observer = observer_gain::compare(&mut runner, &fit.posterior, &predictions)?;
-    let (hangs_on, beside) = match &observer {
-        // What fails at the estimate itself need not be tried beside it.
-        Compared::Failed(_) => {
-            (Ok(HangsOn::default()), Beside::unknown("the model fails under its observer"))
-        }
-        Compared::NoObserver | Compared::Both(_) => {
-            (hangs_on(&mut runner, &fit)?, given_residuals::compare(&mut runner, &fit.posterior)?)
-        }
-    };
+    let AfterFit { predictions, observer, hangs_on, beside } =
+        after_fit(&mut runner, &folder.store, &fit, context)?;
     let jobs = runner.take_rows();
     folder.store.predictions(&predictions, &jobs)?;
     context.keep_events(&folder.store)?;
@@ -213,6 +246,40 @@ fn from_start_to_end(
     folder.finish(study, &fit, &result)?;
     states.clear();
     Ok(result)
+}
+
+/// What the runs after a fit gave.
+struct AfterFit {
+    predictions: Vec<PredictionRow>,
+    observer: Compared,
+    hangs_on: Result<HangsOn, String>,
+    beside: Beside,
+}
+
+/// The runs after a fit, in the order of [`LAST`].
+fn after_fit(
+    runner: &mut EnsembleRunner<'_>,
+    store: &Store,
+    fit: &Fit,
+    context: &mut RunContext<'_>,
+) -> Result<AfterFit, RunError> {
+    context.goes_on(store, fit, 0, runner);
+    let predictions = free_run::run(runner, &fit.posterior)?;
+    context.goes_on(store, fit, 1, runner);
+    let observer = observer_gain::compare(runner, &fit.posterior, &predictions)?;
+    let (hangs_on, beside) = match &observer {
+        // What fails at the estimate itself need not be tried beside it.
+        Compared::Failed(_) => {
+            (Ok(HangsOn::default()), Beside::unknown("the model fails under its observer"))
+        }
+        Compared::NoObserver | Compared::Both(_) => {
+            context.goes_on(store, fit, 2, runner);
+            let hangs_on = hangs_on(runner, fit)?;
+            context.goes_on(store, fit, 3, runner);
+            (hangs_on, given_residuals::compare(runner, &fit.posterior)?)
+        }
+    };
+    Ok(AfterFit { predictions, observer, hangs_on, beside })
 }
 
 /// Stores the covariance given the residuals, for forecasts.

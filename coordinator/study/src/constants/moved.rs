@@ -55,6 +55,12 @@ pub fn all(study: &Study) -> Vec<Moved> {
     found
 }
 
+/// How many there are, without their setups.
+pub(super) fn count(study: &Study) -> usize {
+    let given = study.setup.model.constants.keys().any(|name| name.starts_with(INITIAL));
+    numbers(study).len() + layout_keys(study).len() + usize::from(given)
+}
+
 /// The first step that the model accepts, where it can be asked in this process.
 fn moved(study: &Study, raise: impl Fn(&mut Setup, f64)) -> Option<(f64, Setup)> {
     let sound = |setup: &Setup| {

@@ -14,6 +14,7 @@ use super::runner::{AnalysisIndex, EnsembleRunner, Results, StepWindows};
 use super::stack::stack_outputs;
 use crate::store::snapshot::{Figures, Iteration, Snapshot};
 use crate::store::{AnalysisRow, Store};
+use crate::work::WorkPlan;
 use crate::{Fit, Progress, RunContext, RunError, Study, posterior};
 
 /// Iterates to the posterior mode, continuing from `resumed` if there is one.
@@ -39,6 +40,7 @@ pub(crate) fn fit(
     };
     let values: Vec<f64> = windows.iter().flat_map(|(_, w)| w.observed.iter().copied()).collect();
     let noise = noise(study, &windows, 1.0);
+    let plan = WorkPlan::new(study, batch.set.n_particle());
     let mut now = match resumed {
         Some(snapshot) => {
             runner.recall(snapshot.figures.failures.clone());
@@ -62,12 +64,12 @@ pub(crate) fn fit(
         let mut row = row(study, at, &step);
         row.jobs = runner.take_rows();
         store.analysis(&row, &now)?;
-        context.after_step(store, &progress(&now, &batch, runner))?;
+        context.after_step(store, &progress(&now, (&batch, &plan), runner))?;
     }
     if now.figures.n_used == 0 {
         return Err(EstimatorError::StartFailed { attempt: now.figures.step }.into());
     }
-    Ok(finish(now))
+    Ok(finish(now, plan))
 }
 
 /// The rows of each record with what all records share and the values of its own, where there are such: a record's own values
@@ -156,7 +158,8 @@ fn row(study: &Study, at: AnalysisIndex, step: &BatchStep) -> AnalysisRow {
     }
 }
 
-fn finish(now: Snapshot<Iteration>) -> Fit {
+fn finish(now: Snapshot<Iteration>, plan: WorkPlan) -> Fit {
+    let done = plan.at(0, now.figures.step).done;
     Fit {
         converged: now.estimate.state.converged,
         posterior: now.estimate.posterior,
@@ -168,10 +171,15 @@ fn finish(now: Snapshot<Iteration>) -> Fit {
         counts: now.figures.counts,
         passes: 1,
         last_move: None,
+        work: (plan, done),
     }
 }
 
-fn progress(now: &Snapshot<Iteration>, batch: &Batch, runner: &EnsembleRunner<'_>) -> Progress {
+fn progress(
+    now: &Snapshot<Iteration>,
+    (batch, plan): (&Batch, &WorkPlan),
+    runner: &EnsembleRunner<'_>,
+) -> Progress {
     Progress {
         stage: "batch",
         pass: 1,
@@ -180,5 +188,6 @@ fn progress(now: &Snapshot<Iteration>, batch: &Batch, runner: &EnsembleRunner<'_
         steps: batch.max_iterations,
         runs: now.figures.counts.total,
         workers: runner.n_workers(),
+        work: plan.at(0, now.figures.step),
     }
 }

@@ -17,6 +17,7 @@ use starlings_models::Window;
 
 use super::runner::{EnsembleRunner, StepWindows};
 use crate::store::snapshot::{Ensemble, Figures, Snapshot};
+use crate::work::WorkPlan;
 use crate::{Fit, Move, Progress, RunError, Study, ThetaEntry, posterior};
 
 /// Least width of the points in prior sd: closer, rounding inside the model would show.
@@ -33,6 +34,7 @@ pub(super) struct Schedule<'a> {
     prior: Gaussian,
     /// Training windows by record.
     pub(super) windows: Vec<Vec<Arc<Window>>>,
+    work: WorkPlan,
 }
 
 /// What is known under the study's own prior, and the figures of the pass so far that belong to it.
@@ -47,6 +49,7 @@ impl<'a> Schedule<'a> {
         let options = study.filter_options();
         let drift: Vec<Drift> = study.theta.iter().map(|t| t.drift).collect();
         let still = make(&options)?;
+        let work = WorkPlan::new(study, still.n_particle());
         let drifting = study.drifts().then(|| make(&Options { drift, ..options })).transpose()?;
         Ok(Self {
             study,
@@ -56,6 +59,7 @@ impl<'a> Schedule<'a> {
             passes: study.passes(),
             prior: posterior::prior(study),
             windows: (0..study.records.len()).map(|record| study.windows(record)).collect(),
+            work,
         })
     }
 
@@ -156,6 +160,7 @@ impl<'a> Schedule<'a> {
     pub(super) fn finish(&self, now: &Snapshot<Ensemble>, reported: Reported) -> Fit {
         Fit {
             last_move: self.last_move(now, &reported),
+            work: (self.work.clone(), self.work.at(now.figures.pass, now.figures.step).done),
             posterior: reported.posterior,
             log_likelihood: reported.log_likelihood,
             nis: reported.nis,
@@ -177,6 +182,7 @@ impl<'a> Schedule<'a> {
             steps: self.n_step(),
             runs: now.figures.counts.total,
             workers: runner.n_workers(),
+            work: self.work.at(now.figures.pass, now.figures.step),
         }
     }
 }

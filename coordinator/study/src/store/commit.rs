@@ -22,13 +22,19 @@ impl Store {
         Ok(())
     }
 
-    /// [`Store::commit`], if the last one was [`HOLD_S`] or longer ago; `now_s` is the run's wall time.
+    /// [`Store::commit`], if the last one was [`HOLD_S`] or longer ago; `now_s` is the run's wall time. Before it `note` writes what
+    /// belongs to this moment.
     ///
     /// # Errors
     /// When the database refuses.
-    pub(crate) fn commit_if_due(&self, now_s: f64) -> Result<(), StoreError> {
+    pub(crate) fn commit_if_due(
+        &self,
+        now_s: f64,
+        note: impl FnOnce(&Self) -> Result<(), StoreError>,
+    ) -> Result<(), StoreError> {
         if now_s - self.committed_s.get() >= HOLD_S.max(self.kept.borrow().hold_s()) {
             self.note_elapsed(now_s)?;
+            note(self)?;
             self.commit()?;
             self.committed_s.set(now_s);
         }

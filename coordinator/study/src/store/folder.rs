@@ -18,7 +18,7 @@ pub use super::folder_error::FolderError;
 pub use super::info::StudyInfo;
 use super::info::info;
 use super::json::json;
-use super::lock::FolderLock;
+use super::lock::{FolderLock, holder};
 use super::make;
 use super::meaning::Meaning;
 
@@ -128,6 +128,36 @@ impl RunFolder {
         let _ = std::fs::remove_file(path.join(FROZEN));
         drop(lock);
         let _ = std::fs::remove_dir(path);
+    }
+
+    /// Who runs in it, such as `process 17 on host`; `None` where nobody does.
+    pub fn holder(&self) -> Option<String> {
+        holder(&self.path)
+    }
+
+    /// Whether its command is done.
+    ///
+    /// # Errors
+    /// When the store fails.
+    pub fn is_done(&self) -> Result<bool, StoreError> {
+        self.is_finished(self.purpose()?)
+    }
+
+    /// The command that it belongs to and what the store keeps of its study.
+    ///
+    /// # Errors
+    /// When the store fails or its content is damaged.
+    pub fn about(&self) -> Result<(&'static str, StudyInfo), StoreError> {
+        let text = self.store.meta("info")?.unwrap_or_default();
+        let info = serde_json::from_str(&text).map_err(|error| self.store.damaged("info", error))?;
+        Ok((self.purpose()?.command(), info))
+    }
+
+    /// Folds the log into the database once more, after those who read the run while it ran: a finished run can be read from a
+    /// read-only folder.
+    pub fn rest(&self) {
+        // Where another process still reads, the log stays; the run is finished all the same.
+        let _ = self.store.close_log();
     }
 
     /// What the folder is for.

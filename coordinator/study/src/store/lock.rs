@@ -8,6 +8,7 @@
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, Write};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use starlings_proto::host::host_name;
@@ -19,6 +20,10 @@ pub(super) const NAME: &str = "run.lock";
 
 /// How often a file is opened anew that its holder removed in between.
 const TRIES: usize = 100;
+
+/// How often it is waited for somebody who only looks, and for how long.
+const LOOKS: usize = 10;
+const LOOK: Duration = Duration::from_millis(5);
 
 /// Held until it is dropped.
 #[derive(Debug)]
@@ -55,11 +60,18 @@ impl FolderLock {
     pub(super) fn take(folder: &Path) -> Result<Self, FolderError> {
         let path = folder.join(NAME);
         let unwritable = |source| FolderError::Unwritable { path: path.clone(), source };
+        let mut looks = LOOKS;
         for _ in 0..TRIES {
             let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path);
             let mut file = file.map_err(unwritable)?;
             match file.try_lock() {
                 Ok(()) => {}
+                // Somebody may look who holds it, for an instant.
+                Err(TryLockError::WouldBlock) if read(&mut file).is_gone() && looks > 0 => {
+                    looks -= 1;
+                    std::thread::sleep(LOOK);
+                    continue;
+                }
                 Err(TryLockError::WouldBlock) => return Err(locked(folder, &mut file)),
                 // A file system without locks.
                 Err(TryLockError::Error(_)) => {
@@ -91,6 +103,19 @@ fn locked(folder: &Path, file: &mut File) -> FolderError {
     let Holder { host, pid } = read(file);
     let by = if pid == 0 { String::new() } else { format!(" (process {pid} on {host})") };
     FolderError::Locked { folder: folder.to_owned(), by }
+}
+
+/// Who runs in a folder, such as `process 17 on host`; `None` where nobody does. The folder may be read-only.
+pub(super) fn holder(folder: &Path) -> Option<String> {
+    let mut file = File::open(folder.join(NAME)).ok()?;
+    let is_held = match file.try_lock_shared() {
+        Ok(()) => false,
+        Err(TryLockError::WouldBlock) => true,
+        // A file system without locks.
+        Err(TryLockError::Error(_)) => !read(&mut file).is_gone(),
+    };
+    let Holder { host, pid } = read(&mut file);
+    is_held.then(|| if pid == 0 { "another process".to_owned() } else { format!("process {pid} on {host}") })
 }
 
 fn read(file: &mut File) -> Holder {
@@ -131,7 +156,10 @@ mod tests {
         let error = FolderLock::take(folder.path()).expect_err("somebody is there").to_string();
         let who = format!("(process {} on {})", std::process::id(), own_host());
         assert!(error.contains(&who), "{error}");
+        let told = format!("process {} on {}", std::process::id(), own_host());
+        assert_eq!(holder(folder.path()), Some(told));
         drop(first);
+        assert_eq!(holder(folder.path()), None);
         assert!(!folder.path().join(NAME).exists(), "it leaves nothing");
         drop(FolderLock::take(folder.path()).expect("free again"));
     }
@@ -141,6 +169,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         for left in ["", "{\"host\": \"elsewhere\", \"pid\": 17}", "nonsense"] {
             std::fs::write(folder.path().join(NAME), left).expect("room");
+            assert_eq!(holder(folder.path()), None, "{left}");
             drop(FolderLock::take(folder.path()).unwrap_or_else(|error| panic!("{left}: {error}")));
         }
     }

@@ -61,7 +61,7 @@ impl RunFolder {
     }
 
     /// Whether only its files are to be written again.
-    fn is_finished(&self, purpose: Purpose) -> Result<bool, StoreError> {
+    pub(super) fn is_finished(&self, purpose: Purpose) -> Result<bool, StoreError> {
         Ok(self.store.meta(purpose.result())?.is_some())
     }
 

@@ -1,0 +1,119 @@
+//! A run seen from its folder alone: whether it runs, is done or was ended, and what its store says.
+//!
+//! Next file to read: [`super::course`].
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+use starlings_study::store::StoreError;
+use starlings_study::store::folder::FolderError;
+use starlings_study::{RunFolder, Work, run};
+
+use super::course::Course;
+use super::pace::Pace;
+use super::view::{EventView, Head, Standing, State, View};
+
+/// Events that are shown.
+const EVENTS: usize = 12;
+
+/// A run folder that is looked at again and again.
+pub struct Watched {
+    folder: RunFolder,
+    course: Course,
+    pace: Pace,
+}
+
+/// What the store keeps of how far a run is.
+#[derive(Deserialize)]
+struct Noted {
+    stage: String,
+    pass: usize,
+    step: usize,
+    steps: usize,
+    runs: u64,
+    workers: usize,
+    work: Work,
+}
+
+impl Watched {
+    /// Opens a run folder to look at it.
+    ///
+    /// # Errors
+    /// When there is no run in it.
+    pub fn open(path: &Path) -> Result<Self, FolderError> {
+        Ok(Self { folder: RunFolder::open(path)?, course: Course::default(), pace: Pace::default() })
+    }
+
+    /// The folder.
+    pub fn path(&self) -> PathBuf {
+        self.folder.path.clone()
+    }
+
+    /// What is known now.
+    ///
+    /// # Errors
+    /// When the store fails or its content is damaged.
+    pub fn look(&mut self) -> Result<View, StoreError> {
+        // Before the store: a run that ends meanwhile is done, and not one that nobody runs.
+        let holder = self.folder.holder();
+        let (command, info) = self.folder.about()?;
+        let state = match (self.folder.is_done()?, &holder) {
+            (true, _) => State::Finished,
+            (false, Some(_)) => State::Running,
+            (false, None) => State::Ended,
+        };
+        let store = &self.folder.store;
+        self.course.read_all(store)?;
+        let mut view = View {
+            head: Head {
+                study: info.name,
+                command: command.trim_start_matches("starlings ").to_owned(),
+                model: info.model,
+                version: info.version,
+                units: Vec::new(),
+            },
+            state,
+            elapsed_s: store.elapsed_s()?,
+            ..View::default()
+        };
+        self.course.show(&mut view);
+        let noted = store.meta(run::PROGRESS)?.map(|text| serde_json::from_str::<Noted>(&text));
+        if let Some(noted) = noted.transpose().map_err(|error| store.damaged("progress", error))? {
+            view.standing = self.standing(&noted, view.elapsed_s, state);
+        }
+        let select = format!("SELECT at_s, kind, text FROM events ORDER BY id DESC LIMIT {EVENTS}");
+        let store = &self.folder.store;
+        view.events = store
+            .rows(&select, |row| Ok(EventView { at_s: row.get(0)?, kind: row.get(1)?, text: row.get(2)? }))?;
+        view.ended = match state {
+            State::Ended => {
+                let path = self.folder.path.display();
+                format!("nobody runs it: it was killed or broke off; --out {path} --resume goes on")
+            }
+            State::Running => holder.unwrap_or_default(),
+            State::Finished => String::new(),
+        };
+        Ok(view)
+    }
+
+    fn standing(&mut self, noted: &Noted, elapsed_s: f64, state: State) -> Standing {
+        let Work { done, total, .. } = noted.work;
+        let is_running = state == State::Running;
+        let left_s = self.pace.left(elapsed_s, done, total).filter(|_| is_running);
+        let is_last = run::LAST.contains(&noted.stage.as_str());
+        let (stage, what) = if is_last {
+            (noted.stage.clone(), "ensembles after the fit")
+        } else {
+            (format!("pass {}", noted.pass), "analyses")
+        };
+        let share = if state == State::Finished { 1.0 } else { (done / total).clamp(0.0, 1.0) };
+        Standing {
+            stage,
+            says: format!("{} of {} {what}", noted.step, noted.steps),
+            share: (total > 0.0).then_some(share),
+            left_s,
+            runs: noted.runs,
+            workers: if is_running { noted.workers } else { 0 },
+        }
+    }
+}
