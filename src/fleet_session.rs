@@ -2,6 +2,7 @@
 //!
 //! Shared by every command that runs the model on the fleet. Next file to read: [`crate::run`].
 
+mod args;
 mod entrance;
 mod live_page;
 mod load_file;
@@ -9,14 +10,13 @@ mod plan;
 mod relay;
 
 use std::net::SocketAddr;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Arc, OnceLock, mpsc};
 use std::time::Duration;
 
-use clap::Args;
 use starlings_coordinator::fleet::access::Access;
 use starlings_coordinator::fleet::{
-    FleetConfig, FleetError, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers, PlaceName, RunIdentity,
+    FleetConfig, FleetError, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers, RunIdentity,
 };
 use starlings_coordinator::live::LivePage;
 use starlings_coordinator::metrics::{Address, Server, Source};
@@ -24,17 +24,16 @@ use starlings_coordinator::study::Study;
 use starlings_coordinator::study::store::Store;
 use starlings_coordinator::study::trial::{FleetTrialError, trial_on_fleet};
 use starlings_estimators::Kind;
-use starlings_traces::Target;
 use tokio_util::sync::CancellationToken;
 
 use crate::console::note;
 use crate::failure::Failure;
-use crate::fleet_values::{address, alone, host_of, memory, served_address};
 use crate::interrupt;
-use crate::load::{end_solvers, is_outside};
+use crate::load::end_solvers;
 use crate::progress::Display;
 use crate::solvers::own_program;
 use crate::traces::Traced;
+pub(crate) use args::{FleetArgs, Out};
 pub(crate) use entrance::Entrance;
 use entrance::{failed, serve_metrics};
 pub(crate) use live_page::finish;
@@ -42,114 +41,6 @@ use live_page::serve_page;
 use load_file::LoadFile;
 use plan::{ACCESS, AccessPlan, Plan};
 use relay::{Shown, relay};
-
-/// Which workers run the model.
-#[derive(Args)]
-pub(crate) struct FleetArgs {
-    /// Number of local worker processes; what the study says (fleet.workers) without it.
-    #[arg(long, value_name = "N", conflicts_with = "listen")]
-    workers: Option<usize>,
-    /// Wait for workers to dial this address (HOST:PORT, port 0 picks a free one) instead of starting local ones.
-    #[arg(long, value_name = "ADDR")]
-    listen: Option<String>,
-    /// With --listen: write what workers need to find and to prove themselves into this file; access.json in the run folder
-    /// without it. Where it exists its secrets are used again, so that copies of it stay good over several commands.
-    #[arg(long, value_name = "FILE", requires = "listen")]
-    access: Option<PathBuf>,
-    /// With --listen: take whoever connects, without encryption or proof.
-    #[arg(long, requires = "listen", conflicts_with = "access")]
-    insecure: bool,
-    /// Allow workers whose results differ, as of other builds or processors: a warning of the result instead of an error.
-    #[arg(long)]
-    mixed: bool,
-    /// Memory for states of particles that are larger than 256 KiB, such as "8 GiB"; what is beyond it goes to the disk.
-    #[arg(long, value_name = "SIZE", default_value = "1 GiB", value_parser = memory)]
-    state_memory: usize,
-    /// Folder on a file system that all machines see: states of particles that are larger than 256 KiB stand there, and workers
-    /// that name it too read, write and mix them there. With the feature s3 also s3://BUCKET/PREFIX.
-    #[arg(long, value_name = "FOLDER", conflicts_with = "state_memory")]
-    states: Option<PlaceName>,
-    /// Serve what the fleet does in numbers, for Prometheus, at http://ADDR/metrics, and whether it is well at /healthz and /readyz:
-    /// PORT or :PORT for this machine alone, HOST:PORT for others too (port 0 picks a free one).
-    #[arg(long, value_name = "ADDR")]
-    metrics: Option<String>,
-    /// Serve a page that follows the command while it runs, with a token in its address: on a free port of this machine alone, or on
-    /// PORT, or with HOST:PORT for others too.
-    #[arg(long, value_name = "ADDR", num_args = 0..=1, require_equals = true, default_missing_value = "0")]
-    dashboard: Option<String>,
-    /// Write a span of this command, of every run and of its computation in a local worker, as OTLP: into a FILE, a line of JSON each,
-    /// or to a collector at http://HOST:PORT. Workers elsewhere write theirs where their own --traces says.
-    #[arg(long, value_name = "FILE|URL")]
-    traces: Option<Target>,
-}
-
-impl FleetArgs {
-    /// Whether runs are made on this machine, by workers that this process starts.
-    pub(crate) fn is_here(&self) -> bool {
-        self.listen.is_none()
-    }
-
-    /// Whether workers make the trial: nothing of a solver is started where this process listens, and it never holds a large state.
-    pub(crate) fn workers_try(&self, study: &Study) -> bool {
-        (is_outside(study) && !self.is_here()) || study.has_large_states()
-    }
-
-    /// Checks the arguments; nothing is started yet. `out` is the run folder where it is named, `None` for a command that makes
-    /// none.
-    pub(crate) fn plan(&self, study: &Study, out: Option<&Out<'_>>) -> Result<Plan, Failure> {
-        let n_worker = self.workers.unwrap_or(study.fleet.workers);
-        if n_worker == 0 {
-            return Err(Failure::input(
-                "--workers must be at least 1 (or use --listen ADDR and start workers elsewhere)",
-            ));
-        }
-        let address = self.listen.as_deref().map(|text| address("--listen", text)).transpose()?;
-        let serving = |option, text: &Option<String>| {
-            text.as_deref().map(|text| served_address(option, text)).transpose()
-        };
-        let metrics = serving("--metrics", &self.metrics)?;
-        let dashboard = serving("--dashboard", &self.dashboard)?;
-        let host = self.listen.as_deref().and_then(host_of).map(str::to_owned);
-        if let (Some(host), Some(address)) = (&host, address)
-            && let Some(warning) = alone(host, address)
-        {
-            note(format_args!("warning: --listen: {warning}"));
-        }
-        let access = match (address, self.insecure) {
-            (Some(_), false) => Some(self.access_plan(out)?),
-            _ => None,
-        };
-        let (mixed, state_memory, states) = (self.mixed, self.state_memory, self.states.clone());
-        let traces = self.traces.clone();
-        Ok(Plan {
-            address,
-            host,
-            access,
-            metrics,
-            dashboard,
-            traces,
-            n_worker,
-            mixed,
-            state_memory,
-            states,
-            keeps_states: false,
-        })
-    }
-
-    fn access_plan(&self, out: Option<&Out<'_>>) -> Result<AccessPlan, Failure> {
-        match (&self.access, out) {
-            (Some(file), _) => Ok(AccessPlan::Named(file.clone())),
-            (None, Some(Out(folder))) => Ok(AccessPlan::RunFolder(folder.map(|folder| folder.join(ACCESS)))),
-            (None, None) => Err(Failure::input(
-                "this command makes no run folder: say with --access FILE where the access file goes by which workers prove \
-                 themselves",
-            )),
-        }
-    }
-}
-
-/// The run folder of a command, where it was named.
-pub(crate) struct Out<'a>(pub(crate) Option<&'a Path>);
 
 /// The fleet of one run, its local workers, and the way of its events to the store.
 pub(crate) struct FleetSession {

@@ -5,25 +5,10 @@
 mod reactor_kit;
 mod study_kit;
 
-use reactor_kit::{reactor, recorded};
-use starlings_coordinator::explain::{
-    Context, ExplainError, Explanation, Options, Verdict, candidates, check, explain,
-};
-use starlings_coordinator::fleet::InProcess;
+use reactor_kit::{NOISE, explained, reactor, recorded};
+use starlings_coordinator::explain::{ExplainError, Explanation, Verdict};
 use starlings_coordinator::study::Study;
-use starlings_coordinator::study::store::Store;
 use study_kit::{Case, csv, grid, normals};
-
-fn explained(case: &Case) -> Result<Explanation, ExplainError> {
-    let (study, path) = (case.study(), case.fresh());
-    check(&study, &Options::default())?;
-    std::fs::create_dir_all(&path).unwrap();
-    let store = Store::create(&path.join("run.db"), &[]).unwrap();
-    let mut context = Context { clock: &|| 0.0, watch: &mut |_| {}, events: None, earlier_s: 0.0 };
-    explain(&study, &mut InProcess::new(2), &store, &mut context, &Options::of(&study)).map(|f| f.explanation)
-}
-
-const NOISE: [f64; 3] = [0.05, 0.1, 0.03];
 
 #[test]
 fn a_name_is_withheld_while_a_held_out_channel_fails_and_what_could_not_be_tried_is_told() {
@@ -65,45 +50,6 @@ fn a_name_is_withheld_while_a_held_out_channel_fails_and_what_could_not_be_tried
 
 fn words(usage: &str) -> &'static str {
     if usage == "held-out-channel" { "never fitted" } else { "held out" }
-}
-
-#[test]
-fn states_without_a_role_yield_a_term_by_its_form_and_no_error_of_a_sensor() {
-    for (span, train, held_out) in
-        [(25.0, 25.0, "biomass"), (25.0, 25.0, "substrate"), (25.0, 25.0, "product"), (15.0, 10.5, "product")]
-    {
-        let study = reactor(NOISE, train, held_out, false);
-        let found = explained(&Case::new(&study, &[("batch.csv", recorded(NOISE, span, 0.05))])).unwrap();
-        let said = &found.headline;
-        let names: Vec<&str> = found.effects.iter().map(|e| e.name.as_str()).collect();
-        assert_eq!(names, ["loss:X"], "{held_out}: {said}");
-        assert_eq!(found.effects[0].says, "A loss of X in proportion to X.");
-        let sensor = found.tied_with.iter().flatten().any(|name| name.starts_with("sensor"));
-        assert!(!sensor, "{held_out}: {said}");
-        // It dies at 0.05 per hour.
-        let rate = &found.effects[0].parameters[0];
-        assert!((rate.estimate - 0.05).abs() < 4.0 * rate.sd, "{held_out}: {rate:?}");
-    }
-}
-
-#[test]
-fn a_family_is_left_out_by_its_name() {
-    let case =
-        Case::new(&reactor(NOISE, 25.0, "biomass", true), &[("batch.csv", recorded(NOISE, 25.0, 0.05))]);
-    let of = |without: &[&str]| -> Vec<String> {
-        let options = Options {
-            without: without.iter().map(|name| (*name).to_owned()).collect(),
-            ..Options::default()
-        };
-        candidates(&case.study(), &options).unwrap().into_iter().map(|effect| effect.name).collect()
-    };
-    let all = of(&[]);
-    assert!(
-        all.iter().any(|n| n == "self-limit:X") && all.iter().any(|n| n == "sensor-gain:substrate"),
-        "{all:?}"
-    );
-    assert!(!all.iter().any(|n| n == "loss:X"), "it is tried under the name that the study gives: {all:?}");
-    assert_eq!(of(&["sensors", "generic"]), ["death"]);
 }
 
 #[test]

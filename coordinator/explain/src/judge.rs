@@ -16,6 +16,7 @@ pub(crate) mod misfit;
 pub(crate) mod noise_model;
 pub(crate) mod null_distribution;
 mod objections;
+mod range;
 pub(crate) mod search_result;
 mod uncertainty;
 pub(crate) mod verdict;

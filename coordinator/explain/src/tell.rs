@@ -5,6 +5,7 @@
 //! the effects in it), [`findings`] (all of it, and its place in the run's database).
 
 pub(crate) mod correlated;
+mod errors;
 pub(crate) mod experiment;
 pub(crate) mod figures;
 pub(crate) mod findings;

@@ -1,0 +1,77 @@
+//! The gate of ranges: an estimate at the end of what physics allows.
+//!
+//! Next file to read: [`super::gates`].
+
+use super::gates::Refusal;
+use crate::fit::fitted_variant::FittedVariant;
+use crate::fit::model_variant::AddedEffect;
+use crate::number::{spaced, three};
+
+/// Distance from the end of a range, as a share of its width, within which an estimate counts as at the end.
+const EDGE: f64 = 0.005;
+
+/// The refusal for a coefficient at the end of its range.
+pub(super) fn at_edge(fit: &FittedVariant<'_>) -> Option<Refusal> {
+    let variant = &fit.variant;
+    let theta = fit.theta();
+    for (m, effect) in variant.effects.iter().enumerate() {
+        for (k, parameter) in effect.candidate.def.parameters.iter().enumerate() {
+            let j = variant.first_entry_of(m) + k;
+            let value = variant.study.theta[j].transform.to_physical(theta[j]);
+            let Some(end) = end_at(effect, k, value) else { continue };
+            let gate = if k == 0 && (end.abs() < f64::MIN_POSITIVE) { "sign" } else { "range" };
+            let unit = spaced(&parameter.unit);
+            return Some(Refusal {
+                gate,
+                reason: format!(
+                    "the best value of {} lies at the end of what physics allows ({}{unit}): the shape fits, the physics does \
+                     not",
+                    parameter.name,
+                    three(end)
+                ),
+            });
+        }
+    }
+    None
+}
+
+/// The end of the range of an effect's parameter `k` at which a value lies. Where the range is open at one side, the unit of the
+/// amplitude takes the place of its width, or the value at which an inner parameter was screened.
+fn end_at(effect: &AddedEffect<'_>, k: usize, value: f64) -> Option<f64> {
+    let candidate = effect.candidate;
+    let [lo, hi] = candidate.def.parameters[k].range;
+    let width = if lo.is_finite() && hi.is_finite() {
+        hi - lo
+    } else if k == 0 {
+        effect.unit
+    } else {
+        candidate.points[0][k - 1].abs()
+    };
+    [lo, hi].into_iter().find(|end| end.is_finite() && (value - end).abs() <= EDGE * width)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::candidate::Candidate;
+    use starlings_models::EffectDef;
+    use starlings_models::effect::EffectParameter;
+
+    #[test]
+    fn closeness_to_the_end_of_an_open_range_is_measured_in_the_parameters_own_size() {
+        let with = |range, grid| EffectParameter { range, grid, ..EffectParameter::default() };
+        let (open, wide) = ([0.0, f64::INFINITY], [0.0, 10.0]);
+        let parameters = vec![with(open, vec![]), with([2.0, f64::INFINITY], vec![3.0]), with(wide, vec![])];
+        let candidate = Candidate::new(EffectDef { parameters, ..EffectDef::default() });
+        // The amplitude's unit is not that of the threshold inside the term: thousands against ones, or thousandths.
+        for unit in [4000.0, 4e-3] {
+            let effect = AddedEffect { candidate: &candidate, index: 0, unit };
+            assert_eq!(end_at(&effect, 0, 0.004 * unit), Some(0.0));
+            assert_eq!(end_at(&effect, 0, 0.006 * unit), None);
+            assert_eq!(end_at(&effect, 1, 2.6), None, "a fifth of its size away, unit {unit}");
+            assert_eq!(end_at(&effect, 1, 2.01), Some(2.0), "a three hundredth of it away, unit {unit}");
+            assert_eq!(end_at(&effect, 2, 9.96), Some(10.0));
+            assert_eq!(end_at(&effect, 2, 9.9), None);
+        }
+    }
+}
