@@ -86,11 +86,14 @@ fn a_resumed_run_keeps_its_clock_its_counts_and_one_row_per_job() {
     let mut folder = RunFolder::resume(Purpose::Run, &path, &study, &Call::default()).unwrap();
     assert!(folder.summary().unwrap().is_none(), "an interrupted run has no summary");
     folder.store.event(7.5, "test", "time has passed").unwrap();
-    let mut steps = Vec::new();
+    let (mut steps, mut afterwards) = (Vec::new(), Vec::new());
     let (_sender, events) = mpsc::channel();
     let mut context = RunContext {
         clock: &|| 2.0,
-        watch: &mut |p| steps.push((p.pass, p.step, p.runs)),
+        watch: &mut |p| {
+            let told = if p.is_analysis() { &mut steps } else { &mut afterwards };
+            told.push((p.pass, p.step, p.runs));
+        },
         events: Some(&events),
         earlier_s: 0.0,
         threads: 1,
@@ -100,6 +103,10 @@ fn a_resumed_run_keeps_its_clock_its_counts_and_one_row_per_job() {
     assert_eq!(summary.runs, whole.summary.runs);
     assert_eq!(steps.first(), Some(&(2, 6, 18 * 4)), "seventeen analyses were there already");
     assert_eq!((steps.len(), steps.last().copied()), (7, Some((2, 12, 96))));
+    // The final run, no observer, no constants, one run beside the estimate per parameter and one at it.
+    let runs: Vec<u64> = afterwards.iter().map(|told| told.2).collect();
+    assert_eq!((runs[0], runs.len()), (96, 4), "runs of the part before the resume count");
+    assert!(runs.is_sorted() && runs[3] > 96, "{runs:?}");
     let rows = |folder: &RunFolder, table, columns| {
         starlings_coordinator::study::store::table(&folder.store, table, columns).unwrap()
     };

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use starlings_study::store::StoreError;
 use starlings_study::store::folder::FolderError;
-use starlings_study::{RunFolder, Work, run};
+use starlings_study::{RunFolder, Work, progress};
 
 use super::course::Course;
 use super::pace::Pace;
@@ -77,7 +77,7 @@ impl Watched {
             ..View::default()
         };
         self.course.show(&mut view);
-        let noted = store.meta(run::PROGRESS)?.map(|text| serde_json::from_str::<Noted>(&text));
+        let noted = store.meta(progress::PROGRESS)?.map(|text| serde_json::from_str::<Noted>(&text));
         if let Some(noted) = noted.transpose().map_err(|error| store.damaged("progress", error))? {
             view.standing = self.standing(&noted, view.elapsed_s, state);
         }
@@ -100,7 +100,7 @@ impl Watched {
         let Work { done, total, .. } = noted.work;
         let is_running = state == State::Running;
         let left_s = self.pace.left(elapsed_s, done, total).filter(|_| is_running);
-        let is_last = run::LAST.contains(&noted.stage.as_str());
+        let is_last = progress::LAST.contains(&noted.stage.as_str());
         let (stage, what) = if is_last {
             (noted.stage.clone(), "ensembles after the fit")
         } else {

@@ -5,7 +5,6 @@
 
 use std::sync::mpsc::Receiver;
 
-use serde::Serialize;
 use starlings_estimators::{Form, Gaussian};
 use starlings_fleet::{Fleet, FleetEvent};
 
@@ -19,10 +18,11 @@ use super::summary::Summary;
 use super::{RunError, Study, observer_gain, summary, warnings};
 use crate::fit::runner::EnsembleRunner;
 use crate::observer_gain::Compared;
+use crate::progress::{LAST, Progress};
 use crate::store::folder::{GIVEN_RESIDUALS, OBSERVER, PREDICTION_SD, RunFolder};
 use crate::store::json::json;
 use crate::store::snapshot::{Counts, Snapshot};
-use crate::work::{Work, WorkPlan};
+use crate::work::WorkPlan;
 
 /// What a fit leaves behind.
 #[derive(Clone, Debug)]
@@ -77,45 +77,6 @@ impl Fit {
     }
 }
 
-/// Where a run stands.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Progress {
-    /// `filter`, `batch`, or one of [`LAST`].
-    pub stage: &'static str,
-    /// Pass, from 1.
-    pub pass: usize,
-    /// Passes in all; `None` when they go on until the estimate has settled.
-    pub passes: Option<usize>,
-    /// Analyses done in this pass.
-    pub step: usize,
-    /// Analyses of a pass, at most.
-    pub steps: usize,
-    /// Runs so far.
-    pub runs: u64,
-    /// Workers now.
-    pub workers: usize,
-    /// How much of the work is done.
-    pub work: Work,
-}
-
-/// Name under which the store keeps the last [`Progress`], as JSON.
-pub const PROGRESS: &str = "progress";
-
-/// The runs after a fit, in their order: with the estimate, with the observer, with constants moved, beside the estimate.
-pub const LAST: [&str; 4] = ["final run", "observer", "constants", "residuals"];
-
-impl Progress {
-    /// Whether it tells of an analysis, and not of the runs after the last one.
-    pub fn is_analysis(&self) -> bool {
-        !LAST.contains(&self.stage)
-    }
-
-    /// Keeps it in the store, for those who look at the run from outside.
-    fn note(&self, store: &Store) -> Result<(), StoreError> {
-        store.set_meta(PROGRESS, &json(self))
-    }
-}
-
 /// What the run gets from its caller: a clock, a function for progress, and the fleet's events.
 pub struct RunContext<'a> {
     /// Seconds since the program started.
@@ -144,8 +105,8 @@ impl RunContext<'_> {
         Ok(())
     }
 
-    /// The fit is over and the runs of a place of [`LAST`] begin.
-    fn goes_on(&mut self, store: &Store, fit: &Fit, place: usize, runner: &EnsembleRunner<'_>) {
+    /// The fit is over, after so many runs in all, and the runs of a place of [`LAST`] begin.
+    fn goes_on(&mut self, store: &Store, fit: &Fit, place: usize, runs: u64, runner: &EnsembleRunner<'_>) {
         let (plan, done) = &fit.work;
         let progress = Progress {
             stage: LAST[place],
@@ -153,7 +114,7 @@ impl RunContext<'_> {
             passes: Some(fit.passes),
             step: place,
             steps: LAST.len(),
-            runs: runner.counts.total,
+            runs,
             workers: runner.n_workers(),
             work: plan.after(*done, place),
         };
@@ -263,9 +224,12 @@ fn after_fit(
     fit: &Fit,
     context: &mut RunContext<'_>,
 ) -> Result<AfterFit, RunError> {
-    context.goes_on(store, fit, 0, runner);
+    // Runs of earlier parts of a resumed run are none of this runner's.
+    let earlier = fit.counts.total.saturating_sub(runner.counts.total);
+    let runs = |runner: &EnsembleRunner<'_>| earlier + runner.counts.total;
+    context.goes_on(store, fit, 0, runs(runner), runner);
     let predictions = free_run::run(runner, &fit.posterior)?;
-    context.goes_on(store, fit, 1, runner);
+    context.goes_on(store, fit, 1, runs(runner), runner);
     let observer = observer_gain::compare(runner, &fit.posterior, &predictions)?;
     let (hangs_on, beside) = match &observer {
         // What fails at the estimate itself need not be tried beside it.
@@ -273,9 +237,9 @@ fn after_fit(
             (Ok(HangsOn::default()), Beside::unknown("the model fails under its observer"))
         }
         Compared::NoObserver | Compared::Both(_) => {
-            context.goes_on(store, fit, 2, runner);
+            context.goes_on(store, fit, 2, runs(runner), runner);
             let hangs_on = hangs_on(runner, fit)?;
-            context.goes_on(store, fit, 3, runner);
+            context.goes_on(store, fit, 3, runs(runner), runner);
             (hangs_on, given_residuals::compare(runner, &fit.posterior)?)
         }
     };

@@ -1,0 +1,48 @@
+//! Where a run stands, as it is told and as the store keeps it.
+//!
+//! Next file to read: [`crate::work`], how much there is to do.
+
+use serde::Serialize;
+
+use crate::store::json::json;
+use crate::store::{Store, StoreError};
+use crate::work::Work;
+
+/// Where a run stands.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Progress {
+    /// `filter`, `batch`, or one of [`LAST`].
+    pub stage: &'static str,
+    /// Pass, from 1.
+    pub pass: usize,
+    /// Passes in all; `None` when they go on until the estimate has settled.
+    pub passes: Option<usize>,
+    /// Analyses done in this pass.
+    pub step: usize,
+    /// Analyses of a pass, at most.
+    pub steps: usize,
+    /// Runs so far.
+    pub runs: u64,
+    /// Workers now.
+    pub workers: usize,
+    /// How much of the work is done.
+    pub work: Work,
+}
+
+/// Name under which the store keeps the last [`Progress`], as JSON.
+pub const PROGRESS: &str = "progress";
+
+/// The runs after a fit, in their order: with the estimate, with the observer, with constants moved, beside the estimate.
+pub const LAST: [&str; 4] = ["final run", "observer", "constants", "residuals"];
+
+impl Progress {
+    /// Whether it tells of an analysis, and not of the runs after the last one.
+    pub fn is_analysis(&self) -> bool {
+        !LAST.contains(&self.stage)
+    }
+
+    /// Keeps it in the store, for those who look at the run from outside.
+    pub(crate) fn note(&self, store: &Store) -> Result<(), StoreError> {
+        store.set_meta(PROGRESS, &json(self))
+    }
+}
