@@ -190,6 +190,8 @@ def _started(folder):
         stdout=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        # A shell starts what it puts into the background with Ctrl-C ignored, and the tests with it.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )
     assert child.stdout.readline() == "begins\n"
     deadline = time.monotonic() + 60.0
