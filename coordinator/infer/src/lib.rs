@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`error`] | why there is no inference |
 //! | `rows`, `resampled`, `blocks` | a recording row by row, at equal steps, and cut into blocks, in memory that does not grow with it |
-//! | `file_blocks` | the same blocks as bytes of its file, which workers read |
+//! | `parts`, `file_blocks` | the same blocks as bytes of its file, which workers read |
 //! | `gather` | has the sums of every block made as jobs and merges them in block order |
 //! | `convergence` | the estimate after each power of two of blocks |
 //! | `smoothed` | the same from a smoothed path, where the measurement's noise is known |
@@ -26,6 +26,7 @@ pub mod follow;
 pub mod forecast;
 mod gather;
 mod missing;
+mod parts;
 pub mod reduced;
 mod resampled;
 pub mod result;
