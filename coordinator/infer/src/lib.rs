@@ -9,6 +9,7 @@
 //! | `convergence` | the estimate after each power of two of blocks |
 //! | `smoothed` | the same from a smoothed path, where the measurement's noise is known |
 //! | `missing` | which terms the drift lacks, among candidates |
+//! | [`explained`](mod@explained) | what was found of missing terms as an explanation |
 //! | [`reduced`] | a model with fewer unknowns than coefficients |
 //! | [`result`], `answer`, `words` | the tables with intervals, and what is said of them |
 //! | [`follow`](mod@follow) | a recording that is still written: estimates and alarms as it arrives |
@@ -21,6 +22,7 @@ mod answer;
 mod blocks;
 mod convergence;
 pub mod error;
+pub mod explained;
 mod file_blocks;
 pub mod follow;
 pub mod forecast;
