@@ -32,10 +32,11 @@ intervals:
 inference:
     cargo test --release -p starlings-estimators --test inference -- --ignored --nocapture
 
-# Damage of the plate, torques and scenarios of the nozzle over many draws of the noise: the tables of docs/structures.md.
+# Damage of the plate, torques and scenarios of the nozzle over many draws of the noise: the tables of docs/structures.md; the plate's diagnosis.
 diagnostics:
     cargo test --release -p starlings-structures --test plate_search -- --ignored --nocapture
     cargo test --release -p starlings-estimators --test nozzle -- --ignored --nocapture
+    cargo test --release --test diagnose_examples -- --ignored
 
 # Every system, effect and noise level of docs/battery.md: about an hour. BATTERY_SYSTEMS, BATTERY_KINDS, BATTERY_NOISE, BATTERY_CORRELATION, BATTERY_SEEDS, BATTERY_THREADS choose.
 explain-battery:
