@@ -22,6 +22,7 @@ mod guard;
 mod identify;
 mod import;
 mod infer;
+mod init;
 mod interrupt;
 mod load;
 mod log;
@@ -79,6 +80,8 @@ enum Command {
     Check(check::Args),
     /// Run the model forward with chosen values and noise: a twin experiment.
     Simulate(simulate::Args),
+    /// Write a first version of a study: from a recording, a model, or both.
+    Init(init::Args),
     /// Write a study from a file of another program.
     Import(import::Args),
     /// Infer drift and noise of stochastic equations from recordings of all states.
@@ -134,6 +137,7 @@ fn main() -> ExitCode {
         Command::Infer(args) => infer::run(&args),
         Command::Watch(args) => watch::run(&args),
         Command::Check(args) => check::run(&args),
+        Command::Init(args) => init::run(&args),
         Command::Import(args) => import::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Identify(args) => identify::run(&args),
@@ -189,6 +193,7 @@ impl Command {
             Self::Infer(args) => args.json,
             Self::Watch(args) => args.json,
             Self::Check(args) => args.json,
+            Self::Init(args) => args.json,
             Self::Import(args) => args.json,
             Self::Identify(args) => args.json,
             Self::Forecast(args) => args.json,
