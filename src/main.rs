@@ -10,6 +10,7 @@ mod conformance;
 mod console;
 mod csv_file;
 mod deploy;
+mod diagnose;
 mod disk;
 mod effects;
 mod explain;
@@ -86,6 +87,8 @@ enum Command {
     Import(import::Args),
     /// Infer drift and noise of stochastic equations from recordings of all states.
     Infer(infer::Args),
+    /// Say whether a recording shows a fault, since when, and which scenario of a library it followed.
+    Diagnose(diagnose::Args),
     /// Say whether the estimation is reasonable, before it is made: what these data could determine.
     Identify(identify::Args),
     /// Forecast from a run or an inference: quantiles against time, and when a quantity crosses a level.
@@ -135,6 +138,7 @@ fn main() -> ExitCode {
         Command::Run(args) => run::run(&args, started),
         Command::Explain(args) => explain::run(&args, started),
         Command::Infer(args) => infer::run(&args),
+        Command::Diagnose(args) => diagnose::run(&args),
         Command::Watch(args) => watch::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Init(args) => init::run(&args),
@@ -191,6 +195,7 @@ impl Command {
             Self::Deploy(args) => args.prints_json(),
             Self::Explain(args) => args.json,
             Self::Infer(args) => args.json,
+            Self::Diagnose(args) => args.json,
             Self::Watch(args) => args.json,
             Self::Check(args) => args.json,
             Self::Init(args) => args.json,
