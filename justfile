@@ -76,6 +76,20 @@ pages:
 wheel:
     .ci/wheel
 
+# The pages of docs/ as a book in target/book, every link followed. Installs mdBook into target/tools where it is missing.
+book:
+    .ci/book
+
+# The figures of docs/gallery.md: every example run, and its overview drawn.
+gallery:
+    cargo build --release
+    .ci/gallery
+    STARLINGS_WRITE_PAGES=1 cargo test --test book the_gallery
+
+# The numbers and commands that pages show: written again from what the program says.
+write-pages:
+    STARLINGS_WRITE_PAGES=1 cargo test --test book --test mistakes --test readme
+
 # The image without a registry: its root file system around the debug build, the pig's aorta run in it by chroot as its user, and the image
 # where buildah is there. Needs root.
 container:

@@ -23,6 +23,7 @@ mod guard;
 mod identify;
 mod import;
 mod infer;
+mod init;
 mod interrupt;
 mod load;
 mod log;
@@ -80,6 +81,8 @@ enum Command {
     Check(check::Args),
     /// Run the model forward with chosen values and noise: a twin experiment.
     Simulate(simulate::Args),
+    /// Write a first version of a study: from a recording, a model, or both.
+    Init(init::Args),
     /// Write a study from a file of another program.
     Import(import::Args),
     /// Infer drift and noise of stochastic equations from recordings of all states.
@@ -138,6 +141,7 @@ fn main() -> ExitCode {
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Watch(args) => watch::run(&args),
         Command::Check(args) => check::run(&args),
+        Command::Init(args) => init::run(&args),
         Command::Import(args) => import::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Identify(args) => identify::run(&args),
@@ -194,6 +198,7 @@ impl Command {
             Self::Diagnose(args) => args.json,
             Self::Watch(args) => args.json,
             Self::Check(args) => args.json,
+            Self::Init(args) => args.json,
             Self::Import(args) => args.json,
             Self::Identify(args) => args.json,
             Self::Forecast(args) => args.json,

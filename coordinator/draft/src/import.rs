@@ -6,7 +6,6 @@
 
 #[cfg(fuzzing)]
 pub mod fuzzing;
-mod names;
 mod openbf;
 mod plan;
 mod svzerod;
