@@ -243,7 +243,7 @@ fn cut(choice: &InferChoice, asked: &Asked<'_>, at: Start) -> Cut {
     let by_bytes =
         choice.block.is_none() && !choice.resample && usual <= choice.most_steps && at.n_row >= 1.0;
     Cut {
-        bytes: by_bytes.then(|| (usual as f64 * at.per_row) as u64),
+        bytes: by_bytes.then_some((usual as f64 * at.per_row) as u64),
         step: sums.map_or(at.step, |sums| sums.step),
         block: choice.block.unwrap_or(usual).min(choice.most_steps),
         ahead: choice.sums.n_ahead(),

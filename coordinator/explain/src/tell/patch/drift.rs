@@ -54,9 +54,14 @@ pub fn explained_drift(
 
 /// A name that the study does not have: `added1`, `added2`, …
 fn new_name(text: &str, taken: &[String]) -> String {
-    let name = |k: usize| format!("added{k}");
-    let free = |name: &String| !text.contains(name.as_str()) && !taken.contains(name);
-    (1..).map(name).find(free).unwrap_or_default()
+    let mut number = 1;
+    loop {
+        let name = format!("added{number}");
+        if !text.contains(&name) && !taken.contains(&name) {
+            return name;
+        }
+        number += 1;
+    }
 }
 
 /// Puts a term into the rate of its equation.
@@ -70,12 +75,11 @@ fn enter(document: &mut DocumentMut, term: &DriftTerm, coefficient: &str) -> Res
             return;
         }
         found = true;
-        match state.get_mut("rate").and_then(Item::as_table_like_mut) {
-            Some(terms) => drop(terms.insert(coefficient, value(&new))),
-            None => {
-                let rate = format!("{} + {new}", text(state, "rate"));
-                set_text(state, "rate", &rate);
-            }
+        if let Some(terms) = state.get_mut("rate").and_then(Item::as_table_like_mut) {
+            terms.insert(coefficient, value(&new));
+        } else {
+            let rate = format!("{} + {new}", text(state, "rate"));
+            set_text(state, "rate", &rate);
         }
     });
     if found { Ok(()) } else { Err(PatchError::NoTerm(term.equation.clone())) }
