@@ -108,7 +108,7 @@ fn workers_that_read_files_give_the_bits_of_rows_that_travel() {
 #[test]
 fn blocks_by_bytes_have_the_same_bits_whoever_reads_them() {
     let plain = text(0..400);
-    let texts = [plain.replace('\n', "\r\n"), plain.trim_end().to_owned(), plain.replace("\n", " \n")];
+    let texts = [plain.replace('\n', "\r\n"), plain.trim_end().to_owned(), plain.replace('\n', " \n")];
     for levels in [1, 3] {
         for text in &texts {
             let case = Case::new(levels, &[], &[text.clone(), texts[1].clone()]);
