@@ -68,9 +68,9 @@ slurm:
 kubernetes:
     .ci/kubernetes
 
-# The live page in a headless Chromium at two widths, its console without errors; pictures in target/pages.
+# Reports and the live page in a headless Chromium, clicked through; pictures in target/pages, and those of docs/ made again.
 pages:
-    .ci/pages
+    .ci/pages --docs
 
 # One wheel of program and package in target/wheels, and what a user does with it in an empty environment.
 wheel:

@@ -6,6 +6,7 @@
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod check;
+mod compare;
 mod conformance;
 mod console;
 mod csv_file;
@@ -41,6 +42,7 @@ mod solvers;
 mod spectrum;
 mod traces;
 mod watch;
+mod why;
 mod worker;
 
 use std::process::ExitCode;
@@ -77,6 +79,10 @@ enum Command {
     Explain(explain::Args),
     /// Follow a run in the terminal: by its folder, running or not, or by the address of its live page.
     Watch(watch::Args),
+    /// Set runs side by side: settings that differ, parameters, errors, log evidence.
+    Compare(compare::Args),
+    /// Say why a run, or a parameter, worker, particle or observation of it, is as it is.
+    Why(why::Args),
     /// Validate a study and make one trial run of its model.
     Check(check::Args),
     /// Run the model forward with chosen values and noise: a twin experiment.
@@ -140,6 +146,8 @@ fn main() -> ExitCode {
         Command::Infer(args) => infer::run(&args),
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Watch(args) => watch::run(&args),
+        Command::Compare(args) => compare::run(&args),
+        Command::Why(args) => why::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Init(args) => init::run(&args),
         Command::Import(args) => import::run(&args),
@@ -197,6 +205,8 @@ impl Command {
             Self::Infer(args) => args.json,
             Self::Diagnose(args) => args.json,
             Self::Watch(args) => args.json,
+            Self::Compare(args) => args.json,
+            Self::Why(args) => args.json,
             Self::Check(args) => args.json,
             Self::Init(args) => args.json,
             Self::Import(args) => args.json,

@@ -40,7 +40,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     }
     let data = page::reader::report_data(&folder.store).map_err(Failure::run)?;
     if let Some(path) = &args.overview {
-        let svg = page::overview_svg(&data).map_err(Failure::run)?;
+        let svg = page::overview_svg(&data);
         std::fs::write(path, svg)
             .map_err(|e| Failure::input(format!("cannot write {}: {e}", path.display())))?;
     }

@@ -50,13 +50,37 @@ pub(crate) fn open(
     let default = || Path::new("runs").join(format!("{}{kind}-{stamp}", study.name));
     let path: PathBuf = out.map_or_else(default, Path::to_owned);
     disk::check(study, &path, shares, resume.resume)?;
-    let command = std::env::args().skip(1).collect::<Vec<_>>().join(" ");
-    let command = format!("starlings {command}");
+    let command = again(std::env::args().skip(1));
     if resume.resume {
         let call = Call { command: &command, started: &stamp, other_build: resume.other_build };
         return RunFolder::resume(purpose, &path, study, &call).map_err(|error| failed(&error));
     }
     RunFolder::create(purpose, &path, study, &command, &stamp).map_err(|error| failed(&error))
+}
+
+/// The command that makes a run again, as a shell takes it: without the folder that it wrote, which is taken now, and without what
+/// continued it.
+fn again(mut arguments: impl Iterator<Item = String>) -> String {
+    let mut words = vec!["starlings".to_owned()];
+    while let Some(argument) = arguments.next() {
+        match argument.as_str() {
+            "--out" => drop(arguments.next()),
+            "--resume" | "--other-build" => {}
+            other if other.starts_with("--out=") => {}
+            other => words.push(quoted(other)),
+        }
+    }
+    words.join(" ")
+}
+
+/// A word that a shell of POSIX takes as it is.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "-_./=:,@%+".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', "'\\''"))
+    }
 }
 
 /// Key of where large states of a run stand: the folder that machines share, empty where they stand in the run folder.
@@ -86,4 +110,31 @@ pub(crate) fn give_up(folder: RunFolder, resume: Resume) {
 
 fn failed(error: &FolderError) -> Failure {
     if error.is_input() { Failure::input(error) } else { Failure::run(error) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::again;
+
+    fn of(arguments: &[&str]) -> String {
+        again(arguments.iter().map(|a| (*a).to_owned()))
+    }
+
+    #[test]
+    fn a_command_of_the_report_can_be_pasted() {
+        let expected = "starlings run 'my studies/it'\\''s.toml' --workers 2 --set 'R=1 kPa'";
+        let given = [
+            "run",
+            "my studies/it's.toml",
+            "--out",
+            "runs/a b",
+            "--workers",
+            "2",
+            "--resume",
+            "--set",
+            "R=1 kPa",
+        ];
+        assert_eq!(of(&given), expected);
+        assert_eq!(of(&["explain", "s.toml", "--out=x"]), "starlings explain s.toml");
+    }
 }

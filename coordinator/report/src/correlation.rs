@@ -4,6 +4,9 @@ use serde::Serialize;
 
 use super::number;
 
+/// Rows and columns of a table at most.
+pub(crate) const MOST: usize = 24;
+
 /// One cell: its text and the share of colour behind it.
 #[derive(Debug, Serialize)]
 pub(crate) struct Cell {

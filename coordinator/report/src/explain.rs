@@ -62,6 +62,8 @@ struct Page<'a> {
     facts: Vec<(&'static str, String)>,
     figures: Slots,
     gap: Gap,
+    /// Whether rows have to say which record they are of.
+    several_records: bool,
     curves_left_out: usize,
     failing: Vec<String>,
     effect_title: &'static str,
@@ -94,7 +96,8 @@ impl<'a> Page<'a> {
             verdict_words,
             facts: facts(found, about),
             figures: figures::draw(found, data)?,
-            gap: Gap::new(found, data)?,
+            gap: Gap::new(found, data),
+            several_records: data.curves.iter().any(|curve| curve.record != data.curves[0].record),
             curves_left_out: figures::course::left_out(data),
             failing: failing(found),
             effect_title: match found.verdict {
@@ -106,9 +109,9 @@ impl<'a> Page<'a> {
             ties: found.tied_with.iter().map(|set| set.join(" + ")).collect(),
             separation: experiment.map_or_else(String::new, Experiment::sentence),
             experiments: experiment.map_or(Vec::new(), effect::experiments),
-            disagreement: Disagreement::new(found, data)?,
-            candidates: Candidates::new(found, data)?,
-            shifts: found.parameter_shifts.iter().map(gap::ShiftRow::new).collect::<Result<_, _>>()?,
+            disagreement: Disagreement::new(found, data),
+            candidates: Candidates::new(found, data),
+            shifts: found.parameter_shifts.iter().map(gap::ShiftRow::new).collect(),
             remaining: remaining(found),
             stages: found.runs_by_stage.iter().map(|(stage, n)| (stage.clone(), n.to_string())).collect(),
         })
@@ -127,7 +130,7 @@ fn facts(found: &Explanation, about: &StudyAbout) -> Vec<(&'static str, String)>
         ("Model runs", found.runs.to_string()),
         ("Workers", found.workers.to_string()),
         ("Wall time", number::duration(found.wall_s)),
-        ("Started", about.started.clone()),
+        ("Started", number::date(&about.started)),
     ];
     facts.retain(|(_, text)| !text.is_empty());
     facts

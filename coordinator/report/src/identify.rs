@@ -26,6 +26,9 @@ struct Page<'a> {
     parameters: Vec<ParameterView>,
     directions: Vec<[String; 3]>,
     correlation: Vec<Vec<correlation::Cell>>,
+    /// Names of the parameters in the table of correlations.
+    correlated: Vec<&'a str>,
+    correlation_left_out: usize,
     figures: Slots,
     subsets: Vec<[String; 2]>,
     subsets_left_out: usize,
@@ -59,9 +62,17 @@ impl<'a> Page<'a> {
         Ok(Self {
             found,
             facts: facts(found),
-            parameters: found.parameters.iter().map(parameter).collect::<Result<_, _>>()?,
+            parameters: found.parameters.iter().map(parameter).collect(),
             directions: directions(found),
-            correlation: found.correlation.iter().enumerate().map(|(k, row)| cells(k, row)).collect(),
+            correlation: found
+                .correlation
+                .iter()
+                .take(correlation::MOST)
+                .enumerate()
+                .map(|(k, row)| cells(k, &row[..row.len().min(correlation::MOST)]))
+                .collect(),
+            correlated: found.parameters.iter().take(correlation::MOST).map(|p| p.name.as_str()).collect(),
+            correlation_left_out: found.parameters.len().saturating_sub(correlation::MOST),
             figures: figures::draw(found)?,
             subsets: subsets.iter().take(SUBSETS).map(subset).collect(),
             subsets_left_out: subsets.len().saturating_sub(SUBSETS),
@@ -80,7 +91,7 @@ fn facts(found: &Identification) -> Vec<(&'static str, String)> {
     ]
 }
 
-fn parameter(p: &ParameterInfo) -> Result<ParameterView, ReportError> {
+fn parameter(p: &ParameterInfo) -> ParameterView {
     let row = ParameterRow {
         name: p.name.clone(),
         unit: p.unit.clone(),
@@ -93,7 +104,7 @@ fn parameter(p: &ParameterInfo) -> Result<ParameterView, ReportError> {
         prior_lo: p.prior_interval95[0],
         prior_hi: p.prior_interval95[1],
     };
-    Ok(ParameterView {
+    ParameterView {
         name: p.name.clone(),
         unit: p.unit.clone(),
         value: number::with_sd(p.value, p.expected_sd_physical),
@@ -101,8 +112,8 @@ fn parameter(p: &ParameterInfo) -> Result<ParameterView, ReportError> {
         prior: number::significant(p.prior_sd_physical, 2),
         left: format!("{} %", number::significant(100.0 * p.expected_sd / p.prior_sd, 2)),
         bits: number::with_sd(p.information_bits, 0.1),
-        strip: interval::strip(&row, p.transform.starts_with("log") && p.transform != "logit")?,
-    })
+        strip: interval::strip(&row, p.transform.starts_with("log") && p.transform != "logit"),
+    }
 }
 
 fn directions(found: &Identification) -> Vec<[String; 3]> {

@@ -4,6 +4,7 @@
 //! store nor the study. The page needs no script, no network and no font, works on a phone and in print, and states warnings before
 //! numbers. Deliberately absent: computing anything that was not stored. Next file to read: [`data`].
 
+mod compare;
 mod correlation;
 mod data;
 mod diagnose;
@@ -26,7 +27,9 @@ pub mod reader;
 mod sample;
 #[cfg(test)]
 mod tests;
+mod why;
 
+pub use compare::{CompareError, Comparison, compare, compare_page};
 pub use data::ReportData;
 pub use diagnose::{diagnosis_page, write_diagnosis};
 pub use explained::{state_names, write_explanation};
@@ -35,6 +38,7 @@ pub use forecast::forecast_page;
 pub use identify::identify_page;
 pub use infer::{coefficients_csv, infer_page, write_inference};
 pub use overview::overview_svg;
+pub use why::{Answer, WhyError, why};
 
 /// Why a report could not be made.
 #[derive(Debug, thiserror::Error)]

@@ -52,6 +52,54 @@ pub(crate) fn duration(seconds: f64) -> String {
     }
 }
 
+/// A moment as people write it: `20261124-130531`, as the store has it in UTC, `2026-11-24T13:05:31Z` and `2026-11-24 13:05:31 UTC`
+/// become `24 November 2026, 13:05 UTC`; any other text stays.
+pub(crate) fn date(text: &str) -> String {
+    const MONTHS: [&str; 12] = [
+        "January",
+        "February",
+        "March",
+        "April",
+        "May",
+        "June",
+        "July",
+        "August",
+        "September",
+        "October",
+        "November",
+        "December",
+    ];
+    if let Some(spread) = from_digits(text) {
+        return date(&spread);
+    }
+    let read = || {
+        let (day, rest) = text.split_once(['T', ' '])?;
+        let mut parts = day.split('-').map(str::parse::<usize>);
+        let [year, month, day] = [parts.next()?.ok()?, parts.next()?.ok()?, parts.next()?.ok()?];
+        let clock = rest.get(..5).filter(|clock| clock.as_bytes()[2] == b':')?;
+        let zone = if rest.ends_with('Z') || rest.ends_with("UTC") { " UTC" } else { "" };
+        Some(format!("{day} {} {year}, {clock}{zone}", MONTHS.get(month.checked_sub(1)?)?))
+    };
+    read().unwrap_or_else(|| text.to_owned())
+}
+
+/// A moment of the store's form with the separators that people are used to.
+fn from_digits(text: &str) -> Option<String> {
+    let (day, clock) = text.split_once('-')?;
+    let digits = |part: &str, n: usize| part.len() == n && part.bytes().all(|b| b.is_ascii_digit());
+    (digits(day, 8) && digits(clock, 6)).then(|| {
+        format!(
+            "{}-{}-{} {}:{}:{} UTC",
+            &day[..4],
+            &day[4..6],
+            &day[6..],
+            &clock[..2],
+            &clock[2..4],
+            &clock[4..]
+        )
+    })
+}
+
 /// A part of one, in percent.
 pub(crate) fn percent(share: f64) -> String {
     let percent = 100.0 * share;
@@ -138,6 +186,16 @@ mod tests {
         assert_eq!(quantity(-0.012_345, "mmHg"), "−0.0123 mmHg");
         assert_eq!(quantity(2.0, ""), "2.00");
         assert_eq!(quantity(f64::NAN, "s"), "– s");
+    }
+
+    #[test]
+    fn moments_are_written_as_people_write_them() {
+        assert_eq!(date("2026-11-24T13:05:31Z"), "24 November 2026, 13:05 UTC");
+        assert_eq!(date("20261124-130531"), "24 November 2026, 13:05 UTC");
+        assert_eq!(date("2026-03-02 14:05:31 UTC"), "2 March 2026, 14:05 UTC");
+        for odd in ["", "yesterday", "2026-13-02 14:05 UTC", "2026-00-02T14:05Z", "2026-01-02 ä"] {
+            assert_eq!(date(odd), odd);
+        }
     }
 
     #[test]

@@ -1,52 +1,60 @@
 //! The picture of a result: predicted against measured beside the parameter intervals, as one SVG file.
+//!
+//! It stands alone: colours, sizes and style are in it. Next file to read: [`super::plot::scene`].
 
-use plotters::element::PathElement;
-use plotters::style::RGBColor;
-use plotters::style::WHITE;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
+use std::fmt::Write as _;
 
 use super::data::{ChannelPlot, ParameterRow, ReportData};
 use super::page::figures::fit;
+use super::plot::drawing::standalone_style;
 use super::plot::figure::with_unit;
 use super::plot::interval::{self, BarArea};
-use super::plot::palette::{BLUE, INK, MUTED, VERMILION};
-use super::plot::scene::{Surface, picture, stroke, units, whole, write, write_title};
-use super::{ReportError, headline, number};
+use super::plot::palette::{ALL, BLUE, Colour, INK, MUTED, PURPLE};
+use super::plot::svg::{escape, head};
+use super::{headline, number};
 
-const WIDTH: i32 = 900;
-const HEIGHT: i32 = 420;
+const WIDTH: f64 = 900.0;
+const HEIGHT: f64 = 420.0;
 /// Where the title ends and the two panels begin.
-const HEAD: i32 = 78;
+const HEAD: f64 = 78.0;
 /// Width of the left panel.
-const LEFT: i32 = 580;
+const LEFT: f64 = 580.0;
 /// More parameters than this do not fit.
 const ROWS: usize = 5;
 /// Letters that fit on a line of the right panel.
 const LETTERS: usize = 38;
 
-const MIDDLE_LEFT: Pos = Pos { h_pos: HPos::Left, v_pos: VPos::Center };
-const MIDDLE_RIGHT: Pos = Pos { h_pos: HPos::Right, v_pos: VPos::Center };
-
-/// Draws the overview: about 900 × 420, on white, complete in itself.
-///
-/// # Errors
-///
-/// The picture cannot be drawn.
-pub fn overview_svg(data: &ReportData) -> Result<String, ReportError> {
+/// Draws the overview: 900 × 420, on white, complete in itself.
+pub fn overview_svg(data: &ReportData) -> String {
     let title = format!("{}: result of the run", data.study);
-    picture((WIDTH, HEIGHT), &title, &headline::of(data), |surface| {
-        surface.fill(&WHITE).map_err(ReportError::drawing)?;
-        title_line(surface, data)?;
-        legend(surface)?;
-        let (_, panels) = surface.split_vertically(units(HEAD));
-        let panels = panels.margin(0, units(6), units(10), 0);
-        let (left, right) = panels.split_horizontally(units(LEFT));
-        match shown_channel(&data.channels) {
-            Some(channel) => fit::scene(channel, &data.time_unit).draw(&left)?,
-            None => write(&left, (units(14), units(60)), "no prediction stored", MUTED, MIDDLE_LEFT)?,
+    let size = format!("width=\"{WIDTH}\" height=\"{HEIGHT}\" viewBox=\"0 0 {WIDTH} {HEIGHT}\"");
+    let mut text = head(&size, &title, &headline::of(data));
+    let _ = write!(
+        text,
+        "<style>text{{font:14px Helvetica,Arial,sans-serif;fill:{}}}.tick,.note{{fill:{}}}.title{{font:bold 19px \
+         Helvetica,Arial,sans-serif}}.axis{{fill:none;stroke:{}}}{}</style><rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>",
+        INK.hex,
+        MUTED.hex,
+        MUTED.hex,
+        standalone_style(&ALL)
+    );
+    let names = [data.study.as_str(), data.model.as_str()];
+    let line = names.into_iter().filter(|name| !name.is_empty()).collect::<Vec<_>>().join(" · ");
+    write(&mut text, (14.0, 32.0), &line, "class=\"title\"");
+    legend(&mut text);
+    match shown_channel(&data.channels) {
+        Some(channel) => {
+            let size = (LEFT - 14.0, HEIGHT - HEAD - 8.0);
+            text += &fit::scene(channel, &data.time_unit).standalone((14.0, HEAD), size);
         }
-        intervals(&right, data)
-    })
+        None => write(&mut text, (14.0, HEAD + 60.0), "no prediction stored", "class=\"note\""),
+    }
+    intervals(&mut text, data);
+    text + "</svg>\n"
+}
+
+fn write(text: &mut String, (x, y): (f64, f64), words: &str, attributes: &str) {
+    let _ = write!(text, "<text {attributes} x=\"{x}\" y=\"{y}\">{}</text>", escape(words));
 }
 
 /// The channel that shows most: one that was fitted in part, otherwise the first.
@@ -55,45 +63,36 @@ fn shown_channel(channels: &[ChannelPlot]) -> Option<&ChannelPlot> {
     channels.iter().find(partly).or_else(|| channels.first())
 }
 
-fn title_line(surface: &Surface<'_>, data: &ReportData) -> Result<(), ReportError> {
-    let names = [data.study.as_str(), data.model.as_str()];
-    let line = names.into_iter().filter(|name| !name.is_empty()).collect::<Vec<_>>().join(" · ");
-    write_title(surface, (units(14), units(26)), &line)
-}
-
-fn legend(surface: &Surface<'_>) -> Result<(), ReportError> {
-    let entries: [(i32, &str, RGBColor); 3] = [
-        (14, "measured", INK),
-        (124, "predicted, training span", BLUE),
-        (330, "predicted, held out", VERMILION),
+fn legend(text: &mut String) {
+    let entries: [(f64, &str, Colour); 3] = [
+        (14.0, "measured", INK),
+        (124.0, "predicted, training span", BLUE),
+        (330.0, "predicted, held out", PURPLE),
     ];
-    let height = units(56);
-    for (x, text, colour) in entries {
-        let sample = PathElement::new(vec![(units(x), height), (units(x + 18), height)], stroke(colour, 2.5));
-        surface.draw(&sample).map_err(ReportError::drawing)?;
-        write(surface, (units(x + 24), height), text, MUTED, MIDDLE_LEFT)?;
+    for (x, words, colour) in entries {
+        let _ =
+            write!(text, "<rect x=\"{x}\" y=\"55\" width=\"18\" height=\"2.5\" fill=\"{}\"/>", colour.hex);
+        write(text, (x + 24.0, 61.0), words, "class=\"note\"");
     }
-    Ok(())
 }
 
-fn intervals(surface: &Surface<'_>, data: &ReportData) -> Result<(), ReportError> {
-    let right = units(WIDTH - LEFT - 10 - 16);
+fn intervals(text: &mut String, data: &ReportData) {
+    let (left, right) = (LEFT + 18.0, WIDTH - 16.0);
     let rows = &data.parameters[..data.parameters.len().min(ROWS)];
-    let height = 290 / whole(rows.len().max(3));
+    let height = 290.0 / rows.len().max(3) as f64;
     for (k, row) in rows.iter().enumerate() {
-        let top = units(12 + height * whole(k));
+        let top = height.mul_add(k as f64, HEAD + 16.0);
         let value = interval_text(row);
-        write(surface, (units(8), top), &name_beside(row, &value), INK, MIDDLE_LEFT)?;
-        write(surface, (right, top), &value, INK, MIDDLE_RIGHT)?;
-        let area = BarArea { left: units(8), right, middle: top + units(24) };
-        interval::draw(surface, row, data.log_axis(&row.name), area)?;
+        write(text, (left, top), &name_beside(row, &value), "");
+        write(text, (right, top), &value, "text-anchor=\"end\"");
+        *text += &interval::bars(row, data.log_axis(&row.name), BarArea { left, right, middle: top + 19.0 });
     }
     let note = "blue: after the data, grey: before";
     let note = match data.parameters.len() - rows.len() {
         0 => note.to_owned(),
         more => format!("{note}; {more} more"),
     };
-    write(surface, (units(8), units(HEIGHT - HEAD - 18)), &note, MUTED, MIDDLE_LEFT)
+    write(text, (left, HEIGHT - 14.0), &note, "class=\"note\"");
 }
 
 /// The name with its unit, without it or shortened, as the room beside `value` allows.

@@ -37,6 +37,13 @@ pub(crate) struct Page<'a> {
     nis_mean: String,
     log_likelihood: String,
     correlation: Vec<Vec<correlation::Cell>>,
+    /// Names of the parameters in the table of correlations.
+    correlated: Vec<&'a str>,
+    correlation_left_out: usize,
+    /// The strongest correlation, in words.
+    strongest: Option<String>,
+    /// Fits that are not drawn.
+    fits_left_out: usize,
     fleet: FleetView,
 }
 
@@ -77,7 +84,7 @@ impl<'a> Page<'a> {
             headline: headline::of(data),
             intervals: if data.residuals_first { [GIVEN, STATED] } else { [STATED, GIVEN] },
             facts: facts(data),
-            parameters: data.parameters.iter().map(|row| parameter(row, data)).collect::<Result<_, _>>()?,
+            parameters: data.parameters.iter().map(|row| parameter(row, data)).collect(),
             figures: figures::draw(data)?,
             observer: data.observer.as_ref().map(|row| observer(row, data)),
             hangs_on: hangs_on::view(data.hangs_on.as_ref()),
@@ -86,18 +93,32 @@ impl<'a> Page<'a> {
             correlation: data
                 .correlation
                 .iter()
+                .take(correlation::MOST)
                 .enumerate()
-                .map(|(k, row)| correlation::row(k, row))
+                .map(|(k, row)| correlation::row(k, &row[..row.len().min(correlation::MOST)]))
                 .collect(),
+            correlated: data.parameters.iter().take(correlation::MOST).map(|row| row.name.as_str()).collect(),
+            correlation_left_out: data.parameters.len().saturating_sub(correlation::MOST),
+            strongest: strongest(data),
+            fits_left_out: figures::fit::left_out(data),
             fleet: fleet(data),
         })
     }
 }
 
+/// The strongest correlation between two parameters, in words.
+fn strongest(data: &ReportData) -> Option<String> {
+    let rows = data.correlation.iter().enumerate();
+    let pairs = rows.flat_map(|(i, row)| row.iter().enumerate().take(i).map(move |(j, r)| (i, j, *r)));
+    let (i, j, r) = pairs.filter(|p| p.2.is_finite()).max_by(|p, q| p.2.abs().total_cmp(&q.2.abs()))?;
+    let [beside, below] = [j, i].map(|at| data.parameters.get(at).map_or("", |row| row.name.as_str()));
+    Some(format!("strongest: {beside} and {below}, {}", number::with_sd(r, 0.1)))
+}
+
 fn facts(data: &ReportData) -> Vec<(&'static str, String)> {
     let mut facts = vec![("Model", data.model.clone()), ("Estimator", data.estimator.clone())];
     if let Some(started) = &data.started {
-        facts.push(("Started", started.clone()));
+        facts.push(("Started", number::date(started)));
     }
     facts.push(("Wall time", number::duration(data.wall_s)));
     facts.retain(|(_, text)| !text.is_empty());
@@ -117,9 +138,9 @@ fn observer(row: &ObserverRow, data: &ReportData) -> String {
     )
 }
 
-fn parameter(row: &ParameterRow, data: &ReportData) -> Result<ParameterView, ReportError> {
+fn parameter(row: &ParameterRow, data: &ReportData) -> ParameterView {
     let digits = |value| number::with_sd(value, row.sd);
-    Ok(ParameterView {
+    ParameterView {
         name: row.name.clone(),
         unit: row.unit.clone(),
         estimate: digits(row.estimate),
@@ -134,8 +155,8 @@ fn parameter(row: &ParameterRow, data: &ReportData) -> Result<ParameterView, Rep
             },
         ),
         prior_median: number::significant(row.prior_median, 3),
-        strip: interval::strip(row, data.log_axis(&row.name))?,
-    })
+        strip: interval::strip(row, data.log_axis(&row.name)),
+    }
 }
 
 fn fleet(data: &ReportData) -> FleetView {

@@ -252,6 +252,10 @@ pub struct ParameterShift {
     pub after: f64,
     /// Standard deviation of the latter.
     pub sd: f64,
+    /// The shift and the standard deviation in units of the prior's, where estimates are Gaussian; absent in results of earlier
+    /// versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub in_prior_sd: Option<[f64; 2]>,
 }
 
 /// An experiment that separates tied effects.

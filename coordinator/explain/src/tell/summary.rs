@@ -210,8 +210,18 @@ pub(crate) fn shifts(base: &FittedVariant<'_>, judged: &JudgedFit<'_>) -> Vec<Pa
     let shift = |after: Estimate| {
         let i = own.iter().position(|entry| entry.name == after.name)?;
         let Estimate { name, unit, estimate, sd, .. } = after;
-        let before = own[i].transform.to_physical(before[i]);
-        Some(ParameterShift { name, unit, before, after: estimate, sd })
+        let (transform, prior_sd, theta) = (&own[i].transform, own[i].prior_sd, before[i]);
+        let moved = transform.to_transformed(estimate);
+        let in_prior_sd = [(moved - theta) / prior_sd, sd / transform.derivative(moved).abs() / prior_sd];
+        let in_prior_sd = Some(in_prior_sd).filter(|ends| ends.iter().all(|v| v.is_finite()));
+        Some(ParameterShift {
+            name,
+            unit,
+            before: transform.to_physical(theta),
+            after: estimate,
+            sd,
+            in_prior_sd,
+        })
     };
     estimates(judged).into_iter().take(judged.fit.variant.n_own).filter_map(shift).collect()
 }

@@ -4,7 +4,6 @@ use serde::Serialize;
 use starlings_explain::Figures;
 use starlings_explain::result::{Explanation, FalseAlarm, Nulls, Screened};
 
-use crate::ReportError;
 use crate::number::{self, quantity};
 use crate::plot::meter::{Bar, meter};
 use crate::plot::palette::{BLUE, GREY};
@@ -35,27 +34,23 @@ struct CandidateRow {
 
 impl Candidates {
     /// Formats the candidates.
-    ///
-    /// # Errors
-    ///
-    /// A figure cannot be drawn.
-    pub(super) fn new(found: &Explanation, figures: &Figures) -> Result<Self, ReportError> {
-        Ok(Self {
-            screened: found.screened.iter().take(LISTED).map(row).collect::<Result<_, _>>()?,
+    pub(super) fn new(found: &Explanation, figures: &Figures) -> Self {
+        Self {
+            screened: found.screened.iter().take(LISTED).map(row).collect(),
             left_out: found.screened.len().saturating_sub(LISTED),
             alarm_facts: alarm_facts(&found.false_alarm, figures.best_gain),
             measured: found.false_alarm.nulls.as_ref().map(measured),
-        })
+        }
     }
 }
 
-fn row(s: &Screened) -> Result<CandidateRow, ReportError> {
+fn row(s: &Screened) -> CandidateRow {
     let bars = [
         Bar { from: 0.0, to: s.share.max(0.0), lane: (6, 18), colour: BLUE },
         Bar { from: 0.0, to: s.identifiable, lane: (10, 14), colour: GREY },
     ];
     let title = format!("{}: explains {} of the gap", s.name, number::percent(s.share));
-    Ok(CandidateRow {
+    CandidateRow {
         name: s.name.clone(),
         at: s.at.clone(),
         share: number::percent(s.share),
@@ -63,8 +58,8 @@ fn row(s: &Screened) -> Result<CandidateRow, ReportError> {
         amplitude: quantity(s.amplitude, ""),
         identifiable: number::percent(s.identifiable),
         fate: s.fate.clone(),
-        meter: meter(&title, "Wide bar: share of the gap. Thin bar: identifiable part.", (0.0, 1.0), &bars)?,
-    })
+        meter: meter(&title, "Wide bar: share of the gap. Thin bar: identifiable part.", (0.0, 1.0), &bars),
+    }
 }
 
 fn alarm_facts(alarm: &FalseAlarm, best: f64) -> Vec<(&'static str, String)> {

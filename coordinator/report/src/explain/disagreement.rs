@@ -8,10 +8,9 @@ use starlings_explain::locate::{ChannelGap, Correlated};
 use starlings_explain::result::Explanation;
 
 use super::probability;
-use crate::ReportError;
 use crate::number::{self, quantity};
 use crate::plot::meter::{Bar, meter};
-use crate::plot::palette::{BLUE, INK, MUTED, VERMILION};
+use crate::plot::palette::{ABOVE, BELOW, INK, MUTED};
 
 /// Rows of the table of channels at most.
 const ROWS: usize = 80;
@@ -35,17 +34,13 @@ struct CorrelationRow {
 
 impl Disagreement {
     /// Formats what locating found.
-    ///
-    /// # Errors
-    ///
-    /// A figure cannot be drawn.
-    pub(super) fn new(found: &Explanation, figures: &Figures) -> Result<Self, ReportError> {
+    pub(super) fn new(found: &Explanation, figures: &Figures) -> Self {
         let located = &figures.before;
-        Ok(Self {
+        Self {
             sentences: found.places.iter().map(|place| place.sentence.clone()).collect(),
             channels: located.channels.iter().take(ROWS).map(channel).collect(),
-            correlations: located.correlations.iter().map(correlation).collect::<Result<_, _>>()?,
-        })
+            correlations: located.correlations.iter().map(correlation).collect(),
+        }
     }
 }
 
@@ -65,9 +60,9 @@ fn channel(c: &ChannelGap) -> Vec<String> {
     ]
 }
 
-fn correlation(c: &Correlated) -> Result<CorrelationRow, ReportError> {
+fn correlation(c: &Correlated) -> CorrelationRow {
     let [lo, hi] = c.interval95;
-    let colour = if c.coefficient > 0.0 { VERMILION } else { BLUE };
+    let colour = if c.coefficient > 0.0 { ABOVE } else { BELOW };
     let bars = [
         Bar { from: 0.0, to: c.coefficient, lane: (6, 18), colour },
         Bar { from: lo, to: hi, lane: (11, 13), colour: INK },
@@ -75,7 +70,7 @@ fn correlation(c: &Correlated) -> Result<CorrelationRow, ReportError> {
     ];
     let text = number::with_sd(c.coefficient, 0.1);
     let title = format!("{} with {}: {text}", c.channel, c.with);
-    Ok(CorrelationRow {
+    CorrelationRow {
         channel: c.channel.clone(),
         with: c.with.clone(),
         coefficient: text,
@@ -85,6 +80,6 @@ fn correlation(c: &Correlated) -> Result<CorrelationRow, ReportError> {
             "Bar: coefficient, from −1 to 1. Thin bar: 95\u{a0}% interval.",
             (-1.0, 1.0),
             &bars,
-        )?,
-    })
+        ),
+    }
 }

@@ -15,7 +15,7 @@ use starlings_explain::result::Explanation;
 use crate::ReportError;
 use crate::plot::figure::{Figure, Slot, Slots};
 
-type Draw = fn(&Explanation, &Figures) -> Result<Vec<Figure>, ReportError>;
+type Draw = fn(&Explanation, &Figures) -> Vec<Figure>;
 
 /// The places for figures, in the order of their sections, and what draws the figures of each.
 const SLOTS: [Slot<Draw>; 5] = [

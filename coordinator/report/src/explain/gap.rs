@@ -6,7 +6,6 @@ use serde::Serialize;
 use starlings_explain::Figures;
 use starlings_explain::result::{Explanation, GapRow, ParameterShift};
 
-use crate::ReportError;
 use crate::number::{self, quantity};
 use crate::plot::meter::{Bar, meter};
 use crate::plot::palette::{BLUE, GREY, INK, VERMILION};
@@ -37,23 +36,19 @@ struct GapView {
 
 impl Gap {
     /// Formats the errors.
-    ///
-    /// # Errors
-    ///
-    /// A figure cannot be drawn.
-    pub(super) fn new(found: &Explanation, figures: &Figures) -> Result<Self, ReportError> {
+    pub(super) fn new(found: &Explanation, figures: &Figures) -> Self {
         let rows = rows(found, figures);
         let view = |row: &GapRow| GapView::new(row, &rows, unit_of(&row.channel, figures));
-        Ok(Self {
-            rows: rows.iter().take(ROWS).map(view).collect::<Result<_, _>>()?,
+        Self {
+            rows: rows.iter().take(ROWS).map(view).collect(),
             rows_left_out: rows.len().saturating_sub(ROWS),
             compared: !found.gap.is_empty(),
-        })
+        }
     }
 }
 
 impl GapView {
-    fn new(row: &GapRow, rows: &[GapRow], unit: &str) -> Result<Self, ReportError> {
+    fn new(row: &GapRow, rows: &[GapRow], unit: &str) -> Self {
         let same = rows.iter().filter(|other| other.channel == row.channel);
         let reach = same.flat_map(|other| [other.before, other.after, other.noise]);
         let longest = reach.filter(|v| v.is_finite()).fold(0.0, f64::max);
@@ -73,7 +68,7 @@ impl GapView {
             quantity(row.noise, unit)
         );
         let ratio = row.after / row.before;
-        Ok(Self {
+        Self {
             channel: row.channel.clone(),
             record: row.record.clone(),
             usage: words(&row.usage),
@@ -87,8 +82,8 @@ impl GapView {
                 "Upper bar: before. Lower bar: after. Stroke: noise.",
                 (0.0, longest),
                 &bars,
-            )?,
-        })
+            ),
+        }
     }
 }
 
@@ -140,20 +135,14 @@ pub(super) struct ShiftRow {
 
 impl ShiftRow {
     /// Formats one shift.
-    ///
-    /// # Errors
-    ///
-    /// Its graphic cannot be drawn.
-    pub(super) fn new(p: &ParameterShift) -> Result<Self, ReportError> {
+    pub(super) fn new(p: &ParameterShift) -> Self {
         let shift = (p.after - p.before) / p.sd;
-        let (lo, hi) = (p.after - 2.0 * p.sd, p.after + 2.0 * p.sd);
-        let all = [lo, hi, p.before, p.after];
-        let ends = all.into_iter().filter(|v| v.is_finite());
-        let ends = ends.fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(v), b.max(v)));
+        // One scale for all: a parameter that hardly moved must not look like one that moved far.
+        let [moved, sd] = p.in_prior_sd.unwrap_or([f64::NAN; 2]);
         let bars = [
-            Bar { from: p.before, to: p.after, lane: (11, 13), colour: GREY },
-            Bar { from: lo, to: hi, lane: (7, 17), colour: BLUE },
-            Bar::tick(p.before, VERMILION),
+            Bar { from: 0.0, to: moved, lane: (11, 13), colour: GREY },
+            Bar { from: moved - 2.0 * sd, to: moved + 2.0 * sd, lane: (7, 17), colour: BLUE },
+            Bar::tick(0.0, VERMILION),
         ];
         let shift_text = if shift.is_finite() {
             let sign = if shift > 0.0 { "+" } else { "" };
@@ -162,14 +151,19 @@ impl ShiftRow {
             number::ABSENT.to_owned()
         };
         let title = format!("{}: shifted by {shift_text}", p.name);
-        Ok(Self {
+        Self {
             name: p.name.clone(),
             before: number::with_sd(p.before, p.sd),
             after: number::with_sd(p.after, p.sd),
             sd: number::significant(p.sd, 2),
             shift: shift_text,
             unit: p.unit.clone(),
-            meter: meter(&title, "Stroke: before. Bar: after, ± 2 sd.", ends, &bars)?,
-        })
+            meter: meter(
+                &title,
+                "In prior sd, from −4 to 4. Stroke: before. Bar: after, ± 2 sd.",
+                (-4.0, 4.0),
+                &bars,
+            ),
+        }
     }
 }

@@ -190,7 +190,14 @@ fn false_alarm() -> FalseAlarm {
 }
 
 fn shift(name: &str, unit: &str, before: f64, after: f64) -> ParameterShift {
-    ParameterShift { name: name.into(), unit: unit.into(), before, after, sd: 0.02 }
+    ParameterShift {
+        name: name.into(),
+        unit: unit.into(),
+        before,
+        after,
+        sd: 0.02,
+        in_prior_sd: Some([before - after, 0.02]),
+    }
 }
 
 fn screened() -> Vec<Screened> {

@@ -11,7 +11,7 @@ use starlings_study::forecast::Forecast;
 use crate::ReportError;
 use crate::plot::figure::{Figure, Slot, Slots};
 
-type Draw = fn(&Forecast) -> Result<Vec<Figure>, ReportError>;
+type Draw = fn(&Forecast) -> Vec<Figure>;
 
 /// The places for figures, in the order of their sections, and what draws the figures of each.
 const SLOTS: [Slot<Draw>; 2] = [

@@ -6,6 +6,7 @@ use starlings_study::forecast::measurement::{Errors, From};
 use starlings_study::forecast::result::{Coverage, LevelForecast, OutputForecast};
 
 use super::forecast_page;
+use crate::tests::page::without_scripts;
 
 fn forecast(times: Vec<f64>) -> Forecast {
     let grid = [0.0, 1.0, 2.0];
@@ -62,7 +63,7 @@ fn forecast(times: Vec<f64>) -> Forecast {
 
 #[test]
 fn a_forecast_shows_its_levels_its_fan_and_its_warnings() {
-    let page = forecast_page(&forecast(vec![1.0, 1.9])).unwrap();
+    let page = without_scripts(&forecast_page(&forecast(vec![1.0, 1.9])).unwrap());
     assert_eq!(page.matches("<svg").count(), 2, "the fan and the crossings");
     let bands =
         ["−1.125 to 9.125", "1.25 bar (its training residuals)", "Bands are conditional on the model"];
@@ -80,7 +81,7 @@ fn a_forecast_shows_its_levels_its_fan_and_its_warnings() {
 
 #[test]
 fn a_level_that_nothing_crosses_has_a_sentence_and_no_figure() {
-    let page = forecast_page(&forecast(vec![])).unwrap();
+    let page = without_scripts(&forecast_page(&forecast(vec![])).unwrap());
     assert_eq!(page.matches("<svg").count(), 1);
     assert!(page.contains("not crossed by any of 5 members up to 2"));
 }

@@ -12,7 +12,7 @@ use starlings_study::identify::Identification;
 use crate::ReportError;
 use crate::plot::figure::{Figure, Slot, Slots};
 
-type Draw = fn(&Identification) -> Result<Vec<Figure>, ReportError>;
+type Draw = fn(&Identification) -> Vec<Figure>;
 
 /// The places for figures, in the order of their sections, and what draws the figures of each.
 const SLOTS: [Slot<Draw>; 3] = [

@@ -2,41 +2,32 @@
 //!
 //! Next file to read: [`super::view`].
 
-use plotters::style::RGBColor;
 use starlings_models::spectrum::{Decay, ObserverSpectrum};
 
 use super::gains::Ways;
-use crate::ReportError;
+use super::plane::width;
 use crate::plot::axis::Axis;
+use crate::plot::drawing::place;
+use crate::plot::figure::Figure;
 use crate::plot::mark::{Mark, Point};
-use crate::plot::palette::MUTED;
-use crate::plot::scene::{Scene, picture};
+use crate::plot::palette::{Colour, LIMIT};
+use crate::plot::scene::Scene;
 
-/// Width and height of the figure, in figure units.
-const SIZE: (i32, i32) = (640, 300);
-
-/// A drawing and the places on it that the script needs.
+/// A figure and the places on it that the script needs.
 pub(super) struct DecayFigure {
-    /// One SVG element.
-    pub(super) svg: String,
+    pub(super) figure: Figure,
     /// Horizontal place of each gain; nothing for gain zero, which a logarithmic axis does not have.
     pub(super) cursor: Vec<Option<i32>>,
-    /// Upper and lower end of the figure's axes.
-    pub(super) height: Option<(i32, i32)>,
 }
 
 /// Draws −max Re λ of every observer over the gains of the page, with its best point.
-///
-/// # Errors
-///
-/// The drawing library refuses a mark.
 pub(super) fn draw(
     observers: &[ObserverSpectrum],
     ways: &[Ways],
     gains: &[f64],
-    colours: &[RGBColor],
+    (colours, names): (&[Colour], &[String]),
     (decay, unit): (Option<Decay>, &str),
-) -> Result<DecayFigure, ReportError> {
+) -> DecayFigure {
     let curves: Vec<Vec<Point>> = observers.iter().zip(ways).map(|(o, w)| curve(o, w, gains)).collect();
     let wanted = decay.map(|decay| -decay.max_re());
     let rates = || curves.iter().flatten().map(|point| point.1).chain(wanted);
@@ -47,11 +38,11 @@ pub(super) fn draw(
     let y = Axis::log_around(&format!("decay rate −max Re λ [{unit}]"), rates().filter(visible));
     let mut marks = Vec::new();
     if let Some(rate) = wanted {
-        marks.push(Mark::dashed_level((x.lo, x.hi), rate, MUTED));
+        marks.push(Mark::dashed_level((x.lo, x.hi), rate, LIMIT));
     }
     let n = curves.len();
     for (k, (curve, colour)) in curves.iter().zip(colours).enumerate() {
-        let width = 1.8 + 1.3 * (n - 1 - k) as f64;
+        let width = width(k, n);
         for part in curve.split(|point| !visible(&point.1)).filter(|part| part.len() > 1) {
             marks.push(Mark::Line { points: part.to_vec(), colour: *colour, width });
         }
@@ -63,19 +54,19 @@ pub(super) fn draw(
         }
     }
     let title = "How fast the slowest error decays".to_owned();
-    let description =
-        "Minus the largest real part of all poles against the gain. Dots are the best gains.".to_owned();
-    let (lo, hi) = (y.lo, y.hi);
-    let scene = Scene { title, description, x, y, marks };
-    let svg = picture(SIZE, &scene.title, &scene.description, |surface| scene.draw(surface))?;
-    let at = |gain: &f64| if *gain > 0.0 { (*gain, lo) } else { (f64::NAN, lo) };
-    let cursor = scene.positions(SIZE, &gains.iter().map(at).collect::<Vec<_>>())?;
-    let ends = scene.positions(SIZE, &[(scene.x.lo, hi), (scene.x.lo, lo)])?;
-    Ok(DecayFigure {
-        svg,
-        cursor: cursor.into_iter().map(|place| place.map(|(x, _)| x)).collect(),
-        height: ends[0].zip(ends[1]).map(|(upper, lower)| (upper.1, lower.1)),
-    })
+    let caption = "Minus the largest real part of all poles against the gain. Dots: best gains. A curve that bends down has its best \
+                   gain behind it.";
+    let lo = y.lo;
+    let scene = Scene { title, description: caption.to_owned(), x, y, marks };
+    let at =
+        |gain: &f64| place(&scene, (Some(*gain).filter(|g| *g > 0.0)?, lo)).map(|(x, _)| x.round() as i32);
+    let mut keys: Vec<(String, &str)> =
+        colours.iter().zip(names).map(|(c, name)| (format!("line {}", c.name), name.as_str())).collect();
+    if wanted.is_some() {
+        keys.push(("dash limit".to_owned(), "the wanted decay"));
+    }
+    let cursor = gains.iter().map(at).collect();
+    DecayFigure { figure: Figure::new(&scene, &keys, caption.to_owned()), cursor }
 }
 
 /// (gain, rate) of an observer: the gains of the page, and its best one between them.

@@ -3,7 +3,6 @@
 //! The template (`locus.html`) only arranges, and its script only moves what is drawn.
 
 use nalgebra::Complex;
-use plotters::style::RGBColor;
 use serde::Serialize;
 use serde_json::json;
 use starlings_models::spectrum::{Beyond, ObserverSpectrum, SpectrumError};
@@ -14,18 +13,10 @@ use super::gains::{Ways, frames, shown, ways};
 use super::{decay, plane};
 use crate::ReportError;
 use crate::number::{ABSENT, significant};
-use crate::plot::palette::{BLUE, GREEN, INK, VERMILION};
+use crate::plot::figure::Drawn;
+use crate::plot::palette::{Colour, EQUALS};
+use crate::plot::series;
 
-/// One colour per observer, safe for colour-blind readers (Okabe & Ito 2008).
-const COLOURS: [RGBColor; 7] = [
-    BLUE,
-    VERMILION,
-    GREEN,
-    RGBColor(0xCC, 0x79, 0xA7),
-    RGBColor(0xE6, 0x9F, 0x00),
-    RGBColor(0x56, 0xB4, 0xE9),
-    INK,
-];
 /// Poles in the table of slopes.
 const ROWS: usize = 10;
 
@@ -40,8 +31,8 @@ pub(super) struct View {
     unit: String,
     observers: Vec<ObserverView>,
     refused: Vec<(String, String)>,
-    plane: String,
-    decay: String,
+    plane: Drawn,
+    decay: Drawn,
     /// What the script moves, as JSON.
     data: String,
     gains: Vec<String>,
@@ -67,21 +58,22 @@ impl View {
     /// A pole cannot be followed or a figure cannot be drawn.
     pub(super) fn new(locus: &Locus<'_>) -> Result<Self, ReportError> {
         let unit = format!("1/{}", locus.time_unit);
-        let colours: Vec<RGBColor> = COLOURS.into_iter().cycle().take(locus.observers.len()).collect();
+        let colours: Vec<Colour> = EQUALS.into_iter().cycle().take(locus.observers.len()).collect();
+        let names: Vec<String> = locus.observers.iter().map(|o| o.name.clone()).collect();
         let shown = shown(locus.poles, locus.listed);
         let gains = frames(&shown, locus.observers);
         let ways = follow(locus.observers, &shown, &gains)?;
-        let plane = plane::draw(&shown, &ways, &colours, &unit)?;
-        let figure = decay::draw(locus.observers, &ways, &gains, &colours, (locus.decay, &unit))?;
-        let colour = |c: &RGBColor| format!("#{:02X}{:02X}{:02X}", c.0, c.1, c.2);
-        let hex: Vec<String> = colours.iter().map(colour).collect();
+        let equals = (colours.as_slice(), names.as_slice());
+        let plane = plane::draw(&shown, &ways, equals, &unit);
+        let figure = decay::draw(locus.observers, &ways, &gains, equals, (locus.decay, &unit));
+        let classes: Vec<&str> = colours.iter().map(|c| c.name).collect();
+        let buckets = series::buckets(0);
         let data = json!({
             "gain": gains.iter().map(|gain| significant(*gain, 3)).collect::<Vec<_>>(),
-            "colour": hex,
+            "colour": classes,
             "place": plane.positions,
             "rate": ways.iter().map(rates).collect::<Vec<_>>(),
             "cursor": figure.cursor,
-            "height": figure.height,
         });
         Ok(Self {
             script: include_str!("locus.js"),
@@ -89,10 +81,10 @@ impl View {
             says: locus.says.to_owned(),
             headline: headline(locus, &unit),
             facts: facts(locus, &unit),
-            observers: locus.observers.iter().zip(&hex).map(|(o, colour)| observer(o, colour)).collect(),
+            observers: locus.observers.iter().zip(&classes).map(|(o, colour)| observer(o, colour)).collect(),
             refused: locus.refused.to_vec(),
-            plane: with_overlay(&plane.svg, "<g id=\"poles\"></g>"),
-            decay: with_overlay(&figure.svg, "<line id=\"cursor\" stroke=\"#5B6670\" stroke-width=\"6\"/>"),
+            plane: plane.figure.drawn(buckets)?,
+            decay: figure.figure.drawn(buckets)?,
             // Inside a script element no text may close it.
             data: data.to_string().replace('<', "\\u003c"),
             gains: locus
@@ -209,11 +201,4 @@ fn gain_text(gain: f64) -> String {
 /// A real part; what only rounding keeps from zero is zero.
 fn rate_text(rate: f64) -> String {
     if rate.abs() < 1e-9 { "0".to_owned() } else { significant(rate, 5) }
-}
-
-/// A drawing with elements on top.
-fn with_overlay(svg: &str, overlay: &str) -> String {
-    svg.strip_suffix("</svg>\n")
-        .or_else(|| svg.strip_suffix("</svg>"))
-        .map_or_else(|| svg.to_owned(), |body| format!("{body}{overlay}</svg>"))
 }

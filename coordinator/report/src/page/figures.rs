@@ -9,6 +9,7 @@ mod field_map;
 pub(crate) mod fit;
 mod nis;
 mod observer;
+mod pairs;
 mod residual;
 mod run_times;
 mod track;
@@ -17,14 +18,20 @@ use crate::ReportError;
 use crate::data::ReportData;
 use crate::plot::figure::{Figure, Slot, Slots};
 
-type Draw = fn(&ReportData) -> Result<Vec<Figure>, ReportError>;
+type Draw = fn(&ReportData) -> Vec<Figure>;
 
 /// The places for figures, in the order of their sections, and what draws the figures of each.
-const SLOTS: [Slot<Draw>; 7] = [
+const SLOTS: [Slot<Draw>; 8] = [
     Slot::named("families", along::figures),
-    Slot::section("fit", "Predicted against measured", "No prediction was stored.", fit::figures),
-    Slot::section("residuals", "Residuals", "No residuals were stored.", residual::figures),
+    Slot::named("fit", fit::figures),
+    Slot::section(
+        "residuals",
+        "What the residuals have in common",
+        "No residuals were stored.",
+        residual::figures,
+    ),
     Slot::section("tracks", "Parameters over the run", "No analyses were stored.", track::figures),
+    Slot::named("pairs", pairs::figures),
     Slot::named("nis", nis::figures),
     Slot::named("observer", observer::figures),
     Slot::named("run_times", run_times::figures),

@@ -9,6 +9,8 @@ use super::super::number;
 const LARGEST: f64 = 1e300;
 /// Positive values below this stand at the edge of a logarithmic axis.
 const SMALLEST: f64 = 1e-300;
+/// A bar this many times as high as another asks for a logarithmic axis.
+const SLIVER: f64 = 40.0;
 /// No axis has more ticks than this, whatever is asked.
 const MOST: usize = 50;
 
@@ -81,12 +83,31 @@ impl Axis {
         }
     }
 
+    /// An axis for bars that stand on it, as high as something was counted: logarithmic where the highest would make slivers of the
+    /// lowest.
+    pub(crate) fn counts(label: &str, values: impl IntoIterator<Item = f64>) -> Self {
+        let counted: Vec<f64> = values.into_iter().filter(|v| v.is_finite() && *v > 0.0).collect();
+        let highest = counted.iter().copied().fold(1.0, f64::max).min(LARGEST);
+        let lowest = counted.iter().copied().fold(highest, f64::min);
+        let (lo, hi, scale) = if highest > SLIVER * lowest {
+            (0.5 * lowest, 1.3 * highest, Scale::Logarithmic)
+        } else {
+            (0.0, 1.1 * highest, Scale::Whole)
+        };
+        Self { label: label.to_owned(), lo, hi, scale }
+    }
+
     /// The same axis with free space above the values, for words.
     pub(crate) fn with_headroom(mut self) -> Self {
         if self.scale != Scale::Logarithmic {
             self.hi += 0.1 * (self.hi - self.lo);
         }
         self
+    }
+
+    /// Whether it is logarithmic.
+    pub(crate) fn is_log(&self) -> bool {
+        self.scale == Scale::Logarithmic
     }
 
     /// Where a value stands on the axis.

@@ -1,4 +1,5 @@
-//! A figure as the page shows it: the drawing, its caption and the meaning of its colours.
+//! A figure as the page shows it: one plot or several over the same axis, their caption, the meaning of their colours, and the
+//! numbers that the page's script shows under the pointer.
 
 use std::collections::BTreeMap;
 
@@ -6,6 +7,7 @@ use serde::Serialize;
 
 use super::super::ReportError;
 use super::scene::Scene;
+use super::series::{self, FigureData};
 
 /// A place on a page for the figures that `draw` gives.
 pub(crate) struct Slot<Draw> {
@@ -39,7 +41,7 @@ impl<Draw> Slot<Draw> {
 pub(crate) struct Slots {
     /// By the name of their slot.
     #[serde(flatten)]
-    by_name: BTreeMap<&'static str, Vec<Figure>>,
+    by_name: BTreeMap<&'static str, Vec<Drawn>>,
     /// The sections of their own: name, heading, what is said without figures.
     sections: Vec<[&'static str; 3]>,
 }
@@ -49,52 +51,131 @@ impl Slots {
     ///
     /// # Errors
     ///
-    /// A figure cannot be drawn.
+    /// The numbers of a figure cannot be written.
     pub(crate) fn draw<Draw>(
         slots: &[Slot<Draw>],
-        figures: impl Fn(&Draw) -> Result<Vec<Figure>, ReportError>,
+        figures: impl Fn(&Draw) -> Vec<Figure>,
     ) -> Result<Self, ReportError> {
         let sections = slots.iter().filter_map(|s| s.section.map(|(title, absent)| [s.name, title, absent]));
-        let by_name = slots.iter().map(|slot| Ok((slot.name, figures(&slot.draw)?)));
+        let all: Vec<(&'static str, Vec<Figure>)> =
+            slots.iter().map(|slot| (slot.name, figures(&slot.draw))).collect();
+        let long = all.iter().flat_map(|(_, figures)| figures).map(|f| f.data.n_long()).sum();
+        let buckets = series::buckets(long);
+        let drawn = |figure: Figure| figure.drawn(buckets);
+        let by_name = all.into_iter().map(|(name, figures)| {
+            Ok((name, figures.into_iter().map(drawn).collect::<Result<_, ReportError>>()?))
+        });
         Ok(Self { by_name: by_name.collect::<Result<_, ReportError>>()?, sections: sections.collect() })
     }
 }
 
-/// A drawing with the text that belongs to it.
-#[derive(Debug, Clone, Serialize)]
+/// One plot or several, with the text that belongs to them.
+#[derive(Debug, Clone)]
 pub(crate) struct Figure {
+    title: String,
+    plots: Vec<String>,
+    keys: Vec<Key>,
+    caption: String,
+    data: FigureData,
+}
+
+/// A figure, ready to be set.
+#[derive(Debug, Serialize)]
+pub(crate) struct Drawn {
     /// What is shown, in a few words.
-    pub(crate) title: String,
-    /// One SVG element.
-    pub(crate) svg: String,
+    title: String,
+    /// Elements of the page.
+    plots: Vec<String>,
     /// The meaning of the colours.
-    pub(crate) keys: Vec<Key>,
+    keys: Vec<Key>,
     /// The numbers of this figure and how to read it.
-    pub(crate) caption: String,
+    caption: String,
+    /// Its numbers, as JSON that can stand in a script element.
+    data: String,
 }
 
 /// One entry of the legend; `sample` is a class of the page's style sheet.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Key {
     /// Shape and colour, such as "line blue".
-    pub(crate) sample: &'static str,
+    pub(crate) sample: String,
     /// What it stands for.
-    pub(crate) text: &'static str,
+    pub(crate) text: String,
+}
+
+/// The entries of a legend.
+pub(crate) fn keys(entries: &[(impl AsRef<str>, impl AsRef<str>)]) -> Vec<Key> {
+    entries
+        .iter()
+        .map(|(sample, text)| Key { sample: sample.as_ref().to_owned(), text: text.as_ref().to_owned() })
+        .collect()
 }
 
 impl Figure {
     /// Draws `scene`.
+    pub(crate) fn new(
+        scene: &Scene,
+        entries: &[(impl AsRef<str>, impl AsRef<str>)],
+        caption: String,
+    ) -> Self {
+        let keys = keys(entries);
+        let data = FigureData::new(&[scene], &keys);
+        Self { title: scene.title.clone(), plots: vec![scene.html(&keys, "")], keys, caption, data }
+    }
+
+    /// Draws `scene` with a low one below it over the same horizontal axis, such as residuals below a fit.
+    pub(crate) fn with_below(
+        scene: &Scene,
+        below: &Scene,
+        entries: &[(impl AsRef<str>, impl AsRef<str>)],
+        caption: String,
+    ) -> Self {
+        let keys = keys(entries);
+        let data = FigureData::new(&[scene, below], &keys);
+        let left = scene.left().max(below.left());
+        let plots = vec![scene.html_with(&keys, "upper", left), below.html_with(&keys, "below", left)];
+        Self { title: scene.title.clone(), plots, keys, caption, data }
+    }
+
+    /// Draws a matrix of scenes, each with its row and column counted from 1; on a narrow screen they stand in one column.
+    pub(crate) fn matrix(
+        title: &str,
+        scenes: &[(Scene, (usize, usize))],
+        n_column: usize,
+        entries: &[(impl AsRef<str>, impl AsRef<str>)],
+        caption: String,
+    ) -> Self {
+        let keys = keys(entries);
+        let data = FigureData::new(&scenes.iter().map(|(scene, _)| scene).collect::<Vec<_>>(), &keys);
+        let plots = scenes.iter().map(|(scene, (row, column))| {
+            format!("<div style=\"grid-area:{row}/{column}\">{}</div>", scene.html(&keys, ""))
+        });
+        let plots = vec![format!(
+            "<div class=\"plots matrix\" style=\"--columns:{n_column}\">{}</div>",
+            plots.collect::<String>()
+        )];
+        Self { title: title.to_owned(), plots, keys, caption, data }
+    }
+
+    /// Draws a map: its marks are cells, which have no course to follow.
+    pub(crate) fn map(
+        scene: &Scene,
+        entries: &[(impl AsRef<str>, impl AsRef<str>)],
+        caption: String,
+    ) -> Self {
+        let keys = keys(entries);
+        let data = FigureData::new(&[scene], &[]);
+        Self { title: scene.title.clone(), plots: vec![scene.html(&keys, "")], keys, caption, data }
+    }
+
+    /// The figure, ready to be set; long series keep an envelope of so many buckets.
     ///
     /// # Errors
     ///
-    /// The scene cannot be drawn.
-    pub(crate) fn new(
-        scene: &Scene,
-        keys: &[(&'static str, &'static str)],
-        caption: String,
-    ) -> Result<Self, ReportError> {
-        let keys = keys.iter().map(|&(sample, text)| Key { sample, text }).collect();
-        Ok(Self { title: scene.title.clone(), svg: scene.svg()?, keys, caption })
+    /// Its numbers cannot be written.
+    pub(crate) fn drawn(self, buckets: usize) -> Result<Drawn, ReportError> {
+        let data = self.data.json(buckets)?;
+        Ok(Drawn { title: self.title, plots: self.plots, keys: self.keys, caption: self.caption, data })
     }
 }
 

@@ -1,10 +1,8 @@
 //! Measured values and the spans of a record that were fitted or held out, as marks.
 
-use plotters::style::RGBColor;
-
 use super::axis::Axis;
 use super::mark::Mark;
-use super::palette::{MUTED, SHADE, VERMILION};
+use super::palette::{Colour, MUTED, PURPLE, SHADE};
 use super::thin;
 
 /// At most this many measured values are drawn as dots.
@@ -13,7 +11,7 @@ const DOTS: usize = 160;
 /// The training span and the words above both spans.
 pub(crate) fn spans(trained: Option<[f64; 2]>, x: &Axis) -> Vec<Mark> {
     let Some([from, to]) = trained else {
-        return vec![Mark::Heading { x: x.lo, text: "held out".to_owned(), colour: VERMILION }];
+        return vec![Mark::Heading { x: x.lo, text: "held out".to_owned(), colour: PURPLE }];
     };
     let (from, to) = (from.clamp(x.lo, x.hi), to.clamp(x.lo, x.hi));
     let mut marks = vec![Mark::Span { from, to, colour: SHADE }];
@@ -22,13 +20,13 @@ pub(crate) fn spans(trained: Option<[f64; 2]>, x: &Axis) -> Vec<Mark> {
         marks.push(Mark::Heading { x: from, text: "training".to_owned(), colour: MUTED });
     }
     if room(x.hi - to) {
-        marks.push(Mark::Heading { x: to, text: "held out".to_owned(), colour: VERMILION });
+        marks.push(Mark::Heading { x: to, text: "held out".to_owned(), colour: PURPLE });
     }
     marks
 }
 
 /// Measured values: dots when they are few, otherwise a curve.
-pub(crate) fn measured(time: &[f64], value: &[f64], colour: RGBColor) -> Vec<Mark> {
+pub(crate) fn measured(time: &[f64], value: &[f64], colour: Colour) -> Vec<Mark> {
     let known: Vec<_> = time.iter().copied().zip(value.iter().copied()).filter(|p| p.1.is_finite()).collect();
     if drawn_as_dots(time) {
         return vec![Mark::Dots { points: known, colour, radius: 2.25 }];

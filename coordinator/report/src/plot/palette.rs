@@ -1,32 +1,55 @@
-//! Colours, safe for colour-blind readers, and the sizes of text and figures.
+//! Colours, safe for colour-blind readers, each with one meaning on every page.
 //!
-//! Okabe & Ito, "Color universal design" (2008). The page turns the neutral colours round on a dark screen by their exact
-//! values (see `report.css`), so a colour here and there must stay equal.
+//! Okabe & Ito, "Color universal design" (2008), some darker for contrast. A page takes them by name from `report.css`, which has
+//! them for dark screens too; the values here are for pictures that stand alone, and a test holds both equal.
 
-use plotters::style::RGBColor;
+/// A colour by its name in the style sheet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Colour {
+    /// Its name.
+    pub(crate) name: &'static str,
+    /// Its value on light paper, `#RRGGBB`.
+    pub(crate) hex: &'static str,
+}
+
+const fn colour(name: &'static str, hex: &'static str) -> Colour {
+    Colour { name, hex }
+}
 
 /// Text and measured values.
-pub(crate) const INK: RGBColor = RGBColor(0x1F, 0x29, 0x33);
-/// Axes, tick labels and secondary text.
-pub(crate) const MUTED: RGBColor = RGBColor(0x5B, 0x66, 0x70);
-/// Grid lines.
-pub(crate) const GRID: RGBColor = RGBColor(0xE4, 0xE8, 0xEB);
+pub(crate) const INK: Colour = colour("ink", "#1f2933");
+/// Axes, tick labels, reference lines and secondary text.
+pub(crate) const MUTED: Colour = colour("muted", "#55606a");
 /// The training span.
-pub(crate) const SHADE: RGBColor = RGBColor(0xF0, 0xF3, 0xF5);
-/// Prior, earlier passes.
-pub(crate) const GREY: RGBColor = RGBColor(0x9A, 0xA5, 0xAE);
-/// Prediction and posterior.
-pub(crate) const BLUE: RGBColor = RGBColor(0x00, 0x72, 0xB2);
-/// Held-out span.
-pub(crate) const VERMILION: RGBColor = RGBColor(0xD5, 0x5E, 0x00);
-/// Bands of what is expected.
-pub(crate) const GREEN: RGBColor = RGBColor(0x00, 0x9E, 0x73);
+pub(crate) const SHADE: Colour = colour("shade", "#edf1f4");
+/// Prior, earlier passes, others.
+pub(crate) const GREY: Colour = colour("grey", "#8a959e");
+/// Prediction and posterior; of an explanation, after.
+pub(crate) const BLUE: Colour = colour("blue", "#0067a3");
+/// Of an explanation, before: the model as it is.
+pub(crate) const VERMILION: Colour = colour("vermilion", "#b84a00");
+/// Held out: what no fit saw.
+pub(crate) const PURPLE: Colour = colour("purple", "#96348a");
+/// Bands of what noise or chance leaves.
+pub(crate) const GREEN: Colour = colour("green", "#007a59");
+/// Observed above predicted; positive.
+pub(crate) const ABOVE: Colour = colour("above", "#e69f00");
+/// Observed below predicted; negative.
+pub(crate) const BELOW: Colour = colour("below", "#56b4e9");
+/// A limit that somebody set: a level, a horizon, a threshold.
+pub(crate) const LIMIT: Colour = colour("limit", "#7a5c00");
 
-/// Drawing units per figure unit: the drawing library places everything on whole numbers, which would show as steps.
-pub(crate) const SUBUNITS: i32 = 4;
-/// Width of a figure, in figure units: on a 390 px wide screen one unit is about 0.73 px.
-pub(crate) const FIGURE_WIDTH: i32 = 480;
-/// Height of a figure, in figure units.
-pub(crate) const FIGURE_HEIGHT: i32 = 270;
-/// Size of text, in figure units.
-pub(crate) const TEXT: i32 = 15;
+/// Equals, told apart by the figure's legend alone: records, observers.
+pub(crate) const EQUALS: [Colour; 7] = [
+    colour("equal-1", "#0067a3"),
+    colour("equal-2", "#b84a00"),
+    colour("equal-3", "#007a59"),
+    colour("equal-4", "#96348a"),
+    colour("equal-5", "#7a5c00"),
+    colour("equal-6", "#2f86b5"),
+    colour("equal-7", "#1f2933"),
+];
+
+/// Every colour of a page.
+pub(crate) const ALL: [Colour; 11] =
+    [INK, MUTED, SHADE, GREY, BLUE, VERMILION, PURPLE, GREEN, ABOVE, BELOW, LIMIT];

@@ -1,13 +1,15 @@
-//! Long series become envelopes: the smallest and the largest value of every bucket of samples, so no peak is lost.
+//! Long series become envelopes: the smallest and the largest value of every bucket of the axis, so no peak is lost.
 //!
-//! Our own because plotters draws every point that it is given.
+//! Next file to read: `drawing.rs`, which draws them, and `series.rs`, which keeps a finer one for the page's zoom.
+
+use super::axis::Axis;
 
 /// Series of at most this many samples are drawn as they are.
-const PLAIN: usize = 900;
-/// Buckets of an envelope: about one per device pixel of a figure.
-const BUCKETS: usize = 400;
+pub(crate) const PLAIN: usize = 1200;
+/// Stretches of missing values shorter than this part of a long series do not part it: they are narrower than a pixel.
+const BRIDGED: usize = 800;
 
-/// One drawn sample: a value (`lo` = `hi`) or the range of a bucket.
+/// One sample: a value (`lo` = `hi`) or the ends of a band.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Sample {
     pub(crate) t: f64,
@@ -18,55 +20,60 @@ pub(crate) struct Sample {
 /// The series in parts without gaps; `lo` and `hi` are equal slices for a plain series. Not finite = missing = a gap.
 pub(crate) fn parts(time: &[f64], lo: &[f64], hi: &[f64]) -> Vec<Vec<Sample>> {
     let n = time.len().min(lo.len()).min(hi.len());
-    let stride = if n > PLAIN { n.div_ceil(BUCKETS) } else { 1 };
+    let bridged = if n > PLAIN { n / BRIDGED } else { 0 };
     let mut parts = vec![Vec::new()];
-    for start in (0..n).step_by(stride) {
-        let end = (start + stride).min(n);
-        match bucket(&time[start..end], &lo[start..end], &hi[start..end]) {
-            Some(sample) => {
-                if let Some(last) = parts.last_mut() {
-                    last.push(sample);
-                }
-            }
-            None => parts.push(Vec::new()),
+    let mut missing = 0;
+    for k in 0..n {
+        let sample = Sample { t: time[k], lo: lo[k], hi: hi[k] };
+        if !(sample.t.is_finite() && sample.lo.is_finite() && sample.hi.is_finite()) {
+            missing += 1;
+            continue;
+        }
+        if missing > bridged {
+            parts.push(Vec::new());
+        }
+        missing = 0;
+        if let Some(last) = parts.last_mut() {
+            last.push(sample);
         }
     }
     parts.retain(|part| !part.is_empty());
     parts
 }
 
-fn bucket(time: &[f64], lo: &[f64], hi: &[f64]) -> Option<Sample> {
-    let mut found: Option<Sample> = None;
-    for ((&t, &lo), &hi) in time.iter().zip(lo).zip(hi) {
-        if !(t.is_finite() && lo.is_finite() && hi.is_finite()) {
-            continue;
-        }
-        found = Some(match found {
-            None => Sample { t, lo, hi },
-            Some(s) => Sample { t: s.t, lo: s.lo.min(lo), hi: s.hi.max(hi) },
-        });
-    }
-    found
-}
-
-/// A part as a curve that touches both ends of every bucket's range.
+/// A part as a curve.
 pub(crate) fn curve(part: &[Sample]) -> Vec<(f64, f64)> {
-    let mut points = Vec::with_capacity(2 * part.len());
-    for (k, s) in part.iter().enumerate() {
-        if s.hi <= s.lo {
-            points.push((s.t, s.lo));
-        } else if k % 2 == 0 {
-            points.extend([(s.t, s.lo), (s.t, s.hi)]);
-        } else {
-            points.extend([(s.t, s.hi), (s.t, s.lo)]);
-        }
-    }
-    points
+    part.iter().map(|s| (s.t, s.lo)).collect()
 }
 
 /// A part as a band.
 pub(crate) fn band(part: &[Sample]) -> Vec<(f64, f64, f64)> {
     part.iter().map(|s| (s.t, s.lo, s.hi)).collect()
+}
+
+/// Smallest and largest value in each of `n` buckets of equal width on the axis; `None` where a bucket has no sample. What
+/// lies outside the axis is in the bucket at its end.
+pub(crate) fn envelope(
+    samples: impl Iterator<Item = (f64, f64, f64)>,
+    axis: &Axis,
+    n: usize,
+) -> Vec<Option<(f64, f64)>> {
+    let (first, last) = axis.ends();
+    let mut buckets: Vec<Option<(f64, f64)>> = vec![None; n];
+    for (t, lo, hi) in samples.filter(|s| s.0.is_finite() && s.1.is_finite() && s.2.is_finite()) {
+        let share = (axis.at(t) - first) / (last - first);
+        let at = ((share * n as f64).max(0.0) as usize).min(n.saturating_sub(1));
+        if let Some(bucket) = buckets.get_mut(at) {
+            *bucket = Some(bucket.map_or((lo, hi), |(a, b)| (a.min(lo), b.max(hi))));
+        }
+    }
+    buckets
+}
+
+/// Whether a series is long enough to be drawn as an envelope, and in order of the axis; missing values do not count.
+pub(crate) fn is_long(n: usize, x: impl Iterator<Item = f64>) -> bool {
+    let mut known = x.filter(|t| t.is_finite());
+    n > PLAIN && known.try_fold(f64::NEG_INFINITY, |last, t| (t >= last).then_some(t)).is_some()
 }
 
 #[cfg(test)]
@@ -76,14 +83,16 @@ mod tests {
 
     #[test]
     fn a_long_series_keeps_its_extremes() {
-        let time: Vec<f64> = (0..100_000).map(f64::from).collect();
         let mut value = vec![0.0; 100_000];
         value[54_321] = 7.0;
         value[12_345] = -3.0;
-        let parts = parts(&time, &value, &value);
-        assert!(parts[0].len() <= BUCKETS);
-        assert_eq!(parts[0].iter().map(|s| s.hi).fold(0.0, f64::max), 7.0);
-        assert_eq!(parts[0].iter().map(|s| s.lo).fold(0.0, f64::min), -3.0);
+        let axis = Axis::tight("t", [0.0, 99_999.0]);
+        let samples = value.iter().enumerate().map(|(k, v)| (k as f64, *v, *v));
+        let buckets = envelope(samples, &axis, 700);
+        assert_eq!(buckets.len(), 700);
+        assert_eq!(buckets.iter().flatten().map(|b| b.1).fold(0.0, f64::max), 7.0);
+        assert_eq!(buckets.iter().flatten().map(|b| b.0).fold(0.0, f64::min), -3.0);
+        assert_eq!(buckets[(54_321 * 700) / 99_999], Some((0.0, 7.0)), "the peak stands where it was");
     }
 
     #[test]
@@ -94,5 +103,13 @@ mod tests {
             parts.iter().map(|p| curve(p)).collect::<Vec<_>>(),
             [vec![(0.0, 1.0), (1.0, 2.0)], vec![(3.0, 4.0)]]
         );
+    }
+
+    #[test]
+    fn every_second_value_missing_leaves_a_long_series_whole() {
+        let n = 10_000;
+        let time: Vec<f64> = (0..n).map(f64::from).collect();
+        let value: Vec<f64> = (0..n).map(|k| if k % 2 == 0 { 1.0 } else { f64::NAN }).collect();
+        assert_eq!(parts(&time, &value, &value).len(), 1);
     }
 }

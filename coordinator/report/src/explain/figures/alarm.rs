@@ -5,18 +5,18 @@
 use starlings_explain::Figures;
 use starlings_explain::result::Explanation;
 
+use crate::number;
 use crate::plot::axis::Axis;
 use crate::plot::figure::Figure;
 use crate::plot::mark::Mark;
-use crate::plot::palette::{BLUE, GREY, INK, VERMILION};
+use crate::plot::palette::{BLUE, GREEN, GREY, LIMIT};
 use crate::plot::scene::Scene;
-use crate::{ReportError, number};
 
 /// Bins over the whole axis.
 const BINS: usize = 30;
 /// Smallest gain on a logarithmic axis.
 const LEAST: f64 = 0.1;
-/// A best gain this many times beyond everything else asks for a logarithmic axis.
+/// Gains that differ by more than this factor ask for a logarithmic axis, where none of them is a sliver.
 const FAR: f64 = 12.0;
 
 /// The gains of one search: falls of χ² in units of the effective noise.
@@ -33,29 +33,26 @@ struct Gains<'a> {
 }
 
 /// One histogram; none without any simulation or decoy.
-///
-/// # Errors
-///
-/// A figure cannot be drawn.
-pub(super) fn figures(found: &Explanation, data: &Figures) -> Result<Vec<Figure>, ReportError> {
+pub(super) fn figures(found: &Explanation, data: &Figures) -> Vec<Figure> {
     let gains = Gains {
         null: &data.null_gains,
         decoys: &data.decoy_gains,
         best: data.best_gain,
         threshold: found.false_alarm.threshold,
     };
-    Ok(figure(&gains)?.into_iter().collect())
+    figure(&gains).into_iter().collect()
 }
 
 /// Draws the histogram; `None` without any simulation or decoy.
-fn figure(gains: &Gains<'_>) -> Result<Option<Figure>, ReportError> {
+fn figure(gains: &Gains<'_>) -> Option<Figure> {
     let chance: Vec<f64> =
         gains.null.iter().chain(gains.decoys).copied().filter(|gain| gain.is_finite()).collect();
     if chance.is_empty() {
-        return Ok(None);
+        return None;
     }
     let others = chance.iter().copied().chain([gains.threshold]).filter(|gain| gain.is_finite());
-    let far = gains.best > FAR * others.clone().fold(LEAST, f64::max);
+    let smallest = others.clone().fold(f64::INFINITY, f64::min).max(LEAST);
+    let far = gains.best.max(others.clone().fold(LEAST, f64::max)) > FAR * smallest;
     let all = others.chain([gains.best]).filter(|gain| gain.is_finite());
     let label = "fall of χ², in units of the effective noise";
     let x = if far {
@@ -64,30 +61,29 @@ fn figure(gains: &Gains<'_>) -> Result<Option<Figure>, ReportError> {
         Axis::around(label, all.chain([0.0]))
     };
     let (null, decoys) = (counts(gains.null, &x), counts(gains.decoys, &x));
-    let highest = null.iter().chain(&decoys).copied().max().unwrap_or(0) as f64;
-    let y = Axis::tight("searches", [0.0, 1.15 * highest.max(1.0)]);
+    let y = Axis::counts("searches", null.iter().chain(&decoys).map(|n| *n as f64));
     let mut marks = vec![
-        Mark::Bars { bars: bars(&null, &x, (0.05, 0.5)), colour: BLUE },
+        Mark::Bars { bars: bars(&null, &x, (0.05, 0.5)), colour: GREEN },
         Mark::Bars { bars: bars(&decoys, &x, (0.5, 0.95)), colour: GREY },
     ];
     let upright = |at: f64| vec![(at, y.lo), (at, y.hi)];
     if gains.threshold.is_finite() {
-        marks.push(Mark::Dashes { points: upright(gains.threshold.max(x.lo)), colour: INK });
+        marks.push(Mark::Dashes { points: upright(gains.threshold.max(x.lo)), colour: LIMIT });
     }
     if gains.best.is_finite() {
-        marks.push(Mark::Line { points: upright(gains.best.max(x.lo)), colour: VERMILION, width: 2.5 });
+        marks.push(Mark::Line { points: upright(gains.best.max(x.lo)), colour: BLUE, width: 2.5 });
     }
     let edge = if far { " Gains below 0.1 stand at the left end." } else { "" };
     let caption = format!("{}{edge}", caption(gains));
     let title = "What chance would find".to_owned();
     let scene = Scene { title, description: caption.clone(), x, y, marks };
     let keys = [
-        ("area solid", "simulations without a gap"),
-        ("area grey", "decoys"),
-        ("dash ink", "threshold"),
-        ("line vermilion", "best candidate in the data"),
+        ("area solid green", "simulations without a gap"),
+        ("area solid grey", "decoys"),
+        ("dash limit", "threshold"),
+        ("line blue", "best candidate in the data"),
     ];
-    Figure::new(&scene, &keys, caption).map(Some)
+    Some(Figure::new(&scene, &keys, caption))
 }
 
 fn caption(gains: &Gains<'_>) -> String {

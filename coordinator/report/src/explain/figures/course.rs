@@ -6,13 +6,12 @@ use starlings_explain::result::{Explanation, GapRow};
 use starlings_explain::{Curve, Figures};
 use starlings_study::field::component_of;
 
-use crate::ReportError;
 use crate::explain::gap::{rows, words};
 use crate::number::quantity;
 use crate::plot::axis::Axis;
 use crate::plot::figure::{Figure, with_unit};
 use crate::plot::mark::Mark;
-use crate::plot::measured::{drawn_as_dots, measured, measured_key, spans};
+use crate::plot::measured::{measured, measured_key, spans};
 use crate::plot::palette::{BLUE, GREEN, INK, MUTED, VERMILION};
 use crate::plot::scene::Scene;
 
@@ -22,18 +21,17 @@ const CURVES: usize = 24;
 const FEW: usize = 3;
 
 /// Of every curve that is drawn the values and the residuals.
-///
-/// # Errors
-///
-/// A figure cannot be drawn.
-pub(super) fn figures(found: &Explanation, data: &Figures) -> Result<Vec<Figure>, ReportError> {
+pub(super) fn figures(found: &Explanation, data: &Figures) -> Vec<Figure> {
     let rows = rows(found, data);
     let mut figures = Vec::new();
     for curve in shown(&data.curves).into_iter().take(CURVES) {
-        figures.push(values(curve, &data.time_unit, &numbers(curve, &rows))?);
-        figures.push(residuals(curve, &data.time_unit)?);
+        let (upper, mut keys) = values(curve, &data.time_unit, &numbers(curve, &rows));
+        let below = residuals(curve, &data.time_unit);
+        keys.push(("area green", "± 2 noise sd"));
+        let caption = format!("{} {}", upper.description, below.description);
+        figures.push(Figure::with_below(&upper, &below, &keys, caption));
     }
-    Ok(figures)
+    figures
 }
 
 /// How many curves are not drawn.
@@ -52,8 +50,11 @@ fn shown(curves: &[Curve]) -> Vec<&Curve> {
     groups.flat_map(|group| pick(group).into_iter().map(move |k| &group[k])).collect()
 }
 
-/// Draws one channel of one record; `numbers` is the sentence with its errors.
-fn values(curve: &Curve, time_unit: &str, numbers: &str) -> Result<Figure, ReportError> {
+/// What a legend says: a sample, and its meaning.
+type Entries = Vec<(&'static str, &'static str)>;
+
+/// One channel of one record with its legend; `numbers` is the sentence with its errors.
+fn values(curve: &Curve, time_unit: &str, numbers: &str) -> (Scene, Entries) {
     let series = [&curve.observed, &curve.before, &curve.after];
     let label = with_unit(&curve.channel, &curve.unit);
     let y = Axis::around(&label, series.into_iter().flatten().copied()).with_headroom();
@@ -63,9 +64,9 @@ fn values(curve: &Curve, time_unit: &str, numbers: &str) -> Result<Figure, Repor
     marks.extend(Mark::curve(&curve.time, &curve.before, VERMILION, 1.75));
     marks.extend(Mark::curve(&curve.time, &curve.after, BLUE, 2.0));
     let mut keys =
-        vec![(measured_key(&curve.time), "measured"), ("line vermilion", "simulated by the model as it is")];
+        vec![(measured_key(&curve.time), "measured"), ("line dot vermilion", "before: the model as it is")];
     if !curve.after.is_empty() {
-        keys.push(("line blue", "simulated with the effect"));
+        keys.push(("line dot blue", "after: with the effect"));
     }
     keys.extend(shade_key(curve));
     let see = if curve.after.is_empty() {
@@ -75,33 +76,26 @@ fn values(curve: &Curve, time_unit: &str, numbers: &str) -> Result<Figure, Repor
     };
     let title = format!("{}, record {}: measured and simulated", curve.channel, curve.record);
     let caption = format!("{numbers} {see}");
-    let scene = Scene { title, description: caption.clone(), x, y, marks };
-    Figure::new(&scene, &keys, caption)
+    (Scene { title, description: caption, x, y, marks }, keys)
 }
 
-/// Draws the residuals of one channel of one record.
-fn residuals(curve: &Curve, time_unit: &str) -> Result<Figure, ReportError> {
+/// The residuals of one channel of one record.
+fn residuals(curve: &Curve, time_unit: &str) -> Scene {
     let of =
         |simulated: &[f64]| curve.observed.iter().zip(simulated).map(|(o, s)| o - s).collect::<Vec<f64>>();
     let (before, after) = (of(&curve.before), of(&curve.after));
     let margin = if curve.noise.is_finite() { 2.0 * curve.noise.abs() } else { 0.0 };
-    let label = with_unit(&format!("{}, observed − predicted", curve.channel), &curve.unit);
+    let label = with_unit("observed − predicted", &curve.unit);
     let reach = before.iter().chain(&after).copied().chain([-margin, margin]);
     let y = Axis::around(&label, reach).with_headroom();
     let x = time_axis(curve, time_unit);
     let ends = (x.lo, x.hi);
-    let mut marks = background(curve, &x);
+    let is_span = |mark: &Mark| matches!(mark, Mark::Span { .. });
+    let mut marks: Vec<Mark> = background(curve, &x).into_iter().filter(is_span).collect();
     marks.push(Mark::flat_band(ends, (-margin, margin), GREEN, 0.16));
     marks.push(Mark::level(ends, 0.0, MUTED));
     marks.extend(measured(&curve.time, &before, VERMILION));
     marks.extend(measured(&curve.time, &after, BLUE));
-    let dots = drawn_as_dots(&curve.time);
-    let mut keys = vec![(if dots { "dot vermilion" } else { "line vermilion" }, "residual before")];
-    if !after.is_empty() {
-        keys.push((if dots { "dot blue" } else { "line blue" }, "residual after"));
-    }
-    keys.push(("area green", "± 2 noise sd"));
-    keys.extend(shade_key(curve));
     let caption = if after.is_empty() {
         "What stays outside the band is the gap; a pattern that repeats is an effect that the model lacks."
             .to_owned()
@@ -110,8 +104,7 @@ fn residuals(curve: &Curve, time_unit: &str) -> Result<Figure, ReportError> {
             .to_owned()
     };
     let title = format!("{}, record {}: residuals", curve.channel, curve.record);
-    let scene = Scene { title, description: caption.clone(), x, y, marks };
-    Figure::new(&scene, &keys, caption)
+    Scene { title, description: caption, x, y, marks }
 }
 
 /// The errors of one curve, as a sentence.
@@ -147,7 +140,7 @@ fn trained(curve: &Curve) -> Option<[f64; 2]> {
     curve.train.filter(|span| !curve.held_out && span.iter().all(|end| end.is_finite()))
 }
 
-/// The spans, their words in the colour of secondary text: vermilion and blue mean before and after here.
+/// The spans, their words in the colour of secondary text.
 fn background(curve: &Curve, x: &Axis) -> Vec<Mark> {
     let plain = |mark| match mark {
         Mark::Heading { x, text, .. } => Mark::Heading { x, text, colour: MUTED },

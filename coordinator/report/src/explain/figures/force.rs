@@ -7,13 +7,13 @@ use starlings_explain::Figures;
 use starlings_explain::locate::UnknownInput;
 use starlings_explain::result::Explanation;
 
+use crate::number;
 use crate::plot::axis::Axis;
 use crate::plot::figure::{Figure, with_unit};
 use crate::plot::mark::Mark;
 use crate::plot::palette::{BLUE, MUTED};
 use crate::plot::scene::Scene;
 use crate::plot::thin;
-use crate::{ReportError, number};
 
 /// Unknown inputs drawn at most.
 const FORCES: usize = 8;
@@ -21,23 +21,19 @@ const FORCES: usize = 8;
 const DOTS: usize = 240;
 
 /// The inputs that gain most, each against time and against its state.
-///
-/// # Errors
-///
-/// A figure cannot be drawn.
-pub(super) fn figures(_: &Explanation, data: &Figures) -> Result<Vec<Figure>, ReportError> {
+pub(super) fn figures(_: &Explanation, data: &Figures) -> Vec<Figure> {
     let mut order: Vec<&UnknownInput> = data.before.forces.iter().filter(|f| !f.time.is_empty()).collect();
     order.sort_by(|a, b| b.log_likelihood_gain.total_cmp(&a.log_likelihood_gain));
     let mut figures = Vec::new();
     for input in order.into_iter().take(FORCES) {
-        figures.push(over_time(input, &data.time_unit)?);
-        figures.push(over_state(input)?);
+        figures.push(over_time(input, &data.time_unit));
+        figures.push(over_state(input));
     }
-    Ok(figures)
+    figures
 }
 
 /// Draws the input against time.
-fn over_time(input: &UnknownInput, time_unit: &str) -> Result<Figure, ReportError> {
+fn over_time(input: &UnknownInput, time_unit: &str) -> Figure {
     let side = |sign: f64| -> Vec<f64> {
         let sd = |k: usize| input.sd.get(k).copied().filter(|sd| sd.is_finite()).unwrap_or(0.0);
         input.value.iter().enumerate().map(|(k, v)| v + sign * 2.0 * sd(k)).collect()
@@ -67,7 +63,7 @@ fn over_time(input: &UnknownInput, time_unit: &str) -> Result<Figure, ReportErro
 }
 
 /// Draws the input against the state.
-fn over_state(input: &UnknownInput) -> Result<Figure, ReportError> {
+fn over_state(input: &UnknownInput) -> Figure {
     let points: Vec<(f64, f64)> = input.at.iter().copied().zip(input.value.iter().copied()).collect();
     let points: Vec<_> = points.into_iter().filter(|p| p.0.is_finite() && p.1.is_finite()).collect();
     let stride = points.len().div_ceil(DOTS).max(1);

@@ -7,12 +7,11 @@ use starlings_explain::Figures;
 use starlings_explain::locate::RegionMap;
 use starlings_explain::result::Explanation;
 
-use crate::ReportError;
 use crate::number::{self, quantity};
 use crate::plot::axis::Axis;
 use crate::plot::figure::{Figure, with_unit};
 use crate::plot::mark::Mark;
-use crate::plot::palette::{BLUE, GREEN, GREY, INK, MUTED, VERMILION};
+use crate::plot::palette::{ABOVE, BELOW, GREEN, GREY, INK, MUTED};
 use crate::plot::scene::Scene;
 
 /// Maps drawn at most.
@@ -36,11 +35,7 @@ impl Bin {
 }
 
 /// The maps that account for most of the residuals, each beside itself with the effects.
-///
-/// # Errors
-///
-/// A figure cannot be drawn.
-pub(super) fn figures(_: &Explanation, data: &Figures) -> Result<Vec<Figure>, ReportError> {
+pub(super) fn figures(_: &Explanation, data: &Figures) -> Vec<Figure> {
     let mut order: Vec<&RegionMap> = data.before.maps.iter().collect();
     order.sort_by(|a, b| b.explained.total_cmp(&a.explained));
     let mut figures = Vec::new();
@@ -49,19 +44,19 @@ pub(super) fn figures(_: &Explanation, data: &Figures) -> Result<Vec<Figure>, Re
         let after = data.maps_after.iter().find(same);
         let alike: Vec<&RegionMap> = [Some(before), after].into_iter().flatten().collect();
         let word = if after.is_some() { "before" } else { "the model as it is" };
-        figures.extend(figure(before, word, &alike)?);
+        figures.extend(figure(before, word, &alike));
         if let Some(after) = after {
-            figures.extend(figure(after, "after", &alike)?);
+            figures.extend(figure(after, "after", &alike));
         }
     }
-    Ok(figures)
+    figures
 }
 
 /// Draws `map`, on the scale of all of `alike`; `None` when it has no bin with values.
-fn figure(map: &RegionMap, when: &str, alike: &[&RegionMap]) -> Result<Option<Figure>, ReportError> {
+fn figure(map: &RegionMap, when: &str, alike: &[&RegionMap]) -> Option<Figure> {
     let bins = bins(map);
     if bins.is_empty() {
-        return Ok(None);
+        return None;
     }
     let all: Vec<Bin> = alike.iter().flat_map(|other| self::bins(other)).collect();
     let title = match &map.y {
@@ -71,13 +66,13 @@ fn figure(map: &RegionMap, when: &str, alike: &[&RegionMap]) -> Result<Option<Fi
     let x = Axis::tight(&with_unit(&map.x.0, &map.x.1), map.x_edges.iter().copied());
     let worst = worst(map, &bins);
     let drawn = match &map.y {
-        None => one_signal(map, &bins, &all, (title, x, worst))?,
+        None => one_signal(map, &bins, &all, (title, x, worst)),
         Some((name, unit)) => {
             let y = Axis::tight(&with_unit(name, unit), map.y_edges.iter().copied());
-            two_signals(map, &bins, &all, (title, x, y, worst))?
+            two_signals(map, &bins, &all, (title, x, y, worst))
         }
     };
-    Ok(Some(drawn))
+    Some(drawn)
 }
 
 fn one_signal(
@@ -85,7 +80,7 @@ fn one_signal(
     bins: &[Bin],
     all: &[Bin],
     (title, x, worst): (String, Axis, String),
-) -> Result<Figure, ReportError> {
+) -> Figure {
     let noise = if map.noise.is_finite() { map.noise.abs() } else { 0.0 };
     let reach = all.iter().flat_map(|b| [b.bias - b.scatter(), b.bias + b.scatter()]);
     let label = with_unit(&format!("{}, mean of observed − predicted", map.channel), &map.unit);
@@ -95,7 +90,7 @@ fn one_signal(
     for bin in bins {
         let (from, to) = bin.x;
         let inset = 0.05 * (to - from);
-        let colour = if bin.bias > 0.0 { VERMILION } else { BLUE };
+        let colour = if bin.bias > 0.0 { ABOVE } else { BELOW };
         let sides = (bin.bias.min(0.0), bin.bias.max(0.0));
         marks.push(Mark::flat_band((from + inset, to - inset), sides, colour, 0.75));
         let middle = 0.5 * (from + to);
@@ -106,9 +101,9 @@ fn one_signal(
     let caption = format!("{worst} Bars that stay within the band are no more than noise would leave.");
     let scene = Scene { title, description: caption.clone(), x, y, marks };
     let keys = [
-        ("area solid vermilion", "observed above predicted"),
-        ("area solid blue", "below"),
-        ("tick", "± sd within the bin"),
+        ("area solid above", "observed above predicted"),
+        ("area solid below", "below"),
+        ("tick ink", "± sd within the bin"),
         ("area green", "± noise sd"),
     ];
     Figure::new(&scene, &keys, caption)
@@ -119,14 +114,14 @@ fn two_signals(
     bins: &[Bin],
     all: &[Bin],
     (title, x, y, worst): (String, Axis, Axis, String),
-) -> Result<Figure, ReportError> {
+) -> Figure {
     // Colour begins at the noise, so that a map of noise alone stays pale.
     let scale = all.iter().map(|b| b.bias.abs()).fold(map.noise.abs().max(f64::MIN_POSITIVE), f64::max);
     let mut marks = Vec::new();
     for bin in bins {
         let Some(side) = bin.y else { continue };
         marks.push(Mark::flat_band(bin.x, side, GREY, 0.15));
-        let colour = if bin.bias > 0.0 { VERMILION } else { BLUE };
+        let colour = if bin.bias > 0.0 { ABOVE } else { BELOW };
         let share = (bin.bias.abs() / scale).min(1.0);
         if share > 0.02 {
             marks.push(Mark::flat_band(bin.x, side, colour, 0.9 * share));
@@ -138,11 +133,11 @@ fn two_signals(
     );
     let scene = Scene { title, description: caption.clone(), x, y, marks };
     let keys = [
-        ("area solid vermilion", "observed above predicted"),
-        ("area solid blue", "below"),
+        ("area solid above", "observed above predicted"),
+        ("area solid below", "below"),
         ("area grey-pale", "visited"),
     ];
-    Figure::new(&scene, &keys, caption)
+    Figure::map(&scene, &keys, caption)
 }
 
 /// The bin with the largest mean square, in words.

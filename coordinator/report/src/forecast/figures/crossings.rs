@@ -3,26 +3,21 @@
 use starlings_study::forecast::Forecast;
 use starlings_study::forecast::result::LevelForecast;
 
-use crate::ReportError;
 use crate::plot::axis::Axis;
 use crate::plot::figure::{Figure, with_unit};
 use crate::plot::mark::Mark;
-use crate::plot::palette::{BLUE, GREY, MUTED, VERMILION};
+use crate::plot::palette::{BLUE, GREY, LIMIT, MUTED};
 use crate::plot::scene::Scene;
 
 /// Intervals of the histogram.
 const BINS: usize = 24;
 
 /// One figure per level that is crossed.
-///
-/// # Errors
-///
-/// A figure cannot be drawn.
-pub(super) fn figures(found: &Forecast) -> Result<Vec<Figure>, ReportError> {
+pub(super) fn figures(found: &Forecast) -> Vec<Figure> {
     found.levels.iter().filter(|level| !level.times.is_empty()).map(|level| figure(found, level)).collect()
 }
 
-fn figure(found: &Forecast, level: &LevelForecast) -> Result<Figure, ReportError> {
+fn figure(found: &Forecast, level: &LevelForecast) -> Figure {
     let n = (level.crossed + level.never) as f64;
     let (first, last) = (level.times[0], level.times[level.times.len() - 1]);
     let margin = 0.05 * (last - first).max(1e-3 * (found.until - found.from));
@@ -45,15 +40,15 @@ fn figure(found: &Forecast, level: &LevelForecast) -> Result<Figure, ReportError
     marks.push(Mark::Line { points: steps, colour: BLUE, width: 2.0 });
     marks.push(Mark::dashed_level((x.lo, x.hi), 0.5, MUTED));
     if let Some(horizon) = level.horizon.filter(|t| (lo..=hi).contains(t)) {
-        marks.push(Mark::Dashes { points: vec![(horizon, 0.0), (horizon, 1.0)], colour: VERMILION });
+        marks.push(Mark::Dashes { points: vec![(horizon, 0.0), (horizon, 1.0)], colour: LIMIT });
     }
     let caption = format!("{}.", level.says);
     let title = format!("{}: when", level.says.split(':').next().unwrap_or_default());
     let scene = Scene { title, description: caption.clone(), x, y, marks };
     let keys = [
         ("line blue", "share that has crossed"),
-        ("area grey", "share per interval"),
-        ("line dash vermilion", "horizon"),
+        ("area solid grey", "share per interval"),
+        ("dash limit", "horizon"),
     ];
     let n_key = if level.horizon.is_some() { 3 } else { 2 };
     Figure::new(&scene, &keys[..n_key], caption)

@@ -4,25 +4,20 @@ use starlings_estimators::forecast::Fan;
 use starlings_study::forecast::Forecast;
 use starlings_study::forecast::result::OutputForecast;
 
-use crate::ReportError;
 use crate::plot::axis::Axis;
 use crate::plot::figure::{Figure, with_unit};
 use crate::plot::mark::Mark;
 use crate::plot::measured::{measured, measured_key};
-use crate::plot::palette::{BLUE, GREY, INK, VERMILION};
+use crate::plot::palette::{BLUE, Colour, GREEN, INK, LIMIT};
 use crate::plot::scene::Scene;
 use crate::plot::thin;
 
 /// One figure per output.
-///
-/// # Errors
-///
-/// A figure cannot be drawn.
-pub(super) fn figures(found: &Forecast) -> Result<Vec<Figure>, ReportError> {
+pub(super) fn figures(found: &Forecast) -> Vec<Figure> {
     found.outputs.iter().map(|output| figure(found, output)).collect()
 }
 
-fn figure(found: &Forecast, output: &OutputForecast) -> Result<Figure, ReportError> {
+fn figure(found: &Forecast, output: &OutputForecast) -> Figure {
     let fan = &output.fan;
     let (time, value): (Vec<f64>, Vec<f64>) = output.observed.iter().copied().unzip();
     let levels: Vec<f64> =
@@ -33,24 +28,24 @@ fn figure(found: &Forecast, output: &OutputForecast) -> Result<Figure, ReportErr
     let ends = (x.lo, x.hi);
     let mut marks = Vec::new();
     if let Some(wider) = &output.measured {
-        marks.extend(band(wider, 0.05, 0.95, GREY, 0.3));
+        marks.extend(band(wider, 0.05, 0.95, GREEN, 0.16));
     }
     marks.extend(band(fan, 0.05, 0.95, BLUE, 0.25));
     marks.extend(band(fan, 0.25, 0.75, BLUE, 0.45));
     marks.extend(row(fan, 0.5).into_iter().flat_map(|m| Mark::curve(&fan.times, m, BLUE, 1.75)));
     marks.extend(measured(&time, &value, INK));
-    marks.extend(levels.iter().map(|level| Mark::dashed_level(ends, *level, VERMILION)));
+    marks.extend(levels.iter().map(|level| Mark::dashed_level(ends, *level, LIMIT)));
     let caption =
         "Half of the members run within the darker band, nine in ten within the lighter one.".to_owned();
     let mut keys = vec![("line blue", "median"), ("area blue", "50 and 90\u{a0}% of the members")];
     if output.measured.is_some() {
-        keys.push(("area grey", "90\u{a0}% of what would be measured"));
+        keys.push(("area green", "90\u{a0}% of what would be measured"));
     }
     if !time.is_empty() {
         keys.push((measured_key(&time), "measured"));
     }
     if !levels.is_empty() {
-        keys.push(("line dash vermilion", "level"));
+        keys.push(("dash limit", "level"));
     }
     let title = format!("{}: forecast", output.output);
     let scene = Scene { title, description: caption.clone(), x, y, marks };
@@ -63,7 +58,7 @@ fn row(fan: &Fan, p: f64) -> Option<&Vec<f64>> {
     fan.quantiles.get(at)
 }
 
-fn band(fan: &Fan, lo: f64, hi: f64, colour: plotters::style::RGBColor, opacity: f64) -> Vec<Mark> {
+fn band(fan: &Fan, lo: f64, hi: f64, colour: Colour, opacity: f64) -> Vec<Mark> {
     let (Some(lo), Some(hi)) = (row(fan, lo), row(fan, hi)) else { return Vec::new() };
     let parts = thin::parts(&fan.times, lo, hi);
     parts.iter().map(|part| Mark::Band { points: thin::band(part), colour, opacity }).collect()

@@ -2,22 +2,17 @@
 
 use starlings_study::identify::Identification;
 
-use crate::ReportError;
 use crate::plot::axis::Axis;
 use crate::plot::figure::Figure;
 use crate::plot::mark::Mark;
-use crate::plot::palette::{BLUE, MUTED};
+use crate::plot::palette::{BLUE, LIMIT};
 use crate::plot::scene::Scene;
 
 /// Collinearity index that Brun, Reichert & Künsch (2001) call critical.
 const CRITICAL: f64 = 10.0;
 
 /// One figure: the index of the best conditioned subset of every size; none without subsets.
-///
-/// # Errors
-///
-/// A figure cannot be drawn.
-pub(super) fn figures(found: &Identification) -> Result<Vec<Figure>, ReportError> {
+pub(super) fn figures(found: &Identification) -> Vec<Figure> {
     let points: Vec<(f64, f64)> = found
         .collinearity
         .growing
@@ -25,12 +20,12 @@ pub(super) fn figures(found: &Identification) -> Result<Vec<Figure>, ReportError
         .filter_map(|subset| Some((subset.parameters.len() as f64, subset.index?)))
         .collect();
     if points.is_empty() {
-        return Ok(Vec::new());
+        return Vec::new();
     }
     let x = Axis::over_run("parameters in the subset", points.iter().map(|p| p.0));
     let y = Axis::log_around("collinearity index", points.iter().map(|p| p.1).chain([1.0, CRITICAL]));
     let marks = vec![
-        Mark::dashed_level((x.lo, x.hi), CRITICAL, MUTED),
+        Mark::dashed_level((x.lo, x.hi), CRITICAL, LIMIT),
         Mark::Line { points: points.clone(), colour: BLUE, width: 1.75 },
         Mark::Dots { points: points.clone(), colour: BLUE, radius: 3.0 },
     ];
@@ -41,6 +36,6 @@ pub(super) fn figures(found: &Identification) -> Result<Vec<Figure>, ReportError
     );
     let title = "Collinearity of growing subsets".to_owned();
     let scene = Scene { title, description: caption.clone(), x, y, marks };
-    let keys = [("dot blue", "best conditioned subset"), ("dash muted", "critical")];
-    Ok(vec![Figure::new(&scene, &keys, caption)?])
+    let keys = [("dot blue", "best conditioned subset"), ("dash limit", "critical")];
+    vec![Figure::new(&scene, &keys, caption)]
 }

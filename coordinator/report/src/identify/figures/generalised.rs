@@ -2,7 +2,6 @@
 
 use starlings_study::identify::Identification;
 
-use crate::ReportError;
 use crate::number;
 use crate::plot::axis::Axis;
 use crate::plot::figure::{Figure, with_unit};
@@ -11,11 +10,7 @@ use crate::plot::palette::{BLUE, GREY, MUTED};
 use crate::plot::scene::Scene;
 
 /// One figure per parameter with a generalised sensitivity function, the others behind it.
-///
-/// # Errors
-///
-/// A figure cannot be drawn.
-pub(super) fn figures(found: &Identification) -> Result<Vec<Figure>, ReportError> {
+pub(super) fn figures(found: &Identification) -> Vec<Figure> {
     let series = &found.gsf;
     // Times of several records overlap: then the observation times are counted.
     let one = found.records.len() < 2;

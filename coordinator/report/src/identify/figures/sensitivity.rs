@@ -1,56 +1,80 @@
-//! How strongly the predictions of each time answer to each parameter.
+//! How the prediction of each observed value answers to each parameter, with its sign.
+//!
+//! Next file to read: [`super::generalised`].
 
-use plotters::style::RGBColor;
 use starlings_study::identify::Identification;
-use starlings_study::identify::result::RecordSteps;
 
-use crate::ReportError;
 use crate::number;
 use crate::plot::axis::Axis;
 use crate::plot::figure::{Figure, with_unit};
 use crate::plot::mark::Mark;
-use crate::plot::palette::{BLUE, GREEN, INK, MUTED, VERMILION};
+use crate::plot::palette::{EQUALS, MUTED};
 use crate::plot::scene::Scene;
 
-/// Colours of the records, and their names in a caption.
-const RECORDS: [(RGBColor, &str); 4] =
-    [(BLUE, "blue"), (VERMILION, "vermilion"), (GREEN, "green"), (INK, "black")];
-
-/// One figure per parameter: how strongly the predictions of each time answer to it.
-///
-/// # Errors
-///
-/// A figure cannot be drawn.
-pub(super) fn figures(found: &Identification) -> Result<Vec<Figure>, ReportError> {
-    let series = &found.sensitivity;
-    let largest = |curve: &[f64]| curve.iter().copied().fold(0.0, f64::max);
-    let figure = |(name, curve): (&String, &Vec<f64>)| {
-        let x = Axis::tight(&with_unit("time", &found.time_unit), series.time.iter().copied());
-        let y = Axis::around("change of the predictions [noise sd per prior sd]", [0.0, largest(curve)]);
-        let mut marks = vec![Mark::level((x.lo, x.hi), 0.0, MUTED)];
-        for (k, record) in found.records.iter().enumerate() {
-            let span = record.first..(record.first + record.n).min(curve.len());
-            let colour = RECORDS[k % RECORDS.len()].0;
-            marks.extend(Mark::curve(&series.time[span.clone()], &curve[span], colour, 1.75));
-        }
-        let caption = format!(
-            "At most {} noise sd for one prior sd.{} Where the curve is at zero, a datum says nothing of {name}.",
-            number::significant(largest(curve), 2),
-            record_names(found)
-        );
-        let title = format!("{name}: sensitivity");
-        let scene = Scene { title, description: caption.clone(), x, y, marks };
-        let key = if found.records.len() < 2 { "sensitivity" } else { "first record" };
-        Figure::new(&scene, &[("line blue", key)], caption)
-    };
-    series.curves.iter().filter_map(|(name, curve)| Some((name, curve.as_ref()?))).map(figure).collect()
+/// The sensitivities of one output in one record.
+struct Course {
+    name: String,
+    /// Rows of the sensitivities.
+    rows: Vec<usize>,
 }
 
-fn record_names(found: &Identification) -> String {
-    if found.records.len() < 2 {
-        return String::new();
+/// One figure per parameter, all on the same axes: by how many noise sd a prediction changes when the parameter is one prior sd
+/// larger.
+pub(super) fn figures(found: &Identification) -> Vec<Figure> {
+    let all = courses(found);
+    let shown = &all[..all.len().min(EQUALS.len())];
+    let times = shown.iter().flat_map(|course| course.rows.iter().map(|row| found.rows[*row].time));
+    let x = Axis::tight(&with_unit("time", &found.time_unit), times);
+    let n = found.parameters.len().min(found.whitened.ncols());
+    let figure = |j: usize| {
+        let parameter = &found.parameters[j];
+        let value = |row: &usize| found.whitened[(*row, j)] * parameter.prior_sd;
+        let values = || shown.iter().flat_map(|course| course.rows.iter().map(value));
+        let y = Axis::around("change of the prediction [noise sd per prior sd]", values().chain([0.0]));
+        let mut marks = vec![Mark::level((x.lo, x.hi), 0.0, MUTED)];
+        for (course, colour) in shown.iter().zip(EQUALS) {
+            let time: Vec<f64> = course.rows.iter().map(|row| found.rows[*row].time).collect();
+            let change: Vec<f64> = course.rows.iter().map(value).collect();
+            marks.extend(Mark::curve(&time, &change, colour, 1.75));
+        }
+        let extreme = values().fold(0.0_f64, |most, v| if v.abs() > most.abs() { v } else { most });
+        let more = match all.len() - shown.len() {
+            0 => String::new(),
+            more => format!(" {more} courses more are in the table that --csv writes."),
+        };
+        let caption = format!(
+            "At most {} noise sd for one prior sd. Where the curve is at zero, a datum says nothing of {}; two parameters whose \
+             curves are alike, or mirror images, cannot be told apart.{more}",
+            number::significant(extreme, 2),
+            parameter.name
+        );
+        let title = format!("{}: sensitivity", parameter.name);
+        let scene = Scene { title, description: caption.clone(), x: x.clone(), y, marks };
+        let keys: Vec<(String, &str)> =
+            shown.iter().zip(EQUALS).map(|(c, e)| (format!("line {}", e.name), c.name.as_str())).collect();
+        Figure::new(&scene, &keys, caption)
+    };
+    (0..n).map(figure).collect()
+}
+
+/// The courses, in the order of the data; those that are the same output of several records are told by the record's name.
+fn courses(found: &Identification) -> Vec<Course> {
+    let mut courses: Vec<((usize, usize), Course)> = Vec::new();
+    // The records that have rows, in their order.
+    let mut records: Vec<usize> = Vec::new();
+    for (k, row) in found.rows.iter().enumerate().take(found.whitened.nrows()) {
+        let key = (row.record, row.output);
+        if !records.contains(&row.record) {
+            records.push(row.record);
+        }
+        if let Some((_, course)) = courses.iter_mut().find(|(known, _)| *known == key) {
+            course.rows.push(k);
+            continue;
+        }
+        let output = found.outputs.get(row.output).map_or("output", String::as_str);
+        let record = found.records.get(records.len() - 1).map_or("", |record| record.record.as_str());
+        let name = if found.records.len() < 2 { output.to_owned() } else { format!("{output}, {record}") };
+        courses.push((key, Course { name, rows: vec![k] }));
     }
-    let named =
-        |(k, record): (usize, &RecordSteps)| format!("{}: {}", RECORDS[k % RECORDS.len()].1, record.record);
-    format!(" {}.", found.records.iter().enumerate().map(named).collect::<Vec<_>>().join(", "))
+    courses.into_iter().map(|(_, course)| course).collect()
 }

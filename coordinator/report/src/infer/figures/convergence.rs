@@ -4,7 +4,6 @@ use starlings_estimators::quantiles::normal;
 use starlings_infer::Inference;
 use starlings_infer::result::{CoefficientFound, LEVEL};
 
-use crate::ReportError;
 use crate::number;
 use crate::plot::axis::Axis;
 use crate::plot::figure::{Figure, with_unit};
@@ -16,11 +15,7 @@ use crate::plot::scene::Scene;
 const FIGURES: usize = 12;
 
 /// One figure per coefficient: estimate and 90 % interval after each power of two of blocks.
-///
-/// # Errors
-///
-/// A figure cannot be drawn.
-pub(super) fn figures(found: &Inference) -> Result<Vec<Figure>, ReportError> {
+pub(super) fn figures(found: &Inference) -> Vec<Figure> {
     let mut order: Vec<(usize, &CoefficientFound)> = found.coefficients.iter().enumerate().collect();
     order.sort_by_key(|(p, c)| (c.may_be_zero != Some(false), *p));
     let figures = order.into_iter().filter_map(|(p, c)| figure(found, p, c));
@@ -28,7 +23,7 @@ pub(super) fn figures(found: &Inference) -> Result<Vec<Figure>, ReportError> {
 }
 
 /// The figure of one coefficient; none where it has fewer than two estimates.
-fn figure(found: &Inference, p: usize, c: &CoefficientFound) -> Option<Result<Figure, ReportError>> {
+fn figure(found: &Inference, p: usize, c: &CoefficientFound) -> Option<Figure> {
     let at = found.convergence.iter().filter_map(|at| Some((at.time, at.values.get(p).copied().flatten()?)));
     let points: Vec<(f64, [f64; 2])> = at.collect();
     let (last, sd) = match points.as_slice() {

@@ -1,27 +1,23 @@
 //! A family of parameters against its number: the stiffness of a vessel's regions along the vessel.
 
 use crate::data::{Family, ParameterRow, ReportData};
+use crate::number;
 use crate::plot::axis::Axis;
 use crate::plot::figure::{Figure, with_unit};
 use crate::plot::mark::Mark;
 use crate::plot::palette::{BLUE, GREY, MUTED};
 use crate::plot::scene::Scene;
-use crate::{ReportError, number};
 
 /// Half the width that a parameter takes of the room between two numbers.
 const HALF: f64 = 0.32;
 
 /// One figure per family.
-///
-/// # Errors
-///
-/// A figure cannot be drawn.
-pub(super) fn figures(data: &ReportData) -> Result<Vec<Figure>, ReportError> {
+pub(super) fn figures(data: &ReportData) -> Vec<Figure> {
     data.families.iter().map(|family| figure(family, data)).collect()
 }
 
 /// Draws one family, its members in the order of their numbers.
-fn figure(family: &Family, data: &ReportData) -> Result<Figure, ReportError> {
+fn figure(family: &Family, data: &ReportData) -> Figure {
     let rows: Vec<(f64, &ParameterRow)> = family
         .members
         .iter()

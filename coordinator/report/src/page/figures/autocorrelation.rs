@@ -1,6 +1,5 @@
 //! Sample autocorrelation of the residuals of one channel.
 
-use crate::ReportError;
 use crate::data::{Autocorrelation, ChannelPlot, ReportData};
 use crate::plot::axis::Axis;
 use crate::plot::figure::{Figure, with_unit};
@@ -13,18 +12,14 @@ use crate::plot::thin;
 const STEMS: usize = 120;
 
 /// The autocorrelation of one channel of one record, where it was stored.
-///
-/// # Errors
-///
-/// The figure cannot be drawn.
-pub(super) fn figure(channel: &ChannelPlot, data: &ReportData) -> Result<Option<Figure>, ReportError> {
+pub(super) fn figure(channel: &ChannelPlot, data: &ReportData) -> Option<Figure> {
     let same = |a: &&Autocorrelation| a.record == channel.record && a.channel == channel.channel;
     let found = data.autocorrelation.iter().find(same).filter(|a| !a.value.is_empty());
-    found.map(|series| draw(series, &data.time_unit)).transpose()
+    found.map(|series| draw(series, &data.time_unit))
 }
 
 /// Draws one autocorrelation with the band of white noise.
-fn draw(series: &Autocorrelation, time_unit: &str) -> Result<Figure, ReportError> {
+fn draw(series: &Autocorrelation, time_unit: &str) -> Figure {
     let x = Axis::tight(&with_unit("lag", time_unit), series.lag_time.iter().copied());
     let lowest = series.value.iter().copied().filter(|v| v.is_finite()).fold(-series.band.abs(), f64::min);
     let y = Axis::around("autocorrelation of the residuals", [lowest.min(-0.1), 1.0]);

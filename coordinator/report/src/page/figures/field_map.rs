@@ -3,15 +3,13 @@
 //! A cell is the mean residual over a span of time and a few neighbouring components, so that noise averages out and what the
 //! model lacks stays.
 
-use plotters::style::RGBColor;
-
 use crate::data::ChannelPlot;
+use crate::number;
 use crate::plot::axis::Axis;
 use crate::plot::figure::{Figure, with_unit};
 use crate::plot::mark::Mark;
-use crate::plot::palette::{BLUE, VERMILION};
+use crate::plot::palette::{ABOVE, BELOW, Colour};
 use crate::plot::scene::Scene;
-use crate::{ReportError, number};
 
 /// Cells along the time axis at most.
 const COLUMNS: usize = 60;
@@ -21,15 +19,7 @@ const ROWS: usize = 32;
 const SHADES: i32 = 6;
 
 /// Draws the components of one field in one record, given with their indices.
-///
-/// # Errors
-///
-/// The figure cannot be drawn.
-pub(super) fn figure(
-    field: &str,
-    components: &[(usize, &ChannelPlot)],
-    time_unit: &str,
-) -> Result<Figure, ReportError> {
+pub(super) fn figure(field: &str, components: &[(usize, &ChannelPlot)], time_unit: &str) -> Figure {
     let times = components.iter().flat_map(|(_, c)| c.time.iter().copied());
     let x = Axis::tight(&with_unit("time", time_unit), times);
     let y = Axis::counted(&format!("component of {field}"), components.iter().map(|(i, _)| *i as f64));
@@ -44,8 +34,8 @@ pub(super) fn figure(
     );
     let title = format!("{field}, record {record}: residuals by component");
     let scene = Scene { title, description: caption.clone(), x, y, marks };
-    let keys = [("area vermilion", "observed above predicted"), ("area blue", "observed below predicted")];
-    Figure::new(&scene, &keys, caption)
+    let keys = [("area above", "observed above predicted"), ("area below", "observed below predicted")];
+    Figure::map(&scene, &keys, caption)
 }
 
 /// Mean whitened residuals by cell.
@@ -120,7 +110,7 @@ fn shade(value: f64, scale: f64) -> i32 {
     if value.is_finite() { (value / scale * f64::from(SHADES)).round() as i32 } else { 0 }
 }
 
-fn colour(shade: i32) -> (RGBColor, f64) {
+fn colour(shade: i32) -> (Colour, f64) {
     let opacity = f64::from(shade.abs()) / f64::from(SHADES);
-    (if shade > 0 { VERMILION } else { BLUE }, 0.9 * opacity)
+    (if shade > 0 { ABOVE } else { BELOW }, 0.9 * opacity)
 }

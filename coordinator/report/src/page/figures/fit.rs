@@ -1,53 +1,87 @@
 //! Predicted against measured, over time.
 
+use super::residual;
 use crate::data::{ChannelPlot, ReportData};
+use crate::number;
 use crate::page::outputs::{Output, examples, outputs};
 use crate::plot::axis::Axis;
 use crate::plot::figure::{Figure, with_unit};
 use crate::plot::mark::Mark;
 use crate::plot::measured::{measured, measured_key, spans};
-use crate::plot::palette::{BLUE, INK, VERMILION};
+use crate::plot::palette::{BLUE, INK, PURPLE};
 use crate::plot::scene::Scene;
 use crate::plot::thin;
-use crate::{ReportError, number};
 
-/// One figure per scalar output; of a field the first, the middle and the last component.
-///
-/// # Errors
-///
-/// A figure cannot be drawn.
-pub(super) fn figures(data: &ReportData) -> Result<Vec<Figure>, ReportError> {
-    let shown = outputs(data).into_iter().flat_map(|output| match output {
-        Output::Scalar(channel) => vec![channel],
-        Output::Field(_, components) => examples(&components).to_vec(),
-    });
-    shown.map(|channel| figure(channel, &data.time_unit)).collect()
+/// Figures at most.
+const MOST: usize = 24;
+
+/// One figure per scalar output, its residuals below it; of a field the first, the middle and the last component. Records of one
+/// output share the vertical axis.
+pub(super) fn figures(data: &ReportData) -> Vec<Figure> {
+    let shown = shown(data);
+    let channels = shown.iter().take(MOST);
+    channels.map(|channel| figure(channel, alike(channel, &shown), &data.time_unit)).collect()
 }
 
-fn figure(channel: &ChannelPlot, time_unit: &str) -> Result<Figure, ReportError> {
+/// How many are not drawn.
+pub(in crate::page) fn left_out(data: &ReportData) -> usize {
+    shown(data).len().saturating_sub(MOST)
+}
+
+fn shown(data: &ReportData) -> Vec<&ChannelPlot> {
+    let mut list = Vec::new();
+    for output in outputs(data) {
+        match output {
+            Output::Scalar(channel) => list.push(channel),
+            Output::Field(_, components) => list.extend(examples(&components)),
+        }
+    }
+    list
+}
+
+/// The range of values of the same output in every record.
+fn alike(channel: &ChannelPlot, shown: &[&ChannelPlot]) -> Vec<f64> {
+    let same = shown.iter().filter(|other| other.channel == channel.channel && other.unit == channel.unit);
+    let ends = same.flat_map(|other| {
+        let [_, outer] = margins(other);
+        let reach = other.predicted.iter().zip(outer).flat_map(|(p, margin)| [p - margin, p + margin]);
+        let all = reach.chain(other.observed.iter().copied().flatten()).filter(|v| v.is_finite());
+        let (lo, hi) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), v| (lo.min(v), hi.max(v)));
+        [lo, hi]
+    });
+    ends.collect()
+}
+
+fn figure(channel: &ChannelPlot, reach: Vec<f64>, time_unit: &str) -> Figure {
     let mut keys = vec![(measured_key(&channel.time), "measured")];
     if trained(channel).is_some() {
-        keys.extend([("line blue", "predicted, training"), ("area shade", "training span")]);
+        keys.extend([("line dot blue", "fitted"), ("area shade", "training span")]);
     }
     if trained(channel).is_none_or(|[_, to]| channel.time.iter().any(|t| *t > to)) {
-        keys.push(("line vermilion", "predicted, held out"));
+        keys.push(("line dot purple", "held out"));
     }
-    let band = if trained(channel).is_some() { "area blue" } else { "area vermilion" };
+    let band = if trained(channel).is_some() { "area blue purple" } else { "area purple" };
     if has_spread(channel) {
         keys.push((band, "prediction ± 2 sd of parameters (dark), and of parameters and noise"));
     } else {
         keys.push((band, "prediction ± 2 noise sd"));
     }
-    Figure::new(&scene(channel, time_unit), &keys, caption(channel))
+    keys.push(("area green", "± 2 noise sd"));
+    let upper = scene_within(channel, reach, time_unit);
+    let below = residual::scene(channel, &upper.x);
+    Figure::with_below(&upper, &below, &keys, format!("{} {}", caption(channel), residual::share(channel)))
 }
 
 /// The scene of one channel of one record.
 pub(crate) fn scene(channel: &ChannelPlot, time_unit: &str) -> Scene {
+    scene_within(channel, alike(channel, &[channel]), time_unit)
+}
+
+/// The same on a vertical axis that holds `reach`.
+fn scene_within(channel: &ChannelPlot, reach: Vec<f64>, time_unit: &str) -> Scene {
     let observed: Vec<f64> = channel.observed.iter().map(|v| v.unwrap_or(f64::NAN)).collect();
     let [inner, outer] = margins(channel);
-    let reach = channel.predicted.iter().zip(&outer).flat_map(|(p, margin)| [p - margin, p + margin]);
-    let y = Axis::around(&with_unit(&channel.channel, &channel.unit), reach.chain(observed.iter().copied()))
-        .with_headroom();
+    let y = Axis::around(&with_unit(&channel.channel, &channel.unit), reach).with_headroom();
     let x = Axis::tight(&with_unit("time", time_unit), channel.time.iter().copied());
     let mut marks = spans(trained(channel), &x);
     marks.extend(prediction(channel, &outer, 0.16));
@@ -94,8 +128,7 @@ fn prediction(channel: &ChannelPlot, margin: &[f64], opacity: f64) -> Vec<Mark> 
     let last = span.map_or(0, |[_, to]| time[..n].partition_point(|t| *t <= to));
     let mut marks = Vec::new();
     // Each piece begins where the one before ends, so that the curve has no hole.
-    let pieces =
-        [(0, (first + 1).min(n), VERMILION), (first, last, BLUE), (last.saturating_sub(1), n, VERMILION)];
+    let pieces = [(0, (first + 1).min(n), PURPLE), (first, last, BLUE), (last.saturating_sub(1), n, PURPLE)];
     let skip_head = first == 0;
     for (k, (from, to, colour)) in pieces.into_iter().enumerate() {
         if from >= to || (k == 0 && skip_head) || (k == 2 && last == n) {

@@ -3,6 +3,7 @@
 //! The band is that of each analysis: one that uses fewer observed values scatters more.
 
 use crate::data::{NisSeries, ReportData};
+use crate::number;
 use crate::plot::axis::Axis;
 use crate::plot::figure::Figure;
 use crate::plot::mark::Mark;
@@ -10,21 +11,16 @@ use crate::plot::measured::{drawn_as_dots, measured};
 use crate::plot::palette::{BLUE, GREEN, GREY, MUTED};
 use crate::plot::scene::Scene;
 use crate::plot::thin;
-use crate::{ReportError, number};
 
 /// Smallest value on the logarithmic axis: what is below stands on the axis.
 const FLOOR: f64 = 1e-2;
 
 /// One figure of all passes; none without a pass.
-///
-/// # Errors
-///
-/// A figure cannot be drawn.
-pub(super) fn figures(data: &ReportData) -> Result<Vec<Figure>, ReportError> {
+pub(super) fn figures(data: &ReportData) -> Vec<Figure> {
     data.nis.last().map(|last| figure(&data.nis, last, data.x_label())).into_iter().collect()
 }
 
-fn figure(passes: &[NisSeries], last: &NisSeries, x_label: &str) -> Result<Figure, ReportError> {
+fn figure(passes: &[NisSeries], last: &NisSeries, x_label: &str) -> Figure {
     let x = Axis::over_run(x_label, passes.iter().flat_map(|p| p.time.iter().copied()));
     let floored = |v: &f64| if v.is_nan() { f64::NAN } else { v.max(FLOOR) };
     let values = passes.iter().flat_map(|p| &p.nis_per_observation).chain(&last.lo).chain(&last.hi);

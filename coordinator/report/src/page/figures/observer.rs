@@ -1,6 +1,5 @@
 //! The innovations with the observer beside those of a free run, over time.
 
-use crate::ReportError;
 use crate::data::{ObserverPlot, ObserverRow, ReportData};
 use crate::plot::axis::Axis;
 use crate::plot::figure::{Figure, with_unit};
@@ -10,18 +9,14 @@ use crate::plot::scene::Scene;
 use crate::plot::thin;
 
 /// One figure per record with innovations.
-///
-/// # Errors
-///
-/// A figure cannot be drawn.
-pub(super) fn figures(data: &ReportData) -> Result<Vec<Figure>, ReportError> {
+pub(super) fn figures(data: &ReportData) -> Vec<Figure> {
     let shown = data.observer.iter().flat_map(|row| row.courses.iter().map(move |course| (course, row)));
     let shown = shown.filter(|(course, _)| !course.time.is_empty());
     shown.map(|(course, row)| figure(course, row, &data.time_unit)).collect()
 }
 
 /// Draws one record.
-fn figure(plot: &ObserverPlot, row: &ObserverRow, time_unit: &str) -> Result<Figure, ReportError> {
+fn figure(plot: &ObserverPlot, row: &ObserverRow, time_unit: &str) -> Figure {
     let x = Axis::tight(&with_unit("time", time_unit), plot.time.iter().copied());
     let values = plot.with.iter().chain(&plot.without).copied().chain([0.0, 1.0]);
     let y = Axis::around("root mean square innovation [noise sd]", values);

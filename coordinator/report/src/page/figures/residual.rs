@@ -1,59 +1,88 @@
-//! Residuals, observed − predicted, over time.
+//! Residuals, observed − predicted, over time: below every fit, and what they have in common.
+//!
+//! Next file to read: [`super::autocorrelation`].
 
 use super::fit::trained;
 use super::{autocorrelation, field_map};
 use crate::data::{ChannelPlot, ReportData};
+use crate::number;
 use crate::page::outputs::{Output, examples, outputs};
 use crate::plot::axis::Axis;
 use crate::plot::figure::{Figure, with_unit};
 use crate::plot::mark::Mark;
-use crate::plot::measured::{measured, measured_key, spans};
-use crate::plot::palette::{GREEN, INK, MUTED};
+use crate::plot::measured::{drawn_as_dots, measured};
+use crate::plot::palette::{BLUE, GREEN, MUTED, PURPLE, SHADE};
 use crate::plot::scene::Scene;
-use crate::{ReportError, number};
 
-/// The residuals, each followed by its autocorrelation; of a field the map, and the autocorrelation at its middle.
-///
-/// # Errors
-///
-/// A figure cannot be drawn.
-pub(super) fn figures(data: &ReportData) -> Result<Vec<Figure>, ReportError> {
-    let mut figures = Vec::new();
-    for output in outputs(data) {
-        match output {
-            Output::Scalar(channel) => {
-                figures.push(figure(channel, &data.time_unit)?);
-                figures.extend(autocorrelation::figure(channel, data)?);
-            }
-            Output::Field(field, components) => {
-                figures.push(field_map::figure(field, &components, &data.time_unit)?);
-                figures.extend(autocorrelation::figure(examples(&components)[1], data)?);
-            }
+/// Figures at most.
+const MOST: usize = 24;
+
+/// The autocorrelations, and of a field the map.
+pub(super) fn figures(data: &ReportData) -> Vec<Figure> {
+    let of = |output: Output<'_>| match output {
+        Output::Scalar(channel) => autocorrelation::figure(channel, data).into_iter().collect::<Vec<_>>(),
+        Output::Field(field, components) => {
+            let map = field_map::figure(field, &components, &data.time_unit);
+            let at_middle = autocorrelation::figure(examples(&components)[1], data);
+            std::iter::once(map).chain(at_middle).collect()
         }
-    }
-    Ok(figures)
+    };
+    outputs(data).into_iter().flat_map(of).take(MOST).collect()
 }
 
-/// Draws the residuals of one channel of one record.
-fn figure(channel: &ChannelPlot, time_unit: &str) -> Result<Figure, ReportError> {
-    let residual: Vec<f64> =
-        channel.observed.iter().zip(&channel.predicted).map(|(o, p)| o.unwrap_or(f64::NAN) - p).collect();
+/// The residuals of one channel of one record, in the colour of the span that they belong to.
+pub(super) fn scene(channel: &ChannelPlot, x: &Axis) -> Scene {
+    let residual = residuals(channel);
     let margin = if channel.noise.is_finite() { 2.0 * channel.noise } else { 0.0 };
-    let x = Axis::tight(&with_unit("time", time_unit), channel.time.iter().copied());
-    let label = with_unit(&format!("{}, observed − predicted", channel.channel), &channel.unit);
-    let y = Axis::around(&label, residual.iter().copied().chain([-margin, margin])).with_headroom();
+    let y = Axis::around(
+        &with_unit("observed − predicted", &channel.unit),
+        residual.iter().copied().chain([-margin, margin]),
+    );
     let ends = (x.lo, x.hi);
-    let mut marks = spans(trained(channel), &x);
+    let mut marks = Vec::new();
+    let span = trained(channel);
+    marks.extend(span.map(|[from, to]| Mark::Span { from: from.max(x.lo), to: to.min(x.hi), colour: SHADE }));
     marks.push(Mark::flat_band(ends, (-margin, margin), GREEN, 0.16));
     marks.push(Mark::level(ends, 0.0, MUTED));
-    marks.extend(measured(&channel.time, &residual, INK));
+    let dots = drawn_as_dots(&channel.time);
+    let inside = |t: f64| span.is_some_and(|[from, to]| t >= from && t <= to);
+    for (fitted, colour) in [(true, BLUE), (false, PURPLE)] {
+        let of: Vec<f64> = channel
+            .time
+            .iter()
+            .zip(&residual)
+            .map(|(t, r)| if inside(*t) == fitted { *r } else { f64::NAN })
+            .collect();
+        if of.iter().any(|r| r.is_finite()) {
+            let drawn = measured(&channel.time, &of, colour);
+            marks.extend(if dots { drawn } else { drawn.into_iter().map(thin_line).collect() });
+        }
+    }
+    let title = format!("{}, record {}: residuals", channel.channel, channel.record);
+    Scene { title, description: share(channel), x: x.clone(), y, marks }
+}
+
+fn thin_line(mark: Mark) -> Mark {
+    match mark {
+        Mark::Line { points, colour, .. } => Mark::Line { points, colour, width: 1.0 },
+        other => other,
+    }
+}
+
+/// How many of the residuals noise explains, as a sentence.
+pub(super) fn share(channel: &ChannelPlot) -> String {
+    let residual = residuals(channel);
     let known = residual.iter().filter(|r| r.is_finite()).count();
-    let inside = residual.iter().filter(|r| r.abs() <= margin).count();
-    let caption = format!(
+    let inside = residual.iter().filter(|r| r.abs() <= 2.0 * channel.noise).count();
+    if known == 0 {
+        return "Nothing was measured here.".to_owned();
+    }
+    format!(
         "{} of {known} residuals lie within ± 2 noise sd (95\u{a0}% are expected). A pattern that repeats is an effect that the model lacks.",
         number::percent(inside as f64 / known as f64)
-    );
-    let title = format!("{}, record {}: residuals", channel.channel, channel.record);
-    let scene = Scene { title, description: caption.clone(), x, y, marks };
-    Figure::new(&scene, &[(measured_key(&channel.time), "residual"), ("area green", "± 2 noise sd")], caption)
+    )
+}
+
+fn residuals(channel: &ChannelPlot) -> Vec<f64> {
+    channel.observed.iter().zip(&channel.predicted).map(|(o, p)| o.unwrap_or(f64::NAN) - p).collect()
 }

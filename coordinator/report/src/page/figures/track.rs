@@ -1,25 +1,21 @@
 //! How the estimate of one parameter moved, with its ± 2 sd band, pass by pass.
 
 use crate::data::{PassTrack, ReportData, Track};
+use crate::number;
 use crate::plot::axis::Axis;
 use crate::plot::figure::{Figure, with_unit};
 use crate::plot::mark::Mark;
 use crate::plot::palette::{BLUE, GREY, MUTED};
 use crate::plot::scene::Scene;
 use crate::plot::thin;
-use crate::{ReportError, number};
 
 /// One figure per parameter.
-///
-/// # Errors
-///
-/// A figure cannot be drawn.
-pub(super) fn figures(data: &ReportData) -> Result<Vec<Figure>, ReportError> {
+pub(super) fn figures(data: &ReportData) -> Vec<Figure> {
     data.tracks.iter().map(|track| figure(track, data.x_label())).collect()
 }
 
 /// Draws one parameter over time or iterations.
-fn figure(track: &Track, x_label: &str) -> Result<Figure, ReportError> {
+fn figure(track: &Track, x_label: &str) -> Figure {
     let x = Axis::over_run(x_label, track.passes.iter().flat_map(|p| p.time.iter().copied()));
     // The band of an earlier pass begins as wide as the prior and would flatten the result: it may leave the figure.
     let estimates = track.passes.iter().flat_map(|p| &p.estimate);

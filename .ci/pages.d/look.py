@@ -1,0 +1,268 @@
+"""Looks at every page of the program as a person would, and fails where it is not what it should be.
+
+Usage: look.py PROGRAM PICTURES [DOCS]. Checked: values under the pointer are those of the store; the legend hides, a figure enlarges and
+zooms, files of it can be saved; the keyboard does the same; contrast; nothing wider than the screen; no error on the console and no
+request to elsewhere; a lost worker shows within two seconds; a page of a million samples opens within two.
+"""
+
+import json
+import os
+import pathlib
+import signal
+import sqlite3
+import subprocess
+import sys
+import tempfile
+import time
+
+from browser import Browser, Page, until
+
+WIDE, PHONE = (1400, 1000), (420, 900)
+CONTRAST = 4.5
+# s; a worker is lost when its stream breaks, a page opens when it is loaded.
+LOST, OPEN = 2.0, 2.0
+
+# Every text against what lies behind it, by the formula of WCAG 2.1; the lowest ratio and where it is.
+CONTRASTS = """(() => {
+  const rgb = (text) => { const v = text.match(/[\\d.]+/g).map(Number); return text.startsWith("color(") ? [...v.slice(0, 3).map((x) => 255 * x), v[3] ?? 1] : [...v.slice(0, 3), v[3] ?? 1]; };
+  const light = ([r, g, b]) => { const f = (v) => { v /= 255; return v <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4; }; return 0.2126 * f(r) + 0.7152 * f(g) + 0.0722 * f(b); };
+  const over = (top, below) => top.slice(0, 3).map((v, i) => v * top[3] + below[i] * (1 - top[3])).concat(1);
+  const behind = (node) => { const layers = []; for (let n = node; n; n = n.parentElement) { const c = rgb(getComputedStyle(n).backgroundColor); layers.push(c); if (c[3] === 1) break; }
+    return layers.reverse().reduce((below, top) => over(top, below), matchMedia("(prefers-color-scheme: dark)").matches ? [0, 0, 0, 1] : [255, 255, 255, 1]); };
+  let worst = [99, ""];
+  const walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  while (walk.nextNode()) {
+    const node = walk.currentNode.parentElement, text = walk.currentNode.textContent.trim();
+    if (!text || node.closest("script, style, svg") || !node.checkVisibility()) continue;
+    const paper = behind(node), ink = over(rgb(getComputedStyle(node).color), paper), [a, b] = [light(ink), light(paper)];
+    const ratio = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+    if (ratio < worst[0]) worst = [ratio, `${text.slice(0, 40)} (${node.tagName} ${node.className})`];
+  }
+  return worst;
+})()"""
+
+OPEN_ALL = "document.querySelectorAll('details').forEach((d) => { d.open = true; })"
+
+
+def check(is_so, why):
+    if not is_so:
+        raise AssertionError(why)
+
+
+class Looker:
+    def __init__(self, program, pictures, docs):
+        self.program, self.pictures, self.docs = str(pathlib.Path(program).resolve()), pathlib.Path(pictures), docs
+        self.browser = Browser()
+
+    def make(self, folder, *arguments):
+        done = subprocess.run([self.program, *arguments], capture_output=True, text=True)
+        check(done.returncode == 0, f"{arguments}: {done.stderr}")
+        return folder
+
+    def look(self, name, url, docs_name=None):
+        """A page at both widths and in the dark, with everything closed as a reader meets it, then open."""
+        for width, (wide, high) in {"wide": WIDE, "phone": PHONE}.items():
+            for scheme in ("light", "dark"):
+                page = Page(self.browser, wide, high, dark=scheme == "dark")
+                page.open(url)
+                time.sleep(0.2)
+                if scheme == "light":
+                    page.picture(self.pictures / f"{name}-{width}.png")
+                    if docs_name and self.docs and width == "wide":
+                        page.size(1200, 760)
+                        time.sleep(0.2)
+                        page.picture(pathlib.Path(self.docs) / f"{docs_name}.png")
+                        page.size(wide, high)
+                page.run(OPEN_ALL)
+                time.sleep(0.2)
+                if scheme == "light" or width == "wide":
+                    page.picture(self.pictures / f"{name}-{width}-{scheme}-open.png", whole=True)
+                ratio, where = page.run(CONTRASTS)
+                check(ratio >= CONTRAST, f"{name}, {width}, {scheme}: a contrast of {ratio:.2f} at {where}")
+                over = page.run("document.documentElement.scrollWidth - innerWidth")
+                check(over <= 0, f"{name}, {width}: the page is {over} px wider than the screen")
+                if width == "phone" or name != "many":
+                    cut = page.run("""[...document.querySelectorAll(".scroll")].filter((s) => !s.querySelector(".correlation") && s.scrollWidth > s.clientWidth + 1)
+                        .map((s) => s.textContent.trim().slice(0, 60))""")
+                    check(not cut, f"{name}, {width}: tables are cut off: {cut}")
+                sizes = page.run("[...new Set([...document.querySelectorAll('.plot')].map((p) => getComputedStyle(p).fontSize))]")
+                check(len(sizes) <= 1, f"{name}: text on axes has several sizes: {sizes}")
+                faults = page.faults()
+                check(not faults, f"{name}, {width}, {scheme}: {faults}")
+                page.close()
+        print(f"{name}: seen")
+
+    def no_script(self, name, url):
+        page = Page(self.browser, *WIDE)
+        page.send("Emulation.setScriptExecutionDisabled", value=True)
+        page.send("Page.navigate", url=url)
+        time.sleep(1.0)
+        page.picture(self.pictures / f"{name}-without-script.png")
+        strings = page.send("DOMSnapshot.captureSnapshot", computedStyles=[])["strings"]
+        check("tools" not in strings and any(text.startswith("observed − predicted") for text in strings), f"{name}: without script the page does not read")
+        page.close()
+
+    def click_through(self, url, store):
+        """The first fit of a report: pointer, legend, enlarging, zoom, files, keyboard."""
+        page = Page(self.browser, *WIDE)
+        page.open(url)
+        figure = "#fit figure"
+        page.wait(f"document.querySelector('{figure} .tools')", 5)
+        check(page.run(f"document.querySelector('{figure}').getBoundingClientRect().top < innerHeight"), "the fit is below the fold")
+        rows = sqlite3.connect(store).execute("SELECT record, output, time, observed, predicted FROM predictions ORDER BY rowid").fetchall()
+        rows = [row for row in rows if row[:2] == rows[0][:2]]
+        lo, hi = rows[0][2], rows[-1][2]
+        for share in (0.13, 0.5, 0.87):
+            x, y, w, h = page.run(f"(() => {{ const r = document.querySelector('{figure} .frame').getBoundingClientRect(); return [r.left, r.top, r.width, r.height]; }})()")
+            page.move(x + share * w, y + h / 2)
+            page.wait(f"!document.querySelector('{figure} .readout').hidden", 5)
+            shown = page.run(f"""[...document.querySelectorAll('{figure} .plot')].map((p) => [...p.querySelectorAll(".readout [data-value]")].map((r) => [r.textContent, Number(r.dataset.value)]))""")
+            near = min((row for row in rows if row[3] is not None), key=lambda row: abs(row[2] - (lo + share * (hi - lo))))
+            values = [value for plot in shown for _, value in plot]
+            check(near[3] in values, f"the measured value under the pointer is {shown}, the store has {near}")
+            check(near[4] in values, f"the predicted value under the pointer is {shown}, the store has {near}")
+            check(near[3] - near[4] in values, f"the residual under the pointer is {shown}, the store has {near}")
+        self.legend(page, figure)
+        self.enlarging(page, figure)
+        self.files(page, figure, rows)
+        page.run(f"document.querySelector('{figure}').focus()")
+        page.key("ArrowRight")
+        check(page.run(f"!document.querySelector('{figure} .readout').hidden"), "the arrow keys show no value")
+        page.key("Enter")
+        check(page.run("Boolean(document.querySelector('dialog[open]'))"), "the Enter key does not enlarge")
+        page.key("Escape")
+        page.wait("!document.querySelector('dialog')", 5, "the Escape key does not close")
+        again = Page(self.browser, *WIDE)
+        again.open(url)
+        for one in (page, again):
+            check(not one.faults(), one.faults())
+            one.close()
+        print("report: clicked through")
+
+    def legend(self, page, figure):
+        button = f"{figure} .keys button"
+        before = page.run(f"document.querySelectorAll('{figure} svg g.off').length")
+        page.click(button)
+        check(page.run(f"document.querySelectorAll('{figure} svg g.off').length") > before, "the legend hides nothing")
+        check(page.run(f"document.querySelector('{button}').getAttribute('aria-pressed')") == "false", "the legend does not say what it hides")
+        page.click(button)
+        check(page.run(f"document.querySelectorAll('{figure} svg g.off').length") == before, "the legend shows nothing again")
+
+    def enlarging(self, page, figure):
+        small = page.run(f"document.querySelector('{figure} .frame').getBoundingClientRect().height")
+        page.click(f"{figure} .enlarge")
+        page.wait("document.querySelector('dialog[open] .frame')", 5, "a click does not enlarge")
+        large = page.run("document.querySelector('dialog[open] .frame').getBoundingClientRect().height")
+        check(large > 1.2 * small, f"enlarged from {small} to {large} px")
+        view = page.run("document.querySelector('dialog .drawing').getAttribute('viewBox')")
+        page.click("dialog .zoom:nth-of-type(2)")
+        check(page.run("document.querySelector('dialog .drawing').getAttribute('viewBox')") != view, "a click does not zoom")
+        page.picture(self.pictures / "report-enlarged.png")
+        page.key("Escape")
+        page.wait("!document.querySelector('dialog')", 5, "the figure does not close")
+        check(page.run(f"document.querySelector('{figure} .drawing').getAttribute('viewBox')") == view, "a closed figure stays zoomed")
+
+    def files(self, page, figure, rows):
+        page.run("""window.kept = []; URL.createObjectURL = (b) => { window.kept.push(b); return "data:,"; }; HTMLAnchorElement.prototype.click = () => {}""")
+        for k, kind in enumerate(("CSV", "SVG", "PNG")):
+            page.run(f"[...document.querySelectorAll('{figure} .tools button')].find((b) => b.textContent === '{kind}').click()")
+            page.wait(f"window.kept.length > {k}", 10, f"no {kind}")
+        table = page.run("window.kept[0].text()").strip().split("\n")
+        check(table[0] == "plot,series,x,low,high", table[0])
+        values = {line.rsplit(",", 1)[1] for line in table[1:] if ",measured," in line}
+        stored = {repr(row[3]) for row in rows if row[3] is not None}
+        same = {float(v) for v in values} == {float(v) for v in stored}
+        check(same or len(rows) > 1200, "the CSV of a short figure does not hold what was measured")
+        drawn = page.run("window.kept[1].text().then((t) => new DOMParser().parseFromString(t, 'image/svg+xml').querySelectorAll('parsererror').length)")
+        check(drawn == 0, "the SVG is not well formed")
+        check(page.run("window.kept[2].type === 'image/png' && window.kept[2].size > 5000"), "the PNG is empty")
+
+    def live(self, scratch):
+        """The live page: one of two workers is killed in front of it; then the page becomes the report."""
+        out, says = scratch / "live", scratch / "says"
+        command = [self.program, "run", "examples/coarctation/study.toml", "--out", str(out), "--workers", "2", "--dashboard"]
+        run = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=says.open("w"))
+        try:
+            until(lambda: "live page at" in says.read_text() or run.poll() is not None, 120, "no live page")
+            check(run.poll() is None, says.read_text())
+            url = next(line.split(" at ", 1)[1] for line in says.read_text().splitlines() if line.startswith("live page at"))
+            page = Page(self.browser, *WIDE)
+            page.open(url)
+            page.wait("document.querySelectorAll('#workers tr, table tbody tr').length > 0", 60, "the live page shows no worker")
+            time.sleep(1.5)
+            page.picture(self.pictures / "live-wide.png")
+            if self.docs:
+                page.picture(pathlib.Path(self.docs) / "live-page.png")
+            ratio, where = page.run(CONTRASTS)
+            check(ratio >= CONTRAST, f"live page: a contrast of {ratio:.2f} at {where}")
+            local = subprocess.run(["pgrep", "-P", str(run.pid), "-f", "worker"], capture_output=True, text=True).stdout.split()
+            check(local, "the run has no worker process of its own")
+            os.kill(int(local[0]), signal.SIGKILL)
+            begun = time.monotonic()
+            page.wait("[...document.querySelectorAll('.lost')].some((e) => e.checkVisibility() && /lost/.test(e.textContent))", 10, "a killed worker does not show")
+            took = time.monotonic() - begun
+            check(took <= LOST, f"a killed worker shows after {took:.2f} s")
+            page.picture(self.pictures / "live-lost.png")
+            page.size(*PHONE)
+            time.sleep(0.5)
+            page.picture(self.pictures / "live-phone.png", whole=True)
+            check(page.run("document.documentElement.scrollWidth <= innerWidth"), "the live page is wider than a phone")
+            check(not page.faults(), page.faults())
+            page.close()
+            print(f"live page: a killed worker shows after {took:.2f} s")
+        finally:
+            run.send_signal(signal.SIGINT)
+            run.wait(60)
+
+    def million(self, path):
+        page = Page(self.browser, *WIDE)
+        page.open("about:blank")
+        took = page.open(path.resolve().as_uri())
+        size = path.stat().st_size
+        check(size <= 5_000_000, f"a million samples take {size} bytes")
+        check(took <= OPEN, f"a million samples open in {took:.2f} s")
+        page.click("#fit figure .enlarge")
+        page.wait("document.querySelector('dialog[open] .frame')", 5)
+        before = page.run("document.querySelector('dialog polyline').getAttribute('points')")
+        for _ in range(3):
+            page.click("dialog .zoom:nth-of-type(2)")
+        check(page.run("document.querySelector('dialog polyline').getAttribute('points')") != before, "the zoom shows nothing finer")
+        page.picture(self.pictures / "million-zoomed.png")
+        check(not page.faults(), page.faults())
+        page.close()
+        print(f"a million samples: {size / 1e6:.2f} MB, open in {took:.2f} s")
+
+    def all(self, scratch):
+        run = self.make(scratch / "run", "run", "examples/pig-aorta/study.toml", "--workers", "2", "--out", str(scratch / "run"))
+        report = (run / "report.html").as_uri()
+        self.look("report", report, "page-report")
+        self.click_through(report, run / "run.db")
+        self.no_script("report", report)
+        explained = self.make(scratch / "explain", "explain", "examples/pig-aorta/explain-ex-vivo.toml", "--workers", "2", "--out", str(scratch / "explain"))
+        self.look("explain", (explained / "report.html").as_uri(), "page-explain")
+        self.live(scratch)
+        for name, arguments in {
+            "identify": ("identify", "examples/pig-aorta/study.toml", "--workers", "2", "--html"),
+            "spectrum": ("spectrum", "examples/oscillator/study.toml", "--html"),
+        }.items():
+            path = scratch / f"{name}.html"
+            self.make(path, *arguments, str(path))
+            self.look(name, path.as_uri(), f"page-{name}")
+        samples = self.pictures / "samples"
+        self.million(samples / "million.html")
+        for path in sorted(samples.glob("*.html")):
+            if path.name != "million.html":
+                self.look(path.stem, path.resolve().as_uri())
+
+
+def main():
+    program, pictures, *docs = sys.argv[1:]
+    with tempfile.TemporaryDirectory() as scratch:
+        looker = Looker(program, pictures, docs[0] if docs else None)
+        try:
+            looker.all(pathlib.Path(scratch))
+        finally:
+            looker.browser.close()
+
+
+main()
