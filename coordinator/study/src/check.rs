@@ -165,7 +165,8 @@ fn check(path: &Path, text: &str, solver_host: &SolverHost) -> Result<Study, Stu
     source.verdict()?;
     check_setup(&source, &file, &model.setup, &records)?;
     warnings.extend(model.setup.is_noisy().then(|| NOISE_LEFT_OUT.to_owned()));
-    warnings.extend(units::warnings(&file, &model, &records));
+    let (units, candidate_warnings) = units::warnings(&file, &model, &records);
+    warnings.extend(units);
     let theta = expand::theta(&parameters, &records);
     let described = (model.setup, model.spec);
     Ok(Study {
@@ -178,6 +179,7 @@ fn check(path: &Path, text: &str, solver_host: &SolverHost) -> Result<Study, Stu
         delays: model.delays,
         runs_here: solver.is_none_or(|known| known.is_here),
         warnings,
+        candidate_warnings,
         ..study_of(path, &source, file, described, (fleet, estimator), solver_host)
     })
 }
@@ -214,6 +216,7 @@ fn study_of(
         whole_answers: false,
         solver_host: solver_host.clone(),
         warnings: Vec::new(),
+        candidate_warnings: Vec::new(),
     }
 }
 
