@@ -6,6 +6,7 @@
 
 mod correlation;
 mod data;
+mod diagnose;
 mod explain;
 mod explained;
 mod files;
@@ -27,6 +28,7 @@ mod sample;
 mod tests;
 
 pub use data::ReportData;
+pub use diagnose::{diagnosis_page, write_diagnosis};
 pub use explained::{state_names, write_explanation};
 pub use files::{FilesError, write_files, write_page};
 pub use forecast::forecast_page;
