@@ -189,7 +189,10 @@ fn explanation(
     let checked = decision.checked.map(|i| &found.judged[i]);
     let n_train = cache.rows.train.len();
     let nearest = judged.or(found.judged.first());
-    let after = added.map(|j| j.fit.predicted.as_slice());
+    let before_all = &found.base.predicted;
+    let after = nearest.map_or(before_all, |j| &j.fit.predicted);
+    let is_name = |set: &Vec<String>| set.iter().all(|name| candidates.iter().any(|c| c.name() == name));
+    let (tied, forms): (Vec<_>, Vec<_>) = decision.tied.iter().cloned().partition(is_name);
     Explanation {
         study: study.name.clone(),
         model: study.setup.model.kind.clone(),
@@ -199,7 +202,9 @@ fn explanation(
         places: before.places.clone(),
         effects: added.map(summary::effects).unwrap_or_default(),
         replaced: added.map(|j| j.fit.variant.left_out.clone()).unwrap_or_default(),
-        tied_with: decision.tied.clone(),
+        tied_gap: summary::tied_gap(cache, found, &tied),
+        tied_with: tied,
+        tied_forms: forms.concat(),
         experiment: None,
         closest: nearest
             .filter(|_| decision.verdict == Verdict::Unexplained)
@@ -207,7 +212,7 @@ fn explanation(
             .unwrap_or_default(),
         screened: summary::screened(found, candidates, decision, n_train),
         rejected: rejected::rejected(found, candidates, decision),
-        gap: after.map(|y| summary::gap(cache, &found.base.predicted, y)).unwrap_or_default(),
+        gap: summary::gap(cache, before_all, after),
         held_out: nearest.map_or(&found.held_out, |j| &j.held_out).clone(),
         not_tried: not_tried::not_tried(study, candidates),
         correlated_noise: correlated_noise(study, &cache.rows),
@@ -221,6 +226,6 @@ fn explanation(
         runs_by_stage: cache.runs_by_stage(),
         workers: cache.n_answered(),
         wall_s: cache.elapsed(),
-        warnings: [study.warnings.clone(), warnings].concat(),
+        warnings: [study.warnings.clone(), warnings::of_candidates(study, candidates), warnings].concat(),
     }
 }

@@ -194,7 +194,8 @@ fn checked(
     source.verdict()?;
     check_setup(source, &file, &model.setup, &records)?;
     warnings.extend(model.setup.is_noisy().then(|| NOISE_LEFT_OUT.to_owned()));
-    warnings.extend(units::warnings(&file, &model, &records));
+    let (units, candidate_warnings) = units::warnings(&file, &model, &records);
+    warnings.extend(units);
     let theta = expand::theta(&parameters, &records);
     let described = (model.setup, model.spec);
     Ok(Study {
@@ -207,6 +208,7 @@ fn checked(
         delays: model.delays,
         runs_here: solver.is_none_or(|known| known.is_here),
         warnings,
+        candidate_warnings,
         ..study_of(path, source, file, described, (fleet, estimator), solver_host)
     })
 }
@@ -243,6 +245,7 @@ fn study_of(
         whole_answers: false,
         solver_host: solver_host.clone(),
         warnings: Vec::new(),
+        candidate_warnings: Vec::new(),
     }
 }
 

@@ -169,8 +169,12 @@ pub(super) struct RecordSection {
     /// Model input → column, or `file:column`.
     pub(super) inputs: Named<String>,
     pub(super) channels: Vec<ChannelSection>,
+    /// Where the run begins, if before the first measured row.
+    pub(super) start: Option<Spanned<f64>>,
     pub(super) train: Option<Spanned<[f64; 2]>>,
     pub(super) held_out: bool,
+    /// Rows of a held-out record from which its start is found.
+    pub(super) start_rows: Option<Spanned<u64>>,
     pub(super) every: Spanned<u64>,
 }
 
@@ -185,6 +189,8 @@ pub(super) struct ChannelSection {
     pub(super) from: Option<Spanned<String>>,
     /// Value at which the integral of a rate begins.
     pub(super) start: Option<Spanned<f64>>,
+    /// Never fitted.
+    pub(super) held_out: bool,
     /// Standard deviation in the channel's unit; `None` for `"auto"`.
     pub(super) noise: Spanned<Option<f64>>,
     /// The surfaces that were measured, in the place of a column.

@@ -149,6 +149,8 @@ impl<'c> Searcher<'_, '_, 'c> {
         of: &[(usize, usize)],
     ) -> Result<Vec<ScreeningResult>, ExplainError> {
         if !self.cache.affords(of.len()) {
+            // Besides the candidates, the model as it is may have to be run once more.
+            self.cache.lacks(of.len() + 1);
             self.cut_short = true;
             return Ok(Vec::new());
         }

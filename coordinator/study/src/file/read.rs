@@ -136,7 +136,7 @@ fn observer(source: &Source, root: &Table<'_>) -> ObserverSection {
 }
 
 fn records(source: &Source, root: &Table<'_>) -> Vec<RecordSection> {
-    let keys = ["name", "file", "time", "inputs", "channels", "train", "use", "every"];
+    let keys = ["name", "file", "time", "inputs", "channels", "start", "train", "use", "start_rows", "every"];
     let mut records = Vec::new();
     for t in root.tables("records", "[[records]]", &keys) {
         if t.get("channels").is_none() {
@@ -152,16 +152,19 @@ fn records(source: &Source, root: &Table<'_>) -> Vec<RecordSection> {
             time: t.text("time").unwrap_or_else(|| Spanned::new(t.span.clone(), "time".to_owned())),
             inputs: named_texts(source, &t.free_entries("inputs")),
             channels: channels(source, &t, root.get("infer").is_some()),
+            start: t.number("start"),
             train: t.interval("train"),
             held_out: held_out(source, &t),
+            start_rows: t.count("start_rows"),
             every: t.count("every").unwrap_or_else(|| Spanned::new(t.span.clone(), 1)),
         });
     }
     records
 }
 
-fn held_out(source: &Source, record: &Table<'_>) -> bool {
-    match record.text("use") {
+/// Whether a record, or a channel, is to be left out of every fit.
+fn held_out(source: &Source, of: &Table<'_>) -> bool {
+    match of.text("use") {
         None => false,
         Some(text) if text.get_ref() == "held-out" => true,
         Some(text) if text.get_ref() == "train" => false,
@@ -190,11 +193,12 @@ fn channels(source: &Source, record: &Table<'_>, infers: bool) -> Vec<ChannelSec
             unit: t.text("unit"),
             from: t.text("from"),
             start: t.number("start"),
+            held_out: held_out(source, &t),
             noise: noise.unwrap_or_else(|| Spanned::new(t.span.clone(), None)),
             surface,
         }
     };
-    let keys = ["column", "output", "unit", "noise", "from", "start", "surface", "rest", "open_ends"];
+    let keys = ["column", "output", "unit", "noise", "use", "from", "start", "surface", "rest", "open_ends"];
     record.tables("channels", "a channel", &keys).into_iter().map(read).collect()
 }
 
