@@ -22,6 +22,7 @@ mod settings;
 mod solver;
 mod spectrum;
 mod survey;
+mod together;
 mod units;
 
 use std::path::Path;
@@ -171,7 +172,7 @@ fn checked(
     let estimator = estimator(source, &file.estimator, described);
     let fleet = fleet(source, &file.fleet);
     let explain = explain::explain(source, &file);
-    let spectrum = spectrum::spectrum(source, &file.spectrum);
+    let spectrum = spectrum::spectrum(source, &file.spectrum, &file.observer);
     let observer = settings::observer(source, &file.observer, described);
     let model = model::model(source, &file, solver.as_ref());
     // Everything that follows is judged against the model.
@@ -198,7 +199,8 @@ fn checked(
     warnings.extend(units);
     let theta = expand::theta(&parameters, &records);
     let described = (model.setup, model.spec);
-    Ok(Study {
+    let observers = file.observer.clone();
+    let study = Study {
         candidates: Arc::new(model.candidates),
         parameters,
         theta,
@@ -210,7 +212,10 @@ fn checked(
         warnings,
         candidate_warnings,
         ..study_of(path, source, file, described, (fleet, estimator), solver_host)
-    })
+    };
+    together::check(source, &observers, &study);
+    source.verdict()?;
+    Ok(study)
 }
 
 /// A study of a model, without parameters, records and what commands ask of it.
