@@ -134,12 +134,14 @@ fn no_gap(found: &SearchResult<'_>, noise: &str) -> String {
 fn subject(judged: &JudgedFit<'_>) -> String {
     let variant = &judged.fit.variant;
     let says: Vec<&str> = variant.effects.iter().map(|m| m.candidate.def.says.as_str()).collect();
-    format!("Missing: {}. {}", variant.name(), says.join(" "))
+    let is_made = judged.kinds().contains(&Kind::Proposal);
+    let begins = if is_made { "A proposal, made from these data" } else { "Missing" };
+    format!("{begins}: {}. {}", variant.name(), says.join(" "))
 }
 
 /// That a generic term is no physics; empty for an effect of a field.
 fn of_no_field(judged: &JudgedFit<'_>) -> &'static str {
-    if judged.kinds().contains(&Kind::Generic) {
+    if judged.kinds().iter().any(|kind| kind.is_of_no_field()) {
         " That describes a dependence and not its cause."
     } else {
         ""
