@@ -137,7 +137,9 @@ fn no_gap(found: &SearchResult<'_>, noise: &str) -> String {
 fn subject(judged: &JudgedFit<'_>) -> String {
     let variant = &judged.fit.variant;
     let says: Vec<String> = variant.effects.iter().map(|m| sentence(&m.candidate.def.says)).collect();
-    format!("Missing: {}. {}", variant.name(), says.join(" ").trim())
+    let is_made = judged.kinds().contains(&Kind::Proposal);
+    let begins = if is_made { "A proposal, made from these data" } else { "Missing" };
+    format!("{begins}: {}. {}", variant.name(), says.join(" ").trim())
 }
 
 /// A text with the full stop that its author may have left out.
@@ -161,7 +163,7 @@ fn too_small(cache: &RunCache<'_>, found: &SearchResult<'_>) -> Option<String> {
 
 /// That a generic term is no physics; empty for an effect of a field.
 fn of_no_field(judged: &JudgedFit<'_>) -> &'static str {
-    if judged.kinds().contains(&Kind::Generic) {
+    if judged.kinds().iter().any(|kind| kind.is_of_no_field()) {
         " That describes a dependence and not its cause."
     } else {
         ""
