@@ -150,7 +150,7 @@ fn course(file: &File) -> Result<Course, String> {
     if cycles == 0 {
         return Err("simulation_parameters.number_of_cardiac_cycles: give at least 1".to_owned());
     }
-    let from = if simulation.from_steady() { Origin::Steady } else { Origin::Zero };
+    let from = if simulation.is_from_steady() { Origin::Steady } else { Origin::Zero };
     let all = simulation.output_all_cycles;
     Ok(Course { from, cycles, all, settled: None })
 }

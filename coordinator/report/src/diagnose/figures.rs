@@ -9,7 +9,7 @@ use starlings_diagnose::Diagnosed;
 use crate::ReportError;
 use crate::plot::figure::{Figure, Slot, Slots};
 
-type Draw = fn(&Diagnosed) -> Result<Vec<Figure>, ReportError>;
+type Draw = fn(&Diagnosed) -> Vec<Figure>;
 
 /// The places for figures, in the order of their sections, and what draws the figures of each.
 const SLOTS: [Slot<Draw>; 1] =

@@ -157,15 +157,13 @@ fn law(chamber: &Chamber, place: &str) -> Result<(network::Chamber, Option<Shape
 
 fn shape(activation: &Activation) -> Shape {
     match activation {
-        Activation::HalfCosine { t_active, t_twitch } => {
-            Shape::HalfCosine { active: *t_active, twitch: *t_twitch }
-        }
-        Activation::PiecewiseCosine { contract_start, relax_start, contract_duration, relax_duration } => {
+        Activation::Half { t_active, t_twitch } => Shape::HalfCosine { active: *t_active, twitch: *t_twitch },
+        Activation::Piecewise { contract_start, relax_start, contract_duration, relax_duration } => {
             Shape::Cosines {
                 contract: (*contract_start, *contract_duration),
                 relax: (*relax_start, *relax_duration),
             }
         }
-        Activation::WrappingCosine { Tsa, tpwave } => Shape::Wrapping { Tsa: *Tsa, tpwave: *tpwave },
+        Activation::Wrapping { Tsa, tpwave } => Shape::Wrapping { Tsa: *Tsa, tpwave: *tpwave },
     }
 }

@@ -88,7 +88,7 @@ pub(super) struct Simulation {
 
 impl Simulation {
     /// Whether a run starts from the steady state, as it does unless the file says otherwise.
-    pub(super) fn from_steady(&self) -> bool {
+    pub(super) fn is_from_steady(&self) -> bool {
         self.steady_initial.unwrap_or(true)
     }
 }

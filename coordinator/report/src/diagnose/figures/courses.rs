@@ -3,7 +3,6 @@
 use starlings_diagnose::Diagnosed;
 use starlings_diagnose::result::CourseFound;
 
-use crate::ReportError;
 use crate::plot::axis::Axis;
 use crate::plot::figure::{Figure, with_unit};
 use crate::plot::mark::Mark;
@@ -11,15 +10,11 @@ use crate::plot::palette::{BLUE, GREY, INK, SHADE};
 use crate::plot::scene::Scene;
 
 /// One figure per course.
-///
-/// # Errors
-///
-/// A figure cannot be drawn.
-pub(super) fn figures(found: &Diagnosed) -> Result<Vec<Figure>, ReportError> {
+pub(super) fn figures(found: &Diagnosed) -> Vec<Figure> {
     found.courses.iter().map(|course| figure(found, course)).collect()
 }
 
-fn figure(found: &Diagnosed, course: &CourseFound) -> Result<Figure, ReportError> {
+fn figure(found: &Diagnosed, course: &CourseFound) -> Figure {
     let less = |values: &[f64]| values.iter().zip(&course.healthy).map(|(v, h)| v - h).collect::<Vec<f64>>();
     let (measured, likeliest) = (less(&course.observed), less(&course.likeliest));
     let x = Axis::tight(&with_unit("time", &found.time_unit), course.times.iter().copied());

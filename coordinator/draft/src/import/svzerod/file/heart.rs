@@ -115,11 +115,11 @@ pub(in super::super) struct Chamber {
 #[serde(tag = "type", deny_unknown_fields)]
 pub(in super::super) enum Activation {
     #[serde(rename = "half_cosine")]
-    HalfCosine { t_active: f64, t_twitch: f64 },
+    Half { t_active: f64, t_twitch: f64 },
     #[serde(rename = "piecewise_cosine")]
-    PiecewiseCosine { contract_start: f64, relax_start: f64, contract_duration: f64, relax_duration: f64 },
+    Piecewise { contract_start: f64, relax_start: f64, contract_duration: f64, relax_duration: f64 },
     #[serde(rename = "wrapping_cosine")]
-    WrappingCosine { Tsa: f64, tpwave: f64 },
+    Wrapping { Tsa: f64, tpwave: f64 },
 }
 
 /// Values of a `ChamberElastanceInductor`.
