@@ -32,10 +32,11 @@ intervals:
 inference:
     cargo test --release -p starlings-estimators --test inference -- --ignored --nocapture
 
-# Damage of the plate, torques and scenarios of the nozzle over many draws of the noise: the tables of docs/structures.md.
+# Damage of the plate, torques and scenarios of the nozzle over many draws of the noise: the tables of docs/structures.md; the plate's diagnosis.
 diagnostics:
     cargo test --release -p starlings-structures --test plate_search -- --ignored --nocapture
     cargo test --release -p starlings-estimators --test nozzle -- --ignored --nocapture
+    cargo test --release --test diagnose_examples -- --ignored
 
 # Every system, effect and noise level of docs/battery.md: about an hour. BATTERY_SYSTEMS, BATTERY_KINDS, BATTERY_NOISE, BATTERY_CORRELATION, BATTERY_SEEDS, BATTERY_THREADS choose.
 explain-battery:
@@ -75,16 +76,30 @@ pages:
 wheel:
     .ci/wheel
 
+# The pages of docs/ as a book in target/book, every link followed. Installs mdBook into target/tools where it is missing.
+book:
+    .ci/book
+
+# The figures of docs/gallery.md: every example run, and its overview drawn.
+gallery:
+    cargo build --release
+    .ci/gallery
+    STARLINGS_WRITE_PAGES=1 cargo test --test book the_gallery
+
+# The numbers and commands that pages show: written again from what the program says.
+write-pages:
+    STARLINGS_WRITE_PAGES=1 cargo test --test book --test mistakes --test readme
+
 # The image without a registry: its root file system around the debug build, the pig's aorta run in it by chroot as its user, and the image
 # where buildah is there. Needs root.
 container:
     cargo build --workspace
     .ci/container
 
-# Every fuzz target for FUZZ_SECONDS each, 600 by default (cargo install cargo-fuzz; a stable compiler is told to take the fuzzer's flags).
+# Every fuzz target until it has had FUZZ_SECONDS of processor time, 600 by default, and the table of docs/fuzzing.md (cargo install cargo-fuzz; a
+# stable compiler is told to take the fuzzer's flags).
 fuzz:
-    cargo run --manifest-path fuzz/Cargo.toml --example seeds
-    for target in $(cd fuzz && RUSTC_BOOTSTRAP=1 cargo fuzz list); do (cd fuzz && RUSTC_BOOTSTRAP=1 cargo fuzz run -s none "$target" -- -max_total_time="${FUZZ_SECONDS:-600}" -rss_limit_mb=2048) || exit 1; done
+    fuzz/run.py --write
 
 # Deaths of coordinators and workers, timed: resume with ten thousand runs, workers back, losses noticed, none where all are busy. A
 # quarter of an hour; DEATHS_MINUTES shortens the last.

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # What `starlings infer` takes of a long recording: seconds and memory for 600 000 and 6 000 000 rows of the example lorenz-27, with one worker
-# and with two. `just infer-bench` runs it with a release build; STARLINGS names another program. Nothing is asserted.
+# and with two. `just infer-bench` runs it with a release build; STARLINGS names another program, UNTIL other lengths in s of 200 rows, REPEATS
+# how often each is timed. Nothing is asserted.
 set -euo pipefail
 starlings="$(realpath "${STARLINGS:-target/release/starlings}")"
 example="$(realpath "$(dirname "$0")/../examples/lorenz-27")"
@@ -10,7 +11,7 @@ trap 'rm -r "$folder"' EXIT
 cd "$folder"
 cp "$example"/*.toml "$example"/start.csv .
 sed -i 's/^max_steps = .*/max_steps = 100000000/' truth.toml
-for until in 3000 30000; do
+for until in ${UNTIL:-3000 30000}; do
   "$starlings" simulate truth.toml --until "$until" --step 0.005 -o data.csv 2> /dev/null
   rows="$(($(wc -l < data.csv) - 1))"
   for workers in 1 2; do

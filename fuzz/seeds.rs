@@ -33,6 +33,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             write(target, &format!("example-{i}"), &content[..content.len().min(20_000)])?;
         }
     }
+    let imported = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/import_files");
+    for (target, ending) in [("svzerodsolver", "json"), ("openbf", "yaml")] {
+        for (i, file) in files(&imported.join(target))?.iter().enumerate() {
+            if file.extension().is_some_and(|e| e == ending) {
+                write(target, &format!("network-{i}"), &std::fs::read(file)?)?;
+            }
+        }
+    }
     Ok(())
 }
 

@@ -19,7 +19,7 @@ use crate::load::load;
 /// Validate a study, its recordings and its model, and make one trial run at the prior median.
 ///
 /// A study with a section `[infer]` is checked as `starlings infer` takes it: what is asked of which equations, and the first rows of its
-/// recordings.
+/// recordings. One with a section `[diagnose]` is checked with each of its scenarios in turn.
 #[derive(Parser)]
 pub(crate) struct Args {
     /// The study file.
@@ -36,6 +36,9 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if Study::asks_to_infer(&args.study) {
         return crate::infer::check_only(&args.study, args.json);
+    }
+    if Study::asks_to_diagnose(&args.study) {
+        return crate::diagnose::check_only(&args.study, args.json);
     }
     let mut study = load(&args.study)?;
     let kind = study.estimator.kind;

@@ -2,6 +2,7 @@
 //!
 //! Next files to read: [`mod@print`] for the answer on a terminal, [`crate::fleet_session`] for the fleet.
 
+mod drift;
 mod print;
 
 use std::path::{Path, PathBuf};
@@ -30,7 +31,8 @@ use crate::run_folder;
 ///
 /// The model is fitted as it is, then with one effect after another (`starlings effects STUDY` lists them), on the training
 /// spans only; held-out spans and channels decide. The run folder receives explain.json, report.html and, when an effect was
-/// named, explained.toml: the study with the effect in it, for `starlings run`.
+/// named, explained.toml: the study with the effect in it, for `starlings run`. Of a study with `[infer]`, which has noise in its states,
+/// terms that the drift lacks are named by the statistics of `starlings infer`.
 #[derive(Parser)]
 pub(crate) struct Args {
     /// The study file.
@@ -83,6 +85,9 @@ impl Args {
 
 /// Explains the study's misfit.
 pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
+    if Study::asks_to_infer(&args.study) {
+        return drift::run(args);
+    }
     interrupt::watch();
     let mut study = load_where(&args.study, args.fleet.is_here())?;
     let plan = args.fleet.plan(&study, Some(&Out(args.out.as_deref())))?;

@@ -3,7 +3,7 @@
 //! Next files to read: [`mod@print`] for the answer on a terminal, [`crate::fleet_session`] for the fleet.
 
 mod followed;
-mod print;
+pub(crate) mod print;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -12,6 +12,7 @@ use clap::Parser;
 use serde_json::json;
 use starlings_coordinator::fleet::RunIdentity;
 use starlings_coordinator::infer::{InferError, Inference, Progress, Reader, check, infer, outlook};
+use starlings_coordinator::live::LivePage;
 use starlings_coordinator::report::write_inference;
 use starlings_coordinator::study::Study;
 
@@ -66,25 +67,44 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if let Some(source) = &args.follow {
         return followed::run(&study, source, args.state.clone());
     }
-    check(&study).map_err(|error| failed(&error))?;
-    let plan = args.fleet.plan(&study, Some(&Out(args.out.as_deref())))?;
-    let entrance = Entrance::take(&plan, args.out.as_deref())?;
-    let folder = folder(&study, args.out.as_deref())?;
     let display = Arc::new(Display::new(args.json));
-    let mut session = FleetSession::listen(&study, &plan, entrance, RunIdentity::new(), &display)?;
-    session.show(&study, "infer", None, &display)?;
-    session.start_workers(&study, &plan, Some(&folder))?;
+    let made = make(&study, "infer", (&args.fleet, args.out.as_deref()), &display)?;
+    let told = tell(&made.found, &made.folder, args.json);
+    finish(made.page, Some(&made.folder.join("report.html")));
+    told
+}
+
+/// An inference in its folder.
+pub(crate) struct Made {
+    pub(crate) found: Inference,
+    pub(crate) folder: PathBuf,
+    /// The live page, where there is one.
+    pub(crate) page: Option<LivePage>,
+}
+
+/// Infers for a command on its fleet, and writes the folder of the result.
+pub(crate) fn make(
+    study: &Study,
+    command: &str,
+    (fleet, out): (&FleetArgs, Option<&Path>),
+    display: &Arc<Display>,
+) -> Result<Made, Failure> {
+    check(study).map_err(|error| failed(&error))?;
+    let plan = fleet.plan(study, Some(&Out(out)))?;
+    let entrance = Entrance::take(&plan, out)?;
+    let folder = folder(study, command, out)?;
+    let mut session = FleetSession::listen(study, &plan, entrance, RunIdentity::new(), display)?;
+    session.show(study, command, None, display)?;
+    session.start_workers(study, &plan, Some(&folder))?;
     let mut watch = |at: &Progress| display.blocks(at);
-    let reader = if args.fleet.is_here() { Reader::Workers } else { Reader::Coordinator };
-    let result = infer(&study, &mut session.fleet, reader, &mut watch);
+    let reader = if fleet.is_here() { Reader::Workers } else { Reader::Coordinator };
+    let result = infer(study, &mut session.fleet, reader, &mut watch);
     display.finish();
     let page = session.close(result.is_ok());
     let found = result.map_err(|error| failed(&error))?;
-    write_study(&study, &folder)?;
+    write_study(study, &folder)?;
     write_inference(&folder, &found).map_err(Failure::run)?;
-    let told = tell(&found, &folder, args.json);
-    finish(page, Some(&folder.join("report.html")));
-    told
+    Ok(Made { found, folder, page })
 }
 
 /// Says what an inference would do, for `starlings check`.
@@ -145,12 +165,12 @@ fn tell(found: &Inference, folder: &Path, json: bool) -> Result<(), Failure> {
     print::print(found, folder)
 }
 
-/// The folder of the result, made where it is not there; another result in it is refused.
-fn folder(study: &Study, out: Option<&Path>) -> Result<PathBuf, Failure> {
+/// The folder of the result of a command, made where it is not there; another result in it is refused.
+pub(crate) fn folder(study: &Study, command: &str, out: Option<&Path>) -> Result<PathBuf, Failure> {
     let stamp = jiff::Timestamp::now().strftime("%Y%m%d-%H%M%S");
-    let default = || Path::new("runs").join(format!("{}-infer-{stamp}", study.name));
+    let default = || Path::new("runs").join(format!("{}-{command}-{stamp}", study.name));
     let path = out.map_or_else(default, Path::to_owned);
-    for name in [RESULT, "run.db"] {
+    for name in [RESULT, crate::diagnose::RESULT, "run.db"] {
         if path.join(name).exists() {
             let message =
                 format!("{} holds a result already: give another --out, or remove it", path.display());
@@ -162,7 +182,8 @@ fn folder(study: &Study, out: Option<&Path>) -> Result<PathBuf, Failure> {
     Ok(path)
 }
 
-fn write_study(study: &Study, folder: &Path) -> Result<(), Failure> {
+/// Writes the study as it was read into the folder of its result.
+pub(crate) fn write_study(study: &Study, folder: &Path) -> Result<(), Failure> {
     let path = folder.join("study.toml");
     std::fs::write(&path, &*study.text)
         .map_err(|error| Failure::run(format!("cannot write {}: {error}", path.display())))

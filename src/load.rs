@@ -45,7 +45,8 @@ pub(crate) fn unknown_record<'a>(name: &str, names: impl Iterator<Item = &'a str
     Failure::input(format!("no record named `{name}` (the study has: {})", names.join(", ")))
 }
 
-fn host(here: bool) -> SolverHost {
+/// What starts the solvers of a study: somebody on this machine, or nobody.
+pub(crate) fn host(here: bool) -> SolverHost {
     if here { host_here() } else { host_elsewhere() }
 }
 

@@ -11,6 +11,7 @@ mod conformance;
 mod console;
 mod csv_file;
 mod deploy;
+mod diagnose;
 mod disk;
 mod effects;
 mod explain;
@@ -23,6 +24,7 @@ mod guard;
 mod identify;
 mod import;
 mod infer;
+mod init;
 mod interrupt;
 mod load;
 mod log;
@@ -85,10 +87,14 @@ enum Command {
     Check(check::Args),
     /// Run the model forward with chosen values and noise: a twin experiment.
     Simulate(simulate::Args),
+    /// Write a first version of a study: from a recording, a model, or both.
+    Init(init::Args),
     /// Write a study from a file of another program.
     Import(import::Args),
     /// Infer drift and noise of stochastic equations from recordings of all states.
     Infer(infer::Args),
+    /// Say whether a recording shows a fault, since when, and which scenario of a library it followed.
+    Diagnose(diagnose::Args),
     /// Say whether the estimation is reasonable, before it is made: what these data could determine.
     Identify(identify::Args),
     /// Forecast from a run or an inference: quantiles against time, and when a quantity crosses a level.
@@ -138,10 +144,12 @@ fn main() -> ExitCode {
         Command::Run(args) => run::run(&args, started),
         Command::Explain(args) => explain::run(&args, started),
         Command::Infer(args) => infer::run(&args),
+        Command::Diagnose(args) => diagnose::run(&args),
         Command::Watch(args) => watch::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Why(args) => why::run(&args),
         Command::Check(args) => check::run(&args),
+        Command::Init(args) => init::run(&args),
         Command::Import(args) => import::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Identify(args) => identify::run(&args),
@@ -195,10 +203,12 @@ impl Command {
             Self::Deploy(args) => args.prints_json(),
             Self::Explain(args) => args.json,
             Self::Infer(args) => args.json,
+            Self::Diagnose(args) => args.json,
             Self::Watch(args) => args.json,
             Self::Compare(args) => args.json,
             Self::Why(args) => args.json,
             Self::Check(args) => args.json,
+            Self::Init(args) => args.json,
             Self::Import(args) => args.json,
             Self::Identify(args) => args.json,
             Self::Forecast(args) => args.json,

@@ -9,7 +9,7 @@ use starlings_coordinator::study::store::Purpose;
 
 use crate::console::{line, note};
 use crate::failure::Failure;
-use crate::infer;
+use crate::{diagnose, infer};
 
 /// Write the result files of a run folder again from its run.db: report.html, and the numbers beside it.
 ///
@@ -30,6 +30,9 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if args.dir.join(infer::RESULT).is_file() {
         return infer::write_again(&args.dir, args.overview.is_some(), args.json);
+    }
+    if args.dir.join(diagnose::RESULT).is_file() {
+        return diagnose::write_again(&args.dir, args.overview.is_some(), args.json);
     }
     let folder = RunFolder::open(&args.dir).map_err(Failure::input)?;
     if folder.purpose().map_err(Failure::run)? == Purpose::Explanation {

@@ -4,7 +4,7 @@
 
 mod common;
 
-use std::process::Stdio;
+use std::process::{Command, Stdio};
 
 use common::{bytes, output, repository, run, starlings};
 use serde_json::Value;
@@ -81,6 +81,28 @@ fn the_interval_given_the_residuals_comes_first_where_it_is_much_wider_and_in_a_
     assert!(stdout.contains("95 % interval ") && !stdout.contains("95 % given the residuals"), "{stdout}");
     assert!(stdout.contains("given the residuals the intervals are at most 1."), "{stdout}");
     assert!(at(&page, "95\u{a0}% given the residuals") > at(&page, "95\u{a0}% at the stated noise"));
+}
+
+#[test]
+fn the_number_of_workers_comes_from_the_environment_where_the_command_line_has_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |out: &str, more: &[&str], workers: &str| {
+        let mut command = starlings();
+        command
+            .env("STARLINGS_WORKERS", workers)
+            .arg("run")
+            .arg(repository("examples/oscillator/study.toml"));
+        command.arg("--out").arg(folder.path().join(out)).arg("--json").args(more);
+        command
+    };
+    let workers = |command: &mut Command| {
+        let (_, stdout, _) = output(command);
+        json(&stdout)["workers"].as_u64().unwrap()
+    };
+    assert_eq!(workers(&mut run("one", &[], "1")), 1);
+    assert_eq!(workers(&mut run("three", &["--workers", "3"], "1")), 3);
+    let (code, _, stderr) = output(&mut run("none", &[], "two"));
+    assert!(code == 2 && stderr.contains("STARLINGS_WORKERS is `two`: give a number of workers"), "{stderr}");
 }
 
 #[test]
@@ -264,8 +286,7 @@ fn an_interrupted_run_ends_its_workers_and_says_how_to_go_on() {
         .spawn()
         .unwrap();
     common::wait_until("some analyses", || common::analyses(&out) > 50);
-    let interrupted =
-        std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    let interrupted = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
     assert!(interrupted.success());
     let status = child.wait().unwrap();
     let mut stderr = String::new();

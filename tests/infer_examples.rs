@@ -50,7 +50,10 @@ struct Promise {
 #[serde(deny_unknown_fields)]
 struct Noise {
     equation: String,
+    /// Of which the noise has the covariance with this one; itself without it.
+    with: Option<String>,
     truth: f64,
+    chapter: Option<String>,
     within_sd: f64,
 }
 
@@ -98,19 +101,33 @@ fn compare(found: &Value, promises: &[Promise]) -> String {
     table
 }
 
-fn compare_noise(found: &Value, promises: &[Noise]) {
+/// Compares the noise with its promises; lines of the table where it has a column for the chapter's values.
+fn compare_noise(found: &Value, promises: &[Noise], columns: bool) -> String {
+    let mut table = String::new();
+    let at = |name: &str| found["equations"].as_array().unwrap().iter().position(|e| *e == name).unwrap();
     for p in promises {
-        let at =
-            found["equations"].as_array().unwrap().iter().position(|e| *e == p.equation.as_str()).unwrap();
-        let entry = |key: &str| number(&found["diffusion"][key][at][at]);
+        let (i, j) = (at(&p.equation), at(p.with.as_ref().unwrap_or(&p.equation)));
+        let entry = |key: &str| number(&found["diffusion"][key][i][j]);
         let (value, sd) = (entry("matrix"), entry("sd"));
-        assert!(
-            (value - p.truth).abs() <= p.within_sd * sd,
-            "D of {}: {value} ± {sd} for {}",
-            p.equation,
-            p.truth
-        );
+        let with = p.with.as_ref().map_or_else(String::new, |with| format!(", {with}"));
+        let name = format!("D of {}{with}", p.equation);
+        assert!((value - p.truth).abs() <= p.within_sd * sd, "{name}: {value} ± {sd} for {}", p.truth);
+        if columns {
+            let chapter = p.chapter.as_deref().unwrap_or("");
+            let (value, sd) = (scaled(value, sd), scaled(sd, sd));
+            writeln!(table, "| {name} | {} | {chapter} | {value} ± {sd} | |", p.truth).unwrap();
+        }
     }
+    table
+}
+
+/// A number that may be far below one, to two digits of its standard deviation.
+fn scaled(value: f64, sd: f64) -> String {
+    if sd > 1e-4 {
+        return rounded(value, sd);
+    }
+    let digits = (value.abs().log10().floor() - sd.log10().floor()).max(0.0) as usize + 1;
+    format!("{value:.digits$e}")
 }
 
 /// The README holds this table between its marks, or gets it where that is asked for.
@@ -153,9 +170,13 @@ fn example(name: &str) {
         table.push_str(&compare(&found["coefficients"], &expected.coefficients));
     }
     if !expected.unknowns.is_empty() {
+        if !table.is_empty() {
+            table.push('\n');
+        }
         table.push_str(&compare(&found["reduced"]["unknowns"], &expected.unknowns));
     }
-    compare_noise(&found, &expected.noise);
+    let columns = table.contains("chapter");
+    table.push_str(&compare_noise(&found, &expected.noise, columns));
     if let Some([lo, hi]) = expected.chi_squared {
         let chi = number(&found["reduced"]["chi_squared"]);
         assert!((lo..=hi).contains(&chi), "χ² {chi} outside [{lo}, {hi}]");
@@ -229,4 +250,5 @@ examples! {
     lorenz_27 => "lorenz-27",
     three_tanks => "three-tanks",
     mixed_oscillators => "mixed-oscillators",
+    motor_ignition => "motor-ignition",
 }

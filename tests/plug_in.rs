@@ -1,123 +1,30 @@
 //! The page that takes a newcomer from a function to a posterior, done as it says: its files written, its commands typed, what
 //! they print compared with what it shows.
 //!
-//! Fences say what a block is: `file=NAME` is that file, `append=NAME` goes to its end, `from=PATH` is quoted from there, and of
-//! a `console` block the lines after `$ ` are typed and the others must come out, in that order.
+//! Next file to read: `page_kit`, which says what a block is.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)] // a failed unwrap is a failed test; how long it took is of interest
 
 mod common;
+mod page_kit;
 
-use std::path::Path;
-use std::process::Command;
 use std::time::Instant;
 
-use common::{repository, starlings};
+use common::starlings;
+use page_kit::{Block, blocks, follow, quotations, words};
 
 /// How long the page promises that it takes at most, seconds.
 const PROMISED: f64 = 600.0;
 
-/// A fenced block: the words behind the fence, and the lines inside.
-struct Block {
-    words: Vec<String>,
-    lines: Vec<String>,
-}
-
-impl Block {
-    /// The value of `key=` behind the fence.
-    fn value(&self, key: &str) -> Option<&str> {
-        self.words.iter().find_map(|word| word.strip_prefix(key)?.strip_prefix('='))
-    }
-
-    fn is_console(&self) -> bool {
-        self.words.first().is_some_and(|word| word == "console")
-    }
-
-    fn text(&self) -> String {
-        self.lines.iter().flat_map(|line| [line.as_str(), "\n"]).collect()
-    }
-
-    /// Commands, each with the lines that it must print.
-    fn commands(&self) -> Vec<(&str, Vec<&str>)> {
-        let mut commands: Vec<(&str, Vec<&str>)> = Vec::new();
-        for line in &self.lines {
-            match line.strip_prefix("$ ") {
-                Some(command) => commands.push((command, Vec::new())),
-                None => commands.last_mut().expect("a command comes first").1.push(line),
-            }
-        }
-        commands
-    }
-}
-
 fn page() -> String {
-    std::fs::read_to_string(repository("docs/plug-in.md")).unwrap()
-}
-
-fn blocks(page: &str) -> Vec<Block> {
-    let mut found: Vec<Block> = Vec::new();
-    let mut inside = false;
-    for line in page.lines() {
-        if let Some(fence) = line.strip_prefix("```") {
-            inside = !inside;
-            if inside {
-                let words = fence.split_whitespace().map(str::to_owned).collect();
-                found.push(Block { words, lines: Vec::new() });
-            }
-        } else if inside {
-            found.last_mut().unwrap().lines.push(line.to_owned());
-        }
-    }
-    assert!(!inside, "a fence is left open");
-    found
-}
-
-/// Columns are as wide as their widest cell: only the words count.
-fn words(line: &str) -> String {
-    line.split_whitespace().collect::<Vec<_>>().join(" ")
-}
-
-/// With the binary under test before everything else that is found by its name.
-fn search_path() -> std::ffi::OsString {
-    let beside = Path::new(env!("CARGO_BIN_EXE_starlings")).parent().unwrap().to_path_buf();
-    let others = std::env::var_os("PATH").unwrap_or_default();
-    std::env::join_paths(std::iter::once(beside).chain(std::env::split_paths(&others))).unwrap()
-}
-
-/// Types a command and looks for the lines that it must print.
-fn typed(folder: &Path, command: &str, shown: &[&str]) {
-    let output = Command::new("sh")
-        .args(["-c", &format!("{{ {command}\n}} 2>&1")])
-        .current_dir(folder)
-        .env("PATH", search_path())
-        .output()
-        .unwrap();
-    let said = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(output.status.success(), "`{command}` ends with {}:\n{said}", output.status);
-    let mut lines = said.lines().map(words);
-    for line in shown {
-        assert!(
-            lines.any(|said| said == words(line)),
-            "`{command}` does not print, or not in this place, `{line}`:\n{said}"
-        );
-    }
+    page_kit::page("plug-in.md")
 }
 
 #[test]
 #[ignore = "needs the Python package: .ci/solvers"]
 fn a_newcomer_who_does_what_the_page_says_gets_the_posterior_that_it_shows() {
     let (folder, started) = (tempfile::tempdir().unwrap(), Instant::now());
-    for block in blocks(&page()) {
-        if let Some(name) = block.value("file") {
-            std::fs::write(folder.path().join(name), block.text()).unwrap();
-        } else if let Some(name) = block.value("append") {
-            let path = folder.path().join(name);
-            let before = std::fs::read_to_string(&path).unwrap();
-            std::fs::write(&path, before + &block.text()).unwrap();
-        } else if block.is_console() {
-            block.commands().iter().for_each(|(command, shown)| typed(folder.path(), command, shown));
-        }
-    }
+    follow(&page(), folder.path());
     let seconds = started.elapsed().as_secs_f64();
     println!("every command of the page: {seconds:.1} s");
     assert!(seconds < PROMISED, "the commands alone take {seconds:.0} s");
@@ -152,13 +59,7 @@ fn the_page_leads_to_a_posterior_and_shows_it() {
 
 #[test]
 fn what_the_page_quotes_of_an_example_stands_there() {
-    let mut quoted = 0;
-    for block in blocks(&page()) {
-        let Some(path) = block.value("from") else { continue };
-        let whole = std::fs::read_to_string(repository(path)).unwrap();
-        assert!(whole.contains(&block.text()), "{path} does not have:\n{}", block.text());
-        quoted += 1;
-    }
+    let quoted = quotations(&page());
     assert!(quoted > 3, "only {quoted} quotations: are they still recognised?");
 }
 

@@ -12,56 +12,66 @@ use std::time::Instant;
 
 use access_kit::Started;
 use common::{analyses, output, repository, starlings, wait_until};
-use slurm_kit::{Revived, Trial, deploy, kill, lab, parent, queue, remove, task, worker_process};
+use slurm_kit::nodes::{Cut, kill_node, node_state};
+use slurm_kit::{
+    Trial, coordinator, deploy, is_alive, node_of, queue, remove, task, worker_process, workers,
+};
 
 #[test]
 #[ignore = "needs a Slurm: .ci/slurm test"]
-fn a_node_that_dies_in_the_middle_changes_no_byte_and_its_worker_is_back_at_once() {
+fn a_node_that_dies_and_one_that_is_cut_off_in_the_middle_change_no_byte_and_their_workers_come_back() {
     let trial = Trial::new();
     let (study, out, fit) = (&trial.study, trial.path("pool"), trial.path("fit"));
     let started = Instant::now();
-    // One task fits on a node, and there is a node more than tasks.
-    let (code, said) = deploy(study, &out, &["--workers", "3", "--", "--mem=600"]);
+    // There is a node more than tasks.
+    let (code, said) = deploy(study, &out, &["--workers", "3", "--", "--exclusive"]);
     assert_eq!(code, 0, "{said}");
     assert!(said.contains("3 of 3 run") && said.contains("next:    starlings run"), "{said}");
     println!("three workers run after {:.1} s", started.elapsed().as_secs_f64());
 
     let watch = Started::of(starlings().args(["deploy", "watch", "--every", "0.5"]).arg(&out));
     let access = out.join("access.json");
-    let mut call = starlings();
-    call.arg("run").arg(study).args(["--listen", "127.0.0.1:0", "--access"]).arg(&access);
-    let mut coordinator = Started::of(call.arg("--out").arg(&fit));
+    let mut coordinator = coordinator(study, &access, &fit);
     wait_until("some analyses", || analyses(&fit) > 3);
 
-    let first = task(&out, "worker 0");
-    let node = first["node"].as_str().unwrap().to_owned();
-    let daemon = std::fs::read_to_string(lab().join(format!("run/slurmd-{node}.pid"))).unwrap();
-    let worker = worker_process(&access, "0").unwrap();
-    let script = parent(&worker);
+    let [dead, away] = ["worker 0", "worker 1"].map(|name| node_of(&out, name));
+    assert_ne!(dead, away, "one task on a node");
+    let worker_away = worker_process(&access, "1").unwrap();
     assert!(coordinator.child.try_wait().unwrap().is_none(), "the study is in the middle");
-    // Whoever would tell Slurm of the end of the others dies before them, as all of a machine does at once.
-    for process in [daemon.trim(), &parent(&script), &script, &worker] {
-        kill(process);
-    }
-    let _revived = Revived(node.clone());
-    let killed = Instant::now();
+    let cut = Cut::off(&away);
+    let revived = kill_node(&dead, &worker_process(&access, "0").unwrap());
+    let lost = Instant::now();
 
     assert_eq!(coordinator.end(), Some(0), "{}", coordinator.said());
-    println!("the study ended {:.1} s after the node", killed.elapsed().as_secs_f64());
+    println!("the study ended {:.1} s after the nodes were lost", lost.elapsed().as_secs_f64());
     assert!(trial.is_same(&fit));
 
-    watch.await_words("worker 0: started again at once");
-    wait_until("a new start of worker 0", || {
-        task(&out, "worker 0")["state"] == "running" && task(&out, "worker 0")["restarts"] == 1
+    wait_until("Slurm to miss both", || {
+        [&dead, &away].iter().all(|node| node_state(node).starts_with("down"))
     });
-    // Slurm alone takes 120 s from the loss of the node, which it notices after 10 to 30 s, to the new start.
-    println!("its worker was back after {:.1} s", killed.elapsed().as_secs_f64());
-    assert_ne!(task(&out, "worker 0")["node"], node.as_str());
+    println!("Slurm missed both after {:.1} s", lost.elapsed().as_secs_f64());
+    // The machine that died is switched on again, so that there are nodes for both tasks while the other one is away.
+    drop(revived);
+    let is_back = |name| {
+        let task = task(&out, name);
+        task["state"] == "running" && task["restarts"] == 1
+    };
+    wait_until("both workers", || is_back("worker 0") && is_back("worker 1"));
+    // Slurm alone takes 120 s from the loss of a node, which it notices after 10 to 30 s, to the new start.
+    println!("both workers were back after {:.1} s", lost.elapsed().as_secs_f64());
+    for name in ["worker 0", "worker 1"] {
+        watch.await_words(&format!("{name}: started again at once"));
+        assert_ne!(node_of(&out, name), away);
+    }
+    assert!(is_alive(&worker_away), "nobody ends what is cut off");
+    drop(cut);
+    wait_until("the end of the worker that was cut off", || !is_alive(&worker_away));
 
     let removed = Instant::now();
     remove(&out);
     println!("removed in {:.1} s", removed.elapsed().as_secs_f64());
     watch.await_words("no process is left");
+    wait_until("the end of every worker", || workers(&access).is_empty());
 }
 
 #[test]

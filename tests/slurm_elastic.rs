@@ -10,7 +10,7 @@ mod slurm_kit;
 use access_kit::Started;
 use common::{starlings, wait_until};
 use serde_json::Value;
-use slurm_kit::{Trial, deploy, queue, remove, status};
+use slurm_kit::{Trial, accounts, coordinator, deploy, queue, remove, status};
 
 /// Workers of a deployment that run, as squeue says.
 fn running(out: &std::path::Path) -> usize {
@@ -25,14 +25,10 @@ fn a_pool_grows_with_the_queue_and_shrinks_when_the_run_is_over_and_no_byte_chan
     let (code, said) = deploy(&trial.study, &out, &["--elastic", "1..3", "--slots", "1"]);
     assert!(code == 0 && said.contains("1 of 1 run"), "{said}");
     assert_eq!(queue().lines().count(), 1, "{}", queue());
+    let accounts = || accounts(&out);
     let watch_options = ["deploy", "watch", "--every", "0.5", "--release-after", "5s"];
     let mut watch = Started::of(starlings().args(watch_options).arg(&out));
-    let mut call = starlings();
-    call.arg("run")
-        .arg(&trial.study)
-        .args(["--listen", "127.0.0.1:0", "--access"])
-        .arg(out.join("access.json"));
-    let mut coordinator = Started::of(call.arg("--out").arg(&fit));
+    let mut coordinator = coordinator(&trial.study, &out.join("access.json"), &fit);
 
     watch.await_words("2 workers added, 1 → 3");
     wait_until("three workers in the queue or running", || queue().lines().count() == 3);
@@ -45,6 +41,12 @@ fn a_pool_grows_with_the_queue_and_shrinks_when_the_run_is_over_and_no_byte_chan
     let told: Vec<Value> = events.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert_eq!(told.first().unwrap()["event"], "workers-added");
     assert_eq!(told.last().unwrap()["event"], "workers-released");
+    let before = accounts();
+    assert!(
+        before.iter().all(|job| job.state == "CANCELLED") && before.len() == 2,
+        "two released: {before:?}"
+    );
     remove(&out);
+    wait_until("the account of the last worker", || accounts().len() == 3);
     assert_eq!(watch.end(), Some(0), "{}", watch.said());
 }

@@ -13,9 +13,8 @@ mod slurm_kit;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use access_kit::Started;
 use common::{output, repository, starlings};
-use slurm_kit::{deploy, remove};
+use slurm_kit::{coordinator, deploy, remove};
 
 /// Every rank tells its number and node; the first one is the solver of the example.
 const RANK: &str = "folder=\"$(dirname \"$0\")\"
@@ -61,9 +60,7 @@ fn the_ranks_of_a_solver_are_on_both_nodes_of_the_allocation_of_its_worker_and_n
     let allocation = ["--nodes=2", "--ntasks=2", "--ntasks-per-node=1", "--exclusive"];
     let (code, said) = deploy(&file, &out, &[&options[..], &allocation].concat());
     assert_eq!(code, 0, "{said}");
-    let mut call = starlings();
-    call.arg("run").arg(&file).args(["--listen", "127.0.0.1:0", "--access"]).arg(out.join("access.json"));
-    let mut coordinator = Started::of(call.arg("--out").arg(&fit));
+    let mut coordinator = coordinator(&file, &out.join("access.json"), &fit);
     assert_eq!(coordinator.end(), Some(0), "{}", coordinator.said());
     let ranks: BTreeSet<String> = std::fs::read_dir(dir.path().join("ranks"))
         .unwrap()

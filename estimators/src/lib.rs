@@ -15,6 +15,7 @@ mod block_angular;
 mod blocks;
 mod correlated_noise;
 mod data;
+pub mod departures;
 mod diagnostics;
 mod drift;
 mod error;

@@ -41,7 +41,7 @@ pub(crate) fn chi_squared(p: f64, degrees: f64) -> f64 {
 }
 
 /// Probability that χ² is larger.
-pub(crate) fn chi_squared_tail(value: f64, degrees: f64) -> f64 {
+pub fn chi_squared_tail(value: f64, degrees: f64) -> f64 {
     ChiSquared::new(degrees).map_or(1.0, |chi| chi.sf(value.max(0.0)))
 }
 

@@ -5,6 +5,8 @@
 //! large misfit with all: the probabilities are among the library alone. Read next: `unknown_input.rs`, whose response to a course
 //! is what the outputs then show.
 
+use nalgebra::DMatrix;
+
 use crate::EstimatorError;
 use crate::quantiles::normal;
 
@@ -79,12 +81,39 @@ pub fn identify(
     check(observed, noise, courses, prior)?;
     let of = |course: &Vec<f64>| scenario(&Products::new(observed, course), noise, prior);
     let mut scenarios: Vec<Scenario> = courses.iter().map(of).collect();
-    let most = scenarios.iter().map(|s| s.log_evidence).fold(f64::NEG_INFINITY, f64::max);
-    let total: f64 = scenarios.iter().map(|s| (s.log_evidence - most).exp()).sum();
-    for scenario in &mut scenarios {
-        scenario.probability = (scenario.log_evidence - most).exp() / total;
+    let evidence: Vec<f64> = scenarios.iter().map(|s| s.log_evidence).collect();
+    let probabilities = probabilities(&evidence, &vec![1.0; evidence.len()]);
+    for (scenario, probability) in scenarios.iter_mut().zip(probabilities) {
+        scenario.probability = probability;
     }
     Ok(scenarios)
+}
+
+/// Probabilities of scenarios from the logs of their evidence and how likely each was beforehand, up to a factor; an evidence of −∞ has
+/// none. All are zero where no evidence is finite.
+pub fn probabilities(log_evidence: &[f64], beforehand: &[f64]) -> Vec<f64> {
+    let most = log_evidence.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if !most.is_finite() {
+        return vec![0.0; log_evidence.len()];
+    }
+    let weights: Vec<f64> =
+        log_evidence.iter().zip(beforehand).map(|(log, p)| p * (log - most).exp()).collect();
+    let total: f64 = weights.iter().sum();
+    weights.into_iter().map(|weight| weight / total).collect()
+}
+
+/// Log of the evidence of a scenario with several unknowns by Laplace's approximation, exact where the predictions are linear in them
+/// (MacKay 2003, chapter 27).
+///
+/// `cost` is χ² plus prior at the likeliest point, `jacobian` (m x p) the derivative of the predictions over the noise by unknowns whose
+/// prior is a standard normal, `noise` the m standard deviations. `None` where the Jacobian is not finite.
+pub fn laplace_evidence(cost: f64, jacobian: &DMatrix<f64>, noise: &[f64]) -> Option<f64> {
+    let p = jacobian.ncols();
+    let information = DMatrix::identity(p, p) + jacobian.tr_mul(jacobian);
+    let log_root: f64 = information.cholesky()?.l_dirty().diagonal().iter().map(|v| v.ln()).sum();
+    let log_noise: f64 = noise.iter().map(|sd| sd.ln()).sum();
+    let evidence = -0.5 * (cost + noise.len() as f64 * std::f64::consts::TAU.ln()) - log_noise - log_root;
+    evidence.is_finite().then_some(evidence)
 }
 
 /// y = a s + e with a ~ N(a₀, τ²), e ~ N(0, σ²): precision s·s/σ² + 1/τ², evidence by completing the square.
@@ -165,6 +194,28 @@ mod tests {
         assert!((found.amplitude - (0.28 / 0.09 + 4.0) / precision).abs() < 1e-14);
         assert!((found.sd - 1.0 / precision.sqrt()).abs() < 1e-15);
         assert!((found.probability - 1.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn laplace_is_exact_for_a_multiple_of_a_course() {
+        let (y, s, noise) = ([0.8, -0.3, 0.1], [0.5, 0.4, -0.2], 0.3);
+        let found = identify(&y, noise, &[s.to_vec()], PRIOR).expect("one scenario")[0];
+        // In prior standard deviations from the prior mean.
+        let z = (found.amplitude - PRIOR.mean) / PRIOR.sd;
+        let left = y.iter().zip(&s).map(|(y, s)| ((y - found.amplitude * s) / noise).powi(2)).sum::<f64>();
+        let jacobian = DMatrix::from_fn(3, 1, |i, _| s[i] * PRIOR.sd / noise);
+        let evidence = laplace_evidence(left + z * z, &jacobian, &[noise; 3]).expect("finite");
+        // A dozen rounded operations.
+        assert!((evidence - found.log_evidence).abs() < 1e-12, "{evidence} for {}", found.log_evidence);
+        assert_eq!(laplace_evidence(1.0, &DMatrix::from_element(3, 1, f64::NAN), &[noise; 3]), None);
+    }
+
+    #[test]
+    fn what_was_likelier_beforehand_counts_and_what_cannot_be_has_no_share() {
+        let found = probabilities(&[-1e4, -1e4, f64::NEG_INFINITY], &[1.0, 3.0, 1.0]);
+        assert!((found[0] - 0.25).abs() < 1e-15 && (found[1] - 0.75).abs() < 1e-15, "{found:?}");
+        assert!(found[2] <= 0.0);
+        assert!(probabilities(&[f64::NEG_INFINITY; 2], &[1.0; 2]).iter().all(|p| *p <= 0.0));
     }
 
     #[test]

@@ -15,10 +15,13 @@ use crate::failure::Failure;
 use crate::fleet_values::{address, alone, host_of, memory, served_address};
 use crate::load::is_outside;
 
+/// Number of local workers where the command line has none.
+const WORKERS: &str = "STARLINGS_WORKERS";
+
 /// Which workers run the model.
 #[derive(Args)]
 pub(crate) struct FleetArgs {
-    /// Number of local worker processes; what the study says (fleet.workers) without it.
+    /// Number of local worker processes; without it what STARLINGS_WORKERS says, then what the study says (fleet.workers).
     #[arg(long, value_name = "N", conflicts_with = "listen")]
     workers: Option<usize>,
     /// Wait for workers to dial this address (HOST:PORT, port 0 picks a free one) instead of starting local ones.
@@ -69,7 +72,11 @@ impl FleetArgs {
     /// Checks the arguments; nothing is started yet. `out` is the run folder where it is named, `None` for a command that makes
     /// none.
     pub(crate) fn plan(&self, study: &Study, out: Option<&Out<'_>>) -> Result<Plan, Failure> {
-        let n_worker = self.workers.unwrap_or(study.fleet.workers);
+        let n_worker = match (self.workers, &self.listen) {
+            (Some(n_worker), _) => n_worker,
+            (None, None) => of_environment()?.unwrap_or(study.fleet.workers),
+            (None, Some(_)) => study.fleet.workers,
+        };
         if n_worker == 0 {
             return Err(Failure::input(
                 "--workers must be at least 1 (or use --listen ADDR and start workers elsewhere)",
@@ -118,6 +125,16 @@ impl FleetArgs {
             )),
         }
     }
+}
+
+/// How many workers the environment asks for, on a machine whose users should not have to know.
+fn of_environment() -> Result<Option<usize>, Failure> {
+    let Some(value) = std::env::var_os(WORKERS).filter(|value| !value.is_empty()) else { return Ok(None) };
+    let text = value.to_string_lossy();
+    let number = text.trim().parse().ok().filter(|n| *n > 0);
+    number
+        .map(Some)
+        .ok_or_else(|| Failure::input(format!("{WORKERS} is `{text}`: give a number of workers, at least 1")))
 }
 
 /// The run folder of a command, where it was named.

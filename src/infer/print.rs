@@ -9,7 +9,7 @@ use crate::console::{line, note, number, table, text};
 use crate::failure::Failure;
 
 /// Prints the answer.
-pub(super) fn print(found: &Inference, folder: &Path) -> Result<(), Failure> {
+pub(crate) fn print(found: &Inference, folder: &Path) -> Result<(), Failure> {
     line(format_args!("{}: {}", found.study, found.verdict))?;
     for warning in &found.warnings {
         line(format_args!("warning: {warning}"))?;

@@ -1,12 +1,15 @@
-//! Deployments under the real Slurm that `.ci/slurm test` starts.
+//! Deployments under the real Slurm that `.ci/slurm test` starts. What happens to its nodes: `nodes.rs`.
 
 #![allow(clippy::unwrap_used, dead_code)] // each test uses its part
+
+pub(crate) mod nodes;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use serde_json::Value;
 
+use crate::access_kit::Started;
 use crate::common::{output, repository, run, starlings};
 
 /// A study, what it gives on local workers, and places for a deployment and a run.
@@ -72,35 +75,60 @@ pub(crate) fn remove(out: &Path) {
     assert_eq!(queue(), "", "nothing is left in the queue");
 }
 
+/// Starts a run to which the workers of a deployment come.
+pub(crate) fn coordinator(study: &Path, access: &Path, out: &Path) -> Started {
+    let address = std::env::var("SLURM_LAB_ADDRESS").expect("started by .ci/slurm test");
+    let mut call = starlings();
+    call.arg("run").arg(study).args(["--listen", &format!("{address}:0"), "--access"]).arg(access);
+    Started::of(call.arg("--out").arg(out))
+}
+
+/// The node on which a task of a deployment runs.
+pub(crate) fn node_of(out: &Path, task_name: &str) -> String {
+    task(out, task_name)["node"].as_str().unwrap().to_owned()
+}
+
+/// A job that has ended, as `sacct --completion` tells it.
+#[derive(Debug)]
+pub(crate) struct Account {
+    pub(crate) state: String,
+}
+
+/// The jobs of a deployment that have ended.
+pub(crate) fn accounts(out: &Path) -> Vec<Account> {
+    let text = std::fs::read_to_string(out.join("deployment.json")).unwrap();
+    let deployment: Value = serde_json::from_str(&text).unwrap();
+    let name = deployment["name"].as_str().unwrap();
+    let mut sacct = Command::new("sacct");
+    sacct.args(["--completion", "--noheader", "--parsable2", "--format", "jobname,state", "--file"]);
+    let (code, told, said) = output(sacct.arg(lab().join("log/completed")));
+    assert_eq!(code, 0, "{said}");
+    let ended = told.lines().filter_map(|line| line.split_once('|')).filter(|(job, _)| *job == name);
+    ended.map(|(_, state)| Account { state: state.to_owned() }).collect()
+}
+
+/// The processes of the workers of a deployment.
+pub(crate) fn workers(access: &Path) -> Vec<String> {
+    let processes = std::fs::read_dir("/proc").unwrap().flatten();
+    let of_access = processes.filter(|entry| {
+        let line = std::fs::read(entry.path().join("cmdline")).unwrap_or_default();
+        let has = |word: &str| line.split(|b| *b == 0).any(|w| w == word.as_bytes());
+        has("worker") && has(access.to_str().unwrap()) && !has("/bin/bash")
+    });
+    of_access.map(|entry| entry.file_name().into_string().unwrap()).collect()
+}
+
 /// The process of a worker of a deployment.
 pub(crate) fn worker_process(access: &Path, task: &str) -> Option<String> {
-    std::fs::read_dir("/proc").unwrap().flatten().find_map(|entry| {
-        let read = |name: &str| std::fs::read(entry.path().join(name)).unwrap_or_default();
-        let has = |bytes: &[u8], word: &str| bytes.split(|b| *b == 0).any(|w| w == word.as_bytes());
-        let is_it = has(&read("cmdline"), "worker")
-            && has(&read("cmdline"), access.to_str().unwrap())
-            && has(&read("environ"), &format!("SLURM_ARRAY_TASK_ID={task}"))
-            && !has(&read("cmdline"), "/bin/bash");
-        is_it.then(|| entry.file_name().into_string().unwrap())
+    let own = format!("SLURM_ARRAY_TASK_ID={task}");
+    workers(access).into_iter().find(|pid| {
+        let environment = std::fs::read(format!("/proc/{pid}/environ")).unwrap_or_default();
+        environment.split(|b| *b == 0).any(|variable| variable == own.as_bytes())
     })
 }
 
-/// The process that started a process.
-pub(crate) fn parent(pid: &str) -> String {
-    let status = std::fs::read_to_string(format!("/proc/{pid}/status")).unwrap();
-    let line = status.lines().find_map(|line| line.strip_prefix("PPid:")).unwrap();
-    line.trim().to_owned()
-}
-
-pub(crate) fn kill(pid: &str) {
-    assert!(Command::new("kill").args(["-9", pid]).status().unwrap().success());
-}
-
-/// Starts the daemon of a node again, which frees the name of the node for the next test.
-pub(crate) struct Revived(pub(crate) String);
-
-impl Drop for Revived {
-    fn drop(&mut self) {
-        let _ = Command::new("slurmd").args(["-N", &self.0]).status();
-    }
+/// Whether a process is there and has not ended.
+pub(crate) fn is_alive(pid: &str) -> bool {
+    let status = std::fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default();
+    status.lines().any(|line| line.starts_with("State:") && !line.contains("zombie"))
 }

@@ -15,9 +15,12 @@ use tokio_stream::Stream;
 /// Bytes that wait for the network, from which on a thread waits too.
 const MOST: usize = 16 * 1024 * 1024;
 
-/// The near end of the way.
+/// The near end of the way. Every job holds one: a clone costs a count.
 #[derive(Clone, Debug)]
-pub(crate) struct Outbox {
+pub(crate) struct Outbox(Arc<Near>);
+
+#[derive(Debug)]
+struct Near {
     sender: UnboundedSender<(usize, generated::FromWorker)>,
     room: Arc<Room>,
 }
@@ -47,7 +50,7 @@ impl Outbox {
     pub(crate) fn new() -> (Self, Outgoing) {
         let (sender, receiver) = mpsc::unbounded_channel();
         let room = Arc::<Room>::default();
-        (Self { sender, room: Arc::clone(&room) }, Outgoing { receiver, room })
+        (Self(Arc::new(Near { sender, room: Arc::clone(&room) })), Outgoing { receiver, room })
     }
 
     /// Sends a message; one of a stream that has ended is nobody's.
@@ -60,7 +63,7 @@ impl Outbox {
     /// The same for a thread that may wait until there is room; false where the stream has ended.
     pub(crate) fn send_when_room(&self, message: FromWorker) -> bool {
         let Ok(message) = message.encode() else { return true };
-        self.room.wait() && self.put(message)
+        self.0.room.wait() && self.put(message)
     }
 
     /// Answers a lease; an answer that does not fit in a message becomes a failure that says so.
@@ -72,20 +75,20 @@ impl Outbox {
 
     /// The same for a thread that may wait until there is room.
     pub(crate) fn answer_when_room(&self, lease: Lease, answer: LeaseOutcome, cost: f64) {
-        if let Some(message) = encoded(lease, answer, cost).filter(|_| self.room.wait()) {
+        if let Some(message) = encoded(lease, answer, cost).filter(|_| self.0.room.wait()) {
             self.put(message);
         }
     }
 
     /// Nothing is taken any more: nobody waits.
     pub(crate) fn end(&self) {
-        self.room.end();
+        self.0.room.end();
     }
 
     fn put(&self, message: generated::FromWorker) -> bool {
         let bytes = FromWorker::wire_size(&message);
-        self.room.lock().bytes += bytes;
-        self.sender.send((bytes, message)).is_ok()
+        self.0.room.lock().bytes += bytes;
+        self.0.sender.send((bytes, message)).is_ok()
     }
 }
 

@@ -50,8 +50,10 @@ struct Shared {
 struct Queue {
     tasks: VecDeque<Arc<Task>>,
     running: Vec<Arc<Task>>,
-    /// Threads that wait for a task.
+    /// Threads that wait for a task and were not told of one.
     idle: usize,
+    /// Threads that were told of a task and are not awake yet: for them nobody needs to be told again.
+    told: usize,
     /// No task is begun: no more results can be held.
     full: bool,
     closed: bool,
@@ -103,10 +105,13 @@ impl Slots {
     pub(crate) fn push(&self, task: Task) {
         let mut queue = self.shared.lock();
         queue.tasks.push_back(Arc::new(task));
-        let waited_for = queue.idle > 0;
+        let tells = queue.idle > 0;
+        if tells {
+            (queue.idle, queue.told) = (queue.idle - 1, queue.told + 1);
+        }
         drop(queue);
-        // Each notice is a call of the system, also where nobody waits.
-        if waited_for {
+        // Each notice is a call of the system, and a thread takes longer to wake than several jobs to come.
+        if tells {
             self.shared.filled.notify_one();
         }
     }
@@ -165,6 +170,17 @@ impl Slots {
     }
 }
 
+impl Queue {
+    /// A thread waits no more: it was told, or all were woken.
+    fn woke(&mut self) {
+        if self.told > 0 {
+            self.told -= 1;
+        } else {
+            self.idle -= 1;
+        }
+    }
+}
+
 impl Shared {
     fn lock(&self) -> MutexGuard<'_, Queue> {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
@@ -184,7 +200,7 @@ impl Shared {
             }
             queue.idle += 1;
             queue = self.filled.wait(queue).unwrap_or_else(PoisonError::into_inner);
-            queue.idle -= 1;
+            queue.woke();
         }
     }
 

@@ -8,6 +8,7 @@
 mod incoming;
 mod lent;
 
+use std::ops::Deref;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
@@ -37,9 +38,12 @@ const LANES: usize = 2;
 /// Pieces made ahead of what the network has taken.
 const AHEAD: usize = 4;
 
-/// The way of states over one session.
+/// The way of states over one session. Every job of it holds one, small state or large: a clone costs a count.
 #[derive(Clone)]
-pub(crate) struct Transfers {
+pub(crate) struct Transfers(Arc<Session>);
+
+/// What all clones share.
+pub(crate) struct Session {
     client: FleetClient<Proven>,
     runtime: Handle,
     lanes: Arc<Semaphore>,
@@ -50,9 +54,17 @@ pub(crate) struct Transfers {
     shared: Option<Arc<Folder>>,
     descriptors: Option<Arc<DescriptorReceiver>>,
     /// Memory that the coordinator lent and nobody writes now.
-    lent: Arc<Mutex<Vec<LentMemory>>>,
+    lent: Mutex<Vec<LentMemory>>,
     /// Whether it was told that the folder refuses.
-    is_told: Arc<AtomicBool>,
+    is_told: AtomicBool,
+}
+
+impl Deref for Transfers {
+    type Target = Session;
+
+    fn deref(&self) -> &Session {
+        &self.0
+    }
 }
 
 impl Transfers {
@@ -63,7 +75,7 @@ impl Transfers {
         shared: Option<Arc<Folder>>,
         descriptors: Option<Arc<DescriptorReceiver>>,
     ) -> Self {
-        Self {
+        Self(Arc::new(Session {
             client,
             runtime: Handle::current(),
             lanes: Arc::new(Semaphore::new(LANES)),
@@ -73,9 +85,9 @@ impl Transfers {
             nonce,
             shared,
             descriptors,
-            lent: Arc::default(),
-            is_told: Arc::default(),
-        }
+            lent: Mutex::default(),
+            is_told: AtomicBool::new(false),
+        }))
     }
 
     /// Says once in a session that what should go through the folder goes over the connection.

@@ -4,7 +4,8 @@
 //! study is given the model's own predictions in their place. Next files to read: [`svzerod`] and [`openbf`], which make a
 //! [`plan::Plan`], then [`write`], which makes the study of it.
 
-mod names;
+#[cfg(fuzzing)]
+pub mod fuzzing;
 mod openbf;
 mod plan;
 mod svzerod;

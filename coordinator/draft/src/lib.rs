@@ -1,9 +1,12 @@
 //! First versions of studies, written from files that people have.
 //!
 //! A draft is a folder with a study that `starlings check` accepts, its data and notes of what the file did not say. Nothing is
-//! estimated here. Next file to read: [`import`], which takes files of other programs.
+//! estimated here. Next files to read: [`import`], which takes files of other programs, and [`mod@init`], which takes recordings and models.
 
+mod files;
 pub mod import;
+pub mod init;
+mod names;
 
 use std::path::{Path, PathBuf};
 
@@ -29,6 +32,12 @@ pub enum DraftError {
         /// What and where, with a remedy.
         message: String,
     },
+    /// Something that was asked for does not fit, or was not said.
+    #[error("{0}")]
+    Wish(String),
+    /// The study that was written does not run.
+    #[error("nothing was written: {0}")]
+    Trial(String),
     /// The folder is there already.
     #[error("{} is there already: give another folder with --out, or remove it", .0.display())]
     Taken(PathBuf),
@@ -41,10 +50,10 @@ pub enum DraftError {
         error: std::io::Error,
     },
     /// The model that the file describes cannot be built.
-    #[error("the model of this file is refused: {0}")]
+    #[error("the model is refused: {0}")]
     Study(#[from] StudyError),
     /// The model that the file describes cannot be run.
-    #[error("the model of this file: {0}")]
+    #[error("the model: {0}")]
     Run(#[from] TwinError),
 }
 

@@ -47,6 +47,7 @@ pub use screen::candidates::{candidates, check};
 pub use screen::not_tried::NotTried;
 pub use tell::figures::{Curve, Figures};
 pub use tell::findings::{Findings, load_findings, save_findings};
+pub use tell::patch::drift::{DriftTerm, explained_drift};
 pub use tell::patch::{PatchEffect, PatchError, explained_study};
 pub use tell::result;
 pub use tell::result::Explanation;

@@ -20,6 +20,7 @@ use starlings_fleet::{
     StoredState,
 };
 use starlings_models::{Forward, Job, ParticleError, Prediction, Setup, SetupError, Spec, Window};
+use starlings_proto::StateId;
 use starlings_worker::WorkerConfig;
 use tokio_util::sync::CancellationToken;
 
@@ -98,15 +99,6 @@ fn large() -> Result<(), Failure> {
     Ok(())
 }
 
-/// On which way states travel.
-#[derive(Clone, Copy, PartialEq)]
-enum Way {
-    /// To processes of this one.
-    Local,
-    /// To workers that dial, inside TLS or not.
-    Dialled { tls: bool },
-}
-
 /// All ways, beside the raw sockets.
 fn travelling(cycles: usize, dialled: bool) -> Result<(), Failure> {
     let bytes = (2 * 8 * VALUES * PARTICLES) as f64;
@@ -114,17 +106,25 @@ fn travelling(cycles: usize, dialled: bool) -> Result<(), Failure> {
     let raw = raw::walls(cycles)?;
     println!("{PARTICLES} states of 8 MB there and back, {WORKERS} workers, GB/s both ways");
     println!("  raw socket pairs        p50 {:.2}  best {:.2}", rate(median(&raw)), rate(raw[0]));
-    let ways = [
-        ("local, in memory", usize::MAX, Way::Local),
-        ("local, in a folder", 0, Way::Local),
-        ("dialled, in memory", usize::MAX, Way::Dialled { tls: false }),
-        ("TLS, in memory", usize::MAX, Way::Dialled { tls: true }),
-    ];
-    for (name, memory, way) in ways.into_iter().filter(|(.., way)| dialled || *way == Way::Local) {
-        let walls = states(VALUES, PARTICLES, memory, cycles, way)?;
-        let (p50, best) = (rate(median(&walls)), rate(walls[0]));
+    let print = |name: &str, walls: &[Duration]| {
+        let (p50, best) = (rate(median(walls)), rate(walls[0]));
         let of_raw = p50 / rate(median(&raw));
         println!("  {name:<22}  p50 {p50:.2}  best {best:.2}  of the socket {of_raw:.2}");
+    };
+    for (name, memory) in [("local, in memory", usize::MAX), ("local, in a folder", 0)] {
+        print(name, &local(memory, cycles)?);
+    }
+    if dialled {
+        let [plain, tls] = dialled::compared(cycles)?;
+        print("dialled, in memory", &plain.walls);
+        print("TLS, in memory", &tls.walls);
+        let bandwidth = 1.0 - median(&plain.walls).as_secs_f64() / median(&tls.walls).as_secs_f64();
+        let [busy, busier] = [&plain, &tls].map(|way| 1e3 * way.seconds / cycles as f64);
+        println!(
+            "  TLS costs {:.0} % of the bandwidth; {:.0} % by processor time, {busier:.0} ms a cycle for {busy:.0}",
+            100.0 * bandwidth,
+            100.0 * (1.0 - busy / busier)
+        );
     }
     Ok(())
 }
@@ -159,41 +159,55 @@ fn pieces() {
     println!("pieces of 256 KiB on one thread, GB/s: BLAKE3 {hash:.1}, values to bytes {encode:.1}");
 }
 
-/// Wall times of cycles, fastest first.
-fn states(
-    values: usize,
-    particles: usize,
-    memory: usize,
-    cycles: usize,
-    way: Way,
-) -> Result<Vec<Duration>, Failure> {
+/// Wall times of cycles with local workers, fastest first.
+fn local(memory: usize, cycles: usize) -> Result<Vec<Duration>, Failure> {
     let store = StateStore::new(memory);
-    let (mut fleet, workers): (_, Box<dyn std::any::Any>) = match way {
-        Way::Local => fleet(&store, None).map(|(fleet, workers)| (fleet, Box::new(workers) as _))?,
-        Way::Dialled { tls } => {
-            let (config, events) = config(&store);
-            dialled::fleet(config, &events, tls).map(|(fleet, workers)| (fleet, Box::new(workers) as _))?
-        }
-    };
-    let setup = fleet.install(&Setup::default())?;
-    let mut now = (0..particles).map(|k| start(&store, values, k)).collect::<Result<Vec<_>, Failure>>()?;
-    let first: Vec<_> = now.iter().map(StoredState::id).collect();
+    let (fleet, workers) = fleet(&store, None)?;
+    let mut there = There::begin(fleet, &store)?;
     let mut walls = Vec::new();
     for cycle in 0..=cycles {
-        let started = Instant::now();
-        now = run(&mut fleet, setup, &now)?;
+        let wall = there.cycle()?;
         // The first one warms up.
-        if cycle > 0 || cycles == 1 {
-            walls.push(started.elapsed());
+        if cycle > 0 {
+            walls.push(wall);
         }
     }
-    if !now.iter().map(StoredState::id).eq(first) {
-        return Err("a state is not the one that was sent".into());
-    }
     drop(workers);
-    fleet.close();
+    there.end()?;
     walls.sort_unstable();
     Ok(walls)
+}
+
+/// A fleet and the states that go there and back.
+struct There {
+    fleet: GrpcFleet,
+    setup: SetupId,
+    first: Vec<StateId>,
+    now: Vec<StoredState>,
+}
+
+impl There {
+    fn begin(mut fleet: GrpcFleet, store: &StateStore) -> Result<Self, Failure> {
+        let setup = fleet.install(&Setup::default())?;
+        let now = (0..PARTICLES).map(|k| start(store, VALUES, k)).collect::<Result<Vec<_>, Failure>>()?;
+        let first = now.iter().map(StoredState::id).collect();
+        Ok(Self { fleet, setup, first, now })
+    }
+
+    /// Wall time of one cycle.
+    fn cycle(&mut self) -> Result<Duration, Failure> {
+        let started = Instant::now();
+        self.now = run(&mut self.fleet, self.setup, &self.now)?;
+        Ok(started.elapsed())
+    }
+
+    fn end(self) -> Result<(), Failure> {
+        if !self.now.iter().map(StoredState::id).eq(self.first) {
+            return Err("a state is not the one that was sent".into());
+        }
+        self.fleet.close();
+        Ok(())
+    }
 }
 
 fn config(store: &StateStore) -> (FleetConfig, mpsc::Receiver<FleetEvent>) {

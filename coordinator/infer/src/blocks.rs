@@ -10,6 +10,7 @@ use starlings_estimators::inference::STEP_TOLERANCE;
 use starlings_study::infer_choice::InferRecord;
 
 use crate::error::InferError;
+use crate::parts::Parts;
 use crate::resampled::Feed;
 use crate::rows::{Row, Rows};
 
@@ -36,8 +37,10 @@ pub(crate) struct Block {
 pub(crate) struct Cut {
     /// Sampling step.
     pub(crate) step: f64,
-    /// Steps of a block.
+    /// Steps of a block, about, where it is cut by bytes.
     pub(crate) block: usize,
+    /// Bytes of a block, where it is not cut by steps.
+    pub(crate) bytes: Option<u64>,
     /// Rows beyond its last step.
     pub(crate) ahead: usize,
     /// Whether a new piece begins where rows are missing.
@@ -60,6 +63,8 @@ pub(crate) struct Start {
     pub(crate) step: f64,
     /// Number of rows, guessed from the length of the file.
     pub(crate) n_row: f64,
+    /// Bytes of a row.
+    pub(crate) per_row: f64,
 }
 
 /// Opens a recording.
@@ -92,8 +97,13 @@ pub(crate) fn start(record: &InferRecord) -> Result<Start, InferError> {
         return Err(rows.fault(None, message, "an inference needs many rows"));
     };
     let per_row = (rows.n_byte() - before) as f64 / n_read as f64;
-    let bytes = std::fs::metadata(&record.file).map_or(0, |file| file.len());
-    Ok(Start { step, n_row: bytes as f64 / per_row.max(1.0) })
+    let per_row = per_row.max(1.0);
+    Ok(Start { step, n_row: length(record) as f64 / per_row, per_row })
+}
+
+/// Bytes of a recording's file.
+pub(crate) fn length(record: &InferRecord) -> u64 {
+    std::fs::metadata(&record.file).map_or(0, |file| file.len())
 }
 
 /// The step of times that are in equal steps, or else the most usual one; `None` where no time is later than the one before.
@@ -117,9 +127,12 @@ pub(crate) struct Blocks<'a, R> {
     first: u64,
     times: Vec<f64>,
     values: Vec<f64>,
+    /// Where the file is cut, once its first row was read; and the part of every row that is held.
+    parts: Option<Parts>,
+    of_part: Vec<u64>,
     next: Vec<f64>,
-    /// A row that begins a new piece.
-    held: Option<f64>,
+    /// A row that begins a new piece, and its part.
+    held: Option<(f64, u64)>,
     is_over: bool,
 }
 
@@ -134,6 +147,8 @@ impl<'a, R: Read> Blocks<'a, R> {
             first: 0,
             times: Vec::new(),
             values: Vec::new(),
+            parts: None,
+            of_part: Vec::new(),
             next,
             held: None,
             is_over: false,
@@ -144,15 +159,14 @@ impl<'a, R: Read> Blocks<'a, R> {
     pub(crate) fn next(&mut self) -> Result<Option<Block>, InferError> {
         loop {
             if self.times.len() <= 1
-                && let Some(time) = self.held.take()
+                && let Some((time, part)) = self.held.take()
             {
-                self.begin(time);
+                self.begin(time, part);
             }
-            let wanted = self.cut.block + 1 + self.cut.ahead;
-            while self.times.len() < wanted && !self.is_over && self.held.is_none() {
+            while !self.is_whole() && !self.is_over && self.held.is_none() {
                 self.read()?;
             }
-            if self.times.len() >= wanted {
+            if self.is_whole() {
                 return Ok(Some(self.full()));
             }
             if self.times.len() > 1 {
@@ -165,37 +179,60 @@ impl<'a, R: Read> Blocks<'a, R> {
         }
     }
 
+    /// Steps of the block that is next; `None` while none of the rows that are held is behind it.
+    fn n_step(&self) -> Option<usize> {
+        let Some(part) = self.of_part.first().filter(|_| self.cut.bytes.is_some()) else {
+            return self.cut.bytes.is_none().then_some(self.cut.block);
+        };
+        let n = self.of_part.partition_point(|of| of == part);
+        (n < self.of_part.len()).then_some(n)
+    }
+
+    /// Whether all rows of the next block are held.
+    fn is_whole(&self) -> bool {
+        self.n_step().is_some_and(|n| self.times.len() > n + self.cut.ahead)
+    }
+
     /// A new piece begins with the row that was read last.
-    fn begin(&mut self, time: f64) {
+    fn begin(&mut self, time: f64, part: u64) {
         self.times.clear();
         self.values.clear();
+        self.of_part.clear();
         self.first = self.row - 1;
+        self.hold(time, part);
+    }
+
+    fn hold(&mut self, time: f64, part: u64) {
         self.times.push(time);
         self.values.extend_from_slice(&self.next);
+        self.of_part.push(part);
     }
 
     fn read(&mut self) -> Result<(), InferError> {
         let [from, to] = self.record.1.span;
-        let Some(Row { line, time }) = self.rows.next(&mut self.next)? else {
+        let Some(Row { line, time, byte }) = self.rows.next(&mut self.next)? else {
             self.is_over = true;
             return Ok(());
         };
         self.row += 1;
+        if let (None, Some(bytes)) = (self.parts, self.cut.bytes) {
+            self.parts = Some(Parts::new(byte, length(self.record.1), bytes));
+        }
+        let part = self.parts.map_or(0, |parts| parts.of(byte));
         if time < from || time > to {
             return Ok(());
         }
         let Some(&before) = self.times.last() else {
-            self.begin(time);
+            self.begin(time, part);
             return Ok(());
         };
         let (step, got) = (self.cut.step, time - before);
         if (got - step).abs() <= STEP_TOLERANCE * step {
-            self.times.push(time);
-            self.values.extend_from_slice(&self.next);
+            self.hold(time, part);
             return Ok(());
         }
         if got > 1.5 * step && self.cut.breaks {
-            self.held = Some(time);
+            self.held = Some((time, part));
             return Ok(());
         }
         Err(self.uneven(line, before, time))
@@ -227,7 +264,7 @@ impl<'a, R: Read> Blocks<'a, R> {
 
     /// A whole block, whose last row is kept for the next.
     fn full(&mut self) -> Block {
-        let (n, width) = (self.cut.block, self.next.len());
+        let (n, width) = (self.n_step().unwrap_or(self.cut.block), self.next.len());
         let block = Block {
             record: self.record.0,
             first: self.first,
@@ -237,16 +274,18 @@ impl<'a, R: Read> Blocks<'a, R> {
         };
         self.times.drain(..n);
         self.values.drain(..n * width);
+        self.of_part.drain(..n);
         self.first += n as u64;
         block
     }
 
     /// What is left of a piece.
     fn rest(&mut self) -> Block {
-        let n_step = (self.times.len() - 1).min(self.cut.block);
+        let n_step = (self.times.len() - 1).min(self.n_step().unwrap_or(usize::MAX));
         if n_step + 1 < self.times.len() {
             return Block { n_step, ..self.full() };
         }
+        self.of_part.clear();
         let (times, rows) = (std::mem::take(&mut self.times), std::mem::take(&mut self.values));
         Block { record: self.record.0, first: self.first, n_step, times, rows }
     }

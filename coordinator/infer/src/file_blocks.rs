@@ -1,4 +1,5 @@
-//! Where the blocks of a recording are in its file, so that workers read and parse them: ends of lines are counted and nothing else is read.
+//! Where the blocks of a recording are in its file, so that workers read and parse them: nothing is read where they are cut by bytes, and ends
+//! of lines are counted where the study says how many steps they have.
 //!
 //! The blocks are those of [`crate::blocks`], row for row. What makes a file less plain than rows of numbers (quotes, empty lines, gaps) is found by
 //! whoever parses it. Next file to read: `gather.rs`.
@@ -11,6 +12,7 @@ use starlings_study::infer_choice::InferRecord;
 use starlings_sums::{Bytes, stamp};
 
 use crate::blocks::{Cut, open};
+use crate::parts::Parts;
 
 /// Bytes whose line ends are counted at a time.
 const PORTION: usize = 1 << 14;
@@ -22,6 +24,8 @@ pub(crate) struct FileRecord {
     pub(crate) file: SumsFile,
     /// Where its first row begins.
     pub(crate) first: u64,
+    /// Where it is cut, where that is by bytes.
+    pub(crate) parts: Option<Parts>,
 }
 
 /// A block of a file.
@@ -41,10 +45,10 @@ pub(crate) fn files(records: &[InferRecord], cut: Cut) -> Option<Vec<FileRecord>
     if cut.resample || cut.block <= cut.ahead {
         return None;
     }
-    records.iter().map(file).collect()
+    records.iter().map(|record| file(record, cut)).collect()
 }
 
-fn file(record: &InferRecord) -> Option<FileRecord> {
+fn file(record: &InferRecord, cut: Cut) -> Option<FileRecord> {
     // Which rows are inside a span is known from their times.
     if record.span[0].is_finite() || record.span[1].is_finite() {
         return None;
@@ -55,7 +59,8 @@ fn file(record: &InferRecord) -> Option<FileRecord> {
     let (length, modified) = stamp(&text)?;
     let (first, n_cell, cells) =
         (after_line_end(&mut text, rows.n_byte())?, rows.n_cell(), rows.cells().to_vec());
-    Some(FileRecord { file: SumsFile { path, length, modified, n_cell, cells }, first })
+    let parts = cut.bytes.map(|bytes| Parts::new(rows.n_byte(), length, bytes));
+    Some(FileRecord { file: SumsFile { path, length, modified, n_cell, cells }, first, parts })
 }
 
 /// Where the line after the header begins: its reader may stand between the two bytes of a line end.
@@ -166,7 +171,7 @@ mod tests {
         let record = record();
         for n_row in [2, 3, 9, 10, 11, 12, 13, 14, 19, 20, 21, 22, 23, 24, 31, 2000] {
             for (block, ahead) in [(1, 0), (2, 1), (4, 3), (10, 0), (10, 1), (10, 3), (500, 3)] {
-                let cut = Cut { step: 1.0, block, ahead, breaks: false, resample: false };
+                let cut = Cut { step: 1.0, block, bytes: None, ahead, breaks: false, resample: false };
                 let mut text = "t,x\n".to_owned();
                 (0..n_row).for_each(|k| writeln!(text, "{k},{}", k * k).unwrap_or_default());
                 for text in [text.as_str(), text.trim_end()] {
@@ -196,7 +201,7 @@ mod tests {
     #[test]
     fn a_recording_with_a_span_or_without_a_file_is_read_here() {
         let record = InferRecord { file: "no such file".into(), ..record() };
-        let cut = Cut { step: 1.0, block: 10, ahead: 3, breaks: false, resample: false };
+        let cut = Cut { step: 1.0, block: 10, bytes: None, ahead: 3, breaks: false, resample: false };
         assert_eq!(files(std::slice::from_ref(&record), cut), None);
         let dir = tempfile::tempdir().unwrap_or_else(|error| panic!("{error}"));
         let file = dir.path().join("data.csv");

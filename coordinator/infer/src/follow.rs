@@ -157,7 +157,7 @@ impl First {
         }
         let mut values = vec![0.0; width];
         while self.rows.len() < FIRST {
-            let Some(Row { line, time }) = rows.next(&mut values)? else { break };
+            let Some(Row { line, time, .. }) = rows.next(&mut values)? else { break };
             self.rows.push((line, time, values.clone()));
         }
         let times: Vec<f64> = self.rows.iter().map(|(_, time, _)| *time).collect();

@@ -10,7 +10,7 @@ use starlings_estimators::inference::{InferenceError, Sums};
 use starlings_fleet::{Fleet, Outcome, SetupId};
 use starlings_models::{Job, Setup};
 use starlings_study::infer_choice::InferRecord;
-use starlings_sums::{BlockAnswer, Fault, Question, answer_of, block, file_block};
+use starlings_sums::{BlockAnswer, Fault, Part, Question, answer_of, block, file_block, file_part};
 
 use crate::blocks::{Block, Blocks, Cut, open};
 use crate::error::InferError;
@@ -20,9 +20,9 @@ use crate::file_blocks::{FileBlock, FileBlocks, FileRecord};
 const BATCH_NUMBERS: usize = 1 << 22;
 /// Blocks of the first batch; each later one has twice as many, so that workers begin at once and seldom wait for one another.
 const FIRST_BLOCKS: usize = 4;
-/// Blocks of one batch at most, where rows travel and where places in a file do.
+/// Blocks of one batch at most, where rows travel and where places in a file do. Those of a batch wait for one another.
 const BATCH_BLOCKS: usize = 64;
-const BATCH_PLACES: usize = 1024;
+const BATCH_PLACES: usize = 256;
 
 /// Blocks that are to be summed.
 pub(crate) struct Work<'a> {
@@ -58,9 +58,6 @@ pub(crate) struct Gathered {
 
 /// Hears of what there is after every block.
 type Told<'a> = dyn FnMut(&Gathered, &dyn Fleet) + 'a;
-
-/// A job with the steps that start in its block.
-type Asked = (Job, u64);
 
 impl Work<'_> {
     /// Has all blocks summed. `None` where a file has something else than plain rows, one step apart: then its rows are read here, which
@@ -125,7 +122,7 @@ impl Work<'_> {
     }
 
     /// Reads all recordings in batches of blocks. A reader whose batches nobody takes ends.
-    fn read(&self, sender: &SyncSender<Result<Vec<Asked>, InferError>>) {
+    fn read(&self, sender: &SyncSender<Result<Vec<Job>, InferError>>) {
         let width = 1 + self.question.basis.n_channel();
         let most = (BATCH_NUMBERS / (width * (self.cut.block + 1))).clamp(1, BATCH_BLOCKS);
         let mut batch = Vec::new();
@@ -139,7 +136,7 @@ impl Work<'_> {
             loop {
                 match blocks.next() {
                     Ok(Some(Block { record, first, n_step, times, rows })) => {
-                        batch.push((block(record as u32, first, n_step, times, rows), n_step as u64));
+                        batch.push(block(record as u32, first, n_step, times, rows));
                     }
                     Ok(None) => break,
                     Err(error) => return drop(sender.send(Err(error))),
@@ -156,17 +153,27 @@ impl Work<'_> {
     }
 
     /// Finds the blocks of all files, in batches.
-    fn find(&self, files: &[FileRecord], sender: &SyncSender<Result<Vec<Asked>, InferError>>) {
+    fn find(&self, files: &[FileRecord], sender: &SyncSender<Result<Vec<Job>, InferError>>) {
         let mut batch = Vec::new();
         let mut wanted = FIRST_BLOCKS;
         for (k, record) in files.iter().enumerate() {
+            if let Some(parts) = record.parts {
+                for part in 0..parts.n {
+                    let [from, to] = parts.range(part, record.file.length);
+                    batch.push(file_part(k as u32, Part { from, to, ahead: self.cut.ahead }));
+                    if batch.len() >= BATCH_PLACES && sender.send(Ok(std::mem::take(&mut batch))).is_err() {
+                        return;
+                    }
+                }
+                continue;
+            }
             let Ok(mut blocks) = FileBlocks::open(record, self.cut) else {
                 return drop(sender.send(Err(InferError::Unread)));
             };
             loop {
                 match blocks.next() {
                     Ok(Some(FileBlock { first, n_step, bytes })) => {
-                        batch.push((file_block(k as u32, first, n_step, bytes), n_step as u64));
+                        batch.push(file_block(k as u32, first, n_step, bytes));
                     }
                     Ok(None) => break,
                     Err(_) => return drop(sender.send(Err(InferError::Unread))),
@@ -186,32 +193,26 @@ impl Work<'_> {
         &self,
         fleet: &mut dyn Fleet,
         id: SetupId,
-        batches: &Receiver<Result<Vec<Asked>, InferError>>,
+        batches: &Receiver<Result<Vec<Job>, InferError>>,
         gathered: &mut Gathered,
         told: &mut Told<'_>,
     ) -> Result<(), InferError> {
         for batch in batches {
-            let (mut jobs, steps): (Vec<Job>, Vec<u64>) = batch?.into_iter().unzip();
+            let mut jobs = batch?;
             let records: Vec<usize> = jobs.iter().map(|job| job.record as usize).collect();
             for (k, job) in jobs.iter_mut().enumerate() {
                 job.particle = gathered.n_block as u32 + k as u32;
             }
             let outcomes = fleet.run(id, jobs)?;
-            for ((record, n_step), outcome) in records.into_iter().zip(steps).zip(outcomes) {
-                self.add(gathered, record, n_step, outcome)?;
+            for (record, outcome) in records.into_iter().zip(outcomes) {
+                self.add(gathered, record, outcome)?;
                 told(gathered, &*fleet);
             }
         }
         Ok(())
     }
 
-    fn add(
-        &self,
-        gathered: &mut Gathered,
-        record: usize,
-        n_step: u64,
-        outcome: Outcome,
-    ) -> Result<(), InferError> {
+    fn add(&self, gathered: &mut Gathered, record: usize, outcome: Outcome) -> Result<(), InferError> {
         let name = || self.records[record].name.clone();
         let found = outcome.result.map_err(|failure| InferError::Block { record: name(), failure })?;
         let answer = answer_of(self.question, self.cut.step, self.levels, &found.state)?;
@@ -228,7 +229,7 @@ impl Work<'_> {
         }
         gathered.record = record;
         gathered.n_block += 1;
-        gathered.steps[record] += n_step;
+        gathered.steps[record] += levels.first().map_or(0, Sums::n_step);
         let whole = &mut gathered.spans[record];
         *whole = [if whole[0].is_nan() { span[0] } else { whole[0] }, span[1]];
         Ok(())

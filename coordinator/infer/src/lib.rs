@@ -4,11 +4,12 @@
 //! |---|---|
 //! | [`error`] | why there is no inference |
 //! | `rows`, `resampled`, `blocks` | a recording row by row, at equal steps, and cut into blocks, in memory that does not grow with it |
-//! | `file_blocks` | the same blocks as bytes of its file, which workers read |
+//! | `parts`, `file_blocks` | the same blocks as bytes of its file, which workers read |
 //! | `gather` | has the sums of every block made as jobs and merges them in block order |
 //! | `convergence` | the estimate after each power of two of blocks |
 //! | `smoothed` | the same from a smoothed path, where the measurement's noise is known |
 //! | `missing` | which terms the drift lacks, among candidates |
+//! | [`explained`](mod@explained) | what was found of missing terms as an explanation |
 //! | [`reduced`] | a model with fewer unknowns than coefficients |
 //! | [`result`], `answer`, `words` | the tables with intervals, and what is said of them |
 //! | [`follow`](mod@follow) | a recording that is still written: estimates and alarms as it arrives |
@@ -21,11 +22,13 @@ mod answer;
 mod blocks;
 mod convergence;
 pub mod error;
+pub mod explained;
 mod file_blocks;
 pub mod follow;
 pub mod forecast;
 mod gather;
 mod missing;
+mod parts;
 pub mod reduced;
 mod resampled;
 pub mod result;

@@ -82,7 +82,7 @@ impl Grid {
             *value = if part < 1.0 { a + part * (b - a) } else { *b };
         }
         self.next += 1;
-        Ok(Some(Row { line: self.line, time }))
+        Ok(Some(Row { line: self.line, time, byte: 0 }))
     }
 }
 

@@ -26,6 +26,8 @@ pub(crate) struct Row {
     pub(crate) line: u64,
     /// Time.
     pub(crate) time: f64,
+    /// Where it begins in the file; zero where it was interpolated.
+    pub(crate) byte: u64,
 }
 
 impl<R: Read> Rows<R> {
@@ -78,12 +80,12 @@ impl<R: Read> Rows<R> {
                 return Err(self.fault(line, message, "every row has a number for every column"));
             }
         }
-        let line = self.record.position().map_or(0, csv::Position::line);
+        let (line, byte) = self.record.position().map_or((0, 0), |at| (at.line(), at.byte()));
         let time = self.number(line, 0)?;
         for (k, value) in values.iter_mut().enumerate() {
             *value = self.number(line, k + 1)?;
         }
-        Ok(Some(Row { line, time }))
+        Ok(Some(Row { line, time, byte }))
     }
 
     fn number(&self, line: u64, k: usize) -> Result<f64, InferError> {

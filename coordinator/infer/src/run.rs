@@ -239,7 +239,11 @@ pub(crate) fn asked<'a>(study: &Study, choice: &'a InferChoice, step: f64) -> Re
 fn cut(choice: &InferChoice, asked: &Asked<'_>, at: Start) -> Cut {
     let sums = asked.setup.sums.as_deref();
     let usual = ((at.n_row / BLOCKS) as usize).clamp(LEAST, MOST);
+    // Where the study does not say how many steps: by bytes, which nobody has to read the file for.
+    let by_bytes =
+        choice.block.is_none() && !choice.resample && usual <= choice.most_steps && at.n_row >= 1.0;
     Cut {
+        bytes: by_bytes.then_some((usual as f64 * at.per_row) as u64),
         step: sums.map_or(at.step, |sums| sums.step),
         block: choice.block.unwrap_or(usual).min(choice.most_steps),
         ahead: choice.sums.n_ahead(),

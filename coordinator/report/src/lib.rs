@@ -7,6 +7,7 @@
 mod compare;
 mod correlation;
 mod data;
+mod diagnose;
 mod explain;
 mod explained;
 mod files;
@@ -30,6 +31,7 @@ mod why;
 
 pub use compare::{CompareError, Comparison, compare, compare_page};
 pub use data::ReportData;
+pub use diagnose::{diagnosis_page, write_diagnosis};
 pub use explained::{state_names, write_explanation};
 pub use files::{FilesError, write_files, write_page};
 pub use forecast::forecast_page;

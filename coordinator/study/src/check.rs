@@ -6,6 +6,7 @@
 mod blame;
 mod built;
 mod defs;
+mod diagnose;
 mod explain;
 mod infer;
 mod initial;
@@ -34,6 +35,7 @@ use self::settings::{estimator, fleet};
 use self::solver::DescribedSolver;
 pub(crate) use self::solver::UNTRIED;
 use super::checked::{EstimatorChoice, ExplainChoice, FleetChoice, Record, SpectrumChoice, Study};
+use super::diagnosis::Diagnosis;
 use super::expand;
 use super::file::StudyFile;
 use super::problem::{Problem, Source, StudyError};
@@ -92,10 +94,22 @@ impl Study {
         infer::study(file, text)
     }
 
+    /// Reads and checks a study file for a diagnosis: the study as it is, and one for every scenario.
+    ///
+    /// # Errors
+    /// Everything that is wrong, each with its place and remedy; of several scenarios the first that has something.
+    pub fn load_for_diagnosis(path: &Path, solver_host: &SolverHost) -> Result<Diagnosis, StudyError> {
+        diagnose::diagnosis(path, &text_of(path)?, solver_host)
+    }
+
     /// Whether a study file has a section `[infer]`; a file that cannot be read has none.
     pub fn asks_to_infer(path: &Path) -> bool {
-        let file = text_of(path).ok().and_then(|text| text.parse::<toml::Table>().ok());
-        file.is_some_and(|file| file.contains_key("infer"))
+        has_section(path, "infer")
+    }
+
+    /// Whether a study file has a section `[diagnose]`; a file that cannot be read has none.
+    pub fn asks_to_diagnose(path: &Path) -> bool {
+        has_section(path, "diagnose")
     }
 
     /// Checks the text of a study file that stands, or stood, at `file`.
@@ -113,6 +127,11 @@ impl Study {
     pub fn from_text_with(file: &Path, text: &str, solver_host: &SolverHost) -> Result<Self, StudyError> {
         check(file, text, solver_host)
     }
+}
+
+fn has_section(path: &Path, name: &str) -> bool {
+    let file = text_of(path).ok().and_then(|text| text.parse::<toml::Table>().ok());
+    file.is_some_and(|file| file.contains_key(name))
 }
 
 fn text_of(path: &Path) -> Result<String, StudyError> {
@@ -136,34 +155,44 @@ fn check(path: &Path, text: &str, solver_host: &SolverHost) -> Result<Study, Stu
         survey::survey(&source, &file);
         source.verdict()?;
     }
-    check_name(&source, &file);
-    let solver = solver::solver(&source, &file, solver_host);
+    checked(path, &source, file, solver_host)
+}
+
+/// Checks a file that was read without a fault of form.
+fn checked(
+    path: &Path,
+    source: &Source,
+    file: StudyFile,
+    solver_host: &SolverHost,
+) -> Result<Study, StudyError> {
+    check_name(source, &file);
+    let solver = solver::solver(source, &file, solver_host);
     let described = solver.as_ref().and_then(DescribedSolver::description);
-    let estimator = estimator(&source, &file.estimator, described);
-    let fleet = fleet(&source, &file.fleet);
-    let explain = explain::explain(&source, &file);
-    let spectrum = spectrum::spectrum(&source, &file.spectrum);
-    let observer = settings::observer(&source, &file.observer, described);
-    let model = model::model(&source, &file, solver.as_ref());
+    let estimator = estimator(source, &file.estimator, described);
+    let fleet = fleet(source, &file.fleet);
+    let explain = explain::explain(source, &file);
+    let spectrum = spectrum::spectrum(source, &file.spectrum);
+    let observer = settings::observer(source, &file.observer, described);
+    let model = model::model(source, &file, solver.as_ref());
     // Everything that follows is judged against the model.
-    let Some(mut model) = model else { return Err(survey::without_model(&source, &file)) };
+    let Some(mut model) = model else { return Err(survey::without_model(source, &file)) };
     model.setup.observer = observer;
-    explain::check_names(&source, &file, &model.setup.model);
-    let mut warnings = solver::check(&source, &file, solver.as_ref());
+    explain::check_names(source, &file, &model.setup.model);
+    let mut warnings = solver::check(source, &file, solver.as_ref());
     let relative: Vec<String> = relative::relative(&model.setup.effects).map(|p| p.name.clone()).collect();
-    model::check_values(&source, &file, &model, &|name| !relative.iter().any(|known| known == name));
-    let initial = initial::constants(&source, &file, &model.spec, &mut warnings);
+    model::check_values(source, &file, &model, &|name| !relative.iter().any(|known| known == name));
+    let initial = initial::constants(source, &file, &model.spec, &mut warnings);
     model.setup.model.constants.extend(initial);
-    let priors = parameters::priors(&source, &file, &model, &mut warnings);
-    let records = records(&source, &file, &mut model, &explain.hold_out_channels, &mut warnings);
-    explain::check_held_out(&source, &file, &records);
+    let priors = parameters::priors(source, &file, &model, &mut warnings);
+    let records = records(source, &file, &mut model, &explain.hold_out_channels, &mut warnings);
+    explain::check_held_out(source, &file, &records);
     source.verdict()?;
     model.setup.parameters = file.parameters.iter().map(|p| p.name.get_ref().clone()).collect();
-    let parameters = initial_medians(&source, &file, &model.spec, &priors, &records);
+    let parameters = initial_medians(source, &file, &model.spec, &priors, &records);
     source.verdict()?;
-    scales::check(&source, &file, &mut model, (&parameters, &records), solver_host, &mut warnings);
+    scales::check(source, &file, &mut model, (&parameters, &records), solver_host, &mut warnings);
     source.verdict()?;
-    check_setup(&source, &file, &model.setup, &records)?;
+    check_setup(source, &file, &model.setup, &records)?;
     warnings.extend(model.setup.is_noisy().then(|| NOISE_LEFT_OUT.to_owned()));
     warnings.extend(units::warnings(&file, &model, &records));
     let theta = expand::theta(&parameters, &records);
@@ -178,7 +207,7 @@ fn check(path: &Path, text: &str, solver_host: &SolverHost) -> Result<Study, Stu
         delays: model.delays,
         runs_here: solver.is_none_or(|known| known.is_here),
         warnings,
-        ..study_of(path, &source, file, described, (fleet, estimator), solver_host)
+        ..study_of(path, source, file, described, (fleet, estimator), solver_host)
     })
 }
 

@@ -4,6 +4,7 @@
 //! Next file to read: [`crate::file::read`], which fills these.
 
 mod brackets;
+pub(super) mod diagnose;
 pub(super) mod infer;
 pub(super) mod layout;
 pub(super) mod locate;
@@ -37,6 +38,10 @@ pub(super) struct StudyFile {
     pub(super) spectrum: spectrum::SpectrumSection,
     /// Present where the file has the section.
     pub(super) infer: Option<infer::InferSection>,
+    /// Present where the file has the section.
+    pub(super) diagnose: Option<diagnose::DiagnoseSection>,
+    /// Whether there has to be a parameter to estimate.
+    pub(super) needs_parameter: bool,
     pub(super) estimator: EstimatorSection,
     pub(super) fleet: FleetSection,
 }

@@ -7,6 +7,7 @@
 mod check;
 pub mod checked;
 pub mod constants;
+pub mod diagnosis;
 mod distances;
 mod expand;
 mod failures;

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use bytes::Bytes;
 use starlings_models::{Job, Window};
 
 use super::window;
@@ -19,6 +20,8 @@ const MESSAGE_MARGIN: usize = 64 * 1024;
 pub struct JobEncoder {
     /// By the place of a window in memory, which stays its own for as long as the window is held here.
     windows: HashMap<usize, Encoded>,
+    /// The setup of the last job as it travels: the next one has it too, mostly.
+    setup: Bytes,
 }
 
 #[derive(Debug)]
@@ -48,10 +51,14 @@ impl JobEncoder {
         job: &Job<State>,
         sent: &mut SentWindows,
     ) -> (Option<generated::ToWorker>, generated::ToWorker) {
+        if *self.setup != *setup {
+            self.setup = Bytes::copy_from_slice(setup);
+        }
+        let setup = self.setup.clone();
         let window = self.window(&job.window);
         let (ahead, over) = match &window.name {
             Some(id) => {
-                let name = bytes::Bytes::copy_from_slice(id);
+                let name = Bytes::copy_from_slice(id);
                 (windows::ahead(id, &window.message, sent), generated::job::Over::WindowId(name))
             }
             None => (None, generated::job::Over::Window(window.message.clone())),
@@ -59,7 +66,7 @@ impl JobEncoder {
         let (inside, named) = state::encode(job.state.as_ref());
         let message = generated::Job {
             lease: Some(lease.into()),
-            setup: bytes::Bytes::copy_from_slice(setup),
+            setup,
             particle: job.particle,
             record: job.record,
             over: Some(over),
@@ -101,13 +108,13 @@ pub fn check_size<S>(job: &Job<S>) -> Result<(), ProtocolError> {
 
 pub(super) fn decode_job(
     job: &generated::Job,
-    received: &ReceivedWindows,
+    received: &mut ReceivedWindows,
 ) -> Result<Job<State>, ProtocolError> {
     Ok(Job {
         particle: job.particle,
         record: job.record,
         window: match required(job.over.as_ref(), "window")? {
-            generated::job::Over::Window(window) => Arc::new(window::decode(window)?),
+            generated::job::Over::Window(window) => windows::inside(window, received)?,
             generated::job::Over::WindowId(id) => {
                 Arc::clone(named(id, received).ok_or(ProtocolError::UnknownWindow)?)
             }

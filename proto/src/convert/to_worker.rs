@@ -228,7 +228,7 @@ fn decode_welcome(welcome: generated::Welcome) -> Result<Welcome, ProtocolError>
     Ok(Welcome { protocol, run: cut(run), heartbeat, epoch, run_id, incarnation, probe })
 }
 
-fn decode_job(wire_job: &generated::Job, received: &ReceivedWindows) -> Result<ToWorker, ProtocolError> {
+fn decode_job(wire_job: &generated::Job, received: &mut ReceivedWindows) -> Result<ToWorker, ProtocolError> {
     let lease: Lease = required(wire_job.lease, "lease")?.into();
     let decoded =
         setup_id(&wire_job.setup).and_then(|setup| Ok((setup, job::decode_job(wire_job, received)?)));

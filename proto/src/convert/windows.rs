@@ -28,6 +28,8 @@ pub struct Windows<T> {
     held: HashMap<WindowId, (usize, T)>,
     order: VecDeque<WindowId>,
     bytes: usize,
+    /// The last one that came inside a job, as it came and as it was read: the next job has it too, mostly.
+    inside: Option<(generated::Window, T)>,
 }
 
 /// What the coordinator notes of the windows that it has sent on a stream.
@@ -38,7 +40,7 @@ pub type ReceivedWindows = Windows<Arc<Window>>;
 
 impl<T> Default for Windows<T> {
     fn default() -> Self {
-        Self { held: HashMap::new(), order: VecDeque::new(), bytes: 0 }
+        Self { held: HashMap::new(), order: VecDeque::new(), bytes: 0, inside: None }
     }
 }
 
@@ -62,6 +64,29 @@ impl<T> Windows<T> {
             self.bytes -= bytes;
         }
     }
+}
+
+/// Checks a window that came inside a job. Jobs that come one after the other with the same one share it.
+pub(super) fn inside(
+    message: &generated::Window,
+    received: &mut ReceivedWindows,
+) -> Result<Arc<Window>, ProtocolError> {
+    if let Some((last, window)) = &received.inside
+        && is_same(last, message)
+    {
+        return Ok(Arc::clone(window));
+    }
+    let window = Arc::new(window::decode(message)?);
+    received.inside = Some((message.clone(), Arc::clone(&window)));
+    Ok(window)
+}
+
+/// Whether two windows are the same, bit by bit.
+fn is_same(one: &generated::Window, other: &generated::Window) -> bool {
+    let start = |window: &generated::Window| window.start.map(f64::to_bits);
+    // The others are arrays of bytes.
+    start(one) == start(other)
+        && (&one.times, &one.observed, &one.inputs) == (&other.times, &other.observed, &other.inputs)
 }
 
 /// The name of a window, where it is large enough to travel under one.
@@ -137,6 +162,21 @@ mod tests {
         windows.keep(id(0), KEPT / 4, 0);
         assert_eq!(windows.get(&id(1)), None);
         assert_eq!(windows.bytes, KEPT);
+    }
+
+    #[test]
+    fn jobs_with_the_same_window_share_it_and_those_with_another_zero_do_not() {
+        let window = |start, observed| Window { start, times: vec![1.0], observed, inputs: vec![] };
+        let mut received = ReceivedWindows::default();
+        let mut take = |of: Window| inside(&window::encode(&of), &mut received).unwrap();
+        let first = take(window(0.0, vec![f64::NAN]));
+        assert!(
+            Arc::ptr_eq(&first, &take(window(0.0, vec![f64::NAN]))),
+            "equal bits, though no equal numbers"
+        );
+        assert!(take(window(-0.0, vec![f64::NAN])).start.is_sign_negative());
+        assert!(take(window(-0.0, vec![-0.0])).observed[0].is_sign_negative());
+        assert!(take(window(-0.0, vec![0.0])).observed[0].is_sign_positive());
     }
 
     #[test]

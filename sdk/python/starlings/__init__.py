@@ -33,6 +33,7 @@ from .observers import Correction, Observer
 from .prior import Prior
 from .program import RunError, StudyError
 from .quantity import Quantity
+from .read import read
 from .recording import RecordingError
 from .run_folder import Run, read_run
 from .serve import serve
@@ -76,6 +77,7 @@ __all__ = [
     "extension",
     "identify",
     "infer",
+    "read",
     "read_run",
     "run",
     "serve",

@@ -270,7 +270,7 @@ def main() -> None:
         states = [name.strip() for name in chosen.states.split(",")] if chosen.states else None
         solver = Fmu(chosen.fmu, chosen.step, states)
     except ImportError:
-        raise SystemExit("an FMU needs the package fmpy: pip install 'starlings[fmu]'") from None
+        raise SystemExit("an FMU needs the package fmpy: pip install fmpy") from None
     except (DeclarationError, OSError) as error:
         raise SystemExit(f"this FMU cannot be served: {error}") from None
     serve(solver, ["--describe"] if chosen.describe else [])

@@ -19,7 +19,7 @@ def of_run(run: "Run", draws: int, chains: int, seed: int) -> Any:
     """An arviz.InferenceData with the groups `posterior`, `observed_data` and `constant_data` (the run with the estimate, the
     noise, and whether a value was fitted). Draws are independent: chains are there because ArviZ compares them.
 
-    Every channel is one variable, `RECORD/OUTPUT`, over times of its own.
+    Every channel is one variable, `RECORD:OUTPUT`, over times of its own.
     """
     import arviz
 
@@ -32,12 +32,12 @@ def of_run(run: "Run", draws: int, chains: int, seed: int) -> Any:
     coordinates: Dict[str, Any] = {}
     dimensions: Dict[str, Any] = {}
     for channel, times, values, predicted, noise, fitted in _channels(rows):
-        axis = f"{channel}/time"
+        axis = f"{channel}:time"
         coordinates[axis] = times
         observed[channel] = values
         parts = {"predicted": predicted, "noise": noise, "fitted": fitted}
-        constant.update({f"{channel}/{what}": part for what, part in parts.items()})
-        dimensions.update({name: [axis] for name in [channel, *(f"{channel}/{what}" for what in parts)]})
+        constant.update({f"{channel}:{what}": part for what, part in parts.items()})
+        dimensions.update({name: [axis] for name in [channel, *(f"{channel}:{what}" for what in parts)]})
     return arviz.from_dict(
         posterior=posterior,
         observed_data=observed,
@@ -54,7 +54,7 @@ def _channels(rows: Dict[str, Any]) -> Any:
         here = (rows["record"] == record) & (rows["output"] == output)
         part = {key: values[here] for key, values in rows.items()}
         yield (
-            f"{record}/{output}",
+            f"{record}:{output}",
             part["time"],
             part["observed"],
             part["predicted"],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import os
 from dataclasses import dataclass
 from typing import Any, Dict, List, Mapping, Optional, Sequence
 
@@ -42,11 +43,15 @@ class Recording:
 
 
 def take(data: Any, name: str, time: Optional[str] = None) -> Recording:
-    """A recording of a pandas.DataFrame, or of a table of names with an array each.
+    """A recording of a pandas.DataFrame, of a table of names with an array each, or of a file as `starlings.read` takes it.
 
     The time is the column `time`, or one named "time" or "t", or the index of a DataFrame. Dates and time spans become
     seconds after the first row. Raises RecordingError for what is no column of numbers.
     """
+    if isinstance(data, (str, os.PathLike)):
+        from .read import read
+
+        data = read(data)
     columns = _columns(data, name)
     key = _time(data, columns, name, time)
     if key not in columns:
@@ -148,4 +153,4 @@ def by_name(data: Any) -> "Dict[str, Any]":
 
 
 def _is_table(value: Any) -> bool:
-    return isinstance(value, Mapping) or (hasattr(value, "columns") and hasattr(value, "to_numpy"))
+    return isinstance(value, (Mapping, os.PathLike)) or (hasattr(value, "columns") and hasattr(value, "to_numpy"))

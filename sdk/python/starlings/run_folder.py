@@ -108,6 +108,28 @@ class Run:
 
         return of_run(self, draws, chains, seed)
 
+    def save(
+        self, file: Union[str, "os.PathLike[str]"], *, draws: int = 4000, chains: int = 4, seed: int = 0
+    ) -> Path:
+        """Writes draws of the posterior: `.nc` as InferenceData of `to_arviz`, which `arviz.from_netcdf` reads; `.parquet` or `.csv` with a
+        column per parameter. Needs arviz, or pyarrow. A file that is there is replaced."""
+        path = Path(file)
+        if path.suffix == ".nc":
+            self.to_arviz(draws, chains, seed).to_netcdf(str(path))
+            return path
+        drawn = posterior.draw(self.mean, self.covariance, self.transforms, draws, seed)
+        columns = {name: drawn[:, k] for k, name in enumerate(self.names)}
+        if path.suffix == ".parquet":
+            import pyarrow
+            from pyarrow import parquet
+
+            parquet.write_table(pyarrow.table(columns), path)
+        elif path.suffix == ".csv":
+            np.savetxt(path, drawn, fmt="%.17g", delimiter=",", header=",".join(self.names), comments="")
+        else:
+            raise ValueError(f"{path}: a posterior is saved as .nc, .parquet or .csv")
+        return path
+
     def _repr_html_(self) -> str:
         return page.frame(self.report)
 

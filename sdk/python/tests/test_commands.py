@@ -70,6 +70,14 @@ def test_draws_reproduce_the_posterior_within_monte_carlo_error(cooled):
     assert np.allclose(np.corrcoef(z.T), cooled.correlation, atol=5.0 / np.sqrt(n))
 
 
+def test_the_posterior_is_saved_as_netcdf_that_arviz_reads(cooled, tmp_path):
+    arviz = pytest.importorskip("arviz")
+    saved = arviz.from_netcdf(str(cooled.save(tmp_path / "posterior.nc", draws=400)))
+    drawn = cooled.to_arviz(draws=400)
+    for name in cooled.names:
+        assert np.array_equal(saved.posterior[name].values, drawn.posterior[name].values)
+
+
 def test_the_summary_of_arviz_is_that_of_the_run(cooled):
     arviz = pytest.importorskip("arviz")
     data = cooled.to_arviz(draws=8000)
@@ -79,9 +87,9 @@ def test_the_summary_of_arviz_is_that_of_the_run(cooled):
         error = 5.0 * cooled[name]["sd"] / np.sqrt(8000)
         assert abs(summary.loc[name, "mean"] - cooled[name]["estimate"]) < error
         assert abs(summary.loc[name, "sd"] / cooled[name]["sd"] - 1.0) < 0.06
-    observed = data.observed_data["data/temperature"].to_numpy()
+    observed = data.observed_data["data:temperature"].to_numpy()
     assert observed.shape == (61,)
-    assert int(data.constant_data["data/temperature/fitted"].sum()) == 46
+    assert int(data.constant_data["data:temperature:fitted"].sum()) == 46
 
 
 def test_a_forecast_and_the_tables(cooled):

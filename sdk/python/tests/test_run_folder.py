@@ -63,3 +63,20 @@ def test_with_xarray_the_covariance_has_names(folder):
 def test_a_folder_of_no_run_says_what_it_lacks(tmp_path):
     with pytest.raises(FileNotFoundError, match="it lacks summary.json"):
         starlings.read_run(tmp_path)
+
+
+def test_draws_are_saved_and_read_back_to_the_last_bit(folder, tmp_path):
+    run = starlings.read_run(folder)
+    drawn = run.draws(50, seed=2)
+    saved = starlings.read(run.save(tmp_path / "draws.csv", draws=50, seed=2))
+    for name in ("k", "c"):
+        assert np.array_equal(np.asarray(saved[name]), np.asarray(drawn[name]))
+    with pytest.raises(ValueError, match="as .nc, .parquet or .csv"):
+        run.save(tmp_path / "draws.mat")
+
+
+def test_draws_are_saved_as_parquet(folder, tmp_path):
+    pytest.importorskip("pyarrow")
+    run = starlings.read_run(folder)
+    saved = starlings.read(run.save(tmp_path / "draws.parquet", draws=50, seed=2))
+    assert np.array_equal(np.asarray(saved["k"]), np.asarray(run.draws(50, seed=2)["k"]))

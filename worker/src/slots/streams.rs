@@ -62,6 +62,19 @@ impl Slots {
 /// Nobody needs what a task computed.
 struct RunIsOver;
 
+impl Queue {
+    fn computes(&self, task: &Arc<Task>) -> bool {
+        self.running.iter().any(|running| Arc::ptr_eq(running, task))
+    }
+
+    /// A task computes no more; the stream of now.
+    fn ends(&mut self, task: &Arc<Task>) -> Result<Option<Outbox>, RunIsOver> {
+        let at = self.running.iter().position(|running| Arc::ptr_eq(running, task)).ok_or(RunIsOver)?;
+        self.running.remove(at);
+        Ok(self.stream.clone())
+    }
+}
+
 impl Shared {
     /// Answers a task that ran; held is the result whether there is somebody to answer or not.
     pub(super) fn finished(&self, task: Arc<Task>, result: Result<Prediction, ParticleError>, cost: f64) {
@@ -79,7 +92,7 @@ impl Shared {
     }
 
     fn ended_small(&self, task: &Arc<Task>, result: Result<Prediction<State>, ParticleError>, cost: f64) {
-        let Ok(stream) = self.over(task, Ended::inside(&result, cost), false) else { return };
+        let Ok(stream) = self.over(task, || Ended::inside(&result, cost), false) else { return };
         match (task.asked().take(), stream) {
             (Some(Asked { lease, outbox, .. }), _) => {
                 outbox.answer_when_room(lease, LeaseOutcome::Ran(result), cost);
@@ -96,7 +109,7 @@ impl Shared {
     /// A stream that came meanwhile knows the run as one that goes on: it asks for the result.
     fn ended_large(&self, task: Arc<Task>, large: Arc<Large>) {
         let is_put = task.asked().is_some();
-        if self.over(&task, Ended::Large(Arc::clone(&large)), is_put).is_err() {
+        if self.over(&task, || Ended::Large(Arc::clone(&large)), is_put).is_err() {
             return;
         }
         let Some(Asked { lease, outbox, transfers, .. }) = task.asked().take() else {
@@ -126,17 +139,23 @@ impl Shared {
         gone
     }
 
-    /// Holds how a task ended, which computes no more; the stream of now.
-    fn over(&self, task: &Arc<Task>, ended: Ended, is_put: bool) -> Result<Option<Outbox>, RunIsOver> {
-        let is_it = |running: &Arc<Task>| Arc::ptr_eq(running, task);
-        if !self.lock().running.iter().any(is_it) {
+    /// Holds how a task ended, which computes no more, where anything is held; the stream of now.
+    fn over(
+        &self,
+        task: &Arc<Task>,
+        ended: impl FnOnce() -> Ended,
+        is_put: bool,
+    ) -> Result<Option<Outbox>, RunIsOver> {
+        let Some(held) = &self.held else { return self.lock().ends(task) };
+        if !self.lock().computes(task) {
             return Err(RunIsOver);
         }
-        let has_room = self.held.as_ref().is_none_or(|held| held.keep(task.of(), ended, is_put));
+        let has_room = held.keep(task.of(), ended(), is_put);
         let mut queue = self.lock();
-        queue.running.retain(|running| !is_it(running));
+        // One that is over by now is held all the same.
+        let stream = queue.ends(task).unwrap_or_else(|RunIsOver| queue.stream.clone());
         Self::note_room(&mut queue, has_room);
-        Ok(queue.stream.clone())
+        Ok(stream)
     }
 
     /// No further run is begun where no more can be held.

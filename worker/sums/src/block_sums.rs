@@ -13,7 +13,7 @@ use starlings_models::{
 
 use crate::answer::{Fault, fault_values, sums_values};
 use crate::error::SumsError;
-use crate::file_rows::{self, Bytes};
+use crate::file_rows::{self, Bytes, Part};
 use crate::question::Question;
 
 /// Makes the sums of blocks.
@@ -48,6 +48,12 @@ pub fn file_block(record: u32, first: u64, n_step: usize, bytes: Bytes) -> Job {
     // A window has a time; these rows have their own.
     let window = Window { start: 0.0, times: vec![0.0], observed: Vec::new(), inputs: Vec::new() };
     job(record, window, vec![n_step as f64, first as f64, start as f64, length as f64, n_row as f64])
+}
+
+/// The job of a block whose rows are those of a part of the record's file. The numbers of its rows are not known.
+pub fn file_part(record: u32, part: Part) -> Job {
+    let window = Window { start: 0.0, times: vec![0.0], observed: Vec::new(), inputs: Vec::new() };
+    job(record, window, vec![part.from as f64, part.to as f64, part.ahead as f64])
 }
 
 fn job(record: u32, window: Window, theta: Vec<f64>) -> Job {
@@ -102,9 +108,27 @@ impl BlockSums {
     ) -> Result<Vec<f64>, InferenceError> {
         let file = self.files.get(record as usize);
         let rows = file.and_then(|file| file_rows::read(file, bytes));
+        self.answer_if_read(rows.map(|(times, rows)| (n_step, times, rows)), first)
+    }
+
+    /// The answer for a part of a file.
+    fn answer_of_part(&self, record: u32, part: Part) -> Result<Vec<f64>, InferenceError> {
+        let file = self.files.get(record as usize);
+        self.answer_if_read(file.and_then(|file| file_rows::read_part(file, part)), 0)
+    }
+
+    /// The answer for steps, times and rows, where they could be read.
+    fn answer_if_read(
+        &self,
+        read: Option<(usize, Vec<f64>, Vec<f64>)>,
+        first: u64,
+    ) -> Result<Vec<f64>, InferenceError> {
         let width = self.question.basis.n_channel();
-        match rows.filter(|(times, rows)| n_step < times.len() && rows.len() == times.len() * width) {
-            Some((times, rows)) => self.answer(&times, &rows, n_step, first),
+        let fits = |(n_step, times, rows): &(usize, Vec<f64>, Vec<f64>)| {
+            *n_step < times.len() && rows.len() == times.len() * width
+        };
+        match read.filter(fits) {
+            Some((n_step, times, rows)) => self.answer(&times, &rows, n_step, first),
             None => Ok(fault_values(&self.question, &Fault::Unread).unwrap_or_default()),
         }
     }
@@ -194,7 +218,11 @@ impl Forward for BlockSums {
                 let bytes = Bytes { start: start as u64, length: length as u64, n_row: n_row as usize };
                 self.answer_of_file(job.record, n_step as usize, first as u64, bytes)
             }
-            _ => return bad(format!("block sums need 2 or 5 numbers, got {}", job.theta.len())),
+            [from, to, ahead] => {
+                let part = Part { from: from as u64, to: to as u64, ahead: ahead as usize };
+                self.answer_of_part(job.record, part)
+            }
+            _ => return bad(format!("block sums need 2, 3 or 5 numbers, got {}", job.theta.len())),
         };
         match answer {
             Ok(state) => Ok(Prediction { outputs: Vec::new(), state, cost: 0.0 }),

@@ -21,6 +21,21 @@ pub struct Bytes {
     pub n_row: usize,
 }
 
+/// A part of a file: the rows that begin in it, and those that their steps reach beyond it. A row begins, as the reader of CSV counts, behind
+/// the first byte of the line end before it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Part {
+    /// First byte in which a row of it may begin.
+    pub from: u64,
+    /// The first byte behind these.
+    pub to: u64,
+    /// Rows beyond its last step.
+    pub ahead: usize,
+}
+
+/// Bytes that are read behind a part at first, for the rows beyond it.
+const BEHIND: u64 = 1 << 12;
+
 /// Length of a file and when it was last changed, nanoseconds since 1970; `None` where the system does not say.
 pub fn stamp(file: &File) -> Option<(u64, u64)> {
     let metadata = file.metadata().ok()?;
@@ -45,6 +60,70 @@ pub(crate) fn read(def: &SumsFile, bytes: Bytes) -> Option<(Vec<f64>, Vec<f64>)>
     let rows = parse(&text, def, bytes.n_row)?;
     // A file that was written to meanwhile is another one.
     (stamp(&file)? == described).then_some(rows)
+}
+
+/// Steps that start in a part of the file, and times and values of its rows as [`read`] gives them; `None` as there, or where no step starts
+/// in it.
+pub(crate) fn read_part(def: &SumsFile, part: Part) -> Option<(usize, Vec<f64>, Vec<f64>)> {
+    let mut file = File::open(&def.path).ok()?;
+    let described = (def.length, def.modified);
+    if stamp(&file)? != described {
+        return None;
+    }
+    let mut behind = BEHIND;
+    loop {
+        // Two bytes before it may end the line before its first row.
+        let begin = part.from.saturating_sub(2);
+        let end = part.to.saturating_add(behind).min(def.length);
+        let mut text = vec![0; usize::try_from(end.checked_sub(begin)?).ok()?];
+        file.seek(SeekFrom::Start(begin)).ok()?;
+        file.read_exact(&mut text).ok()?;
+        let Some(of) = lines_of(&text, begin, part, end == def.length) else {
+            if end == def.length {
+                return None;
+            }
+            behind *= 8;
+            continue;
+        };
+        let (times, rows) = parse(&text[of.start..of.end], def, of.n_row)?;
+        // A file that was written to meanwhile is another one.
+        return (stamp(&file)? == described && of.n_step > 0).then_some((of.n_step, times, rows));
+    }
+}
+
+/// The lines of a part in a text.
+struct Lines {
+    start: usize,
+    end: usize,
+    n_row: usize,
+    n_step: usize,
+}
+
+/// Where the lines of a part are in a text that begins at a byte of the file; `None` where the text ends before they do.
+fn lines_of(text: &[u8], begin: u64, part: Part, is_end: bool) -> Option<Lines> {
+    let (mut start, mut n_row, mut n_in) = (None, 0, 0);
+    for at in memchr::memchr_iter(b'\n', text) {
+        // The line behind this end begins, as it is counted, behind the first of its bytes.
+        let after_return = at > 0 && text[at - 1] == b'\r';
+        let row = begin + at as u64 + u64::from(!after_return);
+        if row < part.from {
+            continue;
+        }
+        // Rows behind the part have begun, and this ends the last of them.
+        if n_row > n_in + part.ahead {
+            return Some(Lines { start: start?, end: at + 1, n_row, n_step: n_in });
+        }
+        if at + 1 < text.len() {
+            start.get_or_insert(at + 1);
+            n_row += 1;
+            n_in += usize::from(row < part.to);
+        }
+    }
+    if !is_end {
+        return None;
+    }
+    // At the end of the file the last row ends the last step.
+    Some(Lines { start: start?, end: text.len(), n_row, n_step: n_in.min(n_row.checked_sub(1)?) })
 }
 
 /// The rows of a text.

@@ -12,9 +12,9 @@ mod file_rows;
 mod question;
 
 pub use answer::{BlockAnswer, Fault, answer_of};
-pub use block_sums::{BlockSums, Reading, block, file_block};
+pub use block_sums::{BlockSums, Reading, block, file_block, file_part};
 pub use error::SumsError;
-pub use file_rows::{Bytes, stamp};
+pub use file_rows::{Bytes, Part, stamp};
 pub use question::Question;
 
 use std::sync::Arc;

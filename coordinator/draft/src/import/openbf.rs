@@ -9,8 +9,8 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::Path;
 
-use super::names::Names;
 use super::plan::{Course, Inputs, Origin, Plan, Samples, Unknown};
+use crate::names::Names;
 use file::{File, Vessel};
 
 /// Reads a file and the inflow that it names.

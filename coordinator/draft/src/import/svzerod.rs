@@ -38,7 +38,7 @@ pub(super) fn plan(name: &str, text: &str) -> Result<Plan, String> {
     }
     let course = course(&file, &mut network.notes)?;
     Ok(Plan {
-        name: super::names::Names::default().take(name),
+        name: crate::names::Names::default().take(name),
         program: "svZeroDSolver",
         kind: "rcr-network",
         layout: layout::lines(&network),

@@ -4,9 +4,8 @@
 
 use std::fmt::Write;
 
-use toml_edit::value;
-
 use super::plan::{Origin, Plan};
+use crate::files::quoted;
 
 /// Parts of a study that are known only when its model has run.
 #[derive(Debug, Default)]
@@ -28,10 +27,6 @@ pub(super) fn text(plan: &Plan, known: &Known) -> String {
     // Writing to a text cannot fail.
     let _ = write_all(&mut text, plan, known);
     text
-}
-
-fn quoted(text: &str) -> String {
-    value(text).to_string().trim().to_owned()
 }
 
 fn write_all(text: &mut String, plan: &Plan, known: &Known) -> std::fmt::Result {

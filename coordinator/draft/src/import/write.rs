@@ -10,6 +10,7 @@ use starlings_study::{SolverHost, Study};
 
 use super::plan::{Inputs, Omission, Origin, Plan, Signal};
 use super::text::{Known, text};
+use crate::files::{part_of_range, write_table};
 use crate::{Draft, DraftError};
 
 /// Standard deviation of the noise as a part of a channel's range.
@@ -148,15 +149,7 @@ impl Folder<'_> {
         name: &str,
         rows: impl IntoIterator<Item = R>,
     ) -> Result<(), DraftError> {
-        let file = self.out.join(name);
-        let write = || -> Result<(), csv::Error> {
-            let mut table = csv::Writer::from_path(&file)?;
-            for row in rows {
-                table.write_record(row.as_ref())?;
-            }
-            Ok(table.flush()?)
-        };
-        write().map_err(|error| DraftError::Write { file: file.clone(), error: error.into() })
+        write_table(&self.out.join(name), rows)
     }
 
     /// The inputs over so many periods.
@@ -198,20 +191,10 @@ impl Folder<'_> {
     /// A part of every channel's range; of its size where it is constant.
     fn noise(&self, recording: &Recording) -> Vec<f64> {
         let of = |(output, _): &(String, &str)| {
-            let values = column(recording, output).map_or(&[][..], Vec::as_slice);
-            let low = values.iter().copied().fold(f64::INFINITY, f64::min);
-            let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            let size = low.abs().max(high.abs());
-            let range = if high - low > 1e-6 * size { high - low } else { size };
-            if range > 0.0 && range.is_finite() { rounded(NOISE * range) } else { 1.0 }
+            part_of_range(column(recording, output).map_or(&[][..], Vec::as_slice), NOISE)
         };
         self.plan.channels.iter().map(of).collect()
     }
-}
-
-/// Two significant digits: a standard deviation deserves no more.
-fn rounded(value: f64) -> f64 {
-    format!("{value:.1e}").parse().unwrap_or(value)
 }
 
 fn column<'a>(recording: &'a Recording, name: &str) -> Option<&'a Vec<f64>> {

@@ -4,6 +4,7 @@
 //! priors are wide around the estimates, so that a run of the new study makes estimates of its own. Next files to read:
 //! [`effect`] for what is added, [`mod@remove`] for what is taken out, [`place`] for files that must still be found.
 
+pub(crate) mod drift;
 mod effect;
 mod place;
 mod prior;

@@ -97,7 +97,7 @@ pub(crate) fn warnings(cache: &RunCache<'_>, found: &SearchResult<'_>, decision:
     }
     if cache.study.setup.is_noisy() {
         let why = "effects are scored on the rates alone, without the states' `noise`: which terms the drift of the stochastic equations \
-                   lacks is asked with [infer.candidates] by `starlings infer`, which counts that noise";
+                   lacks is asked with [infer.candidates] by `starlings infer`, or by `explain` of a study with `[infer]`, which count that noise";
         list.push(why.to_owned());
     }
     if matches!(found.adequacy.nature(), Nature::Smaller | Nature::Larger) || found.adequacy.is_numerical() {

@@ -76,7 +76,12 @@ impl Case {
 
     fn gather(&self, from_files: bool, block: usize, breaks: bool) -> Result<Option<Gathered>, InferError> {
         let sums = self.setup.sums.as_ref().unwrap();
-        let cut = Cut { step: STEP, block, ahead: sums.n_ahead(), breaks, resample: false };
+        let ahead = sums.n_ahead();
+        self.gather_cut(from_files, Cut { step: STEP, block, bytes: None, ahead, breaks, resample: false })
+    }
+
+    fn gather_cut(&self, from_files: bool, cut: Cut) -> Result<Option<Gathered>, InferError> {
+        let sums = self.setup.sums.as_ref().unwrap();
         let (setup, question, records) = (&self.setup, &self.question, &self.records[..]);
         let work = Work { setup, question, records, cut, levels: sums.levels };
         let mut fleet = InProcess::new(2).with_factory(factory(Arc::new(Setup::build), Reading::Allowed));
@@ -96,6 +101,27 @@ fn workers_that_read_files_give_the_bits_of_rows_that_travel() {
             assert_eq!(case.gather(true, block, false).unwrap().unwrap(), rows, "blocks of {block}");
             assert_eq!(rows.steps, [999, 496]);
             assert_eq!(rows.spans, [[0.0, 999.0 * STEP], [3.0 * STEP, 499.0 * STEP]]);
+        }
+    }
+}
+
+#[test]
+fn blocks_by_bytes_have_the_same_bits_whoever_reads_them() {
+    let plain = text(0..400);
+    let texts = [plain.replace('\n', "\r\n"), plain.trim_end().to_owned(), plain.replace('\n', " \n")];
+    for levels in [1, 3] {
+        for text in &texts {
+            let case = Case::new(levels, &[], &[text.clone(), texts[1].clone()]);
+            let ahead = case.setup.sums.as_ref().unwrap().n_ahead();
+            // Every place of a cut in a row and at its end, of rows of some 25 bytes.
+            for bytes in (200..260).chain([1000, 5000, 100_000]) {
+                let cut =
+                    Cut { step: STEP, block: 100, bytes: Some(bytes), ahead, breaks: false, resample: false };
+                let rows = case.gather_cut(false, cut).unwrap().unwrap();
+                let files = case.gather_cut(true, cut).unwrap();
+                assert_eq!(files.as_ref(), Some(&rows), "{bytes} bytes, {levels} levels");
+                assert_eq!(rows.steps, [399, 399]);
+            }
         }
     }
 }

@@ -19,7 +19,7 @@ pub(crate) fn priors(
     model: &CheckedModel,
     warnings: &mut Vec<String>,
 ) -> Vec<Option<Prior>> {
-    if file.parameters.is_empty() {
+    if file.parameters.is_empty() && file.needs_parameter {
         let end = source.text.len();
         let help = format!(
             "add `[[parameters]]`; the model has {}",

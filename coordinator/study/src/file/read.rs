@@ -16,7 +16,7 @@ use super::{
 };
 use crate::problem::{Source, StudyError};
 
-const SECTIONS: [&str; 11] = [
+const SECTIONS: [&str; 12] = [
     "study",
     "model",
     "parameters",
@@ -26,6 +26,7 @@ const SECTIONS: [&str; 11] = [
     "explain",
     "spectrum",
     "infer",
+    "diagnose",
     "estimator",
     "fleet",
 ];
@@ -56,6 +57,8 @@ pub(crate) fn read(source: &Source, adapters: &[AdapterDef]) -> Result<StudyFile
         explain: explain(&root),
         spectrum: super::spectrum::read(&root),
         infer: super::infer::read(source, &root),
+        diagnose: super::diagnose::read(source, &root),
+        needs_parameter: true,
         estimator: estimator(&root),
         fleet: fleet(&root),
     };
@@ -79,7 +82,8 @@ fn study(root: &Table<'_>) -> StudySection {
     }
 }
 
-fn parameters(root: &Table<'_>) -> Vec<ParameterSection> {
+/// `[[parameters]]` of the study, or of a table of it.
+pub(super) fn parameters(root: &Table<'_>) -> Vec<ParameterSection> {
     let keys = ["name", "unit", "prior", "process", "per_record"];
     let read = |t: Table<'_>| {
         if t.get("prior").is_none() {

@@ -6,6 +6,9 @@ use super::subject::{Subject, Verdict, got, same, same_bits};
 use super::trial::all_outputs;
 
 pub(super) fn refuses(subject: &Subject<'_>) -> Verdict {
+    if subject.def.files.is_some() {
+        return Verdict::NoOccasion("its files have a place for every parameter and no other".to_owned());
+    }
     let before = got!(subject.plain());
     let outputs = all_outputs(subject.spec());
     let longer = [subject.trial.parameters.as_slice(), &[1.0]].concat();

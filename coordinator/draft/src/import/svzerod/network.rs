@@ -4,8 +4,8 @@
 //! capacitor whose pressure a source prescribes, and nodes whose pressure only inertances determine. Next file to read:
 //! [`super::layout`], which writes it.
 
-use super::super::names::Names;
 use super::super::plan::Omission;
+use crate::names::Names;
 
 /// A node of the network: a position in the list of nodes.
 pub(super) type Node = usize;

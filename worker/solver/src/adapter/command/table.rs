@@ -20,8 +20,11 @@ pub(super) struct Table {
 }
 
 impl Table {
-    /// Reads a table whose first line names the columns; the separator is a comma, else a semicolon or a tab.
+    /// Reads a table whose first line names the columns; the separator is a comma, else a semicolon, a tab or any number of blanks.
     pub(super) fn read(text: &str, file: &str) -> Result<Self, Fault> {
+        if let Some((heading, rows)) = by_blanks(text) {
+            return Ok(Self { file: file.to_owned(), heading, rows });
+        }
         let first = text.lines().next().unwrap_or_default();
         let separator = [b',', b';', b'\t'].into_iter().find(|s| first.as_bytes().contains(s));
         let mut reader = csv::ReaderBuilder::new()
@@ -121,6 +124,19 @@ impl Table {
     }
 }
 
+/// Heading and rows of a table whose columns are separated by blanks: both lines that tell it have as many words.
+fn by_blanks(text: &str) -> Option<(Vec<String>, Vec<csv::StringRecord>)> {
+    let mut lines = text.lines().filter(|line| !line.trim().is_empty());
+    let first = lines.next()?.trim().trim_start_matches('#');
+    if first.contains([',', ';', '\t', '"']) {
+        return None;
+    }
+    let heading: Vec<String> = first.split_whitespace().map(str::to_owned).collect();
+    let rows: Vec<csv::StringRecord> = lines.map(|line| line.split_whitespace().collect()).collect();
+    (heading.len() > 1 && rows.first().is_none_or(|row| row.len() == heading.len()))
+        .then_some((heading, rows))
+}
+
 /// Column `place` (from one) of the rows that hold nothing but numbers and reach that far.
 pub(super) fn plain_column(text: &str, place: usize) -> Vec<f64> {
     let row = |line: &str| -> Option<f64> {
@@ -164,6 +180,16 @@ mod tests {
         assert_eq!(of(&summed, "tip", 1, &[0.3]).unwrap(), [7.0]);
         assert!(of(text, "tip", 1, &[0.5]).unwrap_err().contains("covers the times 0 to 0.4"));
         assert!(of("time,tip\n1,0\n1,2\n", "tip", 1, &[1.0]).unwrap_err().contains("do not increase"));
+    }
+
+    #[test]
+    fn columns_may_stand_apart_by_blanks() {
+        let text = "#  time      tip   load\n   0.0   1.0D-1     10\n\n   1.0   3.0D-1     10\n";
+        assert_eq!(of(text, "tip", 1, &[0.0, 0.5, 1.0]).unwrap(), [0.1, 0.2, 0.3]);
+        let says = of(text, "tpi", 1, &[0.0]).unwrap_err();
+        assert_eq!(says, "r.csv has no column `tpi`; it has time, tip, load; did you mean `tip`?");
+        // A heading of two words above one column is one name.
+        assert_eq!(of("tip load\n1.5\n2.5\n", "tip load", 1, &[0.0, 1.0]).unwrap(), [1.5, 2.5]);
     }
 
     #[test]
