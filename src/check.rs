@@ -119,7 +119,7 @@ fn as_json(study: &Study, channels: &[TrialChannel], ensemble: (usize, bool)) ->
         "trial": channels.iter().map(|c| json!({
             "record": c.record, "output": c.output, "observations": c.n_obs, "rmse": c.rmse, "noise": c.noise,
         })).collect::<Vec<_>>(),
-        "warnings": study.warnings,
+        "warnings": warnings(study),
     })
 }
 
@@ -176,10 +176,16 @@ fn print(study: &Study, channels: &[TrialChannel], ensemble: (usize, bool)) -> R
     if let Some(states) = states_text(study) {
         line(states)?;
     }
-    for warning in &study.warnings {
+    for warning in warnings(study) {
         line(format_args!("warning: {warning}"))?;
     }
     line("the study is sound")
+}
+
+/// Everything that is doubtful in the file, also in effects that only a search tries.
+fn warnings(study: &Study) -> Vec<String> {
+    let of_candidates = study.candidate_warnings.iter().map(|(_, warning)| warning.clone());
+    study.warnings.iter().cloned().chain(of_candidates).collect()
 }
 
 fn print_trial(study: &Study, channels: &[TrialChannel]) -> Result<(), Failure> {

@@ -1,11 +1,14 @@
 //! What people read on a terminal: text on standard output, aligned tables, numbers of the digits they deserve.
 //!
 //! Every command writes to standard output through `line`, `text` or `lost`: a reader that stops early, as `head`
-//! does, ends the command quietly. What is for people only goes to standard error through [`note`].
+//! does, ends the command quietly. What is for people only goes to standard error through [`note`]. Next file to read: [`fitted`].
+
+mod fitted;
 
 use std::fmt::Display;
 use std::io::{self, ErrorKind, IsTerminal, Write};
 
+pub(crate) use self::fitted::fitted;
 use crate::failure::Failure;
 pub(crate) use crate::note::note;
 use crate::plain::Plain;

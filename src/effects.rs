@@ -9,7 +9,7 @@ use starlings_coordinator::study::Study;
 use starlings_models::EffectDef;
 use starlings_models::effect::library::{FAMILIES, Family, stem};
 
-use crate::console::{line, table, text};
+use crate::console::{fitted, line, text};
 use crate::failure::Failure;
 use crate::load::load;
 
@@ -81,7 +81,7 @@ fn print_catalogue(entries: &[Entry]) -> Result<(), Failure> {
         for Entry { effect, .. } in entries.iter().filter(|entry| entry.origin == family.name) {
             rows.push(vec![effect.name.clone(), effect.says.clone(), effect.source.clone()]);
         }
-        text(table(&rows, false))?;
+        text(fitted(&rows))?;
         line("")?;
         parameters(entries.iter().filter(|entry| entry.origin == family.name))?;
         line("")?;
@@ -99,7 +99,7 @@ fn print_study(entries: &[Entry]) -> Result<(), Failure> {
             rows.push(vec![name, origin, add.to.clone(), add.term.clone(), says]);
         }
     }
-    text(table(&rows, false))?;
+    text(fitted(&rows))?;
     line("")?;
     parameters(entries.iter())
 }
@@ -112,5 +112,5 @@ fn parameters<'a>(entries: impl Iterator<Item = &'a Entry>) -> Result<(), Failur
             rows.push(vec![name, p.name.clone(), p.unit.clone(), p.range_text(), p.says.clone()]);
         }
     }
-    text(table(&rows, false))
+    text(fitted(&rows))
 }

@@ -8,6 +8,7 @@ mod live_page;
 mod load_file;
 mod plan;
 mod relay;
+mod repeated;
 
 use std::net::SocketAddr;
 use std::path::Path;

@@ -150,12 +150,11 @@ fn wishes(args: &Args) -> Result<Wishes, Failure> {
     if args.step.is_some_and(|step| !(step > 0.0 && step.is_finite())) {
         return Err(Failure::input("--step must be above zero"));
     }
+    let solver = solver(args)?;
+    let solver = || solver.map(|def| ModelWish::Solver(Box::new(def)));
     Ok(Wishes {
         recordings,
-        model: match model {
-            Some(model) => Some(model),
-            None => solver(args)?.map(ModelWish::Solver).or_else(|| args.model.clone().map(ModelWish::Kind)),
-        },
+        model: model.or_else(solver).or_else(|| args.model.clone().map(ModelWish::Kind)),
         time: args.time.clone(),
         step: args.step,
         time_unit: args.time_unit.clone(),

@@ -141,7 +141,7 @@ fn tell_noise(recording: &Recording, study: &Study) {
 /// The regular grid that was asked for; empty takes the record's own times.
 fn grid(args: &Args, study: &Study, record: usize) -> Result<Vec<f64>, Failure> {
     let (Some(until), Some(step)) = (args.until, args.step) else { return Ok(Vec::new()) };
-    let start = study.records[record].times.first().copied().unwrap_or_default();
+    let start = study.records[record].start;
     if !(step > 0.0 && until > start) {
         return Err(Failure::input(format!(
             "--step must be positive and --until after the record's start at {start}"

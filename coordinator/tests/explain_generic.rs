@@ -5,8 +5,82 @@ mod reactor_kit;
 mod study_kit;
 
 use reactor_kit::{NOISE, explained, reactor, recorded};
-use starlings_coordinator::explain::{Options, candidates};
-use study_kit::Case;
+use starlings_coordinator::explain::{Kind, Options, Verdict, candidates};
+use starlings_coordinator::study::twin::{Twin, simulate};
+use study_kit::{Case, csv, grid, normals};
+
+/// Swings from far out, by two states without a role.
+const SWING: &str = r#"
+[study]
+name = "swing"
+seed = 1
+
+[model]
+kind = "equations"
+outputs = [ { name = "laser", unit = "m", value = "x" } ]
+
+[[model.states]]
+name = "x"
+unit = "m"
+initial = 1.5
+rate = "v"
+
+[[model.states]]
+name = "v"
+unit = "m/s"
+initial = 0.0
+rate = "-k*x - c*v"
+
+[[parameters]]
+name = "k"
+unit = "1/s^2"
+prior = { transform = "log", median = 4.0, factor = 1.3 }
+
+[[parameters]]
+name = "c"
+unit = "1/s"
+prior = { transform = "log", median = 0.1, factor = 2.0 }
+
+[[records]]
+name = "swing"
+file = "swing.csv"
+time = "time"
+channels = [ { column = "laser", output = "laser", noise = 0.01 } ]
+train = [0.0, 15.0]
+"#;
+
+/// Damping that grows with the square of the deflection.
+const DEFLECTION: &str = r#"
+[[effects]]
+name = "deflection"
+says = "Damping that grows with the deflection."
+adds = [ { to = "v", term = "-b*x^2*v" } ]
+parameters = [ { name = "b", unit = "1/(m^2 s)", range = [0, 1] } ]
+"#;
+
+#[test]
+fn a_term_that_nobody_listed_is_proposed_by_its_form() {
+    let times = grid(400, 0.05);
+    let blank = csv("time,laser", &[&times, &vec![1.0; times.len()]]);
+    let twin = Twin {
+        values: [("k", 4.2), ("c", 0.08)].map(|(name, v)| (name.to_owned(), v)).to_vec(),
+        effects: vec![("deflection".to_owned(), 0.2)],
+        seed: 1,
+        ..Twin::default()
+    };
+    let truth = Case::new(&format!("{SWING}{DEFLECTION}"), &[("swing.csv", blank)]);
+    let made = simulate(&truth.study(), &twin).unwrap();
+    let clean = &made.values[made.columns.iter().position(|c| c == "laser").unwrap()];
+    let noisy: Vec<f64> = clean.iter().zip(normals(times.len(), 5)).map(|(v, e)| v + 0.01 * e).collect();
+    let found = explained(&Case::new(SWING, &[("swing.csv", csv("time,laser", &[&times, &noisy]))])).unwrap();
+    let said = &found.headline;
+    assert!(matches!(found.verdict, Verdict::Named | Verdict::Tie), "{said}");
+    assert_eq!(found.effects[0].name, "square-times:v:x:v", "{said}");
+    assert_eq!(found.effects[0].kind, Kind::Proposal);
+    let amplitude = &found.effects[0].parameters[0];
+    assert!((amplitude.estimate + 0.2).abs() < 4.0 * amplitude.sd, "{amplitude:?}");
+    assert!(found.explained_study.is_some() && said.contains("not its cause"), "{said}");
+}
 
 #[test]
 fn states_without_a_role_yield_a_term_by_its_form_and_no_error_of_a_sensor() {

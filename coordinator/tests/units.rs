@@ -65,6 +65,10 @@ channels = [ {{ column = "pressure", output = "pressure", noise = 2.0 {comma} {}
 
 /// An oscillator written as equations, with the unit of its stiffness.
 fn oscillator(stiffness: &str, more: &str) -> Vec<String> {
+    oscillator_study(stiffness, more).warnings
+}
+
+fn oscillator_study(stiffness: &str, more: &str) -> Study {
     load(&format!(
         r#"
 [study]
@@ -102,7 +106,6 @@ channels = [ {{ column = "pressure", output = "position", noise = 2.0 }} ]
 {more}
 "#
     ))
-    .warnings
 }
 
 #[test]
@@ -164,6 +167,33 @@ fn a_wrong_unit_in_an_equation_is_one_warning() {
 }
 
 #[test]
+fn a_number_that_makes_an_argument_plain_has_the_unit_that_it_needs() {
+    let friction = |term: &str| {
+        format!(
+            "[[effects]]\nname = \"friction\"\nadds = [ {{ to = \"v\", term = \"{term}\" }} ]\n\
+             parameters = [ {{ name = \"mu\", unit = \"m/s^2\" }}, {{ name = \"vs\", unit = \"m/s\", range = [0.1, 1], grid = [0.5] }} ]"
+        )
+    };
+    for term in ["-mu*tanh(v/0.002)*vs/vs", "-mu*tanh(500*v)*exp(-v^2/0.04)*vs/vs", "-mu*tanh(v/vs)"] {
+        let study = oscillator_study("N/m", &friction(term));
+        assert!(study.warnings.is_empty() && study.candidate_warnings.is_empty(), "{term}: {study:?}");
+    }
+}
+
+#[test]
+fn an_effect_that_takes_no_part_is_warned_of_where_it_is_tried() {
+    let effect = "[[effects]]\nname = \"odd\"\nadds = [ { to = \"v\", term = \"-d*tanh(x*F)\" } ]\n\
+                  parameters = [ { name = \"d\", unit = \"m/s^2\" } ]";
+    let described = oscillator_study("N/m", effect);
+    assert_eq!(described.warnings, [""; 0], "a run is without it");
+    let [(name, warning)] = &described.candidate_warnings[..] else { panic!("{described:?}") };
+    assert!(name == "odd" && warning.contains("the argument of `tanh` is in"), "{warning}");
+    let prior = "[[parameters]]\nname = \"d\"\nunit = \"m/s^2\"\nprior = { transform = \"linear\", median = 0, sd = 1 }\n";
+    let part = oscillator_study("N/m", &format!("{prior}{effect}"));
+    assert_eq!((part.warnings.len(), part.candidate_warnings.len()), (1, 0), "{:?}", part.warnings);
+}
+
+#[test]
 fn an_equation_holds_in_the_units_that_it_is_written_in() {
     let initial = "[[parameters]]\nname = \"initial:x\"\nunit = \"mm\"\nprior = { transform = \"linear\", mean = 1, sd = 2 }";
     assert_eq!(
@@ -211,7 +241,8 @@ fn a_term_of_an_effect_is_compared_be_it_used_or_not() {
         "units: effect `stiffening`, added to `v`, `-q*x^3`: it is in N, expected m/s per s; its numbers are taken \
                      as they stand.",
     ];
-    assert_eq!(oscillator("N/m", effect), expected);
+    let described = oscillator_study("N/m", effect).candidate_warnings;
+    assert_eq!(described, [("stiffening".to_owned(), expected[0].to_owned())]);
     let used = "[[parameters]]\nname = \"q\"\nprior = { transform = \"log\", median = 1, factor = 2 }\n";
     assert_eq!(oscillator("N/m", &format!("{effect}{used}")), expected);
 }

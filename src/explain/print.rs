@@ -84,7 +84,7 @@ fn coefficient(value: &Coefficient) -> String {
 }
 
 fn ties(found: &Explanation) -> Result<(), Failure> {
-    list("\nthe recordings cannot tell it from", found.tied_with.iter().map(|set| set.join(" + ")), ROWS)?;
+    list("\nthe recordings cannot tell it from", found.ties().into_iter(), ROWS)?;
     match &found.experiment {
         Some(experiment) => line(format_args!("  experiments: {}", experiment.sentence())),
         None => Ok(()),
@@ -92,15 +92,17 @@ fn ties(found: &Explanation) -> Result<(), Failure> {
 }
 
 fn gap(found: &Explanation) -> Result<(), Failure> {
-    if found.gap.is_empty() {
-        return Ok(());
-    }
-    line("\nroot mean square error before and after")?;
-    let heading = ["record", "channel", "use", "before", "after", "noise"];
+    let after = match (found.effects.is_empty(), found.closest.is_empty()) {
+        (false, _) => "after",
+        (true, false) => "with what came nearest",
+        (true, true) => return Ok(()),
+    };
+    line(format_args!("\nroot mean square error before and {after}"))?;
+    let heading = ["record", "channel", "unit", "use", "before", "after", "noise"];
     let mut rows = vec![heading.map(str::to_owned).to_vec()];
     for row in found.gap.iter().take(ROWS) {
         let figures = [row.before, row.after, row.noise].map(|v| number(v, Some(v / DIGITS)));
-        let names = [row.record.clone(), row.channel.clone(), row.usage.clone()];
+        let names = [&row.record, &row.channel, &row.unit, &row.usage].map(Clone::clone);
         rows.push(names.into_iter().chain(figures).collect());
     }
     text(table(&rows, false))?;

@@ -4,6 +4,7 @@ use std::sync::{Arc, mpsc};
 
 use starlings_coordinator::fleet::FleetEvent;
 
+use super::repeated::Repeated;
 use crate::log;
 use crate::progress::Display;
 
@@ -16,7 +17,7 @@ pub(super) struct Shown {
     pub(super) listens: bool,
 }
 
-/// Shows the events that people should see at once and hands all of them on to the store. Where workers come from elsewhere, people
+/// Shows the events that people should see at once, runs that fail alike in one line at the end, and hands all of them on to the store. Where workers come from elsewhere, people
 /// see who comes and goes.
 pub(super) fn relay(
     heard: mpsc::Receiver<FleetEvent>,
@@ -24,9 +25,11 @@ pub(super) fn relay(
     Shown { display, run, listens }: &Shown,
     missing: impl Fn() -> [Option<String>; 2],
 ) {
+    let mut repeated = Repeated::default();
     for event in heard {
         display.heard(&event);
-        if log::is_json() || event.is_notable() || *listens && event.is_of_roster() {
+        let is_notable = || event.is_notable() || *listens && event.is_of_roster();
+        if log::is_json() || is_notable() && !repeated.is_known(&event) {
             let waits = matches!(event, FleetEvent::Waiting { .. });
             let more = missing().into_iter().flatten().filter(|_| waits);
             let said: Vec<String> = std::iter::once(event.to_string()).chain(more).collect();
@@ -44,4 +47,5 @@ pub(super) fn relay(
             let _ = kept.send(event);
         }
     }
+    repeated.told().for_each(|line| display.say(&line));
 }

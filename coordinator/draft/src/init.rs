@@ -60,7 +60,7 @@ pub enum ModelWish {
     /// A file with the layout of a model, such as a netlist; its kind where it is not plain.
     Layout(PathBuf, Option<String>),
     /// A program that describes itself, as it is started in the current folder.
-    Solver(SolverDef),
+    Solver(Box<SolverDef>),
     /// A functional mock-up unit, which is copied into the study's folder.
     Fmu(PathBuf),
 }

@@ -5,9 +5,11 @@
 //!
 //! Next files to read: [`crate::refit::search`], [`crate::judge::verdict`].
 
+use std::cell::OnceCell;
+
 use nalgebra::DVector;
-use starlings_estimators::End;
-use starlings_study::Study;
+use starlings_estimators::{CorrelatedNoise, End};
+use starlings_study::{Record, Study};
 
 use crate::error::ExplainError;
 use crate::fit::candidate::Candidate;
@@ -17,11 +19,12 @@ use crate::fit::kind::Kind;
 use crate::fit::model_variant::ModelVariant;
 use crate::judge::noise_model::{alike, best_supported};
 use crate::judge::search_result::SearchResult;
-use crate::judge::verdict::{Decision, Verdict, decide};
-use crate::locate::Track;
+use crate::judge::verdict::{Decision, Verdict, decide, limits};
+use crate::locate::{self, Track, UnknownInput};
 use crate::options::Options;
-use crate::refit::search::{search, search_generic};
+use crate::refit::search::{search, search_further};
 use crate::run_cache::{Point, RunCache};
+use crate::screen::proposals::{self, Proposals};
 use crate::screen::residual_timing::{change_points, periods};
 use crate::screen::resolve::resolved_candidates;
 use crate::tell::words;
@@ -35,6 +38,8 @@ pub(super) struct Diagnosis<'a, 'c> {
     pub(super) candidates: &'a [Candidate],
     pub(super) decision: Decision,
     pub(super) tracks: &'a [Track],
+    /// The unknown input of every equation, at the model as it is; empty where there is no gap.
+    pub(super) forces: Vec<UnknownInput>,
 }
 
 /// Fits the model as it is, searches and decides, and returns what `then` makes of the diagnosis.
@@ -57,32 +62,109 @@ pub(super) fn diagnose<R>(
         let (periods, change_points) =
             (periods(&cache.rows, &base.predicted), change_points(&cache.rows, &base.predicted));
         let candidates = resolved_candidates(study, &tracks, &periods, &change_points, options)?;
+        let proposed = OnceCell::new();
         let mut found = search(cache, base, &candidates, &tracks, options)?;
         cache.stage("verdict", "");
-        let noise = best_supported(cache, &found);
-        let goes_on = round < ROUNDS && !noise.is_empty() && !alike(&noise, &cache.rows.noise);
+        let noise = another_noise(cache, &found).filter(|_| round < ROUNDS);
+        let goes_on = noise.is_some();
         // As many runs again as all searches so far.
         let is_afforded = cache.affords_runs(cache.runs());
         if !(goes_on && is_afforded) {
             found.cut_short |= goes_on;
-            let mut decision = decide(cache, &found, &candidates)?;
-            if is_open(&found, &decision) && search_generic(cache, &mut found, &candidates, &tracks, options)?
+            let (decision, forces) =
+                decide_further(cache, &mut found, &candidates, &proposed, &tracks, options)?;
+            // A version that came in later may be the one whose residuals show what the noise is.
+            if decision.verdict == Verdict::Unexplained
+                && round < ROUNDS
+                && let Some(noise) = another_noise(cache, &found)
+                && cache.affords_runs(cache.runs())
             {
-                decision = decide(cache, &found, &candidates)?;
+                cache.rows.noise = noise;
+                continue;
             }
-            return then(cache, Diagnosis { found, candidates: &candidates, decision, tracks: &tracks });
+            let candidates = proposed.get().unwrap_or(&candidates);
+            return then(cache, Diagnosis { found, candidates, decision, tracks: &tracks, forces });
         }
-        cache.rows.noise = noise;
+        cache.rows.noise = noise.unwrap_or_default();
     }
     unreachable!("the last round returns")
 }
 
-/// Whether generic terms are tried: nothing explains the gap, or an instrument's error is all that does.
+/// Decides, and goes on with generic terms and then with proposals while nothing explains the gap. `proposed` takes the candidates with the
+/// proposals, where any are made. With the decision come the unknown inputs of the model as it is.
+fn decide_further<'c>(
+    cache: &mut RunCache<'_>,
+    found: &mut SearchResult<'c>,
+    candidates: &'c [Candidate],
+    proposed: &'c OnceCell<Vec<Candidate>>,
+    tracks: &[Track],
+    options: &Options,
+) -> Result<(Decision, Vec<UnknownInput>), ExplainError> {
+    let mut decision = decide(cache, found, candidates)?;
+    if is_open(found, &decision)
+        && search_further(cache, found, candidates, tracks, options, &[Kind::Generic])?
+    {
+        decision = decide(cache, found, candidates)?;
+    }
+    if decision.verdict == Verdict::NoGap {
+        return Ok((decision, Vec::new()));
+    }
+    let forces = forces(cache, &found.base)?;
+    if decision.verdict == Verdict::Unexplained && proposals::are_wanted(found.base.variant.base, options) {
+        let Proposals { candidates: made, considered } = made(found, candidates, tracks, &forces);
+        if !made.is_empty() {
+            found.looked_at = considered as f64 / made.len() as f64;
+            let all = proposed.get_or_init(|| candidates.iter().cloned().chain(made).collect());
+            search_further(cache, found, all, tracks, options, &[Kind::Proposal])?;
+            cache.stage("verdict", "");
+            decision = decide(cache, found, all)?;
+        }
+    }
+    Ok((decision, forces))
+}
+
+/// The unknown input of every equation, at the model as it is.
+fn forces(cache: &mut RunCache<'_>, base: &FittedVariant<'_>) -> Result<Vec<UnknownInput>, ExplainError> {
+    cache.stage("locate", "the unknown input of every equation");
+    let study = &base.variant.study;
+    let most = locate::MOST_RUNS + 2 * study.spec.states.len();
+    if !cache.affords_runs(most as u64) {
+        return Ok(Vec::new());
+    }
+    let mut runs = 0;
+    let forces = locate::unknown_inputs(study, cache.fleet(), base.theta().as_slice(), &mut runs)?;
+    cache.count(runs);
+    Ok(forces)
+}
+
+/// The terms that predict the unknown inputs.
+fn made(
+    found: &SearchResult<'_>,
+    known: &[Candidate],
+    tracks: &[Track],
+    forces: &[UnknownInput],
+) -> Proposals {
+    let study = &found.base.variant.study;
+    let record = study.records.iter().position(Record::is_trained).unwrap_or(0);
+    let theta = study.theta_for(record, found.base.theta().as_slice());
+    proposals::proposals(study, &theta, tracks, forces, known)
+}
+
+/// The noise of the best supported version, where that is another than the one in whose units was searched.
+fn another_noise(cache: &RunCache<'_>, found: &SearchResult<'_>) -> Option<Vec<Option<CorrelatedNoise>>> {
+    let noise = best_supported(cache, found);
+    (!noise.is_empty() && !alike(&noise, &cache.rows.noise)).then_some(noise)
+}
+
+/// Whether generic terms are tried: nothing explains the gap, an instrument's error is all that does, or an effect at a limit of a
+/// parameter inside it, which may be a simpler term.
 fn is_open(found: &SearchResult<'_>, decision: &Decision) -> bool {
-    let instrument = |i: usize| found.judged[i].kinds().contains(&Kind::Instrument);
+    let is_doubtful = |i: usize| {
+        found.judged[i].kinds().contains(&Kind::Instrument) || !limits(&found.judged[i]).is_empty()
+    };
     match decision.verdict {
         Verdict::Unexplained => true,
-        Verdict::Named | Verdict::Tie => decision.best.is_some_and(instrument),
+        Verdict::Named | Verdict::Tie => decision.best.is_some_and(is_doubtful),
         Verdict::NoGap => false,
     }
 }

@@ -20,3 +20,41 @@ mod range;
 pub(crate) mod search_result;
 mod uncertainty;
 pub(crate) mod verdict;
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+    use std::path::Path;
+
+    /// `NAME | file | value` of every number that stands at the head of a file of this folder.
+    fn numbers(folder: &Path, prefix: &str, found: &mut BTreeSet<String>) {
+        for entry in std::fs::read_dir(folder).unwrap().flatten() {
+            let (path, name) = (entry.path(), entry.file_name().to_string_lossy().into_owned());
+            let Ok(text) = std::fs::read_to_string(&path) else { continue };
+            let constants = text
+                .lines()
+                .filter(|line| !line.starts_with(' '))
+                .filter_map(|line| line.split_once("const "));
+            for (name_and_type, value) in constants.filter_map(|(_, rest)| rest.split_once(" = ")) {
+                let (constant, kind) = name_and_type.split_once(": ").unwrap();
+                if kind.contains("f64") || kind == "usize" {
+                    found
+                        .insert(format!("`{constant}` | `{prefix}{name}` | {}", value.trim_end_matches(';')));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_page_lists_every_number_of_the_decision_with_its_value() {
+        let of = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let mut code = BTreeSet::new();
+        numbers(&of.join("src/judge"), "judge/", &mut code);
+        let page = std::fs::read_to_string(of.join("../../docs/explain.md")).unwrap();
+        let rows = page.lines().filter(|line| line.starts_with("| `") && line.contains("` | `judge/"));
+        let listed: BTreeSet<String> = rows
+            .map(|row| row.trim_start_matches("| ").split(" | ").take(3).collect::<Vec<_>>().join(" | "))
+            .collect();
+        assert_eq!(listed, code);
+    }
+}

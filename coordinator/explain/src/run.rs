@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 use starlings_fleet::Fleet;
 use starlings_models::ObserverDef;
-use starlings_study::Study;
 use starlings_study::store::Store;
+use starlings_study::{Record, Study};
 
 use crate::diagnosis::{Diagnosis, diagnose};
 use crate::error::ExplainError;
@@ -24,7 +24,7 @@ use crate::locate::{Located, Track, View};
 use crate::null_recordings;
 use crate::options::{Context, Options};
 use crate::run_cache::{Point, RunCache};
-use crate::screen::not_tried;
+use crate::screen::{not_tried, proposals};
 use crate::tell::correlated::correlated_noise;
 use crate::tell::experiment::propose;
 use crate::tell::figures::Figures;
@@ -85,13 +85,11 @@ fn view<'v>(cache: &'v RunCache<'_>, fit: &'v FittedVariant<'_>, tracks: &'v [Tr
 
 /// Puts the findings together.
 fn finish(cache: &mut RunCache<'_>, diagnosis: &Diagnosis<'_, '_>) -> Result<Findings, ExplainError> {
-    let Diagnosis { found, candidates, decision, tracks } = diagnosis;
+    let Diagnosis { found, candidates, decision, tracks, forces } = diagnosis;
     let mut before = look(cache, &found.base, tracks);
     let judged = decision.best.map(|i| &found.judged[i]);
     let added = judged.filter(|_| matches!(decision.verdict, Verdict::Named | Verdict::Tie));
-    if decision.verdict != Verdict::NoGap {
-        before.forces = forces(cache, &found.base)?;
-    }
+    before.forces = with_terms(forces, found, added, tracks);
     cache.stage("add", "");
     let mut warnings = warnings::warnings(cache, found, decision);
     warnings.extend(cache.told_of_workers()?);
@@ -108,9 +106,9 @@ fn finish(cache: &mut RunCache<'_>, diagnosis: &Diagnosis<'_, '_>) -> Result<Fin
         }
         None => None,
     };
-    let experiment = match (judged, decision.rivals.first()) {
-        (Some(best), Some(rival)) => propose(cache, best, &found.judged[*rival], tracks)?,
-        _ => None,
+    let experiment = match to_separate(found, decision) {
+        Some(versions) => propose(cache, versions, tracks)?,
+        None => None,
     };
     cache.stage("show", "");
     let figures = figures(cache, found, decision, &before)?;
@@ -120,22 +118,48 @@ fn finish(cache: &mut RunCache<'_>, diagnosis: &Diagnosis<'_, '_>) -> Result<Fin
     Ok(Findings { explanation, figures, explained_study: explained })
 }
 
-/// The unknown input of every equation, at the model as it is.
-fn forces(
-    cache: &mut RunCache<'_>,
-    base: &FittedVariant<'_>,
-) -> Result<Vec<locate::UnknownInput>, ExplainError> {
-    cache.stage("locate", "the unknown input of every equation");
-    let study = &base.variant.study;
-    let most = locate::MOST_RUNS + 2 * study.spec.states.len();
-    if !cache.affords_runs(most as u64) {
-        return Ok(Vec::new());
+/// The unknown inputs with what the effects that were added give in their place.
+fn with_terms(
+    forces: &[locate::UnknownInput],
+    found: &SearchResult<'_>,
+    added: Option<&JudgedFit<'_>>,
+    tracks: &[Track],
+) -> Vec<locate::UnknownInput> {
+    let mut forces = forces.to_vec();
+    let Some(judged) = added else { return forces };
+    let study = &found.base.variant.study;
+    let record = study.records.iter().position(Record::is_trained).unwrap_or(0);
+    let theta = study.theta_for(record, found.base.theta().as_slice());
+    let values =
+        summary::effects(judged).into_iter().map(|e| e.parameters.iter().map(|p| p.estimate).collect());
+    let effects: Vec<(&Candidate, Vec<f64>)> =
+        judged.fit.variant.effects.iter().map(|e| e.candidate).zip(values).collect();
+    for force in &mut forces {
+        force.proposed = proposals::along(study, &theta, tracks, &effects, force);
     }
-    let mut runs = 0;
-    let theta = base.theta();
-    let forces = locate::unknown_inputs(study, cache.fleet(), theta.as_slice(), &mut runs)?;
-    cache.count(runs);
-    Ok(forces)
+    forces
+}
+
+/// The versions that an experiment should separate: the tied, or the two that come nearest where nothing is named, of which the model as
+/// it is may be one. A version at the end of what physics allows is none.
+fn to_separate<'f, 'c>(
+    found: &'f SearchResult<'c>,
+    decision: &Decision,
+) -> Option<[&'f FittedVariant<'c>; 2]> {
+    match decision.verdict {
+        Verdict::Tie => Some([decision.best?, *decision.rivals.first()?].map(|i| &found.judged[i].fit)),
+        Verdict::Unexplained => {
+            let is_possible = |j: &&JudgedFit<'_>| {
+                j.refusal.as_ref().is_none_or(|r| !matches!(r.gate, "failed" | "sign" | "range"))
+            };
+            let best = decision.best.map(|i| &found.judged[i]);
+            let others = found.judged.iter().filter(is_possible);
+            let others = others.filter(|j| best.is_none_or(|b| b.names() != j.names()));
+            let mut versions = best.into_iter().chain(others).map(|j| &j.fit).chain([&found.base]);
+            Some([versions.next()?, versions.next()?])
+        }
+        Verdict::Named | Verdict::NoGap => None,
+    }
 }
 
 fn figures(
@@ -189,7 +213,10 @@ fn explanation(
     let checked = decision.checked.map(|i| &found.judged[i]);
     let n_train = cache.rows.train.len();
     let nearest = judged.or(found.judged.first());
-    let after = added.map(|j| j.fit.predicted.as_slice());
+    let before_all = &found.base.predicted;
+    let after = nearest.map_or(before_all, |j| &j.fit.predicted);
+    let is_name = |set: &Vec<String>| set.iter().all(|name| candidates.iter().any(|c| c.name() == name));
+    let (tied, forms): (Vec<_>, Vec<_>) = decision.tied.iter().cloned().partition(is_name);
     Explanation {
         study: study.name.clone(),
         model: study.setup.model.kind.clone(),
@@ -199,7 +226,9 @@ fn explanation(
         places: before.places.clone(),
         effects: added.map(summary::effects).unwrap_or_default(),
         replaced: added.map(|j| j.fit.variant.left_out.clone()).unwrap_or_default(),
-        tied_with: decision.tied.clone(),
+        tied_gap: summary::tied_gap(cache, found, &tied),
+        tied_with: tied,
+        tied_forms: forms.concat(),
         experiment: None,
         closest: nearest
             .filter(|_| decision.verdict == Verdict::Unexplained)
@@ -207,7 +236,7 @@ fn explanation(
             .unwrap_or_default(),
         screened: summary::screened(found, candidates, decision, n_train),
         rejected: rejected::rejected(found, candidates, decision),
-        gap: after.map(|y| summary::gap(cache, &found.base.predicted, y)).unwrap_or_default(),
+        gap: summary::gap(cache, before_all, after),
         held_out: nearest.map_or(&found.held_out, |j| &j.held_out).clone(),
         not_tried: not_tried::not_tried(study, candidates),
         correlated_noise: correlated_noise(study, &cache.rows),
@@ -221,6 +250,6 @@ fn explanation(
         runs_by_stage: cache.runs_by_stage(),
         workers: cache.n_answered(),
         wall_s: cache.elapsed(),
-        warnings: [study.warnings.clone(), warnings].concat(),
+        warnings: [study.warnings.clone(), warnings::of_candidates(study, candidates), warnings].concat(),
     }
 }

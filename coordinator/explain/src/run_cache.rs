@@ -61,6 +61,8 @@ pub struct RunCache<'a> {
     workers: BTreeSet<String>,
     n_batch: usize,
     cut_short: bool,
+    /// Runs that would have sufficed for what was not done first.
+    wanted: Option<u64>,
 }
 
 impl<'a> RunCache<'a> {
@@ -92,6 +94,7 @@ impl<'a> RunCache<'a> {
             workers: BTreeSet::new(),
             n_batch: 0,
             cut_short: false,
+            wanted: None,
         }
     }
 
@@ -175,6 +178,16 @@ impl<'a> RunCache<'a> {
     /// Whether so many more runs keep within the budget.
     pub(crate) fn affords_runs(&self, n: u64) -> bool {
         self.budget.is_none_or(|budget| self.runs() + n <= budget)
+    }
+
+    /// Notes that so many points were not run because the budget did not suffice.
+    pub(crate) fn lacks(&mut self, n_point: usize) {
+        self.wanted = self.wanted.or(Some(self.runs() + self.cost(n_point)));
+    }
+
+    /// The budget, and the runs that would have sufficed for what was not done first.
+    pub(crate) fn too_small(&self) -> Option<(u64, u64)> {
+        self.budget.zip(self.wanted)
     }
 
     /// Notes that something was not done because the budget did not suffice.

@@ -2,13 +2,15 @@
 //!
 //! Files: [`candidates`] and [`resolve`] (which effects, in which units), [`not_tried`] (which physics none of them covers),
 //! [`residual_timing`] (periods and instants worth trying), [`natural_amplitude`] (how large a probe must be), [`influence`] and
-//! [`screening_result`] (what is measured), [`probe`] and [`response`] (how), [`screening`] (all of it in one batch).
+//! [`screening_result`] (what is measured), [`probe`] and [`response`] (how), [`screening`] (all of it in one batch), [`proposals`] (terms
+//! that nobody listed).
 
 pub(crate) mod candidates;
 pub(crate) mod influence;
 mod natural_amplitude;
 pub(crate) mod not_tried;
 mod probe;
+pub(crate) mod proposals;
 pub(crate) mod residual_timing;
 pub(crate) mod resolve;
 mod response;

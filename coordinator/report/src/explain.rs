@@ -106,7 +106,7 @@ impl<'a> Page<'a> {
                 _ => "The missing effect",
             },
             effects: shown.iter().map(|effect| EffectView::new(effect, &about.states)).collect(),
-            ties: found.tied_with.iter().map(|set| set.join(" + ")).collect(),
+            ties: found.ties(),
             separation: experiment.map_or_else(String::new, Experiment::sentence),
             experiments: experiment.map_or(Vec::new(), effect::experiments),
             disagreement: Disagreement::new(found, data),

@@ -22,6 +22,7 @@ mod settings;
 mod solver;
 mod spectrum;
 mod survey;
+mod together;
 mod units;
 
 use std::path::Path;
@@ -171,7 +172,7 @@ fn checked(
     let estimator = estimator(source, &file.estimator, described);
     let fleet = fleet(source, &file.fleet);
     let explain = explain::explain(source, &file);
-    let spectrum = spectrum::spectrum(source, &file.spectrum);
+    let spectrum = spectrum::spectrum(source, &file.spectrum, &file.observer);
     let observer = settings::observer(source, &file.observer, described);
     let model = model::model(source, &file, solver.as_ref());
     // Everything that follows is judged against the model.
@@ -194,10 +195,12 @@ fn checked(
     source.verdict()?;
     check_setup(source, &file, &model.setup, &records)?;
     warnings.extend(model.setup.is_noisy().then(|| NOISE_LEFT_OUT.to_owned()));
-    warnings.extend(units::warnings(&file, &model, &records));
+    let (units, candidate_warnings) = units::warnings(&file, &model, &records);
+    warnings.extend(units);
     let theta = expand::theta(&parameters, &records);
     let described = (model.setup, model.spec);
-    Ok(Study {
+    let observers = file.observer.clone();
+    let study = Study {
         candidates: Arc::new(model.candidates),
         parameters,
         theta,
@@ -207,8 +210,12 @@ fn checked(
         delays: model.delays,
         runs_here: solver.is_none_or(|known| known.is_here),
         warnings,
+        candidate_warnings,
         ..study_of(path, source, file, described, (fleet, estimator), solver_host)
-    })
+    };
+    together::check(source, &observers, &study);
+    source.verdict()?;
+    Ok(study)
 }
 
 /// A study of a model, without parameters, records and what commands ask of it.
@@ -243,6 +250,7 @@ fn study_of(
         whole_answers: false,
         solver_host: solver_host.clone(),
         warnings: Vec::new(),
+        candidate_warnings: Vec::new(),
     }
 }
 

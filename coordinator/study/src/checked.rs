@@ -3,13 +3,15 @@
 //! Nothing here reads files or checks: [`super::check`] does. Next files to read: [`super::expand`] for the way from the
 //! estimated vector to a job's values, [`super::plan`] for the windows.
 
+mod asked;
+
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use starlings_estimators::{Drift, Kind, Options, Points, Root, Transform};
-use starlings_models::spectrum::Decay;
 use starlings_models::{EffectDef, Setup, Signal, Spec};
 
+pub use self::asked::{ExplainChoice, Library, SpectrumChoice};
 use super::infer_choice::InferChoice;
 use super::solver_host::SolverHost;
 use super::surfaces::Node;
@@ -59,8 +61,10 @@ pub struct Study {
     pub whole_answers: bool,
     /// Starts its solver, where the model is one.
     pub solver_host: SolverHost,
-    /// What is doubtful but no error.
+    /// What is doubtful in what takes part in every run, but no error.
     pub warnings: Vec<String>,
+    /// What is doubtful in a candidate, by its name; it counts where the candidate is tried.
+    pub candidate_warnings: Vec<(String, String)>,
 }
 
 /// An uncertain parameter.
@@ -106,7 +110,9 @@ pub struct ThetaEntry {
 pub struct Record {
     /// Name, unique in the study.
     pub name: String,
-    /// Times at which at least one channel was measured, strictly increasing; the run starts at the first.
+    /// Where the run starts: at the first of the times, or before it.
+    pub start: f64,
+    /// Times at which at least one channel was measured, strictly increasing.
     pub times: Vec<f64>,
     /// What was measured.
     pub channels: Vec<Channel>,
@@ -114,6 +120,8 @@ pub struct Record {
     pub inputs: Vec<Signal>,
     /// Training span, both ends included; `None` when the whole record is held out.
     pub train: Option<[f64; 2]>,
+    /// Whether the training span is that of the first rows of a held-out record, which are there to find its initial values.
+    pub only_start: bool,
     /// Observation times per window.
     pub every: usize,
 }
@@ -179,50 +187,10 @@ pub struct FleetChoice {
     pub timeout_factor: Option<f64>,
 }
 
-/// Which effects `explain` may try.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum Library {
-    /// Those of the study and the built-in ones.
-    #[default]
-    All,
-    /// Those of the study.
-    Study,
-    /// The built-in ones.
-    BuiltIn,
-}
-
-/// Settings of `explain`.
-#[derive(Clone, Debug, PartialEq, Default)]
-pub struct ExplainChoice {
-    /// Outputs that are never fitted.
-    pub hold_out_channels: Vec<String>,
-    /// Model runs at most.
-    pub budget: Option<u64>,
-    /// Where candidates come from.
-    pub library: Library,
-    /// Effects that are not to be tried.
-    pub without: Vec<String>,
-    /// Effects to try; empty for all.
-    pub only: Vec<String>,
-    /// Effects at most in one explanation; `None` for the command's own limit.
-    pub max_effects: Option<usize>,
-}
-
-/// Settings of `spectrum`.
-#[derive(Clone, Debug, PartialEq, Default)]
-pub struct SpectrumChoice {
-    /// Kinds of observers; empty for all that the model can host.
-    pub observers: Vec<String>,
-    /// Gains in 1/time; empty for a range around the poles.
-    pub gains: Vec<f64>,
-    /// The decay that is wanted.
-    pub decay: Option<Decay>,
-}
-
 impl Study {
     /// Whether no observer corrects the state during a run.
     pub fn observer_is_off(&self) -> bool {
-        matches!(self.setup.observer.kind.as_str(), "" | "none") || self.setup.observer.gain <= 0.0
+        self.setup.observer.is_off()
     }
 
     /// Whether a parameter moves from one analysis to the next.

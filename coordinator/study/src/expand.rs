@@ -7,8 +7,8 @@ use super::checked::{Record, Study, StudyParameter, ThetaEntry};
 /// The prefix of a parameter that is a state's initial value.
 pub(super) const INITIAL: &str = "initial:";
 
-/// The estimated vector: a shared parameter once, any other once per trained record. In a study of one record the names
-/// need no record.
+/// The estimated vector: a shared parameter once, any other once per trained record; of a held-out record whose first rows tell its
+/// start, its initial values alone. In a study of one record the names need no record.
 pub(super) fn theta(parameters: &[StudyParameter], records: &[Record]) -> Vec<ThetaEntry> {
     let mut entries = Vec::new();
     for (index, parameter) in parameters.iter().enumerate() {
@@ -22,7 +22,8 @@ pub(super) fn theta(parameters: &[StudyParameter], records: &[Record]) -> Vec<Th
             drift: parameter.drift,
         };
         if parameter.per_record && records.len() > 1 {
-            let trained = records.iter().enumerate().filter(|(_, r)| r.is_trained());
+            let has_own = |r: &Record| r.is_trained() && (parameter.is_initial() || !r.only_start);
+            let trained = records.iter().enumerate().filter(|(_, r)| has_own(r));
             entries.extend(trained.map(|(i, r)| entry(format!("{}[{}]", parameter.name, r.name), Some(i))));
         } else {
             entries.push(entry(parameter.name.clone(), None));
@@ -39,10 +40,15 @@ impl StudyParameter {
 }
 
 impl Study {
+    /// Whether the estimated vector holds the value of a parameter for this record, be it shared or its own.
+    pub fn estimates(&self, record: usize, parameter: usize) -> bool {
+        self.theta.iter().any(|e| e.parameter == parameter && e.record.is_none_or(|own| own == record))
+    }
+
     /// Physical values in the order of [`starlings_models::Setup::parameters`] for one record, from the estimated vector in
     /// transformed units.
     ///
-    /// A held-out record has no entries of its own: it takes the mean of the fitted records (in transformed units), and for
+    /// A held-out record has no entries of its own, but for initial values that its first rows tell: it takes the mean of the fitted records (in transformed units), and for
     /// an initial value its own prior median.
     pub fn theta_for(&self, record: usize, transformed: &[f64]) -> Vec<f64> {
         let value = |(index, parameter): (usize, &StudyParameter)| {

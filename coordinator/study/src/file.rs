@@ -150,13 +150,22 @@ pub(super) struct ProcessSection {
     pub(super) walk: Option<Spanned<f64>>,
 }
 
-/// `[observer]`.
-#[derive(Debug)]
+/// `[observer]`, or the first of a list `[[observer]]`.
+#[derive(Clone, Debug)]
 pub(super) struct ObserverSection {
+    /// The others of the list.
+    pub(super) beside: Vec<ObserverSection>,
     pub(super) kind: Spanned<String>,
     pub(super) gain: Spanned<f64>,
     /// Output → state.
     pub(super) corrects: Named<String>,
+}
+
+impl ObserverSection {
+    /// This observer and the others of its list.
+    pub(super) fn all(&self) -> impl Iterator<Item = &Self> {
+        std::iter::once(self).chain(&self.beside)
+    }
 }
 
 /// `[[records]]`.
@@ -169,8 +178,12 @@ pub(super) struct RecordSection {
     /// Model input → column, or `file:column`.
     pub(super) inputs: Named<String>,
     pub(super) channels: Vec<ChannelSection>,
+    /// Where the run begins, if before the first measured row.
+    pub(super) start: Option<Spanned<f64>>,
     pub(super) train: Option<Spanned<[f64; 2]>>,
     pub(super) held_out: bool,
+    /// Rows of a held-out record from which its start is found.
+    pub(super) start_rows: Option<Spanned<u64>>,
     pub(super) every: Spanned<u64>,
 }
 
@@ -185,6 +198,8 @@ pub(super) struct ChannelSection {
     pub(super) from: Option<Spanned<String>>,
     /// Value at which the integral of a rate begins.
     pub(super) start: Option<Spanned<f64>>,
+    /// Never fitted.
+    pub(super) held_out: bool,
     /// Standard deviation in the channel's unit; `None` for `"auto"`.
     pub(super) noise: Spanned<Option<f64>>,
     /// The surfaces that were measured, in the place of a column.

@@ -13,15 +13,15 @@ use crate::fit::runner::StepWindows;
 impl Study {
     /// The training windows of a record, `every` observation times each; none for a held-out record.
     ///
-    /// Where the record's first row trains, the first window holds it alone and has no length: the initial state is
-    /// observed without a step. Rows without a training value are left out, so a gap makes a longer window.
+    /// Where the record's first row trains and the run starts there, the first window holds it alone and has no length: the initial
+    /// state is observed without a step. Rows without a training value are left out, so a gap makes a longer window.
     pub fn windows(&self, record: usize) -> Vec<Arc<Window>> {
         let of_record = &self.records[record];
         let rows = training_rows(of_record);
         let Some(&first) = of_record.times.first() else { return Vec::new() };
         let mut windows = Vec::new();
-        let mut start = first;
-        let alone = usize::from(rows.first() == Some(&0));
+        let mut start = of_record.start;
+        let alone = usize::from(rows.first() == Some(&0) && start >= first);
         let (initial, later) = rows.split_at(alone);
         for rows in initial.chunks(1).chain(later.chunks(of_record.every)) {
             let window = self.window(of_record, start, rows, !self.delays);
@@ -31,12 +31,12 @@ impl Study {
         windows
     }
 
-    /// One window over a record from its first row on. With `train_only` the times and values that train, for a fit of the
+    /// One window over a record from its start on. With `train_only` the times and values that train, for a fit of the
     /// whole record and for an observer, which then corrects at the times and spacings of the filter's windows; otherwise every
     /// time and no observed value, for a free run.
     pub fn whole(&self, record: usize, train_only: bool) -> Window {
         let of_record = &self.records[record];
-        let start = of_record.times.first().copied().unwrap_or_default();
+        let start = of_record.start;
         if train_only {
             return self.window(of_record, start, &training_rows(of_record), false);
         }

@@ -15,6 +15,7 @@ mod pooled_noise;
 mod reader;
 mod separator;
 mod shapes;
+mod start;
 mod surface;
 mod surface_files;
 
@@ -176,12 +177,16 @@ impl<'a> Recordings<'a> {
         }
         let times: Vec<f64> = rows.iter().map(|row| table.times[*row]).collect();
         let inputs = inputs(self, section, &table, &times, spec)?;
+        let start = start::of_run(self.source, section, &times);
+        let first_rows = start::first_rows(self.source, section, &times, &channels);
         Some(Record {
             name: section.name.get_ref().clone(),
+            start: start?,
+            train: train.ok()?.or(first_rows),
+            only_start: section.start_rows.is_some(),
             times,
             channels,
             inputs,
-            train: train.ok()?,
             every: usize::try_from(*section.every.get_ref()).unwrap_or(usize::MAX).max(1),
         })
     }

@@ -88,7 +88,7 @@ pub fn simulate(study: &Study, twin: &Twin) -> Result<Recording, TwinError> {
     let (setup, theta) = place(study, twin)?;
     let model = study.solver_host.build(&setup)?;
     let times = if twin.times.is_empty() { record.times.clone() } else { twin.times.clone() };
-    let start = record.times.first().copied().unwrap_or_default();
+    let start = record.start;
     if times.first().is_some_and(|t| *t < start) || times.windows(2).any(|w| w[1] <= w[0]) {
         return Err(TwinError::Request(format!("times must increase and start at {start} or later")));
     }
@@ -140,7 +140,7 @@ pub fn beats(
         .ok_or_else(|| TwinError::Request(format!("the study has {} records", study.records.len())))?;
     let (setup, theta) = place(study, twin)?;
     let model = study.solver_host.build(&setup)?;
-    let start = record.times.first().copied().unwrap_or_default();
+    let start = record.start;
     let (Some(period), Some(end)) = (twin.period, twin.times.last()) else {
         return Err(TwinError::Request("periods need a length and times".to_owned()));
     };

@@ -2,7 +2,7 @@
 //!
 //! Next file to read: [`crate::runner`].
 
-use starlings_coordinator::explain::{Explanation, Verdict};
+use starlings_coordinator::explain::{Explanation, Kind as EffectKind, Verdict};
 
 /// What is put into the data, and what the search may name.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -11,6 +11,8 @@ pub enum Kind {
     Library,
     /// An effect that no name of a field describes in this system: the search reaches it by its form only.
     Generic,
+    /// An effect of a form that only a proposal has.
+    Unlisted,
     /// One of the library, but the search may name neither it nor its equals.
     LeftOut,
     /// An effect that the parameters imitate.
@@ -27,6 +29,7 @@ impl Kind {
         match self {
             Self::Library => "library",
             Self::Generic => "generic",
+            Self::Unlisted => "unlisted",
             Self::LeftOut => "left out",
             Self::Absorbed => "absorbed",
             Self::Alien => "alien",
@@ -65,6 +68,8 @@ pub enum Outcome {
     Right,
     /// A tie that holds the right name alone.
     RightInTie,
+    /// A proposal of another form, alone or tied: told as made from the data, and as no name.
+    Proposed,
     /// A wrong name, or the right one with more beside it.
     Wrong,
     /// A tie without the right name.
@@ -76,9 +81,10 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Right,
         Self::RightInTie,
+        Self::Proposed,
         Self::Wrong,
         Self::TieWithout,
         Self::Unexplained,
@@ -91,6 +97,7 @@ impl Outcome {
         match self {
             Self::Right => "right",
             Self::RightInTie => "right in tie",
+            Self::Proposed => "proposed",
             Self::Wrong => "wrong",
             Self::TieWithout => "tie without",
             Self::Unexplained => "unexplained",
@@ -104,12 +111,14 @@ impl Outcome {
         let named: Vec<&str> = found.effects.iter().map(|effect| effect.name.as_str()).collect();
         let is_right = |set: &[&str]| set.len() == 1 && accepted.iter().any(|name| name == set[0]);
         let tied = |set: &Vec<String>| is_right(&set.iter().map(String::as_str).collect::<Vec<_>>());
+        let is_made = found.effects.iter().any(|effect| effect.kind == EffectKind::Proposal);
         match found.verdict {
             Verdict::NoGap => Self::NoGap,
             Verdict::Unexplained => Self::Unexplained,
             Verdict::Named if is_right(&named) => Self::Right,
-            Verdict::Named => Self::Wrong,
             Verdict::Tie if is_right(&named) || found.tied_with.iter().any(tied) => Self::RightInTie,
+            Verdict::Named | Verdict::Tie if is_made => Self::Proposed,
+            Verdict::Named => Self::Wrong,
             Verdict::Tie => Self::TieWithout,
         }
     }

@@ -107,6 +107,8 @@ fn of_system(index: usize, system: &System, cases: &mut Vec<Case>) {
         cases.push(case(Kind::LeftOut, name, truth.accepted(), truth.relatives()));
     }
     cases.extend(system.absorbed.iter().map(|t| case(Kind::Absorbed, Some(t.name), t.accepted(), none())));
+    let unlisted = system.unlisted_names();
+    cases.extend(unlisted.iter().map(|name| case(Kind::Unlisted, Some(name), vec![name.clone()], none())));
     cases.extend(system.alien_names().iter().map(|name| case(Kind::Alien, Some(name), none(), none())));
     cases.push(case(Kind::Null, None, none(), none()));
 }

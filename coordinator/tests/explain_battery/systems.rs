@@ -21,6 +21,8 @@ pub struct System {
     pub text: &'static str,
     /// `[[effects]]` that no search knows.
     pub aliens: &'static str,
+    /// `[[effects]]` of a form that only a proposal has, by whose name they go.
+    pub unlisted: &'static str,
     /// Length of the recording.
     pub span: f64,
     /// Inputs and their courses.
@@ -61,9 +63,19 @@ pub struct Truth {
 impl System {
     /// Names of the effects that no search knows.
     pub fn alien_names(&self) -> Vec<String> {
-        let effects = self.aliens.split("[[effects]]").skip(1);
-        effects.filter_map(|text| text.split('"').nth(1)).map(str::to_owned).collect()
+        names(self.aliens)
     }
+
+    /// Names of the effects of a form that only a proposal has.
+    pub fn unlisted_names(&self) -> Vec<String> {
+        names(self.unlisted)
+    }
+}
+
+/// The names of these effects.
+fn names(effects: &str) -> Vec<String> {
+    let effects = effects.split("[[effects]]").skip(1);
+    effects.filter_map(|text| text.split('"').nth(1)).map(str::to_owned).collect()
 }
 
 /// A truth without equals.

@@ -104,7 +104,7 @@ pub fn report(results: &[Result], systems: &[System]) -> String {
         let groups = by_kind(results, |r| (r.case.rho <= 0.0) == is_white);
         if groups.iter().any(|group| !group.results.is_empty()) {
             write!(text, "### {title}\n\n{}\n", table(&groups)).unwrap();
-            text += &in_words(&groups[0], &groups[4]);
+            text += &in_words(&groups[0], &groups[6]);
         }
     }
     let results: Vec<Result> = results.iter().filter(|r| r.case.rho <= 0.0).cloned().collect();
@@ -146,9 +146,10 @@ pub fn report(results: &[Result], systems: &[System]) -> String {
 
 /// The rows of a table by what is missing, of those results that `takes` picks.
 fn by_kind(results: &[Result], takes: impl Fn(&Result) -> bool) -> Vec<Group<'_>> {
+    use Kind::{Absorbed, Alien, Generic, LeftOut, Library, Null, Unlisted};
     let informed = |result: &Result| result.lambda > INFORMATION;
     let mut groups = Vec::new();
-    for kind in [Kind::Library, Kind::Generic, Kind::LeftOut, Kind::Absorbed, Kind::Alien, Kind::Null] {
+    for kind in [Library, Generic, Unlisted, LeftOut, Absorbed, Alien, Null] {
         let is = |result: &Result| result.case.kind == kind && takes(result);
         let word = kind.word();
         if kind == Kind::Null || kind == Kind::Absorbed {

@@ -46,7 +46,7 @@ impl<'a> World<'a> {
         let folder = tempfile::tempdir().unwrap();
         let silence: Vec<Vec<f64>> = system.channels.iter().map(|_| vec![0.0; n]).collect();
         let noise = vec![1.0; system.channels.len()];
-        let text = study_text(system, Told::Sd(&noise), 1) + system.aliens;
+        let text = study_text(system, Told::Sd(&noise), 1) + system.aliens + system.unlisted;
         let study = write(system, folder.path(), &text, &times, &silence);
         let model = study.setup.clone();
         let truth = finer(system, &model);

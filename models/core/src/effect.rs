@@ -11,7 +11,6 @@ mod extended_spec;
 pub mod library;
 pub mod scale;
 mod scope;
-mod scratch;
 mod target;
 mod terms;
 

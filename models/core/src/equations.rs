@@ -30,6 +30,7 @@ mod parse;
 mod parsed;
 mod program;
 mod reach;
+mod tape;
 mod values;
 
 pub use at::{At, Direction, Slot};
@@ -39,3 +40,4 @@ pub use expression::Expression;
 pub use expression_error::ExpressionError;
 pub use model::EquationsModel;
 pub use program::Program;
+pub(crate) use program::Programs;

@@ -30,6 +30,7 @@ mod noise;
 pub mod observer;
 pub mod oscillation;
 mod past;
+mod scratch;
 pub mod segment;
 mod setup;
 mod setup_error;

@@ -66,6 +66,11 @@ impl<'a> Limits<'a> {
         Self::new(u64::MAX, f64::NAN, None)
     }
 
+    /// At most `most` steps and no other limit.
+    pub fn at_most(most: u64) -> Self {
+        Self::new(most, f64::NAN, None)
+    }
+
     /// Counts so many steps that begin at time `t`.
     ///
     /// # Errors

@@ -32,10 +32,10 @@ pub(super) fn name_and_unit(heading: &str) -> (String, String) {
             return (name.trim().to_owned(), label(unit));
         }
     }
-    if let Some((name, unit)) = heading.split_once(" / ").or_else(|| heading.split_once(" in ")) {
-        if Unit::parse(unit.trim()).is_some() {
-            return (name.trim().to_owned(), label(unit));
-        }
+    if let Some((name, unit)) = heading.split_once(" / ").or_else(|| heading.split_once(" in "))
+        && Unit::parse(unit.trim()).is_some()
+    {
+        return (name.trim().to_owned(), label(unit));
     }
     if let Some((name, unit)) = heading.split_once(',').filter(|(_, unit)| Unit::parse(unit.trim()).is_some())
     {

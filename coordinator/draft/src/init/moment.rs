@@ -7,9 +7,9 @@ use jiff::civil::{Date, DateTime, Time};
 /// Date, in the order of the file, of texts that are one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Order {
-    YearFirst,
-    DayFirst,
-    MonthFirst,
+    Ymd,
+    Dmy,
+    Mdy,
 }
 
 /// A moment as a cell has it.
@@ -46,18 +46,18 @@ pub(super) fn order_of<'a>(cells: impl Iterator<Item = &'a str>) -> Result<Order
     for cell in cells {
         let Some(([a, b, _], sign)) = three(date_part(cell)) else { continue };
         if a > 31 {
-            return Ok(Order::YearFirst);
+            return Ok(Order::Ymd);
         }
         if sign == '.' || a > 12 {
-            return Ok(Order::DayFirst);
+            return Ok(Order::Dmy);
         }
         if b > 12 {
-            return Ok(Order::MonthFirst);
+            return Ok(Order::Mdy);
         }
         ambiguous = ambiguous.or(Some(cell));
     }
     match ambiguous {
-        None => Ok(Order::YearFirst),
+        None => Ok(Order::Ymd),
         Some(cell) => Err(format!(
             "in `{cell}` day and month cannot be told apart: write dates as 2024-01-31, or seconds"
         )),
@@ -71,9 +71,7 @@ fn date_part(cell: &str) -> &str {
 impl Moment {
     /// Whether a cell is a moment, in whichever order its date is.
     pub(super) fn is(cell: &str) -> bool {
-        [Order::YearFirst, Order::DayFirst, Order::MonthFirst]
-            .into_iter()
-            .any(|order| Self::of(cell, order).is_some())
+        [Order::Ymd, Order::Dmy, Order::Mdy].into_iter().any(|order| Self::of(cell, order).is_some())
     }
 
     /// The moment of a cell.
@@ -114,9 +112,9 @@ impl Moment {
 fn seconds_of_date(text: &str, order: Order) -> Option<f64> {
     let ([a, b, c], _) = three(text)?;
     let [year, month, day] = match order {
-        Order::YearFirst => [a, b, c],
-        Order::DayFirst => [c, b, a],
-        Order::MonthFirst => [c, a, b],
+        Order::Ymd => [a, b, c],
+        Order::Dmy => [c, b, a],
+        Order::Mdy => [c, a, b],
     };
     let date = Date::new(year.try_into().ok()?, month.try_into().ok()?, day.try_into().ok()?).ok()?;
     let midnight = DateTime::from_parts(date, Time::midnight());
@@ -178,31 +176,31 @@ mod tests {
     fn moments_of_many_forms_are_the_same_seconds() {
         let wanted = Some(1_704_457_830.5);
         for (cell, order) in [
-            ("2024-01-05 12:30:30.5", Order::YearFirst),
-            ("2024-01-05T12:30:30.5Z", Order::YearFirst),
-            ("2024-01-05T14:30:30,5+02:00", Order::YearFirst),
-            ("05.01.2024 12:30:30,5", Order::DayFirst),
-            ("1/5/2024 12:30:30.5 PM", Order::MonthFirst),
+            ("2024-01-05 12:30:30.5", Order::Ymd),
+            ("2024-01-05T12:30:30.5Z", Order::Ymd),
+            ("2024-01-05T14:30:30,5+02:00", Order::Ymd),
+            ("05.01.2024 12:30:30,5", Order::Dmy),
+            ("1/5/2024 12:30:30.5 PM", Order::Mdy),
         ] {
             assert_eq!(seconds(cell, order), wanted, "{cell}");
         }
-        assert_eq!(seconds("00:01:30", Order::YearFirst), Some(90.0));
+        assert_eq!(seconds("00:01:30", Order::Ymd), Some(90.0));
     }
 
     #[test]
     fn numbers_versions_and_impossible_dates_are_no_moments() {
         for cell in ["12", "1.2.3", "2024-13-05", "2024-02-30", "12:70", "a:b", "", "1-2", "12:3:4:5"] {
-            assert!(Moment::of(cell, Order::YearFirst).is_none(), "{cell}");
+            assert!(Moment::of(cell, Order::Ymd).is_none(), "{cell}");
         }
     }
 
     #[test]
     fn the_order_of_a_date_is_found_where_one_of_them_tells_it() {
         let of = |cells: &[&str]| order_of(cells.iter().copied());
-        assert_eq!(of(&["1/5/2024", "1/13/2024"]), Ok(Order::MonthFirst));
-        assert_eq!(of(&["1/5/2024", "13/5/2024"]), Ok(Order::DayFirst));
-        assert_eq!(of(&["05.01.2024"]), Ok(Order::DayFirst));
-        assert_eq!(of(&["2024/01/05"]), Ok(Order::YearFirst));
+        assert_eq!(of(&["1/5/2024", "1/13/2024"]), Ok(Order::Mdy));
+        assert_eq!(of(&["1/5/2024", "13/5/2024"]), Ok(Order::Dmy));
+        assert_eq!(of(&["05.01.2024"]), Ok(Order::Dmy));
+        assert_eq!(of(&["2024/01/05"]), Ok(Order::Ymd));
         assert!(of(&["1/5/2024", "2/5/2024"]).is_err());
     }
 }

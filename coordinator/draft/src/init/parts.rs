@@ -94,19 +94,14 @@ impl Parts {
         let name = stem(&first.file);
         let time_unit = time_unit(wishes, first, ask, &mut notes);
         let noise = noise(wishes, first, roles, ask)?;
-        let (mut unknown, fixed, written) = match &model.spec {
-            Some(spec) => {
-                let (unknown, fixed) = unknowns(spec, &model.constants, wishes, Some(first))?;
-                (unknown, fixed, None)
-            }
-            None => {
-                let (unknown, text) = equations::response(first, roles, &time_unit);
-                (unknown, Vec::new(), Some(text))
-            }
-        };
-        if let Some(spec) = &model.spec {
+        let (unknown, fixed, written) = if let Some(spec) = &model.spec {
+            let (mut unknown, fixed) = unknowns(spec, &model.constants, wishes, Some(first))?;
             unknown.extend(initial_values(spec, first, roles));
-        }
+            (unknown, fixed, None)
+        } else {
+            let (unknown, text) = equations::response(first, roles, &time_unit);
+            (unknown, Vec::new(), Some(text))
+        };
         let named = roles.inputs.iter().map(|(at, name)| (name.clone(), first.columns[*at].name.clone()));
         let named: Vec<(String, String)> = named.collect();
         let mut names = Names::default();
@@ -243,22 +238,17 @@ fn noise(wishes: &Wishes, first: &Recording, roles: &Roles, ask: Ask<'_>) -> Res
     for (_, _, at) in &roles.outputs {
         let channel = &first.columns[*at];
         let said = wishes.noise.iter().find(|(name, _)| *name == channel.heading || *name == channel.name);
-        let sd = match said {
-            Some((_, sd)) => Some(*sd),
-            None => {
-                let unit =
-                    if channel.unit.is_empty() { String::new() } else { format!(" in {}", channel.unit) };
-                let question = Question {
-                    text: format!(
-                        "What is the standard deviation of the errors of `{}`{unit}?",
-                        channel.heading
-                    ),
-                    choices: Vec::new(),
-                    default: Some("auto".to_owned()),
-                    option: format!("--noise {}=SD", channel.name),
-                };
-                ask(&question).and_then(|answer| answer.trim().parse().ok())
-            }
+        let sd = if let Some((_, sd)) = said {
+            Some(*sd)
+        } else {
+            let unit = if channel.unit.is_empty() { String::new() } else { format!(" in {}", channel.unit) };
+            let question = Question {
+                text: format!("What is the standard deviation of the errors of `{}`{unit}?", channel.heading),
+                choices: Vec::new(),
+                default: Some("auto".to_owned()),
+                option: format!("--noise {}=SD", channel.name),
+            };
+            ask(&question).and_then(|answer| answer.trim().parse().ok())
         };
         if sd.is_some_and(|sd: f64| !(sd > 0.0 && sd.is_finite())) {
             return Err(format!("the noise of `{}` must be above zero", channel.heading));

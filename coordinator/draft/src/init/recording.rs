@@ -57,15 +57,12 @@ pub(super) struct TimeWish<'a> {
 pub(super) fn recording(file: &Path, wish: &TimeWish<'_>, ask: Ask<'_>) -> Result<Recording, String> {
     let bytes = std::fs::read(file).map_err(|error| format!("cannot be read: {error}"))?;
     let mut sheet = sheet(&bytes)?;
-    let (time, times) = match wish.step {
-        Some(step) => {
-            sheet.plain = false;
-            (None, Times::counted(sheet.rows.len(), step))
-        }
-        None => {
-            let column = time_column(&sheet, wish.column, ask)?;
-            (Some(column), times(&mut sheet, column)?)
-        }
+    let (time, times) = if let Some(step) = wish.step {
+        sheet.plain = false;
+        (None, Times::counted(sheet.rows.len(), step))
+    } else {
+        let column = time_column(&sheet, wish.column, ask)?;
+        (Some(column), times(&mut sheet, column)?)
     };
     let mut notes = std::mem::take(&mut sheet.notes);
     let skipped: Vec<usize> = time.into_iter().chain(times.clock).collect();

@@ -191,22 +191,17 @@ impl Search<'_> {
             // With an output found, a single column that is left can be nothing else.
             let only = (!self.roles.outputs.is_empty() && free.len() == 1 && self.needs().len() == 1)
                 .then(|| free[0]);
-            let at = match only {
-                Some(at) => at,
-                None => {
-                    let question = Question {
-                        text: format!(
-                            "Which column is the input `{}` of the model{}?",
-                            input.name,
-                            unit(&input)
-                        ),
-                        choices: names,
-                        default: None,
-                        option: format!("--input COLUMN={}", input.name),
-                    };
-                    let why = format!("no column is plainly the input `{}` of the model", input.name);
-                    place(&ask(&question).ok_or_else(|| question.unanswered(&why))?)?
-                }
+            let at = if let Some(at) = only {
+                at
+            } else {
+                let question = Question {
+                    text: format!("Which column is the input `{}` of the model{}?", input.name, unit(&input)),
+                    choices: names,
+                    default: None,
+                    option: format!("--input COLUMN={}", input.name),
+                };
+                let why = format!("no column is plainly the input `{}` of the model", input.name);
+                place(&ask(&question).ok_or_else(|| question.unanswered(&why))?)?
             };
             self.roles.inputs.push((at, input.name));
         }

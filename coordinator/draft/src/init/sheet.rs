@@ -132,13 +132,11 @@ fn decoded(bytes: &[u8], notes: &mut Vec<String>) -> Result<String, String> {
     if bytes.contains(&0) {
         return Err("this is no text: export the table as CSV".to_owned());
     }
-    Ok(match std::str::from_utf8(bytes) {
-        Ok(text) => text.strip_prefix('\u{feff}').unwrap_or(text).to_owned(),
-        Err(_) => {
-            notes.push("the text was not in UTF-8 and was read as Latin-1".to_owned());
-            bytes.iter().map(|byte| char::from(*byte)).collect()
-        }
-    })
+    if let Ok(text) = std::str::from_utf8(bytes) {
+        return Ok(text.strip_prefix('\u{feff}').unwrap_or(text).to_owned());
+    }
+    notes.push("the text was not in UTF-8 and was read as Latin-1".to_owned());
+    Ok(bytes.iter().map(|byte| char::from(*byte)).collect())
 }
 
 /// A line without the mark by which some programs begin their headings.

@@ -40,7 +40,7 @@ impl Folder<'_> {
         for part in &self.parts.records {
             match &part.numbers {
                 Numbers::Measured(recording, _) if recording.as_it_is => {
-                    self.copy(&recording.file, &part.file)?
+                    self.copy(&recording.file, &part.file)?;
                 }
                 Numbers::Measured(recording, complete) => self.rows(part, recording, complete)?,
                 Numbers::Predicted(prediction) => self.predicted(part, prediction, None)?,

@@ -108,7 +108,7 @@ pub(crate) fn record_blocks(study: &Study, rows: &Rows) -> Vec<(Range<usize>, Ve
         return vec![(0..rows.rows.len(), (0..n_param).collect())];
     }
     let place = |r: usize| {
-        let by_mean = |k: usize| !study.records[r].is_trained() && !study.parameters[k].is_initial();
+        let by_mean = |k: usize| !study.estimates(r, k) && !study.parameters[k].is_initial();
         let answers = |j: &usize| {
             let entry = &study.theta[*j];
             entry.record.is_none_or(|own| own == r) || by_mean(entry.parameter)

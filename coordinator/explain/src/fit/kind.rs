@@ -1,7 +1,7 @@
 //! The kinds of effects, and how likely each is before any data: a prior over explanations.
 //!
 //! An effect that the study describes was written for this system. One of the library fits the roles of its quantities, a generic
-//! term fits any equation, and an instrument's error can imitate almost anything. Each is held a third as likely as the one before:
+//! term fits any equation, an instrument's error can imitate almost anything, and a proposal was made to fit. Each is held a third as likely as the one before:
 //! enough to settle what the data leave open, far too little against what they show. Next file to read: [`super::candidate`].
 
 use serde::{Deserialize, Serialize};
@@ -23,6 +23,8 @@ pub enum Kind {
     Generic,
     /// An error of a sensor or of a recorded input.
     Instrument,
+    /// A term that nobody listed, made from these very data.
+    Proposal,
 }
 
 impl Kind {
@@ -33,6 +35,11 @@ impl Kind {
             Some(family) if INSTRUMENTS.contains(&family) => Self::Instrument,
             _ => Self::Library,
         }
+    }
+
+    /// Whether it describes a dependence and no physics.
+    pub(crate) fn is_of_no_field(self) -> bool {
+        matches!(self, Self::Generic | Self::Proposal)
     }
 
     /// What the prior takes from the support of an effect of this kind, in χ².
@@ -47,6 +54,7 @@ impl Kind {
             Self::Library => "effects of the library",
             Self::Generic => "generic terms",
             Self::Instrument => "errors of instruments",
+            Self::Proposal => "proposals",
         }
     }
 }
@@ -67,7 +75,7 @@ mod tests {
 
     #[test]
     fn every_kind_is_a_third_as_likely_as_the_one_before() {
-        let kinds = [Kind::Study, Kind::Library, Kind::Generic, Kind::Instrument];
+        let kinds = [Kind::Study, Kind::Library, Kind::Generic, Kind::Instrument, Kind::Proposal];
         for (k, kind) in (0..).zip(kinds) {
             assert!((kind.price() - 2.0 * 3.0_f64.powi(k).ln()).abs() < 1e-12, "{kind:?}");
         }

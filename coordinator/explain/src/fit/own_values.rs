@@ -40,7 +40,8 @@ fn own_values(cache: &mut RunCache<'_>, fit: &FittedVariant<'_>) -> Result<DMatr
     let study = &fit.variant.study;
     let n = cache.rows.rows.len();
     let own: Vec<usize> = (0..study.parameters.len()).filter(|k| study.parameters[*k].per_record).collect();
-    let held_out: Vec<usize> = (0..study.records.len()).filter(|r| !study.records[*r].is_trained()).collect();
+    let lacks = |r: &usize| own.iter().any(|k| !study.estimates(*r, *k));
+    let held_out: Vec<usize> = (0..study.records.len()).filter(lacks).collect();
     if own.is_empty() || held_out.is_empty() {
         return Ok(DMatrix::zeros(n, 0));
     }
@@ -48,7 +49,7 @@ fn own_values(cache: &mut RunCache<'_>, fit: &FittedVariant<'_>) -> Result<DMatr
     let mut values = DMatrix::zeros(n, own.len());
     for record in held_out {
         let rows = cache.rows.of_record(record);
-        for (k, &parameter) in own.iter().enumerate() {
+        for (k, &parameter) in own.iter().enumerate().filter(|(_, k)| !study.estimates(record, **k)) {
             let influence = if study.parameters[parameter].is_initial() {
                 of_initial(cache, fit, record, parameter)?
             } else {

@@ -15,7 +15,7 @@ use crate::run_cache::RunCache;
 /// Residuals are not white if the probability of as large an autocorrelation in white ones is below this.
 pub(crate) const NOT_WHITE: f64 = 1e-3;
 /// Mean squares over the noise variance that count as the stated noise; a wider interval where chance allows it.
-const AS_STATED: [f64; 2] = [0.5, 1.5];
+pub(crate) const AS_STATED: [f64; 2] = [0.5, 1.5];
 /// Probability of the band in which chance leaves a mean square.
 const LEVEL: f64 = 0.999;
 /// Share of a signal's spread below which residuals are attributed to the integration or to rounding.

@@ -122,6 +122,11 @@ fn noise_floor(rows: &Rows, residual: &DVector<f64>) -> f64 {
     training_stretches(rows).into_iter().map(of).sum()
 }
 
+/// Variance of the white part of the residuals over that of the stated noise, at most one, from their third differences.
+pub(crate) fn white_noise(rows: &Rows, residual: &DVector<f64>) -> f64 {
+    noise_floor(rows, residual) / (residual.len().max(1) as f64)
+}
+
 /// Share of the residuals' squares that white noise makes, from their third differences.
 pub(crate) fn white_share(rows: &Rows, residual: &DVector<f64>) -> f64 {
     noise_floor(rows, residual) / residual.norm_squared().max(f64::MIN_POSITIVE)

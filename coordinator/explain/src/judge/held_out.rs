@@ -24,7 +24,7 @@ const FIRST_ORDER: f64 = 0.05;
 /// channel of every record that fails ...
 const SHARE_OF_EACH: f64 = 0.25;
 /// ... and leave no more than this root mean square over the noise beyond the uncertainty of the estimate ...
-const FAR: f64 = 2.5;
+pub(super) const FAR: f64 = 2.5;
 /// ... unless it takes away this share of a span of a fitted channel: what it leaves there is the smaller part by far, however well the
 /// noise lets it be seen. A channel that is never fitted excuses nothing.
 const MOST: f64 = 0.75;

@@ -2,14 +2,17 @@
 //!
 //! Next file to read: [`super::held_out`].
 
-use super::form::{Leftover, white_share};
+use super::adequacy::AS_STATED;
+use super::contribution::SECOND_SHARE;
+use super::form::{Leftover, white_noise, white_share};
 use super::gates::JudgedFit;
-use super::held_out::forbidding;
+use super::held_out::{FAR, forbidding};
 use super::search_result::SearchResult;
-use crate::fit::kind::Kind;
 use crate::run_cache::RunCache;
 use crate::screen::screening_result::ScreeningResult;
 
+/// How the study says that a noise was given and not found.
+const GIVEN: &str = "given";
 /// Share of white noise in the residuals above which the rest of them must be white too ...
 const AUDIBLE: f64 = 0.12;
 /// ... if their effective variance is above this.
@@ -66,7 +69,7 @@ pub(crate) fn objection(
     if let Some(because) = too_little(judged, &name) {
         return Some(because);
     }
-    if left.is_systematic {
+    if left.is_systematic && !is_remainder(cache, judged) {
         let unseen = judged.misfit.n_held_out > 0 || !judged.held_out.is_empty();
         let held_out = if unseen {
             format!(" and {:.0} on the held-out data", left.gain_held_out)
@@ -92,13 +95,28 @@ pub(crate) fn objection(
     if judged.adequacy.could_be_white() {
         return None;
     }
-    if judged.kinds().contains(&Kind::Generic) {
+    if judged.kinds().iter().any(|kind| kind.is_of_no_field()) {
         return Some(format!(
             "`{name}` comes nearest, but what is left is not noise, and a term without a field of its own is named only where it \
              leaves nothing else"
         ));
     }
     correlated(cache, found, judged)
+}
+
+/// Whether the noise is stated as a judgement, above any white noise that the residuals let be heard, what is left above it is less than a
+/// further effect would have to bring, and nothing is far from it, held out or not: then it is a remainder, whatever could take it away. A
+/// noise that was found is no judgement.
+fn is_remainder(cache: &RunCache<'_>, judged: &JudgedFit<'_>) -> bool {
+    let is_heard = white_noise(&cache.rows, judged.fit.residual()) >= AS_STATED[0];
+    let is_near = judged.adequacy.rmse_over_noise <= FAR && judged.held_out.iter().all(|h| h.beyond <= FAR);
+    is_stated(cache) && !is_heard && is_near && judged.share >= 1.0 - SECOND_SHARE
+}
+
+/// Whether the study gives the noise of every fitted channel.
+fn is_stated(cache: &RunCache<'_>) -> bool {
+    let records = cache.study.records.iter().filter(|r| r.is_trained());
+    records.flat_map(|r| &r.channels).filter(|c| !c.held_out).all(|c| c.noise_how.starts_with(GIVEN))
 }
 
 /// The objection that the data are too few or constant, and so cannot tell one effect from another.
@@ -120,8 +138,11 @@ fn too_little(judged: &JudgedFit<'_>, name: &str) -> Option<String> {
 /// The objection against a variant whose training residuals are correlated.
 fn correlated(cache: &RunCache<'_>, found: &SearchResult<'_>, judged: &JudgedFit<'_>) -> Option<String> {
     let name = judged.fit.variant.name();
-    let white = white_share(&cache.rows, judged.fit.residual());
-    if white > AUDIBLE && judged.inflation > STRUCTURED {
+    let (white, heard) =
+        (white_share(&cache.rows, judged.fit.residual()), white_noise(&cache.rows, judged.fit.residual()));
+    // Where the stated noise is the one that is heard, it is no judgement, and the more is left the less of it is noise.
+    let is_audible = white > AUDIBLE || (heard >= AS_STATED[0] && is_stated(cache));
+    if is_audible && judged.inflation > STRUCTURED {
         return Some(format!(
             "{}, but white noise makes {:.0} % of what is left and so shows that the rest is none: its form is not right, or \
              something else is missing too",

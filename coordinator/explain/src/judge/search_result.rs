@@ -29,6 +29,8 @@ pub(crate) struct SearchResult<'c> {
     pub largest_gain: f64,
     /// Every variant that was refitted, the best first.
     pub judged: Vec<JudgedFit<'c>>,
+    /// Terms that were looked at for every one of those that were made from the data and tried; 1 without any.
+    pub looked_at: f64,
     /// Whether the budget cut the search short.
     pub cut_short: bool,
 }

@@ -4,6 +4,8 @@
 //! what it leaves beyond chance. Otherwise the verdict is a tie, or unexplained with the variant that came nearest. Next file
 //! to read: [`crate::tell::summary`].
 
+use std::cmp::Ordering;
+
 use starlings_estimators::effective_sample_size;
 use starlings_models::equations::{Expression, Slot};
 
@@ -21,6 +23,9 @@ use serde::{Deserialize, Serialize};
 
 /// A rival is tied within this difference in χ², in units of the effective noise.
 const MARGIN: f64 = 6.0;
+/// Difference in χ² up to which the data support two rivals equally, in the same units: odds of e to 1 (Kass and Raftery 1995, "not worth
+/// more than a bare mention").
+const EQUAL: f64 = 2.0;
 /// Correlation of two influences above which no refit can tell their candidates apart.
 pub(crate) const ALIKE: f64 = 0.995;
 /// A rival is tied where the difference in χ² is less than so many of its standard deviations.
@@ -113,11 +118,15 @@ pub(crate) fn decide(
     Ok(Decision { verdict, best: Some(best), checked: Some(checked), tied, rivals, synonyms, because })
 }
 
-/// What is told of a class: the likeliest before any data, then the simplest. What was the best takes its place among the rivals.
+/// What is told of a class: the likeliest kind before any data, then what the data support best, then the simplest. What was the best
+/// takes its place among the rivals.
 fn shown(found: &SearchResult<'_>, mut best: usize, rivals: &mut [usize]) -> usize {
     for rival in rivals {
-        let key = |i: usize| (found.judged[i].kinds(), complexity(&found.judged[i]));
-        if key(*rival) < key(best) {
+        let [other, told] = [*rival, best].map(|i| &found.judged[i]);
+        let apart = (told.rank() - other.rank()) / told.inflation;
+        let by_support = if apart.abs() < EQUAL { Ordering::Equal } else { apart.total_cmp(&0.0) };
+        let simpler = || complexity(other).cmp(&complexity(told));
+        if other.kinds().cmp(&told.kinds()).then(by_support).then_with(simpler).is_lt() {
             std::mem::swap(rival, &mut best);
         }
     }
@@ -160,7 +169,7 @@ fn class(
 }
 
 /// The limiting forms that the data do not exclude: those of a parameter inside a term that they do not determine.
-fn limits(judged: &JudgedFit<'_>) -> Vec<String> {
+pub(crate) fn limits(judged: &JudgedFit<'_>) -> Vec<String> {
     let variant = &judged.fit.variant;
     let Ok(optimum) = judged.fit.optimum() else { return Vec::new() };
     let mut limits = Vec::new();

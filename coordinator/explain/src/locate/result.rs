@@ -182,4 +182,7 @@ pub struct UnknownInput {
     pub at: Vec<f64>,
     /// Log-likelihood gained over the model without it.
     pub log_likelihood_gain: f64,
+    /// What the effects that were added give along the same run; empty where they add nothing to this equation.
+    #[serde(default)]
+    pub proposed: Vec<f64>,
 }

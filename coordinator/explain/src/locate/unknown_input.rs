@@ -74,6 +74,7 @@ fn input(study: &Study, candidate: &Candidate, record: usize, best: Estimate) ->
         sd: best.sd,
         at: best.at,
         log_likelihood_gain: best.log_likelihood - best.without,
+        proposed: Vec::new(),
     }
 }
 

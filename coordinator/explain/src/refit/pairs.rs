@@ -18,10 +18,10 @@ use crate::judge::verdict::ALIKE;
 use crate::screen::screening_result::ScreeningResult;
 
 /// Pairs that begin a refit.
-const PAIRS: usize = 6;
+const PAIRS: usize = 10;
 /// Rounds of runs after which those that promise most go on ...
 const ROUNDS: usize = 12;
-/// ... so many of them.
+/// ... so many of those by their scores, and so many of those at finite amplitudes.
 const FINAL: usize = 3;
 /// Part of the way to the amplitudes that the scores promise at which a refit begins: as far as the influences surely hold.
 const FIRST_WAY: f64 = 0.1;
@@ -34,6 +34,15 @@ struct Member {
     own: DVector<f64>,
 }
 
+impl Member {
+    /// Whether another has the same influence, with an amplitude of an allowed sign.
+    fn is_alike(&self, other: &Self) -> bool {
+        let along = self.own.dot(&other.own);
+        let signs = self.sign * other.sign;
+        along.abs() > ALIKE * self.own.norm() * other.own.norm() && signs * along >= 0.0
+    }
+}
+
 /// A pair with the amplitudes of both and the fall of χ² to first order.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct PairScore {
@@ -43,7 +52,7 @@ struct PairScore {
 }
 
 impl<'c> Searcher<'_, '_, 'c> {
-    /// Refits the best pairs at the model as it is, where no variant passes the gates.
+    /// Refits the best pairs at the model as it is, where nothing else explains the gap.
     pub(super) fn refit_pairs(&mut self, found: &mut SearchResult<'c>) -> Result<(), ExplainError> {
         let members = self.members(found)?;
         let optimum = found.base.optimum()?;
@@ -64,18 +73,26 @@ impl<'c> Searcher<'_, '_, 'c> {
         }
         self.cache.stage("screen", "effects at finite amplitudes, since no effect explains the gap alone");
         let wanted = found.base.cost() - threshold;
-        fits.extend(self.finite_fits(found, wanted)?);
-        if fits.is_empty() {
+        let finite = self.finite_fits(found, wanted)?;
+        let n = fits.len() + finite.len();
+        self.cache.stage("refit", &format!("{n} pairs, since no effect explains the gap alone"));
+        let mut first = self.first_of(fits)?;
+        first.extend(self.first_of(finite)?);
+        if first.is_empty() {
             return Ok(());
         }
-        self.cache.stage("refit", &format!("{} pairs, since no effect explains the gap alone", fits.len()));
+        let fits = self.refit(first)?;
+        self.judge_all(found, fits)
+    }
+
+    /// Those of these fits that promise most after their first rounds. Without a run, for it failed or the budget ended before it, there
+    /// is nothing to judge.
+    fn first_of(&mut self, mut fits: Vec<FittedVariant<'c>>) -> Result<Vec<FittedVariant<'c>>, ExplainError> {
         self.cut_short |= !drive_rounds(self.cache, &mut fits, ROUNDS)?;
-        // Without a run, for it failed or the budget ended before it, there is nothing to judge.
         fits.retain(|fit| !fit.residual().is_empty());
         fits.sort_by(|a, b| a.promised().total_cmp(&b.promised()));
         fits.truncate(FINAL);
-        let fits = self.refit(fits)?;
-        self.judge_all(found, fits)
+        Ok(fits)
     }
 
     /// A fit that adds two effects to a fitted variant and begins on the way to the amplitudes that their scores promise, with the
@@ -108,18 +125,24 @@ impl<'c> Searcher<'_, '_, 'c> {
     }
 
     /// What each candidate does at the model as it is, at the best point of its grid. As many as the memory holds, those that gain
-    /// most first.
+    /// most first; of those that do the same the likeliest before any data.
     fn members(&mut self, found: &SearchResult<'c>) -> Result<Vec<Member>, ExplainError> {
         let optimum = found.base.optimum()?;
         let usable = found.screening.iter().filter(|h| h.failure.is_none() && !h.is_imitated());
         let mut best = largest_of_each(usable, |h| h.score.gain);
         best.truncate(self.cache.series_held().max(2));
-        let member = |result: ScreeningResult| {
+        let mut members: Vec<Member> = Vec::with_capacity(best.len());
+        for result in best {
             let own = optimum.unimitated(&result.influence.of_train(self.cache)?);
-            let sign = self.candidates[result.candidate].sign();
-            Ok(Member { result, sign, own })
-        };
-        best.into_iter().map(member).collect()
+            let candidate = &self.candidates[result.candidate];
+            let (kind, new) = (candidate.kind, Member { sign: candidate.sign(), result, own });
+            match members.iter_mut().find(|known| known.is_alike(&new)) {
+                Some(known) if kind < self.candidates[known.result.candidate].kind => *known = new,
+                Some(_) => {}
+                None => members.push(new),
+            }
+        }
+        Ok(members)
     }
 }
 

@@ -21,6 +21,7 @@ use crate::judge::held_out::held_out;
 use crate::judge::misfit::Misfit;
 use crate::judge::null_distribution::{LEAST, NullDistribution};
 use crate::judge::search_result::SearchResult;
+use crate::judge::verdict::{Verdict, decide};
 use crate::locate::Track;
 use crate::options::Options;
 use crate::run_cache::RunCache;
@@ -36,8 +37,12 @@ pub(super) struct Searcher<'s, 'l, 'c> {
     /// Candidates were asked for by name, so that each is refitted whatever its score says.
     pub(super) asked: bool,
     /// The kinds of effects that are tried.
-    tried: fn(Kind) -> bool,
+    tried: &'static [Kind],
 }
+
+/// Kinds that are tried first, and those that are where effects are asked for by name.
+const FIRST: &[Kind] = &[Kind::Study, Kind::Library, Kind::Instrument];
+const ASKED: &[Kind] = &[Kind::Study, Kind::Library, Kind::Generic, Kind::Instrument];
 
 /// Searches from a fitted model.
 ///
@@ -51,7 +56,7 @@ pub(crate) fn search<'c>(
     options: &Options,
 ) -> Result<SearchResult<'c>, ExplainError> {
     let asked = !options.only.is_empty();
-    let tried = if asked { |_| true } else { |kind| kind != Kind::Generic };
+    let tried = if asked { ASKED } else { FIRST };
     let mut searcher = Searcher { cache, candidates, tracks, cut_short: false, asked, tried };
     let before = Misfit::of(searcher.cache, &base);
     let adequacy = Adequacy::of(searcher.cache, &base);
@@ -70,42 +75,50 @@ pub(crate) fn search<'c>(
         screening,
         largest_gain,
         judged,
+        looked_at: 1.0,
         cut_short,
     };
     if adequacy.is_gap() || largest_gain > found.null_distribution.threshold {
         let best = searcher.best_of_each(&found.screening);
         searcher.refit_singles(&mut found, &best)?;
         searcher.replace_terms(&mut found)?;
-        if options.max_effects > 1 && found.passing().is_empty() {
-            searcher.refit_pairs(&mut found)?;
-        }
         searcher.second_pass(&mut found, options)?;
+        // What passes the gates may yet be refused, and stand before a pair that would not be.
+        let is_open = found.passing().is_empty()
+            || decide(searcher.cache, &found, candidates)?.verdict == Verdict::Unexplained;
+        if options.max_effects > 1 && is_open {
+            searcher.refit_pairs(&mut found)?;
+            searcher.second_pass(&mut found, options)?;
+        }
     }
     found.cut_short = searcher.cut_short || searcher.cache.was_cut_short();
     Ok(found)
 }
 
-/// Goes on with the generic terms, one at a time, where no effect with a name of its own explains the gap. Whether there is any.
+/// Goes on with candidates of one more kind, one at a time, where none of those before explains the gap. Whether there is any.
 ///
 /// # Errors
 /// As [`search`].
-pub(crate) fn search_generic<'c>(
+pub(crate) fn search_further<'c>(
     cache: &mut RunCache<'_>,
     found: &mut SearchResult<'c>,
     candidates: &'c [Candidate],
     tracks: &[Track],
     options: &Options,
+    tried: &'static [Kind],
 ) -> Result<bool, ExplainError> {
-    if !options.only.is_empty() || candidates.iter().all(|c| c.kind != Kind::Generic) {
+    let mut of_kind = candidates.iter().filter(|c| tried.contains(&c.kind));
+    let Some(kind) = of_kind.next().map(|c| c.kind).filter(|_| options.only.is_empty()) else {
         return Ok(false);
-    }
-    let tried = |kind| kind == Kind::Generic;
+    };
     let mut searcher = Searcher { cache, candidates, tracks, cut_short: false, asked: false, tried };
-    searcher.cache.stage("screen", "generic terms, since no other effect explains the gap");
+    searcher.cache.stage("screen", &format!("{}, since no other effect explains the gap", kind.plural()));
     let screening = searcher.screen_all(&found.base)?;
     let best = searcher.best_of_each(&screening);
     found.screening.extend(screening);
     found.null_distribution = null_distribution(searcher.cache, &found.base, &found.screening, candidates)?;
+    // The largest of k times as many squares of normal numbers is 2 ln k larger (Fisher and Tippett 1928).
+    found.null_distribution.threshold += 2.0 * found.looked_at.ln();
     found.largest_gain = largest_gain(&found.screening, candidates);
     searcher.refit_singles(found, &best)?;
     searcher.second_pass(found, &Options { max_effects: 1, ..options.clone() })?;
@@ -137,7 +150,7 @@ impl<'c> Searcher<'_, '_, 'c> {
             .candidates
             .iter()
             .enumerate()
-            .filter(|(_, candidate)| (self.tried)(candidate.kind))
+            .filter(|(_, candidate)| self.tried.contains(&candidate.kind))
             .flat_map(|(c, candidate)| (0..candidate.points.len()).map(move |p| (c, p)))
             .collect();
         self.screen(fit, &of)
@@ -149,6 +162,8 @@ impl<'c> Searcher<'_, '_, 'c> {
         of: &[(usize, usize)],
     ) -> Result<Vec<ScreeningResult>, ExplainError> {
         if !self.cache.affords(of.len()) {
+            // Besides the candidates, the model as it is may have to be run once more.
+            self.cache.lacks(of.len() + 1);
             self.cut_short = true;
             return Ok(Vec::new());
         }

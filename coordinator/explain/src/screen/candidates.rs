@@ -11,6 +11,7 @@ use crate::fit::kind::Kind;
 use crate::fit::same_form::same_form;
 use crate::number::three;
 use crate::options::Options;
+use crate::screen::proposals::PROPOSALS;
 
 /// The effects to try, those of the study first.
 ///
@@ -125,7 +126,8 @@ pub fn check(study: &Study, options: &Options) -> Result<(), ExplainError> {
 /// Refuses an unknown name of an effect or a family. An effect that the model has already may be named; this has no influence.
 fn check_name(name: &str, study: &Study, all: &[&EffectDef]) -> Result<(), ExplainError> {
     let effects = all.iter().copied().chain(&study.setup.effects).map(|e| e.name.as_str());
-    let names: Vec<&str> = effects.chain(FAMILIES.iter().map(|family| family.name)).collect();
+    let names: Vec<&str> =
+        effects.chain(FAMILIES.iter().map(|family| family.name)).chain([PROPOSALS]).collect();
     if names.contains(&name) {
         return Ok(());
     }

@@ -35,8 +35,15 @@ pub(super) fn natural_amplitude(
     (largest > 0.0 && largest.is_finite()).then(|| 1.0 / largest)
 }
 
-/// Root mean square of a term at amplitude one over that of what it is added to.
-fn ratio(reference: &ReferenceRun<'_>, candidate: &Candidate, point: &[f64], add: &Addition) -> Option<f64> {
+/// A term of a candidate at amplitude one, at these steps of a record; nothing where it cannot be evaluated along the run.
+pub(super) fn along_run(
+    reference: &ReferenceRun<'_>,
+    candidate: &Candidate,
+    point: &[f64],
+    term: &str,
+    record: usize,
+    steps: &[usize],
+) -> Option<Vec<f64>> {
     let names = std::cell::RefCell::new(Vec::<String>::new());
     let known = |name: &str| value(reference, candidate, point, name, 0, 0).is_some();
     let resolve = |name: &str| {
@@ -50,17 +57,28 @@ fn ratio(reference: &ReferenceRun<'_>, candidate: &Candidate, point: &[f64], add
         });
         Some(Slot::Parameter(at))
     };
-    let program = Expression::parse(&add.term).ok()?.compile(&resolve, &|_| None).ok()?;
+    let program = Expression::parse(term).ok()?.compile(&resolve, &|_| None).ok()?;
     let names = names.into_inner();
+    let one = |step: &usize| {
+        let t = *reference.study.records[record].times.get(*step)?;
+        let values: Option<Vec<f64>> =
+            names.iter().map(|name| value(reference, candidate, point, name, record, *step)).collect();
+        Some(program.eval(&At { t, x: &[], theta: &values?, u: Drive::NONE, y: &[] }))
+    };
+    steps.iter().map(one).collect()
+}
+
+/// Root mean square of a term at amplitude one over that of what it is added to.
+fn ratio(reference: &ReferenceRun<'_>, candidate: &Candidate, point: &[f64], add: &Addition) -> Option<f64> {
     let (mut term, mut host, mut n) = (0.0, 0.0, 0_u32);
     for (record, of_record) in reference.study.records.iter().enumerate().filter(|(_, r)| r.is_trained()) {
         let stride = (of_record.times.len() / 200).max(1);
-        for (step, &t) in of_record.times.iter().enumerate().step_by(stride) {
-            let values: Option<Vec<f64>> =
-                names.iter().map(|name| value(reference, candidate, point, name, record, step)).collect();
-            let at = At { t, x: &[], theta: &values?, u: Drive::NONE, y: &[] };
-            term += program.eval(&at).powi(2);
-            host += size(reference, &add.to, record, step).powi(2);
+        let steps: Vec<usize> = (0..of_record.times.len()).step_by(stride).collect();
+        for (value, step) in
+            along_run(reference, candidate, point, &add.term, record, &steps)?.iter().zip(&steps)
+        {
+            term += value.powi(2);
+            host += size(reference, &add.to, record, *step).powi(2);
             n += 1;
         }
     }

@@ -60,6 +60,7 @@ pub(crate) fn screen<'c>(
     let spread = spread(cache);
     let unmoved = zero_amplitude(fit, &probes);
     if !cache.affords(probes.len() + usize::from(unmoved.is_some())) {
+        cache.lacks(probes.len() + usize::from(unmoved.is_some()));
         cache.cut_short();
         return Ok(Vec::new());
     }

@@ -1,6 +1,7 @@
-//! The experiment that would best tell tied effects apart: what to measure, how to drive, how long to record.
+//! The experiment that would best tell two versions apart, tied ones or the nearest to what nothing explains: what to measure, how to
+//! drive, how long to record.
 //!
-//! Every experiment is simulated with each of the tied variants as fitted; their difference in the noise of the channels is
+//! Every experiment is simulated with both versions as fitted; their difference in the noise of the channels is
 //! how well it separates them. The model's own parameters would be fitted again in the new data, so the figure is an upper
 //! bound, and so is the one for the data at hand that it is compared with. Next file to read: [`crate::judge::verdict`].
 
@@ -11,7 +12,7 @@ use starlings_study::{Record, Study};
 
 use super::result::Experiment;
 use crate::error::ExplainError;
-use crate::judge::gates::JudgedFit;
+use crate::fit::fitted_variant::FittedVariant;
 use crate::locate::Track;
 use crate::number::three;
 use crate::run_cache::RunCache;
@@ -31,26 +32,25 @@ struct Trial {
     measured: Vec<(String, f64)>,
 }
 
-/// Simulates experiments with the best variant and its nearest rival; nothing when neither differs anywhere.
+/// Simulates experiments with two versions; nothing when they differ nowhere.
 ///
 /// # Errors
 /// When the fleet fails.
 pub(crate) fn propose(
     cache: &mut RunCache<'_>,
-    best: &JudgedFit<'_>,
-    rival: &JudgedFit<'_>,
+    versions: [&FittedVariant<'_>; 2],
     tracks: &[Track],
 ) -> Result<Option<Experiment>, ExplainError> {
     let study = cache.study;
     let Some(record) = study.records.iter().position(Record::is_trained) else { return Ok(None) };
     let trials = trials(study, record, tracks);
-    let mut separations = separations(cache, [best, rival], record, &trials)?.into_iter();
+    let mut separations = separations(cache, versions, record, &trials)?.into_iter();
     let now = separations.next().flatten().unwrap_or(0.0);
     let mut tried: Vec<(String, f64)> =
         trials.into_iter().skip(1).zip(separations).filter_map(|(trial, s)| Some((trial.says, s?))).collect();
     tried.sort_by(|a, b| b.1.total_cmp(&a.1));
     let Some((says, separation)) = tried.first().cloned() else { return Ok(None) };
-    let between = [best, rival].map(|judged| judged.fit.variant.name()).to_vec();
+    let between = versions.map(|fit| fit.variant.name()).to_vec();
     Ok(Some(Experiment { says, between, separation, separation_now: now, tried }))
 }
 
@@ -180,7 +180,7 @@ fn stretched(window: &Window, n_obs: usize) -> Window {
 /// trials there are.
 fn separations(
     cache: &mut RunCache<'_>,
-    variants: [&JudgedFit<'_>; 2],
+    versions: [&FittedVariant<'_>; 2],
     record: usize,
     trials: &[Trial],
 ) -> Result<Vec<Option<f64>>, ExplainError> {
@@ -190,10 +190,10 @@ fn separations(
     for trial in trials {
         let observed = vec![f64::NAN; trial.measured.len() * trial.window.times.len()];
         let window = Arc::new(Window { observed, ..trial.window.clone() });
-        for variant in variants {
-            let mut study = variant.fit.variant.study.clone();
+        for fit in versions {
+            let mut study = fit.variant.study.clone();
             study.setup.outputs = trial.measured.iter().map(|(name, _)| name.clone()).collect();
-            let theta = study.theta_for(record, variant.fit.theta().as_slice());
+            let theta = study.theta_for(record, fit.theta().as_slice());
             let (particle, record, window) = (runs.len() as u32, record as u32, Arc::clone(&window));
             runs.push((study, Job { particle, record, window, theta, state: None }));
         }

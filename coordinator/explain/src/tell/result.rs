@@ -30,8 +30,14 @@ pub struct Explanation {
     pub effects: Vec<NamedEffect>,
     /// Terms of the model that the effects replace.
     pub replaced: Vec<String>,
-    /// Every set of effects that explains the gap about as well as `effects`.
+    /// Every set of effects that explains the gap about as well as `effects`, by their names.
     pub tied_with: Vec<Vec<String>>,
+    /// The errors with each of these sets; none for one that was not refitted.
+    #[serde(default)]
+    pub tied_gap: Vec<Vec<GapRow>>,
+    /// What else explains it as well and has no name of its own, in words: a limiting or another form of `effects`.
+    #[serde(default)]
+    pub tied_forms: Vec<String>,
     /// The experiment that would best separate the tied sets.
     pub experiment: Option<Experiment>,
     /// Where nothing explains the gap, the effects of what came nearest.
@@ -40,7 +46,8 @@ pub struct Explanation {
     pub screened: Vec<Screened>,
     /// Candidates that were refitted and refused, with the reason in words.
     pub rejected: Vec<Rejected>,
-    /// Root mean square error before and after, by channel and use; empty when nothing was added.
+    /// Root mean square error before and after, by channel and use: with what was added, or with what came nearest; the same twice
+    /// where nothing was refitted.
     pub gap: Vec<GapRow>,
     /// Errors on held-out data, by record and channel, with the effects that were named or came nearest.
     #[serde(default)]
@@ -73,6 +80,14 @@ pub struct Explanation {
     pub wall_s: f64,
     /// Warnings.
     pub warnings: Vec<String>,
+}
+
+impl Explanation {
+    /// Everything that explains the gap about as well, in words: the tied sets, then other forms of what is told.
+    pub fn ties(&self) -> Vec<String> {
+        let sets = self.tied_with.iter().map(|set| set.join(" + "));
+        sets.chain(self.tied_forms.iter().cloned()).collect()
+    }
 }
 
 /// An effect with its coefficients.
@@ -131,8 +146,8 @@ pub struct Screened {
     pub share: f64,
     /// Fall of χ², to first order.
     pub gain: f64,
-    /// Amplitude, to first order.
-    pub amplitude: f64,
+    /// Amplitude, to first order; none where nothing of its influence is its own, or none was measured.
+    pub amplitude: Option<f64>,
     /// Part of its influence that the model's parameters cannot imitate, from 0 to 1.
     pub identifiable: f64,
     /// What became of it: `named`, `tied`, `refitted`, `not refitted`, `wrong sign`, `absorbed by the parameters`,
@@ -158,6 +173,9 @@ pub struct GapRow {
     pub record: String,
     /// Output name.
     pub channel: String,
+    /// Unit label of the errors and of the noise.
+    #[serde(default)]
+    pub unit: String,
     /// `train`, `held-out` or `held-out-channel`.
     #[serde(rename = "use")]
     pub usage: String,

@@ -87,7 +87,8 @@ pub(crate) fn screened(
             at: at.join(", "),
             share: if excess > 0.0 { (best.score.gain / excess).min(1.0) } else { 0.0 },
             gain: best.score.gain,
-            amplitude: best.score.amplitude,
+            // What rounding leaves of an influence that the parameters imitate would promise any amplitude.
+            amplitude: (best.failure.is_none() && !best.is_imitated()).then_some(best.score.amplitude),
             identifiable: best.score.identifiable,
             fate: fate(found, decision, index, candidate, best),
         })
@@ -141,6 +142,7 @@ pub(crate) fn gap(cache: &RunCache<'_>, before: &[f64], after: &[f64]) -> Vec<Ga
                     list.push(GapRow {
                         record: record.name.clone(),
                         channel: channel.output.clone(),
+                        unit: unit(study, r, c),
                         usage: usage.word().to_owned(),
                         before: cache.rows.rmse(before, of),
                         after: cache.rows.rmse(after, of),
@@ -151,6 +153,19 @@ pub(crate) fn gap(cache: &RunCache<'_>, before: &[f64], after: &[f64]) -> Vec<Ga
         }
     }
     list
+}
+
+/// The errors with each set of names, where it was refitted.
+pub(crate) fn tied_gap(
+    cache: &RunCache<'_>,
+    found: &SearchResult<'_>,
+    tied: &[Vec<String>],
+) -> Vec<Vec<GapRow>> {
+    let of = |set: &Vec<String>| {
+        let judged = found.judged.iter().find(|judged| judged.names() == *set);
+        judged.map(|judged| gap(cache, &found.base.predicted, &judged.fit.predicted)).unwrap_or_default()
+    };
+    tied.iter().map(of).collect()
 }
 
 /// What is left of the gap after a fit; the figures of the form are those of the variant whose form was `checked`.

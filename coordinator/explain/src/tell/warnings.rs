@@ -3,7 +3,9 @@
 //! Next file to read: [`super::words`].
 
 use starlings_models::{BuildSetup, SOLVER};
+use starlings_study::Study;
 
+use crate::fit::candidate::Candidate;
 use crate::fit::fitted_variant::FittedVariant;
 use crate::judge::adequacy::Nature;
 use crate::judge::contribution::DISCREPANT;
@@ -73,6 +75,13 @@ fn still_failing(judged: &JudgedFit<'_>) -> Option<String> {
             listed(&failing)
         )
     })
+}
+
+/// What is doubtful in the candidates that were tried.
+pub(crate) fn of_candidates(study: &Study, candidates: &[Candidate]) -> Vec<String> {
+    let is_tried = |name: &String| candidates.iter().any(|candidate| candidate.name() == name);
+    let told = study.candidate_warnings.iter().filter(|(name, _)| is_tried(name));
+    told.map(|(_, warning)| warning.clone()).collect()
 }
 
 /// All warnings.

@@ -74,7 +74,10 @@ pub(crate) fn headline(
             )
         }
         (Verdict::Unexplained, _) => unexplained(cache, found, candidates, decision),
-        _ => return no_gap(found, &noise),
+        _ => {
+            let why = too_small(cache, found).map(|why| format!(" {why}"));
+            return no_gap(found, &noise) + &why.unwrap_or_default();
+        }
     };
     if noise.is_empty() { verdict } else { format!("{verdict} The noise is correlated in time: {noise}.") }
 }
@@ -88,8 +91,8 @@ fn unexplained(
 ) -> String {
     let because = if decision.because.is_empty() { String::new() } else { format!(": {}", decision.because) };
     let nearest = decision.best.or((!found.judged.is_empty()).then_some(0)).map(|i| &found.judged[i]);
-    let mut sentences =
-        vec![format!("Nothing that was tried explains the gap{}.", because.trim_end_matches('.'))];
+    let because = format!("Nothing that was tried explains the gap{}.", because.trim_end_matches('.'));
+    let mut sentences = vec![too_small(cache, found).unwrap_or(because)];
     let of = nearest.map_or(&found.held_out, |j| &j.held_out);
     let failing: Vec<&HeldOut> = of.iter().filter(|h| h.fails).collect();
     if !failing.is_empty() {
@@ -133,13 +136,34 @@ fn no_gap(found: &SearchResult<'_>, noise: &str) -> String {
 
 fn subject(judged: &JudgedFit<'_>) -> String {
     let variant = &judged.fit.variant;
-    let says: Vec<&str> = variant.effects.iter().map(|m| m.candidate.def.says.as_str()).collect();
-    format!("Missing: {}. {}", variant.name(), says.join(" "))
+    let says: Vec<String> = variant.effects.iter().map(|m| sentence(&m.candidate.def.says)).collect();
+    let is_made = judged.kinds().contains(&Kind::Proposal);
+    let begins = if is_made { "A proposal, made from these data" } else { "Missing" };
+    format!("{begins}: {}. {}", variant.name(), says.join(" ").trim())
+}
+
+/// A text with the full stop that its author may have left out.
+fn sentence(text: &str) -> String {
+    let text = text.trim();
+    if text.is_empty() || text.ends_with(['.', '!', '?', '…']) {
+        text.to_owned()
+    } else {
+        format!("{text}.")
+    }
+}
+
+/// That the budget ended before anything was tried, and what it would have to be; nothing where something was.
+fn too_small(cache: &RunCache<'_>, found: &SearchResult<'_>) -> Option<String> {
+    let (budget, needed) = cache.too_small().filter(|_| found.screening.is_empty())?;
+    Some(format!(
+        "The budget of {budget} runs is too small: nothing was tried; a first look at every effect needs {needed}, refits \
+         several times as many."
+    ))
 }
 
 /// That a generic term is no physics; empty for an effect of a field.
 fn of_no_field(judged: &JudgedFit<'_>) -> &'static str {
-    if judged.kinds().contains(&Kind::Generic) {
+    if judged.kinds().iter().any(|kind| kind.is_of_no_field()) {
         " That describes a dependence and not its cause."
     } else {
         ""

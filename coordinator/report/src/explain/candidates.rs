@@ -55,7 +55,7 @@ fn row(s: &Screened) -> CandidateRow {
         at: s.at.clone(),
         share: number::percent(s.share),
         gain: quantity(s.gain, ""),
-        amplitude: quantity(s.amplitude, ""),
+        amplitude: quantity(s.amplitude.unwrap_or(f64::NAN), ""),
         identifiable: number::percent(s.identifiable),
         fate: s.fate.clone(),
         meter: meter(&title, "Wide bar: share of the gap. Thin bar: identifiable part.", (0.0, 1.0), &bars),

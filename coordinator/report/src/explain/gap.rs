@@ -42,7 +42,7 @@ impl Gap {
         Self {
             rows: rows.iter().take(ROWS).map(view).collect(),
             rows_left_out: rows.len().saturating_sub(ROWS),
-            compared: !found.gap.is_empty(),
+            compared: !found.effects.is_empty(),
         }
     }
 }
@@ -99,7 +99,7 @@ pub(super) fn words(usage: &str) -> &'static str {
 
 /// The errors before and after; where nothing was added, those of the model as it is.
 pub(super) fn rows(found: &Explanation, figures: &Figures) -> Vec<GapRow> {
-    if found.gap.is_empty() { as_it_is(figures) } else { found.gap.clone() }
+    if found.effects.is_empty() { as_it_is(figures) } else { found.gap.clone() }
 }
 
 /// The errors of the model as it is.
@@ -107,6 +107,7 @@ fn as_it_is(figures: &Figures) -> Vec<GapRow> {
     let row = |c: &starlings_explain::locate::ChannelGap| GapRow {
         record: c.record.clone(),
         channel: c.channel.clone(),
+        unit: c.unit.clone(),
         usage: c.usage.clone(),
         before: c.rmse,
         after: f64::NAN,

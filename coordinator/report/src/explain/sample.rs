@@ -87,6 +87,7 @@ fn explanation(verdict: Verdict, records: usize) -> Explanation {
     let row = |record: usize, usage: &str, before, after| GapRow {
         record: format!("in-vivo-{record}"),
         channel: "pressure".into(),
+        unit: "mmHg".into(),
         usage: usage.into(),
         before,
         after,
@@ -112,6 +113,8 @@ fn explanation(verdict: Verdict, records: usize) -> Explanation {
         effects: vec![effect()],
         replaced: Vec::new(),
         tied_with: Vec::new(),
+        tied_gap: Vec::new(),
+        tied_forms: Vec::new(),
         experiment: None,
         closest: Vec::new(),
         screened: screened(),
@@ -206,7 +209,7 @@ fn screened() -> Vec<Screened> {
         at: String::new(),
         share,
         gain: 4100.0 * share,
-        amplitude: 0.09,
+        amplitude: Some(0.09),
         identifiable: 0.6,
         fate: fate.into(),
     };

@@ -193,6 +193,7 @@ fn of_values(values: &[f64]) -> (Explanation, Figures) {
     }
     for u in &mut f.before.forces {
         let series = u.time.iter_mut().chain(&mut u.value).chain(&mut u.sd).chain(&mut u.at);
+        let series = series.chain(&mut u.proposed);
         series.chain([&mut u.log_likelihood_gain]).for_each(|v| *v = next());
     }
     for c in &mut f.before.correlations {
@@ -242,6 +243,7 @@ fn series_of_one_value_or_of_unequal_lengths_are_drawn_as_far_as_they_go() {
     sample.1.curves[0].after.truncate(20);
     sample.1.before.forces[0].sd.clear();
     sample.1.before.forces[0].at.truncate(3);
+    sample.1.before.forces[0].proposed.truncate(4);
     sample.1.before.maps[1].bias.truncate(5);
     sample.1.before.maps[0].x_edges.clear();
     sample.1.before.spectra[0].power_over_noise.truncate(1);

@@ -46,8 +46,7 @@ pub(super) fn seconds(source: &Source, key: &str, given: &Spanned<f64>) -> f64 {
 pub(super) fn check_delays(source: &Source, file: &StudyFile, setup: &Setup, records: &[Record]) {
     let Ok(model) = setup.model() else { return };
     let most = setup.max_steps.unwrap_or(MAX_STEPS);
-    let length =
-        |record: &Record| record.times.last().zip(record.times.first()).map(|(last, first)| last - first);
+    let length = |record: &Record| record.times.last().map(|last| last - record.start);
     let spans = records.iter().filter_map(|record| Some((record, length(record)?)));
     let Some((record, length)) = spans.max_by(|a, b| a.1.total_cmp(&b.1)) else { return };
     for Memory { of, longest } in model.memories() {

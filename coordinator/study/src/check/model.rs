@@ -67,7 +67,7 @@ fn sort_effects(source: &Source, file: &StudyFile, setup: &mut Setup, bare: &Spe
         file.parameters.iter().any(|p| p.name.get_ref() == name)
             || file.model.constants.iter().any(|(constant, _)| constant.get_ref() == name)
     };
-    let mut candidates = Vec::new();
+    let mut candidates: Vec<EffectDef> = Vec::new();
     for section in &file.effects {
         let told = source.count();
         refuse_fields(source, section, bare);
@@ -84,16 +84,29 @@ fn sort_effects(source: &Source, file: &StudyFile, setup: &mut Setup, bare: &Spe
         }
         match write_out(&effect(section), bare, &file.study.time_unit) {
             Ok(written) if written.parameters.iter().any(|p| given(&p.name)) => setup.effects.push(written),
-            Ok(written) => {
-                // A candidate must build too, or the search for a missing effect would fail late.
-                let trial = Setup { effects: vec![written.clone()], ..setup.clone() };
-                spec(source, file, &trial);
-                candidates.push(written);
-            }
+            Ok(written) => candidates.push(written),
             Err(error) => blame(source, file, &error),
         }
     }
+    // A candidate must build too, or the search for a missing effect would fail late.
+    for candidate in candidates.iter().filter(|_| source.count() == before) {
+        let mut effects = needed(candidate, &setup.effects, &candidates);
+        effects.push(candidate.clone());
+        spec(source, file, &Setup { effects, ..setup.clone() });
+    }
     (source.count() == before).then_some(candidates)
+}
+
+/// The effects beside which a candidate is tried: those that take part, and candidates whose states it adds to or reads.
+fn needed(candidate: &EffectDef, present: &[EffectDef], candidates: &[EffectDef]) -> Vec<EffectDef> {
+    let terms = candidate.adds.iter().map(|add| &add.term).chain(candidate.states.iter().map(|s| &s.rate));
+    let read = terms.filter_map(|term| Expression::parse(term).ok()).flat_map(|term| term.names());
+    let mut names: Vec<String> = read.map(|(name, _)| name).collect();
+    names.extend(candidate.adds.iter().map(|add| add.to.clone()));
+    let is_read = |effect: &&EffectDef| {
+        effect.name != candidate.name && effect.states.iter().any(|state| names.contains(&state.name))
+    };
+    present.iter().chain(candidates.iter().filter(is_read)).cloned().collect()
 }
 
 /// Terms are scalar: a field in a term is reported here, before its name is looked up.

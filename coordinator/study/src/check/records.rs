@@ -4,6 +4,7 @@
 
 use super::built::CheckedModel;
 use crate::checked::Record;
+use crate::expand::INITIAL;
 use crate::field::field_of;
 use crate::file::{RecordSection, StudyFile};
 use crate::problem::Source;
@@ -48,6 +49,11 @@ fn check_record_list(source: &Source, file: &StudyFile) {
             let message = format!("two records are named `{}`", record.name.get_ref());
             source.report_with(record.name.span(), message, "names of records are unique in a study");
         }
+    }
+    let has_initial = file.parameters.iter().any(|p| p.name.get_ref().starts_with(INITIAL));
+    for rows in file.records.iter().filter_map(|record| record.start_rows.as_ref()).filter(|_| !has_initial) {
+        let help = format!("add `[[parameters]]` with `name = \"{INITIAL}<state>\"`, or remove `start_rows`");
+        source.report_with(rows.span(), "no initial value is estimated that these rows could tell", help);
     }
     // A held-out name that no channel measures is refused: with a typing error the channel that is meant would be fitted.
     let measured: Vec<String> =

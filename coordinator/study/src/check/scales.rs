@@ -138,10 +138,9 @@ fn courses(
         (*lo, *hi) = (lo.min(value), hi.max(value));
     };
     for (index, trial) in trials.iter().enumerate() {
-        let Some(start) = trial.record.times.first().copied() else { continue };
         let n_obs = bare.outputs.len();
         let window = Window {
-            start,
+            start: trial.record.start,
             times: trial.times.clone(),
             observed: vec![f64::NAN; n_obs * trial.times.len()],
             inputs: trial.record.inputs.clone(),

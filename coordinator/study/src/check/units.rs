@@ -4,6 +4,7 @@
 //! no common system are reported; equations hold in the units that the study writes them in. The column of an input has no unit
 //! label. Next file to read: [`starlings_models::units`].
 
+use starlings_models::EffectDef;
 use starlings_models::units::{Labels, Unit, consistent};
 
 use super::built::{CheckedModel, quantity};
@@ -14,8 +15,12 @@ use crate::file::StudyFile;
 /// Time unit of the built-in models.
 const MODEL_TIME: &str = "s";
 
-/// Every warning about units.
-pub(crate) fn warnings(file: &StudyFile, model: &CheckedModel, records: &[Record]) -> Vec<String> {
+/// Every warning about units of what takes part in a run, and those of each candidate by its name.
+pub(crate) fn warnings(
+    file: &StudyFile,
+    model: &CheckedModel,
+    records: &[Record],
+) -> (Vec<String>, Vec<(String, String)>) {
     // A solver may use any units: nothing converts them.
     let exact = model.setup.model.equations.is_some() || model.setup.model.solver.is_some();
     let pairs = pairs(file, model, records);
@@ -32,10 +37,14 @@ pub(crate) fn warnings(file: &StudyFile, model: &CheckedModel, records: &[Record
     }
     let mut mismatches: Vec<_> =
         model.setup.model.equations.iter().flat_map(|equations| labels.equations(equations)).collect();
-    let effects = model.setup.effects.iter().chain(&model.candidates);
-    mismatches.extend(effects.flat_map(|effect| labels.effect(effect, &model.spec)));
-    list.extend(mismatches.iter().map(|m| format!("units: {m}; its numbers are taken as they stand.")));
-    list
+    mismatches.extend(model.setup.effects.iter().flat_map(|effect| labels.effect(effect, &model.spec)));
+    let sentence = |m: &dyn std::fmt::Display| format!("units: {m}; its numbers are taken as they stand.");
+    list.extend(mismatches.iter().map(|m| sentence(m)));
+    let of_candidate = |effect: &EffectDef| {
+        let found = labels.effect(effect, &model.spec);
+        found.iter().map(|m| (effect.name.clone(), sentence(m))).collect::<Vec<_>>()
+    };
+    (list, model.candidates.iter().flat_map(of_candidate).collect())
 }
 
 /// Outputs whose innovation `corrects` adds to a state in another unit. The model's own labels are compared: contradictions
@@ -55,7 +64,7 @@ fn corrections(file: &StudyFile, model: &CheckedModel) -> Vec<String> {
             )
         })
     };
-    file.observer.corrects.iter().filter_map(warn).collect()
+    file.observer.all().flat_map(|o| &o.corrects).filter_map(warn).collect()
 }
 
 /// A label beside the model's for the same quantity.

@@ -122,21 +122,31 @@ fn process(parameter: &Table<'_>) -> ProcessSection {
     ProcessSection { forgetting: t.number("forgetting"), walk: t.number("walk") }
 }
 
+/// `[observer]`, or a list `[[observer]]`.
 fn observer(source: &Source, root: &Table<'_>) -> ObserverSection {
-    let none = Spanned::new(0..0, "none".to_owned());
-    let zero = Spanned::new(0..0, 0.0);
-    let Some(t) = root.table("observer", "[observer]", &["kind", "gain", "corrects"]) else {
-        return ObserverSection { kind: none, gain: zero, corrects: Vec::new() };
+    let keys = ["kind", "gain", "corrects"];
+    let is_list = root.get("observer").is_some_and(|node| node.get_ref().as_array().is_some());
+    let tables: Vec<Table<'_>> = if is_list {
+        root.tables("observer", "[[observer]]", &keys)
+    } else {
+        root.table("observer", "[observer]", &keys).into_iter().collect()
     };
-    ObserverSection {
-        kind: t.text("kind").unwrap_or(none),
-        gain: t.number("gain").unwrap_or(zero),
+    let mut sections = tables.iter().map(|t| ObserverSection {
+        kind: t.text("kind").unwrap_or_else(|| Spanned::new(t.span.clone(), "none".to_owned())),
+        gain: t.number("gain").unwrap_or_else(|| Spanned::new(t.span.clone(), 0.0)),
         corrects: named_texts(source, &t.free_entries("corrects")),
-    }
+        beside: Vec::new(),
+    });
+    let Some(first) = sections.next() else {
+        let (kind, gain) = (Spanned::new(0..0, "none".to_owned()), Spanned::new(0..0, 0.0));
+        return ObserverSection { kind, gain, corrects: Vec::new(), beside: Vec::new() };
+    };
+    let beside = sections.collect();
+    ObserverSection { beside, ..first }
 }
 
 fn records(source: &Source, root: &Table<'_>) -> Vec<RecordSection> {
-    let keys = ["name", "file", "time", "inputs", "channels", "train", "use", "every"];
+    let keys = ["name", "file", "time", "inputs", "channels", "start", "train", "use", "start_rows", "every"];
     let mut records = Vec::new();
     for t in root.tables("records", "[[records]]", &keys) {
         if t.get("channels").is_none() {
@@ -152,16 +162,19 @@ fn records(source: &Source, root: &Table<'_>) -> Vec<RecordSection> {
             time: t.text("time").unwrap_or_else(|| Spanned::new(t.span.clone(), "time".to_owned())),
             inputs: named_texts(source, &t.free_entries("inputs")),
             channels: channels(source, &t, root.get("infer").is_some()),
+            start: t.number("start"),
             train: t.interval("train"),
             held_out: held_out(source, &t),
+            start_rows: t.count("start_rows"),
             every: t.count("every").unwrap_or_else(|| Spanned::new(t.span.clone(), 1)),
         });
     }
     records
 }
 
-fn held_out(source: &Source, record: &Table<'_>) -> bool {
-    match record.text("use") {
+/// Whether a record, or a channel, is to be left out of every fit.
+fn held_out(source: &Source, of: &Table<'_>) -> bool {
+    match of.text("use") {
         None => false,
         Some(text) if text.get_ref() == "held-out" => true,
         Some(text) if text.get_ref() == "train" => false,
@@ -190,11 +203,12 @@ fn channels(source: &Source, record: &Table<'_>, infers: bool) -> Vec<ChannelSec
             unit: t.text("unit"),
             from: t.text("from"),
             start: t.number("start"),
+            held_out: held_out(source, &t),
             noise: noise.unwrap_or_else(|| Spanned::new(t.span.clone(), None)),
             surface,
         }
     };
-    let keys = ["column", "output", "unit", "noise", "from", "start", "surface", "rest", "open_ends"];
+    let keys = ["column", "output", "unit", "noise", "use", "from", "start", "surface", "rest", "open_ends"];
     record.tables("channels", "a channel", &keys).into_iter().map(read).collect()
 }
 

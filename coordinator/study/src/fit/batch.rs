@@ -73,7 +73,8 @@ pub(crate) fn fit(
 }
 
 /// The rows of each record with what all records share and the values of its own, where there are such: a record's own values
-/// need no runs of the others. None for a study that shares everything, or has one record to fit.
+/// need no runs of the others. None for a study that shares everything, has one record to fit, or a record that takes a value from the
+/// others since its first rows tell only where it starts.
 fn blocks(study: &Study, windows: &StepWindows) -> Vec<Block> {
     if windows.len() < 2 || study.theta.iter().all(|entry| entry.record.is_none()) {
         return Vec::new();
@@ -88,7 +89,9 @@ fn blocks(study: &Study, windows: &StepWindows) -> Vec<Block> {
         end += window.observed.len();
         Block { rows: first..end, parameters: of(None).chain(of(Some(*record))).collect() }
     };
-    windows.iter().map(block).collect()
+    let blocks: Vec<Block> = windows.iter().map(block).collect();
+    let alike = blocks.iter().all(|block| block.parameters.len() == blocks[0].parameters.len());
+    if alike { blocks } else { Vec::new() }
 }
 
 /// Predictions and which points failed. In blocks a run that failed counts against its own record alone: its values are no

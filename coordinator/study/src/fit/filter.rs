@@ -138,7 +138,7 @@ fn row(
 fn elapsed(study: &Study, windows: &StepWindows) -> f64 {
     windows
         .iter()
-        .filter_map(|(record, w)| Some(w.times.last()? - study.records[*record].times.first()?))
+        .filter_map(|(record, w)| Some(w.times.last()? - study.records[*record].start))
         .fold(0.0, f64::max)
 }
 

@@ -72,7 +72,7 @@ impl ChannelReader<'_> {
         let unit = written.filter(|_| derived == Derived::Itself);
         let channel = |(values, part): (Vec<f64>, Part)| Channel {
             row: context.row(&part.output),
-            held_out: context.is_held_out(&part.output),
+            held_out: section.held_out || context.is_held_out(&part.output),
             output: part.output,
             column: part.column,
             unit: unit.clone(),

@@ -115,18 +115,19 @@ fn covers(
 ) -> bool {
     let (Some(from), Some(to)) = (signal.times.first(), signal.times.last()) else { return false };
     let (Some(first), Some(last)) = (times.first(), times.last()) else { return false };
+    let first = section.start.as_ref().map_or(first, |start| start.get_ref());
     if from <= first && last <= to {
         return true;
     }
     let message = format!(
-        "input `{}` covers {from} to {to}, but record `{}` is observed from {first} to {last}",
+        "input `{}` covers {from} to {to}, but record `{}` is run from {first} to {last}",
         written.get_ref(),
         section.name.get_ref()
     );
     files.source.report_with(
         written.span(),
         message,
-        "an input must cover every observation time of its record",
+        "an input must cover the start and every observation time of its record",
     );
     false
 }

@@ -49,7 +49,7 @@ impl ChannelReader<'_> {
             let output = if n == 1 { output.clone() } else { format!("{output}[{i}]") };
             channels.push(Channel {
                 row: context.row(&output),
-                held_out: context.is_held_out(&output),
+                held_out: section.held_out || context.is_held_out(&output),
                 output,
                 column: surface.file.get_ref().clone(),
                 unit: section.unit.as_ref().map(|u| u.get_ref().clone()).filter(|u| !u.is_empty()),

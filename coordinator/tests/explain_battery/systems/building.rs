@@ -106,6 +106,7 @@ pub(super) fn system() -> System {
         name: "building",
         text: TEXT,
         aliens: ALIENS,
+        unlisted: "",
         span: 240.0,
         inputs: &[("ambient", ambient), ("heating", heating), ("sun", sun)],
         channels: &["indoor"],

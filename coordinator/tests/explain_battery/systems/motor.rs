@@ -76,6 +76,7 @@ pub(super) fn system() -> System {
         name: "motor",
         text: TEXT,
         aliens: ALIENS,
+        unlisted: "",
         span: 5.0,
         inputs: &[],
         channels: &["pressure", "thrust"],

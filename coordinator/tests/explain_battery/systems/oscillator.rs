@@ -62,6 +62,21 @@ adds = [ { to = "v", term = "b_telegraph*step(sin(0.71*t + 1) + sin(1.93*t*g_tel
 parameters = [ { name = "b_telegraph", range = [-50, 50] }, { name = "g_telegraph", grid = [0.9, 1.2], range = [0.5, 2] } ]
 "#;
 
+/// Damping that grows with the deflection, and with the cube of the velocity: forms of proposals alone, by whose names they go.
+const UNLISTED: &str = r#"
+[[effects]]
+name = "square-times:v:x:v"
+says = "Damping that grows with the square of the deflection."
+adds = [ { to = "v", term = "-b_deflection*x^2*v" } ]
+parameters = [ { name = "b_deflection", range = [0, 50] } ]
+
+[[effects]]
+name = "cube:v:v"
+says = "Damping with the cube of the velocity."
+adds = [ { to = "v", term = "-b_cube*v^3" } ]
+parameters = [ { name = "b_cube", range = [0, 50] } ]
+"#;
+
 /// A force of several tones, so that the amplitude wanders.
 fn force(t: f64) -> f64 {
     1.1 * (1.3 * t).sin() + 0.9 * (2.17 * t + 1.0).sin() + 0.7 * (0.41 * t + 0.5).sin()
@@ -95,6 +110,7 @@ pub(super) fn system() -> System {
         name: "oscillator",
         text: TEXT,
         aliens: ALIENS,
+        unlisted: UNLISTED,
         span: 50.0,
         inputs: &[("force", force)],
         channels: &["position"],

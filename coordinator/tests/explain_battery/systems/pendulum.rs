@@ -86,6 +86,7 @@ pub(super) fn system() -> System {
         name: "pendulum",
         text: TEXT,
         aliens: ALIENS,
+        unlisted: "",
         span: 30.0,
         inputs: &[("torque", torque)],
         channels: &["angle"],

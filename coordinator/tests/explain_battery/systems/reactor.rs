@@ -52,6 +52,21 @@ unit = ""
 prior = { transform = "log", median = 0.3, factor = 1.2 }
 "#;
 
+/// Losses that grow with the product: forms of proposals alone, by whose names they go.
+const UNLISTED: &str = r#"
+[[effects]]
+name = "square-times:X:P:X"
+says = "A loss of biomass with the square of the product."
+adds = [ { to = "X", term = "-b_poison*P^2*X" } ]
+parameters = [ { name = "b_poison", range = [0, 50] } ]
+
+[[effects]]
+name = "product:S:X:P"
+says = "A loss of substrate with biomass times product."
+adds = [ { to = "S", term = "-b_by*X*P" } ]
+parameters = [ { name = "b_by", range = [0, 50] } ]
+"#;
+
 /// A fed reactor.
 fn feed(t: f64) -> f64 {
     0.6 + 0.35 * (0.21 * t).sin() + 0.2 * (0.47 * t + 1.0).sin()
@@ -73,6 +88,7 @@ pub(super) fn system() -> System {
         name: "reactor",
         text: TEXT,
         aliens: "",
+        unlisted: UNLISTED,
         span: 60.0,
         inputs: &[("feed", feed)],
         channels: &["biomass", "substrate"],

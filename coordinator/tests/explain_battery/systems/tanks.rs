@@ -106,6 +106,7 @@ pub(super) fn system() -> System {
         name: "tanks",
         text: TEXT,
         aliens: ALIENS,
+        unlisted: "",
         span: 100.0,
         inputs: &[("pump", pump)],
         channels: &["first", "last"],

@@ -100,6 +100,7 @@ pub(super) fn system() -> System {
         name: "tube",
         text: TEXT,
         aliens: ALIENS,
+        unlisted: "",
         span: 5.0,
         inputs: &[("flow", flow)],
         channels: &["inlet_pressure", "displacement[2]"],

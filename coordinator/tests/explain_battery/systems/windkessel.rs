@@ -89,6 +89,7 @@ pub(super) fn system() -> System {
         name: "windkessel",
         text: TEXT,
         aliens: ALIENS,
+        unlisted: "",
         span: 10.0,
         inputs: &[("flow", flow)],
         channels: &["pressure"],

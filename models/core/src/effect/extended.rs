@@ -14,11 +14,11 @@ use std::collections::BTreeMap;
 
 use super::extended_spec::extended_spec;
 use super::scope::{Reach, Scope, note_memories};
-use super::scratch::Scratch;
 use super::{Effect, EffectDef, Moment, TermEffect, Touches};
 use crate::SetupError;
 use crate::equations::Slot;
 use crate::integrate::Solver;
+use crate::scratch::Scratch;
 use crate::segment::{Drive, Segment};
 use crate::{Blocks, Memory, Model, ModelFailure, Spec, advance_by};
 
@@ -159,6 +159,9 @@ impl Model for Extended {
 
     fn rhs(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, dx: &mut [f64]) {
         let at = Moment { t, x, theta, u, y: &[] };
+        if !self.touches.reads_outputs && !self.touches.inputs_follow_states {
+            return self.rate(at, &[], dx);
+        }
         let (y, rate) = self.outputs_and_rate(at);
         self.rate(Moment { y: y.as_ref(), ..at }, rate.as_ref(), dx);
     }

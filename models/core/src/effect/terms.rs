@@ -5,7 +5,7 @@
 use super::scope::{Reach, Scope, names};
 use super::{Addition, Effect, EffectDef, Moment, Target, Touches};
 use crate::SetupError;
-use crate::equations::{At, Direction, Program, Slot};
+use crate::equations::{At, Direction, Program, Programs, Slot};
 use crate::segment::Drive;
 use crate::{Quantity, Spec, nearest};
 
@@ -19,6 +19,17 @@ pub(crate) struct TermEffect {
     parameters: Vec<(usize, Program)>,
     initial: Vec<(usize, Program)>,
     switches: Vec<Program>,
+    /// The terms of each list, evaluated together.
+    together: Together,
+}
+
+/// The values of several terms, evaluated together.
+#[derive(Default)]
+struct Together {
+    rates: Programs,
+    outputs: Programs,
+    parameters: Programs,
+    switches: Programs,
 }
 
 impl TermEffect {
@@ -36,6 +47,7 @@ impl TermEffect {
             parameters: Vec::new(),
             initial: Vec::new(),
             switches: Vec::new(),
+            together: Together::default(),
         };
         for add in &def.adds {
             effect.add(add, scope)?;
@@ -53,6 +65,13 @@ impl TermEffect {
         }
         effect.check_parameters_used()?;
         effect.touches = effect.find_touches(scope)?;
+        let of = |list: &[(usize, Program)]| Programs::new(list.iter().map(|(_, program)| program));
+        effect.together = Together {
+            rates: of(&effect.rates),
+            outputs: of(&effect.outputs),
+            parameters: of(&effect.parameters),
+            switches: Programs::new(&effect.switches),
+        };
         Ok(effect)
     }
 
@@ -153,21 +172,15 @@ impl Effect for TermEffect {
     }
 
     fn add_to_parameters(&self, moment: Moment<'_>, theta: &mut [f64]) {
-        for (i, program) in &self.parameters {
-            theta[*i] += program.eval(&at(moment));
-        }
+        self.together.parameters.each(&at(moment), |k, value| theta[self.parameters[k].0] += value);
     }
 
     fn add_to_rates(&self, moment: Moment<'_>, dx: &mut [f64]) {
-        for (i, program) in &self.rates {
-            dx[*i] += program.eval(&at(moment));
-        }
+        self.together.rates.each(&at(moment), |k, value| dx[self.rates[k].0] += value);
     }
 
     fn add_to_outputs(&self, moment: Moment<'_>, y: &mut [f64]) {
-        for (i, program) in &self.outputs {
-            y[*i] += program.eval(&at(moment));
-        }
+        self.together.outputs.each(&at(moment), |k, value| y[self.outputs[k].0] += value);
     }
 
     fn n_switch(&self) -> usize {
@@ -175,8 +188,6 @@ impl Effect for TermEffect {
     }
 
     fn switches(&self, moment: Moment<'_>, g: &mut [f64]) {
-        for (g, program) in g.iter_mut().zip(&self.switches) {
-            *g = program.eval(&at(moment));
-        }
+        self.together.switches.write(&at(moment), g);
     }
 }

@@ -14,7 +14,7 @@ use super::inline::Names;
 use super::node::Node;
 use super::noise::Noise;
 use super::parsed::{Parsed, Placed, fault};
-use super::program::Program;
+use super::program::{Program, Programs};
 use crate::bounds::unbounded;
 use crate::integrate::Solver;
 use crate::memory::{self, Memory};
@@ -24,13 +24,13 @@ use crate::{Quantity, SetupError, Spec, nearest};
 #[derive(Clone, Debug)]
 pub(super) struct Built {
     pub(super) spec: Spec,
-    pub(super) initial: Vec<Program>,
-    pub(super) rates: Vec<Program>,
+    pub(super) initial: Programs,
+    pub(super) rates: Programs,
     /// For each rate, the states that it depends on.
     pub(super) depends: Vec<Vec<usize>>,
-    pub(super) outputs: Vec<Program>,
+    pub(super) outputs: Programs,
     pub(super) noise: Noise,
-    pub(super) switches: Vec<Program>,
+    pub(super) switches: Programs,
     pub(super) memories: Vec<Memory>,
     /// For each memory, the state or output that it remembers.
     pub(super) sources: Vec<Slot>,
@@ -92,12 +92,12 @@ pub(super) fn build(def: &EquationsDef, constants: &BTreeMap<String, f64>) -> Re
     let memories = memories.take();
     Ok(Built {
         spec,
-        initial,
+        initial: Programs::new(&initial),
         depends: rates.iter().map(|(e, _)| dependencies(e.node(), &names)).collect(),
-        rates: rates.into_iter().map(|(_, p)| p).collect(),
-        outputs: values.into_iter().map(|(_, p)| p).collect(),
+        rates: Programs::new(rates.iter().map(|(_, p)| p)),
+        outputs: Programs::new(values.iter().map(|(_, p)| p)),
         noise,
-        switches,
+        switches: Programs::new(&switches),
         sources: memories.iter().map(|memory| source(&memory.of, def, &names)).collect(),
         memories,
         solver,

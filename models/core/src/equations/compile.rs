@@ -1,12 +1,16 @@
 //! From a syntax tree to flat code: names become slots, constants are folded, whole powers become products.
 //!
-//! Next file to read: [`super::program`], which runs the code.
+//! Next file to read: [`super::tape`], the code.
 
 use super::at::Slot;
 use super::expression_error::ExpressionError;
 use super::node::{Name, Node, Operation};
-use super::program::{MAX_STACK, Op, Program};
+use super::program::Program;
+use super::tape::{Operand, Writer};
 use super::values::{self, Source};
+
+/// Deepest expression: so many values may wait for others at a time.
+const MAX_WAITING: usize = 64;
 
 /// Largest whole exponent that is worked out by multiplication.
 const MAX_POWER: f64 = 64.0;
@@ -20,10 +24,13 @@ pub(super) fn compile(
     resolve: Resolve<'_>,
     nearest: Nearest<'_>,
 ) -> Result<Program, ExpressionError> {
-    let mut compiler = Compiler { resolve, nearest, code: Vec::new(), height: 0, highest: 0 };
-    let tree = compiler.resolved(node)?;
-    compiler.emit(&tree)?;
-    Ok(Program { code: compiler.code, stack: compiler.highest })
+    let tree = Compiler { resolve, nearest }.resolved(node)?;
+    if tree.waiting() > MAX_WAITING {
+        return Err(ExpressionError::new(1, "nested too deep: split it into several outputs or states"));
+    }
+    let mut writer = Writer::default();
+    let value = tree.written(&mut writer);
+    Ok(Program { tape: writer.finish(&[value]), n_operation: tree.n_operation() })
 }
 
 /// A tree whose names are resolved and whose constants are folded.
@@ -40,9 +47,6 @@ enum Tree {
 struct Compiler<'a> {
     resolve: Resolve<'a>,
     nearest: Nearest<'a>,
-    code: Vec<Op>,
-    height: usize,
-    highest: usize,
 }
 
 fn number(tree: &Tree) -> Option<f64> {
@@ -136,66 +140,64 @@ impl Compiler<'_> {
             }
         }
     }
+}
 
-    fn op(&mut self, op: Op) {
-        self.code.push(op);
+impl Tree {
+    /// Values that wait for others at most while this one is worked out from left to right.
+    fn waiting(&self) -> usize {
+        match self {
+            Self::Leaf(_) => 1,
+            Self::Call(_, a) | Self::Power(a, _) | Self::Delay(_, a) | Self::DelayedSlope(_, a) => {
+                a.waiting()
+            }
+            Self::Pair(_, a, b) if matches!(**b, Self::Leaf(_)) => a.waiting(),
+            Self::Pair(_, a, b) => a.waiting().max(1 + b.waiting()),
+            Self::If(c, a, b) => c.waiting().max(a.waiting()).max(b.waiting()),
+        }
     }
 
-    fn push(&mut self, source: Source) -> Result<(), ExpressionError> {
-        self.op(Op::Push(source));
-        self.height += 1;
-        self.highest = self.highest.max(self.height);
-        if self.highest > MAX_STACK {
-            return Err(ExpressionError::new(1, "nested too deep: split it into several outputs or states"));
+    /// Operations as they are written: a value is read in one, except as the second of two.
+    fn n_operation(&self) -> usize {
+        match self {
+            Self::Leaf(_) => 1,
+            Self::Call(_, a) | Self::Power(a, _) | Self::Delay(_, a) | Self::DelayedSlope(_, a) => {
+                1 + a.n_operation()
+            }
+            Self::Pair(_, a, b) if matches!(**b, Self::Leaf(_)) => 1 + a.n_operation(),
+            Self::Pair(_, a, b) => 1 + a.n_operation() + b.n_operation(),
+            Self::If(c, a, b) => 2 + c.n_operation() + a.n_operation() + b.n_operation(),
         }
-        Ok(())
     }
 
-    /// Appends code that leaves the tree's value on top.
-    fn emit(&mut self, tree: &Tree) -> Result<(), ExpressionError> {
-        match tree {
-            Tree::Leaf(source) => self.push(*source)?,
-            Tree::Call(function, a) => {
-                self.emit(a)?;
-                self.op(Op::Call(*function));
+    /// Writes code for the tree's value.
+    fn written(&self, writer: &mut Writer) -> Operand {
+        match self {
+            Self::Leaf(source) => writer.read(*source),
+            Self::Call(function, a) => {
+                let a = a.written(writer);
+                writer.call(*function, a)
             }
-            Tree::Power(a, n) => {
-                self.emit(a)?;
-                self.op(Op::Power(*n));
+            Self::Power(a, n) => {
+                let a = a.written(writer);
+                writer.power(a, *n)
             }
-            Tree::Delay(input, tau) => {
-                self.emit(tau)?;
-                self.op(Op::Delay(*input));
+            Self::Delay(input, tau) => {
+                let tau = tau.written(writer);
+                writer.delay(*input, tau)
             }
-            Tree::DelayedSlope(input, tau) => {
-                self.emit(tau)?;
-                self.op(Op::DelayedSlope(*input));
+            Self::DelayedSlope(input, tau) => {
+                let tau = tau.written(writer);
+                writer.delayed_slope(*input, tau)
             }
-            Tree::Pair(operation, a, b) => {
-                self.emit(a)?;
-                if let Tree::Leaf(source) = **b {
-                    self.op(Op::PairWith(*operation, source));
-                } else {
-                    self.emit(b)?;
-                    self.op(Op::Pair(*operation));
-                    self.height -= 1;
-                }
+            Self::Pair(operation, a, b) => {
+                let (a, b) = (a.written(writer), b.written(writer));
+                writer.pair(*operation, a, b)
             }
-            Tree::If(c, a, b) => {
-                self.emit(c)?;
-                let unless = self.code.len();
-                self.op(Op::Unless(0));
-                self.height -= 1;
-                self.emit(a)?;
-                let jump = self.code.len();
-                self.op(Op::Jump(0));
-                self.height -= 1;
-                self.code[unless] = Op::Unless(self.code.len() as u32);
-                self.emit(b)?;
-                self.code[jump] = Op::Jump(self.code.len() as u32);
+            Self::If(c, a, b) => {
+                let (c, a, b) = (c.written(writer), a.written(writer), b.written(writer));
+                writer.choose(c, a, b)
             }
         }
-        Ok(())
     }
 }
 

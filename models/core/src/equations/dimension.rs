@@ -130,10 +130,11 @@ impl Walk<'_, '_> {
             Function::Log => "the argument of `log`",
             Function::Tanh => "the argument of `tanh`",
         };
-        // In `sin(6.28*t)` the number is a frequency: nothing there has a unit of its own.
+        // In `sin(6.28*t)` and `tanh(v/0.002)` the number has the unit that makes the argument plain: a frequency, a speed.
+        let has_number = matches!(found, Measure::Known { exact: false, .. });
         let mut named = false;
         a.walk(&mut |part| named |= part.name().is_some());
-        if named {
+        if named && !has_number {
             self.expect(part, found, PLAIN);
         }
         Measure::Number

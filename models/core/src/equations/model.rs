@@ -7,7 +7,6 @@ use std::collections::BTreeMap;
 use super::at::{At, Direction, Slot};
 use super::build::{self, Built};
 use super::def::EquationsDef;
-use super::program::Program;
 use crate::integrate::Solver;
 use crate::segment::Drive;
 use crate::{Memory, Model, SetupError, Spec};
@@ -58,27 +57,21 @@ impl EquationsModel {
     }
 }
 
-fn write(programs: &[Program], at: &At<'_>, values: &mut [f64]) {
-    for (value, program) in values.iter_mut().zip(programs) {
-        *value = program.eval(at);
-    }
-}
-
 impl Model for EquationsModel {
     fn spec(&self) -> &Spec {
         &self.built.spec
     }
 
     fn initial(&self, theta: &[f64], x: &mut [f64]) {
-        write(&self.built.initial, &At { t: 0.0, x: &[], theta, u: Drive::NONE, y: &[] }, x);
+        self.built.initial.write(&At { t: 0.0, x: &[], theta, u: Drive::NONE, y: &[] }, x);
     }
 
     fn rhs(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, dx: &mut [f64]) {
-        write(&self.built.rates, &At { t, x, theta, u, y: &[] }, dx);
+        self.built.rates.write(&At { t, x, theta, u, y: &[] }, dx);
     }
 
     fn output(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, y: &mut [f64]) {
-        write(&self.built.outputs, &At { t, x, theta, u, y: &[] }, y);
+        self.built.outputs.write(&At { t, x, theta, u, y: &[] }, y);
     }
 
     fn solver(&self) -> Solver {
@@ -102,7 +95,7 @@ impl Model for EquationsModel {
     }
 
     fn switches(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, g: &mut [f64]) {
-        write(&self.built.switches, &At { t, x, theta, u, y: &[] }, g);
+        self.built.switches.write(&At { t, x, theta, u, y: &[] }, g);
     }
 
     fn memories(&self) -> &[Memory] {
@@ -114,7 +107,7 @@ impl Model for EquationsModel {
         for (value, source) in values.iter_mut().zip(&self.built.sources) {
             *value = match *source {
                 Slot::State(i) => x[i],
-                Slot::Output(i) => self.built.outputs[i].eval(&at),
+                Slot::Output(i) => self.built.outputs.one(i, &at),
                 _ => f64::NAN,
             };
         }
@@ -132,13 +125,17 @@ impl Model for EquationsModel {
         let n = self.unit.len();
         let at = At { t, x, theta, u, y: &[] };
         dfdx.fill(0.0);
-        for (i, (rate, depends)) in self.built.rates.iter().zip(&self.built.depends).enumerate() {
-            for &j in depends {
-                let along = Direction { x: &self.unit[n - 1 - j..], ..Direction::default() };
-                dfdx[j * n + i] = rate.eval_dual(&at, &along).1;
-            }
-            dfdt[i] = rate.eval_dual(&at, &Direction { t: 1.0, u: u.slope, ..Direction::default() }).1;
+        for (j, column) in dfdx.chunks_exact_mut(n).enumerate() {
+            let along = Direction { x: &self.unit[n - 1 - j..], ..Direction::default() };
+            self.built.rates.each_slope(&at, &along, |i, slope| {
+                // A rate without the state has no slope, whatever values that are not finite would make of it.
+                if self.built.depends[i].contains(&j) {
+                    column[i] = slope;
+                }
+            });
         }
+        let along = Direction { t: 1.0, u: u.slope, ..Direction::default() };
+        self.built.rates.each_slope(&at, &along, |i, slope| dfdt[i] = slope);
         true
     }
 }

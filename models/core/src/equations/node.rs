@@ -3,7 +3,7 @@
 //! It knows names, not where their values are: [`super::compile`] resolves them. Next file to read: [`super::parse`].
 
 /// Functions of one argument.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Function {
     Neg,
     Sin,
@@ -19,7 +19,7 @@ pub(super) enum Function {
 }
 
 /// Operations on two arguments.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Operation {
     Add,
     Sub,

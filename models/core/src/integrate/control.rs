@@ -10,6 +10,7 @@ use super::events::Events;
 use super::stepper::{MAX_STEPS, Stepper, scaled};
 use super::system::{System, not_finite};
 use crate::failure::ModelFailure;
+use crate::scratch::Scratch;
 
 const SAFETY: f64 = 0.9;
 /// Weight of the integral part.
@@ -39,7 +40,7 @@ pub(super) struct Run<'a, S, P> {
     pub(super) x: &'a mut [f64],
     pub(super) tolerance: Tolerance,
     pub(super) events: Events,
-    new: Vec<f64>,
+    new: Scratch,
     /// Length of the next attempt.
     h: f64,
     /// Shortest step that still moves the clock.
@@ -49,6 +50,10 @@ pub(super) struct Run<'a, S, P> {
     pub(super) steps: u64,
     /// Whether no step was accepted yet.
     pub(super) fresh: bool,
+    /// Switching points since the time beside it.
+    crossings: (u32, f64),
+    /// Whether the present rate leads across a switching surface within the step that was refused last.
+    faces_switch: bool,
 }
 
 impl<'a, S: System, P: Stepper> Run<'a, S, P> {
@@ -61,7 +66,7 @@ impl<'a, S: System, P: Stepper> Run<'a, S, P> {
     ) -> Self {
         let events = Events::new(system.n_switch());
         let shortest = 16.0 * f64::EPSILON * t.abs().max(end.abs());
-        let new = vec![0.0; x.len()];
+        let new = Scratch::new(x.len());
         Self {
             system,
             stepper,
@@ -76,6 +81,8 @@ impl<'a, S: System, P: Stepper> Run<'a, S, P> {
             last_error: 1e-4,
             steps: 0,
             fresh: true,
+            crossings: (0, t),
+            faces_switch: false,
         }
     }
 
@@ -92,17 +99,22 @@ impl<'a, S: System, P: Stepper> Run<'a, S, P> {
         Ok(())
     }
 
-    /// A tenth of the time in which the state would change by itself at the present rate. It costs no evaluation, since spans
-    /// are often shorter than the step could be; a bad guess costs one refused step.
+    /// The whole span, since most spans lie between two samples of a recording and are shorter than a step could be: where it
+    /// is too long, the error of the refused step tells the next one. Across switching points an error tells nothing; where
+    /// there are any, a span that is long beside the time in which the state changes by itself at the present rate begins with a
+    /// tenth of that time.
     fn first_step(&self) -> f64 {
         let span = self.end - self.t;
+        if self.system.n_switch() == 0 {
+            return span;
+        }
         let (mut state, mut rate) = (0.0, 0.0);
         for (x, f) in self.x.iter().zip(self.stepper.rate()) {
             state += scaled(*x, *x, *x, self.tolerance).powi(2);
             rate += scaled(*f, *x, *x, self.tolerance).powi(2);
         }
-        let guess = 0.1 * (state / rate).sqrt();
-        if guess.is_finite() { guess.clamp(1e-4 * span, span) } else { span }
+        let natural = (state / rate).sqrt();
+        if natural < span { (0.1 * natural).max(1e-4 * span) } else { span }
     }
 
     /// One attempt at a step.
@@ -111,7 +123,7 @@ impl<'a, S: System, P: Stepper> Run<'a, S, P> {
         let last = self.h * 1.01 >= left;
         let h = if last { left } else { self.h };
         let error = self.attempt(h)?;
-        if error.is_finite() && self.events.changed(self.system, self.t + h, &self.new) {
+        if error.is_finite() && self.events.changed(self.system, self.t + h, self.new.as_ref()) {
             return self.cross(h);
         }
         if error.is_nan() || error > 1.0 {
@@ -132,12 +144,12 @@ impl<'a, S: System, P: Stepper> Run<'a, S, P> {
         if self.steps > limit {
             return Err(ModelFailure::TooManySteps { time: self.t, limit });
         }
-        Ok(self.stepper.attempt(self.system, self.t, self.x, h, &mut self.new, self.tolerance))
+        Ok(self.stepper.attempt(self.system, self.t, self.x, h, self.new.as_mut(), self.tolerance))
     }
 
     fn accept(&mut self, h: f64, target: f64) -> bool {
         self.t = target;
-        self.x.copy_from_slice(&self.new);
+        self.x.copy_from_slice(self.new.as_ref());
         self.events.passed();
         self.fresh = false;
         self.stepper.accept(self.system, self.t, h, self.x)
@@ -156,10 +168,11 @@ impl<'a, S: System, P: Stepper> Run<'a, S, P> {
             0.1
         };
         self.h = h * factor;
+        self.look_ahead(h);
         if self.h >= self.shortest {
             return Ok(Step::Refused);
         }
-        if self.new.iter().all(|v| v.is_finite()) {
+        if self.new.as_ref().iter().all(|v| v.is_finite()) {
             return Err(ModelFailure::StepTooSmall { time: self.t, step: self.h });
         }
         Err(self.culprit(h))
@@ -172,7 +185,7 @@ impl<'a, S: System, P: Stepper> Run<'a, S, P> {
             *x += h * f;
         }
         self.system.rhs(self.t + h, &ahead, &mut rate);
-        let found = if rate.iter().all(|v| v.is_finite()) { &self.new } else { &rate };
+        let found = if rate.iter().all(|v| v.is_finite()) { self.new.as_ref() } else { &rate };
         not_finite(self.system, self.t, found)
     }
 }

@@ -6,16 +6,20 @@
 use super::Tolerance;
 use super::stepper::{Stepper, scaled};
 use super::system::System;
+use crate::scratch::ShortVec;
 
 /// The pair's working memory: seven rates and one stage.
 pub(super) struct Dopri5 {
-    work: Vec<f64>,
+    work: ShortVec<WORK>,
     n: usize,
     /// Whether to look for stiffness.
     watch: bool,
     stiff: u32,
     not_stiff: u32,
 }
+
+/// Numbers of working memory on the stack: those of eight states.
+const WORK: usize = 64;
 
 const C: [f64; 4] = [1.0 / 5.0, 3.0 / 10.0, 4.0 / 5.0, 8.0 / 9.0];
 const A2: f64 = 1.0 / 5.0;
@@ -33,7 +37,7 @@ const STABILITY: f64 = 3.25;
 
 impl Dopri5 {
     pub(super) fn new(n: usize, watch: bool) -> Self {
-        Self { work: vec![0.0; 8 * n], n, watch, stiff: 0, not_stiff: 0 }
+        Self { work: ShortVec::new(8 * n), n, watch, stiff: 0, not_stiff: 0 }
     }
 }
 
@@ -41,12 +45,12 @@ impl Stepper for Dopri5 {
     const ORDER: f64 = 5.0;
 
     fn restart<S: System>(&mut self, system: &mut S, t: f64, x: &[f64]) {
-        system.rhs(t, x, &mut self.work[..self.n]);
+        system.rhs(t, x, &mut self.work.as_mut()[..self.n]);
         (self.stiff, self.not_stiff) = (0, 0);
     }
 
     fn rate(&self) -> &[f64] {
-        &self.work[..self.n]
+        &self.work.as_ref()[..self.n]
     }
 
     fn attempt<S: System>(
@@ -59,7 +63,7 @@ impl Stepper for Dopri5 {
         tolerance: Tolerance,
     ) -> f64 {
         let n = self.n;
-        let (k1, rest) = self.work.split_at_mut(n);
+        let (k1, rest) = self.work.as_mut().split_at_mut(n);
         let (k2, rest) = rest.split_at_mut(n);
         let (k3, rest) = rest.split_at_mut(n);
         let (k4, rest) = rest.split_at_mut(n);
@@ -105,7 +109,7 @@ impl Stepper for Dopri5 {
         if self.watch {
             self.look_for_stiffness(h, new);
         }
-        self.work.copy_within(6 * self.n..7 * self.n, 0);
+        self.work.as_mut().copy_within(6 * self.n..7 * self.n, 0);
         self.stiff >= 15
     }
 }
@@ -115,7 +119,8 @@ impl Dopri5 {
     /// after step, means that stability and not accuracy sets the step.
     fn look_for_stiffness(&mut self, h: f64, new: &[f64]) {
         let n = self.n;
-        let (k6, k7, stage) = (&self.work[5 * n..6 * n], &self.work[6 * n..7 * n], &self.work[7 * n..]);
+        let work = self.work.as_ref();
+        let (k6, k7, stage) = (&work[5 * n..6 * n], &work[6 * n..7 * n], &work[7 * n..]);
         let (mut rates, mut states) = (0.0, 0.0);
         for i in 0..n {
             rates += (k7[i] - k6[i]).powi(2);

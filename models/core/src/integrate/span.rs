@@ -12,7 +12,7 @@ use crate::failure::ModelFailure;
 /// How an integration ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Reached {
-    /// At the end of the span.
+    /// At the end of the span, or where a condition to stay on a surface failed.
     End,
     /// At this time the method gave up for stiffness.
     Stiff(f64),
@@ -31,17 +31,32 @@ pub(super) fn integrate<S: System, P: Stepper>(
     }
     let mut run = Run::new(system, stepper, span, x, tolerance);
     run.start()?;
-    while run.t < run.end {
+    follow(&mut run)
+}
+
+/// Goes on with a run that was started, up to its end or to where a condition of its system to stay on it fails.
+pub(super) fn follow<S: System, P: Stepper>(run: &mut Run<'_, S, P>) -> Result<Reached, ModelFailure> {
+    let guards = run.system.n_guard();
+    while run.t < run.end && (0..guards).all(|guard| run.events.side(guard)) {
         match run.step()? {
             Step::Stiff => return Ok(Reached::Stiff(run.t)),
             Step::Crossed => {
                 let index = run.events.tracked();
-                slide(&mut run, index..index + 1)?;
+                if index >= guards {
+                    slide(run, index..index + 1)?;
+                }
             }
             // A span may start where the one before it left the state sliding.
             Step::Refused if run.fresh => {
-                let all = 0..run.system.n_switch();
-                slide(&mut run, all)?;
+                let all = guards..run.system.n_switch();
+                slide(run, all)?;
+            }
+            // Beyond a surface ahead the rates lead back, so that no step ends there.
+            Step::Refused if run.faces_switch() => {
+                let index = run.events.tracked();
+                if index >= guards {
+                    slide(run, index..index + 1)?;
+                }
             }
             Step::Passed | Step::Refused => {}
         }

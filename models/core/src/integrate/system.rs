@@ -12,6 +12,11 @@ pub(crate) trait System {
     fn n_switch(&self) -> usize;
     fn switches(&mut self, t: f64, x: &[f64], g: &mut [f64]);
 
+    /// How many of the first switching functions are conditions: an integration ends where one of them falls below zero.
+    fn n_guard(&self) -> usize {
+        0
+    }
+
     /// Writes ∂f/∂x column by column and ∂f/∂t; `f` is the rate at (t, x), `scratch` holds 2n numbers.
     fn jacobian(
         &mut self,

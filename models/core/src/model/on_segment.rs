@@ -6,6 +6,7 @@ use super::Model;
 use crate::failure::ModelFailure;
 use crate::integrate::{self, Solver, System, differences};
 use crate::limits::Limits;
+use crate::scratch::Scratch;
 use crate::segment::{Drive, Segment};
 use crate::spec::Spec;
 
@@ -29,27 +30,27 @@ struct OnSegment<'a, M: ?Sized> {
     model: &'a M,
     segment: Segment<'a>,
     theta: &'a [f64],
-    u: Vec<f64>,
+    u: Scratch,
     n_state: usize,
     n_switch: usize,
 }
 
 impl<'a, M: Model + ?Sized> OnSegment<'a, M> {
     fn new(model: &'a M, segment: Segment<'a>, theta: &'a [f64], n_state: usize) -> Self {
-        Self { model, segment, theta, u: segment.u0.to_vec(), n_state, n_switch: model.n_switch() }
+        Self { model, segment, theta, u: Scratch::of(segment.u0), n_state, n_switch: model.n_switch() }
     }
 
     #[inline]
     fn set_time(&mut self, t: f64) {
         let past = t - self.segment.t0;
-        for ((u, u0), slope) in self.u.iter_mut().zip(self.segment.u0).zip(self.segment.slope) {
+        for ((u, u0), slope) in self.u.as_mut().iter_mut().zip(self.segment.u0).zip(self.segment.slope) {
             *u = u0 + slope * past;
         }
     }
 
     #[inline]
     fn drive(&self) -> Drive<'_> {
-        Drive { value: &self.u, slope: self.segment.slope, history: self.segment.history }
+        Drive { value: self.u.as_ref(), slope: self.segment.slope, history: self.segment.history }
     }
 }
 

@@ -11,7 +11,7 @@ use crate::number;
 use crate::plot::axis::Axis;
 use crate::plot::figure::{Figure, with_unit};
 use crate::plot::mark::Mark;
-use crate::plot::palette::{BLUE, MUTED};
+use crate::plot::palette::{BLUE, MUTED, VERMILION};
 use crate::plot::scene::Scene;
 use crate::plot::thin;
 
@@ -48,6 +48,10 @@ fn over_time(input: &UnknownInput, time_unit: &str) -> Figure {
         .collect();
     marks.push(Mark::level((x.lo, x.hi), 0.0, MUTED));
     marks.extend(Mark::curve(&input.time, &input.value, BLUE, 1.75));
+    let is_drawn = input.proposed.len() == input.time.len();
+    if is_drawn {
+        marks.extend(Mark::curve(&input.time, &input.proposed, VERMILION, 1.75));
+    }
     let known: Vec<_> = lo.iter().zip(&hi).filter(|(lo, hi)| lo.is_finite() && hi.is_finite()).collect();
     let off = known.iter().filter(|(lo, hi)| **lo > 0.0 || **hi < 0.0).count();
     let share = number::percent(off as f64 / known.len() as f64);
@@ -59,7 +63,12 @@ fn over_time(input: &UnknownInput, time_unit: &str) -> Figure {
     );
     let title = format!("Unknown input of {}, record {}: over time", input.state, input.record);
     let scene = Scene { title, description: caption.clone(), x, y, marks };
-    Figure::new(&scene, &[("line blue", "estimate"), ("area blue", "± 2 sd")], caption)
+    let legend = [
+        ("line blue", "estimate"),
+        ("area blue", "± 2 sd"),
+        ("line vermilion", "what was added, along the same run"),
+    ];
+    Figure::new(&scene, &legend[..2 + usize::from(is_drawn)], caption)
 }
 
 /// Draws the input against the state.

@@ -114,5 +114,6 @@ fn force(time: &[f64]) -> UnknownInput {
         sd: vec![0.7; time.len()],
         at: time.iter().map(|t| 90.0 + 12.0 * (1.3 * t).sin()).collect(),
         log_likelihood_gain: 310.0,
+        proposed: time.iter().map(|t| 3.0 * (1.3 * t).cos().signum()).collect(),
     }
 }

@@ -34,6 +34,11 @@ pub(super) fn held_out(source: &Source, file: &StudyFile, equations: &EquationsD
 }
 
 fn record(source: &Source, section: &RecordSection, equations: &EquationsDef) -> Option<InferRecord> {
+    let start = section.start.as_ref().map(|start| ("start", start.span()));
+    let rows = section.start_rows.as_ref().map(|rows| ("start_rows", rows.span()));
+    for (key, span) in start.into_iter().chain(rows) {
+        source.report_with(span, format!("an inference makes no runs that `{key}` could begin"), "remove it");
+    }
     let before = source.count();
     let mut columns = Vec::new();
     for channel in &section.channels {

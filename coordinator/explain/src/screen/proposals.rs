@@ -1,0 +1,115 @@
+//! Terms that nobody listed, made from the unknown input that an equation would need.
+//!
+//! Every term of a small grammar ([`grammar`]) is fitted to the unknown input; what predicts parts of it that the fit has not seen, with
+//! one sign throughout ([`recovered`]), becomes a candidate like any other: it is run, refitted and judged, and pays for all the terms
+//! that were looked at. Next file to read: [`crate::refit::search`].
+
+mod grammar;
+mod recovered;
+
+use starlings_models::EffectDef;
+use starlings_study::{Study, checked::Library};
+
+use self::grammar::grammar;
+use self::recovered::Recovered;
+use super::natural_amplitude::{ReferenceRun, along_run};
+use crate::fit::candidate::Candidate;
+use crate::fit::kind::Kind;
+use crate::fit::same_form::same_form;
+use crate::locate::{Track, UnknownInput};
+use crate::options::Options;
+
+/// Name by which `without` leaves all of them out.
+pub(crate) const PROPOSALS: &str = "proposals";
+/// Terms of one equation that become candidates.
+const MOST: usize = 10;
+
+/// Terms made from unknown inputs.
+#[derive(Debug, Default)]
+pub(crate) struct Proposals {
+    /// Those that predict the unknown input.
+    pub(crate) candidates: Vec<Candidate>,
+    /// Terms that were looked at.
+    pub(crate) considered: usize,
+}
+
+/// Whether a search may make terms of its own: no list limits it, and they were not left out.
+pub(crate) fn are_wanted(study: &Study, options: &Options) -> bool {
+    let unlimited = options.only.is_empty() && matches!(study.explain.library, Library::All);
+    unlimited && !options.without.iter().any(|name| name == PROPOSALS)
+}
+
+/// The terms that predict the unknown inputs best, of a form that none of `known` has. `theta` are the values of the first trained record,
+/// physical, `tracks` the courses of the run to which the inputs belong.
+pub(crate) fn proposals(
+    study: &Study,
+    theta: &[f64],
+    tracks: &[Track],
+    inputs: &[UnknownInput],
+    known: &[Candidate],
+) -> Proposals {
+    let run = ReferenceRun { study, theta, tracks };
+    let mut all = Proposals::default();
+    for input in inputs {
+        let Some(recovered) = Recovered::new(&run, input) else { continue };
+        let is_new = |def: &EffectDef| !known.iter().any(|other| same_form(&other.def, def));
+        let of_equation: Vec<Candidate> = grammar(study, &input.state, tracks)
+            .into_iter()
+            .filter(is_new)
+            .map(|def| Candidate::new(def).of_kind(Kind::Proposal))
+            .collect();
+        all.considered += of_equation.len();
+        let mut scored: Vec<(f64, Candidate)> = of_equation
+            .into_iter()
+            .filter_map(|candidate| {
+                let term = course(&run, &candidate, &candidate.points[0], input)?;
+                Some((recovered.predicted_by(&term)?, candidate))
+            })
+            .collect();
+        scored.sort_by(|a, b| b.0.total_cmp(&a.0));
+        all.candidates.extend(scored.into_iter().take(MOST).map(|(_, candidate)| candidate));
+    }
+    all
+}
+
+/// What effects with these values of their parameters add to the equation of an unknown input, at its times. Empty where none adds to it,
+/// or one that does cannot be evaluated along the run.
+pub(crate) fn along(
+    study: &Study,
+    theta: &[f64],
+    tracks: &[Track],
+    effects: &[(&Candidate, Vec<f64>)],
+    input: &UnknownInput,
+) -> Vec<f64> {
+    let run = ReferenceRun { study, theta, tracks };
+    let mut sum: Vec<f64> = Vec::new();
+    for (candidate, values) in effects.iter().filter(|(c, _)| c.def.adds.iter().any(|a| a.to == input.state))
+    {
+        let Some(of_one) = course(&run, candidate, &values[1..], input) else { return Vec::new() };
+        sum.resize(of_one.len(), 0.0);
+        sum.iter_mut().zip(of_one).for_each(|(sum, v)| *sum += values[0] * v);
+    }
+    sum
+}
+
+/// The terms of a candidate in the equation of an unknown input along the run, at amplitude one.
+fn course(
+    run: &ReferenceRun<'_>,
+    candidate: &Candidate,
+    point: &[f64],
+    input: &UnknownInput,
+) -> Option<Vec<f64>> {
+    let record = run.study.records.iter().position(|r| r.name == input.record)?;
+    let steps = steps(&run.study.records[record].times, &input.time);
+    let mut sum = vec![0.0; steps.len()];
+    for add in candidate.def.adds.iter().filter(|add| add.to == input.state) {
+        let term = along_run(run, candidate, point, &add.term, record, &steps)?;
+        sum.iter_mut().zip(term).for_each(|(sum, v)| *sum += v);
+    }
+    Some(sum)
+}
+
+/// The position of each of these times among those of a record, the last before it.
+fn steps(times: &[f64], wanted: &[f64]) -> Vec<usize> {
+    wanted.iter().map(|t| times.partition_point(|known| known <= t).saturating_sub(1)).collect()
+}

@@ -1,0 +1,208 @@
+//! The grammar of terms that an equation may lack: powers, products, directions, limits and trends of the states and inputs.
+//!
+//! Dimensions are carried by the coefficient, so that a term is possible wherever nothing but numbers enters a function; what needs a
+//! scale takes it from the course of its quantity. A factor of constant sign has no direction and no size of its own. Next file to
+//! read: [`super`].
+
+use starlings_models::effect::{Addition, EffectParameter};
+use starlings_models::units::Unit;
+use starlings_models::{EffectDef, Quantity, Role};
+use starlings_study::Study;
+
+use crate::locate::Track;
+
+/// Quantities that enter at most, those of the study's order: the number of terms grows with its square.
+const MOST: usize = 6;
+/// Part of a quantity's swing over which its direction changes.
+const WIDTH: f64 = 0.02;
+
+/// A state or input with the ends of its course.
+#[derive(Clone, Copy)]
+struct Signal<'a> {
+    of: &'a Quantity,
+    ends: [f64; 2],
+}
+
+impl Signal<'_> {
+    fn name(&self) -> &str {
+        &self.of.name
+    }
+
+    fn swing(&self) -> f64 {
+        0.5 * (self.ends[1] - self.ends[0])
+    }
+
+    fn changes_sign(&self) -> bool {
+        self.ends[0] < 0.0 && self.ends[1] > 0.0
+    }
+}
+
+/// An equation whose terms are made.
+struct Equation<'a> {
+    state: &'a Quantity,
+    time: &'a str,
+    made: Vec<EffectDef>,
+}
+
+/// Every term that the equation of a state may lack; none of a displacement, whose rate is a velocity by definition.
+pub(super) fn grammar(study: &Study, state: &str, tracks: &[Track]) -> Vec<EffectDef> {
+    let spec = &study.spec;
+    let scalar = |q: &&Quantity| q.size == 1;
+    let Some(state) =
+        spec.states.iter().filter(scalar).find(|q| q.name == state && q.role != Role::Displacement)
+    else {
+        return Vec::new();
+    };
+    let signal = |of| -> Option<Signal<'_>> {
+        let of: &Quantity = of;
+        let ends = tracks.iter().find(|t| t.name == of.name)?.ends();
+        (ends[1] - ends[0] > 1e-9 * ends[0].abs().max(ends[1].abs()) && ends.iter().all(|e| e.is_finite()))
+            .then_some(Signal { of, ends })
+    };
+    let signals: Vec<Signal<'_>> =
+        spec.states.iter().chain(&spec.inputs).filter(scalar).filter_map(signal).take(MOST).collect();
+    let mut equation = Equation { state, time: &study.time_unit, made: Vec::new() };
+    equation.add("trend", &[], 1.0, "grows with time", |k| format!("{k}*t"));
+    for (i, q) in signals.iter().enumerate() {
+        equation.of_one(q);
+        for p in &signals[i + 1..] {
+            equation.of_two(q, p);
+        }
+    }
+    equation.made
+}
+
+impl Equation<'_> {
+    /// The terms of one quantity.
+    fn of_one(&mut self, q: &Signal<'_>) {
+        let (x, own) = (q.name().to_owned(), q.name() == self.state.name);
+        let width = WIDTH * q.swing();
+        self.add("even-square", &[(q, 2.0)], 0.0, &format!("goes with the square of {x}"), |k| {
+            format!("{k}*{x}^2")
+        });
+        self.add("cube", &[(q, 3.0)], 0.0, &format!("goes with the cube of {x}"), |k| format!("{k}*{x}^3"));
+        self.add("drift", &[(q, 1.0)], 1.0, &format!("goes with {x} and grows with time"), |k| {
+            format!("{k}*{x}*t")
+        });
+        let root = format!("goes with the square root of the size of {x}");
+        self.add("root", &[(q, 0.5)], 0.0, &root, |k| format!("{k}*{x}/sqrt(abs({x}) + {width:?})"));
+        if q.changes_sign() {
+            let square = format!("goes with the square of {x} and has its sign");
+            self.add("odd-square", &[(q, 2.0)], 0.0, &square, |k| format!("{k}*{x}*abs({x})"));
+            let direction = format!("has one size and the sign of {x}");
+            self.add("direction", &[(q, 0.0)], 0.0, &direction, |k| format!("{k}*tanh({x}/{width:?})"));
+            let size = format!("goes with the size of {x}, whatever its sign");
+            self.add("size", &[(q, 1.0)], 0.0, &size, |k| format!("{k}*abs({x})"));
+            let clamped = |k: &str, h: &str| {
+                (format!("{k}*max(min({x}, {h}), -{h})"), format!("goes with {x} and stays at a limit"))
+            };
+            let range = [0.02 * q.swing(), q.swing()];
+            self.with_inner(q, "clamped", range, [0.2, 0.5].map(|s| s * q.swing()).to_vec(), clamped);
+        }
+        if !own {
+            self.with_inner(
+                q,
+                "limited",
+                [0.02 * q.swing(), 5.0 * q.swing()],
+                [0.2, 0.8].map(|s| s * q.swing()).to_vec(),
+                |k, h| (format!("{k}*{x}/({h} + abs({x}))"), format!("goes with {x} up to a limit")),
+            );
+            let at = |share: f64| q.ends[0] + 2.0 * share * q.swing();
+            self.with_inner(q, "beyond", q.ends, [0.25, 0.5, 0.75].map(at).to_vec(), |k, h| {
+                (format!("{k}*max({x} - {h}, 0)"), format!("goes with what {x} exceeds a threshold by"))
+            });
+        }
+    }
+
+    /// The terms of two different quantities.
+    fn of_two(&mut self, a: &Signal<'_>, b: &Signal<'_>) {
+        let (x, y) = (a.name(), b.name());
+        self.add("product", &[(a, 1.0), (b, 1.0)], 0.0, &format!("goes with {x} times {y}"), |k| {
+            format!("{k}*{x}*{y}")
+        });
+        for (q, p) in [(a, b), (b, a)] {
+            let (x, y) = (q.name(), p.name());
+            let says = format!("goes with the square of {x} times {y}");
+            self.add("square-times", &[(q, 2.0), (p, 1.0)], 0.0, &says, |k| format!("{k}*{x}^2*{y}"));
+            if q.changes_sign() {
+                let says = format!("goes with the size of {x} times {y}");
+                self.add("size-times", &[(q, 1.0), (p, 1.0)], 0.0, &says, |k| format!("{k}*abs({x})*{y}"));
+            }
+        }
+    }
+
+    /// A term with one coefficient, of these quantities with their powers; `t` is the power of the time.
+    fn add(
+        &mut self,
+        stem: &str,
+        of: &[(&Signal<'_>, f64)],
+        t: f64,
+        says: &str,
+        term: impl Fn(&str) -> String,
+    ) {
+        let told: Vec<&str> =
+            std::iter::once(self.state.name.as_str()).chain(of.iter().map(|(q, _)| q.name())).collect();
+        let name = format!("{stem}:{}", told.join(":"));
+        let amplitude = coefficient("k", stem, &told);
+        let factors = of.iter().map(|(q, power)| (q.of.unit.as_str(), *power));
+        let factors: Vec<(&str, f64)> = factors.chain([(self.time, t)]).collect();
+        let unit = self.unit(&factors);
+        self.push(name, says, term(&amplitude), vec![parameter(&amplitude, unit)]);
+    }
+
+    /// A term with a parameter inside, in the unit of its quantity.
+    fn with_inner(
+        &mut self,
+        q: &Signal<'_>,
+        stem: &str,
+        range: [f64; 2],
+        grid: Vec<f64>,
+        term: impl Fn(&str, &str) -> (String, String),
+    ) {
+        let told = [self.state.name.as_str(), q.name()];
+        let (amplitude, inner) = (coefficient("k", stem, &told), coefficient("at", stem, &told));
+        let (text, says) = term(&amplitude, &inner);
+        let power = if stem == "limited" { 0.0 } else { 1.0 };
+        let unit = self.unit(&[(q.of.unit.as_str(), power)]);
+        let inside = EffectParameter { range, grid, ..parameter(&inner, q.of.unit.clone()) };
+        self.push(
+            format!("{stem}:{}", told.join(":")),
+            &says,
+            text,
+            vec![parameter(&amplitude, unit), inside],
+        );
+    }
+
+    fn push(&mut self, name: String, says: &str, term: String, parameters: Vec<EffectParameter>) {
+        let says = format!("The rate of {} lacks a term that {says}.", self.state.name);
+        let adds = vec![Addition { to: self.state.name.clone(), term }];
+        self.made.push(EffectDef { name, says, adds, parameters, ..EffectDef::default() });
+    }
+
+    /// The label of the rate's unit over that of a term's factors; empty where one of them has none that can be read.
+    fn unit(&self, factors: &[(&str, f64)]) -> String {
+        let mut all = vec![(self.state.unit.as_str(), 1.0), (self.time, -1.0)];
+        all.extend(
+            factors.iter().filter(|(_, power)| power.abs() > 0.0).map(|(label, power)| (*label, -power)),
+        );
+        let mut unit = Unit { factor: 1.0, exponents: [0.0; 7] };
+        let one = unit;
+        for (label, power) in all {
+            let Some(of) = Unit::parse(label) else { return String::new() };
+            unit.factor *= of.factor.powf(power);
+            for (sum, exponent) in unit.exponents.iter_mut().zip(of.exponents) {
+                *sum += power * exponent;
+            }
+        }
+        if unit.same(&one) { String::new() } else { unit.text() }
+    }
+}
+
+/// The name of a parameter of a term.
+fn coefficient(what: &str, stem: &str, told: &[&str]) -> String {
+    format!("{what}_{stem}_{}", told.join("_")).replace('-', "_")
+}
+
+fn parameter(name: &str, unit: String) -> EffectParameter {
+    EffectParameter { name: name.to_owned(), unit, ..EffectParameter::default() }
+}

@@ -1,0 +1,45 @@
+//! What a study asks of `explain` and `spectrum`.
+//!
+//! Next file to read: [`super`].
+
+use starlings_models::spectrum::Decay;
+
+/// Which effects `explain` may try.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Library {
+    /// Those of the study and the built-in ones.
+    #[default]
+    All,
+    /// Those of the study.
+    Study,
+    /// The built-in ones.
+    BuiltIn,
+}
+
+/// Settings of `explain`.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct ExplainChoice {
+    /// Outputs that are never fitted.
+    pub hold_out_channels: Vec<String>,
+    /// Model runs at most.
+    pub budget: Option<u64>,
+    /// Where candidates come from.
+    pub library: Library,
+    /// Effects that are not to be tried.
+    pub without: Vec<String>,
+    /// Effects to try; empty for all.
+    pub only: Vec<String>,
+    /// Effects at most in one explanation; `None` for the command's own limit.
+    pub max_effects: Option<usize>,
+}
+
+/// Settings of `spectrum`.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct SpectrumChoice {
+    /// Kinds of observers; empty for all that the model can host.
+    pub observers: Vec<String>,
+    /// Gains in 1/time; empty for a range around the poles.
+    pub gains: Vec<f64>,
+    /// The decay that is wanted.
+    pub decay: Option<Decay>,
+}

@@ -1,0 +1,52 @@
+//! Where the run of a record begins, and the rows of a held-out record that tell its initial values.
+//!
+//! Next file to read: [`super::channel`].
+
+use crate::checked::Channel;
+use crate::file::RecordSection;
+use crate::problem::Source;
+
+/// The start of the run: the first measured time, or the one before it that the study gives. `None` when a problem was reported.
+pub(super) fn of_run(source: &Source, section: &RecordSection, times: &[f64]) -> Option<f64> {
+    let first = *times.first()?;
+    let Some(start) = &section.start else { return Some(first) };
+    let value = *start.get_ref();
+    if value <= first && value.is_finite() {
+        return Some(value);
+    }
+    source.report_with(
+        start.span(),
+        format!("record `{}` starts at {value}, after its first measured row at {first}", section.name.get_ref()),
+        format!("`start` begins the run earlier, so that the model settles: give {first} or less; `train` leaves rows out"),
+    );
+    None
+}
+
+/// The span of the first rows of a held-out record that its initial values are found from; `None` where the study gives none, or
+/// a problem was reported.
+pub(super) fn first_rows(
+    source: &Source,
+    section: &RecordSection,
+    times: &[f64],
+    channels: &[Channel],
+) -> Option<[f64; 2]> {
+    let rows = section.start_rows.as_ref()?;
+    let name = section.name.get_ref();
+    if !section.held_out {
+        let message = format!("record `{name}` is fitted, so its start is too");
+        source.report_with(rows.span(), message, "remove `start_rows`, or add `use = \"held-out\"`");
+        return None;
+    }
+    let measured = |row: &usize| channels.iter().any(|c| !c.held_out && c.values[*row].is_finite());
+    let seen: Vec<f64> = (0..times.len()).filter(measured).map(|row| times[row]).collect();
+    let n = usize::try_from(*rows.get_ref()).unwrap_or(usize::MAX);
+    if n == 0 || n >= seen.len() {
+        source.report_with(
+            rows.span(),
+            format!("`start_rows` is {n}, but record `{name}` has {} rows that a fit could see", seen.len()),
+            "give at least 1, and leave rows that are held out",
+        );
+        return None;
+    }
+    Some([times[0], seen[n - 1]])
+}
