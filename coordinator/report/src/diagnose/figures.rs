@@ -1,6 +1,6 @@
 //! The figures of a diagnosis, one file per kind.
 //!
-//! A new one is a file with `figures(&Diagnosed)` and its line in [`SLOTS`]. Next file to read: [`courses`].
+//! A new one is a file with `figures(&Diagnosed)` and its line in [`SLOTS`], which `diagnose.html` sets. Next file to read: [`courses`].
 
 mod courses;
 
@@ -12,8 +12,7 @@ use crate::plot::figure::{Figure, Slot, Slots};
 type Draw = fn(&Diagnosed) -> Vec<Figure>;
 
 /// The places for figures, in the order of their sections, and what draws the figures of each.
-const SLOTS: [Slot<Draw>; 1] =
-    [Slot::section("courses", "Courses", "No scenario could be run.", courses::figures)];
+const SLOTS: [Slot<Draw>; 1] = [Slot::named("courses", courses::figures)];
 
 /// Draws every figure of the page.
 ///

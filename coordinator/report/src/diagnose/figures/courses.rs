@@ -6,7 +6,7 @@ use starlings_diagnose::result::CourseFound;
 use crate::plot::axis::Axis;
 use crate::plot::figure::{Figure, with_unit};
 use crate::plot::mark::Mark;
-use crate::plot::palette::{BLUE, GREY, INK, SHADE};
+use crate::plot::palette::{BLUE, GREEN, INK, SHADE};
 use crate::plot::scene::Scene;
 
 /// One figure per course.
@@ -27,11 +27,11 @@ fn figure(found: &Diagnosed, course: &CourseFound) -> Figure {
         .filter(|seen| (&seen.record, &seen.output) == (&course.record, &course.output));
     let mut marks = Vec::new();
     marks.extend(seen.map(|seen| Mark::Span { from: seen.since, to: seen.until, colour: SHADE }));
-    marks.push(Mark::flat_band((x.lo, x.hi), (-2.0 * course.noise, 2.0 * course.noise), GREY, 0.3));
+    marks.push(Mark::flat_band((x.lo, x.hi), (-2.0 * course.noise, 2.0 * course.noise), GREEN, 0.16));
     marks.push(Mark::Dots {
         points: course.times.iter().copied().zip(measured).collect(),
         colour: INK,
-        radius: 1.0,
+        radius: 1.25,
     });
     marks.extend(Mark::curve(&course.times, &likeliest, BLUE, 1.75));
     let title = format!("{}, {}", course.output, course.record);
@@ -42,7 +42,7 @@ fn figure(found: &Diagnosed, course: &CourseFound) -> Figure {
     let mut keys = vec![
         ("dot ink", "measured"),
         ("line blue", "likeliest scenario"),
-        ("area grey", "two standard deviations of the noise"),
+        ("area green", "two standard deviations of the noise"),
     ];
     if seen.is_some() {
         keys.push(("area shade", "first departure"));
