@@ -163,3 +163,35 @@ fn a_gauge_at_an_unknown_node_is_refused() {
     assert_eq!(path, "gauges[0].to");
     assert!(message.contains("did you mean `desc`"), "{message}");
 }
+
+#[test]
+fn chambers_and_what_belongs_to_them_are_refused_where_they_do_not_fit() {
+    let chamber = json!({ "name": "lv", "kind": "chamber", "from": "a", "active": 2.0 });
+    refused(
+        json!([chamber, c("wall", "a", "0"), r("out", "a", "0")]),
+        "elements[1]",
+        &["`lv`", "`wall`", "loop"],
+    );
+    refused(
+        json!([c("wall", "a", "0"), chamber, r("out", "a", "0")]),
+        "elements[1]",
+        &["`wall`", "resistance"],
+    );
+    let half = json!({ "name": "lv", "kind": "chamber", "from": "a", "active": 2.0, "wall": 9.0 });
+    refused(json!([half, r("out", "a", "0")]), "elements[0]", &["`wall` and `stiffening`, or neither"]);
+    let under = json!({ "name": "muscle", "kind": "C", "from": "m", "around": "b" });
+    let elements = json!([under, r("x", "m", "b"), r("y", "b", "0")]);
+    refused(elements, "elements[0].around", &["no chamber to the ground is at node `b`"]);
+    let share = json!({ "name": "muscle", "kind": "C", "from": "m", "share": 0.5 });
+    refused(json!([share, r("x", "m", "0")]), "elements[0].share", &["needs `around`"]);
+    let two = json!({ "name": "v", "kind": "diode", "from": "m", "smooth": 1.0, "steepness": 5.0 });
+    refused(json!([two, c("x", "m", "0")]), "elements[0]", &["remove one of the two"]);
+    let flat = json!({ "name": "v", "kind": "diode", "from": "m", "steepness": 0.0 });
+    refused(json!([flat, c("x", "m", "0")]), "elements[0].steepness", &["not above zero"]);
+}
+
+#[test]
+fn a_tolerance_that_is_none_is_refused() {
+    let (at, says) = refusal(json!({ "tolerance": 0.5, "elements": [c("x", "m", "0")] }));
+    assert!(at == "tolerance" && says.contains("between 1e-12 and 0.01"), "{at}: {says}");
+}

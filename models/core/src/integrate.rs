@@ -9,6 +9,7 @@ mod control;
 mod dopri5;
 mod events;
 mod fixed;
+pub mod rodas;
 mod rosenbrock;
 mod sliding;
 mod span;

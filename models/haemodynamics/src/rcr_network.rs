@@ -3,17 +3,23 @@
 //! The state holds the pressures of capacitors and the flows of inertances. All other pressures and flows follow from it
 //! by the nodal equations at each time (Ho, Ruehli & Brennan 1975), which are solved whenever the rate or an output is
 //! asked for: there is no differential-algebraic solver here, and networks that would need one of higher index are refused
-//! with a remedy. A network of linear elements takes exact steps. Next file to read: [`netlist`] for what a study writes,
-//! then [`solve`].
+//! with a remedy. A network of linear elements takes exact steps, others implicit ones on a sparse factorisation. Next file to
+//! read: [`netlist`] for what a study writes, then [`solve`].
 
 mod assembly;
+mod chambers;
 mod circuit;
+mod companion;
 mod elements;
+mod factors;
+mod implicit;
 mod laws;
 mod netlist;
+mod nodal;
 mod parameters;
 mod shift;
 mod solve;
+mod sparse;
 mod step;
 mod topology;
 mod units;
@@ -26,6 +32,7 @@ use starlings_models_core::{
 
 use assembly::Assembly;
 use circuit::{Ends, FlowOf, Law};
+use implicit::Task;
 use netlist::Netlist;
 use shift::Source;
 use solve::{Given, Network};
@@ -41,9 +48,29 @@ struct RcrNetwork {
     flows: Vec<FlowOf>,
     /// Pressure differences that are outputs.
     drops: Vec<Ends>,
+    /// States of volumes that are outputs.
+    volumes: Vec<usize>,
     /// Ends of the branches that switch, at zero pressure drop.
     valves: Vec<Ends>,
+    /// Relative tolerance of the integration.
+    tolerance: f64,
+    /// How the span of one line of the signals is run.
+    way: Way,
 }
+
+/// How a span is run on which every signal is linear.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Way {
+    /// In one exact step.
+    Exact,
+    /// In implicit steps.
+    Implicit,
+    /// In steps that end where a sharp valve opens or closes; beside chambers the control of the steps is left to find it.
+    Events,
+}
+
+/// States of a linear network at most that it takes exact steps, whose cost grows with the third power.
+const MOST_EXACT: usize = 64;
 
 /// Builds the network of a layout.
 ///
@@ -57,6 +84,13 @@ impl RcrNetwork {
     fn new(netlist: &Netlist) -> Result<Self, SetupError> {
         let assembly = Assembly::new(netlist)?;
         let outputs = outputs(&assembly);
+        let way = if assembly.circuit.is_linear() && assembly.circuit.n_state <= MOST_EXACT {
+            Way::Exact
+        } else if assembly.circuit.has_sharp_valves() && assembly.volumes.is_empty() {
+            Way::Events
+        } else {
+            Way::Implicit
+        };
         let network = Network::new(assembly.circuit)?;
         let valves = network.circuit.resistive.iter().filter_map(|branch| match branch.law {
             Law::Diode { smooth, .. } if smooth <= 0.0 => Some(branch.ends),
@@ -81,6 +115,9 @@ impl RcrNetwork {
             initial: assembly.initial,
             flows: assembly.flows.into_iter().map(|(_, flow)| flow).collect(),
             drops: assembly.drops.into_iter().map(|(_, ends)| ends).collect(),
+            volumes: assembly.volumes.into_iter().map(|(_, state)| state).collect(),
+            tolerance: netlist.tolerance,
+            way,
         })
     }
 
@@ -106,7 +143,7 @@ impl RcrNetwork {
         theta: &[f64],
         x: &mut [f64],
     ) -> Result<(), ModelFailure> {
-        if !self.network.circuit.is_linear() {
+        if self.way == Way::Events {
             return advance_by(self, self.solver(), segment, theta, x);
         }
         let length = segment.t1 - segment.t0;
@@ -116,14 +153,20 @@ impl RcrNetwork {
         let last = Drive { value: &end, slope, history };
         self.with_signals(segment.t0, theta, first, |start, slopes| {
             self.with_signals(segment.t1, theta, last, |end, _| {
-                step::exact(&self.network, theta, Span { length, start, end, slopes }, x);
-            });
-        });
-        Ok(())
+                let span = Span { length, start, end, slopes };
+                if self.way == Way::Exact {
+                    step::exact(&self.network, theta, span, x);
+                    return Ok(());
+                }
+                let (network, states, tolerance) = (&self.network, &self.spec.states[..], self.tolerance);
+                let (limits, start) = (segment.limits, segment.t0);
+                implicit::advance(Task { network, states, theta, tolerance, limits, start }, span, x)
+            })
+        })
     }
 }
 
-/// Pressure of every node, flow of every element, pressure drop of every loss, valve and gauge.
+/// Pressure of every node, flow of every element, pressure drop of every loss, valve and gauge, volume of every chamber.
 fn outputs(assembly: &Assembly) -> Vec<Quantity> {
     let quantity = |name: String, measure: Measure, says: String| {
         Quantity::new(&name, measure.label(assembly.units)).role(measure.role()).says(&says)
@@ -137,7 +180,11 @@ fn outputs(assembly: &Assembly) -> Vec<Quantity> {
     let drops = assembly.drops.iter().map(|(name, _)| {
         quantity(format!("dp_{name}"), Measure::Pressure, format!("Pressure drop `{name}`."))
     });
-    nodes.chain(flows).chain(drops).collect()
+    let volumes = assembly
+        .volumes
+        .iter()
+        .map(|(name, _)| quantity(format!("V_{name}"), Measure::Volume, format!("Volume of `{name}`.")));
+    nodes.chain(flows).chain(drops).chain(volumes).collect()
 }
 
 impl Model for RcrNetwork {
@@ -164,14 +211,16 @@ impl Model for RcrNetwork {
             let pressures = solution.pressure[1..].iter().copied();
             let flows = self.flows.iter().map(|of| self.network.flow(*of, &solution, given, &dx));
             let drops = self.drops.iter().map(|ends| solution.drop(*ends));
-            for (y, value) in y.iter_mut().zip(pressures.chain(flows).chain(drops)) {
+            let volumes = self.volumes.iter().map(|state| x[*state]);
+            for (y, value) in y.iter_mut().zip(pressures.chain(flows).chain(drops).chain(volumes)) {
                 *y = value;
             }
         });
     }
 
     fn solver(&self) -> Solver {
-        Solver::Auto(Tolerance { relative: 1e-8, absolute: 1e-8 })
+        let tolerance = self.tolerance.min(1e-8);
+        Solver::Auto(Tolerance { relative: tolerance, absolute: tolerance })
     }
 
     fn n_switch(&self) -> usize {

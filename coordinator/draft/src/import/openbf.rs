@@ -34,6 +34,7 @@ pub(super) fn plan(path: &Path, text: &str) -> Result<Plan, String> {
         inputs: Inputs::new(&[inflow], period),
         points,
         course: course(&file, &parts.middles)?,
+        initial: Vec::new(),
         omissions: Vec::new(),
         notes: parts.notes,
     })

@@ -25,6 +25,8 @@ pub(super) struct Plan {
     pub(super) points: usize,
     /// How the program runs.
     pub(super) course: Course,
+    /// States that the program starts with where it starts from zero, those that are not zero.
+    pub(super) initial: Vec<(String, f64)>,
     /// What is left out if it is small.
     pub(super) omissions: Vec<Omission>,
     /// One sentence each, of what was put in another form.
@@ -59,7 +61,7 @@ pub(super) enum Origin {
     Rest,
     /// The steady state under the means of the inputs.
     Steady,
-    /// Pressures and flows of zero.
+    /// Pressures, flows and volumes of zero, but for the plan's states.
     Zero,
 }
 

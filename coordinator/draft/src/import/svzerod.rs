@@ -2,11 +2,17 @@
 //!
 //! Next files to read: [`file`] for what is read, [`blocks`] for what becomes of it.
 
+mod activation;
 mod blocks;
+mod chambers;
 mod file;
+mod heart;
+mod initial;
 mod junctions;
+mod kind;
 mod layout;
 mod network;
+mod outlets;
 
 use serde_json::Value;
 
@@ -19,11 +25,16 @@ use network::Kind;
 pub(super) fn plan(name: &str, text: &str) -> Result<Plan, String> {
     let file = file::read(text)?;
     refuse_blocks(&file)?;
-    let blocks = Blocks::new(&file)?;
+    let mut blocks = Blocks::new(&file)?;
     let simulation = &file.simulation_parameters;
     let period = period(&blocks, simulation)?;
-    let Blocks { mut network, mut courses, channels, mut unknowns, .. } = blocks;
-    network.mend(period);
+    blocks.network.mend(period);
+    let mut course = course(&file)?;
+    let mut notes = Vec::new();
+    let initial = initial::states(&file, &blocks, &mut course, &mut notes)?;
+    let Blocks { mut network, mut courses, channels, mut unknowns, activations, .. } = blocks;
+    network.notes.extend(notes);
+    courses.extend(activations.iter().map(|(name, shape)| shape.samples(name, period)));
     for course in &mut courses {
         if let [value] = course.values[..] {
             (course.times, course.values) = (vec![0.0, period], vec![value; 2]);
@@ -36,7 +47,6 @@ pub(super) fn plan(name: &str, text: &str) -> Result<Plan, String> {
     if points < 2 {
         return Err("simulation_parameters.number_of_time_pts_per_cardiac_cycle: give at least 2".to_owned());
     }
-    let course = course(&file, &mut network.notes)?;
     Ok(Plan {
         name: super::names::Names::default().take(name),
         program: "svZeroDSolver",
@@ -48,6 +58,7 @@ pub(super) fn plan(name: &str, text: &str) -> Result<Plan, String> {
         inputs: Inputs::new(&courses, period),
         points,
         course,
+        initial,
         omissions: network.omissions,
         notes: network.notes,
     })
@@ -79,24 +90,16 @@ fn once_each(channels: Vec<(String, &'static str)>) -> Vec<(String, &'static str
 
 /// Names the blocks of the file that no model here has.
 fn refuse_blocks(file: &File) -> Result<(), String> {
-    let lists = [
-        ("closed_loop_blocks", &file.closed_loop_blocks, "closed_loop_type"),
-        ("chambers", &file.chambers, "type"),
-        ("valves", &file.valves, "type"),
-        ("external_solver_coupling_blocks", &file.external_solver_coupling_blocks, "type"),
-    ];
     let mut missing = Vec::new();
-    for (list, blocks, key) in lists {
-        for (i, block) in blocks.iter().enumerate() {
-            let kind = block.get(key).and_then(Value::as_str).unwrap_or("unknown type");
-            missing.push(format!("{list}[{i}] ({kind})"));
-        }
+    for (i, block) in file.external_solver_coupling_blocks.iter().enumerate() {
+        let kind = block.get("type").and_then(Value::as_str).unwrap_or("unknown type");
+        missing.push(format!("external_solver_coupling_blocks[{i}] ({kind})"));
     }
     if missing.is_empty() {
         return Ok(());
     }
     Err(format!(
-        "{} {} not in `rcr-network`: run svZeroDSolver itself as an external solver for a file with chambers, valves or a closed loop",
+        "{} {} not in `rcr-network`: run svZeroDSolver itself as an external solver for a file that another solver drives",
         missing.join(", "),
         if missing.len() == 1 { "is" } else { "are" }
     ))
@@ -104,7 +107,7 @@ fn refuse_blocks(file: &File) -> Result<(), String> {
 
 /// The period that all signals of the file have.
 fn period(blocks: &Blocks, simulation: &Simulation) -> Result<f64, String> {
-    let mut found: Option<(f64, &str)> = None;
+    let mut found = blocks.period.as_ref().map(|(period, place)| (*period, place.as_str()));
     for course in blocks.courses.iter().filter(|course| course.values.len() > 1) {
         let own = course.times[course.times.len() - 1];
         match found {
@@ -133,7 +136,7 @@ fn period(blocks: &Blocks, simulation: &Simulation) -> Result<f64, String> {
 }
 
 /// Where the program starts and which of its periods it shows.
-fn course(file: &File, notes: &mut Vec<String>) -> Result<Course, String> {
+fn course(file: &File) -> Result<Course, String> {
     let simulation = &file.simulation_parameters;
     if simulation.coupled_simulation {
         return Err(
@@ -147,22 +150,7 @@ fn course(file: &File, notes: &mut Vec<String>) -> Result<Course, String> {
     if cycles == 0 {
         return Err("simulation_parameters.number_of_cardiac_cycles: give at least 1".to_owned());
     }
-    let from = if simulation.steady_initial { Origin::Steady } else { Origin::Zero };
+    let from = if simulation.from_steady() { Origin::Steady } else { Origin::Zero };
     let all = simulation.output_all_cycles;
-    if !(file.initial_condition.is_empty() && file.initial_condition_d.is_empty()) {
-        if all || cycles < FORGET {
-            return Err(format!(
-                "initial_condition: not read, and after {} cycles it still counts; ask for the last of at least {FORGET} cycles",
-                if all { 0 } else { cycles }
-            ));
-        }
-        notes.push(
-            "`initial_condition` is not read: the last of many cycles is shown, which hardly knows it"
-                .to_owned(),
-        );
-    }
     Ok(Course { from, cycles, all, settled: None })
 }
-
-/// Cycles after which a network hardly knows where it started.
-const FORGET: usize = 10;

@@ -67,7 +67,9 @@ impl Folder<'_> {
             return Ok(());
         }
         let found = if course.from == Origin::Zero {
-            components(&study.spec.states).into_iter().map(|state| (state, 0.0)).collect()
+            let given = |name: &String| self.plan.initial.iter().find(|(state, _)| state == name);
+            let value = |name: &String| given(name).map_or(0.0, |(_, value)| *value);
+            components(&study.spec.states).into_iter().map(|name| (name.clone(), value(&name))).collect()
         } else {
             let (period, times) = (Some(inputs.period), vec![0.0, inputs.period]);
             simulate(&study, &Twin { period, times, ..Twin::default() })?.start

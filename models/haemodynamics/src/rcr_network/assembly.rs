@@ -5,7 +5,7 @@
 use starlings_models_core::layout::fault;
 use starlings_models_core::{Quantity, SetupError, nearest};
 
-use super::circuit::{Circuit, Ends, FlowOf, Resistive};
+use super::circuit::{Circuit, Ends, FlowOf, Resistive, Tie, TieKind};
 use super::netlist::{Element, GROUND, Gauge, Kind, Netlist};
 use super::parameters::{Parameters, identifier};
 use super::shift::Source;
@@ -24,6 +24,8 @@ pub(super) struct Assembly {
     pub(super) flows: Vec<(String, FlowOf)>,
     /// Pressure differences that are outputs.
     pub(super) drops: Vec<(String, Ends)>,
+    /// Volumes that are outputs, with their states.
+    pub(super) volumes: Vec<(String, usize)>,
     /// Pairs of an output and the state that it measures.
     pub(super) measures: Vec<(String, String)>,
     pub(super) units: System,
@@ -38,6 +40,9 @@ impl Assembly {
     /// When the netlist names something unknown or twice, or an element lacks or has what does not belong to it.
     pub(super) fn new(netlist: &Netlist) -> Result<Self, SetupError> {
         let mut assembly = Self::begin(netlist)?;
+        if !(netlist.tolerance >= 1e-12 && netlist.tolerance <= 1e-2) {
+            return Err(fault("tolerance", format!("{} is not between 1e-12 and 0.01", netlist.tolerance)));
+        }
         if netlist.elements.is_empty() {
             return Err(fault("elements", "a network needs elements"));
         }
@@ -58,6 +63,7 @@ impl Assembly {
             );
             return Err(fault(place, message));
         }
+        assembly.find_chambers()?;
         assembly.check_ends(netlist)?;
         for (i, gauge) in netlist.gauges.iter().enumerate() {
             assembly.gauge(gauge, &format!("gauges[{i}]"))?;
@@ -118,6 +124,7 @@ impl Assembly {
             sources: Vec::new(),
             flows: Vec::new(),
             drops: Vec::new(),
+            volumes: Vec::new(),
             measures: Vec::new(),
             units: netlist.units,
             node_initial,
@@ -199,13 +206,32 @@ impl Assembly {
         self.circuit.resistive.len() - 1
     }
 
+    /// Finds the chambers around capacitors.
+    fn find_chambers(&mut self) -> Result<(), SetupError> {
+        let chamber = |tie: &Tie| {
+            (tie.ends.to == 0 && matches!(tie.kind, TieKind::Chamber { .. })).then_some(tie.ends.from)
+        };
+        let nodes: Vec<Option<usize>> = self.circuit.ties.iter().map(chamber).collect();
+        for tie in &mut self.circuit.ties {
+            let TieKind::Under { around, .. } = &mut tie.kind else { continue };
+            around.tie = nodes.iter().position(|node| *node == Some(around.node)).ok_or_else(|| {
+                let message = format!(
+                    "no chamber to the ground is at node `{}`, so its pressure cannot press on `{}`",
+                    self.circuit.nodes[around.node], tie.says
+                );
+                fault(&format!("{}.around", tie.path), message)
+            })?;
+        }
+        Ok(())
+    }
+
     /// Refuses an undeclared node that only one element ends at: most likely a misspelt one.
     fn check_ends(&self, netlist: &Netlist) -> Result<(), SetupError> {
         if self.declared {
             return Ok(());
         }
         for (name, place) in self.circuit.nodes.iter().zip(&self.circuit.places).skip(1) {
-            let ends = netlist.elements.iter().flat_map(|e| [&e.from, &e.to]);
+            let ends = netlist.elements.iter().flat_map(|e| [&e.from, &e.to, &e.around]);
             let count = ends.flatten().filter(|end| *end == name).count();
             if count == 1 {
                 // The element's own other end cannot be meant: it would join a node with itself.
@@ -251,6 +277,15 @@ fn check_keys(element: &Element, path: &str) -> Result<(), SetupError> {
             format!("both ends of `{}` are node `{from}`: an element joins two nodes", element.name)
         };
         return Err(fault(path, message));
+    }
+    if let Some(steepness) = element.steepness.filter(|s| !(*s > 0.0 && s.is_finite())) {
+        return Err(fault(&format!("{path}.steepness"), format!("{steepness} is not above zero")));
+    }
+    if element.steepness.is_some() && element.smooth.is_some() {
+        return Err(fault(
+            path,
+            "a valve opens over a drop (`smooth`) or by `steepness`: remove one of the two",
+        ));
     }
     let smooth = element.smooth.unwrap_or(0.0);
     if !(smooth >= 0.0 && smooth.is_finite()) {

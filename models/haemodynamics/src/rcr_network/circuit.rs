@@ -6,6 +6,9 @@
 //!
 //! Positions in θ, in the state and among the signals are resolved; names are gone. Next file to read: [`super::topology`].
 
+/// A loss without a resistance has this part of the smallest one of the network: half of the digits of a number.
+const NEGLIGIBLE: f64 = 1e-8;
+
 /// The two nodes of a branch; node 0 is the ground. Flow counts from the first to the second.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Ends {
@@ -29,8 +32,32 @@ pub(super) struct Tie {
 pub(super) enum TieKind {
     /// Capacitors side by side; the difference is this state.
     Capacitors { state: usize, parts: Vec<Capacitor> },
+    /// A capacitor under a share of the pressure of a chamber; p(from) − p(to) − share · p is this state.
+    Under { state: usize, compliance: usize, share: usize, around: Around },
+    /// A chamber; this state is its volume.
+    Chamber { state: usize, law: Chamber },
     /// p(to) − p(from) is the level.
     Pressure(Level),
+}
+
+/// The chamber around a capacitor: the node that the netlist names, and the chamber's tie.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Around {
+    pub(super) node: usize,
+    pub(super) tie: usize,
+}
+
+/// Positions in θ and among the signals of what a chamber's pressure follows from; see [`super::laws`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Chamber {
+    pub(super) active: usize,
+    pub(super) passive: usize,
+    pub(super) rest: usize,
+    pub(super) rest_active: usize,
+    /// Scale and rate of an exponential wall.
+    pub(super) wall: Option<[usize; 2]>,
+    /// Signal of the activation.
+    pub(super) activation: usize,
 }
 
 /// One capacitor of a tie: q = C d(p(from) − p(to) − p_out)/dt.
@@ -75,6 +102,7 @@ pub(super) enum Law {
     Linear { resistance: usize },
     Loss { linear: usize, quadratic: usize },
     Diode { open: usize, closed: usize, smooth: f64 },
+    Valve { open: usize, closed: usize, steepness: f64 },
 }
 
 /// L dq/dt = p(from) − p(to).
@@ -124,6 +152,33 @@ pub(super) struct Circuit {
 impl Circuit {
     /// Whether the rate of the state is affine in state and signals.
     pub(super) fn is_linear(&self) -> bool {
+        let chamber = |tie: &Tie| matches!(tie.kind, TieKind::Chamber { .. });
         self.resistive.iter().all(|branch| matches!(branch.law, Law::Linear { .. }))
+            && !self.ties.iter().any(chamber)
+    }
+
+    /// The resistance that a loss has at least: far below every other of the network, and far above what rounding hides.
+    pub(super) fn least_resistance(&self, theta: &[f64]) -> f64 {
+        let of = |law: Law| match law {
+            Law::Linear { resistance: at } | Law::Loss { linear: at, .. } => theta[at],
+            Law::Diode { .. } | Law::Valve { .. } => 0.0,
+        };
+        let given = self.resistive.iter().map(|branch| of(branch.law)).filter(|r| *r > 0.0);
+        let least = given.fold(f64::INFINITY, f64::min);
+        NEGLIGIBLE * if least.is_finite() { least } else { 1.0 }
+    }
+
+    /// Positions in θ of the levels of constant sources.
+    pub(super) fn constant_levels(&self) -> impl Iterator<Item = usize> + '_ {
+        self.ties.iter().filter_map(|tie| match tie.kind {
+            TieKind::Pressure(Level::Parameter(at)) => Some(at),
+            _ => None,
+        })
+    }
+
+    /// Whether the rate has a kink at the drop of some valve.
+    pub(super) fn has_sharp_valves(&self) -> bool {
+        let sharp = |law: Law| matches!(law, Law::Diode { smooth, .. } if smooth <= 0.0);
+        self.resistive.iter().any(|branch| sharp(branch.law))
     }
 }

@@ -36,18 +36,8 @@ impl Assembly {
             }
             Kind::Loss => self.loss(element, ends, path)?,
             Kind::Diode => self.diode(element, ends, path)?,
-            Kind::C => {
-                let value = element.value.as_ref();
-                let compliance = self.value(element, path, Measure::Compliance, ("value", "C", value))?;
-                let outside = match &element.input {
-                    Some(input) => {
-                        Some(self.signal(input, Measure::Pressure, None, &format!("{path}.input"))?)
-                    }
-                    None => None,
-                };
-                let (name, initial) = (element.name.as_str(), element.initial);
-                self.capacitor(Storage { name, path, ends, compliance, outside, initial })?
-            }
+            Kind::C => self.compliance(element, ends, path)?,
+            Kind::Chamber => self.heart_chamber(element, ends, path)?,
             Kind::L => self.inertance(element, ends, path)?,
             Kind::Rcr => self.rcr(element, ends, path)?,
             Kind::Flow => {
@@ -62,7 +52,7 @@ impl Assembly {
     }
 
     /// Position in θ of a value: its key, the prefix of its own parameter, what is written.
-    fn value(
+    pub(super) fn value(
         &mut self,
         element: &Element,
         path: &str,
@@ -72,9 +62,13 @@ impl Assembly {
         // Pressures that resist the flow are absent, and signals in time, unless the netlist says otherwise.
         let default = matches!(measure, Measure::Pressure | Measure::Time).then_some(0.0);
         let what = match key {
-            "value" => measure.word().to_owned(),
+            "value" | "stiffening" => measure.word().to_owned(),
             "shift" => "time by which it follows its input".to_owned(),
             "venous" => "pressure behind the distal resistance".to_owned(),
+            "share" => "share of the pressure around it".to_owned(),
+            "active" | "passive" => format!("{} when {key}", measure.word()),
+            "rest" | "rest_active" => "volume without pressure".to_owned(),
+            "wall" => "scale of the passive wall's pressure".to_owned(),
             _ => format!("{key} {}", measure.word().trim_start_matches(key).trim_start()),
         };
         let says = format!("{} of `{}`.", capital(what.trim_end()), element.name);
@@ -83,13 +77,33 @@ impl Assembly {
         self.parameters.place(slot, value)
     }
 
+    fn compliance(&mut self, element: &Element, ends: Ends, path: &str) -> Result<FlowOf, SetupError> {
+        let value = element.value.as_ref();
+        let compliance = self.value(element, path, Measure::Compliance, ("value", "C", value))?;
+        if element.around.is_some() {
+            return self.compliance_under(element, ends, compliance, path);
+        }
+        if element.share.is_some() {
+            return Err(fault(
+                &format!("{path}.share"),
+                "a share of the pressure of a chamber needs `around`",
+            ));
+        }
+        let outside = match &element.input {
+            Some(input) => Some(self.signal(input, Measure::Pressure, None, &format!("{path}.input"))?),
+            None => None,
+        };
+        let (name, initial) = (element.name.as_str(), element.initial);
+        self.capacitor(Storage { name, path, ends, compliance, outside, initial })
+    }
+
     fn branch(&mut self, ends: Ends, law: Law, against: Option<usize>) -> usize {
         self.resistive(Resistive { ends, law, against })
     }
 
     fn loss(&mut self, element: &Element, ends: Ends, path: &str) -> Result<FlowOf, SetupError> {
         let value = element.linear.as_ref();
-        let linear = self.value(element, path, Measure::Resistance, ("linear", "Kv", value))?;
+        let linear = self.value(element, path, Measure::LinearLoss, ("linear", "Kv", value))?;
         let value = element.quadratic.as_ref();
         let quadratic = self.value(element, path, Measure::QuadraticLoss, ("quadratic", "Kq", value))?;
         let at = self.branch(ends, Law::Loss { linear, quadratic }, None);
@@ -111,7 +125,11 @@ impl Assembly {
             return Err(fault(&format!("{path}.closed"), message));
         }
         let smooth = element.smooth.unwrap_or(0.0);
-        let at = self.branch(ends, Law::Diode { open, closed, smooth }, None);
+        let law = match element.steepness {
+            Some(steepness) => Law::Valve { open, closed, steepness },
+            None => Law::Diode { open, closed, smooth },
+        };
+        let at = self.branch(ends, law, None);
         self.drops.push((element.name.clone(), ends));
         Ok(FlowOf::Resistive(at))
     }

@@ -24,6 +24,13 @@ pub(super) struct Netlist {
     /// Pressure differences that are outputs.
     #[serde(default)]
     pub(super) gauges: Vec<Gauge>,
+    /// Relative tolerance of the integration of a network that is not linear.
+    #[serde(default = "tolerance")]
+    pub(super) tolerance: f64,
+}
+
+fn tolerance() -> f64 {
+    1e-6
 }
 
 /// An output p(from) − p(to).
@@ -72,11 +79,29 @@ pub(super) struct Element {
     pub(super) closed: Option<Value>,
     /// Diode: pressure drop over which it opens; without it, at once.
     pub(super) smooth: Option<f64>,
-    /// C: input with the pressure outside. Flow, pressure: input with the source's value.
+    /// Diode: how steeply the resistance goes from closed to open, per pressure.
+    pub(super) steepness: Option<f64>,
+    /// C: a node with a chamber, a share of whose pressure is outside.
+    pub(super) around: Option<String>,
+    /// C: the share.
+    pub(super) share: Option<Value>,
+    /// Chamber: elastance when fully active.
+    pub(super) active: Option<Value>,
+    /// Chamber: elastance when passive.
+    pub(super) passive: Option<Value>,
+    /// Chamber: volume without pressure when passive.
+    pub(super) rest: Option<Value>,
+    /// Chamber: volume without pressure when fully active; without it, the passive one.
+    pub(super) rest_active: Option<Value>,
+    /// Chamber: scale of the pressure of an exponential passive wall.
+    pub(super) wall: Option<Value>,
+    /// Chamber: rate of that exponential per volume.
+    pub(super) stiffening: Option<Value>,
+    /// C: input with the pressure outside. Flow, pressure: input with the source's value. Chamber: input with the activation.
     pub(super) input: Option<String>,
     /// Flow, pressure: by how much the source follows its input.
     pub(super) shift: Option<Value>,
-    /// C, L, RCR: value at the start.
+    /// C, L, RCR, chamber: value at the start.
     pub(super) initial: Option<f64>,
 }
 
@@ -93,6 +118,8 @@ pub(super) enum Kind {
     Rcr,
     #[serde(rename = "loss")]
     Loss,
+    #[serde(rename = "chamber")]
+    Chamber,
     #[serde(rename = "flow")]
     Flow,
     #[serde(rename = "pressure")]
@@ -104,9 +131,12 @@ impl Kind {
     pub(super) fn keys(self) -> &'static [&'static str] {
         match self {
             Self::R => &["value"],
-            Self::C => &["value", "input", "initial"],
+            Self::C => &["value", "input", "around", "share", "initial"],
             Self::L => &["value", "initial"],
-            Self::Diode => &["open", "closed", "smooth"],
+            Self::Diode => &["open", "closed", "smooth", "steepness"],
+            Self::Chamber => {
+                &["active", "passive", "rest", "rest_active", "wall", "stiffening", "input", "initial"]
+            }
             Self::Rcr => &["proximal", "compliance", "distal", "venous", "initial"],
             Self::Loss => &["linear", "quadratic"],
             Self::Flow => &["input", "shift"],
@@ -123,6 +153,7 @@ impl Kind {
             Self::Diode => "diode",
             Self::Rcr => "rcr",
             Self::Loss => "loss",
+            Self::Chamber => "chamber",
             Self::Flow => "flow",
             Self::Pressure => "pressure",
         }
@@ -143,6 +174,15 @@ impl Element {
             ("open", self.open.is_some()),
             ("closed", self.closed.is_some()),
             ("smooth", self.smooth.is_some()),
+            ("steepness", self.steepness.is_some()),
+            ("around", self.around.is_some()),
+            ("share", self.share.is_some()),
+            ("active", self.active.is_some()),
+            ("passive", self.passive.is_some()),
+            ("rest", self.rest.is_some()),
+            ("rest_active", self.rest_active.is_some()),
+            ("wall", self.wall.is_some()),
+            ("stiffening", self.stiffening.is_some()),
             ("input", self.input.is_some()),
             ("shift", self.shift.is_some()),
             ("initial", self.initial.is_some()),
@@ -220,6 +260,7 @@ impl Default for Netlist {
             nodes: Vec::new(),
             elements: vec![inflow, wall, outlet("upper", 0.2, 0.3, 3.0), outlet("lower", 0.1, 0.7, 1.5)],
             gauges: Vec::new(),
+            tolerance: tolerance(),
         }
     }
 }

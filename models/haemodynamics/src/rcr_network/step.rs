@@ -6,7 +6,6 @@
 use nalgebra::{DMatrix, DVector};
 use starlings_models_core::exponential::exponential;
 
-use super::circuit::{Level, TieKind};
 use super::solve::{Given, Network};
 
 /// A span on which signals are linear.
@@ -58,11 +57,7 @@ fn matrix(network: &Network, theta: &[f64], n: usize) -> DMatrix<f64> {
     for branch in &network.circuit.resistive {
         branch.against.into_iter().for_each(|at| quiet[at] = 0.0);
     }
-    for tie in &network.circuit.ties {
-        if let TieKind::Pressure(Level::Parameter(at)) = tie.kind {
-            quiet[at] = 0.0;
-        }
-    }
+    network.circuit.constant_levels().for_each(|at| quiet[at] = 0.0);
     let silent = vec![0.0; network.circuit.n_signal];
     let mut matrix = DMatrix::zeros(n, n);
     let mut unit = vec![0.0; n];

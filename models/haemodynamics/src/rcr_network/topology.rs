@@ -7,7 +7,7 @@
 use starlings_models_core::SetupError;
 use starlings_models_core::layout::fault;
 
-use super::circuit::{Circuit, Ends};
+use super::circuit::{Circuit, Ends, Tie};
 
 /// One tie on the way from a tree's root to its leaves.
 #[derive(Clone, Copy, Debug)]
@@ -35,15 +35,7 @@ impl Forest {
     /// # Errors
     /// When ties form a loop, or a tree has no resistive path to the ground.
     pub(super) fn new(circuit: &Circuit) -> Result<Self, SetupError> {
-        let n = circuit.nodes.len();
-        let mut forest = Self { hops: Vec::new(), tree: vec![usize::MAX; n], n_tree: 0 };
-        let mut used = vec![false; circuit.ties.len()];
-        for root in 0..n {
-            if forest.tree[root] == usize::MAX {
-                forest.grow(circuit, root, &mut used);
-                forest.n_tree += 1;
-            }
-        }
+        let (forest, used) = Self::over(circuit, &|_| true);
         if let Some(closing) = used.iter().position(|used| !used) {
             return Err(loop_of_ties(circuit, closing));
         }
@@ -51,13 +43,27 @@ impl Forest {
         Ok(forest)
     }
 
-    fn grow(&mut self, circuit: &Circuit, root: usize, used: &mut [bool]) {
+    /// The forest of those ties that are kept, and which of them belong to it.
+    pub(super) fn over(circuit: &Circuit, keep: &dyn Fn(&Tie) -> bool) -> (Self, Vec<bool>) {
+        let n = circuit.nodes.len();
+        let mut forest = Self { hops: Vec::new(), tree: vec![usize::MAX; n], n_tree: 0 };
+        let mut used = vec![false; circuit.ties.len()];
+        for root in 0..n {
+            if forest.tree[root] == usize::MAX {
+                forest.grow(circuit, root, keep, &mut used);
+                forest.n_tree += 1;
+            }
+        }
+        (forest, used)
+    }
+
+    fn grow(&mut self, circuit: &Circuit, root: usize, keep: &dyn Fn(&Tie) -> bool, used: &mut [bool]) {
         self.tree[root] = self.n_tree;
         let mut reached = vec![root];
         let mut next = 0;
         while let Some(&parent) = reached.get(next) {
             next += 1;
-            for (tie, branch) in circuit.ties.iter().enumerate() {
+            for (tie, branch) in circuit.ties.iter().enumerate().filter(|(_, tie)| keep(tie)) {
                 let Ends { from, to } = branch.ends;
                 let (child, sign) = match parent {
                     p if p == from => (to, 1.0),

@@ -28,8 +28,14 @@ pub(super) enum Measure {
     Resistance,
     Compliance,
     Inertance,
+    LinearLoss,
     QuadraticLoss,
     Time,
+    Volume,
+    Elastance,
+    Stiffening,
+    Share,
+    Activation,
 }
 
 impl Measure {
@@ -38,11 +44,15 @@ impl Measure {
         let [clinical, cgs, si] = match self {
             Self::Pressure => ["mmHg", "dyn/cm^2", "Pa"],
             Self::Flow => ["mL/s", "cm^3/s", "m^3/s"],
-            Self::Resistance => ["mmHg s/mL", "dyn s/cm^5", "Pa s/m^3"],
+            Self::Resistance | Self::LinearLoss => ["mmHg s/mL", "dyn s/cm^5", "Pa s/m^3"],
             Self::Compliance => ["mL/mmHg", "cm^5/dyn", "m^3/Pa"],
             Self::Inertance => ["mmHg s^2/mL", "g/cm^4", "kg/m^4"],
             Self::QuadraticLoss => ["mmHg s^2/mL^2", "g/cm^7", "kg/m^7"],
             Self::Time => ["s", "s", "s"],
+            Self::Volume => ["mL", "cm^3", "m^3"],
+            Self::Elastance => ["mmHg/mL", "dyn/cm^5", "Pa/m^3"],
+            Self::Stiffening => ["1/mL", "1/cm^3", "1/m^3"],
+            Self::Share | Self::Activation => ["", "", ""],
         };
         match system {
             System::Clinical => clinical,
@@ -56,11 +66,16 @@ impl Measure {
         match self {
             Self::Pressure => Role::Pressure,
             Self::Flow => Role::Flow,
-            Self::Resistance => Role::Resistance,
+            Self::Resistance | Self::LinearLoss => Role::Resistance,
             Self::Compliance => Role::Compliance,
             Self::Inertance => Role::Inertia,
             Self::Time => Role::Shift,
-            Self::QuadraticLoss => Role::Other,
+            Self::QuadraticLoss
+            | Self::Volume
+            | Self::Elastance
+            | Self::Stiffening
+            | Self::Share
+            | Self::Activation => Role::Other,
         }
     }
 
@@ -68,8 +83,12 @@ impl Measure {
     pub(super) fn range(self) -> [f64; 2] {
         match self {
             Self::Resistance | Self::Compliance | Self::Inertance => [f64::MIN_POSITIVE, f64::INFINITY],
-            Self::QuadraticLoss => [0.0, f64::INFINITY],
-            Self::Pressure | Self::Flow | Self::Time => [f64::NEG_INFINITY, f64::INFINITY],
+            Self::LinearLoss | Self::QuadraticLoss | Self::Elastance | Self::Stiffening => {
+                [0.0, f64::INFINITY]
+            }
+            Self::Share | Self::Pressure | Self::Flow | Self::Time | Self::Volume | Self::Activation => {
+                [f64::NEG_INFINITY, f64::INFINITY]
+            }
         }
     }
 
@@ -81,8 +100,14 @@ impl Measure {
             Self::Resistance => "resistance",
             Self::Compliance => "compliance",
             Self::Inertance => "inertance",
+            Self::LinearLoss => "linear loss",
             Self::QuadraticLoss => "quadratic loss",
             Self::Time => "time",
+            Self::Volume => "volume",
+            Self::Elastance => "elastance",
+            Self::Stiffening => "stiffening per volume",
+            Self::Share => "share",
+            Self::Activation => "activation",
         }
     }
 }

@@ -2,17 +2,20 @@
 //!
 //! The equations are those of the documentation of svZeroDSolver: a `BloodVessel` is a resistance with
 //! stenosis, a capacitor behind it and an inertance; a `BloodVesselCRL` has the capacitor at its inlet. Next files to
-//! read: [`super::junctions`], then [`super::network`].
+//! read: [`super::junctions`] and [`super::heart`], then [`super::network`].
 
 use std::collections::BTreeMap;
 
 use super::super::plan::{Samples, Unknown};
-use super::file::{Boundary, Coronary, File, Flow, Pressure, Rcr, Resistance, Vessel, VesselValues, typed};
+use super::activation::Shape;
+use super::file::{Boundary, File, Flow, Pressure, Resistance, Vessel, VesselValues, typed};
+use super::heart::HeartNodes;
 use super::network::{GROUND, Kind, Network, Node, Series};
 
-const FLOW: &str = "cm^3/s";
+/// Labels of flows and resistances in cgs units.
+pub(super) const FLOW: &str = "cm^3/s";
 const PRESSURE: &str = "dyn/cm^2";
-const RESISTANCE: &str = "dyn s/cm^5";
+pub(super) const RESISTANCE: &str = "dyn s/cm^5";
 
 /// A network on its way, with what a study needs besides.
 #[derive(Debug)]
@@ -23,9 +26,18 @@ pub(super) struct Blocks {
     pub(super) unknowns: Vec<Unknown>,
     /// Inlet and outlet of every vessel, by its name; nothing where nothing is joined yet.
     pub(super) ends: BTreeMap<String, [Option<Node>; 2]>,
+    /// Inlet and outlet of every chamber, by its name.
+    pub(super) chambers: BTreeMap<String, [Node; 2]>,
+    /// What boundary conditions join of a closed loop.
+    pub(super) heart: Option<HeartNodes>,
+    /// Inputs that are activations.
+    pub(super) activations: Vec<(String, Shape)>,
+    /// States by the names that an initial condition has for them.
+    pub(super) states: BTreeMap<String, String>,
+    /// The period that a closed loop gives, and where.
+    pub(super) period: Option<(f64, String)>,
     /// Where boundary conditions are.
     places: BTreeMap<String, (Node, Side)>,
-    largest_flow: Option<f64>,
 }
 
 /// On which side of the network a boundary condition is.
@@ -44,25 +56,20 @@ impl Blocks {
             channels: Vec::new(),
             unknowns: Vec::new(),
             ends: BTreeMap::new(),
+            chambers: BTreeMap::new(),
+            heart: None,
+            activations: Vec::new(),
+            states: BTreeMap::new(),
+            period: None,
             places: BTreeMap::new(),
-            largest_flow: largest_flow(file)?,
         };
-        for vessel in &file.vessels {
-            if blocks.ends.insert(vessel.vessel_name.clone(), [None, None]).is_some() {
-                return Err(format!("two vessels are called `{}`", vessel.vessel_name));
-            }
-            for (end, (name, side)) in [
-                (&vessel.boundary_conditions.inlet, ("in", Side::Inlet)),
-                (&vessel.boundary_conditions.outlet, ("out", Side::Outlet)),
-            ] {
-                let Some(boundary) = end else { continue };
-                let node = blocks.network.node(&format!("{}_{name}", vessel.vessel_name));
-                blocks.join(&vessel.vessel_name, side, node)?;
-                blocks.place(boundary, node, side)?;
-            }
-        }
+        blocks.vessel_ends(file)?;
+        blocks.chambers(file)?;
         for (i, junction) in file.junctions.iter().enumerate() {
             blocks.junction(file, junction, &format!("junctions[{i}]"))?;
+        }
+        for (i, valve) in file.valves.iter().enumerate() {
+            blocks.valve(valve, &format!("valves[{i}]"))?;
         }
         for (i, vessel) in file.vessels.iter().enumerate() {
             blocks.vessel(vessel, &format!("vessels[{i}]"))?;
@@ -79,6 +86,38 @@ impl Blocks {
             ));
         }
         Ok(blocks)
+    }
+
+    /// Joins the boundary conditions that vessels name.
+    fn vessel_ends(&mut self, file: &File) -> Result<(), String> {
+        for vessel in &file.vessels {
+            if self.ends.insert(vessel.vessel_name.clone(), [None, None]).is_some() {
+                return Err(format!("two vessels are called `{}`", vessel.vessel_name));
+            }
+            for (end, (name, side)) in [
+                (&vessel.boundary_conditions.inlet, ("in", Side::Inlet)),
+                (&vessel.boundary_conditions.outlet, ("out", Side::Outlet)),
+            ] {
+                let Some(boundary) = end else { continue };
+                let node = self.network.node(&format!("{}_{name}", vessel.vessel_name));
+                self.join(&vessel.vessel_name, side, node)?;
+                self.place(boundary, node, side)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Joins a block to a node: a vessel's or a chamber's end, else a boundary condition.
+    pub(super) fn attach(&mut self, block: &str, side: Side, node: Node) -> Result<(), String> {
+        if let Some([inlet, outlet]) = self.chambers.get(block) {
+            self.network.merge(node, if side == Side::Inlet { *inlet } else { *outlet });
+            return Ok(());
+        }
+        if self.ends.contains_key(block) {
+            return self.join(block, side, node);
+        }
+        // What flows out of a boundary condition enters the network.
+        self.place(block, node, if side == Side::Outlet { Side::Inlet } else { Side::Outlet })
     }
 
     /// Joins an end of a vessel to a node.
@@ -101,8 +140,8 @@ impl Blocks {
     }
 
     /// What stands between a junction and one of its vessels.
-    pub(super) fn of(&self, resistance: f64, stenosis: f64, inertance: f64) -> Series {
-        Series { resistance, stenosis, capacity: 0.0, inertance, largest_flow: self.largest_flow }
+    pub(super) fn of(resistance: f64, stenosis: f64, inertance: f64) -> Series {
+        Series { resistance, stenosis, capacity: 0.0, inertance }
     }
 
     fn vessel(&mut self, vessel: &Vessel, place: &str) -> Result<(), String> {
@@ -113,7 +152,7 @@ impl Blocks {
         };
         let values: VesselValues =
             typed(&format!("{place}.zero_d_element_values"), &vessel.zero_d_element_values)?;
-        let mut series = self.of(values.R_poiseuille, values.stenosis_coefficient, values.L);
+        let mut series = Self::of(values.R_poiseuille, values.stenosis_coefficient, values.L);
         match vessel.zero_d_element_type.as_str() {
             "BloodVessel" => series.capacity = values.C,
             "BloodVesselCRL" if values.C > 0.0 => {
@@ -134,7 +173,16 @@ impl Blocks {
     fn boundary(&mut self, boundary: &Boundary, place: &str) -> Result<(), String> {
         let (name, values) = (boundary.bc_name.as_str(), &boundary.bc_values);
         let own = format!("{place}.bc_values");
-        let known = ["FLOW", "PRESSURE", "RESISTANCE", "RCR", "CORONARY"];
+        let known = [
+            "FLOW",
+            "PRESSURE",
+            "RESISTANCE",
+            "RCR",
+            "CORONARY",
+            "ClosedLoopRCR",
+            "ClosedLoopCoronaryLeft",
+            "ClosedLoopCoronaryRight",
+        ];
         if !known.contains(&boundary.bc_type.as_str()) {
             return Err(format!(
                 "{place}: the boundary condition `{name}` of type `{}` is not in `rcr-network` (known: {})",
@@ -172,71 +220,24 @@ impl Blocks {
                 self.resistance(&own, "R", name, R, node, end, true)?;
             }
             "RCR" => self.rcr(&own, name, &typed(&own, values)?, node)?,
+            "ClosedLoopRCR" => self.closed_rcr(&own, name, &typed(&own, values)?, node)?,
+            side @ ("ClosedLoopCoronaryLeft" | "ClosedLoopCoronaryRight") => {
+                let left = side.ends_with("Left");
+                self.closed_coronary(&own, name, &typed(&own, values)?, (node, left))?;
+            }
             _ => self.coronary(&own, name, typed(&own, values)?, node)?,
         }
         Ok(())
     }
 
-    /// A resistance that has to be above zero; the last of an outlet is what a study does not know.
-    #[allow(clippy::too_many_arguments)] // a place in the file and one in the network
-    fn resistance(
+    /// Adds the course of an input.
+    pub(super) fn course(
         &mut self,
         place: &str,
-        key: &str,
-        name: &str,
-        value: f64,
-        from: Node,
-        to: Node,
-        last: bool,
+        name: String,
+        times: Vec<f64>,
+        values: Vec<f64>,
     ) -> Result<(), String> {
-        positive(place, key, value)?;
-        let element = self.network.add(name, Kind::Resistance(value), from, to);
-        if last {
-            self.unknowns.push(Unknown { name: format!("R_{element}"), unit: RESISTANCE, value });
-            self.channels.push((format!("q_{element}"), FLOW));
-        }
-        Ok(())
-    }
-
-    fn rcr(&mut self, place: &str, name: &str, values: &Rcr, node: Node) -> Result<(), String> {
-        let &Rcr { Rp, C, Rd, Pd } = values;
-        positive(place, "Rd", Rd)?;
-        if Rp == 0.0 || C == 0.0 {
-            // The model's own element has all three.
-            let chamber = self.network.node(&format!("{name}_chamber"));
-            let series = Series { capacity: C, ..self.of(Rp, 0.0, 0.0) };
-            self.network.series(&format!("{name}_proximal"), series, node, chamber)?;
-            let end = self.network.constant(name, Pd);
-            return self.resistance(place, "Rd", name, Rd, chamber, end, true);
-        }
-        positive(place, "Rp", Rp)?;
-        positive(place, "C", C)?;
-        let kind = Kind::Rcr { proximal: Rp, compliance: C, distal: Rd, venous: Pd };
-        let element = self.network.add(name, kind, node, GROUND);
-        self.unknowns.push(Unknown { name: format!("Rd_{element}"), unit: RESISTANCE, value: Rd });
-        self.channels.push((format!("q_{element}"), FLOW));
-        Ok(())
-    }
-
-    fn coronary(&mut self, place: &str, name: &str, values: Coronary, node: Node) -> Result<(), String> {
-        let Coronary { Ra1, Ra2, Rv1, Ca, Cc, P_v, t, Pim } = values;
-        positive(place, "Ca", Ca)?;
-        positive(place, "Cc", Cc)?;
-        let arteries = self.network.node(&format!("{name}_arteries"));
-        let muscle = self.network.node(&format!("{name}_muscle"));
-        self.resistance(place, "Ra1", &format!("{name}_Ra1"), Ra1, node, arteries, false)?;
-        let kind = Kind::Capacitor { value: Ca, outside: None };
-        self.network.add(&format!("{name}_Ca"), kind, arteries, GROUND);
-        self.resistance(place, "Ra2", &format!("{name}_Ra2"), Ra2, arteries, muscle, false)?;
-        let input = self.network.names.take(&format!("{name}_Pim"));
-        let kind = Kind::Capacitor { value: Cc, outside: Some(input.clone()) };
-        self.network.add(&format!("{name}_Cc"), kind, muscle, GROUND);
-        let end = self.network.constant(name, P_v);
-        self.resistance(place, "Rv1", &format!("{name}_Rv1"), Rv1, muscle, end, true)?;
-        self.course(place, input, t, Pim)
-    }
-
-    fn course(&mut self, place: &str, name: String, times: Vec<f64>, values: Vec<f64>) -> Result<(), String> {
         let course = Samples { name, times, values };
         if let Some(fault) = course.fault() {
             return Err(format!("{place}: {fault}"));
@@ -246,23 +247,10 @@ impl Blocks {
     }
 }
 
-fn positive(place: &str, key: &str, value: f64) -> Result<(), String> {
+pub(super) fn positive(place: &str, key: &str, value: f64) -> Result<(), String> {
     if value > 0.0 && value.is_finite() {
         Ok(())
     } else {
         Err(format!("{place}.{key}: {value} is not above zero"))
     }
-}
-
-/// The largest flow that sources can bring together; nothing where a pressure drives the network.
-fn largest_flow(file: &File) -> Result<Option<f64>, String> {
-    let mut sum = 0.0;
-    for (i, boundary) in file.boundary_conditions.iter().enumerate() {
-        if boundary.bc_type == "FLOW" {
-            let place = format!("boundary_conditions[{i}].bc_values");
-            let Flow { Q, .. } = typed(&place, &boundary.bc_values)?;
-            sum += Q.iter().fold(0.0, |most: f64, q| most.max(q.abs()));
-        }
-    }
-    Ok((sum > 0.0).then_some(sum))
 }

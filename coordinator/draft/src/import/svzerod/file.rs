@@ -1,10 +1,17 @@
 //! An input file of svZeroDSolver as it is written, read strictly: a key that is not known here is refused with its place.
 //!
-//! Keys that begin with `_` are comments, as the program itself takes them. Next file to read: [`super::blocks`].
+//! Keys that begin with `_` are comments, as the program itself takes them. Next files to read: [`heart`] for chambers, valves and
+//! closed loops, then [`super::blocks`].
 
 #![allow(clippy::struct_field_names, non_snake_case)] // the file's own keys
 
+mod heart;
+
 use std::collections::BTreeMap;
+
+pub(super) use heart::{
+    Activation, Chamber, ClosedCoronary, ClosedLoop, ClosedRcr, Cosines, Heart, Twitch, Valve,
+};
 
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
@@ -23,11 +30,11 @@ pub(super) struct File {
     #[serde(default)]
     pub(super) junctions: Vec<Junction>,
     #[serde(default)]
-    pub(super) closed_loop_blocks: Vec<Value>,
+    pub(super) closed_loop_blocks: Vec<ClosedLoop>,
     #[serde(default)]
-    pub(super) valves: Vec<Value>,
+    pub(super) valves: Vec<Valve>,
     #[serde(default)]
-    pub(super) chambers: Vec<Value>,
+    pub(super) chambers: Vec<Chamber>,
     #[serde(default)]
     pub(super) external_solver_coupling_blocks: Vec<Value>,
     #[serde(default)]
@@ -45,8 +52,7 @@ pub(super) struct Simulation {
     pub(super) cardiac_period: Option<f64>,
     #[serde(default)]
     pub(super) coupled_simulation: bool,
-    #[serde(default = "yes")]
-    pub(super) steady_initial: bool,
+    pub(super) steady_initial: Option<bool>,
     #[serde(default)]
     pub(super) output_all_cycles: bool,
     #[serde(default, rename = "number_of_time_pts")]
@@ -80,8 +86,11 @@ pub(super) struct Simulation {
     _model_name: Option<Value>,
 }
 
-fn yes() -> bool {
-    true
+impl Simulation {
+    /// Whether a run starts from the steady state, as it does unless the file says otherwise.
+    pub(super) fn from_steady(&self) -> bool {
+        self.steady_initial.unwrap_or(true)
+    }
 }
 
 /// A boundary condition; what `bc_values` may hold follows from `bc_type`.

@@ -24,7 +24,7 @@ impl Blocks {
         }
         let name = &junction.junction_name;
         let centre = self.network.node(name);
-        let series = self.between(junction, (inlets.len(), outlets.len()), place)?;
+        let series = Self::between(junction, (inlets.len(), outlets.len()), place)?;
         for (i, block) in inlets.iter().chain(&outlets).enumerate() {
             let inlet = i < inlets.len();
             let node = match series[i] {
@@ -36,23 +36,14 @@ impl Blocks {
                     node
                 }
             };
-            // What flows into a junction leaves a vessel, or is a boundary condition at an inlet.
-            if self.ends.contains_key(block) {
-                self.join(block, if inlet { Side::Outlet } else { Side::Inlet }, node)?;
-            } else {
-                self.place(block, node, if inlet { Side::Inlet } else { Side::Outlet })?;
-            }
+            // What flows into a junction leaves a block.
+            self.attach(block, if inlet { Side::Outlet } else { Side::Inlet }, node)?;
         }
         Ok(())
     }
 
     /// What stands between the node of a junction and each of so many inlets and outlets, in their order.
-    fn between(
-        &self,
-        junction: &Junction,
-        n: (usize, usize),
-        place: &str,
-    ) -> Result<Vec<Option<Series>>, String> {
+    fn between(junction: &Junction, n: (usize, usize), place: &str) -> Result<Vec<Option<Series>>, String> {
         let none = || -> Result<(), String> {
             match &junction.junction_values {
                 None => Ok(()),
@@ -70,7 +61,7 @@ impl Blocks {
             "resistive_junction" => {
                 let Resistances { R } = typed(&own, values)?;
                 count(&own, "R", R.len(), n.0 + n.1)?;
-                Ok(R.into_iter().map(|resistance| Some(self.of(resistance, 0.0, 0.0))).collect())
+                Ok(R.into_iter().map(|resistance| Some(Self::of(resistance, 0.0, 0.0))).collect())
             }
             "BloodVesselJunction" => {
                 if n.0 != 1 {
@@ -84,7 +75,7 @@ impl Blocks {
                 count(&own, "L", L.len(), n.1)?;
                 count(&own, "stenosis_coefficient", stenosis_coefficient.len(), n.1)?;
                 let outlets = R_poiseuille.iter().zip(&L).zip(stenosis_coefficient);
-                let outlets = outlets.map(|((r, l), s)| Some(self.of(*r, s, *l)));
+                let outlets = outlets.map(|((r, l), s)| Some(Self::of(*r, s, *l)));
                 Ok(std::iter::once(None).chain(outlets).collect())
             }
             other => Err(format!(

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::network::{Element, GROUND, Kind, Network};
+use super::network::{Chamber, Element, GROUND, Kind, Network, Opening};
 
 /// The lines, in the order of the elements.
 pub(super) fn lines(network: &Network) -> String {
@@ -26,6 +26,19 @@ fn line(network: &Network, element: &Element) -> String {
         Kind::Capacitor { value, outside: Some(input) } => {
             ("C", format!(", value = {value:?}, input = \"{input}\""))
         }
+        Kind::Under { value, around, share } => {
+            let around = network.name(*around);
+            ("C", format!(", value = {value:?}, around = \"{around}\", share = {share:?}"))
+        }
+        Kind::Chamber(chamber) => ("chamber", chamber_values(chamber)),
+        Kind::Valve { open, closed, opening } => {
+            let opening = match opening {
+                Opening::Sharp => String::new(),
+                Opening::Over(drop) => format!(", smooth = {drop:?}"),
+                Opening::Steepness(steepness) => format!(", steepness = {steepness:?}"),
+            };
+            ("diode", format!(", open = {open:?}, closed = {closed:?}{opening}"))
+        }
         Kind::Inertance(value) => ("L", format!(", value = {value:?}")),
         Kind::Flow => ("flow", String::new()),
         Kind::Pressure => ("pressure", String::new()),
@@ -43,4 +56,17 @@ fn line(network: &Network, element: &Element) -> String {
     };
     let ends = end("from", element.from) + &end("to", element.to);
     format!("name = \"{}\", kind = \"{kind}\"{ends}{values}", element.name)
+}
+
+fn chamber_values(chamber: &Chamber) -> String {
+    let Chamber { active, passive, rest: [rest, rest_active], wall, input } = chamber;
+    let mut text = format!(", active = {active:?}, passive = {passive:?}, rest = {rest:?}");
+    if rest_active.to_bits() != rest.to_bits() {
+        // Writing to a text cannot fail.
+        let _ = write!(text, ", rest_active = {rest_active:?}");
+    }
+    if let Some([scale, rate]) = wall {
+        let _ = write!(text, ", wall = {scale:?}, stiffening = {rate:?}");
+    }
+    text + &format!(", input = \"{input}\"")
 }

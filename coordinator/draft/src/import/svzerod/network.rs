@@ -7,6 +7,8 @@
 use super::super::names::Names;
 use super::super::plan::Omission;
 
+pub(super) use super::kind::{Chamber, Kind, Opening};
+
 /// A node of the network: a position in the list of nodes.
 pub(super) type Node = usize;
 /// The node at zero pressure.
@@ -19,33 +21,6 @@ pub(super) struct Element {
     pub(super) kind: Kind,
     pub(super) from: Node,
     pub(super) to: Node,
-}
-
-/// What it is, with its values.
-#[derive(Clone, Debug)]
-pub(super) enum Kind {
-    Resistance(f64),
-    Loss {
-        linear: f64,
-        quadratic: f64,
-    },
-    /// `outside` is an input: the pressure around it.
-    Capacitor {
-        value: f64,
-        outside: Option<String>,
-    },
-    Inertance(f64),
-    /// The input of the element's name.
-    Flow,
-    /// The input of the element's name.
-    Pressure,
-    Constant(f64),
-    Rcr {
-        proximal: f64,
-        compliance: f64,
-        distal: f64,
-        venous: f64,
-    },
 }
 
 /// Times of one period in which a capacitor follows the pressure that a source prescribes, and the ringing of added elements
@@ -78,6 +53,12 @@ impl Network {
         self.nodes.push(self.names.take(wanted));
         self.same.push(self.nodes.len() - 1);
         self.nodes.len() - 1
+    }
+
+    /// The first element of a kind at a node.
+    pub(super) fn at(&self, node: Node, kind: impl Fn(&Kind) -> bool) -> Option<&Element> {
+        let root = self.root(node);
+        self.elements.iter().find(|element| self.root(element.from) == root && kind(&element.kind))
     }
 
     /// The first of the nodes that are one with this.
@@ -120,7 +101,7 @@ impl Network {
     /// A resistance, a stenosis and an inertance in series, with a capacitor to the ground between the first two and the last;
     /// what is zero is left out.
     pub(super) fn series(&mut self, name: &str, values: Series, from: Node, to: Node) -> Result<(), String> {
-        let Series { resistance, stenosis, capacity, inertance, largest_flow } = values;
+        let Series { resistance, stenosis, capacity, inertance } = values;
         for (what, value) in [("resistance", resistance), ("capacitance", capacity), ("inertance", inertance)]
         {
             if !(value >= 0.0 && value.is_finite()) {
@@ -139,9 +120,7 @@ impl Network {
             }
         };
         if stenosis > 0.0 {
-            let linear =
-                if resistance > 0.0 { resistance } else { 1e-6 * stenosis * largest_flow.unwrap_or(1.0) };
-            self.add(name, Kind::Loss { linear, quadratic: stenosis }, from, middle);
+            self.add(name, Kind::Loss { linear: resistance, quadratic: stenosis }, from, middle);
         } else if resistance > 0.0 {
             let element = self.add(name, Kind::Resistance(resistance), from, middle);
             if given < 0.0 {
@@ -174,8 +153,11 @@ impl Network {
         let prescribed: Vec<Node> = self
             .elements
             .iter()
-            .filter(|element| matches!(element.kind, Kind::Pressure | Kind::Constant(_)))
-            .map(|element| self.root(element.to))
+            .filter_map(|element| match element.kind {
+                Kind::Pressure | Kind::Constant(_) => Some(self.root(element.to)),
+                Kind::Chamber(_) => Some(self.root(element.from)),
+                _ => None,
+            })
             .collect();
         for at in 0..self.elements.len() {
             let Element { name, kind, from, .. } = self.elements[at].clone();
@@ -187,7 +169,7 @@ impl Network {
             self.elements[at].from = node;
             self.add(&format!("{name}_entry"), Kind::Resistance(FAST * period / value), from, node);
             self.notes.push(format!(
-                "a source prescribes the pressure on the capacitor `{name}`: a small resistance `{name}_entry` stands before it"
+                "a source or a chamber prescribes the pressure on the capacitor `{name}`: a small resistance `{name}_entry` stands before it"
             ));
         }
     }
@@ -259,6 +241,4 @@ pub(super) struct Series {
     pub(super) stenosis: f64,
     pub(super) capacity: f64,
     pub(super) inertance: f64,
-    /// The largest flow that sources bring, where they are flows.
-    pub(super) largest_flow: Option<f64>,
 }
