@@ -228,3 +228,24 @@ fn an_observer_may_not_rest_on_a_held_out_channel() {
     let told = problem(&held_out, &file);
     assert!(told.starts_with("study.toml:21: without the channels that are held out"), "{told}");
 }
+
+/// Two observers of a tube whose outlet pressure is measured too.
+fn side_by_side(first: (&str, f64), second: (&str, f64)) -> String {
+    let pressure = "noise = 0.01 }, { column = \"pressure\", output = \"pressure\", noise = 1000 }";
+    let of = |(kind, gain): (&str, f64)| format!("[[observer]]\nkind = \"{kind}\"\ngain = {gain}\n");
+    TUBE.replace("noise = 0.01 }", pressure) + &of(first) + &of(second)
+}
+
+#[test]
+fn observers_that_correct_states_of_their_own_go_together_and_two_of_one_state_are_refused() {
+    let of = truth(Twin::default());
+    let file = [("wall.csv", columns(&of, |_| true))];
+    let told = problem(&side_by_side(("sdf", 20.0), ("nudging", 5.0)), &file);
+    assert!(told.contains("the observers `sdf` and `nudging` both correct the state `eta[0]`"), "{told}");
+    let told = problem(&side_by_side(("sdf", 20.0), ("windkessel", 0.0)), &file);
+    assert!(told.contains("an observer of a list has a kind and a gain above zero"), "{told}");
+    let done = Case::new(&side_by_side(("sdf", 20.0), ("windkessel", 5.0)), &file).run();
+    let observer = done.summary.observer.unwrap();
+    assert_eq!(observer.kind, "sdf + windkessel");
+    assert!(observer.innovation_rms_with.is_finite());
+}

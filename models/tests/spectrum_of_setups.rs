@@ -92,9 +92,9 @@ fn a_setup_lists_why_it_cannot_host_an_observer() {
     let linearised =
         LinearisedSetup::new(setup.model().expect("a model"), &setup, &[], NATIVE).expect("linear");
     let observers = linearised.observers();
-    assert!(observers.contains(&("nudging", None)));
+    assert!(observers.contains(&("nudging".to_owned(), None)));
     let why =
-        observers.iter().find(|(kind, _)| *kind == "sdf").and_then(|(_, why)| why.as_ref()).expect("refused");
+        observers.iter().find(|(kind, _)| kind == "sdf").and_then(|(_, why)| why.as_ref()).expect("refused");
     assert!(why.to_string().contains("models that can host it"), "{why}");
     let found = linearised.examine("nudging", &[0.0, 1.0], 5, Some(Decay::new(10.0, 0.1).expect("a decay")));
     let found = found.expect("hosted");

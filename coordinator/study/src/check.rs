@@ -21,6 +21,7 @@ mod settings;
 mod solver;
 mod spectrum;
 mod survey;
+mod together;
 mod units;
 
 use std::path::Path;
@@ -142,7 +143,7 @@ fn check(path: &Path, text: &str, solver_host: &SolverHost) -> Result<Study, Stu
     let estimator = estimator(&source, &file.estimator, described);
     let fleet = fleet(&source, &file.fleet);
     let explain = explain::explain(&source, &file);
-    let spectrum = spectrum::spectrum(&source, &file.spectrum);
+    let spectrum = spectrum::spectrum(&source, &file.spectrum, &file.observer);
     let observer = settings::observer(&source, &file.observer, described);
     let model = model::model(&source, &file, solver.as_ref());
     // Everything that follows is judged against the model.
@@ -168,7 +169,8 @@ fn check(path: &Path, text: &str, solver_host: &SolverHost) -> Result<Study, Stu
     warnings.extend(units::warnings(&file, &model, &records));
     let theta = expand::theta(&parameters, &records);
     let described = (model.setup, model.spec);
-    Ok(Study {
+    let observers = file.observer.clone();
+    let study = Study {
         candidates: Arc::new(model.candidates),
         parameters,
         theta,
@@ -179,7 +181,10 @@ fn check(path: &Path, text: &str, solver_host: &SolverHost) -> Result<Study, Stu
         runs_here: solver.is_none_or(|known| known.is_here),
         warnings,
         ..study_of(path, &source, file, described, (fleet, estimator), solver_host)
-    })
+    };
+    together::check(&source, &observers, &study);
+    source.verdict()?;
+    Ok(study)
 }
 
 /// A study of a model, without parameters, records and what commands ask of it.

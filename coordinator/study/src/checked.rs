@@ -222,7 +222,7 @@ pub struct SpectrumChoice {
 impl Study {
     /// Whether no observer corrects the state during a run.
     pub fn observer_is_off(&self) -> bool {
-        matches!(self.setup.observer.kind.as_str(), "" | "none") || self.setup.observer.gain <= 0.0
+        self.setup.observer.is_off()
     }
 
     /// Whether a parameter moves from one analysis to the next.

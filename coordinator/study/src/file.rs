@@ -145,13 +145,22 @@ pub(super) struct ProcessSection {
     pub(super) walk: Option<Spanned<f64>>,
 }
 
-/// `[observer]`.
-#[derive(Debug)]
+/// `[observer]`, or the first of a list `[[observer]]`.
+#[derive(Clone, Debug)]
 pub(super) struct ObserverSection {
+    /// The others of the list.
+    pub(super) beside: Vec<ObserverSection>,
     pub(super) kind: Spanned<String>,
     pub(super) gain: Spanned<f64>,
     /// Output → state.
     pub(super) corrects: Named<String>,
+}
+
+impl ObserverSection {
+    /// This observer and the others of its list.
+    pub(super) fn all(&self) -> impl Iterator<Item = &Self> {
+        std::iter::once(self).chain(&self.beside)
+    }
 }
 
 /// `[[records]]`.

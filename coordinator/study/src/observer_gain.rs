@@ -17,9 +17,9 @@ use super::{RunError, Study};
 /// The root mean square innovations over the training spans, in noise standard deviations.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ObserverFit {
-    /// The observer.
+    /// The observer; of several their kinds joined by ` + `.
     pub kind: String,
-    /// Its gain, in 1/time unit; that of `windkessel` counts in 1/(R_d C) and has no unit.
+    /// Its gain, of several that of the first, in 1/time unit; that of `windkessel` counts in 1/(R_d C) and has no unit.
     pub gain: f64,
     /// With the observer: every observation predicted from a state corrected by the earlier ones.
     pub innovation_rms_with: f64,
@@ -86,7 +86,7 @@ pub(crate) fn compare(
         courses.push(course(study, *record, window, &prediction.outputs, free, &mut sums));
     }
     let fit = ObserverFit {
-        kind: study.setup.observer.kind.clone(),
+        kind: study.setup.observer.name(),
         gain: study.setup.observer.gain,
         innovation_rms_with: sums.with(),
         innovation_rms_without: sums.without(),
@@ -102,7 +102,8 @@ fn failed(study: &Study, record: usize, error: &Failure) -> String {
     format!(
         "with the estimated parameters the model fails under the observer `{}` on record `{}` ({error}): what the observer \
          does for the state is not known. Lower its gain.",
-        study.setup.observer.kind, study.records[record].name
+        study.setup.observer.name(),
+        study.records[record].name
     )
 }
 
@@ -110,7 +111,7 @@ fn endless(study: &Study) -> String {
     format!(
         "the innovations under the observer `{}` are no finite numbers: what it does for the state is not known. Lower its \
          gain.",
-        study.setup.observer.kind
+        study.setup.observer.name()
     )
 }
 

@@ -121,8 +121,8 @@ fn kinds(
     if named.is_empty() {
         for (kind, why) in linearised.observers() {
             match why {
-                None => kinds.push(kind.to_owned()),
-                Some(why) => refused.push((kind.to_owned(), why.to_string())),
+                None => kinds.push(kind),
+                Some(why) => refused.push((kind, why.to_string())),
             }
         }
     }

@@ -13,6 +13,7 @@ mod none;
 mod nudging;
 mod sdf;
 mod sdf_displacement;
+mod together;
 mod wall;
 mod windkessel;
 
@@ -21,6 +22,9 @@ use nalgebra::DMatrix;
 use crate::SetupError;
 use crate::setup::ObserverDef;
 use crate::{Model, NativeModels, Spec, nearest};
+use together::Together;
+
+pub use together::shared_state;
 
 /// What an observer corrects with: one observation time.
 #[derive(Clone, Copy)]
@@ -103,11 +107,15 @@ pub fn kinds() -> Vec<Kind> {
     ]
 }
 
-/// Makes the observer that the definition names; an empty kind is `none`.
+/// Makes the observer that the definition names, with those beside it; an empty kind is `none`.
 ///
 /// # Errors
-/// When the kind is unknown, the gain is not a finite number ≥ 0, or the observer finds nothing to correct.
+/// When a kind is unknown, a gain is not a finite number ≥ 0, or an observer finds nothing to correct.
 pub fn build(def: &ObserverDef, wiring: Wiring<'_>) -> Result<Box<dyn Observer>, SetupError> {
+    if def.beside.is_empty() { one(def, wiring) } else { Ok(Box::new(Together::new(def, wiring)?)) }
+}
+
+fn one(def: &ObserverDef, wiring: Wiring<'_>) -> Result<Box<dyn Observer>, SetupError> {
     let wanted = if def.kind.is_empty() { none::KIND.kind } else { def.kind.as_str() };
     let kinds = kinds();
     let Some(kind) = kinds.iter().find(|k| k.kind == wanted) else {

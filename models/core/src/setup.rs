@@ -46,6 +46,40 @@ pub struct ObserverDef {
     pub gain: f64,
     /// Output → state that it corrects, where the model does not say so itself.
     pub corrects: BTreeMap<String, String>,
+    /// Observers that correct other states in the same run.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub beside: Vec<ObserverDef>,
+}
+
+impl ObserverDef {
+    /// This observer and those beside it.
+    pub fn all(&self) -> impl Iterator<Item = &Self> {
+        std::iter::once(self).chain(&self.beside)
+    }
+
+    /// Its kind, joined with those beside it: `sdf + windkessel`.
+    pub fn name(&self) -> String {
+        self.all().map(|def| def.kind.as_str()).collect::<Vec<_>>().join(" + ")
+    }
+
+    /// Whether none of them corrects anything.
+    pub fn is_off(&self) -> bool {
+        self.all().all(|def| matches!(def.kind.as_str(), "" | "none") || def.gain <= 0.0)
+    }
+
+    /// The same at another gain, those beside it in proportion.
+    #[must_use]
+    pub fn at(&self, gain: f64) -> Self {
+        let share = if self.gain > 0.0 { gain / self.gain } else { 0.0 };
+        let beside = self.beside.iter().map(|def| Self { gain: share * def.gain, ..def.clone() });
+        Self { gain, beside: beside.collect(), ..self.clone() }
+    }
+
+    /// Without those beside it.
+    #[must_use]
+    pub fn alone(&self) -> Self {
+        Self { beside: Vec::new(), ..self.clone() }
+    }
 }
 
 /// Everything that stays the same over the jobs of one fit.

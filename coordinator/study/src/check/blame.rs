@@ -34,7 +34,7 @@ fn names(file: &StudyFile) -> Vec<&Spanned<String>> {
     names.extend(equations().flat_map(|e| &e.replaceable));
     names.extend(file.effects.iter().filter_map(|e| e.built_in.as_ref()));
     names.extend(file.effects.iter().flat_map(|e| &e.adds).map(|(to, _)| to));
-    names.extend(file.observer.corrects.iter().flat_map(|(output, state)| [output, state]));
+    names.extend(file.observer.all().flat_map(|o| &o.corrects).flat_map(|(output, state)| [output, state]));
     names.extend(file.effects.iter().map(|e| &e.name));
     names.extend(file.effects.iter().flat_map(|e| &e.parameters).map(|p| &p.name));
     names.extend(file.effects.iter().flat_map(|e| &e.states).map(|s| &s.name));

@@ -5,22 +5,27 @@
 
 use starlings_models::catalogue::NATIVE;
 use starlings_models::observer::{self, Observer, Wiring};
-use starlings_models::{BuildSetup, Model, SOLVER, Setup, SetupError, Spec};
+use starlings_models::{BuildSetup, Model, ObserverDef, SOLVER, Setup, SetupError, Spec};
 
 use super::blame::blame;
 use crate::checked::Record;
-use crate::file::StudyFile;
+use crate::file::{ObserverSection, StudyFile};
 use crate::plan::training_rows;
 use crate::problem::Source;
 
 /// Reports an observer that lacks what it needs, or whose gain makes its correction unstable.
 pub(crate) fn check(source: &Source, file: &StudyFile, setup: &Setup, records: &[Record]) {
     // What an observer inside a solver needs, and which gains are stable there, is not known here.
-    if matches!(setup.observer.kind.as_str(), "" | "none") || setup.model.kind == SOLVER {
+    if setup.model.kind == SOLVER {
         return;
     }
-    if let Some(built) = built(source, file, setup, records) {
-        check_gain(source, file, records, &built);
+    for (section, def) in file.observer.all().zip(setup.observer.all()) {
+        if matches!(def.kind.as_str(), "" | "none") {
+            continue;
+        }
+        if let Some(built) = built(source, (file, section), (setup, def), records) {
+            check_gain(source, (file, section), records, &built);
+        }
     }
 }
 
@@ -32,7 +37,12 @@ struct Built {
 }
 
 /// The observer as it works in the fit, where held-out channels are never seen; `None` when a problem was reported.
-fn built(source: &Source, file: &StudyFile, setup: &Setup, records: &[Record]) -> Option<Built> {
+fn built(
+    source: &Source,
+    (file, section): (&StudyFile, &ObserverSection),
+    (setup, def): (&Setup, &ObserverDef),
+    records: &[Record],
+) -> Option<Built> {
     let seen = |output: &String| {
         let channels = records.iter().filter(|r| r.is_trained()).flat_map(|r| &r.channels);
         channels.into_iter().any(|c| c.output == *output && !c.held_out)
@@ -42,7 +52,7 @@ fn built(source: &Source, file: &StudyFile, setup: &Setup, records: &[Record]) -
         let (model, spec) = (setup.model()?, setup.spec()?);
         let theta = constants(setup, &spec);
         let wiring = Wiring { spec: &spec, outputs, model: &*model, theta: &theta, native: NATIVE };
-        let observer = observer::build(&setup.observer, wiring)?;
+        let observer = observer::build(&def.alone(), wiring)?;
         Ok(Built { observer, model, theta })
     };
     match (build(&fitted), build(&setup.outputs)) {
@@ -56,7 +66,7 @@ fn built(source: &Source, file: &StudyFile, setup: &Setup, records: &[Record]) -
                 "without the channels that are held out, the observer has not what it needs: {error}"
             );
             source.report_with(
-                file.observer.kind.span(),
+                section.kind.span(),
                 message,
                 "remove the channels that it needs from `hold_out_channels`, or choose another observer",
             );
@@ -76,8 +86,13 @@ fn constants(setup: &Setup, spec: &Spec) -> Vec<f64> {
 }
 
 /// A correction in steps is stable up to a gain that depends on the time between observations.
-fn check_gain(source: &Source, file: &StudyFile, records: &[Record], built: &Built) {
-    let gain = *file.observer.gain.get_ref();
+fn check_gain(
+    source: &Source,
+    (file, section): (&StudyFile, &ObserverSection),
+    records: &[Record],
+    built: &Built,
+) {
+    let gain = *section.gain.get_ref();
     let spacings = records.iter().filter(|r| r.is_trained()).filter_map(|r| Some((r, spacing(r)?)));
     let Some((record, dt)) = spacings.max_by(|a, b| a.1.total_cmp(&b.1)) else { return };
     let Built { observer, model, theta } = built;
@@ -86,10 +101,10 @@ fn check_gain(source: &Source, file: &StudyFile, records: &[Record], built: &Bui
     };
     let unit = &file.study.time_unit;
     source.report_with(
-        file.observer.gain.span(),
+        section.gain.span(),
         format!(
             "a gain of {gain} is unstable: the observer `{}` corrects in steps, and record `{}` is observed {dt:.4} {unit} apart",
-            file.observer.kind.get_ref(),
+            section.kind.get_ref(),
             record.name
         ),
         format!("the largest stable gain is {largest:.4} 1/{unit}: lower the gain, or use data observed more often"),

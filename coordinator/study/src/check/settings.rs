@@ -10,12 +10,30 @@ use crate::checked::{EstimatorChoice, FleetChoice};
 use crate::file::{EstimatorSection, FleetSection, ObserverSection};
 use crate::problem::Source;
 
-/// `[observer]`.
+/// `[observer]`, or a list of them.
 pub(crate) fn observer(
     source: &Source,
     section: &ObserverSection,
     solver: Option<&Description>,
 ) -> ObserverDef {
+    for other in &section.beside {
+        if let Some(solver) = solver {
+            let message = format!("the solver `{}` hosts one observer at a time", solver.name);
+            source.report_with(other.kind.span(), message, "write one `[observer]`");
+        }
+    }
+    if !section.beside.is_empty() {
+        let idle = |s: &&ObserverSection| s.kind.get_ref() == "none" || *s.gain.get_ref() <= 0.0;
+        for one in section.all().filter(idle) {
+            let message = "an observer of a list has a kind and a gain above zero";
+            source.report_with(one.kind.span(), message, "remove it, or give both");
+        }
+    }
+    let beside = section.beside.iter().map(|other| one_observer(source, other, solver)).collect();
+    ObserverDef { beside, ..one_observer(source, section, solver) }
+}
+
+fn one_observer(source: &Source, section: &ObserverSection, solver: Option<&Description>) -> ObserverDef {
     let kind = section.kind.get_ref();
     let known = || starlings_models::observer::kinds().iter().map(|k| k.kind.to_owned()).collect();
     let hosted = |solver: &Description| {
@@ -35,7 +53,7 @@ pub(crate) fn observer(
         source.report_with(section.gain.span(), message, "0 switches the observer off");
     }
     let corrects = section.corrects.iter().map(|(o, s)| (o.get_ref().clone(), s.get_ref().clone())).collect();
-    ObserverDef { kind: kind.clone(), gain, corrects }
+    ObserverDef { kind: kind.clone(), gain, corrects, ..ObserverDef::default() }
 }
 
 /// `[estimator]`. A solver that cannot restart from a state has its records run as a whole.

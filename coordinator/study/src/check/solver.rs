@@ -243,7 +243,7 @@ pub(crate) fn check(source: &Source, file: &StudyFile, known: Option<&DescribedS
         return Vec::new();
     };
     let name = &description.name;
-    if let Some((output, _)) = file.observer.corrects.first() {
+    if let Some((output, _)) = file.observer.all().find_map(|o| o.corrects.first()) {
         let message =
             format!("what an observer of the solver `{name}` corrects is the solver's own business");
         source.report_with(output.span(), message, "remove `corrects`");

@@ -5,12 +5,19 @@
 use starlings_models::spectrum::Decay;
 
 use crate::checked::SpectrumChoice;
+use crate::file::ObserverSection;
 use crate::file::spectrum::{DecaySection, SpectrumSection};
 use crate::problem::Source;
 
 /// `[spectrum]`.
-pub(super) fn spectrum(source: &Source, section: &SpectrumSection) -> SpectrumChoice {
-    let kinds: Vec<String> = starlings_models::observer::kinds().iter().map(|k| k.kind.to_owned()).collect();
+pub(super) fn spectrum(source: &Source, section: &SpectrumSection, own: &ObserverSection) -> SpectrumChoice {
+    let mut kinds: Vec<String> =
+        starlings_models::observer::kinds().iter().map(|k| k.kind.to_owned()).collect();
+    // Several observers of the study are one entry, under their joined name.
+    let own: Vec<&str> = own.all().map(|one| one.kind.get_ref().as_str()).collect();
+    if own.len() > 1 {
+        kinds.push(own.join(" + "));
+    }
     for name in section.observers.iter().filter(|name| !kinds.contains(name.get_ref())) {
         source.report_unknown(name.span(), format!("unknown observer `{}`", name.get_ref()), &kinds);
     }

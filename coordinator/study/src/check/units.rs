@@ -55,7 +55,7 @@ fn corrections(file: &StudyFile, model: &CheckedModel) -> Vec<String> {
             )
         })
     };
-    file.observer.corrects.iter().filter_map(warn).collect()
+    file.observer.all().flat_map(|o| &o.corrects).filter_map(warn).collect()
 }
 
 /// A label beside the model's for the same quantity.

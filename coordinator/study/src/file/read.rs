@@ -118,17 +118,27 @@ fn process(parameter: &Table<'_>) -> ProcessSection {
     ProcessSection { forgetting: t.number("forgetting"), walk: t.number("walk") }
 }
 
+/// `[observer]`, or a list `[[observer]]`.
 fn observer(source: &Source, root: &Table<'_>) -> ObserverSection {
-    let none = Spanned::new(0..0, "none".to_owned());
-    let zero = Spanned::new(0..0, 0.0);
-    let Some(t) = root.table("observer", "[observer]", &["kind", "gain", "corrects"]) else {
-        return ObserverSection { kind: none, gain: zero, corrects: Vec::new() };
+    let keys = ["kind", "gain", "corrects"];
+    let is_list = root.get("observer").is_some_and(|node| node.get_ref().as_array().is_some());
+    let tables: Vec<Table<'_>> = if is_list {
+        root.tables("observer", "[[observer]]", &keys)
+    } else {
+        root.table("observer", "[observer]", &keys).into_iter().collect()
     };
-    ObserverSection {
-        kind: t.text("kind").unwrap_or(none),
-        gain: t.number("gain").unwrap_or(zero),
+    let mut sections = tables.iter().map(|t| ObserverSection {
+        kind: t.text("kind").unwrap_or_else(|| Spanned::new(t.span.clone(), "none".to_owned())),
+        gain: t.number("gain").unwrap_or_else(|| Spanned::new(t.span.clone(), 0.0)),
         corrects: named_texts(source, &t.free_entries("corrects")),
-    }
+        beside: Vec::new(),
+    });
+    let Some(first) = sections.next() else {
+        let (kind, gain) = (Spanned::new(0..0, "none".to_owned()), Spanned::new(0..0, 0.0));
+        return ObserverSection { kind, gain, corrects: Vec::new(), beside: Vec::new() };
+    };
+    let beside = sections.collect();
+    ObserverSection { beside, ..first }
 }
 
 fn records(source: &Source, root: &Table<'_>) -> Vec<RecordSection> {
