@@ -69,7 +69,7 @@ fn words(found: &Comparison) -> String {
     let mut said = format!("{}\n", found.verdict());
     let mut section = |title: &str, rows: Vec<Vec<String>>| {
         if rows.len() > 1 {
-            said += &format!("\n{title}\n{}", table(&rows, false));
+            said.extend(["\n", title, "\n", &table(&rows, false)]);
         }
     };
     let runs = found

@@ -16,7 +16,7 @@ fn a_name_is_withheld_while_a_held_out_channel_fails_and_what_could_not_be_tried
         [(25.0, 25.0, "biomass"), (25.0, 25.0, "substrate"), (15.0, 10.5, "product"), (25.0, 17.5, "biomass")]
     {
         let study = reactor(NOISE, train, held_out, false);
-        let study = study.replace("[explain]", "[explain]\nwithout = [\"generic\"]");
+        let study = study.replace("[explain]", "[explain]\nwithout = [\"generic\", \"proposals\"]");
         let found = explained(&Case::new(&study, &[("batch.csv", recorded(NOISE, span, 0.05))])).unwrap();
         let said = &found.headline;
         assert_eq!(found.verdict, Verdict::Unexplained, "{held_out}: {said}");
