@@ -9,8 +9,6 @@ use crate::names::Names;
 
 pub(super) use super::kind::{Chamber, Kind, Opening};
 
-pub(super) use super::kind::{Chamber, Kind, Opening};
-
 /// A node of the network: a position in the list of nodes.
 pub(super) type Node = usize;
 /// The node at zero pressure.
