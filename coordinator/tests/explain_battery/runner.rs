@@ -113,7 +113,10 @@ fn judged(base: Result, found: &Explanation, draw: &Draw, world: &World<'_>, noi
         false_alarm: found.false_alarm.rate,
         ..base
     };
-    if !found.effects.is_empty() && found.replaced.is_empty() {
+    // A proposal is no effect of the world, unless it has the form of the truth.
+    let is_known = |name: &str| world.effects.iter().any(|effect| effect.name == name);
+    let is_of_world = found.effects.iter().all(|effect| is_known(&effect.name));
+    if !found.effects.is_empty() && found.replaced.is_empty() && is_of_world {
         result.rival = rival(found, draw, world, noise);
     }
     if result.outcome == Outcome::Right {

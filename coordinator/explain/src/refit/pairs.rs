@@ -10,6 +10,7 @@ use super::search::{Searcher, largest_of_each};
 use crate::error::ExplainError;
 use crate::fit::drive::drive_rounds;
 use crate::fit::fitted_variant::FittedVariant;
+use crate::fit::kind::Kind;
 use crate::fit::model_variant::{AddedEffect, ModelVariant};
 use crate::judge::contribution::SECOND_SHARE;
 use crate::judge::effective_noise::inflation;
@@ -125,10 +126,16 @@ impl<'c> Searcher<'_, '_, 'c> {
     }
 
     /// What each candidate does at the model as it is, at the best point of its grid. As many as the memory holds, those that gain
-    /// most first; of those that do the same the likeliest before any data.
+    /// most first; of those that do the same the likeliest before any data. An instrument's error, which can imitate almost anything, is
+    /// none beside a variant that passes the gates.
     fn members(&mut self, found: &SearchResult<'c>) -> Result<Vec<Member>, ExplainError> {
         let optimum = found.base.optimum()?;
-        let usable = found.screening.iter().filter(|h| h.failure.is_none() && !h.is_imitated());
+        let kind = |h: &ScreeningResult| self.candidates[h.candidate].kind;
+        let all = found.passing().is_empty();
+        let is_usable = |h: &&ScreeningResult| {
+            h.failure.is_none() && !h.is_imitated() && (all || kind(h) != Kind::Instrument)
+        };
+        let usable = found.screening.iter().filter(is_usable);
         let mut best = largest_of_each(usable, |h| h.score.gain);
         best.truncate(self.cache.series_held().max(2));
         let mut members: Vec<Member> = Vec::with_capacity(best.len());

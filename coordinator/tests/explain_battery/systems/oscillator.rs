@@ -67,14 +67,14 @@ const UNLISTED: &str = r#"
 [[effects]]
 name = "square-times:v:x:v"
 says = "Damping that grows with the square of the deflection."
-adds = [ { to = "v", term = "-b_deflection*x^2*v" } ]
-parameters = [ { name = "b_deflection", range = [0, 50] } ]
+adds = [ { to = "v", term = "b_deflection*x^2*v" } ]
+parameters = [ { name = "b_deflection", range = [-50, 0] } ]
 
 [[effects]]
 name = "cube:v:v"
 says = "Damping with the cube of the velocity."
-adds = [ { to = "v", term = "-b_cube*v^3" } ]
-parameters = [ { name = "b_cube", range = [0, 50] } ]
+adds = [ { to = "v", term = "b_cube*v^3" } ]
+parameters = [ { name = "b_cube", range = [-50, 0] } ]
 "#;
 
 /// A force of several tones, so that the amplitude wanders.

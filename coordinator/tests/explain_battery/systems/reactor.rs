@@ -57,14 +57,14 @@ const UNLISTED: &str = r#"
 [[effects]]
 name = "square-times:X:P:X"
 says = "A loss of biomass with the square of the product."
-adds = [ { to = "X", term = "-b_poison*P^2*X" } ]
-parameters = [ { name = "b_poison", range = [0, 50] } ]
+adds = [ { to = "X", term = "b_poison*P^2*X" } ]
+parameters = [ { name = "b_poison", range = [-50, 0] } ]
 
 [[effects]]
 name = "product:S:X:P"
 says = "A loss of substrate with biomass times product."
-adds = [ { to = "S", term = "-b_by*X*P" } ]
-parameters = [ { name = "b_by", range = [0, 50] } ]
+adds = [ { to = "S", term = "b_by*X*P" } ]
+parameters = [ { name = "b_by", range = [-50, 0] } ]
 "#;
 
 /// A fed reactor.
