@@ -4,8 +4,6 @@
 //! what it leaves beyond chance. Otherwise the verdict is a tie, or unexplained with the variant that came nearest. Next file
 //! to read: [`crate::tell::summary`].
 
-use std::cmp::Ordering;
-
 use starlings_estimators::effective_sample_size;
 use starlings_models::equations::{Expression, Slot};
 
@@ -23,9 +21,6 @@ use serde::{Deserialize, Serialize};
 
 /// A rival is tied within this difference in χ², in units of the effective noise.
 const MARGIN: f64 = 6.0;
-/// Difference in χ² up to which the data support two rivals equally, in the same units: odds of e to 1 (Kass and Raftery 1995, "not worth
-/// more than a bare mention").
-const EQUAL: f64 = 2.0;
 /// Correlation of two influences above which no refit can tell their candidates apart.
 pub(crate) const ALIKE: f64 = 0.995;
 /// A rival is tied where the difference in χ² is less than so many of its standard deviations.
@@ -118,15 +113,11 @@ pub(crate) fn decide(
     Ok(Decision { verdict, best: Some(best), checked: Some(checked), tied, rivals, synonyms, because })
 }
 
-/// What is told of a class: the likeliest kind before any data, then what the data support best, then the simplest. What was the best
-/// takes its place among the rivals.
+/// What is told of a class: the likeliest before any data, then the simplest. What was the best takes its place among the rivals.
 fn shown(found: &SearchResult<'_>, mut best: usize, rivals: &mut [usize]) -> usize {
     for rival in rivals {
-        let [other, told] = [*rival, best].map(|i| &found.judged[i]);
-        let apart = (told.rank() - other.rank()) / told.inflation;
-        let by_support = if apart.abs() < EQUAL { Ordering::Equal } else { apart.total_cmp(&0.0) };
-        let simpler = || complexity(other).cmp(&complexity(told));
-        if other.kinds().cmp(&told.kinds()).then(by_support).then_with(simpler).is_lt() {
+        let key = |i: usize| (found.judged[i].kinds(), complexity(&found.judged[i]));
+        if key(*rival) < key(best) {
             std::mem::swap(rival, &mut best);
         }
     }
