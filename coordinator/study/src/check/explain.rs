@@ -30,6 +30,9 @@ pub(crate) fn explain(source: &Source, file: &StudyFile) -> ExplainChoice {
     }
 }
 
+/// The family of the terms that `starlings explain` makes from the data, of which none is known before.
+const PROPOSALS: &str = "proposals";
+
 /// What is named must be an effect described in the study, a built-in effect for its model or a family of these.
 pub(crate) fn check_names(source: &Source, file: &StudyFile, model: &ModelDef) {
     let section = &file.explain;
@@ -42,6 +45,7 @@ pub(crate) fn check_names(source: &Source, file: &StudyFile, model: &ModelDef) {
     let mut known: Vec<String> = library(&spec).into_iter().map(|effect| effect.name).collect();
     known.extend(file.effects.iter().map(|effect| effect.name.get_ref().clone()));
     known.extend(FAMILIES.iter().map(|family| family.name.to_owned()));
+    known.push(PROPOSALS.to_owned());
     known.sort();
     known.dedup();
     for name in section.without.iter().chain(&section.only).filter(|name| !known.contains(name.get_ref())) {
