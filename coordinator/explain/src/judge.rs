@@ -49,9 +49,11 @@ mod tests {
     fn the_page_lists_every_number_of_the_decision_with_its_value() {
         let of = Path::new(env!("CARGO_MANIFEST_DIR"));
         let mut code = BTreeSet::new();
-        numbers(&of.join("src/judge"), "judge/", &mut code);
+        numbers(&of.join("src/judge"), "coordinator/explain/src/judge/", &mut code);
         let page = std::fs::read_to_string(of.join("../../docs/explain.md")).unwrap();
-        let rows = page.lines().filter(|line| line.starts_with("| `") && line.contains("` | `judge/"));
+        let rows = page
+            .lines()
+            .filter(|line| line.starts_with("| `") && line.contains("` | `coordinator/explain/src/judge/"));
         let listed: BTreeSet<String> = rows
             .map(|row| row.trim_start_matches("| ").split(" | ").take(3).collect::<Vec<_>>().join(" | "))
             .collect();
