@@ -9,7 +9,8 @@ use crate::integrate::Tolerance;
 use crate::integrate::system::System;
 use crate::limits::Limits;
 
-/// Distance from the surface at which the two sides' rates are taken, in tolerances: beyond rounding, below notice.
+/// Distance from the surface at which the two sides' rates are taken, and again twice as far, in tolerances: beyond rounding. The
+/// rates at the surface are extrapolated from both, since a state may stay on it for as long as a run takes.
 const OFFSET: f64 = 100.0;
 /// Distance from the surface up to which the state is on it, in tolerances.
 const NEAR: f64 = 10.0;
@@ -36,8 +37,10 @@ pub(super) struct Surface<'a> {
     foot: f64,
     /// From the state to the points at which they are taken, in normals.
     shifts: [f64; 2],
-    /// Rates on the positive and the negative side.
+    /// Rates on the positive and the negative side, at the surface.
     rates: [Vec<f64>; 2],
+    /// Rates twice as far from it.
+    farther: Vec<f64>,
 }
 
 impl<'a> Surface<'a> {
@@ -55,6 +58,7 @@ impl<'a> Surface<'a> {
             foot: 0.0,
             shifts: [0.0; 2],
             rates: [zeros(), zeros()],
+            farther: zeros(),
             inner,
         }
     }
@@ -90,17 +94,22 @@ impl<'a> Surface<'a> {
         for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
             // From here to the surface, and from there to the side.
             self.shifts[side] = sign * share + self.foot;
-            self.move_to(side, x);
+            self.move_by(self.shifts[side], x);
             self.inner.rhs(t, &self.moved, &mut self.rates[side]);
+            self.move_by(self.shifts[side] + sign * share, x);
+            self.inner.rhs(t, &self.moved, &mut self.farther);
+            for (rate, farther) in self.rates[side].iter_mut().zip(&self.farther) {
+                *rate = if farther.is_finite() { 2.0 * *rate - farther } else { *rate };
+            }
             growth[side] += self.normal.iter().zip(&self.rates[side]).map(|(a, b)| a * b).sum::<f64>();
         }
         Some(growth)
     }
 
-    /// Goes to the point at which the rate of one side is taken.
-    fn move_to(&mut self, side: usize, x: &[f64]) {
+    /// Goes to a point beside the state, so many normals away.
+    fn move_by(&mut self, shift: f64, x: &[f64]) {
         for ((moved, x), normal) in self.moved.iter_mut().zip(x).zip(&self.normal) {
-            *moved = x + self.shifts[side] * normal;
+            *moved = x + shift * normal;
         }
     }
 
@@ -126,7 +135,7 @@ impl<'a> Surface<'a> {
         let (n, m) = (x.len(), self.g.len());
         let mut sides = [vec![0.0; m], vec![0.0; m]];
         for (side, values) in sides.iter_mut().enumerate() {
-            self.move_to(side, x);
+            self.move_by(self.shifts[side], x);
             self.inner.switches(t, &self.moved, values);
         }
         self.moved.copy_from_slice(x);
