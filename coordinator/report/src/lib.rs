@@ -1,8 +1,8 @@
 //! The report of a run: one self-contained HTML page and one overview picture, made from plain data.
 //!
 //! [`reader`] fills [`ReportData`] from the store; [`render`] and [`overview_svg`] turn it into text and know neither the
-//! store nor the study. The page needs no script, no network and no font, works on a phone and in print, and states warnings before
-//! numbers. Deliberately absent: computing anything that was not stored. Next file to read: [`data`].
+//! store nor the study. The page reads without script and needs no network and no font, works on a phone and in print, and states
+//! warnings before numbers; a script inside it shows values under the pointer. Deliberately absent: computing anything that was not stored. Next file to read: [`data`].
 
 mod compare;
 mod correlation;

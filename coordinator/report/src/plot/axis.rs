@@ -1,7 +1,7 @@
 //! One axis: its label, its range and its ticks.
 //!
-//! Whatever the values are, the ends are finite, the range has a width and the ticks are few. Ranges and ticks are our own because
-//! those of plotters overflow at extreme values and put no round numbers on short logarithmic axes.
+//! Whatever the values are, the ends are finite, the range has a width and the ticks are few. Ticks are round
+//! numbers, also on short logarithmic axes.
 
 use super::super::number;
 

@@ -53,3 +53,25 @@ pub(crate) const EQUALS: [Colour; 7] = [
 /// Every colour of a page.
 pub(crate) const ALL: [Colour; 11] =
     [INK, MUTED, SHADE, GREY, BLUE, VERMILION, PURPLE, GREEN, ABOVE, BELOW, LIMIT];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_style_sheet_has_every_colour_under_its_name() {
+        let sheet = include_str!("../report.css");
+        let light = sheet.lines().find(|line| line.starts_with(":root")).unwrap();
+        for colour in ALL {
+            let defined = format!("--{}: {};", colour.name, colour.hex);
+            assert!(light.contains(&defined), "{defined}");
+        }
+        // Equals borrow the colours of others, and are told apart by the legend of their figure.
+        for colour in EQUALS {
+            let class = format!(".c.{}, .key.{} {{ --c: var(--", colour.name, colour.name);
+            let source = sheet.lines().find_map(|line| line.strip_prefix(&class)).unwrap();
+            let variable = source.split(')').next().unwrap();
+            assert!(light.contains(&format!("--{variable}: {};", colour.hex)), "{}", colour.name);
+        }
+    }
+}
