@@ -1,7 +1,7 @@
 //! What people read on a terminal: text on standard output, aligned tables, numbers of the digits they deserve.
 //!
 //! Every command writes to standard output through `line`, `text` or `lost`: a reader that stops early, as `head`
-//! does, ends the command quietly. What is for people only goes to standard error through [`note`]. Next file to read: [`fitted`].
+//! does, ends the command quietly. What is for people only goes to standard error through [`note`]. Next file to read: [`mod@fitted`].
 
 mod fitted;
 

@@ -2,8 +2,9 @@
 //!
 //! Ten crates, which import downwards only: [`fleet`] dispatches jobs and knows no study; [`study`] runs the loop and writes the
 //! store; [`explain`] says what a study's model lacks, by running variants of it; [`infer`] finds drift and noise of stochastic
-//! equations; [`diagnose`](starlings_diagnose) says whether a recording shows a fault and which; [`report`] reads only what the store holds; [`metrics`] tells a Prometheus what the fleet does; [`live`] shows people a
-//! run while it runs; [`draft`] writes first versions of studies from files that people have. Here are their names for programs that
+//! equations; [`diagnose`] says whether a recording shows a fault and which; [`report`] reads only what the store holds; [`metrics`]
+//! tells a Prometheus what the fleet does; [`live`] shows people a run while it runs; [`draft`] writes first versions of studies from
+//! files that people have. Here are their names for programs that
 //! want all of them, and the tests that need more than one. Next file to read: [`study`].
 
 pub use starlings_diagnose as diagnose;

@@ -1,7 +1,7 @@
 //! Runs that fail for one reason: the first is told, the others are counted and told in one line at the end.
 //!
 //! Two reasons are one where they differ by numbers only, such as the time at which an integration stopped. Next file to read:
-//! [`super::relay`].
+//! [`mod@super::relay`].
 
 use starlings_coordinator::fleet::FleetEvent;
 
