@@ -19,6 +19,7 @@ mod expected;
 mod fit;
 mod function;
 mod functions;
+mod lagged;
 mod missing;
 mod noise_check;
 mod normal;

@@ -192,7 +192,7 @@ impl Answer {
                     .zip_map(&self.posterior.diffusion, |sd, d| if d.abs() > 0.0 { sd } else { 0.0 }),
             ),
             interval90: (0..n).map(|l| self.posterior.diffusion_interval(l, LEVEL)).collect(),
-            degrees: self.posterior.degrees,
+            degrees: self.posterior.least_degrees(),
             lag_corrected: self.lag_corrected,
             measured_sd: if let MeasuredChoice::Known(sd) = choice.measured { Some(sd) } else { None },
         }

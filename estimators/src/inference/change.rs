@@ -67,7 +67,7 @@ pub fn compare(
     let scores = rows.iter().zip(score.iter().zip(&sd)).map(|(i, (e, sd))| (reference.active[*i], e / sd));
     let scores = scores.collect();
     let (statistic, degrees) = square(&score, &covariance, &sd)?;
-    let probability = match reference.degrees {
+    let probability = match reference.least_degrees() {
         _ if degrees == 0 => 1.0,
         None => chi_squared_tail(statistic, degrees as f64),
         Some(left) => fisher_tail(statistic / degrees as f64, degrees as f64, left),

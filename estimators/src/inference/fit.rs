@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::diffusion::{self, Diffusion};
 use super::normal::{Moments, invert, invert_shared, spread};
-use super::{InferenceError, Posterior, Prior, Structure, Sums};
+use super::{InferenceError, Posterior, Prior, Structure, Sums, lagged};
 
 /// Change of D, relative to itself, below which it has settled.
 const SETTLED: f64 = 1e-11;
@@ -21,6 +21,9 @@ const PASSES: usize = 1000;
 /// more to the residuals than it explains: the Jacobian is of first order in h div f, and coefficients are so uncertain that this
 /// is not small. More steps, fewer terms, a prior or the left point help.
 const RUNAWAY: f64 = 10.0;
+
+/// By how much D is moved, relative to itself, for the slope of the coefficients: rounding and curvature count as little.
+const SLOPE: f64 = 1e-5;
 
 /// How an inference is made.
 #[derive(serde::Serialize, serde::Deserialize, Debug, Clone, PartialEq)]
@@ -102,7 +105,7 @@ impl Fit {
             let pass = self.pass(&moments, &inverse)?;
             let drift = structure.matrix(&pass.active, pass.mean.as_slice());
             if let Diffusion::Known(_) = self.diffusion {
-                return self.finish(sums, structure, pass, drift, noise, passes);
+                return self.finish(&moments, sums, pass, noise, passes);
             }
             self.enough(sums, &moments, &pass.active)?;
             let spread = |phi: &DMatrix<f64>| spread(structure, &pass.active, &pass.covariance, phi);
@@ -120,7 +123,7 @@ impl Fit {
             }
             noise = next;
             if settled {
-                return self.finish(sums, structure, pass, drift, noise, passes);
+                return self.finish(&moments, sums, pass, noise, passes);
             }
         }
         Err(InferenceError::NotSettled { passes: PASSES })
@@ -167,29 +170,70 @@ impl Fit {
 
     fn finish(
         &self,
+        moments: &Moments<'_>,
         sums: &Sums,
-        structure: &Structure,
         pass: Pass,
-        drift: DMatrix<f64>,
         diffusion: DMatrix<f64>,
         passes: usize,
     ) -> Result<Posterior, InferenceError> {
-        let Pass { active, observed, precision, covariance, mean } = pass;
-        if covariance.diagonal().iter().any(|v| !v.is_finite() || *v <= 0.0) {
-            return Err(InferenceError::Overflow { what: "the variance of a coefficient" });
-        }
-        Ok(Posterior {
-            estimates: Posterior::estimates(structure, &active, &observed, &mean, &covariance),
-            diffusion,
-            degrees: self.diffusion.degrees(sums, active.len()),
+        let structure = moments.structure;
+        let drift = structure.matrix(&pass.active, pass.mean.as_slice());
+        let mut found = Posterior {
+            estimates: Vec::new(),
+            degrees: self.diffusion.degrees(sums, pass.active.len()),
+            shares: self.shares(sums, structure, &pass, &drift),
             n_step: sums.n_step(),
             passes,
-            active,
-            mean,
-            covariance,
-            precision,
+            diffusion,
             drift,
-        })
+            active: pass.active,
+            mean: pass.mean,
+            covariance: pass.covariance,
+            precision: pass.precision,
+        };
+        self.widen(moments, &mut found)?;
+        if found.covariance.diagonal().iter().any(|v| !v.is_finite() || *v <= 0.0) {
+            return Err(InferenceError::Overflow { what: "the variance of a coefficient" });
+        }
+        let Posterior { active, mean, covariance, .. } = &found;
+        found.estimates = Posterior::estimates(structure, active, &pass.observed, mean, covariance);
+        Ok(found)
+    }
+
+    /// The shares of the degrees of freedom that variances from lagged residuals have, length L; empty for other ones.
+    fn shares(&self, sums: &Sums, structure: &Structure, pass: &Pass, drift: &DMatrix<f64>) -> Vec<f64> {
+        if !self.lag_corrected || sums.n_pair() == 0 || matches!(self.diffusion, Diffusion::Known(_)) {
+            return Vec::new();
+        }
+        let spread = |phi: &DMatrix<f64>| spread(structure, &pass.active, &pass.covariance, phi);
+        let squares = sums.residuals(drift) + spread(&sums.phi());
+        let lagged = sums.lagged_residuals(drift) + spread(&sums.lagged_phi());
+        let (n, pairs) = (sums.n_step() as f64, sums.n_pair() as f64);
+        lagged::shares(&self.diffusion, (&squares, n), (&lagged, pairs))
+    }
+
+    /// Lets the coefficients be as uncertain as their share ½ D V Φ⁻¹ is, where D is from lagged residuals. From independent ones
+    /// D is too well known for that to count.
+    fn widen(&self, moments: &Moments<'_>, found: &mut Posterior) -> Result<(), InferenceError> {
+        if found.shares.is_empty() {
+            return Ok(());
+        }
+        let (sd, n) = (found.diffusion_sd(), found.diffusion.nrows());
+        for entries in lagged::free(&self.diffusion, n) {
+            let (i, j) = entries[0];
+            let scale = SLOPE * (found.diffusion[(i, i)] * found.diffusion[(j, j)]).sqrt();
+            let mut moved = found.diffusion.clone();
+            for (i, j) in entries {
+                moved[(i, j)] += scale;
+                moved[(j, i)] = moved[(i, j)];
+            }
+            let pass = self.pass(moments, &diffusion::inverse(&moved, moments.structure)?)?;
+            if pass.active == found.active {
+                let slope = (pass.mean - &found.mean) / scale;
+                lagged::widen(&mut found.covariance, &mut found.precision, &slope, sd[(i, j)]);
+            }
+        }
+        Ok(())
     }
 }
 

@@ -36,8 +36,11 @@ pub struct Posterior {
     /// D, L x L, per time unit.
     #[serde(with = "super::text::matrix")]
     pub diffusion: DMatrix<f64>,
-    /// Degrees of freedom left for each variance in D; `None` where D was given.
+    /// Degrees of freedom left for each variance in D, were all residuals independent; `None` where D was given.
     pub degrees: Option<f64>,
+    /// The share of them that each variance has where D was taken from lagged residuals, length L; empty elsewhere.
+    #[serde(default)]
+    pub(crate) shares: Vec<f64>,
     /// Number of steps N.
     pub n_step: u64,
     /// Passes until coefficients and noise settled.
@@ -85,10 +88,23 @@ impl Posterior {
         self.estimates.iter().find(|e| e.name == name)?.value
     }
 
+    /// Degrees of freedom of the variance of an equation's noise; `None` where D was given.
+    pub fn degrees_of(&self, equation: usize) -> Option<f64> {
+        let share = self.shares.get(equation).copied().unwrap_or(1.0);
+        // A variance of which nothing is left has a value yet, of as little weight as one residual's.
+        self.degrees.map(|degrees| (degrees * share).max(degrees.min(1.0)))
+    }
+
+    /// The least of them over the equations.
+    pub fn least_degrees(&self) -> Option<f64> {
+        let all = (0..self.diffusion.nrows()).filter_map(|l| self.degrees_of(l));
+        self.degrees.map(|degrees| all.fold(degrees, f64::min))
+    }
+
     /// The interval that holds a coefficient with probability `level`, by Student's t.
     pub fn interval(&self, coefficient: usize, level: f64) -> Option<[f64; 2]> {
         let Value { mean, sd } = self.estimates.get(coefficient)?.value?;
-        let half = student(0.5 * (1.0 + level), self.degrees) * sd;
+        let half = student(0.5 * (1.0 + level), self.least_degrees()) * sd;
         Some([mean - half, mean + half])
     }
 
@@ -97,19 +113,20 @@ impl Posterior {
         self.interval(coefficient, level).map(|[lo, hi]| lo <= 0.0 && hi >= 0.0)
     }
 
-    /// Standard deviations of the entries of D, L x L, of its inverse Wishart posterior: sd(D_ii) = D_ii sqrt(2/ν). Zero where D was
-    /// given.
+    /// Standard deviations of the entries of D, L x L, of its inverse Wishart posterior: sd(D_ii) = D_ii sqrt(2/ν), with the ν of each
+    /// equation. Zero where D was given.
     pub fn diffusion_sd(&self) -> DMatrix<f64> {
         let d = &self.diffusion;
         DMatrix::from_fn(d.nrows(), d.ncols(), |i, j| {
             let variance = d[(i, i)] * d[(j, j)] + d[(i, j)] * d[(i, j)];
-            self.degrees.map_or(0.0, |n| (variance / n).sqrt())
+            let degrees = self.degrees_of(i).zip(self.degrees_of(j));
+            degrees.map_or(0.0, |(of_i, of_j)| (variance / (of_i * of_j).sqrt()).sqrt())
         })
     }
 
     /// The interval that holds D_ii with probability `level`; `None` where D was given.
     pub fn diffusion_interval(&self, equation: usize, level: f64) -> Option<[f64; 2]> {
-        let degrees = self.degrees?;
+        let degrees = self.degrees_of(equation)?;
         let d = self.diffusion[(equation, equation)] * degrees;
         let at = |p| d / chi_squared(p, degrees);
         Some([at(0.5 * (1.0 + level)), at(0.5 * (1.0 - level))])
@@ -143,12 +160,14 @@ impl Posterior {
             && self.covariance.shape() == (a, a)
             && self.precision.shape() == (a, a)
             && self.diffusion.shape() == (l, l)
-            && self.drift.shape() == (l, b);
+            && self.drift.shape() == (l, b)
+            && (self.shares.is_empty() || self.shares.len() == l);
         if !increasing || self.active.last().is_some_and(|p| *p >= self.estimates.len()) || !shapes {
             return Err(InferenceError::Damaged { what: "a part of the posterior of another shape" });
         }
         let parts = [&self.covariance, &self.precision, &self.diffusion, &self.drift];
-        let mut numbers = parts.into_iter().flatten().chain(&self.mean).chain(&self.degrees);
+        let mut numbers =
+            parts.into_iter().flatten().chain(&self.mean).chain(&self.degrees).chain(&self.shares);
         if !numbers.all(|v| v.is_finite()) {
             return Err(InferenceError::Damaged { what: "a number of the posterior that is not finite" });
         }

@@ -48,7 +48,7 @@ pub(crate) fn score(
     let covariance = posterior.covariance.select_rows(&rows).select_columns(&rows);
     let chi_squared = mean.dot(&covariance.cholesky()?.solve(&mean));
     let n = rows.len() as f64;
-    let left = posterior.degrees.unwrap_or(f64::INFINITY);
+    let left = posterior.least_degrees().unwrap_or(f64::INFINITY);
     let by_chance = fisher_tail(chi_squared / n, n, left);
     let allowed = coefficients.iter().all(|c| allowed(*c));
     Some(Score { coefficients: coefficients.to_vec(), chi_squared, by_chance, allowed })

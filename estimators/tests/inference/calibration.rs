@@ -1,9 +1,13 @@
 //! Intervals hold the truth as often as they say, over 200 seeds of three systems.
 
-use nalgebra::DMatrix;
-use starlings_estimators::inference::{Diffusion, Fit, Iteration, Measured, Noisy, Posterior};
+use std::sync::Arc;
 
-use crate::kit::sde::{gauss, rng};
+use nalgebra::DMatrix;
+use starlings_estimators::inference::{
+    Basis, Diffusion, Fit, Iteration, Measured, Noisy, Polynomial, Posterior, Rule, Structure,
+};
+
+use crate::kit::sde::{gauss, heun, record, rng};
 use crate::kit::{lorenz, motor, sums, tanks, times};
 
 const SEEDS: u64 = 200;
@@ -77,6 +81,43 @@ fn intervals_of_the_noise_are_calibrated() {
     println!("D of the motor: {share:.3}");
     // Four sd of a share of 400 draws.
     assert!((0.84..=0.96).contains(&share), "{share}");
+}
+
+/// Two coupled decays, measured with errors of this sd: shares of 90 % intervals that hold the four coefficients and the two variances of
+/// the noise, from lagged residuals.
+fn from_lagged_residuals(sd: f64) -> [f64; 2] {
+    let basis = Arc::new(
+        Basis::new(2, 0).with(Rule::MidPoint, Polynomial::new(&["x", "y"], 2, &[0, 1], 1, false)).unwrap(),
+    );
+    let structure = Structure::same(&basis, &["x", "y"]).unwrap();
+    let (truth, noise) = ([-1.0, 0.5, -0.7, -0.5], [0.25, 0.09]);
+    let root = [[0.5, 0.0], [0.0, 0.3]];
+    let drift = |_: f64, [x, y]: &[f64; 2]| [-x + 0.5 * y, -0.7 * x - 0.5 * y];
+    let mut held = [0.0; 2];
+    for seed in 0..SEEDS {
+        let (mut rng, mut errors) = (rng(9000 + seed), rng(90_000 + seed));
+        let path = record(5000, (0.02, 2), [0.5, 0.0], |t, h, x| heun(&mut rng, (t, h), x, &root, &drift));
+        let rows: Vec<[f64; 2]> = path.iter().map(|x| x.map(|v| v + sd * gauss(&mut errors))).collect();
+        let fit = Fit { lag_corrected: true, ..Fit::new(Diffusion::Full, 4) };
+        let posterior = fit.posterior(&sums(&basis, &rows, 0.02), &structure).unwrap();
+        let within = |[lo, hi]: [f64; 2], truth: f64| f64::from(u8::from(lo <= truth && truth <= hi));
+        for (k, truth) in truth.iter().enumerate() {
+            held[0] += within(posterior.interval(k, 0.9).unwrap(), *truth) / (4.0 * SEEDS as f64);
+        }
+        for (l, truth) in noise.iter().enumerate() {
+            held[1] += within(posterior.diffusion_interval(l, 0.9).unwrap(), *truth) / (2.0 * SEEDS as f64);
+        }
+    }
+    held
+}
+
+#[test]
+fn intervals_from_lagged_residuals_are_calibrated_whatever_the_errors_of_the_measurement() {
+    for sd in [0.0, 0.02, 0.05] {
+        let held = from_lagged_residuals(sd);
+        println!("errors of {sd}: {held:.3?} of coefficients and of noise");
+        assert!(held.iter().all(|share| (0.85..=0.95).contains(share)), "{sd}: {held:?}");
+    }
 }
 
 /// The Lorenz system with measurement noise of 0.2, smoothed: given its path, and with what the path's uncertainty adds.

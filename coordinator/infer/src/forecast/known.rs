@@ -120,7 +120,7 @@ impl Known {
         let gaussian =
             Gaussian { mean: posterior.mean().clone(), covariance: posterior.covariance().clone() };
         Ok(Self {
-            draws: Draws::new(gaussian, &posterior.diffusion, posterior.degrees, form(choice))?,
+            draws: Draws::new(gaussian, &posterior.diffusion, posterior.least_degrees(), form(choice))?,
             step,
             measured: errors(choice, &checks, corrected, structure.equations().len()),
             last: Some((time, values)),
