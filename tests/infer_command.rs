@@ -2,12 +2,14 @@
 
 #![allow(clippy::unwrap_used)] // a failed unwrap is a failed test
 
+mod access_kit;
 mod common;
 mod infer_kit;
 
 use std::fmt::Write as _;
 use std::fs;
 
+use access_kit::{Started, listening};
 use common::{output, starlings};
 use infer_kit::{STUDY, folder, infer, recording, refused};
 
@@ -31,6 +33,28 @@ fn one_two_and_three_workers_give_the_same_bytes() {
     assert_eq!(found["convergence"].as_array().unwrap().len(), 6, "after 1, 2, 4, 8, 16 and all 17 blocks");
     let (code, _, stderr) = output(starlings().current_dir(dir.path()).args(["report", "two"]));
     assert_eq!(code, 0, "{stderr}");
+}
+
+#[test]
+fn a_worker_that_sees_no_file_of_the_coordinator_makes_the_same_bytes() {
+    let dir = folder(STUDY, &recording(5000, usize::MAX));
+    infer(dir.path(), "local", "2");
+    let (study, elsewhere) = (dir.path().join("study.toml"), tempfile::tempdir().unwrap());
+    let out = dir.path().join("remote");
+    let mut open = listening("infer", &study, &["--out", out.to_str().unwrap()]);
+    // Its own folder has a recording of the same name with other rows, which it must not read.
+    fs::write(elsewhere.path().join("data.csv"), recording(5000, 0)).unwrap();
+    let access = elsewhere.path().join("access.json");
+    fs::copy(out.join("access.json"), &access).unwrap();
+    let mut call = starlings();
+    call.current_dir(elsewhere.path()).args(["worker", "--access", "access.json"]);
+    let mut worker = Started::of(&mut call);
+    assert_eq!(open.end(), Some(0), "{}", open.said());
+    assert_eq!(worker.end(), Some(0), "{}", worker.said());
+    for file in ["infer.json", "coefficients.csv", "report.html", "study.toml"] {
+        let read = |folder: &str| fs::read(dir.path().join(folder).join(file)).unwrap();
+        assert_eq!(read("local"), read("remote"), "{file}");
+    }
 }
 
 #[test]
