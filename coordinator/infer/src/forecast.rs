@@ -129,6 +129,7 @@ fn measured(
     Some(MeasuredOutput {
         errors: Errors { noise: sd, sd, from: From::Inferred },
         values: rows.map(value).collect(),
+        never_fitted: false,
     })
 }
 

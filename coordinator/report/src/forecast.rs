@@ -96,6 +96,7 @@ fn errors_of(errors: &Errors, unit: &str) -> String {
         From::Noise => "stated noise",
         From::Residuals => "its training residuals",
         From::OtherResiduals => "as residuals of fitted outputs exceed their noise",
+        From::OwnValues => "its own measured values, never fitted",
         From::Inferred => "of the inference",
     };
     format!("{} ({from})", number::quantity(errors.sd, unit))

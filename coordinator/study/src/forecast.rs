@@ -10,6 +10,7 @@ pub mod ensemble;
 mod error;
 pub mod measurement;
 mod members;
+mod own_errors;
 mod posterior;
 pub mod result;
 mod tables;
@@ -48,16 +49,18 @@ pub fn forecast(
     let measured = plan.setup.outputs.iter().map(|name| {
         let channel = record.channels.iter().find(|c| c.output == *name && c.node.is_none())?;
         let values = measured_values(record, channel, &plan.times);
-        Some(MeasuredOutput { errors: residuals.errors(name, channel.noise), values })
+        let errors = residuals.errors(name, channel.noise);
+        Some(MeasuredOutput { errors, values, never_fitted: residuals.are_none_of(name) })
     });
+    let measured: Vec<_> = measured.collect();
     let ensemble = Ensemble {
         record: (plan.record as u32, record.name.clone()),
         inputs: record.inputs.clone(),
         members: members(study, &plan, &drawn.gaussian),
-        measured: measured.collect(),
         measured_until: record.times.last().copied().unwrap_or_default(),
         wider: drawn.wider,
-        conditional_on: conditional_on(drawn.wider),
+        conditional_on: conditional_on(drawn.wider, measured.iter().flatten().any(|m| m.never_fitted)),
+        measured,
         warnings: warnings(study, ask),
         setup: plan.setup,
         times: plan.times,
@@ -96,7 +99,7 @@ fn measured_values(record: &Record, channel: &Channel, times: &[f64]) -> Vec<Mea
         .collect()
 }
 
-fn conditional_on(wider: Option<f64>) -> String {
+fn conditional_on(wider: Option<f64>, never_fitted: bool) -> String {
     let spread = wider.map_or_else(
         || {
             "on the posterior at the stated noise, since the run has none given its residuals: bands are too narrow where the \
@@ -112,7 +115,12 @@ fn conditional_on(wider: Option<f64>) -> String {
     );
     format!(
         "Bands are conditional on the model and {spread}. The band of what would be measured holds errors as large as the training \
-         residuals, and at least the stated noise; what the model lacks only later is in neither band."
+         residuals, and at least the stated noise{}; what the model lacks only later is in neither band.",
+        if never_fitted {
+            ", and for an output that was never fitted as large as its own values show outside the fifth of the record where they stand"
+        } else {
+            ""
+        }
     )
 }
 

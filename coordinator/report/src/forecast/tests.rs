@@ -35,7 +35,12 @@ fn forecast(times: Vec<f64>) -> Forecast {
         at_end: [4.0, 0.0, 8.0],
         measured_at_end: Some([-1.125, 9.125]),
         errors: Some(Errors { noise: 0.5, sd: 1.25, from: From::Residuals }),
-        coverage90: Some(Coverage { train: Some(0.9), held_out: None }),
+        coverage90: Some(Coverage {
+            train: Some(0.9),
+            held_out: None,
+            held_out_by_fit: None,
+            sd_by_fit: None,
+        }),
         fan: fan.clone(),
         measured: Some(fan),
         observed: vec![(0.0, 0.1), (1.0, 2.2)],

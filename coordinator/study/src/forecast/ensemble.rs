@@ -8,9 +8,11 @@ use starlings_estimators::forecast::{Crossings, Fan};
 use starlings_fleet::Fleet;
 use starlings_models::{Setup, Signal};
 
+use super::measurement::{Errors, From};
 use super::members::Members;
-use super::result::{Forecast, LevelForecast, OutputForecast};
-use super::{Ask, StudyForecastError, measurement::Errors};
+use super::own_errors::OwnErrors;
+use super::result::{Band, Forecast, LevelForecast, OutputForecast};
+use super::{Ask, StudyForecastError};
 use crate::Study;
 
 /// Stream of the seed that members are drawn with.
@@ -53,8 +55,10 @@ pub struct Ensemble {
 pub struct MeasuredOutput {
     /// Errors of what would be measured.
     pub errors: Errors,
-    /// The values.
+    /// The values, in the order of time.
     pub values: Vec<MeasuredValue>,
+    /// Whether nothing was fitted of it, so that its own values tell more of its errors.
+    pub never_fitted: bool,
 }
 
 /// One measured value.
@@ -97,6 +101,7 @@ impl Ensemble {
                 ask.members
             ));
         }
+        warnings.extend(outputs.iter().filter_map(OutputForecast::says_what_no_fit_shows));
         warnings.extend(self.warnings);
         Ok(Forecast {
             study: study.name.clone(),
@@ -126,18 +131,31 @@ impl Ensemble {
         seed: u64,
         row: usize,
     ) -> Result<OutputForecast, StudyForecastError> {
-        let fan = Fan::of(&self.times, &members.courses(row), &Fan::USUAL)?;
+        let courses = members.courses(row);
+        let fan = Fan::of(&self.times, &courses, &Fan::USUAL)?;
         let measured = self.measured[row].as_ref();
-        let band = measured
-            .map(|m| Fan::of(&self.times, &members.with_noise(row, m.errors.sd, seed), &Fan::USUAL))
-            .transpose()?;
+        let band =
+            measured.map(|measured| self.band(measured, &courses, |sd| members.with_noise(row, sd, seed)));
         let values = measured.map_or(&[][..], |m| &m.values);
-        Ok(OutputForecast::new(
-            study,
-            &self.setup.outputs[row],
-            fan,
-            band.zip(measured.map(|m| m.errors)),
-            values,
-        ))
+        Ok(OutputForecast::new(study, &self.setup.outputs[row], fan, band.transpose()?, values))
+    }
+
+    /// The band of what would be measured, for members with errors of a standard deviation at every time.
+    fn band(
+        &self,
+        measured: &MeasuredOutput,
+        courses: &[Vec<f64>],
+        with_noise: impl Fn(&[f64]) -> Vec<Vec<f64>>,
+    ) -> Result<Band, StudyForecastError> {
+        let fan = |sd: &[f64]| Fan::of(&self.times, &with_noise(sd), &Fan::USUAL);
+        let Errors { noise, sd, from } = measured.errors;
+        let by_fit = fan(&vec![sd; self.times.len()])?;
+        let own = OwnErrors::of(&measured.values, &self.times, courses);
+        let Some(own) = own.filter(|own| measured.never_fitted && own.whole() > sd) else {
+            return Ok(Band { fan: by_fit, by_fit: None, errors: Errors { noise, sd, from } });
+        };
+        let at: Vec<f64> = self.times.iter().map(|time| own.at(*time).max(sd)).collect();
+        let errors = Errors { noise, sd: own.whole(), from: From::OwnValues };
+        Ok(Band { fan: fan(&at)?, by_fit: Some((by_fit, sd)), errors })
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! The residuals of the free run with the estimate hold the noise and what the model lacks. Where they exceed the stated noise, the
 //! errors of measured values are taken as large as they are. An output that was never fitted has no residuals of its own: the noise
-//! stated for it counts as wrong by the same factor as that of the fitted outputs (Birge, *Phys. Rev.* 1932). Held-out values do not
-//! enter. A band holds at each time by itself, for which the correlation of the errors does not count.
+//! stated for it counts as wrong by the same factor as that of the fitted outputs (Birge, *Phys. Rev.* 1932), unless its own
+//! measured values say more (`own_errors.rs`). Held-out values of fitted outputs do not enter. A band holds at each time by itself, for which the correlation of the errors does not count.
 
 use serde::Serialize;
 use starlings_models::BuildSetup;
@@ -21,6 +21,8 @@ pub enum From {
     Residuals,
     /// The residuals of the outputs that were fitted, which exceed their noise; this one was not fitted.
     OtherResiduals,
+    /// Its own measured values, which differ by more; it was not fitted.
+    OwnValues,
     /// The errors of the measurement that an inference was given, or that residuals of neighbouring steps share.
     Inferred,
 }
@@ -70,6 +72,12 @@ impl TrainingResiduals {
         Ok(Self { outputs, free, is_noisy: study.setup.is_noisy() })
     }
 
+    /// Whether the errors of an output can be told by its own measured values: it was never fitted, and nothing but the parameters
+    /// moves the members.
+    pub(super) fn are_none_of(&self, output: &str) -> bool {
+        !self.is_noisy && !self.outputs.iter().any(|(name, _, _)| name == output)
+    }
+
     /// The errors of an output with this stated noise. Where the states have noise the residuals of a free run hold that too, and
     /// so do the members: then the stated noise is used.
     pub(super) fn errors(&self, output: &str, noise: f64) -> Errors {
@@ -104,6 +112,7 @@ mod tests {
     fn errors_are_as_large_as_the_residuals_and_never_smaller_than_the_noise() {
         // 50 residuals with a sum of squares of 225 noise variances, half of which the parameters leave free: 3 noise sd.
         let residuals = of(&[("p", 225.0, 50.0), ("q", 1.0, 50.0)], false);
+        assert!(residuals.are_none_of("r") && !residuals.are_none_of("p"));
         assert_eq!(residuals.errors("p", 0.5), Errors { noise: 0.5, sd: 1.5, from: From::Residuals });
         assert_eq!(residuals.errors("q", 2.0), Errors { noise: 2.0, sd: 2.0, from: From::Noise });
         // Of both together: 226 over 50.

@@ -78,12 +78,12 @@ impl Members {
         self.predicted.iter().map(of).collect()
     }
 
-    /// The same as it would be measured, with errors of this standard deviation.
-    pub(super) fn with_noise(&self, row: usize, sd: f64, seed: u64) -> Vec<Vec<f64>> {
+    /// The same as it would be measured, with errors of this standard deviation at every time.
+    pub(super) fn with_noise(&self, row: usize, sd: &[f64], seed: u64) -> Vec<Vec<f64>> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(MEASURED + row as u64);
         let mut courses = self.courses(row);
-        for value in courses.iter_mut().flatten() {
+        for (value, sd) in courses.iter_mut().flat_map(|course| course.iter_mut().zip(sd)) {
             let z: f64 = StandardNormal.sample(&mut rng);
             *value += sd * z;
         }

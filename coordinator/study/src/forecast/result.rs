@@ -49,6 +49,17 @@ pub struct Forecast {
     pub levels: Vec<LevelForecast>,
 }
 
+/// Share of held-out values in a band of 90 % below which it is said to be too narrow.
+const SHORT: f64 = 0.8;
+
+/// Quantiles of what would be measured, with its errors.
+pub(super) struct Band {
+    pub(super) fan: Fan,
+    pub(super) errors: Errors,
+    /// The same with the errors that the fitted outputs have, and their standard deviation, where the output's own values say more.
+    pub(super) by_fit: Option<(Fan, f64)>,
+}
+
 /// The course of one output.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct OutputForecast {
@@ -82,6 +93,10 @@ pub struct Coverage {
     pub train: Option<f64>,
     /// Of those that were not.
     pub held_out: Option<f64>,
+    /// Of those in the band that the fitted outputs alone would give, where the output was never fitted and its own values widen it.
+    pub held_out_by_fit: Option<f64>,
+    /// The standard deviation of errors in that band.
+    pub sd_by_fit: Option<f64>,
 }
 
 /// When a level is crossed.
@@ -121,29 +136,15 @@ impl OutputForecast {
         study: &Study,
         name: &str,
         fan: Fan,
-        measured: Option<(Fan, Errors)>,
+        measured: Option<Band>,
         values: &[MeasuredValue],
     ) -> Self {
         let last = fan.times.len() - 1;
-        let at = |fan: &Fan, p: f64, k: usize| {
-            let row = fan.probabilities.iter().position(|q| (q - p).abs() < 1e-9);
-            row.map_or(f64::NAN, |row| fan.quantiles[row][k])
-        };
-        let (band, errors) = measured.unzip();
-        let measured_at_end = band.as_ref().map(|band| [0.05, 0.95].map(|p| at(band, p, last)));
-        let mut shares = [[0_u32; 2]; 2];
         let observed = values.iter().map(|measured| (measured.time, measured.value)).collect();
-        for measured in values {
-            let Some(band) = &band else { continue };
-            let k = fan.times.partition_point(|time| *time < measured.time).min(last);
-            let within = at(band, 0.05, k) <= measured.value && measured.value <= at(band, 0.95, k);
-            let held_out = usize::from(measured.held_out);
-            shares[held_out][0] += u32::from(within);
-            shares[held_out][1] += 1;
-        }
-        let share = |[within, all]: [u32; 2]| (all > 0).then(|| f64::from(within) / f64::from(all));
-        let [train, held_out] = shares.map(share);
-        let coverage90 = band.is_some().then_some(Coverage { train, held_out });
+        let ends = |fan: &Fan| [0.05, 0.95].map(|p| at(fan, p, last));
+        let measured_at_end = measured.as_ref().map(|band| ends(&band.fan));
+        let coverage90 = measured.as_ref().map(|band| Coverage::of(band, values));
+        let (band, errors) = measured.map(|band| (band.fan, band.errors)).unzip();
         let at_end = [0.5, 0.05, 0.95].map(|p| at(&fan, p, last));
         Self {
             output: name.to_owned(),
@@ -155,6 +156,54 @@ impl OutputForecast {
             fan,
             measured: band,
             observed,
+        }
+    }
+}
+
+impl OutputForecast {
+    /// What has to be said where the fitted outputs do not show how far off this one is.
+    pub(super) fn says_what_no_fit_shows(&self) -> Option<String> {
+        let Coverage { held_out_by_fit: Some(share), sd_by_fit: Some(sd), .. } = self.coverage90? else {
+            return None;
+        };
+        let own = self.errors?.sd;
+        (share < SHORT).then(|| {
+            format!(
+                "what was fitted does not show how far off `{}` is, which never was: errors of {sd:.3} {unit} would hold {:.1} % of its values \
+                 in the 90 % band; its own, {own:.3} {unit}, widen it: the model is wrong there (`starlings explain` asks for what it lacks)",
+                self.output,
+                100.0 * share,
+                unit = self.unit,
+            )
+        })
+    }
+}
+
+/// The quantile of this probability at the time of this number.
+fn at(fan: &Fan, p: f64, k: usize) -> f64 {
+    let row = fan.probabilities.iter().position(|q| (q - p).abs() < 1e-9);
+    row.map_or(f64::NAN, |row| fan.quantiles[row][k])
+}
+
+/// Whether a value lies in the central 90 % of a fan.
+fn holds(fan: &Fan, measured: &MeasuredValue) -> bool {
+    let k = fan.times.partition_point(|time| *time < measured.time).min(fan.times.len() - 1);
+    at(fan, 0.05, k) <= measured.value && measured.value <= at(fan, 0.95, k)
+}
+
+impl Coverage {
+    fn of(band: &Band, values: &[MeasuredValue]) -> Self {
+        let share = |fan: &Fan, held_out: bool| {
+            let of_use = || values.iter().filter(|value| value.held_out == held_out);
+            let within = of_use().filter(|value| holds(fan, value)).count();
+            let all = of_use().count();
+            (all > 0).then(|| within as f64 / all as f64)
+        };
+        Self {
+            train: share(&band.fan, false),
+            held_out: share(&band.fan, true),
+            held_out_by_fit: band.by_fit.as_ref().and_then(|(fan, _)| share(fan, true)),
+            sd_by_fit: band.by_fit.as_ref().map(|(_, sd)| *sd),
         }
     }
 }
