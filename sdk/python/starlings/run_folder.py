@@ -175,6 +175,8 @@ def read_run(folder: Union[str, "Path"]) -> Run:
     names = [row["parameter"] for row in rows]
     covariance = np.array([[float(row[f"cov:{name}"]) for name in names] for row in rows])
     columns = {key: column([row[key] for row in rows]) for key in rows[0] if not key.startswith("cov:")}
+    # A unit may be written as a number: "1" stays text.
+    columns["unit"] = np.array([row.get("unit", "") for row in rows], dtype=object)
     transforms = [row.get("transform", "linear") for row in rows]
     means = np.array([float(row["mean_transformed"]) for row in rows])
     return Run(path, summary, names, table(columns, "parameter"), covariance, means, transforms)

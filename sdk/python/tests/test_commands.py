@@ -51,6 +51,7 @@ def test_a_function_and_arrays_come_to_a_posterior(cooled):
     for name, truth in (("start", 70.0), ("rate", 0.05)):
         entry = cooled[name]
         assert abs(entry["estimate"] - truth) < 4.0 * entry["sd"]
+    assert list(cooled.parameters["unit"]) == ["K", "1/s"]
     assert (cooled.folder / "study" / "study.toml").is_file()
     assert cooled.report.is_file()
     assert cooled._repr_html_().startswith("<iframe srcdoc=")
