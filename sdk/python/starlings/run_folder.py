@@ -18,8 +18,8 @@ from typing import Any, Dict, List, Optional, Sequence, Union
 import numpy as np
 
 from . import page, posterior
-from .answers import Forecast
-from .program import call, output
+from .forecasts import Forecast, Place, forecast
+from .program import output
 from .tables import column, read_columns, table
 from .values import Array
 
@@ -87,23 +87,20 @@ class Run:
         *,
         members: int = 200,
         until: Optional[float] = None,
+        step: Optional[float] = None,
         levels: Sequence[str] = (),
         horizon: Optional[float] = None,
         record: Optional[str] = None,
         seed: Optional[int] = None,
         set: Optional[Dict[str, float]] = None,  # noqa: A002  (the name that the command has)
         workers: Optional[int] = None,
-        out: Optional[Union[str, "os.PathLike[str]"]] = None,
+        out: Optional[Place] = None,
         progress: Optional[bool] = None,
     ) -> Forecast:
-        """Quantiles against time, and when a quantity crosses a level ("pressure>5"), of an ensemble from the posterior."""
-        folder = Path(out) if out is not None else self.folder / "forecast"
-        words = ["forecast", str(self.folder), "--members", str(members), "--out", str(folder)]
-        options = {"until": until, "horizon": horizon, "record": record, "seed": seed, "workers": workers, "study": self.study}
-        words += [word for key, value in options.items() if value is not None for word in (f"--{key}", str(value))]
-        words += [word for level in levels for word in ("--level", level)]
-        words += [word for key, value in (set or {}).items() for word in ("--set", f"{key}={value!r}")]
-        return Forecast(call(words, progress), folder)
+        """Quantiles against time, and when a quantity crosses a level ("pressure>5"), of an ensemble from the posterior. `until`, `horizon` and
+        `step`, the spacing of times after the record's end, are in the study's unit of time."""
+        options = {"until": until, "step": step, "horizon": horizon, "record": record, "seed": seed, "workers": workers}
+        return forecast(self.folder, {**options, "study": self.study}, members, levels, set, out, progress)
 
     def to_arviz(self, draws: int = 1000, chains: int = 4, seed: int = 0, *, predictive: bool = False) -> Any:
         """The run as ArviZ takes it: posterior, observed data, and the run with the estimate. Needs arviz.

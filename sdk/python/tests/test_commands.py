@@ -163,6 +163,25 @@ def test_drift_and_noise_of_a_twin(tmp_path):
     assert abs(table["estimate"][k] + 8.0 / 3.0) < 4.0 * table["sd"][k]
     assert table["observed"][k] and not table["may_be_zero"][k]
     assert found._repr_html_().startswith("<iframe")
+    ahead = found.forecast(until=8.2, step=0.01, levels=["x1>1000"], members=20, workers=1)
+    assert ahead.levels[0]["probability"] == 0.0
+    assert np.isclose(np.asarray(ahead.fan["time"]).max(), 8.2)
+
+
+def test_a_diagnosis_names_what_struck_the_nozzle(tmp_path):
+    found = starlings.diagnose(EXAMPLES / "thrust-vector-control" / "diagnose.toml", out=tmp_path / "nozzle", workers=2)
+    assert (found.verdict, found.named) == ("named", ["blow"])
+    # The blow begins at 0.1 s; a record holds 500 values per second.
+    assert found.since is not None and 0.09 < found.since < 0.12
+    table = found.scenarios.reset_index() if hasattr(found.scenarios, "reset_index") else found.scenarios
+    k = list(table["name"]).index("blow")
+    # The data were made with 1.25 times the blow of the library.
+    assert abs(table["severity"][k] - 1.25) < 4.0 * table["severity_sd"][k]
+    assert table["severity_lo90"][k] < table["severity"][k] < table["severity_hi90"][k]
+    assert bool(table["explains"][k]) and table["probability"][k] > 0.99
+    assert {"blow", "ring", "push"} == set(found.parameters["scenario"])
+    assert found.says and not found.warnings
+    assert found._repr_html_().startswith("<iframe")
 
 
 def test_a_wrong_study_names_its_places():
