@@ -8,8 +8,8 @@
     study = starlings.study(cooling, frame, {"start": starlings.Prior(80, factor=2), "rate": starlings.Prior(0.1, factor=3)})
     starlings.run(study)
 
-`run`, `check`, `explain`, `identify`, `infer` and `twin` take a study: a `Study`, the path of a study file, or its sections as
-tables. A solver with a state of its own, or one that a study file names, is written so:
+`run`, `check`, `explain`, `identify`, `infer`, `diagnose` and `twin` take a study: a `Study`, the path of a study file, or its
+sections as tables. A solver with a state of its own, or one that a study file names, is written so:
 
     @starlings.solver(parameters={"k": "N/m"}, states={"x": "m", "v": "m/s"}, outputs={"position": "m"},
                       measures={"position": "x"}, dt=0.01)
@@ -23,11 +23,12 @@ A solver says what it has and does one thing: `rate`, `step` or `run` (`Solver`)
 `simulate` tries it without a study, `Observer` gives it a correction towards data. `read_run` reads results.
 """
 
-from .answers import Checked, Explanation, Forecast, Identification, Inference
+from .answers import Checked, Diagnosis, Explanation, Identification, Inference
 from .build import study
-from .commands import check, explain, identify, infer, run, twin
+from .commands import check, diagnose, explain, identify, infer, run, twin
 from .expression import Expression, ExpressionError
 from .failures import DeclarationError, Failed, NotFinite, OutsideDomain, Unavailable
+from .forecasts import Forecast
 from .matrices import extension
 from .observers import Correction, Observer
 from .prior import Prior
@@ -47,6 +48,7 @@ __all__ = [
     "Checked",
     "Correction",
     "DeclarationError",
+    "Diagnosis",
     "Explanation",
     "Expression",
     "ExpressionError",
@@ -73,6 +75,7 @@ __all__ = [
     "Values",
     "Window",
     "check",
+    "diagnose",
     "explain",
     "extension",
     "identify",

@@ -13,15 +13,12 @@ import time
 from pathlib import Path
 from typing import Any, Iterator, List, Mapping, Optional, Sequence, Union
 
-from .answers import Checked, Explanation, Identification, Inference
+from .answers import Checked, Diagnosis, Explanation, Identification, Inference
+from .forecasts import Place
 from .program import StudyError, call, output
 from .run_folder import Run, read_run
 from .study_file import AnyStudy, Study, as_study
 from .tables import read_columns, table
-
-#: A folder or a file.
-Place = Union[str, "os.PathLike[str]"]
-
 
 def run(
     study: AnyStudy,
@@ -102,7 +99,27 @@ def infer(
     words = [*_fleet(workers, listen, access), *options]
     with _standing(study, overrides, folder / "study") as file:
         found = call(["infer", str(file), "--out", str(folder), *words], progress)
-    return Inference(found, folder)
+    return Inference(found, folder, _lasting(study, folder))
+
+
+def diagnose(
+    study: AnyStudy,
+    /,
+    *,
+    out: Optional[Place] = None,
+    workers: Optional[int] = None,
+    listen: Optional[str] = None,
+    access: Optional[Place] = None,
+    options: Sequence[str] = (),
+    progress: Optional[bool] = None,
+    **overrides: Any,
+) -> Diagnosis:
+    """Says whether recordings show a fault, since when, which scenario of `[diagnose]` it followed and how severe it is. As `run`."""
+    folder = _folder(study, out, "-diagnose")
+    words = [*_fleet(workers, listen, access), *options]
+    with _standing(study, overrides, folder / "study") as file:
+        found = call(["diagnose", str(file), "--out", str(folder), *words], progress)
+    return Diagnosis(found, folder)
 
 
 def check(study: AnyStudy, /, *, options: Sequence[str] = (), **overrides: Any) -> Checked:

@@ -134,5 +134,11 @@ fn outputs(network: &Network) -> Vec<Quantity> {
                 .says(&format!("Volume flow out of `{name}`.")),
         );
     }
+    all.push(Quantity::new("strain", "").size(n).says("Circumferential strain of the wall in each cell."));
+    all.push(
+        Quantity::new("stress", PRESSURE)
+            .size(n)
+            .says("Circumferential stress of the wall in each cell, elastic and viscous."),
+    );
     all
 }
