@@ -76,6 +76,11 @@ pages:
 wheel:
     .ci/wheel
 
+# Everything of a release in target/release-files: wheel, source distribution, programs with completions and pages of the manual, components,
+# licences, checksums. Half an hour on two cores.
+release:
+    .ci/release
+
 # The pages of docs/ as a book in target/book, every link followed. Installs mdBook into target/tools where it is missing.
 book:
     .ci/book

@@ -26,6 +26,9 @@ use crate::run_folder;
 /// At most this many constants are told on the terminal.
 const TOLD: usize = 3;
 
+/// At most this many predictions are told on the terminal.
+const PREDICTED: usize = 12;
+
 /// Estimate the parameters of a study; writes posterior.csv, summary.json and report.html into a run folder.
 #[derive(Parser)]
 pub(crate) struct Args {
@@ -184,6 +187,9 @@ fn print(summary: &Summary, folder: &Path, json: bool) -> Result<(), Failure> {
             number(c.noise, None)
         ))?;
     }
+    if !summary.predictions.is_empty() {
+        line(format_args!("\n{}", table(&predictions(summary), false)))?;
+    }
     if let Some(found) = &summary.hangs_on {
         hangs_on(found)?;
     }
@@ -198,6 +204,29 @@ fn print(summary: &Summary, folder: &Path, json: bool) -> Result<(), Failure> {
         summary.fit.nis_per_observation
     ))?;
     line(format_args!("report: {}", folder.join("report.html").display()))
+}
+
+/// What was predicted, measured or not: mean, lowest and highest value over each record.
+fn predictions(summary: &Summary) -> Vec<Vec<String>> {
+    let names = ["predicted", "unit", "record"].into_iter();
+    let titles = summary.predictions[0].figures().map(|(title, _)| title);
+    let head = names.chain(titles.into_iter().flat_map(|title| [title, "95 %"]));
+    let mut rows = vec![head.map(str::to_owned).collect::<Vec<_>>()];
+    for p in summary.predictions.iter().take(PREDICTED) {
+        let mut row = vec![p.output.clone(), p.unit.clone(), p.record.clone()];
+        for (_, figure) in p.figures() {
+            let [lo, hi] = figure.interval95;
+            // An interval of 95 % is about four sd long.
+            let sd = Some(0.25 * (hi - lo));
+            row.extend([number(figure.estimate, sd), format!("{} … {}", number(lo, sd), number(hi, sd))]);
+        }
+        rows.push(row);
+    }
+    let more = summary.predictions.len().saturating_sub(PREDICTED);
+    if more > 0 {
+        rows.push(vec![format!("{more} more in predicted.csv")]);
+    }
+    rows
 }
 
 /// The constants that matter most, in a sentence each.

@@ -8,6 +8,7 @@ request to elsewhere; a lost worker shows within two seconds; a page of a millio
 import json
 import os
 import pathlib
+import shutil
 import signal
 import sqlite3
 import subprocess
@@ -232,6 +233,21 @@ class Looker:
         page.close()
         print(f"a million samples: {size / 1e6:.2f} MB, open in {took:.2f} s")
 
+    def others(self, scratch, run):
+        """The pages of the commands that are quick, each of a result of its own."""
+        lorenz = pathlib.Path(shutil.copytree("examples/lorenz", scratch / "lorenz"))
+        self.make(lorenz, "simulate", str(lorenz / "truth.toml"), "--until", "8", "--step", "0.002", "-o", str(lorenz / "data.csv"))
+        for name, arguments in {
+            "forecast": ("forecast", str(run), "--members", "50"),
+            "infer": ("infer", str(lorenz / "study.toml")),
+            "diagnose": ("diagnose", "examples/thrust-vector-control/diagnose.toml"),
+        }.items():
+            folder = self.make(scratch / name, *arguments, "--out", str(scratch / name))
+            self.look(name, (folder / "report.html").as_uri())
+        other = self.make(scratch / "other", "run", "examples/rcr/study.toml", "--workers", "2", "--out", str(scratch / "other"))
+        page = self.make(scratch / "compare.html", "compare", str(run), str(other), "--html", str(scratch / "compare.html"))
+        self.look("compare", page.as_uri())
+
     def all(self, scratch):
         run = self.make(scratch / "run", "run", "examples/pig-aorta/study.toml", "--workers", "2", "--out", str(scratch / "run"))
         report = (run / "report.html").as_uri()
@@ -248,6 +264,7 @@ class Looker:
             path = scratch / f"{name}.html"
             self.make(path, *arguments, str(path))
             self.look(name, path.as_uri(), f"page-{name}")
+        self.others(scratch, run)
         samples = self.pictures / "samples"
         self.million(samples / "million.html")
         for path in sorted(samples.glob("*.html")):

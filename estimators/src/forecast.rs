@@ -2,12 +2,14 @@
 //! level.
 //!
 //! The members are whatever the caller has run; where they come from, a posterior or noise, is not known here. The order of the
-//! files is `forecast/crossing.rs` (one member), `forecast/distribution.rs` (all of them), `forecast/fan.rs`.
+//! files is `forecast/crossing.rs` (one member), `forecast/distribution.rs` (all of them), `forecast/fan.rs`, `forecast/central.rs`.
 
+mod central;
 mod crossing;
 mod distribution;
 mod fan;
 
+pub use central::central95;
 pub use crossing::{Direction, Level};
 pub use distribution::Crossings;
 pub use fan::Fan;

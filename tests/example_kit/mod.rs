@@ -20,7 +20,21 @@ struct Expected {
     #[serde(default)]
     fit: Fit,
     #[serde(default)]
+    predictions: Vec<Prediction>,
+    #[serde(default)]
     warnings: Warnings,
+}
+
+/// The truth of a quantity over a record, which its intervals are to hold when they are so many times as wide.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Prediction {
+    output: String,
+    lowest: f64,
+    highest: f64,
+    within: f64,
+    /// Length of an interval over its value at most.
+    narrower_than: f64,
 }
 
 #[derive(Deserialize)]
@@ -88,12 +102,31 @@ fn compare(summary: &Value, expected: &Expected) {
             }
         }
     }
+    expected.predictions.iter().for_each(|p| compare_prediction(summary, p));
     let warnings = summary["warnings"].to_string();
     for text in &expected.warnings.contains {
         assert!(warnings.contains(text), "no warning about `{text}` in {warnings}");
     }
     for text in &expected.warnings.lacks {
         assert!(!warnings.contains(text), "an unexpected warning about `{text}` in {warnings}");
+    }
+}
+
+fn compare_prediction(summary: &Value, expected: &Prediction) {
+    let all = summary["predictions"].as_array().expect("predictions");
+    let found = all.iter().find(|p| p["output"] == expected.output.as_str());
+    let found = found.unwrap_or_else(|| panic!("no `{}` in {all:?}", expected.output));
+    for (key, truth) in [("lowest", expected.lowest), ("highest", expected.highest)] {
+        let [lo, hi] = [0, 1].map(|end| number(&found[key]["interval95"][end]));
+        let estimate = number(&found[key]["estimate"]);
+        let (off, half) = ((estimate - truth).abs(), 0.5 * (hi - lo));
+        assert!(
+            off <= expected.within * half,
+            "{} {key}: {estimate} in {lo} to {hi}, {truth}",
+            expected.output
+        );
+        let limit = expected.narrower_than * truth.abs();
+        assert!(2.0 * half < limit, "{} {key}: {lo} to {hi} is wider than {limit}", expected.output);
     }
 }
 

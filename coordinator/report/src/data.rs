@@ -8,6 +8,7 @@ mod parameter;
 use serde::{Deserialize, Serialize};
 
 pub(crate) use parameter::ParameterRow;
+use starlings_study::predicted::{PredictedCourse, PredictedOutput};
 
 /// Everything one report shows.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -51,6 +52,10 @@ pub struct ReportData {
     pub(crate) x_label: String,
     /// One per record and observed output.
     pub(crate) channels: Vec<ChannelPlot>,
+    /// What was predicted besides, measured or not.
+    pub(crate) predicted: Vec<PredictedCourse>,
+    /// The same in numbers.
+    pub(crate) predictions: Vec<PredictedOutput>,
     /// One per record and observed output, of the residuals.
     pub(crate) autocorrelation: Vec<Autocorrelation>,
     /// Normalised innovation squared, one series per pass.

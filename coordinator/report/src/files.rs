@@ -1,9 +1,11 @@
-//! The files of a finished run: `posterior.csv`, `summary.json` and `report.html`, all made from its store.
+//! The files of a finished run: `posterior.csv`, `summary.json`, `report.html` and, where it predicted anything, `predicted.csv`, all
+//! made from its store.
 
 use std::io;
 use std::path::PathBuf;
 
 use starlings_study::RunFolder;
+use starlings_study::predicted;
 use starlings_study::store::StoreError;
 use starlings_study::store::folder::write;
 
@@ -44,7 +46,7 @@ pub enum FilesError {
     },
 }
 
-/// Writes the three files into the run folder.
+/// Writes the files into the run folder.
 ///
 /// # Errors
 /// When the run is not finished, the store is damaged, or a file cannot be written.
@@ -59,6 +61,11 @@ pub fn write_files(folder: &RunFolder) -> Result<(), FilesError> {
         serde_json::to_string_pretty(&summary).map_err(|e| folder.store.damaged("summary", e))? + "\n";
     for (name, text) in [("posterior.csv", posterior), ("summary.json", summary)] {
         place(folder, name, &text)?;
+    }
+    let courses = predicted::read(&folder.store)?;
+    if !courses.is_empty() {
+        let text = predicted::to_csv(&courses).map_err(|e| folder.store.damaged("predictions", e))?;
+        place(folder, "predicted.csv", &text)?;
     }
     Ok(())
 }

@@ -5,6 +5,7 @@
 
 pub(crate) mod figures;
 mod outputs;
+mod predicted;
 
 use serde::Serialize;
 
@@ -42,6 +43,9 @@ pub(crate) struct Page<'a> {
     correlation_left_out: usize,
     /// The strongest correlation, in words.
     strongest: Option<String>,
+    /// What was predicted besides, in numbers.
+    predicted: Vec<predicted::PredictedView>,
+    predicted_left_out: usize,
     /// Fits that are not drawn.
     fits_left_out: usize,
     fleet: FleetView,
@@ -100,6 +104,8 @@ impl<'a> Page<'a> {
             correlated: data.parameters.iter().take(correlation::MOST).map(|row| row.name.as_str()).collect(),
             correlation_left_out: data.parameters.len().saturating_sub(correlation::MOST),
             strongest: strongest(data),
+            predicted: predicted::rows(data),
+            predicted_left_out: predicted::left_out(data),
             fits_left_out: figures::fit::left_out(data),
             fleet: fleet(data),
         })

@@ -12,6 +12,7 @@ use std::collections::BTreeMap;
 use starlings_estimators::{autocorrelation, nis_band};
 use starlings_study::ObserverCourse;
 use starlings_study::posterior::Estimate;
+use starlings_study::predicted;
 use starlings_study::store::folder::{OBSERVER, PREDICTION_SD, StudyInfo};
 use starlings_study::store::{Store, StoreError};
 use starlings_study::summary::Summary;
@@ -38,6 +39,7 @@ pub fn report_data(store: &Store) -> Result<ReportData, StoreError> {
     let mut data = ReportData {
         tracks: tracks(store, &info, summary.as_ref())?,
         channels: channels(store, &info)?,
+        predicted: predicted::read(store)?,
         nis: nis(store)?,
         fleet: fleet::table(store, summary.as_ref())?,
         x_label: if info.batch { "iteration".to_owned() } else { format!("time [{}]", info.time_unit) },
@@ -110,6 +112,7 @@ fn finished(data: &mut ReportData, summary: Summary) {
     data.warnings = summary.warnings;
     data.estimator = summary.estimator;
     data.hangs_on = summary.hangs_on;
+    data.predictions = summary.predictions;
     data.wall_s = summary.wall_s;
     data.correlation = summary.correlation;
     data.nis_per_observation = Some(summary.fit.nis_per_observation);

@@ -14,6 +14,7 @@ mod limits;
 mod model;
 mod observer;
 mod parameters;
+mod predict;
 mod prior;
 mod records;
 pub(crate) mod relative;
@@ -35,7 +36,9 @@ use self::records::records;
 use self::settings::{estimator, fleet};
 use self::solver::DescribedSolver;
 pub(crate) use self::solver::UNTRIED;
-use super::checked::{EstimatorChoice, ExplainChoice, FleetChoice, Record, SpectrumChoice, Study};
+use super::checked::{
+    EstimatorChoice, ExplainChoice, FleetChoice, PredictChoice, Record, SpectrumChoice, Study,
+};
 use super::diagnosis::Diagnosis;
 use super::expand;
 use super::file::StudyFile;
@@ -187,6 +190,7 @@ fn checked(
     let priors = parameters::priors(source, &file, &model, &mut warnings);
     let records = records(source, &file, &mut model, &explain.hold_out_channels, &mut warnings);
     explain::check_held_out(source, &file, &records);
+    let predict = predict::predict(source, &file.predict, &model.spec, &records);
     source.verdict()?;
     model.setup.parameters = file.parameters.iter().map(|p| p.name.get_ref().clone()).collect();
     let parameters = initial_medians(source, &file, &model.spec, &priors, &records);
@@ -207,6 +211,7 @@ fn checked(
         records: Arc::new(records),
         explain,
         spectrum,
+        predict,
         delays: model.delays,
         runs_here: solver.is_none_or(|known| known.is_here),
         warnings,
@@ -244,6 +249,7 @@ fn study_of(
         fleet,
         explain: ExplainChoice::default(),
         spectrum: SpectrumChoice::default(),
+        predict: PredictChoice::default(),
         infer: None,
         delays: false,
         runs_here: true,

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use starlings_estimators::{Drift, Kind, Options, Points, Root, Transform};
 use starlings_models::{EffectDef, Setup, Signal, Spec};
 
-pub use self::asked::{ExplainChoice, Library, SpectrumChoice};
+pub use self::asked::{ExplainChoice, Library, PredictChoice, SpectrumChoice};
 use super::infer_choice::InferChoice;
 use super::solver_host::SolverHost;
 use super::surfaces::Node;
@@ -51,6 +51,8 @@ pub struct Study {
     pub explain: ExplainChoice,
     /// What `spectrum` compares.
     pub spectrum: SpectrumChoice,
+    /// What `run` predicts after the fit.
+    pub predict: PredictChoice,
     /// What `infer` asks, where the file says so and the study was read for it.
     pub infer: Option<Arc<InferChoice>>,
     /// An input is used at earlier times: windows then hold it from the record's start.

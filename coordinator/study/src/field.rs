@@ -24,6 +24,12 @@ pub fn quantity_of<'a>(list: &'a [Quantity], name: &str) -> Option<&'a Quantity>
     })
 }
 
+/// Unit label of an output or a state; empty for any other name.
+pub(crate) fn unit_of(spec: &Spec, name: &str) -> String {
+    let found = quantity_of(&spec.outputs, name).or_else(|| quantity_of(&spec.states, name));
+    found.map(|q| q.unit.clone()).unwrap_or_default()
+}
+
 /// The names of all components of these quantities, in the order of their concatenation.
 pub fn components(list: &[Quantity]) -> Vec<String> {
     let n = list.iter().map(|q| q.size).sum();

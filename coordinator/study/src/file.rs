@@ -10,6 +10,7 @@ pub(super) mod layout;
 pub(super) mod locate;
 pub(crate) mod memory;
 mod model;
+pub(super) mod predict;
 mod quantity;
 pub(super) mod read;
 mod settings;
@@ -36,6 +37,7 @@ pub(super) struct StudyFile {
     pub(super) effects: Vec<EffectSection>,
     pub(super) explain: ExplainSection,
     pub(super) spectrum: spectrum::SpectrumSection,
+    pub(super) predict: predict::PredictSection,
     /// Present where the file has the section.
     pub(super) infer: Option<infer::InferSection>,
     /// Present where the file has the section.

@@ -16,7 +16,6 @@ pub mod result;
 mod tables;
 
 use nalgebra::DVector;
-use rand_distr::{Distribution, StandardNormal};
 use starlings_estimators::Gaussian;
 use starlings_fleet::Fleet;
 use starlings_models::BuildSetup;
@@ -28,7 +27,7 @@ pub use ask::{Ask, Threshold};
 pub use error::StudyForecastError;
 pub use result::Forecast;
 
-use ensemble::{Ensemble, MeasuredOutput, MeasuredValue, draws};
+use ensemble::{Ensemble, MeasuredOutput, MeasuredValue, drawn};
 use measurement::TrainingResiduals;
 use posterior::Drawn;
 
@@ -70,18 +69,14 @@ pub fn forecast(
 
 /// The parameters of every member, drawn from the posterior.
 fn members(study: &Study, plan: &ask::Plan, posterior: &Gaussian) -> Vec<Vec<f64>> {
-    let mut rng = draws(plan.seed);
-    let root = posterior.factor();
-    let member = |_| {
-        let z = DVector::from_fn(root.ncols(), |_, _| StandardNormal.sample(&mut rng));
-        let drawn: DVector<f64> = &posterior.mean + &root * z;
+    let member = |drawn: DVector<f64>| {
         let mut theta = study.theta_for(plan.record, drawn.as_slice());
         for (place, value) in &plan.fixed {
             theta[*place] = *value;
         }
         theta
     };
-    (0..plan.members).map(member).collect()
+    drawn(posterior, plan.members, plan.seed).into_iter().map(member).collect()
 }
 
 /// What a channel measured at times of the forecast.

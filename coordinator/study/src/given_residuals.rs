@@ -36,7 +36,7 @@ pub(crate) enum GivenResiduals {
 
 impl GivenResiduals {
     /// The posterior with its covariance given the residuals, or as it is where that is not known.
-    fn widened(&self, posterior: &Gaussian) -> Gaussian {
+    pub(crate) fn widened(&self, posterior: &Gaussian) -> Gaussian {
         match self {
             Self::Wider { covariance, .. } => {
                 Gaussian { mean: posterior.mean.clone(), covariance: covariance.clone() }

@@ -23,6 +23,7 @@ pub mod infer_choice;
 mod observer_gain;
 mod plan;
 pub mod posterior;
+pub mod predicted;
 mod predictive;
 mod problem;
 pub mod progress;

@@ -32,8 +32,9 @@ pub struct Progress {
 /// Name under which the store keeps the last [`Progress`], as JSON.
 pub const PROGRESS: &str = "progress";
 
-/// The runs after a fit, in their order: with the estimate, with the observer, with constants moved, beside the estimate.
-pub const LAST: [&str; 4] = ["final run", "observer", "constants", "residuals"];
+/// The runs after a fit, in their order: with the estimate, with the observer, with constants moved, beside the estimate, with draws of
+/// the posterior.
+pub const LAST: [&str; 5] = ["final run", "observer", "constants", "residuals", "predictions"];
 
 impl Progress {
     /// Whether it tells of an analysis, and not of the runs after the last one.

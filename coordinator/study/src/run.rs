@@ -15,9 +15,10 @@ use super::given_residuals::{self, Beside, GivenResiduals};
 use super::identify::IdentifyError;
 use super::store::{PredictionRow, Store, StoreError};
 use super::summary::Summary;
-use super::{RunError, Study, observer_gain, summary, warnings};
+use super::{RunError, Study, observer_gain, predicted, summary, warnings};
 use crate::fit::runner::EnsembleRunner;
 use crate::observer_gain::Compared;
+use crate::predicted::Predictions;
 use crate::progress::{LAST, Progress};
 use crate::store::folder::{GIVEN_RESIDUALS, OBSERVER, PREDICTION_SD, RunFolder};
 use crate::store::json::json;
@@ -170,13 +171,15 @@ fn from_start_to_end(
         Form::Windows(make) => filter::fit(make, &mut runner, &folder.store, context, resumed)?,
         Form::WholeRecords => batch::fit(&mut runner, &folder.store, context, resumed)?,
     };
-    let AfterFit { predictions, observer, hangs_on, beside } =
+    let AfterFit { predictions, predicted, observer, hangs_on, beside } =
         after_fit(&mut runner, &folder.store, &fit, context)?;
     let jobs = runner.take_rows();
     folder.store.predictions(&predictions, &jobs)?;
     context.keep_events(&folder.store)?;
     let mut result = summary::make(study, &fit, &predictions, runner.n_answered(), context.elapsed());
     result.add_residuals(study, &fit, &beside.given);
+    predicted::keep(&folder.store, &predicted.courses)?;
+    result.add_predictions(study, predicted.outputs, &beside.given);
     keep_covariance(&folder.store, &beside.given)?;
     if let Some(spread) = &beside.spread {
         folder.store.set_meta(PREDICTION_SD, &json(spread))?;
@@ -193,6 +196,7 @@ fn from_start_to_end(
     let residuals = warnings::residuals::residuals(study, &fit, &folder.store, &predictions)?;
     result.warnings = warnings::collect(study, &fit, &result, &predictions, &residuals);
     result.warnings.extend(unknown);
+    result.warnings.extend(predicted.warnings);
     result.warnings.extend(folder.mixed()?);
     result.warnings.extend(runner.timeouts());
     result.warnings.extend(folder.store.told_of_workers()?);
@@ -212,6 +216,7 @@ fn from_start_to_end(
 /// What the runs after a fit gave.
 struct AfterFit {
     predictions: Vec<PredictionRow>,
+    predicted: Predictions,
     observer: Compared,
     hangs_on: Result<HangsOn, String>,
     beside: Beside,
@@ -243,7 +248,12 @@ fn after_fit(
             (hangs_on, given_residuals::compare(runner, &fit.posterior)?)
         }
     };
-    Ok(AfterFit { predictions, observer, hangs_on, beside })
+    let mut predicted = Predictions::default();
+    if !runner.study().predict.outputs.is_empty() {
+        context.goes_on(store, fit, 4, runs(runner), runner);
+        predicted = predicted::predict(runner, &beside.given.widened(&fit.posterior))?;
+    }
+    Ok(AfterFit { predictions, predicted, observer, hangs_on, beside })
 }
 
 /// Stores the covariance given the residuals, for forecasts.

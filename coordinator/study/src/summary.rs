@@ -14,6 +14,7 @@ use super::field::field_of;
 use super::given_residuals::GivenResiduals;
 use super::observer_gain::ObserverFit;
 use super::posterior::{self, Estimate, estimates};
+use super::predicted::{self, Figure, PredictedOutput};
 use super::store::PredictionRow;
 use super::{Fit, Study};
 
@@ -95,6 +96,9 @@ pub struct Summary {
     /// How far the estimates follow the constants of the model; absent where it has none, and for parameters that drift.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hangs_on: Option<HangsOn>,
+    /// What was predicted that the study asks for in `[predict]`; absent where it does not.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub predictions: Vec<PredictedOutput>,
     /// Runs.
     pub runs: Runs,
     /// Workers that answered at least one run.
@@ -124,6 +128,20 @@ impl Summary {
         }
     }
 
+    /// Adds what was predicted of quantities that the study asks for.
+    pub(super) fn add_predictions(
+        &mut self,
+        study: &Study,
+        predictions: Vec<PredictedOutput>,
+        given: &GivenResiduals,
+    ) {
+        if !predictions.is_empty() {
+            let wider = matches!(given, GivenResiduals::Wider { .. });
+            self.conditional_on.push_str(&predicted::conditional_on(study, wider));
+        }
+        self.predictions = predictions;
+    }
+
     /// Whether the interval of a parameter given the residuals is more than 1.5 times that at the stated noise: then it is the
     /// one to look at first.
     pub fn residuals_first(&self) -> bool {
@@ -149,6 +167,11 @@ impl Summary {
         });
         let of_correlation = self.correlation.iter().flatten().map(|v| ("correlation".to_owned(), *v));
         let of_fit = [("log-likelihood", self.fit.log_likelihood), ("NIS", self.fit.nis_per_observation)];
+        let of_predictions = self.predictions.iter().flat_map(|p| {
+            let values = p.figures().map(|(_, Figure { estimate, interval95: [lo, hi] })| [estimate, lo, hi]);
+            values.into_iter().flatten().map(|v| (format!("prediction of {}", p.output), v))
+        });
+        let of_correlation = of_correlation.chain(of_predictions);
         let mut all = of_parameters.chain(of_correlation).chain(of_fit.map(|(name, v)| (name.to_owned(), v)));
         all.find(|(_, v)| !v.is_finite()).map_or(Ok(()), |(name, _)| Err(name))
     }
@@ -166,6 +189,7 @@ pub fn make(study: &Study, fit: &Fit, predictions: &[PredictionRow], workers: us
         fit: fit_figures(study, fit, predictions),
         observer: None,
         hangs_on: None,
+        predictions: Vec::new(),
         runs: Runs {
             total: fit.counts.total,
             failed: fit.counts.failed,

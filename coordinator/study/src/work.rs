@@ -65,13 +65,15 @@ impl WorkPlan {
         let observer = if study.observer_is_off() { 0.0 } else { trained };
         let constants = if n_constant > 0 { (beside + n_constant as f64) * trained } else { 0.0 };
         let residuals = if study.drifts() && is_filter { 0.0 } else { beside * whole };
+        let predicted =
+            if study.predict.outputs.is_empty() { 0.0 } else { study.predict.members as f64 * whole };
         let weight = if is_filter { WHOLE } else { 1.0 };
         Self {
             before,
             particles: n_particle as f64,
             passes: study.passes(),
             is_filter,
-            last: [whole, observer, constants, residuals].map(|work| weight * work).to_vec(),
+            last: [whole, observer, constants, residuals, predicted].map(|work| weight * work).to_vec(),
         }
     }
 
@@ -102,7 +104,8 @@ impl WorkPlan {
         Work { done, next, total: fit + self.last.iter().sum::<f64>() }
     }
 
-    /// After a fit with this much done, before the runs after it with this place: the final run, the observer, constants, residuals.
+    /// After a fit with this much done, before the runs after it with this place: the final run, the observer, constants, residuals,
+    /// predictions.
     pub(crate) fn after(&self, fit: f64, place: usize) -> Work {
         let done = self.last.iter().take(place).sum::<f64>();
         let next = self.last.get(place).copied().unwrap_or(0.0);

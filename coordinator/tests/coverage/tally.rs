@@ -1,6 +1,7 @@
 //! Counts over the draws: intervals that hold the truth, distances from it, warnings, passes, runs.
 
 use starlings_coordinator::fleet::InProcess;
+use starlings_coordinator::study::predicted::{self, PredictedCourse};
 use starlings_coordinator::study::store::Purpose;
 use starlings_coordinator::study::{RunContext, RunFolder, Study, Summary, run::run as run_study};
 
@@ -19,6 +20,7 @@ pub(crate) struct Done {
     pub(crate) summary: Summary,
     pub(crate) estimates: Vec<Estimate>,
     pub(crate) passes: usize,
+    pub(crate) courses: Vec<PredictedCourse>,
 }
 
 /// Warnings that say that the intervals may be wrong.
@@ -56,7 +58,8 @@ pub(crate) fn run(study: &Study) -> Done {
     };
     let passes = starlings_coordinator::study::store::table(&folder.store, "analyses", "pass").unwrap();
     let passes = passes.iter().map(|row| row[0].parse().unwrap()).max().unwrap();
-    Done { estimates: rows.iter().enumerate().map(estimate).collect(), summary, passes }
+    let courses = predicted::read(&folder.store).unwrap();
+    Done { courses, estimates: rows.iter().enumerate().map(estimate).collect(), summary, passes }
 }
 
 /// Over the draws of one system.

@@ -16,6 +16,7 @@ mod vessels;
 mod viscous;
 mod wall;
 
+use starlings_models_core::blocks::{Sections, WindkesselBlock};
 use starlings_models_core::segment::Segment;
 use starlings_models_core::{Drive, Model, ModelDef, ModelFailure, SetupError, Spec};
 
@@ -31,6 +32,8 @@ use vessels::Vessels;
 /// ∂A/∂t + ∂Q/∂x = 0,  ∂Q/∂t + ∂(α Q²/A)/∂x + (A/ρ) ∂p/∂x = −K_r Q/A,  K_r = 2(ζ + 2)πμ/ρ,
 ///
 /// p = p_ext + (E h/((1 − ν²)R0²) + k_s)(R − R0) + (c_w + c_s) ∂R/∂t.
+///
+/// The wall's circumferential stress is that of a ring kept from moving along the axis, σ = E (R − R0)/((1 − ν²) R0) + c_w (R0/h) ∂R/∂t.
 ///
 /// At junctions mass is conserved and p + ½ρu² is continuous; at an RCR outlet p = π + R_p Q and C dπ/dt = Q −
 /// (π − p_venous)/R_d. Units are cm, g, s and dyn/cm². The vessels, their Young's moduli E and the outlets are those of the
@@ -164,6 +167,8 @@ impl Model for Artery1d {
         if vessels.rate(u.value[0], x, &mut work, &mut rate).is_err() {
             return y.fill(f64::NAN);
         }
+        let (y, hoop) = y.split_at_mut(self.spec.n_output() - 2 * n);
+        let (strain, stress) = hoop.split_at_mut(n);
         for (i, tube) in self.network.tubes.iter().enumerate() {
             let first = Vessels::first_face(i, tube);
             for j in 0..tube.n {
@@ -171,6 +176,7 @@ impl Model for Artery1d {
                 let viscous = 0.5 * (work.viscous.face[first + j] + work.viscous.face[first + j + 1]);
                 y[cell] = ring.displacement(x[cell]);
                 y[n + cell] = vessels.p_ext + ring.pressure(x[cell]) + viscous;
+                [strain[cell], stress[cell]] = vessels.strain_and_stress(tube, j, x[cell], viscous);
             }
         }
         y[2 * n..3 * n].copy_from_slice(&x[n..2 * n]);
@@ -179,6 +185,22 @@ impl Model for Artery1d {
             y[0] = work.faces.node[node];
             y[1] = vessels.outflow(node, &work.faces);
         }
+    }
+
+    fn sections(&self, theta: &[f64]) -> Option<Sections> {
+        let vessels = Vessels::new(&self.network, theta);
+        let chamber = |(&node, outlet): (&usize, &vessels::Outlet)| {
+            let (number, distal, compliance) = outlet.chamber?;
+            let state = 2 * self.network.n_cell + number;
+            let block = WindkesselBlock { state, rate: 1.0 / (distal * compliance) };
+            Some((block, quantities::named(&self.network, "outlet_pressure", node)))
+        };
+        Some(Sections {
+            area: 0,
+            n: self.network.n_cell,
+            displacement: "displacement",
+            outlets: self.network.outlets.iter().zip(&vessels.outlets).filter_map(chamber).collect(),
+        })
     }
 
     fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ModelFailure> {

@@ -32,6 +32,9 @@ use state::State;
 ///
 /// p = π + R_p Q at the outlet,  C dπ/dt = Q − π/R_d.
 ///
+/// The wall's circumferential strain is ε = η/R and its stress σ = E ε/(1 − ν²) + c_w w R/h, that of a ring which is kept from moving
+/// along the axis (Quarteroni, Tuveri & Veneziani 2000, the terms of the wall above times R/h).
+///
 /// Units are cm, g, s and dyn/cm². E is `E1`, `E2`, ... in the regions of the [`Layout`].
 ///
 /// With an image pressure p_i in the layout, R is the radius seen in an image under p_i and η counts from the image: the
@@ -102,11 +105,35 @@ impl FsiTube {
     /// The stiffness of wall and tissue for a Young's modulus; NaN where the image has no unloaded radius.
     fn of_young(&self, c: &Coefficients, young: f64) -> f64 {
         if self.image_pressure > 0.0 {
-            let ring = Rings { membrane: vec![c.membrane(young)], support: c.tissue };
-            let unloaded = ring.unloaded(&[c.radius], self.image_pressure);
-            return unloaded.map_or(f64::NAN, |found| c.stiffness_at(young, found.shape[0]));
+            return c.stiffness_at(young, self.unloaded(c, young));
         }
         c.stiffness(young)
+    }
+
+    /// The radius without load of a wall of this Young's modulus; NaN where the image has none.
+    fn unloaded(&self, c: &Coefficients, young: f64) -> f64 {
+        if self.image_pressure > 0.0 {
+            let ring = Rings { membrane: vec![c.membrane(young)], support: c.tissue };
+            let unloaded = ring.unloaded(&[c.radius], self.image_pressure);
+            return unloaded.map_or(f64::NAN, |found| found.shape[0]);
+        }
+        c.radius
+    }
+
+    /// Writes strain and stress of the wall in every cell.
+    fn wall(&self, x: &[f64], theta: &[f64], c: &Coefficients, [strain, stress]: [&mut [f64]; 2]) {
+        let n = self.n_cell();
+        let mut known = None;
+        for (k, &region) in self.region.iter().enumerate() {
+            // Cells of a region follow each other.
+            let unloaded = match known {
+                Some((of, radius)) if of == region => radius,
+                _ => self.unloaded(c, theta[region]),
+            };
+            known = Some((region, unloaded));
+            let stretch = x[k] + c.radius - unloaded;
+            [strain[k], stress[k]] = c.strain_and_stress(theta[region], unloaded, stretch, x[n + k]);
+        }
     }
 
     /// Flow out of the tube: what flows in and does not widen the wall.
@@ -183,6 +210,8 @@ impl Model for FsiTube {
         let outflow = self.outflow(&c, u.value[0], x);
         y[2 * n] = x[2 * n] + c.proximal * outflow;
         y[2 * n + 1] = outflow;
+        let (strain, stress) = y[2 * n + 3..].split_at_mut(n);
+        self.wall(x, theta, &c, [strain, stress]);
     }
 
     fn blocks(&self, theta: &[f64]) -> Option<Blocks> {

@@ -32,11 +32,21 @@ def physical(transform: str, z: Array) -> Array:
     return within
 
 
-def draw(mean: Array, covariance: Array, transforms: Sequence[str], n: int, seed: int) -> Array:
-    """`n` draws in the parameters' units, [n][n_param]. A covariance without full rank is drawn in the directions that it has."""
+def gaussian(mean: Array, covariance: Array, n: int, seed: int) -> Array:
+    """`n` draws of the transformed parameters, [n][n_param]. A covariance without full rank is drawn in the directions that it has."""
     if n < 1:
         raise ValueError(f"{n} draws: at least one is needed")
     values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
     root = vectors * np.sqrt(np.clip(values, 0.0, None))
-    z = mean + np.random.default_rng(seed).standard_normal((n, len(mean))) @ root.T
+    z: Array = mean + np.random.default_rng(seed).standard_normal((n, len(mean))) @ root.T
+    return z
+
+
+def in_units(transforms: Sequence[str], z: Array) -> Array:
+    """Draws of transformed parameters in the parameters' units, [n][n_param]."""
     return np.column_stack([physical(transform, z[:, k]) for k, transform in enumerate(transforms)])
+
+
+def draw(mean: Array, covariance: Array, transforms: Sequence[str], n: int, seed: int) -> Array:
+    """`n` draws in the parameters' units, [n][n_param]."""
+    return in_units(transforms, gaussian(mean, covariance, n, seed))

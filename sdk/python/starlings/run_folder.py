@@ -8,6 +8,9 @@ from __future__ import annotations
 import csv
 import json
 import os
+import sqlite3
+import urllib.parse
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Dict, List, Optional, Sequence, Union
@@ -99,11 +102,25 @@ class Run:
         options = {"until": until, "step": step, "horizon": horizon, "record": record, "seed": seed, "workers": workers}
         return forecast(self.folder, {**options, "study": self.study}, members, levels, set, out, progress)
 
-    def to_arviz(self, draws: int = 1000, chains: int = 4, seed: int = 0) -> Any:
-        """The run as ArviZ takes it: posterior, observed data, and the run with the estimate. Needs arviz."""
+    def to_arviz(self, draws: int = 1000, chains: int = 4, seed: int = 0, *, predictive: bool = False) -> Any:
+        """The run as ArviZ takes it: posterior, observed data, and the run with the estimate. Needs arviz.
+
+        With `predictive` also draws of the posterior predictive and the log likelihood of every fitted value, for `arviz.plot_ppc` and
+        `arviz.loo`. That runs the model around the estimate as `starlings.identify` does: predictions are those of the model to
+        first order in the transformed parameters, as the posterior is, with the noise that the study states.
+        """
         from .inference_data import of_run
 
-        return of_run(self, draws, chains, seed)
+        return of_run(self, draws, chains, seed, predictive)
+
+    def study_file(self) -> Path:
+        """The study file of the run: `study` where that is named, else where it was when it was run."""
+        if self.study is not None:
+            return self.study
+        database = f"file:{urllib.parse.quote(str(self.folder / 'run.db'))}?mode=ro"
+        with closing(sqlite3.connect(database, uri=True)) as store:
+            (text,) = store.execute("SELECT value FROM meta WHERE key = 'info'").fetchone()
+        return Path(json.loads(text)["file"])
 
     def save(
         self, file: Union[str, "os.PathLike[str]"], *, draws: int = 4000, chains: int = 4, seed: int = 0
@@ -155,6 +172,8 @@ def read_run(folder: Union[str, "Path"]) -> Run:
     names = [row["parameter"] for row in rows]
     covariance = np.array([[float(row[f"cov:{name}"]) for name in names] for row in rows])
     columns = {key: column([row[key] for row in rows]) for key in rows[0] if not key.startswith("cov:")}
+    # A unit may be written as a number: "1" stays text.
+    columns["unit"] = np.array([row.get("unit", "") for row in rows], dtype=object)
     transforms = [row.get("transform", "linear") for row in rows]
     means = np.array([float(row["mean_transformed"]) for row in rows])
     return Run(path, summary, names, table(columns, "parameter"), covariance, means, transforms)

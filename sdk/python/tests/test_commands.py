@@ -51,6 +51,7 @@ def test_a_function_and_arrays_come_to_a_posterior(cooled):
     for name, truth in (("start", 70.0), ("rate", 0.05)):
         entry = cooled[name]
         assert abs(entry["estimate"] - truth) < 4.0 * entry["sd"]
+    assert list(cooled.parameters["unit"]) == ["K", "1/s"]
     assert (cooled.folder / "study" / "study.toml").is_file()
     assert cooled.report.is_file()
     assert cooled._repr_html_().startswith("<iframe srcdoc=")
@@ -90,6 +91,31 @@ def test_the_summary_of_arviz_is_that_of_the_run(cooled):
     observed = data.observed_data["data:temperature"].to_numpy()
     assert observed.shape == (61,)
     assert int(data.constant_data["data:temperature:fitted"].sum()) == 46
+
+
+def test_predictive_draws_and_log_likelihoods_are_those_of_the_model_and_of_the_summary(cooled):
+    arviz = pytest.importorskip("arviz")
+    data = cooled.to_arviz(draws=4000, predictive=True)
+    channel = "data:temperature"
+    t = data.log_likelihood[f"{channel}:fitted_time"].to_numpy()
+    observed = data.observed_data[channel].to_numpy()
+    likelihood = data.log_likelihood[channel].to_numpy().reshape(4000, -1)
+    drawn = {name: data.posterior[name].to_numpy().reshape(4000, 1) for name in cooled.names}
+    exact = cooling(t, drawn["start"], drawn["rate"])
+    by_hand = -0.5 * ((observed - exact) / 0.3) ** 2 - np.log(0.3 * np.sqrt(2.0 * np.pi))
+    # What is left is of second order: posterior sd of a few per mille of a prediction of 70 K, squared, over the noise.
+    assert np.abs(likelihood.sum(axis=1) - by_hand.sum(axis=1)).max() < 0.1
+    # The mean over draws: that of the estimate, by the error of the summary, less half of what the parameters cost.
+    error = next(c for c in cooled.summary["fit"]["channels"] if c["name"] == channel or c["name"] == "temperature")
+    of_estimate = -0.5 * len(t) * (error["train_rmse"] / 0.3) ** 2 - len(t) * np.log(0.3 * np.sqrt(2.0 * np.pi))
+    # Two parameters, both determined by the data alone: half a unit each; its Monte-Carlo error is 1/sqrt(4000).
+    assert abs(likelihood.sum(axis=1).mean() - (of_estimate - 1.0)) < 0.1
+    predictive = data.posterior_predictive[channel].to_numpy().reshape(4000, -1)
+    assert np.allclose(predictive.mean(axis=0), exact.mean(axis=0), atol=6.0 * 0.33 / np.sqrt(4000))
+    assert np.allclose(predictive.std(axis=0) ** 2, 0.09 + exact.std(axis=0) ** 2, rtol=0.15)
+    assert np.isfinite(arviz.loo(data).elpd_loo)
+    again = cooled.to_arviz(draws=4000, predictive=True)
+    assert np.array_equal(again.posterior_predictive[channel].to_numpy().reshape(4000, -1), predictive)
 
 
 def test_a_forecast_and_the_tables(cooled):

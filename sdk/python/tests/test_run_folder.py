@@ -47,6 +47,11 @@ def test_without_pandas_the_table_is_of_arrays(folder, monkeypatch):
     assert table["parameter"].tolist() == ["k", "c"]
 
 
+def test_a_unit_that_is_a_number_stays_text(folder):
+    (folder / "posterior.csv").write_text(POSTERIOR.replace("N/m", "1").replace("N s/m", "1"))
+    assert list(starlings.read_run(folder).parameters["unit"]) == ["1", "1"]
+
+
 def test_with_pandas_the_table_has_one_row_per_parameter(folder):
     pytest.importorskip("pandas")
     table = starlings.read_run(folder).parameters

@@ -10,6 +10,7 @@ pub(crate) mod fit;
 mod nis;
 mod observer;
 mod pairs;
+mod predicted;
 mod residual;
 mod run_times;
 mod track;
@@ -21,9 +22,10 @@ use crate::plot::figure::{Figure, Slot, Slots};
 type Draw = fn(&ReportData) -> Vec<Figure>;
 
 /// The places for figures, in the order of their sections, and what draws the figures of each.
-const SLOTS: [Slot<Draw>; 8] = [
+const SLOTS: [Slot<Draw>; 9] = [
     Slot::named("families", along::figures),
     Slot::named("fit", fit::figures),
+    Slot::named("predicted", predicted::figures),
     Slot::section(
         "residuals",
         "What the residuals have in common",

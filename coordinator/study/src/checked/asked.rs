@@ -1,4 +1,4 @@
-//! What a study asks of `explain` and `spectrum`.
+//! What a study asks of `explain`, `spectrum` and, beyond its estimates, of `run`.
 //!
 //! Next file to read: [`super`].
 
@@ -42,4 +42,21 @@ pub struct SpectrumChoice {
     pub gains: Vec<f64>,
     /// The decay that is wanted.
     pub decay: Option<Decay>,
+}
+
+/// What `run` predicts after the fit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PredictChoice {
+    /// Outputs and scalar states, a field component by component; empty for nothing.
+    pub outputs: Vec<String>,
+    /// Draws of the posterior.
+    pub members: usize,
+    /// Spacing of times beside those of the records; none without it.
+    pub step: Option<f64>,
+}
+
+impl Default for PredictChoice {
+    fn default() -> Self {
+        Self { outputs: Vec::new(), members: 200, step: None }
+    }
 }

@@ -16,7 +16,7 @@ use super::{
 };
 use crate::problem::{Source, StudyError};
 
-const SECTIONS: [&str; 12] = [
+const SECTIONS: [&str; 13] = [
     "study",
     "model",
     "parameters",
@@ -25,6 +25,7 @@ const SECTIONS: [&str; 12] = [
     "effects",
     "explain",
     "spectrum",
+    "predict",
     "infer",
     "diagnose",
     "estimator",
@@ -56,6 +57,7 @@ pub(crate) fn read(source: &Source, adapters: &[AdapterDef]) -> Result<StudyFile
         effects: effects(source, &root),
         explain: explain(&root),
         spectrum: super::spectrum::read(&root),
+        predict: super::predict::read(&root),
         infer: super::infer::read(source, &root),
         diagnose: super::diagnose::read(source, &root),
         needs_parameter: true,

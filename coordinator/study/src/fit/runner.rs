@@ -3,12 +3,14 @@
 //! Outcomes are gathered by particle and record, never by arrival, so the numbers do not depend on which worker computed them.
 //! What to do about a particle that failed is not decided here: see [`super::rescue`].
 
+mod others;
+
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 use starlings_fleet::{Fleet, Held, Outcome, SetupId};
-use starlings_models::{BuildSetup, Job, Prediction, Setup, Window};
+use starlings_models::{BuildSetup, Job, Prediction, Window};
 
 pub(crate) use super::index::AnalysisIndex;
 use super::kept::Kept;
@@ -148,35 +150,6 @@ impl<'a> EnsembleRunner<'a> {
         self.run(at, &everyone, theta, &states, windows)
     }
 
-    /// Runs one particle over the windows with each of the setups, which differ from the study's in the model's numbers only.
-    /// Returns `[setup][window]`.
-    ///
-    /// # Errors
-    /// When the fleet fails as a whole, or refuses a setup.
-    pub(crate) fn run_setups(
-        &mut self,
-        at: AnalysisIndex,
-        setups: &[Setup],
-        theta: &DMatrix<f64>,
-        windows: &StepWindows,
-    ) -> Result<Results, RunError> {
-        let values: Vec<f64> = theta.column(0).iter().copied().collect();
-        let mut jobs = Vec::with_capacity(setups.len() * windows.len());
-        for (particle, setup) in setups.iter().enumerate() {
-            let setup = self.fleet.install(setup)?;
-            for (record, window) in windows {
-                let window = self.sent(*record, window);
-                let theta = self.study.theta_for(*record, &values);
-                let job =
-                    Job { particle: particle as u32, record: *record as u32, window, theta, state: None };
-                jobs.push((setup, job));
-            }
-        }
-        self.counts.total += jobs.len() as u64;
-        let outcomes = self.outcomes(at, jobs.len(), |index| jobs[index].clone())?;
-        self.gather(at, outcomes, (0..setups.len()).map(|setup| (setup, 0)), theta, windows)
-    }
-
     /// Counts and notes the outcomes of the particles, each given with its column of `theta`, window after window, and takes from
     /// every prediction what the channels measure. Returns `[particle in the order given][window]`.
     fn gather(
@@ -192,16 +165,8 @@ impl<'a> EnsembleRunner<'a> {
         for (particle, column) in particles {
             let mut of_particle = Vec::with_capacity(windows.len());
             for ((record, window), outcome) in windows.iter().zip(outcomes.by_ref()) {
-                self.rows.push(self.row(at, *record, particle, &outcome));
-                // A timeout that is repeated from the store has no worker.
-                if !outcome.worker.is_empty() && !self.workers.contains(&outcome.worker) {
-                    self.workers.insert(outcome.worker.clone());
-                }
-                self.counts.retried += u64::from(outcome.attempts.saturating_sub(1));
-                self.counts.failed += u64::from(outcome.result.is_err());
                 let values = self.study.theta_for(*record, theta.column(column).into_owned().as_slice());
-                let failure = outcome.result.as_ref().err().map(ToString::to_string);
-                self.failures.learn(&values, failure.as_deref());
+                self.note(at, *record, particle, &values, &outcome);
                 let mut result = outcome.result;
                 if let Ok(prediction) = &mut result {
                     // Of what the solver gave, the outputs that the study asked for.
@@ -215,6 +180,26 @@ impl<'a> EnsembleRunner<'a> {
             results.push(of_particle);
         }
         Ok(results)
+    }
+
+    /// Counts an outcome and keeps its row.
+    fn note(
+        &mut self,
+        at: AnalysisIndex,
+        record: usize,
+        particle: usize,
+        values: &[f64],
+        outcome: &Outcome<Held>,
+    ) {
+        self.rows.push(self.row(at, record, particle, outcome));
+        // A timeout that is repeated from the store has no worker.
+        if !outcome.worker.is_empty() && !self.workers.contains(&outcome.worker) {
+            self.workers.insert(outcome.worker.clone());
+        }
+        self.counts.retried += u64::from(outcome.attempts.saturating_sub(1));
+        self.counts.failed += u64::from(outcome.result.is_err());
+        let failure = outcome.result.as_ref().err().map(ToString::to_string);
+        self.failures.learn(values, failure.as_deref());
     }
 
     /// The window that a job carries: what the solver answers for, with what an observer knows.

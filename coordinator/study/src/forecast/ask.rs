@@ -71,6 +71,7 @@ impl Ask {
         setup.noise = study.setup.is_noisy().then_some(self.seed);
         let record = &study.records[self.record];
         let measured = record.channels.iter().filter(|c| c.node.is_none()).map(|c| &c.output);
+        let measured = measured.chain(&study.predict.outputs);
         setup.outputs = self.outputs(study, measured)?;
         let fixed = self.set(study, &mut setup)?;
         let recorded = &record.times;

@@ -2,8 +2,11 @@
 //!
 //! Next files to read: `members.rs`, which runs it, and [`super::result`].
 
+use nalgebra::DVector;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use starlings_estimators::Gaussian;
 use starlings_estimators::forecast::{Crossings, Fan};
 use starlings_fleet::Fleet;
 use starlings_models::{Setup, Signal};
@@ -23,6 +26,16 @@ pub fn draws(seed: u64) -> ChaCha8Rng {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(DRAWS);
     rng
+}
+
+/// So many vectors from a posterior, in transformed units.
+pub(crate) fn drawn(posterior: &Gaussian, n: usize, seed: u64) -> Vec<DVector<f64>> {
+    let (mut rng, root) = (draws(seed), posterior.factor());
+    let mut one = |_| {
+        let z = DVector::from_fn(root.ncols(), |_, _| StandardNormal.sample(&mut rng));
+        &posterior.mean + &root * z
+    };
+    (0..n).map(&mut one).collect()
 }
 
 /// What members are run with and what they are compared with.

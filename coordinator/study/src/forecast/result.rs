@@ -7,7 +7,7 @@ use super::Threshold;
 use super::ensemble::MeasuredValue;
 use super::measurement::Errors;
 use crate::Study;
-use crate::field::quantity_of;
+use crate::field::unit_of;
 
 /// A forecast.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -148,7 +148,7 @@ impl OutputForecast {
         let at_end = [0.5, 0.05, 0.95].map(|p| at(&fan, p, last));
         Self {
             output: name.to_owned(),
-            unit: unit(study, name),
+            unit: unit_of(&study.spec, name),
             at_end,
             measured_at_end,
             errors,
@@ -229,7 +229,7 @@ impl LevelForecast {
         };
         Self {
             output: output.clone(),
-            unit: unit(study, output),
+            unit: unit_of(&study.spec, output),
             direction: level.direction,
             value: level.value,
             crossed: found.times.len(),
@@ -243,10 +243,4 @@ impl LevelForecast {
             times: found.times,
         }
     }
-}
-
-/// Unit label of an output or a state.
-fn unit(study: &Study, name: &str) -> String {
-    let found = quantity_of(&study.spec.outputs, name).or_else(|| quantity_of(&study.spec.states, name));
-    found.map(|q| q.unit.clone()).unwrap_or_default()
 }

@@ -52,6 +52,9 @@ impl Meaning {
             (START.to_owned(), start(study)),
             (SOLVER.to_owned(), solver(study)),
         ]);
+        if purpose == Purpose::Run && !study.predict.outputs.is_empty() {
+            parts.insert("predict".to_owned(), written(&study.predict));
+        }
         if purpose == Purpose::Explanation {
             parts.insert("explain".to_owned(), written(&(&study.explain, &study.candidates)));
         }

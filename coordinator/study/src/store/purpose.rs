@@ -53,7 +53,7 @@ impl Purpose {
     /// The files that the command writes beside its database.
     pub(super) fn files(self) -> &'static [&'static str] {
         match self {
-            Self::Run => &["study.toml", "posterior.csv", "summary.json", "report.html"],
+            Self::Run => &["study.toml", "posterior.csv", "summary.json", "predicted.csv", "report.html"],
             Self::Explanation => &["study.toml", "explain.json", "explained.toml", "report.html"],
         }
     }

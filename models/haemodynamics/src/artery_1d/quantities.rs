@@ -31,7 +31,7 @@ pub(super) fn spec(network: &Network) -> Spec {
 }
 
 /// `stem` for the only outlet, `stem_<node>` for one of several.
-fn named(network: &Network, stem: &str, node: usize) -> String {
+pub(super) fn named(network: &Network, stem: &str, node: usize) -> String {
     if network.outlets.len() == 1 { stem.to_owned() } else { format!("{stem}_{}", network.nodes[node].name) }
 }
 
@@ -134,5 +134,11 @@ fn outputs(network: &Network) -> Vec<Quantity> {
                 .says(&format!("Volume flow out of `{name}`.")),
         );
     }
+    all.push(Quantity::new("strain", "").size(n).says("Circumferential strain of the wall in each cell."));
+    all.push(
+        Quantity::new("stress", PRESSURE)
+            .size(n)
+            .says("Circumferential stress of the wall in each cell, elastic and viscous."),
+    );
     all
 }

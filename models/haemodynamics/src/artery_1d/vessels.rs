@@ -35,6 +35,10 @@ pub(super) struct Vessels<'a> {
     pub(super) friction: f64,
     /// Γ = c_w + c_s: pressure per radial velocity of wall and tissue.
     pub(super) damping: f64,
+    /// The wall's share c_w/Γ of that; zero without any.
+    wall_damping: f64,
+    /// Stiffness of the tissue k_s in dyn/cm³.
+    tissue: f64,
     pub(super) p_ext: f64,
     pub(super) p_venous: f64,
     /// Pressure of the initial state.
@@ -56,6 +60,8 @@ impl<'a> Vessels<'a> {
             alpha,
             friction: 8.0 * PI * mu / rho,
             damping: c_w + c_s,
+            wall_damping: if c_w > 0.0 { c_w / (c_w + c_s) } else { 0.0 },
+            tissue: k_s,
             p_ext,
             p_venous,
             p_start,
@@ -73,6 +79,16 @@ impl<'a> Vessels<'a> {
             vessels.cells.extend(cells.map(|(radius, h)| ring(middle(radius), middle(h))));
         }
         vessels
+    }
+
+    /// Circumferential strain ε = (R − R0)/R0 and stress of the wall in cell `j` of a tube, σ = E ε/(1 − ν²) + c_w (∂R/∂t) R0/h, where
+    /// `viscous` is the pressure (c_w + c_s) ∂R/∂t. The wall alone holds the pressure σ h/R0.
+    pub(super) fn strain_and_stress(&self, tube: &Tube, j: usize, area: f64, viscous: f64) -> [f64; 2] {
+        let ring = self.cells[tube.first + j];
+        let thickness = 0.5 * (tube.thickness[j] + tube.thickness[j + 1]);
+        let stretch = ring.displacement(area);
+        let held = (ring.stiffness - self.tissue) * stretch + self.wall_damping * viscous;
+        [stretch / ring.radius, held * ring.radius / thickness]
     }
 
     /// Number of state components.

@@ -19,6 +19,10 @@ pub(super) struct Coefficients {
     pub(super) mass: f64,
     /// Damping of wall and tissue c_w + c_s in dyn s/cm³.
     pub(super) damping: f64,
+    /// Damping of the wall alone c_w in dyn s/cm³.
+    wall_damping: f64,
+    /// Thickness of the wall h in cm.
+    thickness: f64,
     /// Area of a cell's wall s = 2π R dx in cm².
     pub(super) area: f64,
     /// 1/s: a product with it costs a fraction of a division.
@@ -56,6 +60,8 @@ impl Coefficients {
             tissue: k_s,
             mass: rho_s * h,
             damping: c_w + c_s,
+            wall_damping: c_w,
+            thickness: h,
             area,
             per_area: 1.0 / area,
             inertance: rho_f / section * dx,
@@ -76,6 +82,14 @@ impl Coefficients {
     /// Stiffness of wall and tissue together in dyn/cm³, for a wall of this Young's modulus and unloaded radius.
     pub(super) fn stiffness_at(&self, young: f64, unloaded: f64) -> f64 {
         self.membrane(young) / (unloaded * unloaded) + self.tissue
+    }
+
+    /// Circumferential strain and stress of a ring that is `stretch` wider than its unloaded radius and moves with the velocity `w`:
+    /// ε = stretch/R and σ = E ε/(1 − ν²) + c_w w R/h, so that σ h/R is the pressure that the wall alone holds.
+    pub(super) fn strain_and_stress(&self, young: f64, unloaded: f64, stretch: f64, w: f64) -> [f64; 2] {
+        let strain = stretch / unloaded;
+        let elastic = self.membrane(young) / self.thickness * strain;
+        [strain, elastic + self.wall_damping * w * unloaded / self.thickness]
     }
 
     /// Stiffness of wall and tissue together k in dyn/cm³, for a wall of this Young's modulus.

@@ -55,6 +55,12 @@ fn outputs(n: usize) -> Vec<Quantity> {
         Quantity::new("pressure", "dyn/cm^2").role(Role::Pressure).says("Pressure at the outlet."),
         Quantity::new("outflow", "cm^3/s").role(Role::Flow).says("Flow out of the tube."),
         Quantity::new("inlet_pressure", "dyn/cm^2").role(Role::Pressure).says("Pressure at the inlet."),
+        Quantity::new("strain", "")
+            .size(n)
+            .says("Circumferential strain of the wall from its unloaded radius, from the inlet on."),
+        Quantity::new("stress", "dyn/cm^2")
+            .size(n)
+            .says("Circumferential stress of the wall, elastic and viscous, from the inlet on."),
     ]
 }
 
