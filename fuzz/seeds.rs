@@ -5,19 +5,21 @@ use std::sync::Arc;
 
 use prost::Message;
 use starlings_models::{
-    Description, Job, ModelFailure, ObserverDef, ParticleError, Prediction, Quantity, Run, Setup, Solved, Spec,
-    Timeout, Window,
+    Description, Job, ModelFailure, ObserverDef, ParticleError, Prediction, Quantity, Run, Setup, Solved,
+    Spec, Timeout, Window,
 };
 use starlings_proto::access::{AccessFile, Token};
+use starlings_proto::convert::lent::{GiveBack, Lend, encode_in_memory};
+use starlings_proto::convert::piece_names::encode_names;
 use starlings_proto::convert::solver::description::encode_description;
 use starlings_proto::convert::solver::{Reply, encode_reply, encode_run};
-use starlings_proto::convert::piece_names::encode_names;
-use starlings_proto::convert::lent::{GiveBack, Lend, encode_in_memory};
-use starlings_proto::convert::state::{CHUNK_VALUES, Get, PutHead, encode_chunk, encode_head, encode_put_result};
+use starlings_proto::convert::state::{
+    CHUNK_VALUES, Get, PutHead, encode_chunk, encode_head, encode_put_result,
+};
 use starlings_proto::convert::{HeldRun, ended};
 use starlings_proto::{
-    Bytes, FromWorker, Hello, JobEncoder, Lease, LeaseOutcome, PROTOCOL, SentWindows, State, ToWorker, VERSION,
-    Welcome, encode_setup,
+    Bytes, FromWorker, Hello, JobEncoder, Lease, LeaseOutcome, PROTOCOL, SentWindows, State, ToWorker,
+    VERSION, Welcome, encode_setup,
 };
 
 const LEASE: Lease = Lease { epoch: 1, job: 7, attempt: 1 };
@@ -27,7 +29,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     texts()?;
     let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples");
     for (target, ending) in [("study", "toml"), ("recording", "csv"), ("mesh", "off"), ("template", "tmpl")] {
-        for (i, file) in files(&examples)?.iter().filter(|file| file.extension().is_some_and(|e| e == ending)).enumerate() {
+        for (i, file) in
+            files(&examples)?.iter().filter(|file| file.extension().is_some_and(|e| e == ending)).enumerate()
+        {
             let content = std::fs::read(file)?;
             // A long one teaches the fuzzer nothing more and slows it down.
             write(target, &format!("example-{i}"), &content[..content.len().min(20_000)])?;
@@ -91,7 +95,10 @@ fn messages() -> Result<(), Box<dyn std::error::Error>> {
         FromWorker::Result { lease: LEASE, answer: LeaseOutcome::Withdrawn, cost: 0.0 },
         FromWorker::Heartbeat { running: 1, queued: 2 },
         FromWorker::Goodbye("ctrl-c".to_owned()),
-        FromWorker::Held(vec![HeldRun { key: [9; 32], ended: Some(kept) }, HeldRun { key: [8; 32], ended: None }]),
+        FromWorker::Held(vec![
+            HeldRun { key: [9; 32], ended: Some(kept) },
+            HeldRun { key: [8; 32], ended: None },
+        ]),
     ];
     for (i, outcome) in outcomes.into_iter().enumerate() {
         write("kept_run", &format!("end-{i}"), &ended::encode(&outcome, 0.25))?;
@@ -107,9 +114,17 @@ fn messages() -> Result<(), Box<dyn std::error::Error>> {
     to_worker()?;
     solver()?;
 
-    write("state_transfer", "get", &Get { epoch: 1, nonce: 42, state: [7; 32], names: true, descriptor: 3 }.encode().encode_to_vec())?;
+    write(
+        "state_transfer",
+        "get",
+        &Get { epoch: 1, nonce: 42, state: [7; 32], names: true, descriptor: 3 }.encode().encode_to_vec(),
+    )?;
     write("state_transfer", "answer", &encode_put_result(&[7; 32]).encode_to_vec())?;
-    write("state_transfer", "head", &PutHead { n_state: 3, lease: LEASE, nonce: 42 }.encode().encode_to_vec())?;
+    write(
+        "state_transfer",
+        "head",
+        &PutHead { n_state: 3, lease: LEASE, nonce: 42 }.encode().encode_to_vec(),
+    )?;
     let lend = Lend { head: PutHead { n_state: 3, lease: LEASE, nonce: 42 }, descriptor: 5 };
     write("state_transfer", "lend", &lend.encode().encode_to_vec())?;
     let back = GiveBack { epoch: 1, nonce: 42, descriptor: 5 };
@@ -206,7 +221,9 @@ fn solver() -> Result<(), Box<dyn std::error::Error>> {
     write("solver_request", "run", &encode_run(&run, "/tmp/scratch").encode_to_vec())?;
     let solved = Solved { outputs: vec![0.1, 0.2], state: vec![0.0, 0.0] };
     let late = ParticleError::Infrastructure("no licence".to_owned());
-    for (i, reply) in [Reply::Progress(0.5), Reply::Ended(Ok(solved)), Reply::Ended(Err(late))].iter().enumerate() {
+    for (i, reply) in
+        [Reply::Progress(0.5), Reply::Ended(Ok(solved)), Reply::Ended(Err(late))].iter().enumerate()
+    {
         write("solver_reply", &format!("kind-{i}"), &encode_reply(reply).encode_to_vec())?;
     }
     Ok(())
@@ -218,8 +235,18 @@ fn texts() -> Result<(), Box<dyn std::error::Error>> {
     write("expression", "all", b"a*exp(-b*t) + delay(x, 0.1) - if(x > 0, sqrt(x), 2^3)/max(1, y)")?;
     write("um_bridge_answer", "one", br#"{"output": [[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]]}"#)?;
     write("um_bridge_answer", "each", br#"{"output": [[1.0, 4.0], [2.0, null, 5.0, 6.0]]}"#)?;
-    write("template", "beam", b"*ELASTIC\n{{ E | fixed(3) }}, 0.3\n{% for t in times %}{{ t }}\n{% endfor %}")?;
-    write("mesh", "tetrahedron", b"OFF\n4 4 6\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 2\n3 0 1 3\n3 0 2 3\n3 1 2 3\n")?;
+    write(
+        "template",
+        "beam",
+        b"*ELASTIC\n{{ E | fixed(3) }}, 0.3\n{% for t in times %}{{ t }}\n{% endfor %}",
+    )?;
+    write(
+        "mesh",
+        "tetrahedron",
+        b"OFF\n4 4 6\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 2\n3 0 1 3\n3 0 2 3\n3 1 2 3\n",
+    )?;
+    write("mesh", "stl", b"solid one\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n")?;
+    write("mesh", "vtp", b"<VTKFile type=\"PolyData\"><PolyData><Piece NumberOfPolys=\"1\"><Points><DataArray type=\"Float32\" format=\"ascii\">0 0 0 1 0 0 0 1 0</DataArray></Points><Polys><DataArray type=\"Int64\" Name=\"connectivity\" format=\"ascii\">0 1 2</DataArray><DataArray type=\"Int64\" Name=\"offsets\" format=\"ascii\">3</DataArray></Polys></Piece></PolyData></VTKFile>")?;
     write("recording", "three", b"t,flow,pressure\n0,1,90\n0.5,2,95\n1,1,91\n1.5,0,88\n")?;
     Ok(())
 }

@@ -2,88 +2,15 @@
 // Values that are copied are compared exactly; the helpers of a test file are tests too.
 #![allow(clippy::float_cmp, clippy::unwrap_used)]
 mod study_kit;
-
-use std::fmt::Write as _;
+mod wall_kit;
 
 use starlings_coordinator::fleet::InProcess;
+use starlings_coordinator::study::Study;
 use starlings_coordinator::study::identify::{At, identify};
 use starlings_coordinator::study::trial::trial;
-use starlings_coordinator::study::twin::{Recording, Twin, simulate};
-use starlings_coordinator::study::{Problem, Study};
 use study_kit::fleets::Mortal;
-use study_kit::{Case, Done, csv, grid, normals};
-
-/// A tube of five cells of 5 cm in one region.
-const STUDY: &str = r#"
-[study]
-name = "wall"
-[model]
-kind = "fsi-tube"
-[model.layout]
-cells = 5
-regions = 1
-[[parameters]]
-name = "E1"
-prior = { transform = "log2", median = 5e6, sd = 1.0 }
-[[records]]
-name = "beats"
-file = "flow.csv"
-inputs = { flow = "flow" }
-channels = [ { CHANNEL } ]
-"#;
-const SURFACE: &str = r#"surface = "profiles.csv", rest = "rest.csv", output = "displacement", noise = 0.01"#;
-const COLUMN: &str = r#"column = "displacement", output = "displacement", noise = 0.01"#;
-const TRUTH: f64 = 3.5e6;
-const SD: f64 = 0.01;
-const NODES: [f64; 5] = [2.5, 7.5, 12.5, 17.5, 22.5];
-
-fn study(channel: &str) -> String {
-    STUDY.replace("CHANNEL", channel)
-}
-
-/// The record's file: times and flow, and a column that is not used.
-fn flow() -> String {
-    let times = grid(41, 0.02);
-    let values: Vec<f64> =
-        times.iter().map(|t| if *t < 0.4 { 300.0 * (7.854 * t).sin().powi(2) } else { 0.0 }).collect();
-    csv("time,flow,zero", &[&times, &values, &[0.0; 41]])
-}
-
-/// The true tube at the times of the record.
-fn truth() -> Recording {
-    let blank = study(r#"column = "zero", output = "pressure", noise = 1.0"#);
-    let study = Case::new(&blank, &[("flow.csv", flow())]).study();
-    simulate(&study, &Twin { values: vec![("E1".to_owned(), TRUTH)], ..Twin::default() }).unwrap()
-}
-
-/// Displacement of each node at every time, with noise.
-fn displacements(noise: f64) -> (Vec<f64>, Vec<Vec<f64>>) {
-    let of = truth();
-    let column = |i: usize| {
-        let at = of.columns.iter().position(|c| *c == format!("displacement[{i}]")).unwrap();
-        let errors = normals(of.times.len(), i as u64);
-        of.values[at].iter().zip(errors).map(|(v, e)| v + noise * e).collect()
-    };
-    (of.times.clone(), (0..5).map(column).collect())
-}
-
-/// Profiles over the nodes and one point further at either end, shifted along the axis.
-fn profiles(noise: f64, slide: f64) -> String {
-    let (times, columns) = displacements(noise);
-    let mut text = "time,z,r\n".to_owned();
-    for (k, t) in times.iter().enumerate() {
-        writeln!(text, "{t},{},{:?}", -1.0 + slide, 1.0 + columns[0][k]).unwrap();
-        for (z, column) in NODES.iter().zip(&columns) {
-            writeln!(text, "{t},{},{:?}", z + slide, 1.0 + column[k]).unwrap();
-        }
-        writeln!(text, "{t},{},{:?}", 26.0 + slide, 1.0 + columns[4][k]).unwrap();
-    }
-    text
-}
-
-fn rest() -> String {
-    csv("z,r", &[&NODES, &[1.0; 5]])
-}
+use study_kit::{Case, Done, csv};
+use wall_kit::{COLUMN, SD, SURFACE, TRUTH, displacements, flow, profiles, rest, study, truth};
 
 /// The same displacements as plain columns.
 fn columns(noise: f64) -> String {
@@ -174,61 +101,6 @@ fn the_bytes_do_not_depend_on_workers_or_on_a_resumed_run() {
         let resumed = case.go(&path, &mut InProcess::new(2)).unwrap();
         assert_eq!(one.csv, resumed.csv);
     }
-}
-
-#[test]
-fn meshes_of_a_tube_are_read_and_compared_along_the_given_normals() {
-    let (times, columns) = displacements(0.0);
-    let mut list = "time,file\n".to_owned();
-    let mut files = vec![("flow.csv".to_owned(), flow())];
-    let m = 48;
-    for (k, t) in times.iter().enumerate().step_by(8) {
-        writeln!(list, "{t},mesh{k}.off").unwrap();
-        let ends = [(-1.0, 0), (2.5, 0), (7.5, 1), (12.5, 2), (17.5, 3), (22.5, 4), (26.0, 4)];
-        let mut off = format!("OFF\n{} {} 0\n", ends.len() * m, (ends.len() - 1) * m * 2);
-        for (z, node) in ends {
-            // Chords are inside the wall by r (1 − cos(π/m)): the corners stand so far out that the middle of an edge is on it.
-            let r = (1.0 + columns[node][k]) / (std::f64::consts::PI / m as f64).cos();
-            for j in 0..m {
-                let angle = std::f64::consts::TAU * (j as f64 + 0.5) / m as f64;
-                writeln!(off, "{z} {:?} {:?}", r * angle.cos(), r * angle.sin()).unwrap();
-            }
-        }
-        for i in 0..ends.len() - 1 {
-            for j in 0..m {
-                let (a, b) = (i * m + j, i * m + (j + 1) % m);
-                writeln!(off, "3 {a} {b} {}\n3 {a} {} {}", b + m, b + m, a + m).unwrap();
-            }
-        }
-        files.push((format!("mesh{k}.off"), off));
-    }
-    files.push(("meshes.csv".to_owned(), list));
-    let (one, zero) = ([1.0; 5], [0.0; 5]);
-    files.push(("nodes.csv".to_owned(), csv("x,y,z,nx,ny,nz", &[&NODES, &one, &zero, &zero, &one, &zero])));
-    let channel = r#"surface = "meshes.csv", rest = "nodes.csv", output = "displacement", noise = 0.01"#;
-    let files: Vec<(&str, String)> = files.iter().map(|(name, text)| (name.as_str(), text.clone())).collect();
-    let done = Case::new(&study(channel), &files).run();
-    // As on a profile; the triangles of a band are not quite in the cone of their corners.
-    assert!((done.estimate("E1").estimate / TRUTH - 1.0).abs() < 0.01, "{:?}", done.estimate("E1"));
-    let two_ends = format!("{channel}, open_ends = 0");
-    let said = problem(&study(&two_ends), &files);
-    assert!(said.starts_with("mesh0.off:1:") && said.contains("open_ends"), "{said}");
-}
-
-fn problem(study: &str, files: &[(&str, String)]) -> String {
-    let folder = tempfile::tempdir().unwrap();
-    for (name, text) in files {
-        std::fs::write(folder.path().join(name), text).unwrap();
-    }
-    let file = folder.path().join("study.toml");
-    std::fs::write(&file, study).unwrap();
-    let found: Vec<Problem> = Study::load(&file).err().map_or_else(Vec::new, |error| error.problems);
-    assert_eq!(found.len(), 1, "{found:?}");
-    let p = &found[0];
-    let folder = format!("{}/", p.file.parent().unwrap().display());
-    let name = p.file.file_name().unwrap().to_string_lossy().into_owned();
-    let line = p.line_column().unwrap_or_default().0;
-    format!("{name}:{line}: {}; {}", p.message.replace(&folder, ""), p.help.clone().unwrap_or_default())
 }
 
 #[test]

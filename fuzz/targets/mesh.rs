@@ -1,6 +1,6 @@
-//! A mesh in the Object File Format.
+//! A mesh in OFF, STL and VTP.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
 
-fuzz_target!(|text: &str| starlings_study::fuzzing::mesh(text));
+fuzz_target!(|bytes: &[u8]| starlings_study::fuzzing::mesh(bytes));

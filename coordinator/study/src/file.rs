@@ -217,6 +217,8 @@ pub(super) struct SurfaceSection {
     pub(super) rest: Spanned<String>,
     /// Open ends of every mesh.
     pub(super) open_ends: usize,
+    /// Standard deviation of the surface's points across the direction of a node, along the wall; none where it does not matter.
+    pub(super) noise_along: Option<Spanned<f64>>,
 }
 
 /// `[[effects]]`.

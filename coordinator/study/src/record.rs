@@ -8,6 +8,7 @@ mod derived;
 #[cfg(fuzzing)]
 pub(crate) mod fuzzing;
 mod input;
+mod mesh_file;
 mod noise;
 mod off;
 mod part;
@@ -16,8 +17,10 @@ mod reader;
 mod separator;
 mod shapes;
 mod start;
+mod stl;
 mod surface;
 mod surface_files;
+mod vtp;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -2,7 +2,6 @@
 //!
 //! A channel of this kind has a node of the model's wall and one surface per time. Its observed value is zero, its predicted
 //! one the signed distance of the displaced node to the surface of the time, positive outside (Moireau et al. 2013). Models,
-//! one the signed distance of the displaced node to the surface of the time, positive outside (Moireau et al. 2013). Models,
 //! workers and estimators get displacements and numbers only. How surfaces are read is in [`crate::record`]. Next file to read:
 //! [`super::distances`], where predictions become distances.
 
@@ -46,8 +45,19 @@ pub struct Shapes {
     pub times: Vec<f64>,
     /// One surface for each.
     pub shapes: Vec<Shape>,
+    /// Diagonal of the box around each.
+    pub lengths: Vec<f64>,
     /// Every coordinate that they were read from, by which a change of the files is seen.
     pub numbers: Vec<f64>,
+}
+
+/// Diagonal of the box around points; zero for none.
+pub(crate) fn length<const D: usize>(points: impl IntoIterator<Item = [f64; D]>) -> f64 {
+    let mut around = [[f64::INFINITY, f64::NEG_INFINITY]; D];
+    for point in points {
+        around.iter_mut().zip(point).for_each(|([lo, hi], x)| (*lo, *hi) = (lo.min(x), hi.max(x)));
+    }
+    around.iter().map(|[lo, hi]| (hi - lo).max(0.0).powi(2)).sum::<f64>().sqrt()
 }
 
 impl Shapes {
@@ -100,6 +110,18 @@ impl Node {
             displacement -= foot.distance / slope;
         }
         None
+    }
+
+    /// Standard deviation of the distance to the surface of this time, whose points have the noise `across` along the node's
+    /// direction and `along` at right angles to it; `None` without a surface, and where the node's line does not meet it.
+    ///
+    /// Where the surface has the normal n and the node the direction m, the variance is that of n · error: across² (n · m)² +
+    /// along² (1 − (n · m)²). It depends on the data alone, so that it is the same for all particles.
+    pub(crate) fn noise(&self, time: f64, across: f64, along: f64) -> Option<f64> {
+        let foot = self.foot(time, self.crossing(time)?)?;
+        let cosine: f64 = foot.normal.iter().zip(&self.normal).map(|(a, b)| a * b).sum();
+        let share = cosine.powi(2).min(1.0);
+        Some((across.powi(2) * share + along.powi(2) * (1.0 - share)).sqrt())
     }
 
     fn foot(&self, time: f64, displacement: f64) -> Option<Foot<3>> {

@@ -210,7 +210,7 @@ fn channels(source: &Source, record: &Table<'_>, infers: bool) -> Vec<ChannelSec
             surface,
         }
     };
-    let keys = ["column", "output", "unit", "noise", "use", "from", "start", "surface", "rest", "open_ends"];
+    let keys = ["column", "output", "unit", "noise", "use", "from", "start", "surface", "rest", "open_ends", "noise_along"];
     record.tables("channels", "a channel", &keys).into_iter().map(read).collect()
 }
 
@@ -220,7 +220,7 @@ const TUBE_ENDS: usize = 2;
 /// The surface part of a channel; nothing where it has a column.
 fn surface(source: &Source, t: &Table<'_>) -> Option<SurfaceSection> {
     if t.get("surface").is_none() {
-        for key in ["rest", "open_ends"] {
+        for key in ["rest", "open_ends", "noise_along"] {
             if let Some(span) = t.key_span(key) {
                 source.report_with(
                     span,
@@ -250,6 +250,7 @@ fn surface(source: &Source, t: &Table<'_>) -> Option<SurfaceSection> {
             "a CSV file with the place of every node of the output without displacement",
         ),
         open_ends: ends,
+        noise_along: t.number("noise_along"),
     })
 }
 

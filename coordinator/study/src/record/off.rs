@@ -1,38 +1,26 @@
 //! Triangle meshes in the Object File Format: `OFF`, the numbers of vertices and faces, coordinates, then faces `3 a b c`.
 //!
 //! Colours and polygons are not read; whether the triangles make a surface is checked by the mesh itself. Next file to read:
-//! [`super::surface`].
+//! [`super::mesh_file`].
 
 use std::ops::Range;
 
-/// Vertices and triangles as they are written.
-#[derive(Debug, PartialEq)]
-pub(super) struct Off {
-    pub(super) vertices: Vec<[f64; 3]>,
-    pub(super) triangles: Vec<[usize; 3]>,
-}
-
-/// What is wrong with a text, and where.
-#[derive(Debug, PartialEq)]
-pub(super) struct Fault {
-    pub(super) span: Range<usize>,
-    pub(super) message: String,
-}
+use super::mesh_file::{Fault, Triangles};
 
 /// Reads a mesh.
 ///
 /// # Errors
 /// The first thing that is not as the format has it.
-pub(super) fn read(text: &str) -> Result<Off, Fault> {
+pub(super) fn read(text: &str) -> Result<Triangles, Fault> {
     let mut words = Words { rest: words(text), end: text.len() };
     let (span, magic) = words.next("the word `OFF`")?;
     if magic != "OFF" {
-        return Err(Fault { span, message: format!("expected `OFF` as the first word, found `{magic}`") });
+        return Err(fault(span, format!("expected `OFF` as the first word, found `{magic}`")));
     }
     let n_vertex: usize = words.number("the number of vertices")?;
     let n_face: usize = words.number("the number of faces")?;
     let _edges: usize = words.number("the number of edges")?;
-    let mut off = Off { vertices: Vec::new(), triangles: Vec::new() };
+    let mut off = Triangles::default();
     for _ in 0..n_vertex {
         off.vertices.push([
             words.number("x of a vertex")?,
@@ -45,7 +33,7 @@ pub(super) fn read(text: &str) -> Result<Off, Fault> {
         let corners: usize = words.number("the number of a face's vertices")?;
         if corners != 3 {
             let message = format!("face {face} has {corners} vertices: cut it into triangles");
-            return Err(Fault { span, message });
+            return Err(fault(span, message));
         }
         off.triangles.push([
             words.number("a vertex of a face")?,
@@ -55,11 +43,15 @@ pub(super) fn read(text: &str) -> Result<Off, Fault> {
     }
     match words.rest.last() {
         None => Ok(off),
-        Some((span, word)) => Err(Fault {
-            span: span.clone(),
-            message: format!("`{word}` follows the last of {n_face} faces: colours are not read"),
-        }),
+        Some((span, word)) => {
+            let message = format!("`{word}` follows the last of {n_face} faces: colours are not read");
+            Err(fault(span.clone(), message))
+        }
     }
+}
+
+fn fault(span: Range<usize>, message: String) -> Fault {
+    Fault { span: Some(span), message }
 }
 
 /// The words of a text with their places, last first; `#` begins a comment.
@@ -91,12 +83,12 @@ impl<'a> Words<'a> {
 
     fn next(&mut self, what: &str) -> Result<(Range<usize>, &'a str), Fault> {
         let span = self.span();
-        self.rest.pop().ok_or_else(|| Fault { span, message: format!("the file ends before {what}") })
+        self.rest.pop().ok_or_else(|| fault(span, format!("the file ends before {what}")))
     }
 
     fn number<T: std::str::FromStr>(&mut self, what: &str) -> Result<T, Fault> {
         let (span, word) = self.next(what)?;
-        word.parse().map_err(|_| Fault { span, message: format!("`{word}` is not {what}") })
+        word.parse().map_err(|_| fault(span, format!("`{word}` is not {what}")))
     }
 }
 
@@ -116,7 +108,7 @@ mod tests {
     fn what_is_wrong_is_named_with_its_place() {
         let fault = |text: &str| {
             let fault = read(text).unwrap_err();
-            format!("{} at {}", fault.message, fault.span.start)
+            format!("{} at {}", fault.message, fault.span.unwrap().start)
         };
         assert_eq!(fault("ply\n"), "expected `OFF` as the first word, found `ply` at 0");
         assert_eq!(fault("OFF\n1 1 0\n0 0 x\n"), "`x` is not z of a vertex at 14");

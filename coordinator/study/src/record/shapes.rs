@@ -1,6 +1,6 @@
 //! From files to surfaces and nodes: profiles `time,z,r`, or meshes named by `time,file`.
 //!
-//! Next file to read: [`super::off`] for meshes; what makes a surface is in `starlings_models::surface`.
+//! Next file to read: [`super::mesh_file`] for meshes; what makes a surface is in `starlings_models::surface`.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -8,9 +8,10 @@ use std::sync::Arc;
 
 use starlings_models::surface::{Mesh, Profile};
 
-use super::{Csv, Table, off};
+use super::mesh_file::{Triangles, read};
+use super::{Csv, Table};
 use crate::problem::{Problem, Source, quoted_list};
-use crate::surfaces::{Shape, Shapes};
+use crate::surfaces::{Shape, Shapes, length};
 
 /// Times closer than this, relative to their size, are one.
 const SAME: f64 = 1e-9;
@@ -21,8 +22,8 @@ pub(super) type NodeAtRest = ([f64; 3], [f64; 3]);
 /// Reads the surfaces of one channel.
 pub(super) struct Surfaces<'a> {
     pub(super) csv: &'a Csv,
-    /// Texts of meshes by name.
-    pub(super) meshes: &'a BTreeMap<String, (PathBuf, String)>,
+    /// Files of meshes by name.
+    pub(super) meshes: &'a BTreeMap<String, (PathBuf, Vec<u8>)>,
     /// Open ends of every mesh.
     pub(super) open_ends: usize,
     pub(super) source: &'a Source,
@@ -52,7 +53,8 @@ impl Surfaces<'_> {
         let mut first = 0;
         for group in times.chunk_by(|a, b| a.total_cmp(b).is_eq()) {
             let at = self.row_time(first, time, group[0])?;
-            let profile = Profile::new(points[first..first + group.len()].to_vec()).map_err(|error| {
+            let line = &points[first..first + group.len()];
+            let profile = Profile::new(line.to_vec()).map_err(|error| {
                 let message = format!("the surface at time {}: {error}", group[0]);
                 self.csv.problem(
                     first,
@@ -63,6 +65,7 @@ impl Surfaces<'_> {
             })?;
             shapes.times.push(at);
             shapes.shapes.push(Shape::Profile(profile));
+            shapes.lengths.push(length(line.iter().copied()));
             first += group.len();
         }
         Ok(shapes)
@@ -74,32 +77,33 @@ impl Surfaces<'_> {
         let mut shapes = Shapes::default();
         for (row, (t, name)) in times.into_iter().zip(self.csv.texts(file)).enumerate() {
             shapes.times.push(self.row_time(row, time, t)?);
-            let shape = self.mesh(name, &mut shapes.numbers)?;
+            let shape = self.mesh(name, &mut shapes)?;
             shapes.shapes.push(Shape::Mesh(shape));
         }
         Ok(shapes)
     }
 
-    /// The mesh of this name; its numbers are added to those known.
-    fn mesh(&self, name: &str, numbers: &mut Vec<f64>) -> Result<Mesh, Problem> {
-        let Some((path, text)) = self.meshes.get(name) else {
+    /// The mesh of this name; its numbers and its length are added to those known.
+    fn mesh(&self, name: &str, known: &mut Shapes) -> Result<Mesh, Problem> {
+        let Some((path, bytes)) = self.meshes.get(name) else {
             unreachable!("every mesh that the surface file names was read");
         };
-        let problem = |message: String, span: std::ops::Range<usize>, help: &str| Problem {
+        let problem = |message: String, span: Option<std::ops::Range<usize>>, help: &str| Problem {
             message,
             help: Some(help.to_owned()),
             file: path.clone(),
-            source_text: Some(Arc::from(text.as_str())),
-            span: Some(span),
+            source_text: std::str::from_utf8(bytes).ok().filter(|_| span.is_some()).map(Arc::from),
+            span,
         };
-        let off::Off { vertices, triangles } = off::read(text).map_err(|fault| {
-            problem(fault.message, fault.span, "write triangles in the Object File Format (OFF)")
+        let Triangles { vertices, triangles } = read(name, bytes).map_err(|fault| {
+            problem(fault.message, fault.span, "write triangles as OFF (*.off), STL (*.stl) or VTP (*.vtp)")
         })?;
-        numbers.extend(vertices.as_flattened());
-        numbers.extend(triangles.as_flattened().iter().map(|v| *v as f64));
+        known.lengths.push(length(vertices.iter().copied()));
+        known.numbers.extend(vertices.as_flattened());
+        known.numbers.extend(triangles.as_flattened().iter().map(|v| *v as f64));
         Mesh::new(vertices, triangles, self.open_ends).map_err(|error| {
             let help = "repair the mesh, or say how many open ends it has by `open_ends` (2 for a tube, 0 for a closed surface)";
-            problem(error.to_string(), 0..3, help)
+            problem(error.to_string(), Some(0..3), help)
         })
     }
 

@@ -8,12 +8,12 @@ use starlings_models::{Role, Spec};
 
 use super::Context;
 use super::reader::{ChannelReader, measured_somewhere};
-use super::shapes::Surfaces;
+use super::shapes::{NodeAtRest, Surfaces};
 use super::surface_files::SurfaceFiles;
 use crate::checked::Channel;
 use crate::file::{ChannelSection, SurfaceSection};
 use crate::problem::quoted_list;
-use crate::surfaces::Node;
+use crate::surfaces::{Node, Shape, Shapes, length};
 
 impl ChannelReader<'_> {
     /// The channels of a surface, one per node; `None` when a problem was reported.
@@ -26,6 +26,7 @@ impl ChannelReader<'_> {
     ) -> Option<Vec<Channel>> {
         self.displacement(section)?;
         let noise = self.surface_noise(section)?;
+        let along = self.noise_along(surface, noise)?;
         let output = section.output.get_ref();
         let n = Spec::range_of(&self.spec.outputs, output).map_or(1, |range| range.len());
         let with_ends = Surfaces {
@@ -37,6 +38,7 @@ impl ChannelReader<'_> {
         };
         let shapes = Arc::new(with_ends.read()?);
         let places = with_ends.rest(&files.rest, n, output)?;
+        self.in_place(surface, &shapes, &places)?;
         let mut channels = Vec::with_capacity(n);
         for (i, (rest, normal)) in places.into_iter().enumerate() {
             let node = Node { rest, normal, seen: Arc::clone(&shapes) };
@@ -53,7 +55,7 @@ impl ChannelReader<'_> {
                 output,
                 column: surface.file.get_ref().clone(),
                 unit: section.unit.as_ref().map(|u| u.get_ref().clone()).filter(|u| !u.is_empty()),
-                noise,
+                noise: self.tilted(surface, &node, &values, [noise, along]),
                 noise_how: "given in the study".to_owned(),
                 values,
                 node: Some(node),
@@ -72,6 +74,73 @@ impl ChannelReader<'_> {
         }
         context.warnings.push(self.what_is_compared(section, surface, [channels.len(), n]));
         Some(channels)
+    }
+
+    /// Refuses surfaces that are further away from all nodes at rest than either is long, or than a vessel is wide: they are in another
+    /// unit or another place.
+    fn in_place(&self, surface: &SurfaceSection, shapes: &Arc<Shapes>, places: &[NodeAtRest]) -> Option<()> {
+        let (Some(time), Some(seen)) = (shapes.times.first(), shapes.lengths.first()) else {
+            return Some(());
+        };
+        let distance = |(rest, normal): &NodeAtRest| {
+            Node { rest: *rest, normal: *normal, seen: Arc::clone(shapes) }.distance(*time, 0.0)
+        };
+        let nearest = places.iter().filter_map(distance).map(f64::abs).fold(f64::INFINITY, f64::min);
+        let own = length(places.iter().map(|(rest, _)| *rest));
+        // Two nodes may be closer to each other than a wall moves.
+        let mut far = nearest > *seen || places.len() > 2 && nearest > own;
+        if matches!(shapes.shapes[0], Shape::Profile(_)) {
+            far |= nearest > 2.0 * places.iter().map(|(rest, _)| rest[1]).fold(0.0, f64::max);
+        }
+        if !far {
+            return Some(());
+        }
+        let message = format!(
+            "the surface of `{}` at time {time} is {nearest:.4} away from the nearest node at rest; it is {seen:.4} long, the nodes \
+             reach over {own:.4}",
+            surface.file.get_ref()
+        );
+        let help = format!(
+            "surfaces and the nodes of `{}` must lie in the same place, in the same unit: numbers in mm are 10 times those in cm, 1000 \
+             times those in m",
+            surface.rest.get_ref()
+        );
+        self.source.report_with(surface.file.span(), message, help);
+        None
+    }
+
+    /// What a distance to a surface has of the noise across and along the wall: root mean square over the times at which the node is
+    /// shown.
+    fn tilted(
+        &self,
+        surface: &SurfaceSection,
+        node: &Node,
+        values: &[f64],
+        [across, along]: [f64; 2],
+    ) -> f64 {
+        if surface.noise_along.is_none() {
+            return across;
+        }
+        let seen = self.table.times.iter().zip(values).filter(|(_, v)| v.is_finite());
+        let squares: Vec<f64> =
+            seen.filter_map(|(time, _)| node.noise(*time, across, along)).map(|sd| sd * sd).collect();
+        if squares.is_empty() { across } else { (squares.iter().sum::<f64>() / squares.len() as f64).sqrt() }
+    }
+
+    /// The noise along the wall, that across it unless the study says otherwise. Nothing after a complaint.
+    fn noise_along(&self, surface: &SurfaceSection, across: f64) -> Option<f64> {
+        let Some(given) = &surface.noise_along else { return Some(across) };
+        let sd = *given.get_ref();
+        if sd >= 0.0 && sd.is_finite() {
+            return Some(sd);
+        }
+        let help = "give the standard deviation of the surface's points along the wall, in their unit";
+        self.source.report_with(
+            given.span(),
+            format!("`noise_along` must be zero or more, found {sd}"),
+            help,
+        );
+        None
     }
 
     /// What stands under the output's name in figures and tables.

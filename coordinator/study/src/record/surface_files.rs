@@ -13,8 +13,8 @@ use crate::file::{RecordSection, SurfaceSection};
 pub(super) struct SurfaceFiles {
     pub(super) surface: Rc<Csv>,
     pub(super) rest: Rc<Csv>,
-    /// Texts of the meshes that the surface file names, by name.
-    pub(super) meshes: BTreeMap<String, (PathBuf, String)>,
+    /// Meshes that the surface file names, as they stand in their files, by name.
+    pub(super) meshes: BTreeMap<String, (PathBuf, Vec<u8>)>,
 }
 
 impl Recordings<'_> {
@@ -37,13 +37,13 @@ impl Recordings<'_> {
         if let Ok(column) = surface.index("file") {
             for (row, name) in surface.texts(column).enumerate() {
                 let path = self.folder.join(name);
-                match std::fs::read_to_string(&path) {
-                    Ok(text) => {
-                        meshes.insert(name.to_owned(), (path, text));
+                match std::fs::read(&path) {
+                    Ok(bytes) => {
+                        meshes.insert(name.to_owned(), (path, bytes));
                     }
                     Err(error) => {
                         let message = format!("cannot read `{}`: {}", path.display(), super::plain(&error));
-                        let help = "name a mesh in the Object File Format (OFF), relative to the study file";
+                        let help = "name a mesh in OFF, STL or VTP, relative to the study file";
                         self.source.adopt(surface.problem(row, column, message, help));
                     }
                 }
