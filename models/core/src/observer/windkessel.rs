@@ -58,12 +58,11 @@ impl WindkesselObserver {
     /// When the model has no Windkessel behind a wall, or no pressure before one is observed.
     pub(crate) fn new(def: &ObserverDef, wiring: Wiring<'_>) -> Result<Self, SetupError> {
         let sections = wiring.model.sections(wiring.theta).filter(|_| def.corrects.is_empty());
-        let all = match sections {
-            Some(sections) => sections.outlets,
-            None => {
-                let (block, pressure) = hosted(def, &wiring, |b| b.windkessel.zip(b.outputs.pressure))?;
-                vec![(block, pressure.to_owned())]
-            }
+        let all = if let Some(sections) = sections {
+            sections.outlets
+        } else {
+            let (block, pressure) = hosted(def, &wiring, |b| b.windkessel.zip(b.outputs.pressure))?;
+            vec![(block, pressure.to_owned())]
         };
         let names: Vec<String> = all.iter().map(|(_, pressure)| format!("`{pressure}`")).collect();
         let mut outlets = Vec::new();
