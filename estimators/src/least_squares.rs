@@ -1,7 +1,7 @@
 //! Damped least squares over runs that the caller makes: it says which run it needs next and takes the result.
 //!
-//! Levenberg (1944) and Marquardt (1963) with the secant update of Broyden (1965) between Jacobians, for models whose runs
-//! are the only cost: a Jacobian is asked for at the start, where the secant no longer predicts the cost, and once at the end.
+//! Levenberg (1944) and Marquardt (1963) within a region of trust (Moré 1978), with the secant update of Broyden (1965) between
+//! Jacobians, for models whose runs are the only cost: a Jacobian is asked for at the start, where the secant no longer predicts the cost, and once at the end.
 //! In scaled parameters z of the caller's choice, with an independent Gaussian prior and bounds on each. Read next:
 //! `block_angular.rs`, what a Jacobian is, and `score.rs`, which computes what another parameter would add to a finished fit.
 
@@ -37,7 +37,10 @@ pub struct LeastSquares {
     fresh: bool,
     /// The Jacobian that was measured at this point, while the secant changes `jacobian`.
     measured: Option<BlockAngular>,
-    damping: f64,
+    /// Length that a step may have, every component over what moves the residual by one ...
+    radius: f64,
+    /// ... and that of the last step.
+    length: f64,
     rejected: usize,
     predicted: f64,
     need: Need,
@@ -59,7 +62,8 @@ impl LeastSquares {
             jacobian: BlockAngular::default(),
             fresh: false,
             measured: None,
-            damping: 0.0,
+            radius: f64::INFINITY,
+            length: 0.0,
             rejected: 0,
             predicted: 0.0,
             need,
@@ -228,6 +232,7 @@ impl LeastSquares {
             let [lo, hi] = self.prior.bounds[*j];
             step[*j] = (self.z[*j] + solved[k] * shrink).clamp(lo, hi) - self.z[*j];
         }
+        self.length = curvature.component_mul(&step).dot(&step).sqrt();
         let prior = precision.component_mul(&step).dot(&step);
         self.predicted = 2.0 * gradient.dot(&step) - self.jacobian.times(&step).norm_squared() - prior;
         Some(step)

@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use starlings_coordinator::explain::result::{Coefficient, NamedEffect, Rejected};
-use starlings_coordinator::explain::{Explanation, Verdict};
+use starlings_coordinator::explain::{Explanation, Probabilities, Verdict};
 
 use crate::console::{line, number, table, text};
 use crate::failure::Failure;
@@ -24,6 +24,8 @@ pub(super) fn print(found: &Explanation, states: &[String], folder: &Path) -> Re
         line(format_args!("warning: {warning}"))?;
     }
     line(format_args!("\n{}", found.headline))?;
+    let probable = found.probabilities.as_ref().map(Probabilities::lines).unwrap_or_default();
+    list("\nhow probable that is", probable.into_iter(), ROWS)?;
     list("\nwhere simulation and recordings disagree", found.places.iter().map(|p| p.sentence.clone()), FEW)?;
     for effect in &found.effects {
         line("")?;

@@ -38,6 +38,7 @@ pub use fit::drive::drive;
 pub use fit::fitted_variant::FittedVariant;
 pub use fit::kind::Kind;
 pub use judge::held_out::HeldOut;
+pub use judge::probability::{Probabilities, ProbableSet};
 pub use judge::verdict::Verdict;
 pub use options::{Context, Options, Stage};
 pub use rows::Rows;

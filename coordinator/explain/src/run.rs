@@ -17,6 +17,7 @@ use crate::fit::fitted_variant::FittedVariant;
 use crate::fit::prediction_sd::prediction_sd;
 use crate::judge::effective_noise::inflation;
 use crate::judge::gates::JudgedFit;
+use crate::judge::probability::probabilities;
 use crate::judge::search_result::SearchResult;
 use crate::judge::verdict::{Decision, Verdict};
 use crate::locate;
@@ -223,6 +224,7 @@ fn explanation(
         seed: study.seed,
         verdict: decision.verdict,
         headline: words::headline(cache, found, candidates, decision),
+        probabilities: probabilities(found, candidates, decision, n_train),
         places: before.places.clone(),
         effects: added.map(summary::effects).unwrap_or_default(),
         replaced: added.map(|j| j.fit.variant.left_out.clone()).unwrap_or_default(),

@@ -15,7 +15,7 @@ mod tests;
 
 use serde::{Deserialize, Serialize};
 use starlings_explain::result::{Experiment, Explanation};
-use starlings_explain::{Figures, Verdict};
+use starlings_explain::{Figures, Probabilities, Verdict};
 
 use super::plot::figure::Slots;
 use super::{ReportError, layout, number};
@@ -59,6 +59,8 @@ struct Page<'a> {
     about: &'a StudyAbout,
     verdict: &'static str,
     verdict_words: &'static str,
+    /// How probable each answer is, in words.
+    probable: Vec<String>,
     facts: Vec<(&'static str, String)>,
     figures: Slots,
     gap: Gap,
@@ -94,6 +96,7 @@ impl<'a> Page<'a> {
             about,
             verdict,
             verdict_words,
+            probable: found.probabilities.as_ref().map(Probabilities::lines).unwrap_or_default(),
             facts: facts(found, about),
             figures: figures::draw(found, data)?,
             gap: Gap::new(found, data),

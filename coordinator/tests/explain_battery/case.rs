@@ -5,7 +5,7 @@
 use starlings_coordinator::explain::{Explanation, Kind as EffectKind, Verdict};
 
 /// What is put into the data, and what the search may name.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// An effect of the library or of the study, which the search may name.
     Library,
@@ -25,7 +25,7 @@ pub enum Kind {
 
 impl Kind {
     /// The word of the tables.
-    pub fn word(&self) -> &'static str {
+    pub fn word(self) -> &'static str {
         match self {
             Self::Library => "library",
             Self::Generic => "generic",
@@ -137,6 +137,8 @@ pub struct Result {
     pub estimate: Option<(f64, [f64; 2])>,
     /// What was named, and what tied with it.
     pub named: String,
+    /// What was told as a probability, with whether it is so: of every set that it is the truth alone, and that the truth is none of them.
+    pub told: Vec<(f64, bool)>,
     /// χ² of the model with what was named, refitted to data without noise: below a few units the data hold nothing against it.
     pub rival: Option<f64>,
     /// Terms of the model that it replaces.

@@ -110,6 +110,20 @@ fn a_small_battery_is_explained() {
         assert_eq!(quiet.count(Outcome::Wrong) + quiet.count(Outcome::TieWithout), 0);
     }
     assert_eq!(of(Kind::Alien).count(Outcome::Wrong), 0);
+    probabilities_hold(&results);
+}
+
+/// What is told of a case sums to one, and answers told with 90 % and more are so in about as large a share: of the twenty at hand one may
+/// be off.
+fn probabilities_hold(results: &[case::Result]) {
+    for result in results.iter().filter(|result| !result.told.is_empty()) {
+        let sum: f64 = result.told.iter().map(|(p, _)| p).sum();
+        assert!((sum - 1.0).abs() < 1e-9, "{sum} in {:?}", result.case);
+    }
+    let table = tally::reliability(results);
+    let (.., n, told, so) =
+        table.iter().find(|([lo, _], ..)| *lo >= 0.9).expect("answers told with 90 % and more");
+    assert!(*n >= 10 && (so - told).abs() < 0.05, "{n} answers told with {told:.3}, of which {so:.3} are so");
 }
 
 /// Noise that is correlated in time is no gap, and hides no effect that it leaves audible.

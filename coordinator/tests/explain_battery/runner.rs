@@ -12,7 +12,7 @@ use starlings_coordinator::fleet::InProcess;
 use starlings_coordinator::study::store::Store;
 use starlings_models::EffectDef;
 
-use crate::case::{Case, Outcome, Result};
+use crate::case::{Case, Kind, Outcome, Result};
 use crate::draw::{Draw, Noise, draw, noisy, random};
 use crate::information::{refit, refit_with};
 use crate::systems::System;
@@ -72,6 +72,7 @@ pub fn one(world: &World<'_>, case: &Case) -> Option<Result> {
         amplitude: draw.effect.as_ref().map_or(0.0, |(_, values)| values[0]),
         estimate: None,
         named: String::new(),
+        told: Vec::new(),
         rival: None,
         replaced: 0,
         held_out: None,
@@ -108,6 +109,7 @@ fn judged(base: Result, found: &Explanation, draw: &Draw, world: &World<'_>, noi
     let mut result = Result {
         outcome: Outcome::of(found, &base.case.accepted),
         named: if found.effects.is_empty() { found.headline.clone() } else { named.join(" | ") },
+        told: told(found, &base.case),
         replaced: found.replaced.len(),
         runs: found.runs,
         false_alarm: found.false_alarm.rate,
@@ -126,6 +128,19 @@ fn judged(base: Result, found: &Explanation, draw: &Draw, world: &World<'_>, noi
         result.estimate = same.then_some((amplitude.estimate, amplitude.interval95));
     }
     result
+}
+
+/// The probabilities that were told, with what is so.
+fn told(found: &Explanation, case: &Case) -> Vec<(f64, bool)> {
+    let Some(of) = &found.probabilities else { return Vec::new() };
+    let is_unlisted = matches!(case.kind, Kind::LeftOut | Kind::Alien);
+    let is_truth = |names: &[String]| !is_unlisted && names.len() == 1 && case.accepted.contains(&names[0]);
+    let sets = of.sets.iter().map(|set| (set.probability, is_truth(&set.names)));
+    let others = [
+        (of.none_of_these, is_unlisted),
+        (of.nothing_missing, matches!(case.kind, Kind::Null | Kind::Absorbed)),
+    ];
+    sets.chain(others).collect()
 }
 
 /// The noise-free misfit of what was named.

@@ -105,6 +105,9 @@ pub fn report(results: &[Result], systems: &[System]) -> String {
         if groups.iter().any(|group| !group.results.is_empty()) {
             write!(text, "### {title}\n\n{}\n", table(&groups)).unwrap();
             text += &in_words(&groups[0], &groups[6]);
+            let of: Vec<Result> =
+                results.iter().filter(|r| (r.case.rho <= 0.0) == is_white).cloned().collect();
+            write!(text, "### Probabilities\n\n{}\n", reliability_table(&of)).unwrap();
         }
     }
     let results: Vec<Result> = results.iter().filter(|r| r.case.rho <= 0.0).cloned().collect();
@@ -141,6 +144,40 @@ pub fn report(results: &[Result], systems: &[System]) -> String {
         }
     }
     write!(text, "### Library effects one by one, λ > 100\n\n{}\n", table(&groups)).unwrap();
+    text
+}
+
+/// Ends of the intervals of told probabilities.
+const TOLD: [f64; 7] = [0.0, 0.01, 0.1, 0.5, 0.9, 0.99, 1.0];
+/// Share of the cases whose truth is in no list, as the tool takes it before any data.
+const LEFT_OUT: f64 = 0.1;
+
+/// How often what was told with a probability is so, by that probability, where one truth in ten is in no list: (interval, answers, mean
+/// probability, share that is so).
+pub fn reliability(results: &[Result]) -> Vec<([f64; 2], usize, f64, f64)> {
+    let weight = |kind: Kind| match kind {
+        Kind::Library => 1.0 - LEFT_OUT,
+        Kind::LeftOut => LEFT_OUT,
+        _ => 0.0,
+    };
+    let told = results.iter().flat_map(|r| r.told.iter().map(|(p, so)| (weight(r.case.kind), *p, *so)));
+    let told: Vec<(f64, f64, bool)> = told.filter(|(weight, ..)| *weight > 0.0).collect();
+    let of = |ends: &[f64]| {
+        let inside: Vec<_> = told.iter().filter(|(_, p, _)| (ends[0]..ends[1]).contains(p)).collect();
+        let sum: f64 = inside.iter().map(|(weight, ..)| weight).sum();
+        let mean = inside.iter().map(|(weight, p, _)| weight * p).sum::<f64>() / sum;
+        let so = inside.iter().filter(|(.., so)| *so).map(|(weight, ..)| weight).sum::<f64>() / sum;
+        ([ends[0], ends[1]], inside.len(), mean, so)
+    };
+    TOLD.windows(2).map(of).filter(|(_, n, ..)| *n > 0).collect()
+}
+
+/// The same as a table.
+fn reliability_table(results: &[Result]) -> String {
+    let mut text = String::from("| told, % | answers | told, mean | so |\n|---|---|---|---|\n");
+    for ([lo, hi], n, mean, so) in reliability(results) {
+        writeln!(text, "| {:.0} to {:.0} | {n} | {mean:.3} | {so:.3} |", 100.0 * lo, 100.0 * hi).unwrap();
+    }
     text
 }
 

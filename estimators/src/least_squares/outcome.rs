@@ -1,4 +1,4 @@
-//! What follows from the run of a step: where the fit stands, its damping, and whether the secant is trusted further.
+//! What follows from the run of a step: where the fit stands, how far a step is trusted, and whether the secant is trusted further.
 //!
 //! Next file to read: [`super::damped`], the step itself.
 
@@ -6,8 +6,12 @@ use nalgebra::DVector;
 
 use super::{End, LeastSquares, Need};
 
-/// Damping after the first rejected step.
-const REJECTED_DAMPING: f64 = 1e-2;
+/// Radius of trust after a rejected step, over the length of that step ...
+const REJECTED: f64 = 0.25;
+/// ... after one that lowered the cost by less than a quarter of what was predicted ...
+const POOR: f64 = 0.5;
+/// ... and, at least, after one that lowered it by more than three quarters of it.
+const GOOD: f64 = 2.0;
 /// Rejected steps in a row after which the fit has stalled.
 const MOST_REJECTED: usize = 8;
 
@@ -27,9 +31,9 @@ impl LeastSquares {
         self.measured = None;
         self.rejected = 0;
         if ratio > 0.75 {
-            self.damping *= 0.1;
+            self.radius = self.radius.max(GOOD * self.length);
         } else if ratio < 0.25 {
-            self.damping = self.damping.max(REJECTED_DAMPING) * 2.0;
+            self.radius = POOR * self.length;
         }
         if self.trials_left == 0 {
             self.need = Need::Nothing(End::Limit);
@@ -42,10 +46,10 @@ impl LeastSquares {
 
     pub(super) fn reject(&mut self, was_fresh: bool) {
         self.rejected += 1;
-        // Where it was the secant that failed, the damping stays as it was.
+        // Where it was the secant that failed, the radius stays as it was.
         let is_secants = self.thorough && self.measured.is_none();
         if !is_secants {
-            self.damping = self.damping.max(REJECTED_DAMPING) * 5.0;
+            self.radius = REJECTED * self.length;
         }
         if self.trials_left == 0 {
             self.need = Need::Nothing(End::Limit);
@@ -63,10 +67,10 @@ impl LeastSquares {
         }
     }
 
-    /// Ends because no step lowers the cost. The fall that the undamped step predicts shows how far from a minimum that is.
+    /// Ends because no step lowers the cost. The fall that the whole step predicts shows how far from a minimum that is.
     fn give_up(&mut self, was_fresh: bool) {
         let of_here = self.restore() || was_fresh;
-        self.damping = 0.0;
+        self.radius = f64::INFINITY;
         let _ = self.step();
         self.need = Need::Nothing(if of_here { End::Stalled } else { End::Tentative });
     }

@@ -145,7 +145,7 @@ fn residuals_far_above_the_stated_noise_do_not_keep_a_fit_from_converging() {
 }
 
 #[test]
-fn a_step_that_the_secant_misjudged_leaves_the_damping_as_it_was() {
+fn a_step_that_the_secant_misjudged_leaves_the_region_of_trust_as_it_was() {
     let mut fit = LeastSquares::new(DVector::from_vec(vec![1.0, 0.2]), flat(2), 1e-6, 50);
     loop {
         match fit.need().clone() {
@@ -155,8 +155,36 @@ fn a_step_that_the_secant_misjudged_leaves_the_damping_as_it_was() {
             Need::Nothing(end) => panic!("{end:?} before a step by the secant"),
         }
     }
-    fit.damping = 0.3;
+    fit.radius = 0.3;
     fit.give_residual(None);
     assert!(matches!(fit.need(), Need::Jacobian(_)), "{:?}", fit.need());
-    assert_eq!(fit.damping.to_bits(), 0.3_f64.to_bits());
+    assert_eq!(fit.radius.to_bits(), 0.3_f64.to_bits());
+}
+
+/// Of two parameters nearly only the sum shows: they lie in a valley whose curvature is a millionth of that across it, and which
+/// bends.
+#[test]
+fn a_bent_valley_is_followed_to_its_end() {
+    let at = |z: &DVector<f64>, i: usize| {
+        let across = 1e3 * (z[0] + z[1] - 0.02 * (z[0] - z[1]).powi(2));
+        if i == 0 { across } else { (z[0] - z[1]) - 8.0 }
+    };
+    let slope = |z: &DVector<f64>, i: usize, j: usize| {
+        let sign = if j == 0 { 1.0 } else { -1.0 };
+        if i == 0 { 1e3 * (1.0 - 0.04 * sign * (z[0] - z[1])) } else { sign }
+    };
+    let mut fit = LeastSquares::new(DVector::from_vec(vec![-4.0, 4.0]), flat(2), 1e-6, 200);
+    let end = loop {
+        match fit.need().clone() {
+            Need::Residual(z) => fit.give_residual(Some(DVector::from_fn(2, |i, _| -at(&z, i)))),
+            Need::Jacobian(z) => {
+                fit.give_jacobian(Some(DMatrix::from_fn(2, 2, |i, j| slope(&z, i, j)).into()))
+            }
+            Need::Nothing(end) => break end,
+        }
+    };
+    assert_eq!(end, End::Converged, "cost {} at {:?}", fit.cost(), fit.best().0);
+    // The residual vanishes at a difference of 8 and a sum of 1.28; the tolerance of the cost is 1e-6 of one.
+    let [a, b] = [fit.best().0[0], fit.best().0[1]];
+    assert!((a - b - 8.0).abs() < 2e-3 && (a + b - 1.28).abs() < 2e-3, "{a} {b}");
 }

@@ -13,17 +13,35 @@ use super::jacobian::record_blocks;
 use crate::error::ExplainError;
 use crate::run_cache::{Point, RowPredictions, RunCache};
 
-/// Step of the differences, in z.
-pub(crate) const STEP: f64 = 1e-3;
+/// Longest step of the differences, in z ...
+const STEP: f64 = 1e-3;
+/// ... and the change of the residuals, root mean square, beyond which it is shorter: an error of the derivative along what the data feel
+/// most would bend the steps along what they hardly feel.
+const CHANGE: f64 = 0.3;
+/// Shortest step over the longest: the digits of an integration.
+const SHORTEST: f64 = 1e-2;
 
 impl FittedVariant<'_> {
-    /// One point per parameter of the study, all of its entries moved by `step`.
-    pub(crate) fn moved(&self, z: &DVector<f64>, step: f64) -> Vec<DVector<f64>> {
+    /// The step of every parameter of the study, by what the last Jacobian says of it.
+    pub(crate) fn steps(&self, z: &DVector<f64>) -> Vec<f64> {
+        let study = &self.variant.study;
+        let mut steps = vec![STEP; study.parameters.len()];
+        let of_train = &self.jacobian.of_train;
+        for (j, square) in of_train.squares().iter().enumerate() {
+            let slope = (square / of_train.nrows().max(1) as f64).sqrt() * z[j].abs().max(1.0);
+            let step = &mut steps[study.theta[j].parameter];
+            *step = step.min((CHANGE / slope.max(CHANGE)).max(SHORTEST * STEP));
+        }
+        steps
+    }
+
+    /// One point per parameter of the study, all of its entries moved by its step.
+    pub(crate) fn moved(&self, z: &DVector<f64>, steps: &[f64]) -> Vec<DVector<f64>> {
         let study = &self.variant.study;
         let point = |parameter: usize| {
             let mut moved = z.clone();
             for j in (0..study.theta.len()).filter(|j| study.theta[*j].parameter == parameter) {
-                moved[j] += step * moved[j].abs().max(1.0);
+                moved[j] += steps[parameter] * moved[j].abs().max(1.0);
             }
             moved
         };
@@ -38,15 +56,15 @@ impl FittedVariant<'_> {
         z: &DVector<f64>,
         answers: Vec<RowPredictions>,
     ) -> Result<Option<BlockAngular>, ExplainError> {
-        let mut steps = vec![STEP; answers.len()];
+        let mut steps = self.steps(z);
         let mut found: Vec<Option<Arc<Vec<f64>>>> = answers.into_iter().map(Result::ok).collect();
         let failed: Vec<usize> = (0..found.len()).filter(|k| found[*k].is_none()).collect();
         if !failed.is_empty() {
-            let back = self.moved(z, -STEP);
+            let back = self.moved(z, &steps.iter().map(|step| -step).collect::<Vec<_>>());
             let points: Vec<Point<'_>> = failed.iter().map(|k| point(self, &back[*k])).collect();
             for (k, answer) in failed.iter().zip(cache.run(&points)?) {
                 found[*k] = answer.ok();
-                steps[*k] = -STEP;
+                steps[*k] *= -1.0;
             }
         }
         let Some(found) = found.into_iter().collect::<Option<Vec<_>>>() else { return Ok(None) };

@@ -8,7 +8,6 @@
 use nalgebra::DVector;
 use starlings_estimators::Need;
 
-use super::differences::STEP;
 use super::fitted_variant::{FittedVariant, point};
 use super::jacobian::SplitJacobian;
 use crate::error::ExplainError;
@@ -62,7 +61,7 @@ impl FittedVariant<'_> {
     fn points(&self) -> Vec<DVector<f64>> {
         match self.solver.need() {
             Need::Residual(z) => vec![z.clone()],
-            Need::Jacobian(z) => self.moved(z, STEP),
+            Need::Jacobian(z) => self.moved(z, &self.steps(z)),
             Need::Nothing(_) => Vec::new(),
         }
     }

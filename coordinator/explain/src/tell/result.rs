@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::fit::kind::Kind;
 use crate::judge::held_out::HeldOut;
+use crate::judge::probability::Probabilities;
 use crate::judge::verdict::Verdict;
 use crate::locate::MisfitPlace;
 use crate::screen::not_tried::NotTried;
@@ -23,6 +24,9 @@ pub struct Explanation {
     pub verdict: Verdict,
     /// The verdict in one or two sentences.
     pub headline: String,
+    /// How probable each answer is; none where there is no gap.
+    #[serde(default)]
+    pub probabilities: Option<Probabilities>,
     /// Where simulation and data disagree, worst first.
     #[serde(rename = "where")]
     pub places: Vec<MisfitPlace>,

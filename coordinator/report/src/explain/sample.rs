@@ -99,6 +99,7 @@ fn explanation(verdict: Verdict, records: usize) -> Explanation {
         seed: 1,
         verdict,
         headline: "The characteristic impedance is missing: 0.0943 mmHg s/mL.".into(),
+        probabilities: None,
         places: vec![MisfitPlace {
             channel: "pressure".into(),
             unit: "mmHg".into(),
@@ -127,10 +128,7 @@ fn explanation(verdict: Verdict, records: usize) -> Explanation {
             .flat_map(|k| [row(k, "train", 9.43, 2.11), row(k, "held-out", 9.12, 2.34)])
             .collect(),
         held_out: held_out(),
-        not_tried: vec![NotTried {
-            kind: "thermal".into(),
-            reason: "this model has no place for it; it needs: a state with the role temperature".into(),
-        }],
+        not_tried: not_tried(),
         correlated_noise: correlated_noise(),
         remaining: remaining(),
         false_alarm: false_alarm(),
@@ -144,6 +142,11 @@ fn explanation(verdict: Verdict, records: usize) -> Explanation {
         wall_s: 8.4,
         warnings: vec!["The noise was estimated from the data.".into()],
     }
+}
+
+fn not_tried() -> Vec<NotTried> {
+    let reason = "this model has no place for it; it needs: a state with the role temperature";
+    vec![NotTried { kind: "thermal".into(), reason: reason.into() }]
 }
 
 fn held_out() -> Vec<HeldOut> {

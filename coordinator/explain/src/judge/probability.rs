@@ -1,0 +1,184 @@
+//! How probable each set of effects is, and that none of them is what is missing.
+//!
+//! What the data say of the sets among each other is their support in units of the effective noise, so that correlated residuals count as
+//! the few values that they are worth. What they say of causes outside of the list is the verdict itself: how often it falls where the
+//! truth is in no list, over how often where it is, was counted where the answer is known. Next file to read: [`super::verdict`].
+
+use serde::{Deserialize, Serialize};
+
+use super::gates::JudgedFit;
+use super::search_result::SearchResult;
+use super::verdict::{Decision, Verdict};
+use crate::fit::candidate::Candidate;
+use crate::number::percent;
+
+/// Probability, before any data, that what is missing is in no list.
+const UNLISTED: f64 = 0.1;
+/// How often one name falls where the truth is in no list, over how often where it is ...
+const NAMED: f64 = 0.21;
+/// ... the same of a tie ...
+const TIED: f64 = 0.5;
+/// ... and of `unexplained`.
+const UNEXPLAINED: f64 = 45.0;
+/// Sets and their probabilities that are told in words.
+const TOLD: usize = 4;
+/// Probability below which a set is not spoken of.
+const SPOKEN: f64 = 0.005;
+
+/// How probable each answer is where there is a gap; all of them sum to one.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Probabilities {
+    /// The sets of effects, the most probable first.
+    pub sets: Vec<ProbableSet>,
+    /// Nothing is missing.
+    pub nothing_missing: f64,
+    /// Something is missing that is in no list.
+    pub none_of_these: f64,
+    /// Share of the gap, above the noise, that is left with what was named or came nearest.
+    pub discrepancy: f64,
+}
+
+/// A set of effects with its probability.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ProbableSet {
+    /// Names of the effects.
+    pub names: Vec<String>,
+    /// Terms of the model that they replace.
+    pub replaced: Vec<String>,
+    /// The probability.
+    pub probability: f64,
+}
+
+impl Probabilities {
+    /// The most probable answers in words, and what is left of the gap.
+    pub fn lines(&self) -> Vec<String> {
+        let sets = self.sets.iter().take(TOLD).map(|set| {
+            let instead = set.replaced.iter().map(|term| format!(" instead of {term}"));
+            (set.probability, set.names.join(" + ") + &instead.collect::<String>())
+        });
+        let others = [
+            (self.none_of_these, "none of these: something that was not tried".to_owned()),
+            (self.nothing_missing, "nothing is missing".to_owned()),
+        ];
+        let told = sets.chain(others).filter(|(probability, _)| *probability >= SPOKEN);
+        let mut lines: Vec<String> = told.map(|(p, what)| format!("{}: {what}", percent(p))).collect();
+        lines.push(format!("{} of the gap is left", percent(self.discrepancy)));
+        lines
+    }
+}
+
+/// The probabilities after a verdict; `None` where there is no gap. `n_train` values were fitted.
+pub(crate) fn probabilities(
+    found: &SearchResult<'_>,
+    candidates: &[Candidate],
+    decision: &Decision,
+    n_train: usize,
+) -> Option<Probabilities> {
+    let odds = match decision.verdict {
+        Verdict::Named => NAMED,
+        Verdict::Tie => TIED,
+        Verdict::Unexplained => UNEXPLAINED,
+        Verdict::NoGap => return None,
+    };
+    let is_answered = decision.verdict != Verdict::Unexplained;
+    let counted: Vec<&JudgedFit<'_>> = found.judged.iter().filter(|j| counts(j, is_answered)).collect();
+    let best = decision.best.map(|i| &found.judged[i]);
+    let nearest = best.or(counted.first().copied());
+    let excess = |chi2: f64| (chi2 - n_train as f64).max(0.0);
+    let (was, is) = (excess(found.before.train), nearest.map_or(found.before.train, |j| j.misfit.train));
+    let discrepancy = if was > 0.0 { (excess(is) / was).min(1.0) } else { 0.0 };
+    let inflation = nearest.map_or(found.adequacy.inflation, |j| j.inflation);
+    // An effect pays what a search gains by chance; those beyond the first have paid in their gain.
+    let support = |of: f64| 0.5 * (of / inflation - found.null_distribution.threshold);
+    let mut weights: Vec<(ProbableSet, f64)> = Vec::new();
+    for judged in counted {
+        // A set that adds something small to what is told does not speak against it.
+        let told = best.filter(|best| is_answered && holds(judged, best)).unwrap_or(judged);
+        add(&mut weights, told.names(), &told.fit.variant.left_out, support(judged.standing()));
+    }
+    // What was not refitted and does the same as what is told has its support, but for the prior.
+    if let Some(best) = best.filter(|_| is_answered) {
+        for set in &decision.tied {
+            let of = |name: &String| candidates.iter().find(|c| c.name() == name);
+            let Some(members) = set.iter().map(of).collect::<Option<Vec<_>>>() else { continue };
+            let prior = inflation * members.iter().map(|c| c.kind.price()).sum::<f64>();
+            if !found.judged.iter().any(|j| j.names() == *set) {
+                add(&mut weights, set.clone(), &best.fit.variant.left_out, support(best.rank() - prior));
+            }
+        }
+    }
+    weights.retain(|(set, _)| !decision.synonyms.contains(&set.names.join(" + ")));
+    let of_verdict = odds * UNLISTED / (1.0 - UNLISTED);
+    let listed = 1.0 / (1.0 + of_verdict);
+    // Where what is left is no noise, so much of the gap is in no list.
+    let is_left = is_answered && best.is_some_and(|j| !j.adequacy.could_be_white());
+    Some(shared(weights, if is_left { listed * (1.0 - discrepancy) } else { listed }, discrepancy))
+}
+
+/// Whether a variant has a say: it passes the gates, or, where nothing explains the gap, is at least possible.
+fn counts(judged: &JudgedFit<'_>, is_answered: bool) -> bool {
+    let is_possible = |gate: &str| !is_answered && !matches!(gate, "failed" | "sign" | "range");
+    judged.refusal.as_ref().is_none_or(|r| is_possible(r.gate))
+}
+
+/// Whether a variant has all the effects of another.
+fn holds(judged: &JudgedFit<'_>, other: &JudgedFit<'_>) -> bool {
+    let (names, left_out) = (judged.names(), &judged.fit.variant.left_out);
+    *left_out == other.fit.variant.left_out && other.names().iter().all(|name| names.contains(name))
+}
+
+/// Gives a set its log weight, the largest of those that it is given.
+fn add(weights: &mut Vec<(ProbableSet, f64)>, names: Vec<String>, replaced: &[String], weight: f64) {
+    let known = weights.iter_mut().find(|(set, _)| set.names == names && set.replaced == replaced);
+    match known {
+        Some((_, most)) => *most = most.max(weight),
+        None => weights.push((ProbableSet { names, replaced: replaced.to_vec(), probability: 0.0 }, weight)),
+    }
+}
+
+/// Shares the probability that the truth is in the list among its sets and the model as it is, whose log weight is zero.
+fn shared(weights: Vec<(ProbableSet, f64)>, listed: f64, discrepancy: f64) -> Probabilities {
+    let most = weights.iter().map(|(_, w)| *w).fold(0.0, f64::max);
+    let nothing = (-most).exp();
+    let sum = nothing + weights.iter().map(|(_, w)| (w - most).exp()).sum::<f64>();
+    let probable =
+        |(set, w): (ProbableSet, f64)| ProbableSet { probability: listed * (w - most).exp() / sum, ..set };
+    let mut sets: Vec<ProbableSet> = weights.into_iter().map(probable).collect();
+    sets.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    Probabilities { sets, nothing_missing: listed * nothing / sum, none_of_these: 1.0 - listed, discrepancy }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_probabilities_sum_to_one_and_stand_as_the_weights() {
+        let mut weights = Vec::new();
+        for (name, weight) in [("drag", 40.0), ("friction", 37.0), ("drag", 38.0)] {
+            add(&mut weights, vec![name.to_owned()], &[], weight);
+        }
+        let of = shared(weights, 0.9, 0.2);
+        let sum: f64 = of.sets.iter().map(|set| set.probability).sum();
+        // Three sums of exponentials.
+        assert!((sum + of.nothing_missing + of.none_of_these - 1.0).abs() < 1e-12);
+        let [drag, friction] = of.sets.as_slice() else { panic!("{of:?}") };
+        assert_eq!((drag.names[0].as_str(), friction.names[0].as_str()), ("drag", "friction"));
+        assert!((drag.probability / friction.probability - 3.0_f64.exp()).abs() < 1e-9);
+        assert_eq!(
+            of.lines(),
+            [
+                "86 %: drag",
+                "4 %: friction",
+                "10 %: none of these: something that was not tried",
+                "20 % of the gap is left"
+            ]
+        );
+    }
+
+    #[test]
+    fn without_any_set_nothing_is_missing_or_it_is_in_no_list() {
+        let of = shared(Vec::new(), 0.2, 1.0);
+        assert!((of.nothing_missing - 0.2).abs() < 1e-12 && (of.none_of_these - 0.8).abs() < 1e-12);
+    }
+}
