@@ -1,13 +1,14 @@
 """Writes the recordings of an elastic tube with known stiffness: the wall's displacement over heart beats.
 
-A tube of 25 rings in five regions, filled with blood, an RCR Windkessel at its outlet; units are cm, g, s, dyn/cm^2. The
+A tube of 25 rings, in five regions or with a strap, filled with blood, an RCR Windkessel at its outlet; units are cm, g, s, dyn/cm^2. The
 inflow is a half sine of 300 cm^3/s that lasts 0.3 s in each beat of 0.8 s. The run starts on its periodic orbit and takes
 implicit midpoint steps of 1 ms; the displacement of every ring is kept each 10 ms, with Gaussian noise of a tenth of the
 largest pulsatile amplitude.
 
     flow.csv                  inflow at every step of ten beats
-    wall.csv                  ten beats; wall-tissue.csv: three beats of the same tube in tissue
-    initial.csv               the state at time zero; initial-tissue.csv
+    wall.csv                  ten beats; wall-tissue.csv: three beats of the same tube in tissue; wall-strap.csv: five beats of
+                              a tube that is the same all along but for a strap around its first 5 cm, twice as stiff
+    initial.csv               the state at time zero; initial-tissue.csv, initial-strap.csv
 
 Standard library only; the seed is fixed, so the script always writes the same files:
 
@@ -22,8 +23,9 @@ from pathlib import Path
 L, R, H, NU = 25.0, 1.0, 0.15, 0.5
 RHO_S, RHO_F, MU, C_W = 1.1, 1.06, 0.035, 2e3
 R_P, R_D, C = 150.0, 1850.0, 1e-3
-YOUNG = [5e6 * 2.0**octave for octave in (0.5, 1.5, -0.5, 0.0, -1.0)]
 CELLS = 25
+YOUNG = [5e6 * 2.0**octave for octave in (0.5, 1.5, -0.5, 0.0, -1.0) for _ in range(CELLS // 5)]  # of every ring
+STRAP = [1e7 if j < 5 else 5e6 for j in range(CELLS)]
 BEAT, EJECTION, PEAK = 0.8, 0.3, 300.0
 STEPS_PER_BEAT, STEPS_PER_SAMPLE = 800, 10
 DT = BEAT / STEPS_PER_BEAT
@@ -41,12 +43,13 @@ def flow_at(step: int) -> float:
 
 
 class Tube:
-    """The tube in tissue of stiffness k_s and viscosity c_s; its state is displacement, velocity and pressure."""
+    """The tube of rings with these moduli in tissue of stiffness k_s and viscosity c_s; its state is displacement, velocity and
+    pressure."""
 
-    def __init__(self, k_s: float = 0.0, c_s: float = 0.0) -> None:
+    def __init__(self, young: list[float] = YOUNG, k_s: float = 0.0, c_s: float = 0.0) -> None:
         """Sets up the linear system of one step, which is the same for every step."""
         mass, damping = RHO_S * H, C_W + c_s
-        ring = [YOUNG[j * len(YOUNG) // CELLS] * H / ((1.0 - NU**2) * R**2) for j in range(CELLS)]
+        ring = [modulus * H / ((1.0 - NU**2) * R**2) for modulus in young]
         self.stiffness = [k + k_s for k in ring]
         self.inertia = 2.0 * mass / DT
         wall = [(self.inertia + damping + 0.5 * DT * k) / AREA for k in self.stiffness]
@@ -155,6 +158,7 @@ def main() -> None:
     write("flow.csv", ["time", "flow"], ((repr(step / 1000), repr(flow_at(step))) for step in steps))
     record(Tube(), 10, "")
     record(Tube(k_s=2e5, c_s=5e3), 3, "-tissue")
+    record(Tube(STRAP), 5, "-strap")
 
 
 if __name__ == "__main__":

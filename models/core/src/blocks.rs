@@ -54,6 +54,19 @@ pub struct WallOutputs {
     pub pressure: Option<&'static str>,
 }
 
+/// What observers of a network of vessels stand on whose walls have no inertia: their sections, and the Windkessels behind the outlets.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sections {
+    /// Position in the state of the first of the n sections A = πR².
+    pub area: usize,
+    /// How many there are.
+    pub n: usize,
+    /// Field of the n displacements R − R0.
+    pub displacement: &'static str,
+    /// The Windkessels, each with the output that shows the pressure before it.
+    pub outlets: Vec<(WindkesselBlock, String)>,
+}
+
 impl Blocks {
     /// Number of wall displacements.
     pub(crate) fn n_wall(&self) -> usize {

@@ -5,6 +5,7 @@
 
 mod on_segment;
 
+use crate::blocks::Sections;
 use crate::integrate::Solver;
 use crate::memory::Memory;
 use crate::segment::{Drive, Segment};
@@ -72,6 +73,13 @@ pub trait Model: Send + Sync {
     /// The blocks of a linear fluid–structure system at these parameters; `None` for a model that is none. Whether there are
     /// any does not depend on the parameters' values, which may be placeholders.
     fn blocks(&self, theta: &[f64]) -> Option<Blocks> {
+        let _ = theta;
+        None
+    }
+
+    /// The sections of a network of vessels at these parameters; `None` for a model that is none. Whether there are any does not depend
+    /// on the parameters' values, which may be placeholders.
+    fn sections(&self, theta: &[f64]) -> Option<Sections> {
         let _ = theta;
         None
     }

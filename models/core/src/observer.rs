@@ -13,6 +13,7 @@ mod none;
 mod nudging;
 mod sdf;
 mod sdf_displacement;
+mod sections;
 mod together;
 mod wall;
 mod windkessel;

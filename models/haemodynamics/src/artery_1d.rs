@@ -16,6 +16,7 @@ mod vessels;
 mod viscous;
 mod wall;
 
+use starlings_models_core::blocks::{Sections, WindkesselBlock};
 use starlings_models_core::segment::Segment;
 use starlings_models_core::{Drive, Model, ModelDef, ModelFailure, SetupError, Spec};
 
@@ -184,6 +185,22 @@ impl Model for Artery1d {
             y[0] = work.faces.node[node];
             y[1] = vessels.outflow(node, &work.faces);
         }
+    }
+
+    fn sections(&self, theta: &[f64]) -> Option<Sections> {
+        let vessels = Vessels::new(&self.network, theta);
+        let chamber = |(&node, outlet): (&usize, &vessels::Outlet)| {
+            let (number, distal, compliance) = outlet.chamber?;
+            let state = 2 * self.network.n_cell + number;
+            let block = WindkesselBlock { state, rate: 1.0 / (distal * compliance) };
+            Some((block, quantities::named(&self.network, "outlet_pressure", node)))
+        };
+        Some(Sections {
+            area: 0,
+            n: self.network.n_cell,
+            displacement: "displacement",
+            outlets: self.network.outlets.iter().zip(&vessels.outlets).filter_map(chamber).collect(),
+        })
     }
 
     fn advance(&self, segment: Segment<'_>, theta: &[f64], x: &mut [f64]) -> Result<(), ModelFailure> {

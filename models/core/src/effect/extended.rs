@@ -16,6 +16,7 @@ use super::extended_spec::extended_spec;
 use super::scope::{Reach, Scope, note_memories};
 use super::{Effect, EffectDef, Moment, TermEffect, Touches};
 use crate::SetupError;
+use crate::blocks::Sections;
 use crate::equations::Slot;
 use crate::integrate::Solver;
 use crate::scratch::Scratch;
@@ -184,6 +185,13 @@ impl Model for Extended {
             return self.inner.blocks(&theta[..self.n_param]);
         }
         self.with_fixed_parameters(theta, |theta| self.inner.blocks(theta))
+    }
+
+    fn sections(&self, theta: &[f64]) -> Option<Sections> {
+        if self.touches.parameters_vary {
+            return self.inner.sections(&theta[..self.n_param]);
+        }
+        self.with_fixed_parameters(theta, |theta| self.inner.sections(theta))
     }
 
     fn solver(&self) -> Solver {

@@ -9,6 +9,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::extension::{extension, onto_all, seen};
+use super::sections::SectionFeedback;
 use super::wall::{Shown, Wall, add, feedback};
 use super::{Correction, Kind, Observer, Wiring};
 use crate::Model;
@@ -19,7 +20,10 @@ use crate::setup::ObserverDef;
 pub(super) const KIND: Kind = Kind {
     kind: "sdf",
     says: "Observed wall displacements pull the whole wall along its own elastic extension.",
-    build: |def, wiring| Ok(Box::new(DisplacementFeedback::new(def, wiring)?)),
+    build: |def, wiring| match wiring.model.sections(wiring.theta) {
+        Some(sections) => Ok(Box::new(SectionFeedback::new(def, &wiring, &sections)?)),
+        None => Ok(Box::new(DisplacementFeedback::new(def, wiring)?)),
+    },
 };
 
 /// Feedback of the wall displacement on the displacement.

@@ -12,6 +12,7 @@ use super::measured::mean_innovation;
 use super::wall::{components, hosted};
 use super::{Correction, Kind, Observer, Wiring};
 use crate::SetupError;
+use crate::blocks::WindkesselBlock;
 use crate::setup::ObserverDef;
 use crate::{Drive, Model, Spec};
 
@@ -22,74 +23,120 @@ pub(super) const KIND: Kind = Kind {
     build: |def, wiring| Ok(Box::new(WindkesselObserver::new(def, wiring)?)),
 };
 
-/// Feedback of the outlet pressure on the Windkessel.
+/// Feedback of the pressures before outlets on the Windkessels behind them.
 #[derive(Debug)]
 pub(crate) struct WindkesselObserver {
     gain: f64,
+    outlets: Vec<Outlet>,
+}
+
+/// A Windkessel whose pressure is observed.
+#[derive(Debug)]
+struct Outlet {
     /// Position of π in the state.
     state: usize,
     /// Name of the pressure output.
-    pressure: &'static str,
+    pressure: String,
     /// The rows that show the pressure.
     rows: Vec<usize>,
 }
 
+/// The Windkessels of a model, each with the output that shows the pressure before it.
+fn windkessels(model: &dyn Model, theta: &[f64]) -> Option<Vec<(WindkesselBlock, String)>> {
+    if let Some(sections) = model.sections(theta) {
+        return Some(sections.outlets);
+    }
+    let blocks = model.blocks(theta)?;
+    let (block, pressure) = blocks.windkessel.zip(blocks.outputs.pressure)?;
+    Some(vec![(block, pressure.to_owned())])
+}
+
 impl WindkesselObserver {
-    /// Finds the observed pressure.
+    /// Finds the observed pressures.
     ///
     /// # Errors
-    /// When the model has no Windkessel behind a wall or its pressure is not observed.
+    /// When the model has no Windkessel behind a wall, or no pressure before one is observed.
     pub(crate) fn new(def: &ObserverDef, wiring: Wiring<'_>) -> Result<Self, SetupError> {
-        let (block, pressure) = hosted(def, &wiring, |b| b.windkessel.zip(b.outputs.pressure))?;
-        let rows: Vec<usize> = components(&wiring, pressure)?.into_iter().map(|(row, _)| row).collect();
-        if rows.is_empty() {
+        let sections = wiring.model.sections(wiring.theta).filter(|_| def.corrects.is_empty());
+        let all = match sections {
+            Some(sections) => sections.outlets,
+            None => {
+                let (block, pressure) = hosted(def, &wiring, |b| b.windkessel.zip(b.outputs.pressure))?;
+                vec![(block, pressure.to_owned())]
+            }
+        };
+        let names: Vec<String> = all.iter().map(|(_, pressure)| format!("`{pressure}`")).collect();
+        let mut outlets = Vec::new();
+        for (block, pressure) in all {
+            let rows: Vec<usize> = components(&wiring, &pressure)?.into_iter().map(|(row, _)| row).collect();
+            if !rows.is_empty() {
+                outlets.push(Outlet { state: block.state, pressure, rows });
+            }
+        }
+        if outlets.is_empty() {
             return Err(SetupError::Invalid(format!(
-                "the observer `windkessel` needs the output `{pressure}` observed, and no channel has it: add a \
-                 channel with `output = \"{pressure}\"`, estimate the initial pressure among the parameters, or \
-                 take `sdf`, which corrects the pressure through the volume of the vessel"
+                "the observer `windkessel` needs the output {names} observed, and no channel has it: add a \
+                 channel with it as `output`, estimate the initial pressure among the parameters, or \
+                 take `sdf`, which corrects the pressure through the volume of the vessel",
+                names = names.join(" or ")
             )));
         }
-        Ok(Self { gain: def.gain, state: block.state, pressure, rows })
+        Ok(Self { gain: def.gain, outlets })
     }
 
-    /// γ/(R_d C), in 1/time.
-    fn rate(&self, model: &dyn Model, theta: &[f64]) -> f64 {
-        let block = model.blocks(theta).and_then(|blocks| blocks.windkessel);
-        block.map_or(0.0, |block| self.gain * block.rate)
+    /// γ/(R_d C) of a Windkessel, in 1/time.
+    fn rate(&self, outlet: &Outlet, model: &dyn Model, theta: &[f64]) -> f64 {
+        let all = windkessels(model, theta).unwrap_or_default();
+        let block = all.iter().find(|(block, _)| block.state == outlet.state);
+        block.map_or(0.0, |(block, _)| self.gain * block.rate)
     }
+}
 
-    /// ∂p/∂x, n_state: unit steps about rest, exact for a linear system.
-    fn gradient(&self, model: &dyn Model, theta: &[f64]) -> Vec<f64> {
-        let spec = model.spec();
-        let rest = vec![0.0; spec.inputs.iter().map(|q| q.size).sum()];
-        let drive = Drive { value: &rest, slope: &rest, ..Drive::NONE };
-        let at = Spec::range_of(&spec.outputs, self.pressure).map_or(0, |range| range.start);
-        let (mut x, mut y) = (vec![0.0; spec.n_state()], vec![0.0; spec.n_output()]);
-        let mut pressure = |j: usize, value: f64| {
-            x[j] = value;
+/// ∂p/∂x of an output, n_state: unit steps about rest, exact for a linear system; small ones about the initial state of a nonlinear one.
+fn gradient(model: &dyn Model, theta: &[f64], pressure: &str) -> Vec<f64> {
+    let spec = model.spec();
+    let rest = vec![0.0; spec.inputs.iter().map(|q| q.size).sum()];
+    let drive = Drive { value: &rest, slope: &rest, ..Drive::NONE };
+    let at = Spec::range_of(&spec.outputs, pressure).map_or(0, |range| range.start);
+    let (mut x, mut y) = (vec![0.0; spec.n_state()], vec![0.0; spec.n_output()]);
+    let is_linear = model.blocks(theta).is_some();
+    if !is_linear {
+        model.initial(theta, &mut x);
+    }
+    let mut slope = |j: usize| {
+        let (here, step) = (x[j], if is_linear { 1.0 } else { f64::EPSILON.cbrt() * x[j].abs().max(1.0) });
+        let mut value = |step: f64| {
+            x[j] = here + step;
             model.output(0.0, &x, theta, drive, &mut y);
-            x[j] = 0.0;
+            x[j] = here;
             y[at]
         };
-        (0..spec.n_state()).map(|j| 0.5 * (pressure(j, 1.0) - pressure(j, -1.0))).collect()
-    }
+        0.5 * (value(step) - value(-step)) / step
+    };
+    (0..spec.n_state()).map(&mut slope).collect()
 }
 
 impl Observer for WindkesselObserver {
     /// δπ = (1 − e^(−γΔt/(R_d C))) (z − p): exact for a held flow, stable at any gain.
     fn correct(&self, at: Correction<'_>, x: &mut [f64]) {
-        if let Some((innovation, _)) = mean_innovation(&at, &self.rows) {
-            let rate = self.rate(at.model, at.theta);
-            x[self.state] += -(-rate * at.dt).exp_m1() * innovation;
+        for outlet in &self.outlets {
+            if let Some((innovation, _)) = mean_innovation(&at, &outlet.rows) {
+                let rate = self.rate(outlet, at.model, at.theta);
+                x[outlet.state] += -(-rate * at.dt).exp_m1() * innovation;
+            }
         }
     }
 
-    /// γ/(R_d C) ∂p/∂x in the row of π: the predicted pressure holds R_p times the model's own flow.
+    /// γ/(R_d C) ∂p/∂x in the row of each π: the predicted pressure holds R_p times the model's own flow.
     fn feedback(&self, model: &dyn Model, theta: &[f64]) -> DMatrix<f64> {
         let n = model.spec().n_state();
-        let (rate, mut feedback) = (self.rate(model, theta), DMatrix::zeros(n, n));
-        for (entry, slope) in feedback.row_mut(self.state).iter_mut().zip(self.gradient(model, theta)) {
-            *entry = rate * slope;
+        let mut feedback = DMatrix::zeros(n, n);
+        for outlet in &self.outlets {
+            let rate = self.rate(outlet, model, theta);
+            let slopes = gradient(model, theta, &outlet.pressure);
+            for (entry, slope) in feedback.row_mut(outlet.state).iter_mut().zip(slopes) {
+                *entry = rate * slope;
+            }
         }
         feedback
     }

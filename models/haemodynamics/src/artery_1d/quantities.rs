@@ -31,7 +31,7 @@ pub(super) fn spec(network: &Network) -> Spec {
 }
 
 /// `stem` for the only outlet, `stem_<node>` for one of several.
-fn named(network: &Network, stem: &str, node: usize) -> String {
+pub(super) fn named(network: &Network, stem: &str, node: usize) -> String {
     if network.outlets.len() == 1 { stem.to_owned() } else { format!("{stem}_{}", network.nodes[node].name) }
 }
 
