@@ -3,10 +3,11 @@
 //! A solver that was asked for its description, or made a trial run, stays for the next question; it ends before the workers
 //! start theirs, or with the command. Next file to read: [`crate::solvers`].
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use starlings_coordinator::study::{SolverHost, Study, Undescribed};
+use starlings_coordinator::study::store::folder::StudyInfo;
+use starlings_coordinator::study::{RunFolder, SolverHost, Study, Undescribed};
 use starlings_models::{BuildSetup, SOLVER, Setup, SetupError};
 use starlings_solver::Solvers;
 use starlings_solver::{adapters, faults};
@@ -27,8 +28,32 @@ pub(crate) fn load_where(path: &Path, here: bool) -> Result<Study, Failure> {
     Ok(Study::load_with(path, &host(here))?)
 }
 
+/// The study of a run as it was run; `named` says where it and its recordings are, if not where they were.
+pub(crate) fn of_run(folder: &RunFolder, named: Option<&Path>, here: bool) -> Result<Study, Failure> {
+    let frozen = folder.store.meta("study").map_err(Failure::run)?.unwrap_or_default();
+    let info = folder.store.meta("info").map_err(Failure::run)?.unwrap_or_default();
+    let stood = serde_json::from_str::<StudyInfo>(&info).map(|info| info.file).unwrap_or_default();
+    load_frozen(&place(&folder.path, named, &stood)?, &frozen, here)
+}
+
+/// Where the study of a folder stands, so that its recordings are found: `named`, or else where it `stood`.
+pub(crate) fn place(folder: &Path, named: Option<&Path>, stood: &str) -> Result<PathBuf, Failure> {
+    let place = match named {
+        Some(file) => file.to_owned(),
+        None if stood.is_empty() => folder.join("study.toml"),
+        None => Path::new(stood).to_owned(),
+    };
+    if place.exists() {
+        return Ok(place);
+    }
+    Err(Failure::input(format!(
+        "the study of this run stood at {}, and is not there: say where it and its recordings are with --study FILE",
+        place.display()
+    )))
+}
+
 /// The same for the text of a study that stood at `path` when it was run.
-pub(crate) fn load_frozen(path: &Path, text: &str, here: bool) -> Result<Study, Failure> {
+fn load_frozen(path: &Path, text: &str, here: bool) -> Result<Study, Failure> {
     Ok(Study::from_text_with(path, text, &host(here))?)
 }
 

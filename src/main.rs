@@ -32,6 +32,7 @@ mod models;
 mod note;
 mod plain;
 mod progress;
+mod replay;
 mod report;
 mod run;
 mod run_folder;
@@ -83,6 +84,8 @@ enum Command {
     Compare(compare::Args),
     /// Say why a run, or a parameter, worker, particle or observation of it, is as it is.
     Why(why::Args),
+    /// Make a run of a sigma point again, with the inputs that it had, and say whether the bits are the same here.
+    Replay(replay::Args),
     /// Validate a study and make one trial run of its model.
     Check(check::Args),
     /// Run the model forward with chosen values and noise: a twin experiment.
@@ -148,6 +151,7 @@ fn main() -> ExitCode {
         Command::Watch(args) => watch::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Why(args) => why::run(&args),
+        Command::Replay(args) => replay::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Init(args) => init::run(&args),
         Command::Import(args) => import::run(&args),
@@ -207,6 +211,7 @@ impl Command {
             Self::Watch(args) => args.json,
             Self::Compare(args) => args.json,
             Self::Why(args) => args.json,
+            Self::Replay(args) => args.json,
             Self::Check(args) => args.json,
             Self::Init(args) => args.json,
             Self::Import(args) => args.json,

@@ -2,20 +2,17 @@
 //!
 //! Next file to read: [`super`].
 
-use std::path::{Path, PathBuf};
-
 use starlings_coordinator::fleet::Fleet;
 use starlings_coordinator::infer::forecast::known::Known;
 use starlings_coordinator::infer::{InferError, Inference, forecast as of_inference};
 use starlings_coordinator::study::forecast::{Ask, Forecast, StudyForecastError, forecast as of_run};
-use starlings_coordinator::study::store::folder::StudyInfo;
 use starlings_coordinator::study::{RunFolder, Study};
 
 use super::Args;
 use crate::failure::Failure;
 use crate::infer::{RESULT, read_result};
 use crate::interrupt;
-use crate::load::{self, load_frozen, unknown_record};
+use crate::load::{self, unknown_record};
 
 /// A study, and what is known of it when a forecast begins.
 pub(super) struct Source {
@@ -48,7 +45,7 @@ impl Source {
             return Self::inferred(args);
         }
         let folder = RunFolder::open(&args.from).map_err(Failure::input)?;
-        let study = study_of(args, &folder)?;
+        let study = load::of_run(&folder, args.study.as_deref(), args.fleet.is_here())?;
         Ok(Self { study, known: Posterior::Run(Box::new(folder)) })
     }
 
@@ -58,7 +55,7 @@ impl Source {
         let frozen = args.from.join("study.toml");
         let text = std::fs::read_to_string(&frozen)
             .map_err(|error| Failure::input(format!("cannot read {}: {error}", frozen.display())))?;
-        let place = place(args, &found.file)?;
+        let place = load::place(&args.from, args.study.as_deref(), &found.file)?;
         let study = Study::from_text_for_inference(&place, &text)?;
         let known = Known::of_result(&study, &found).map_err(|error| failed(&error))?;
         Ok(Self { study, known: Posterior::Inference(Box::new(known)) })
@@ -107,28 +104,4 @@ fn failed(error: &InferError) -> Failure {
         return cancelled();
     }
     if error.is_input() { Failure::input(error) } else { Failure::run(error) }
-}
-
-/// The study as it was run.
-fn study_of(args: &Args, folder: &RunFolder) -> Result<Study, Failure> {
-    let frozen = folder.store.meta("study").map_err(Failure::run)?.unwrap_or_default();
-    let info = folder.store.meta("info").map_err(Failure::run)?.unwrap_or_default();
-    let stood = serde_json::from_str::<StudyInfo>(&info).map(|info| info.file).unwrap_or_default();
-    load_frozen(&place(args, &stood)?, &frozen, args.fleet.is_here())
-}
-
-/// Where the study stands, so that its recordings are found.
-fn place(args: &Args, stood: &str) -> Result<PathBuf, Failure> {
-    let place = match &args.study {
-        Some(file) => file.clone(),
-        None if stood.is_empty() => args.from.join("study.toml"),
-        None => Path::new(stood).to_owned(),
-    };
-    if place.exists() {
-        return Ok(place);
-    }
-    Err(Failure::input(format!(
-        "the study of this run stood at {}, and is not there: say where it and its recordings are with --study FILE",
-        place.display()
-    )))
 }

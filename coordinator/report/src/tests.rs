@@ -134,6 +134,16 @@ fn many_records_and_parameters_keep_the_page_readable() {
     assert!(overview_svg(&data).contains("7 more"));
 }
 
+#[test]
+fn outputs_that_are_not_drawn_are_counted_where_others_are() {
+    let mut data = sample::run(60);
+    let channel = data.channels[0].clone();
+    data.channels = (1..=30).map(|k| ChannelPlot { record: format!("r-{k}"), ..channel.clone() }).collect();
+    let page = render(&data).unwrap();
+    assert!(page.contains("6 more are in run.db."), "30 fits, of which 24 are drawn");
+    assert!(page.contains("Residuals of 6 outputs and records more are in run.db."));
+}
+
 /// Twenty-five components with a residual that grows along the field and changes its sign halfway through time.
 fn field(n: usize) -> ReportData {
     let mut data = sample::run(n);

@@ -12,6 +12,7 @@ pub(crate) mod free_run;
 mod index;
 mod journal;
 mod kept;
+pub(crate) mod replay;
 pub(crate) mod resample;
 pub(crate) mod rescue;
 pub(crate) mod results;

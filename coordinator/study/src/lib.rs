@@ -28,6 +28,7 @@ mod predictive;
 mod problem;
 pub mod progress;
 mod record;
+pub mod replay;
 mod room;
 pub mod run;
 mod run_error;

@@ -5,6 +5,7 @@
 //! killed at any instant continues from a whole analysis a moment before (`commit`). Nothing here computes. Next file to read:
 //! [`crate::store::snapshot`].
 
+mod answer;
 mod arrived;
 mod call;
 mod changes;
@@ -15,6 +16,7 @@ pub mod folder;
 mod folder_error;
 mod identity;
 mod info;
+mod inputs;
 pub(super) mod json;
 mod kept_states;
 mod lock;
@@ -41,8 +43,10 @@ use kept_states::KeptStates;
 use schema::{SCHEMA_VERSION, insert_analysis, insert_jobs, insert_predictions};
 use snapshot::{Estimate, Snapshot};
 
+pub use answer::Answer;
 pub use arrived::ArrivedRun;
 pub use error::StoreError;
+pub(crate) use inputs::{Inputs, KeptRun};
 pub use program::Program;
 pub use purpose::{EXPLANATION, Purpose};
 pub use remembered::RunKey;
@@ -57,6 +61,8 @@ pub struct Store {
     committed_s: Cell<f64>,
     /// Whether there are runs of an analysis that is not made yet.
     holds_arrived: Cell<bool>,
+    /// Bytes of inputs that the rows since the last ones allow.
+    inputs_allowed: Cell<usize>,
     /// Large states of the last snapshots.
     kept: RefCell<KeptStates>,
 }
@@ -82,6 +88,8 @@ impl Store {
         store.guard(store.connection.execute_batch(arrived::TABLE))?;
         store.holds_arrived.set(store.guard(arrived::any(&store.connection))?);
         store.guard(store.connection.execute_batch(kept_states::TABLE))?;
+        store.guard(store.connection.execute_batch(inputs::TABLE))?;
+        store.add_answers()?;
         Ok(store)
     }
 
@@ -127,6 +135,7 @@ impl Store {
             connection,
             committed_s: Cell::new(f64::NEG_INFINITY),
             holds_arrived: Cell::new(false),
+            inputs_allowed: Cell::new(0),
             kept: RefCell::default(),
         })
     }
@@ -234,6 +243,7 @@ impl Store {
             let _ = self.commit();
         } else {
             self.holds_arrived.set(false);
+            self.allow_inputs(row);
             self.kept.borrow_mut().wrote(snapshot.stored());
         }
         self.guard(written)

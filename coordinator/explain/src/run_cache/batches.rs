@@ -292,6 +292,8 @@ fn remembered(
         worker: outcome.worker.clone(),
         error: outcome.result.as_ref().err().map(ToString::to_string),
         cost_s: outcome.result.as_ref().map_or(0.0, |p| p.cost),
+        // The run itself is remembered, by what it depends on.
+        answer: None,
     };
     Ok((row, from_outcome(study, outcome, particle, record, n_value)?))
 }

@@ -112,6 +112,12 @@ pub(crate) fn keys(entries: &[(impl AsRef<str>, impl AsRef<str>)]) -> Vec<Key> {
 }
 
 impl Figure {
+    /// The same with a sentence more below it.
+    pub(crate) fn saying(mut self, more: &str) -> Self {
+        self.caption = format!("{} {more}", self.caption);
+        self
+    }
+
     /// Draws `scene`.
     pub(crate) fn new(
         scene: &Scene,

@@ -19,6 +19,7 @@ fn job(step: usize, particle: u32, attempts: u32, error: Option<&str>) -> JobRow
         worker: "1@node-07/311".into(),
         error: error.map(ToOwned::to_owned),
         cost_s: if error.is_some() { 0.0 } else { 1.5 },
+        answer: None,
     }
 }
 

@@ -18,6 +18,7 @@ fn job(step: usize, particle: u32, worker: &str, error: Option<&str>) -> JobRow 
         worker: worker.into(),
         error: error.map(ToOwned::to_owned),
         cost_s: 1.5,
+        answer: None,
     }
 }
 

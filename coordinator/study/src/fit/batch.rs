@@ -51,6 +51,7 @@ pub(crate) fn fit(
     while !now.estimate.state.converged && now.figures.step < batch.max_iterations {
         let at = AnalysisIndex { pass: 1, step: now.figures.step };
         let theta = batch.sample(&now.estimate.state);
+        store.keep_points(at.step, &theta)?;
         let results = run_ensemble(runner, &mut now, at, &theta, &windows)?;
         let (predictions, failed) = gathered(&batch, &results, &windows);
         let (next, step) = batch.step(

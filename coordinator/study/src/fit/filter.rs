@@ -40,6 +40,7 @@ pub(crate) fn fit(
     let mut reported = schedule.reported(&now)?;
     loop {
         while now.figures.step < schedule.n_step() {
+            store.keep_inputs(&now)?;
             let (row, next) = step(runner, &schedule, &mut now, &reported)?;
             reported = next;
             store.analysis(&row, &now)?;
@@ -59,7 +60,7 @@ pub(crate) fn fit(
 
 /// Predict, observe, analyse, recombine: one step of the filter over every record that still has data. Returns what the
 /// store keeps of it and what is known after it; `before` is what was known before.
-fn step(
+pub(super) fn step(
     runner: &mut EnsembleRunner<'_>,
     schedule: &Schedule<'_>,
     now: &mut Snapshot<Ensemble>,

@@ -18,7 +18,7 @@ pub(crate) use super::results::{Predicted, Results, StepWindows};
 use crate::failures::{FailureCluster, Failures};
 use crate::states::States;
 use crate::store::snapshot::Counts;
-use crate::store::{JobRow, Store};
+use crate::store::{Answer, JobRow, Store};
 use crate::trial::named;
 use crate::{RunError, Study};
 
@@ -253,6 +253,7 @@ impl<'a> EnsembleRunner<'a> {
             worker: outcome.worker.clone(),
             error: outcome.result.as_ref().err().map(ToString::to_string),
             cost_s: outcome.result.as_ref().map_or(0.0, |p| p.cost),
+            answer: outcome.result.as_ref().ok().map(Answer::of),
         }
     }
 

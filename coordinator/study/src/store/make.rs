@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use rusqlite::Connection;
 
 use super::schema::{SCHEMA, SCHEMA_VERSION};
-use super::{Store, StoreError, arrived, kept_states, remembered};
+use super::{Store, StoreError, arrived, inputs, kept_states, remembered};
 
 /// Endings of the files that SQLite keeps beside a database.
 const COMPANIONS: [&str; 4] = ["", "-wal", "-shm", "-journal"];
@@ -68,6 +68,7 @@ fn fill(path: &Path, meta: &[(&str, &str)]) -> rusqlite::Result<()> {
     transaction.execute_batch(remembered::TABLE)?;
     transaction.execute_batch(arrived::TABLE)?;
     transaction.execute_batch(kept_states::TABLE)?;
+    transaction.execute_batch(inputs::TABLE)?;
     transaction.pragma_update(None, "user_version", SCHEMA_VERSION)?;
     for (key, value) in meta {
         transaction.execute("INSERT INTO meta (key, value) VALUES (?1, ?2)", [key, value])?;

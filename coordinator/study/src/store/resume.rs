@@ -73,6 +73,31 @@ impl RunFolder {
         self.store.meta(MIXED)
     }
 
+    /// What differs from what made the run that may change its numbers, in words; an error names the recordings that are others.
+    pub(crate) fn changed(&self, study: &Study) -> Result<Result<Vec<String>, String>, StoreError> {
+        let text = self.store.meta("study")?.unwrap_or_default();
+        let mut told = match differing(&self.store, &text, study, Purpose::Run)? {
+            Some((Part::Recordings, which)) => return Ok(Err(which.join(", "))),
+            Some((Part::Solver, _)) => {
+                vec!["the solver describes itself otherwise, or one of its files is another".to_owned()]
+            }
+            Some((Part::StudyFile, _)) => vec!["this program reads the study otherwise".to_owned()],
+            None => Vec::new(),
+        };
+        let (before, now) = (self.store.program()?, Program::of(study));
+        if before.version() != now.version() || before.is_other_build(&now) {
+            told.push(format!(
+                "it was made by {} {}, and this is {} {}",
+                before.version(),
+                before.build(),
+                now.version(),
+                now.build()
+            ));
+        }
+        told.extend(before.solver_changes(&now).into_iter().map(|change| format!("of the solver {change}")));
+        Ok(Ok(told))
+    }
+
     fn same_programs(&self, study: &Study, purpose: Purpose, call: &Call<'_>) -> Result<(), FolderError> {
         let (before, now) = (self.store.program()?, Program::of(study));
         let folder = self.path.clone();
@@ -131,18 +156,33 @@ fn same_study(
     study: &Study,
     purpose: Purpose,
 ) -> Result<(), FolderError> {
+    let Some((part, which)) = differing(store, text, study, purpose)? else { return Ok(()) };
+    let what = match part {
+        Part::StudyFile => "the study file",
+        Part::Recordings => "the recordings",
+        Part::Solver => "the solver or one of its files",
+    };
+    let which = if which.is_empty() { String::new() } else { format!(": {}", which.join(", ")) };
+    Err(FolderError::OtherStudy { folder: path.to_owned(), what, which })
+}
+
+/// The first part of a study that is not as the store has it, and what of it; `text` is that of the store.
+fn differing(
+    store: &Store,
+    text: &str,
+    study: &Study,
+    purpose: Purpose,
+) -> Result<Option<(Part, Vec<String>)>, StoreError> {
     let kept = store.meta(Meaning::KEY)?.unwrap_or_default();
     let kept: Meaning = serde_json::from_str(&kept).unwrap_or_default();
     let (parts, records) = kept.differences(&Meaning::of(study, purpose));
     let told = changes(text, &study.text);
-    let Some(part) = first(&parts, &told) else { return Ok(()) };
-    let (what, which) = match part {
-        Part::StudyFile => ("the study file", told),
-        Part::Recordings => ("the recordings", records.iter().map(|name| format!("`{name}`")).collect()),
-        Part::Solver => ("the solver or one of its files", Vec::new()),
-    };
-    let which = if which.is_empty() { String::new() } else { format!(": {}", which.join(", ")) };
-    Err(FolderError::OtherStudy { folder: path.to_owned(), what, which })
+    let part = first(&parts, &told);
+    Ok(part.map(|part| match part {
+        Part::StudyFile => (part, told),
+        Part::Recordings => (part, records.iter().map(|name| format!("`{name}`")).collect()),
+        Part::Solver => (part, Vec::new()),
+    }))
 }
 
 /// The part to report. A change of the study file may change the other parts too; where the file is unchanged, a change of the

@@ -1,5 +1,7 @@
 //! The rows of the run's tables, as plain data.
 
+use super::Answer;
+
 /// One row of the table `jobs`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JobRow {
@@ -19,6 +21,8 @@ pub struct JobRow {
     pub error: Option<String>,
     /// Wall time of the run in s.
     pub cost_s: f64,
+    /// What it answered, where that is kept.
+    pub answer: Option<Answer>,
 }
 
 /// One parameter's estimate after one analysis.

@@ -11,7 +11,8 @@ pub(super) const SCHEMA: &str = "
 CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
 CREATE TABLE events (id INTEGER PRIMARY KEY, at_s REAL NOT NULL, kind TEXT NOT NULL, text TEXT NOT NULL);
 CREATE TABLE jobs (id INTEGER PRIMARY KEY, pass INTEGER NOT NULL, step INTEGER NOT NULL, record TEXT NOT NULL,
-  particle INTEGER NOT NULL, attempts INTEGER NOT NULL, worker TEXT NOT NULL, status TEXT NOT NULL, error TEXT, cost_s REAL);
+  particle INTEGER NOT NULL, attempts INTEGER NOT NULL, worker TEXT NOT NULL, status TEXT NOT NULL, error TEXT, cost_s REAL,
+  answer BLOB);
 CREATE TABLE analyses (pass INTEGER NOT NULL, step INTEGER NOT NULL, time REAL NOT NULL, n_used INTEGER NOT NULL,
   nis REAL NOT NULL, log_likelihood REAL NOT NULL, information_lost REAL NOT NULL, PRIMARY KEY (pass, step));
 CREATE TABLE estimates (pass INTEGER NOT NULL, step INTEGER NOT NULL, parameter TEXT NOT NULL, estimate REAL NOT NULL,
@@ -53,8 +54,8 @@ pub(super) fn insert_analysis(connection: &Connection, row: &AnalysisRow) -> rus
 
 pub(super) fn insert_jobs(connection: &Connection, jobs: &[JobRow]) -> rusqlite::Result<()> {
     let mut insert = connection.prepare_cached(
-        "INSERT INTO jobs (pass, step, record, particle, attempts, worker, status, error, cost_s)
-         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
+        "INSERT INTO jobs (pass, step, record, particle, attempts, worker, status, error, cost_s, answer)
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)",
     )?;
     for job in jobs {
         let status = if job.error.is_none() { "done" } else { "failed" };
@@ -67,7 +68,8 @@ pub(super) fn insert_jobs(connection: &Connection, jobs: &[JobRow]) -> rusqlite:
             job.worker,
             status,
             job.error,
-            job.cost_s
+            job.cost_s,
+            job.answer.map(|answer| answer.bytes())
         ])?;
     }
     Ok(())

@@ -27,7 +27,19 @@ pub(super) fn figures(data: &ReportData) -> Vec<Figure> {
             std::iter::once(map).chain(at_middle).collect()
         }
     };
-    outputs(data).into_iter().flat_map(of).take(MOST).collect()
+    let outputs = outputs(data);
+    // Of a field or a channel there are more figures than one, or none: what is told are the outputs that are not drawn.
+    let mut drawn: Vec<Figure> = Vec::new();
+    let mut left_out = 0;
+    for output in outputs {
+        if drawn.len() < MOST { drawn.extend(of(output)) } else { left_out += 1 }
+    }
+    drawn.truncate(MOST);
+    if let Some(last) = drawn.pop() {
+        let more = format!("Residuals of {left_out} outputs and records more are in run.db.");
+        drawn.push(if left_out > 0 { last.saying(&more) } else { last });
+    }
+    drawn
 }
 
 /// The residuals of one channel of one record, in the colour of the span that they belong to.
