@@ -6,6 +6,7 @@
 use std::sync::Arc;
 
 use starlings_models_core::effect::Extended;
+use starlings_models_core::periodic::beginning;
 use starlings_models_core::{
     Forward, Model, SOLVER, Setup, SetupError, Simulator, Spec, external, with_memories,
 };
@@ -47,7 +48,7 @@ impl BuildSetup for Setup {
             let message = "the model runs in a program of its own, which only a worker starts";
             return Err(SetupError::Invalid(message.to_owned()));
         }
-        Ok(Box::new(Simulator::new(self.model()?, self, catalogue::NATIVE)?))
+        beginning(Box::new(Simulator::new(self.model()?, self, catalogue::NATIVE)?), self)
     }
 
     fn spec(&self) -> Result<Spec, SetupError> {

@@ -14,6 +14,7 @@ mod limits;
 mod model;
 mod observer;
 mod parameters;
+mod periodic;
 mod predict;
 mod prior;
 mod records;
@@ -196,6 +197,8 @@ fn checked(
     let parameters = initial_medians(source, &file, &model.spec, &priors, &records);
     source.verdict()?;
     scales::check(source, &file, &mut model, (&parameters, &records), solver_host, &mut warnings);
+    source.verdict()?;
+    model.setup.periods = periodic::periods(source, &file, &model, &records);
     source.verdict()?;
     check_setup(source, &file, &model.setup, &records)?;
     warnings.extend(model.setup.is_noisy().then(|| NOISE_LEFT_OUT.to_owned()));

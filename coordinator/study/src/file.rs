@@ -68,6 +68,10 @@ pub(super) struct ModelSection {
     pub(super) layout: Option<layout::Layout>,
     /// Present when `kind` is `equations`.
     pub(super) equations: Option<EquationsSection>,
+    /// Where runs begin: `initial` or `periodic`.
+    pub(super) start: Option<Spanned<String>>,
+    /// Length of a period, of records that do not say.
+    pub(super) period: Option<Spanned<f64>>,
     /// Steps that one run may take.
     pub(super) max_steps: Option<Spanned<u64>>,
     /// Seconds; a solver's stand in its own section.
@@ -182,6 +186,8 @@ pub(super) struct RecordSection {
     pub(super) channels: Vec<ChannelSection>,
     /// Where the run begins, if before the first measured row.
     pub(super) start: Option<Spanned<f64>>,
+    /// Length of a period.
+    pub(super) period: Option<Spanned<f64>>,
     pub(super) train: Option<Spanned<[f64; 2]>>,
     pub(super) held_out: bool,
     /// Rows of a held-out record from which its start is found.

@@ -82,6 +82,13 @@ impl Study {
         rows_of(times, window).flat_map(|j| outputs[j * n_obs..(j + 1) * n_obs].iter().copied()).collect()
     }
 
+    /// The end of the first period where a run from here finds its own periodic start, and else here.
+    fn first_period(&self, record: &Record, start: f64) -> f64 {
+        let place = self.records.iter().position(|known| known.name == record.name);
+        let period = place.and_then(|place| self.setup.periods.get(place)).filter(|_| start <= record.start);
+        start + period.copied().unwrap_or(0.0)
+    }
+
     /// The window over these rows, their training values in it.
     fn window(&self, record: &Record, start: f64, rows: &[usize], cut: bool) -> Window {
         let n_obs = self.setup.outputs.len();
@@ -94,7 +101,8 @@ impl Study {
         let times: Vec<f64> = rows.iter().map(|row| record.times[*row]).collect();
         let end = times.last().copied().unwrap_or(start);
         let inputs = if cut {
-            record.inputs.iter().map(|signal| bracket(signal, start, end)).collect()
+            let until = end.max(self.first_period(record, start));
+            record.inputs.iter().map(|signal| bracket(signal, start, until)).collect()
         } else {
             record.inputs.clone()
         };

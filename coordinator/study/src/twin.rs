@@ -1,10 +1,9 @@
 //! A twin experiment: the study's model run forward with chosen values and noise, to make data whose truth is known.
 //!
 //! Nothing is estimated and no fleet is needed. The noise of every output is a ChaCha8 stream of its own, so adding an
-//! output changes no other's data. Next files to read: [`periodic`] for a start in the periodic state, [`run`].
+//! output changes no other's data. Next files to read: [`run`], and [`starlings_models::periodic`] for a start in the periodic state.
 
 mod noise;
-mod periodic;
 mod run;
 
 use std::sync::Arc;
@@ -85,7 +84,10 @@ pub fn simulate(study: &Study, twin: &Twin) -> Result<Recording, TwinError> {
         .records
         .get(twin.record)
         .ok_or_else(|| TwinError::Request(format!("the study has {} records", study.records.len())))?;
-    let (setup, theta) = place(study, twin)?;
+    let (mut setup, theta) = place(study, twin)?;
+    if twin.period.is_some() {
+        setup.periods.clear();
+    }
     let model = study.solver_host.build(&setup)?;
     let times = if twin.times.is_empty() { record.times.clone() } else { twin.times.clone() };
     let start = record.start;

@@ -3,13 +3,14 @@
 //! Warnings travel with the result into the summary, the report and the terminal. They never change a number. Next file to
 //! read: [`consistency`].
 
+mod alike;
 mod consistency;
 pub(crate) mod residuals;
 
 use starlings_estimators::{Drift, Transform, weak_directions};
 
 use self::residuals::Residuals;
-use super::identify::words::{combination, members};
+use super::identify::words::{combination, listed, members};
 use super::posterior::{prior, standard_deviations};
 use super::store::PredictionRow;
 use super::summary::Summary;
@@ -41,7 +42,7 @@ pub(crate) fn collect(
     warnings.extend(consistency::still_moving(study, fit));
     warnings.extend(consistency::free_run(fit, study, predictions));
     warnings.extend(consistency::autocorrelated(residuals));
-    warnings.extend(correlated_pairs(summary));
+    warnings.extend(alike::correlated_sets(summary));
     warnings.extend(uninformed(study, fit));
     warnings.extend(uninformed_directions(study, fit));
     warnings.extend(far_from_prior(study, fit));
@@ -70,18 +71,6 @@ fn drift_ignored(study: &Study) -> Vec<String> {
         .collect()
 }
 
-fn correlated_pairs(summary: &Summary) -> Vec<String> {
-    let mut found = Vec::new();
-    for (i, row) in summary.correlation.iter().enumerate() {
-        for (j, value) in row.iter().enumerate().skip(i + 1) {
-            if value.abs() > CORRELATED {
-                found.push(correlated(&summary.parameters[i].name, &summary.parameters[j].name, *value));
-            }
-        }
-    }
-    found
-}
-
 /// The warning that two parameters are known only in combination.
 pub(super) fn correlated(first: &str, second: &str, value: f64) -> String {
     format!(
@@ -89,21 +78,18 @@ pub(super) fn correlated(first: &str, second: &str, value: f64) -> String {
     )
 }
 
-fn uninformed(study: &Study, fit: &Fit) -> Vec<String> {
+fn uninformed(study: &Study, fit: &Fit) -> Option<String> {
     let sd = standard_deviations(&fit.posterior);
-    study
-        .theta
-        .iter()
-        .zip(&sd)
-        .filter(|(entry, sd)| **sd > UNINFORMED * entry.prior_sd)
-        .map(|(entry, sd)| {
-            format!(
-                "the data say almost nothing about {}: its uncertainty is still {:.0} % of the prior's.",
-                entry.name,
-                100.0 * sd / entry.prior_sd
-            )
-        })
-        .collect()
+    let shares = study.theta.iter().zip(&sd).map(|(entry, sd)| (entry.name.as_str(), sd / entry.prior_sd));
+    let (names, shares): (Vec<&str>, Vec<f64>) = shares.filter(|(_, share)| *share > UNINFORMED).unzip();
+    let ends = (shares.iter().copied().reduce(f64::min)?, shares.iter().copied().reduce(f64::max)?);
+    let (lo, hi) = (100.0 * ends.0, 100.0 * ends.1);
+    let uncertainty = if names.len() == 1 {
+        format!("its uncertainty is still {hi:.0} %")
+    } else {
+        format!("their uncertainty is still {lo:.0} to {hi:.0} %")
+    };
+    Some(format!("the data say almost nothing about {}: {uncertainty} of the prior's.", listed(&names)))
 }
 
 /// Combinations about which the data say almost nothing although they inform some of their parameters.

@@ -93,6 +93,20 @@ pub(crate) fn tube() -> System {
     System::of("tube", "fsi-tube/study.toml", &TUBE)
 }
 
+/// The tube in its periodic state, which every run finds by itself.
+pub(crate) fn periodic() -> System {
+    System::of("tube, periodic start", "fsi-tube/periodic.toml", &TUBE)
+}
+
+/// The same recordings, fitted by runs that start at rest under 80 mmHg, displaced by the reference stiffness.
+pub(crate) fn reference() -> System {
+    let mut system = System { name: "periodic tube, `reference` start", ..periodic() };
+    system.study.setup.periods.clear();
+    let layout = system.study.setup.model.layout.as_mut().and_then(|layout| layout.as_object_mut());
+    layout.unwrap().insert("start".to_owned(), "reference".into());
+    system
+}
+
 pub(crate) const ARTERY: [(&str, f64); 5] = [
     ("E_aorta", 4e6),
     ("E_left", 1.2e7),

@@ -30,6 +30,7 @@ mod noise;
 pub mod observer;
 pub mod oscillation;
 mod past;
+pub mod periodic;
 mod scratch;
 pub mod segment;
 mod setup;

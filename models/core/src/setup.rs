@@ -105,6 +105,10 @@ pub struct Setup {
     /// Seconds of computing that one run may take; [`crate::limits::TIMEOUT`] where nothing is said. A solver has its own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub timeout: Option<f64>,
+    /// Period of each record, by its number, where runs that are given no state begin in the periodic one; empty where they begin in
+    /// the initial state.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub periods: Vec<f64>,
     /// What jobs of a dynamical inference sum over their rows, instead of running the model.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sums: Option<Box<SumsDef>>,

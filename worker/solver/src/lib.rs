@@ -29,6 +29,7 @@ mod stopwatch;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use starlings_models::periodic::beginning;
 use starlings_models::{
     BuildSetup, Description, External, Factory, Forward, ParticleError, Run, SOLVER, Setup, SetupError,
     Solve, Solved, SolverDef, SolverFault,
@@ -135,7 +136,7 @@ impl Solvers {
         if let Some(known) = def.described.as_ref().filter(|known| **known != description) {
             return Err(SetupError::Invalid(differs(known, &description)));
         }
-        Ok(Box::new(External::new(setup, description, Outside(reached))?))
+        beginning(Box::new(External::new(setup, description, Outside(reached))?), setup)
     }
 
     /// What a worker makes its setups with.

@@ -75,6 +75,7 @@ impl Served {
             timeout: None,
             noise: None,
             sums: None,
+            periods: Vec::new(),
         };
         let theta =
             request.parameters.into_iter().chain(request.initial.iter().map(|(_, value)| *value)).collect();

@@ -23,7 +23,7 @@ const EQUATIONS: [&str; 6] = ["outputs", "inputs", "replaceable", "roles", "solv
 /// Reads `[model]`.
 pub(crate) fn model(source: &Source, root: &Table<'_>, adapters: &[AdapterDef]) -> ModelSection {
     let mut keys = [
-        &["kind", "constants", "initial", "layout", "max_steps", "timeout"],
+        &["kind", "constants", "initial", "layout", "start", "period", "max_steps", "timeout"],
         &EQUATIONS[..],
         &solver::KEYS[..],
     ]
@@ -40,6 +40,8 @@ pub(crate) fn model(source: &Source, root: &Table<'_>, adapters: &[AdapterDef]) 
             constants: Vec::new(),
             initial: None,
             layout: None,
+            start: None,
+            period: None,
             max_steps: None,
             timeout: None,
             equations: None,
@@ -59,6 +61,8 @@ pub(crate) fn model(source: &Source, root: &Table<'_>, adapters: &[AdapterDef]) 
         initial: t.text("initial"),
         kind,
         layout,
+        start: t.text("start"),
+        period: t.number("period"),
         max_steps: t.count("max_steps"),
         timeout,
         equations,

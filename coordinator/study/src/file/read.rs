@@ -148,7 +148,19 @@ fn observer(source: &Source, root: &Table<'_>) -> ObserverSection {
 }
 
 fn records(source: &Source, root: &Table<'_>) -> Vec<RecordSection> {
-    let keys = ["name", "file", "time", "inputs", "channels", "start", "train", "use", "start_rows", "every"];
+    let keys = [
+        "name",
+        "file",
+        "time",
+        "inputs",
+        "channels",
+        "start",
+        "period",
+        "train",
+        "use",
+        "start_rows",
+        "every",
+    ];
     let mut records = Vec::new();
     for t in root.tables("records", "[[records]]", &keys) {
         if t.get("channels").is_none() {
@@ -165,6 +177,7 @@ fn records(source: &Source, root: &Table<'_>) -> Vec<RecordSection> {
             inputs: named_texts(source, &t.free_entries("inputs")),
             channels: channels(source, &t, root.get("infer").is_some()),
             start: t.number("start"),
+            period: t.number("period"),
             train: t.interval("train"),
             held_out: held_out(source, &t),
             start_rows: t.count("start_rows"),

@@ -4,6 +4,7 @@
 //! [`crate::warnings`].
 
 use super::result::{DirectionInfo, Identification, ParameterInfo};
+use super::words::listed;
 use crate::Study;
 use crate::warnings::{CORRELATED, UNINFORMED, correlated, uninformed_combination};
 
@@ -140,13 +141,4 @@ fn together(found: &Identification) -> Option<String> {
         whole.index.map_or_else(|| "beyond measure".to_owned(), |index| format!("{index:.1}")),
         best.index.unwrap_or(1.0)
     ))
-}
-
-/// `a`, `a and b`, `a, b and c`.
-fn listed(names: &[String]) -> String {
-    match names {
-        [] => String::new(),
-        [one] => one.clone(),
-        [first @ .., last] => format!("{} and {last}", first.join(", ")),
-    }
 }

@@ -42,6 +42,15 @@ pub fn combination(names: &[&str], direction: &Direction) -> String {
     text
 }
 
+/// `a`, `a and b`, `a, b and c`.
+pub(crate) fn listed<S: AsRef<str>>(names: &[S]) -> String {
+    let text = |names: &[S]| names.iter().map(AsRef::as_ref).collect::<Vec<_>>().join(", ");
+    match names {
+        [first @ .., last] if !first.is_empty() => format!("{} and {}", text(first), last.as_ref()),
+        _ => text(names),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

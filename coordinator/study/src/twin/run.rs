@@ -1,13 +1,13 @@
 //! The runs of a twin: its start, and its record.
 //!
-//! Next file to read: [`super::periodic`].
+//! Next file to read: [`starlings_models::periodic`].
 
 use std::sync::Arc;
 
-use starlings_models::{Forward, Job, ParticleError, Prediction, Signal, Spec, Window};
+use starlings_models::periodic::{NotPeriodic, fixed_point, sizes};
+use starlings_models::{Forward, Job, ParticleError, Prediction, Signal, Window};
 
 use super::TwinError;
-use super::periodic::{NotPeriodic, fixed_point};
 
 /// Change of an input's value from one period to the next, as a share of its range, beyond which it is not periodic.
 const NOT_PERIODIC: f64 = 0.05;
@@ -73,32 +73,21 @@ impl Run<'_> {
 
     /// The size of every state component: the largest value of its quantity over a period, at a few times.
     fn sizes(&self, window: &Window, times: &[f64], mut x: Vec<f64>) -> Result<Vec<f64>, ParticleError> {
-        let spec = self.model.spec();
-        let mut size = vec![0.0; spec.n_state()];
+        let mut states = Vec::with_capacity(PARTS + 1);
         let mut from = window.start;
         for times in times.chunks(times.len().div_ceil(PARTS)) {
-            take_larger(&mut size, spec, &x);
+            states.push(x.clone());
             x = self.predict(&self.part(window, from, times.to_vec()), Some(x))?.state;
             from = times.last().copied().unwrap_or(from);
         }
-        take_larger(&mut size, spec, &x);
-        Ok(size.into_iter().map(|s| if s > 0.0 { s } else { 1.0 }).collect())
+        states.push(x);
+        Ok(sizes(self.model.spec(), &states))
     }
 
     /// A window over these times with the inputs of another.
     fn part(&self, window: &Window, start: f64, times: Vec<f64>) -> Arc<Window> {
         let observed = vec![f64::NAN; times.len() * self.n_obs];
         Arc::new(Window { start, times, observed, inputs: window.inputs.clone() })
-    }
-}
-
-fn take_larger(size: &mut [f64], spec: &Spec, x: &[f64]) {
-    let mut first = 0;
-    for quantity in &spec.states {
-        let block = first..first + quantity.size;
-        let largest = x[block.clone()].iter().fold(0.0_f64, |max, v| max.max(v.abs()));
-        size[block].iter_mut().for_each(|s| *s = s.max(largest));
-        first += quantity.size;
     }
 }
 

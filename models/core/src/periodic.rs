@@ -2,54 +2,70 @@
 //!
 //! Repeating the period removes the effect of a start only as fast as the slowest mode decays, which takes many beats in a
 //! Windkessel. Anderson mixing (Anderson 1965; Walker & Ni 2011, algorithm AA) combines the last periods so that their changes
-//! cancel best, which removes the few slow modes after about as many periods. Next file to read: [`super`].
+//! cancel best, which removes the few slow modes after about as many periods. Next file to read: [`start`], runs that begin there.
+
+mod start;
 
 use std::collections::VecDeque;
 
-use nalgebra::{DMatrix, DVector};
-use starlings_estimators::svd;
-use starlings_models::ParticleError;
+use nalgebra::{DMatrix, DVector, SVD};
+
+use crate::{ParticleError, Spec};
+
+pub use start::{PeriodicStart, beginning};
 
 /// Change over one period, in units of each state quantity's size, at which the state counts as periodic.
 const TOLERANCE: f64 = 1e-10;
+/// Change that is as good as none where it does not shrink any more: the tolerance of a solver holds it up.
+const HELD_UP: f64 = 1e-7;
+/// Periods in which the change has to halve; else it is held up.
+const PATIENCE: usize = 4;
 /// Periods at most.
 const LIMIT: usize = 60;
 /// Earlier periods that are combined.
 const DEPTH: usize = 10;
+/// Sweeps of a decomposition at most.
+const SWEEPS: usize = 1000;
 /// Singular values of the combined changes below this share of the largest are rounding errors.
 const RANK: f64 = 1e-13;
 
 /// Runs one period from a state to the one at its end.
-pub(super) type Period<'a> = dyn FnMut(&[f64]) -> Result<Vec<f64>, ParticleError> + 'a;
+pub type Period<'a> = dyn FnMut(&[f64]) -> Result<Vec<f64>, ParticleError> + 'a;
 
 /// A state that returns to itself.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Periodic {
+pub struct Periodic {
     /// The state at the period's start.
-    pub(super) state: Vec<f64>,
+    pub state: Vec<f64>,
     /// Periods that were run.
-    pub(super) n_period: usize,
+    pub n_period: usize,
 }
 
 /// Why there is none.
 #[derive(Debug)]
-pub(super) enum NotPeriodic {
+pub enum NotPeriodic {
     /// The model fails on the way.
     Model(ParticleError),
     /// The state still changes by this share of its size after that many periods.
-    StillMoving { n_period: usize, change: f64 },
+    StillMoving {
+        /// Periods that were run.
+        n_period: usize,
+        /// Change of the last one.
+        change: f64,
+    },
 }
 
 /// Finds the fixed point of `period`, which maps a state to the one a period later; `size` scales its entries.
-pub(super) fn fixed_point(
-    period: &mut Period<'_>,
-    start: Vec<f64>,
-    size: &[f64],
-) -> Result<Periodic, NotPeriodic> {
+///
+/// # Errors
+/// When the model fails on the way, or the state does not settle.
+pub fn fixed_point(period: &mut Period<'_>, start: Vec<f64>, size: &[f64]) -> Result<Periodic, NotPeriodic> {
     let scaled = |a: &DVector<f64>| a.zip_map(&DVector::from_column_slice(size), |a, s| a / s);
     let mut x = DVector::from_vec(start);
     let mut mixing = Mixing::default();
     let mut change = f64::INFINITY;
+    // The smallest change so far, and the period in which it last halved.
+    let mut least = (f64::INFINITY, 0);
     for n_period in 1..=LIMIT {
         let image = match period(x.as_slice()) {
             Ok(image) => DVector::from_vec(image),
@@ -65,7 +81,10 @@ pub(super) fn fixed_point(
         };
         let residual = scaled(&(&image - &x));
         change = residual.amax();
-        if change <= TOLERANCE {
+        if change <= 0.5 * least.0 {
+            least = (change, n_period);
+        }
+        if change <= TOLERANCE || (change <= HELD_UP && n_period >= least.1 + PATIENCE) {
             return Ok(Periodic { state: image.as_slice().to_vec(), n_period });
         }
         x = mixing.next(image, residual);
@@ -97,10 +116,7 @@ impl Mixing {
         if !self.residuals.is_empty() {
             let differences: Vec<DVector<f64>> = self.residuals.iter().cloned().collect();
             // Differences that cannot be decomposed are a plain step.
-            if let Ok((u, values, v_t)) = svd(&DMatrix::from_columns(&differences), "changes per period") {
-                let least = RANK * values.max();
-                let inverse = values.map(|s| if s > least { 1.0 / s } else { 0.0 });
-                let gamma = v_t.tr_mul(&u.tr_mul(&residual).component_mul(&inverse));
+            if let Some(gamma) = least_squares(DMatrix::from_columns(&differences), &residual) {
                 for (difference, share) in self.images.iter().zip(gamma.iter()) {
                     next.axpy(-share, difference, 1.0);
                 }
@@ -110,6 +126,27 @@ impl Mixing {
         self.last_residual = Some(residual);
         next
     }
+}
+
+/// The shares of the columns that come closest to a vector; singular values that are rounding errors count as zero.
+fn least_squares(columns: DMatrix<f64>, vector: &DVector<f64>) -> Option<DVector<f64>> {
+    let svd = SVD::try_new(columns, true, true, f64::EPSILON, SWEEPS)?;
+    let least = RANK * svd.singular_values.max();
+    svd.solve(vector, least).ok()
+}
+
+/// The size of every state component: the largest value of its quantity among some states.
+pub fn sizes(spec: &Spec, states: &[Vec<f64>]) -> Vec<f64> {
+    let mut size = vec![0.0_f64; spec.n_state()];
+    let mut first = 0;
+    for quantity in &spec.states {
+        let block = first..first + quantity.size;
+        let largest = |x: &Vec<f64>| x[block.clone()].iter().fold(0.0_f64, |max, v| max.max(v.abs()));
+        let largest = states.iter().map(largest).fold(0.0, f64::max);
+        size[block.clone()].fill(if largest > 0.0 { largest } else { 1.0 });
+        first += quantity.size;
+    }
+    size
 }
 
 #[cfg(test)]
@@ -143,6 +180,21 @@ mod tests {
             // The change of the last period, amplified by 1/(1 − e^−0.37) = 3.2.
             assert!((x / s - 1.0).abs() < 4e-10, "{x} of {s}");
         }
+    }
+
+    #[test]
+    fn a_change_that_a_tolerance_holds_up_counts_as_none_and_a_larger_one_does_not() {
+        // Halves its distance from 1, with an error in the last digits that a solver keeps.
+        let held = |error: f64| {
+            let mut sign = 1.0;
+            move |x: &[f64]| {
+                sign = -sign;
+                Ok(vec![0.5 * (x[0] + 1.0) + sign * error])
+            }
+        };
+        let found = fixed_point(&mut held(1e-9), vec![0.0], &[1.0]).expect("as good as periodic");
+        assert!(found.n_period < 20 && (found.state[0] - 1.0).abs() < 1e-7, "{found:?}");
+        assert!(fixed_point(&mut held(1e-5), vec![0.0], &[1.0]).is_err());
     }
 
     #[test]
