@@ -101,6 +101,7 @@ impl Solve for Inside {
             timeout: None,
             noise: None,
             sums: None,
+            periods: Vec::new(),
         };
         let theta =
             run.parameters.iter().copied().chain(run.initial.iter().map(|(_, value)| *value)).collect();

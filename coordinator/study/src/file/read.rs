@@ -223,7 +223,19 @@ fn channels(source: &Source, record: &Table<'_>, infers: bool) -> Vec<ChannelSec
             surface,
         }
     };
-    let keys = ["column", "output", "unit", "noise", "use", "from", "start", "surface", "rest", "open_ends", "noise_along"];
+    let keys = [
+        "column",
+        "output",
+        "unit",
+        "noise",
+        "use",
+        "from",
+        "start",
+        "surface",
+        "rest",
+        "open_ends",
+        "noise_along",
+    ];
     record.tables("channels", "a channel", &keys).into_iter().map(read).collect()
 }
 
