@@ -178,7 +178,7 @@ fn a_bent_valley_is_followed_to_its_end() {
         match fit.need().clone() {
             Need::Residual(z) => fit.give_residual(Some(DVector::from_fn(2, |i, _| -at(&z, i)))),
             Need::Jacobian(z) => {
-                fit.give_jacobian(Some(DMatrix::from_fn(2, 2, |i, j| slope(&z, i, j)).into()))
+                fit.give_jacobian(Some(DMatrix::from_fn(2, 2, |i, j| slope(&z, i, j)).into()));
             }
             Need::Nothing(end) => break end,
         }
