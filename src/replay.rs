@@ -115,29 +115,25 @@ fn failed(error: &ReplayError) -> Failure {
 
 /// The answer in words.
 fn words(found: &Replay) -> String {
-    let of = format!("pass {}, analysis {}", found.pass, found.analysis);
-    let mut said = format!("particle {} at {of}\n", found.particle);
+    let mut lines =
+        vec![format!("particle {} at pass {}, analysis {}", found.particle, found.pass, found.analysis)];
     if let Some(earlier) = &found.earlier {
-        said += &format!(
-            "it cannot be given the inputs that it had: particle {} at analysis {}, which they follow from, is not the same here\n  {}\n",
-            earlier.particle,
-            earlier.analysis,
-            earlier.says()
-        );
+        lines.push(format!(
+            "it cannot be given the inputs that it had: particle {} at analysis {}, which they follow from, is not the same here",
+            earlier.particle, earlier.analysis
+        ));
+        lines.push(format!("  {}", earlier.says()));
     }
     let values =
         found.runs.first().map(|run| run.values.iter().map(|(name, value)| format!("{name} = {value:?}")));
     if let Some(values) = values {
-        said += &format!("with {}\n", values.collect::<Vec<_>>().join(", "));
+        lines.push(format!("with {}", values.collect::<Vec<_>>().join(", ")));
     }
-    for run in &found.runs {
-        said += &format!("  {}\n", run.says());
-    }
-    for change in &found.changed {
-        said += &format!("changed since: {change}\n");
-    }
+    lines.extend(found.runs.iter().map(|run| format!("  {}", run.says())));
+    lines.extend(found.changed.iter().map(|change| format!("changed since: {change}")));
     let n_run = usize::try_from(found.n_run).unwrap_or(usize::MAX);
-    said + &format!("{} made\n", counted(n_run, "run", "runs"))
+    lines.push(format!("{} made\n", counted(n_run, "run", "runs")));
+    lines.join("\n")
 }
 
 fn counted(n: usize, one: &str, many: &str) -> String {

@@ -35,8 +35,12 @@ fn wall(displaced: &[f64]) -> Wall {
 
 fn as_off((vertices, triangles): &Wall) -> String {
     let mut off = format!("OFF\n{} {} 0\n", vertices.len(), triangles.len());
-    vertices.iter().for_each(|[x, y, z]| writeln!(off, "{x} {y:?} {z:?}").unwrap());
-    triangles.iter().for_each(|[a, b, c]| writeln!(off, "3 {a} {b} {c}").unwrap());
+    for [x, y, z] in vertices {
+        writeln!(off, "{x} {y:?} {z:?}").unwrap();
+    }
+    for [a, b, c] in triangles {
+        writeln!(off, "3 {a} {b} {c}").unwrap();
+    }
     off
 }
 
@@ -87,13 +91,16 @@ fn meshes(ending: &str, write: fn(&Wall) -> String, change: impl Fn(&mut Wall)) 
     files
 }
 
+/// A mesh of a wall as the text of a file.
+type Writer = fn(&Wall) -> String;
+
 fn borrowed(files: &[(String, String)]) -> Vec<(&str, String)> {
     files.iter().map(|(name, text)| (name.as_str(), text.clone())).collect()
 }
 
 #[test]
 fn meshes_of_a_tube_are_read_and_compared_along_the_given_normals() {
-    let formats: [(&str, fn(&Wall) -> String); 3] = [("off", as_off), ("stl", as_stl), ("VTP", as_vtp)];
+    let formats: [(&str, Writer); 3] = [("off", as_off), ("stl", as_stl), ("VTP", as_vtp)];
     let estimates = formats.map(|(ending, write)| {
         let files = meshes(ending, write, |_| {});
         let done = Case::new(&study(MESHES), &borrowed(&files)).run();
@@ -172,7 +179,9 @@ fn noise_along_the_wall_counts_where_the_wall_leans() {
     let sd = |radius: fn(f64) -> f64, extra: &str| {
         let mut text = "time,z,r\n".to_owned();
         for t in grid(41, 0.02) {
-            [-1.0, 10.0, 26.0].iter().for_each(|z| writeln!(text, "{t},{z},{:?}", radius(*z)).unwrap());
+            for z in [-1.0, 10.0, 26.0] {
+                writeln!(text, "{t},{z},{:?}", radius(z)).unwrap();
+            }
         }
         let radii = NODES.map(radius);
         let rest = csv("z,r,nz,nr", &[&NODES, &radii, &[0.0; 5], &[1.0; 5]]);
