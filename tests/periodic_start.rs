@@ -101,7 +101,7 @@ fn a_simulated_twin_of_such_a_study_is_periodic() {
     let file = study(folder.path(), STUDY);
     let data = folder.path().join("twin.csv");
     let mut command = starlings();
-    command.arg("simulate").arg(&file).args(["--set", "R=3", "--set", "C=1", "--out"]).arg(&data);
+    command.arg("simulate").arg(&file).args(["--set", "R=3", "--set", "C=1", "--output"]).arg(&data);
     let (code, _, stderr) = output(&mut command);
     assert_eq!(code, 0, "{stderr}");
     let mut rows = csv::Reader::from_path(&data).unwrap();

@@ -124,7 +124,8 @@ impl Failures {
             let worked = |i: usize| self.worked.get(i).filter(|spread| spread.n > 0.0);
             let range = |(i, (name, spread)): (usize, (&String, &Spread))| FailedRange {
                 parameter: name.clone(),
-                failed: spread.range,
+                // A value beyond the largest number ends there: infinity does not survive JSON.
+                failed: spread.range.map(|v| v.clamp(f64::MIN, f64::MAX)),
                 worked: worked(i).map(|spread| spread.range),
             };
             let distances = names.iter().zip(spreads).enumerate();

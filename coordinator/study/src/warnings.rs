@@ -84,12 +84,12 @@ fn uninformed(study: &Study, fit: &Fit) -> Option<String> {
     let (names, shares): (Vec<&str>, Vec<f64>) = shares.filter(|(_, share)| *share > UNINFORMED).unzip();
     let ends = (shares.iter().copied().reduce(f64::min)?, shares.iter().copied().reduce(f64::max)?);
     let (lo, hi) = (100.0 * ends.0, 100.0 * ends.1);
-    let uncertainty = if names.len() == 1 {
-        format!("its uncertainty is still {hi:.0} %")
-    } else {
-        format!("their uncertainty is still {lo:.0} to {hi:.0} %")
-    };
-    Some(format!("the data say almost nothing about {}: {uncertainty} of the prior's.", listed(&names)))
+    let whose = if names.len() == 1 { "its" } else { "their" };
+    let share = if hi - lo < 0.5 { format!("{hi:.0}") } else { format!("{lo:.0} to {hi:.0}") };
+    let names = listed(&names);
+    Some(format!(
+        "the data say almost nothing about {names}: {whose} uncertainty is still {share} % of the prior's."
+    ))
 }
 
 /// Combinations about which the data say almost nothing although they inform some of their parameters.

@@ -20,6 +20,8 @@ const TOLERANCE: f64 = 1e-10;
 const HELD_UP: f64 = 1e-7;
 /// Periods in which the change has to halve; else it is held up.
 const PATIENCE: usize = 4;
+/// Distance from zero, in units of each state quantity's size, beyond which no mixture is taken: there rounding hides a change.
+const FAR: f64 = 1e6;
 /// Periods at most.
 const LIMIT: usize = 60;
 /// Earlier periods that are combined.
@@ -88,6 +90,13 @@ pub fn fixed_point(period: &mut Period<'_>, start: Vec<f64>, size: &[f64]) -> Re
             return Ok(Periodic { state: image.as_slice().to_vec(), n_period });
         }
         x = mixing.next(image, residual);
+        if scaled(&x).iter().any(|v| v.is_nan() || v.abs() > FAR) {
+            // Changes that differ by rounding alone make a mixture of any size: the last image is the state to go on from.
+            if let Some(image) = mixing.last_image.take() {
+                x = image;
+            }
+            mixing = Mixing::default();
+        }
     }
     Err(NotPeriodic::StillMoving { n_period: LIMIT, change })
 }
@@ -205,6 +214,16 @@ mod tests {
                 assert_eq!(n_period, LIMIT);
                 assert!((change - 1.0).abs() < 1e-9, "{change}");
             }
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_drift_that_rounding_alone_varies_is_no_periodic_state_far_away() {
+        // Mixing two changes that differ by 1e-13 would step to 1e13 and beyond, where adding one to a number leaves it as it is.
+        let mut drift = |x: &[f64]| Ok(vec![x[0] + 1.0 + 1e-13 * (1e3 * x[0]).sin()]);
+        match fixed_point(&mut drift, vec![0.0], &[1.0]) {
+            Err(NotPeriodic::StillMoving { change, .. }) => assert!((change - 1.0).abs() < 1e-9, "{change}"),
             other => panic!("{other:?}"),
         }
     }
