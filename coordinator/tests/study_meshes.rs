@@ -192,7 +192,8 @@ fn noise_along_the_wall_counts_where_the_wall_leans() {
     let level = |_: f64| 1.0;
     let cone = |z: f64| 2.0 + z;
     // Variances are summed as n² σ², so that the sd itself comes back to rounding.
-    let near = |found: f64, sought: f64| assert!((found / sought - 1.0).abs() < 1e-14, "{found} for {sought}");
+    let near =
+        |found: f64, sought: f64| assert!((found / sought - 1.0).abs() < 1e-14, "{found} for {sought}");
     near(sd(level, ", noise_along = 0.07"), SD);
     near(sd(cone, ""), SD);
     // √((0.01² + 0.07²)/2) = 0.05.

@@ -5,7 +5,9 @@ pub(crate) mod page;
 
 use starlings_study::constants::{ConstantEffect, Follows, HangsOn};
 
-use super::data::{ChannelPlot, Family, ObserverPlot, ObserverRow, ParameterRow, ReportData};
+use super::data::{
+    Autocorrelation, ChannelPlot, Family, ObserverPlot, ObserverRow, ParameterRow, ReportData,
+};
 use super::{overview_svg, render, sample};
 use page::{n_figure, without_scripts};
 
@@ -139,6 +141,9 @@ fn outputs_that_are_not_drawn_are_counted_where_others_are() {
     let mut data = sample::run(60);
     let channel = data.channels[0].clone();
     data.channels = (1..=30).map(|k| ChannelPlot { record: format!("r-{k}"), ..channel.clone() }).collect();
+    let series = data.autocorrelation[0].clone();
+    data.autocorrelation =
+        (1..=30).map(|k| Autocorrelation { record: format!("r-{k}"), ..series.clone() }).collect();
     let page = render(&data).unwrap();
     assert!(page.contains("6 more are in run.db."), "30 fits, of which 24 are drawn");
     assert!(page.contains("Residuals of 6 outputs and records more are in run.db."));

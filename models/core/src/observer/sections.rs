@@ -62,9 +62,11 @@ impl Observer for SectionFeedback {
         let pull = -(-self.gain * at.dt).exp_m1();
         for (area, rows) in x[self.area..].iter_mut().zip(&self.rows) {
             if let Some((innovation, _)) = mean_innovation(&at, rows) {
-                let radius = (*area / PI).sqrt() + pull * innovation;
+                let radius = (*area / PI).sqrt();
                 // A vessel without a section left is the model's to refuse.
-                *area = PI * radius.max(0.0).powi(2);
+                let change = (pull * innovation).max(-radius);
+                // π(R + δR)² − πR², so that no innovation moves nothing, to the bit.
+                *area += PI * change * (2.0 * radius + change);
             }
         }
     }
