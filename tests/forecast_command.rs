@@ -3,61 +3,19 @@
 #![allow(clippy::unwrap_used)] // a failed unwrap is a failed test
 
 mod common;
+mod swing_kit;
 
 use std::fmt::Write;
 use std::path::Path;
 
 use common::{bytes, output, run, starlings};
 use nalgebra::{Matrix2, Vector2};
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
 use serde_json::Value;
+use swing_kit::{NOISE, STUDY, errors, motion, recording};
 
-/// A free oscillator of mass 1, damping 0.4 and stiffness 9 whose start alone is unknown.
-const STUDY: &str = r#"
-[study]
-name = "free"
-seed = 5
-
-[model]
-kind = "oscillator"
-constants = { m = 1.0, c = 0.4, k = 9.0 }
-
-[[parameters]]
-name = "initial:x"
-unit = "m"
-prior = { transform = "linear", median = 0.5, sd = 1.0 }
-
-[[parameters]]
-name = "initial:v"
-unit = "m/s"
-prior = { transform = "linear", median = 0.0, sd = 3.0 }
-
-[[records]]
-name = "swing"
-file = "swing.csv"
-time = "time"
-channels = [ { column = "position", output = "position", noise = 0.2 } ]
-train = [0.0, 2.0]
-
-[estimator]
-kind = "batch"
-"#;
-
-const NOISE: f64 = 0.2;
-
-/// Position after a time from unit displacement and unit velocity (Meirovitch 1986, section 1.6).
-fn motion(t: f64) -> Vector2<f64> {
-    let (sigma, w) = (0.2, (9.0_f64 - 0.04).sqrt());
-    let (sin, cos) = (w * t).sin_cos();
-    Vector2::new(cos + sigma / w * sin, sin / w) * (-sigma * t).exp()
-}
-
-/// Times and values of the recording: a swing with errors that look like noise.
-fn recording() -> Vec<(f64, f64)> {
-    let error = |i: u32| NOISE * (f64::from(i * i) * 0.7).sin() * 1.4;
-    (0..=30).map(|i| (0.1 * f64::from(i), motion(0.1 * f64::from(i)).x + error(i))).collect()
+/// Position after a time from unit displacement and unit velocity.
+fn position(t: f64) -> Vector2<f64> {
+    motion(t).row(0).transpose()
 }
 
 /// Mean and covariance of the start after the rows up to 2 s.
@@ -65,7 +23,7 @@ fn posterior() -> (Vector2<f64>, Matrix2<f64>) {
     let prior = Matrix2::new(1.0, 0.0, 0.0, 1.0 / 9.0);
     let (mut precision, mut weighted) = (prior, prior * Vector2::new(0.5, 0.0));
     for (t, y) in recording().into_iter().filter(|(t, _)| *t < 2.0 + 1e-9) {
-        let phi = motion(t);
+        let phi = position(t);
         precision += phi * phi.transpose() / (NOISE * NOISE);
         weighted += phi * (y / (NOISE * NOISE));
     }
@@ -76,11 +34,7 @@ fn posterior() -> (Vector2<f64>, Matrix2<f64>) {
 /// A folder with the study, its recording and a finished run.
 fn finished(folder: &Path) {
     std::fs::write(folder.join("free.toml"), STUDY).unwrap();
-    let mut csv = "time,position\n".to_owned();
-    for (t, y) in recording() {
-        writeln!(csv, "{t},{y}").unwrap();
-    }
-    std::fs::write(folder.join("swing.csv"), csv).unwrap();
+    swing_kit::write(folder);
     run(&folder.join("free.toml"), &folder.join("run"), 2);
 }
 
@@ -105,7 +59,7 @@ fn the_fan_of_a_linear_oscillator_is_its_posterior_predictive_band() {
     let wider = found["wider_given_residuals"].as_f64().unwrap();
     assert!((1.0..1.2).contains(&wider), "{wider}");
     let fitted = recording().into_iter().filter(|(t, _)| *t < 2.0 + 1e-9);
-    let squares: Vec<f64> = fitted.map(|(t, y)| (y - motion(t).dot(&mean)).powi(2)).collect();
+    let squares: Vec<f64> = fitted.map(|(t, y)| (y - position(t).dot(&mean)).powi(2)).collect();
     let residual = (squares.iter().sum::<f64>() / (squares.len() as f64 - 2.0)).sqrt();
     let sd = found["outputs"][0]["errors"]["sd"].as_f64().unwrap();
     assert!((sd - residual.max(NOISE)).abs() < 1e-3, "{sd}, {residual}");
@@ -115,7 +69,7 @@ fn the_fan_of_a_linear_oscillator_is_its_posterior_predictive_band() {
     for row in rows.records() {
         let row = row.unwrap();
         let value = |i: usize| row[i].parse::<f64>().unwrap();
-        let phi = motion(value(2));
+        let phi = position(value(2));
         let own = (phi.transpose() * covariance * phi)[(0, 0)];
         let variance = if &row[1] == "measured" { own + sd * sd } else { own };
         // 2.5, 5, 25, 50, 75, 95 and 97.5 % of a Gaussian; the sample quantile of 5 % of 2000 has an sd of 0.047 of its sd.
@@ -128,7 +82,7 @@ fn the_fan_of_a_linear_oscillator_is_its_posterior_predictive_band() {
     }
     // Both kinds at the record's 31 times and the 20 after them.
     assert_eq!(seen, 2 * 51);
-    assert!((found["outputs"][0]["at_end"][0].as_f64().unwrap() - motion(5.0).dot(&mean)).abs() < 0.05);
+    assert!((found["outputs"][0]["at_end"][0].as_f64().unwrap() - position(5.0).dot(&mean)).abs() < 0.05);
     let first = ["forecast.json", "fan.csv", "crossing-times.csv", "report.html"]
         .map(|name| bytes(&folder.path().join("run/forecast"), name));
     let (code, _, stderr) = forecast(folder.path(), &[&asked[..], &["--workers", "1"]].concat());
@@ -154,7 +108,7 @@ fn the_report_of_the_run_has_the_same_band_to_first_order_which_is_exact_here() 
     let rows = recording();
     assert_eq!(sd.as_array().unwrap().len(), rows.len(), "held-out values have one too");
     for ((t, _), sd) in rows.iter().zip(sd.as_array().unwrap()) {
-        let phi = motion(*t);
+        let phi = position(*t);
         let expected = (phi.transpose() * given * phi)[(0, 0)].sqrt();
         // The integrator's tolerance over a tenth of a posterior sd, and seven digits.
         assert!((sd.as_f64().unwrap() - expected).abs() < 1e-4 * expected, "{t}: {sd} for {expected}");
@@ -215,19 +169,6 @@ fn levels_and_mistakes_are_told() {
     assert_eq!(code, 0, "{stderr}");
 }
 
-/// Errors of a recording: white, or an autoregression of the same sd, from a seed.
-fn errors(seed: u64, correlation: f64, n: usize) -> Vec<f64> {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let mut last: f64 = StandardNormal.sample(&mut rng);
-    let mut next = || {
-        let now = last;
-        let z: f64 = StandardNormal.sample(&mut rng);
-        last = correlation.mul_add(last, (1.0 - correlation * correlation).sqrt() * z);
-        now
-    };
-    (0..n).map(|_| next()).collect()
-}
-
 /// Shares of values in the 90 % band of what would be measured, fitted and held out, over so many twins with errors of `sd`.
 fn coverage(n_twin: u64, sd: f64, correlation: f64) -> [f64; 2] {
     let mut shares = [0.0; 2];
@@ -241,7 +182,7 @@ fn coverage(n_twin: u64, sd: f64, correlation: f64) -> [f64; 2] {
         let mut csv = "time,position\n".to_owned();
         for (i, error) in errors(seed, correlation, 121).into_iter().enumerate() {
             let t = 0.05 * i as f64;
-            writeln!(csv, "{t},{}", motion(t).x + sd * error).unwrap();
+            writeln!(csv, "{t},{}", position(t).x + sd * error).unwrap();
         }
         std::fs::write(folder.path().join("swing.csv"), csv).unwrap();
         let out = folder.path().join(format!("run-{seed}"));

@@ -3,68 +3,34 @@
 #![allow(clippy::unwrap_used)] // a failed unwrap is a failed test
 
 mod common;
+mod swing_kit;
 
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use common::{bytes, output, refused, run, starlings};
 use nalgebra::{Matrix2, Vector2};
 use serde_json::Value;
+use swing_kit::{STUDY, motion};
 
-/// A free oscillator of mass 1, damping 0.4 and stiffness 9 whose start alone is unknown, seen by its position.
-const STUDY: &str = r#"
-[study]
-name = "free"
-seed = 5
-
-[model]
-kind = "oscillator"
-constants = { m = 1.0, c = 0.4, k = 9.0 }
-
-[[parameters]]
-name = "initial:x"
-unit = "m"
-prior = { transform = "linear", median = 0.5, sd = 1.0 }
-
-[[parameters]]
-name = "initial:v"
-unit = "m/s"
-prior = { transform = "linear", median = 0.0, sd = 3.0 }
-
-[[records]]
-name = "swing"
-file = "swing.csv"
-channels = [ { column = "position", output = "position", noise = 0.2 } ]
-train = [0.0, 2.0]
-
-[estimator]
-kind = "batch"
-
+/// What is asked for beside the estimates.
+const PREDICT: &str = r#"
 [predict]
 outputs = ["velocity", "x"]
 members = 999
 step = 0.05
 "#;
 
-/// Columns: position and velocity after a time from unit displacement (Meirovitch 1986, section 1.6), then from unit velocity.
-fn motion(t: f64) -> Matrix2<f64> {
-    let (sigma, w) = (0.2, (9.0_f64 - 0.04).sqrt());
-    let (sin, cos) = (w * t).sin_cos();
-    Matrix2::new(cos + sigma / w * sin, sin / w, -9.0 / w * sin, cos - sigma / w * sin) * (-sigma * t).exp()
-}
-
-/// A folder with the study and a recording whose errors look like noise.
+/// A folder with the study and its recording.
 fn study(folder: &Path, text: &str) -> PathBuf {
-    let mut csv = "time,position\n".to_owned();
-    for i in 0..=30_u32 {
-        let t = 0.1 * f64::from(i);
-        let error = 0.28 * (f64::from(i * i) * 0.7).sin();
-        writeln!(csv, "{t},{}", motion(t)[(0, 0)] + error).unwrap();
-    }
-    std::fs::write(folder.join("swing.csv"), csv).unwrap();
+    swing_kit::write(folder);
     let file = folder.join("study.toml");
     std::fs::write(&file, text).unwrap();
     file
+}
+
+/// The free oscillator's study with what it asks for.
+fn asking() -> String {
+    format!("{STUDY}{PREDICT}")
 }
 
 /// The posterior given the residuals that a run left, in its estimates and its database.
@@ -91,7 +57,7 @@ fn rows(out: &Path) -> Vec<(String, [f64; 4])> {
 fn bands_of_a_velocity_that_nobody_measured_are_those_of_the_posterior() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("run");
-    let summary = run(&study(folder.path(), STUDY), &out, 2);
+    let summary = run(&study(folder.path(), &asking()), &out, 2);
     let (mean, covariance) = posterior(&summary, &out);
     let rows = rows(&out);
     // The record's times are every second of the step's.
@@ -202,8 +168,8 @@ fn what_cannot_be_predicted_is_refused_before_anything_runs() {
         ("step = 0.05", "step = 1e-9", &["numbers", "a longer `step`"]),
         ("outputs = [\"velocity\", \"x\"]\n", "", &["outputs"]),
     ] {
-        let text = STUDY.replace(from, to);
-        assert_ne!(text, STUDY);
+        let text = asking().replace(from, to);
+        assert_ne!(text, asking());
         let file = study(folder.path(), &text);
         refused(starlings().arg("run").arg(&file).arg("--out").arg(folder.path().join("out")), words);
         refused(starlings().arg("check").arg(&file), words);

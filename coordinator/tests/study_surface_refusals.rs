@@ -1,45 +1,19 @@
 //! Files that hold no valid surface: each refused with its file, line and remedy.
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 mod study_kit;
+mod wall_kit;
 
-use starlings_coordinator::study::{Problem, Study};
 use study_kit::{csv, grid};
+use wall_kit::{SURFACE, problem, study};
 
-const STUDY: &str = r#"
-[study]
-name = "wall"
-[model]
-kind = "fsi-tube"
-[model.layout]
-cells = 5
-regions = 1
-[[parameters]]
-name = "E1"
-prior = { transform = "log2", median = 5e6, sd = 1.0 }
-[[records]]
-name = "beats"
-file = "flow.csv"
-inputs = { flow = "flow" }
-channels = [ { CHANNEL } ]
-"#;
-const SURFACE: &str = r#"surface = "profiles.csv", rest = "rest.csv", output = "displacement", noise = 0.01"#;
 const PROFILES: &str = "time,z,r\n0,0,1\n0,25,1\n0.02,0,1\n0.02,25,1\n";
 const REST: &str = "z,r\n2.5,1\n7.5,1\n12.5,1\n17.5,1\n22.5,1\n";
 
-/// The only problem of a study with these files: `file:line: message; help`, without the folder.
+/// The only problem of a study with these files.
 fn said(channel: &str, profiles: &str, rest: &str) -> String {
-    let folder = tempfile::tempdir().unwrap();
-    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
-    write("flow.csv", &csv("time,flow,zero", &[&grid(11, 0.02), &[0.0; 11], &[0.0; 11]]));
-    write("profiles.csv", profiles);
-    write("rest.csv", rest);
-    write("study.toml", &STUDY.replace("CHANNEL", channel));
-    let found: Vec<Problem> = Study::load(&folder.path().join("study.toml")).unwrap_err().problems;
-    assert_eq!(found.len(), 1, "{found:?}");
-    let p = &found[0];
-    let name = p.file.file_name().unwrap().to_string_lossy().into_owned();
-    let line = p.line_column().unwrap_or_default().0;
-    format!("{name}:{line}: {}; {}", p.message, p.help.clone().unwrap_or_default())
+    let flow = csv("time,flow,zero", &[&grid(11, 0.02), &[0.0; 11], &[0.0; 11]]);
+    let files = [("flow.csv", flow), ("profiles.csv", profiles.to_owned()), ("rest.csv", rest.to_owned())];
+    problem(&study(channel), &files)
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! Damped least squares over runs that the caller makes: it says which run it needs next and takes the result.
 //!
 //! Levenberg (1944) and Marquardt (1963) within a region of trust (Moré 1978), with the secant update of Broyden (1965) between
-//! Jacobians, for models whose runs are the only cost: a Jacobian is asked for at the start, where the secant no longer predicts the cost, and once at the end.
-//! In scaled parameters z of the caller's choice, with an independent Gaussian prior and bounds on each. Read next:
+//! Jacobians, for models whose runs are the only cost: a Jacobian is asked for at the start, where the secant no longer predicts the
+//! cost, and once at the end. In scaled parameters z of the caller's choice, with an independent Gaussian prior and bounds on each. Read next:
 //! `block_angular.rs`, what a Jacobian is, and `score.rs`, which computes what another parameter would add to a finished fit.
 
 mod damped;

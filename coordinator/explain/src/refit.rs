@@ -1,11 +1,12 @@
 //! The search: refits of the best candidates, then a second pass from the best of them with replacements and pairs.
 //!
-//! Files: [`search`], [`race`], [`pairs`] and [`finite`] where no effect explains the gap alone, [`second_pass`], and
+//! Files: [`search`], [`race`], [`ranking`], [`pairs`] and [`finite`] where no effect explains the gap alone, [`second_pass`], and
 //! [`modulated_forms`], whose effects ask whether the form of an effect is right.
 
 mod finite;
 mod modulated_forms;
 mod pairs;
 mod race;
+mod ranking;
 pub(crate) mod search;
 mod second_pass;

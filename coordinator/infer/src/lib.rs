@@ -28,6 +28,7 @@ pub mod follow;
 pub mod forecast;
 mod gather;
 mod missing;
+mod outlook;
 mod parts;
 pub mod reduced;
 mod resampled;
@@ -38,5 +39,6 @@ mod smoothed;
 mod words;
 
 pub use error::InferError;
+pub use outlook::{Outlook, outlook};
 pub use result::Inference;
-pub use run::{Outlook, Progress, Reader, check, infer, outlook};
+pub use run::{Progress, Reader, check, infer};

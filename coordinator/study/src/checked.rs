@@ -11,7 +11,7 @@ use std::sync::Arc;
 use starlings_estimators::{Drift, Kind, Options, Points, Root, Transform};
 use starlings_models::{EffectDef, Setup, Signal, Spec};
 
-pub use self::asked::{ExplainChoice, Library, PredictChoice, SpectrumChoice};
+pub use self::asked::{ExplainChoice, Library, PROPOSALS, PredictChoice, SpectrumChoice};
 use super::infer_choice::InferChoice;
 use super::solver_host::SolverHost;
 use super::surfaces::Node;

@@ -8,19 +8,16 @@ mod derived;
 #[cfg(fuzzing)]
 pub(crate) mod fuzzing;
 mod input;
-mod mesh_file;
+mod mesh;
 mod noise;
-mod off;
 mod part;
 mod pooled_noise;
 mod reader;
 mod separator;
 mod shapes;
 mod start;
-mod stl;
 mod surface;
 mod surface_files;
-mod vtp;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

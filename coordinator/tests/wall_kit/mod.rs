@@ -81,6 +81,7 @@ pub(crate) fn rest() -> String {
     csv("z,r", &[&NODES, &[1.0; 5]])
 }
 
+/// The only problem of a study with these files: `file:line: message; help`, without the folder.
 pub(crate) fn problem(study: &str, files: &[(&str, String)]) -> String {
     let folder = tempfile::tempdir().unwrap();
     for (name, text) in files {

@@ -1,7 +1,7 @@
 //! The damped step by QR of the stacked rows (J; P^1/2; damping): their square, which has twice the digits, is never formed.
 //!
-//! The damping follows from the region of trust. Deliberately without bounds: the caller says which components are free. Next files to read: [`super`],
-//! `block_angular/reduction.rs`, which factors the rows.
+//! The damping follows from the region of trust. Deliberately without bounds: the caller says which components are free. Next files to
+//! read: [`super`], `block_angular/reduction.rs`, which factors the rows.
 
 use nalgebra::DVector;
 

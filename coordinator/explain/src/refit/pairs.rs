@@ -6,7 +6,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::search::{Searcher, largest_of_each};
+use super::ranking::largest_of_each;
+use super::search::Searcher;
 use crate::error::ExplainError;
 use crate::fit::drive::drive_rounds;
 use crate::fit::fitted_variant::FittedVariant;

@@ -6,8 +6,7 @@
 //! the study calls replaceable are left out in turn, and the search is repeated without them. Next file to read:
 //! [`crate::judge::verdict`].
 
-use std::cmp::Ordering;
-
+use super::ranking::{largest_of_each, order};
 use crate::error::ExplainError;
 use crate::fit::candidate::Candidate;
 use crate::fit::drive::drive;
@@ -16,7 +15,7 @@ use crate::fit::kind::Kind;
 use crate::fit::model_variant::{AddedEffect, ModelVariant};
 use crate::judge::adequacy::Adequacy;
 use crate::judge::effective_noise::inflation;
-use crate::judge::gates::{JudgedFit, judge};
+use crate::judge::gates::judge;
 use crate::judge::held_out::held_out;
 use crate::judge::misfit::Misfit;
 use crate::judge::null_distribution::{LEAST, NullDistribution};
@@ -275,27 +274,4 @@ impl<'c> Searcher<'_, '_, 'c> {
         }
         Ok(())
     }
-}
-
-/// Those that pass the gates first, then by rank and prior.
-fn order(a: &JudgedFit<'_>, b: &JudgedFit<'_>) -> Ordering {
-    let refused = |j: &JudgedFit<'_>| j.refusal.is_some();
-    refused(a).cmp(&refused(b)).then(b.standing().total_cmp(&a.standing()))
-}
-
-/// The result with the largest gain of every candidate, the largest first.
-pub(super) fn largest_of_each<'r>(
-    results: impl Iterator<Item = &'r ScreeningResult>,
-    gain: impl Fn(&ScreeningResult) -> f64,
-) -> Vec<ScreeningResult> {
-    let mut best: Vec<ScreeningResult> = Vec::new();
-    for result in results {
-        match best.iter_mut().find(|b| b.candidate == result.candidate) {
-            Some(known) if gain(result) > gain(known) => known.clone_from(result),
-            Some(_) => {}
-            None => best.push(result.clone()),
-        }
-    }
-    best.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
-    best
 }

@@ -4,14 +4,14 @@
 
 use starlings_models::effect::library::{FAMILIES, family_of, library_in, shows_in};
 use starlings_models::{BuildSetup, EffectDef, Setup, nearest};
-use starlings_study::{Study, checked::Library};
+use starlings_study::Study;
+use starlings_study::checked::{Library, PROPOSALS};
 
 use crate::error::ExplainError;
 use crate::fit::kind::Kind;
 use crate::fit::same_form::same_form;
 use crate::number::three;
 use crate::options::Options;
-use crate::screen::proposals::PROPOSALS;
 
 /// The effects to try, those of the study first.
 ///

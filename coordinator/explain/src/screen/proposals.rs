@@ -8,7 +8,8 @@ mod grammar;
 mod recovered;
 
 use starlings_models::EffectDef;
-use starlings_study::{Study, checked::Library};
+use starlings_study::Study;
+use starlings_study::checked::{Library, PROPOSALS};
 
 use self::grammar::grammar;
 use self::recovered::Recovered;
@@ -19,8 +20,6 @@ use crate::fit::same_form::same_form;
 use crate::locate::{Track, UnknownInput};
 use crate::options::Options;
 
-/// Name by which `without` leaves all of them out.
-pub(crate) const PROPOSALS: &str = "proposals";
 /// Terms of one equation that become candidates.
 const MOST: usize = 10;
 

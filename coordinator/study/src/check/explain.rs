@@ -8,7 +8,7 @@ use starlings_models::{BuildSetup, ModelDef, Setup};
 use toml::Spanned;
 
 use super::settings::{choose, counted};
-use crate::checked::{ExplainChoice, Library, Record};
+use crate::checked::{ExplainChoice, Library, PROPOSALS, Record};
 use crate::file::{ChannelSection, StudyFile};
 use crate::problem::Source;
 
@@ -29,9 +29,6 @@ pub(crate) fn explain(source: &Source, file: &StudyFile) -> ExplainChoice {
         max_effects: counted(source, section.max_effects.as_ref(), "max_effects", MAX_EFFECTS),
     }
 }
-
-/// The family of the terms that `starlings explain` makes from the data, of which none is known before.
-const PROPOSALS: &str = "proposals";
 
 /// What is named must be an effect described in the study, a built-in effect for its model or a family of these.
 pub(crate) fn check_names(source: &Source, file: &StudyFile, model: &ModelDef) {

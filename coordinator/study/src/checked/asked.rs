@@ -16,6 +16,9 @@ pub enum Library {
     BuiltIn,
 }
 
+/// Name by which `without` leaves out all terms that `explain` makes from the data, of which none is known before.
+pub const PROPOSALS: &str = "proposals";
+
 /// Settings of `explain`.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct ExplainChoice {

@@ -8,14 +8,13 @@ pub(crate) fn times_of(record: &Record, step: Option<f64>) -> Vec<f64> {
     let (Some(step), Some(&end)) = (step, record.times.last()) else { return times };
     let near = 1e-9 * step;
     let n = ((end - record.start) / step + 1e-9).floor().max(0.0) as usize;
-    for k in 0..=n {
-        let time = step.mul_add(k as f64, record.start);
-        let place = times.partition_point(|t| *t < time - near);
-        // A time of the record stands for one that is within a rounding of it.
-        if times.get(place).is_none_or(|t| *t > time + near) {
-            times.insert(place, time);
-        }
-    }
+    // A time of the record stands for one that is within a rounding of it.
+    let is_new = |time: &f64| {
+        let place = record.times.partition_point(|t| *t < time - near);
+        record.times.get(place).is_none_or(|t| *t > time + near)
+    };
+    times.extend((0..=n).map(|k| step.mul_add(k as f64, record.start)).filter(is_new));
+    times.sort_by(f64::total_cmp);
     times
 }
 

@@ -2,7 +2,7 @@
 
 use starlings_models::surface::Mesh;
 
-use super::mesh_file::{Triangles, read};
+use super::mesh::{Triangles, read};
 
 /// Reads a mesh in every format and asks for a place on it.
 pub(crate) fn mesh(bytes: &[u8]) {

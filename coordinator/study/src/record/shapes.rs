@@ -1,6 +1,6 @@
 //! From files to surfaces and nodes: profiles `time,z,r`, or meshes named by `time,file`.
 //!
-//! Next file to read: [`super::mesh_file`] for meshes; what makes a surface is in `starlings_models::surface`.
+//! Next file to read: [`super::mesh`] for meshes; what makes a surface is in `starlings_models::surface`.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use starlings_models::surface::{Mesh, Profile};
 
-use super::mesh_file::{Triangles, read};
+use super::mesh::{Triangles, read};
 use super::{Csv, Table};
 use crate::problem::{Problem, Source, quoted_list};
 use crate::surfaces::{Shape, Shapes, length};

@@ -1,13 +1,13 @@
 //! Triangle meshes in STL, as text or binary, by `stl_io`.
 //!
 //! Normals are not read: the order of a triangle's corners says which side is out. Only the first solid of a file is read. Next file to
-//! read: [`super::mesh_file`].
+//! read: [`super`].
 
 use std::io::Cursor;
 
 use stl_io::create_stl_reader;
 
-use super::mesh_file::{Fault, Triangles, welded};
+use super::{Fault, Triangles, welded};
 
 /// Bytes before the triangles of a binary file: a free header and the number of triangles.
 const HEADER: usize = 80;

@@ -1,13 +1,15 @@
 //! Files of triangle meshes: OFF, STL (text and binary) and VTP, told apart by the end of their name.
 //!
 //! Here is what the formats share; whether triangles make a surface is checked by the mesh itself. Next files to read:
-//! [`super::off`], [`super::stl`], [`super::vtp`].
+//! [`off`], [`stl`], [`vtp`].
+
+mod off;
+mod stl;
+mod vtp;
 
 use std::collections::HashMap;
 use std::ops::Range;
 use std::path::Path;
-
-use super::{off, stl, vtp};
 
 /// Vertices and triangles as they are written; triangles name their vertices, counted from 0.
 #[derive(Debug, Default, PartialEq)]

@@ -8,7 +8,7 @@ mod array;
 use roxmltree::{Document, Node};
 
 use self::array::{Encoding, array, number};
-use super::mesh_file::{Fault, Triangles, welded};
+use super::{Fault, Triangles, welded};
 
 /// Reads a mesh.
 ///

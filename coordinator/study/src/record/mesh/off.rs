@@ -1,11 +1,11 @@
 //! Triangle meshes in the Object File Format: `OFF`, the numbers of vertices and faces, coordinates, then faces `3 a b c`.
 //!
 //! Colours and polygons are not read; whether the triangles make a surface is checked by the mesh itself. Next file to read:
-//! [`super::mesh_file`].
+//! [`super`].
 
 use std::ops::Range;
 
-use super::mesh_file::{Fault, Triangles};
+use super::{Fault, Triangles};
 
 /// Reads a mesh.
 ///

@@ -8,7 +8,7 @@ use miniz_oxide::inflate::decompress_to_vec_zlib_with_limit;
 use roxmltree::Node;
 
 use super::fault;
-use crate::record::mesh_file::Fault;
+use crate::record::mesh::Fault;
 
 /// How the file writes its numbers.
 pub(super) struct Encoding<'a> {
