@@ -61,7 +61,7 @@ pub struct Compared {
 pub struct ParameterAcross {
     /// Its name.
     pub name: String,
-    /// Unit label; of the first run that has it.
+    /// Unit label; where runs differ in it one after the other, in the order of the runs.
     pub unit: String,
     /// `null` where a run does not estimate it.
     pub values: Vec<Option<Estimate>>,
@@ -185,9 +185,10 @@ fn parameters(all: &[Read]) -> Vec<ParameterAcross> {
         let find = |run: &Read| run.summary.as_ref()?.parameters.iter().find(|p| p.name == name).cloned();
         let values: Vec<Option<Estimate>> = all.iter().map(find).collect();
         let known: Vec<&Estimate> = values.iter().flatten().collect();
-        let unit = known.first().map(|e| e.unit.clone()).unwrap_or_default();
-        let apart = apart(&known).filter(|_| known.iter().all(|e| e.unit == unit));
-        ParameterAcross { name: name.to_owned(), unit, values, apart }
+        let mut units: Vec<&str> = known.iter().map(|e| e.unit.as_str()).collect();
+        units.dedup();
+        let apart = apart(&known).filter(|_| units.len() == 1);
+        ParameterAcross { name: name.to_owned(), unit: units.join(", "), values, apart }
     };
     names(all, |s| s.parameters.iter().map(|p| p.name.as_str()).collect()).into_iter().map(row).collect()
 }

@@ -74,6 +74,14 @@ fn parameters_are_set_side_by_side_by_name_and_their_distance_is_in_sd_of_the_di
 }
 
 #[test]
+fn values_in_different_units_stand_under_both_and_have_no_distance() {
+    let other = Estimate { unit: "mmHg".to_owned(), ..estimate("R", 7.5, 0.3) };
+    let all = [estimate("R", 1.0, 0.3), other].map(|e| run("runs/one", &[e], -10.0, 7.0));
+    let found = comparison(all.into());
+    assert_eq!((found.parameters[0].unit.as_str(), found.parameters[0].apart), ("kPa, mmHg", None));
+}
+
+#[test]
 fn evidence_of_other_data_is_not_compared() {
     let of = |observed| run("runs/same", &[estimate("R", 1.0, 0.3)], -10.0, observed);
     let found = comparison(vec![of(7.0), of(7.5)]);

@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 use nalgebra::DMatrix;
 
 use super::measured::mean_innovation;
-use super::wall::components;
+use super::wall::{components, names_no_states};
 use super::{Correction, Observer, Wiring};
 use crate::blocks::Sections;
 use crate::setup::ObserverDef;
@@ -34,12 +34,7 @@ impl SectionFeedback {
         wiring: &Wiring<'_>,
         sections: &Sections,
     ) -> Result<Self, SetupError> {
-        if !def.corrects.is_empty() {
-            return Err(SetupError::Invalid(format!(
-                "the observer `{}` knows which states it corrects: remove `corrects`, or take `nudging`, which uses it",
-                def.kind
-            )));
-        }
+        names_no_states(def)?;
         let mut rows = vec![Vec::new(); sections.n];
         for (row, ring) in components(wiring, sections.displacement)? {
             rows[ring].push(row);

@@ -105,6 +105,17 @@ impl Innovation {
 /// The most components of a state field behind blocks: they are dense, 8 MB each at this size, and a correction makes several.
 pub(super) const MOST_NODES: usize = 1000;
 
+/// Refuses states that are named for an observer which knows its own.
+pub(super) fn names_no_states(def: &ObserverDef) -> Result<(), SetupError> {
+    if !def.corrects.is_empty() {
+        return Err(SetupError::Invalid(format!(
+            "the observer `{}` knows which states it corrects: remove `corrects`, or take `nudging`, which uses it",
+            def.kind
+        )));
+    }
+    Ok(())
+}
+
 /// The part of the model's blocks that an observer stands on.
 ///
 /// # Errors
@@ -114,12 +125,7 @@ pub(super) fn hosted<T>(
     wiring: &Wiring<'_>,
     part: fn(Blocks) -> Option<T>,
 ) -> Result<T, SetupError> {
-    if !def.corrects.is_empty() {
-        return Err(SetupError::Invalid(format!(
-            "the observer `{}` knows which states it corrects: remove `corrects`, or take `nudging`, which uses it",
-            def.kind
-        )));
-    }
+    names_no_states(def)?;
     let largest = wiring.spec.states.iter().map(|q| q.size).max().unwrap_or(0);
     if largest > MOST_NODES {
         return Err(SetupError::Invalid(format!(

@@ -9,7 +9,7 @@
 use nalgebra::DMatrix;
 
 use super::measured::mean_innovation;
-use super::wall::{components, hosted};
+use super::wall::{components, hosted, names_no_states};
 use super::{Correction, Kind, Observer, Wiring};
 use crate::SetupError;
 use crate::blocks::WindkesselBlock;
@@ -57,8 +57,8 @@ impl WindkesselObserver {
     /// # Errors
     /// When the model has no Windkessel behind a wall, or no pressure before one is observed.
     pub(crate) fn new(def: &ObserverDef, wiring: Wiring<'_>) -> Result<Self, SetupError> {
-        let sections = wiring.model.sections(wiring.theta).filter(|_| def.corrects.is_empty());
-        let all = if let Some(sections) = sections {
+        names_no_states(def)?;
+        let all = if let Some(sections) = wiring.model.sections(wiring.theta) {
             sections.outlets
         } else {
             let (block, pressure) = hosted(def, &wiring, |b| b.windkessel.zip(b.outputs.pressure))?;
@@ -84,8 +84,7 @@ impl WindkesselObserver {
     }
 
     /// γ/(R_d C) of a Windkessel, in 1/time.
-    fn rate(&self, outlet: &Outlet, model: &dyn Model, theta: &[f64]) -> f64 {
-        let all = windkessels(model, theta).unwrap_or_default();
+    fn rate(&self, outlet: &Outlet, all: &[(WindkesselBlock, String)]) -> f64 {
         let block = all.iter().find(|(block, _)| block.state == outlet.state);
         block.map_or(0.0, |(block, _)| self.gain * block.rate)
     }
@@ -118,9 +117,10 @@ fn gradient(model: &dyn Model, theta: &[f64], pressure: &str) -> Vec<f64> {
 impl Observer for WindkesselObserver {
     /// δπ = (1 − e^(−γΔt/(R_d C))) (z − p): exact for a held flow, stable at any gain.
     fn correct(&self, at: Correction<'_>, x: &mut [f64]) {
+        let all = windkessels(at.model, at.theta).unwrap_or_default();
         for outlet in &self.outlets {
             if let Some((innovation, _)) = mean_innovation(&at, &outlet.rows) {
-                let rate = self.rate(outlet, at.model, at.theta);
+                let rate = self.rate(outlet, &all);
                 x[outlet.state] += -(-rate * at.dt).exp_m1() * innovation;
             }
         }
@@ -129,9 +129,10 @@ impl Observer for WindkesselObserver {
     /// γ/(R_d C) ∂p/∂x in the row of each π: the predicted pressure holds R_p times the model's own flow.
     fn feedback(&self, model: &dyn Model, theta: &[f64]) -> DMatrix<f64> {
         let n = model.spec().n_state();
+        let all = windkessels(model, theta).unwrap_or_default();
         let mut feedback = DMatrix::zeros(n, n);
         for outlet in &self.outlets {
-            let rate = self.rate(outlet, model, theta);
+            let rate = self.rate(outlet, &all);
             let slopes = gradient(model, theta, &outlet.pressure);
             for (entry, slope) in feedback.row_mut(outlet.state).iter_mut().zip(slopes) {
                 *entry = rate * slope;

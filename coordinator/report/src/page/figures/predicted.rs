@@ -18,7 +18,16 @@ const FEW: usize = 3;
 
 /// One figure per output and record; of a field the first, the middle and the last component.
 pub(super) fn figures(data: &ReportData) -> Vec<Figure> {
-    shown(data).into_iter().take(MOST).map(|course| figure(course, &data.time_unit)).collect()
+    let all = shown(data);
+    let mut drawn: Vec<Figure> =
+        all.iter().take(MOST).map(|course| figure(course, &data.time_unit)).collect();
+    let left_out = all.len() - drawn.len();
+    if left_out > 0
+        && let Some(last) = drawn.pop()
+    {
+        drawn.push(last.saying(&format!("{left_out} courses more are in predicted.csv.")));
+    }
+    drawn
 }
 
 fn shown(data: &ReportData) -> Vec<&PredictedCourse> {
