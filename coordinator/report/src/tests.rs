@@ -1,14 +1,12 @@
 //! Tests of the whole page and of the overview picture. Next file to read: [`extremes`], for numbers that no study gives.
 
 mod extremes;
+mod left_out;
 pub(crate) mod page;
 
 use starlings_study::constants::{ConstantEffect, Follows, HangsOn};
-use starlings_study::predicted::PredictedCourse;
 
-use super::data::{
-    Autocorrelation, ChannelPlot, Family, ObserverPlot, ObserverRow, ParameterRow, ReportData,
-};
+use super::data::{ChannelPlot, Family, ObserverPlot, ObserverRow, ParameterRow, ReportData};
 use super::{overview_svg, render, sample};
 use page::{n_figure, without_scripts};
 
@@ -135,31 +133,6 @@ fn many_records_and_parameters_keep_the_page_readable() {
     assert_well_formed(&page);
     assert_eq!(page.matches(": predicted against measured</strong>").count(), 4);
     assert!(overview_svg(&data).contains("7 more"));
-}
-
-#[test]
-fn outputs_that_are_not_drawn_are_counted_where_others_are() {
-    let mut data = sample::run(60);
-    let channel = data.channels[0].clone();
-    data.channels = (1..=30).map(|k| ChannelPlot { record: format!("r-{k}"), ..channel.clone() }).collect();
-    let series = data.autocorrelation[0].clone();
-    data.autocorrelation =
-        (1..=30).map(|k| Autocorrelation { record: format!("r-{k}"), ..series.clone() }).collect();
-    let course = PredictedCourse {
-        record: "r-1".to_owned(),
-        output: String::new(),
-        unit: String::new(),
-        time: vec![0.0, 1.0],
-        median: vec![1.0, 2.0],
-        lo: vec![0.5, 1.5],
-        hi: vec![1.5, 2.5],
-    };
-    data.predicted =
-        (1..=30).map(|k| PredictedCourse { output: format!("q{k}"), ..course.clone() }).collect();
-    let page = render(&data).unwrap();
-    assert!(page.contains("6 more are in run.db."), "30 fits, of which 24 are drawn");
-    assert!(page.contains("6 courses more are in predicted.csv."));
-    assert!(page.contains("Residuals of 6 outputs and records more are in run.db."));
 }
 
 /// Twenty-five components with a residual that grows along the field and changes its sign halfway through time.
