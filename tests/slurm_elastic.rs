@@ -8,6 +8,7 @@ mod common;
 mod slurm_kit;
 
 use access_kit::Started;
+use common::studies::slow;
 use common::{starlings, wait_until};
 use serde_json::Value;
 use slurm_kit::{Trial, accounts, coordinator, deploy, queue, remove, status};
@@ -20,7 +21,8 @@ fn running(out: &std::path::Path) -> usize {
 #[test]
 #[ignore = "needs a Slurm: .ci/slurm test"]
 fn a_pool_grows_with_the_queue_and_shrinks_when_the_run_is_over_and_no_byte_changes() {
-    let trial = Trial::new();
+    // One worker has enough to do until the watch has looked twice.
+    let trial = Trial::of(|folder| slow(folder, 8));
     let (out, fit) = (trial.path("pool"), trial.path("fit"));
     let (code, said) = deploy(&trial.study, &out, &["--elastic", "1..3", "--slots", "1"]);
     assert!(code == 0 && said.contains("1 of 1 run"), "{said}");

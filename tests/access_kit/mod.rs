@@ -6,8 +6,9 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
 
-use crate::common::{starlings, wait_until};
+use crate::common::{LIMIT, starlings, wait_until};
 
 /// A process that is killed when nobody keeps it, and what it says on standard error.
 pub(crate) struct Started {
@@ -34,7 +35,11 @@ impl Started {
     }
 
     pub(crate) fn await_words(&self, words: &str) {
-        wait_until(words, || self.said().contains(words));
+        let start = Instant::now();
+        while !self.said().contains(words) {
+            assert!(start.elapsed() < LIMIT, "waited too long for `{words}` in:\n{}", self.said());
+            std::thread::sleep(Duration::from_millis(2));
+        }
     }
 
     /// Its exit code.

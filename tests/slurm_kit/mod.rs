@@ -21,8 +21,13 @@ pub(crate) struct Trial {
 
 impl Trial {
     pub(crate) fn new() -> Self {
-        let trial =
-            Self { folder: tempfile::tempdir().unwrap(), study: repository("examples/pig-aorta/study.toml") };
+        Self::of(|_| repository("examples/pig-aorta/study.toml"))
+    }
+
+    /// Of a study that is written into a folder.
+    pub(crate) fn of(study: impl FnOnce(&Path) -> PathBuf) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let trial = Self { study: study(folder.path()), folder };
         run(&trial.study, &trial.path("alone"), 2);
         trial
     }
