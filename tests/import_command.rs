@@ -257,3 +257,18 @@ fn an_aorta_of_openbf_runs_and_what_the_model_lacks_is_named() {
         assert!(!other.exists());
     }
 }
+
+#[test]
+fn periods_that_the_program_would_add_are_told() {
+    let folder = TempDir::new().unwrap();
+    let text = std::fs::read_to_string(file("svzerodsolver/pulsatileFlow_R_RCR.json")).unwrap();
+    let mut network: Value = serde_json::from_str(&text).unwrap();
+    let notes = |network: &Value, name: &str| {
+        let path = folder.path().join(format!("{name}.json"));
+        std::fs::write(&path, network.to_string()).unwrap();
+        import(&path, &folder.path().join(name))["notes"].to_string()
+    };
+    assert!(!notes(&network, "as-given").contains("more periods"));
+    network["simulation_parameters"]["use_cycle_to_cycle_error"] = json!(true);
+    assert!(notes(&network, "until-they-repeat").contains("more periods than the"));
+}

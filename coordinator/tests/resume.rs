@@ -175,6 +175,20 @@ fn an_empty_database_of_an_earlier_program_is_told_with_its_remedy() {
 }
 
 #[test]
+fn a_database_of_another_program_is_left_alone_and_said_to_be_one() {
+    let case = line();
+    let path = case.fresh();
+    std::fs::create_dir_all(&path).unwrap();
+    let foreign = rusqlite::Connection::open(path.join("run.db")).unwrap();
+    foreign.execute_batch("CREATE TABLE birds (name TEXT)").unwrap();
+    let error = refused(&path, &case.study()).to_string();
+    assert!(error.contains("run.db is a database of another program: give the folder of a run"), "{error}");
+    std::fs::write(path.join("run.db"), "a text of some length, and no database at all").unwrap();
+    let error = refused(&path, &case.study()).to_string();
+    assert!(error.contains("cannot use") && error.contains("give the folder of a run"), "{error}");
+}
+
+#[test]
 fn a_resume_without_a_folder_starts_nothing() {
     let case = line();
     let path = case.fresh();

@@ -18,6 +18,12 @@ use crate::load::is_outside;
 /// Number of local workers where the command line has none.
 const WORKERS: &str = "STARLINGS_WORKERS";
 
+/// What `--dashboard` says where there is to be no page.
+const OFF: &str = "off";
+
+/// A free port of this machine alone.
+const FREE_PORT: &str = "0";
+
 /// Which workers run the model.
 #[derive(Args)]
 pub(crate) struct FleetArgs {
@@ -49,8 +55,8 @@ pub(crate) struct FleetArgs {
     #[arg(long, value_name = "ADDR")]
     metrics: Option<String>,
     /// Serve a page that follows the command while it runs, with a token in its address: on a free port of this machine alone, or on
-    /// PORT, or with HOST:PORT for others too.
-    #[arg(long, value_name = "ADDR", num_args = 0..=1, require_equals = true, default_missing_value = "0")]
+    /// PORT, or with HOST:PORT for others too. With --listen there is one on a free port of this machine unless this says `off`.
+    #[arg(long, value_name = "ADDR", num_args = 0..=1, require_equals = true, default_missing_value = FREE_PORT)]
     dashboard: Option<String>,
     /// Write a span of this command, of every run and of its computation in a local worker, as OTLP: into a FILE, a line of JSON each,
     /// or to a collector at http://HOST:PORT. Workers elsewhere write theirs where their own --traces says.
@@ -83,11 +89,14 @@ impl FleetArgs {
             ));
         }
         let address = self.listen.as_deref().map(|text| address("--listen", text)).transpose()?;
-        let serving = |option, text: &Option<String>| {
-            text.as_deref().map(|text| served_address(option, text)).transpose()
+        let serving = |option, text: Option<&str>| text.map(|text| served_address(option, text)).transpose();
+        let metrics = serving("--metrics", self.metrics.as_deref())?;
+        let page = match (self.dashboard.as_deref(), &self.listen) {
+            (Some(OFF), _) | (None, None) => None,
+            (Some(place), _) => Some(place),
+            (None, Some(_)) => Some(FREE_PORT),
         };
-        let metrics = serving("--metrics", &self.metrics)?;
-        let dashboard = serving("--dashboard", &self.dashboard)?;
+        let dashboard = serving("--dashboard", page)?;
         let host = self.listen.as_deref().and_then(host_of).map(str::to_owned);
         if let (Some(host), Some(address)) = (&host, address)
             && let Some(warning) = alone(host, address)

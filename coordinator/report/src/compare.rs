@@ -256,6 +256,11 @@ impl Comparison {
         let far = self.parameters.iter().filter(|p| p.apart.is_some_and(|d| d > 2.0)).count();
         let known = self.parameters.iter().filter(|p| p.apart.is_some()).count();
         let agree = match (known, far) {
+            (0, _) if self.runs.iter().any(|run| !run.finished) => {
+                let unfinished = self.labels().into_iter().zip(&self.runs).filter(|(_, run)| !run.finished);
+                let names: Vec<String> = unfinished.map(|(label, _)| label).collect();
+                format!("Not finished, and so without estimates to compare: {}.", names.join(", "))
+            }
             (0, _) => "The runs share no estimated parameter.".to_owned(),
             (n, 0) => {
                 format!("{n} shared parameters agree within two standard deviations of their difference.")

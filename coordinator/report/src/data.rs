@@ -218,8 +218,10 @@ pub(crate) struct NisSeries {
 pub(crate) struct FleetTable {
     /// One row per worker, in order of joining.
     pub(crate) workers: Vec<WorkerRow>,
-    /// Model runs that were asked for.
+    /// Model runs that the fit asked for.
     pub(crate) runs_total: u64,
+    /// Runs beside those: at the estimate, and for intervals and predictions.
+    pub(crate) runs_after: u64,
     /// Runs that failed for good.
     pub(crate) failed: u64,
     /// Attempts beyond the first of a run.

@@ -1,6 +1,6 @@
 //! The result in one sentence.
 
-use super::data::{ParameterRow, ReportData};
+use super::data::{ParameterRow, ReportData, Track};
 use super::number;
 
 /// More parameters than this are counted, not listed.
@@ -12,7 +12,7 @@ pub(crate) fn of(data: &ReportData) -> String {
         return said.clone();
     }
     if data.parameters.is_empty() {
-        return "The run has no estimate yet.".to_owned();
+        return so_far(data);
     }
     let mut listed: Vec<String> = data.parameters.iter().take(LISTED).map(estimate).collect();
     if data.parameters.len() > LISTED {
@@ -23,15 +23,31 @@ pub(crate) fn of(data: &ReportData) -> String {
 }
 
 fn estimate(row: &ParameterRow) -> String {
-    let digits = |value| number::with_sd(value, row.sd);
-    let unit = if row.unit.is_empty() { String::new() } else { format!("\u{a0}{}", row.unit) };
-    format!(
-        "{}\u{a0}=\u{a0}{} [{} to {}]{unit}",
-        row.name,
-        digits(row.estimate),
-        digits(row.lo),
-        digits(row.hi)
-    )
+    valued(&row.name, &row.unit, [row.lo, row.estimate, row.hi], row.sd)
+}
+
+fn valued(name: &str, unit: &str, [lo, value, hi]: [f64; 3], sd: f64) -> String {
+    let digits = |value| number::with_sd(value, sd);
+    let unit = if unit.is_empty() { String::new() } else { format!("\u{a0}{unit}") };
+    format!("{name}\u{a0}=\u{a0}{} [{} to {}]{unit}", digits(value), digits(lo), digits(hi))
+}
+
+/// What a run that is not finished has come to.
+fn so_far(data: &ReportData) -> String {
+    let last = |track: &Track| {
+        let pass = track.passes.last()?;
+        let ends = [*pass.lo.last()?, *pass.estimate.last()?, *pass.hi.last()?];
+        // An interval of 95 % is about four sd long.
+        Some(valued(&track.name, &track.unit, ends, 0.25 * (ends[2] - ends[0])))
+    };
+    let mut listed: Vec<String> = data.tracks.iter().filter_map(last).take(LISTED).collect();
+    if listed.is_empty() {
+        return "The run has no estimate yet.".to_owned();
+    }
+    if data.tracks.len() > LISTED {
+        listed.push(format!("and {} more", data.tracks.len() - LISTED));
+    }
+    format!("The run is not finished; so far {} (95\u{a0}% intervals).", listed.join(", "))
 }
 
 /// The held-out error of the only channel that has one.
@@ -48,5 +64,31 @@ fn held_out(data: &ReportData) -> String {
         .trim_end()
         .to_owned(),
         _ => String::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::data::PassTrack;
+    use super::*;
+
+    #[test]
+    fn a_run_that_is_not_finished_says_what_it_has_come_to() {
+        assert_eq!(of(&ReportData::default()), "The run has no estimate yet.");
+        let pass = |pass, estimate: f64| PassTrack {
+            pass,
+            time: vec![1.0, 2.0],
+            estimate: vec![0.0, estimate],
+            lo: vec![0.0, estimate - 2.0],
+            hi: vec![0.0, estimate + 2.0],
+        };
+        let track = Track {
+            name: "k".to_owned(),
+            unit: "N/m".to_owned(),
+            passes: vec![pass(1, 30.0), pass(2, 40.0)],
+            ..Track::default()
+        };
+        let said = of(&ReportData { tracks: vec![track], ..ReportData::default() }).replace('\u{a0}', " ");
+        assert_eq!(said, "The run is not finished; so far k = 40.0 [38.0 to 42.0] N/m (95 % intervals).");
     }
 }

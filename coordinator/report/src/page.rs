@@ -126,7 +126,10 @@ fn facts(data: &ReportData) -> Vec<(&'static str, String)> {
     if let Some(started) = &data.started {
         facts.push(("Started", number::date(started)));
     }
-    facts.push(("Wall time", number::duration(data.wall_s)));
+    // Of a run that is not finished it is not known.
+    if data.wall_s > 0.0 {
+        facts.push(("Wall time", number::duration(data.wall_s)));
+    }
     facts.retain(|(_, text)| !text.is_empty());
     facts
 }
@@ -169,6 +172,7 @@ fn fleet(data: &ReportData) -> FleetView {
     let fleet = &data.fleet;
     let mut counts = vec![
         ("model runs", fleet.runs_total.to_string()),
+        ("runs after the fit", fleet.runs_after.to_string()),
         ("failed attempts", fleet.failed.to_string()),
         ("retried", fleet.retried.to_string()),
         ("rescued", fleet.rescued.to_string()),

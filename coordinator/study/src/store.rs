@@ -67,6 +67,23 @@ pub struct Store {
     kept: RefCell<KeptStates>,
 }
 
+/// Why a database is not that of a run of this program.
+fn foreign(path: &Path, version: i64, n_table: i64) -> String {
+    let path = path.display();
+    match (version, n_table) {
+        (0, 0) => {
+            format!(
+                "{path} holds nothing: the program was ended while it was made; remove the file and start again"
+            )
+        }
+        (0, _) => format!("{path} is a database of another program: give the folder of a run"),
+        _ => format!(
+            "{path} has store version {version}, this program reads version {SCHEMA_VERSION}: read it with the program that wrote it, or \
+             make the run again"
+        ),
+    }
+}
+
 impl Drop for Store {
     fn drop(&mut self) {
         // A destructor returns no error; what was committed before is kept.
@@ -112,17 +129,10 @@ impl Store {
         let store = Self::connect(path, flags)?;
         let version: i64 =
             store.guard(store.connection.pragma_query_value(None, "user_version", |row| row.get(0)))?;
-        if version == 0 {
-            return Err(StoreError::Unusable(format!(
-                "{} holds nothing: the program was ended while it was made; remove the file and start again",
-                path.display()
-            )));
-        }
         if version != SCHEMA_VERSION {
-            return Err(StoreError::Unusable(format!(
-                "{} has store version {version}, this program reads version {SCHEMA_VERSION}",
-                path.display()
-            )));
+            let n_table = "SELECT count(*) FROM sqlite_master";
+            let n_table: i64 = store.guard(store.connection.query_row(n_table, [], |row| row.get(0)))?;
+            return Err(StoreError::Unusable(foreign(path, version, n_table)));
         }
         Ok(store)
     }

@@ -34,6 +34,7 @@ mod tape;
 mod values;
 
 pub use at::{At, Direction, Slot};
+pub use check::has_meaning;
 pub use def::{EquationsDef, InputDef, Method, OutputDef, SolverDef, StateDef};
 pub use drift::{Drift, DriftFunction, DriftPlace};
 pub use expression::Expression;

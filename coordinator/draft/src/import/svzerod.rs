@@ -31,6 +31,13 @@ pub(super) fn plan(name: &str, text: &str) -> Result<Plan, String> {
     blocks.network.mend(period);
     let mut course = course(&file)?;
     let mut notes = Vec::new();
+    if simulation.use_cycle_to_cycle_error {
+        notes.push(format!(
+            "use_cycle_to_cycle_error: the program goes on for more periods than the {} of the file until they repeat; the study has these, and \
+             starlings simulate --periodic {period} gives what repeats",
+            course.cycles
+        ));
+    }
     let initial = initial::states(&file, &blocks, &mut course, &mut notes)?;
     let Blocks { mut network, mut courses, channels, mut unknowns, activations, .. } = blocks;
     network.notes.extend(notes);

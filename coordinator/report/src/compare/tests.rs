@@ -102,3 +102,14 @@ fn the_page_has_a_figure_per_parameter_and_no_markup_from_a_study() {
     assert!(!read.contains("<script") && read.contains("&lt;script&gt;"));
     assert!(read.contains("not finished") && !read.contains("NaN"));
 }
+
+#[test]
+fn a_run_that_is_not_finished_is_named_where_nothing_can_be_compared() {
+    let [one, mut two] =
+        ["runs/one", "runs/two"].map(|name| run(name, &[estimate("R", 1.0, 0.3)], -10.0, 7.0));
+    (two.compared.finished, two.summary) = (false, None);
+    assert_eq!(
+        comparison(vec![one, two]).verdict(),
+        "Not finished, and so without estimates to compare: two."
+    );
+}

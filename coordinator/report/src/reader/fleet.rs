@@ -59,6 +59,7 @@ pub(super) fn table(store: &Store, summary: Option<&Summary>) -> Result<FleetTab
     Ok(FleetTable {
         workers: workers.into_values().collect(),
         runs_total: counts.total,
+        runs_after: (jobs.len() as u64).saturating_sub(counts.total),
         failed: counts.failed,
         retried: counts.retried,
         rescued: counts.rescued,

@@ -91,6 +91,16 @@ fn an_unfinished_run_counts_what_its_jobs_say() {
 }
 
 #[test]
+fn runs_of_the_fit_and_those_after_it_add_up_to_the_jobs_of_the_workers() {
+    let (_folder, store) = killed();
+    let mut fitted = summary();
+    fitted.runs.total = 3;
+    let fleet = fleet::table(&store, Some(&fitted)).unwrap();
+    let jobs: u64 = fleet.workers.iter().map(|worker| worker.jobs).sum();
+    assert_eq!((fleet.runs_total, fleet.runs_after, fleet.runs_total + fleet.runs_after), (3, 2, jobs));
+}
+
+#[test]
 fn each_analysis_has_the_band_of_the_values_it_used() {
     let (_folder, store) = killed();
     let series = report_data(&store).unwrap().nis.remove(0);

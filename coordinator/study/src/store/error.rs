@@ -8,7 +8,7 @@ use starlings_fleet::StateError;
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
     /// The database refused; the text names the file and the remedy.
-    #[error("cannot write to {path}: {source}{}", remedy(source))]
+    #[error("cannot use {path}: {source}{}", remedy(source))]
     Database {
         /// The database file.
         path: PathBuf,
@@ -64,6 +64,7 @@ fn remedy(source: &rusqlite::Error) -> &'static str {
         Some(rusqlite::ErrorCode::SystemIoFailure) => {
             "; the disk failed or is full: see that it has space and continue with --resume, all but its last moment is kept"
         }
+        Some(rusqlite::ErrorCode::NotADatabase) => ": give the folder of a run",
         Some(rusqlite::ErrorCode::ReadOnly | rusqlite::ErrorCode::CannotOpen) => {
             "; check that the folder exists and may be written"
         }

@@ -33,13 +33,18 @@ pub(super) fn names(def: &EquationsDef) -> Result<(), SetupError> {
     Ok(())
 }
 
+/// Whether a word means something in expressions, so that nothing else can have it as its name.
+pub fn has_meaning(name: &str) -> bool {
+    ["t", "pi"].contains(&name) || parse::FUNCTIONS.contains(&name)
+}
+
 /// The name can stand in an expression; `what` says with its article what it names.
 pub(crate) fn usable(name: &str, what: &str) -> Result<(), SetupError> {
     let mut letters = name.chars();
     let starts = letters.next().is_some_and(|c| c.is_alphabetic() || c == '_');
     let why = if !starts || !letters.all(|c| c.is_alphanumeric() || c == '_') {
         "expected a letter or `_`, then letters, digits and `_`"
-    } else if ["t", "pi"].contains(&name) || parse::FUNCTIONS.contains(&name) {
+    } else if has_meaning(name) {
         "it has a meaning in expressions"
     } else {
         return Ok(());

@@ -63,8 +63,8 @@ pub(super) struct Simulation {
     _absolute_tolerance: Option<Value>,
     #[serde(default, rename = "maximum_nonlinear_iterations")]
     _maximum_nonlinear_iterations: Option<Value>,
-    #[serde(default, rename = "use_cycle_to_cycle_error")]
-    _use_cycle_to_cycle_error: Option<Value>,
+    #[serde(default)]
+    pub(super) use_cycle_to_cycle_error: bool,
     #[serde(default, rename = "sim_cycle_to_cycle_percent_error")]
     _sim_cycle_to_cycle_percent_error: Option<Value>,
     #[serde(default, rename = "rho_infty")]
