@@ -125,16 +125,35 @@ impl Table {
 }
 
 /// Heading and rows of a table whose columns are separated by blanks: both lines that tell it have as many words.
+///
+/// Titles, comments after a `#` and a line of units may stand above the rows, and units in brackets in the heading.
 fn by_blanks(text: &str) -> Option<(Vec<String>, Vec<csv::StringRecord>)> {
-    let mut lines = text.lines().filter(|line| !line.trim().is_empty());
-    let first = lines.next()?.trim().trim_start_matches('#');
-    if first.contains([',', ';', '\t', '"']) {
-        return None;
-    }
-    let heading: Vec<String> = first.split_whitespace().map(str::to_owned).collect();
-    let rows: Vec<csv::StringRecord> = lines.map(|line| line.split_whitespace().collect()).collect();
-    (heading.len() > 1 && rows.first().is_none_or(|row| row.len() == heading.len()))
-        .then_some((heading, rows))
+    let lines: Vec<&str> = text.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+    let is_comment = |line: &str| line.starts_with('#');
+    let is_row =
+        |line: &&str| !is_comment(line) && line.split_whitespace().any(|word| number(word).is_some());
+    let begin = lines.iter().position(is_row).unwrap_or(lines.len());
+    let n = lines.get(begin).map(|row| row.split_whitespace().count());
+    let heading = |line: &str| -> Option<Vec<String>> {
+        let words: Vec<String> = names(line.trim_start_matches('#')).map(str::to_owned).collect();
+        (words.len() > 1 && n.is_none_or(|n| n == words.len())).then_some(words)
+    };
+    // Where no line names the columns without a `#`, the last of the comments does.
+    let (comments, titles): (Vec<&str>, Vec<&str>) = lines[..begin].iter().partition(|line| is_comment(line));
+    let heading =
+        titles.into_iter().find_map(heading).or_else(|| comments.into_iter().rev().find_map(heading))?;
+    let is_apart = |line: &str| !line.contains([',', ';', '\t', '"']);
+    let rows = || lines[begin..].iter().filter(|line| !is_comment(line));
+    (heading.iter().all(|word| is_apart(word)) && rows().next().is_none_or(|row| is_apart(row)))
+        .then(|| (heading, rows().map(|line| line.split_whitespace().collect()).collect()))
+}
+
+/// The words of a heading but for units in brackets of their own.
+fn names(heading: &str) -> impl Iterator<Item = &str> {
+    let is_unit = |word: &&str| {
+        [('[', ']'), ('(', ')')].iter().any(|(open, close)| word.starts_with(*open) && word.ends_with(*close))
+    };
+    heading.split_whitespace().filter(move |word| !is_unit(word))
 }
 
 /// Column `place` (from one) of the rows that hold nothing but numbers and reach that far.
@@ -188,6 +207,15 @@ mod tests {
         assert_eq!(of(text, "tip", 1, &[0.0, 0.5, 1.0]).unwrap(), [0.1, 0.2, 0.3]);
         let says = of(text, "tpi", 1, &[0.0]).unwrap_err();
         assert_eq!(says, "r.csv has no column `tpi`; it has time, tip, load; did you mean `tip`?");
+        // What stands above the heading, a line of units below it and units in it are no names.
+        let text = "# my program 3\n# units s K\nZeit Temp\n0 293.0\n1 294.0\n";
+        assert_eq!(of(text, "Temp", 1, &[0.0, 1.0]).unwrap(), [293.0, 294.0]);
+        let text = "Zeit [s]  Temp [K]\n0 293.0\n1 294.0\n# done\n";
+        assert_eq!(of(text, "Temp", 1, &[0.0, 1.0]).unwrap(), [293.0, 294.0]);
+        let text = "results of a run\ntime tip\ns mm\n0 1\n1 2\n";
+        assert_eq!(of(text, "tip", 1, &[0.5]).unwrap(), [1.5]);
+        let says = of("time tip\n0 ****\n1 2\n", "tip", 1, &[0.5]).unwrap_err();
+        assert!(says.contains("`****`"), "{says}");
         // A heading of two words above one column is one name.
         assert_eq!(of("tip load\n1.5\n2.5\n", "tip load", 1, &[0.0, 1.0]).unwrap(), [1.5, 2.5]);
     }
