@@ -10,6 +10,7 @@ use starlings_coordinator::draft::import::import;
 use crate::console::{line, note};
 use crate::failure::Failure;
 use crate::load;
+use crate::run_folder::quoted;
 
 /// Write a study from a file of another program: a network of svZeroDSolver (JSON) or of openBF (YAML).
 ///
@@ -45,5 +46,6 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         note(text);
     }
     let study = draft.study.display();
-    line(format_args!("{study} was written: `starlings check {study}` says what a run would do"))
+    let word = quoted(&study.to_string());
+    line(format_args!("{study} was written: `starlings check {word}` says what a run would do"))
 }

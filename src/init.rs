@@ -15,6 +15,7 @@ use crate::console::{line, note};
 use crate::failure::Failure;
 use crate::load;
 use crate::plain::Plain;
+use crate::run_folder::quoted;
 use crate::solvers::adapter_names;
 
 /// Write a first version of a study: from a recording, a model, or both. `check` accepts it, and what was guessed says `TODO`.
@@ -99,7 +100,8 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         note(text);
     }
     let study = draft.study.display();
-    line(format_args!("{study} was written: `starlings check {study}` says what a run would do"))
+    let word = quoted(&study.to_string());
+    line(format_args!("{study} was written: `starlings check {word}` says what a run would do"))
 }
 
 impl Args {

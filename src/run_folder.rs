@@ -74,7 +74,7 @@ fn again(mut arguments: impl Iterator<Item = String>) -> String {
 }
 
 /// A word that a shell of POSIX takes as it is.
-fn quoted(word: &str) -> String {
+pub(crate) fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "-_./=:,@%+".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
         word.to_owned()
