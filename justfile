@@ -149,6 +149,11 @@ fmt:
 doc $RUSTDOCFLAGS="-D warnings":
     cargo doc --workspace --no-deps
 
+# What the live page costs a study of short runs, in turns with the same study without it: two minutes on a quiet machine.
+live-bench:
+    cargo build --release
+    python3 benches/live_page.py
+
 # Seconds and memory of `infer` for a long recording, with one worker and with two.
 infer-bench:
     cargo bench -p starlings-sums --bench file_blocks

@@ -1,0 +1,123 @@
+#!/usr/bin/env python3
+"""What the live page costs a study whose runs take some 10 ms: the same study with a page that somebody looks at and without one, in turns.
+
+    python3 benches/live_page.py [--turns N]     the release build, or what STARLINGS names; nothing is asserted
+
+A viewer reads the stream as a browser does. Both workers compute all the time, so that whatever the page takes is missing to them.
+"""
+
+import argparse
+import json
+import os
+import re
+import statistics
+import subprocess
+import tempfile
+import threading
+import time
+import urllib.request
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+
+#: The fast term costs steps of integration and moves nothing.
+STUDY = """
+[study]
+name = "ten-milliseconds"
+[model]
+kind = "equations"
+outputs = [ { name = "y", value = "x" } ]
+[[model.states]]
+name = "x"
+initial = 0.3
+rate = "a + b*t + sin(FAST*t)"
+[[parameters]]
+name = "a"
+prior = { transform = "linear", median = 0.5, sd = 1.0 }
+[[parameters]]
+name = "b"
+prior = { transform = "linear", median = 0.0, sd = 1.0 }
+[[records]]
+name = "r"
+file = "data.csv"
+channels = [ { column = "y", output = "y", noise = 0.1 } ]
+[estimator]
+kind = "roukf"
+passes = 2
+"""
+
+
+class Viewer(threading.Thread):
+    """Reads the stream of a page until it says that the run is over, as the page does."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__(daemon=True)
+        self.page, self.views = page, 0
+
+    def run(self) -> None:
+        try:
+            with urllib.request.urlopen(self.page + "stream") as stream:
+                for line in stream:
+                    if not line.startswith(b"data:"):
+                        continue
+                    self.views += 1
+                    if json.loads(line[len(b"data:") :])["view"]["state"] != "running":
+                        return
+        except OSError:
+            pass
+
+
+def timed(program: str, folder: Path, page: bool) -> tuple[float, int, int]:
+    """Seconds of a run, how many views were read, runs of the model."""
+    out = Path(tempfile.mkdtemp(dir=folder)) / "out"
+    call = [program, "run", "study.toml", "--workers", "2", "--out", str(out), *(["--dashboard"] if page else [])]
+    started = time.perf_counter()
+    run = subprocess.Popen(call, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    viewer = None
+    assert run.stderr is not None
+    for line in run.stderr:
+        if found := re.match(r"live page at (\S+)", line):
+            viewer = Viewer(found[1])
+            viewer.start()
+    if run.wait() != 0:
+        raise SystemExit("the study failed")
+    took = time.perf_counter() - started
+    if viewer:
+        viewer.join(timeout=5)
+    return took, viewer.views if viewer else 0, runs(out)
+
+
+def runs(out: Path) -> int:
+    return int(re.search(r'"total": *(\d+)', (out / "summary.json").read_text())[1])
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--turns", type=int, default=10)
+    turns = parser.parse_args().turns
+    program = os.environ.get("STARLINGS", str(ROOT / "target/release/starlings"))
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        rows = [f"{t / 50},{0.3 + 0.9 * t / 50 - 0.2 * (t / 50) ** 2}" for t in range(200)]
+        (folder / "data.csv").write_text("\n".join(["time,y", *rows]) + "\n")
+        # A run of 10 ms on this machine: by what one takes with a first guess.
+        fast = 150_000.0
+        for _ in range(2):
+            (folder / "study.toml").write_text(STUDY.replace("FAST", f"{fast:.0f}"))
+            took, _, n = timed(program, folder, False)
+            each = 2 * took / n
+            print(f"{1e3 * each:.1f} ms a run, {n} runs")
+            fast *= 0.01 / each
+        pairs = []
+        for turn in range(turns):
+            # Whoever is first changes from turn to turn.
+            order = [False, True] if turn % 2 else [True, False]
+            took = {page: timed(program, folder, page) for page in order}
+            pairs.append(took[True][0] / took[False][0] - 1)
+            print(f"without {took[False][0]:.3f} s, with {took[True][0]:.3f} s and {took[True][1]} views", flush=True)
+        pairs.sort()
+        print(f"cost: {100 * statistics.median(pairs):.1f} % (from {100 * pairs[0]:.1f} to {100 * pairs[-1]:.1f}) in {turns} turns")
+
+
+if __name__ == "__main__":
+    main()
