@@ -48,7 +48,7 @@ passes = 2
 
 
 class Viewer(threading.Thread):
-    """Reads the stream of a page until it says that the run is over, as the page does."""
+    """Reads the stream of a page until it says that the run is over and then the report, as the page does."""
 
     def __init__(self, page: str) -> None:
         super().__init__(daemon=True)
@@ -57,14 +57,17 @@ class Viewer(threading.Thread):
     def run(self) -> None:
         try:
             with urllib.request.urlopen(self.page + "stream") as stream:
-                for line in stream:
-                    if not line.startswith(b"data:"):
-                        continue
-                    self.views += 1
-                    if json.loads(line[len(b"data:") :])["view"]["state"] != "running":
-                        return
+                while self.is_running(stream.readline()):
+                    pass
+            urllib.request.urlopen(self.page + "report").read()
         except OSError:
             pass
+
+    def is_running(self, line: bytes) -> bool:
+        if not line.startswith(b"data:"):
+            return line != b""
+        self.views += 1
+        return json.loads(line[len(b"data:") :])["view"]["state"] == "running"
 
 
 def timed(program: str, folder: Path, page: bool) -> tuple[float, int, int]:
