@@ -19,6 +19,8 @@ import time
 from browser import Browser, Page, until
 
 WIDE, PHONE = (1400, 1000), (420, 900)
+# Widths of windows on laptops, at which tables are looked at too.
+BETWEEN = (1024, 1100, 1200, 1280)
 CONTRAST = 4.5
 # s; a worker is lost when its stream breaks, a page opens when it is loaded.
 LOST, OPEN = 2.0, 2.0
@@ -41,6 +43,10 @@ CONTRASTS = """(() => {
   }
   return worst;
 })()"""
+
+# Tables of which a part is out of sight; those of correlations are as large as they are.
+CUT = """[...document.querySelectorAll(".scroll")].filter((s) => !s.querySelector(".correlation") && s.scrollWidth > s.clientWidth + 1)
+  .map((s) => s.textContent.trim().slice(0, 60))"""
 
 OPEN_ALL = "document.querySelectorAll('details').forEach((d) => { d.open = true; })"
 
@@ -83,15 +89,39 @@ class Looker:
                 over = page.run("document.documentElement.scrollWidth - innerWidth")
                 check(over <= 0, f"{name}, {width}: the page is {over} px wider than the screen")
                 if width == "phone" or name != "many":
-                    cut = page.run("""[...document.querySelectorAll(".scroll")].filter((s) => !s.querySelector(".correlation") && s.scrollWidth > s.clientWidth + 1)
-                        .map((s) => s.textContent.trim().slice(0, 60))""")
-                    check(not cut, f"{name}, {width}: tables are cut off: {cut}")
+                    for between in (wide, *(BETWEEN if (width, scheme) == ("wide", "light") else ())):
+                        page.size(between, high)
+                        cut = page.run(CUT)
+                        check(not cut, f"{name}, {between} px: tables are cut off: {cut}")
+                    page.size(wide, high)
+                if (width, scheme) == ("wide", "light"):
+                    self.touch(name, page)
                 sizes = page.run("[...new Set([...document.querySelectorAll('.plot')].map((p) => getComputedStyle(p).fontSize))]")
                 check(len(sizes) <= 1, f"{name}: text on axes has several sizes: {sizes}")
                 faults = page.faults()
                 check(not faults, f"{name}, {width}, {scheme}: {faults}")
                 page.close()
         print(f"{name}: seen")
+
+    def touch(self, name, page):
+        """The first figure of any page: the pointer and the arrow keys show a value where there are some, a click and the Enter key enlarge it."""
+        page.run("""(() => { const f = [...document.querySelectorAll("figure")].find((f) => f.querySelector(".enlarge") && f.querySelector(".frame"));
+            if (f) { f.classList.add("touched"); f.scrollIntoView({ block: "center" }); } })()""")
+        if not page.run("Boolean(document.querySelector('.touched'))"):
+            return
+        dialog = "Boolean(document.querySelector('dialog[open]'))"
+        for enlarge in (lambda: page.click(".touched .enlarge"), lambda: (page.run("document.querySelector('.touched').focus()"), page.key("Enter"))):
+            enlarge()
+            page.wait(dialog, 5, f"{name}: a figure does not enlarge")
+            page.key("Escape")
+            page.wait(f"!{dialog}", 5, f"{name}: an enlarged figure does not close")
+        if page.run("Boolean(document.querySelector('.touched .readout'))"):
+            page.run("document.querySelector('.touched').focus()")
+            page.key("ArrowRight")
+            page.wait("!document.querySelector('.touched .readout').hidden", 5, f"{name}: the arrow keys show no value")
+            x, y, w, h = page.run("(() => { const r = document.querySelector('.touched .frame').getBoundingClientRect(); return [r.left, r.top, r.width, r.height]; })()")
+            page.move(x + w / 2, y + h / 2)
+            page.wait("document.querySelector('.touched .readout').textContent.trim() !== ''", 5, f"{name}: the pointer shows no value")
 
     def no_script(self, name, url):
         page = Page(self.browser, *WIDE)
@@ -243,10 +273,13 @@ class Looker:
             "diagnose": ("diagnose", "examples/thrust-vector-control/diagnose.toml"),
         }.items():
             folder = self.make(scratch / name, *arguments, "--out", str(scratch / name))
-            self.look(name, (folder / "report.html").as_uri())
+            self.look(name, (folder / "report.html").as_uri(), f"page-{name}")
         other = self.make(scratch / "other", "run", "examples/rcr/study.toml", "--workers", "2", "--out", str(scratch / "other"))
         page = self.make(scratch / "compare.html", "compare", str(run), str(other), "--html", str(scratch / "compare.html"))
-        self.look("compare", page.as_uri())
+        self.look("compare", page.as_uri(), "page-compare")
+        # Long names and units.
+        wide = self.make(scratch / "wide", "run", "examples/toy-fsi-windkessel/study.toml", "--workers", "2", "--out", str(scratch / "wide"))
+        self.look("wide-table", (wide / "report.html").as_uri())
 
     def all(self, scratch):
         run = self.make(scratch / "run", "run", "examples/pig-aorta/study.toml", "--workers", "2", "--out", str(scratch / "run"))
