@@ -5,14 +5,12 @@ Next file to read: build.py, which makes one of arrays and a function.
 
 from __future__ import annotations
 
-import contextlib
 import copy
 import html
 import os
-import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Dict, Iterator, List, Mapping, Optional, Union
+from typing import Any, Dict, List, Mapping, Optional, Union
 
 from .program import StudyError
 
@@ -32,14 +30,19 @@ class Study:
     @classmethod
     def read(cls, file: Union[str, "os.PathLike[str]"]) -> "Study":
         """The study in a TOML file. Raises FileNotFoundError, or StudyError for what is no TOML."""
+        path = Path(file)
+        return cls.of_text(path.read_text(encoding="utf-8"), path)
+
+    @classmethod
+    def of_text(cls, text: str, file: Path) -> "Study":
+        """The study of a text that stood in `file`, from which its paths lead. Raises StudyError for what is no TOML."""
         import tomlkit
         from tomlkit.exceptions import ParseError
 
-        path = Path(file)
         try:
-            return cls(tomlkit.parse(path.read_text(encoding="utf-8")), path)
+            return cls(tomlkit.parse(text), file)
         except ParseError as error:
-            raise StudyError(f"{path}: {error}") from None
+            raise StudyError(f"{file}: {error}") from None
 
     @property
     def name(self) -> str:
@@ -74,25 +77,6 @@ class Study:
         file = path / FILE
         file.write_text(self.text(), encoding="utf-8")
         return file
-
-    @contextlib.contextmanager
-    def beside(self) -> Iterator[Path]:
-        """A file of this study beside the one that it was read from, where its relative paths hold; it is gone afterwards."""
-        assert self.file is not None
-        folder = self.file.resolve().parent
-        try:
-            handle, name = tempfile.mkstemp(".toml", f".{self.file.stem}-", folder)
-        except OSError as error:
-            raise StudyError(
-                f"a changed study is written beside {self.file}, where its paths hold, and {folder} cannot be written to "
-                f"({error.strerror}): copy the folder of the study"
-            ) from None
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                file.write(self.text())
-            yield Path(name)
-        finally:
-            os.unlink(name)
 
     def _repr_html_(self) -> str:
         return f"<pre>{html.escape(self.text())}</pre>"
