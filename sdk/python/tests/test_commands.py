@@ -200,6 +200,15 @@ def test_a_function_that_fails_says_so_with_its_line(tmp_path):
         starlings.run(study, out=tmp_path / "out")
 
 
+def test_a_function_that_ends_the_process_is_a_failure_and_hangs_nothing(tmp_path):
+    def leaves(t, start):
+        sys.exit(3)
+
+    study = starlings.study(leaves, {"t": [0.0, 1.0], "y": [1.0, 2.0]}, {"start": starlings.Prior(1, factor=2)}, noise=0.1)
+    with pytest.raises(starlings.StudyError, match="the model ended the process by sys.exit"):
+        starlings.run(study, out=tmp_path / "out")
+
+
 def test_a_folder_that_is_taken_is_refused(cooled):
     with pytest.raises(starlings.StudyError, match="already"):
         starlings.run(cooled.folder / "study" / "study.toml", out=cooled.folder)
