@@ -6,19 +6,21 @@ tables, merged into it (`Study.changed`). Next files to read: standing.py, progr
 
 from __future__ import annotations
 
+import contextlib
 import os
 import tempfile
 import time
 from pathlib import Path
-from typing import Any, List, Mapping, Optional, Sequence, Union
+from typing import Any, Iterator, List, Mapping, Optional, Sequence, Union
 
 from .answers import Checked, Diagnosis, Explanation, Identification, Inference
 from .forecasts import Place
-from .program import StudyError, call, output
+from .program import RunError, StudyError, call, output
 from .run_folder import Run, read_run
 from .standing import standing
 from .study_file import AnyStudy, Study
 from .tables import read_columns, table
+
 
 def run(
     study: AnyStudy,
@@ -40,11 +42,12 @@ def run(
     address, with what stands in the access file. `options`: further options of `starlings run --help`. `progress`: whether a bar
     is shown; by default where somebody looks.
 
-    Raises StudyError for what is wrong with the study, RunError for what fails.
+    Raises StudyError for what is wrong with the study, RunError for what fails. Ctrl-C raises KeyboardInterrupt, which says where what
+    was computed is and how it goes on.
     """
     folder = _folder(study, out, "")
     words = [*_fleet(workers, listen, access), *options, *(["--resume"] if resume else [])]
-    with standing(study, overrides, folder) as file:
+    with standing(study, overrides, folder) as file, _going_on("run", folder):
         call(["run", str(file), "--out", str(folder), *words], progress)
     found = read_run(folder)
     found.study = Path(os.path.abspath(file))
@@ -77,7 +80,7 @@ def explain(
     words += ["--budget", str(budget)] if budget is not None else []
     words += [word for name in without for word in ("--without", name)]
     words += [word for name in only for word in ("--only", name)]
-    with standing(study, overrides, folder) as file:
+    with standing(study, overrides, folder) as file, _going_on("explain", folder):
         found = call(["explain", str(file), "--out", str(folder), *words], progress)
     return Explanation(found, folder)
 
@@ -169,6 +172,22 @@ def twin(
         return table(read_columns(output(["simulate", str(file), *words, *options], False)))
 
 
+@contextlib.contextmanager
+def _going_on(command: str, folder: Path) -> Iterator[None]:
+    """Says, of what ends before it is done, how it goes on here: the program says how on the command line."""
+    remedy = f"starlings.{command}(..., out={str(folder)!r}, resume=True)"
+    try:
+        yield
+    except KeyboardInterrupt:
+        if not (folder / "run.db").is_file():
+            raise
+        raise KeyboardInterrupt(f"what was computed so far is in {folder}: {remedy} goes on") from None
+    except (RunError, StudyError) as error:
+        if "--resume" in str(error):
+            error.args = (f"{error}\nFrom Python: {remedy}",)
+        raise
+
+
 def _fleet(workers: Optional[int], listen: Optional[str], access: Optional[Place]) -> List[str]:
     given = {"workers": workers, "listen": listen, "access": access}
     return [word for key, value in given.items() if value is not None for word in (f"--{key}", str(value))]
@@ -180,7 +199,14 @@ def _folder(study: AnyStudy, out: Optional[Place], kind: str) -> Path:
         return Path(out)
     name = _name(study)
     stamp = time.strftime("%Y%m%d-%H%M%S", time.gmtime())
-    first = Path("runs") / f"{name}{kind}-{stamp}"
+    runs = Path("runs")
+    try:
+        tempfile.TemporaryFile(dir=runs if runs.is_dir() else ".").close()
+    except OSError as error:
+        raise StudyError(
+            f"results go into {runs} in the current folder, which cannot be written to ({error.strerror}): name another place with out="
+        ) from None
+    first = runs / f"{name}{kind}-{stamp}"
     folder, number = first, 2
     while folder.exists():
         folder, number = first.with_name(f"{first.name}-{number}"), number + 1
