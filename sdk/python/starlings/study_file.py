@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Dict, List, Mapping, Optional, Union
 
+from .plain import plain, without_none
 from .program import StudyError
 
 #: Name of the study file in a folder that `save` makes.
@@ -47,7 +48,8 @@ class Study:
     @property
     def name(self) -> str:
         """Its name."""
-        return str(self.sections.get("study", {}).get("name", "study"))
+        section = self.sections.get("study")
+        return str(section.get("name", "study")) if isinstance(section, Mapping) else "study"
 
     def changed(self, **overrides: Any) -> "Study":
         """The same study with other values: `study.changed(study={"seed": 2}, estimator={"passes": 4})`.
@@ -60,10 +62,12 @@ class Study:
         return Study(sections, self.file, dict(self.files))
 
     def text(self) -> str:
-        """As TOML."""
+        """As TOML. Raises StudyError for values that no study file can have."""
         import tomlkit
 
-        return tomlkit.dumps(self.sections)
+        # What was read from a file keeps its comments.
+        is_read = isinstance(self.sections, tomlkit.TOMLDocument)
+        return tomlkit.dumps(self.sections if is_read else plain(self.sections))
 
     def save(self, folder: Union[str, "os.PathLike[str]"]) -> Path:
         """Writes study.toml and the files that it names into a folder, which is made; its path is returned.
@@ -91,7 +95,7 @@ def as_study(study: AnyStudy, overrides: Mapping[str, Any]) -> Study:
     if isinstance(study, Study):
         found = study
     elif isinstance(study, Mapping):
-        found = Study(copy.deepcopy(dict(study)), Path.cwd() / FILE)
+        found = Study(plain(study), Path.cwd() / FILE)
     else:
         found = Study.read(study)
     return found.changed(**overrides) if overrides else found
@@ -108,7 +112,7 @@ def _merge(into: Any, changes: Mapping[str, Any], place: str) -> None:
         elif isinstance(value, Mapping) and isinstance(there, Mapping):
             _merge(there, value, f"{at}.")
         else:
-            into[key] = copy.deepcopy(value)
+            into[key] = plain(without_none(value), at)
 
 
 def _merge_named(entries: List[Any], changes: Mapping[str, Any], place: str) -> None:
