@@ -8,8 +8,8 @@
     study = starlings.study(cooling, frame, {"start": starlings.Prior(80, factor=2), "rate": starlings.Prior(0.1, factor=3)})
     starlings.run(study)
 
-`run`, `check`, `explain`, `identify`, `infer`, `diagnose` and `twin` take a study: a `Study`, the path of a study file, or its
-sections as tables. A solver with a state of its own, or one that a study file names, is written so:
+`run`, `check`, `explain`, `identify`, `infer`, `diagnose` and `simulate` take a study: a `Study`, the path of a study file, or
+its sections as tables. A solver with a state of its own, or one that a study file names, is written so:
 
     @starlings.solver(parameters={"k": "N/m"}, states={"x": "m", "v": "m/s"}, outputs={"position": "m"},
                       measures={"position": "x"}, dt=0.01)
@@ -20,7 +20,7 @@ sections as tables. A solver with a state of its own, or one that a study file n
     starlings.serve(Spring)
 
 A solver says what it has and does one thing: `rate`, `step` or `run` (`Solver`). `serve` is the last line of its file,
-`simulate` tries it without a study, `Observer` gives it a correction towards data. `read_run` reads results.
+`simulate` tries it without a study too, `Observer` gives it a correction towards data. `read_run` reads results.
 """
 
 from .answers import Checked, Diagnosis, Explanation, Identification, Inference

@@ -7,19 +7,25 @@ from __future__ import annotations
 
 import inspect
 import os
+import re
 import sys
 from pathlib import Path
 from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 from .failures import DeclarationError
 from .pickled import TIMES, WINDOW, arguments, pack
+from .plain import plain
 from .prior import Prior, Priors, entries
+from .quantity import is_name
 from .recording import Recording, by_name, take
 from .solver import Served, Solver
 from .study_file import Study
 
 #: File in which a function or a class travels.
 PACKED = "model.pkl"
+
+#: What names a component of a field in a column of a model that has one.
+_FIELD = re.compile(r"\[\d+\]$")
 
 #: Standard deviation of a measurement: one for all, or by column; "auto" is found from the data.
 Noise = Union[float, str, Mapping[str, Union[float, str]]]
@@ -64,6 +70,7 @@ def study(
         raise DeclarationError("no recordings: give at least one in `data`")
     columns = next(iter(recordings.values())).measured
     ins, outs = _columns_of(model, columns, priors, inputs, outputs)
+    _check_noise(noise, outs)
     labels = dict(units or {})
     table, files = _model(model, priors, {key: labels.get(key, "1") for key in ins}, {key: labels.get(key, "1") for key in outs})
     made: Dict[str, Any] = {
@@ -83,7 +90,7 @@ def study(
     unknown = [key for key in held_out if key not in recordings]
     if unknown:
         raise DeclarationError(f"`held_out` names `{unknown[0]}`; there are {', '.join(recordings)}")
-    return Study(made, None, files).changed(**sections) if sections else Study(made, None, files)
+    return Study(plain(made), None, files).changed(**sections)
 
 
 def _columns_of(
@@ -110,6 +117,7 @@ def _columns_of(
             + (f", outputs are {', '.join(known[1])}" if known else "")
             + "; say which is which with outputs={output: column}"
         )
+    _check_names(outputs, _is_function(model))
     if _is_function(model):
         _check_arguments(model, priors, inputs)
     return dict(inputs), dict(outputs)
@@ -197,6 +205,33 @@ def _record(
     if inputs:
         record["inputs"] = dict(inputs)
     return record
+
+
+def _check_noise(noise: Noise, outputs: Mapping[str, str]) -> None:
+    if not isinstance(noise, Mapping):
+        return
+    known = dict.fromkeys([*outputs, *outputs.values()])
+    stray = [name for name in noise if name not in known]
+    if stray:
+        raise DeclarationError(f"`noise` names `{stray[0]}`, which is no column that is measured; there are {', '.join(known)}")
+
+
+def _check_names(outputs: Mapping[str, str], of_function: bool) -> None:
+    """Refuses names that no output can have: of a function whole ones, of other models those of components of fields too."""
+    odd = [key for key in outputs if not is_name(key if of_function else _FIELD.sub("", key))]
+    if not odd:
+        return
+    rest = "".join(f', "{key}": "{column}"' for key, column in outputs.items() if key not in odd)
+    raise DeclarationError(
+        f"`{odd[0]}` cannot be the name of an output, which is a word of letters, digits and `_`: say which output the column is with "
+        f'outputs={{"{_word(odd[0])}": "{outputs[odd[0]]}"{rest}}}, without the columns that are none'
+    )
+
+
+def _word(column: str) -> str:
+    """A name like a column's: "Temp [°C]" is called temp."""
+    words = re.findall(r"[a-z]\w*", column.lower(), re.ASCII)
+    return words[0] if words and is_name(words[0]) else "y"
 
 
 def _noise_of(noise: Noise, output: str, column: str) -> Union[float, str]:

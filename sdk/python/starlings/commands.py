@@ -1,7 +1,7 @@
 """The commands of the program, for studies in files, tables or memory.
 
 Each takes a study (`starlings.Study`, the path of a study file, or its sections as tables) and overrides: sections of the study as
-tables, merged into it (`Study.changed`). Next file to read: program.py.
+tables, merged into it (`Study.changed`). Next files to read: standing.py, program.py.
 """
 
 from __future__ import annotations
@@ -15,10 +15,12 @@ from typing import Any, Iterator, List, Mapping, Optional, Sequence, Union
 
 from .answers import Checked, Diagnosis, Explanation, Identification, Inference
 from .forecasts import Place
-from .program import StudyError, call, output
+from .program import RunError, StudyError, call, output
 from .run_folder import Run, read_run
-from .study_file import AnyStudy, Study, as_study
+from .standing import standing
+from .study_file import AnyStudy, Study
 from .tables import read_columns, table
+
 
 def run(
     study: AnyStudy,
@@ -35,19 +37,20 @@ def run(
 ) -> Run:
     """Estimates the parameters of a study.
 
-    `out`: the run folder, by default `runs/NAME-TIME`; of a study made here the files stand in `study` inside it. `resume`: goes
+    `out`: the run folder, by default `runs/NAME-TIME`; of a study made or changed here the files stand in `study` inside it. `resume`: goes
     on with what was interrupted there. `workers`: local processes. `listen` and `access`: workers on other machines dial an
     address, with what stands in the access file. `options`: further options of `starlings run --help`. `progress`: whether a bar
     is shown; by default where somebody looks.
 
-    Raises StudyError for what is wrong with the study, RunError for what fails.
+    Raises StudyError for what is wrong with the study, RunError for what fails. Ctrl-C raises KeyboardInterrupt, which says where what
+    was computed is and how it goes on.
     """
     folder = _folder(study, out, "")
     words = [*_fleet(workers, listen, access), *options, *(["--resume"] if resume else [])]
-    with _standing(study, overrides, folder / "study") as file:
+    with standing(study, overrides, folder) as file, _going_on("run", folder):
         call(["run", str(file), "--out", str(folder), *words], progress)
     found = read_run(folder)
-    found.study = _lasting(study, folder)
+    found.study = Path(os.path.abspath(file))
     return found
 
 
@@ -77,7 +80,7 @@ def explain(
     words += ["--budget", str(budget)] if budget is not None else []
     words += [word for name in without for word in ("--without", name)]
     words += [word for name in only for word in ("--only", name)]
-    with _standing(study, overrides, folder / "study") as file:
+    with standing(study, overrides, folder) as file, _going_on("explain", folder):
         found = call(["explain", str(file), "--out", str(folder), *words], progress)
     return Explanation(found, folder)
 
@@ -97,9 +100,9 @@ def infer(
     """Infers drift and noise of stochastic equations from recordings of all states. As `run`."""
     folder = _folder(study, out, "-infer")
     words = [*_fleet(workers, listen, access), *options]
-    with _standing(study, overrides, folder / "study") as file:
+    with standing(study, overrides, folder) as file:
         found = call(["infer", str(file), "--out", str(folder), *words], progress)
-    return Inference(found, folder, _lasting(study, folder))
+    return Inference(found, folder, Path(os.path.abspath(file)))
 
 
 def diagnose(
@@ -117,14 +120,14 @@ def diagnose(
     """Says whether recordings show a fault, since when, which scenario of `[diagnose]` it followed and how severe it is. As `run`."""
     folder = _folder(study, out, "-diagnose")
     words = [*_fleet(workers, listen, access), *options]
-    with _standing(study, overrides, folder / "study") as file:
+    with standing(study, overrides, folder) as file:
         found = call(["diagnose", str(file), "--out", str(folder), *words], progress)
     return Diagnosis(found, folder)
 
 
 def check(study: AnyStudy, /, *, options: Sequence[str] = (), **overrides: Any) -> Checked:
     """Validates a study and makes one trial run of its model. Raises StudyError with every problem that it finds."""
-    with _standing(study, overrides, None) as file:
+    with standing(study, overrides, None) as file:
         return Checked(call(["check", str(file), *options], False))
 
 
@@ -140,7 +143,7 @@ def identify(
 ) -> Identification:
     """Says what these data could determine, before it is estimated; around the prior medians, or the estimate of a run `at`."""
     centre = ["--at", str(at.folder if isinstance(at, Run) else at)] if at is not None else []
-    with _standing(study, overrides, None) as file, tempfile.TemporaryDirectory() as scratch:
+    with standing(study, overrides, None) as file, tempfile.TemporaryDirectory() as scratch:
         page = Path(scratch) / "identify.html"
         words = [*centre, *_fleet(workers, None, None), "--html", str(page), *options]
         found = call(["identify", str(file), *words], progress)
@@ -165,8 +168,24 @@ def twin(
     given = {"noise": noise, "seed": seed, "record": record}
     words = [word for key, value in given.items() if value is not None for word in (f"--{key}", str(value))]
     words += [word for name, value in (values or {}).items() for word in ("--set", f"{name}={float(value)!r}")]
-    with _standing(study, overrides, None) as file:
+    with standing(study, overrides, None) as file:
         return table(read_columns(output(["simulate", str(file), *words, *options], False)))
+
+
+@contextlib.contextmanager
+def _going_on(command: str, folder: Path) -> Iterator[None]:
+    """Says, of what ends before it is done, how it goes on here: the program says how on the command line."""
+    remedy = f"starlings.{command}(..., out={str(folder)!r}, resume=True)"
+    try:
+        yield
+    except KeyboardInterrupt:
+        if not (folder / "run.db").is_file():
+            raise
+        raise KeyboardInterrupt(f"what was computed so far is in {folder}: {remedy} goes on") from None
+    except (RunError, StudyError) as error:
+        if "--resume" in str(error):
+            error.args = (f"{error}\nFrom Python: {remedy}",)
+        raise
 
 
 def _fleet(workers: Optional[int], listen: Optional[str], access: Optional[Place]) -> List[str]:
@@ -180,7 +199,14 @@ def _folder(study: AnyStudy, out: Optional[Place], kind: str) -> Path:
         return Path(out)
     name = _name(study)
     stamp = time.strftime("%Y%m%d-%H%M%S", time.gmtime())
-    first = Path("runs") / f"{name}{kind}-{stamp}"
+    runs = Path("runs")
+    try:
+        tempfile.TemporaryFile(dir=runs if runs.is_dir() else ".").close()
+    except OSError as error:
+        raise StudyError(
+            f"results go into {runs} in the current folder, which cannot be written to ({error.strerror}): name another place with out="
+        ) from None
+    first = runs / f"{name}{kind}-{stamp}"
     folder, number = first, 2
     while folder.exists():
         folder, number = first.with_name(f"{first.name}-{number}"), number + 1
@@ -197,29 +223,3 @@ def _name(study: AnyStudy) -> str:
     except (StudyError, OSError, UnicodeDecodeError):
         # The command says what is wrong with the file.
         return Path(study).stem
-
-
-@contextlib.contextmanager
-def _standing(study: AnyStudy, overrides: Mapping[str, Any], folder: Optional[Path]) -> Iterator[Path]:
-    """The study as a file: where it stands; beside that where it was changed; in `folder`, or one that goes, where it was made here."""
-    if isinstance(study, (str, os.PathLike)) and not overrides:
-        yield Path(study)
-        return
-    found = as_study(study, overrides)
-    if found.file is not None:
-        with found.beside() as file:
-            yield file
-    elif folder is not None:
-        yield found.save(folder)
-    else:
-        with tempfile.TemporaryDirectory() as scratch:
-            yield found.save(scratch)
-
-
-def _lasting(study: AnyStudy, folder: Path) -> Optional[Path]:
-    """Where the files of a study stand after the command."""
-    if isinstance(study, (str, os.PathLike)):
-        return Path(study)
-    if isinstance(study, Study) and study.file is not None:
-        return study.file
-    return folder / "study" / "study.toml" if isinstance(study, Study) else Path.cwd() / "study.toml"

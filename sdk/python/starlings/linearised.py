@@ -36,9 +36,9 @@ class Linearised:
 
 def linearised(run: "Run") -> Dict[str, Linearised]:
     """Every channel with fitted values, by `RECORD:OUTPUT`. Runs the model: an ensemble around the estimate, as `identify` makes it."""
-    with tempfile.TemporaryDirectory() as scratch:
+    with run.as_it_ran() as study, tempfile.TemporaryDirectory() as scratch:
         file = Path(scratch) / "slopes.csv"
-        call(["identify", str(run.study_file()), "--at", str(run.folder), "--csv", str(file)], False)
+        call(["identify", str(study), "--at", str(run.folder), "--csv", str(file)], False)
         slopes = read_columns(file.read_text(encoding="utf-8"))
     rows = run.columns("predictions")
     found = {}

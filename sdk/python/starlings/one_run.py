@@ -64,7 +64,13 @@ def execute(
     except (OSError, MemoryError) as error:  # of the machine, not of the parameters
         show(error, served.solver)
         raise Failed(UNAVAILABLE, told(error, served.solver)) from error
-    except Exception as error:  # whatever a solver raises is data about this run
+    except KeyboardInterrupt:  # of who sits before it
+        raise
+    except SystemExit as error:  # the process serves others too: it goes on
+        show(error, served.solver)
+        what = f"{told(error, served.solver)}: the model ended the process by sys.exit; raise an exception where a run fails"
+        raise Failed(SOLVER, what) from error
+    except BaseException as error:  # whatever a solver raises is data about this run
         show(error, served.solver)
         raise Failed(SOLVER, told(error, served.solver)) from error
     finally:

@@ -18,5 +18,7 @@ def frame(file: Path) -> str:
 
 def of_text(text: str) -> str:
     """The same of its text."""
+    # Without allow-downloads no figure could be saved from a notebook.
+    sandbox = "allow-scripts allow-popups allow-downloads"
     style = f"width:100%;height:{_HEIGHT};border:1px solid #ccc"
-    return f'<iframe srcdoc="{html.escape(text, quote=True)}" style="{style}" sandbox="allow-scripts allow-popups"></iframe>'
+    return f'<iframe srcdoc="{html.escape(text, quote=True)}" style="{style}" sandbox="{sandbox}"></iframe>'

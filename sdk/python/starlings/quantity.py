@@ -62,9 +62,13 @@ def quantities(what: str, declared: Quantities) -> Tuple[Quantity, ...]:
     return tuple(replace(q, size=int(q.size)) for q in found)
 
 
+def is_name(name: object) -> bool:
+    """Whether this can be the name of a quantity."""
+    return isinstance(name, str) and name.replace("-", "_").replace(".", "_").isidentifier() and name not in _RESERVED
+
+
 def _check(what: str, q: Quantity) -> None:
-    named = isinstance(q.name, str) and q.name.replace("-", "_").replace(".", "_").isidentifier()
-    if not named or q.name in _RESERVED:
+    if not is_name(q.name):
         raise DeclarationError(f"{what}: {q.name!r} cannot be a name; take a word of letters, digits and `_`")
     if not isinstance(q.unit, str):
         raise DeclarationError(f"{what}: the unit of `{q.name}` is {q.unit!r}, expected text")

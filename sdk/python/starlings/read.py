@@ -21,6 +21,8 @@ from .values import Array
 #: Seconds of the units in which NetCDF counts time (CF conventions: "hours since 2020-01-01").
 _SECONDS = {"millisecond": 1e-3, "msec": 1e-3, "second": 1.0, "sec": 1.0, "s": 1.0, "minute": 60.0, "min": 60.0, "hour": 3600.0, "hr": 3600.0,
             "h": 3600.0, "day": 86400.0, "d": 86400.0}
+#: Ends of names of files that are no text.
+_BINARY = (".parquet", ".feather", ".arrow", ".nc", ".h5", ".hdf5", ".mat", ".xlsx", ".xls")
 _SINCE = re.compile(r"\s*(?P<unit>[A-Za-z]+?)s?\s+since\s+", re.IGNORECASE)
 
 
@@ -28,15 +30,26 @@ def read(file: Union[str, "os.PathLike[str]"], *, group: Optional[str] = None) -
     """A table of the columns in a file: a pandas.DataFrame where pandas is installed, else arrays by name.
 
     The format is found by the file's first bytes, not by its name: Parquet, Feather (pyarrow); NetCDF 3, MATLAB 5 to 7.2 (scipy); NetCDF 4,
-    HDF5, MATLAB 7.3 (h5py); Excel (pandas, openpyxl); else CSV. Of files with variables of any shape those are taken that are
+    HDF5, MATLAB 7.3 (h5py); Excel (pandas, openpyxl); else CSV, unless it is named as one of these. Of files with variables of any shape those are taken that are
     one-dimensional and as long as the time, or as most of them where none is named time or t. `group` names a group or a struct inside,
     "run1/sensors". Times of NetCDF that count from a date become seconds after the first.
 
-    Raises RecordingError for what is no table, and where a library is missing; FileNotFoundError where there is no file.
+    Raises RecordingError for what is no table or damaged, and where a library is missing; FileNotFoundError where there is no file.
     """
     path = Path(file)
     with open(path, "rb") as opened:
         start = opened.read(128)
+    try:
+        return _of_format(path, start, group)
+    except RecordingError:
+        raise
+    except Exception as error:  # whatever a library raises at what it cannot read
+        said = " ".join(str(error).split())
+        raise RecordingError(f"{path} cannot be read, and may be damaged or cut off: write it again ({said})") from error
+
+
+def _of_format(path: Path, start: bytes, group: Optional[str]) -> Any:
+    """The table of a file that begins so."""
     if start.startswith(b"PAR1"):
         return _frame(_arrow("pyarrow.parquet", path).read_table(path))
     if start.startswith((b"ARROW1", b"FEA1")):
@@ -49,6 +62,8 @@ def read(file: Union[str, "os.PathLike[str]"], *, group: Optional[str] = None) -
         return table(_vectors(_hdf5(path, group), path, None))
     if start.startswith((b"PK\x03\x04", b"\xd0\xcf\x11\xe0")):
         return _need("pandas", path, "a workbook").read_excel(path)
+    if path.suffix.lower() in _BINARY:
+        raise RecordingError(f"{path} does not begin as a {path.suffix} file does, and may be damaged, cut off or of an older kind: write it again")
     if b"\x00" in start:
         raise RecordingError(f"{path} is in no format that is known here: give it as CSV, Parquet, NetCDF or MATLAB")
     return _csv(path)
@@ -77,6 +92,8 @@ def _frame(found: Any) -> Any:
 
 def _csv(path: Path) -> Any:
     text = path.read_text(encoding="utf-8-sig")
+    if not text.strip():
+        raise RecordingError(f"{path} is empty: it holds no table")
     first = text.partition("\n")[0]
     if any(first.count(sign) > first.count(",") for sign in ";\t|"):
         raise RecordingError(

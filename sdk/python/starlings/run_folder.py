@@ -9,17 +9,20 @@ import csv
 import json
 import os
 import sqlite3
+import tempfile
 import urllib.parse
-from contextlib import closing
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Dict, List, Optional, Sequence, Union
+from typing import Any, Dict, Iterator, List, Optional, Sequence, Union
 
 import numpy as np
 
 from . import page, posterior
 from .forecasts import Forecast, Place, forecast
-from .program import output
+from .program import StudyError, output
+from .resolved import resolved
+from .study_file import Study
 from .tables import column, read_columns, table
 from .values import Array
 
@@ -115,12 +118,31 @@ class Run:
 
     def study_file(self) -> Path:
         """The study file of the run: `study` where that is named, else where it was when it was run."""
-        if self.study is not None:
-            return self.study
+        return self.study if self.study is not None else Path(json.loads(self._remembered("info"))["file"])
+
+    @contextmanager
+    def as_it_ran(self) -> Iterator[Path]:
+        """The study as it ran, as a file: where it stands, or, where that was changed since, one that is gone afterwards.
+
+        Raises StudyError where its recordings cannot be found, since the study is not where it was.
+        """
+        place, text = self.study_file(), self._remembered("study")
+        if not place.is_file():
+            raise StudyError(
+                f"the study of {self.folder} stood at {place}, and is not there: set `study` of the run to where it and its recordings are"
+            )
+        if place.read_text(encoding="utf-8") == text:
+            yield place
+            return
+        with tempfile.TemporaryDirectory() as scratch:
+            yield resolved(Study.of_text(text, place)).save(scratch)
+
+    def _remembered(self, key: str) -> str:
+        """What the store of the run has under a key."""
         database = f"file:{urllib.parse.quote(str(self.folder / 'run.db'))}?mode=ro"
         with closing(sqlite3.connect(database, uri=True)) as store:
-            (text,) = store.execute("SELECT value FROM meta WHERE key = 'info'").fetchone()
-        return Path(json.loads(text)["file"])
+            (text,) = store.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
+        return str(text)
 
     def save(
         self, file: Union[str, "os.PathLike[str]"], *, draws: int = 4000, chains: int = 4, seed: int = 0

@@ -62,7 +62,7 @@ def run(
     except OSError as error:
         raise SystemExit(f"this solver cannot be served: {error}") from None
     if os.environ.get(LIFELINE):
-        threading.Thread(target=_wait_for_end, args=(end,), daemon=True).start()
+        threading.Thread(target=_wait_for_end, args=(_own_input(), end), daemon=True).start()
     say(f"starlings-solver ready {reached}\n")
     try:
         server.work()
@@ -100,6 +100,15 @@ def _own_output() -> Callable[[str], None]:
     return say
 
 
+def _own_input() -> int:
+    """Keeps the lifeline for what waits for its end: a solver, and programs that it starts, find an empty standard input."""
+    kept = os.dup(0)
+    empty = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(empty, 0)
+    os.close(empty)
+    return kept
+
+
 def _keep_memory() -> None:
     """Tells the allocator of glibc to keep memory that is freed: a large state would otherwise be mapped anew in every run."""
     try:
@@ -112,9 +121,9 @@ def _keep_memory() -> None:
     mallopt(arenas, 1)
 
 
-def _wait_for_end(end: Callable[[], None]) -> None:
+def _wait_for_end(lifeline: int, end: Callable[[], None]) -> None:
     try:
-        while os.read(0, 65536):
+        while os.read(lifeline, 65536):
             pass
     finally:
         end()

@@ -1,16 +1,23 @@
-"""Runs a solver in this process, without a fleet: for trying it out, for tests, for making data. See `twin` for studies."""
+"""Runs a model forward, without a fleet: for trying it out, for tests, for making data.
+
+A solver runs in this process; what a study says is run by the program. Next file to read: one_run.py, or commands.py.
+"""
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
-from typing import Any, Dict, Mapping, Optional, Sequence, Tuple, Type, Union
+from typing import Any, Dict, Mapping, Optional, Sequence, Tuple, Type, Union, overload
 
 import numpy as np
 
+from .commands import twin
 from .failures import BadRequest
 from .job import Job
 from .one_run import execute
+from .program import StudyError
 from .solver import Served, Solver
+from .study_file import AnyStudy, Study
 from .values import Array, Signal
 
 
@@ -22,6 +29,11 @@ class Simulated:
     state: Array
 
 
+#: Arguments of a run of a solver that a study says itself.
+_OF_SOLVERS = ("times", "start", "state", "initial", "inputs", "observed", "gain", "terms", "constants")
+
+
+@overload
 def simulate(
     solver: Union[Solver, Type[Solver]],
     *,
@@ -36,15 +48,81 @@ def simulate(
     gain: float = 0.0,
     terms: Sequence[Tuple[str, str]] = (),
     constants: Optional[Mapping[str, float]] = None,
-) -> Simulated:
-    """Runs the solver from `start` through `times` exactly as a study would.
+) -> Simulated: ...
 
-    `parameters` by name, those with a default may be left out. `inputs` by name as (times, values). `observed` by output,
-    [n_times] or [n_times][size], NaN where nothing was measured; used by the observer alone. `terms` are pairs of a state and
-    an expression that is added to its rate, with `constants` for the names in it.
 
-    Raises starlings.Failed where the run gives no prediction.
+@overload
+def simulate(
+    solver: AnyStudy,
+    values: Optional[Mapping[str, float]] = None,
+    *,
+    noise: Optional[float] = None,
+    seed: Optional[int] = None,
+    record: Optional[str] = None,
+    options: Sequence[str] = (),
+    **overrides: Any,
+) -> Any: ...
+
+
+def simulate(solver: Any, values: Optional[Mapping[str, float]] = None, **given: Any) -> Any:
+    """Runs a model forward: that of a study, at its times and with its inputs, or a solver in this process.
+
+    simulate(study, {"k": 40.0}, noise=None, seed=None, record=None, options=(), **overrides)
+
+    Of a study (a `Study`, the path of its file, or its sections as tables) it is `twin`: a table of the outputs against time. The
+    values may stand in `parameters={"k": 40.0}` as well; the others have their prior medians.
+
+    simulate(solver, parameters=None, times=..., start=0.0, state=None, initial=None, inputs=None, observed=None, observer="none",
+             gain=0.0, terms=(), constants=None)
+
+    Of a solver it is a run from `start` through `times`, [n_times], exactly as a study would make it: a `Simulated`. `parameters` by name,
+    those with a default may be left out. `inputs` by name as (times, values). `observed` by output, [n_times] or [n_times][size], NaN
+    where nothing was measured; used by the observer alone. `terms` are pairs of a state and an expression that is added to its
+    rate, with `constants` for the names in it.
+
+    Raises starlings.Failed where the run of a solver gives no prediction, as `twin` where that of a study does.
     """
+    if isinstance(solver, (Study, str, os.PathLike, Mapping)):
+        return _of_study(solver, values, given)
+    if values is not None:
+        raise BadRequest("the values of a solver's parameters stand in parameters={name: value}")
+    return _of_solver(solver, **given)
+
+
+def _of_study(study: AnyStudy, values: Optional[Mapping[str, float]], given: Dict[str, Any]) -> Any:
+    stray = next((name for name in _OF_SOLVERS if name in given), None)
+    if stray is not None:
+        raise StudyError(
+            f"`{stray}` is for a solver: a study has times and inputs of its own; options=[\"--until\", \"10\", \"--step\", \"0.1\"] "
+            "gives other times"
+        )
+    # Of the tables of a study a parameter is never a number.
+    parameters = given.get("parameters")
+    if isinstance(parameters, Mapping):
+        numbers = {name: float(value) for name, value in parameters.items() if isinstance(value, (int, float, np.number))}
+        values = {**(values or {}), **numbers}
+        rest = {name: value for name, value in parameters.items() if name not in numbers}
+        given = {key: value for key, value in given.items() if key != "parameters"}
+        if rest:
+            given["parameters"] = rest
+    return twin(study, values, **given)
+
+
+def _of_solver(
+    solver: Union[Solver, Type[Solver]],
+    *,
+    parameters: Optional[Mapping[str, float]] = None,
+    times: Any,
+    start: float = 0.0,
+    state: Any = None,
+    initial: Optional[Mapping[str, float]] = None,
+    inputs: Optional[Mapping[str, Tuple[Any, Any]]] = None,
+    observed: Optional[Mapping[str, Any]] = None,
+    observer: str = "none",
+    gain: float = 0.0,
+    terms: Sequence[Tuple[str, str]] = (),
+    constants: Optional[Mapping[str, float]] = None,
+) -> Simulated:
     served = Served(solver)
     grid = np.asarray(times, dtype=np.float64).reshape(-1)
     names = served.outputs.names()

@@ -5,15 +5,14 @@ Next file to read: build.py, which makes one of arrays and a function.
 
 from __future__ import annotations
 
-import contextlib
 import copy
 import html
 import os
-import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Dict, Iterator, List, Mapping, Optional, Union
+from typing import Any, Dict, List, Mapping, Optional, Union
 
+from .plain import plain, without_none
 from .program import StudyError
 
 #: Name of the study file in a folder that `save` makes.
@@ -32,19 +31,25 @@ class Study:
     @classmethod
     def read(cls, file: Union[str, "os.PathLike[str]"]) -> "Study":
         """The study in a TOML file. Raises FileNotFoundError, or StudyError for what is no TOML."""
+        path = Path(file)
+        return cls.of_text(path.read_text(encoding="utf-8"), path)
+
+    @classmethod
+    def of_text(cls, text: str, file: Path) -> "Study":
+        """The study of a text that stood in `file`, from which its paths lead. Raises StudyError for what is no TOML."""
         import tomlkit
         from tomlkit.exceptions import ParseError
 
-        path = Path(file)
         try:
-            return cls(tomlkit.parse(path.read_text(encoding="utf-8")), path)
+            return cls(tomlkit.parse(text), file)
         except ParseError as error:
-            raise StudyError(f"{path}: {error}") from None
+            raise StudyError(f"{file}: {error}") from None
 
     @property
     def name(self) -> str:
         """Its name."""
-        return str(self.sections.get("study", {}).get("name", "study"))
+        section = self.sections.get("study")
+        return str(section.get("name", "study")) if isinstance(section, Mapping) else "study"
 
     def changed(self, **overrides: Any) -> "Study":
         """The same study with other values: `study.changed(study={"seed": 2}, estimator={"passes": 4})`.
@@ -57,10 +62,12 @@ class Study:
         return Study(sections, self.file, dict(self.files))
 
     def text(self) -> str:
-        """As TOML."""
+        """As TOML. Raises StudyError for values that no study file can have."""
         import tomlkit
 
-        return tomlkit.dumps(self.sections)
+        # What was read from a file keeps its comments.
+        is_read = isinstance(self.sections, tomlkit.TOMLDocument)
+        return tomlkit.dumps(self.sections if is_read else plain(self.sections))
 
     def save(self, folder: Union[str, "os.PathLike[str]"]) -> Path:
         """Writes study.toml and the files that it names into a folder, which is made; its path is returned.
@@ -75,25 +82,6 @@ class Study:
         file.write_text(self.text(), encoding="utf-8")
         return file
 
-    @contextlib.contextmanager
-    def beside(self) -> Iterator[Path]:
-        """A file of this study beside the one that it was read from, where its relative paths hold; it is gone afterwards."""
-        assert self.file is not None
-        folder = self.file.resolve().parent
-        try:
-            handle, name = tempfile.mkstemp(".toml", f".{self.file.stem}-", folder)
-        except OSError as error:
-            raise StudyError(
-                f"a changed study is written beside {self.file}, where its paths hold, and {folder} cannot be written to "
-                f"({error.strerror}): copy the folder of the study"
-            ) from None
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                file.write(self.text())
-            yield Path(name)
-        finally:
-            os.unlink(name)
-
     def _repr_html_(self) -> str:
         return f"<pre>{html.escape(self.text())}</pre>"
 
@@ -107,7 +95,7 @@ def as_study(study: AnyStudy, overrides: Mapping[str, Any]) -> Study:
     if isinstance(study, Study):
         found = study
     elif isinstance(study, Mapping):
-        found = Study(copy.deepcopy(dict(study)), Path.cwd() / FILE)
+        found = Study(plain(study), Path.cwd() / FILE)
     else:
         found = Study.read(study)
     return found.changed(**overrides) if overrides else found
@@ -124,7 +112,7 @@ def _merge(into: Any, changes: Mapping[str, Any], place: str) -> None:
         elif isinstance(value, Mapping) and isinstance(there, Mapping):
             _merge(there, value, f"{at}.")
         else:
-            into[key] = copy.deepcopy(value)
+            into[key] = plain(without_none(value), at)
 
 
 def _merge_named(entries: List[Any], changes: Mapping[str, Any], place: str) -> None:

@@ -119,3 +119,23 @@ def test_what_is_no_table_is_told(tmp_path):
     scipy_io.savemat(tmp_path / "a.mat", {"field": np.zeros((3, 4)), "one": 1.0})
     with pytest.raises(starlings.RecordingError, match="no one-dimensional variable; there are field, one"):
         starlings.read(tmp_path / "a.mat")
+
+
+def test_a_file_that_is_damaged_is_no_table(tmp_path):
+    pyarrow = pytest.importorskip("pyarrow")
+    from pyarrow import parquet
+
+    whole, cut, late, empty = (tmp_path / name for name in ("a.parquet", "b.parquet", "c.parquet", "d.csv"))
+    parquet.write_table(pyarrow.table({"t": T, "y": Y}), whole)
+    cut.write_bytes(whole.read_bytes()[:-40])
+    late.write_bytes(whole.read_bytes()[40:].replace(b"\x00", b" "))
+    empty.write_bytes(b"")
+    with pytest.raises(starlings.RecordingError, match=r"b\.parquet cannot be read, and may be damaged or cut off: write it again \("):
+        starlings.read(cut)
+    with pytest.raises(starlings.RecordingError, match=r"c\.parquet does not begin as a \.parquet file does, and may be damaged"):
+        take(late, "data")
+    with pytest.raises(starlings.RecordingError, match=r"d\.csv is empty"):
+        starlings.read(empty)
+    (tmp_path / "e.parquet").write_bytes(b"")
+    with pytest.raises(starlings.RecordingError, match=r"e\.parquet does not begin"):
+        starlings.read(tmp_path / "e.parquet")

@@ -1,6 +1,7 @@
 """Reading what a run leaves."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -85,3 +86,11 @@ def test_draws_are_saved_as_parquet(folder, tmp_path):
     run = starlings.read_run(folder)
     saved = starlings.read(run.save(tmp_path / "draws.parquet", draws=50, seed=2))
     assert np.array_equal(np.asarray(saved["k"]), np.asarray(run.draws(50, seed=2)["k"]))
+
+
+def test_a_page_in_a_notebook_may_save_its_figures_and_nothing_else(folder):
+    run = starlings.read_run(folder)
+    assert run._repr_html_() == f"<p>{folder / 'report.html'} is not there</p>"
+    run.report.write_text("<p>a figure</p>")
+    (allowed,) = re.findall(r' sandbox="([^"]*)"', run._repr_html_())
+    assert set(allowed.split()) == {"allow-scripts", "allow-popups", "allow-downloads"}

@@ -108,8 +108,12 @@ def test_what_does_not_fit_is_told_in_a_sentence(serve, changes, said):
 
 
 BROKEN = """
+    import sys
     import numpy as np
     import starlings
+
+    class Stop(BaseException):
+        pass
 
     class Broken(starlings.Solver):
         parameters = {"how": ""}
@@ -126,6 +130,12 @@ BROKEN = """
                 return [1.0, 2.0, 3.0]
             if p.how == 4.0:
                 raise starlings.NotFinite("pressure", t)
+            if p.how == 6.0:
+                sys.exit(3)
+            if p.how == 7.0:
+                input("how far? ")
+            if p.how == 8.0:
+                raise Stop("enough")
             return x
         def output(self, t, x, p, u):
             return [np.inf if p.how == 5.0 else 0.0]
@@ -137,7 +147,7 @@ BROKEN = """
 @pytest.mark.parametrize(
     ("how", "kind", "text", "time"),
     [
-        (1.0, pb.Failure.SOLVER, "ZeroDivisionError: division by zero (some_solver.py:13)", None),
+        (1.0, pb.Failure.SOLVER, "ZeroDivisionError: division by zero (some_solver.py:17)", None),
         (2.0, pb.Failure.NOT_FINITE, "state `wall[1]`", 1.0),
         (
             3.0,
@@ -147,6 +157,9 @@ BROKEN = """
         ),
         (4.0, pb.Failure.NOT_FINITE, "pressure", 0.0),
         (5.0, pb.Failure.NOT_FINITE, "output `y`", 1.0),
+        (6.0, pb.Failure.SOLVER, "SystemExit: 3 (some_solver.py:25): the model ended the process by sys.exit; raise", None),
+        (7.0, pb.Failure.SOLVER, "EOFError: EOF when reading a line (some_solver.py:27)", None),
+        (8.0, pb.Failure.SOLVER, "Stop: enough (some_solver.py:29)", None),
     ],
 )
 def test_a_failure_is_told_and_the_next_run_goes_on(serve, how, kind, text, time):
@@ -163,7 +176,7 @@ def test_a_failure_is_told_and_the_next_run_goes_on(serve, how, kind, text, time
     assert failure.kind == kind
     assert failure.text.startswith(text)
     # What was returned wrongly is placed where it was returned; several lines return here, so it is that of the method.
-    assert how != 3.0 or failure.text.endswith("(some_solver.py:10)"), failure.text
+    assert how != 3.0 or failure.text.endswith("(some_solver.py:14)"), failure.text
     assert "\n" not in failure.text
     assert (failure.time if failure.HasField("time") else None) == time
     assert ask(0.0).WhichOneof("kind") == "finished"

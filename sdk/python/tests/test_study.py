@@ -37,6 +37,11 @@ def test_a_function_and_a_table_are_a_study():
     assert made.files["data.csv"].startswith(b"t,power,T\n0.0,1.0,20.0\n")
 
 
+def test_a_column_of_any_name_is_measured_where_its_output_is_named():
+    made = study(data={**TABLE, "Temp [°C]": TABLE["T"]}, outputs={"temp": "Temp [°C]"}, noise={"Temp [°C]": 0.1})
+    assert made.sections["records"][0]["channels"] == [{"column": "Temp [°C]", "output": "temp", "noise": 0.1}]
+
+
 def test_the_function_arrives_whole_and_is_run_as_a_solver():
     solver = unpack(study().files["model.pkl"])
     assert solver.__doc__.startswith("Temperature of a tank")
@@ -79,6 +84,13 @@ def test_what_cannot_be_carried_says_what_to_do():
         ({"outputs": {"T": "temperature"}}, "names the column `temperature`; there are power, T"),
         ({"held_out": ["monday"]}, "`held_out` names `monday`; there are data"),
         ({"model": lambda *all: all}, r"takes `\*all`: name its arguments"),
+        ({"noise": {"Q": 0.3}}, "`noise` names `Q`, which is no column that is measured; there are T$"),
+        ({"noise": {"power": 0.3}}, "`noise` names `power`, which is no column that is measured; there are T$"),
+        (
+            {"data": {**TABLE, "Temp [°C]": TABLE["T"]}},
+            r'`Temp \[°C\]` cannot be the name of an output, .* with outputs=\{"temp": "Temp \[°C\]", "T": "T"\}, without',
+        ),
+        ({"outputs": {"T (K)": "T"}}, r'`T \(K\)` cannot be the name of an output, .* outputs=\{"y": "T"\}'),
         ({"model": 3}, "the model is 3: give a function"),
         ({"data": []}, "no recordings"),
         ({"data": {"a/b": TABLE}}, "holds a slash"),
