@@ -51,6 +51,10 @@ faults:
 chaos:
     STARLINGS_WRITE_PAGES=1 cargo test --test chaos -- --ignored --nocapture
 
+# How well the time left that is told agrees with the truth, on three examples. Minutes, on a quiet machine.
+time-left:
+    cargo test --test time_left -- --ignored --nocapture
+
 # The same cycles through Starlings and through what others use, and the table of docs/fleet.md: a quarter of an hour on a quiet machine.
 peers:
     python3 benches/peers/compare.py --write

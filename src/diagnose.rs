@@ -5,7 +5,6 @@
 mod print;
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use clap::Parser;
 use serde_json::json;
@@ -51,16 +50,11 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let plan = args.fleet.plan(study, Some(&Out(args.out.as_deref())))?;
     let entrance = Entrance::take(&plan, args.out.as_deref())?;
     let folder = folder(study, "diagnose", args.out.as_deref())?;
-    let display = Arc::new(Display::new(args.json));
+    let display = Display::new(args.json);
     let mut session = FleetSession::listen(study, &plan, entrance, RunIdentity::new(), &display)?;
     session.show(study, "diagnose", None, &display)?;
     session.start_workers(study, &plan, Some(&folder))?;
-    let mut watch = |what: &str| {
-        if !args.json {
-            display.say(what);
-        }
-    };
-    let result = diagnose(&diagnosis, &mut session.fleet, &mut watch);
+    let result = diagnose(&diagnosis, &mut session.fleet, &mut |at| display.stage(at));
     display.finish();
     let page = session.close(result.is_ok());
     let found = result.map_err(|error| failed(&error))?;

@@ -6,17 +6,16 @@ mod drift;
 mod print;
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::Instant;
 
 use clap::Parser;
 use starlings_coordinator::explain::{
-    Context, ExplainError, Explanation, Options, Stage, check, explain, load_findings, save_findings,
+    Context, ExplainError, Explanation, Options, check, explain, load_findings, save_findings,
 };
 use starlings_coordinator::report::{self, FilesError};
 use starlings_coordinator::study::store::Purpose;
 use starlings_coordinator::study::trial::trial;
-use starlings_coordinator::study::{RunFolder, Study};
+use starlings_coordinator::study::{RunFolder, Stage, Study};
 
 use crate::console::{line, note};
 use crate::disk;
@@ -113,7 +112,7 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
         note(format_args!("the explanation in {path} is finished already; writing its files again"));
         return write(&folder, args.json);
     }
-    let display = Arc::new(Display::new(args.json));
+    let display = Display::new(args.json);
     let identity = folder.store.begin().map_err(Failure::run)?;
     let mut session = FleetSession::listen(&study, &plan, entrance, identity, &display)?;
     session.show(&study, "explain", Some(&folder.path), &display)?;
@@ -123,7 +122,13 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
         run_folder::give_up(folder, args.resume);
         return Err(failure);
     }
-    let mut watch = |stage: &Stage| display.stage(stage);
+    let mut watch = |stage: &Stage| {
+        display.stage(stage);
+        // Who looks at the folder may miss it; the explanation does not depend on it.
+        if stage.work.next <= 0.0 {
+            let _ = stage.note(&folder.store);
+        }
+    };
     let clock = move || started.elapsed().as_secs_f64();
     let earlier_s = folder.store.elapsed_s().map_err(Failure::run)?;
     let mut context = Context { clock: &clock, watch: &mut watch, events: Some(&session.events), earlier_s };

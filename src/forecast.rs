@@ -5,7 +5,6 @@
 mod source;
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use clap::Parser;
 use starlings_coordinator::fleet::RunIdentity;
@@ -92,12 +91,12 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let ask = ask(args, &source)?;
     source.check(&ask)?;
     let plan = args.fleet.plan(study, None)?;
-    let display = Arc::new(Display::new(args.json));
+    let display = Display::new(args.json);
     let mut session =
         FleetSession::listen(study, &plan, Entrance::take(&plan, None)?, RunIdentity::new(), &display)?;
     session.show(study, "forecast", None, &display)?;
     session.start_workers(study, &plan, None)?;
-    let result = source.forecast(&mut session.fleet, &ask);
+    let result = source.forecast(&mut session.fleet, &ask, &mut |at| display.stage(at));
     display.finish();
     let page = session.close(result.is_ok());
     let found = result?;

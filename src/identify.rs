@@ -1,7 +1,6 @@
 //! `starlings identify`: is the estimation reasonable, before it is made?
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use clap::Parser;
 use starlings_coordinator::fleet::RunIdentity;
@@ -61,7 +60,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         dry_run(&mut study, &BATCH, Depth::First).map_err(Failure::input)?;
     }
     disk::check_states(&study, plan.place().as_deref(), false)?;
-    let display = Arc::new(Display::new(args.json));
+    let display = Display::new(args.json);
     let mut session =
         FleetSession::listen(&study, &plan, Entrance::take(&plan, None)?, RunIdentity::new(), &display)?;
     session.show(&study, "identify", None, &display)?;
@@ -77,7 +76,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
             if records == 1 { "" } else { "s" }
         ));
     }
-    let result = identify(&study, &mut session.fleet, &at);
+    let result = identify(&study, &mut session.fleet, &at, &mut |at| display.stage(at));
     display.finish();
     let page = session.close(result.is_ok());
     let found = result.map_err(|error| match error {

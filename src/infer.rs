@@ -67,7 +67,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if let Some(source) = &args.follow {
         return followed::run(&study, source, args.state.clone());
     }
-    let display = Arc::new(Display::new(args.json));
+    let display = Display::new(args.json);
     let made = make(&study, "infer", (&args.fleet, args.out.as_deref()), &display)?;
     let told = tell(&made.found, &made.folder, args.json);
     finish(made.page, Some(&made.folder.join("report.html")));

@@ -6,8 +6,9 @@ use std::io::IsTerminal;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use clap::ValueEnum;
-use starlings_coordinator::explain::Stage;
 use starlings_coordinator::fleet::FleetEvent;
+use starlings_coordinator::live::Standing;
+use starlings_coordinator::study::Stage;
 use starlings_coordinator::{infer, study};
 use starlings_worker::{News, Tell};
 use tracing_subscriber::filter::LevelFilter;
@@ -64,22 +65,34 @@ pub(crate) fn fleet(run: &str, event: &FleetEvent, said: &str) {
 }
 
 /// One analysis more, with what is `said` of it.
-pub(crate) fn step(at: &study::Progress, said: &str) {
+pub(crate) fn step(at: &study::Progress, Standing { share, left_s, .. }: &Standing, said: &str) {
     let (stage, pass, passes) = (at.stage, at.pass, at.passes);
     let (step, steps, runs, workers) = (at.step, at.steps, at.runs, at.workers);
-    tracing::info!(event = PROGRESS, stage, pass, passes, step, steps, runs, workers, "{said}");
+    tracing::info!(
+        event = PROGRESS,
+        stage,
+        pass,
+        passes,
+        step,
+        steps,
+        runs,
+        workers,
+        share,
+        left_s,
+        "{said}"
+    );
 }
 
-/// An explanation goes on.
-pub(crate) fn stage(at: &Stage, said: &str) {
+/// A command goes on whose work has stages.
+pub(crate) fn stage(at: &Stage, Standing { share, left_s, .. }: &Standing, said: &str) {
     let (stage, runs, workers) = (at.name, at.runs, at.workers);
-    tracing::info!(event = PROGRESS, stage, runs, workers, "{said}");
+    tracing::info!(event = PROGRESS, stage, runs, workers, share, left_s, "{said}");
 }
 
 /// An inference goes on.
-pub(crate) fn blocks(at: &infer::Progress, said: &str) {
-    let (stage, blocks, workers) = ("sums", at.n_block, at.workers);
-    tracing::info!(event = PROGRESS, stage, blocks, workers, "{said}");
+pub(crate) fn blocks(at: &infer::Progress, Standing { share, left_s, .. }: &Standing, said: &str) {
+    let (stage, blocks, workers) = (at.stage, at.n_block, at.workers);
+    tracing::info!(event = PROGRESS, stage, blocks, workers, share, left_s, "{said}");
 }
 
 /// Records the news of a worker, with the run and the connection that it had last; `name` is the end of its name at its coordinators.

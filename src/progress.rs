@@ -1,43 +1,59 @@
 //! Progress: a bar on a terminal, plain lines elsewhere, records with `--log json`, nothing with `--json` alone; the same words on the
 //! live page.
 //!
-//! Next file to read: [`form`], for how each of them looks.
+//! Next file to read: [`told`], for what is said, then [`form`], for how it looks.
 
 mod form;
+mod told;
 
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-use starlings_coordinator::explain::Stage;
 use starlings_coordinator::fleet::FleetEvent;
 use starlings_coordinator::live::{Live, Pace, Standing};
-use starlings_coordinator::study::{Progress, Work};
+use starlings_coordinator::study::{Progress, Stage};
+use starlings_coordinator::{infer, study};
 
-use crate::log;
 use form::Form;
+use told::Told;
+
+/// Time between two looks at the clock while nothing is told.
+const LOOK_EVERY: Duration = Duration::from_secs(1);
 
 /// How far the work was when it was last told of.
 #[derive(Default)]
 struct Known {
     pace: Pace,
-    work: Work,
-    /// What was said then.
-    standing: Standing,
+    /// What was told then; nothing before the work begins and after it ends.
+    told: Option<Told>,
+    /// Work that was done by then.
+    done: f64,
 }
 
 /// Shows where a command stands.
 pub(crate) struct Display {
     began: Instant,
     form: Form,
-    pace: Mutex<Known>,
+    known: Mutex<Known>,
     /// The live page, where there is one.
     live: OnceLock<Live>,
 }
 
 impl Display {
     /// Records with `--log json`; nothing when `silent`; a bar if standard error is a terminal, lines otherwise.
-    pub(crate) fn new(silent: bool) -> Self {
-        Self { began: Instant::now(), form: Form::new(silent), pace: Mutex::default(), live: OnceLock::new() }
+    pub(crate) fn new(silent: bool) -> Arc<Self> {
+        let (form, known, live) = (Form::new(silent), Mutex::default(), OnceLock::new());
+        let display = Arc::new(Self { began: Instant::now(), form, known, live });
+        let shown = Arc::downgrade(&display);
+        // Without it a long stage that tells nothing shows no time; nothing else depends on it.
+        let _ = std::thread::Builder::new().name("progress".to_owned()).spawn(move || {
+            while let Some(display) = shown.upgrade() {
+                display.look();
+                drop(display);
+                std::thread::sleep(LOOK_EVERY);
+            }
+        });
+        display
     }
 
     /// Seconds since it began.
@@ -62,73 +78,59 @@ impl Display {
         }
     }
 
-    /// So much of the batch is done of which the last step told.
+    /// So much of the batch is done of which was told last.
     fn batch(&self, share: f64) {
-        let mut known = lock(&self.pace);
-        if known.work.total > 0.0 && share < 1.0 {
-            let work = known.work;
-            let standing = known.at(self.began.elapsed().as_secs_f64(), work.done + share * work.next);
-            drop(known);
-            self.form.batch(&standing);
-            if let Some(live) = self.live.get() {
-                live.stands(standing);
-            }
+        let mut known = self.known();
+        let next = known.told.as_ref().map(Told::work).filter(|work| work.next > 0.0 && share < 1.0);
+        if let Some(work) = next {
+            known.done = known.done.max(work.done + share * work.next);
+            self.show(known, false);
         }
+    }
+
+    /// Time passes.
+    fn look(&self) {
+        self.show(self.known(), false);
     }
 
     /// One analysis more.
-    pub(crate) fn step(&self, p: &Progress) {
-        let stage = match p.passes {
-            None => format!("pass {}", p.pass),
-            Some(passes) if passes > 1 => format!("pass {}/{passes}", p.pass),
-            Some(_) => p.stage.to_owned(),
-        };
-        let (stage, says) = if p.is_analysis() {
-            (stage, format!("{} of {} analyses", p.step, p.steps))
-        } else {
-            (p.stage.to_owned(), format!("{} of {} ensembles after the fit", p.step, p.steps))
-        };
-        let (runs, workers) = (p.runs, p.workers);
-        let mut known = lock(&self.pace);
-        known.work = p.work;
-        known.standing = Standing { stage, says, share: None, left_s: None, runs, workers };
-        let standing = known.at(self.began.elapsed().as_secs_f64(), p.work.done);
-        drop(known);
-        self.form.step(&standing, p);
-        if let Some(live) = self.live.get() {
-            live.stands(standing);
-        }
+    pub(crate) fn step(&self, at: &Progress) {
+        let is_edge = at.step == 1 || at.step == at.steps;
+        self.tell(Told::Step(at.clone()), |_| is_edge);
     }
 
-    /// An explanation goes on: each stage is told once, and where it stands now and then.
-    pub(crate) fn stage(&self, stage: &Stage) {
-        let standing = Standing {
-            stage: stage.name.to_owned(),
-            says: stage.says.clone(),
-            share: None,
-            left_s: None,
-            runs: stage.runs,
-            workers: stage.workers,
-        };
-        self.form.stage(&standing, |said| log::stage(stage, said));
-        if let Some(live) = self.live.get() {
-            live.stage(standing);
-        }
+    /// A command goes on whose work has stages: each is told once, and where it stands now and then.
+    pub(crate) fn stage(&self, at: &Stage) {
+        self.tell(Told::Stage(at.clone()), |before| before.is_none_or(|before| before.is_another(at)));
     }
 
     /// An inference goes on.
-    pub(crate) fn blocks(&self, at: &starlings_coordinator::infer::Progress) {
-        let standing = Standing {
-            stage: "sums".to_owned(),
-            says: format!("{} blocks, {} steps", at.n_block, at.n_step),
-            share: None,
-            left_s: None,
-            runs: at.n_block,
-            workers: at.workers,
-        };
-        self.form.blocks(&standing, at);
-        if let Some(live) = self.live.get() {
-            live.stands(standing);
+    pub(crate) fn blocks(&self, at: &infer::Progress) {
+        let is_first = |before: Option<&Told>| before.is_none_or(|before| before.stage() != at.stage);
+        self.tell(Told::Blocks(at.clone()), is_first);
+    }
+
+    fn tell(&self, told: Told, is_edge: impl FnOnce(Option<&Told>) -> bool) {
+        let mut known = self.known();
+        let is_edge = is_edge(known.told.as_ref());
+        let told = told.after(known.told.take());
+        let study::Work { done, .. } = told.work();
+        (known.done, known.told) = (done, Some(told));
+        self.show(known, is_edge);
+    }
+
+    /// Shows what is known now; at once at an edge of a stage.
+    fn show(&self, mut known: MutexGuard<'_, Known>, is_edge: bool) {
+        let Some(standing) = known.at(self.began.elapsed().as_secs_f64()) else { return };
+        if let Some(told) = &known.told {
+            self.form.show(&standing, is_edge, |said| told.record(&standing, said));
+        }
+        let has_stages = matches!(known.told, Some(Told::Stage(_) | Told::Blocks(_)));
+        drop(known);
+        match self.live.get() {
+            Some(live) if has_stages => live.stage(standing),
+            Some(live) => live.stands(standing),
+            None => {}
         }
     }
 
@@ -139,20 +141,22 @@ impl Display {
 
     /// Clears the bar.
     pub(crate) fn finish(&self) {
+        self.known().told = None;
         self.form.finish();
+    }
+
+    fn known(&self) -> MutexGuard<'_, Known> {
+        self.known.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Known {
-    /// Where the work stands with so much of it done at this time, s.
-    fn at(&mut self, now_s: f64, done: f64) -> Standing {
-        let total = self.work.total;
-        let left_s = self.pace.left(now_s, done, total);
-        let share = (total > 0.0).then(|| (done / total).clamp(0.0, 1.0));
-        Standing { share, left_s, ..self.standing.clone() }
+    /// Where the work stands at this time, s.
+    fn at(&mut self, now_s: f64) -> Option<Standing> {
+        let told = self.told.as_ref()?;
+        let total = told.work().total;
+        let left_s = self.pace.left(now_s, self.done, total);
+        let share = (total > 0.0).then(|| (self.done / total).clamp(0.0, 1.0));
+        Some(Standing { share, left_s, ..told.in_words() })
     }
-}
-
-fn lock(known: &Mutex<Known>) -> MutexGuard<'_, Known> {
-    known.lock().unwrap_or_else(PoisonError::into_inner)
 }

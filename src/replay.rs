@@ -3,7 +3,6 @@
 //! Next file to read: [`again`].
 
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use clap::Parser;
 use starlings_coordinator::fleet::RunIdentity;
@@ -84,7 +83,7 @@ fn on_fleet(args: &Args, study: &mut Study, folder: &RunFolder, target: &Target)
         dry_run(study, kind, Depth::First).map_err(Failure::input)?;
     }
     disk::check_states(study, plan.place().as_deref(), false)?;
-    let display = Arc::new(Display::new(args.json));
+    let display = Display::new(args.json);
     let entrance = Entrance::take(&plan, None)?;
     let mut session = FleetSession::listen(study, &plan, entrance, RunIdentity::new(), &display)?;
     session.show(study, "replay", None, &display)?;

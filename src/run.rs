@@ -1,7 +1,6 @@
 //! `starlings run`: a study, a fleet, a run folder.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::Instant;
 
 use clap::Parser;
@@ -71,7 +70,7 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
         report::write_files(&folder).map_err(Failure::run)?;
         return print(&summary, &folder.path, args.json);
     }
-    let display = Arc::new(Display::new(args.json));
+    let display = Display::new(args.json);
     let moved = run_folder::moved(&folder, place.as_deref())?.unwrap_or_default();
     let identity = folder.store.begin().map_err(Failure::run)?;
     let mut session = FleetSession::listen(&study, &plan, entrance, identity, &display)?;

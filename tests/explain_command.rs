@@ -98,8 +98,12 @@ fn a_missing_pressure_drop_is_named_added_and_shown() {
     let (code, stdout, stderr) = output(&mut explain(&study, &out));
     assert_eq!(code, 0, "{stderr}");
     for stage in ["fit", "locate", "screen", "refit", "gates", "verdict", "add", "show"] {
-        assert!(stderr.lines().any(|l| l.starts_with(stage)), "no stage `{stage}` in {stderr}");
+        // One progress over all of them.
+        let says = |l: &str| l.starts_with(stage) && l.contains(" runs, ") && l.contains(" %");
+        assert!(stderr.lines().any(says), "no stage `{stage}` in {stderr}");
     }
+    let (_, seen, _) = output(starlings().arg("watch").arg(&out).arg("--json"));
+    assert_eq!(json(seen.as_bytes())["standing"]["share"], 1.0, "the folder tells it too: {seen}");
     let found = json(&bytes(&out, "explain.json"));
     let verdict = found["verdict"].as_str().unwrap();
     assert!(verdict == "named" || verdict == "tie", "{found:#}");

@@ -109,8 +109,8 @@ fn trials_twins_and_sensitivities_run_the_solver_too() {
     assert_eq!(trial(&outside).unwrap(), trial(&study).unwrap());
     let twin = Twin { noise: 0.1, seed: 4, ..Twin::default() };
     assert_eq!(simulate(&outside, &twin).unwrap(), simulate(&study, &twin).unwrap());
-    let found = identify(&outside, &mut threads(&inside), &At::Prior).unwrap();
-    let want = identify(&study, &mut InProcess::new(1), &At::Prior).unwrap();
+    let found = identify(&outside, &mut threads(&inside), &At::Prior, &mut |_| {}).unwrap();
+    let want = identify(&study, &mut InProcess::new(1), &At::Prior, &mut |_| {}).unwrap();
     assert_eq!(found.rows.len(), want.rows.len());
     // The arithmetic is the same; 1e-9 is room for the order of sums.
     let worst = found

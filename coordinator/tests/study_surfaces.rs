@@ -57,7 +57,7 @@ fn identify_and_trial_see_distances_and_not_displacements() {
     let rms = shown.iter().map(|c| c.rmse).fold(0.0, f64::max);
     // At the prior median of 5 instead of 3.5 million the wall is displaced by less, not by nothing.
     assert!((0.01..0.1).contains(&rms) && shown.iter().all(|c| c.n_obs == 41), "{rms}");
-    let of = |study: &Study| identify(study, &mut InProcess::new(2), &At::Prior).unwrap();
+    let of = |study: &Study| identify(study, &mut InProcess::new(2), &At::Prior, &mut |_| {}).unwrap();
     let plain = Case::new(&self::study(COLUMN), &[("flow.csv", columns(0.0))]).study();
     let (surface, column) = (of(&study), of(&plain));
     let norm = |i: &starlings_coordinator::study::identify::Identification| i.parameters[0].sensitivity_norm;

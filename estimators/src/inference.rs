@@ -8,6 +8,7 @@
 
 mod basis;
 mod change;
+mod coarse;
 mod decimation;
 mod detector;
 mod diffusion;
@@ -40,6 +41,7 @@ mod window;
 
 pub use basis::{Basis, Rule};
 pub use change::{Change, compare};
+pub use coarse::{StepError, step_errors, step_in_rates};
 pub use decimation::{Decimation, Extrapolated, Strength, extrapolate};
 pub use detector::{Detector, DetectorState, Following, Report};
 pub use diffusion::Diffusion;
@@ -50,7 +52,7 @@ pub use fit::Fit;
 pub use function::Function;
 pub use functions::{Columns, Functions, Samples};
 pub use missing::{Candidate, Missing, Named, Score, Search, joint, missing_terms};
-pub use noise_check::{MATTERS, NoiseCheck, Verdict, noise_checks};
+pub use noise_check::{MATTERS, NoiseCheck, Scatter, Verdict, noise_checks, scatter};
 pub use polynomial::Polynomial;
 pub use posterior::{Estimate, Posterior, Value};
 pub use prior::Prior;

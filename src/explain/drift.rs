@@ -4,7 +4,6 @@
 //! term in it. Next file to read: [`crate::infer`].
 
 use std::path::Path;
-use std::sync::Arc;
 
 use starlings_coordinator::explain::{DriftTerm, explained_drift};
 use starlings_coordinator::infer::explained::{DriftExplanation, explained};
@@ -30,7 +29,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
             args.study.display()
         )));
     }
-    let display = Arc::new(Display::new(args.json));
+    let display = Display::new(args.json);
     let made = make(&study, "explain", (&args.fleet, args.out.as_deref()), &display)?;
     let told = tell(&study, &made, args.json);
     finish(made.page, Some(&made.folder.join("report.html")));

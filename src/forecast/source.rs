@@ -6,7 +6,7 @@ use starlings_coordinator::fleet::Fleet;
 use starlings_coordinator::infer::forecast::known::Known;
 use starlings_coordinator::infer::{InferError, Inference, forecast as of_inference};
 use starlings_coordinator::study::forecast::{Ask, Forecast, StudyForecastError, forecast as of_run};
-use starlings_coordinator::study::{RunFolder, Study};
+use starlings_coordinator::study::{RunFolder, Stage, Study};
 
 use super::Args;
 use crate::failure::Failure;
@@ -80,16 +80,21 @@ impl Source {
         }
     }
 
-    pub(super) fn forecast(&self, fleet: &mut dyn Fleet, ask: &Ask) -> Result<Forecast, Failure> {
+    pub(super) fn forecast(
+        &self,
+        fleet: &mut dyn Fleet,
+        ask: &Ask,
+        watch: &mut dyn FnMut(&Stage),
+    ) -> Result<Forecast, Failure> {
         let study = &self.study;
         match &self.known {
-            Posterior::Run(folder) => of_run(study, folder, fleet, ask).map_err(|error| match error {
+            Posterior::Run(folder) => of_run(study, folder, fleet, ask, watch).map_err(|error| match error {
                 StudyForecastError::Run(cause) if cause.is_cancelled() => cancelled(),
                 error if error.is_input() => Failure::input(error),
                 error => Failure::run(error),
             }),
             Posterior::Inference(known) => {
-                of_inference::forecast(study, known, fleet, ask).map_err(|error| failed(&error))
+                of_inference::forecast(study, known, fleet, ask, watch).map_err(|error| failed(&error))
             }
         }
     }

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`error`] | why there is no diagnosis |
 //! | `runs` | what was measured, and runs of several models over it on the fleet |
+//! | `foreseen` | how many runs there will be |
 //! | `hypothesis` | a model with its fit: the one without a fault, or a scenario |
 //! | `search` | where the fit of a scenario with a grid of starts begins |
 //! | `alarm` | whether the recording departs from the model without a fault, at the stated rate of false alarms |
@@ -15,6 +16,7 @@
 
 mod alarm;
 pub mod error;
+mod foreseen;
 mod hypothesis;
 pub mod result;
 pub mod run;

@@ -4,10 +4,12 @@
 
 use starlings_estimators::scenarios::probabilities;
 use starlings_fleet::Fleet;
+use starlings_study::Stage;
 use starlings_study::diagnosis::Diagnosis;
 
 use crate::alarm::{Series, alarm};
 use crate::error::DiagnoseError;
+use crate::foreseen::Foreseen;
 use crate::hypothesis::{Hypothesis, drive};
 use crate::result::{
     AlarmFound, CourseFound, Diagnosed, HealthyFound, LISTED, NAMED, ScenarioFound, Verdict,
@@ -21,21 +23,21 @@ const COURSES: usize = 6;
 /// Values of a course that are kept at most.
 const KEPT: usize = 1000;
 
-/// Diagnoses a study that was read for it.
+/// Diagnoses a study that was read for it. `watch` hears of every part as it begins, and before and after every batch of runs.
 ///
 /// # Errors
 /// When the fleet fails, or the model without a fault or every scenario cannot be run.
 pub fn diagnose(
     of: &Diagnosis,
     fleet: &mut dyn Fleet,
-    watch: &mut dyn FnMut(&str),
+    watch: &mut dyn FnMut(&Stage),
 ) -> Result<Diagnosed, DiagnoseError> {
-    let mut runs = Runs::new(fleet, rows(&of.healthy));
+    let mut runs = Runs::new(fleet, rows(&of.healthy), Foreseen::new(of), watch);
     if runs.rows.is_empty() {
         return Err(DiagnoseError::NoValues);
     }
     let healthy_model = Runnable::new(&of.healthy);
-    watch("the model without a fault");
+    runs.begin(0, "fit", "the model without a fault".to_owned());
     let mut healthy = [Hypothesis::at_prior(&healthy_model)];
     drive(&mut runs, &mut healthy)?;
     let [healthy] = healthy;
@@ -43,7 +45,7 @@ pub fn diagnose(
         return Err(DiagnoseError::Healthy(reason.clone()));
     }
     let models: Vec<Runnable> = of.scenarios.iter().map(|s| Runnable::new(&s.study)).collect();
-    let fits = library(of, &mut runs, &healthy, &models, watch)?;
+    let fits = library(of, &mut runs, &healthy, &models)?;
     judged(of, &runs, &healthy, &fits)
 }
 
@@ -53,18 +55,17 @@ fn library<'m>(
     runs: &mut Runs<'_>,
     healthy: &Hypothesis<'_>,
     models: &'m [Runnable],
-    watch: &mut dyn FnMut(&str),
 ) -> Result<Vec<Hypothesis<'m>>, DiagnoseError> {
     let mut fits = Vec::new();
     let mut of_scenario = Vec::new();
     for (k, (scenario, model)) in of.scenarios.iter().zip(models).enumerate() {
-        watch(&format!("scenario `{}`", scenario.name));
+        runs.begin(1 + k, "search", format!("scenario `{}`", scenario.name));
         for start in starts(runs, healthy, (scenario, model), of.severity())? {
             fits.push(Hypothesis::new(model, start));
             of_scenario.push(k);
         }
     }
-    watch("fits of all scenarios");
+    runs.begin(1 + models.len(), "fits", "all scenarios".to_owned());
     drive(runs, &mut fits)?;
     let mut best: Vec<Option<Hypothesis<'m>>> = vec![None; models.len()];
     for (k, fit) in of_scenario.into_iter().zip(fits) {

@@ -8,9 +8,10 @@ use std::sync::Arc;
 use nalgebra::DVector;
 use starlings_fleet::{Fleet, Held};
 use starlings_models::{Job, Window};
-use starlings_study::Study;
+use starlings_study::{Stage, Study};
 
 use crate::error::{DiagnoseError, no_answer};
+use crate::foreseen::Foreseen;
 
 /// Runs of one batch at most: what comes back of them is held together.
 const BATCH: usize = 512;
@@ -94,11 +95,33 @@ pub(crate) struct Runs<'a> {
     pub(crate) rows: Vec<Row>,
     /// Runs so far.
     pub(crate) n_run: u64,
+    watch: &'a mut dyn FnMut(&Stage),
+    foreseen: Foreseen,
+    /// What is being done, in a word and in a few.
+    stage: (&'static str, String),
 }
 
 impl<'a> Runs<'a> {
-    pub(crate) fn new(fleet: &'a mut dyn Fleet, rows: Vec<Row>) -> Self {
-        Self { fleet, rows, n_run: 0 }
+    pub(crate) fn new(
+        fleet: &'a mut dyn Fleet,
+        rows: Vec<Row>,
+        foreseen: Foreseen,
+        watch: &'a mut dyn FnMut(&Stage),
+    ) -> Self {
+        Self { fleet, rows, n_run: 0, watch, foreseen, stage: ("", String::new()) }
+    }
+
+    /// A part of the diagnosis begins.
+    pub(crate) fn begin(&mut self, part: usize, name: &'static str, says: String) {
+        self.foreseen.begin(part, self.n_run);
+        self.stage = (name, says);
+        self.tell(0);
+    }
+
+    fn tell(&mut self, next: usize) {
+        let (name, says) = self.stage.clone();
+        let work = self.foreseen.work(self.n_run, next);
+        (self.watch)(&Stage { name, says, runs: self.n_run, workers: self.fleet.n_workers(), work });
     }
 
     /// The predictions of points (transformed parameters) of models, in their order.
@@ -127,8 +150,10 @@ impl<'a> Runs<'a> {
                 jobs.push((setup, Job::<Held> { particle, record, window, theta, state: None }));
             }
         }
+        self.tell(jobs.len());
         self.n_run += jobs.len() as u64;
         let mut outcomes = self.fleet.run_held(jobs)?.into_iter();
+        self.tell(0);
         let mut answers = Vec::with_capacity(points.len());
         for (particle, (of, _)) in points.iter().enumerate() {
             let mut outputs: Vec<Vec<f64>> = vec![Vec::new(); of.study.records.len()];

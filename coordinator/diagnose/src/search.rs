@@ -13,7 +13,7 @@ use crate::hypothesis::{Hypothesis, theta};
 use crate::runs::{Runnable, Runs};
 
 /// Points of a grid that are refined.
-const REFINED: usize = 3;
+pub(crate) const REFINED: usize = 3;
 /// Points that are run and held at a time.
 const PORTION: usize = 256;
 /// Largest factor on the severity of a start, and smallest as its inverse.

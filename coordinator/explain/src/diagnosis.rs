@@ -22,11 +22,12 @@ use crate::judge::search_result::SearchResult;
 use crate::judge::verdict::{Decision, Verdict, decide, limits};
 use crate::locate::{self, Track, UnknownInput};
 use crate::options::Options;
-use crate::refit::search::{search, search_further};
+use crate::refit::search::{first_kinds, search, search_further};
 use crate::run_cache::{Point, RunCache};
+use crate::screen::candidates::candidates;
 use crate::screen::proposals::{self, Proposals};
 use crate::screen::residual_timing::{change_points, periods};
-use crate::screen::resolve::resolved_candidates;
+use crate::screen::resolve::{kinded, resolved_candidates};
 use crate::tell::words;
 
 /// Searches at most, each in units of the noise that the last one showed.
@@ -54,6 +55,10 @@ pub(super) fn diagnose<R>(
     then: impl FnOnce(&mut RunCache<'_>, Diagnosis<'_, '_>) -> Result<R, ExplainError>,
 ) -> Result<R, ExplainError> {
     let mut start = None;
+    if let Ok(known) = candidates(study, options) {
+        let of: Vec<Candidate> = known.into_iter().map(|def| kinded(study, def)).collect();
+        foresee(cache, &of, options);
+    }
     for round in 1.. {
         let base = fit_as_it_is(cache, study, start, options)?;
         start = Some(base.z().clone());
@@ -62,6 +67,7 @@ pub(super) fn diagnose<R>(
         let (periods, change_points) =
             (periods(&cache.rows, &base.predicted), change_points(&cache.rows, &base.predicted));
         let candidates = resolved_candidates(study, &tracks, &periods, &change_points, options)?;
+        foresee(cache, &candidates, options);
         let proposed = OnceCell::new();
         let mut found = search(cache, base, &candidates, &tracks, options)?;
         cache.stage("verdict", "");
@@ -88,6 +94,12 @@ pub(super) fn diagnose<R>(
         cache.rows.noise = noise.unwrap_or_default();
     }
     unreachable!("the last round returns")
+}
+
+/// How much there is to screen first.
+fn foresee(cache: &mut RunCache<'_>, candidates: &[Candidate], options: &Options) {
+    let tried = || candidates.iter().filter(|c| first_kinds(options).contains(&c.kind));
+    cache.foreseen.candidates(tried().count(), tried().map(|c| c.points.len()).sum());
 }
 
 /// Decides, and goes on with generic terms and then with proposals while nothing explains the gap. `proposed` takes the candidates with the

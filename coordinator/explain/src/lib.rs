@@ -40,7 +40,7 @@ pub use fit::kind::Kind;
 pub use judge::held_out::HeldOut;
 pub use judge::probability::{Probabilities, ProbableSet};
 pub use judge::verdict::Verdict;
-pub use options::{Context, Options, Stage};
+pub use options::{Context, Options};
 pub use rows::Rows;
 pub use run::explain;
 pub use run_cache::{Point, RunCache};

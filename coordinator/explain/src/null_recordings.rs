@@ -10,26 +10,26 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use starlings_fleet::Fleet;
-use starlings_study::Study;
 use starlings_study::store::Store;
+use starlings_study::{Stage, Study, Work};
 
 use crate::diagnosis::diagnose;
 use crate::error::ExplainError;
 use crate::judge::verdict::Verdict;
-use crate::options::{Context, Options, Stage};
+use crate::options::{Context, Options};
 use crate::rows::Rows;
-use crate::run_cache::RunCache;
+use crate::run_cache::{Foreseen, RunCache};
 use crate::tell::result::Nulls;
 use crate::tell::summary;
 
 /// Searches `options.nulls` simulated recordings. `fitted` is what the fitted model as it is predicts, by row, and the rows with their
-/// noise.
+/// noise; `before` the runs of the search so far.
 ///
 /// # Errors
 /// When the fleet or the store fails. A simulated recording whose fit does not converge counts as one without a name.
 pub(super) fn measure(
     study: &Study,
-    fitted: &(Arc<Vec<f64>>, Rows),
+    (fitted, before): (&(Arc<Vec<f64>>, Rows), u64),
     fleet: &mut dyn Fleet,
     store: &Store,
     context: &mut Context<'_>,
@@ -39,9 +39,12 @@ pub(super) fn measure(
     let options = Options { force: true, ..options.clone() };
     for k in 0..nulls.of {
         let simulated = simulated(study, fitted, &mut random(study.seed, k as u64));
-        let (runs, n_worker) = (nulls.runs, fleet.n_workers());
         let says = format!("{} of {} recordings without a gap", k + 1, nulls.of);
-        (context.watch)(&Stage { name: "null", says, runs, workers: n_worker });
+        let (done, runs) = (before + nulls.runs, nulls.runs);
+        let each = if k > 0 { runs as f64 / k as f64 } else { Foreseen::of_null(before as f64) };
+        let total = each.mul_add((nulls.of - k) as f64, done as f64);
+        let work = Work { done: done as f64, next: 0.0, total };
+        (context.watch)(&Stage { name: "null", says, runs, workers: fleet.n_workers(), work });
         let mut quiet = |_: &Stage| {};
         let mut inner = Context {
             clock: context.clock,

@@ -5,7 +5,7 @@
 use std::sync::mpsc::Receiver;
 
 use starlings_fleet::FleetEvent;
-use starlings_study::Study;
+use starlings_study::{Stage, Study};
 
 /// Bytes of intermediate results of one kind that are held by default.
 pub(crate) const HOLD: usize = 1 << 20;
@@ -59,24 +59,12 @@ impl Options {
     }
 }
 
-/// Where an explanation stands.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Stage {
-    /// `fit`, `locate`, `screen`, `refit`, `gates`, `verdict`, `add`, `show` or `null`.
-    pub name: &'static str,
-    /// What is being done, in a few words.
-    pub says: String,
-    /// Runs so far.
-    pub runs: u64,
-    /// Workers now.
-    pub workers: usize,
-}
-
 /// What an explanation needs from outside: the time, an observer of its progress, and the fleet's events.
 pub struct Context<'a> {
     /// Seconds since the program started.
     pub clock: &'a dyn Fn() -> f64,
-    /// Called at the start of every stage and after every batch of runs.
+    /// Called at the start of every stage, and before and after every batch of runs. Stages are `fit`, `locate`, `screen`, `refit`, `gates`,
+    /// `verdict`, `add`, `show` and `null`.
     pub watch: &'a mut dyn FnMut(&Stage),
     /// Events of the fleet, kept in the store.
     pub events: Option<&'a Receiver<FleetEvent>>,

@@ -52,13 +52,15 @@ pub fn explain(
     let budget = options.budget.or(study.explain.budget);
     let mut cache = RunCache::new(&free, &mut *fleet, store, context, budget);
     cache.hold_at_most(options.hold);
+    cache.foreseen.nulls(options.nulls);
     let (mut findings, fitted) = diagnose(&mut cache, &free, options, |cache, diagnosis| {
         let fitted = (Arc::clone(&diagnosis.found.base.predicted), cache.rows.clone());
         Ok((finish(cache, &diagnosis)?, fitted))
     })?;
     drop(cache);
+    let runs = findings.explanation.runs;
     if options.nulls > 0 {
-        let nulls = null_recordings::measure(&free, &fitted, fleet, store, context, options)?;
+        let nulls = null_recordings::measure(&free, (&fitted, runs), fleet, store, context, options)?;
         findings.explanation.runs += nulls.runs;
         findings.explanation.runs_by_stage.push(("null".to_owned(), nulls.runs));
         findings.explanation.false_alarm.nulls = Some(nulls);

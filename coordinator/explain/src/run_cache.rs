@@ -7,6 +7,7 @@
 //! [`crate::fit::model_variant`].
 
 mod batches;
+mod foreseen;
 mod lru;
 mod remembered;
 mod tracks;
@@ -18,12 +19,13 @@ use std::sync::mpsc::Receiver;
 use nalgebra::DVector;
 use starlings_fleet::{Fleet, FleetEvent};
 use starlings_models::Window;
-use starlings_study::Study;
 use starlings_study::store::{RunKey, Store, StoreError};
+use starlings_study::{Stage, Study};
 
+pub(crate) use self::foreseen::Foreseen;
 use self::lru::LruCache;
 use crate::error::ExplainError;
-use crate::options::{Context, HOLD, Stage};
+use crate::options::{Context, HOLD};
 use crate::rows::Rows;
 
 /// A variant of the model and a parameter vector (transformed units) to run it with.
@@ -57,6 +59,8 @@ pub struct RunCache<'a> {
     hold: usize,
     budget: Option<u64>,
     stage: &'static str,
+    /// How many runs there will be.
+    pub(crate) foreseen: Foreseen,
     runs: Vec<(&'static str, u64)>,
     workers: BTreeSet<String>,
     n_batch: usize,
@@ -90,6 +94,7 @@ impl<'a> RunCache<'a> {
             hold: HOLD,
             budget,
             stage: "fit",
+            foreseen: Foreseen::new(study),
             runs: Vec::new(),
             workers: BTreeSet::new(),
             n_batch: 0,
@@ -116,12 +121,16 @@ impl<'a> RunCache<'a> {
     /// Begins a stage and reports it.
     pub(crate) fn stage(&mut self, name: &'static str, says: &str) {
         self.stage = name;
-        self.report_stage(says);
+        self.foreseen.stage(name, self.runs());
+        self.report_stage(says, 0);
     }
 
-    fn report_stage(&mut self, says: &str) {
-        let (runs, workers) = (self.runs(), self.fleet.n_workers());
-        (self.watch)(&Stage { name: self.stage, says: says.to_owned(), runs, workers });
+    /// Reports the stage, of which so many runs are made next.
+    fn report_stage(&mut self, says: &str, next: usize) {
+        // Those that are made next are counted already.
+        let (runs, workers) = (self.runs().saturating_sub(next as u64), self.fleet.n_workers());
+        let work = self.foreseen.work(runs, next);
+        (self.watch)(&Stage { name: self.stage, says: says.to_owned(), runs, workers, work });
     }
 
     /// Runs so far: one particle over one record each.

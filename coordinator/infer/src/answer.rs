@@ -11,6 +11,8 @@ use starlings_study::infer_choice::{DiffusionChoice, InferChoice, MeasuredChoice
 
 use crate::blocks::Cut;
 use crate::error::InferError;
+use crate::hidden;
+use crate::progress::Teller;
 use crate::result::{CoefficientFound, DiffusionFound, LEVEL, RichardsonFound};
 use crate::run::Asked;
 use crate::smoothed::{not_converged, smoothed};
@@ -116,7 +118,9 @@ impl Answer {
         let Some(sums) = levels.first() else {
             return Err(InferError::Setting("no block of any recording was summed".to_owned()));
         };
-        let Fitted { posterior, checks, lag_corrected } = Fitted::of(choice, fit, structure, sums, None)?;
+        let fitted = Fitted::of(choice, fit, structure, sums, None);
+        let Fitted { posterior, checks, lag_corrected } =
+            fitted.map_err(|error| hidden::told(error, sums, structure))?;
         let fit = Fit { lag_corrected, ..fit.clone() };
         let (extrapolated, doubts) = match to_no_step(&fit, structure, &posterior, &levels[1..]) {
             Ok(extrapolated) => (extrapolated, Vec::new()),
@@ -132,6 +136,7 @@ impl Answer {
         cut: Cut,
         sd: f64,
         levels: &[Sums],
+        teller: &mut Teller<'_>,
     ) -> Result<Self, InferError> {
         let Asked { choice, question, fit, .. } = asked;
         let checks = match levels.first().map(|sums| Fitted::of(choice, fit, &question.structure, sums, None))
@@ -143,7 +148,7 @@ impl Answer {
             }
             Some(Err(error)) => return Err(error.into()),
         };
-        let found = smoothed(question, fit, &choice.records, cut, sd)?;
+        let found = smoothed(question, fit, &choice.records, cut, sd, teller)?;
         let doubts = not_converged(found.converged, found.log_likelihood.len()).into_iter().collect();
         Ok(Self { posterior: found.posterior, checks, lag_corrected: false, extrapolated: None, doubts })
     }

@@ -10,6 +10,7 @@ use starlings_estimators::inference::STEP_TOLERANCE;
 use starlings_study::infer_choice::InferRecord;
 
 use crate::error::InferError;
+use crate::even_step::{even_step, rounded};
 use crate::parts::Parts;
 use crate::resampled::Feed;
 use crate::rows::{Row, Rows};
@@ -104,17 +105,6 @@ pub(crate) fn start(record: &InferRecord) -> Result<Start, InferError> {
 /// Bytes of a recording's file.
 pub(crate) fn length(record: &InferRecord) -> u64 {
     std::fs::metadata(&record.file).map_or(0, |file| file.len())
-}
-
-/// The step of times that are in equal steps, or else the most usual one; `None` where no time is later than the one before.
-pub(crate) fn even_step(times: &[f64]) -> Option<f64> {
-    let mut steps: Vec<f64> =
-        times.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
-    steps.sort_by(f64::total_cmp);
-    let median = *steps.get(steps.len() / 2)?;
-    let even = steps.iter().all(|step| (step - median).abs() <= STEP_TOLERANCE * median);
-    let whole = even && steps.len() + 1 == times.len();
-    Some(if whole { (times[times.len() - 1] - times[0]) / steps.len() as f64 } else { median })
 }
 
 /// The blocks of one recording.
@@ -254,7 +244,7 @@ impl<'a, R: Read> Blocks<'a, R> {
             (
                 format!(
                     "the step from {before} to {time} is {} where the recording's is {step}",
-                    time - before
+                    rounded(time - before, &[before, time], 1)
                 ),
                 "an inference needs equal steps: `resample = STEP` in [infer] interpolates to them",
             )

@@ -26,6 +26,15 @@ pub enum InferError {
         #[from]
         error: InferenceError,
     },
+    /// Errors of the measurement are far larger than what states move by in a step.
+    #[error(
+        "errors of the measurement hide how these states move in a step: {says}; no fit holds the recording as it was measured (give \
+         `measurement_noise = <sd>` in [infer], which smooths, or average rows to fewer and longer steps)"
+    )]
+    Hidden {
+        /// The states with the figures.
+        says: String,
+    },
     /// A recording is not what it should be.
     #[error("{}{}: {message} ({help})", file.display(), line.map(|line| format!(":{line}")).unwrap_or_default())]
     Recording {

@@ -15,8 +15,8 @@ use starlings_estimators::inference::InferenceError;
 use starlings_study::Study;
 use starlings_study::infer_choice::{InferChoice, MeasuredChoice};
 
-use crate::blocks::even_step;
 use crate::error::InferError;
+use crate::even_step::even_step;
 use crate::rows::{Row, Rows};
 use crate::run::{asked, choice};
 use follower::Follower;

@@ -12,11 +12,11 @@ use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use starlings_fleet::Fleet;
 use starlings_models::Signal;
-use starlings_study::Study;
 use starlings_study::forecast::ensemble::{Ensemble, MeasuredOutput, MeasuredValue, draws};
 use starlings_study::forecast::measurement::{Errors, From};
 use starlings_study::forecast::{Ask, Forecast};
 use starlings_study::infer_choice::InferRecord;
+use starlings_study::{Stage, Study};
 
 use crate::error::InferError;
 use crate::run::{asked, choice};
@@ -28,7 +28,7 @@ use model::Simulated;
 const SAME: f64 = 1e-6;
 
 /// Forecasts from what is known of a study that was read for an inference. `record` of the request is one of those that were inferred
-/// from.
+/// from. `watch` hears of its stages.
 ///
 /// # Errors
 /// When what is known is of another study, what is asked does not fit it, a recording cannot be read, the fleet fails or no member has
@@ -38,8 +38,9 @@ pub fn forecast(
     known: &Known,
     fleet: &mut dyn Fleet,
     ask: &Ask,
+    watch: &mut dyn FnMut(&Stage),
 ) -> Result<Forecast, InferError> {
-    Ok(ensemble(study, known, ask)?.forecast(study, fleet, ask)?)
+    Ok(ensemble(study, known, ask)?.forecast(study, fleet, ask, watch)?)
 }
 
 /// Refuses what makes no forecast, before anything runs.

@@ -56,8 +56,8 @@ pub(crate) struct Gathered {
     record: usize,
 }
 
-/// Hears of what there is after every block.
-type Told<'a> = dyn FnMut(&Gathered, &dyn Fleet) + 'a;
+/// Hears of what there is after every block, and before a batch of the number of its blocks.
+type Told<'a> = dyn FnMut(&Gathered, Option<usize>, &dyn Fleet) + 'a;
 
 impl Work<'_> {
     /// Has all blocks summed. `None` where a file has something else than plain rows, one step apart: then its rows are read here, which
@@ -203,10 +203,11 @@ impl Work<'_> {
             for (k, job) in jobs.iter_mut().enumerate() {
                 job.particle = gathered.n_block as u32 + k as u32;
             }
+            told(gathered, Some(jobs.len()), &*fleet);
             let outcomes = fleet.run(id, jobs)?;
             for (record, outcome) in records.into_iter().zip(outcomes) {
                 self.add(gathered, record, outcome)?;
-                told(gathered, &*fleet);
+                told(gathered, None, &*fleet);
             }
         }
         Ok(())

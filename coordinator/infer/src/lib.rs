@@ -3,33 +3,39 @@
 //! | file | what it does |
 //! |---|---|
 //! | [`error`] | why there is no inference |
-//! | `rows`, `resampled`, `blocks` | a recording row by row, at equal steps, and cut into blocks, in memory that does not grow with it |
+//! | `rows`, `even_step`, `resampled`, `blocks` | a recording row by row, at equal steps, and cut into blocks, in memory that does not grow with it |
 //! | `parts`, `file_blocks` | the same blocks as bytes of its file, which workers read |
 //! | `gather` | has the sums of every block made as jobs and merges them in block order |
 //! | `convergence` | the estimate after each power of two of blocks |
 //! | `smoothed` | the same from a smoothed path, where the measurement's noise is known |
+//! | `hidden`, `coarse` | whether errors of the measurement, or the recording's steps, are in the way |
 //! | `missing` | which terms the drift lacks, among candidates |
 //! | [`explained`](mod@explained) | what was found of missing terms as an explanation |
 //! | [`reduced`] | a model with fewer unknowns than coefficients |
 //! | [`result`], `answer`, `words` | the tables with intervals, and what is said of them |
 //! | [`follow`](mod@follow) | a recording that is still written: estimates and alarms as it arrives |
 //! | [`forecast`](mod@forecast) | an ensemble of what comes next, drawn from the posterior |
+//! | `progress` | where it stands, while it works |
 //! | [`run`] | all of it on a page |
 //!
 //! The mathematics is in the estimators; nothing here computes a posterior. Next file to read: [`mod@run`].
 
 mod answer;
 mod blocks;
+mod coarse;
 mod convergence;
 pub mod error;
+mod even_step;
 pub mod explained;
 mod file_blocks;
 pub mod follow;
 pub mod forecast;
 mod gather;
+mod hidden;
 mod missing;
 mod outlook;
 mod parts;
+mod progress;
 pub mod reduced;
 mod resampled;
 pub mod result;
@@ -40,5 +46,6 @@ mod words;
 
 pub use error::InferError;
 pub use outlook::{Outlook, outlook};
+pub use progress::Progress;
 pub use result::Inference;
-pub use run::{Progress, Reader, check, infer};
+pub use run::{Reader, check, infer};

@@ -11,11 +11,13 @@ use starlings_sums::Question;
 
 use crate::answer::{Answer, fit};
 use crate::blocks::{Cut, Start, start};
+use crate::coarse::{Coarse, coarse};
 use crate::convergence::Convergence;
 use crate::error::InferError;
 use crate::file_blocks::files;
 use crate::gather::{Gathered, Source, Work};
 use crate::missing::Wider;
+use crate::progress::{Progress, Teller};
 use crate::reduced::{check_reduced, fit_reduced};
 use crate::result::{Converging, Inference, MissingFound, RecordUsed};
 use crate::words;
@@ -25,17 +27,6 @@ const BLOCKS: f64 = 64.0;
 /// Steps of such a block, at least and at most.
 const LEAST: usize = 256;
 const MOST: usize = 65_536;
-
-/// Where an inference stands.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Progress {
-    /// Blocks whose sums are there.
-    pub n_block: u64,
-    /// Steps in them.
-    pub n_step: u64,
-    /// Workers now.
-    pub workers: usize,
-}
 
 /// What is asked, once the first recording has said its step.
 pub(crate) struct Asked<'a> {
@@ -72,16 +63,20 @@ pub fn infer(
     let at = start(first)?;
     let asked = asked(study, choice, at.step)?;
     let cut = cut(choice, &asked, at);
-    let (gathered, convergence) = gathered(&asked, &choice.records, cut, fleet, (reader, &mut *watch))?;
+    let mut teller = Teller::new(choice, cut, at, watch);
+    let (gathered, convergence) = gathered(&asked, &choice.records, cut, fleet, (reader, &mut teller))?;
     let structure = &asked.question.structure;
     let answer = match choice.measured {
-        MeasuredChoice::Known(sd) => Answer::smoothed(&asked, cut, sd, &gathered.levels)?,
+        MeasuredChoice::Known(sd) => Answer::smoothed(&asked, cut, sd, &gathered.levels, &mut teller)?,
         _ => Answer::of(choice, &asked.fit, structure, &gathered.levels)?,
     };
     let fit = Fit { lag_corrected: answer.lag_corrected, ..asked.fit.clone() };
-    let missing = missing(&asked, &fit, &gathered, cut, fleet, (reader, watch))?;
+    let missing = missing(&asked, &fit, &gathered, cut, fleet, (reader, &mut teller))?;
+    teller.posterior();
     let convergence = convergence.finish(&fit, structure, &gathered);
-    told_of(study, &asked, &gathered, &answer, cut, (convergence, missing))
+    let sums = gathered.levels.first();
+    let coarse = sums.and_then(|sums| coarse(&asked, &fit, &answer, sums, cut, at));
+    told_of(study, &asked, &gathered, &answer, cut, (convergence, missing, coarse))
 }
 
 /// Terms that the drift lacks, where they are looked for: compared on the held-out records too, where there are any.
@@ -91,7 +86,7 @@ fn missing(
     of_all: &Gathered,
     cut: Cut,
     fleet: &mut dyn Fleet,
-    ways: Ways<'_>,
+    ways: Ways<'_, '_>,
 ) -> Result<Option<MissingFound>, InferError> {
     let Asked { choice, question, .. } = asked;
     let (Some(settings), Some(structure)) = (choice.missing, &question.wider) else { return Ok(None) };
@@ -105,8 +100,8 @@ fn missing(
     Wider::new(structure, fit)?.look(choice, settings, sums, held_out).map(Some)
 }
 
-/// Who reads the recordings, and who watches.
-type Ways<'a> = (Reader, &'a mut dyn FnMut(&Progress));
+/// Who reads the recordings, and who is told.
+type Ways<'a, 'w> = (Reader, &'a mut Teller<'w>);
 
 /// Whether what a study asks fits together, before anything is read: functions, priors, the reduced model, what excludes one another.
 ///
@@ -161,7 +156,7 @@ fn gathered(
     records: &[InferRecord],
     cut: Cut,
     fleet: &mut dyn Fleet,
-    (reader, watch): Ways<'_>,
+    (reader, teller): Ways<'_, '_>,
 ) -> Result<(Gathered, Convergence), InferError> {
     let Asked { choice, setup, question, .. } = asked;
     let work = Work { setup, question, records, cut, levels: choice.sums.levels };
@@ -172,12 +167,15 @@ fn gathered(
     let sources = files.as_deref().map(Source::Files).into_iter().chain([Source::Rows]);
     for source in sources {
         let mut convergence = Convergence::default();
-        let mut told = |gathered: &Gathered, fleet: &dyn Fleet| {
-            convergence.look(gathered);
+        let mut told = |gathered: &Gathered, next: Option<usize>, fleet: &dyn Fleet| {
+            if next.is_none() {
+                convergence.look(gathered);
+            }
             let n_step = gathered.levels.first().map_or(0, Sums::n_step);
-            watch(&Progress { n_block: gathered.n_block, n_step, workers: fleet.n_workers() });
+            teller.sums(gathered.n_block, n_step, next.unwrap_or(0), fleet);
         };
         if let Some(gathered) = work.gather(source, fleet, &mut told)? {
+            teller.summed(gathered.levels.first().map_or(0, Sums::n_step));
             return Ok((gathered, convergence));
         }
     }
@@ -225,7 +223,7 @@ fn told_of(
     gathered: &Gathered,
     answer: &Answer,
     cut: Cut,
-    (convergence, missing): (Vec<Converging>, Option<MissingFound>),
+    (convergence, missing, coarse): (Vec<Converging>, Option<MissingFound>, Option<Coarse>),
 ) -> Result<Inference, InferError> {
     let choice = asked.choice;
     let structure = &asked.question.structure;
@@ -236,7 +234,8 @@ fn told_of(
     let coefficients = answer.coefficients(choice);
     let n_step = gathered.levels.first().map_or(0, Sums::n_step);
     let records = choice.records.iter().enumerate();
-    let warnings = words::warnings(choice, answer, reduced.as_ref(), missing.as_ref());
+    let mut warnings = words::warnings(choice, answer, reduced.as_ref(), missing.as_ref());
+    warnings.extend(coarse.map(|coarse| words::of_steps(&coarse, cut.step, &study.time_unit)));
     Ok(Inference {
         study: study.name.clone(),
         verdict: words::verdict(n_step, &coefficients, reduced.as_ref(), missing.as_ref()),

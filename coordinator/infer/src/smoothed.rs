@@ -9,6 +9,7 @@ use starlings_sums::Question;
 
 use crate::blocks::{Blocks, Cut, open};
 use crate::error::InferError;
+use crate::progress::Teller;
 use starlings_study::infer_choice::InferRecord;
 
 /// Rounds of smoothing and fitting, and the growth of the likelihood at which they end.
@@ -30,6 +31,7 @@ pub(crate) fn smoothed(
     records: &[InferRecord],
     cut: Cut,
     sd: f64,
+    teller: &mut Teller<'_>,
 ) -> Result<NoisyPosterior, InferError> {
     let [record] = records else {
         return Err(InferError::Setting("smoothing takes one recording".to_owned()));
@@ -46,7 +48,8 @@ pub(crate) fn smoothed(
     let n = question.basis.n_state();
     let noise = Measured::Known(DMatrix::from_diagonal_element(n, n, sd * sd));
     let noisy = Noisy { basis: &question.basis, step: cut.step, times: &times, rows: &rows };
-    Ok(noisy.infer(fit, &question.structure, &noise, ITERATION)?)
+    let mut watch = |log: &[f64]| teller.round(log, ITERATION.tolerance, ITERATION.most);
+    Ok(noisy.infer_watched(fit, &question.structure, &noise, ITERATION, &mut watch)?)
 }
 
 #[cfg(test)]

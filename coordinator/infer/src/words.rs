@@ -2,10 +2,11 @@
 //!
 //! Next file to read: [`super::result`].
 
-use starlings_estimators::inference::{NoiseCheck, Verdict};
+use starlings_estimators::inference::{NoiseCheck, StepError, Verdict};
 use starlings_study::infer_choice::{InferChoice, MeasuredChoice};
 
 use crate::answer::Answer;
+use crate::coarse::Coarse;
 use crate::result::{CoefficientFound, MissingFound, NamedTerm, ReducedFound};
 
 /// The result in one sentence.
@@ -123,6 +124,37 @@ fn of_missing(missing: &MissingFound) -> Vec<String> {
         ));
     }
     warnings
+}
+
+/// Coefficients that are named at most, those first that move most beside their intervals.
+const MOVED: usize = 4;
+
+/// That steps are coarse for the dynamics.
+pub(crate) fn of_steps(coarse: &Coarse, step: f64, unit: &str) -> String {
+    let begins = format!("steps of {step} {unit} are coarse for this dynamics:");
+    let help = "`richardson = true` in [infer] takes that out, shorter steps make it small";
+    match coarse {
+        Coarse::Moved(moved) => {
+            let mut moved: Vec<_> = moved.iter().collect();
+            moved.sort_by(|a, b| (b.moves / b.half).abs().total_cmp(&(a.moves / a.half).abs()));
+            let said =
+                |of: &&StepError| format!("{} by {:+.2e} (interval ± {:.2e})", of.name, of.moves, of.half);
+            let mut list: Vec<String> = moved.iter().take(MOVED).map(said).collect();
+            let more = moved.len().saturating_sub(MOVED);
+            if more > 0 {
+                list.push(format!("{more} more"));
+            }
+            format!(
+                "{begins} without the error of the step coefficients would move out of their intervals, by the first rows of the recording {}; \
+                 {help}",
+                list.join(", ")
+            )
+        }
+        Coarse::Fast(rates) => format!(
+            "{begins} a step is {rates:.1} times the fastest time of the drift that was found, whose rates are too small by that; twice the \
+             step has no fit, from which `richardson` could take it out: record at a tenth of that time"
+        ),
+    }
 }
 
 /// What is doubtful.

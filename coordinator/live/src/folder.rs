@@ -23,9 +23,25 @@ pub struct Watched {
     pace: Pace,
 }
 
-/// What the store keeps of how far a run is.
+/// What the store keeps of how far a run is, or an explanation.
 #[derive(Deserialize)]
-struct Noted {
+#[serde(untagged)]
+enum Noted {
+    Run(Analysed),
+    Explanation(Staged),
+}
+
+#[derive(Deserialize)]
+struct Staged {
+    name: String,
+    says: String,
+    runs: u64,
+    workers: usize,
+    work: Work,
+}
+
+#[derive(Deserialize)]
+struct Analysed {
     stage: String,
     pass: usize,
     step: usize,
@@ -79,7 +95,7 @@ impl Watched {
         self.course.show(&mut view);
         let noted = store.meta(progress::PROGRESS)?.map(|text| serde_json::from_str::<Noted>(&text));
         if let Some(noted) = noted.transpose().map_err(|error| store.damaged("progress", error))? {
-            view.standing = self.standing(&noted, view.elapsed_s, state);
+            view.standing = self.standing(noted, view.elapsed_s, state);
         }
         let select = format!("SELECT at_s, kind, text FROM events ORDER BY id DESC LIMIT {EVENTS}");
         let store = &self.folder.store;
@@ -96,24 +112,37 @@ impl Watched {
         Ok(view)
     }
 
-    fn standing(&mut self, noted: &Noted, elapsed_s: f64, state: State) -> Standing {
-        let Work { done, total, .. } = noted.work;
+    fn standing(&mut self, noted: Noted, elapsed_s: f64, state: State) -> Standing {
+        let Staged { name: stage, says, runs, workers, work } = noted.in_words();
+        let Work { done, total, .. } = work;
         let is_running = state == State::Running;
         let left_s = self.pace.left(elapsed_s, done, total).filter(|_| is_running);
-        let is_last = progress::LAST.contains(&noted.stage.as_str());
-        let (stage, what) = if is_last {
-            (noted.stage.clone(), "ensembles after the fit")
-        } else {
-            (format!("pass {}", noted.pass), "analyses")
-        };
         let share = if state == State::Finished { 1.0 } else { (done / total).clamp(0.0, 1.0) };
         Standing {
             stage,
-            says: format!("{} of {} {what}", noted.step, noted.steps),
+            says,
             share: (total > 0.0).then_some(share),
             left_s,
-            runs: noted.runs,
-            workers: if is_running { noted.workers } else { 0 },
+            runs,
+            counted: "runs".to_owned(),
+            workers: if is_running { workers } else { 0 },
         }
+    }
+}
+
+impl Noted {
+    fn in_words(self) -> Staged {
+        let of = match self {
+            Self::Explanation(staged) => return staged,
+            Self::Run(analysed) => analysed,
+        };
+        let is_last = progress::LAST.contains(&of.stage.as_str());
+        let (name, what) = if is_last {
+            (of.stage, "ensembles after the fit")
+        } else {
+            (format!("pass {}", of.pass), "analyses")
+        };
+        let says = format!("{} of {} {what}", of.step, of.steps);
+        Staged { name, says, runs: of.runs, workers: of.workers, work: of.work }
     }
 }

@@ -16,7 +16,8 @@ pub struct Pace {
 impl Pace {
     /// Time left, s, where so much of `total` is done at this time; `None` until there is something to tell it from.
     ///
-    /// The speed is the mean over the later half of the time so far, so that workers that come or go show, and one slow run does not.
+    /// The speed is the mean over the later half of the time so far, so that workers that come or go show, and one slow run does not. Between
+    /// two looks at which something more is done the time left falls with the time that passes, until that takes longer than it should.
     pub fn left(&mut self, now_s: f64, done: f64, total: f64) -> Option<f64> {
         if self.looks.back().is_none_or(|(_, before)| done > *before) {
             self.looks.push_back((now_s, done));
@@ -30,11 +31,20 @@ impl Pace {
             });
         }
         let (first, _) = *self.looks.front()?;
+        let (last_s, last) = *self.looks.back()?;
         let middle = f64::midpoint(first, now_s);
         let later = self.looks.iter().position(|(at, _)| *at > middle).unwrap_or(self.looks.len());
-        let (from_s, from) = *self.looks.get(later.saturating_sub(1))?;
-        let (passed, made) = (now_s - from_s, done - from);
-        (passed > 0.0 && made > 0.0).then(|| (total - done).max(0.0) * passed / made)
+        // Two looks at least, between which something was done.
+        let from = later.saturating_sub(1).min(self.looks.len().checked_sub(2)?);
+        let (from_s, before) = self.looks[from];
+        let (passed, made) = (last_s - from_s, last - before);
+        let rest = (total - last).max(0.0);
+        let foreseen = rest * passed / made - (now_s - last_s);
+        // As if as much were done just now as between two looks before.
+        let steps = self.looks.iter().skip(from).zip(self.looks.iter().skip(from + 1));
+        let step = steps.map(|((_, a), (_, b))| b - a).fold(0.0, f64::max).min(rest);
+        let at_least = (rest - step) * (now_s - from_s) / (made + step);
+        (passed > 0.0 && made > 0.0).then(|| foreseen.max(at_least))
     }
 }
 
@@ -53,6 +63,20 @@ mod tests {
             assert!((left - 0.5 * (100.0 - done)).abs() < 1e-6, "{left} at {done}");
         }
         assert!(pace.looks.len() <= KEPT);
+    }
+
+    #[test]
+    fn between_two_looks_the_time_left_falls_with_time_and_no_further_than_work_that_is_late() {
+        let mut pace = Pace::default();
+        for k in 0..=10 {
+            pace.left(f64::from(k), f64::from(k), 30.0);
+        }
+        let left = |pace: &mut Pace, now| pace.left(now, 10.0, 30.0).expect("it is known");
+        assert!((left(&mut pace, 10.0) - 20.0).abs() < 1e-9);
+        assert!((left(&mut pace, 10.5) - 19.5).abs() < 1e-9);
+        // The eleventh unit is four seconds late: nineteen would be left after four units in the last eight seconds.
+        let late = left(&mut pace, 15.0);
+        assert!((late - 38.0).abs() < 1e-9, "{late}");
     }
 
     #[test]

@@ -118,7 +118,7 @@ impl Live {
         lock(&self.0.told).stands(standing);
     }
 
-    /// An explanation is in this stage.
+    /// A command whose work has stages is in this one.
     pub fn stage(&self, standing: Standing) {
         let now = (self.0.clock)();
         lock(&self.0.told).stage(now, standing);

@@ -71,7 +71,7 @@ impl Told {
         self.standing = standing;
     }
 
-    /// A stage of an explanation goes on or begins at this time, s since the command began.
+    /// A stage goes on or begins at this time, s since the command began.
     pub fn stage(&mut self, at_s: f64, standing: Standing) {
         match self.stages.last_mut() {
             Some(last) if last.name == standing.stage => last.says.clone_from(&standing.says),

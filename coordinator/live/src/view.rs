@@ -45,6 +45,8 @@ pub struct Standing {
     pub left_s: Option<f64>,
     /// Runs of the model so far, or blocks of a recording.
     pub runs: u64,
+    /// Which of both: `runs` or `blocks`.
+    pub counted: String,
     /// Workers.
     pub workers: usize,
 }
@@ -110,7 +112,7 @@ fn or_nan<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
     Ok(Option::<f64>::deserialize(from)?.unwrap_or(f64::NAN))
 }
 
-/// A stage of an explanation.
+/// A stage of a command's work, where it has them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StageView {
     /// Its name.
@@ -165,7 +167,7 @@ pub struct View {
     pub nis: Option<(f64, u64)>,
     /// Parameters after the last analysis.
     pub parameters: Vec<ParameterView>,
-    /// The stages of an explanation so far.
+    /// The stages so far.
     pub stages: Vec<StageView>,
     /// What happened last, the latest first.
     pub events: Vec<EventView>,

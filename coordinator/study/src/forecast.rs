@@ -21,7 +21,7 @@ use starlings_fleet::Fleet;
 use starlings_models::BuildSetup;
 
 use crate::checked::{Channel, Record};
-use crate::{RunFolder, Study};
+use crate::{RunFolder, Stage, Study};
 
 pub use ask::{Ask, Threshold};
 pub use error::StudyForecastError;
@@ -31,7 +31,7 @@ use ensemble::{Ensemble, MeasuredOutput, MeasuredValue, drawn};
 use measurement::TrainingResiduals;
 use posterior::Drawn;
 
-/// Forecasts from a finished run.
+/// Forecasts from a finished run. `watch` hears of its stages.
 ///
 /// # Errors
 /// When the run is not finished, what is asked does not fit the study, the fleet fails, or no member has a prediction.
@@ -40,6 +40,7 @@ pub fn forecast(
     folder: &RunFolder,
     fleet: &mut dyn Fleet,
     ask: &Ask,
+    watch: &mut dyn FnMut(&Stage),
 ) -> Result<Forecast, StudyForecastError> {
     let drawn = Drawn::read(study, folder)?;
     let residuals = TrainingResiduals::read(study, folder)?;
@@ -64,7 +65,7 @@ pub fn forecast(
         setup: plan.setup,
         times: plan.times,
     };
-    ensemble.forecast(study, fleet, ask)
+    ensemble.forecast(study, fleet, ask, watch)
 }
 
 /// The parameters of every member, drawn from the posterior.

@@ -51,7 +51,7 @@ pub use file::memory::bytes_of;
 pub use fit::LIMIT as MAX_PASSES;
 pub use observer_gain::ObserverCourse;
 pub use problem::{Problem, StudyError};
-pub use progress::Progress;
+pub use progress::{Progress, Stage};
 pub use run::{Fit, Move, RunContext};
 pub use run_error::RunError;
 pub use solver_host::{SolverHost, Undescribed};

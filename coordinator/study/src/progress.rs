@@ -29,7 +29,32 @@ pub struct Progress {
     pub work: Work,
 }
 
-/// Name under which the store keeps the last [`Progress`], as JSON.
+/// Where a command stands whose work has stages and no passes.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Stage {
+    /// What is being done, in a word.
+    pub name: &'static str,
+    /// More of it, in a few words; empty where the stage goes on.
+    pub says: String,
+    /// Runs so far.
+    pub runs: u64,
+    /// Workers now.
+    pub workers: usize,
+    /// How much of the work is done, of all stages together.
+    pub work: Work,
+}
+
+impl Stage {
+    /// Keeps it in the store, as [`Progress::note`].
+    ///
+    /// # Errors
+    /// When the store cannot be written.
+    pub fn note(&self, store: &Store) -> Result<(), StoreError> {
+        store.set_meta(PROGRESS, &json(self))
+    }
+}
+
+/// Name under which the store keeps the last [`Progress`] or [`Stage`], as JSON.
 pub const PROGRESS: &str = "progress";
 
 /// The runs after a fit, in their order: with the estimate, with the observer, with constants moved, beside the estimate, with draws of

@@ -78,6 +78,21 @@ impl Noisy<'_> {
         measured: &Measured,
         iteration: Iteration,
     ) -> Result<NoisyPosterior, InferenceError> {
+        self.infer_watched(fit, structure, measured, iteration, &mut |_| {})
+    }
+
+    /// The same; `watch` hears of the log-likelihoods of the rounds so far as each begins.
+    ///
+    /// # Errors
+    /// As for [`Noisy::infer`].
+    pub fn infer_watched(
+        &self,
+        fit: &Fit,
+        structure: &Structure,
+        measured: &Measured,
+        iteration: Iteration,
+        watch: &mut dyn FnMut(&[f64]),
+    ) -> Result<NoisyPosterior, InferenceError> {
         let mut stream = Stream::new(Arc::clone(self.basis), self.step)?;
         stream.extend(self.times, self.rows)?;
         let raw = stream.take()?;
@@ -101,6 +116,7 @@ impl Noisy<'_> {
         let mut stretch = 1.0;
         let mut converged = false;
         for _ in 0..iteration.most {
+            watch(&log_likelihood);
             let (path, log) = self.smooth(&tried.0, &tried.1)?;
             let growth = log_likelihood.last().map_or(f64::INFINITY, |last| log - last);
             if growth < 0.0 && stretch > 1.0 {

@@ -76,3 +76,41 @@ pub fn noise_checks(
     };
     Ok(structure.equations().iter().enumerate().map(check).collect())
 }
+
+/// How rows scatter, and how far a state moves between them, by neighbouring differences alone: without a fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scatter {
+    /// The equation.
+    pub equation: String,
+    /// Share of the variance of a difference that errors of the measurement have: twice −E ẋ_n ẋ_{n+1} / E ẋ².
+    pub share: f64,
+    /// Standard deviation of these errors, in the state's unit.
+    pub measured: f64,
+    /// What the state itself moves by in a step, root mean square, in its unit, at most: with 95 % probability.
+    pub moves: f64,
+}
+
+/// What neighbouring differences of every state say, where there are pairs of steps. A drift that goes far in a step makes them alike, and the
+/// share of the errors too small.
+pub fn scatter(sums: &Sums, structure: &Structure) -> Vec<Scatter> {
+    if sums.n_pair() == 0 || sums.n_state() != structure.equations().len() {
+        return Vec::new();
+    }
+    let still = DMatrix::zeros(sums.n_state(), sums.n_function());
+    let (squares, lagged) = (sums.q(), sums.lagged_residuals(&still));
+    let (n, pairs, h) = (sums.n_step() as f64, sums.n_pair() as f64, sums.step());
+    let of = |(l, equation): (usize, &String)| {
+        let square = squares[(l, l)] / n;
+        let ratio = (-lagged[(l, l)] / pairs / square).clamp(0.0, 0.5);
+        let squared = ratio * ratio;
+        let sd = ((1.0 - 3.0 * squared + 4.0 * squared * squared) / pairs).max(0.0).sqrt();
+        let left = (1.0 - 2.0 * (ratio - normal(SURE) * sd)).min(1.0);
+        Scatter {
+            equation: equation.clone(),
+            share: 2.0 * ratio,
+            measured: h * (ratio * square).sqrt(),
+            moves: h * (left * square).sqrt(),
+        }
+    };
+    structure.equations().iter().enumerate().map(of).collect()
+}

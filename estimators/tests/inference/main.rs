@@ -3,6 +3,7 @@
 
 mod calibration;
 mod changes;
+mod coarse;
 mod damaged;
 mod decimated;
 mod draws;

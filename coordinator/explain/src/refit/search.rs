@@ -43,6 +43,11 @@ pub(super) struct Searcher<'s, 'l, 'c> {
 const FIRST: &[Kind] = &[Kind::Study, Kind::Library, Kind::Instrument];
 const ASKED: &[Kind] = &[Kind::Study, Kind::Library, Kind::Generic, Kind::Instrument];
 
+/// The kinds that a search tries first.
+pub(crate) fn first_kinds(options: &Options) -> &'static [Kind] {
+    if options.only.is_empty() { FIRST } else { ASKED }
+}
+
 /// Searches from a fitted model.
 ///
 /// # Errors
@@ -55,7 +60,7 @@ pub(crate) fn search<'c>(
     options: &Options,
 ) -> Result<SearchResult<'c>, ExplainError> {
     let asked = !options.only.is_empty();
-    let tried = if asked { ASKED } else { FIRST };
+    let tried = first_kinds(options);
     let mut searcher = Searcher { cache, candidates, tracks, cut_short: false, asked, tried };
     let before = Misfit::of(searcher.cache, &base);
     let adequacy = Adequacy::of(searcher.cache, &base);

@@ -192,6 +192,7 @@ impl RunCache<'_> {
             early: HashMap::new(),
             refused: None,
         };
+        self.report_stage("", jobs.len());
         // Nobody reads the states that whole records end in.
         let held = jobs.into_iter().map(|(setup, job)| (setup, job.map(Held::Values)));
         let outcomes = self.fleet.run_telling(held.collect(), &mut |early| arrivals.take_early(early));
@@ -220,7 +221,7 @@ impl RunCache<'_> {
             self.recent.insert(key, known);
         }
         self.n_batch += 1;
-        self.report_stage("");
+        self.report_stage("", 0);
         Ok(())
     }
 

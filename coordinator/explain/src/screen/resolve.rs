@@ -24,13 +24,13 @@ pub(crate) fn resolved_candidates(
     options: &Options,
 ) -> Result<Vec<Candidate>, ExplainError> {
     let defs = resolved(study, candidates(study, options)?, tracks, periods, change_points);
-    Ok(defs
-        .into_iter()
-        .map(|def| {
-            let kind = kind_of(study, &def.name);
-            Candidate::new(def).of_kind(kind)
-        })
-        .collect())
+    Ok(defs.into_iter().map(|def| kinded(study, def)).collect())
+}
+
+/// A candidate with its kind.
+pub(crate) fn kinded(study: &Study, def: EffectDef) -> Candidate {
+    let kind = kind_of(study, &def.name);
+    Candidate::new(def).of_kind(kind)
 }
 
 /// The effects with their numbers in the model's units. An effect whose quantity is constant along the run is left out, since its

@@ -87,7 +87,7 @@ impl Case {
         let mut fleet = InProcess::new(2).with_factory(factory(Arc::new(Setup::build), Reading::Allowed));
         let found = files(records, cut).unwrap();
         let source = if from_files { Source::Files(&found) } else { Source::Rows };
-        work.gather(source, &mut fleet, &mut |_, _| {})
+        work.gather(source, &mut fleet, &mut |_, _, _| {})
     }
 }
 

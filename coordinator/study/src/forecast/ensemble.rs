@@ -16,7 +16,7 @@ use super::members::Members;
 use super::own_errors::OwnErrors;
 use super::result::{Band, Forecast, LevelForecast, OutputForecast};
 use super::{Ask, StudyForecastError};
-use crate::Study;
+use crate::{Stage, Study, Work};
 
 /// Stream of the seed that members are drawn with.
 const DRAWS: u64 = 0;
@@ -86,7 +86,7 @@ pub struct MeasuredValue {
 }
 
 impl Ensemble {
-    /// Runs the members and says what they make.
+    /// Runs the members and says what they make. `watch` hears of that as it begins.
     ///
     /// # Errors
     /// When the fleet fails, or no member has a prediction.
@@ -95,7 +95,12 @@ impl Ensemble {
         study: &Study,
         fleet: &mut dyn Fleet,
         ask: &Ask,
+        watch: &mut dyn FnMut(&Stage),
     ) -> Result<Forecast, StudyForecastError> {
+        let n = self.members.len();
+        let work = Work { done: 0.0, next: n as f64, total: n as f64 };
+        let says = format!("{n} members");
+        watch(&Stage { name: "ensemble", says, runs: 0, workers: fleet.n_workers(), work });
         let members = Members::run(fleet, &self)?;
         let outputs = (0..self.setup.outputs.len()).map(|row| self.output(study, &members, ask.seed, row));
         let outputs = outputs.collect::<Result<Vec<_>, _>>()?;

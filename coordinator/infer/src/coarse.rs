@@ -1,0 +1,80 @@
+//! Whether the recording's steps are coarse for the dynamics that was found: its first rows at h, 2h and 4h, in pieces.
+//!
+//! They are read here, whoever reads the recording: a few milliseconds, whatever its length. Next file to read: `words.rs`, which says it.
+
+use starlings_estimators::inference::{
+    Decimation, Fit, StepError, Sums, Verdict, step_errors, step_in_rates,
+};
+use starlings_study::infer_choice::MeasuredChoice;
+
+use crate::answer::Answer;
+use crate::blocks::{Blocks, Cut, Start, open};
+use crate::error::InferError;
+use crate::result::LEVEL;
+use crate::run::Asked;
+
+/// Pieces that are compared with one another.
+const PIECES: usize = 16;
+/// Steps of a piece, at least and at most.
+const LEAST: usize = 16;
+const MOST: usize = 1024;
+/// Steps times the drift's fastest rate from which steps are coarse where longer ones have no fit: there a rate is found too small by 8 %.
+const RATES: f64 = 1.0;
+
+/// What the step does to the estimates.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Coarse {
+    /// These coefficients would move out of their intervals.
+    Moved(Vec<StepError>),
+    /// A step is so many times the fastest time of the drift, and longer steps have no fit to compare with.
+    Fast(f64),
+}
+
+/// Looks whether steps are coarse; `None` where they are not, where errors of the measurement or an interpolation hide it, or where the study
+/// extrapolates.
+pub(crate) fn coarse(
+    asked: &Asked<'_>,
+    fit: &Fit,
+    answer: &Answer,
+    sums: &Sums,
+    cut: Cut,
+    at: Start,
+) -> Option<Coarse> {
+    let choice = asked.choice;
+    let is_noisy = answer.checks.iter().any(|check| check.verdict == Verdict::Matters);
+    let is_known = matches!(choice.measured, MeasuredChoice::Known(_));
+    if choice.sums.levels > 1 || choice.resample || is_known || is_noisy {
+        return None;
+    }
+    let structure = &asked.question.structure;
+    let pieces = pieces(asked, cut, at).unwrap_or_default();
+    match step_errors(&pieces, fit, structure, &answer.posterior, LEVEL) {
+        Ok(moved) => (!moved.is_empty()).then_some(Coarse::Moved(moved)),
+        Err(_) => {
+            let rates = step_in_rates(sums, &answer.posterior);
+            (rates > RATES).then_some(Coarse::Fast(rates))
+        }
+    }
+}
+
+/// Sums at h, 2h and 4h of the first pieces of the first recording.
+fn pieces(asked: &Asked<'_>, cut: Cut, at: Start) -> Result<Vec<[Sums; 3]>, InferError> {
+    let Some(record) = asked.choice.records.first() else { return Ok(Vec::new()) };
+    let n_step = ((at.n_row / PIECES as f64) as usize).clamp(LEAST, MOST);
+    let cut = Cut { bytes: None, block: n_step, ahead: 0, ..cut };
+    let mut blocks = Blocks::new((0, record), open(record)?, cut);
+    let basis = &asked.question.basis;
+    let mut pieces = Vec::with_capacity(PIECES);
+    while pieces.len() < PIECES
+        && let Some(block) = blocks.next()?
+    {
+        let mut levels = Decimation::new(basis, cut.step, 3)?;
+        for (time, row) in block.times.iter().zip(block.rows.chunks_exact(basis.n_channel())) {
+            levels.push(*time, row)?;
+        }
+        let sums = <[Sums; 3]>::try_from(levels.sums()?);
+        // What is left at the end of a short recording is no piece.
+        pieces.extend(sums.ok().filter(|_| block.n_step >= LEAST));
+    }
+    Ok(pieces)
+}

@@ -1,0 +1,52 @@
+//! `starlings infer`: what is said of a recording's step, by its digits and where it is coarse for the dynamics.
+
+#![allow(clippy::unwrap_used)] // a failed unwrap is a failed test
+
+mod common;
+mod infer_kit;
+
+use common::{output, starlings};
+use infer_kit::{STUDY, folder, infer, recording};
+use serde_json::Value;
+
+/// Every so many rows of a recording.
+fn every(n: usize, data: &str) -> String {
+    let rows = data.lines().skip(1).step_by(n);
+    std::iter::once("time,x,z").chain(rows).flat_map(|line| [line, "\n"]).collect()
+}
+
+fn coarse(found: &Value) -> Vec<&str> {
+    let said = found["warnings"].as_array().unwrap().iter().map(|warning| warning.as_str().unwrap());
+    said.filter(|warning| warning.contains("coarse for this dynamics")).collect()
+}
+
+#[test]
+fn steps_that_are_coarse_for_the_dynamics_are_told_with_the_remedy_and_fine_ones_are_not() {
+    // Rates of 3 per unit of time: 0.03 of their time in a step, and 0.2.
+    let data = recording(400_000, usize::MAX);
+    let fine = infer(folder(STUDY, &data).path(), "out", "2");
+    assert_eq!(coarse(&fine), Vec::<&str>::new());
+    let rows = every(6, &data);
+    let dir = folder(STUDY, &rows);
+    let found = infer(dir.path(), "out", "2");
+    let said = coarse(&found);
+    assert!(said.len() == 1 && said[0].starts_with("steps of 0.06 s are coarse"), "{found}");
+    assert!(said[0].contains("`richardson = true` in [infer]"), "{said:?}");
+    // What it asks for moves estimates towards the rates of the path and ends the warning.
+    let study = STUDY.replace("block = 300", "block = 300\nrichardson = true");
+    let mended = infer(folder(&study, &rows).path(), "out", "2");
+    assert_eq!(coarse(&mended), Vec::<&str>::new());
+    let c = |of: &Value| of["coefficients"][1]["estimate"].as_f64().unwrap();
+    let of_path = c(&fine);
+    assert!((c(&mended) - of_path).abs() < 0.7 * (c(&found) - of_path).abs(), "{of_path} {mended} {found}");
+}
+
+#[test]
+fn a_step_is_told_with_the_digits_of_the_times() {
+    // The mean of these differences is 0.020000000000000018.
+    let dir = folder(STUDY, &every(2, &recording(2_000, usize::MAX)));
+    let (code, stdout, stderr) = output(starlings().current_dir(dir.path()).args(["check", "study.toml"]));
+    assert_eq!(code, 0, "{stderr}");
+    assert!(stdout.contains("steps of 0.02 s,"), "{stdout}");
+    assert_eq!(infer(dir.path(), "out", "1")["step"], 0.02);
+}
