@@ -69,7 +69,7 @@ pub(crate) fn window(setup: &Setup, n: usize) -> Window {
         Signal { times: sampled.clone(), values }
     };
     let observed = vec![f64::NAN; n * n_obs];
-    Window { start: 0.0, times, observed, inputs: (0..n_input).map(signal).collect() }
+    Window { start: 0.0, times, observed, inputs: (0..n_input).map(signal).collect(), since: vec![] }
 }
 
 /// A job from the initial state.
