@@ -56,7 +56,7 @@ pub struct Fit {
 
 impl Fit {
     /// The posterior that runs from the start of a record are made with.
-    fn from_the_start(&self) -> Gaussian {
+    fn at_the_start(&self) -> Gaussian {
         let mut posterior = self.posterior.clone();
         for (entry, value) in &self.starts {
             posterior.mean[*entry] = *value;
@@ -247,10 +247,10 @@ fn after_fit(
     let earlier = fit.counts.total.saturating_sub(runner.counts.total);
     let runs = |runner: &EnsembleRunner<'_>| earlier + runner.counts.total;
     context.goes_on(store, fit, 0, runs(runner), runner);
-    let from_the_start = fit.from_the_start();
-    let predictions = free_run::run(runner, &from_the_start)?;
+    let at_the_start = fit.at_the_start();
+    let predictions = free_run::run(runner, &at_the_start)?;
     context.goes_on(store, fit, 1, runs(runner), runner);
-    let observer = observer_gain::compare(runner, &from_the_start, &predictions)?;
+    let observer = observer_gain::compare(runner, &at_the_start, &predictions)?;
     // What fails at the estimate itself need not be tried beside it.
     let (hangs_on, beside) = if observer.fails() {
         (Ok(HangsOn::default()), Beside::unknown("the model fails under its observer"))

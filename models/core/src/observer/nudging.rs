@@ -52,15 +52,12 @@ impl Nudging {
         let mut channels: Vec<(usize, Vec<usize>)> = Vec::new();
         let mut named: Vec<Vec<usize>> = Vec::new();
         for Measured { row, output, state } in measured(def, &wiring)? {
-            match channels.iter().position(|(at, _)| *at == state) {
-                Some(at) => {
-                    channels[at].1.push(row);
-                    named[at].push(output);
-                }
-                None => {
-                    channels.push((state, vec![row]));
-                    named.push(vec![output]);
-                }
+            if let Some(at) = channels.iter().position(|(at, _)| *at == state) {
+                channels[at].1.push(row);
+                named[at].push(output);
+            } else {
+                channels.push((state, vec![row]));
+                named.push(vec![output]);
             }
         }
         if def.corrects.is_empty() {
