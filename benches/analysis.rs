@@ -148,6 +148,7 @@ fn windkessel_beat(figures: &mut Map<String, Value>) -> Result<(), Failure> {
         times: times[1..].to_vec(),
         observed: vec![f64::NAN; 200],
         inputs: vec![Signal { times, values: flow }],
+        since: Vec::new(),
     };
     let job = Job {
         particle: 0,

@@ -171,8 +171,13 @@ fn install(fleet: &mut GrpcFleet, kind: &str) -> Result<SetupId, Failure> {
 
 /// Wall time of one batch, from the caller's side.
 fn run(fleet: &mut GrpcFleet, setup: SetupId, n: usize) -> Result<Duration, Failure> {
-    let window =
-        Arc::new(Window { start: 0.0, times: vec![1.0], observed: vec![2.0; FLOATS], inputs: vec![] });
+    let window = Arc::new(Window {
+        start: 0.0,
+        times: vec![1.0],
+        observed: vec![2.0; FLOATS],
+        inputs: vec![],
+        since: vec![],
+    });
     let job = |i: usize| Job {
         particle: i as u32,
         record: 0,

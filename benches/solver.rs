@@ -237,6 +237,7 @@ fn step(theta: Vec<f64>, i: usize, state: Option<Vec<f64>>) -> Job {
         times: vec![end],
         observed: vec![f64::NAN],
         inputs: vec![Signal { times: vec![0.0, 1.0], values: vec![0.1, 0.1] }],
+        since: Vec::new(),
     };
     Job { particle: 0, record: 0, window: Arc::new(window), theta, state }
 }

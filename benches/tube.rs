@@ -176,6 +176,7 @@ fn worker(figures: &mut Map<String, Value>) -> Result<(), Failure> {
         observed: vec![f64::NAN; observed.len() * CELLS],
         times: observed,
         inputs: vec![Signal { times, values }],
+        since: Vec::new(),
     };
     let job = Job { particle: 0, record: 0, window: Arc::new(window), theta: vec![5e6; 5], state: None };
     let model = setup().build()?;

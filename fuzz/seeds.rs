@@ -149,7 +149,7 @@ fn to_worker() -> Result<(), Box<dyn std::error::Error>> {
     write("setup", "default", &json)?;
     let window = |n: usize| {
         let times = (1..=n).map(|i| i as f64).collect();
-        Arc::new(Window { start: 0.0, times, observed: vec![f64::NAN; n], inputs: vec![] })
+        Arc::new(Window { start: 0.0, times, observed: vec![f64::NAN; n], inputs: vec![], since: vec![] })
     };
     let welcome = Welcome {
         protocol: PROTOCOL,
@@ -204,7 +204,7 @@ fn solver() -> Result<(), Box<dyn std::error::Error>> {
     };
     write("solver_description", "beam", &encode_description(&description).encode_to_vec())?;
     write("description_file", "beam", &serde_json::to_vec(&description)?)?;
-    let window = Window { start: 0.0, times: vec![1.0, 2.0], observed: vec![0.1, 0.2], inputs: vec![] };
+    let window = Window { start: 0.0, times: vec![1.0, 2.0], observed: vec![0.1, 0.2], inputs: vec![], since: vec![] };
     let run = Run {
         particle: 1,
         record: 0,

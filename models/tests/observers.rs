@@ -73,7 +73,8 @@ fn a_wrong_initial_pressure_is_forgotten_at_the_rate_of_the_gain() {
 #[test]
 fn an_observation_at_the_very_start_is_predicted_but_corrects_nothing() {
     let (setup, theta) = setup("oscillator");
-    let window = Window { start: 0.0, times: vec![0.0], observed: vec![9.0, 9.0], inputs: vec![] };
+    let window =
+        Window { start: 0.0, times: vec![0.0], observed: vec![9.0, 9.0], inputs: vec![], since: vec![] };
     let prediction = run(&*nudged(&setup, 1e9).build().unwrap(), &window, &theta);
     assert_eq!(prediction.outputs, [1.0, 0.0]);
     assert_eq!(prediction.state, [1.0, 0.0]);

@@ -44,7 +44,7 @@ fn corrected(with_effect: bool, kind: &str) -> (Vec<f64>, nalgebra::DMatrix<f64>
     let observed: Vec<f64> = (0..50).map(|i| (i as f64).sin()).collect();
     let at = Correction {
         t: 0.0,
-        dt: 0.01,
+        spans: &[0.01; 50],
         observed: &observed,
         predicted: &predicted,
         model: &*model,

@@ -5,7 +5,7 @@ mod common;
 #[path = "../core/tests/dense_wall/mod.rs"]
 mod dense_wall;
 
-use common::{largest_difference, run, setup, window};
+use common::{kinds, largest_difference, run, setup, window};
 use dense_wall::{channels, poles};
 use nalgebra::DMatrix;
 use starlings_models::catalogue::NATIVE;
@@ -128,7 +128,8 @@ fn the_largest_stable_gain_of_an_image_force_is_where_runs_begin_to_grow_at_any_
         let most = image_force.stable_up_to(&*model, &THETA, dt).unwrap();
         let largest = |gain: f64| {
             let times = (1..=200).map(|j| f64::from(j) * dt).collect();
-            let window = Window { start: 0.0, times, observed: vec![0.0; 400], inputs: vec![] };
+            let window =
+                Window { start: 0.0, times, observed: vec![0.0; 400], inputs: vec![], since: vec![] };
             let state = run(&*observed("image-force", gain).build().unwrap(), &window, &THETA).state;
             state[0].abs().max(state[1].abs() / OMEGA)
         };
@@ -157,6 +158,31 @@ fn a_model_without_a_wall_is_refused_with_those_that_have_one() {
     }
     let error = error("windkessel", "oscillator");
     assert!(error.contains("cannot be hosted by the model `oscillator`"), "{error}");
+}
+
+#[test]
+fn the_models_that_a_refusal_names_are_those_that_can_be_built() {
+    for kind in ["dvf", "dvf-am", "sdf", "sdf-displacement", "image-force", "windkessel"] {
+        let told = |model: &str| {
+            let (mut setup, _) = setup(model);
+            setup.observer = def(kind, 1.0);
+            setup.outputs = setup.spec().unwrap().outputs.iter().map(|q| q.name.clone()).collect();
+            setup.build().err().map(|error| error.to_string())
+        };
+        let refusal = told("windkessel-2").unwrap();
+        let mut hosts = 0;
+        for model in kinds() {
+            let hosted = told(&model).is_none();
+            assert_eq!(
+                refusal.contains(&format!("`{model}`")),
+                hosted || model == "windkessel-2",
+                "{kind} on {model}: {refusal}"
+            );
+            hosts += usize::from(hosted);
+        }
+        assert!(hosts > 0, "{kind}");
+        assert_eq!(refusal.contains("`artery-1d`"), ["sdf", "windkessel"].contains(&kind), "{refusal}");
+    }
 }
 
 #[test]

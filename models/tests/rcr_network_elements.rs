@@ -43,6 +43,45 @@ fn a_loss_without_any_part_passes_every_flow_without_a_drop() {
     assert!(got["dp_open"][0].abs() < 1e-5, "{:?}", got["dp_open"]);
 }
 
+#[test]
+fn a_resistance_of_zero_joins_its_nodes_in_a_linear_network_and_under_an_open_valve() {
+    // A Windkessel of two elements: p of the node is that of the chamber, with or without a resistance written before it.
+    let inflow = |times: &[f64]| vec![signal(times, |t| 80.0 + 40.0 * (6.0 * t).sin())];
+    let times = grid(40, 2.0);
+    let outlet = |proximal: f64| {
+        json!({ "elements": [
+            { "name": "inflow", "kind": "flow", "to": "a" },
+            { "name": "body", "kind": "rcr", "from": "a", "proximal": proximal, "compliance": 1.2, "distal": 1.1, "initial": 70.0 },
+        ]})
+    };
+    let joined = simulate(&network(outlet(0.0), &[]), &times, inflow(&times));
+    let apart = simulate(&network(outlet(0.05), &[]), &times, inflow(&times));
+    for (k, t) in times.iter().enumerate() {
+        let flow = 80.0 + 40.0 * (6.0 * t).sin();
+        // What flows is given: the chamber does not feel R_p, which stands as 1e-8 of R_d.
+        let wanted = apart["p_a"][k] - 0.05 * flow;
+        assert!((joined["p_a"][k] - wanted).abs() < 1e-4, "{t}: {} for {wanted}", joined["p_a"][k]);
+    }
+    assert!((apart["p_a"][0] - joined["p_a"][0]).abs() > 3.0, "the resistance is felt where it is");
+    // Two stores joined without a resistance are one: C = 0.7 under 60 mL/s.
+    let stores = json!({ "elements": [
+        { "name": "inflow", "kind": "flow", "to": "a" },
+        { "name": "near", "kind": "C", "from": "a", "value": 0.5, "initial": 50.0 },
+        { "name": "link", "kind": "R", "from": "a", "to": "b", "value": 0.0 },
+        { "name": "far", "kind": "C", "from": "b", "value": 0.2, "initial": 50.0 },
+    ]});
+    let got = simulate(&network(stores, &[]), &[0.5], vec![signal(&[0.0, 1.0], |_| 60.0)]);
+    assert!((got["p_a"][0] - (50.0 + 30.0 / 0.7)).abs() < 1e-5, "{:?}", got["p_a"]);
+    assert!((got["p_b"][0] - got["p_a"][0]).abs() < 1e-5, "{:?}", got["p_b"]);
+    let valve = json!({ "elements": [
+        { "name": "heart", "kind": "pressure", "to": "a", "value": 90.0 },
+        { "name": "valve", "kind": "diode", "from": "a", "to": "b", "open": 0.0, "closed": 1e4 },
+        { "name": "body", "kind": "R", "from": "b", "value": 1.5 },
+    ]});
+    let got = simulate(&network(valve, &[]), &[1.0], vec![]);
+    assert!((got["q_body"][0] - 60.0).abs() < 1e-5, "{:?}", got["q_body"]);
+}
+
 /// A chamber that empties through a resistance.
 fn emptying(extra: &Value) -> Value {
     let mut chamber = json!({ "name": "heart", "kind": "chamber", "from": "a", "active": 3.0, "passive": 0.5,

@@ -125,6 +125,14 @@ fn keys_and_values_that_do_not_belong_to_an_element_are_refused() {
     refused(json!([wrong_key]), "elements[0].compliance", &["`R` has no `compliance`", "`value`"]);
     let negative = json!({ "name": "a", "kind": "R", "from": "x", "value": -1.0 });
     refused(json!([negative]), "elements[0].value", &["-1 is no value of a resistance"]);
+    let empty = json!({ "name": "wall", "kind": "C", "from": "x", "value": 0.0 });
+    refused(
+        json!([empty]),
+        "elements[0].value",
+        &["`C_wall`: 0 is no value of a compliance", "leave the element out"],
+    );
+    let light = json!({ "name": "blood", "kind": "L", "from": "x", "value": 0.0 });
+    refused(json!([light]), "elements[0].value", &["`L_blood`: 0 is no value of a inertance", "leave"]);
     let text = json!({ "name": "a", "kind": "R", "from": "x", "value": [1.0] });
     refused(json!([text]), "elements[0].value", &["a number or the name of a parameter"]);
     let kind = json!({ "name": "a", "kind": "resistor", "from": "x" });

@@ -21,7 +21,7 @@ fn decode(message: generated::ToWorker) -> Result<ToWorker, ProtocolError> {
 }
 
 fn small_job() -> Job<State> {
-    let window = Window { start: 0.0, times: vec![1.0], observed: vec![2.0], inputs: vec![] };
+    let window = Window { start: 0.0, times: vec![1.0], observed: vec![2.0], inputs: vec![], since: vec![] };
     Job { particle: 0, record: 0, window: Arc::new(window), theta: vec![], state: None }
 }
 

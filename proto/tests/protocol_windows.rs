@@ -24,7 +24,13 @@ const LEASE: Lease = Lease { epoch: 1, job: 2, attempt: 1 };
 fn the_windows_of_a_batch_are_encoded_once_and_shared_by_its_messages() {
     let window = |start: f64| {
         let signal = Signal { times: vec![start, start + 1.0], values: vec![0.0, 1.0] };
-        Arc::new(Window { start, times: vec![start + 0.5], observed: vec![f64::NAN], inputs: vec![signal] })
+        Arc::new(Window {
+            start,
+            times: vec![start + 0.5],
+            observed: vec![f64::NAN],
+            inputs: vec![signal],
+            since: vec![],
+        })
     };
     let windows = [window(0.0), window(1.0)];
     // Particle by particle, as an ensemble over two records travels.
@@ -49,7 +55,8 @@ fn the_windows_of_a_batch_are_encoded_once_and_shared_by_its_messages() {
 fn jobs_over_a_large_window() -> [Job<State>; 2] {
     let times: Vec<f64> = (0..2000).map(f64::from).collect();
     let signal = Signal { times: times.clone(), values: times.clone() };
-    let window = Arc::new(Window { start: 0.0, observed: times.clone(), times, inputs: vec![signal] });
+    let window =
+        Arc::new(Window { start: 0.0, observed: times.clone(), times, inputs: vec![signal], since: vec![] });
     [0, 1].map(|particle| {
         let window = Arc::clone(&window);
         Job { particle, record: 0, window, theta: vec![f64::from(particle)], state: None }

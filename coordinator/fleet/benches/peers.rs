@@ -122,7 +122,7 @@ fn fleet(store: &StateStore, n: usize) -> Result<(GrpcFleet, LocalWorkers), Fail
 }
 
 fn window() -> Window {
-    Window { start: 0.0, times: vec![1.0], observed: vec![0.0], inputs: vec![] }
+    Window { start: 0.0, times: vec![1.0], observed: vec![0.0], inputs: vec![], since: vec![] }
 }
 
 /// Wall time of a batch of runs of so many seconds each.

@@ -135,7 +135,8 @@ fn install(fleet: &mut GrpcFleet, kind: &str) -> Result<SetupId, Failure> {
 
 /// Wall time of a batch of runs of so many seconds, and how long the workers idled before each.
 fn run(fleet: &mut GrpcFleet, setup: SetupId, seconds: &[f64]) -> Result<(Duration, Vec<f64>), Failure> {
-    let window = Window { start: 0.0, times: vec![1.0], observed: vec![0.0; FLOATS], inputs: vec![] };
+    let window =
+        Window { start: 0.0, times: vec![1.0], observed: vec![0.0; FLOATS], inputs: vec![], since: vec![] };
     let window = Arc::new(window);
     let job = |(i, seconds): (usize, &f64)| Job {
         particle: i as u32,

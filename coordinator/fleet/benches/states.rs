@@ -249,7 +249,8 @@ fn start(store: &StateStore, values: usize, particle: usize) -> Result<StoredSta
 }
 
 fn run(fleet: &mut GrpcFleet, setup: SetupId, states: &[StoredState]) -> Result<Vec<StoredState>, Failure> {
-    let window = Arc::new(Window { start: 0.0, times: vec![1.0], observed: vec![2.0], inputs: vec![] });
+    let window =
+        Arc::new(Window { start: 0.0, times: vec![1.0], observed: vec![2.0], inputs: vec![], since: vec![] });
     let job = |(k, state): (usize, &StoredState)| {
         let (window, state) = (Arc::clone(&window), Some(Held::Stored(state.clone())));
         (setup, Job { particle: k as u32, record: 0, window, theta: vec![], state })

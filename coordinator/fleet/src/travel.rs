@@ -65,7 +65,8 @@ mod tests {
 
     #[test]
     fn a_state_of_any_size_travels() {
-        let window = Window { start: 0.0, times: vec![1.0], observed: vec![1.0], inputs: Vec::new() };
+        let window =
+            Window { start: 0.0, times: vec![1.0], observed: vec![1.0], inputs: Vec::new(), since: vec![] };
         let window = Arc::new(window);
         for n in [32_768, 32_769] {
             let state = Held::Values(vec![0.0; n]);

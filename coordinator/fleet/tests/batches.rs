@@ -60,6 +60,7 @@ fn threads_and_a_worker_over_the_wire_give_the_same_bits() {
         times: (1..40).map(|i| 0.1 * f64::from(i)).collect(),
         observed: vec![f64::NAN; 39],
         inputs: vec![],
+        since: Vec::new(),
     };
     let window = Arc::new(window);
     let job = |particle| Job {

@@ -130,6 +130,7 @@ fn a_mixed_batch_gives_the_same_bits_on_threads_and_over_the_wire() {
         times: (1..40).map(|i| 0.1 * f64::from(i)).collect(),
         observed: vec![f64::NAN; 39 * n_obs],
         inputs: vec![],
+        since: Vec::new(),
     };
     let windows = [1, 2].map(|n_obs| Arc::new(window(n_obs)));
     let job = |particle: u32| Job {

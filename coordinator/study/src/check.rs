@@ -12,6 +12,7 @@ mod infer;
 mod initial;
 mod limits;
 mod model;
+mod nudged;
 mod observer;
 mod parameters;
 mod periodic;
@@ -26,6 +27,7 @@ mod spectrum;
 mod survey;
 mod together;
 mod units;
+mod walks;
 
 use std::path::Path;
 use std::sync::Arc;
@@ -205,6 +207,7 @@ fn checked(
     let (units, candidate_warnings) = units::warnings(&file, &model, &records);
     warnings.extend(units);
     let theta = expand::theta(&parameters, &records);
+    walks::check(source, &file, (&parameters, &records), (&model.spec, estimator.kind.is_filter()));
     let described = (model.setup, model.spec);
     let observers = file.observer.clone();
     let study = Study {
@@ -221,6 +224,7 @@ fn checked(
         candidate_warnings,
         ..study_of(path, source, file, described, (fleet, estimator), solver_host)
     };
+    nudged::check(source, &observers, &study);
     together::check(source, &observers, &study);
     source.verdict()?;
     Ok(study)

@@ -21,5 +21,6 @@ mod schedule;
 pub(crate) mod settle;
 pub(crate) mod stack;
 mod timeouts;
+mod walking;
 
 pub use settle::LIMIT;

@@ -47,6 +47,8 @@ pub(crate) struct Comparison {
     pub fit: ObserverFit,
     /// Their course, one entry per record.
     pub courses: Vec<ObserverCourse>,
+    /// A sentence per record that is not among them, since the model fails there.
+    pub left_out: Vec<String>,
 }
 
 /// The result of the comparison.
@@ -58,6 +60,17 @@ pub(crate) enum Compared {
     Both(Comparison),
     /// The run with the observer gave nothing to compare; a sentence that says why.
     Failed(String),
+}
+
+impl Compared {
+    /// Whether the model fails under its observer on some record.
+    pub(crate) fn fails(&self) -> bool {
+        match self {
+            Self::NoObserver => false,
+            Self::Both(found) => !found.left_out.is_empty(),
+            Self::Failed(_) => true,
+        }
+    }
 }
 
 /// Runs the trained records once more, with the observer, and compares. `free` is the free run at the same estimate.
@@ -76,14 +89,20 @@ pub(crate) fn compare(
     let windows = study.trained_windows();
     let theta = DMatrix::from_column_slice(posterior.mean.len(), 1, posterior.mean.as_slice());
     let results = runner.run_from_start(AnalysisIndex { pass: 0, step: 1 }, &theta, &windows)?;
-    let mut courses = Vec::new();
+    let (mut courses, mut left_out) = (Vec::new(), Vec::new());
     let mut sums = Sums::default();
     for ((record, window), result) in windows.iter().zip(results.into_iter().flatten()) {
         let prediction = match result {
             Ok(prediction) => prediction,
-            Err(error) => return Ok(Compared::Failed(failed(study, *record, &error))),
+            Err(error) => {
+                left_out.push(failed(study, *record, &error));
+                continue;
+            }
         };
         courses.push(course(study, *record, window, &prediction.outputs, free, &mut sums));
+    }
+    if courses.is_empty() && !left_out.is_empty() {
+        return Ok(Compared::Failed(left_out.join(" ")));
     }
     let fit = ObserverFit {
         kind: study.setup.observer.name(),
@@ -94,14 +113,15 @@ pub(crate) fn compare(
     if !(fit.innovation_rms_with.is_finite() && fit.innovation_rms_without.is_finite()) {
         return Ok(Compared::Failed(endless(study)));
     }
-    Ok(Compared::Both(Comparison { fit, courses }))
+    Ok(Compared::Both(Comparison { fit, courses, left_out }))
 }
 
-/// The sentence that says which comparison is missing, and why.
+/// The sentence that says what is missing, and why.
 fn failed(study: &Study, record: usize, error: &Failure) -> String {
     format!(
-        "with the estimated parameters the model fails under the observer `{}` on record `{}` ({error}): what the observer \
-         does for the state is not known. Lower its gain.",
+        "with the estimated parameters the model fails under the observer `{}` on record `{}` ({error}): innovations with and \
+         without the observer leave that record out, and neither the constants that the answer hangs on nor intervals given the \
+         residuals are known. Lower its gain.",
         study.setup.observer.name(),
         study.records[record].name
     )

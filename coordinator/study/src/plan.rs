@@ -21,10 +21,15 @@ impl Study {
         let Some(&first) = of_record.times.first() else { return Vec::new() };
         let mut windows = Vec::new();
         let mut start = of_record.start;
+        let mut last = LastValues::of(of_record, self.setup.outputs.len());
         let alone = usize::from(rows.first() == Some(&0) && start >= first);
         let (initial, later) = rows.split_at(alone);
         for rows in initial.chunks(1).chain(later.chunks(of_record.every)) {
-            let window = self.window(of_record, start, rows, !self.delays);
+            let mut window = self.window(of_record, start, rows, !self.delays);
+            if !self.observer_is_off() {
+                window.since = last.before(start);
+                last.see(&window);
+            }
             start = window.times.last().copied().unwrap_or(start);
             windows.push(Arc::new(window));
         }
@@ -45,6 +50,7 @@ impl Study {
             times: of_record.times.clone(),
             observed: vec![f64::NAN; of_record.times.len() * self.setup.outputs.len()],
             inputs: of_record.inputs.clone(),
+            since: Vec::new(),
         }
     }
 
@@ -106,7 +112,44 @@ impl Study {
         } else {
             record.inputs.clone()
         };
-        Window { start, times, observed, inputs }
+        Window { start, times, observed, inputs, since: vec![] }
+    }
+}
+
+/// When the rows of a record had their last values, for observers.
+struct LastValues {
+    /// `None` for a row that never has one.
+    times: Vec<Option<f64>>,
+}
+
+impl LastValues {
+    /// At the start of a record, from which rows that are fitted count.
+    fn of(record: &Record, n_obs: usize) -> Self {
+        let mut times = vec![None; n_obs];
+        for channel in record.channels.iter().filter(|c| !c.held_out) {
+            times[channel.row] = Some(record.start);
+        }
+        Self { times }
+    }
+
+    /// What a window that begins at `start` says of them; nothing where they all count from there.
+    fn before(&self, start: f64) -> Vec<f64> {
+        if self.times.iter().flatten().all(|time| *time >= start) {
+            return Vec::new();
+        }
+        self.times.iter().map(|time| time.unwrap_or(start)).collect()
+    }
+
+    /// Notes the values of a window.
+    fn see(&mut self, window: &Window) {
+        let n_obs = self.times.len().max(1);
+        for (t, values) in window.times.iter().zip(window.observed.chunks(n_obs)) {
+            for (time, value) in self.times.iter_mut().zip(values) {
+                if value.is_finite() {
+                    *time = Some(*t);
+                }
+            }
+        }
     }
 }
 

@@ -48,8 +48,21 @@ pub struct Fit {
     pub converged: bool,
     /// How far the last pass moved the estimate; `None` for one pass, which has no estimate before it.
     pub last_move: Option<Move>,
+    /// Entries that stand for the last value of a state that walks, with the value at which runs from the start begin.
+    pub(crate) starts: Vec<(usize, f64)>,
     /// What was planned, and how much of it the fit was.
     pub(crate) work: (WorkPlan, f64),
+}
+
+impl Fit {
+    /// The posterior that runs from the start of a record are made with.
+    fn at_the_start(&self) -> Gaussian {
+        let mut posterior = self.posterior.clone();
+        for (entry, value) in &self.starts {
+            posterior.mean[*entry] = *value;
+        }
+        posterior
+    }
 }
 
 /// The entry of the estimated vector that a pass moved most.
@@ -184,14 +197,15 @@ fn from_start_to_end(
     if let Some(spread) = &beside.spread {
         folder.store.set_meta(PREDICTION_SD, &json(spread))?;
     }
-    let mut unknown = None;
+    let mut unknown = Vec::new();
     match observer {
         Compared::NoObserver => {}
         Compared::Both(observer) => {
             folder.store.set_meta(OBSERVER, &json(&observer.courses))?;
             result.observer = Some(observer.fit);
+            unknown = observer.left_out;
         }
-        Compared::Failed(why) => unknown = Some(why),
+        Compared::Failed(why) => unknown.push(why),
     }
     let residuals = warnings::residuals::residuals(study, &fit, &folder.store, &predictions)?;
     result.warnings = warnings::collect(study, &fit, &result, &predictions, &residuals);
@@ -233,20 +247,18 @@ fn after_fit(
     let earlier = fit.counts.total.saturating_sub(runner.counts.total);
     let runs = |runner: &EnsembleRunner<'_>| earlier + runner.counts.total;
     context.goes_on(store, fit, 0, runs(runner), runner);
-    let predictions = free_run::run(runner, &fit.posterior)?;
+    let at_the_start = fit.at_the_start();
+    let predictions = free_run::run(runner, &at_the_start)?;
     context.goes_on(store, fit, 1, runs(runner), runner);
-    let observer = observer_gain::compare(runner, &fit.posterior, &predictions)?;
-    let (hangs_on, beside) = match &observer {
-        // What fails at the estimate itself need not be tried beside it.
-        Compared::Failed(_) => {
-            (Ok(HangsOn::default()), Beside::unknown("the model fails under its observer"))
-        }
-        Compared::NoObserver | Compared::Both(_) => {
-            context.goes_on(store, fit, 2, runs(runner), runner);
-            let hangs_on = hangs_on(runner, fit)?;
-            context.goes_on(store, fit, 3, runs(runner), runner);
-            (hangs_on, given_residuals::compare(runner, &fit.posterior)?)
-        }
+    let observer = observer_gain::compare(runner, &at_the_start, &predictions)?;
+    // What fails at the estimate itself need not be tried beside it.
+    let (hangs_on, beside) = if observer.fails() {
+        (Ok(HangsOn::default()), Beside::unknown("the model fails under its observer"))
+    } else {
+        context.goes_on(store, fit, 2, runs(runner), runner);
+        let hangs_on = hangs_on(runner, fit)?;
+        context.goes_on(store, fit, 3, runs(runner), runner);
+        (hangs_on, given_residuals::compare(runner, &fit.posterior)?)
     };
     let mut predicted = Predictions::default();
     if !runner.study().predict.outputs.is_empty() {

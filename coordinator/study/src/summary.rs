@@ -277,9 +277,14 @@ impl Tally {
 }
 
 fn conditional_on(study: &Study) -> String {
+    let walks = if study.walks() {
+        " States walk: the estimate of an initial value is the state after the last analysis."
+    } else {
+        ""
+    };
     format!(
         "Intervals are conditional on the model `{}` being right, on independent Gaussian measurement noise of the stated \
-         standard deviations, on the stated priors, and on the model being close to linear within the posterior.",
+         standard deviations, on the stated priors, and on the model being close to linear within the posterior.{walks}",
         study.setup.model.kind
     )
 }

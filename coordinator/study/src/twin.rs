@@ -101,6 +101,7 @@ pub fn simulate(study: &Study, twin: &Twin) -> Result<Recording, TwinError> {
         observed: vec![f64::NAN; times.len() * run.n_obs],
         times,
         inputs: record.inputs.clone(),
+        since: Vec::new(),
     };
     let restarts = model.spec().restart;
     let state = match twin.period {
@@ -158,6 +159,7 @@ pub fn beats(
         observed: vec![f64::NAN; twin.times.len() * run.n_obs],
         times: twin.times.clone(),
         inputs: record.inputs.clone(),
+        since: Vec::new(),
     };
     let window = Arc::new(window);
     let mut state = run.initial(&window)?;

@@ -53,7 +53,8 @@ impl<'a> World<'a> {
         let spec = model.spec().unwrap_or_else(|error| panic!("{}: {error}", system.name));
         let inputs = study.records[0].inputs.clone();
         let observed = vec![f64::NAN; n * system.channels.len()];
-        let window = Arc::new(Window { start: times[0], times: times.clone(), observed, inputs });
+        let window =
+            Arc::new(Window { start: times[0], times: times.clone(), observed, inputs, since: vec![] });
         let mut world = World { system, times, study, model, truth, effects: Vec::new(), window };
         world.effects = library(&spec);
         world.effects.extend(world.study.candidates.iter().cloned());

@@ -48,6 +48,11 @@ impl Case {
         Study::load(&self.folder.path().join("study.toml")).unwrap_or_else(|error| panic!("{error}"))
     }
 
+    /// What is wrong with the study, if anything.
+    pub fn refusal(&self) -> Option<String> {
+        Study::load(&self.folder.path().join("study.toml")).err().map(|error| error.to_string())
+    }
+
     /// A run folder that no run has used.
     pub fn fresh(&self) -> PathBuf {
         self.runs.set(self.runs.get() + 1);

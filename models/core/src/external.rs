@@ -119,6 +119,7 @@ impl<S: Solve> External<S> {
                 observed: vec![f64::NAN; n * times.len()],
                 inputs: window.inputs.clone(),
                 times: times.clone(),
+                since: Vec::new(),
             };
             let shown = effects.run(theta, replayed, of_effects.inputs.take())?;
             let signal = |i: usize| Signal {
@@ -154,6 +155,7 @@ impl<S: Solve> External<S> {
             times: window.times.clone(),
             observed: vec![f64::NAN; outputs.len()],
             inputs: window.inputs.iter().cloned().chain(recorded).collect(),
+            since: Vec::new(),
         };
         let shown = effects.run(theta, replayed, of_effects.outputs.take())?;
         of_effects.outputs = Some(shown.state);

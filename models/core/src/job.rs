@@ -31,6 +31,9 @@ pub struct Window {
     pub observed: Vec<f64>,
     /// Input signals in the order of the model's inputs, covering `[start, end]` (and earlier where a delay asks for it).
     pub inputs: Vec<Signal>,
+    /// Per output row the time of its last observed value before `start`, or the start of the record; empty: `start` for all. An
+    /// observer corrects by a value as strongly as the time since the one before it of the same row asks.
+    pub since: Vec<f64>,
 }
 
 /// One run: this particle, these parameters, this window, from this state.

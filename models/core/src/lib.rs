@@ -37,6 +37,7 @@ mod setup;
 mod setup_error;
 mod simulator;
 pub mod solver;
+mod spans;
 mod spec;
 pub mod spectrum;
 mod sums_def;

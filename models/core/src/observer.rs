@@ -14,6 +14,7 @@ mod nudging;
 mod sdf;
 mod sdf_displacement;
 mod sections;
+mod slopes;
 mod together;
 mod wall;
 mod windkessel;
@@ -32,8 +33,8 @@ pub use together::shared_state;
 pub struct Correction<'a> {
     /// Observation time.
     pub t: f64,
-    /// Time since the previous observation of the window, or since its start; positive.
-    pub dt: f64,
+    /// Per row of `observed` the time since its own last value, or since the start of the record; positive.
+    pub spans: &'a [f64],
     /// Observed values, one per row of the predicted outputs; NaN where nothing was measured or it is held out.
     pub observed: &'a [f64],
     /// Predicted values, as recorded before this correction.
@@ -53,6 +54,9 @@ pub trait Observer: Send + Sync {
     /// under this observer at its gain in continuous time, A being the model's own linearisation; zero where nothing is
     /// observed. [`Correction`]s are its steps.
     fn feedback(&self, model: &dyn Model, theta: &[f64]) -> DMatrix<f64>;
+
+    /// The rows of the predicted outputs that it corrects by.
+    fn reads(&self) -> Vec<usize>;
 
     /// The largest stable gain with observations every `dt`; `None` for a correction that any gain leaves stable. `theta` are
     /// the parameters of `model`.

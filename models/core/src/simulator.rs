@@ -15,6 +15,7 @@ use crate::observer::{self, Correction, Observer, Wiring};
 use crate::past::Past;
 use crate::segment::Segment;
 use crate::setup::Setup;
+use crate::spans::Spans;
 use crate::{
     Drive, Forward, Job, Model, ModelFailure, NativeModels, ParticleError, Prediction, Spec, Stop, Timeout,
     Until, Window, nearest,
@@ -150,6 +151,7 @@ impl Simulator {
         let mut outputs = Vec::with_capacity(window.observed.len());
         let n_obs = self.rows.len();
         let mut previous = window.start;
+        let mut spans = Spans::new(window, n_obs);
         for (j, &t) in window.times.iter().enumerate() {
             inputs.walk([previous, t], limits, |segment| {
                 limits.take(1, segment.t0)?;
@@ -162,13 +164,13 @@ impl Simulator {
                 Row::Output(i) => y[i],
                 Row::State(i) => x[i],
             }));
-            let dt = t - previous;
-            if dt > 0.0 {
-                let column = j * n_obs..(j + 1) * n_obs;
-                let (observed, predicted) = (&window.observed[column.clone()], &outputs[column]);
-                let (model, theta) = (&*self.model, theta.as_slice());
-                self.observer.correct(Correction { t, dt, observed, predicted, model, theta }, &mut x);
+            let column = j * n_obs..(j + 1) * n_obs;
+            let (observed, predicted) = (&window.observed[column.clone()], &outputs[column]);
+            if t > previous {
+                let (model, theta, spans) = (&*self.model, theta.as_slice(), spans.until(t));
+                self.observer.correct(Correction { t, spans, observed, predicted, model, theta }, &mut x);
             }
+            spans.see(t, observed);
             previous = t;
         }
         past.store(previous, &mut x);
@@ -195,6 +197,12 @@ pub(crate) fn check_job(job: &Job, n_value: usize, n_row: usize, spec: &Spec) ->
     let (given, wanted) = (window.observed.len(), n_row * window.times.len());
     if given != wanted {
         return Err(bad(format!("{given} observed values where outputs times times make {wanted}")));
+    }
+    if !(window.since.is_empty() || window.since.len() == n_row) {
+        return Err(bad(format!("{} times of last values for {n_row} rows", window.since.len())));
+    }
+    if !window.since.iter().all(|last| *last <= window.start) {
+        return Err(bad("a last value before the window that is not before its start".to_owned()));
     }
     let (given, wanted) = (window.inputs.len(), spec.inputs.len());
     if given != wanted {

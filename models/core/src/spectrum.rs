@@ -30,7 +30,7 @@ pub use coordinates::{Energy, natural};
 pub use decay::Decay;
 pub use gain::{Best, Beyond, GainCurve};
 pub use linearise::linearisation;
-pub use linearised_setup::{LinearisedSetup, ObserverSpectrum};
+pub use linearised_setup::{LinearisedSetup, ObserverSpectrum, start};
 pub use locus::Follower;
 pub use observed::{Feedback, ObservedSystem};
 pub use pole::poles;

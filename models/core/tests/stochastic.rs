@@ -48,6 +48,7 @@ fn path(simulator: &Simulator, times: &[f64], particle: u32, record: u32) -> Vec
         times: times.to_vec(),
         observed: vec![f64::NAN; n * times.len()],
         inputs: vec![],
+        since: Vec::new(),
     };
     let job = Job { particle, record, window: Arc::new(window), theta: vec![], state: None };
     simulator.run(&job).unwrap().outputs

@@ -50,7 +50,7 @@ fn run(list: &[(&str, f64)], p0: f64, observed: Option<&[f64]>) -> Vec<f64> {
     // The stored pressure is not measured.
     seen.iter_mut().skip(21).step_by(22).for_each(|value| *value = f64::NAN);
     let flow = Signal { times: vec![0.0, 1.0], values: vec![0.0; 2] };
-    let window = Arc::new(Window { start: 0.0, times, observed: seen, inputs: vec![flow] });
+    let window = Arc::new(Window { start: 0.0, times, observed: seen, inputs: vec![flow], since: vec![] });
     simulator.run(&Job { particle: 0, record: 0, window, theta: vec![p0], state: None }).unwrap().outputs
 }
 

@@ -69,7 +69,7 @@ pub(crate) fn window(setup: &Setup, n: usize) -> Window {
         Signal { times: sampled.clone(), values }
     };
     let observed = vec![f64::NAN; n * n_obs];
-    Window { start: 0.0, times, observed, inputs: (0..n_input).map(signal).collect() }
+    Window { start: 0.0, times, observed, inputs: (0..n_input).map(signal).collect(), since: vec![] }
 }
 
 /// A job from the initial state.
@@ -87,13 +87,20 @@ pub(crate) fn run_in_pieces(model: &dyn Forward, window: &Window, theta: &[f64],
     let n_obs = window.observed.len() / window.times.len();
     let mut whole = Prediction::<Vec<f64>>::default();
     let (mut start, mut state) = (window.start, None);
+    // What an observer must know of the pieces before.
+    let mut since = vec![window.start; n_obs];
     for (times, observed) in window.times.chunks(every).zip(window.observed.chunks(every * n_obs)) {
-        let piece = Window { start, times: times.to_vec(), observed: observed.to_vec(), ..window.clone() };
+        let (times_of, values) = (times.to_vec(), observed.to_vec());
+        let inputs = window.inputs.clone();
+        let piece = Window { start, times: times_of, observed: values, inputs, since: since.clone() };
         let prediction = model.run(&Job { state, ..job(&piece, theta) }).unwrap();
         whole.outputs.extend(prediction.outputs);
         whole.state.clone_from(&prediction.state);
         state = Some(prediction.state);
         start = times[times.len() - 1];
+        for (t, values) in times.iter().zip(observed.chunks(n_obs)) {
+            since.iter_mut().zip(values).filter(|(_, v)| !v.is_nan()).for_each(|(last, _)| *last = *t);
+        }
     }
     whole
 }

@@ -74,7 +74,7 @@ impl Bench {
         };
         let observed = vec![f64::NAN; times.len() * sizes.iter().sum::<usize>()];
         let inputs = (0..spec.inputs.len()).map(signal).collect();
-        let window = Window { start: 0.0, times, observed, inputs };
+        let window = Window { start: 0.0, times, observed, inputs, since: vec![] };
         Self { name, spec, window, setup, theta, sizes }
     }
 

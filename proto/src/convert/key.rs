@@ -85,7 +85,7 @@ mod tests {
 
     fn job() -> Job {
         let inputs = vec![Signal { times: vec![0.0, 1.0], values: vec![2.0, 3.0] }];
-        let window = Window { start: 0.0, times: vec![1.0], observed: vec![f64::NAN], inputs };
+        let window = Window { start: 0.0, times: vec![1.0], observed: vec![f64::NAN], inputs, since: vec![] };
         Job { particle: 1, record: 2, window: window.into(), theta: vec![0.5, -0.0], state: Some(vec![1.0]) }
     }
 
@@ -114,6 +114,8 @@ mod tests {
             over(&|window| window.inputs[0].times[1] = 2.0),
             over(&|window| window.inputs[0].values[1] = 2.0),
             over(&|window| window.inputs.clear()),
+            over(&|window| window.since = vec![-0.5]),
+            over(&|window| window.since = vec![0.0]),
         ];
         assert_eq!(job_key(&[7; 32], &job()), same, "another copy of the same job");
         let n = keys.len();

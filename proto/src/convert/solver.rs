@@ -104,6 +104,7 @@ pub fn decode_run(message: &generated::RunRequest) -> Result<Request, ProtocolEr
             times: floats::decode(&message.times, "times")?,
             observed: floats::decode(&message.observed, "observed")?,
             inputs: message.inputs.iter().map(signal).collect::<Result<_, ProtocolError>>()?,
+            since: Vec::new(),
         },
         observer: ObserverDef { kind: observer.kind, gain: observer.gain, ..ObserverDef::default() },
         state: message.state.as_ref().map(|bytes| floats::decode(bytes, "state")).transpose()?,

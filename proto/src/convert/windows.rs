@@ -86,7 +86,8 @@ fn is_same(one: &generated::Window, other: &generated::Window) -> bool {
     let start = |window: &generated::Window| window.start.map(f64::to_bits);
     // The others are arrays of bytes.
     start(one) == start(other)
-        && (&one.times, &one.observed, &one.inputs) == (&other.times, &other.observed, &other.inputs)
+        && (&one.times, &one.observed, &one.since, &one.inputs)
+            == (&other.times, &other.observed, &other.since, &other.inputs)
 }
 
 /// The name of a window, where it is large enough to travel under one.
@@ -134,6 +135,7 @@ pub(super) fn digest(window: &generated::Window) -> WindowId {
     add(&window.start.map(f64::to_le_bytes).unwrap_or_default());
     add(&window.times);
     add(&window.observed);
+    add(&window.since);
     for signal in &window.inputs {
         add(&signal.times);
         add(&signal.values);
@@ -166,7 +168,8 @@ mod tests {
 
     #[test]
     fn jobs_with_the_same_window_share_it_and_those_with_another_zero_do_not() {
-        let window = |start, observed| Window { start, times: vec![1.0], observed, inputs: vec![] };
+        let window =
+            |start, observed| Window { start, times: vec![1.0], observed, inputs: vec![], since: vec![] };
         let mut received = ReceivedWindows::default();
         let mut take = |of: Window| inside(&window::encode(&of), &mut received).unwrap();
         let first = take(window(0.0, vec![f64::NAN]));

@@ -42,6 +42,7 @@ pub(crate) fn window() -> impl Strategy<Value = Window> {
                     times,
                     observed,
                     inputs,
+                    since: Vec::new(),
                 })
         },
     )

@@ -105,7 +105,7 @@ impl Bench {
 fn job(k: f64, times: &[f64], n_output: usize, flow: &[f64]) -> Job {
     let inputs = vec![Signal { times: (0..flow.len()).map(|i| i as f64).collect(), values: flow.to_vec() }];
     let observed = vec![f64::NAN; n_output * times.len()];
-    let window = Arc::new(Window { start: 0.0, times: times.to_vec(), observed, inputs });
+    let window = Arc::new(Window { start: 0.0, times: times.to_vec(), observed, inputs, since: vec![] });
     Job { particle: 3, record: 1, window, theta: vec![k], state: None }
 }
 

@@ -41,7 +41,8 @@ fn program(script: &str, folder: &std::path::Path) -> Box<dyn Forward> {
 }
 
 fn job() -> Job {
-    let window = Window { start: 0.0, times: vec![1.0], observed: vec![f64::NAN], inputs: vec![] };
+    let window =
+        Window { start: 0.0, times: vec![1.0], observed: vec![f64::NAN], inputs: vec![], since: vec![] };
     Job { particle: 0, record: 0, window: Arc::new(window), theta: vec![1.0], state: None }
 }
 

@@ -66,6 +66,7 @@ fn job(theta: &[f64], from: usize, to: usize, state: Option<Vec<f64>>) -> Job {
         times: (from + 1..=to).map(time).collect(),
         observed: vec![f64::NAN; 2 * (to - from)],
         inputs: vec![Signal { times: (0..81).map(time).collect(), values: drive }],
+        since: Vec::new(),
     };
     Job { particle: 3, record: 0, window: Arc::new(window), theta: theta.to_vec(), state }
 }

@@ -13,7 +13,7 @@ fn held(memory: usize, disk: u64) -> Arc<Held> {
 }
 
 fn job(particle: u32) -> Arc<Job> {
-    let window = Window { start: 0.0, times: vec![1.0], observed: vec![0.0], inputs: vec![] };
+    let window = Window { start: 0.0, times: vec![1.0], observed: vec![0.0], inputs: vec![], since: vec![] };
     Arc::new(Job { particle, record: 0, window: window.into(), theta: vec![0.5], state: None })
 }
 

@@ -27,8 +27,13 @@ impl Forward for Endless {
 
 /// A job of the particle 0.
 fn job() -> Job {
-    let window =
-        starlings_models::Window { start: 0.0, times: vec![1.0], observed: vec![0.0], inputs: vec![] };
+    let window = starlings_models::Window {
+        start: 0.0,
+        times: vec![1.0],
+        observed: vec![0.0],
+        inputs: vec![],
+        since: vec![],
+    };
     Job { particle: 0, record: 0, window: Arc::new(window), theta: vec![], state: None }
 }
 

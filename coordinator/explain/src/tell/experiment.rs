@@ -173,6 +173,7 @@ fn stretched(window: &Window, n_obs: usize) -> Window {
         times: [window.times.as_slice(), &later(&window.times)].concat(),
         observed: vec![f64::NAN; 2 * window.times.len() * n_obs],
         inputs: inputs.collect(),
+        since: Vec::new(),
     }
 }
 
@@ -221,6 +222,7 @@ mod tests {
             times: vec![0.0, 1.0, 2.0, 3.0],
             observed: vec![f64::NAN; 8],
             inputs: vec![Signal { times, values }],
+            since: Vec::new(),
         };
         let longer = stretched(&window, 2);
         assert_eq!(longer.times, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);

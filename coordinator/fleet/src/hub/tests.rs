@@ -46,7 +46,7 @@ fn batch(hub: &Hub) -> (Submission, Receiver<Reply>) {
     let (setup, json) = encode_setup(&Setup::default()).expect("it travels");
     let shape = SetupShape { parameters: vec!["k".to_owned()], n_state: None, sums: false };
     hub.install(setup, json, shape, Likeness::Exact);
-    let window = Window { start: 0.0, times: vec![1.0], observed: vec![0.0], inputs: vec![] };
+    let window = Window { start: 0.0, times: vec![1.0], observed: vec![0.0], inputs: vec![], since: vec![] };
     let job = starlings_models::Job {
         particle: 0,
         record: 0,

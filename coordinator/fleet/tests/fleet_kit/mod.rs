@@ -63,8 +63,13 @@ pub fn square(job: &Job) -> Prediction {
 }
 
 pub fn jobs(n: u32) -> Vec<Job> {
-    let window =
-        Arc::new(Window { start: 0.0, times: vec![1.0], observed: vec![f64::NAN; 2], inputs: vec![] });
+    let window = Arc::new(Window {
+        start: 0.0,
+        times: vec![1.0],
+        observed: vec![f64::NAN; 2],
+        inputs: vec![],
+        since: vec![],
+    });
     let job = |particle| Job {
         particle,
         record: 0,

@@ -23,7 +23,10 @@ pub(crate) fn check(source: &Source, file: &StudyFile, setup: &Setup, records: &
         if matches!(def.kind.as_str(), "" | "none") {
             continue;
         }
-        if let Some(built) = built(source, (file, section), (setup, def), records) {
+        // What nudging sees may depend on what is estimated: [`super::nudged`] looks at the prior medians.
+        if let Some(built) = built(source, (file, section), (setup, def), records)
+            && def.kind != super::nudged::KIND
+        {
             check_gain(source, (file, section), records, &built);
         }
     }
@@ -34,6 +37,8 @@ struct Built {
     observer: Box<dyn Observer>,
     model: Box<dyn Model>,
     theta: Vec<f64>,
+    /// Rows of all outputs of the study by which it corrects.
+    rows: Vec<usize>,
 }
 
 /// The observer as it works in the fit, where held-out channels are never seen; `None` when a problem was reported.
@@ -53,7 +58,9 @@ fn built(
         let theta = constants(setup, &spec);
         let wiring = Wiring { spec: &spec, outputs, model: &*model, theta: &theta, native: NATIVE };
         let observer = observer::build(&def.alone(), wiring)?;
-        Ok(Built { observer, model, theta })
+        let all = observer::build(&def.alone(), Wiring { outputs: &setup.outputs, ..wiring })?;
+        let rows = all.reads();
+        Ok(Built { observer, model, theta, rows })
     };
     match (build(&fitted), build(&setup.outputs)) {
         (Ok(built), _) => Some(built),
@@ -93,26 +100,52 @@ fn check_gain(
     built: &Built,
 ) {
     let gain = *section.gain.get_ref();
-    let spacings = records.iter().filter(|r| r.is_trained()).filter_map(|r| Some((r, spacing(r)?)));
+    let Built { observer, model, theta, rows } = built;
+    let spacings = records.iter().filter(|r| r.is_trained()).filter_map(|r| Some((r, spacing(r, rows)?)));
     let Some((record, dt)) = spacings.max_by(|a, b| a.1.total_cmp(&b.1)) else { return };
-    let Built { observer, model, theta } = built;
     let Some(largest) = observer.stable_up_to(&**model, theta, dt).filter(|most| gain > *most) else {
         return;
     };
-    let unit = &file.study.time_unit;
+    report(source, section, (dt, &record.name), largest, &file.study.time_unit);
+}
+
+/// Reports a gain above the largest stable one where a record is observed so far apart.
+pub(super) fn report(
+    source: &Source,
+    section: &ObserverSection,
+    (dt, record): (f64, &str),
+    largest: f64,
+    unit: &str,
+) {
+    let (gain, kind) = (*section.gain.get_ref(), section.kind.get_ref());
+    if largest <= 0.0 {
+        source.report_with(
+            section.gain.span(),
+            format!("no gain is stable: what `corrects` says makes the observer `{kind}` drive an error away from the data"),
+            "an output may only correct a state with which it rises: correct another state, or give the output the other sign",
+        );
+        return;
+    }
     source.report_with(
         section.gain.span(),
         format!(
-            "a gain of {gain} is unstable: the observer `{}` corrects in steps, and record `{}` is observed {dt:.4} {unit} apart",
-            section.kind.get_ref(),
-            record.name
+            "a gain of {gain} is unstable: the observer `{kind}` corrects in steps, and record `{record}` is observed {dt:.4} {unit} apart"
         ),
         format!("the largest stable gain is {largest:.4} 1/{unit}: lower the gain, or use data observed more often"),
     );
 }
 
-/// Largest time between the observations that a record fits: the gain must be stable over every one.
-fn spacing(record: &Record) -> Option<f64> {
+/// Largest time between two values of one channel that a record fits and the observer corrects by: the gain must be stable over it.
+pub(super) fn spacing(record: &Record, read: &[usize]) -> Option<f64> {
     let rows = training_rows(record);
-    rows.windows(2).map(|w| record.times[w[1]] - record.times[w[0]]).max_by(f64::total_cmp)
+    let channels = record.channels.iter().filter(|c| !c.held_out && read.contains(&c.row));
+    let largest = channels.filter_map(|channel| {
+        let times: Vec<f64> = rows
+            .iter()
+            .filter(|row| channel.values[**row].is_finite())
+            .map(|row| record.times[*row])
+            .collect();
+        times.windows(2).map(|w| w[1] - w[0]).max_by(f64::total_cmp)
+    });
+    largest.max_by(f64::total_cmp)
 }

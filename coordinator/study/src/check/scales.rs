@@ -144,6 +144,7 @@ fn courses(
             times: trial.times.clone(),
             observed: vec![f64::NAN; n_obs * trial.times.len()],
             inputs: trial.record.inputs.clone(),
+            since: Vec::new(),
         };
         let theta = trial.theta.iter().zip(&kept).filter(|(_, kept)| **kept).map(|(v, _)| *v).collect();
         let job = Job { particle: 0, record: index as u32, window: Arc::new(window), theta, state: None };

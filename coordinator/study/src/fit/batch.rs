@@ -167,6 +167,7 @@ fn finish(now: Snapshot<Iteration>, plan: WorkPlan) -> Fit {
     Fit {
         converged: now.estimate.state.converged,
         posterior: now.estimate.posterior,
+        starts: Vec::new(),
         log_likelihood: now.figures.log_likelihood,
         nis: now.figures.nis,
         n_used: now.figures.n_used,

@@ -75,6 +75,9 @@ pub(super) fn step(
     for (index, (record, _)) in windows.iter().enumerate() {
         now.states[*record] = Some(stack_states(&results, index)?);
     }
+    if let Some(walking) = schedule.walking(now.figures.pass) {
+        walking.follow(&mut particles.theta, &now.states)?;
+    }
     let mut predictions = stack_outputs(&results, &windows);
     if schedule.resample && rescued == 0 {
         let states = &mut now.states;

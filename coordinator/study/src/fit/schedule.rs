@@ -16,6 +16,7 @@ use starlings_estimators::{Drift, Filter, Gaussian, MakeFilter, Options, Particl
 use starlings_models::Window;
 
 use super::runner::{EnsembleRunner, StepWindows};
+use super::walking::Walking;
 use crate::store::snapshot::{Ensemble, Figures, Snapshot};
 use crate::work::WorkPlan;
 use crate::{Fit, Move, Progress, RunError, Study, ThetaEntry, posterior};
@@ -32,6 +33,8 @@ pub(super) struct Schedule<'a> {
     pub(super) passes: Option<usize>,
     pub(super) resample: bool,
     prior: Gaussian,
+    /// Entries that follow their states in the pass with drift.
+    walking: Walking,
     /// Training windows by record.
     pub(super) windows: Vec<Vec<Arc<Window>>>,
     work: WorkPlan,
@@ -57,6 +60,7 @@ impl<'a> Schedule<'a> {
             drifting,
             still,
             passes: study.passes(),
+            walking: Walking::of(study),
             prior: posterior::prior(study),
             windows: (0..study.records.len()).map(|record| study.windows(record)).collect(),
             work,
@@ -66,6 +70,11 @@ impl<'a> Schedule<'a> {
     /// The filter of one pass: drift belongs to the last.
     pub(super) fn filter(&self, pass: usize) -> &dyn Filter {
         self.drifting.as_deref().filter(|_| self.is_last(pass)).unwrap_or(&*self.still)
+    }
+
+    /// The entries that follow their states in one pass: those of states that walk, in the pass with drift.
+    pub(super) fn walking(&self, pass: usize) -> Option<&Walking> {
+        self.is_last(pass).then_some(&self.walking)
     }
 
     /// Whether a fixed number of passes ends with this one.
@@ -160,6 +169,7 @@ impl<'a> Schedule<'a> {
     pub(super) fn finish(&self, now: &Snapshot<Ensemble>, reported: Reported) -> Fit {
         Fit {
             last_move: self.last_move(now, &reported),
+            starts: self.walking.starts(&now.estimate.centre),
             work: (self.work.clone(), self.work.at(now.figures.pass, now.figures.step).done),
             posterior: reported.posterior,
             log_likelihood: reported.log_likelihood,

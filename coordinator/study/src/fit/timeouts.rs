@@ -103,7 +103,8 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let store = Store::create(&folder.path().join("run.db"), &[("program", r#"{"build": "one"}"#)]);
         let store = store.expect("a store");
-        let window = Window { start: 0.0, times: vec![1.0], observed: vec![2.0], inputs: Vec::new() };
+        let window =
+            Window { start: 0.0, times: vec![1.0], observed: vec![2.0], inputs: Vec::new(), since: vec![] };
         let job = Job { particle: 0, record: 0, window: Arc::new(window), theta: vec![3.0], state: None };
         let setup = [7; 32];
         let late = Timeout { limit: 5.0, says: "it did not answer within 5 s".to_owned() };

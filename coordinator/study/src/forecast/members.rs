@@ -38,6 +38,7 @@ impl Members {
             times: times.clone(),
             observed: vec![f64::NAN; n_obs * times.len()],
             inputs: ensemble.inputs.clone(),
+            since: Vec::new(),
         });
         let job = |(particle, theta): (usize, &Vec<f64>)| Job {
             particle: particle as u32,

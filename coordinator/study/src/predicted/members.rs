@@ -68,6 +68,7 @@ fn window(study: &Study, times: Vec<f64>, record: &crate::Record) -> Window {
         observed: vec![f64::NAN; study.predict.outputs.len() * times.len()],
         times,
         inputs: record.inputs.clone(),
+        since: Vec::new(),
     }
 }
 

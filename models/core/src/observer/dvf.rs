@@ -49,11 +49,16 @@ impl Observer for VelocityFeedback {
         let Some(innovation) = self.wall.innovation(&at) else { return };
         let Some(blocks) = at.model.blocks(at.theta) else { return };
         let trace = blocks.trace.as_ref();
-        let pull = restricted((self.norm)(&blocks), &innovation.observed) * (self.wall.gain * at.dt);
+        let norm = innovation.weighed(restricted((self.norm)(&blocks), &innovation.observed));
+        let pull = norm * (self.wall.gain * innovation.longest());
         let force = on_velocity(trace, &pull * innovation.column());
         let damping = on_velocity(trace, of_velocity(trace, pull));
         let change = solve(blocks.mass + damping, force);
         add(x, self.wall.velocity, change.as_slice());
+    }
+
+    fn reads(&self) -> Vec<usize> {
+        self.wall.reads()
     }
 
     fn feedback(&self, model: &dyn Model, theta: &[f64]) -> DMatrix<f64> {

@@ -46,9 +46,14 @@ impl Observer for ImageForce {
     fn correct(&self, at: Correction<'_>, x: &mut [f64]) {
         let Some(innovation) = self.wall.innovation(&at) else { return };
         let Some(blocks) = at.model.blocks(at.theta) else { return };
-        let force = Self::spring(&blocks, &innovation.observed) * innovation.column();
-        let change = solve(blocks.mass, force) * (at.dt * self.wall.gain * self.wall.gain);
+        let norm = innovation.weighed(restricted(blocks.solid_mass.clone(), &innovation.observed));
+        let force = on_velocity(blocks.trace.as_ref(), norm) * innovation.column();
+        let change = solve(blocks.mass, force) * (innovation.longest() * self.wall.gain * self.wall.gain);
         add(x, self.wall.velocity, change.as_slice());
+    }
+
+    fn reads(&self) -> Vec<usize> {
+        self.wall.reads()
     }
 
     fn feedback(&self, model: &dyn Model, theta: &[f64]) -> DMatrix<f64> {

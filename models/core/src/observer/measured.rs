@@ -14,6 +14,8 @@ use crate::{Quantity, Spec, nearest};
 pub(crate) struct Measured {
     /// Row of the predicted outputs.
     pub row: usize,
+    /// Component of the outputs that it shows.
+    pub output: usize,
     /// State component.
     pub state: usize,
 }
@@ -37,7 +39,8 @@ pub(crate) fn measured(def: &ObserverDef, wiring: &Wiring<'_>) -> Result<Vec<Mea
             continue;
         };
         if let Some(states) = behind(def, spec, output, rows.len())? {
-            found.extend(states.enumerate().map(|(i, state)| Measured { row: row + i, state }));
+            let shown = rows.clone().zip(states).enumerate();
+            found.extend(shown.map(|(i, (output, state))| Measured { row: row + i, output, state }));
         }
         row += rows.len();
     }
@@ -73,14 +76,30 @@ fn behind(
     Ok(Some(first..first + n))
 }
 
-/// The mean of observed − predicted over rows that show the same, and how many of them were observed; `None` when none was.
-pub(super) fn mean_innovation(at: &Correction<'_>, rows: &[usize]) -> Option<(f64, u32)> {
+/// The mean of observed − predicted over rows that show the same, and the time since any of them was observed before; `None` when none
+/// is now.
+pub(super) fn mean_innovation(at: &Correction<'_>, rows: &[usize]) -> Option<(f64, f64)> {
     let (mut sum, mut n) = (0.0, 0_u32);
     for &row in rows.iter().filter(|&&row| !at.observed[row].is_nan()) {
         sum += at.observed[row] - at.predicted[row];
         n += 1;
     }
-    (n > 0).then(|| (sum / f64::from(n), n))
+    let span = rows.iter().map(|&row| at.spans[row]).fold(f64::INFINITY, f64::min);
+    (n > 0).then(|| (sum / f64::from(n), span))
+}
+
+/// What rows that each pull by themselves pull together: the mean of observed − predicted, weighted by the times since each was observed
+/// before, and the sum of those times; `None` when none is observed now.
+pub(super) fn pull(at: &Correction<'_>, rows: &[usize]) -> Option<(f64, f64)> {
+    let seen = || rows.iter().copied().filter(|&row| !at.observed[row].is_nan());
+    let longest = seen().map(|row| at.spans[row]).reduce(f64::max)?;
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for row in seen() {
+        let weight = at.spans[row] / longest;
+        sum += weight * (at.observed[row] - at.predicted[row]);
+        weights += weight;
+    }
+    Some((sum / weights, weights * longest))
 }
 
 /// Components of an observed output; `None` for a recorded state, which takes one row and measures nothing.

@@ -15,6 +15,10 @@ pub(super) const KIND: Kind =
 impl Observer for NoObserver {
     fn correct(&self, _at: Correction<'_>, _x: &mut [f64]) {}
 
+    fn reads(&self) -> Vec<usize> {
+        Vec::new()
+    }
+
     fn feedback(&self, model: &dyn Model, _theta: &[f64]) -> DMatrix<f64> {
         let n = model.spec().n_state();
         DMatrix::zeros(n, n)

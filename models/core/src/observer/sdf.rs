@@ -46,15 +46,21 @@ impl Observer for DisplacementFeedback {
     /// δd = (1 − e^(−γΔt)) Ext (z − d): exact for a held model, stable at any gain.
     fn correct(&self, at: Correction<'_>, x: &mut [f64]) {
         let Some(innovation) = self.wall.innovation(&at) else { return };
-        let pull = -(-self.wall.gain * at.dt).exp_m1();
+        let pulled = innovation
+            .value
+            .zip_map(&innovation.span, |value, span| value * -(-self.wall.gain * span).exp_m1());
         if innovation.observed.iter().all(|seen| *seen) {
-            add(x, self.wall.displacement, (innovation.value * pull).as_slice());
+            add(x, self.wall.displacement, pulled.as_slice());
             return;
         }
         let Some(blocks) = at.model.blocks(at.theta) else { return };
-        let value = DVector::from_vec(seen(innovation.value.as_slice(), &innovation.observed));
-        let change = extension(&blocks.stiffness, &innovation.observed) * value * pull;
+        let value = DVector::from_vec(seen(pulled.as_slice(), &innovation.observed));
+        let change = extension(&blocks.stiffness, &innovation.observed) * value;
         add(x, self.wall.displacement, change.as_slice());
+    }
+
+    fn reads(&self) -> Vec<usize> {
+        self.wall.reads()
     }
 
     fn feedback(&self, model: &dyn Model, theta: &[f64]) -> DMatrix<f64> {

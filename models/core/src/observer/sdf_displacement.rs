@@ -40,9 +40,14 @@ impl SolidFeedback {
 }
 
 impl SolidFeedback {
-    /// Eᵀ γ Ms Ext, n_c × n, the observed nodes given, and the same times E, n_c × n_c.
-    fn pull(&self, blocks: &Blocks, observed: &[bool]) -> (DMatrix<f64>, DMatrix<f64>) {
-        let extension = onto_all(&extension(&blocks.stiffness, observed), observed);
+    /// Eᵀ γ Ms Ext, n_c × n, the observed nodes given and `weighed` for the times since each was seen, and the same times E, n_c × n_c.
+    fn pull(
+        &self,
+        blocks: &Blocks,
+        observed: &[bool],
+        weighed: impl Fn(DMatrix<f64>) -> DMatrix<f64>,
+    ) -> (DMatrix<f64>, DMatrix<f64>) {
+        let extension = weighed(onto_all(&extension(&blocks.stiffness, observed), observed));
         let trace = blocks.trace.as_ref();
         let force = on_velocity(trace, &blocks.solid_mass * extension * self.wall.gain);
         let damping = of_velocity(trace, force.clone());
@@ -58,9 +63,11 @@ impl Observer for SolidFeedback {
     fn correct(&self, at: Correction<'_>, x: &mut [f64]) {
         let Some(innovation) = self.wall.innovation(&at) else { return };
         let Some(blocks) = at.model.blocks(at.theta) else { return };
-        let (force, damping) = self.pull(&blocks, &innovation.observed);
-        let system = blocks.mass + damping * at.dt;
-        let Some(change) = system.lu().solve(&(force * innovation.column() * at.dt)) else {
+        let (force, damping) =
+            self.pull(&blocks, &innovation.observed, |extension| innovation.by_node(extension));
+        let longest = innovation.longest();
+        let system = blocks.mass + damping * longest;
+        let Some(change) = system.lu().solve(&(force * innovation.column() * longest)) else {
             // The run reports a state that is not a number.
             x.fill(f64::NAN);
             return;
@@ -71,11 +78,15 @@ impl Observer for SolidFeedback {
         }
     }
 
+    fn reads(&self) -> Vec<usize> {
+        self.wall.reads()
+    }
+
     /// Γ on the velocity: γ M⁻¹ Eᵀ Ms Ext E.
     fn feedback(&self, model: &dyn Model, theta: &[f64]) -> DMatrix<f64> {
         let n = model.spec().n_state();
         let Some(blocks) = model.blocks(theta) else { return DMatrix::zeros(n, n) };
-        let (_, damping) = self.pull(&blocks, &self.wall.observed());
+        let (_, damping) = self.pull(&blocks, &self.wall.observed(), |extension| extension);
         feedback(model, (self.wall.velocity, self.wall.velocity), &solve(blocks.mass, damping))
     }
 

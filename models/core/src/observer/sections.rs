@@ -54,9 +54,9 @@ impl SectionFeedback {
 impl Observer for SectionFeedback {
     /// δR = (1 − e^(−γΔt)) (z − d) on observed rings: exact for a held model, stable at any gain.
     fn correct(&self, at: Correction<'_>, x: &mut [f64]) {
-        let pull = -(-self.gain * at.dt).exp_m1();
         for (area, rows) in x[self.area..].iter_mut().zip(&self.rows) {
-            if let Some((innovation, _)) = mean_innovation(&at, rows) {
+            if let Some((innovation, span)) = mean_innovation(&at, rows) {
+                let pull = -(-self.gain * span).exp_m1();
                 let radius = (*area / PI).sqrt();
                 // A vessel without a section left is the model's to refuse.
                 let change = (pull * innovation).max(-radius);
@@ -64,6 +64,10 @@ impl Observer for SectionFeedback {
                 *area += PI * change * (2.0 * radius + change);
             }
         }
+    }
+
+    fn reads(&self) -> Vec<usize> {
+        self.rows.iter().flatten().copied().collect()
     }
 
     /// γ on every observed section: an error of R is one of A over 2πR, and one of d.

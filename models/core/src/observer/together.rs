@@ -31,6 +31,10 @@ impl Observer for Together {
         }
     }
 
+    fn reads(&self) -> Vec<usize> {
+        self.members.iter().flat_map(|member| member.reads()).collect()
+    }
+
     fn feedback(&self, model: &dyn Model, theta: &[f64]) -> DMatrix<f64> {
         let n = model.spec().n_state();
         self.members.iter().fold(DMatrix::zeros(n, n), |sum, member| sum + member.feedback(model, theta))

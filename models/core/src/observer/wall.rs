@@ -5,10 +5,10 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::measured::{mean_innovation, shown};
-use super::{Correction, Wiring};
+use super::{Correction, Wiring, one};
 use crate::SetupError;
 use crate::setup::ObserverDef;
-use crate::{Blocks, Model, Spec};
+use crate::{Blocks, Model, NativeModels, Spec};
 
 /// Which of the wall's outputs an observer takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,6 +39,8 @@ pub(super) struct Innovation {
     pub(super) observed: Vec<bool>,
     /// n, zero where nothing was observed; the mean where several rows show one node.
     pub(super) value: DVector<f64>,
+    /// n, the time since each node was observed before; zero where it is not now.
+    pub(super) span: DVector<f64>,
 }
 
 impl Wall {
@@ -80,13 +82,20 @@ impl Wall {
 
     /// The innovation of one observation time; `None` when nothing was observed or everything was as predicted.
     pub(super) fn innovation(&self, at: &Correction<'_>) -> Option<Innovation> {
-        let means: Vec<Option<f64>> =
-            self.rows.iter().map(|rows| mean_innovation(at, rows).map(|(mean, _)| mean)).collect();
-        let value = DVector::from_iterator(means.len(), means.iter().map(|mean| mean.unwrap_or(0.0)));
+        let means: Vec<Option<(f64, f64)>> = self.rows.iter().map(|rows| mean_innovation(at, rows)).collect();
+        let of = |part: fn((f64, f64)) -> f64| {
+            DVector::from_iterator(means.len(), means.iter().map(|mean| mean.map_or(0.0, part)))
+        };
+        let (value, span) = (of(|(mean, _)| mean), of(|(_, span)| span));
         if value.iter().all(|v| *v == 0.0) {
             return None;
         }
-        Some(Innovation { observed: means.iter().map(Option::is_some).collect(), value })
+        Some(Innovation { observed: means.iter().map(Option::is_some).collect(), value, span })
+    }
+
+    /// The rows that show a node.
+    pub(super) fn reads(&self) -> Vec<usize> {
+        self.rows.iter().flatten().copied().collect()
     }
 
     /// H of the nodes that the channels can show.
@@ -99,6 +108,31 @@ impl Innovation {
     /// The innovation as an n × 1 matrix.
     pub(super) fn column(&self) -> DMatrix<f64> {
         DMatrix::from_column_slice(self.value.len(), 1, self.value.as_slice())
+    }
+
+    /// The longest time since a node that is observed now was observed before.
+    pub(super) fn longest(&self) -> f64 {
+        self.span.max()
+    }
+
+    /// W N W of a norm N, W² the times since the nodes were observed before over the longest: symmetric where N is.
+    pub(super) fn weighed(&self, mut norm: DMatrix<f64>) -> DMatrix<f64> {
+        let longest = self.longest();
+        for (node, span) in self.span.iter().enumerate() {
+            let weight = (span / longest).sqrt();
+            norm.row_mut(node).scale_mut(weight);
+            norm.column_mut(node).scale_mut(weight);
+        }
+        norm
+    }
+
+    /// The columns of nodes, each times W² of [`Self::weighed`].
+    pub(super) fn by_node(&self, mut columns: DMatrix<f64>) -> DMatrix<f64> {
+        let longest = self.longest();
+        for (mut column, span) in columns.column_iter_mut().zip(self.span.iter()) {
+            column.scale_mut(span / longest);
+        }
+        columns
     }
 }
 
@@ -137,17 +171,8 @@ pub(super) fn hosted<T>(
     if let Some(part) = wiring.model.blocks(wiring.theta).and_then(part) {
         return Ok(part);
     }
-    let fits = |model: &dyn Model| {
-        let theta = vec![1.0; model.spec().parameters.len()];
-        model.blocks(&theta).and_then(part).is_some()
-    };
-    let hosts: Vec<String> = wiring
-        .native
-        .all()?
-        .iter()
-        .filter(|model| fits(&***model))
-        .map(|model| format!("`{}`", model.spec().kind))
-        .collect();
+    let hosts = hosts(def, wiring.native)?;
+    let hosts: Vec<String> = hosts.iter().map(|kind| format!("`{kind}`")).collect();
     let hosts = if hosts.is_empty() { "none of the built-in models".to_owned() } else { hosts.join(", ") };
     Err(SetupError::Invalid(format!(
         "the observer `{}` cannot be hosted by the model `{}`, which lacks the part of a fluid–structure system \
@@ -155,6 +180,21 @@ pub(super) fn hosted<T>(
          states, and `none` leaves the state free",
         def.kind, wiring.spec.kind
     )))
+}
+
+/// The kinds of the models that host an observer when all of their outputs are observed: those against which it can be built.
+///
+/// # Errors
+/// When a model refuses its own default layout, which is a defect.
+pub(super) fn hosts(def: &ObserverDef, native: NativeModels) -> Result<Vec<String>, SetupError> {
+    let hosts = |model: &dyn Model| {
+        let (spec, theta) = (model.spec(), vec![1.0; model.spec().parameters.len()]);
+        let outputs: Vec<String> = spec.outputs.iter().map(|q| q.name.clone()).collect();
+        // No list to name others from: what does not fit is asked no further.
+        let native = NativeModels::NONE;
+        one(def, Wiring { spec, outputs: &outputs, model, theta: &theta, native }).is_ok()
+    };
+    Ok(native.all()?.iter().filter(|model| hosts(&***model)).map(|model| model.spec().kind.clone()).collect())
 }
 
 /// Every observed row that shows the output `field` or one of its components, with the component.

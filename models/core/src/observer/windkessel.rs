@@ -9,12 +9,13 @@
 use nalgebra::DMatrix;
 
 use super::measured::mean_innovation;
+use super::slopes::slopes;
 use super::wall::{components, hosted, names_no_states};
 use super::{Correction, Kind, Observer, Wiring};
 use crate::SetupError;
 use crate::blocks::WindkesselBlock;
 use crate::setup::ObserverDef;
-use crate::{Drive, Model, Spec};
+use crate::{Model, Spec};
 
 /// The entry of the observer list.
 pub(super) const KIND: Kind = Kind {
@@ -90,28 +91,11 @@ impl WindkesselObserver {
     }
 }
 
-/// ∂p/∂x of an output, n_state: unit steps about rest, exact for a linear system; small ones about the initial state of a nonlinear one.
+/// ∂p/∂x of an output, n_state.
 fn gradient(model: &dyn Model, theta: &[f64], pressure: &str) -> Vec<f64> {
-    let spec = model.spec();
-    let rest = vec![0.0; spec.inputs.iter().map(|q| q.size).sum()];
-    let drive = Drive { value: &rest, slope: &rest, ..Drive::NONE };
-    let at = Spec::range_of(&spec.outputs, pressure).map_or(0, |range| range.start);
-    let (mut x, mut y) = (vec![0.0; spec.n_state()], vec![0.0; spec.n_output()]);
-    let is_linear = model.blocks(theta).is_some();
-    if !is_linear {
-        model.initial(theta, &mut x);
-    }
-    let mut slope = |j: usize| {
-        let (here, step) = (x[j], if is_linear { 1.0 } else { f64::EPSILON.cbrt() * x[j].abs().max(1.0) });
-        let mut value = |step: f64| {
-            x[j] = here + step;
-            model.output(0.0, &x, theta, drive, &mut y);
-            x[j] = here;
-            y[at]
-        };
-        0.5 * (value(step) - value(-step)) / step
-    };
-    (0..spec.n_state()).map(&mut slope).collect()
+    let at = Spec::range_of(&model.spec().outputs, pressure).map_or(0, |range| range.start);
+    let all: Vec<usize> = (0..model.spec().n_state()).collect();
+    slopes(model, theta, &all).row(at).iter().copied().collect()
 }
 
 impl Observer for WindkesselObserver {
@@ -119,11 +103,15 @@ impl Observer for WindkesselObserver {
     fn correct(&self, at: Correction<'_>, x: &mut [f64]) {
         let all = windkessels(at.model, at.theta).unwrap_or_default();
         for outlet in &self.outlets {
-            if let Some((innovation, _)) = mean_innovation(&at, &outlet.rows) {
+            if let Some((innovation, span)) = mean_innovation(&at, &outlet.rows) {
                 let rate = self.rate(outlet, &all);
-                x[outlet.state] += -(-rate * at.dt).exp_m1() * innovation;
+                x[outlet.state] += -(-rate * span).exp_m1() * innovation;
             }
         }
+    }
+
+    fn reads(&self) -> Vec<usize> {
+        self.outlets.iter().flat_map(|outlet| &outlet.rows).copied().collect()
     }
 
     /// γ/(R_d C) ∂p/∂x in the row of each π: the predicted pressure holds R_p times the model's own flow.
@@ -133,8 +121,8 @@ impl Observer for WindkesselObserver {
         let mut feedback = DMatrix::zeros(n, n);
         for outlet in &self.outlets {
             let rate = self.rate(outlet, &all);
-            let slopes = gradient(model, theta, &outlet.pressure);
-            for (entry, slope) in feedback.row_mut(outlet.state).iter_mut().zip(slopes) {
+            let gradient = gradient(model, theta, &outlet.pressure);
+            for (entry, slope) in feedback.row_mut(outlet.state).iter_mut().zip(gradient) {
                 *entry = rate * slope;
             }
         }

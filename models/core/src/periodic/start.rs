@@ -50,6 +50,7 @@ impl PeriodicStart {
                 times: vec![to],
                 observed: vec![f64::NAN; self.n_row],
                 inputs: job.window.inputs.clone(),
+                since: Vec::new(),
             });
             self.inner.run_within(&Job { window, state, ..job.clone() }, until).map(|found| found.state)
         };

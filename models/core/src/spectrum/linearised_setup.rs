@@ -210,8 +210,11 @@ impl LinearisedSetup {
     }
 }
 
-/// The model's parameters and the state in which its runs start.
-fn start(setup: &Setup, model: &dyn Model, values: &[f64]) -> Result<(Vec<f64>, Vec<f64>), SetupError> {
+/// The model's parameters, at values of the setup's, and the state in which its runs start.
+///
+/// # Errors
+/// When a name of the setup is unknown, or the values are not as many as its parameters.
+pub fn start(setup: &Setup, model: &dyn Model, values: &[f64]) -> Result<(Vec<f64>, Vec<f64>), SetupError> {
     let spec = with_memories(model.spec(), model.memories());
     let binding = Binding::new(setup, &spec, &free_names(setup, &spec)?)?;
     if values.len() != binding.len() {

@@ -146,7 +146,9 @@ impl DenseWall {
     ) -> Vec<f64> {
         let predicted = self.show(channels, x);
         let mut x = x.to_vec();
-        let at = Correction { t: dt, dt, observed, predicted: &predicted, model: self, theta: &[] };
+        let spans = vec![dt; observed.len()];
+        let at =
+            Correction { t: dt, spans: &spans, observed, predicted: &predicted, model: self, theta: &[] };
         observer.correct(at, &mut x);
         x
     }

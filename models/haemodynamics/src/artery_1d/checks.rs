@@ -7,7 +7,7 @@ use std::collections::HashSet;
 use starlings_models_core::SetupError;
 use starlings_models_core::layout::fault;
 
-use super::layout::{Segment, young};
+use super::layout::{Segment, modulus};
 use crate::MOST_CELLS;
 
 /// Regions of all vessels together at most: the pressures of their ends are one full system of equations in every step.
@@ -18,6 +18,21 @@ pub(super) fn name(path: &str, name: &str) -> Result<(), SetupError> {
     let fits = name.starts_with(|c: char| c.is_ascii_alphabetic())
         && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
     if fits { Ok(()) } else { Err(fault(path, format!("`{name}` is no name: use letters, digits and `_`"))) }
+}
+
+/// Refuses a law of stiffness that is not above zero over the radii of a segment, between whose ends it rises or falls.
+fn wall(path: &str, segment: &Segment) -> Result<(), SetupError> {
+    let Some(law) = segment.wall else { return Ok(()) };
+    for radius in [segment.radius, segment.radius_to.unwrap_or(segment.radius)] {
+        let stiffness = law.at(radius);
+        if !(stiffness > 0.0 && stiffness.is_finite()) {
+            let message = format!(
+                "E h/R0 = k1 e^(k2 R0) + k3 is {stiffness} at a radius of {radius} cm: give a law above zero"
+            );
+            return Err(fault(path, message));
+        }
+    }
+    Ok(())
 }
 
 /// Refuses what no vessel can be, too many cells, and vessels whose parameters would share a name.
@@ -46,6 +61,7 @@ pub(super) fn segments(segments: &[Segment]) -> Result<(), SetupError> {
                 return Err(fault(&path(key), format!("{key} is {size}: give a number of cm above zero")));
             }
         }
+        wall(&path("wall"), segment)?;
         if !(segment.profile >= 2.0 && segment.profile.is_finite()) {
             let message =
                 format!("profile is {}: give 2 for a parabola, more for a flatter profile", segment.profile);
@@ -66,7 +82,8 @@ pub(super) fn segments(segments: &[Segment]) -> Result<(), SetupError> {
             return Err(fault(&path("cells"), message));
         }
         for region in 0..regions {
-            let (modulus, place) = young(segment, region, segments.len() == 1);
+            let own = modulus(segment, region, segments.len() == 1);
+            let (modulus, place) = (own.name, own.place);
             if !moduli.insert(modulus.clone()) {
                 let message = format!(
                     "Young's modulus of {place} is `{modulus}`, and so is another: rename one of the two"

@@ -34,6 +34,8 @@ pub struct Segment {
     pub thickness: f64,
     /// h at `to` in cm, linear in between; by default as at `from`.
     pub thickness_to: Option<f64>,
+    /// E h/R0 as a function of R0, where it is given so; `thickness` then sets the stress alone.
+    pub wall: Option<WallLaw>,
     /// ζ of the velocity profile u (ζ + 2)/ζ (1 − (r/R)^ζ), which the friction 2(ζ + 2)πμ Q/A follows from (Smith, Pullan &
     /// Hunter 2002): 2 for a parabola, more for a flatter one.
     #[serde(default = "parabola")]
@@ -44,6 +46,25 @@ pub struct Segment {
     /// Number of equally long regions, each with a stiffness of its own.
     #[serde(default = "one")]
     pub regions: usize,
+}
+
+/// The stiffness of arteries by their size, E h/R0 = k1 e^(k2 R0) + k3 (Olufsen 1999).
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WallLaw {
+    /// In dyn/cm².
+    pub k1: f64,
+    /// In 1/cm.
+    pub k2: f64,
+    /// In dyn/cm².
+    pub k3: f64,
+}
+
+impl WallLaw {
+    /// E h/R0 in dyn/cm² at a radius R0 in cm.
+    pub(super) fn at(self, radius: f64) -> f64 {
+        self.k3 + self.k1 * (self.k2 * radius).exp()
+    }
 }
 
 /// A node at which something other than joining happens.
@@ -93,6 +114,7 @@ impl Default for Layout {
             radius_to: None,
             thickness: 0.15,
             thickness_to: None,
+            wall: None,
             profile: parabola(),
             cells: 20,
             regions: 5,
@@ -105,13 +127,24 @@ impl Default for Layout {
     }
 }
 
-/// Name and description of one region's Young's modulus.
-pub(super) fn young(segment: &Segment, region: usize, alone: bool) -> (String, String) {
-    let name = &segment.name;
-    let number = region + 1;
-    match (alone, segment.regions) {
-        (true, _) => (format!("E{number}"), format!("region {number} of `{name}`")),
-        (false, 1) => (format!("E_{name}"), format!("`{name}`")),
-        (false, _) => (format!("E_{name}_{number}"), format!("region {number} of `{name}`")),
-    }
+/// The parameter that sets the stiffness of one region.
+#[derive(Debug)]
+pub(super) struct Modulus {
+    pub(super) name: String,
+    /// Whose it is.
+    pub(super) place: String,
+    /// Whether it is a multiple of what a law says, and no Young's modulus.
+    pub(super) of_law: bool,
+}
+
+/// That of a region of a segment, which may be the only one.
+pub(super) fn modulus(segment: &Segment, region: usize, alone: bool) -> Modulus {
+    let (name, number, of_law) = (&segment.name, region + 1, segment.wall.is_some());
+    let stem = if of_law { "stiffness" } else { "E" };
+    let (name, place) = match (alone, segment.regions) {
+        (true, _) => (format!("{stem}{number}"), format!("region {number} of `{name}`")),
+        (false, 1) => (format!("{stem}_{name}"), format!("`{name}`")),
+        (false, _) => (format!("{stem}_{name}_{number}"), format!("region {number} of `{name}`")),
+    };
+    Modulus { name, place, of_law }
 }

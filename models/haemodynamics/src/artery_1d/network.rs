@@ -8,9 +8,9 @@ use starlings_models_core::SetupError;
 use starlings_models_core::layout::fault;
 
 use super::checks;
-use super::layout::{Layout, NodeKind, Segment, young};
+use super::layout::{Layout, Modulus, NodeKind, Segment, WallLaw, modulus};
 
-/// A tube of one Young's modulus.
+/// A tube of one parameter of stiffness.
 #[derive(Debug)]
 pub(super) struct Tube {
     /// Number of its first cell in the network.
@@ -23,6 +23,8 @@ pub(super) struct Tube {
     pub(super) radius: Vec<f64>,
     /// Wall thickness at the faces in cm.
     pub(super) thickness: Vec<f64>,
+    /// E h/R0 by R0, where a law says it.
+    pub(super) wall: Option<WallLaw>,
     /// Friction relative to that of a parabolic profile, (ζ + 2)/4.
     pub(super) friction: f64,
     /// Nodes at the start and at the end.
@@ -61,8 +63,8 @@ pub(super) struct Network {
     pub(super) tubes: Vec<Tube>,
     pub(super) nodes: Vec<Node>,
     pub(super) n_cell: usize,
-    /// Name and description of the Young's modulus of each tube.
-    pub(super) young: Vec<(String, String)>,
+    /// The parameter of stiffness of each tube.
+    pub(super) moduli: Vec<Modulus>,
     /// The node of the inlet.
     pub(super) inlet: usize,
     /// The nodes of the outlets, in the order of the layout.
@@ -116,7 +118,7 @@ impl Network {
         if outlets.is_empty() {
             return Err(fault("nodes", "no outlet: list a node of kind \"rcr\" or \"resistance\""));
         }
-        Ok(Self { tubes: Vec::new(), nodes, n_cell: 0, young: Vec::new(), inlet, outlets })
+        Ok(Self { tubes: Vec::new(), nodes, n_cell: 0, moduli: Vec::new(), inlet, outlets })
     }
 
     /// The node of this name; a joint where there is none yet.
@@ -161,11 +163,12 @@ impl Network {
                 dx,
                 radius: (region * n..=(region + 1) * n).map(|face| between(radius, face)).collect(),
                 thickness: (region * n..=(region + 1) * n).map(|face| between(thickness, face)).collect(),
+                wall: segment.wall,
                 friction: (segment.profile + 2.0) / 4.0,
                 nodes: [from, to],
             });
             self.n_cell += n;
-            self.young.push(young(segment, region, alone));
+            self.moduli.push(modulus(segment, region, alone));
             from = to;
         }
     }

@@ -4,7 +4,7 @@
 
 use starlings_models_core::{Quantity, Role, Spec};
 
-use super::layout::NodeKind;
+use super::layout::{Modulus, NodeKind};
 use super::network::Network;
 
 /// Young's modulus of an artery in dyn/cm².
@@ -51,14 +51,16 @@ fn states(network: &Network) -> Vec<Quantity> {
 }
 
 fn parameters(network: &Network) -> Vec<Quantity> {
-    let young = |(name, place): &(String, String)| {
-        Quantity::new(name, PRESSURE)
-            .role(Role::Stiffness)
-            .positive()
-            .default(YOUNG)
-            .says(&format!("Young's modulus of {place}."))
+    let stiffness = |Modulus { name, place, of_law }: &Modulus| {
+        let (unit, default) = if *of_law { ("", 1.0) } else { (PRESSURE, YOUNG) };
+        let says = if *of_law {
+            format!("Stiffness of {place}, as a multiple of what its law says.")
+        } else {
+            format!("Young's modulus of {place}.")
+        };
+        Quantity::new(name, unit).role(Role::Stiffness).positive().default(default).says(&says)
     };
-    let mut all: Vec<Quantity> = network.young.iter().map(young).collect();
+    let mut all: Vec<Quantity> = network.moduli.iter().map(stiffness).collect();
     all.extend(shared());
     for &node in &network.outlets {
         all.extend(outlet(network, node));

@@ -69,7 +69,9 @@ impl<'a> Vessels<'a> {
         };
         for (tube, young) in network.tubes.iter().zip(theta) {
             let ring = |radius: f64, thickness: f64| {
-                let plate = young * thickness / (1.0 - nu * nu);
+                // E h; of a law, a multiple of what it says.
+                let held = tube.wall.map_or(thickness, |law| radius * law.at(radius));
+                let plate = young * held / (1.0 - nu * nu);
                 Ring { stiffness: plate / (radius * radius) + k_s, radius }
             };
             let (radius, thickness) = (&tube.radius, &tube.thickness);

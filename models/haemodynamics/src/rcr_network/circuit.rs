@@ -157,7 +157,7 @@ impl Circuit {
             && !self.ties.iter().any(chamber)
     }
 
-    /// The resistance that a loss has at least: far below every other of the network, and far above what rounding hides.
+    /// The resistance that a branch has at least, one of zero among them: far below every other of the network, and far above what rounding hides.
     pub(super) fn least_resistance(&self, theta: &[f64]) -> f64 {
         let of = |law: Law| match law {
             Law::Linear { resistance: at } | Law::Loss { linear: at, .. } => theta[at],

@@ -50,7 +50,7 @@ pub(super) struct Moment<'a> {
     pub(super) rates: &'a [f64],
     /// Slopes of the pressures around capacitors.
     pub(super) slopes: &'a [f64],
-    /// The resistance that a loss has at least.
+    /// The resistance that a branch has at least.
     pub(super) least: f64,
 }
 

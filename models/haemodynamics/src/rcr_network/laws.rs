@@ -28,18 +28,20 @@ pub(super) struct At {
 }
 
 impl Law {
-    /// The law with its values; a loss has at least the resistance `least`.
+    /// The law with its values; every branch has at least the resistance `least`, so that zero is an open connection.
     pub(super) fn valued(self, theta: &[f64], least: f64) -> Valued {
         match self {
-            Self::Linear { resistance } => Valued::Linear { conductance: 1.0 / theta[resistance] },
+            Self::Linear { resistance } => Valued::Linear { conductance: 1.0 / theta[resistance].max(least) },
             Self::Loss { linear, quadratic } => {
                 Valued::Loss { linear: theta[linear].max(least), quadratic: theta[quadratic] }
             }
             Self::Diode { open, closed, smooth } => {
-                Valued::Diode { open: 1.0 / theta[open], closed: 1.0 / theta[closed], smooth }
+                let [open, closed] = [open, closed].map(|at| 1.0 / theta[at].max(least));
+                Valued::Diode { open, closed, smooth }
             }
             Self::Valve { open, closed, steepness } => {
-                Valued::Valve { open: theta[open], closed: theta[closed], steepness }
+                let [open, closed] = [open, closed].map(|at| theta[at].max(least));
+                Valued::Valve { open, closed, steepness }
             }
         }
     }

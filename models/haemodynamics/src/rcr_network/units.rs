@@ -82,10 +82,12 @@ impl Measure {
     /// Smallest and largest value that physics allows.
     pub(super) fn range(self) -> [f64; 2] {
         match self {
-            Self::Resistance | Self::Compliance | Self::Inertance => [f64::MIN_POSITIVE, f64::INFINITY],
-            Self::LinearLoss | Self::QuadraticLoss | Self::Elastance | Self::Stiffening => {
-                [0.0, f64::INFINITY]
-            }
+            Self::Compliance | Self::Inertance => [f64::MIN_POSITIVE, f64::INFINITY],
+            Self::Resistance
+            | Self::LinearLoss
+            | Self::QuadraticLoss
+            | Self::Elastance
+            | Self::Stiffening => [0.0, f64::INFINITY],
             Self::Share | Self::Pressure | Self::Flow | Self::Time | Self::Volume | Self::Activation => {
                 [f64::NEG_INFINITY, f64::INFINITY]
             }

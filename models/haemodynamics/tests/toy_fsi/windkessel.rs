@@ -131,7 +131,7 @@ fn error_of_a_run(
     let dt = end / n as f64;
     let observers: Vec<_> = feedbacks.iter().map(|&(kind, gain)| toy.observer(kind, gain)).collect();
     let (mut x, mut predicted) = (start.clone(), vec![0.0; start.len()]);
-    let rest = vec![0.0; start.len()];
+    let (rest, spans) = (vec![0.0; start.len()], vec![dt; start.len()]);
     for step in 0..n {
         let t0 = step as f64 * dt;
         let (u0, slope, history) = (&[0.0][..], &[0.0][..], Drive::NONE.history);
@@ -141,7 +141,7 @@ fn error_of_a_run(
         toy.model.output(t0 + dt, x.as_slice(), &toy.theta, drive, &mut predicted);
         for observer in &observers {
             let (t, model, theta) = (t0 + dt, &*toy.model, &toy.theta[..]);
-            let at = Correction { t, dt, observed: &rest, predicted: &predicted, model, theta };
+            let at = Correction { t, spans: &spans, observed: &rest, predicted: &predicted, model, theta };
             observer.correct(at, x.as_mut_slice());
         }
     }

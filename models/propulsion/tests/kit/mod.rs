@@ -54,6 +54,7 @@ impl Motor {
             times: times.to_vec(),
             observed: vec![f64::NAN; n_obs * times.len()],
             inputs: vec![Signal { times: vec![0.0, 1.0], values: vec![1.0, 0.8] }; n_input],
+            since: Vec::new(),
         };
         let job = Job { particle: 0, record: 0, window: Arc::new(window), theta: vec![], state };
         let ran = simulator.run(&job).unwrap();

@@ -77,6 +77,7 @@ fn restart(subject: &Subject<'_>) -> Verdict {
         times: window.times[from..to].to_vec(),
         observed: vec![f64::NAN; n * (to - from)],
         inputs: window.inputs.clone(),
+        since: Vec::new(),
     };
     let (first, second) = (part(0, cut, window.start), part(cut, window.times.len(), window.times[cut - 1]));
     let none = ObserverDef::default();

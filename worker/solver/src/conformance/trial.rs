@@ -45,6 +45,7 @@ impl Trial {
             observed: vec![f64::NAN; spec.n_output() * (times.len() - 1)],
             inputs: spec.inputs.iter().map(input).collect(),
             times: times[1..].to_vec(),
+            since: Vec::new(),
         };
         Ok(Self { parameters: spec.parameters.iter().map(value).collect(), window })
     }

@@ -119,6 +119,7 @@ impl Walk<'_> {
             times: vec![first.start],
             observed: vec![f64::NAN; n_obs],
             inputs: first.inputs.clone(),
+            since: Vec::new(),
         };
         let window = Arc::new(window);
         let outcomes = fleet.run(self.candidate.setup, vec![self.job(&window, None, 0.0)]);

@@ -113,7 +113,13 @@ mod tests {
 
     #[test]
     fn placeholders_become_values_and_other_braces_stay() {
-        let window = Window { start: 0.0, times: vec![1.0, 2.5], observed: Vec::new(), inputs: Vec::new() };
+        let window = Window {
+            start: 0.0,
+            times: vec![1.0, 2.5],
+            observed: Vec::new(),
+            inputs: Vec::new(),
+            since: vec![],
+        };
         let run = Run {
             particle: 3,
             record: 1,

@@ -193,6 +193,7 @@ mod tests {
             times: vec![0.1, 1e-9],
             observed: Vec::new(),
             inputs: vec![Signal { times: vec![0.0, 1.0], values: vec![3.0, 1.0 / 3.0] }],
+            since: Vec::new(),
         };
         let run = Run {
             particle: 2,

@@ -1,0 +1,55 @@
+//! Nudging by an output that is not one state: its gain is bounded where the study is read.
+#![allow(clippy::unwrap_used)]
+mod study_kit;
+
+use study_kit::{Case, csv, grid};
+
+/// A level x and another v, seen as `a * x + 3 * v` every 0.1 s.
+fn told(corrects: &str, gain: f64, median: f64) -> Option<String> {
+    let study = format!(
+        r#"
+[study]
+name = "nudged"
+[model]
+kind = "equations"
+outputs = [ {{ name = "sum", value = "a*x + 3*v" }} ]
+[[model.states]]
+name = "x"
+initial = 1.0
+rate = "-x"
+[[model.states]]
+name = "v"
+initial = 0.5
+rate = "-v"
+[[parameters]]
+name = "a"
+prior = {{ transform = "linear", median = {median:?}, sd = 0.1 }}
+[observer]
+kind = "nudging"
+gain = {gain:?}
+corrects = {{ sum = "{corrects}" }}
+[[records]]
+name = "one"
+file = "sum.csv"
+channels = [ {{ column = "sum", output = "sum", noise = 0.1 }} ]
+"#
+    );
+    let times = grid(21, 0.1);
+    Case::new(&study, &[("sum.csv", csv("time,sum", &[&times, &[1.0; 21]]))]).refusal()
+}
+
+#[test]
+fn the_gain_is_bounded_by_what_the_output_shows_of_the_state_at_the_prior_medians() {
+    // h = 3: γΔt < ln 3, 10.986/s.
+    assert_eq!(told("v", 10.9, 1.0), None);
+    let unstable = told("v", 11.0, 1.0).unwrap();
+    assert!(unstable.contains("a gain of 11 is unstable: the observer `nudging`"), "{unstable}");
+    assert!(unstable.contains("the largest stable gain is 10.9861 1/s"), "{unstable}");
+    // h is the parameter, 1 at its median or 4: ln 2.
+    assert_eq!(told("x", 1e3, 1.0), None);
+    let unstable = told("x", 7.0, 4.0).unwrap();
+    assert!(unstable.contains("the largest stable gain is 6.9315 1/s"), "{unstable}");
+    // An output that falls as its state rises.
+    let away = told("x", 1e-3, -1.0).unwrap();
+    assert!(away.contains("no gain is stable") && away.contains("the other sign"), "{away}");
+}

@@ -1,0 +1,161 @@
+//! A state that walks: the filter beside a Kalman filter of all states with that noise, and what is refused.
+#![allow(clippy::unwrap_used)]
+mod study_kit;
+
+use nalgebra::{DMatrix, DVector};
+use study_kit::linear::{self, A, Answer, B, NOISE, START, assert_exact};
+use study_kit::{Case, csv, grid, normals, run_once};
+
+/// Roundings of a few dozen analyses.
+const TOLERANCE: f64 = 1e-9;
+
+/// A linear system between analyses, observed in its first state.
+struct Kalman {
+    mean: DVector<f64>,
+    covariance: DMatrix<f64>,
+    /// Variances that every analysis adds.
+    walk: DVector<f64>,
+    evidence: f64,
+}
+
+impl Kalman {
+    fn new(mean: &[f64], sd: &[f64], walk: &[f64]) -> Self {
+        Self {
+            mean: DVector::from_column_slice(mean),
+            covariance: DMatrix::from_diagonal(&DVector::from_column_slice(sd).map(|s| s * s)),
+            walk: DVector::from_column_slice(walk).map(|s| s * s),
+            evidence: 0.0,
+        }
+    }
+
+    fn predict(&mut self, step: &DMatrix<f64>) {
+        self.mean = step * &self.mean;
+        self.covariance = step * &self.covariance * step.transpose();
+    }
+
+    fn observe(&mut self, h: &[f64], z: f64, noise: f64) {
+        let h = DVector::from_column_slice(h);
+        let gain = &self.covariance * &h;
+        let (variance, innovation) = (h.dot(&gain) + noise * noise, z - h.dot(&self.mean));
+        self.evidence -= 0.5 * ((std::f64::consts::TAU * variance).ln() + innovation * innovation / variance);
+        self.mean += &gain * (innovation / variance);
+        self.covariance -= &gain * gain.transpose() / variance;
+        self.covariance += DMatrix::from_diagonal(&self.walk);
+    }
+
+    fn answer(self) -> Answer {
+        Answer { mean: self.mean, covariance: self.covariance, evidence: self.evidence }
+    }
+}
+
+/// The line of the linear kit, whose state walks.
+fn walking(estimator: &str, records: &str) -> String {
+    let sd = format!("sd = {} }}", START.1);
+    let study = linear::study_of(estimator, records);
+    let (before, after) = study.rsplit_once(&sd).unwrap();
+    format!("{before}{sd}\nprocess = {{ walk = 0.2 }}{after}")
+}
+
+/// x' = a + b t with state noise on x: the vector (a, b, x).
+fn of_the_line(times: &[f64], z: &[f64]) -> Answer {
+    let mut kalman = Kalman::new(&[A.0, B.0, START.0], &[A.1, B.1, START.1], &[0.0, 0.0, 0.2]);
+    let mut before = times[0];
+    for (t, z) in times.iter().zip(z) {
+        let step = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, t - before, 0.5 * (t * t - before * before), 1.0];
+        kalman.predict(&DMatrix::from_row_slice(3, 3, &step));
+        kalman.observe(&[0.0, 0.0, 1.0], *z, NOISE);
+        before = *t;
+    }
+    kalman.answer()
+}
+
+#[test]
+fn a_state_that_walks_beside_parameters_is_the_kalman_filter_with_state_noise() {
+    let (times, z) = linear::data(30, 1);
+    let answer = of_the_line(&times, &z);
+    for points in ["simplex", "canonical", "star", "julier-uhlmann"] {
+        let study = walking(
+            &format!("points = \"{points}\"\npasses = 1\nresample = \"none\""),
+            &linear::record("one", "line.csv", NOISE, ""),
+        );
+        let done = run_once(&study, &[("line.csv", linear::file(&times, &z))]);
+        assert_exact(&done, &answer, TOLERANCE, points);
+        assert!(done.summary.conditional_on.contains("States walk"), "{}", done.summary.conditional_on);
+    }
+    // Without the noise the answer is another one: the test can fail.
+    let still = linear::Regression::of_record(&times, &z).solve();
+    assert!((still.mean[2] - answer.mean[2]).abs() > 0.1);
+}
+
+/// Position of an undamped oscillator of circular frequency 3, every 0.1 s.
+const OSCILLATOR: &str = r#"
+[study]
+name = "oscillator"
+[model]
+kind = "oscillator"
+constants = { m = 2.0, c = 0.0, k = 18.0 }
+[[parameters]]
+name = "initial:x"
+prior = { transform = "linear", median = 0.5, sd = 0.4 }
+[[parameters]]
+name = "initial:v"
+prior = { transform = "linear", median = 0.0, sd = 1.0 }
+process = { walk = 0.3 }
+[estimator]
+passes = 1
+[[records]]
+name = "one"
+file = "position.csv"
+channels = [ { column = "x", output = "position", noise = 0.05 } ]
+"#;
+
+#[test]
+fn noise_on_the_velocity_alone_is_the_kalman_filter_of_position_and_velocity() {
+    let times = grid(40, 0.1);
+    let z: Vec<f64> =
+        times.iter().zip(normals(40, 5)).map(|(t, e)| 0.9 * (3.0 * t).cos() + 0.05 * e).collect();
+    let (sin, cos) = 0.3_f64.sin_cos();
+    let step = DMatrix::from_row_slice(2, 2, &[cos, sin / 3.0, -3.0 * sin, cos]);
+    let mut kalman = Kalman::new(&[0.5, 0.0], &[0.4, 1.0], &[0.0, 0.3]);
+    for (k, z) in z.iter().enumerate() {
+        if k > 0 {
+            kalman.predict(&step);
+        }
+        kalman.observe(&[1.0, 0.0], *z, 0.05);
+    }
+    let done = run_once(OSCILLATOR, &[("position.csv", csv("time,x", &[&times, &z]))]);
+    assert_exact(&done, &kalman.answer(), TOLERANCE, "oscillator");
+    // A free run begins where the pass began, not where the state ended.
+    let first = done.predicted("one")[0].1;
+    assert!((first - 0.5).abs() < 1e-12, "{first}");
+}
+
+#[test]
+fn what_cannot_walk_is_refused_with_the_remedy() {
+    let (times, z) = linear::data(30, 1);
+    let one = linear::record("one", "line.csv", NOISE, "");
+    let told = |study: &str| {
+        let files =
+            [("line.csv", linear::file(&times, &z)), ("short.csv", linear::file(&times[..20], &z[..20]))];
+        Case::new(study, &files).refusal().unwrap_or_default()
+    };
+    assert_eq!(told(&walking("passes = 1", &one)), "");
+    let batch = told(&walking("kind = \"batch\"", &one));
+    assert!(
+        batch.contains("a state cannot walk in a batch fit") && batch.contains("`kind = \"roukf\"`"),
+        "{batch}"
+    );
+    let two = linear::record("one", "line.csv", NOISE, "") + &linear::record("two", "line.csv", NOISE, "");
+    assert_eq!(told(&walking("passes = 1", &two)), "");
+    let shared = walking("passes = 1", &two).replace("process =", "per_record = false\nprocess =");
+    assert!(told(&shared).contains("the state of each walks by itself"), "{}", told(&shared));
+    let unequal =
+        linear::record("one", "line.csv", NOISE, "") + &linear::record("two", "short.csv", NOISE, "");
+    let unequal = told(&walking("passes = 1", &unequal));
+    assert!(unequal.contains("different numbers of them"), "{unequal}");
+    let log = walking("passes = 1", &one).replace(
+        &format!("transform = \"linear\", median = {}, sd = {}", START.0, START.1),
+        "transform = \"log\", median = 0.3, factor = 2.0",
+    );
+    assert!(told(&log).contains("a state walks in its own unit"), "{}", told(&log));
+}
