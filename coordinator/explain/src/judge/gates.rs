@@ -11,7 +11,7 @@ use super::form::Leftover;
 use super::held_out::{HeldOut, held_out};
 use super::misfit::Misfit;
 use super::range::at_edge;
-use super::uncertainty::allowances;
+use super::uncertainty::{Uncertainty, allowances};
 use crate::fit::fitted_variant::FittedVariant;
 use crate::fit::kind::Kind;
 use crate::number::{spaced, three, times};
@@ -20,6 +20,8 @@ use crate::run_cache::RunCache;
 
 /// Factor by which a held-out error may grow without counting as worse.
 const WORSE: f64 = 1.02;
+/// Rise of minus twice the log density of a held-out channel that is no more than chance: odds of 20 to 1.
+const UNLIKELY: f64 = 6.0;
 
 /// Why a variant may not be named.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -122,12 +124,13 @@ pub(crate) fn judge<'c>(
     let gain_held_out = before.held_out - misfit.held_out;
     let share = ratio(before.train - misfit.train, before.train - m);
     let n_held = misfit.n_held_out as f64;
-    let has_excess = before.held_out > n_held + 3.0 * (2.0 * n_held).sqrt();
+    let scatter = scatter(misfit.n_held_out, cache.rows.noise_freedom(|row| row.usage == Usage::HeldOut));
+    let has_excess = before.held_out > n_held + 3.0 * scatter;
     let share_held_out =
         (misfit.n_held_out > 0 && has_excess).then(|| ratio(gain_held_out, before.held_out - n_held));
     let [allowance, allowance_unseen] = allowances(cache, &fit);
     let held_out = held_out(cache, base, &fit);
-    let beyond = misfit.held_out - allowance - n_held - 2.0 * (2.0 * n_held).sqrt();
+    let beyond = misfit.held_out - allowance - n_held - 2.0 * scatter;
     let unaccounted = if has_excess { ratio(beyond.max(0.0), before.held_out - n_held) } else { 0.0 };
     let mut judged = JudgedFit {
         fit,
@@ -147,6 +150,12 @@ pub(crate) fn judge<'c>(
     };
     judged.refusal = refusal(cache, base, before, &judged, threshold);
     judged
+}
+
+/// Standard deviation of the χ² of n values of noise whose variance is known with so many degrees of freedom.
+fn scatter(n: usize, freedom: f64) -> f64 {
+    let n = n as f64;
+    (2.0 * n + 2.0 * n * n / freedom).sqrt()
 }
 
 fn ratio(part: f64, whole: f64) -> f64 {
@@ -210,18 +219,28 @@ fn held_out_span(before: Misfit, judged: &JudgedFit<'_>) -> Option<Refusal> {
     })
 }
 
-/// The refusal for a held-out channel that gets worse.
+/// The refusal for a held-out channel that gets worse: its error grows, and it is less likely by what the estimate and its
+/// uncertainty predict.
 fn held_out_channel(
     cache: &RunCache<'_>,
     base: &FittedVariant<'_>,
     fit: &FittedVariant<'_>,
 ) -> Option<Refusal> {
     let rows = &cache.rows;
+    let unlikelihood = |fit: &FittedVariant<'_>, at: &[usize]| {
+        let errors = rows.whitened(&fit.predicted);
+        let of = Uncertainty::of(cache, fit).map(|of| of.of_rows(at, &errors)).unwrap_or_default();
+        at.iter().map(|i| errors[*i].powi(2)).sum::<f64>() - of.allowance + of.width
+    };
     for (output, name) in cache.study.setup.outputs.iter().enumerate() {
         let of = |row: &Row| row.output == output && row.usage == Usage::HeldOutChannel;
         let Some(row) = rows.rows.iter().find(|row| of(row)) else { continue };
         let (before, after) = (rows.rmse(&base.predicted, of), rows.rmse(&fit.predicted, of));
-        if after > before * WORSE {
+        if after <= before * WORSE {
+            continue;
+        }
+        let at: Vec<usize> = (0..rows.rows.len()).filter(|i| of(&rows.rows[*i])).collect();
+        if unlikelihood(fit, &at) > unlikelihood(base, &at) + UNLIKELY {
             return Some(Refusal {
                 gate: "held-out channel",
                 reason: format!(
