@@ -88,7 +88,7 @@ pub(crate) fn leftover(
     // What the uncertainty of the estimate explains of the held-out errors says nothing of the form.
     let uncertainty = Uncertainty::of(cache, fit);
     let beyond = |errors: &[f64]| {
-        let explained = uncertainty.as_ref().map_or(0.0, |of| of.of_rows(&held, errors).allowance);
+        let explained = uncertainty.as_ref().map_or(0.0, |of| of.allowance(&held, errors));
         held.iter().map(|i| errors[*i].powi(2)).sum::<f64>() - explained
     };
     let before = beyond(&whitened);

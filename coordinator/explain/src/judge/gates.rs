@@ -11,7 +11,7 @@ use super::form::Leftover;
 use super::held_out::{HeldOut, held_out};
 use super::misfit::Misfit;
 use super::range::at_edge;
-use super::uncertainty::{Uncertainty, allowances};
+use super::uncertainty::allowances;
 use crate::fit::fitted_variant::FittedVariant;
 use crate::fit::kind::Kind;
 use crate::number::{spaced, three, times};
@@ -20,8 +20,6 @@ use crate::run_cache::RunCache;
 
 /// Factor by which a held-out error may grow without counting as worse.
 const WORSE: f64 = 1.02;
-/// Rise of minus twice the log density of a held-out channel that is no more than chance: odds of 20 to 1.
-const UNLIKELY: f64 = 6.0;
 
 /// Why a variant may not be named.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -219,28 +217,18 @@ fn held_out_span(before: Misfit, judged: &JudgedFit<'_>) -> Option<Refusal> {
     })
 }
 
-/// The refusal for a held-out channel that gets worse: its error grows, and it is less likely by what the estimate and its
-/// uncertainty predict.
+/// The refusal for a held-out channel that gets worse.
 fn held_out_channel(
     cache: &RunCache<'_>,
     base: &FittedVariant<'_>,
     fit: &FittedVariant<'_>,
 ) -> Option<Refusal> {
     let rows = &cache.rows;
-    let unlikelihood = |fit: &FittedVariant<'_>, at: &[usize]| {
-        let errors = rows.whitened(&fit.predicted);
-        let of = Uncertainty::of(cache, fit).map(|of| of.of_rows(at, &errors)).unwrap_or_default();
-        at.iter().map(|i| errors[*i].powi(2)).sum::<f64>() - of.allowance + of.width
-    };
     for (output, name) in cache.study.setup.outputs.iter().enumerate() {
         let of = |row: &Row| row.output == output && row.usage == Usage::HeldOutChannel;
         let Some(row) = rows.rows.iter().find(|row| of(row)) else { continue };
         let (before, after) = (rows.rmse(&base.predicted, of), rows.rmse(&fit.predicted, of));
-        if after <= before * WORSE {
-            continue;
-        }
-        let at: Vec<usize> = (0..rows.rows.len()).filter(|i| of(&rows.rows[*i])).collect();
-        if unlikelihood(fit, &at) > unlikelihood(base, &at) + UNLIKELY {
+        if after > before * WORSE {
             return Some(Refusal {
                 gate: "held-out channel",
                 reason: format!(

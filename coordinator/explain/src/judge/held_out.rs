@@ -89,7 +89,7 @@ pub(crate) fn held_out(
         let n = at.len() as f64;
         let squares = |e: &[f64]| at.iter().map(|i| e[*i].powi(2)).sum::<f64>();
         let (was, is) = (squares(&before), squares(&after));
-        let explained = uncertainty.as_ref().map_or(0.0, |of| of.of_rows(&at, &after).allowance);
+        let explained = uncertainty.as_ref().map_or(0.0, |of| of.allowance(&at, &after));
         let record = &cache.study.records[row.record];
         let beyond = (is - explained).max(0.0) / (n * level * level);
         let chance = nis_band_of_uncertain_noise(at.len(), row.noise_freedom, LEVEL).1;

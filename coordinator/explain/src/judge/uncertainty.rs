@@ -19,7 +19,7 @@ pub(super) fn allowances(cache: &RunCache<'_>, fit: &FittedVariant<'_>) -> [f64;
     let errors = cache.rows.whitened(&fit.predicted);
     let of = |wanted: &[Usage]| {
         let at: Vec<usize> = (0..rows.len()).filter(|i| wanted.contains(&rows[*i].usage)).collect();
-        if at.is_empty() { 0.0 } else { uncertainty.of_rows(&at, &errors).allowance }
+        if at.is_empty() { 0.0 } else { uncertainty.allowance(&at, &errors) }
     };
     [of(&[Usage::HeldOut]), of(&[Usage::HeldOut, Usage::HeldOutChannel])]
 }
@@ -29,15 +29,6 @@ pub(super) struct Uncertainty<'f> {
     jacobian: BlockAngular,
     own_values: &'f DMatrix<f64>,
     covariance: DMatrix<f64>,
-}
-
-/// What the uncertainty of an estimate makes of some rows.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Explained {
-    /// The part of χ² that it explains.
-    pub(super) allowance: f64,
-    /// ln |1 + J C Jᵀ|: what the wider prediction takes from the density of the rows, as χ².
-    pub(super) width: f64,
 }
 
 impl<'f> Uncertainty<'f> {
@@ -53,23 +44,21 @@ impl<'f> Uncertainty<'f> {
         })
     }
 
-    /// The allowance bᵀ (C⁻¹ + JᵀJ)⁻¹ b with b = Jᵀ e is the fall of χ² from these rows, increasing (Jacobian J), to a joint fit, for
+    /// bᵀ (C⁻¹ + JᵀJ)⁻¹ b with b = Jᵀ e: the fall of χ² from these rows, increasing (Jacobian J), to a joint fit, for
     /// an estimate of covariance C and values of a held-out record's own of unit variance; `errors` e are those of all rows,
     /// whitened. χ² less this is eᵀ (1 + J C Jᵀ)⁻¹ e, the squared distance of the rows from their prediction (Mahalanobis 1936).
     /// Parameters on which the rows do not depend are left out, which does not change it.
-    pub(super) fn of_rows(&self, rows: &[usize], errors: &[f64]) -> Explained {
-        let of = self.explained(rows, errors);
-        of.filter(|of| of.allowance.is_finite() && of.width.is_finite()).unwrap_or_default()
+    pub(super) fn allowance(&self, rows: &[usize], errors: &[f64]) -> f64 {
+        self.fall(rows, errors).filter(|fall| fall.is_finite()).unwrap_or(0.0)
     }
 
-    fn explained(&self, rows: &[usize], errors: &[f64]) -> Option<Explained> {
+    fn fall(&self, rows: &[usize], errors: &[f64]) -> Option<f64> {
         let residual = DVector::from_iterator(rows.len(), rows.iter().map(|i| errors[*i]));
         let jacobian = self.jacobian.select_rows(rows);
         let parameters = columns_of(&jacobian);
         let p = parameters.len();
         let covariance = self.covariance.select_rows(&parameters).select_columns(&parameters);
-        let root = covariance.cholesky()?;
-        let (mut information, before) = (root.inverse(), -root.ln_determinant());
+        let mut information = covariance.cholesky()?.inverse();
         let mut along = DVector::zeros(p);
         for block in jacobian.blocks() {
             let own = self.own(&rows[block.rows.clone()]);
@@ -92,8 +81,7 @@ impl<'f> Uncertainty<'f> {
                 }
             }
         }
-        let root = information.cholesky()?;
-        Some(Explained { allowance: along.dot(&root.solve(&along)), width: root.ln_determinant() - before })
+        Some(along.dot(&information.cholesky()?.solve(&along)))
     }
 
     /// What a held-out record's own values change in some of its rows; without columns where they change nothing.
