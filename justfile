@@ -38,7 +38,7 @@ diagnostics:
     cargo test --release -p starlings-estimators --test nozzle -- --ignored --nocapture
     cargo test --release --test diagnose_examples -- --ignored
 
-# Every system, effect and noise level of docs/battery.md: about an hour. BATTERY_SYSTEMS, BATTERY_KINDS, BATTERY_NOISE, BATTERY_CORRELATION, BATTERY_SEEDS, BATTERY_THREADS choose.
+# Every system, effect and noise level of docs/battery.md: about an hour. BATTERY_SYSTEMS, BATTERY_KINDS, BATTERY_EFFECTS, BATTERY_NOISE, BATTERY_CORRELATION, BATTERY_SEEDS, BATTERY_THREADS choose; STARLINGS_WRITE_PAGES draws docs/pictures/battery-reliability.svg.
 explain-battery:
     cargo test --release -p starlings-coordinator --test explain_battery -- --ignored --nocapture the_whole
 

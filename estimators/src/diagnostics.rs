@@ -3,10 +3,14 @@
 //! No thresholds for warnings here: the caller sets them. Read next: `analysis.rs`.
 
 use nalgebra::DMatrix;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 /// Third quartile of the standard normal distribution: median of |x| for unit sd.
 const MEDIAN_ABSOLUTE: f64 = 0.674_489_750_196_081_7;
+
+/// Degrees of freedom per third difference: the variance of the logarithm of a noise variance found from n of them is 2/(0.21 n).
+/// Neighbours share three of four samples, and a median tells less than a mean square would.
+const FREEDOM: f64 = 0.21;
 
 /// Noise sd of an evenly sampled smooth series from its third differences: median |d3| / (0.6745 sqrt 20).
 ///
@@ -24,6 +28,12 @@ pub fn noise_from_third_differences(series: &[f64]) -> f64 {
     size.sort_by(f64::total_cmp);
     let median = 0.5 * (size[(size.len() - 1) / 2] + size[size.len() / 2]);
     median / (MEDIAN_ABSOLUTE * 20f64.sqrt())
+}
+
+/// Degrees of freedom with which [`noise_from_third_differences`] of `n` samples tells a noise variance: as many independent values of
+/// known mean would tell it as well by their mean square.
+pub fn freedom_of_third_differences(n: usize) -> f64 {
+    FREEDOM * n.saturating_sub(3).max(1) as f64
 }
 
 /// Autocorrelation at lags 0 to `max_lag` (length `max_lag + 1`), the biased estimate (Box & Jenkins 1976, section 2.1).
@@ -92,6 +102,18 @@ pub fn effective_nis_band(n: f64, level: f64) -> (f64, f64) {
     ChiSquared::new(n).map_or((f64::NAN, f64::NAN), |chi| {
         let tail = 0.5 * (1.0 - level);
         (chi.inverse_cdf(tail) / n, chi.inverse_cdf(1.0 - tail) / n)
+    })
+}
+
+/// The same for squares over a variance that is itself uncertain, known with so many degrees of freedom (F distribution: Snedecor 1934);
+/// with infinitely many it is [`nis_band`].
+pub fn nis_band_of_uncertain_noise(n_used: usize, freedom: f64, level: f64) -> (f64, f64) {
+    if freedom.is_infinite() {
+        return nis_band(n_used, level);
+    }
+    FisherSnedecor::new(n_used as f64, freedom).map_or((f64::NAN, f64::NAN), |ratio| {
+        let tail = 0.5 * (1.0 - level);
+        (ratio.inverse_cdf(tail), ratio.inverse_cdf(1.0 - tail))
     })
 }
 

@@ -34,6 +34,8 @@ pub struct LeastSquares {
     residual: DVector<f64>,
     cost: f64,
     jacobian: BlockAngular,
+    /// Whether a Jacobian was measured yet: without one, a column of zeros is an influence that nobody knows.
+    is_known: bool,
     fresh: bool,
     /// The Jacobian that was measured at this point, while the secant changes `jacobian`.
     measured: Option<BlockAngular>,
@@ -60,6 +62,7 @@ impl LeastSquares {
             residual: DVector::zeros(0),
             cost: f64::INFINITY,
             jacobian: BlockAngular::default(),
+            is_known: false,
             fresh: false,
             measured: None,
             radius: f64::INFINITY,
@@ -71,7 +74,8 @@ impl LeastSquares {
     }
 
     /// A fit from a point whose residual (m) and approximate Jacobian (m x p) are known: its first step costs one run. It ends
-    /// as soon as the secant predicts no further fall of the cost; [`LeastSquares::polish`] goes on from there.
+    /// as soon as the secant predicts no further fall of the cost; [`LeastSquares::polish`] goes on from there. Components whose
+    /// column is zero stay where they are until a Jacobian is measured.
     pub fn from_known(
         z: DVector<f64>,
         residual: DVector<f64>,
@@ -185,7 +189,7 @@ impl LeastSquares {
             Some(jacobian) => {
                 self.measured = Some(jacobian.clone());
                 self.jacobian = jacobian;
-                self.fresh = true;
+                (self.is_known, self.fresh) = (true, true);
                 self.plan();
             }
             None if self.jacobian.is_empty() => self.need = Need::Nothing(End::NoStart),
@@ -213,18 +217,29 @@ impl LeastSquares {
     }
 
     /// The damped step within the bounds; notes the fall of the cost that it predicts. Components at a bound that pull outwards
-    /// are left where they are.
+    /// are left where they are, and those that move no residual go to their prior mean last: a parameter inside a term whose
+    /// amplitude is still zero has its influence where the amplitude is not.
     fn step(&mut self) -> Option<DVector<f64>> {
+        let (felt, smallest) = (self.jacobian.squares(), self.tolerance.max(self.resolution()));
+        let step = self.step_of(&felt, &|j| felt[j] > 0.0)?;
+        if self.is_known && self.predicted <= smallest && felt.iter().any(|square| *square <= 0.0) {
+            return self.step_of(&felt, &|_| true);
+        }
+        Some(step)
+    }
+
+    /// The step of the components that may move, whose columns have these squares.
+    fn step_of(&mut self, felt: &DVector<f64>, moves: &dyn Fn(usize) -> bool) -> Option<DVector<f64>> {
         let p = self.z.len();
         let precision = &self.prior.precision;
         let pull = &self.prior.mean - &self.z;
         let gradient = self.jacobian.tr_times(&self.residual) + precision.component_mul(&pull);
-        let curvature = self.jacobian.squares() + precision;
+        let curvature = felt + precision;
         let held = |j: usize| {
             let [lo, hi] = self.prior.bounds[j];
             (self.z[j] <= lo && gradient[j] < 0.0) || (self.z[j] >= hi && gradient[j] > 0.0)
         };
-        let free: Vec<usize> = (0..p).filter(|j| !held(*j) && curvature[*j] > 0.0).collect();
+        let free: Vec<usize> = (0..p).filter(|j| moves(*j) && !held(*j) && curvature[*j] > 0.0).collect();
         let solved = damped::solve(self, &free, &pull, &curvature)?;
         let shrink = (LONGEST / solved.amax().max(f64::MIN_POSITIVE)).min(1.0);
         let mut step = DVector::zeros(p);

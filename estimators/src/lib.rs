@@ -54,8 +54,8 @@ pub use blocks::Block;
 pub use correlated_noise::{CorrelatedNoise, FittedNoise, Part, Series, fit_noise};
 pub use data::{Data, Noise};
 pub use diagnostics::{
-    autocorrelation, correlation, effective_nis_band, effective_sample_size, nis_band,
-    noise_from_third_differences,
+    autocorrelation, correlation, effective_nis_band, effective_sample_size, freedom_of_third_differences,
+    nis_band, nis_band_of_uncertain_noise, noise_from_third_differences,
 };
 pub use drift::Drift;
 pub use error::EstimatorError;

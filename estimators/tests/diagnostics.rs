@@ -5,8 +5,8 @@ mod common;
 use common::{gauss, rng};
 use nalgebra::DMatrix;
 use starlings_estimators::{
-    Gaussian, Transform, autocorrelation, correlation, effective_sample_size, nis_band,
-    noise_from_third_differences,
+    Gaussian, Transform, autocorrelation, correlation, effective_sample_size, freedom_of_third_differences,
+    nis_band, nis_band_of_uncertain_noise, noise_from_third_differences,
 };
 
 fn white(seed: u64, n: usize) -> Vec<f64> {
@@ -25,6 +25,26 @@ fn third_differences_find_the_noise_under_a_smooth_signal_with_holes() {
     assert!(noise_from_third_differences(&[1.0, 2.0, 3.0]).is_nan());
     let parabola: Vec<f64> = (0..20).map(|k| f64::from(k * k)).collect();
     assert!(noise_from_third_differences(&parabola) < 1e-12);
+}
+
+#[test]
+fn third_differences_tell_the_noise_as_well_as_their_freedom_says() {
+    for n in [60, 250] {
+        let logs: Vec<f64> =
+            (0..400).map(|k| noise_from_third_differences(&white(1000 + k, n)).powi(2).ln()).collect();
+        let mean = logs.iter().sum::<f64>() / 400.0;
+        let variance = logs.iter().map(|l| (l - mean).powi(2)).sum::<f64>() / 399.0;
+        // A variance of 400 values scatters by 7 %; of a logarithm it is 2/freedom up to a few per cent.
+        assert!((variance * freedom_of_third_differences(n) / 2.0 - 1.0).abs() < 0.25, "{n}: {variance}");
+    }
+}
+
+#[test]
+fn the_band_of_squares_over_an_uncertain_noise_is_that_of_their_ratio() {
+    // Tables of F: 2.774 with 10 and 20 degrees of freedom, 3.419 with 20 and 10, at 0.975.
+    let (lo, hi) = nis_band_of_uncertain_noise(10, 20.0, 0.95);
+    assert!((hi - 2.774).abs() < 5e-4 && (1.0 / lo - 3.419).abs() < 5e-4, "{lo} {hi}");
+    assert_eq!(nis_band_of_uncertain_noise(10, f64::INFINITY, 0.95), nis_band(10, 0.95));
 }
 
 #[test]

@@ -6,7 +6,7 @@
 //! file to read: [`crate::run_cache`].
 
 use nalgebra::DVector;
-use starlings_estimators::CorrelatedNoise;
+use starlings_estimators::{CorrelatedNoise, freedom_of_third_differences};
 use starlings_study::Study;
 use starlings_study::field::quantity_of;
 
@@ -49,6 +49,8 @@ pub struct Row {
     pub observed: f64,
     /// Noise sd, in the channel's unit.
     pub noise: f64,
+    /// Degrees of freedom with which its variance is known; infinite where the study gives it.
+    pub noise_freedom: f64,
     /// What it may be used for.
     pub usage: Usage,
 }
@@ -82,6 +84,8 @@ impl Rows {
         let mut rows = Vec::with_capacity(n);
         for (r, record) in study.records.iter().enumerate() {
             for (c, channel) in record.channels.iter().enumerate() {
+                let noise_freedom =
+                    channel.noise_found_from.map_or(f64::INFINITY, freedom_of_third_differences);
                 for (step, (&time, &observed)) in record.times.iter().zip(&channel.values).enumerate() {
                     if !observed.is_finite() {
                         continue;
@@ -94,7 +98,17 @@ impl Rows {
                         Usage::HeldOut
                     };
                     let (output, noise) = (channel.row, channel.noise);
-                    rows.push(Row { record: r, channel: c, output, step, time, observed, noise, usage });
+                    rows.push(Row {
+                        record: r,
+                        channel: c,
+                        output,
+                        step,
+                        time,
+                        observed,
+                        noise,
+                        noise_freedom,
+                        usage,
+                    });
                 }
             }
         }
@@ -181,6 +195,26 @@ impl Rows {
         self.rows[stretch.clone()].iter().map(|row| row.time).collect()
     }
 
+    /// Degrees of freedom with which the mean noise variance of the rows that `of` takes is known; infinite where the study gives every
+    /// noise of theirs. Channels of one output whose noise is the same were found to have it together.
+    pub(crate) fn noise_freedom(&self, of: impl Fn(&Row) -> bool) -> f64 {
+        let mut found: Vec<((usize, u64), f64, f64)> = Vec::new();
+        let mut n = 0.0;
+        for row in self.rows.iter().filter(|row| of(row)) {
+            n += 1.0;
+            if row.noise_freedom.is_infinite() {
+                continue;
+            }
+            let key = (row.output, row.noise.to_bits());
+            match found.iter_mut().find(|(known, ..)| *known == key) {
+                Some((_, of_it, _)) => *of_it += 1.0,
+                None => found.push((key, 1.0, row.noise_freedom)),
+            }
+        }
+        let spread = found.iter().map(|(_, of_it, freedom)| (of_it / n).powi(2) / freedom).sum::<f64>();
+        if spread > 0.0 { 1.0 / spread } else { f64::INFINITY }
+    }
+
     /// Root mean square of observed − predicted over the rows that `of` takes; NaN for none.
     pub(crate) fn rmse(&self, predicted: &[f64], of: impl Fn(&Row) -> bool) -> f64 {
         let squares: Vec<f64> = self
@@ -200,7 +234,17 @@ impl Rows {
     pub(crate) fn sample(n: usize, usage: impl Fn(usize) -> Usage) -> Self {
         let row = |step: usize| {
             let (time, usage) = (step as f64, usage(step));
-            Row { record: 0, channel: 0, output: 0, step, time, observed: 0.0, noise: 1.0, usage }
+            Row {
+                record: 0,
+                channel: 0,
+                output: 0,
+                step,
+                time,
+                observed: 0.0,
+                noise: 1.0,
+                noise_freedom: f64::INFINITY,
+                usage,
+            }
         };
         let rows: Vec<Row> = (0..n).map(row).collect();
         let train = (0..n).filter(|i| rows[*i].usage == Usage::Train).collect();

@@ -141,6 +141,10 @@ pub struct Result {
     pub told: Vec<(f64, bool)>,
     /// χ² of the model with what was named, refitted to data without noise: below a few units the data hold nothing against it.
     pub rival: Option<f64>,
+    /// What became of the true effect in the search: its fate among the screened, or why it was refused.
+    pub truth: String,
+    /// Parameters inside the term of the true effect.
+    pub n_inner: usize,
     /// Terms of the model that it replaces.
     pub replaced: usize,
     /// RMSE after over the true noise, on the span that was held out.

@@ -8,13 +8,14 @@ mod case;
 mod draw;
 mod information;
 mod plan;
+mod reliability;
 mod runner;
 mod structure;
 mod systems;
 mod tally;
 mod world;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use starlings_models::BuildSetup;
 
@@ -72,7 +73,7 @@ fn every_effect_changes_the_outputs_by_the_wanted_share() {
 fn a_small_battery_is_explained() {
     let systems = systems::all();
     let (white, levels) = (vec![0.0], vec![0.03]);
-    let plan = Plan { systems: Vec::new(), kinds: Vec::new(), levels, rhos: white, seeds: 0..2, threads: 2 };
+    let plan = Plan { levels, rhos: white, ..Plan::of_seeds(0..2) };
     let small = [
         ("oscillator", "coulomb-friction"),
         ("oscillator", "cubic-stiffness"),
@@ -120,10 +121,12 @@ fn probabilities_hold(results: &[case::Result]) {
         let sum: f64 = result.told.iter().map(|(p, _)| p).sum();
         assert!((sum - 1.0).abs() < 1e-9, "{sum} in {:?}", result.case);
     }
-    let table = tally::reliability(results);
-    let (.., n, told, so) =
-        table.iter().find(|([lo, _], ..)| *lo >= 0.9).expect("answers told with 90 % and more");
-    assert!(*n >= 10 && (so - told).abs() < 0.05, "{n} answers told with {told:.3}, of which {so:.3} are so");
+    let table = reliability::reliability(results);
+    let sure = table.iter().find(|answers| answers.told[0] >= 0.9).expect("answers told with 90 % and more");
+    let (n, told, so) = (sure.n, sure.mean, sure.so);
+    assert!(n >= 10 && (so - told).abs() < 0.05, "{n} answers told with {told:.3}, of which {so:.3} are so");
+    let picture = reliability::picture(results);
+    assert_eq!(picture.matches("<circle").count(), table.len(), "{picture}");
 }
 
 /// Noise that is correlated in time is no gap, and hides no effect that it leaves audible.
@@ -131,7 +134,7 @@ fn probabilities_hold(results: &[case::Result]) {
 fn a_small_battery_with_correlated_noise_is_explained() {
     let systems = systems::all();
     let (levels, rhos) = (vec![0.03], vec![0.6]);
-    let plan = Plan { systems: Vec::new(), kinds: Vec::new(), levels, rhos, seeds: 0..2, threads: 2 };
+    let plan = Plan { levels, rhos, ..Plan::of_seeds(0..2) };
     let small = [
         ("oscillator", "cubic-stiffness"),
         ("pendulum", "quadratic-drag"),
@@ -176,6 +179,11 @@ fn the_whole_battery_is_tallied() {
     std::fs::write(folder.join("battery.md"), report).unwrap();
     std::fs::write(folder.join("battery.csv"), tally::csv(&results, &systems)).unwrap();
     println!("written to {}", folder.display());
+    if std::env::var_os("STARLINGS_WRITE_PAGES").is_some() {
+        let white: Vec<case::Result> = results.into_iter().filter(|r| r.case.rho <= 0.0).collect();
+        let pictures = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/pictures");
+        std::fs::write(pictures.join("battery-reliability.svg"), reliability::picture(&white)).unwrap();
+    }
 }
 
 #[test]

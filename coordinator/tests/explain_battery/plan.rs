@@ -21,6 +21,8 @@ const LONG: usize = 1000;
 pub struct Plan {
     pub systems: Vec<String>,
     pub kinds: Vec<String>,
+    /// Names of effects.
+    pub effects: Vec<String>,
     pub levels: Vec<f64>,
     /// Correlations of the noise of neighbouring samples.
     pub rhos: Vec<f64>,
@@ -29,7 +31,14 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// From `BATTERY_SYSTEMS`, `BATTERY_KINDS`, `BATTERY_NOISE`, `BATTERY_CORRELATION`, `BATTERY_SEEDS` (`0..10`) and `BATTERY_THREADS`.
+    /// Everything of these seeds, on two threads.
+    pub fn of_seeds(seeds: std::ops::Range<u64>) -> Self {
+        let all = Vec::new;
+        let (levels, rhos) = (LEVELS.to_vec(), RHOS.to_vec());
+        Self { systems: all(), kinds: all(), effects: all(), levels, rhos, seeds, threads: 2 }
+    }
+
+    /// From `BATTERY_SYSTEMS`, `BATTERY_KINDS`, `BATTERY_EFFECTS`, `BATTERY_NOISE`, `BATTERY_CORRELATION`, `BATTERY_SEEDS` (`0..10`) and `BATTERY_THREADS`.
     pub fn from_environment() -> Self {
         let list = |name: &str| -> Vec<String> {
             let text = std::env::var(name).unwrap_or_default();
@@ -45,6 +54,7 @@ impl Plan {
         Self {
             systems: list("BATTERY_SYSTEMS"),
             kinds: list("BATTERY_KINDS"),
+            effects: list("BATTERY_EFFECTS"),
             levels: if levels.is_empty() { LEVELS.to_vec() } else { levels },
             rhos: if rhos.is_empty() { RHOS.to_vec() } else { rhos },
             seeds: first.parse().unwrap()..end.parse().unwrap(),
@@ -74,7 +84,11 @@ impl Plan {
                 }
             }
         }
-        cases.retain(|case| self.kinds.is_empty() || self.kinds.iter().any(|kind| kind == case.kind.word()));
+        let is_in = |list: &[String], name: &str| list.is_empty() || list.iter().any(|known| known == name);
+        cases.retain(|case| {
+            let effect = case.effect.as_deref().unwrap_or_default();
+            is_in(&self.kinds, case.kind.word()) && is_in(&self.effects, effect)
+        });
         cases
     }
 }

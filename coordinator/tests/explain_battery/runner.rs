@@ -74,6 +74,8 @@ pub fn one(world: &World<'_>, case: &Case) -> Option<Result> {
         named: String::new(),
         told: Vec::new(),
         rival: None,
+        truth: String::new(),
+        n_inner: draw.effect.as_ref().map_or(0, |(_, values)| values.len() - 1),
         replaced: 0,
         held_out: None,
         runs: 0,
@@ -110,6 +112,7 @@ fn judged(base: Result, found: &Explanation, draw: &Draw, world: &World<'_>, noi
         outcome: Outcome::of(found, &base.case.accepted),
         named: if found.effects.is_empty() { found.headline.clone() } else { named.join(" | ") },
         told: told(found, &base.case),
+        truth: truth(found, &base.case.accepted),
         replaced: found.replaced.len(),
         runs: found.runs,
         false_alarm: found.false_alarm.rate,
@@ -128,6 +131,18 @@ fn judged(base: Result, found: &Explanation, draw: &Draw, world: &World<'_>, noi
         result.estimate = same.then_some((amplitude.estimate, amplitude.interval95));
     }
     result
+}
+
+/// What became of the effects that are right, and why those that were refused were.
+fn truth(found: &Explanation, accepted: &[String]) -> String {
+    let is_right = |name: &String| accepted.contains(name);
+    let fates = found.screened.iter().filter(|s| is_right(&s.name)).map(|s| {
+        let at = if s.at.is_empty() { String::new() } else { format!(" at {}", s.at) };
+        format!("{} {}{at}, gain {:.1}, own {:.3}", s.name, s.fate, s.gain, s.identifiable)
+    });
+    let refused = found.rejected.iter().filter(|r| is_right(&r.name));
+    let refused = refused.map(|r| format!("{} refused by {}: {}", r.name, r.gate, r.reason));
+    fates.chain(refused).collect::<Vec<_>>().join("; ")
 }
 
 /// The probabilities that were told, with what is so.

@@ -1,10 +1,11 @@
 //! Counts outcomes and writes them as tables.
 //!
-//! Next file to read: [`crate::case`].
+//! Next file to read: [`crate::reliability`], how often what was told as probable is so.
 
 use std::fmt::Write as _;
 
 use crate::case::{Kind, Outcome, Result};
+use crate::reliability;
 use crate::systems::System;
 
 /// χ² above which the data carry the information.
@@ -107,7 +108,7 @@ pub fn report(results: &[Result], systems: &[System]) -> String {
             text += &in_words(&groups[0], &groups[6]);
             let of: Vec<Result> =
                 results.iter().filter(|r| (r.case.rho <= 0.0) == is_white).cloned().collect();
-            write!(text, "### Probabilities\n\n{}\n", reliability_table(&of)).unwrap();
+            write!(text, "### Probabilities\n\n{}\n", reliability::table(&of)).unwrap();
         }
     }
     let results: Vec<Result> = results.iter().filter(|r| r.case.rho <= 0.0).cloned().collect();
@@ -129,6 +130,9 @@ pub fn report(results: &[Result], systems: &[System]) -> String {
         for (name, auto) in [("noise given", false), ("noise found", true)] {
             groups.push(Group::of(name, results, |r| is(r) && r.case.auto == auto));
         }
+        for (name, inner) in [("no value inside the term", false), ("inner values off the grid", true)] {
+            groups.push(Group::of(name, results, |r| is(r) && (r.n_inner > 0) == inner));
+        }
         write!(text, "### {}, λ > 100\n\n{}\n", kind.word(), table(&groups)).unwrap();
     }
     let mut groups = Vec::new();
@@ -144,40 +148,6 @@ pub fn report(results: &[Result], systems: &[System]) -> String {
         }
     }
     write!(text, "### Library effects one by one, λ > 100\n\n{}\n", table(&groups)).unwrap();
-    text
-}
-
-/// Ends of the intervals of told probabilities.
-const TOLD: [f64; 7] = [0.0, 0.01, 0.1, 0.5, 0.9, 0.99, 1.0];
-/// Share of the cases whose truth is in no list, as the tool takes it before any data.
-const LEFT_OUT: f64 = 0.1;
-
-/// How often what was told with a probability is so, by that probability, where one truth in ten is in no list: (interval, answers, mean
-/// probability, share that is so).
-pub fn reliability(results: &[Result]) -> Vec<([f64; 2], usize, f64, f64)> {
-    let weight = |kind: Kind| match kind {
-        Kind::Library => 1.0 - LEFT_OUT,
-        Kind::LeftOut => LEFT_OUT,
-        _ => 0.0,
-    };
-    let told = results.iter().flat_map(|r| r.told.iter().map(|(p, so)| (weight(r.case.kind), *p, *so)));
-    let told: Vec<(f64, f64, bool)> = told.filter(|(weight, ..)| *weight > 0.0).collect();
-    let of = |ends: &[f64]| {
-        let inside: Vec<_> = told.iter().filter(|(_, p, _)| (ends[0]..ends[1]).contains(p)).collect();
-        let sum: f64 = inside.iter().map(|(weight, ..)| weight).sum();
-        let mean = inside.iter().map(|(weight, p, _)| weight * p).sum::<f64>() / sum;
-        let so = inside.iter().filter(|(.., so)| *so).map(|(weight, ..)| weight).sum::<f64>() / sum;
-        ([ends[0], ends[1]], inside.len(), mean, so)
-    };
-    TOLD.windows(2).map(of).filter(|(_, n, ..)| *n > 0).collect()
-}
-
-/// The same as a table.
-fn reliability_table(results: &[Result]) -> String {
-    let mut text = String::from("| told, % | answers | told, mean | so |\n|---|---|---|---|\n");
-    for ([lo, hi], n, mean, so) in reliability(results) {
-        writeln!(text, "| {:.0} to {:.0} | {n} | {mean:.3} | {so:.3} |", 100.0 * lo, 100.0 * hi).unwrap();
-    }
     text
 }
 
@@ -213,14 +183,14 @@ fn in_words(library: &Group<'_>, left_out: &Group<'_>) -> String {
 /// One line per case.
 pub fn csv(results: &[Result], systems: &[System]) -> String {
     let mut text = String::from(
-        "system,kind,effect,noise,rho,n,seed,auto,lambda,outcome,named,rival,replaced,amplitude,estimate,lo,hi,held_out,runs,false_alarm,wall_s\n",
+        "system,kind,effect,noise,rho,n,seed,auto,lambda,outcome,named,rival,replaced,amplitude,estimate,lo,hi,held_out,runs,false_alarm,wall_s,truth\n",
     );
     for r in results {
         let (estimate, [lo, hi]) = r.estimate.unwrap_or((f64::NAN, [f64::NAN; 2]));
         let case = &r.case;
         writeln!(
             text,
-            "{},{},{},{},{},{},{},{},{:.4e},{},\"{}\",{:.3e},{},{:e},{estimate:e},{lo:e},{hi:e},{:.4},{},{:.4},{:.3}",
+            "{},{},{},{},{},{},{},{},{:.4e},{},\"{}\",{:.3e},{},{:e},{estimate:e},{lo:e},{hi:e},{:.4},{},{:.4},{:.3},\"{}\"",
             systems[case.system].name,
             case.kind.word(),
             case.effect.as_deref().unwrap_or(""),
@@ -239,6 +209,7 @@ pub fn csv(results: &[Result], systems: &[System]) -> String {
             r.runs,
             r.false_alarm,
             r.wall_s,
+            r.truth.replace('"', "'"),
         )
         .unwrap();
     }

@@ -86,6 +86,40 @@ fn a_known_start_costs_one_run_per_step_and_no_jacobian() {
 }
 
 #[test]
+fn a_parameter_whose_influence_is_not_known_stays_until_it_is_measured() {
+    // At amplitude zero the rate moves nothing, and its prior lies far from it.
+    let z = DVector::from_vec(vec![0.0, 0.9]);
+    let prior = || Scaled {
+        mean: DVector::from_vec(vec![0.0, 5.0]),
+        precision: DVector::from_vec(vec![0.0, 1.0]),
+        ..flat(2)
+    };
+    let mut fit = LeastSquares::from_known(z.clone(), residual(&z), jacobian(&z).into(), prior(), 0.1, 20);
+    let end = loop {
+        match fit.need().clone() {
+            Need::Residual(z) => {
+                assert_eq!(z[1].to_bits(), 0.9_f64.to_bits(), "moved without a reason");
+                fit.give_residual(Some(residual(&z)));
+            }
+            Need::Jacobian(_) => panic!("no Jacobian is asked for"),
+            Need::Nothing(end) => break end,
+        }
+    };
+    assert_eq!(end, End::Tentative);
+    assert!(fit.best().0[0] > 1.0, "{:?}", fit.best().0);
+    fit.polish(20);
+    assert_eq!(drive(&mut fit).0, End::Converged);
+    // The data hold the rate to about 1e-2, a hundredth of the prior's sd: the pull of 4.3 moves it by 4e-4 or so.
+    assert!((fit.best().0[1] - 0.7).abs() < 5e-3, "{:?}", fit.best().0);
+    // Where the amplitude stays zero, the rate goes to its prior mean in the end.
+    let mut held = prior();
+    held.bounds[0] = [0.0, 0.0];
+    let mut fit = LeastSquares::new(z, held, 1e-6, 20);
+    assert_eq!(drive(&mut fit).0, End::Converged);
+    assert!((fit.best().0[1] - 5.0).abs() < 1e-6, "{:?}", fit.best().0);
+}
+
+#[test]
 fn steps_that_overshoot_are_shortened_until_one_helps() {
     // Gauss-Newton diverges on the arctangent from here, and the secant across it overshoots too.
     let mut fit = LeastSquares::new(DVector::from_element(1, 0.5), flat(1), 1e-9, 50);

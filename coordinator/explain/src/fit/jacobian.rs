@@ -145,7 +145,8 @@ mod tests {
         let row = |i: usize| {
             let (record, step) = (i / 5, i % 5);
             let (time, usage) = (step as f64, usage(record, step));
-            Row { record, channel: 0, output: 0, step, time, observed: 0.0, noise: 1.0, usage }
+            let (observed, noise, noise_freedom) = (0.0, 1.0, f64::INFINITY);
+            Row { record, channel: 0, output: 0, step, time, observed, noise, noise_freedom, usage }
         };
         let rows: Vec<Row> = (0..15).map(row).collect();
         let train = (0..15).filter(|i| rows[*i].usage == Usage::Train).collect();

@@ -4,12 +4,12 @@
 //! Next file to read: [`crate::tell::words`].
 
 use nalgebra::DVector;
-use starlings_estimators::nis_band;
+use starlings_estimators::nis_band_of_uncertain_noise;
 
 use super::effective_noise::{inflation, whiteness};
 use crate::fit::fitted_variant::FittedVariant;
 use crate::number::{three, times};
-use crate::rows::Rows;
+use crate::rows::{Rows, Usage};
 use crate::run_cache::RunCache;
 
 /// Residuals are not white if the probability of as large an autocorrelation in white ones is below this.
@@ -34,6 +34,8 @@ pub(crate) struct Adequacy {
     pub inflation: f64,
     /// Root mean square over the spread of the recorded values; infinite where these do not vary.
     pub over_spread: f64,
+    /// Degrees of freedom with which the variance of the noise is known: infinite where the study gives it.
+    pub noise_freedom: f64,
 }
 
 /// How the residuals compare with the stated noise.
@@ -80,11 +82,12 @@ impl Adequacy {
             whiteness: whiteness(rows, residual),
             inflation: inflation(rows, residual),
             over_spread: if spread > 0.0 { (squares / spread).sqrt() } else { f64::INFINITY },
+            noise_freedom: rows.noise_freedom(|row| row.usage == Usage::Train),
         }
     }
 
-    /// How the residuals compare with the stated noise. Larger or smaller than it are residuals beyond both what chance leaves
-    /// and [`AS_STATED`].
+    /// How the residuals compare with the stated noise. Larger or smaller than it are residuals beyond both what chance leaves, in them
+    /// and in a noise that was found, and [`AS_STATED`].
     pub(crate) fn nature(&self) -> Nature {
         if self.n == 0 {
             return Nature::Nothing;
@@ -94,7 +97,7 @@ impl Adequacy {
             let hidden = self.inflation <= 1.0 && square < AS_STATED[0];
             return if hidden { Nature::Hidden } else { Nature::Correlated };
         }
-        let (lo, hi) = nis_band(self.n, LEVEL);
+        let (lo, hi) = self.band();
         if square > hi.max(AS_STATED[1]) {
             Nature::Larger
         } else if square < lo.min(AS_STATED[0]) {
@@ -102,6 +105,11 @@ impl Adequacy {
         } else {
             Nature::Noise
         }
+    }
+
+    /// The mean squares over the noise variance that chance leaves.
+    fn band(&self) -> (f64, f64) {
+        nis_band_of_uncertain_noise(self.n, self.noise_freedom, LEVEL)
     }
 
     /// Whether the residuals are white, or their correlation is hidden by the stated noise.
@@ -192,7 +200,16 @@ mod tests {
                 {
                     for inflation in [1.0, 3.3, 200.0] {
                         for over_spread in [1e-9, 1e-3, 0.5, f64::INFINITY] {
-                            all.push(Adequacy { n, rmse_over_noise, whiteness, inflation, over_spread });
+                            for noise_freedom in [5.0, f64::INFINITY] {
+                                all.push(Adequacy {
+                                    n,
+                                    rmse_over_noise,
+                                    whiteness,
+                                    inflation,
+                                    over_spread,
+                                    noise_freedom,
+                                });
+                            }
                         }
                     }
                 }
@@ -207,7 +224,7 @@ mod tests {
             let text = a.says();
             let (tested, square) = (a.whiteness.is_some(), a.rmse_over_noise.powi(2));
             if text.contains("could be noise") {
-                let (lo, hi) = nis_band(a.n, LEVEL);
+                let (lo, hi) = a.band();
                 assert!(tested && square >= lo.min(0.5) && square <= hi.max(1.5), "{text}: {a:?}");
             }
             if text.contains("correlated in time") && !text.contains("whether they are") {
@@ -245,12 +262,27 @@ mod tests {
             whiteness: None,
             inflation: 1.0,
             over_spread: f64::INFINITY,
+            noise_freedom: f64::INFINITY,
         };
         assert_eq!(one.nature(), Nature::Noise);
         assert!(one.says().contains("too few in a row"), "{}", one.says());
-        let far =
-            Adequacy { n: 60, rmse_over_noise: 2.5, whiteness: Some(0.6), inflation: 6.2, over_spread: 0.1 };
+        let far = Adequacy {
+            n: 60,
+            rmse_over_noise: 2.5,
+            whiteness: Some(0.6),
+            inflation: 6.2,
+            over_spread: 0.1,
+            ..one
+        };
         assert_eq!(far.nature(), Nature::Larger);
+        // A noise found from 28 samples: five degrees of freedom.
+        let found = Adequacy { noise_freedom: 5.0, ..far };
+        assert_eq!(
+            found.nature(),
+            Nature::Noise,
+            "so uncertain a noise may be two and a half times as large"
+        );
+        assert_eq!(Adequacy { noise_freedom: 500.0, ..far }.nature(), Nature::Larger);
         assert_eq!(
             far.says(),
             "the residuals are 2.50 times the stated noise, with no sign of correlation in time: the noise is larger than stated, or \

@@ -12,6 +12,7 @@ use starlings_estimators::noise_from_third_differences;
 
 use self::column::{Column, Columns};
 use super::effective_noise::{inflation, training_stretches};
+use super::uncertainty::Uncertainty;
 use crate::error::ExplainError;
 use crate::fit::fitted_variant::FittedVariant;
 use crate::rows::{Rows, Usage};
@@ -34,7 +35,7 @@ const RECURRENCE: f64 = 0.15;
 pub(crate) struct Leftover {
     /// Fall of χ² of the training rows, in units of the effective noise.
     pub gain: f64,
-    /// Fall of χ² of the held-out rows that they bring, in the same units.
+    /// Fall of χ² of the held-out rows that they bring, beyond the uncertainty of the estimate, in the same units.
     pub gain_held_out: f64,
     /// Share of the χ² above the noise that they take away.
     pub share: f64,
@@ -84,6 +85,13 @@ pub(crate) fn leftover(
     let mut residual = optimum.residual().clone();
     let mut correction = DVector::zeros(rows.rows.len());
     let whitened = rows.whitened(&fit.predicted);
+    // What the uncertainty of the estimate explains of the held-out errors says nothing of the form.
+    let uncertainty = Uncertainty::of(cache, fit);
+    let beyond = |errors: &[f64]| {
+        let explained = uncertainty.as_ref().map_or(0.0, |of| of.allowance(&held, errors));
+        held.iter().map(|i| errors[*i].powi(2)).sum::<f64>() - explained
+    };
+    let before = beyond(&whitened);
     let mut taken: Vec<Column> = Vec::new();
     for n_column in 1..=MOST.min(columns.len()) {
         let Some(best) = columns.nearest(&residual, &taken)? else { break };
@@ -93,9 +101,9 @@ pub(crate) fn leftover(
         taken.push(best);
         // The noise is that of the residuals without the columns taken so far.
         let noise = inflation(rows, &residual.rows(0, rows.train.len()).into_owned());
-        let fall = |i: &usize| whitened[*i].powi(2) - (whitened[*i] - correction[*i]).powi(2);
+        let corrected: Vec<f64> = whitened.iter().zip(&correction).map(|(e, c)| e - c).collect();
         let gain = (optimum.residual().norm_squared() - residual.norm_squared()) / noise;
-        let gain_held_out = held.iter().map(fall).sum::<f64>() / noise;
+        let gain_held_out = (before - beyond(&corrected)) / noise;
         let wanted = RECURRENCE * gain * held.len() as f64 / rows.train.len().max(1) as f64;
         let above = |e: &DVector<f64>| e.norm_squared() - floor;
         // Where the residuals do not exceed the noise, the quotient is not defined and its bounds stand for it.

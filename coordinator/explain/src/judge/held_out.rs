@@ -5,7 +5,7 @@
 //! Next files to read: [`super::gates`] for the gates, [`super::uncertainty`] for what the uncertainty explains.
 
 use serde::{Deserialize, Serialize};
-use starlings_estimators::nis_band;
+use starlings_estimators::nis_band_of_uncertain_noise;
 
 use super::adequacy::Adequacy;
 use super::uncertainty::Uncertainty;
@@ -16,7 +16,7 @@ use crate::run_cache::RunCache;
 
 /// Root mean square over its expectation above which held-out data fail ...
 const FAILS: f64 = 1.25;
-/// ... and which must also lie outside the band of this probability.
+/// ... and which must also lie outside the band of this probability, which is wider where the noise was found and not given.
 const LEVEL: f64 = 0.9998;
 /// What the uncertainty of the estimate explains is known to first order only: a rest below this share of it is no failure.
 const FIRST_ORDER: f64 = 0.05;
@@ -89,9 +89,10 @@ pub(crate) fn held_out(
         let n = at.len() as f64;
         let squares = |e: &[f64]| at.iter().map(|i| e[*i].powi(2)).sum::<f64>();
         let (was, is) = (squares(&before), squares(&after));
-        let explained = uncertainty.as_ref().map_or(0.0, |of| of.allowance(&at));
+        let explained = uncertainty.as_ref().map_or(0.0, |of| of.allowance(&at, &after));
         let record = &cache.study.records[row.record];
         let beyond = (is - explained).max(0.0) / (n * level * level);
+        let chance = nis_band_of_uncertain_noise(at.len(), row.noise_freedom, LEVEL).1;
         HeldOut {
             record: record.name.clone(),
             channel: record.channels[row.channel].output.clone(),
@@ -100,8 +101,7 @@ pub(crate) fn held_out(
             before: (squares(&scaled_before) / n).sqrt(),
             after: (squares(&scaled_after) / n).sqrt(),
             beyond: beyond.sqrt(),
-            fails: beyond > (FAILS * FAILS).max(nis_band(at.len(), LEVEL).1)
-                && is - explained > FIRST_ORDER * explained,
+            fails: beyond > (FAILS * FAILS).max(chance) && is - explained > FIRST_ORDER * explained,
             mended: if was > n { ((was - is + explained) / (was - n)).clamp(-1.0, 1.0) } else { 0.0 },
         }
     };
@@ -164,7 +164,14 @@ mod tests {
 
     fn residuals(rmse_over_noise: f64, p: f64) -> Adequacy {
         let inflation = if p < 1e-3 { 20.0 } else { 1.0 };
-        Adequacy { n: 200, rmse_over_noise, whiteness: Some(p), inflation, over_spread: 0.1 }
+        Adequacy {
+            n: 200,
+            rmse_over_noise,
+            whiteness: Some(p),
+            inflation,
+            over_spread: 0.1,
+            noise_freedom: f64::INFINITY,
+        }
     }
 
     #[test]

@@ -16,9 +16,10 @@ use crate::run_cache::RunCache;
 pub(super) fn allowances(cache: &RunCache<'_>, fit: &FittedVariant<'_>) -> [f64; 2] {
     let Some(uncertainty) = Uncertainty::of(cache, fit) else { return [0.0; 2] };
     let rows = &cache.rows.rows;
+    let errors = cache.rows.whitened(&fit.predicted);
     let of = |wanted: &[Usage]| {
         let at: Vec<usize> = (0..rows.len()).filter(|i| wanted.contains(&rows[*i].usage)).collect();
-        if at.is_empty() { 0.0 } else { uncertainty.allowance(&at) }
+        if at.is_empty() { 0.0 } else { uncertainty.allowance(&at, &errors) }
     };
     [of(&[Usage::HeldOut]), of(&[Usage::HeldOut, Usage::HeldOutChannel])]
 }
@@ -28,7 +29,6 @@ pub(super) struct Uncertainty<'f> {
     jacobian: BlockAngular,
     own_values: &'f DMatrix<f64>,
     covariance: DMatrix<f64>,
-    whitened: Vec<f64>,
 }
 
 impl<'f> Uncertainty<'f> {
@@ -41,20 +41,19 @@ impl<'f> Uncertainty<'f> {
             jacobian: fit.jacobian.in_blocks(&cache.rows),
             own_values: &fit.own_values,
             covariance: optimum.covariance().clone(),
-            whitened: cache.rows.whitened(&fit.predicted),
         })
     }
 
-    /// bᵀ (C⁻¹ + JᵀJ)⁻¹ b with b = Jᵀ e: the fall of χ² from these rows, increasing (residuals e, Jacobian J), to a joint fit,
-    /// for an estimate of covariance C and values of a held-out record's own of unit variance. χ² less this is eᵀ (1 + J C
-    /// Jᵀ)⁻¹ e, the squared distance of the rows from their prediction (Mahalanobis 1936). Parameters on which the rows do not
-    /// depend are left out, which does not change it.
-    pub(super) fn allowance(&self, rows: &[usize]) -> f64 {
-        self.fall(rows).filter(|fall| fall.is_finite()).unwrap_or(0.0)
+    /// bᵀ (C⁻¹ + JᵀJ)⁻¹ b with b = Jᵀ e: the fall of χ² from these rows, increasing (Jacobian J), to a joint fit, for
+    /// an estimate of covariance C and values of a held-out record's own of unit variance; `errors` e are those of all rows,
+    /// whitened. χ² less this is eᵀ (1 + J C Jᵀ)⁻¹ e, the squared distance of the rows from their prediction (Mahalanobis 1936).
+    /// Parameters on which the rows do not depend are left out, which does not change it.
+    pub(super) fn allowance(&self, rows: &[usize], errors: &[f64]) -> f64 {
+        self.fall(rows, errors).filter(|fall| fall.is_finite()).unwrap_or(0.0)
     }
 
-    fn fall(&self, rows: &[usize]) -> Option<f64> {
-        let residual = DVector::from_iterator(rows.len(), rows.iter().map(|i| self.whitened[*i]));
+    fn fall(&self, rows: &[usize], errors: &[f64]) -> Option<f64> {
+        let residual = DVector::from_iterator(rows.len(), rows.iter().map(|i| errors[*i]));
         let jacobian = self.jacobian.select_rows(rows);
         let parameters = columns_of(&jacobian);
         let p = parameters.len();

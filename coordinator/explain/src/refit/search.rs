@@ -15,7 +15,7 @@ use crate::fit::kind::Kind;
 use crate::fit::model_variant::{AddedEffect, ModelVariant};
 use crate::judge::adequacy::Adequacy;
 use crate::judge::effective_noise::inflation;
-use crate::judge::gates::judge;
+use crate::judge::gates::{JudgedFit, judge};
 use crate::judge::held_out::held_out;
 use crate::judge::misfit::Misfit;
 use crate::judge::null_distribution::{LEAST, NullDistribution};
@@ -184,7 +184,7 @@ impl<'c> Searcher<'_, '_, 'c> {
         let chance = found.adequacy.inflation * found.null_distribution.threshold;
         let mut next = best.to_vec();
         while !next.is_empty() {
-            let fits = self.race_and_refit(&found.base, &next)?;
+            let fits = self.race_and_refit(&found.base, &next, &found.screening)?;
             if fits.is_empty() || self.cut_short {
                 return self.judge_all(found, fits);
             }
@@ -193,7 +193,9 @@ impl<'c> Searcher<'_, '_, 'c> {
                 found.judged.iter().any(|j| j.fit.variant.effects[0].index == h.candidate)
             };
             next.clear();
-            if found.passing().is_empty() {
+            // What passed in an earlier search and was refused by the verdict does not end this one.
+            let is_tried = |j: &JudgedFit<'_>| j.kinds().iter().all(|kind| self.tried.contains(kind));
+            if !found.judged.iter().any(|j| j.refusal.is_none() && is_tried(j)) {
                 next.extend(best.iter().filter(|h| h.score.gain > chance && !is_refitted(h)).cloned());
             }
         }
@@ -269,7 +271,7 @@ impl<'c> Searcher<'_, '_, 'c> {
             }
             let screening = self.screen_all(&without)?;
             let best = self.best_of_each(&screening);
-            let fits = self.race_and_refit(&without, &best)?;
+            let fits = self.race_and_refit(&without, &best, &screening)?;
             self.judge_all(found, fits)?;
         }
         Ok(())

@@ -1,8 +1,8 @@
 //! Terms that nobody listed, made from the unknown input that an equation would need.
 //!
-//! Every term of a small grammar ([`grammar`]) is fitted to the unknown input; what predicts parts of it that the fit has not seen, with
-//! one sign throughout ([`recovered`]), becomes a candidate like any other: it is run, refitted and judged, and pays for all the terms
-//! that were looked at. Next file to read: [`crate::refit::search`].
+//! Every term of a small grammar ([`grammar`]) is fitted to the unknown input; those that best predict parts of it that the fit has not
+//! seen, with one sign throughout ([`recovered`]), become candidates like any other: they are run, refitted and judged, and pay for all
+//! the terms that were looked at. Next file to read: [`crate::refit::search`].
 
 mod grammar;
 mod recovered;
@@ -21,12 +21,12 @@ use crate::locate::{Track, UnknownInput};
 use crate::options::Options;
 
 /// Terms of one equation that become candidates.
-const MOST: usize = 10;
+const MOST: usize = 60;
 
 /// Terms made from unknown inputs.
 #[derive(Debug, Default)]
 pub(crate) struct Proposals {
-    /// Those that predict the unknown input.
+    /// Those that predict the unknown input best.
     pub(crate) candidates: Vec<Candidate>,
     /// Terms that were looked at.
     pub(crate) considered: usize,
@@ -62,7 +62,8 @@ pub(crate) fn proposals(
             .into_iter()
             .filter_map(|candidate| {
                 let term = course(&run, &candidate, &candidate.points[0], input)?;
-                Some((recovered.predicted_by(&term)?, candidate))
+                // What the input shows of a term is blurred; a score by runs tells more.
+                Some((recovered.predicted_by(&term).unwrap_or(0.0), candidate))
             })
             .collect();
         scored.sort_by(|a, b| b.0.total_cmp(&a.0));

@@ -78,6 +78,7 @@ impl ChannelReader<'_> {
             unit: unit.clone(),
             noise: noise.sd,
             noise_how: noise.how.clone(),
+            noise_found_from: noise.found_from,
             values: self.derive(derived, &values),
             node: None,
         };
@@ -126,7 +127,7 @@ impl ChannelReader<'_> {
                 column.sd
             ),
         };
-        Noise { sd: column.sd * spread, how }
+        Noise { sd: column.sd * spread, how, ..column }
     }
 
     fn derived_warning(

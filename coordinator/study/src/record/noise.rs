@@ -14,6 +14,8 @@ use crate::file::ChannelSection;
 pub(super) struct Noise {
     pub(super) sd: f64,
     pub(super) how: String,
+    /// Values from which it was found; `None` where it was given.
+    pub(super) found_from: Option<usize>,
 }
 
 impl ChannelReader<'_> {
@@ -21,7 +23,7 @@ impl ChannelReader<'_> {
     pub(super) fn noise(&self, section: &ChannelSection, parts: &[&[f64]], unit: &str) -> Option<Noise> {
         if let Some(sd) = *section.noise.get_ref() {
             if sd > 0.0 {
-                return Some(Noise { sd, how: "given in the study".to_owned() });
+                return Some(Noise { sd, how: "given in the study".to_owned(), found_from: None });
             }
             let message = format!("`noise` must be above zero, found {sd}");
             let help =
@@ -34,7 +36,8 @@ impl ChannelReader<'_> {
         let known: Vec<f64> = sds.iter().copied().filter(|sd| !sd.is_nan()).collect();
         let sd = root_mean_square(&known);
         if sd > 0.0 && sd.is_finite() {
-            return Some(Noise { sd, how: self.found(parts) });
+            let n = parts.iter().map(|values| self.known(values)).sum();
+            return Some(Noise { sd, how: self.found(parts), found_from: Some(n) });
         }
         let why = if known.is_empty() {
             "there are no four samples in a row"
@@ -61,6 +64,11 @@ impl ChannelReader<'_> {
                 )
             }
         }
+    }
+
+    /// The number of values at the rows that count.
+    fn known(&self, values: &[f64]) -> usize {
+        self.used(values).iter().filter(|value| value.is_finite()).count()
     }
 
     /// The values at the rows that count.

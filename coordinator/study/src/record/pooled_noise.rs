@@ -16,7 +16,7 @@ pub(super) const FOUND: &str = "from the third differences of its ";
 /// together; warnings that speak of it follow. A record that is held out tells nothing of another one's noise.
 pub(crate) fn pool_short_records(records: &mut [Record], warnings: &mut [String]) {
     let is_found = |channel: &Channel| channel.noise_how.starts_with(FOUND);
-    let mut pooled: Vec<(usize, usize, f64, String)> = Vec::new();
+    let mut pooled: Vec<(usize, usize, f64, String, usize)> = Vec::new();
     for (r, record) in records.iter().enumerate() {
         for (c, channel) in record.channels.iter().enumerate().filter(|(_, channel)| is_found(channel)) {
             let own = used(record, channel);
@@ -39,11 +39,12 @@ pub(crate) fn pool_short_records(records: &mut [Record], warnings: &mut [String]
             let series = others.into_iter().fold(own, |all, other| [all, vec![f64::NAN], other].concat());
             let sd = noise_from_third_differences(&series);
             if sd > 0.0 && sd.is_finite() {
-                pooled.push((r, c, sd, how));
+                let known = series.iter().filter(|value| value.is_finite()).count();
+                pooled.push((r, c, sd, how, known));
             }
         }
     }
-    for (r, c, sd, how) in pooled {
+    for (r, c, sd, how, known) in pooled {
         let Record { name, channels, .. } = &mut records[r];
         let channel = &mut channels[c];
         let about = format!("the noise of `{}` in record `{name}` was not given", channel.output);
@@ -57,7 +58,7 @@ pub(crate) fn pool_short_records(records: &mut [Record], warnings: &mut [String]
             let unit = unit.1.split_once(" was found").map_or("", |(unit, _)| unit);
             *warning = format!("{about}: {after}{unit} was found {how}{rest}");
         }
-        (channel.noise, channel.noise_how) = (sd, how);
+        (channel.noise, channel.noise_how, channel.noise_found_from) = (sd, how, Some(known));
     }
 }
 

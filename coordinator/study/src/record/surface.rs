@@ -57,6 +57,7 @@ impl ChannelReader<'_> {
                 unit: section.unit.as_ref().map(|u| u.get_ref().clone()).filter(|u| !u.is_empty()),
                 noise: self.tilted(surface, &node, &values, [noise, along]),
                 noise_how: "given in the study".to_owned(),
+                noise_found_from: None,
                 values,
                 node: Some(node),
             });

@@ -1,16 +1,21 @@
 //! The unknown input of an equation as data, and how well a term predicts it.
 //!
-//! The fitted parameters have taken up part of what is missing, for which a constant and every state and input in proportion stand. A
+//! The fitted parameters have taken up part of what is missing: what each of them changes in the rate, for which a constant and every
+//! state and input in proportion stand as well, since they act through other equations too. A
 //! term counts by what it predicts of parts that its fit has not seen (Stone 1974, J. R. Statist. Soc. B 36, 111). Next file to read:
 //! [`super::grammar`].
 
 use nalgebra::{DMatrix, DVector};
+use starlings_models::EffectDef;
 
+use crate::fit::candidate::Candidate;
 use crate::locate::UnknownInput;
-use crate::screen::natural_amplitude::ReferenceRun;
+use crate::screen::natural_amplitude::{ReferenceRun, along_run};
 
 /// Parts of the record, each of which is predicted from the others.
 const PARTS: usize = 5;
+/// Step of a difference, as a share of a parameter.
+const STEP: f64 = 1e-4;
 /// Added to the products of columns of length one: some of them repeat one another.
 const RIDGE: f64 = 1e-9;
 
@@ -18,7 +23,7 @@ const RIDGE: f64 = 1e-9;
 pub(super) struct Recovered {
     weight: DVector<f64>,
     value: DVector<f64>,
-    /// Values × (1 + signals), weighted, columns of length one.
+    /// Values × (1 + signals + parameters), weighted, columns of length one.
     taken_up: DMatrix<f64>,
 }
 
@@ -37,13 +42,16 @@ impl Recovered {
             .filter(|t| spec.states.iter().chain(&spec.inputs).any(|q| q.name == t.name && q.size == 1))
             .filter_map(|t| t.values.get(record))
             .collect();
-        let p = signals.len() + 1;
+        let slopes = slopes(run, &input.state, record, &steps);
+        let p = signals.len() + 1 + slopes.len();
         if !is_sound || n < PARTS * (p + 2) {
             return None;
         }
         let weight = DVector::from_fn(n, |i, _| 1.0 / input.sd[i].max(smallest));
-        let of = |i: usize, j: usize| {
-            if j == 0 { 1.0 } else { signals[j - 1].get(steps[i]).copied().unwrap_or(f64::NAN) }
+        let of = |i: usize, j: usize| match j.checked_sub(1 + signals.len()) {
+            Some(k) => slopes[k][i],
+            None if j == 0 => 1.0,
+            None => signals[j - 1].get(steps[i]).copied().unwrap_or(f64::NAN),
         };
         let mut taken_up = DMatrix::from_fn(n, p, |i, j| weight[i] * of(i, j));
         if taken_up.iter().any(|v| !v.is_finite()) {
@@ -94,6 +102,32 @@ impl Recovered {
         let error = self.value.rows(from, n) - columns.rows(from, n) * &fitted;
         Some((error.norm_squared(), fitted[fitted.len() - 1]))
     }
+}
+
+/// What the parameters change in the rate of a state at these steps of a record, one series for each that does; none where the model
+/// has no equations that can be read.
+fn slopes(run: &ReferenceRun<'_>, state: &str, record: usize, steps: &[usize]) -> Vec<Vec<f64>> {
+    let equations = run.study.setup.model.equations.as_ref();
+    let Some(of) = equations.and_then(|e| e.states.iter().find(|s| s.name == state)) else {
+        return Vec::new();
+    };
+    let plain = Candidate::new(EffectDef::default());
+    let rate = |theta: &[f64]| -> Option<DVector<f64>> {
+        let moved = ReferenceRun { study: run.study, theta, tracks: run.tracks };
+        let mut sum = DVector::zeros(steps.len());
+        for (_, term) in &of.rate {
+            sum += DVector::from_vec(along_run(&moved, &plain, &[], term, record, steps)?);
+        }
+        Some(sum)
+    };
+    let slope = |i: usize| {
+        let (mut up, mut down) = (run.theta.to_vec(), run.theta.to_vec());
+        let step = STEP * run.theta[i].abs().max(STEP);
+        (up[i], down[i]) = (up[i] + step, down[i] - step);
+        let slope = (rate(&up)? - rate(&down)?) / (2.0 * step);
+        (slope.amax() > 0.0 && slope.iter().all(|v| v.is_finite())).then(|| slope.as_slice().to_vec())
+    };
+    (0..run.theta.len()).filter_map(slope).collect()
 }
 
 #[cfg(test)]
