@@ -11,7 +11,7 @@ import csv
 import io
 import os
 from pathlib import Path
-from typing import Any, Dict, List, Mapping, Optional
+from typing import Any, Dict, List, Optional
 
 from .study_file import Study
 
@@ -29,14 +29,7 @@ def resolved(study: Study) -> Study:
             _solver(model, base)
     for number, record in enumerate(_tables(sections, "records")):
         _rename(record, "file", base)
-        inputs = record.get("inputs")
-        if isinstance(inputs, dict):
-            for name, written in inputs.items():
-                # `other.csv:column`; a column of the record's own file may hold a colon too.
-                file, colon, column = str(written).rpartition(":")
-                found = _found(file, base) if colon else None
-                if found is not None:
-                    inputs[name] = f"{found}:{column}"
+        _inputs(record, base)
         for place, channel in enumerate(_tables(record, "channels")):
             meshes = _meshes(channel.get("surface"), base)
             if meshes is not None:
@@ -45,7 +38,21 @@ def resolved(study: Study) -> Study:
             else:
                 _rename(channel, "surface", base)
             _rename(channel, "rest", base)
+    for scenario in _tables(sections.get("diagnose"), "scenarios"):
+        _inputs(scenario, base)
     return Study(sections, None, files)
+
+
+def _inputs(of: Dict[str, Any], base: Path) -> None:
+    inputs = of.get("inputs")
+    if not isinstance(inputs, dict):
+        return
+    for name, written in list(inputs.items()):
+        # `other.csv:column`; a column of the record's own file may hold a colon too.
+        file, colon, column = str(written).rpartition(":")
+        found = _found(file, base) if colon else None
+        if found is not None:
+            inputs[name] = f"{found}:{column}"
 
 
 def _solver(model: Dict[str, Any], base: Path) -> None:
@@ -61,8 +68,8 @@ def _solver(model: Dict[str, Any], base: Path) -> None:
         model["folder"] = os.path.normpath(base / folder)
 
 
-def _tables(of: Mapping[str, Any], key: str) -> List[Dict[str, Any]]:
-    entries = of.get(key)
+def _tables(of: Any, key: str) -> List[Dict[str, Any]]:
+    entries = of.get(key) if isinstance(of, dict) else None
     return [entry for entry in entries if isinstance(entry, dict)] if isinstance(entries, list) else []
 
 

@@ -96,7 +96,9 @@ def test_every_path_of_a_study_is_resolved(tmp_path):
         "copies": ["a.csv", "/far.csv"],
     }
     record = {"name": "r", "file": "a.csv", "inputs": {"F": "b.csv:f", "G": "g:2"}, "channels": [{"surface": "walls.csv", "rest": "b.csv"}]}
-    found = resolved(starlings.Study({"model": model, "records": [record]}, tmp_path / "study.toml"))
+    scenario = {"name": "s", "inputs": {"F": "b.csv:g"}}
+    sections = {"model": model, "records": [record], "diagnose": {"scenarios": [scenario]}}
+    found = resolved(starlings.Study(sections, tmp_path / "study.toml"))
     at = {name: str(tmp_path / name) for name in ("a.csv", "b.csv", "mesh.stl", "beam.tpl")}
     assert found.file is None
     assert found.sections["model"] == {
@@ -108,6 +110,7 @@ def test_every_path_of_a_study_is_resolved(tmp_path):
     }
     (record,) = found.sections["records"]
     assert (record["file"], record["inputs"]) == (at["a.csv"], {"F": f"{at['b.csv']}:f", "G": "g:2"})
+    assert found.sections["diagnose"]["scenarios"][0]["inputs"] == {"F": f"{at['b.csv']}:g"}
     (channel,) = record["channels"]
     assert channel["rest"] == at["b.csv"]
     assert found.files[channel["surface"]].decode() == f"time,file\n0,{at['mesh.stl']}\n"
