@@ -105,11 +105,12 @@ class Looker:
 
     def touch(self, name, page):
         """The first figure of any page: the pointer and the arrow keys show a value where there are some, a click and the Enter key enlarge it."""
-        page.run("""(() => { const f = [...document.querySelectorAll("figure")].find((f) => f.querySelector(".enlarge") && f.querySelector(".frame"));
+        page.run("""(() => { const f = [...document.querySelectorAll("figure")].find((f) => f.querySelector(".frame") && f.checkVisibility());
             if (f) { f.classList.add("touched"); f.scrollIntoView({ block: "center" }); } })()""")
         if not page.run("Boolean(document.querySelector('.touched'))"):
             return
-        dialog = "Boolean(document.querySelector('dialog[open]'))"
+        page.wait("document.querySelector('.touched .enlarge')", 5, f"{name}: a figure in view has no tools")
+        dialog = "Boolean(document.querySelector('dialog'))"
         for enlarge in (lambda: page.click(".touched .enlarge"), lambda: (page.run("document.querySelector('.touched').focus()"), page.key("Enter"))):
             enlarge()
             page.wait(dialog, 5, f"{name}: a figure does not enlarge")
