@@ -66,15 +66,15 @@ impl Watched {
 #[ignore = "it reads clocks: `just time-left`"]
 fn told_ends_are_within_a_quarter_of_the_truth_from_a_fifth_on() {
     let shares = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
-    let head: String = shares.iter().map(|share| format!(" {:.0} % |", 100.0 * share)).collect();
+    let head = shares.map(|share| format!(" {:.0} % |", 100.0 * share)).concat();
     println!("| command | took |{head} largest error | mean error |");
     println!("|---|---|{}---|---|", "---|".repeat(shares.len()));
     let mut off = Vec::new();
     for (command, study) in OF {
         let watched = watched(command, study);
         let cell =
-            |share: &f64| watched.at(*share).map_or_else(|| " – |".to_owned(), |end| format!(" {end:.2} |"));
-        let cells: String = shares.iter().map(cell).collect();
+            |share: f64| watched.at(share).map_or_else(|| " – |".to_owned(), |end| format!(" {end:.2} |"));
+        let cells = shares.map(cell).concat();
         let (largest, mean) = watched.errors(FROM);
         println!(
             "| `{command} examples/{study}` | {:.0} s |{cells} {:.0} % | {:.0} % |",

@@ -48,13 +48,11 @@ pub(crate) fn coarse(
     }
     let structure = &asked.question.structure;
     let pieces = pieces(asked, cut, at).unwrap_or_default();
-    match step_errors(&pieces, fit, structure, &answer.posterior, LEVEL) {
-        Ok(moved) => (!moved.is_empty()).then_some(Coarse::Moved(moved)),
-        Err(_) => {
-            let rates = step_in_rates(sums, &answer.posterior);
-            (rates > RATES).then_some(Coarse::Fast(rates))
-        }
+    if let Ok(moved) = step_errors(&pieces, fit, structure, &answer.posterior, LEVEL) {
+        return (!moved.is_empty()).then_some(Coarse::Moved(moved));
     }
+    let rates = step_in_rates(sums, &answer.posterior);
+    (rates > RATES).then_some(Coarse::Fast(rates))
 }
 
 /// Sums at h, 2h and 4h of the first pieces of the first recording.

@@ -36,7 +36,7 @@ pub(crate) fn rounded(step: f64, times: &[f64], n_step: usize) -> f64 {
 fn last_digit(value: f64) -> f64 {
     let text = format!("{value}");
     let places = text.split_once('.').map_or(0, |(_, places)| places.len());
-    10.0_f64.powi(-(places as i32))
+    10.0_f64.powf(-(places as f64))
 }
 
 #[cfg(test)]

@@ -154,6 +154,7 @@ fn fleet() -> FleetTable {
     FleetTable {
         workers: vec![worker("local-1", 931, 1), worker("local-2", 922, 0)],
         runs_total: 1852,
+        runs_after: 1,
         failed: 1,
         retried: 1,
         rescued: 0,
