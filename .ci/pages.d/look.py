@@ -280,7 +280,7 @@ class Looker:
         }.items():
             folder = self.make(scratch / name, *arguments, "--out", str(scratch / name))
             self.look(name, (folder / "report.html").as_uri(), f"page-{name}")
-        other = self.make(scratch / "other", "run", "examples/rcr/study.toml", "--workers", "2", "--out", str(scratch / "other"))
+        other = self.make(scratch / "other", "run", "examples/pig-aorta-joint/study.toml", "--workers", "2", "--out", str(scratch / "other"))
         page = self.make(scratch / "compare.html", "compare", str(run), str(other), "--html", str(scratch / "compare.html"))
         self.look("compare", page.as_uri(), "page-compare")
         # Long names and units.
