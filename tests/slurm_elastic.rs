@@ -43,11 +43,10 @@ fn a_pool_grows_with_the_queue_and_shrinks_when_the_run_is_over_and_no_byte_chan
     let told: Vec<Value> = events.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert_eq!(told.first().unwrap()["event"], "workers-added");
     assert_eq!(told.last().unwrap()["event"], "workers-released");
+    // A job is written down when its node has told that it ended.
+    wait_until("the accounts of the two that were released", || accounts().len() == 2);
     let before = accounts();
-    assert!(
-        before.iter().all(|job| job.state == "CANCELLED") && before.len() == 2,
-        "two released: {before:?}"
-    );
+    assert!(before.iter().all(|job| job.state == "CANCELLED"), "two released: {before:?}");
     remove(&out);
     wait_until("the account of the last worker", || accounts().len() == 3);
     assert_eq!(watch.end(), Some(0), "{}", watch.said());
