@@ -92,7 +92,7 @@ def timed(program: str, folder: Path, page: bool) -> tuple[float, int, int]:
 
 
 def runs(out: Path) -> int:
-    return int(re.search(r'"total": *(\d+)', (out / "summary.json").read_text())[1])
+    return int(json.loads((out / "summary.json").read_text())["runs"]["total"])
 
 
 def main() -> None:

@@ -6,15 +6,11 @@ done, and the time that is left.
 
 from __future__ import annotations
 
-import re
 import sys
 from typing import Any, Mapping, Optional
 
 #: Runs after a fit have stages of their own, whose names say nothing to who waits.
 _ANALYSES = ("filter", "batch")
-#: The share and the time left at the end of a sentence, of a program that tells them in words only.
-_SHARE = re.compile(r", (?P<percent>\d+) %")
-_LEFT = re.compile(r"about (?P<time>\d+ \w+) left")
 #: A bar once a share is known, a sentence before.
 _BAR, _SENTENCE = "{desc} {percentage:3.0f}%|{bar}| {elapsed}{postfix}", "{desc}, {elapsed}{postfix}"
 
@@ -36,14 +32,15 @@ class Progress:
             from tqdm.auto import tqdm
 
             self._bar = tqdm(desc=doing, total=100.0, leave=False, bar_format=_SENTENCE)
-        bar, share = self._bar, _share(fields)
+        bar, share, left_s = self._bar, fields.get("share"), fields.get("left_s")
         if share is not None:
             bar.bar_format, bar.n = _BAR, max(bar.n, 100.0 * min(share, 1.0))
         workers = fields.get("workers")
         words = [f"{workers} worker" + ("" if workers == 1 else "s")] if workers else []
-        left = _left(fields)
+        if left_s is not None:
+            words.append(f"about {_time(left_s)} left")
         bar.set_description_str(doing, refresh=False)
-        bar.set_postfix_str(", ".join([*words, *([f"about {left} left"] if left else [])]), refresh=False)
+        bar.set_postfix_str(", ".join(words), refresh=False)
         bar.refresh()
 
     def close(self) -> None:
@@ -67,26 +64,12 @@ def _doing(fields: Mapping[str, Any]) -> str:
     return f"pass {fields.get('pass', 1)}{passes}, {step} of {steps} analyses"
 
 
-def _share(fields: Mapping[str, Any]) -> Optional[float]:
-    """The share of all work that is done, from 0 to 1, where it is known."""
-    if fields.get("share") is not None:
-        return float(fields["share"])
-    if fields.get("done") is not None and fields.get("total"):
-        return float(fields["done"]) / float(fields["total"])
-    told = _SHARE.search(str(fields.get("message", "")))
-    return float(told["percent"]) / 100.0 if told else None
-
-
-def _left(fields: Mapping[str, Any]) -> str:
-    """The time that is left, in words; empty where it is not known."""
-    left = fields.get("left_s")
-    if left is None:
-        told = _LEFT.search(str(fields.get("message", "")))
-        return told["time"] if told else ""
-    for unit, seconds in (("h", 3600.0), ("min", 60.0)):
-        if left >= 1.5 * seconds:
-            return f"{left / seconds:.0f} {unit}"
-    return f"{max(float(left), 0.0):.0f} s"
+def _time(seconds: float) -> str:
+    """A time in its largest unit."""
+    for unit, one in (("h", 3600.0), ("min", 60.0)):
+        if seconds >= 1.5 * one:
+            return f"{seconds / one:.0f} {unit}"
+    return f"{seconds:.0f} s"
 
 
 def _is_notebook() -> bool:

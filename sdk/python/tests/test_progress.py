@@ -52,18 +52,19 @@ def test_a_run_is_one_bar_that_only_grows(bars, tmp_path):
 
 
 def test_what_the_fleet_says_of_an_analysis_is_no_progress_of_the_command(bars):
-    shown([{"message": "1 of 4 runs", "run": "oscillator"}, {"message": "1 of 4 runs", "run": "oscillator", "done": 1, "total": 4}])
+    shown([{"message": "1 of 4 runs", "run": "oscillator"}, {"message": "2 of 4 runs", "run": "oscillator"}])
     assert bars == []
 
 
-def test_numbers_are_taken_before_words_and_a_share_never_falls(bars):
+def test_a_share_never_falls_and_the_time_left_stands_beside_it(bars):
     step = {"stage": "filter", "pass": 2, "passes": 3, "step": 5, "steps": 9, "workers": 2}
     shown(
         [
             {"stage": "screen", "runs": 0, "workers": 0},
-            {**step, "share": 0.5, "left_s": 90.0, "message": "40 %, about 3 minutes left"},
-            {**step, "done": 45.0, "total": 100.0},
-            {**step, "message": "pass 2: 5 of 9 analyses, 60 %, about 1 minute left"},
+            {**step, "share": 0.5, "left_s": 95.0},
+            {**step, "share": 0.45},
+            {**step, "share": 0.6, "left_s": 59.6},
+            {**step, "share": 0.61, "left_s": 7200.0},
         ]
     )
     (looks,) = bars
@@ -71,5 +72,6 @@ def test_numbers_are_taken_before_words_and_a_share_never_falls(bars):
         (0, "run: screen", ""),
         (50.0, "run: pass 2/3, 5 of 9 analyses", "2 workers, about 2 min left"),
         (50.0, "run: pass 2/3, 5 of 9 analyses", "2 workers"),
-        (60.0, "run: pass 2/3, 5 of 9 analyses", "2 workers, about 1 minute left"),
+        (60.0, "run: pass 2/3, 5 of 9 analyses", "2 workers, about 60 s left"),
+        (61.0, "run: pass 2/3, 5 of 9 analyses", "2 workers, about 2 h left"),
     ]
