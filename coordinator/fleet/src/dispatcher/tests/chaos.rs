@@ -3,6 +3,7 @@
 mod act;
 mod draw;
 mod fair;
+mod happen;
 mod world;
 
 use act::{Act, act, late};
