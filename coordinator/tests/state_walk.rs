@@ -158,4 +158,43 @@ fn what_cannot_walk_is_refused_with_the_remedy() {
         "transform = \"log\", median = 0.3, factor = 2.0",
     );
     assert!(told(&log).contains("a state walks in its own unit"), "{}", told(&log));
+    // Predictions begin at the start of a record, where the posterior of such a study says nothing.
+    let predicted = walking("passes = 1", &one) + "[predict]\noutputs = [\"y\"]\n";
+    assert!(told(&predicted).contains("and what is predicted begins at its start"), "{}", told(&predicted));
+}
+
+#[test]
+fn what_is_asked_of_a_state_that_walks_is_asked_of_the_initial_values_beside_it() {
+    let beside = OSCILLATOR.replace(
+        "transform = \"linear\", median = 0.5, sd = 0.4",
+        "transform = \"log\", median = 0.5, factor = 2.0",
+    );
+    let times = grid(40, 0.1);
+    let told =
+        Case::new(&beside, &[("position.csv", csv("time,x", &[&times, &[0.5; 40]]))]).refusal().unwrap();
+    assert!(told.contains("the prior of `initial:x` is not linear"), "{told}");
+}
+
+#[test]
+fn one_value_follows_the_record_that_is_fitted_wherever_it_stands() {
+    let (times, z) = linear::data(30, 1);
+    let held_out = linear::record("unseen", "line.csv", NOISE, "use = \"held-out\"\n");
+    let one = linear::record("one", "line.csv", NOISE, "");
+    let study = walking("passes = 1\nresample = \"none\"", &(held_out + &one))
+        .replace("process =", "per_record = false\nprocess =");
+    let done = run_once(&study, &[("line.csv", linear::file(&times, &z))]);
+    assert_exact(&done, &of_the_line(&times, &z), TOLERANCE, "a record that is held out before it");
+}
+
+#[test]
+fn where_a_state_has_gone_is_not_held_against_the_prior_of_its_start() {
+    // From 0.3 ± 0.5 to far away.
+    let times = grid(30, 0.1);
+    let z: Vec<f64> = times.iter().map(|t| 0.3 + 10.0 * t).collect();
+    let records = linear::record("one", "line.csv", NOISE, "");
+    let study = walking("passes = 1\nresample = \"none\"", &records);
+    let done = run_once(&study, &[("line.csv", linear::file(&times, &z))]);
+    let of_start = |w: &&String| w.contains("initial:x is") && w.contains("from its prior median");
+    assert_eq!(done.summary.warnings.iter().find(of_start), None);
+    assert!(done.summary.parameters.iter().any(|p| p.name == "initial:x" && p.estimate > 20.0));
 }

@@ -207,9 +207,9 @@ fn checked(
     let (units, candidate_warnings) = units::warnings(&file, &model, &records);
     warnings.extend(units);
     let theta = expand::theta(&parameters, &records);
-    walks::check(source, &file, (&parameters, &records), (&model.spec, estimator.kind.is_filter()));
     let described = (model.setup, model.spec);
-    let observers = file.observer.clone();
+    let (observers, processes, predicted) =
+        (file.observer.clone(), walks::places(&file), file.predict.span.clone());
     let study = Study {
         candidates: Arc::new(model.candidates),
         parameters,
@@ -224,6 +224,7 @@ fn checked(
         candidate_warnings,
         ..study_of(path, source, file, described, (fleet, estimator), solver_host)
     };
+    walks::check(source, &processes, predicted, &study);
     nudged::check(source, &observers, &study);
     together::check(source, &observers, &study);
     source.verdict()?;

@@ -143,7 +143,7 @@ pub struct Channel {
     pub noise: f64,
     /// How that standard deviation was found.
     pub noise_how: String,
-    /// Number of values from which it was found; `None` where the study gives it.
+    /// Number of third differences from which it was found; `None` where the study gives it.
     pub noise_found_from: Option<usize>,
     /// Values at the record's times; NaN where missing.
     pub values: Vec<f64>,

@@ -118,6 +118,8 @@ impl Study {
 
 /// When the rows of a record had their last values, for observers.
 struct LastValues {
+    /// Where the record starts.
+    start: f64,
     /// `None` for a row that never has one.
     times: Vec<Option<f64>>,
 }
@@ -129,7 +131,7 @@ impl LastValues {
         for channel in record.channels.iter().filter(|c| !c.held_out) {
             times[channel.row] = Some(record.start);
         }
-        Self { times }
+        Self { start: record.start, times }
     }
 
     /// What a window that begins at `start` says of them; nothing where they all count from there.
@@ -137,7 +139,7 @@ impl LastValues {
         if self.times.iter().flatten().all(|time| *time >= start) {
             return Vec::new();
         }
-        self.times.iter().map(|time| time.unwrap_or(start)).collect()
+        self.times.iter().map(|time| time.unwrap_or(self.start)).collect()
     }
 
     /// Notes the values of a window.

@@ -80,7 +80,8 @@ pub(super) fn correlated(first: &str, second: &str, value: f64) -> String {
 
 fn uninformed(study: &Study, fit: &Fit) -> Option<String> {
     let sd = standard_deviations(&fit.posterior);
-    let shares = study.theta.iter().zip(&sd).map(|(entry, sd)| (entry.name.as_str(), sd / entry.prior_sd));
+    let entries = study.theta.iter().zip(&sd).enumerate().filter(|(j, _)| !is_at_the_end(fit, *j));
+    let shares = entries.map(|(_, (entry, sd))| (entry.name.as_str(), sd / entry.prior_sd));
     let (names, shares): (Vec<&str>, Vec<f64>) = shares.filter(|(_, share)| *share > UNINFORMED).unzip();
     let ends = (shares.iter().copied().reduce(f64::min)?, shares.iter().copied().reduce(f64::max)?);
     let (lo, hi) = (100.0 * ends.0, 100.0 * ends.1);
@@ -114,12 +115,19 @@ pub(super) fn uninformed_combination(combination: &str, share: f64) -> String {
     )
 }
 
+/// Whether an entry ends as the state of a record at its last analysis.
+fn is_at_the_end(fit: &Fit, entry: usize) -> bool {
+    fit.starts.iter().any(|(of, _)| *of == entry)
+}
+
 fn far_from_prior(study: &Study, fit: &Fit) -> Vec<String> {
     let prior = prior(study);
     study
         .theta
         .iter()
         .enumerate()
+        // The state at the end of a record is not what its prior spoke of.
+        .filter(|(j, _)| !is_at_the_end(fit, *j))
         .filter_map(|(j, entry)| {
             let distance = (fit.posterior.mean[j] - prior.mean[j]).abs() / entry.prior_sd;
             let estimate = entry.transform.to_physical(fit.posterior.mean[j]);

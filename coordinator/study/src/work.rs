@@ -18,7 +18,8 @@ const WHOLE: f64 = 0.4;
 /// Runs of a whole record between two passes that go on until the estimate has settled.
 const SEARCH: f64 = 2.0;
 
-/// Work of a run, in units of its study's time: simulated time times runs.
+/// Work of a command, in a unit of its own: of a run simulated time times runs, in its study's time; of an explanation, an identification, a
+/// diagnosis and a forecast runs of the model; of an inference steps of the recording.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Work {
     /// What is done.

@@ -1,73 +1,77 @@
-//! Whether the estimator can let a state walk, and the study says all that takes.
+//! Whether the estimator can let states walk, and the study says all that takes.
 //!
-//! Next file to read: [`crate::fit::filter`].
+//! Where one walks, the entries of all initial values follow their states: what is asked of one is asked of all. Next file to read:
+//! [`crate::fit::filter`].
 
-use starlings_models::Spec;
+use std::collections::HashMap;
+use std::ops::Range;
+
+use starlings_estimators::Transform;
 use toml::Spanned;
 
-use crate::checked::{Record, StudyParameter};
+use crate::Study;
+use crate::checked::StudyParameter;
 use crate::file::StudyFile;
-use crate::plan::training_rows;
 use crate::problem::Source;
-use starlings_estimators::{Drift, Transform};
 
-/// Reports walks of states that cannot be.
-pub(crate) fn check(
+/// Where the file says of each parameter how it moves, or else its name.
+pub(super) fn places(file: &StudyFile) -> HashMap<String, Range<usize>> {
+    let place = |section: &crate::file::ParameterSection| {
+        let walk = section.process.walk.as_ref().map(Spanned::span);
+        (section.name.get_ref().clone(), walk.unwrap_or_else(|| section.name.span()))
+    };
+    file.parameters.iter().map(place).collect()
+}
+
+/// Reports walks of states that cannot be; `predicted` is where the file asks for predictions.
+pub(super) fn check(
     source: &Source,
-    file: &StudyFile,
-    (parameters, records): (&[StudyParameter], &[Record]),
-    (spec, is_filter): (&Spec, bool),
+    places: &HashMap<String, Range<usize>>,
+    predicted: Range<usize>,
+    study: &Study,
 ) {
-    for parameter in parameters.iter().filter(|p| p.is_initial() && matches!(p.drift, Drift::Walk(_))) {
-        let section = file.parameters.iter().find(|section| *section.name.get_ref() == parameter.name);
-        let Some(place) = section.and_then(|section| section.process.walk.as_ref()).map(Spanned::span) else {
-            continue;
-        };
-        if let Some((message, help)) = fault(parameter, records, spec, is_filter) {
-            source.report_with(place, message, help);
+    if !study.walks() {
+        return;
+    }
+    for parameter in study.parameters.iter().filter(|p| p.is_initial()) {
+        if let Some((message, help)) = fault(parameter, study) {
+            source.report_with(places.get(&parameter.name).cloned().unwrap_or_default(), message, help);
         }
+    }
+    if !study.predict.outputs.is_empty() {
+        let message = "a state walks, so that the posterior has it at the end of the record, and what is predicted begins at its start";
+        source.report_with(predicted, message, "remove `process` of the initial values, or `[predict]`");
     }
 }
 
-fn fault(
-    parameter: &StudyParameter,
-    records: &[Record],
-    spec: &Spec,
-    is_filter: bool,
-) -> Option<(String, &'static str)> {
+fn fault(parameter: &StudyParameter, study: &Study) -> Option<(String, &'static str)> {
     let name = &parameter.name;
-    if !is_filter {
+    if !study.estimator.kind.is_filter() {
         let message =
             format!("a state cannot walk in a batch fit, whose runs go through whole records: `{name}`");
         return Some((message, "take `kind = \"roukf\"` in `[estimator]`, or remove `process`"));
     }
-    if !spec.restart {
-        let message =
-            format!("`{name}` cannot walk: `{}` does not go on from a state that it is given", spec.kind);
+    if !study.spec.restart {
+        let message = format!(
+            "`{name}` cannot walk: `{}` does not go on from a state that it is given",
+            study.spec.kind
+        );
         return Some((message, "remove `process`; a parameter may walk"));
     }
     if !matches!(parameter.transform, Transform::Linear) {
         let message = format!("a state walks in its own unit, and the prior of `{name}` is not linear");
         return Some((message, "write `transform = \"linear\"` with an `sd`"));
     }
-    let trained: Vec<&Record> = records.iter().filter(|record| record.is_trained()).collect();
+    let trained: Vec<usize> = (0..study.records.len()).filter(|r| study.records[*r].is_trained()).collect();
     if !parameter.per_record && trained.len() > 1 {
         let message = format!("`{name}` is one value for all records, and the state of each walks by itself");
         return Some((message, "remove `per_record = false`"));
     }
-    let mut counts = trained.iter().map(|record| analyses(record));
+    let mut counts = trained.iter().map(|record| study.windows(*record).len());
     let first = counts.next()?;
     counts.any(|count| count != first).then(|| {
         let message =
             format!("`{name}` walks at every analysis, and the records have different numbers of them");
         (message, "fit records of equal length, or each in a study of its own")
     })
-}
-
-/// Analyses of a record, as many as it has windows.
-fn analyses(record: &Record) -> usize {
-    let rows = training_rows(record);
-    let alone =
-        usize::from(rows.first() == Some(&0) && record.times.first().is_some_and(|t| record.start >= *t));
-    alone + (rows.len() - alone).div_ceil(record.every)
 }

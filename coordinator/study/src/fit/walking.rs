@@ -11,6 +11,7 @@ use starlings_estimators::Drift;
 use starlings_fleet::StateError;
 use starlings_models::Spec;
 
+use crate::checked::Record;
 use crate::expand::INITIAL;
 use crate::states::States;
 use crate::{Study, ThetaEntry};
@@ -32,10 +33,12 @@ impl Walking {
         if !study.walks() {
             return Self::default();
         }
+        // One value for all records is that of the only one which is fitted: see `check::walks`.
+        let fitted = study.records.iter().position(Record::is_trained);
         let follower = |(entry, of): (usize, &ThetaEntry)| {
             let state = study.parameters[of.parameter].name.strip_prefix(INITIAL)?;
             let component = Spec::range_of(&study.spec.states, state)?.start;
-            Some(Follower { entry, record: of.record.unwrap_or(0), component })
+            Some(Follower { entry, record: of.record.or(fitted)?, component })
         };
         Self(study.theta.iter().enumerate().filter_map(follower).collect())
     }
@@ -76,5 +79,15 @@ impl Study {
     pub fn walks(&self) -> bool {
         let of_state = |entry: &ThetaEntry| self.parameters[entry.parameter].is_initial();
         self.theta.iter().any(|entry| of_state(entry) && matches!(entry.drift, Drift::Walk(_)))
+    }
+
+    /// Why `what`, which begins at the start of a record, cannot go on from the posterior of this study.
+    pub(crate) fn ends_elsewhere(&self, what: &str) -> Option<String> {
+        self.walks().then(|| {
+            format!(
+                "the study lets a state walk, so that its posterior has the state at the end of the record, and {what} begins at its \
+                 start: remove `process` of the initial values and run again"
+            )
+        })
     }
 }

@@ -16,10 +16,8 @@ const FIXED: usize = 8;
 /// When the run is not finished, or its posterior is not that of this study.
 fn read(study: &Study, folder: &RunFolder) -> Result<Gaussian, StudyForecastError> {
     let shown = folder.path.display();
-    if study.walks() {
-        let message = "the study lets a state walk, so that its posterior has the state at the end of the record, and a forecast begins \
-                       at its start: remove `process` of the initial values and run again";
-        return Err(StudyForecastError::Request(message.to_owned()));
+    if let Some(message) = study.ends_elsewhere("a forecast") {
+        return Err(StudyForecastError::Request(message));
     }
     let Some(text) = folder.store.meta("posterior")? else {
         let message =

@@ -43,6 +43,9 @@ impl At {
 }
 
 fn estimate(study: &Study, path: &Path) -> Result<Vec<f64>, IdentifyError> {
+    if let Some(message) = study.ends_elsewhere("what is identified") {
+        return Err(IdentifyError::Point(message));
+    }
     let folder = RunFolder::open(path)?;
     let shown = path.display();
     let unfinished =
