@@ -4,15 +4,15 @@ mod study_kit;
 
 use study_kit::{Case, csv, grid};
 
-/// A level x and another v, seen as `a * x + 3 * v` every 0.1 s.
-fn told(corrects: &str, gain: f64, median: f64) -> Option<String> {
-    let study = format!(
+/// A level x and another v, seen as `a * x + 3 * v` every 0.1 s, with `more` in the study.
+fn study(corrects: &str, gain: f64, median: f64, more: &str) -> String {
+    format!(
         r#"
 [study]
 name = "nudged"
 [model]
 kind = "equations"
-outputs = [ {{ name = "sum", value = "a*x + 3*v" }} ]
+outputs = [ {{ name = "sum", value = "a*x + 3*v" }}, {{ name = "turned", value = "-x" }} ]
 [[model.states]]
 name = "x"
 initial = 1.0
@@ -27,19 +27,27 @@ prior = {{ transform = "linear", median = {median:?}, sd = 0.1 }}
 [observer]
 kind = "nudging"
 gain = {gain:?}
-corrects = {{ sum = "{corrects}" }}
+corrects = {{ {corrects} }}
 [[records]]
 name = "one"
 file = "sum.csv"
-channels = [ {{ column = "sum", output = "sum", noise = 0.1 }} ]
+channels = [
+  {{ column = "sum", output = "sum", noise = 0.1 }},
+  {{ column = "turned", output = "turned", noise = 0.1 }},
+]
+{more}
 "#
-    );
+    )
+}
+
+fn told(study: &str) -> Option<String> {
     let times = grid(21, 0.1);
-    Case::new(&study, &[("sum.csv", csv("time,sum", &[&times, &[1.0; 21]]))]).refusal()
+    Case::new(study, &[("sum.csv", csv("time,sum,turned", &[&times, &[1.0; 21], &[1.0; 21]]))]).refusal()
 }
 
 #[test]
 fn the_gain_is_bounded_by_what_the_output_shows_of_the_state_at_the_prior_medians() {
+    let told = |state: &str, gain, median| told(&study(&format!("sum = \"{state}\""), gain, median, ""));
     // h = 3: γΔt < ln 3, 10.986/s.
     assert_eq!(told("v", 10.9, 1.0), None);
     let unstable = told("v", 11.0, 1.0).unwrap();
@@ -52,4 +60,13 @@ fn the_gain_is_bounded_by_what_the_output_shows_of_the_state_at_the_prior_median
     // An output that falls as its state rises.
     let away = told("x", 1e-3, -1.0).unwrap();
     assert!(away.contains("no gain is stable") && away.contains("the other sign"), "{away}");
+}
+
+#[test]
+fn a_channel_that_is_held_out_corrects_nothing_and_bounds_nothing() {
+    let both = "sum = \"x\", turned = \"x\"";
+    // Their mean falls as x rises: (0.5 − 1)/2.
+    let refused = told(&study(both, 1.0, 0.5, "")).unwrap();
+    assert!(refused.contains("no gain is stable"), "{refused}");
+    assert_eq!(told(&study(both, 1.0, 0.5, "[explain]\nhold_out_channels = [\"turned\"]\n")), None);
 }

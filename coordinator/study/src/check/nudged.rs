@@ -8,7 +8,7 @@ use starlings_models::observer::{self, Wiring};
 use starlings_models::spectrum::start;
 use starlings_models::{BuildSetup, ObserverDef, SOLVER, SetupError};
 
-use super::observer::{report, spacing};
+use super::observer::{fitted, report, spacing};
 use crate::file::ObserverSection;
 use crate::problem::Source;
 use crate::{Study, posterior};
@@ -38,10 +38,11 @@ fn limit(study: &Study, def: &ObserverDef) -> Result<Option<(f64, String, f64)>,
     let medians = study.theta_for(0, posterior::prior(study).mean.as_slice());
     let (model, spec) = (study.setup.model()?, study.setup.spec()?);
     let (theta, _) = start(&study.setup, &*model, &medians)?;
-    let outputs = &study.setup.outputs;
-    let wiring = Wiring { spec: &spec, outputs, model: &*model, theta: &theta, native: NATIVE };
+    // As it works in the fit, where held-out channels are never seen; rows are those of all outputs.
+    let outputs = fitted(&study.setup, &study.records);
+    let wiring = Wiring { spec: &spec, outputs: &outputs, model: &*model, theta: &theta, native: NATIVE };
     let observer = observer::build(&def.alone(), wiring)?;
-    let rows = observer.reads();
+    let rows = observer::build(&def.alone(), Wiring { outputs: &study.setup.outputs, ..wiring })?.reads();
     let trained = study.records.iter().filter(|record| record.is_trained());
     let spacings = trained.filter_map(|record| Some((spacing(record, &rows)?, record.name.clone())));
     let Some((dt, record)) = spacings.max_by(|a, b| a.0.total_cmp(&b.0)) else { return Ok(None) };

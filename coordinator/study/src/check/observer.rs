@@ -48,11 +48,7 @@ fn built(
     (setup, def): (&Setup, &ObserverDef),
     records: &[Record],
 ) -> Option<Built> {
-    let seen = |output: &String| {
-        let channels = records.iter().filter(|r| r.is_trained()).flat_map(|r| &r.channels);
-        channels.into_iter().any(|c| c.output == *output && !c.held_out)
-    };
-    let fitted: Vec<String> = setup.outputs.iter().filter(|o| seen(o)).cloned().collect();
+    let fitted = fitted(setup, records);
     let build = |outputs: &[String]| -> Result<Built, SetupError> {
         let (model, spec) = (setup.model()?, setup.spec()?);
         let theta = constants(setup, &spec);
@@ -80,6 +76,15 @@ fn built(
             None
         }
     }
+}
+
+/// Outputs of the study that some record fits.
+pub(super) fn fitted(setup: &Setup, records: &[Record]) -> Vec<String> {
+    let seen = |output: &&String| {
+        let mut channels = records.iter().filter(|r| r.is_trained()).flat_map(|r| &r.channels);
+        channels.any(|c| c.output == **output && !c.held_out)
+    };
+    setup.outputs.iter().filter(seen).cloned().collect()
 }
 
 /// Constants and defaults in the order of the model's parameters, zero for what is estimated.

@@ -33,8 +33,8 @@ pub(crate) struct Nudging {
 
 /// The most corrected components whose stability is looked at: a dense eigenvalue problem of that size.
 const MOST: usize = 300;
-/// γΔt beyond which a correction takes the whole innovation, to rounding.
-const WHOLE: f64 = 50.0;
+/// Share of the largest eigenvalue below which one is zero: slopes are differences of outputs.
+const ROUNDING: f64 = 1e-6;
 
 /// The entry of the observer list.
 pub(super) const KIND: Kind = Kind {
@@ -84,16 +84,6 @@ impl Nudging {
     }
 }
 
-/// Largest modulus of the eigenvalues of a correction, 1 − K H, whose states are pulled by k of their innovations.
-fn growth(observation: &DMatrix<f64>, pulls: impl Iterator<Item = f64>) -> f64 {
-    let mut left = -observation.clone();
-    for (mut row, pull) in left.row_iter_mut().zip(pulls) {
-        row.scale_mut(pull);
-    }
-    left += DMatrix::identity(left.nrows(), left.nrows());
-    left.complex_eigenvalues().iter().map(|value| value.norm()).fold(0.0, f64::max)
-}
-
 impl Observer for Nudging {
     fn correct(&self, at: Correction<'_>, x: &mut [f64]) {
         for (state, rows) in &self.channels {
@@ -118,27 +108,14 @@ impl Observer for Nudging {
         if observation.iter().any(|slope| !slope.is_finite()) {
             return None;
         }
-        let grows = |strength: f64| {
-            let pulls = self.channels.iter().map(|(_, rows)| -(-(rows.len() as f64) * strength).exp_m1());
-            // Eigenvalues of one that belong to states which no output shows round.
-            growth(&observation, pulls) > 1.0 + 1e-9
-        };
-        // From gains that hardly pull to those that take the whole innovation.
-        let strengths = (0..=80).map(|k| WHOLE * 10_f64.powf(-0.1 * f64::from(80 - k)));
-        let (mut stable, mut unstable) = (0.0, None);
-        for strength in strengths {
-            if grows(strength) {
-                unstable = Some(strength);
-                break;
-            }
-            stable = strength;
-        }
-        let mut unstable = unstable?;
-        while stable > 0.0 && unstable / stable > 1.0 + 1e-9 {
-            let middle = f64::midpoint(stable, unstable);
-            if grows(middle) { unstable = middle } else { stable = middle }
-        }
-        Some(stable / dt)
+        let eigenvalues = observation.complex_eigenvalues();
+        let largest = eigenvalues.iter().map(|value| value.norm()).fold(0.0, f64::max);
+        // |1 − kλ| ≤ 1 for k ≤ 2 Re λ/|λ|². Of zero, to rounding, are those of states that no output shows.
+        let shown = eigenvalues.iter().filter(|value| value.norm() > ROUNDING * largest);
+        let most = shown.map(|value| (2.0 * value.re / value.norm_sqr()).max(0.0)).reduce(f64::min)?;
+        // k = 1 − e^(−nγΔt) of a state with n rows: that with the most takes the largest part.
+        let n_row = self.channels.iter().map(|(_, rows)| rows.len()).max()?;
+        (most < 1.0).then(|| -(-most).ln_1p() / (n_row as f64 * dt))
     }
 
     fn feedback(&self, model: &dyn Model, theta: &[f64]) -> DMatrix<f64> {
