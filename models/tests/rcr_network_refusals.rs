@@ -124,15 +124,15 @@ fn keys_and_values_that_do_not_belong_to_an_element_are_refused() {
     let wrong_key = json!({ "name": "a", "kind": "R", "from": "x", "compliance": 1.0 });
     refused(json!([wrong_key]), "elements[0].compliance", &["`R` has no `compliance`", "`value`"]);
     let negative = json!({ "name": "a", "kind": "R", "from": "x", "value": -1.0 });
-    refused(json!([negative]), "elements[0].value", &["-1 is no value of a resistance"]);
+    refused(json!([negative]), "elements[0].value", &["no resistance has the value -1"]);
     let empty = json!({ "name": "wall", "kind": "C", "from": "x", "value": 0.0 });
     refused(
         json!([empty]),
         "elements[0].value",
-        &["`C_wall`: 0 is no value of a compliance", "leave the element out"],
+        &["`C_wall`: no compliance has the value 0", "leave the element out"],
     );
     let light = json!({ "name": "blood", "kind": "L", "from": "x", "value": 0.0 });
-    refused(json!([light]), "elements[0].value", &["`L_blood`: 0 is no value of a inertance", "leave"]);
+    refused(json!([light]), "elements[0].value", &["`L_blood`: no inertance has the value 0", "leave"]);
     let text = json!({ "name": "a", "kind": "R", "from": "x", "value": [1.0] });
     refused(json!([text]), "elements[0].value", &["a number or the name of a parameter"]);
     let kind = json!({ "name": "a", "kind": "resistor", "from": "x" });

@@ -55,7 +55,7 @@ impl Parameters {
         if let Some(number) = default.filter(|number| !(lo..=hi).contains(number) || !number.is_finite()) {
             // A resistance of zero is an open connection; a store of zero is a state too many.
             let remedy = if number == 0.0 { ": leave the element out" } else { "" };
-            let message = format!("`{name}`: {number} is no value of a {}{remedy}", slot.measure.word());
+            let message = format!("`{name}`: no {} has the value {number}{remedy}", slot.measure.word());
             return Err(fault(slot.path, message));
         }
         if let Some(at) = self.list.iter().position(|(_, q)| q.name == name) {
