@@ -3,7 +3,7 @@
 //! They are read here, whoever reads the recording: a few milliseconds, whatever its length. Next file to read: `words.rs`, which says it.
 
 use starlings_estimators::inference::{
-    Decimation, Fit, StepError, Sums, Verdict, step_errors, step_in_rates,
+    Decimation, Fit, InferenceError, StepError, Sums, Verdict, step_errors, step_in_rates,
 };
 use starlings_study::infer_choice::MeasuredChoice;
 
@@ -47,12 +47,16 @@ pub(crate) fn coarse(
         return None;
     }
     let structure = &asked.question.structure;
-    let pieces = pieces(asked, cut, at).unwrap_or_default();
-    if let Ok(moved) = step_errors(&pieces, fit, structure, &answer.posterior, LEVEL) {
-        return (!moved.is_empty()).then_some(Coarse::Moved(moved));
+    let pieces = pieces(asked, cut, at).ok()?;
+    match step_errors(&pieces, fit, structure, &answer.posterior, LEVEL) {
+        Ok(moved) => (!moved.is_empty()).then_some(Coarse::Moved(moved)),
+        // Pieces that do not compare say nothing of the step; a longer one without a fit does.
+        Err(InferenceError::Shape { .. } | InferenceError::Incompatible { .. }) => None,
+        Err(_) => {
+            let rates = step_in_rates(sums, &answer.posterior);
+            (rates > RATES).then_some(Coarse::Fast(rates))
+        }
     }
-    let rates = step_in_rates(sums, &answer.posterior);
-    (rates > RATES).then_some(Coarse::Fast(rates))
 }
 
 /// Sums at h, 2h and 4h of the first pieces of the first recording.

@@ -4,7 +4,7 @@
 
 use std::fmt::Write as _;
 
-use starlings_estimators::inference::{InferenceError, Scatter, Structure, Sums, scatter};
+use starlings_estimators::inference::{IncrementNoise, InferenceError, Structure, Sums, increment_noise};
 
 use crate::error::InferError;
 
@@ -16,14 +16,15 @@ pub(crate) fn told(error: InferenceError, sums: &Sums, structure: &Structure) ->
     if !matches!(error, InferenceError::NotSettled { .. } | InferenceError::DiffusionNotDefinite { .. }) {
         return error.into();
     }
-    let hidden: Vec<Scatter> = scatter(sums, structure).into_iter().filter(|s| s.share > HIDDEN).collect();
+    let hidden: Vec<IncrementNoise> =
+        increment_noise(sums, structure).into_iter().filter(|s| s.share > HIDDEN).collect();
     if hidden.is_empty() {
         return error.into();
     }
     let mut says = String::new();
     for (k, of) in hidden.iter().enumerate() {
         let comma = if k > 0 { ", " } else { "" };
-        let Scatter { equation, measured, moves, .. } = of;
+        let IncrementNoise { equation, measured, moves, .. } = of;
         let _ =
             write!(says, "{comma}`{equation}` (errors of sd {measured:.2e}, movement {moves:.2e} or less)");
     }

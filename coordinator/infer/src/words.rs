@@ -151,8 +151,8 @@ pub(crate) fn of_steps(coarse: &Coarse, step: f64, unit: &str) -> String {
             )
         }
         Coarse::Fast(rates) => format!(
-            "{begins} a step is {rates:.1} times the fastest time of the drift that was found, whose rates are too small by that; twice the \
-             step has no fit, from which `richardson` could take it out: record at a tenth of that time"
+            "{begins} a step is {rates:.1} times the fastest time of the drift that was found, whose rates are too small by that; two or \
+             four times the step has no fit, from which `richardson` could take it out: record at a tenth of that time"
         ),
     }
 }
