@@ -17,11 +17,7 @@ const FREEDOM: f64 = 0.21;
 /// Differences that touch a NaN are skipped; NaN when none is left. Third differences remove any parabola, and white noise has
 /// third differences of variance 1 + 9 + 9 + 1 = 20; a few jumps hardly change the median.
 pub fn noise_from_third_differences(series: &[f64]) -> f64 {
-    let mut size: Vec<f64> = series
-        .windows(4)
-        .map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs())
-        .filter(|d| d.is_finite())
-        .collect();
+    let mut size: Vec<f64> = third_differences(series).map(f64::abs).collect();
     if size.is_empty() {
         return f64::NAN;
     }
@@ -30,10 +26,20 @@ pub fn noise_from_third_differences(series: &[f64]) -> f64 {
     median / (MEDIAN_ABSOLUTE * 20f64.sqrt())
 }
 
-/// Degrees of freedom with which [`noise_from_third_differences`] of `n` samples tells a noise variance: as many independent values of
-/// known mean would tell it as well by their mean square.
+/// Third differences that touch no NaN.
+fn third_differences(series: &[f64]) -> impl Iterator<Item = f64> {
+    series.windows(4).map(|w| w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).filter(|d| d.is_finite())
+}
+
+/// Number of third differences that [`noise_from_third_differences`] has of a series.
+pub fn n_third_difference(series: &[f64]) -> usize {
+    third_differences(series).count()
+}
+
+/// Degrees of freedom with which `n` third differences tell a noise variance: as many independent values of known mean would tell it as
+/// well by their mean square.
 pub fn freedom_of_third_differences(n: usize) -> f64 {
-    FREEDOM * n.saturating_sub(3).max(1) as f64
+    FREEDOM * n.max(1) as f64
 }
 
 /// Autocorrelation at lags 0 to `max_lag` (length `max_lag + 1`), the biased estimate (Box & Jenkins 1976, section 2.1).

@@ -52,7 +52,7 @@ pub use fit::Fit;
 pub use function::Function;
 pub use functions::{Columns, Functions, Samples};
 pub use missing::{Candidate, Missing, Named, Score, Search, joint, missing_terms};
-pub use noise_check::{MATTERS, NoiseCheck, Scatter, Verdict, noise_checks, scatter};
+pub use noise_check::{IncrementNoise, MATTERS, NoiseCheck, Verdict, increment_noise, noise_checks};
 pub use polynomial::Polynomial;
 pub use posterior::{Estimate, Posterior, Value};
 pub use prior::Prior;

@@ -34,8 +34,6 @@ pub struct LeastSquares {
     residual: DVector<f64>,
     cost: f64,
     jacobian: BlockAngular,
-    /// Whether a Jacobian was measured yet: without one, a column of zeros is an influence that nobody knows.
-    is_known: bool,
     fresh: bool,
     /// The Jacobian that was measured at this point, while the secant changes `jacobian`.
     measured: Option<BlockAngular>,
@@ -62,7 +60,6 @@ impl LeastSquares {
             residual: DVector::zeros(0),
             cost: f64::INFINITY,
             jacobian: BlockAngular::default(),
-            is_known: false,
             fresh: false,
             measured: None,
             radius: f64::INFINITY,
@@ -189,7 +186,7 @@ impl LeastSquares {
             Some(jacobian) => {
                 self.measured = Some(jacobian.clone());
                 self.jacobian = jacobian;
-                (self.is_known, self.fresh) = (true, true);
+                self.fresh = true;
                 self.plan();
             }
             None if self.jacobian.is_empty() => self.need = Need::Nothing(End::NoStart),
@@ -222,7 +219,7 @@ impl LeastSquares {
     fn step(&mut self) -> Option<DVector<f64>> {
         let (felt, smallest) = (self.jacobian.squares(), self.tolerance.max(self.resolution()));
         let step = self.step_of(&felt, &|j| felt[j] > 0.0)?;
-        if self.is_known && self.predicted <= smallest && felt.iter().any(|square| *square <= 0.0) {
+        if self.thorough && self.predicted <= smallest && felt.iter().any(|square| *square <= 0.0) {
             return self.step_of(&felt, &|_| true);
         }
         Some(step)

@@ -55,7 +55,7 @@ pub use correlated_noise::{CorrelatedNoise, FittedNoise, Part, Series, fit_noise
 pub use data::{Data, Noise};
 pub use diagnostics::{
     autocorrelation, correlation, effective_nis_band, effective_sample_size, freedom_of_third_differences,
-    nis_band, nis_band_of_uncertain_noise, noise_from_third_differences,
+    n_third_difference, nis_band, nis_band_of_uncertain_noise, noise_from_third_differences,
 };
 pub use drift::Drift;
 pub use error::EstimatorError;

@@ -40,6 +40,17 @@ pub(crate) fn chi_squared(p: f64, degrees: f64) -> f64 {
     ChiSquared::new(degrees).map_or(degrees, |chi| chi.inverse_cdf(p))
 }
 
+/// The 95 % interval of a rate that was seen in n trials (Wilson, Journal of the American Statistical Association 1927, 22, 209); the whole
+/// range from 0 to 1 without any.
+pub fn wilson(rate: f64, n: f64) -> [f64; 2] {
+    if n <= 0.0 {
+        return [0.0, 1.0];
+    }
+    let z2 = Z95 * Z95;
+    let (centre, half) = (rate + z2 / (2.0 * n), Z95 * ((rate * (1.0 - rate) + z2 / (4.0 * n)) / n).sqrt());
+    [centre - half, centre + half].map(|end| (end / (1.0 + z2 / n)).clamp(0.0, 1.0))
+}
+
 /// Probability that χ² is larger.
 pub fn chi_squared_tail(value: f64, degrees: f64) -> f64 {
     ChiSquared::new(degrees).map_or(1.0, |chi| chi.sf(value.max(0.0)))
@@ -56,6 +67,16 @@ pub(crate) fn fisher_tail(value: f64, degrees: f64, left: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_interval_of_a_rate_is_that_of_the_tables_and_whole_without_a_trial() {
+        // Newcombe, Statistics in Medicine 1998, 17, 857: 81 of 263 and 0 of 20, method 3.
+        for ((seen, n), wanted) in [((81.0, 263.0), [0.2553, 0.3662]), ((0.0, 20.0), [0.0, 0.1611])] {
+            let found = wilson(seen / n, n);
+            assert!(found.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 5e-5), "{found:?}");
+        }
+        assert_eq!(wilson(f64::NAN, 0.0).map(f64::to_bits), [0.0_f64, 1.0].map(f64::to_bits));
+    }
 
     #[test]
     fn the_normal_quantile_is_that_of_the_tables() {

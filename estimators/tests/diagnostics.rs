@@ -6,7 +6,7 @@ use common::{gauss, rng};
 use nalgebra::DMatrix;
 use starlings_estimators::{
     Gaussian, Transform, autocorrelation, correlation, effective_sample_size, freedom_of_third_differences,
-    nis_band, nis_band_of_uncertain_noise, noise_from_third_differences,
+    n_third_difference, nis_band, nis_band_of_uncertain_noise, noise_from_third_differences,
 };
 
 fn white(seed: u64, n: usize) -> Vec<f64> {
@@ -29,13 +29,23 @@ fn third_differences_find_the_noise_under_a_smooth_signal_with_holes() {
 
 #[test]
 fn third_differences_tell_the_noise_as_well_as_their_freedom_says() {
-    for n in [60, 250] {
+    // Stretches of seven have four differences each, which tell a little more than as many of one long stretch.
+    for (n, gap, [lo, hi]) in
+        [(60, None, [0.75, 1.25]), (250, None, [0.75, 1.25]), (400, Some(8), [0.5, 1.1])]
+    {
+        let series = |k: u64| -> Vec<f64> {
+            let is_gap = |i: usize| gap.is_some_and(|gap| i % gap == gap - 1);
+            let values = white(1000 + k, n).into_iter().enumerate();
+            values.map(|(i, v)| if is_gap(i) { f64::NAN } else { v }).collect()
+        };
         let logs: Vec<f64> =
-            (0..400).map(|k| noise_from_third_differences(&white(1000 + k, n)).powi(2).ln()).collect();
+            (0..400).map(|k| noise_from_third_differences(&series(k)).powi(2).ln()).collect();
+        let freedom = freedom_of_third_differences(n_third_difference(&series(0)));
         let mean = logs.iter().sum::<f64>() / 400.0;
         let variance = logs.iter().map(|l| (l - mean).powi(2)).sum::<f64>() / 399.0;
         // A variance of 400 values scatters by 7 %; of a logarithm it is 2/freedom up to a few per cent.
-        assert!((variance * freedom_of_third_differences(n) / 2.0 - 1.0).abs() < 0.25, "{n}: {variance}");
+        let ratio = 0.5 * variance * freedom;
+        assert!((lo..hi).contains(&ratio), "{n} with gaps {gap:?}: {ratio}");
     }
 }
 

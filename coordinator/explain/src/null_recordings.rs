@@ -9,6 +9,7 @@ use std::sync::Arc;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+use starlings_estimators::quantiles::wilson;
 use starlings_fleet::Fleet;
 use starlings_study::store::Store;
 use starlings_study::{Stage, Study, Work};
@@ -20,7 +21,6 @@ use crate::options::{Context, Options};
 use crate::rows::Rows;
 use crate::run_cache::{Foreseen, RunCache};
 use crate::tell::result::Nulls;
-use crate::tell::summary;
 
 /// Searches `options.nulls` simulated recordings. `fitted` is what the fitted model as it is predicts, by row, and the rows with their
 /// noise; `before` the runs of the search so far.
@@ -62,7 +62,8 @@ pub(super) fn measure(
             Err(error) => return Err(error),
         }
     }
-    nulls.upper95 = summary::wilson_upper(nulls.names as f64 / nulls.of.max(1) as f64, nulls.of as f64);
+    let [_, upper95] = wilson(nulls.names as f64 / nulls.of.max(1) as f64, nulls.of as f64);
+    nulls.upper95 = upper95;
     Ok(nulls)
 }
 

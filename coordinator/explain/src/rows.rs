@@ -196,16 +196,17 @@ impl Rows {
     }
 
     /// Degrees of freedom with which the mean noise variance of the rows that `of` takes is known; infinite where the study gives every
-    /// noise of theirs. Channels of one output whose noise is the same were found to have it together.
+    /// noise of theirs. What has the same noise to the bit was found to have it together: components of a field, records of one channel.
+    /// Variances that are known by themselves are weighed by their rows (Satterthwaite, Biometrics Bulletin 1946).
     pub(crate) fn noise_freedom(&self, of: impl Fn(&Row) -> bool) -> f64 {
-        let mut found: Vec<((usize, u64), f64, f64)> = Vec::new();
+        let mut found: Vec<(u64, f64, f64)> = Vec::new();
         let mut n = 0.0;
         for row in self.rows.iter().filter(|row| of(row)) {
             n += 1.0;
             if row.noise_freedom.is_infinite() {
                 continue;
             }
-            let key = (row.output, row.noise.to_bits());
+            let key = row.noise.to_bits();
             match found.iter_mut().find(|(known, ..)| *known == key) {
                 Some((_, of_it, _)) => *of_it += 1.0,
                 None => found.push((key, 1.0, row.noise_freedom)),

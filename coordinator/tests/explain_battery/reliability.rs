@@ -5,14 +5,14 @@
 
 use std::fmt::Write as _;
 
+use starlings_estimators::quantiles::wilson;
+
 use crate::case::{Kind, Result};
 
 /// Ends of the intervals of told probabilities.
 const TOLD: [f64; 7] = [0.0, 0.01, 0.1, 0.5, 0.9, 0.99, 1.0];
 /// Share of the cases whose truth is in no list, as the tool takes it before any data.
 const LEFT_OUT: f64 = 0.1;
-/// Quantile of the normal distribution for 95 %.
-const Z95: f64 = 1.959_964;
 
 /// The answers that were told with a probability in one interval.
 pub struct Answers {
@@ -31,10 +31,7 @@ pub struct Answers {
 impl Answers {
     /// The 95 % interval of the share (Wilson 1927).
     fn interval(&self) -> [f64; 2] {
-        let (n, z2) = (self.effective, Z95 * Z95);
-        let centre = self.so + z2 / (2.0 * n);
-        let half = Z95 * (self.so * (1.0 - self.so) / n + z2 / (4.0 * n * n)).sqrt();
-        [centre - half, centre + half].map(|end| (end / (1.0 + z2 / n)).clamp(0.0, 1.0))
+        wilson(self.so, self.effective)
     }
 }
 

@@ -63,8 +63,7 @@ pub fn noise_checks(
     let check = |(l, equation): (usize, &String)| {
         let shared = -lagged[(l, l)] / pairs;
         let ratio = shared / (squares[(l, l)] / n);
-        let squared = ratio * ratio;
-        let sd = ((1.0 - 3.0 * squared + 4.0 * squared * squared) / pairs).max(0.0).sqrt();
+        let sd = bartlett_sd(ratio, pairs);
         let margin = normal(SURE) * sd;
         let verdict = match ratio - MATTERS {
             above if above > margin => Verdict::Matters,
@@ -77,12 +76,20 @@ pub fn noise_checks(
     Ok(structure.equations().iter().enumerate().map(check).collect())
 }
 
-/// How rows scatter, and how far a state moves between them, by neighbouring differences alone: without a fit.
+/// Standard deviation of a lag-one autocorrelation from so many pairs, of a moving average of order one (Bartlett, Journal of the Royal
+/// Statistical Society B 1946).
+fn bartlett_sd(ratio: f64, pairs: f64) -> f64 {
+    let squared = ratio * ratio;
+    ((1.0 - 3.0 * squared + 4.0 * squared * squared) / pairs).max(0.0).sqrt()
+}
+
+/// Errors of the measurement, and how far a state moves between rows, by the lag-one autocovariance of neighbouring differences alone (Roll,
+/// Journal of Finance 1984): without a fit.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Scatter {
+pub struct IncrementNoise {
     /// The equation.
     pub equation: String,
-    /// Share of the variance of a difference that errors of the measurement have: twice −E ẋ_n ẋ_{n+1} / E ẋ².
+    /// Share, from 0 to 1, of the variance of a difference that errors of the measurement have: twice −E ẋ_n ẋ_{n+1} / E ẋ².
     pub share: f64,
     /// Standard deviation of these errors, in the state's unit.
     pub measured: f64,
@@ -92,7 +99,7 @@ pub struct Scatter {
 
 /// What neighbouring differences of every state say, where there are pairs of steps. A drift that goes far in a step makes them alike, and the
 /// share of the errors too small.
-pub fn scatter(sums: &Sums, structure: &Structure) -> Vec<Scatter> {
+pub fn increment_noise(sums: &Sums, structure: &Structure) -> Vec<IncrementNoise> {
     if sums.n_pair() == 0 || sums.n_state() != structure.equations().len() {
         return Vec::new();
     }
@@ -102,10 +109,9 @@ pub fn scatter(sums: &Sums, structure: &Structure) -> Vec<Scatter> {
     let of = |(l, equation): (usize, &String)| {
         let square = squares[(l, l)] / n;
         let ratio = (-lagged[(l, l)] / pairs / square).clamp(0.0, 0.5);
-        let squared = ratio * ratio;
-        let sd = ((1.0 - 3.0 * squared + 4.0 * squared * squared) / pairs).max(0.0).sqrt();
+        let sd = bartlett_sd(ratio, pairs);
         let left = (1.0 - 2.0 * (ratio - normal(SURE) * sd)).min(1.0);
-        Scatter {
+        IncrementNoise {
             equation: equation.clone(),
             share: 2.0 * ratio,
             measured: h * (ratio * square).sqrt(),

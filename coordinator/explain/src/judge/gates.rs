@@ -122,13 +122,13 @@ pub(crate) fn judge<'c>(
     let gain_held_out = before.held_out - misfit.held_out;
     let share = ratio(before.train - misfit.train, before.train - m);
     let n_held = misfit.n_held_out as f64;
-    let scatter = scatter(misfit.n_held_out, cache.rows.noise_freedom(|row| row.usage == Usage::HeldOut));
-    let has_excess = before.held_out > n_held + 3.0 * scatter;
+    let sd = chi_squared_sd(misfit.n_held_out, cache.rows.noise_freedom(|row| row.usage == Usage::HeldOut));
+    let has_excess = before.held_out > n_held + 3.0 * sd;
     let share_held_out =
         (misfit.n_held_out > 0 && has_excess).then(|| ratio(gain_held_out, before.held_out - n_held));
     let [allowance, allowance_unseen] = allowances(cache, &fit);
     let held_out = held_out(cache, base, &fit);
-    let beyond = misfit.held_out - allowance - n_held - 2.0 * scatter;
+    let beyond = misfit.held_out - allowance - n_held - 2.0 * sd;
     let unaccounted = if has_excess { ratio(beyond.max(0.0), before.held_out - n_held) } else { 0.0 };
     let mut judged = JudgedFit {
         fit,
@@ -150,8 +150,9 @@ pub(crate) fn judge<'c>(
     judged
 }
 
-/// Standard deviation of the χ² of n values of noise whose variance is known with so many degrees of freedom.
-fn scatter(n: usize, freedom: f64) -> f64 {
+/// Standard deviation of the χ² of n values of noise whose variance is known with so many degrees of freedom, to first order in their
+/// inverse: that of χ² itself, and n times the relative sd √(2/freedom) of the variance.
+fn chi_squared_sd(n: usize, freedom: f64) -> f64 {
     let n = n as f64;
     (2.0 * n + 2.0 * n * n / freedom).sqrt()
 }

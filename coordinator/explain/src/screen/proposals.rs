@@ -1,8 +1,8 @@
 //! Terms that nobody listed, made from the unknown input that an equation would need.
 //!
-//! Every term of a small grammar ([`grammar`]) is fitted to the unknown input; those that best predict parts of it that the fit has not
-//! seen, with one sign throughout ([`recovered`]), become candidates like any other: they are run, refitted and judged, and pay for all
-//! the terms that were looked at. Next file to read: [`crate::refit::search`].
+//! Every term of a small grammar ([`grammar`]) is fitted to the unknown input. They are ranked by how well they predict parts of it that the
+//! fit has not seen, with one sign throughout ([`recovered`]), and the first become candidates like any other: they are run, refitted and
+//! judged, and pay for all the terms that were looked at. Next file to read: [`crate::refit::search`].
 
 mod grammar;
 mod recovered;
@@ -26,7 +26,7 @@ const MOST: usize = 60;
 /// Terms made from unknown inputs.
 #[derive(Debug, Default)]
 pub(crate) struct Proposals {
-    /// Those that predict the unknown input best.
+    /// Those that predict the unknown input best first.
     pub(crate) candidates: Vec<Candidate>,
     /// Terms that were looked at.
     pub(crate) considered: usize,

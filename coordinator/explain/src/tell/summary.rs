@@ -3,7 +3,7 @@
 //! Nothing is decided here. Next file to read: [`crate::run`].
 
 use nalgebra::DMatrix;
-use starlings_estimators::quantiles::Z95;
+use starlings_estimators::quantiles::wilson;
 use starlings_estimators::{Gaussian, Optimum};
 use starlings_study::posterior::{self, Estimate};
 
@@ -194,7 +194,7 @@ pub(crate) fn remaining(
 pub(crate) fn false_alarm(found: &SearchResult<'_>, best_gain: f64) -> FalseAlarm {
     let n = found.null_distribution.maxima.len() as f64;
     let rate = found.null_distribution.exceeding();
-    let upper = wilson_upper(rate, n);
+    let [_, upper] = wilson(rate, n);
     FalseAlarm {
         rate,
         upper95: upper,
@@ -206,16 +206,6 @@ pub(crate) fn false_alarm(found: &SearchResult<'_>, best_gain: f64) -> FalseAlar
         threshold: found.null_distribution.threshold,
         decoys: found.null_distribution.decoys_above(best_gain),
         nulls: None,
-    }
-}
-
-/// Upper end of the 95 % interval of a rate seen in n trials (Wilson 1927); 1 without any.
-pub(crate) fn wilson_upper(rate: f64, n: f64) -> f64 {
-    let z2 = Z95 * Z95;
-    if n > 0.0 {
-        (rate + z2 / (2.0 * n) + Z95 * ((rate * (1.0 - rate) + z2 / (4.0 * n)) / n).sqrt()) / (1.0 + z2 / n)
-    } else {
-        1.0
     }
 }
 

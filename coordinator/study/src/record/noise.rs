@@ -3,7 +3,7 @@
 //! The components of a field are measured by one instrument: they share one standard deviation. Next file to read:
 //! [`super::channel`].
 
-use starlings_estimators::noise_from_third_differences;
+use starlings_estimators::{n_third_difference, noise_from_third_differences};
 
 use super::pooled_noise::FOUND;
 use super::reader::ChannelReader;
@@ -14,7 +14,7 @@ use crate::file::ChannelSection;
 pub(super) struct Noise {
     pub(super) sd: f64,
     pub(super) how: String,
-    /// Values from which it was found; `None` where it was given.
+    /// Third differences from which it was found; `None` where it was given.
     pub(super) found_from: Option<usize>,
 }
 
@@ -36,7 +36,7 @@ impl ChannelReader<'_> {
         let known: Vec<f64> = sds.iter().copied().filter(|sd| !sd.is_nan()).collect();
         let sd = root_mean_square(&known);
         if sd > 0.0 && sd.is_finite() {
-            let n = parts.iter().map(|values| self.known(values)).sum();
+            let n = parts.iter().map(|values| n_third_difference(&self.used(values))).sum();
             return Some(Noise { sd, how: self.found(parts), found_from: Some(n) });
         }
         let why = if known.is_empty() {
@@ -64,11 +64,6 @@ impl ChannelReader<'_> {
                 )
             }
         }
-    }
-
-    /// The number of values at the rows that count.
-    fn known(&self, values: &[f64]) -> usize {
-        self.used(values).iter().filter(|value| value.is_finite()).count()
     }
 
     /// The values at the rows that count.

@@ -2,7 +2,7 @@
 //!
 //! Next file to read: [`super::noise`].
 
-use starlings_estimators::noise_from_third_differences;
+use starlings_estimators::{n_third_difference, noise_from_third_differences};
 
 use super::channel::with_unit;
 use crate::checked::{Channel, Record};
@@ -39,12 +39,11 @@ pub(crate) fn pool_short_records(records: &mut [Record], warnings: &mut [String]
             let series = others.into_iter().fold(own, |all, other| [all, vec![f64::NAN], other].concat());
             let sd = noise_from_third_differences(&series);
             if sd > 0.0 && sd.is_finite() {
-                let known = series.iter().filter(|value| value.is_finite()).count();
-                pooled.push((r, c, sd, how, known));
+                pooled.push((r, c, sd, how, n_third_difference(&series)));
             }
         }
     }
-    for (r, c, sd, how, known) in pooled {
+    for (r, c, sd, how, n_difference) in pooled {
         let Record { name, channels, .. } = &mut records[r];
         let channel = &mut channels[c];
         let about = format!("the noise of `{}` in record `{name}` was not given", channel.output);
@@ -58,7 +57,7 @@ pub(crate) fn pool_short_records(records: &mut [Record], warnings: &mut [String]
             let unit = unit.1.split_once(" was found").map_or("", |(unit, _)| unit);
             *warning = format!("{about}: {after}{unit} was found {how}{rest}");
         }
-        (channel.noise, channel.noise_how, channel.noise_found_from) = (sd, how, Some(known));
+        (channel.noise, channel.noise_how, channel.noise_found_from) = (sd, how, Some(n_difference));
     }
 }
 
