@@ -93,9 +93,19 @@ fn text_of_test(target: &str, name: &str) -> String {
             .collect();
         // What is left out of a plain run has to be asked for.
         let ignored = if attributes.contains("#[ignore") { "needs -- --ignored\n" } else { "" };
-        return format!("{ignored}{text}{kits}");
+        return format!("{ignored}{}", code(&(text + &kits)));
     }
     panic!("no test `{name}` in a target `{target}`");
+}
+
+/// A text without comments, whose numbers nothing holds.
+fn code(text: &str) -> String {
+    let of_line = |line: &str| match line.find("//") {
+        // `http://` is no comment.
+        Some(at) if !line[..at].ends_with(':') => format!("{}\n", &line[..at]),
+        _ => format!("{line}\n"),
+    };
+    text.lines().map(of_line).collect::<Vec<_>>().concat()
 }
 
 /// Numbers of a text as they are written: sign left out, `_` between digits taken away.
