@@ -143,13 +143,7 @@ fn windkessel_beat(figures: &mut Map<String, Value>) -> Result<(), Failure> {
     };
     let times: Vec<f64> = (0..=200).map(|k| 0.005 * f64::from(k)).collect();
     let flow = times.iter().map(|t| if *t < 0.3 { 300.0 * (10.472 * t).sin() } else { 0.0 }).collect();
-    let window = Window {
-        start: 0.0,
-        times: times[1..].to_vec(),
-        observed: vec![f64::NAN; 200],
-        inputs: vec![Signal { times, values: flow }],
-        since: Vec::new(),
-    };
+    let window = Window::free(0.0, times[1..].to_vec(), 1, vec![Signal { times, values: flow }]);
     let job = Job {
         particle: 0,
         record: 0,

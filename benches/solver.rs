@@ -232,12 +232,7 @@ fn outside(native: &Setup, def: SolverDef) -> Result<Box<dyn Forward>, Failure> 
 /// A window of one observation.
 fn step(theta: Vec<f64>, i: usize, state: Option<Vec<f64>>) -> Job {
     let (start, end) = (0.1 * (i as f64 - 1.0), 0.1 * i as f64);
-    let window = Window {
-        start,
-        times: vec![end],
-        observed: vec![f64::NAN],
-        inputs: vec![Signal { times: vec![0.0, 1.0], values: vec![0.1, 0.1] }],
-        since: Vec::new(),
-    };
+    let window =
+        Window::free(start, vec![end], 1, vec![Signal { times: vec![0.0, 1.0], values: vec![0.1, 0.1] }]);
     Job { particle: 0, record: 0, window: Arc::new(window), theta, state }
 }

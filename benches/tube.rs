@@ -171,13 +171,7 @@ fn worker(figures: &mut Map<String, Value>) -> Result<(), Failure> {
     let times: Vec<f64> = (0..=STEPS).map(|i| i as f64 * DT).collect();
     let values = times.iter().map(|t| inflow(*t)).collect();
     let observed: Vec<f64> = times[1..].iter().skip(9).step_by(10).copied().collect();
-    let window = Window {
-        start: 0.0,
-        observed: vec![f64::NAN; observed.len() * CELLS],
-        times: observed,
-        inputs: vec![Signal { times, values }],
-        since: Vec::new(),
-    };
+    let window = Window::free(0.0, observed, CELLS, vec![Signal { times, values }]);
     let job = Job { particle: 0, record: 0, window: Arc::new(window), theta: vec![5e6; 5], state: None };
     let model = setup().build()?;
     model.run(&job)?;

@@ -149,7 +149,7 @@ fn to_worker() -> Result<(), Box<dyn std::error::Error>> {
     write("setup", "default", &json)?;
     let window = |n: usize| {
         let times = (1..=n).map(|i| i as f64).collect();
-        Arc::new(Window { start: 0.0, times, observed: vec![f64::NAN; n], inputs: vec![], since: vec![] })
+        Arc::new(Window::free(0.0, times, 1, vec![]))
     };
     let welcome = Welcome {
         protocol: PROTOCOL,

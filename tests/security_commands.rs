@@ -43,7 +43,7 @@ fn asked(access: &Path, options: &[&str], setup: &Setup, inputs: Vec<Signal>) ->
         .unwrap();
     let started: Started = worker(access, options);
     let setup = fleet.install(setup).unwrap();
-    let window = Window { start: 0.0, times: vec![0.5], observed: vec![f64::NAN], inputs, since: vec![] };
+    let window = Window::free(0.0, vec![0.5], 1, inputs);
     let job = Job { particle: 0, record: 0, window: window.into(), theta: vec![30.0, 1.5], state: None };
     let run = std::thread::spawn(move || fleet.run(setup, vec![job]));
     let refused = loop {

@@ -86,13 +86,7 @@ impl Screened {
 
 fn screen(fleet: &mut GrpcFleet, setups: &[Setup]) -> Result<Screened, Failure> {
     let times: Vec<f64> = (1..=OBSERVATIONS).map(|i| DURATION * i as f64 / OBSERVATIONS as f64).collect();
-    let window = Arc::new(Window {
-        start: 0.0,
-        observed: vec![f64::NAN; times.len()],
-        times,
-        inputs: vec![],
-        since: vec![],
-    });
+    let window = Arc::new(Window::free(0.0, times, 1, vec![]));
     let started = Instant::now();
     let ids = setups.iter().map(|setup| fleet.install(setup)).collect::<Result<Vec<SetupId>, _>>()?;
     let job = |i: usize| {

@@ -8,7 +8,7 @@ use starlings_models::{BuildSetup, Setup, Signal, Window};
 /// Observation times 0, 0.1, …, with every value missing.
 fn window(n: usize, n_obs: usize, inputs: Vec<Signal>) -> Window {
     let times: Vec<f64> = (0..n).map(|i| 0.1 * i as f64).collect();
-    Window { start: 0.0, observed: vec![f64::NAN; n * n_obs], times, inputs, since: vec![] }
+    Window::free(0.0, times, n_obs, inputs)
 }
 
 /// A ramp from `start` with `slope`, sampled at its ends and twice in between.

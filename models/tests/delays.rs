@@ -42,7 +42,7 @@ fn equations(states: &[(&str, &str, &str)], outputs: &[(&str, &str)], constants:
 /// A free run from `start` with `n` observation times `every` apart.
 fn free(setup: &Setup, start: f64, n: usize, every: f64) -> Window {
     let times: Vec<f64> = (1..=n).map(|i| start + i as f64 * every).collect();
-    Window { start, observed: vec![f64::NAN; n * setup.outputs.len()], times, inputs: vec![], since: vec![] }
+    Window::free(start, times, setup.outputs.len(), vec![])
 }
 
 /// x' = −x(t − τ) with x = 1 before 0: Σₖ (−1)ᵏ (t − (k − 1) τ)ᵏ/k! over the k with a positive base.

@@ -24,13 +24,7 @@ const LEASE: Lease = Lease { epoch: 1, job: 2, attempt: 1 };
 fn the_windows_of_a_batch_are_encoded_once_and_shared_by_its_messages() {
     let window = |start: f64| {
         let signal = Signal { times: vec![start, start + 1.0], values: vec![0.0, 1.0] };
-        Arc::new(Window {
-            start,
-            times: vec![start + 0.5],
-            observed: vec![f64::NAN],
-            inputs: vec![signal],
-            since: vec![],
-        })
+        Arc::new(Window::free(start, vec![start + 0.5], 1, vec![signal]))
     };
     let windows = [window(0.0), window(1.0)];
     // Particle by particle, as an ensemble over two records travels.

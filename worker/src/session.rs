@@ -204,8 +204,7 @@ mod tests {
 
     /// A run of the oscillator to time 1.
     fn job() -> Job<State> {
-        let window =
-            Window { start: 0.0, times: vec![1.0], observed: vec![f64::NAN], inputs: vec![], since: vec![] };
+        let window = Window::free(0.0, vec![1.0], 1, vec![]);
         Job { particle: 0, record: 0, window: Arc::new(window), theta: vec![], state: None }
     }
 

@@ -55,14 +55,7 @@ fn threads_and_a_worker_over_the_wire_give_the_same_bits() {
         outputs: names(&["position"]),
         ..Setup::default()
     };
-    let window = Window {
-        start: 0.0,
-        times: (1..40).map(|i| 0.1 * f64::from(i)).collect(),
-        observed: vec![f64::NAN; 39],
-        inputs: vec![],
-        since: Vec::new(),
-    };
-    let window = Arc::new(window);
+    let window = Arc::new(Window::free(0.0, (1..40).map(|i| 0.1 * f64::from(i)).collect(), 1, vec![]));
     let job = |particle| Job {
         particle,
         record: 0,

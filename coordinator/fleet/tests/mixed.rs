@@ -125,14 +125,8 @@ fn a_mixed_batch_gives_the_same_bits_on_threads_and_over_the_wire() {
     };
     let mut dragged = Setup { effects: vec![drag], outputs: names(&["v", "position"]), ..plain.clone() };
     dragged.model.constants.insert("a".to_owned(), 0.7);
-    let window = |n_obs: usize| Window {
-        start: 0.0,
-        times: (1..40).map(|i| 0.1 * f64::from(i)).collect(),
-        observed: vec![f64::NAN; 39 * n_obs],
-        inputs: vec![],
-        since: Vec::new(),
-    };
-    let windows = [1, 2].map(|n_obs| Arc::new(window(n_obs)));
+    let times: Vec<f64> = (1..40).map(|i| 0.1 * f64::from(i)).collect();
+    let windows = [1, 2].map(|n_obs| Arc::new(Window::free(0.0, times.clone(), n_obs, vec![])));
     let job = |particle: u32| Job {
         particle,
         record: 0,

@@ -28,8 +28,7 @@ fn models() -> Factory {
 }
 
 fn job(particle: u32, state: Held) -> Job<Held> {
-    let window =
-        Window { start: 0.0, times: vec![1.0], observed: vec![f64::NAN; 2], inputs: vec![], since: vec![] };
+    let window = Window::free(0.0, vec![1.0], 2, vec![]);
     Job { particle, record: 0, window: Arc::new(window), theta: vec![], state: Some(state) }
 }
 

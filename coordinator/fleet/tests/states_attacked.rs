@@ -66,8 +66,7 @@ fn under_with(store: StateStore, attack: impl AsyncFnOnce(SocketAddr)) -> (Vec<f
     let run = std::thread::spawn(move || {
         // A setup that this side cannot build: it does not know how long a state is.
         let setup = fleet.install(&Setup::default()).unwrap();
-        let window =
-            Window { start: 0.0, times: vec![1.0], observed: vec![f64::NAN], inputs: vec![], since: vec![] };
+        let window = Window::free(0.0, vec![1.0], 1, vec![]);
         let state = Some(Held::Values(vec![0.5; N]));
         let job = Job { particle: 0, record: 0, window: window.into(), theta: vec![], state };
         let outcome = fleet.run_held(vec![(setup, job)]).unwrap().remove(0);

@@ -45,13 +45,7 @@ impl Study {
         if train_only {
             return self.window(of_record, start, &training_rows(of_record), false);
         }
-        Window {
-            start,
-            times: of_record.times.clone(),
-            observed: vec![f64::NAN; of_record.times.len() * self.setup.outputs.len()],
-            inputs: of_record.inputs.clone(),
-            since: Vec::new(),
-        }
+        Window::free(start, of_record.times.clone(), self.setup.outputs.len(), of_record.inputs.clone())
     }
 
     /// Every trained record from its start, each with its number, as [`Study::whole`] gives it to a fit of the whole record.

@@ -96,13 +96,7 @@ pub fn simulate(study: &Study, twin: &Twin) -> Result<Recording, TwinError> {
     }
     let mut run =
         Run { model: &*model, record: twin.record, theta, n_obs: setup.outputs.len(), n_period: None };
-    let mut window = Window {
-        start,
-        observed: vec![f64::NAN; times.len() * run.n_obs],
-        times,
-        inputs: record.inputs.clone(),
-        since: Vec::new(),
-    };
+    let mut window = Window::free(start, times, run.n_obs, record.inputs.clone());
     let restarts = model.spec().restart;
     let state = match twin.period {
         Some(_) if !restarts => {
@@ -154,13 +148,7 @@ pub fn beats(
         return Err(TwinError::Request("a model that cannot restart from a state has no periods".to_owned()));
     }
     let run = Run { model: &*model, record: twin.record, theta, n_obs: setup.outputs.len(), n_period: None };
-    let window = Window {
-        start,
-        observed: vec![f64::NAN; twin.times.len() * run.n_obs],
-        times: twin.times.clone(),
-        inputs: record.inputs.clone(),
-        since: Vec::new(),
-    };
+    let window = Window::free(start, twin.times.clone(), run.n_obs, record.inputs.clone());
     let window = Arc::new(window);
     let mut state = run.initial(&window)?;
     let names = components(&study.spec.states);

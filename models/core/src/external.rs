@@ -114,13 +114,7 @@ impl<S: Solve> External<S> {
         if let Some(effects) = &self.on_inputs {
             let times = applied::grid(window);
             let n = self.description.spec.inputs.len();
-            let replayed = Window {
-                start: window.start,
-                observed: vec![f64::NAN; n * times.len()],
-                inputs: window.inputs.clone(),
-                times: times.clone(),
-                since: Vec::new(),
-            };
+            let replayed = Window::free(window.start, times.clone(), n, window.inputs.clone());
             let shown = effects.run(theta, replayed, of_effects.inputs.take())?;
             let signal = |i: usize| Signal {
                 times: times.clone(),
@@ -150,13 +144,8 @@ impl<S: Solve> External<S> {
             times: times.clone(),
             values: before.iter().map(|y| y[i]).chain(outputs.iter().skip(i).step_by(n).copied()).collect(),
         });
-        let replayed = Window {
-            start: window.start,
-            times: window.times.clone(),
-            observed: vec![f64::NAN; outputs.len()],
-            inputs: window.inputs.iter().cloned().chain(recorded).collect(),
-            since: Vec::new(),
-        };
+        let inputs = window.inputs.iter().cloned().chain(recorded).collect();
+        let replayed = Window::free(window.start, window.times.clone(), n, inputs);
         let shown = effects.run(theta, replayed, of_effects.outputs.take())?;
         of_effects.outputs = Some(shown.state);
         of_effects.last = outputs.len().checked_sub(n).map(|first| outputs[first..].to_vec());

@@ -36,6 +36,13 @@ pub struct Window {
     pub since: Vec<f64>,
 }
 
+impl Window {
+    /// A window in which nothing is observed: the model runs freely to `times`, with `n_obs` output rows at each.
+    pub fn free(start: f64, times: Vec<f64>, n_obs: usize, inputs: Vec<Signal>) -> Self {
+        Self { start, observed: vec![f64::NAN; n_obs * times.len()], times, inputs, since: Vec::new() }
+    }
+}
+
 /// One run: this particle, these parameters, this window, from this state.
 ///
 /// A model gets the values of the state; on its way to a worker a large state may stand as something else, `S`.

@@ -43,13 +43,7 @@ fn simulator(def: &EquationsDef, noise: Option<u64>) -> Simulator {
 /// Predicted outputs at the times, time by time.
 fn path(simulator: &Simulator, times: &[f64], particle: u32, record: u32) -> Vec<f64> {
     let n = simulator.spec().n_output();
-    let window = Window {
-        start: 0.0,
-        times: times.to_vec(),
-        observed: vec![f64::NAN; n * times.len()],
-        inputs: vec![],
-        since: Vec::new(),
-    };
+    let window = Window::free(0.0, times.to_vec(), n, vec![]);
     let job = Job { particle, record, window: Arc::new(window), theta: vec![], state: None };
     simulator.run(&job).unwrap().outputs
 }

@@ -31,8 +31,7 @@ fn the_model_records_what_the_inspection_computes() {
     let simulator = Simulator::new(built, &setup, NativeModels::NONE).unwrap();
     let times: Vec<f64> = (0..375).map(|i| f64::from(i) * step).collect();
     let force = Signal { times: times.clone(), values: burst(step, 375) };
-    let observed = vec![f64::NAN; 6 * 375];
-    let window = Arc::new(Window { start: 0.0, times, observed, inputs: vec![force], since: vec![] });
+    let window = Arc::new(Window::free(0.0, times, 6, vec![force]));
     let job = Job { particle: 0, record: 0, window, theta: vec![0.3, 0.5, 0.7], state: None };
     let recorded = simulator.run(&job).unwrap().outputs;
     let expected = inspection.exact(&Damage { patch: PATCH, severity: 0.3 });

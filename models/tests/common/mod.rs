@@ -68,8 +68,7 @@ pub(crate) fn window(setup: &Setup, n: usize) -> Window {
         let values = sampled.iter().map(|t| 40.0 * (9.0 * t + k as f64).sin().max(0.0)).collect();
         Signal { times: sampled.clone(), values }
     };
-    let observed = vec![f64::NAN; n * n_obs];
-    Window { start: 0.0, times, observed, inputs: (0..n_input).map(signal).collect(), since: vec![] }
+    Window::free(0.0, times, n_obs, (0..n_input).map(signal).collect())
 }
 
 /// A job from the initial state.

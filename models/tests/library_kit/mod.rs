@@ -72,9 +72,8 @@ impl Bench {
             let values = sampled.iter().map(value).collect();
             Signal { times: sampled.clone(), values }
         };
-        let observed = vec![f64::NAN; times.len() * sizes.iter().sum::<usize>()];
-        let inputs = (0..spec.inputs.len()).map(signal).collect();
-        let window = Window { start: 0.0, times, observed, inputs, since: vec![] };
+        let window =
+            Window::free(0.0, times, sizes.iter().sum(), (0..spec.inputs.len()).map(signal).collect());
         Self { name, spec, window, setup, theta, sizes }
     }
 

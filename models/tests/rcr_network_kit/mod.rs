@@ -28,8 +28,7 @@ pub(crate) fn grid(n: usize, end: f64) -> Vec<f64> {
 }
 
 pub(crate) fn over(setup: &Setup, times: Vec<f64>, inputs: Vec<Signal>) -> Window {
-    let observed = vec![f64::NAN; times.len() * setup.outputs.len()];
-    Window { start: 0.0, times, observed, inputs, since: vec![] }
+    Window::free(0.0, times, setup.outputs.len(), inputs)
 }
 
 /// The series of one output.

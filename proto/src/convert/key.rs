@@ -85,7 +85,7 @@ mod tests {
 
     fn job() -> Job {
         let inputs = vec![Signal { times: vec![0.0, 1.0], values: vec![2.0, 3.0] }];
-        let window = Window { start: 0.0, times: vec![1.0], observed: vec![f64::NAN], inputs, since: vec![] };
+        let window = Window::free(0.0, vec![1.0], 1, inputs);
         Job { particle: 1, record: 2, window: window.into(), theta: vec![0.5, -0.0], state: Some(vec![1.0]) }
     }
 

@@ -104,8 +104,7 @@ impl Bench {
 
 fn job(k: f64, times: &[f64], n_output: usize, flow: &[f64]) -> Job {
     let inputs = vec![Signal { times: (0..flow.len()).map(|i| i as f64).collect(), values: flow.to_vec() }];
-    let observed = vec![f64::NAN; n_output * times.len()];
-    let window = Arc::new(Window { start: 0.0, times: times.to_vec(), observed, inputs, since: vec![] });
+    let window = Arc::new(Window::free(0.0, times.to_vec(), n_output, inputs));
     Job { particle: 3, record: 1, window, theta: vec![k], state: None }
 }
 

@@ -41,8 +41,7 @@ fn program(script: &str, folder: &std::path::Path) -> Box<dyn Forward> {
 }
 
 fn job() -> Job {
-    let window =
-        Window { start: 0.0, times: vec![1.0], observed: vec![f64::NAN], inputs: vec![], since: vec![] };
+    let window = Window::free(0.0, vec![1.0], 1, vec![]);
     Job { particle: 0, record: 0, window: Arc::new(window), theta: vec![1.0], state: None }
 }
 

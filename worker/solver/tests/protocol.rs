@@ -61,13 +61,12 @@ fn both(solvers: &Solvers, def: &SolverDef, effects: Vec<EffectDef>) -> (Box<dyn
 fn job(theta: &[f64], from: usize, to: usize, state: Option<Vec<f64>>) -> Job {
     let time = |i: usize| i as f64 * 0.05;
     let drive: Vec<f64> = (0..81).map(|i| (1.7 * time(i)).sin()).collect();
-    let window = Window {
-        start: time(from),
-        times: (from + 1..=to).map(time).collect(),
-        observed: vec![f64::NAN; 2 * (to - from)],
-        inputs: vec![Signal { times: (0..81).map(time).collect(), values: drive }],
-        since: Vec::new(),
-    };
+    let window = Window::free(
+        time(from),
+        (from + 1..=to).map(time).collect(),
+        2,
+        vec![Signal { times: (0..81).map(time).collect(), values: drive }],
+    );
     Job { particle: 3, record: 0, window: Arc::new(window), theta: theta.to_vec(), state }
 }
 

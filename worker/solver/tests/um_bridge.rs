@@ -64,9 +64,7 @@ impl Bench {
     }
 
     fn run(&self, theta: &[f64], times: &[f64]) -> Result<Vec<f64>, String> {
-        let observed = vec![f64::NAN; times.len()];
-        let window =
-            Window { start: 0.0, times: times.to_vec(), observed, inputs: Vec::new(), since: vec![] };
+        let window = Window::free(0.0, times.to_vec(), 1, Vec::new());
         let job =
             Job { particle: 0, record: 0, window: Arc::new(window), theta: theta.to_vec(), state: None };
         let prediction = self.forward()?.run(&job).map_err(|error| error.to_string())?;
@@ -103,13 +101,7 @@ fn a_server_that_dies_under_a_run_is_started_again() {
 fn twice_at_once(bench: &Bench) -> [Result<Vec<f64>, String>; 2] {
     let forward = bench.forward().unwrap();
     let run = || {
-        let window = Window {
-            start: 0.0,
-            times: vec![3.0],
-            observed: vec![f64::NAN],
-            inputs: Vec::new(),
-            since: vec![],
-        };
+        let window = Window::free(0.0, vec![3.0], 1, Vec::new());
         let job =
             Job { particle: 0, record: 0, window: Arc::new(window), theta: vec![1.0, 2.0], state: None };
         forward.run(&job).map(|prediction| prediction.outputs).map_err(|error| error.to_string())

@@ -168,13 +168,8 @@ fn stretched(window: &Window, n_obs: usize) -> Window {
         }
         Signal { times, values }
     });
-    Window {
-        start: window.start,
-        times: [window.times.as_slice(), &later(&window.times)].concat(),
-        observed: vec![f64::NAN; 2 * window.times.len() * n_obs],
-        inputs: inputs.collect(),
-        since: Vec::new(),
-    }
+    let times = [window.times.as_slice(), &later(&window.times)].concat();
+    Window::free(window.start, times, n_obs, inputs.collect())
 }
 
 /// χ² between two variants in each trial, all in one batch; nothing where one of them fails. The budget decides how many of the
@@ -217,13 +212,7 @@ mod tests {
         // A delay may ask for an input before the record starts: two samples lie there.
         let times: Vec<f64> = (0..12).map(|k| 0.5 * f64::from(k) - 1.0).collect();
         let values: Vec<f64> = (0..12).map(f64::from).collect();
-        let window = Window {
-            start: 0.0,
-            times: vec![0.0, 1.0, 2.0, 3.0],
-            observed: vec![f64::NAN; 8],
-            inputs: vec![Signal { times, values }],
-            since: Vec::new(),
-        };
+        let window = Window::free(0.0, vec![0.0, 1.0, 2.0, 3.0], 2, vec![Signal { times, values }]);
         let longer = stretched(&window, 2);
         assert_eq!(longer.times, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
         assert_eq!(longer.observed.len(), 16);

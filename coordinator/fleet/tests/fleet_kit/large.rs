@@ -26,8 +26,7 @@ pub fn moved(job: &Job) -> Prediction {
 
 /// A particle's run over a window with so many observed values, from a state with values that are hard to carry.
 pub fn job(particle: u32, n_observed: usize) -> Job {
-    let observed = vec![f64::NAN; n_observed];
-    let window = Window { start: 0.0, times: vec![1.0], observed, inputs: vec![], since: vec![] };
+    let window = Window::free(0.0, vec![1.0], n_observed, vec![]);
     let mut state: Vec<f64> = (0..N).map(|i| ((i * 31 + particle as usize) % 1009) as f64 / 7.0).collect();
     (state[1], state[2]) = (-0.0, f64::MIN_POSITIVE / 4.0);
     Job { particle, record: 0, window: Arc::new(window), theta: vec![], state: Some(state) }

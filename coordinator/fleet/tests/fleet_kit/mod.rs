@@ -63,13 +63,7 @@ pub fn square(job: &Job) -> Prediction {
 }
 
 pub fn jobs(n: u32) -> Vec<Job> {
-    let window = Arc::new(Window {
-        start: 0.0,
-        times: vec![1.0],
-        observed: vec![f64::NAN; 2],
-        inputs: vec![],
-        since: vec![],
-    });
+    let window = Arc::new(Window::free(0.0, vec![1.0], 2, vec![]));
     let job = |particle| Job {
         particle,
         record: 0,

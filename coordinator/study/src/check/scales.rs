@@ -139,13 +139,8 @@ fn courses(
     };
     for (index, trial) in trials.iter().enumerate() {
         let n_obs = bare.outputs.len();
-        let window = Window {
-            start: trial.record.start,
-            times: trial.times.clone(),
-            observed: vec![f64::NAN; n_obs * trial.times.len()],
-            inputs: trial.record.inputs.clone(),
-            since: Vec::new(),
-        };
+        let window =
+            Window::free(trial.record.start, trial.times.clone(), n_obs, trial.record.inputs.clone());
         let theta = trial.theta.iter().zip(&kept).filter(|(_, kept)| **kept).map(|(v, _)| *v).collect();
         let job = Job { particle: 0, record: index as u32, window: Arc::new(window), theta, state: None };
         let outputs = model

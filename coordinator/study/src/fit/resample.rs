@@ -153,11 +153,5 @@ fn observe_again(
 fn instant(window: &Window) -> Window {
     let end = window.times.last().copied().unwrap_or(window.start);
     let n_obs = window.observed.len() / window.times.len().max(1);
-    Window {
-        start: end,
-        times: vec![end],
-        observed: vec![f64::NAN; n_obs],
-        inputs: window.inputs.clone(),
-        since: vec![],
-    }
+    Window::free(end, vec![end], n_obs, window.inputs.clone())
 }

@@ -33,13 +33,7 @@ impl Members {
     pub(super) fn run(fleet: &mut dyn Fleet, ensemble: &Ensemble) -> Result<Self, StudyForecastError> {
         let n_obs = ensemble.setup.outputs.len();
         let times = &ensemble.times;
-        let window = Arc::new(Window {
-            start: times[0],
-            times: times.clone(),
-            observed: vec![f64::NAN; n_obs * times.len()],
-            inputs: ensemble.inputs.clone(),
-            since: Vec::new(),
-        });
+        let window = Arc::new(Window::free(times[0], times.clone(), n_obs, ensemble.inputs.clone()));
         let job = |(particle, theta): (usize, &Vec<f64>)| Job {
             particle: particle as u32,
             record: ensemble.record.0,

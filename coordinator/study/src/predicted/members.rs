@@ -63,13 +63,7 @@ pub(super) fn run(runner: &mut EnsembleRunner<'_>, posterior: &Gaussian) -> Resu
 
 /// A record from its start, without any observed value.
 fn window(study: &Study, times: Vec<f64>, record: &crate::Record) -> Window {
-    Window {
-        start: record.start,
-        observed: vec![f64::NAN; study.predict.outputs.len() * times.len()],
-        times,
-        inputs: record.inputs.clone(),
-        since: Vec::new(),
-    }
+    Window::free(record.start, times, study.predict.outputs.len(), record.inputs.clone())
 }
 
 impl Members {

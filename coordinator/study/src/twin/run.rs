@@ -86,8 +86,7 @@ impl Run<'_> {
 
     /// A window over these times with the inputs of another.
     fn part(&self, window: &Window, start: f64, times: Vec<f64>) -> Arc<Window> {
-        let observed = vec![f64::NAN; times.len() * self.n_obs];
-        Arc::new(Window { start, times, observed, inputs: window.inputs.clone(), since: vec![] })
+        Arc::new(Window::free(start, times, self.n_obs, window.inputs.clone()))
     }
 }
 

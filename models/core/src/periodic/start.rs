@@ -45,13 +45,7 @@ impl PeriodicStart {
     fn state(&self, job: &Job, period: f64, until: &Until<'_>) -> Result<Vec<f64>, ParticleError> {
         let start = job.window.start;
         let run = |from: f64, to: f64, state: Option<Vec<f64>>| {
-            let window = Arc::new(Window {
-                start: from,
-                times: vec![to],
-                observed: vec![f64::NAN; self.n_row],
-                inputs: job.window.inputs.clone(),
-                since: Vec::new(),
-            });
+            let window = Arc::new(Window::free(from, vec![to], self.n_row, job.window.inputs.clone()));
             self.inner.run_within(&Job { window, state, ..job.clone() }, until).map(|found| found.state)
         };
         let mut states = vec![run(start, start, None)?];

@@ -49,13 +49,12 @@ impl Motor {
             Simulator::new(model(self.kind, &self.layout), &setup, NativeModels::of(&[MODELS])).unwrap();
         let n_input = simulator.spec().inputs.len();
         let n_obs = rows(&*model(self.kind, &self.layout), &self.outputs);
-        let window = Window {
-            start: 0.0,
-            times: times.to_vec(),
-            observed: vec![f64::NAN; n_obs * times.len()],
-            inputs: vec![Signal { times: vec![0.0, 1.0], values: vec![1.0, 0.8] }; n_input],
-            since: Vec::new(),
-        };
+        let window = Window::free(
+            0.0,
+            times.to_vec(),
+            n_obs,
+            vec![Signal { times: vec![0.0, 1.0], values: vec![1.0, 0.8] }; n_input],
+        );
         let job = Job { particle: 0, record: 0, window: Arc::new(window), theta: vec![], state };
         let ran = simulator.run(&job).unwrap();
         (ran.outputs.chunks(n_obs).map(<[f64]>::to_vec).collect(), ran.state)

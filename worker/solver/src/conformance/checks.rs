@@ -72,12 +72,8 @@ fn restart(subject: &Subject<'_>) -> Verdict {
     let outputs = all_outputs(subject.spec());
     let window = &subject.trial.window;
     let (n, cut) = (subject.spec().n_output(), window.times.len() / 2);
-    let part = |from: usize, to: usize, start: f64| Window {
-        start,
-        times: window.times[from..to].to_vec(),
-        observed: vec![f64::NAN; n * (to - from)],
-        inputs: window.inputs.clone(),
-        since: Vec::new(),
+    let part = |from: usize, to: usize, start: f64| {
+        Window::free(start, window.times[from..to].to_vec(), n, window.inputs.clone())
     };
     let (first, second) = (part(0, cut, window.start), part(cut, window.times.len(), window.times[cut - 1]));
     let none = ObserverDef::default();

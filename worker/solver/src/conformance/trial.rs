@@ -40,13 +40,8 @@ impl Trial {
         };
         let (start, end) = (times[0], times[times.len() - 1]);
         let input = |q| Signal { times: vec![start, end], values: vec![value(q); 2] };
-        let window = Window {
-            start,
-            observed: vec![f64::NAN; spec.n_output() * (times.len() - 1)],
-            inputs: spec.inputs.iter().map(input).collect(),
-            times: times[1..].to_vec(),
-            since: Vec::new(),
-        };
+        let inputs = spec.inputs.iter().map(input).collect();
+        let window = Window::free(start, times[1..].to_vec(), spec.n_output(), inputs);
         Ok(Self { parameters: spec.parameters.iter().map(value).collect(), window })
     }
 

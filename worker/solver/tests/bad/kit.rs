@@ -152,12 +152,6 @@ pub(crate) fn setup(solvers: &Solvers, def: &SolverDef) -> Setup {
 /// A run over three times.
 pub(crate) fn job(state: Option<Vec<f64>>) -> Job {
     let times = vec![0.1, 0.2, 0.3];
-    let window = Window {
-        start: 0.0,
-        observed: vec![f64::NAN; 2 * times.len()],
-        times,
-        inputs: Vec::new(),
-        since: vec![],
-    };
+    let window = Window::free(0.0, times, 2, Vec::new());
     Job { particle: 3, record: 0, window: Arc::new(window), theta: vec![30.0, 0.5], state }
 }

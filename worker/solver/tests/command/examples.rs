@@ -72,7 +72,7 @@ fn the_program_in_c_cools_a_plate_as_the_series_solution_does() {
         ..FilesDef::default()
     };
     let times = vec![2.0, 30.25, 120.0];
-    let window = Window { start: 0.0, observed: vec![f64::NAN; 6], times, inputs: Vec::new(), since: vec![] };
+    let window = Window::free(0.0, times, 2, Vec::new());
     let outputs = vec![Quantity::new("centre", "degC"), Quantity::new("surface", "degC")];
     let truth = [("k", 45.0), ("h", 1200.0), ("plate", 850.0)];
     let got = run(&[&program], files, &truth, outputs, window, &[]);
@@ -97,8 +97,7 @@ fn calculix_bends_the_beam_of_its_example() {
     };
     let times = vec![1.0, 2.0];
     let force = Signal { times: times.clone(), values: vec![5.1, 9.8] };
-    let window =
-        Window { start: 1.0, observed: vec![f64::NAN; 6], times, inputs: vec![force], since: vec![] };
+    let window = Window::free(1.0, times, 3, vec![force]);
     let outputs = vec![Quantity::new("deflection", "mm").size(3)];
     let truth = [("E_root", 70.0), ("E_middle", 45.0), ("E_tip", 30.0)];
     let got = run(&["ccx", "beam"], files, &truth, outputs, window, &["force"]);

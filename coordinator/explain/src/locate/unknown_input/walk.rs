@@ -114,13 +114,7 @@ impl Walk<'_> {
     ) -> Result<Option<Vec<f64>>, ExplainError> {
         let Some(first) = windows.first() else { return Ok(None) };
         let n_obs = self.study.setup.outputs.len();
-        let window = Window {
-            start: first.start,
-            times: vec![first.start],
-            observed: vec![f64::NAN; n_obs],
-            inputs: first.inputs.clone(),
-            since: Vec::new(),
-        };
+        let window = Window::free(first.start, vec![first.start], n_obs, first.inputs.clone());
         let window = Arc::new(window);
         let outcomes = fleet.run(self.candidate.setup, vec![self.job(&window, None, 0.0)]);
         let outcomes = outcomes.map_err(|error| fleet_failure(self.study, error))?;
