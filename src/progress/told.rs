@@ -3,7 +3,7 @@
 //! Next file to read: [`super::form`].
 
 use starlings_coordinator::infer;
-use starlings_coordinator::live::Standing;
+use starlings_coordinator::live::{Counted, Standing};
 use starlings_coordinator::study::{Progress, Stage, Work};
 
 use crate::log;
@@ -61,7 +61,6 @@ impl Told {
                 stage: at.name.to_owned(),
                 says: at.says.clone(),
                 runs: at.runs,
-                counted: "runs".to_owned(),
                 workers: at.workers,
                 ..Standing::default()
             },
@@ -69,7 +68,7 @@ impl Told {
                 stage: at.stage.to_owned(),
                 says: at.says.clone(),
                 runs: at.n_block,
-                counted: "blocks".to_owned(),
+                counted: Counted::Blocks,
                 workers: at.workers,
                 ..Standing::default()
             },
@@ -97,6 +96,5 @@ fn step(at: &Progress) -> Standing {
     } else {
         (at.stage.to_owned(), format!("{} of {} ensembles after the fit", at.step, at.steps))
     };
-    let counted = "runs".to_owned();
-    Standing { stage, says, runs: at.runs, counted, workers: at.workers, ..Standing::default() }
+    Standing { stage, says, runs: at.runs, workers: at.workers, ..Standing::default() }
 }

@@ -22,11 +22,7 @@ pub(super) fn standing(view: &View) -> String {
     let stage = [&standing.stage, &standing.says].into_iter().filter(|part| !part.is_empty());
     let stage = stage.map(String::as_str).collect::<Vec<_>>().join(": ");
     says.push(if stage.is_empty() { "no analysis yet".to_owned() } else { stage });
-    says.push(format!(
-        "{} {}",
-        standing.runs,
-        if standing.counted.is_empty() { "runs" } else { &standing.counted }
-    ));
+    says.push(format!("{} {}", standing.runs, standing.counted));
     says.push(format!("{} workers", standing.workers));
     says.extend(standing.share.map(|share| format!("{:.0} %", 100.0 * share)));
     says.push(format!("{} so far", duration(view.elapsed_s)));

@@ -11,7 +11,7 @@ use starlings_study::{RunFolder, Work, progress};
 
 use super::course::Course;
 use super::pace::Pace;
-use super::view::{EventView, Head, Standing, State, View};
+use super::view::{Counted, EventView, Head, Standing, State, View};
 
 /// Events that are shown.
 const EVENTS: usize = 12;
@@ -124,7 +124,7 @@ impl Watched {
             share: (total > 0.0).then_some(share),
             left_s,
             runs,
-            counted: "runs".to_owned(),
+            counted: Counted::Runs,
             workers: if is_running { workers } else { 0 },
         }
     }

@@ -18,4 +18,4 @@ pub use folder::Watched;
 pub use pace::Pace;
 pub use serve::{Live, LivePage};
 pub use told::Told;
-pub use view::{Head, Standing, State, View};
+pub use view::{Counted, Head, Standing, State, View};

@@ -2,6 +2,8 @@
 //!
 //! Next file to read: [`super::told`].
 
+use std::fmt;
+
 use serde::{Deserialize, Deserializer, Serialize};
 
 /// What does not change while a command runs.
@@ -32,6 +34,26 @@ pub enum State {
     Ended,
 }
 
+/// What the work is counted in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Counted {
+    /// Runs of the model.
+    #[default]
+    Runs,
+    /// Blocks of a recording.
+    Blocks,
+}
+
+impl fmt::Display for Counted {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Runs => "runs",
+            Self::Blocks => "blocks",
+        })
+    }
+}
+
 /// How far the work is.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Standing {
@@ -43,10 +65,10 @@ pub struct Standing {
     pub share: Option<f64>,
     /// Time left, s, where it can be said.
     pub left_s: Option<f64>,
-    /// Runs of the model so far, or blocks of a recording.
+    /// How many of what is counted are done.
     pub runs: u64,
-    /// Which of both: `runs` or `blocks`.
-    pub counted: String,
+    /// What is counted.
+    pub counted: Counted,
     /// Workers.
     pub workers: usize,
 }

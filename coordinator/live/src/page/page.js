@@ -181,7 +181,7 @@
     $("share").hidden = share === null && view.state !== "running";
     const left = view.state !== "running" || standing.left_s === null ? "" : `, about ${time(standing.left_s)} left`;
     const done = share === null ? "" : `${Math.floor(100 * share)} % · `;
-    text($("times"), `${done}${time(elapsed)} so far${left} · ${count(standing.runs)} ${standing.counted || "runs"}${head.command === "run" ? " in the analyses so far" : " so far"}`);
+    text($("times"), `${done}${time(elapsed)} so far${left} · ${count(standing.runs)} ${standing.counted}${head.command === "run" ? " in the analyses so far" : " so far"}`);
     const notice = view.state === "ended" ? view.ended : view.unreadable ? `The store cannot be read: ${view.unreadable}` : "";
     if (!isOver || view.state !== "finished") { show("notice", notice !== ""); text($("notice"), notice); }
 

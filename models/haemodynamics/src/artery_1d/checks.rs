@@ -7,7 +7,7 @@ use std::collections::HashSet;
 use starlings_models_core::SetupError;
 use starlings_models_core::layout::fault;
 
-use super::layout::{Segment, modulus};
+use super::layout::{Segment, StiffnessParameter, stiffness_parameter};
 use crate::MOST_CELLS;
 
 /// Regions of all vessels together at most: the pressures of their ends are one full system of equations in every step.
@@ -37,7 +37,7 @@ fn wall(path: &str, segment: &Segment) -> Result<(), SetupError> {
 
 /// Refuses what no vessel can be, too many cells, and vessels whose parameters would share a name.
 pub(super) fn segments(segments: &[Segment]) -> Result<(), SetupError> {
-    let (mut n_cell, mut n_region, mut moduli) = (0_usize, 0_usize, HashSet::new());
+    let (mut n_cell, mut n_region, mut names) = (0_usize, 0_usize, HashSet::new());
     for (i, segment) in segments.iter().enumerate() {
         let path = |key: &str| format!("segments[{i}].{key}");
         for (key, name) in [("name", &segment.name), ("from", &segment.from), ("to", &segment.to)] {
@@ -82,12 +82,11 @@ pub(super) fn segments(segments: &[Segment]) -> Result<(), SetupError> {
             return Err(fault(&path("cells"), message));
         }
         for region in 0..regions {
-            let own = modulus(segment, region, segments.len() == 1);
-            let (modulus, place) = (own.name, own.place);
-            if !moduli.insert(modulus.clone()) {
-                let message = format!(
-                    "Young's modulus of {place} is `{modulus}`, and so is another: rename one of the two"
-                );
+            let StiffnessParameter { name, place, .. } =
+                stiffness_parameter(segment, region, segments.len() == 1);
+            if !names.insert(name.clone()) {
+                let message =
+                    format!("the stiffness of {place} is `{name}`, and so is another: rename one of the two");
                 return Err(fault(&path("name"), message));
             }
         }

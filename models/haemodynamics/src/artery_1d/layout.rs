@@ -129,7 +129,7 @@ impl Default for Layout {
 
 /// The parameter that sets the stiffness of one region.
 #[derive(Debug)]
-pub(super) struct Modulus {
+pub(super) struct StiffnessParameter {
     pub(super) name: String,
     /// Whose it is.
     pub(super) place: String,
@@ -138,7 +138,7 @@ pub(super) struct Modulus {
 }
 
 /// That of a region of a segment, which may be the only one.
-pub(super) fn modulus(segment: &Segment, region: usize, alone: bool) -> Modulus {
+pub(super) fn stiffness_parameter(segment: &Segment, region: usize, alone: bool) -> StiffnessParameter {
     let (name, number, of_law) = (&segment.name, region + 1, segment.wall.is_some());
     let stem = if of_law { "stiffness" } else { "E" };
     let (name, place) = match (alone, segment.regions) {
@@ -146,5 +146,5 @@ pub(super) fn modulus(segment: &Segment, region: usize, alone: bool) -> Modulus 
         (false, 1) => (format!("{stem}_{name}"), format!("`{name}`")),
         (false, _) => (format!("{stem}_{name}_{number}"), format!("region {number} of `{name}`")),
     };
-    Modulus { name, place, of_law }
+    StiffnessParameter { name, place, of_law }
 }

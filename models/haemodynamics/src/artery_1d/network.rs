@@ -8,7 +8,7 @@ use starlings_models_core::SetupError;
 use starlings_models_core::layout::fault;
 
 use super::checks;
-use super::layout::{Layout, Modulus, NodeKind, Segment, WallLaw, modulus};
+use super::layout::{Layout, NodeKind, Segment, StiffnessParameter, WallLaw, stiffness_parameter};
 
 /// A tube of one parameter of stiffness.
 #[derive(Debug)]
@@ -64,7 +64,7 @@ pub(super) struct Network {
     pub(super) nodes: Vec<Node>,
     pub(super) n_cell: usize,
     /// The parameter of stiffness of each tube.
-    pub(super) moduli: Vec<Modulus>,
+    pub(super) stiffnesses: Vec<StiffnessParameter>,
     /// The node of the inlet.
     pub(super) inlet: usize,
     /// The nodes of the outlets, in the order of the layout.
@@ -118,7 +118,7 @@ impl Network {
         if outlets.is_empty() {
             return Err(fault("nodes", "no outlet: list a node of kind \"rcr\" or \"resistance\""));
         }
-        Ok(Self { tubes: Vec::new(), nodes, n_cell: 0, moduli: Vec::new(), inlet, outlets })
+        Ok(Self { tubes: Vec::new(), nodes, n_cell: 0, stiffnesses: Vec::new(), inlet, outlets })
     }
 
     /// The node of this name; a joint where there is none yet.
@@ -168,7 +168,7 @@ impl Network {
                 nodes: [from, to],
             });
             self.n_cell += n;
-            self.moduli.push(modulus(segment, region, alone));
+            self.stiffnesses.push(stiffness_parameter(segment, region, alone));
             from = to;
         }
     }

@@ -4,7 +4,7 @@
 
 use starlings_models_core::{Quantity, Role, Spec};
 
-use super::layout::{Modulus, NodeKind};
+use super::layout::{NodeKind, StiffnessParameter};
 use super::network::Network;
 
 /// Young's modulus of an artery in dyn/cm².
@@ -51,7 +51,7 @@ fn states(network: &Network) -> Vec<Quantity> {
 }
 
 fn parameters(network: &Network) -> Vec<Quantity> {
-    let stiffness = |Modulus { name, place, of_law }: &Modulus| {
+    let stiffness = |StiffnessParameter { name, place, of_law }: &StiffnessParameter| {
         let (unit, default) = if *of_law { ("", 1.0) } else { (PRESSURE, YOUNG) };
         let says = if *of_law {
             format!("Stiffness of {place}, as a multiple of what its law says.")
@@ -60,7 +60,7 @@ fn parameters(network: &Network) -> Vec<Quantity> {
         };
         Quantity::new(name, unit).role(Role::Stiffness).positive().default(default).says(&says)
     };
-    let mut all: Vec<Quantity> = network.moduli.iter().map(stiffness).collect();
+    let mut all: Vec<Quantity> = network.stiffnesses.iter().map(stiffness).collect();
     all.extend(shared());
     for &node in &network.outlets {
         all.extend(outlet(network, node));
