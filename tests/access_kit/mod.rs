@@ -6,6 +6,7 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use crate::common::{LIMIT, starlings, wait_until};
@@ -14,7 +15,11 @@ use crate::common::{LIMIT, starlings, wait_until};
 pub(crate) struct Started {
     pub(crate) child: Child,
     said: Arc<Mutex<String>>,
+    reader: JoinHandle<()>,
 }
+
+/// How long what a process said in its last moment may be on its way; what it started may keep its stream open for longer.
+const LAST_WORDS: Duration = Duration::from_secs(2);
 
 impl Started {
     pub(crate) fn of(command: &mut Command) -> Self {
@@ -22,12 +27,12 @@ impl Started {
             command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
         let said = Arc::<Mutex<String>>::default();
         let (kept, stderr) = (Arc::clone(&said), child.stderr.take().unwrap());
-        std::thread::spawn(move || {
+        let reader = std::thread::spawn(move || {
             for line in BufReader::new(stderr).lines().map_while(Result::ok) {
                 kept.lock().unwrap().push_str(&(line + "\n"));
             }
         });
-        Self { child, said }
+        Self { child, said, reader }
     }
 
     pub(crate) fn said(&self) -> String {
@@ -42,9 +47,13 @@ impl Started {
         }
     }
 
-    /// Its exit code.
+    /// Its exit code, when all that it said has been read.
     pub(crate) fn end(&mut self) -> Option<i32> {
         wait_until("the end of a process", || self.child.try_wait().unwrap().is_some());
+        let ended = Instant::now();
+        while !self.reader.is_finished() && ended.elapsed() < LAST_WORDS {
+            std::thread::sleep(Duration::from_millis(2));
+        }
         self.child.wait().unwrap().code()
     }
 }
