@@ -18,14 +18,17 @@ const PIECES: usize = 16;
 /// Steps of a piece, at least and at most.
 const LEAST: usize = 16;
 const MOST: usize = 1024;
-/// Steps times the drift's fastest rate from which steps are coarse where longer ones have no fit: there a rate is found too small by 8 %.
-const RATES: f64 = 1.0;
+/// Steps times the drift's fastest rate from which steps are coarse where twice as long ones have no fit: there a rate is found wrong by 1 %
+/// at least, the (λh)²/12 of a path without noise.
+const RATES: f64 = 0.35;
 
 /// What the step does to the estimates.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Coarse {
     /// These coefficients would move out of their intervals.
     Moved(Vec<StepError>),
+    /// They would by a third at least of how far they move from twice the step; four times the step has no fit to extrapolate from.
+    Moving(Vec<StepError>),
     /// A step is so many times the fastest time of the drift, and longer steps have no fit to compare with.
     Fast(f64),
 }
@@ -48,21 +51,26 @@ pub(crate) fn coarse(
     }
     let structure = &asked.question.structure;
     let pieces = pieces(asked, cut, at).ok()?;
-    match step_errors(&pieces, fit, structure, &answer.posterior, LEVEL) {
+    let errors = |n_step| step_errors(&pieces, n_step, fit, structure, &answer.posterior, LEVEL);
+    match errors(3) {
         Ok(moved) => (!moved.is_empty()).then_some(Coarse::Moved(moved)),
         // Pieces that do not compare say nothing of the step; a longer one without a fit does.
         Err(InferenceError::Shape { .. } | InferenceError::Incompatible { .. }) => None,
-        Err(_) => {
-            let rates = step_in_rates(sums, &answer.posterior);
-            (rates > RATES).then_some(Coarse::Fast(rates))
-        }
+        Err(_) => errors(2).map_or_else(
+            |_| {
+                let rates = step_in_rates(sums, &answer.posterior);
+                (rates > RATES).then_some(Coarse::Fast(rates))
+            },
+            |moving| (!moving.is_empty()).then_some(Coarse::Moving(moving)),
+        ),
     }
 }
 
 /// Sums at h, 2h and 4h of the first pieces of the first recording.
 fn pieces(asked: &Asked<'_>, cut: Cut, at: Start) -> Result<Vec<[Sums; 3]>, InferError> {
     let Some(record) = asked.choice.records.first() else { return Ok(Vec::new()) };
-    let n_step = ((at.n_row / PIECES as f64) as usize).clamp(LEAST, MOST);
+    let n_row = at.n_row.min((record.span[1] - record.span[0]) / at.step);
+    let n_step = ((n_row / PIECES as f64) as usize).clamp(LEAST, MOST);
     let cut = Cut { bytes: None, block: n_step, ahead: 0, ..cut };
     let mut blocks = Blocks::new((0, record), open(record)?, cut);
     let basis = &asked.question.basis;

@@ -132,29 +132,34 @@ const MOVED: usize = 4;
 /// That steps are coarse for the dynamics.
 pub(crate) fn of_steps(coarse: &Coarse, step: f64, unit: &str) -> String {
     let begins = format!("steps of {step} {unit} are coarse for this dynamics:");
-    let help = "`richardson = true` in [infer] takes that out, shorter steps make it small";
+    let out = "without the error of the step coefficients would move out of their intervals, by the first rows of the recording";
     match coarse {
-        Coarse::Moved(moved) => {
-            let mut moved: Vec<_> = moved.iter().collect();
-            moved.sort_by(|a, b| (b.moves / b.half).abs().total_cmp(&(a.moves / a.half).abs()));
-            let said =
-                |of: &&StepError| format!("{} by {:+.2e} (interval ± {:.2e})", of.name, of.moves, of.half);
-            let mut list: Vec<String> = moved.iter().take(MOVED).map(said).collect();
-            let more = moved.len().saturating_sub(MOVED);
-            if more > 0 {
-                list.push(format!("{more} more"));
-            }
-            format!(
-                "{begins} without the error of the step coefficients would move out of their intervals, by the first rows of the recording {}; \
-                 {help}",
-                list.join(", ")
-            )
-        }
+        Coarse::Moved(moved) => format!(
+            "{begins} {out} {}; `richardson = true` in [infer] takes that out, shorter steps make it small",
+            listed(moved)
+        ),
+        Coarse::Moving(moving) => format!(
+            "{begins} {out} {} at least; four times the step has no fit, from which `richardson` could take it out: record in shorter steps",
+            listed(moving)
+        ),
         Coarse::Fast(rates) => format!(
-            "{begins} a step is {rates:.1} times the fastest time of the drift that was found, whose rates are too small by that; two or \
+            "{begins} a step is {rates:.1} times the fastest time of the drift that was found, whose rates are wrong by that; two or \
              four times the step has no fit, from which `richardson` could take it out: record at a tenth of that time"
         ),
     }
+}
+
+/// What would move, the furthest beside its interval first.
+fn listed(moved: &[StepError]) -> String {
+    let mut moved: Vec<_> = moved.iter().collect();
+    moved.sort_by(|a, b| (b.moves / b.half).abs().total_cmp(&(a.moves / a.half).abs()));
+    let said = |of: &&StepError| format!("{} by {:+.2e} (interval ± {:.2e})", of.name, of.moves, of.half);
+    let mut list: Vec<String> = moved.iter().take(MOVED).map(said).collect();
+    let more = moved.len().saturating_sub(MOVED);
+    if more > 0 {
+        list.push(format!("{more} more"));
+    }
+    list.join(", ")
 }
 
 /// What is doubtful.

@@ -2,8 +2,9 @@
 //! by, on pieces of the recording, beside the interval of that coefficient.
 //!
 //! The pieces have sums at h, 2h and 4h (`decimation.rs`); how well they know the move is told by the jackknife over them (Tukey, Annals of
-//! Mathematical Statistics 1958). Where such long steps have no fit, the fitted drift itself says how far it goes in a step: at mid-points
-//! a rate λ comes out as (2/h) tanh(λh/2), too small by (λh)²/12 of itself. Read next: `decimation.rs`, which takes the error out.
+//! Mathematical Statistics 1958). Where 4h has no fit, h and 2h are compared, whose difference is at least three times the error at h, for
+//! the error falls with the square of the step at most. Where 2h has none either, the fitted drift itself says how far it goes in a step: at
+//! mid-points a rate λ comes out as (2/h) tanh(λh/2), too small by (λh)²/12 of itself. Read next: `decimation.rs`, which takes the error out.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -27,12 +28,13 @@ pub struct StepError {
 }
 
 /// The coefficients that the error of the step moves out of their intervals of probability `level`, and surely so. `pieces` are sums at h, 2h
-/// and 4h of parts of the recording, `posterior` is that of all of it.
+/// and 4h of parts of the recording, of which the first `n_step` are compared, three or two; `posterior` is that of all of it.
 ///
 /// # Errors
-/// `Shape` for fewer than two pieces or other than three steps; as [`Fit::posterior`] and [`extrapolate`] at any of them.
+/// `Shape` for fewer than two pieces or other than two or three steps; as [`Fit::posterior`] and [`extrapolate`] at any of them.
 pub fn step_errors(
     pieces: &[[Sums; 3]],
+    n_step: usize,
     fit: &Fit,
     structure: &Structure,
     posterior: &Posterior,
@@ -42,9 +44,12 @@ pub fn step_errors(
     if n < 2 {
         return Err(InferenceError::Shape { what: "pieces of a recording", expected: 2, got: n });
     }
+    if !(2..=3).contains(&n_step) {
+        return Err(InferenceError::Shape { what: "steps to compare", expected: 3, got: n_step });
+    }
     let at = |k: usize| fit.posterior(&merged(pieces, k, None)?, structure);
-    let levels = [at(0)?, at(1)?, at(2)?];
-    let found = extrapolate(&levels, None)?;
+    let levels = (0..n_step).map(at).collect::<Result<Vec<_>, _>>()?;
+    let found = extrapolate(&levels, (n_step == 2).then_some(Strength::Weak))?;
     let mut without = Vec::with_capacity(n);
     for left_out in 0..n {
         let known = |k: usize| {
